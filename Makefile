@@ -1,0 +1,44 @@
+# Two commands do everything: `make demo` plans an example, `make test` checks the project.
+VENV := .venv
+BIN := $(VENV)/bin
+NATIVE := $(wildcard solvers/src/*.rs solvers/src/*/*.rs) solvers/Cargo.toml pyproject.toml
+export PATH := $(CURDIR)/$(BIN):$(PATH)
+
+.PHONY: demo test lint bench clean
+
+demo: $(VENV)/built
+	@$(BIN)/python examples/vase.py --blocks 2000 --output out/vase.ngc
+	@$(BIN)/feedplan plan out/vase.ngc --machine vase -o out/vase
+	@echo "The report is out/vase/report.html"
+
+test: lint
+	cargo test --release --quiet --manifest-path solvers/Cargo.toml
+	$(BIN)/python -m mypy.stubtest feedplan._solvers
+	$(BIN)/pytest
+
+lint: $(VENV)/built
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	cargo fmt --check --manifest-path solvers/Cargo.toml
+	cargo clippy --release --quiet --all-targets --manifest-path solvers/Cargo.toml -- -D warnings
+	cargo clippy --release --quiet --features python --manifest-path solvers/Cargo.toml -- -D warnings
+
+bench: $(VENV)/built
+	cargo bench --manifest-path solvers/Cargo.toml
+	$(BIN)/python -m benchmarks
+
+clean:
+	rm -rf $(VENV) out solvers/target
+
+# The native module is built once, and again only when its sources change.
+$(VENV)/built: $(VENV)/maturin $(NATIVE)
+	@command -v cargo >/dev/null || { echo "cargo is missing: install the Rust toolchain"; exit 1; }
+	$(BIN)/pip install --quiet --constraint constraints.txt --no-build-isolation --editable ".[dev]"
+	@touch $@
+
+$(VENV)/maturin: constraints.txt
+	@python3 -m venv $(VENV) || { echo "python3 lacks venv: install the package python3-venv"; exit 1; }
+	$(BIN)/pip install --quiet --constraint constraints.txt maturin
+	@touch $@

@@ -1,0 +1,56 @@
+"""A path: polynomial pieces in Bernstein form, grouped into runs between full stops."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class FitSummary:
+    """What fitting did: G1 `points` in, B-`splines` and `polynomials` out, true `deviation` [mm] of the
+    followed path from the programmed one (both ways)."""
+
+    points: int = 0
+    splines: int = 0
+    polynomials: int = 0
+    deviation: float = 0.0
+
+    @property
+    def spline_ratio(self) -> float:
+        """Line segments approximated by one B-spline."""
+        return self.points / self.splines if self.splines else 1.0
+
+    @property
+    def polynomial_ratio(self) -> float:
+        """Line segments approximated by one polynomial."""
+        return self.points / self.polynomials if self.polynomials else 1.0
+
+
+@dataclass(frozen=True)
+class Path:
+    """Quadratic pieces C_i(u), u in [0, width_i], joined end to end.
+
+    `axes` names; `control_points` (n, 3, axes) Bézier points [mm]; `width` (n,) parameter interval [mm: about
+    the length]; `feed` (n,) commanded feed [mm/s], infinite on rapids; `move` (n, 2) first and last program
+    move that the piece follows; `line` (n,) source line of the first; `runs` (r + 1,) piece offsets: the tool
+    stands still at the start and the end of each run; `dwell` (r,) pause after each run [s]; `tolerance` (n,)
+    allowed distance from the programmed path [mm].
+    Within a run the tangent is continuous, unless corners are passed with a velocity jump.
+    """
+
+    axes: tuple[str, ...]
+    control_points: NDArray[np.float64]
+    width: NDArray[np.float64]
+    feed: NDArray[np.float64]
+    move: NDArray[np.int64]
+    line: NDArray[np.int32]
+    runs: NDArray[np.int64]
+    dwell: NDArray[np.float64]
+    tolerance: NDArray[np.float64]
+    fit: FitSummary = field(default_factory=FitSummary)
+
+    def __len__(self) -> int:
+        return len(self.width)

@@ -1,0 +1,55 @@
+"""A speed profile: the exact arcs of p = (du/dt)² along a path."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class ArcKind(IntEnum):
+    """What stays constant on an arc of the profile; `value` holds the constant."""
+
+    AXIS_ACCELERATION = 0  # q'_k s + q''_k p = value [mm/s²], signed
+    FLAT = 1  # p itself; value is 0
+    FEED = 2  # the speed: |C'|² p = value [mm²/s²]
+    AXIS_VELOCITY = 3  # one axis's speed: q'_k² p = value [mm²/s²]
+    CHORD = 4  # the chord-error limit: p = value · |C'|
+
+
+@dataclass(frozen=True)
+class SpeedProfile:
+    """Arcs in the order of the path.
+
+    Per arc: `piece` (index into the path), `kind` (ArcKind), `axis` (the axis that the arc's constant
+    belongs to, 255 for none), `value` (see ArcKind), `u0`, `u1` (local parameter, u0 < u1), `p0`, `p1` (p at
+    both ends [mm²/s²]), `duration` [s]. `runs` (r + 1,) arc offsets of the path's runs.
+    Between the ends p follows exactly from the kind: it is never interpolated.
+    """
+
+    piece: NDArray[np.uint32]
+    kind: NDArray[np.uint8]
+    axis: NDArray[np.uint8]
+    value: NDArray[np.float64]
+    u0: NDArray[np.float64]
+    u1: NDArray[np.float64]
+    p0: NDArray[np.float64]
+    p1: NDArray[np.float64]
+    duration: NDArray[np.float64]
+    runs: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.piece)
+
+    @property
+    def time(self) -> float:
+        """Time in motion, dwells not counted [s]."""
+        return float(self.duration.sum())
+
+    @property
+    def run_times(self) -> NDArray[np.float64]:
+        """Time of each run [s], shape (runs,)."""
+        ends = np.concatenate(([0.0], np.cumsum(self.duration)))
+        return np.asarray(np.diff(ends[self.runs]))

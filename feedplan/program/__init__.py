@@ -1,0 +1,1 @@
+"""Part programs: text in, moves in millimetres and seconds out."""

@@ -1,0 +1,61 @@
+"""A part program as moves: what every reader returns and the path is built from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class MoveKind(IntEnum):
+    """What a move is."""
+
+    RAPID = 0
+    LINE = 1
+    ARC = 2
+
+
+class PathControl(IntEnum):
+    """How closely the programmed path is followed: G61.1, G61, G64."""
+
+    EXACT_STOP = 0
+    EXACT_PATH = 1
+    TOLERANCE = 2
+
+
+@dataclass(frozen=True)
+class Program:
+    """Moves of a part program in order, in machine coordinates.
+
+    `start` (axes,) is where the first move begins [mm]. Per move, `n` rows: `kind` (MoveKind), `target`
+    (n, axes) [mm], `feed` [mm/s] (infinite on rapids), `line` (1-based source line), `control`
+    (PathControl), `blend_tolerance` and `fit_tolerance` (G64 P and Q [mm], NaN where the program gives
+    none), `stop` (a full stop after the move: M words, dwells, the end), `dwell` [s] after it.
+    Arcs, one row each: `arc_move` (index of the move), `arc_centre` (k, 3) [mm] in X, Y, Z, `arc_normal`
+    (k,) the axis 0, 1, 2 the arc turns about, `arc_angle` (k,) signed sweep [rad], positive counter-clockwise
+    seen from the tip of the normal; a helix moves the normal axis linearly with the angle.
+    `warnings` are sentences for the user.
+    """
+
+    name: str
+    axes: tuple[str, ...]
+    start: NDArray[np.float64]
+    kind: NDArray[np.uint8]
+    target: NDArray[np.float64]
+    feed: NDArray[np.float64]
+    line: NDArray[np.int32]
+    control: NDArray[np.uint8]
+    blend_tolerance: NDArray[np.float64]
+    fit_tolerance: NDArray[np.float64]
+    stop: NDArray[np.bool_]
+    dwell: NDArray[np.float64]
+    arc_move: NDArray[np.int64]
+    arc_centre: NDArray[np.float64]
+    arc_normal: NDArray[np.uint8]
+    arc_angle: NDArray[np.float64]
+    warnings: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.kind)

@@ -1,0 +1,26 @@
+"""Units at the border: everything inside is mm, degrees and seconds."""
+
+from __future__ import annotations
+
+MM_PER_INCH = 25.4
+SECONDS_PER_MINUTE = 60.0
+
+
+def mm_per_min(speed: float) -> float:
+    """Speed [mm/s] as the mm/min of a part program."""
+    return speed * SECONDS_PER_MINUTE
+
+
+def duration_text(seconds: float) -> str:
+    """A duration as people read it: `842 µs`, `1.234 s`, `12 min 03.4 s`, `2 h 05 min 10 s`."""
+    if seconds < 1e-3:
+        return f"{seconds * 1e6:.0f} µs"
+    if seconds < 1.0:
+        return f"{seconds * 1e3:.1f} ms"
+    if seconds < SECONDS_PER_MINUTE:
+        return f"{seconds:.3f} s"
+    minutes, rest = divmod(seconds, SECONDS_PER_MINUTE)
+    if minutes < 60:
+        return f"{minutes:.0f} min {rest:04.1f} s"
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours:.0f} h {minutes:02.0f} min {rest:02.0f} s"
