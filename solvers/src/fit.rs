@@ -195,7 +195,8 @@ fn stretch_blocks<const M: usize>(
     for group in groups {
         features.extend(&group[1..]);
     }
-    let spline = spline::interpolate(chain.points, &features, start, finish);
+    let through: Vec<_> = features.iter().map(|&at| chain.points[at]).collect();
+    let spline = spline::interpolate(&through, start, finish);
     let sound = |j: usize| {
         let (tangent, at) = (&spline.tangent[j], features[j]);
         let speed = norm(tangent);

@@ -132,10 +132,14 @@ impl<const M: usize> Step<M> {
         let (mut worst, mut fault) = (tolerance_sq, None);
         let mut bound_sq = [0.0_f64; 2];
         let mut knot_chord = None;
-        let (mut x, mut off_sq) = (0.0, 0.0);
+        let gap_sq = |p: &[f64; M], q: &[f64; M]| {
+            let gap = sub(p, q);
+            dot(&gap, &gap)
+        };
+        let (mut x, mut off_sq) = (0.0, gap_sq(&self.start, &points[a]));
         for k in a..b {
             let (next, next_off_sq) = match k + 1 == b {
-                true => (self.width, 0.0),
+                true => (self.width, gap_sq(&self.end, &points[b])),
                 false => self.foot(&halves, &points[k + 1], scale * (along[k + 1] - along[a]), x, tolerance_sq),
             };
             if next_off_sq > worst {

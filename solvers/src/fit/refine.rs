@@ -12,7 +12,7 @@ use super::breaking::turn_cosine;
 use super::certificate::{Fault, Segment, Step, Verdict};
 use super::spline::{interpolate, End};
 use super::{chord, Chain, FittedPiece};
-use crate::quadratic::Quadratic;
+use crate::quadratic::{norm, sub, Quadratic};
 
 /// From this round on, a step that fails is halved as well.
 const HALVE: usize = 4;
@@ -20,6 +20,8 @@ const HALVE: usize = 4;
 const LINES: usize = 24;
 /// In this round, every spline that still fails becomes lines.
 const LAST: usize = 40;
+/// Largest offset of the curve from a feature, of the tolerance.
+const SHIFT: f64 = 0.75;
 
 /// A group, or a part of a long one.
 pub struct Block<const M: usize> {
@@ -90,6 +92,8 @@ struct State<const M: usize> {
     line: bool,
     /// The tangent may jump at the start.
     broken: bool,
+    /// From the first feature to where the spline passes it: 0 unless that was of no use.
+    offset: Option<[f64; M]>,
     /// Filled in by `interpolate`; a step that is new or has a new neighbour has none.
     fitted: Option<(Step<M>, Verdict)>,
 }
@@ -105,7 +109,7 @@ impl<'a, const M: usize> Refinement<'a, M> {
     fn new(chain: &'a Chain<M>, features: &[usize], ends: [End<M>; 2]) -> Self {
         let steps = features
             .windows(2)
-            .map(|f| State { from: f[0], to: f[1], line: false, broken: false, fitted: None })
+            .map(|f| State { from: f[0], to: f[1], line: false, broken: false, offset: None, fitted: None })
             .collect();
         Self { chain, ends, steps, end_broken: false }
     }
@@ -146,6 +150,26 @@ impl<'a, const M: usize> Refinement<'a, M> {
         }
     }
 
+    /// Where the spline passes the feature at the start of step `j`.
+    fn passage(&self, j: usize) -> [f64; M] {
+        let step = &self.steps[j];
+        let point = &self.chain.points[step.from];
+        step.offset.map_or(*point, |offset| std::array::from_fn(|k| point[k] + offset[k]))
+    }
+
+    /// Half of what a smooth curve through the points bulges over the chords at point `at`, towards their inside: by
+    /// so much the curve can cut the corner to share its deviation between points and chords.
+    fn inward(&self, at: usize) -> [f64; M] {
+        let points = self.chain.points;
+        let (before, after) = (sub(&points[at], &points[at - 1]), sub(&points[at + 1], &points[at]));
+        let (a, b) = (norm(&before), norm(&after));
+        let inside: [f64; M] = std::array::from_fn(|k| (a * after[k] - b * before[k]) / (a + b));
+        let share = (a + b) * (a + b) / (32.0 * a * b);
+        let length = share * norm(&inside);
+        let share = share * (SHIFT * self.chain.tolerance / length).min(1.0);
+        inside.map(|value| share * value)
+    }
+
     /// Solves and certifies every spline that has changed.
     fn interpolate(&mut self) {
         let chain = self.chain;
@@ -155,13 +179,14 @@ impl<'a, const M: usize> Refinement<'a, M> {
                 continue;
             }
             features.clear();
-            features.push(self.steps[first].from);
-            features.extend(self.steps[first..end].iter().map(|step| step.to));
-            let spline = interpolate(chain.points, &features, self.end(first, 0), self.end(end, 1));
+            features.push(chain.points[self.steps[first].from]);
+            features.extend((first + 1..end).map(|j| self.passage(j)));
+            features.push(chain.points[self.steps[end - 1].to]);
+            let spline = interpolate(&features, self.end(first, 0), self.end(end, 1));
             for (i, state) in self.steps[first..end].iter_mut().enumerate() {
                 let step = Step {
-                    start: chain.points[state.from],
-                    end: chain.points[state.to],
+                    start: features[i],
+                    end: features[i + 1],
                     width: spline.step[i],
                     tangent: [spline.tangent[i], spline.slope[i], spline.tangent[i + 1]],
                 };
@@ -237,6 +262,7 @@ impl<'a, const M: usize> Refinement<'a, M> {
             false => 1.0,
         };
         let (left, right) = (corner(from, j > first), corner(to, j + 1 < end));
+        let shift = [j, j + 1].iter().any(|&k| first < k && k < end && self.steps[k].offset.is_none());
         let given = |end: End<M>| end != End::Free;
         if round >= LINES {
             self.steps[j].line = true;
@@ -244,6 +270,12 @@ impl<'a, const M: usize> Refinement<'a, M> {
             self.set_broken(j);
         } else if right < 1.0 {
             self.set_broken(j + 1);
+        } else if shift {
+            for k in [j, j + 1] {
+                if first < k && k < end && self.steps[k].offset.is_none() {
+                    self.steps[k].offset = Some(self.inward(self.steps[k].from));
+                }
+            }
         } else if j == first && given(self.end(j, 0)) {
             self.set_broken(j);
         } else if j + 1 == end && given(self.end(end, 1)) {
@@ -284,7 +316,7 @@ impl<'a, const M: usize> Refinement<'a, M> {
             }
             while next < added.len() && added[next] < rest.to {
                 steps.push(State { to: added[next], fitted: None, ..rest });
-                rest = State { from: added[next], broken: false, fitted: None, ..rest };
+                rest = State { from: added[next], broken: false, offset: None, fitted: None, ..rest };
                 next += 1;
             }
             steps.push(rest);

@@ -28,10 +28,9 @@ pub struct Spline<const M: usize> {
     pub tangent: Vec<[f64; M]>,
 }
 
-/// The spline through `points[features[..]]`, at least two.
+/// The spline through `features`, at least two.
 pub fn interpolate<const M: usize>(
-    points: &[[f64; M]],
-    features: &[usize],
+    features: &[[f64; M]],
     start: End<M>,
     finish: End<M>,
 ) -> Spline<M> {
@@ -39,12 +38,12 @@ pub fn interpolate<const M: usize>(
     let h: Vec<f64> = features
         .windows(2)
         // Features that coincide still need a step; the certificate will ask for the points between them.
-        .map(|f| norm(&sub(&points[f[1]], &points[f[0]])).max(f64::MIN_POSITIVE * 1e10))
+        .map(|f| norm(&sub(&f[1], &f[0])).max(f64::MIN_POSITIVE * 1e10))
         .collect();
     let chord: Vec<[f64; M]> = features
         .windows(2)
         .zip(&h)
-        .map(|(f, h)| std::array::from_fn(|k| (points[f[1]][k] - points[f[0]][k]) / h))
+        .map(|(f, h)| std::array::from_fn(|k| (f[1][k] - f[0][k]) / h))
         .collect();
     let before = |j: usize| h[j] / (h[j - 1] + h[j]);
     let after = |j: usize| h[j] / (h[j] + h[j + 1]);
