@@ -20,6 +20,8 @@ const HALVE: usize = 4;
 const LINES: usize = 24;
 /// In this round, every spline that still fails becomes lines.
 const LAST: usize = 40;
+/// An offset makes a bulge of up to twice the tolerance fit; beyond that and some allowance none does.
+const HOPELESS: f64 = 2.25;
 /// Largest offset of the curve from a feature, of the tolerance.
 const SHIFT: f64 = 0.75;
 
@@ -222,6 +224,10 @@ impl<'a, const M: usize> Refinement<'a, M> {
                     }
                     continue;
                 }
+                if self.is_hopeless(j) {
+                    self.make_line(j);
+                    continue;
+                }
                 let count = added.len();
                 if round < LINES {
                     if j > first && self.steps[j - 1].to - self.steps[j - 1].from > 1 {
@@ -249,6 +255,26 @@ impl<'a, const M: usize> Refinement<'a, M> {
         match self.steps[j].fitted {
             Some((_, Verdict { fault: Some(_), deviation: [a, b], .. })) => a.max(b),
             _ => 0.0,
+        }
+    }
+
+    /// Whether any smooth curve would bulge over the chord of step `j` by more than an offset can share out.
+    fn is_hopeless(&self, j: usize) -> bool {
+        let State { from, to, .. } = self.steps[j];
+        let points = self.chain.points;
+        if from == 0 || to + 1 == points.len() || self.chain.is_corner(from) || self.chain.is_corner(to) {
+            return false;
+        }
+        let turn = |at: usize| turn_cosine(&points[at - 1], &points[at], &points[at + 1]).clamp(-1.0, 1.0).acos();
+        let length = self.chain.along[to] - self.chain.along[from];
+        let bulge = length * (turn(from) + turn(to)) / 16.0;
+        bulge.min(self.excess(j)) > HOPELESS * self.chain.tolerance
+    }
+
+    fn make_line(&mut self, j: usize) {
+        self.steps[j].line = true;
+        for k in j.saturating_sub(1)..(j + 2).min(self.steps.len()) {
+            self.steps[k].fitted = None;
         }
     }
 
