@@ -1,6 +1,9 @@
 //! Native kernels of feedplan. Every kernel takes slices and returns vectors; it knows no file and no Python.
 //! `python` alone binds them (feature `python`). Lengths are millimetres, times seconds.
 
+pub mod bang_bang_quadratic;
+pub mod bernstein;
+pub mod limit_curve;
 pub mod quadratic;
 
 #[cfg(feature = "python")]
