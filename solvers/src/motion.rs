@@ -224,7 +224,7 @@ impl<const M: usize> Motion<M> {
 
     fn invert<F: Integrand>(&self, table: &Table<F>, table_error: f64, done: f64, period: f64) -> State {
         let total = table.total();
-        let tolerance = total * (STEP_ERROR * period / self.arc.duration).max(4.0 * f64::EPSILON);
+        let tolerance = (STEP_ERROR * total * period / self.arc.duration).max(table.rounding());
         let located = sarfraz::locate(table, done * total, tolerance);
         let error = (located.miss + table_error) / total;
         State { u: located.u, iterations: located.iterations, error, ..State::default() }
@@ -304,11 +304,19 @@ impl AxisLaw {
 
     fn at(&self, arc: &ProfileArc, u: f64) -> State {
         let width = arc.u1 - arc.u0;
-        let (low, high) = (self.g0.min(self.g1), self.g0.max(self.g1));
-        let y = (if self.g0 <= self.g1 { u - arc.u0 } else { arc.u1 - u }) / width;
-        let g = low + (high - low) * y;
-        let part = y * (low + g) / (low + high);
-        let (near, far) = if self.g0 <= self.g1 { (self.v0, self.v1) } else { (self.v1, self.v0) };
+        let (before, after) = ((u - arc.u0) / width, (arc.u1 - u) / width);
+        let g = if self.g0 <= self.g1 {
+            self.g0 + (self.g1 - self.g0) * before
+        } else {
+            self.g1 + (self.g0 - self.g1) * after
+        };
+        // v² is linear in the way; from the nearer end, which may be at rest.
+        let (part, near, far) = if before <= after {
+            (before * (self.g0 + g), self.v0, self.v1)
+        } else {
+            (after * (self.g1 + g), self.v1, self.v0)
+        };
+        let part = part / (self.g0 + self.g1);
         let v = (near * near + part * (far - near) * (far + near)).max(0.0).sqrt();
         State { u, v, g, ..State::default() }
     }

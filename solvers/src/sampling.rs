@@ -28,10 +28,11 @@ pub const MAX_COUNT: f64 = 2e9;
 /// A run that ends this part of a period after a setpoint ends on it.
 const SLACK: f64 = 1e-9;
 
-/// An end is at rest when its speed is this part of the speed at the other end of its arc.
-const STANDSTILL: f64 = 1e-9;
+/// An end is at rest when its speed is this part of the speed at the other end of its arc: a rounding error of
+/// p leaves the square root of one.
+const STANDSTILL: f64 = 1e-6;
 
-/// A Newton–Raphson step is repeated so often at most; two or three times are usual.
+/// A Newton–Raphson step is repeated so often before halving; two or three times are usual.
 const MAX_REPEATS: u32 = 20;
 
 /// Setpoints computed by one task.
@@ -287,27 +288,35 @@ impl<const M: usize> Sampler<M> {
     /// Moves u to `time` on the arc; returns the rounds of Newton–Raphson and the length error left, in steps.
     fn step(&self, motion: &Motion<M>, time: f64, u: &mut f64) -> (u32, f64) {
         let table = motion.lengths();
-        let (mut rounds, mut tolerance, mut length) = (0, 0.0, table.integral(*u));
-        for repeat in 0..=MAX_REPEATS {
+        let (mut low, mut high) = (table.nodes[0].u, table.nodes[table.nodes.len() - 1].u);
+        let (mut rounds, mut whole) = (0, 0.0);
+        for repeat in 0.. {
             let state = motion.at(*u);
             let left = time - motion.time(&state);
             let rates = motion.rates(&state);
-            if left.abs() <= STEP_ERROR * self.period || repeat == MAX_REPEATS {
-                let table_error = motion.length_error() / (norm(&rates.velocity) * self.period);
-                return (
-                    rounds,
-                    left.abs() / self.period + if table_error.is_finite() { table_error } else { 0.0 },
-                );
-            }
             let step = step_length(&rates, left);
             if repeat == 0 {
-                tolerance = 0.1 * STEP_ERROR * step.abs() + 4.0 * f64::EPSILON * table.total();
+                // The step may have begun on an earlier arc.
+                whole = step_length(&rates, self.period).max(step.abs());
             }
-            let (located, sum) = newton::advance(&table, (*u, length), step, tolerance);
-            (*u, length) = (located.u, sum);
+            if left > 0.0 {
+                low = low.max(*u);
+            } else {
+                high = high.min(*u);
+            }
+            let middle = 0.5 * (low + high);
+            if step.abs() <= STEP_ERROR * whole + 2.0 * table.rounding() || !(low < middle && middle < high) {
+                let error = if whole > 0.0 { (step.abs() + motion.length_error()) / whole } else { 0.0 };
+                return (rounds, error);
+            }
+            let tolerance = 0.1 * STEP_ERROR * whole + table.rounding();
+            let (located, _) = newton::advance(&table, (*u, table.integral(*u)), step, tolerance);
             rounds += located.iterations;
+            // A large period can be too much for the series.
+            let usable = low < located.u && located.u < high && repeat < MAX_REPEATS;
+            *u = if usable { located.u } else { middle };
         }
-        unreachable!("the last repeat returns")
+        unreachable!("halving comes to an end")
     }
 
     fn set(&self, part: &mut Slices<M>, i: usize, arc: usize, motion: &Motion<M>, state: &State) {
@@ -360,8 +369,8 @@ fn step_length<const M: usize>(rates: &Rates<M>, time: f64) -> f64 {
     let Rates { velocity, acceleration, jerk } = rates;
     let v = norm(velocity);
     if v == 0.0 {
-        // From rest the tool moves where it is accelerated to.
-        return 0.5 * norm(acceleration) * time * time;
+        // Away from the standstill, forward or back in time.
+        return 0.5 * norm(acceleration) * time * time.abs();
     }
     let a = dot(velocity, acceleration) / v;
     let across: [f64; M] = std::array::from_fn(|k| acceleration[k] - a * velocity[k] / v);
@@ -374,7 +383,7 @@ fn step_length<const M: usize>(rates: &Rates<M>, time: f64) -> f64 {
 fn periods_of(time: f64, period: f64) -> f64 {
     let exact = time / period;
     match time > 0.0 {
-        true => (exact - SLACK.max(4.0 * f64::EPSILON * exact)).ceil().max(1.0),
+        true => (exact * (1.0 - 4.0 * f64::EPSILON) - SLACK).ceil().max(1.0),
         false => 0.0,
     }
 }
