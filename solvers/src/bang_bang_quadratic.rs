@@ -119,7 +119,11 @@ pub fn plan<const M: usize>(problem: &Problem<M>) -> Result<Profile, Fault> {
         least_acceleration: problem.max_acceleration.iter().fold(f64::INFINITY, |least, &a| least.min(a)),
         chord: problem.chord_tolerance.is_finite().then(|| {
             let (delta, period_sq) = (problem.chord_tolerance, problem.period * problem.period);
-            ChordLimit { alpha: 8.0 * delta / period_sq, slow_sq: 4.0 * delta * delta / period_sq, tolerance: delta }
+            ChordLimit {
+                alpha: 8.0 * delta / period_sq,
+                slow_sq: 4.0 * delta * delta / period_sq,
+                tolerance: delta,
+            }
         }),
     };
     let groups = group(problem.runs);
@@ -181,9 +185,14 @@ fn check<const M: usize>(problem: &Problem<M>) -> Result<(), Fault> {
         }
     }
     let runs = problem.runs;
-    if runs.len() < 2 || runs[0] != 0 || runs[runs.len() - 1] != count || runs.windows(2).any(|run| run[0] >= run[1])
+    if runs.len() < 2
+        || runs[0] != 0
+        || runs[runs.len() - 1] != count
+        || runs.windows(2).any(|run| run[0] >= run[1])
     {
-        return wrong(format!("the runs do not divide the {count} pieces: give rising offsets from 0 to {count}"));
+        return wrong(format!(
+            "the runs do not divide the {count} pieces: give rising offsets from 0 to {count}"
+        ));
     }
     for k in 0..M {
         let (v, a) = (problem.max_velocity[k], problem.max_acceleration[k]);
@@ -200,7 +209,10 @@ fn check<const M: usize>(problem: &Problem<M>) -> Result<(), Fault> {
         }
     }
     if problem.chord_tolerance.is_nan() || problem.chord_tolerance <= 0.0 {
-        return wrong(format!("the chord tolerance is {} mm: give a positive number", problem.chord_tolerance));
+        return wrong(format!(
+            "the chord tolerance is {} mm: give a positive number",
+            problem.chord_tolerance
+        ));
     }
     if problem.chord_tolerance.is_finite() && !positive(problem.period) {
         return wrong(format!("the servo period is {} s: give a positive number", problem.period));

@@ -2,6 +2,7 @@
 
 mod arrays;
 mod plan;
+mod sampling;
 
 use pyo3::prelude::*;
 
@@ -45,6 +46,7 @@ pub(crate) use with_axes;
 #[pymodule]
 fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    sampling::register(module)?;
     plan::register(module)?;
     Ok(())
 }

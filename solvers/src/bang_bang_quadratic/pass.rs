@@ -39,13 +39,8 @@ pub fn backward<const M: usize>(
             p = p.min(axes.acceleration[k] / sub.bend[k].abs());
         }
     }
-    let cap = [Arc {
-        x0: 0.0,
-        x1: sub.length,
-        p0: sub.cap_at(0.0),
-        p1: sub.cap_at(sub.length),
-        kind: Kind::Cap,
-    }];
+    let cap =
+        [Arc { x0: 0.0, x1: sub.length, p0: sub.cap_at(0.0), p1: sub.cap_at(sub.length), kind: Kind::Cap }];
     Pass::<M, true> { sub, axes, bounds: &cap, out, x: 0.0, p: p.min(cap[0].p0) }.run()
 }
 

@@ -40,12 +40,7 @@ pub struct Part {
 impl Part {
     /// The part as a sub-piece travelled forward, or backward.
     #[inline(always)]
-    pub fn sub_piece<const M: usize>(
-        &self,
-        piece: &Piece<M>,
-        axes: &Axes<M>,
-        backward: bool,
-    ) -> SubPiece<M> {
+    pub fn sub_piece<const M: usize>(&self, piece: &Piece<M>, axes: &Axes<M>, backward: bool) -> SubPiece<M> {
         let (left, right) = (piece.tangent(self.from), piece.tangent(self.to));
         let (mut start, mut end, mut bend) = ([0.0; M], [0.0; M], [0.0; M]);
         for k in 0..M {
@@ -192,9 +187,7 @@ impl Splitter {
                 continue;
             }
             let bend: [f64; M] = std::array::from_fn(|k| piece.right[k] - piece.left[k]);
-            let lowest = (-dot(&piece.left, &bend)
-                / dot(&bend, &bend))
-            .clamp(a, b);
+            let lowest = (-dot(&piece.left, &bend) / dot(&bend, &bend)).clamp(a, b);
             let least_radius = radius_at(a).min(radius_at(b)).min(radius_at(lowest)).max(chord.tolerance);
             let factor = chord.alpha / piece.twist * (1.0 - chord.tolerance / (2.0 * least_radius));
             self.cut_by_cap(piece, axes, feed_sq, Some(factor), fast, (a, b));

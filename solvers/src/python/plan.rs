@@ -46,7 +46,8 @@ fn plan_quadratic<'py>(
     start_speed: f64,
     end_speed: f64,
 ) -> PyResult<Columns<'py>> {
-    let runs: Vec<usize> = runs.as_array().iter().map(|&run| usize::try_from(run).unwrap_or(usize::MAX)).collect();
+    let runs: Vec<usize> =
+        runs.as_array().iter().map(|&run| usize::try_from(run).unwrap_or(usize::MAX)).collect();
     with_axes!(control_points.shape()[2], M, {
         let pieces = quadratics::<M>(&control_points, &width)?;
         let problem = Problem {
