@@ -1,6 +1,7 @@
 """Types of the native module."""
 
 from typing import final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,3 +66,13 @@ class Sampler:
         int,
         float,
     ]: ...
+__version__: str
+
+def read_gcode(
+    source: bytes,
+    name: str,
+    places: NDArray[np.float64],
+    machine_axes: str,
+    block_delete: bool,
+    max_moves: int,
+) -> dict[str, Any]: ...

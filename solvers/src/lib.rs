@@ -7,6 +7,7 @@ pub mod bernstein;
 pub mod limit_curve;
 pub mod motion;
 pub mod newton;
+pub mod gcode;
 pub mod quadratic;
 pub mod sampling;
 pub mod sarfraz;

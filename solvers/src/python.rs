@@ -3,6 +3,7 @@
 mod arrays;
 mod plan;
 mod sampling;
+mod gcode;
 
 use pyo3::prelude::*;
 
@@ -48,5 +49,6 @@ fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     sampling::register(module)?;
     plan::register(module)?;
+    gcode::register(module)?;
     Ok(())
 }
