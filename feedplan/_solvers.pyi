@@ -76,3 +76,17 @@ def read_gcode(
     block_delete: bool,
     max_moves: int,
 ) -> dict[str, Any]: ...
+import numpy as np
+from numpy.typing import NDArray
+
+__version__: str
+
+def fit_points(
+    points: NDArray[np.float64],
+    tolerance: float,
+    max_chord: float,
+    max_curvature: float,
+    corner_angle: float,
+) -> tuple[
+    NDArray[np.float64], NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.uint32]
+]: ...

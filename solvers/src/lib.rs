@@ -8,6 +8,7 @@ pub mod limit_curve;
 pub mod motion;
 pub mod newton;
 pub mod gcode;
+pub mod fit;
 pub mod quadratic;
 pub mod sampling;
 pub mod sarfraz;

@@ -4,6 +4,7 @@ mod arrays;
 mod plan;
 mod sampling;
 mod gcode;
+mod fit;
 
 use pyo3::prelude::*;
 
@@ -50,5 +51,6 @@ fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     sampling::register(module)?;
     plan::register(module)?;
     gcode::register(module)?;
+    fit::register(module)?;
     Ok(())
 }
