@@ -1,15 +1,18 @@
 """Types of the native module."""
 
-from typing import final
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
     "PathLength",
+    "PlanFault",
     "Sampler",
     "__version__",
+    "fit_points",
+    "plan_quadratic",
+    "read_gcode",
 ]
 
 __version__: str
@@ -66,7 +69,6 @@ class Sampler:
         int,
         float,
     ]: ...
-__version__: str
 
 def read_gcode(
     source: bytes,
@@ -76,10 +78,7 @@ def read_gcode(
     block_delete: bool,
     max_moves: int,
 ) -> dict[str, Any]: ...
-import numpy as np
-from numpy.typing import NDArray
 
-__version__: str
 
 def fit_points(
     points: NDArray[np.float64],
