@@ -13,9 +13,40 @@ __all__ = [
     "fit_points",
     "plan_quadratic",
     "read_gcode",
+    "PlanError",
+    "Sampler",
+    "__version__",
+    "plan_quadratic",
 ]
 
 __version__: str
+
+class PlanError(Exception): ...
+
+def plan_quadratic(
+    control_points: NDArray[np.float64],
+    width: NDArray[np.float64],
+    runs: NDArray[np.int64],
+    feed: NDArray[np.float64],
+    junction_speed: NDArray[np.float64],
+    max_velocity: NDArray[np.float64],
+    max_acceleration: NDArray[np.float64],
+    chord_tolerance: float,
+    period: float,
+    start_speed: float,
+    end_speed: float,
+) -> tuple[
+    NDArray[np.uint32],
+    NDArray[np.uint8],
+    NDArray[np.uint8],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.int64],
+]: ...
 
 @final
 class PathLength:
