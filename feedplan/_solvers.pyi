@@ -7,16 +7,12 @@ from numpy.typing import NDArray
 
 __all__ = [
     "PathLength",
-    "PlanFault",
+    "PlanError",
     "Sampler",
     "__version__",
     "fit_points",
     "plan_quadratic",
     "read_gcode",
-    "PlanError",
-    "Sampler",
-    "__version__",
-    "plan_quadratic",
 ]
 
 __version__: str
@@ -109,8 +105,6 @@ def read_gcode(
     block_delete: bool,
     max_moves: int,
 ) -> dict[str, Any]: ...
-
-
 def fit_points(
     points: NDArray[np.float64],
     tolerance: float,
