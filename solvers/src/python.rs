@@ -1,7 +1,10 @@
 //! The Python module `feedplan._solvers`: arrays in, arrays out, one submodule file per kernel.
 
 mod arrays;
+mod fit;
 mod gcode;
+mod plan;
+mod sampling;
 
 use pyo3::prelude::*;
 
@@ -45,6 +48,9 @@ pub(crate) use with_axes;
 #[pymodule]
 fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    sampling::register(module)?;
+    plan::register(module)?;
     gcode::register(module)?;
+    fit::register(module)?;
     Ok(())
 }
