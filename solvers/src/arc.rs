@@ -49,8 +49,7 @@ pub enum ArcError {
 }
 
 /// The polar form of an arc about its centre.
-struct Polar<const M: usize> {
-    arc: Arc<M>,
+struct Polar {
     /// From the centre to the start, of length 1.
     direction: [f64; 2],
     radius: f64,
@@ -61,8 +60,8 @@ struct Polar<const M: usize> {
     sweep: f64,
 }
 
-impl<const M: usize> Polar<M> {
-    fn new(arc: &Arc<M>) -> Result<Self, ArcError> {
+impl Polar {
+    fn new<const M: usize>(arc: &Arc<M>) -> Result<Self, ArcError> {
         let [x, y] = arc.plane;
         let from = [arc.start[x] - arc.centre[0], arc.start[y] - arc.centre[1]];
         let to = [arc.end[x] - arc.centre[0], arc.end[y] - arc.centre[1]];
@@ -82,7 +81,6 @@ impl<const M: usize> Polar<M> {
         other[x] = 0.0;
         other[y] = 0.0;
         Ok(Self {
-            arc: *arc,
             direction: [from[0] / radius, from[1] / radius],
             radius,
             growth: (end_radius - radius) / sweep.abs(),

@@ -2,7 +2,10 @@
 //! `python` alone binds them (feature `python`). Lengths are millimetres, times seconds.
 
 pub mod arc;
+pub mod corner;
 pub mod fit;
+pub mod follow;
+pub mod path_builder;
 pub mod quadratic;
 
 #[cfg(feature = "python")]
