@@ -6,7 +6,12 @@ pub mod corner;
 pub mod fit;
 pub mod follow;
 pub mod path_builder;
+pub mod arc_length;
+pub mod motion;
+pub mod newton;
 pub mod quadratic;
+pub mod sampling;
+pub mod sarfraz;
 
 #[cfg(feature = "python")]
 mod python;

@@ -2,6 +2,7 @@
 
 mod arrays;
 mod path;
+mod sampling;
 
 use pyo3::prelude::*;
 
@@ -46,5 +47,6 @@ pub(crate) use with_axes;
 fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     path::register(module)?;
+    sampling::register(module)?;
     Ok(())
 }
