@@ -9,6 +9,8 @@ __all__ = [
     "PathLength",
     "Sampler",
     "__version__",
+    "build_path",
+    "fit_points",
 ]
 
 __version__: str
@@ -65,3 +67,49 @@ class Sampler:
         int,
         float,
     ]: ...
+
+def fit_points(
+    points: NDArray[np.float64],
+    tolerance: float,
+    max_chord: float,
+    max_curvature: float,
+    corner_angle: float,
+) -> tuple[
+    NDArray[np.float64], NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.uint32]
+]: ...
+
+def build_path(
+    name: str,
+    start: NDArray[np.float64],
+    kind: NDArray[np.uint8],
+    target: NDArray[np.float64],
+    feed: NDArray[np.float64],
+    line: NDArray[np.int32],
+    tolerance: NDArray[np.float64],
+    fit_tolerance: NDArray[np.float64],
+    halt: NDArray[np.bool_],
+    arc_move: NDArray[np.int64],
+    arc_plane: NDArray[np.int64],
+    arc_centre: NDArray[np.float64],
+    arc_sweep: NDArray[np.float64],
+    max_velocity: NDArray[np.float64],
+    max_acceleration: NDArray[np.float64],
+    travel: NDArray[np.float64],
+    jump: bool,
+    exact_tolerance: float,
+    max_chord: float,
+    corner_acceleration: float,
+    max_speed: float,
+    corner_angle: float,
+) -> tuple[
+    tuple[
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.int64],
+        NDArray[np.float64],
+        NDArray[np.int64],
+    ],
+    tuple[int, int, int, float],
+    tuple[int, int, float] | None,
+]: ...

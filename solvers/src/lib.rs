@@ -2,13 +2,13 @@
 //! `python` alone binds them (feature `python`). Lengths are millimetres, times seconds.
 
 pub mod arc;
+pub mod arc_length;
 pub mod corner;
 pub mod fit;
 pub mod follow;
-pub mod path_builder;
-pub mod arc_length;
 pub mod motion;
 pub mod newton;
+pub mod path_builder;
 pub mod quadratic;
 pub mod sampling;
 pub mod sarfraz;

@@ -1,6 +1,7 @@
 //! The Python module `feedplan._solvers`: arrays in, arrays out, one submodule file per kernel.
 
 mod arrays;
+mod fit;
 mod path;
 mod sampling;
 
@@ -46,6 +47,7 @@ pub(crate) use with_axes;
 #[pymodule]
 fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    fit::register(module)?;
     path::register(module)?;
     sampling::register(module)?;
     Ok(())
