@@ -77,7 +77,6 @@ def fit_points(
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.uint32]
 ]: ...
-
 def build_path(
     name: str,
     start: NDArray[np.float64],

@@ -287,7 +287,8 @@ fn bent<const M: usize>(
         && after.len() == 1
         && is_line(&last.piece)
         && is_line(&first.piece)
-        && last.feed == first.feed;
+        && last.feed == first.feed
+        && last.tolerance == first.tolerance;
     let mut pieces: Vec<Followed<M>> = before.iter().chain(after).copied().collect();
     let mut excess: f64 = 0.0;
     let mut deviate = |index: usize, share: f64| {
@@ -308,8 +309,7 @@ fn bent<const M: usize>(
             piece: Quadratic { control, width: length_before + length_after },
             first: last.first,
             last: first.last,
-            deviation: distance,
-            tolerance: last.tolerance.min(first.tolerance),
+            deviation: distance + last.deviation.max(first.deviation),
             ..*last
         }]));
     }
