@@ -1,19 +1,55 @@
 """Types of the native module."""
 
 from typing import final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
     "PathLength",
+    "PlanFault",
     "Sampler",
     "__version__",
     "build_path",
     "fit_points",
+    "fit_points",
+    "plan_quadratic",
+    "read_gcode",
+    "PlanError",
+    "Sampler",
+    "__version__",
+    "plan_quadratic",
 ]
 
 __version__: str
+
+class PlanError(Exception): ...
+
+def plan_quadratic(
+    control_points: NDArray[np.float64],
+    width: NDArray[np.float64],
+    runs: NDArray[np.int64],
+    feed: NDArray[np.float64],
+    junction_speed: NDArray[np.float64],
+    max_velocity: NDArray[np.float64],
+    max_acceleration: NDArray[np.float64],
+    chord_tolerance: float,
+    period: float,
+    start_speed: float,
+    end_speed: float,
+) -> tuple[
+    NDArray[np.uint32],
+    NDArray[np.uint8],
+    NDArray[np.uint8],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.int64],
+]: ...
 
 @final
 class PathLength:
@@ -67,6 +103,16 @@ class Sampler:
         int,
         float,
     ]: ...
+
+def read_gcode(
+    source: bytes,
+    name: str,
+    places: NDArray[np.float64],
+    machine_axes: str,
+    block_delete: bool,
+    max_moves: int,
+) -> dict[str, Any]: ...
+
 
 def fit_points(
     points: NDArray[np.float64],

@@ -95,7 +95,8 @@ pub fn fit_points<const M: usize>(points: &[[f64; M]], options: &FitOptions) -> 
         if !(block.continues && open && part.starts_smooth) {
             spline += u32::from(!pieces.is_empty());
         }
-        pieces.extend(part.pieces.iter().map(|piece| FittedPiece { spline: spline + piece.spline, ..*piece }));
+        pieces
+            .extend(part.pieces.iter().map(|piece| FittedPiece { spline: spline + piece.spline, ..*piece }));
         spline += part.pieces.last().map_or(0, |piece| piece.spline);
         open = part.ends_smooth;
     }
@@ -195,7 +196,8 @@ fn stretch_blocks<const M: usize>(
     for group in groups {
         features.extend(&group[1..]);
     }
-    let spline = spline::interpolate(chain.points, &features, start, finish);
+    let through: Vec<_> = features.iter().map(|&at| chain.points[at]).collect();
+    let spline = spline::interpolate(&through, start, finish);
     let sound = |j: usize| {
         let (tangent, at) = (&spline.tangent[j], features[j]);
         let speed = norm(tangent);

@@ -3,6 +3,8 @@
 mod arrays;
 mod fit;
 mod path;
+mod gcode;
+mod plan;
 mod sampling;
 
 use pyo3::prelude::*;
@@ -50,5 +52,8 @@ fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     fit::register(module)?;
     path::register(module)?;
     sampling::register(module)?;
+    plan::register(module)?;
+    gcode::register(module)?;
+    fit::register(module)?;
     Ok(())
 }

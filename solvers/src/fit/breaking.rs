@@ -4,7 +4,8 @@
 //! those already show the curve; where they lie closer than the tolerance can tell from a line, or in noise, they are
 //! taken 2, 4, 8 … points away until the point is off their chord by more than the tolerance (after Coeurjolly and
 //! Svensson, who use the longest digital segments); if it never is, the curvature is 0. A point where the curvature is greatest between two places where it
-//! is a fifth lower is an extreme; plateaus and ripples have none.
+//! is a fifth lower is an extreme, unless what it saw belongs to a sharper extreme as near as its look reaches;
+//! plateaus and ripples have none.
 //!
 //! Breaking points are: ends of the chain; ends of lines, which are long chords and runs of colinear points; extremes
 //! above the curvature threshold; and corners above it, extremes or not.
@@ -93,9 +94,8 @@ fn end_of_line<const M: usize>(
 ) -> Break {
     // Far enough to tell a direction from noise within the tolerance.
     let apart = |&k: &usize| norm(&sub(&chain.points[k], &chain.points[at])) > 2.0 * chain.tolerance;
-    let left = before.map_or(at, |(from, _)| {
-        (from.max(at.saturating_sub(WIDEST))..at).rev().find(apart).unwrap_or(from)
-    });
+    let left = before
+        .map_or(at, |(from, _)| (from.max(at.saturating_sub(WIDEST))..at).rev().find(apart).unwrap_or(from));
     let right = after.map_or(at, |(_, to)| (at + 1..to.min(at + WIDEST)).find(apart).unwrap_or(to));
     Break { at, sides: [left, right], corner: is_corner(chain, at, [left, right]), line }
 }
@@ -235,8 +235,9 @@ fn curvature<const M: usize>(chain: &Chain<M>, a: usize, b: usize, k: usize) -> 
     }
 }
 
-/// Maxima that are `PROMINENCE` above the minima next to them, offset by `first`.
-fn peaks(curvature: &[(f64, usize)], first: usize, peaks: &mut Vec<usize>) {
+/// Maxima that are `PROMINENCE` above the minima next to them and the greatest within their look, offset by `first`.
+fn peaks(curvature: &[(f64, usize)], first: usize, extremes: &mut Vec<usize>) {
+    let mut peaks = Vec::new();
     let mut rising = false;
     let (mut least, mut most, mut at) = (f64::INFINITY, 0.0, 0);
     for (k, &(kappa, _)) in curvature.iter().enumerate() {
@@ -244,13 +245,22 @@ fn peaks(curvature: &[(f64, usize)], first: usize, peaks: &mut Vec<usize>) {
             if kappa > most {
                 (most, at) = (kappa, k);
             } else if kappa * PROMINENCE < most {
-                peaks.push(first + at);
+                peaks.push(at);
                 (rising, least) = (false, kappa);
             }
         } else if kappa < least {
             least = kappa;
         } else if kappa > PROMINENCE * least {
             (rising, most, at) = (true, kappa, k);
+        }
+    }
+    for (i, &peak) in peaks.iter().enumerate() {
+        let (kappa, look) = curvature[peak];
+        let sharper = |&other: &usize| curvature[other].0 > kappa;
+        let before = peaks[..i].iter().rev().take_while(|&&other| peak - other <= look);
+        let after = peaks[i + 1..].iter().take_while(|&&other| other - peak <= look);
+        if !before.chain(after).any(sharper) {
+            extremes.push(first + peak);
         }
     }
 }

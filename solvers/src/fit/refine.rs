@@ -12,7 +12,7 @@ use super::breaking::turn_cosine;
 use super::certificate::{Fault, Segment, Step, Verdict};
 use super::spline::{interpolate, End};
 use super::{chord, Chain, FittedPiece};
-use crate::quadratic::Quadratic;
+use crate::quadratic::{norm, sub, Quadratic};
 
 /// From this round on, a step that fails is halved as well.
 const HALVE: usize = 4;
@@ -20,6 +20,10 @@ const HALVE: usize = 4;
 const LINES: usize = 24;
 /// In this round, every spline that still fails becomes lines.
 const LAST: usize = 40;
+/// An offset makes a bulge of up to twice the tolerance fit; beyond that and some allowance none does.
+const HOPELESS: f64 = 2.25;
+/// Largest offset of the curve from a feature, of the tolerance.
+const SHIFT: f64 = 0.75;
 
 /// A group, or a part of a long one.
 pub struct Block<const M: usize> {
@@ -71,14 +75,9 @@ impl<const M: usize> Block<M> {
 fn line<const M: usize>(chain: &Chain<M>, a: usize, b: usize) -> FittedPiece<M> {
     let points = chain.points;
     let segment = Segment::new(&points[a], &points[b]);
-    let deviation = points[a + 1..b].iter().fold(0.0_f64, |worst, p| worst.max(segment.distance_sq(p))).sqrt();
-    FittedPiece {
-        piece: Quadratic::line(points[a], points[b]),
-        first: a,
-        last: b - 1,
-        deviation,
-        spline: 0,
-    }
+    let deviation =
+        points[a + 1..b].iter().fold(0.0_f64, |worst, p| worst.max(segment.distance_sq(p))).sqrt();
+    FittedPiece { piece: Quadratic::line(points[a], points[b]), first: a, last: b - 1, deviation, spline: 0 }
 }
 
 /// From one feature to the next.
@@ -90,6 +89,8 @@ struct State<const M: usize> {
     line: bool,
     /// The tangent may jump at the start.
     broken: bool,
+    /// From the first feature to where the spline passes it: 0 unless that was of no use.
+    offset: Option<[f64; M]>,
     /// Filled in by `interpolate`; a step that is new or has a new neighbour has none.
     fitted: Option<(Step<M>, Verdict)>,
 }
@@ -105,7 +106,7 @@ impl<'a, const M: usize> Refinement<'a, M> {
     fn new(chain: &'a Chain<M>, features: &[usize], ends: [End<M>; 2]) -> Self {
         let steps = features
             .windows(2)
-            .map(|f| State { from: f[0], to: f[1], line: false, broken: false, fitted: None })
+            .map(|f| State { from: f[0], to: f[1], line: false, broken: false, offset: None, fitted: None })
             .collect();
         Self { chain, ends, steps, end_broken: false }
     }
@@ -146,6 +147,26 @@ impl<'a, const M: usize> Refinement<'a, M> {
         }
     }
 
+    /// Where the spline passes the feature at the start of step `j`.
+    fn passage(&self, j: usize) -> [f64; M] {
+        let step = &self.steps[j];
+        let point = &self.chain.points[step.from];
+        step.offset.map_or(*point, |offset| std::array::from_fn(|k| point[k] + offset[k]))
+    }
+
+    /// Half of what a smooth curve through the points bulges over the chords at point `at`, towards their inside: by
+    /// so much the curve can cut the corner to share its deviation between points and chords.
+    fn inward(&self, at: usize) -> [f64; M] {
+        let points = self.chain.points;
+        let (before, after) = (sub(&points[at], &points[at - 1]), sub(&points[at + 1], &points[at]));
+        let (a, b) = (norm(&before), norm(&after));
+        let inside: [f64; M] = std::array::from_fn(|k| (a * after[k] - b * before[k]) / (a + b));
+        let share = (a + b) * (a + b) / (32.0 * a * b);
+        let length = share * norm(&inside);
+        let share = share * (SHIFT * self.chain.tolerance / length).min(1.0);
+        inside.map(|value| share * value)
+    }
+
     /// Solves and certifies every spline that has changed.
     fn interpolate(&mut self) {
         let chain = self.chain;
@@ -155,13 +176,14 @@ impl<'a, const M: usize> Refinement<'a, M> {
                 continue;
             }
             features.clear();
-            features.push(self.steps[first].from);
-            features.extend(self.steps[first..end].iter().map(|step| step.to));
-            let spline = interpolate(chain.points, &features, self.end(first, 0), self.end(end, 1));
+            features.push(chain.points[self.steps[first].from]);
+            features.extend((first + 1..end).map(|j| self.passage(j)));
+            features.push(chain.points[self.steps[end - 1].to]);
+            let spline = interpolate(&features, self.end(first, 0), self.end(end, 1));
             for (i, state) in self.steps[first..end].iter_mut().enumerate() {
                 let step = Step {
-                    start: chain.points[state.from],
-                    end: chain.points[state.to],
+                    start: features[i],
+                    end: features[i + 1],
                     width: spline.step[i],
                     tangent: [spline.tangent[i], spline.slope[i], spline.tangent[i + 1]],
                 };
@@ -197,6 +219,10 @@ impl<'a, const M: usize> Refinement<'a, M> {
                     }
                     continue;
                 }
+                if self.is_hopeless(j) {
+                    self.make_line(j);
+                    continue;
+                }
                 let count = added.len();
                 if round < LINES {
                     if j > first && self.steps[j - 1].to - self.steps[j - 1].from > 1 {
@@ -227,6 +253,27 @@ impl<'a, const M: usize> Refinement<'a, M> {
         }
     }
 
+    /// Whether any smooth curve would bulge over the chord of step `j` by more than an offset can share out.
+    fn is_hopeless(&self, j: usize) -> bool {
+        let State { from, to, .. } = self.steps[j];
+        let points = self.chain.points;
+        if from == 0 || to + 1 == points.len() || self.chain.is_corner(from) || self.chain.is_corner(to) {
+            return false;
+        }
+        let turn =
+            |at: usize| turn_cosine(&points[at - 1], &points[at], &points[at + 1]).clamp(-1.0, 1.0).acos();
+        let length = self.chain.along[to] - self.chain.along[from];
+        let bulge = length * (turn(from) + turn(to)) / 16.0;
+        bulge.min(self.excess(j)) > HOPELESS * self.chain.tolerance
+    }
+
+    fn make_line(&mut self, j: usize) {
+        self.steps[j].line = true;
+        for k in j.saturating_sub(1)..(j + 2).min(self.steps.len()) {
+            self.steps[k].fitted = None;
+        }
+    }
+
     /// No feature helps the chord of step `j` of the spline `[first, end)`.
     fn break_at(&mut self, first: usize, j: usize, end: usize, round: usize) {
         let State { from, to, .. } = self.steps[j];
@@ -237,6 +284,7 @@ impl<'a, const M: usize> Refinement<'a, M> {
             false => 1.0,
         };
         let (left, right) = (corner(from, j > first), corner(to, j + 1 < end));
+        let shift = [j, j + 1].iter().any(|&k| first < k && k < end && self.steps[k].offset.is_none());
         let given = |end: End<M>| end != End::Free;
         if round >= LINES {
             self.steps[j].line = true;
@@ -244,6 +292,12 @@ impl<'a, const M: usize> Refinement<'a, M> {
             self.set_broken(j);
         } else if right < 1.0 {
             self.set_broken(j + 1);
+        } else if shift {
+            for k in [j, j + 1] {
+                if first < k && k < end && self.steps[k].offset.is_none() {
+                    self.steps[k].offset = Some(self.inward(self.steps[k].from));
+                }
+            }
         } else if j == first && given(self.end(j, 0)) {
             self.set_broken(j);
         } else if j + 1 == end && given(self.end(end, 1)) {
@@ -284,7 +338,7 @@ impl<'a, const M: usize> Refinement<'a, M> {
             }
             while next < added.len() && added[next] < rest.to {
                 steps.push(State { to: added[next], fitted: None, ..rest });
-                rest = State { from: added[next], broken: false, fitted: None, ..rest };
+                rest = State { from: added[next], broken: false, offset: None, fitted: None, ..rest };
                 next += 1;
             }
             steps.push(rest);
@@ -326,7 +380,12 @@ impl<'a, const M: usize> Refinement<'a, M> {
         let start = &fitted(first).0;
         let mut at = (start.start, start.tangent[0], self.steps[first].from);
         let (mut width, mut deviation) = (0.0, 0.0_f64);
-        let mut finish = |point: [f64; M], slope: [f64; M], chord: usize, next: usize, width: &mut f64, deviation: &mut f64| {
+        let mut finish = |point: [f64; M],
+                          slope: [f64; M],
+                          chord: usize,
+                          next: usize,
+                          width: &mut f64,
+                          deviation: &mut f64| {
             let quarter = 0.25 * *width;
             let (from, tangent, first) = at;
             let middle =
@@ -341,7 +400,14 @@ impl<'a, const M: usize> Refinement<'a, M> {
             width += 0.5 * step.width;
             deviation = deviation.max(verdict.deviation[0]);
             if !((j == first && free_start) || (j + 1 == end && free_end)) {
-                finish(step.knot(), step.tangent[1], verdict.knot_chord, verdict.knot_chord, &mut width, &mut deviation);
+                finish(
+                    step.knot(),
+                    step.tangent[1],
+                    verdict.knot_chord,
+                    verdict.knot_chord,
+                    &mut width,
+                    &mut deviation,
+                );
             }
             width += 0.5 * step.width;
             deviation = deviation.max(verdict.deviation[1]);
