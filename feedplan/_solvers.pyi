@@ -1,5 +1,6 @@
 """Types of the native module."""
 
+from typing import final
 from typing import Any, final
 
 import numpy as np
@@ -10,6 +11,8 @@ __all__ = [
     "PlanError",
     "Sampler",
     "__version__",
+    "build_path",
+    "fit_points",
     "fit_points",
     "plan_quadratic",
     "read_gcode",
@@ -113,4 +116,39 @@ def fit_points(
     corner_angle: float,
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.uint32]
+]: ...
+def build_path(
+    name: str,
+    start: NDArray[np.float64],
+    kind: NDArray[np.uint8],
+    target: NDArray[np.float64],
+    feed: NDArray[np.float64],
+    line: NDArray[np.int32],
+    tolerance: NDArray[np.float64],
+    fit_tolerance: NDArray[np.float64],
+    halt: NDArray[np.bool_],
+    arc_move: NDArray[np.int64],
+    arc_plane: NDArray[np.int64],
+    arc_centre: NDArray[np.float64],
+    arc_sweep: NDArray[np.float64],
+    max_velocity: NDArray[np.float64],
+    max_acceleration: NDArray[np.float64],
+    travel: NDArray[np.float64],
+    jump: bool,
+    exact_tolerance: float,
+    max_chord: float,
+    corner_acceleration: float,
+    max_speed: float,
+    corner_angle: float,
+) -> tuple[
+    tuple[
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.int64],
+        NDArray[np.float64],
+        NDArray[np.int64],
+    ],
+    tuple[int, int, int, float],
+    tuple[int, int, float] | None,
 ]: ...

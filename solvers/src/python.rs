@@ -2,6 +2,7 @@
 
 mod arrays;
 mod fit;
+mod path;
 mod gcode;
 mod plan;
 mod sampling;
@@ -48,6 +49,8 @@ pub(crate) use with_axes;
 #[pymodule]
 fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    fit::register(module)?;
+    path::register(module)?;
     sampling::register(module)?;
     plan::register(module)?;
     gcode::register(module)?;
