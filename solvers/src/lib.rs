@@ -2,6 +2,7 @@
 //! `python` alone binds them (feature `python`). Lengths are millimetres, times seconds.
 
 pub mod quadratic;
+pub mod text;
 
 #[cfg(feature = "python")]
 mod python;
