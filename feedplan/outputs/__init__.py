@@ -57,7 +57,12 @@ def load_setpoints(place: str | FilePath) -> SetpointChunk:
     """
     file = FilePath(place)
     if file.is_dir():
-        file = _file_in(file)
+        found = files_in(file)
+        if not found:
+            raise InputError(
+                f"{file} holds no setpoints: `feedplan plan PROGRAM -o {file}` writes them there"
+            )
+        file = found[0]
     for name in formats():
         if file.suffix == f".{name}":
             return _load(name, file)
@@ -65,13 +70,10 @@ def load_setpoints(place: str | FilePath) -> SetpointChunk:
     raise InputError(f"{file}: setpoints cannot be read from this kind of file: give a file in {known}")
 
 
-def _file_in(folder: FilePath) -> FilePath:
+def files_in(folder: FilePath) -> list[FilePath]:
+    """The files of setpoints in a folder, the newest first."""
     files = [folder / format_named(name).FILE for name in formats()]
-    # npz first: it is whole numbers of doubles, and quick.
-    for file in sorted(files, key=lambda file: file.suffix != ".npz"):
-        if file.exists():
-            return file
-    raise InputError(f"{folder} holds no setpoints: `feedplan plan PROGRAM -o {folder}` writes them there")
+    return sorted((file for file in files if file.exists()), key=lambda file: -file.stat().st_mtime_ns)
 
 
 def _load(name: str, file: FilePath) -> SetpointChunk:

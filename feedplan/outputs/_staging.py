@@ -13,6 +13,13 @@ from pathlib import Path as FilePath
 from feedplan.errors import InputError
 
 
+def require_folder(folder: FilePath) -> None:
+    """Raises InputError where `folder` or a part of its path is something else than a folder."""
+    for place in (folder, *folder.parents):
+        if place.exists() and not place.is_dir():
+            raise InputError(f"{place} is a file, not a folder: choose another folder with -o")
+
+
 @contextmanager
 def staged(folder: FilePath, last: str) -> Iterator[FilePath]:
     """A fresh folder to write into; what it holds moves to `folder` when the block ends without an error.
@@ -21,8 +28,7 @@ def staged(folder: FilePath, last: str) -> Iterator[FilePath]:
     so that its presence tells that all are there; other files stay. After an error nothing is left behind.
     Raises InputError where the file system refuses.
     """
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder} is a file, not a folder: choose another folder with -o")
+    require_folder(folder)
     # Inside an existing folder, else in the nearest parent that exists: the same file system either way.
     home = folder
     while not home.exists():

@@ -59,6 +59,8 @@ class NpyArchive:
 
     def append(self, name: str, rows: NDArray[Any]) -> None:
         """The next rows of the array of that name."""
+        if len(rows) == 0:
+            return
         member = self._members[name]
         self._write(member, np.ascontiguousarray(rows, dtype=member.dtype).data.cast("B"))
 

@@ -28,13 +28,13 @@ def write_report(
     profile: SpeedProfile,
     audit: Audit,
     figures: SetpointFigures,
-    source: Sequence[str] | None = None,
+    source: FilePath | None = None,
 ) -> None:
-    """Writes the page. `summary` is the content of plan.json, `source` the lines of the part program."""
+    """Writes the page. `summary` is the content of plan.json, `source` the text of the part program."""
     from plotly.offline import get_plotlyjs
 
     slow = slowest_lines(problem, profile)
-    texts = {row.line: source[row.line - 1] for row in slow if source and 0 < row.line <= len(source)}
+    texts = _lines(source, {row.line for row in slow}) if source else {}
     data = chart_data(problem, profile, figures, audit)
     name = FilePath(str(summary.get("program") or "path")).name
     page = Template(_asset("page.html")).substitute(
@@ -55,6 +55,21 @@ def write_report(
         script=_asset("page.js"),
     )
     file.write_text(page, encoding="utf-8")
+
+
+def _lines(source: FilePath, wanted: set[int]) -> dict[int, str]:
+    """The text of these lines; none where the file is gone or is no text."""
+    texts: dict[int, str] = {}
+    try:
+        with source.open("rb") as stream:
+            for number, line in enumerate(stream, start=1):
+                if number in wanted:
+                    texts[number] = line.decode("utf-8", errors="replace")
+                    if len(texts) == len(wanted):
+                        break
+    except OSError:
+        return {}
+    return texts
 
 
 def _asset(name: str) -> str:
