@@ -20,6 +20,7 @@ from feedplan.setpoints import SetpointChunk
 _TIME_POINTS = 240_000  # of all curves over time together
 _TIME_POINTS_PER_CURVE = 24_000
 _LENGTH_POINTS = 12_000  # of each curve over length
+_MEAN_POINTS = 1_000  # of the mean of each curve, drawn where it oscillates too fast for a line
 _PATH_POINTS = 60_000
 
 # The tool path may be drawn this far beside itself, as a part of its extent: a tenth of a pixel at first.
@@ -78,11 +79,9 @@ class SetpointFigures:
     def over_time(self) -> dict[str, Any]:
         """Speed with its source lines, and velocity, acceleration and jerk of each axis, over time."""
         axes = len(self._axes)
-        t, speed, line = self._curves.curve(0)
-        result: dict[str, Any] = {"speed": {"t": packed(t), "y": packed(speed), "line": packed(line)}}
+        result: dict[str, Any] = {"speed": _curve(self._curves, 0, with_line=True)}
         for group, name in enumerate(("velocity", "acceleration", "jerk")):
-            curves = [self._curves.curve(1 + group * axes + k) for k in range(axes)]
-            result[name] = [{"t": packed(t), "y": packed(y)} for t, y, _ in curves]
+            result[name] = [_curve(self._curves, 1 + group * axes + k) for k in range(axes)]
         return result
 
     def tool_path(self) -> dict[str, Any]:
@@ -102,6 +101,18 @@ class SetpointFigures:
         for column in self._linear:
             places[:, "XYZ".index(self._axes[column])] = position[:, column]
         return places
+
+
+def _curve(curves: Envelope, column: int, with_line: bool = False) -> dict[str, Any]:
+    """A column as the page reads it: x, y, the mean, and the source lines where they are wanted."""
+    x, y, line = curves.curve(column)
+    mean_x, mean = curves.mean(column, _MEAN_POINTS)
+    result: dict[str, Any] = {
+        "x": packed(x),
+        "y": packed(y),
+        "mean": {"x": packed(mean_x), "y": packed(mean)},
+    }
+    return result | ({"line": packed(line)} if with_line else {})
 
 
 def over_length(problem: Problem, profile: SpeedProfile) -> dict[str, Any]:
@@ -124,11 +135,14 @@ def over_length(problem: Problem, profile: SpeedProfile) -> dict[str, Any]:
         cutting = max(cutting, float(cut[np.isfinite(cut)].max(initial=0.0)))
     result: dict[str, Any] = {"top_speed": top, "cutting_speed": cutting or top}
     for column, name in enumerate(names):
-        length, value, line = curves.curve(column)
+        if name == "speed":
+            result[name] = _curve(curves, column, with_line=True)
+            continue
+        length, value, _ = curves.curve(column)
         if np.isfinite(value).any():
             # Far above everything else a limit says no more than "not here"; the chart ends before.
             value = np.minimum(value, 20.0 * top) if top > 0 else value
-            result[name] = {"s": packed(length), "y": packed(value), "line": packed(line)}
+            result[name] = {"x": packed(length), "y": packed(value)}
     return result
 
 

@@ -19,6 +19,7 @@
   const layout = (more) => ({
     paper_bgcolor: "rgba(0,0,0,0)",
     plot_bgcolor: "rgba(0,0,0,0)",
+    separators: ".\u202f",
     font: { family: getComputedStyle(document.body).fontFamily, size: 13, color: style("--soft") },
     hoverlabel: { bgcolor: style("--card"), bordercolor: style("--faint"), font: { color: style("--ink") } },
     modebar: { bgcolor: "rgba(0,0,0,0)", color: style("--soft"), activecolor: style("--ink") },
@@ -26,7 +27,7 @@
   });
   const axis = (more) => ({
     gridcolor: style("--grid"), linecolor: style("--faint"), zeroline: false, automargin: true,
-    ticks: "", exponentformat: "power", ...more,
+    ticks: "", exponentformat: "none", separatethousands: true, ...more,
   });
   const title = (text) => ({ text, font: { size: 13, color: style("--soft") }, standoff: 8 });
 
@@ -36,24 +37,85 @@
     return top;
   };
 
-  /* The window [from, to] of a curve with both extremes of each bucket; all points where they are few. */
-  const DRAWN = 4000;
-  function windowed(x, y, from, to) {
+  /* The points of a curve in [from, to], with one beyond either end. */
+  function within({ x, y, line }, from, to) {
     let first = 0, last = x.length;
-    while (first + 1 < last && x[first + 1] < from) first += 1;
+    while (first + 2 < last && x[first + 1] < from) first += 1;
     while (last - 2 > first && x[last - 2] > to) last -= 1;
-    const width = Math.ceil((2 * (last - first)) / DRAWN);
-    if (width <= 2) return { x: x.subarray(first, last), y: y.subarray(first, last), pick: null, first };
+    return { x: x.subarray(first, last), y: y.subarray(first, last), line: line && line.subarray(first, last) };
+  }
+
+  /* Both extremes of each bucket where there are more points than a line needs. */
+  const DRAWN = 4000;
+  function thinned({ x, y, line }) {
+    const width = Math.ceil((2 * x.length) / DRAWN);
+    if (width <= 2) return { x, y, line };
     const pick = [];
-    for (let start = first; start < last; start += width) {
+    for (let start = 0; start < x.length; start += width) {
       let low = start, high = start;
-      for (let i = start; i < Math.min(start + width, last); i += 1) {
+      for (let i = start; i < Math.min(start + width, x.length); i += 1) {
         if (y[i] < y[low]) low = i;
         if (y[i] > y[high]) high = i;
       }
-      pick.push(Math.min(low, high), Math.max(low, high));
+      pick.push(Math.min(low, high));
+      if (low !== high) pick.push(Math.max(low, high));
     }
-    return { x: pick.map((i) => x[i]), y: pick.map((i) => y[i]), pick, first };
+    return { x: pick.map((i) => x[i]), y: pick.map((i) => y[i]), line: line && pick.map((i) => line[i]) };
+  }
+
+  /* More ups and downs than pixels make a solid block: then a band of extremes and the mean say more. */
+  const BANDS = 400;
+  function isDense({ y }, top, pixels) {
+    let way = 0, low = Infinity, high = -Infinity;
+    for (let i = 0; i < y.length; i += 1) {
+      const value = Math.min(y[i], top);
+      if (i) way += Math.abs(value - Math.min(y[i - 1], top));
+      low = Math.min(low, value);
+      high = Math.max(high, value);
+    }
+    return way > 0.5 * pixels * (high - low) && high > low;
+  }
+  function band({ x, y }) {
+    const from = x[0], span = x[x.length - 1] - from || 1;
+    const low = new Array(BANDS).fill(Infinity), high = new Array(BANDS).fill(-Infinity);
+    for (let i = 0; i < x.length; i += 1) {
+      const k = Math.min(Math.floor(((x[i] - from) / span) * BANDS), BANDS - 1);
+      if (y[i] < low[k]) low[k] = y[i];
+      if (y[i] > high[k]) high[k] = y[i];
+    }
+    const filled = low.map((_, k) => k).filter((k) => high[k] >= low[k]);
+    return { x: filled.map((k) => from + ((k + 0.5) / BANDS) * span), low: filled.map((k) => low[k]), high: filled.map((k) => high[k]) };
+  }
+
+  /* The traces of one curve: a line, or where it is dense a band with the mean. */
+  function curveTraces(curve, from, to, { colour, width = 1.2, scale = 1, pixels, more, isLimit, top = Infinity, unit }) {
+    const shown = within(curve, from, to);
+    const scaled = (values) => (scale === 1 ? values : Array.from(values, (value) => value * scale));
+    const line = (x, y, extra) => ({ type: "scatter", mode: "lines", x, y: scaled(y), ...more, ...extra });
+    if (!isDense(shown, top, pixels)) {
+      const few = thinned(shown);
+      return [line(few.x, few.y, {
+        line: { color: style(colour), width, ...more.line }, customdata: few.line && Array.from(few.line),
+        hovertemplate: `%{y:.4~g} ${unit}${few.line ? ", line %{customdata}" : ""}`,
+      })];
+    }
+    const { x, low, high } = band(shown);
+    if (isLimit) {
+      return [line(x, low, { name: `${more.name}, least`, line: { color: style(colour), width, ...more.line }, hovertemplate: `%{y:.4~g} ${unit}` })];
+    }
+    const mean = within(curve.mean, from, to);
+    const bare = { line: { width: 0 }, showlegend: false, fill: "none" };
+    return [
+      line(x, low, { ...bare, hovertemplate: `%{y:.4~g} ${unit} least` }),
+      line(x, high, { ...bare, fill: "tonexty", fillcolor: wash(colour, 0.22), hovertemplate: `%{y:.4~g} ${unit} greatest` }),
+      line(mean.x, mean.y, { name: more.legendgroup ? more.name : `${more.name}, mean and range`, line: { color: style(colour), width: 1.4 }, fill: "none", hovertemplate: `%{y:.4~g} ${unit} mean` }),
+    ];
+  }
+
+  function wash(name, alpha) {
+    const colour = style(name);
+    const [r, g, b] = [1, 3, 5].map((i) => parseInt(colour.slice(i, i + 2), 16));
+    return `rgba(${r},${g},${b},${alpha})`;
   }
 
   /* Tool path ------------------------------------------------------------------------------------ */
@@ -98,7 +160,8 @@
   function proportions() {
     const sizes = ["x", "y", "z"].map(size);
     const { clientWidth, clientHeight } = element("path");
-    const scale = (2.7 * Math.min(1, clientWidth / (1.7 * clientHeight))) / (Math.hypot(...sizes) || 1);
+    const room = Math.min(1, clientWidth / (1.7 * clientHeight));
+    const scale = room * Math.min(2.7 / (Math.hypot(...sizes) || 1), 2.2 / (sizes[2] || 1e-9));
     return { x: Math.max(sizes[0] * scale, 1e-3), y: Math.max(sizes[1] * scale, 1e-3), z: Math.max(sizes[2] * scale, 1e-3) };
   }
 
@@ -182,37 +245,23 @@
   };
   function drawLength(from = -Infinity, to = Infinity) {
     const traces = [];
-    const curve = (name, label, line, more) => {
-      const { s, y, line: lines } = data.length[name];
-      const shown = windowed(s, y, from, to);
-      const at = (j) => lines[shown.pick ? shown.pick[j] : shown.first + j];
-      traces.push({
-        type: "scatter", mode: "lines", name: label, x: shown.x, y: shown.y, line,
-        customdata: name === "speed" ? Array.from(shown.x, (_, j) => at(j)) : undefined,
-        hovertemplate: name === "speed" ? "%{y:.4~g} mm/s, line %{customdata}" : "%{y:.4~g} mm/s", ...more,
-      });
-    };
-    for (const [name, [label, colour, dash]] of Object.entries(LIMITS)) {
-      if (data.length[name]) curve(name, label, { color: style(colour), width: 1.1, dash });
-    }
-    if (data.length.speed) {
-      curve("speed", "planned speed", { color: style("--accent"), width: 2 }, { fill: "tozeroy", fillcolor: wash("--accent", 0.12) });
-    }
+    const pixels = element("length").clientWidth;
     const top = 1.25 * (data.length.top_speed || 1);
+    for (const [name, [label, colour, dash]] of Object.entries(LIMITS)) {
+      if (!data.length[name]) continue;
+      const more = { name: label, line: { dash } };
+      traces.push(...curveTraces(data.length[name], from, to, { colour, width: 1.1, pixels, more, isLimit: true, top, unit: "mm/s" }));
+    }
+    const more = { name: "planned speed", fill: "tozeroy", fillcolor: wash("--accent", 0.12) };
+    traces.push(...curveTraces(data.length.speed, from, to, { colour: "--accent", width: 2, pixels, more, unit: "mm/s" }));
     const chart = element("length");
     const old = chart.layout;
     Plotly.react(chart, traces, layout({
       margin: { l: 64, r: 20, t: 34, b: 46 }, hovermode: "x unified", dragmode: "zoom", uirevision: "length",
-      legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", font: { size: 13 } },
+      legend: { orientation: "h", traceorder: "normal", x: 0, y: 1.02, yanchor: "bottom", font: { size: 13 } },
       xaxis: axis({ title: title("path length [mm]"), ...(old && Number.isFinite(from) ? { range: [from, to] } : {}) }),
       yaxis: axis({ title: title("speed [mm/s]"), range: old ? old.yaxis.range : [0, top] }),
     }), { ...config, ...flatTools });
-  }
-
-  function wash(name, alpha) {
-    const colour = style(name);
-    const [r, g, b] = [1, 3, 5].map((i) => parseInt(colour.slice(i, i + 2), 16));
-    return `rgba(${r},${g},${b},${alpha})`;
   }
 
   /* Axes over time ------------------------------------------------------------------------------- */
@@ -224,7 +273,8 @@
     const shapes = [];
     const annotations = [];
     const form = {};
-    const isNarrow = element("time").clientWidth < 700;
+    const pixels = element("time").clientWidth;
+    const isNarrow = pixels < 700;
     const gap = 0.045;
     const height = (1 - gap * (ROWS.length - 1)) / ROWS.length;
     ROWS.forEach(([name, unit], row) => {
@@ -232,28 +282,18 @@
       const bottom = 1 - (row + 1) * height - row * gap;
       let range;
       if (name === "speed") {
-        const { t, y, line } = data.time.speed;
-        const shown = windowed(t, y, from, to);
-        traces.push({
-          type: "scatter", mode: "lines", name: "speed", x: shown.x, y: shown.y, yaxis: id, showlegend: false,
-          line: { color: style("--accent"), width: 1.6 }, fill: "tozeroy", fillcolor: wash("--accent", 0.12),
-          customdata: Array.from(shown.x, (_, j) => line[shown.pick ? shown.pick[j] : shown.first + j]),
-          hovertemplate: "%{y:.4~g} mm/s, line %{customdata}",
-        });
-        range = [0, 1.1 * (greatest(y) || 1)];
+        const more = { name: "speed", yaxis: id, showlegend: false, fill: "tozeroy", fillcolor: wash("--accent", 0.12) };
+        traces.push(...curveTraces(data.time.speed, from, to, { colour: "--accent", width: 1.6, pixels, more, unit }));
+        range = [0, 1.1 * (greatest(data.time.speed.y) || 1)];
       } else {
         const limits = data.limits[name];
         const percent = relative && limits.every((limit) => limit);
         const scale = limits.map((limit) => (percent ? 100 / limit : 1));
         let top = 0;
-        data.time[name].forEach(({ t, y }, k) => {
-          const shown = windowed(t, y, from, to);
-          traces.push({
-            type: "scatter", mode: "lines", name: data.axes[k], legendgroup: data.axes[k], x: shown.x,
-            y: percent ? Array.from(shown.y, (v) => v * scale[k]) : shown.y, yaxis: id,
-            showlegend: name === "velocity", line: { color: axisColour(k), width: 1.2 },
-            hovertemplate: percent ? "%{y:.4~g} %" : `%{y:.4~g} ${unit}`,
-          });
+        data.time[name].forEach((curve, k) => {
+          const more = { name: data.axes[k], legendgroup: data.axes[k], yaxis: id, showlegend: name === "velocity" };
+          const colour = `--axis-${k % 6}`;
+          traces.push(...curveTraces(curve, from, to, { colour, scale: scale[k], pixels, more, unit: percent ? "%" : unit }));
           top = Math.max(top, tops[name][k] * scale[k]);
         });
         /* A limit far outside would squeeze the curves: it is named beside the chart and drawn only when near. */
@@ -285,7 +325,7 @@
     }
     Plotly.react("time", traces, layout({
       ...form, shapes, annotations, margin: { l: 64, r: 20, t: 30, b: 46 }, hovermode: "x unified", hoversubplots: "axis", dragmode: "zoom",
-      legend: { orientation: "h", x: 1, xanchor: "right", y: 1 - height - gap, yanchor: "bottom", font: { size: 13 } },
+      legend: { orientation: "h", traceorder: "normal", x: 1, xanchor: "right", y: 1 - height - gap, yanchor: "bottom", font: { size: 13 } },
       xaxis: axis({ title: title("time [s]"), anchor: `y${ROWS.length}`, range: Number.isFinite(from) ? [from, to] : [0, data.duration || 1] }),
     }), { ...config, ...flatTools });
   }

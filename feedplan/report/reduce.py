@@ -19,6 +19,8 @@ class Envelope:
         self._width = 1 if count <= points else -(-2 * count // points)
         self._rest: tuple[Floats, Floats, NDArray[np.int64]] | None = None
         self._parts: list[tuple[NDArray[np.int64], Floats, Floats, NDArray[np.int64]]] = []
+        self._means: list[tuple[Floats, Floats]] = []
+        self._last: float | None = None
         self._done = 0
 
     def add(self, x: Floats, values: Floats, tag: NDArray[np.int64] | None = None) -> None:
@@ -34,9 +36,7 @@ class Envelope:
 
     def curve(self, column: int) -> tuple[Floats, Floats, NDArray[np.int64]]:
         """x, value and tag of the points kept in one column, in order."""
-        if self._rest is not None and len(self._rest[0]):
-            self._keep(*self._rest, len(self._rest[0]))
-            self._rest = None
+        self._finish()
         if not self._parts:
             return np.empty(0), np.empty(0), np.empty(0, np.int64)
         place, x, value, tag = (
@@ -44,6 +44,22 @@ class Envelope:
         )
         single = np.concatenate(([True], np.diff(place) != 0))
         return x[single], value[single], tag[single]
+
+    def mean(self, column: int, points: int) -> tuple[Floats, Floats]:
+        """x and mean over x of at most `points` stretches of one column: what a band of extremes hides."""
+        self._finish()
+        if not self._means:
+            return np.empty(0), np.empty(0)
+        x = np.concatenate([part[0] for part in self._means])
+        value = np.concatenate([part[1][column] for part in self._means])
+        starts = np.arange(0, len(x), max(1, -(-len(x) // points)))
+        sizes = np.diff(np.append(starts, len(x)))
+        return np.add.reduceat(x, starts) / sizes, np.add.reduceat(value, starts) / sizes
+
+    def _finish(self) -> None:
+        if self._rest is not None and len(self._rest[0]):
+            self._keep(*self._rest, len(self._rest[0]))
+        self._rest = None
 
     def _keep(self, x: Floats, values: Floats, tag: NDArray[np.int64], width: int) -> None:
         if len(x) == 0:
@@ -56,6 +72,14 @@ class Envelope:
         pick = np.sort(np.stack([start + least, start + greatest], axis=-1), axis=-1)
         value = np.take_along_axis(values.T[:, :, None], pick.reshape(len(pick), -1, 1), axis=1)
         self._parts.append((pick + self._done, x[pick], value.reshape(pick.shape), tag[pick]))
+        # Each sample stands for the way from the one before; where there is none, all count alike.
+        before = x[0] if self._last is None else self._last
+        weight = np.diff(x, prepend=before).reshape(-1, width)
+        weight[weight.sum(axis=1) <= 0] = 1.0
+        with np.errstate(invalid="ignore"):
+            mean = np.einsum("cbw,bw->cb", columns, weight) / weight.sum(axis=1)
+        self._means.append((x.reshape(-1, width).mean(axis=1), mean))
+        self._last = float(x[-1])
         self._done += len(x)
 
 

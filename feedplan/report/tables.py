@@ -52,7 +52,7 @@ def numbers(summary: Mapping[str, Any], setpoints: int) -> str:
     bound, gap = summary.get("lower_bound"), summary.get("gap")
     cells = [
         ("Time", *_value_unit(duration_text(time)), f"{time:.6g} s" if time >= 60 else ""),
-        ("Length", f"{length:,.1f}".replace(",", " "), "mm", f"{summary['pieces']} pieces"),
+        ("Length", *_length(length), f"{summary['pieces']} pieces"),
         ("Mean speed", f"{mean:.4g}", "mm/s", f"{mm_per_min(mean):.5g} mm/min"),
         ("Stops", str(summary["stops"]), "", f"{summary['runs']} runs"),
         ("Setpoints", f"{setpoints:,}".replace(",", " "), "", ""),
@@ -62,11 +62,14 @@ def numbers(summary: Mapping[str, Any], setpoints: int) -> str:
             "proved optimal" if gap is not None and gap <= 1e-9 else f"no plan is faster than {bound:.6g} s"
         )
         cells.insert(1, ("Gap to the bound", _short(100.0 * (gap or 0.0)), "%", proof))
-    items = "".join(
-        f'<div><dt>{label}</dt><dd>{value}<small>{unit}</small></dd><p class="more">{more}</p></div>'
-        for label, value, unit, more in cells
-    )
+    items = "".join(_number(*cell) for cell in cells)
     return f'<dl class="numbers card">{items}</dl>'
+
+
+def _number(label: str, value: str, unit: str, more: str) -> str:
+    size = "long" if len(value) > 9 else "short"
+    shown = f'<dd class="{size}">{value}<small>{unit}</small></dd>'
+    return f'<div><dt>{label}</dt>{shown}<p class="more">{more}</p></div>'
 
 
 def limits_table(shares: Sequence[Share]) -> str:
@@ -188,6 +191,10 @@ def _percent(ratio: float) -> str:
 
 def _short(value: float) -> str:
     return "0" if abs(value) < 1e-9 else f"{value:.3g}"
+
+
+def _length(length: float) -> tuple[str, str]:
+    return (f"{length:.1f}", "mm") if length < 10_000 else (f"{length / 1000:,.1f}".replace(",", " "), "m")
 
 
 def _value_unit(text: str) -> tuple[str, str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -113,7 +114,7 @@ def test_the_charts_hold_the_setpoints(square: Any, tmp_path: Path) -> None:
     assert data["axes"] == ["X", "Y", "Z"]
     assert data["limits"]["jerk"] == [50_000.0, 50_000.0, None]
     speed = data["time"]["speed"]
-    np.testing.assert_allclose(numbers(speed["t"]), square.chunk.t, rtol=1e-7)
+    np.testing.assert_allclose(numbers(speed["x"]), square.chunk.t, rtol=1e-7)
     assert numbers(speed["y"]).max() == 50.0
     assert set(numbers(speed["line"])) == {3, 4, 5, 6}
     assert numbers(data["time"]["acceleration"][0]["y"]).min() == -500.0
@@ -126,6 +127,13 @@ def test_the_charts_hold_the_setpoints(square: Any, tmp_path: Path) -> None:
     }
     assert {(0, 0), (20, 0), (20, 20), (0, 20)} <= corners
     assert len(numbers(path["x"])) < 400
+
+
+def test_the_data_cannot_end_its_script(broken_square: Any, tmp_path: Path) -> None:
+    checks = [replace(check, name="</script>") for check in broken_square.verdict.checks]
+    broken_square.verdict = replace(broken_square.verdict, checks=tuple(checks))
+    data = data_of(page(broken_square, tmp_path / "report.html"))
+    assert data["failures"][0]["name"] == "</script>"
 
 
 def test_a_program_that_is_gone_costs_only_its_text(square: Any, tmp_path: Path) -> None:

@@ -44,6 +44,24 @@ def test_one_sample_in_a_million_is_not_lost() -> None:
     assert (x[y.argmax()], y.max()) == (654_321, 7.0)
 
 
+def test_the_mean_of_a_saw_is_its_middle() -> None:
+    values = np.stack([np.arange(10_000) % 2, np.arange(10_000.0)], axis=1)
+    curves = envelope(values, 1000, (3, 5000))
+    x, mean = curves.mean(0, 100)
+    assert len(x) <= 100
+    # The first sample has no way behind it, so the first stretch may lean a little.
+    assert mean[1:] == pytest.approx(0.5)
+    assert mean[0] == pytest.approx(0.5, abs=0.01)
+
+
+def test_the_mean_is_over_x_not_over_samples() -> None:
+    # Nine tenths of the samples crowd in the first tenth of the way, where the value is 1; else it is 0.
+    x = np.concatenate([np.linspace(0.0, 0.1, 900), np.linspace(0.1, 1.0, 101)[1:]])
+    curves = Envelope(1000, 2)
+    curves.add(x, (x <= 0.1).astype(float)[:, None])
+    assert curves.mean(0, 10)[1] == pytest.approx([0.1])
+
+
 def test_gaps_hide_no_peak() -> None:
     values = np.full((100, 1), np.nan)
     values[42] = 1.0
