@@ -1,7 +1,12 @@
 //! Native kernels of feedplan. Every kernel takes slices and returns vectors; it knows no file and no Python.
 //! `python` alone binds them (feature `python`). Lengths are millimetres, times seconds.
 
+pub mod arc_length;
+pub mod motion;
+pub mod newton;
 pub mod quadratic;
+pub mod sampling;
+pub mod sarfraz;
 pub mod text;
 
 #[cfg(feature = "python")]

@@ -1,6 +1,7 @@
 //! The Python module `feedplan._solvers`: arrays in, arrays out, one submodule file per kernel.
 
 mod arrays;
+mod sampling;
 mod text;
 
 use pyo3::prelude::*;
@@ -46,5 +47,6 @@ pub(crate) use with_axes;
 fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     text::register(module)?;
+    sampling::register(module)?;
     Ok(())
 }
