@@ -26,10 +26,10 @@ def chunk_of(arrays: Mapping[str, Any], file: FilePath) -> SetpointChunk:
     for name, shape in shapes.items():
         array = np.asanyarray(arrays[name])
         if array.shape != shape or array.dtype.kind not in "fiu":
-            raise InputError(
-                f"{file}: {name} has the shape {array.shape}, numbers of shape {shape} are needed"
-            )
-    numbers = {name: np.asanyarray(arrays[name], dtype=np.float64) for name in ("t", *QUANTITIES)}
+            raise InputError(f"{file}: {name} has the shape {array.shape}: give numbers of shape {shape}")
+    t, position, velocity, acceleration, jerk = (
+        np.asanyarray(arrays[name], dtype=np.float64) for name in ("t", *QUANTITIES)
+    )
     with np.errstate(invalid="ignore"):
         line = np.asanyarray(arrays["line"]).astype(np.int32, copy=False)
-    return SetpointChunk(line=line, axes=axes, **numbers)
+    return SetpointChunk(t, position, velocity, acceleration, jerk, line, axes)
