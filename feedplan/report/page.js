@@ -121,7 +121,15 @@
   /* Tool path ------------------------------------------------------------------------------------ */
   const path = data.path;
   const topColour = data.length.cutting_speed || 1;
-  const views = { xyz: null, xy: ["x", "y"], xz: ["x", "z"], yz: ["y", "z"] };
+  const size = (name) => path[name].reduce(([a, b], v) => [Math.min(a, v), Math.max(b, v)], [Infinity, -Infinity]).reduce((a, b) => b - a);
+  const EYE = { x: -1.1, y: -1.5, z: 1.1 };
+  /* What goes right and what goes up, from x, y, z; `xyz` is the same view as the first one in 3D. */
+  const views = {
+    xyz: [[0.806, -0.591, 0], [0.301, 0.41, 0.86]],
+    xy: [[1, 0, 0], [0, 1, 0]],
+    xz: [[1, 0, 0], [0, 0, 1]],
+    yz: [[0, 1, 0], [0, 0, 1]],
+  };
   const hasWebGL = (() => {
     try {
       const canvas = document.createElement("canvas");
@@ -130,15 +138,13 @@
       return false;
     }
   })();
-  const extent = (name) => path[name].reduce(([a, b], v) => [Math.min(a, v), Math.max(b, v)], [Infinity, -Infinity]);
-  const size = (name) => { const [a, b] = extent(name); return b - a; };
 
   function firstView() {
     const flat = ["x", "y", "z"].map((name) => size(name) <= 1e-6 * (size("x") + size("y") + size("z")));
     if (flat[2]) return "xy";
     if (flat[1]) return "xz";
     if (flat[0]) return "yz";
-    return hasWebGL ? "xyz" : "xy";
+    return "xyz";
   }
 
   function colourScale() {
@@ -186,15 +192,18 @@
       margin: { l: 0, r: 0, t: 0, b: 0 },
       scene: {
         aspectmode: "manual", aspectratio: proportions(), xaxis: scene("X"), yaxis: scene("Y"), zaxis: scene("Z"),
-        camera: { eye: { x: -1.1, y: -1.5, z: 1.1 }, projection: { type: "orthographic" } },
+        camera: { eye: EYE, projection: { type: "orthographic" } },
       },
     })];
   }
 
   /* A flat view groups neighbours of like speed: one SVG line a colour. */
   const LEVELS = 24;
-  function flat([across, up]) {
-    const [a, b] = [path[across], path[up]];
+  function flat(name) {
+    const projected = ([a, b, c]) => path.x.map((x, i) => a * x + b * path.y[i] + c * path.z[i]);
+    const onto = ([a, b, c]) => path.marks.map(([x, y, z]) => a * x + b * y + c * z);
+    const [across, up] = views[name];
+    const [a, b] = [projected(across), projected(up)];
     const groups = Array.from({ length: LEVELS }, () => ({ x: [], y: [], text: [], end: -1 }));
     for (let i = 0; i + 1 < a.length; i += 1) {
       const part = (path.speed[i] + path.speed[i + 1]) / 2 / topColour;
@@ -208,31 +217,34 @@
     }
     const traces = groups.map((group, k) => ({
       type: "scatter", mode: "lines", x: group.x, y: group.y, text: group.text,
-      hovertemplate: "%{text}<br>%{x:.3f}, %{y:.3f}<extra></extra>",
+      hovertemplate: "%{text}<extra></extra>",
       line: { color: mixed((k + 0.5) / LEVELS), width: 2, simplify: true }, showlegend: false, connectgaps: false,
     }));
     const marker = (x, y, symbol, colour, text) => x.length && traces.push({
       type: "scatter", mode: "markers", x, y, text, hovertemplate: "%{text}<extra></extra>",
       marker: { symbol, size: 10, color: colour }, showlegend: false,
     });
-    const k = { x: 0, y: 1, z: 2 };
     marker(a.length ? [a[0]] : [], a.length ? [b[0]] : [], "circle-open", style("--ink"), ["start"]);
-    marker(path.marks.map((m) => m[k[across]]), path.marks.map((m) => m[k[up]]), "x", style("--bad"),
-      data.failures.map((f) => `${f.axis || ""} ${f.name} broken`));
+    marker(onto(across), onto(up), "x", style("--bad"), data.failures.map((f) => `${f.axis || ""} ${f.name} broken`));
+    const isSlanted = name === "xyz";
+    const along = (letter) => axis({
+      title: title(isSlanted ? "" : `${letter.toUpperCase()} [mm]`), showticklabels: !isSlanted, showgrid: !isSlanted, showline: !isSlanted,
+    });
     return [traces, layout({
       margin: { l: 56, r: 20, t: 14, b: 46 }, hovermode: "closest", dragmode: "pan",
-      xaxis: axis({ title: title(`${across.toUpperCase()} [mm]`) }),
-      yaxis: axis({ title: title(`${up.toUpperCase()} [mm]`), scaleanchor: "x", scaleratio: 1 }),
+      xaxis: along(name[0]),
+      yaxis: { ...along(name[1]), scaleanchor: "x", scaleratio: 1 },
     })];
   }
 
   let view = firstView();
-  function drawPath() {
-    const [traces, form] = views[view] ? flat(views[view]) : spatial();
-    Plotly.react("path", traces, form, { ...config, ...(views[view] ? flatTools : spatialTools), scrollZoom: true });
+  function drawPath(onPaper = false) {
+    const isSpatial = view === "xyz" && hasWebGL && !onPaper;
+    const [traces, form] = isSpatial ? spatial() : flat(view);
+    Plotly.purge("path");
+    Plotly.newPlot("path", traces, form, { ...config, ...(isSpatial ? spatialTools : flatTools), scrollZoom: true });
     for (const button of element("views").children) {
       button.setAttribute("aria-pressed", String(button.dataset.view === view));
-      button.disabled = button.dataset.view === "xyz" && !hasWebGL;
     }
   }
 
@@ -352,7 +364,6 @@
   element("views").addEventListener("click", (event) => {
     if (!event.target.dataset.view) return;
     view = event.target.dataset.view;
-    Plotly.purge("path");
     drawPath();
   });
   element("scaling").addEventListener("click", (event) => {
@@ -367,4 +378,19 @@
   refines("length", drawLength);
   refines("time", drawTime);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawAll);
+
+  /* Paper is light and narrow, and has no WebGL. */
+  const PAPER = { path: 400, length: 320, time: 860 };
+  addEventListener("beforeprint", () => {
+    document.documentElement.classList.add("printing");
+    drawPath(true);
+    drawLength();
+    drawTime();
+    for (const [id, height] of Object.entries(PAPER)) Plotly.relayout(id, { width: 670, height });
+  });
+  addEventListener("afterprint", () => {
+    document.documentElement.classList.remove("printing");
+    for (const id of Object.keys(PAPER)) Plotly.relayout(id, { width: null, height: null, autosize: true });
+    drawAll();
+  });
 })();
