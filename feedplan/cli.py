@@ -110,7 +110,7 @@ _TOLERANCE = click.option(
 )
 _JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 _QUIET = click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
-_SPEED = _Number(or_zero=True)
+_ZERO_OR_MORE = _Number(or_zero=True)
 
 
 @click.group(
@@ -136,8 +136,8 @@ def cli(context: click.Context) -> int:
 @click.option("--feed-override", type=_Number(), default=1.0, metavar="FACTOR", help="Factor on the feed.")
 @click.option("--period", type=_Number(), metavar="S", help="Servo period in place of the machine's.")
 @click.option("--interpolator", type=click.Choice(INTERPOLATORS), default="sarfraz", show_default=True)
-@click.option("--start-speed", type=_SPEED, default=0.0, metavar="MM/S", help="Speed at the start.")
-@click.option("--end-speed", type=_SPEED, default=0.0, metavar="MM/S", help="Speed at the end.")
+@click.option("--start-speed", type=_ZERO_OR_MORE, default=0.0, metavar="MM/S", help="Speed at the start.")
+@click.option("--end-speed", type=_ZERO_OR_MORE, default=0.0, metavar="MM/S", help="Speed at the end.")
 @click.option("--output", "-o", metavar="DIR", help="Write plan.json, setpoints and report.html there.")
 @click.option(
     "--format",
@@ -236,6 +236,41 @@ def fit(program: str, machine: str, tolerance: float | None, as_json: bool) -> N
     else:
         pieces = ("pieces", f"{summary['pieces']} in {summary['runs']} runs")
         console.print_rows([("program", program), *console.fit_rows(summary), pieces])
+
+
+@cli.command()
+@click.argument("place", metavar="DIR|SETPOINTS")
+@click.option("--machine", "-m", metavar="NAME|FILE", help=f"{_MACHINE_HELP}  [default: the plan's]")
+@click.option(
+    "--resolution", type=_ZERO_OR_MORE, default=0.0, metavar="MM", help="Last digit of rounded positions."
+)
+@click.option("--jerk", is_flag=True, help="Judge jerk as well.")
+@_JSON
+def check(place: str, machine: str | None, resolution: float, jerk: bool, as_json: bool) -> int:
+    """Audit setpoints against the limits of a machine.
+
+    Positions, velocities and accelerations are measured by differences alone. Exit code 1: a limit is broken.
+    """
+    from feedplan.audit import audit_setpoints
+    from feedplan.files import planned_machine, summary_text
+
+    points = outputs.load_setpoints(place)
+    audit = audit_setpoints(
+        points.t,
+        points.position,
+        Machine.load(machine or planned_machine(FilePath(place))),
+        axes=points.axes,
+        velocity=points.velocity,
+        acceleration=points.acceleration,
+        line=points.line,
+        resolution=resolution,
+        jerk=jerk,
+    )
+    if as_json:
+        sys.stdout.write(summary_text(audit.to_json()))
+    else:
+        console.print_table(console.AUDIT_HEADER, console.audit_rows(audit))
+    return DONE if audit.ok else _fail(console.failure_sentence(audit), BROKEN)
 
 
 @cli.command()

@@ -16,15 +16,6 @@ if TYPE_CHECKING:
 
 Rows = Sequence[tuple[str, str]]
 
-UNITS = {
-    "feed": "mm/s",
-    "velocity": "mm/s",
-    "acceleration": "mm/s²",
-    "jerk": "mm/s³",
-    "chord": "mm",
-    "deviation": "mm",
-}
-
 
 def print_rows(rows: Rows) -> None:
     """Names and values, one pair a line."""
@@ -128,7 +119,7 @@ def audit_text(audit: Audit) -> str:
     """The verdict in one line."""
     samples = f"{audit.checked_samples} samples"
     if not audit.ok:
-        return f"FAILED, {len(audit.failures)} of {len(audit.checks)} limits broken, {samples}"
+        return f"FAILED, {len(audit.broken)} of {len(audit.checks)} limits broken, {samples}"
     judged = [check for check in audit.checks if check.judged and math.isfinite(check.ratio)]
     nearest = max(judged, key=lambda check: check.ratio, default=None)
     use = f", nearest {check_name(nearest)} {100 * nearest.ratio:.2f} %" if nearest else ""
@@ -137,24 +128,22 @@ def audit_text(audit: Audit) -> str:
 
 def failure_sentence(audit: Audit) -> str:
     """What is broken, in one sentence."""
-    broken = (
-        f"{check_name(check)} reaches {check.worst:.6g} where {check.limit:.6g} {UNITS.get(check.name, '')} "
-        f"is allowed (at {check.time:.4f} s, line {check.line})"
-        for check in audit.failures
-    )
-    return f"the audit failed: {'; '.join(broken)}"
+    return f"the audit failed: {'; '.join(audit.failures) or 'nothing was checked'}"
+
+
+AUDIT_HEADER = ("limit", "worst", "allowed", "use", "time s", "line", "verdict")
 
 
 def audit_rows(audit: Audit) -> list[tuple[str, ...]]:
-    """The checks as rows of a table: limit, worst, allowed, use, time, line, verdict."""
+    """The checks as rows under `AUDIT_HEADER`."""
     return [
         (
             check_name(check),
             f"{check.worst:.6g}",
-            f"{check.limit:.6g} {UNITS.get(check.name, '')}" if math.isfinite(check.limit) else "none",
+            f"{check.limit:.6g} {check.unit}".strip(),
             f"{100 * check.ratio:.2f} %" if math.isfinite(check.ratio) else "-",
             f"{check.time:.4f}",
-            str(check.line),
+            str(check.line or "-"),
             "not judged" if not check.judged else "holds" if check.ok else "BROKEN",
         )
         for check in audit.checks
@@ -163,4 +152,4 @@ def audit_rows(audit: Audit) -> list[tuple[str, ...]]:
 
 def check_name(check: LimitCheck) -> str:
     """`X acceleration`, `feed`."""
-    return f"{check.axis or ''} {check.name}".strip()
+    return f"{check.axis or ''} {check.name.replace('_', ' ')}".strip()

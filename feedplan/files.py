@@ -9,6 +9,7 @@ from contextlib import ExitStack
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
+from feedplan.errors import InputError
 from feedplan.outputs import format_named
 from feedplan.outputs._staging import require_folder, staged
 
@@ -43,7 +44,7 @@ def write_plan(
     outputs = [format_named(name) for name in dict.fromkeys(formats)]
     audit, summary = plan.audit(), plan.summary()
     setpoints = plan.setpoints(interpolator=interpolator)
-    figures = SetpointFigures(plan.problem, setpoints.count, [check.time for check in audit.failures])
+    figures = SetpointFigures(plan.problem, setpoints.count, [check.time for check in audit.broken])
     with staged(folder, last=SUMMARY_FILE) as stage:
         with ExitStack() as stack:
             sinks = [
@@ -69,6 +70,16 @@ def write_plan(
     if progress:
         progress("write", 1.0)
     return tuple(folder / name for name in names)
+
+
+def planned_machine(place: FilePath) -> str:
+    """The machine that these setpoints were planned for. Raises InputError where none is known."""
+    file = (place if place.is_dir() else place.parent) / SUMMARY_FILE
+    try:
+        name = json.loads(file.read_text(encoding="utf-8"))["machine"]
+    except (OSError, ValueError, KeyError, TypeError):
+        raise InputError(f"{file} names no machine: give the machine with --machine") from None
+    return str(name)
 
 
 def summary_text(summary: dict[str, Any]) -> str:

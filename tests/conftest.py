@@ -77,12 +77,12 @@ def part_of(chunk: SetpointChunk, first: int, last: int) -> SetpointChunk:
 
 @pytest.fixture
 def square() -> SquarePlan:
-    return _square(LimitCheck("acceleration", "X", 500.0, 500.0, 1.0, 0.05, 3, True, True))
+    return _square(LimitCheck("acceleration", "X", 500.0, 500.0, 1.0, 0.05, 3, True))
 
 
 @pytest.fixture
 def broken_square() -> SquarePlan:
-    return _square(LimitCheck("acceleration", "X", 750.0, 500.0, 1.5, 0.05, 3, True, False))
+    return _square(LimitCheck("acceleration", "X", 750.0, 500.0, 1.5, 0.05, 3, True))
 
 
 def _square(check: LimitCheck) -> SquarePlan:
@@ -127,7 +127,7 @@ def _square(check: LimitCheck) -> SquarePlan:
         runs=np.arange(0, 13, 3),
     )
     machine = Machine.load("router")
-    jerk = LimitCheck("jerk", "X", 1e6, 5e4, 20.0, 0.1, 3, False, False)
+    jerk = LimitCheck("jerk", "X", 1e6, 5e4, 20.0, 0.1, 3, False)
     return SquarePlan(machine, problem, profile, _chunk(corners), Audit((check, jerk), 2001))
 
 

@@ -164,7 +164,5 @@ def chart_data(
         "path": figures.tool_path(),
         "length": over_length(problem, profile),
         "time": figures.over_time(),
-        "failures": [
-            {"name": check.name, "axis": check.axis, "time": check.time} for check in audit.failures
-        ],
+        "failures": [{"name": check.name, "axis": check.axis, "time": check.time} for check in audit.broken],
     }

@@ -11,13 +11,21 @@ from feedplan.audit import Audit, LimitCheck
 from feedplan.report.losses import Share, SlowLine
 from feedplan.units import duration_text, mm_per_min
 
-_UNITS = {
-    "feed": "mm/s",
-    "velocity": "mm/s",
-    "acceleration": "mm/s²",
-    "jerk": "mm/s³",
-    "chord": "mm",
-    "deviation": "mm",
+# What a check is called where its own name says too little.
+_NAMES = {
+    "chord": "chord error",
+    "deviation": "deviation from the program",
+    "jump": "velocity jump at corners",
+    "continuity": "speed jump between pieces",
+    "junction": "speed at corners and stops",
+    "duration": "recorded durations",
+    "order": "order of the arcs",
+    "gap": "gaps in the path",
+    "place": "setpoints off the path",
+    "grid": "time grid",
+    "recorded_velocity": "recorded velocity",
+    "recorded_acceleration": "recorded acceleration",
+    "numbers": "numbers that are not finite",
 }
 
 
@@ -30,12 +38,7 @@ def verdict(audit: Audit) -> str:
         tight = f" Nearest to its limit: {_name(nearest)}, {_percent(nearest.ratio)}." if nearest else ""
         text = f"<p>Every limit holds at {samples} checked samples.{tight}</p>"
         return f'<div class="verdict passed"><span class="mark">Audit passed</span>{text}</div>'
-    broken = "".join(
-        f"<li><b>{_name(check)}</b> reaches {_with_unit(check, check.worst)} where "
-        f"{_with_unit(check, check.limit)} is allowed ({_percent(check.ratio)}), "
-        f"at {check.time:.4f} s, line {check.line}</li>"
-        for check in audit.failures
-    )
+    broken = "".join(f"<li>{escape(sentence)}</li>" for sentence in audit.failures)
     count = len(audit.failures)
     limits = "limit is" if count == 1 else "limits are"
     head = f"{count} {limits} broken at {samples} checked samples. Do not run this plan."
@@ -163,20 +166,20 @@ def _audit_row(check: LimitCheck) -> str:
     return (
         f'<tr class="{kind}-row"><td>{_name(check)}</td><td class="n">{_with_unit(check, check.worst)}</td>'
         f'<td class="n">{_with_unit(check, check.limit)}</td><td class="bar">{bar}</td>'
-        f'<td class="n">{_percent(check.ratio)}</td><td class="n">{check.time:.4f}</td>'
-        f'<td class="n">{check.line}</td><td class="verdict-cell">{word}</td></tr>'
+        f'<td class="n">{_percent(check.ratio)}</td>'
+        f'<td class="n">{f"{check.time:.4f}" if math.isfinite(check.time) else "–"}</td>'
+        f'<td class="n">{check.line or "–"}</td><td class="verdict-cell">{word}</td></tr>'
     )
 
 
 def _name(check: LimitCheck) -> str:
-    names = {"chord": "chord error", "deviation": "deviation from the program"}
-    return escape(f"{check.axis or ''} {names.get(check.name, check.name)}".strip())
+    return escape(f"{check.axis or ''} {_NAMES.get(check.name, check.name)}".strip())
 
 
 def _with_unit(check: LimitCheck, value: float) -> str:
     if not math.isfinite(value):
         return "no limit" if value > 0 else "–"
-    return f"{value:.6g} {_UNITS.get(check.name, '')}".strip()
+    return f"{value:.6g} {check.unit}".strip()
 
 
 def _percent(ratio: float) -> str:
