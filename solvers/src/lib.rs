@@ -2,6 +2,9 @@
 //! `python` alone binds them (feature `python`). Lengths are millimetres, times seconds.
 
 pub mod arc_length;
+pub mod bang_bang_quadratic;
+pub mod bernstein;
+pub mod limit_curve;
 pub mod motion;
 pub mod newton;
 pub mod quadratic;

@@ -1,6 +1,7 @@
 //! The Python module `feedplan._solvers`: arrays in, arrays out, one submodule file per kernel.
 
 mod arrays;
+mod plan;
 mod sampling;
 mod text;
 
@@ -48,5 +49,6 @@ fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     text::register(module)?;
     sampling::register(module)?;
+    plan::register(module)?;
     Ok(())
 }
