@@ -172,13 +172,14 @@ def _quotient(top: Floats, bottom: Floats) -> Floats:
 
 
 def _chord_speed(problem: Problem, tangent: Floats, second: Floats, rate: Floats) -> Floats:
-    """(2/T)·√(2ρδ − δ²) with the radius of curvature ρ; infinite where the tolerance does not limit."""
+    """(2/T)·√(2ρδ − δ²) with the radius of curvature ρ; infinite where the tolerance does not limit.
+
+    Below ρ = δ it stays 2δ/T: no shorter part of the path can leave its chord by δ.
+    """
     tolerance = problem.chord_tolerance
     if not np.isfinite(tolerance):
         return np.full(len(rate), np.inf)
     dot = np.einsum("ij,ij->i", tangent, second)
     cross = np.sqrt(np.maximum(rate**2 * np.einsum("ij,ij->i", second, second) - dot**2, 0.0))
-    radius = _quotient(rate**3, cross)
-    room = 2.0 * radius * tolerance - tolerance**2
-    # A radius below half the tolerance: the whole curve is within it, whatever the speed.
-    return np.where(room > 0, 2.0 / problem.period * np.sqrt(np.maximum(room, 0.0)), np.inf)
+    radius = np.maximum(_quotient(rate**3, cross), tolerance)
+    return np.asarray(2.0 / problem.period * np.sqrt(2.0 * radius * tolerance - tolerance**2))

@@ -112,3 +112,7 @@ def test_the_chord_error_limits_the_bend(square: Any) -> None:
     step = 2.0 * np.sqrt(2.0 * radius * tolerance - tolerance**2)
     assert samples.chord.min() == pytest.approx(step / period, rel=1e-12)
     assert samples.chord.argmin() == len(samples.chord) // 2
+
+    problem, profile = bend(square, ArcKind.FLAT, 0, 0.0, (100.0, 100.0))
+    coarse = sampled(replace(problem, chord_tolerance=100.0), profile)
+    assert coarse.chord.min() == pytest.approx(2.0 * 100.0 / period)
