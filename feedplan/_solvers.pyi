@@ -1,18 +1,49 @@
 """Types of the native module."""
 
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
     "PathLength",
+    "PlanError",
     "Sampler",
     "__version__",
     "csv_rows",
+    "fit_points",
+    "plan_quadratic",
+    "read_gcode",
 ]
 
 __version__: str
+
+class PlanError(Exception): ...
+
+def plan_quadratic(
+    control_points: NDArray[np.float64],
+    width: NDArray[np.float64],
+    runs: NDArray[np.int64],
+    feed: NDArray[np.float64],
+    junction_speed: NDArray[np.float64],
+    max_velocity: NDArray[np.float64],
+    max_acceleration: NDArray[np.float64],
+    chord_tolerance: float,
+    period: float,
+    start_speed: float,
+    end_speed: float,
+) -> tuple[
+    NDArray[np.uint32],
+    NDArray[np.uint8],
+    NDArray[np.uint8],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.int64],
+]: ...
 
 @final
 class PathLength:
@@ -68,3 +99,20 @@ class Sampler:
     ]: ...
 
 def csv_rows(values: NDArray[np.float64], last: NDArray[np.int32]) -> bytes: ...
+def read_gcode(
+    source: bytes,
+    name: str,
+    places: NDArray[np.float64],
+    machine_axes: str,
+    block_delete: bool,
+    max_moves: int,
+) -> dict[str, Any]: ...
+def fit_points(
+    points: NDArray[np.float64],
+    tolerance: float,
+    max_chord: float,
+    max_curvature: float,
+    corner_angle: float,
+) -> tuple[
+    NDArray[np.float64], NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.uint32]
+]: ...

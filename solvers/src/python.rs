@@ -1,6 +1,8 @@
 //! The Python module `feedplan._solvers`: arrays in, arrays out, one submodule file per kernel.
 
 mod arrays;
+mod fit;
+mod gcode;
 mod plan;
 mod sampling;
 mod text;
@@ -50,5 +52,7 @@ fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     text::register(module)?;
     sampling::register(module)?;
     plan::register(module)?;
+    gcode::register(module)?;
+    fit::register(module)?;
     Ok(())
 }
