@@ -13,6 +13,7 @@ __all__ = [
     "__version__",
     "build_path",
     "fit_points",
+    "csv_rows",
     "fit_points",
     "plan_quadratic",
     "read_gcode",
@@ -100,6 +101,7 @@ class Sampler:
         float,
     ]: ...
 
+def csv_rows(values: NDArray[np.float64], last: NDArray[np.int32]) -> bytes: ...
 def read_gcode(
     source: bytes,
     name: str,

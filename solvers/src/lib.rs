@@ -18,6 +18,7 @@ pub mod path_builder;
 pub mod quadratic;
 pub mod sampling;
 pub mod sarfraz;
+pub mod text;
 
 #[cfg(feature = "python")]
 mod python;

@@ -6,6 +6,7 @@ mod path;
 mod gcode;
 mod plan;
 mod sampling;
+mod text;
 
 use pyo3::prelude::*;
 
@@ -51,6 +52,7 @@ fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     fit::register(module)?;
     path::register(module)?;
+    text::register(module)?;
     sampling::register(module)?;
     plan::register(module)?;
     gcode::register(module)?;
