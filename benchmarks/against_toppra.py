@@ -43,7 +43,5 @@ def run(quick: bool = False) -> Result:
         NAME,
         f"Exact planner against toppra {toppra_mesh.VERSION} at equal accuracy",
         tuple(rows),
-        (
-            "toppra: collocation on a mesh aligned with the knots, the coarsest found that is accurate enough.",
-        ),
+        ("toppra: collocation on a mesh aligned with the knots, the coarsest found that is close enough.",),
     )
