@@ -1,7 +1,15 @@
 //! Native kernels of feedplan. Every kernel takes slices and returns vectors; it knows no file and no Python.
 //! `python` alone binds them (feature `python`). Lengths are millimetres, times seconds.
 
+pub mod arc_length;
+pub mod bang_bang_quadratic;
+pub mod bernstein;
+pub mod limit_curve;
+pub mod motion;
+pub mod newton;
 pub mod quadratic;
+pub mod sampling;
+pub mod sarfraz;
 
 #[cfg(feature = "python")]
 mod python;

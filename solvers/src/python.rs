@@ -1,6 +1,8 @@
 //! The Python module `feedplan._solvers`: arrays in, arrays out, one submodule file per kernel.
 
 mod arrays;
+mod plan;
+mod sampling;
 
 use pyo3::prelude::*;
 
@@ -44,5 +46,7 @@ pub(crate) use with_axes;
 #[pymodule]
 fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    sampling::register(module)?;
+    plan::register(module)?;
     Ok(())
 }
