@@ -1,6 +1,7 @@
 """Types of the native module."""
 
 from typing import final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,3 +66,27 @@ class Sampler:
         int,
         float,
     ]: ...
+__version__: str
+
+def read_gcode(
+    source: bytes,
+    name: str,
+    places: NDArray[np.float64],
+    machine_axes: str,
+    block_delete: bool,
+    max_moves: int,
+) -> dict[str, Any]: ...
+import numpy as np
+from numpy.typing import NDArray
+
+__version__: str
+
+def fit_points(
+    points: NDArray[np.float64],
+    tolerance: float,
+    max_chord: float,
+    max_curvature: float,
+    corner_angle: float,
+) -> tuple[
+    NDArray[np.float64], NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.uint32]
+]: ...

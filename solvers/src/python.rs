@@ -3,6 +3,8 @@
 mod arrays;
 mod plan;
 mod sampling;
+mod gcode;
+mod fit;
 
 use pyo3::prelude::*;
 
@@ -48,5 +50,7 @@ fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     sampling::register(module)?;
     plan::register(module)?;
+    gcode::register(module)?;
+    fit::register(module)?;
     Ok(())
 }
