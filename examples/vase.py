@@ -45,10 +45,11 @@ def height(x: float, y: Array) -> Array:
 
     # Reeds stand out of the belly and meet in creases; the waves on the collars are smooth. Both fade
     # towards the silhouette, where the walls are steep.
-    reeds = np.abs(np.cos(np.pi * y / REED_PITCH + 0.5 * REEDS * angle))
-    waves = np.cos(2.0 * np.pi * y / 3.5) * np.cos(12.0 * angle)
+    turns = y / REED_PITCH + REEDS * angle / (2.0 * np.pi)
+    reeds = 1.0 - 4.0 * (turns - np.round(turns)) ** 2
+    waves = np.cos(2.0 * np.pi * y / 5.0) * np.cos(12.0 * angle)
     collars = _window(y, 10.5, 17.5) + _window(y, 31.5, 37.5) + _window(y, 105.3, 108.7)
-    relief = REED_DEPTH * _window(y, 39.0, 87.0) * reeds + 0.12 * collars * waves
+    relief = REED_DEPTH * _window(y, 39.0, 87.0) * reeds + 0.08 * collars * waves
     surface = body + relief * np.cos(angle) ** 2
 
     for first, last, count, rise, half_width in BEADS:
@@ -90,7 +91,7 @@ def program(
     *,
     step_over: float = 0.1,
     feed: float = 6000.0,
-    tolerance: float = 0.005,
+    tolerance: float = 0.01,
     decimals: int = 4,
 ) -> str:
     """The part program with about `blocks` blocks: whole passes of 486 points each.
@@ -145,7 +146,7 @@ def main() -> None:
     parser.add_argument("--blocks", type=int, default=2000, help="about how many blocks (default 2000)")
     parser.add_argument("--step-over", type=float, default=0.1, help="between passes [mm] (default 0.1)")
     parser.add_argument("--feed", type=float, default=6000.0, help="[mm/min] (default 6000)")
-    parser.add_argument("--tolerance", type=float, default=0.005, help="G64 P [mm] (default 0.005)")
+    parser.add_argument("--tolerance", type=float, default=0.01, help="G64 P [mm] (default 0.01)")
     parser.add_argument("--decimals", type=int, default=4, help="of the coordinates (default 4)")
     parser.add_argument("--output", type=Path, default=Path("out/vase.ngc"))
     arguments = parser.parse_args()
