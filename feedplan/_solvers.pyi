@@ -1,18 +1,48 @@
 """Types of the native module."""
 
-from typing import final
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
     "PathLength",
+    "PlanError",
     "Sampler",
     "__version__",
+    "fit_points",
+    "plan_quadratic",
+    "read_gcode",
 ]
 
 __version__: str
+
+class PlanError(Exception): ...
+
+def plan_quadratic(
+    control_points: NDArray[np.float64],
+    width: NDArray[np.float64],
+    runs: NDArray[np.int64],
+    feed: NDArray[np.float64],
+    junction_speed: NDArray[np.float64],
+    max_velocity: NDArray[np.float64],
+    max_acceleration: NDArray[np.float64],
+    chord_tolerance: float,
+    period: float,
+    start_speed: float,
+    end_speed: float,
+) -> tuple[
+    NDArray[np.uint32],
+    NDArray[np.uint8],
+    NDArray[np.uint8],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.int64],
+]: ...
 
 @final
 class PathLength:
@@ -66,7 +96,6 @@ class Sampler:
         int,
         float,
     ]: ...
-__version__: str
 
 def read_gcode(
     source: bytes,
@@ -76,11 +105,6 @@ def read_gcode(
     block_delete: bool,
     max_moves: int,
 ) -> dict[str, Any]: ...
-import numpy as np
-from numpy.typing import NDArray
-
-__version__: str
-
 def fit_points(
     points: NDArray[np.float64],
     tolerance: float,

@@ -49,7 +49,9 @@ fn cam_path(count: usize, seed: u64) -> Vec<Quadratic<3>> {
         let part = before / (before + after);
         std::array::from_fn(|k| points[i][k] + part * (points[i + 1][k] - points[i][k]))
     };
-    (0..count).map(|i| Quadratic { control: [knot(i), points[i + 1], knot(i + 1)], width: width(i) }).collect()
+    (0..count)
+        .map(|i| Quadratic { control: [knot(i), points[i + 1], knot(i + 1)], width: width(i) })
+        .collect()
 }
 
 fn problem<'a>(

@@ -34,8 +34,7 @@ fn arcs() -> String {
     let mut text = String::from("G21 G90 G17\nG0 X0 Y0\nG1 X0 F2000\n");
     for i in 0..BLOCKS {
         let code = 2 + i % 2;
-        writeln!(text, "N{i} G{code} X{} Y{:.3} I0.500 J0. F{}", i % 50_000 + 1, 0.0, 1000 + i % 7)
-            .unwrap();
+        writeln!(text, "N{i} G{code} X{} Y{:.3} I0.500 J0. F{}", i % 50_000 + 1, 0.0, 1000 + i % 7).unwrap();
         if (i + 1) % 50_000 == 0 {
             text += "G0 X0 Y0\n";
         }

@@ -222,11 +222,11 @@ fn check<const M: usize>(problem: &Problem<M>) -> Result<(), Fault> {
         if !piece.control.iter().flatten().all(|value| value.is_finite()) {
             return wrong("a control point is not a finite number".into());
         }
-        if !positive(piece.width) {
-            return wrong(format!("the parameter width is {}: give a positive number", piece.width));
-        }
         if piece.control[0] == piece.control[1] && piece.control[1] == piece.control[2] {
             return wrong("the piece has no length: leave it out".into());
+        }
+        if !positive(piece.width) {
+            return wrong(format!("the parameter width is {}: give a positive number", piece.width));
         }
         if !positive(problem.feed[i]) {
             return wrong(format!("the feed is {} mm/s: give a positive finite number", problem.feed[i]));

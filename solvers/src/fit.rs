@@ -95,7 +95,8 @@ pub fn fit_points<const M: usize>(points: &[[f64; M]], options: &FitOptions) -> 
         if !(block.continues && open && part.starts_smooth) {
             spline += u32::from(!pieces.is_empty());
         }
-        pieces.extend(part.pieces.iter().map(|piece| FittedPiece { spline: spline + piece.spline, ..*piece }));
+        pieces
+            .extend(part.pieces.iter().map(|piece| FittedPiece { spline: spline + piece.spline, ..*piece }));
         spline += part.pieces.last().map_or(0, |piece| piece.spline);
         open = part.ends_smooth;
     }

@@ -4,11 +4,11 @@
 pub mod arc_length;
 pub mod bang_bang_quadratic;
 pub mod bernstein;
+pub mod fit;
+pub mod gcode;
 pub mod limit_curve;
 pub mod motion;
 pub mod newton;
-pub mod gcode;
-pub mod fit;
 pub mod quadratic;
 pub mod sampling;
 pub mod sarfraz;

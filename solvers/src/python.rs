@@ -1,10 +1,10 @@
 //! The Python module `feedplan._solvers`: arrays in, arrays out, one submodule file per kernel.
 
 mod arrays;
+mod fit;
+mod gcode;
 mod plan;
 mod sampling;
-mod gcode;
-mod fit;
 
 use pyo3::prelude::*;
 

@@ -94,9 +94,8 @@ fn end_of_line<const M: usize>(
 ) -> Break {
     // Far enough to tell a direction from noise within the tolerance.
     let apart = |&k: &usize| norm(&sub(&chain.points[k], &chain.points[at])) > 2.0 * chain.tolerance;
-    let left = before.map_or(at, |(from, _)| {
-        (from.max(at.saturating_sub(WIDEST))..at).rev().find(apart).unwrap_or(from)
-    });
+    let left = before
+        .map_or(at, |(from, _)| (from.max(at.saturating_sub(WIDEST))..at).rev().find(apart).unwrap_or(from));
     let right = after.map_or(at, |(_, to)| (at + 1..to.min(at + WIDEST)).find(apart).unwrap_or(to));
     Break { at, sides: [left, right], corner: is_corner(chain, at, [left, right]), line }
 }

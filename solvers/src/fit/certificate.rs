@@ -140,7 +140,9 @@ impl<const M: usize> Step<M> {
         for k in a..b {
             let (next, next_off_sq) = match k + 1 == b {
                 true => (self.width, gap_sq(&self.end, &points[b])),
-                false => self.foot(&halves, &points[k + 1], scale * (along[k + 1] - along[a]), x, tolerance_sq),
+                false => {
+                    self.foot(&halves, &points[k + 1], scale * (along[k + 1] - along[a]), x, tolerance_sq)
+                }
             };
             if next_off_sq > worst {
                 (worst, fault) = (next_off_sq, Some(Fault::Point(k + 1)));
@@ -157,8 +159,10 @@ impl<const M: usize> Step<M> {
                 part
             } else {
                 let at_knot = segment.distance_sq(&halves[0].point(middle));
-                let left = part_bound_sq(&halves[0], x, middle, &segment, tolerance_sq, HALVINGS).max(at_knot);
-                let right = part_bound_sq(&halves[1], middle, next, &segment, tolerance_sq, HALVINGS).max(at_knot);
+                let left =
+                    part_bound_sq(&halves[0], x, middle, &segment, tolerance_sq, HALVINGS).max(at_knot);
+                let right =
+                    part_bound_sq(&halves[1], middle, next, &segment, tolerance_sq, HALVINGS).max(at_knot);
                 bound_sq[0] = bound_sq[0].max(left).max(off_sq);
                 bound_sq[1] = bound_sq[1].max(right).max(next_off_sq);
                 left.max(right)
@@ -177,14 +181,7 @@ impl<const M: usize> Step<M> {
 
     /// A foot point of `p` not before `from`, by Newton's method from `guess`, and its squared distance.
     #[inline(always)]
-    fn foot(
-        &self,
-        halves: &[Half<M>; 2],
-        p: &[f64; M],
-        guess: f64,
-        from: f64,
-        enough_sq: f64,
-    ) -> (f64, f64) {
+    fn foot(&self, halves: &[Half<M>; 2], p: &[f64; M], guess: f64, from: f64, enough_sq: f64) -> (f64, f64) {
         let middle = 0.5 * self.width;
         let mut x = guess.max(from);
         for _ in 0..4 {
@@ -197,8 +194,7 @@ impl<const M: usize> Step<M> {
             let d = next - x;
             x = next;
             if same {
-                let off: [f64; M] =
-                    std::array::from_fn(|k| rest[k] - d * (tangent[k] + d * half.bend[k]));
+                let off: [f64; M] = std::array::from_fn(|k| rest[k] - d * (tangent[k] + d * half.bend[k]));
                 let off_sq = dot(&off, &off);
                 if off_sq <= enough_sq {
                     return (x, off_sq);

@@ -19,9 +19,8 @@ const SMALL: usize = 32;
 /// The feature points of the group from point `a` to point `b`, both included; `extremes` are those to begin with,
 /// strictly between, in order.
 pub fn select<const M: usize>(chain: &Chain<M>, a: usize, b: usize, mut extremes: &[usize]) -> Vec<usize> {
-    let next_extreme = |extremes: &[usize], after: usize| {
-        extremes.iter().copied().find(|&next| next > after).unwrap_or(b)
-    };
+    let next_extreme =
+        |extremes: &[usize], after: usize| extremes.iter().copied().find(|&next| next > after).unwrap_or(b);
     let mut features = vec![a];
     let mut q1 = a;
     let mut q2 = next_extreme(extremes, a).min(a + FIRST);

@@ -75,14 +75,9 @@ impl<const M: usize> Block<M> {
 fn line<const M: usize>(chain: &Chain<M>, a: usize, b: usize) -> FittedPiece<M> {
     let points = chain.points;
     let segment = Segment::new(&points[a], &points[b]);
-    let deviation = points[a + 1..b].iter().fold(0.0_f64, |worst, p| worst.max(segment.distance_sq(p))).sqrt();
-    FittedPiece {
-        piece: Quadratic::line(points[a], points[b]),
-        first: a,
-        last: b - 1,
-        deviation,
-        spline: 0,
-    }
+    let deviation =
+        points[a + 1..b].iter().fold(0.0_f64, |worst, p| worst.max(segment.distance_sq(p))).sqrt();
+    FittedPiece { piece: Quadratic::line(points[a], points[b]), first: a, last: b - 1, deviation, spline: 0 }
 }
 
 /// From one feature to the next.
@@ -265,7 +260,8 @@ impl<'a, const M: usize> Refinement<'a, M> {
         if from == 0 || to + 1 == points.len() || self.chain.is_corner(from) || self.chain.is_corner(to) {
             return false;
         }
-        let turn = |at: usize| turn_cosine(&points[at - 1], &points[at], &points[at + 1]).clamp(-1.0, 1.0).acos();
+        let turn =
+            |at: usize| turn_cosine(&points[at - 1], &points[at], &points[at + 1]).clamp(-1.0, 1.0).acos();
         let length = self.chain.along[to] - self.chain.along[from];
         let bulge = length * (turn(from) + turn(to)) / 16.0;
         bulge.min(self.excess(j)) > HOPELESS * self.chain.tolerance
@@ -384,7 +380,12 @@ impl<'a, const M: usize> Refinement<'a, M> {
         let start = &fitted(first).0;
         let mut at = (start.start, start.tangent[0], self.steps[first].from);
         let (mut width, mut deviation) = (0.0, 0.0_f64);
-        let mut finish = |point: [f64; M], slope: [f64; M], chord: usize, next: usize, width: &mut f64, deviation: &mut f64| {
+        let mut finish = |point: [f64; M],
+                          slope: [f64; M],
+                          chord: usize,
+                          next: usize,
+                          width: &mut f64,
+                          deviation: &mut f64| {
             let quarter = 0.25 * *width;
             let (from, tangent, first) = at;
             let middle =
@@ -399,7 +400,14 @@ impl<'a, const M: usize> Refinement<'a, M> {
             width += 0.5 * step.width;
             deviation = deviation.max(verdict.deviation[0]);
             if !((j == first && free_start) || (j + 1 == end && free_end)) {
-                finish(step.knot(), step.tangent[1], verdict.knot_chord, verdict.knot_chord, &mut width, &mut deviation);
+                finish(
+                    step.knot(),
+                    step.tangent[1],
+                    verdict.knot_chord,
+                    verdict.knot_chord,
+                    &mut width,
+                    &mut deviation,
+                );
             }
             width += 0.5 * step.width;
             deviation = deviation.max(verdict.deviation[1]);

@@ -29,22 +29,15 @@ pub struct Spline<const M: usize> {
 }
 
 /// The spline through `features`, at least two.
-pub fn interpolate<const M: usize>(
-    features: &[[f64; M]],
-    start: End<M>,
-    finish: End<M>,
-) -> Spline<M> {
+pub fn interpolate<const M: usize>(features: &[[f64; M]], start: End<M>, finish: End<M>) -> Spline<M> {
     let count = features.len() - 1;
     let h: Vec<f64> = features
         .windows(2)
         // Features that coincide still need a step; the certificate will ask for the points between them.
         .map(|f| norm(&sub(&f[1], &f[0])).max(f64::MIN_POSITIVE * 1e10))
         .collect();
-    let chord: Vec<[f64; M]> = features
-        .windows(2)
-        .zip(&h)
-        .map(|(f, h)| std::array::from_fn(|k| (f[1][k] - f[0][k]) / h))
-        .collect();
+    let chord: Vec<[f64; M]> =
+        features.windows(2).zip(&h).map(|(f, h)| std::array::from_fn(|k| (f[1][k] - f[0][k]) / h)).collect();
     let before = |j: usize| h[j] / (h[j - 1] + h[j]);
     let after = |j: usize| h[j] / (h[j] + h[j + 1]);
 
@@ -86,9 +79,9 @@ pub fn interpolate<const M: usize>(
         (End::Free, End::Tangent(other)) => extrapolate(&slope[0], &other, 1.0),
         (End::Free, End::Free) => slope[0],
     });
-    tangent.extend((1..count).map(|j| std::array::from_fn(|k| {
-        (h[j] * slope[j - 1][k] + h[j - 1] * slope[j][k]) / (h[j - 1] + h[j])
-    })));
+    tangent.extend((1..count).map(|j| {
+        std::array::from_fn(|k| (h[j] * slope[j - 1][k] + h[j - 1] * slope[j][k]) / (h[j - 1] + h[j]))
+    }));
     tangent.push(match (start, finish) {
         (_, End::Tangent(tangent)) => tangent,
         (_, End::Free) if count > 1 => extrapolate(&slope[count - 1], &slope[count - 2], before(count - 1)),

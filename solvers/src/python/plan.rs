@@ -9,7 +9,7 @@ use crate::bang_bang_quadratic::{plan, Fault, Problem, Profile};
 
 pyo3::create_exception!(
     _solvers,
-    PlanFault,
+    PlanError,
     pyo3::exceptions::PyException,
     "No profile: (kind, piece or None, reachable speed or None, sentence), kind start, end, input or stuck."
 );
@@ -91,11 +91,11 @@ fn to_exception(fault: &Fault) -> PyErr {
         Fault::Input { piece, .. } => ("input", piece, None),
         Fault::Stuck { piece, .. } => ("stuck", Some(piece), None),
     };
-    PlanFault::new_err((kind, piece, reachable, text))
+    PlanError::new_err((kind, piece, reachable, text))
 }
 
 /// Adds the function and its exception to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add("PlanFault", module.py().get_type::<PlanFault>())?;
+    module.add("PlanError", module.py().get_type::<PlanError>())?;
     module.add_function(wrap_pyfunction!(plan_quadratic, module)?)
 }
