@@ -1,6 +1,5 @@
 """Types of the native module."""
 
-from typing import final
 from typing import Any, final
 
 import numpy as np
@@ -12,7 +11,6 @@ __all__ = [
     "Sampler",
     "__version__",
     "build_path",
-    "fit_points",
     "csv_rows",
     "fit_points",
     "plan_quadratic",
@@ -102,6 +100,7 @@ class Sampler:
     ]: ...
 
 def csv_rows(values: NDArray[np.float64], last: NDArray[np.int32]) -> bytes: ...
+
 def read_gcode(
     source: bytes,
     name: str,
@@ -110,6 +109,7 @@ def read_gcode(
     block_delete: bool,
     max_moves: int,
 ) -> dict[str, Any]: ...
+
 def fit_points(
     points: NDArray[np.float64],
     tolerance: float,
@@ -119,6 +119,7 @@ def fit_points(
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.uint32]
 ]: ...
+
 def build_path(
     name: str,
     start: NDArray[np.float64],

@@ -177,8 +177,11 @@ pub fn bend<const M: usize>(
         let index = if corner_at_end { i } else { count - 1 - i };
         let piece = &mut side[index];
         let near = if i + 1 == count { 1.0 } else { far + piece.width / length };
-        let shares =
-            if corner_at_end { [far * far, far * near, near * near] } else { [near * near, far * near, far * far] };
+        let shares = if corner_at_end {
+            [far * far, far * near, near * near]
+        } else {
+            [near * near, far * near, far * far]
+        };
         for (point, share) in piece.control.iter_mut().zip(shares) {
             for k in 0..M {
                 point[k] += share * displacement[k];

@@ -124,7 +124,8 @@ impl<const M: usize> Moves<'_, M> {
 
     /// Move `i` may be fitted together with the move before.
     fn chained(&self, i: usize) -> bool {
-        let fitted = |k: usize| self.kind[k] == LINE && self.fit_tolerance[k] > 0.0 && self.tolerance[k] > 0.0;
+        let fitted =
+            |k: usize| self.kind[k] == LINE && self.fit_tolerance[k] > 0.0 && self.tolerance[k] > 0.0;
         fitted(i - 1)
             && fitted(i)
             && !self.halt[i - 1]

@@ -298,7 +298,9 @@ fn bent<const M: usize>(
         followed.deviation += distance * share;
     };
     bend(&mut side_before, true, &displacement, length_before, &mut deviate);
-    bend(&mut side_after, false, &displacement, length_after, |index, share| deviate(before.len() + index, share));
+    bend(&mut side_after, false, &displacement, length_after, |index, share| {
+        deviate(before.len() + index, share)
+    });
     // The bounds are sums, which may be rounded up.
     if excess > 1.0 + 1e-9 {
         return Some(Err(excess));

@@ -2,8 +2,8 @@
 
 mod arrays;
 mod fit;
-mod path;
 mod gcode;
+mod path;
 mod plan;
 mod sampling;
 mod text;
@@ -56,6 +56,5 @@ fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     sampling::register(module)?;
     plan::register(module)?;
     gcode::register(module)?;
-    fit::register(module)?;
     Ok(())
 }
