@@ -1,9 +1,114 @@
 """Types of the native module."""
 
+from typing import Any, final
+
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = [
+    "PathLength",
+    "PlanError",
+    "Sampler",
+    "__version__",
+    "build_path",
+    "csv_rows",
+    "fit_points",
+    "plan_quadratic",
+    "read_gcode",
+]
+
 __version__: str
+
+class PlanError(Exception): ...
+
+def plan_quadratic(
+    control_points: NDArray[np.float64],
+    width: NDArray[np.float64],
+    runs: NDArray[np.int64],
+    feed: NDArray[np.float64],
+    junction_speed: NDArray[np.float64],
+    max_velocity: NDArray[np.float64],
+    max_acceleration: NDArray[np.float64],
+    chord_tolerance: float,
+    period: float,
+    start_speed: float,
+    end_speed: float,
+) -> tuple[
+    NDArray[np.uint32],
+    NDArray[np.uint8],
+    NDArray[np.uint8],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.int64],
+]: ...
+
+@final
+class PathLength:
+    def __new__(cls, control_points: NDArray[np.float64], width: NDArray[np.float64]) -> PathLength: ...
+    @property
+    def total(self) -> float: ...
+    @property
+    def error(self) -> float: ...
+    def lengths(self, piece: NDArray[np.uint32], u: NDArray[np.float64]) -> NDArray[np.float64]: ...
+    def locate(
+        self, lengths: NDArray[np.float64], tolerance: float, newton: bool
+    ) -> tuple[NDArray[np.uint32], NDArray[np.float64], NDArray[np.uint32], NDArray[np.float64]]: ...
+
+@final
+class Sampler:
+    def __new__(
+        cls,
+        control_points: NDArray[np.float64],
+        width: NDArray[np.float64],
+        line: NDArray[np.int32],
+        runs: NDArray[np.int64],
+        dwell: NDArray[np.float64],
+        piece: NDArray[np.uint32],
+        kind: NDArray[np.uint8],
+        axis: NDArray[np.uint8],
+        value: NDArray[np.float64],
+        u0: NDArray[np.float64],
+        u1: NDArray[np.float64],
+        p0: NDArray[np.float64],
+        p1: NDArray[np.float64],
+        duration: NDArray[np.float64],
+        arc_runs: NDArray[np.int64],
+        period: float,
+        newton: bool,
+    ) -> Sampler: ...
+    @property
+    def count(self) -> int: ...
+    @property
+    def duration(self) -> float: ...
+    def chunk(
+        self, start: int, stop: int
+    ) -> tuple[
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.int32],
+        NDArray[np.uint32],
+        NDArray[np.float64],
+        int,
+        float,
+    ]: ...
+
+def csv_rows(values: NDArray[np.float64], last: NDArray[np.int32]) -> bytes: ...
+
+def read_gcode(
+    source: bytes,
+    name: str,
+    places: NDArray[np.float64],
+    machine_axes: str,
+    block_delete: bool,
+    max_moves: int,
+) -> dict[str, Any]: ...
 
 def fit_points(
     points: NDArray[np.float64],
@@ -13,4 +118,40 @@ def fit_points(
     corner_angle: float,
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.uint32]
+]: ...
+
+def build_path(
+    name: str,
+    start: NDArray[np.float64],
+    kind: NDArray[np.uint8],
+    target: NDArray[np.float64],
+    feed: NDArray[np.float64],
+    line: NDArray[np.int32],
+    tolerance: NDArray[np.float64],
+    fit_tolerance: NDArray[np.float64],
+    halt: NDArray[np.bool_],
+    arc_move: NDArray[np.int64],
+    arc_plane: NDArray[np.int64],
+    arc_centre: NDArray[np.float64],
+    arc_sweep: NDArray[np.float64],
+    max_velocity: NDArray[np.float64],
+    max_acceleration: NDArray[np.float64],
+    travel: NDArray[np.float64],
+    jump: bool,
+    exact_tolerance: float,
+    max_chord: float,
+    corner_acceleration: float,
+    max_speed: float,
+    corner_angle: float,
+) -> tuple[
+    tuple[
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.int64],
+        NDArray[np.float64],
+        NDArray[np.int64],
+    ],
+    tuple[int, int, int, float],
+    tuple[int, int, float] | None,
 ]: ...

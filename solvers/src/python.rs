@@ -2,6 +2,11 @@
 
 mod arrays;
 mod fit;
+mod gcode;
+mod path;
+mod plan;
+mod sampling;
+mod text;
 
 use pyo3::prelude::*;
 
@@ -46,5 +51,10 @@ pub(crate) use with_axes;
 fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     fit::register(module)?;
+    path::register(module)?;
+    text::register(module)?;
+    sampling::register(module)?;
+    plan::register(module)?;
+    gcode::register(module)?;
     Ok(())
 }
