@@ -1,6 +1,5 @@
 """Types of the native module."""
 
-from typing import final
 from typing import Any, final
 
 import numpy as np
@@ -8,18 +7,13 @@ from numpy.typing import NDArray
 
 __all__ = [
     "PathLength",
-    "PlanFault",
+    "PlanError",
     "Sampler",
     "__version__",
     "build_path",
     "fit_points",
-    "fit_points",
     "plan_quadratic",
     "read_gcode",
-    "PlanError",
-    "Sampler",
-    "__version__",
-    "plan_quadratic",
 ]
 
 __version__: str

@@ -3,13 +3,11 @@
 
 pub mod arc;
 pub mod arc_length;
+pub mod bang_bang_quadratic;
+pub mod bernstein;
 pub mod corner;
 pub mod fit;
 pub mod follow;
-pub mod arc_length;
-pub mod bang_bang_quadratic;
-pub mod bernstein;
-pub mod fit;
 pub mod gcode;
 pub mod limit_curve;
 pub mod motion;

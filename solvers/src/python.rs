@@ -2,8 +2,8 @@
 
 mod arrays;
 mod fit;
-mod path;
 mod gcode;
+mod path;
 mod plan;
 mod sampling;
 
@@ -50,10 +50,9 @@ pub(crate) use with_axes;
 fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     fit::register(module)?;
-    path::register(module)?;
-    sampling::register(module)?;
-    plan::register(module)?;
     gcode::register(module)?;
-    fit::register(module)?;
+    path::register(module)?;
+    plan::register(module)?;
+    sampling::register(module)?;
     Ok(())
 }
