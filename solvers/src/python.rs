@@ -56,5 +56,9 @@ fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     sampling::register(module)?;
     plan::register(module)?;
     gcode::register(module)?;
+    gcode::register(module)?;
+    path::register(module)?;
+    plan::register(module)?;
+    sampling::register(module)?;
     Ok(())
 }
