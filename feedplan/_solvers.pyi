@@ -109,8 +109,6 @@ def read_gcode(
     block_delete: bool,
     max_moves: int,
 ) -> dict[str, Any]: ...
-
-
 def fit_points(
     points: NDArray[np.float64],
     tolerance: float,

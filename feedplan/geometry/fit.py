@@ -75,7 +75,9 @@ def fit_points(
         raise InputError(f"point {int(bad.argmax())} is not finite: correct its coordinates")
     same = (array[1:] == array[:-1]).all(axis=1)
     if same.any():
-        raise InputError(f"points {int(same.argmax())} and {int(same.argmax()) + 1} coincide: remove one of them")
+        raise InputError(
+            f"points {int(same.argmax())} and {int(same.argmax()) + 1} coincide: remove one of them"
+        )
     if math.isnan(tolerance):
         raise InputError("the fitting tolerance is not a number: give it in mm")
     return FittedCurve(*_solvers.fit_points(array, tolerance, max_chord, max_curvature, corner_angle))
