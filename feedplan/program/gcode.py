@@ -26,8 +26,8 @@ Everything else is an error that names the line and the word: cutter radius comp
 (G5 G6), threading, probing, subprograms and flow control (O words, M97 to M99), words that no code of their
 block uses. Within a block the order is LinuxCNC's, with differences that posts count on: F is in the units of
 its own block, G80 gives way to another motion code beside it, and G0 beside G28 only stays in force. All axes
-start at machine zero; a change of offsets moves nothing. A stop or dwell belongs to the move before it; a dwell
-before the first move is kept as `start_dwell`.
+start at machine zero; a change of offsets moves nothing. A stop or dwell belongs to the move before it, and a
+dwell before the first move is kept as `start_dwell`.
 """
 
 from __future__ import annotations
