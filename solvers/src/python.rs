@@ -1,6 +1,7 @@
 //! The Python module `feedplan._solvers`: arrays in, arrays out, one submodule file per kernel.
 
 mod arrays;
+mod audit;
 
 use pyo3::prelude::*;
 
@@ -44,5 +45,6 @@ pub(crate) use with_axes;
 #[pymodule]
 fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    audit::register(module)?;
     Ok(())
 }
