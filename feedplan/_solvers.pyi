@@ -1,3 +1,67 @@
 """Types of the native module."""
 
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "PathLength",
+    "Sampler",
+    "__version__",
+]
+
 __version__: str
+
+@final
+class PathLength:
+    def __new__(cls, control_points: NDArray[np.float64], width: NDArray[np.float64]) -> PathLength: ...
+    @property
+    def total(self) -> float: ...
+    @property
+    def error(self) -> float: ...
+    def lengths(self, piece: NDArray[np.uint32], u: NDArray[np.float64]) -> NDArray[np.float64]: ...
+    def locate(
+        self, lengths: NDArray[np.float64], tolerance: float, newton: bool
+    ) -> tuple[NDArray[np.uint32], NDArray[np.float64], NDArray[np.uint32], NDArray[np.float64]]: ...
+
+@final
+class Sampler:
+    def __new__(
+        cls,
+        control_points: NDArray[np.float64],
+        width: NDArray[np.float64],
+        line: NDArray[np.int32],
+        runs: NDArray[np.int64],
+        dwell: NDArray[np.float64],
+        piece: NDArray[np.uint32],
+        kind: NDArray[np.uint8],
+        axis: NDArray[np.uint8],
+        value: NDArray[np.float64],
+        u0: NDArray[np.float64],
+        u1: NDArray[np.float64],
+        p0: NDArray[np.float64],
+        p1: NDArray[np.float64],
+        duration: NDArray[np.float64],
+        arc_runs: NDArray[np.int64],
+        period: float,
+        newton: bool,
+    ) -> Sampler: ...
+    @property
+    def count(self) -> int: ...
+    @property
+    def duration(self) -> float: ...
+    def chunk(
+        self, start: int, stop: int
+    ) -> tuple[
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.int32],
+        NDArray[np.uint32],
+        NDArray[np.float64],
+        int,
+        float,
+    ]: ...

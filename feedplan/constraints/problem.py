@@ -7,7 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.constraints.feed import feed_limit
+from feedplan.constraints.junction import junction_limit
+from feedplan.errors import InputError
 from feedplan.geometry.path import Path
+from feedplan.machine.machine import Machine
 
 
 @dataclass(frozen=True)
@@ -31,3 +35,39 @@ class Problem:
     period: float
     start_speed: float = 0.0
     end_speed: float = 0.0
+
+
+def build_problem(
+    path: Path,
+    machine: Machine,
+    *,
+    feed: float | None = None,
+    feed_override: float = 1.0,
+    start_speed: float = 0.0,
+    end_speed: float = 0.0,
+) -> Problem:
+    """The path on the machine.
+
+    `feed` [mm/s] replaces the programmed feeds, `feed_override` multiplies them (rapids keep the axes'
+    limits), `start_speed` and `end_speed` [mm/s] hold at the ends of the whole path.
+    Raises InputError for a value out of range.
+    """
+    for name, value in (("start speed", start_speed), ("end speed", end_speed)):
+        if not (np.isfinite(value) and value >= 0):
+            raise InputError(f"{name} is {value} mm/s: give a finite speed of 0 or more")
+    axes = [machine.axis(name) for name in path.axes]
+    max_velocity = np.array([axis.max_velocity for axis in axes])
+    junction_speed = junction_limit(path, np.array([axis.max_velocity_jump for axis in axes]))
+    junction_speed[0], junction_speed[-1] = start_speed, end_speed
+    return Problem(
+        path=path,
+        max_velocity=max_velocity,
+        max_acceleration=np.array([axis.max_acceleration for axis in axes]),
+        max_jerk=np.array([axis.max_jerk for axis in axes]),
+        feed=feed_limit(path, max_velocity, feed, feed_override),
+        junction_speed=junction_speed,
+        chord_tolerance=machine.chord_tolerance,
+        period=machine.period,
+        start_speed=start_speed,
+        end_speed=end_speed,
+    )

@@ -58,6 +58,13 @@ class Machine:
         """The axis letters in order."""
         return tuple(axis.name for axis in self.axes)
 
+    def axis(self, name: str) -> Axis:
+        """The axis of that letter; raises MachineError where there is none."""
+        for axis in self.axes:
+            if axis.name == name:
+                return axis
+        raise MachineError(f"machine {self.name} has no axis {name}: it has {', '.join(self.axis_names)}")
+
     @classmethod
     def load(cls, source: str | FilePath) -> Machine:
         """The bundled machine of that name, or the machine in a TOML file.

@@ -2,7 +2,15 @@
 //! `python` alone binds them (feature `python`). Lengths are millimetres, times seconds.
 
 pub mod audit;
+pub mod arc_length;
+pub mod bang_bang_quadratic;
+pub mod bernstein;
+pub mod limit_curve;
+pub mod motion;
+pub mod newton;
 pub mod quadratic;
+pub mod sampling;
+pub mod sarfraz;
 
 #[cfg(feature = "python")]
 mod python;

@@ -2,6 +2,8 @@
 
 mod arrays;
 mod audit;
+mod plan;
+mod sampling;
 
 use pyo3::prelude::*;
 
@@ -46,5 +48,7 @@ pub(crate) use with_axes;
 fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     audit::register(module)?;
+    sampling::register(module)?;
+    plan::register(module)?;
     Ok(())
 }

@@ -1,0 +1,144 @@
+"""Setpoints at the servo period, from a path and the speed profile planned on it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from feedplan import _solvers
+from feedplan.errors import InputError
+from feedplan.geometry.path import Path
+from feedplan.profile import SpeedProfile
+
+Scalar = TypeVar("Scalar", bound=np.generic)
+
+INTERPOLATORS = ("sarfraz", "newton")
+# Six axes of it take 5 GB; a stream of any length goes through in smaller chunks.
+MAX_CHUNK = 20_000_000
+
+
+@dataclass(frozen=True)
+class SetpointChunk:
+    """Consecutive setpoints: `t` (n,) [s]; `position` [mm], `velocity` [mm/s], `acceleration` [mm/s²] and
+    `jerk` [mm/s³], each (n, axes); `line` (n,) source line; `axes` names.
+
+    `piece` (n,) and `u` (n,) say where on the path each is, and are empty where that is not known.
+    """
+
+    t: NDArray[np.float64]
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    acceleration: NDArray[np.float64]
+    jerk: NDArray[np.float64]
+    line: NDArray[np.int32]
+    axes: tuple[str, ...]
+    piece: NDArray[np.uint32] = field(default_factory=lambda: np.empty(0, np.uint32))
+    u: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+
+@dataclass(frozen=True)
+class SamplingStats:
+    """The worst of all setpoints computed so far: `iterations` of the interpolator (0: closed forms only) and
+    `length_error` in parts of a step, the proven error of the length table included."""
+
+    iterations: int = 0
+    length_error: float = 0.0
+
+
+class Setpoints:
+    """The stream of setpoints, computed as it is read.
+
+    Setpoint 0 is the start of the path. A run with time T and pause D takes ceil((T + D)/period) periods:
+    each stop is hit exactly and the stream waits less than one period there, so that `duration` [s], the time
+    of the last of `count` setpoints, is a little longer than the plan's time. A path that ends in motion ends
+    at its true time, after a shorter last step. At a stop velocity, acceleration and jerk are 0; at a
+    switching point, where the acceleration jumps, a setpoint has the values of the arc that begins there.
+    """
+
+    def __init__(self, path: Path, profile: SpeedProfile, period: float, interpolator: str) -> None:
+        if interpolator not in INTERPOLATORS:
+            raise InputError(
+                f"there is no interpolator '{interpolator}': use one of {', '.join(INTERPOLATORS)}"
+            )
+        self._sampler = _solvers.Sampler(
+            _array(path.control_points, np.float64),
+            _array(path.width, np.float64),
+            _array(path.line, np.int32),
+            _array(path.runs, np.int64),
+            _array(path.dwell, np.float64),
+            _array(profile.piece, np.uint32),
+            _array(profile.kind, np.uint8),
+            _array(profile.axis, np.uint8),
+            _array(profile.value, np.float64),
+            _array(profile.u0, np.float64),
+            _array(profile.u1, np.float64),
+            _array(profile.p0, np.float64),
+            _array(profile.p1, np.float64),
+            _array(profile.duration, np.float64),
+            _array(profile.runs, np.int64),
+            float(period),
+            interpolator == "newton",
+        )
+        self.period = float(period)
+        self.axes = path.axes
+        self.interpolator = interpolator
+        self.stats = SamplingStats()
+
+    @property
+    def count(self) -> int:
+        """Number of setpoints, the start of the path included."""
+        return self._sampler.count
+
+    @property
+    def duration(self) -> float:
+        """Time of the last setpoint [s]."""
+        return self._sampler.duration
+
+    def __len__(self) -> int:
+        return self.count
+
+    def chunks(self, size: int = 100_000) -> Iterator[SetpointChunk]:
+        """The stream in chunks of `size` setpoints, the last one shorter: memory does not grow with it.
+
+        The numbers do not depend on the size. Raises InputError for a size out of range.
+        """
+        if not 1 <= size <= MAX_CHUNK:
+            raise InputError(f"chunks of {size} setpoints: give a size from 1 to {MAX_CHUNK}")
+        return (self._chunk(start, min(start + size, self.count)) for start in range(0, self.count, size))
+
+    def all(self) -> SetpointChunk:
+        """The whole stream at once. Raises InputError where it is too long for that."""
+        if self.count > MAX_CHUNK:
+            raise InputError(f"{self.count} setpoints are too many to hold at once: read them by chunks()")
+        return self._chunk(0, self.count)
+
+    def _chunk(self, start: int, stop: int) -> SetpointChunk:
+        t, position, velocity, acceleration, jerk, line, piece, u, iterations, error = self._sampler.chunk(
+            start, stop
+        )
+        self.stats = SamplingStats(
+            max(self.stats.iterations, iterations), max(self.stats.length_error, error)
+        )
+        return SetpointChunk(t, position, velocity, acceleration, jerk, line, self.axes, piece, u)
+
+
+def setpoints(path: Path, profile: SpeedProfile, period: float, interpolator: str = "sarfraz") -> Setpoints:
+    """Setpoints every `period` [s] of a profile on its path.
+
+    `sarfraz`: closed forms where an axis moves at constant acceleration or speed, and length table with
+    Sarfraz predictor-corrector elsewhere. `newton`: steps of speed times period, to second order, and
+    Newton–Raphson.
+    Raises InputError for a period or an interpolator that cannot be used, or a profile of another path.
+    """
+    return Setpoints(path, profile, period, interpolator)
+
+
+def _array(values: ArrayLike, dtype: type[Scalar]) -> NDArray[Scalar]:
+    return np.ascontiguousarray(values, dtype=dtype)

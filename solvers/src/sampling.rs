@@ -1,0 +1,428 @@
+//! Setpoints at the servo period: positions, velocities, accelerations and jerks of a profile on its path.
+//!
+//! Every run starts on a setpoint and its end is hit exactly: run r with time T_r and pause D_r takes
+//! ceil((T_r + D_r)/period) periods, so the stream waits less than one period at a stop. A setpoint is found
+//! from its index alone (run, time in the run, arc, place on the arc), so any part of the stream can be computed
+//! on its own, in parallel and with the same digits. The Newton–Raphson interpolator goes step by step instead.
+//!
+//! At a stop velocity, acceleration and jerk are 0. At a switching point, where the acceleration jumps, a
+//! setpoint has the values of the arc that begins there.
+
+mod check;
+mod chunk;
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use self::check::check;
+use self::chunk::Slices;
+pub use self::chunk::{Chunk, Effort};
+use crate::motion::{Motion, ProfileArc, Rates, State, STEP_ERROR};
+use crate::newton;
+use crate::quadratic::{dot, norm, Quadratic};
+
+/// More setpoints than this are refused: their indices and arrays would serve nobody.
+pub const MAX_COUNT: f64 = 2e9;
+
+/// A run that ends this part of a period after a setpoint ends on it.
+const SLACK: f64 = 1e-9;
+
+/// An end is at rest when its speed is this part of the speed at the other end of its arc: a rounding error of
+/// p leaves the square root of one.
+const STANDSTILL: f64 = 1e-6;
+
+/// A Newton–Raphson step is repeated so often before halving; two or three times are usual.
+const MAX_REPEATS: u32 = 20;
+
+/// Setpoints computed by one task.
+const BLOCK: usize = 4096;
+
+/// How the place at the next setpoint is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Interpolator {
+    /// Closed forms on arcs; length table and Sarfraz predictor-corrector elsewhere.
+    Sarfraz,
+    /// Zhang 4.2: step length from speed and tangential acceleration, then Newton–Raphson.
+    Newton,
+}
+
+/// A run between stops.
+#[derive(Clone, Debug)]
+struct Run {
+    arcs: Range<usize>,
+    /// Setpoint on which the run starts.
+    first: usize,
+    periods: usize,
+    /// Time in motion in seconds.
+    time: f64,
+    last_piece: usize,
+}
+
+/// Where the Newton–Raphson interpolator stands: the setpoint it found last, in which run, on which arc.
+#[derive(Clone, Copy, Debug)]
+pub struct Resume {
+    index: usize,
+    arc: usize,
+    u: f64,
+}
+
+/// What a path gives: pieces, their source lines, runs as piece offsets, and the pause after each run.
+pub struct PathData<const M: usize> {
+    pub pieces: Vec<Quadratic<M>>,
+    pub lines: Vec<i32>,
+    pub runs: Vec<usize>,
+    pub dwell: Vec<f64>,
+}
+
+/// A profile on its path, ready to be read at any setpoint.
+pub struct Sampler<const M: usize> {
+    path: PathData<M>,
+    arcs: Vec<ProfileArc>,
+    /// Time from the start of the arc's run.
+    starts: Vec<f64>,
+    runs: Vec<Run>,
+    period: f64,
+    interpolator: Interpolator,
+    count: usize,
+    /// The path ends at a speed: the last setpoint has its true time.
+    ends_moving: bool,
+}
+
+impl<const M: usize> Sampler<M> {
+    /// Lays the time grid. `arc_runs` are the arc offsets of the runs. The error is a sentence for the user.
+    pub fn new(
+        path: PathData<M>,
+        arcs: Vec<ProfileArc>,
+        arc_runs: &[usize],
+        period: f64,
+        interpolator: Interpolator,
+    ) -> Result<Self, String> {
+        check(&path, &arcs, arc_runs)?;
+        if !(period.is_finite() && period > 0.0) {
+            return Err(format!("the period is {period} s: give a positive one"));
+        }
+        let mut starts = Vec::with_capacity(arcs.len());
+        let (mut runs, mut first, mut ends_moving) = (Vec::with_capacity(path.dwell.len()), 0.0, false);
+        for r in 0..path.dwell.len() {
+            let (arc_range, pieces) = (arc_runs[r]..arc_runs[r + 1], path.runs[r]..path.runs[r + 1]);
+            let mut time = 0.0;
+            for arc in &arcs[arc_range.clone()] {
+                starts.push(time);
+                time += arc.duration;
+            }
+            let last = r + 1 == path.dwell.len();
+            if let Some(arc) = arcs[arc_range.clone()].last() {
+                let motion = Motion::new(&path.pieces[arc.piece as usize], arc, false);
+                let speed = |u| norm(&motion.rates(&motion.at(u)).velocity);
+                if speed(arc.u1) > STANDSTILL * speed(arc.u0) {
+                    let line = path.lines[arc.piece as usize];
+                    if !last {
+                        return Err(format!(
+                            "line {line}: the profile ends run {} at {:.6} mm/s: only the last run may end in motion",
+                            r + 1,
+                            speed(arc.u1)
+                        ));
+                    }
+                    if path.dwell[r] > 0.0 {
+                        return Err(format!(
+                            "line {line}: the plan ends at {:.6} mm/s, but the program pauses {} s there: plan with end speed 0",
+                            speed(arc.u1),
+                            path.dwell[r]
+                        ));
+                    }
+                    ends_moving = true;
+                }
+            }
+            let periods = periods_of(time + path.dwell[r], period);
+            if first + periods > MAX_COUNT {
+                return Err(format!(
+                    "a period of {period} s makes more than {MAX_COUNT:.0} setpoints: use a larger period"
+                ));
+            }
+            runs.push(Run {
+                arcs: arc_range,
+                first: first as usize,
+                periods: periods as usize,
+                time,
+                last_piece: pieces.end - 1,
+            });
+            first += periods;
+        }
+        Ok(Self { path, arcs, starts, runs, period, interpolator, count: first as usize + 1, ends_moving })
+    }
+
+    /// Number of setpoints, the start of the path included.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Time of the last setpoint in seconds.
+    pub fn duration(&self) -> f64 {
+        self.time(self.count - 1)
+    }
+
+    /// Time of a setpoint in seconds.
+    fn time(&self, index: usize) -> f64 {
+        match self.runs.last() {
+            Some(run) if self.ends_moving && index == self.count - 1 => {
+                run.first as f64 * self.period + run.time
+            }
+            _ => index as f64 * self.period,
+        }
+    }
+
+    /// The setpoints in a range. `resume` carries the state of the Newton–Raphson interpolator from one range to
+    /// the next; without it, or out of order, a run is followed again from its start.
+    pub fn chunk(&self, range: Range<usize>, resume: &mut Option<Resume>) -> Chunk<M> {
+        let mut chunk = Chunk::with_size(range.len());
+        let parts = chunk.slices(range.start).split(&self.cuts(&range));
+        let results: Vec<(Effort, Option<Resume>)> = match self.interpolator {
+            Interpolator::Sarfraz => {
+                parts.into_par_iter().map(|part| (self.fill_by_time(part), None)).collect()
+            }
+            Interpolator::Newton => {
+                let resume = *resume;
+                parts.into_par_iter().map(|part| self.fill_by_steps(part, resume)).collect()
+            }
+        };
+        for (effort, state) in results {
+            chunk.effort.raise(effort.iterations, effort.length_error);
+            *resume = state.or(*resume);
+        }
+        chunk
+    }
+
+    /// Where a range is cut into tasks: anywhere, or between runs where the steps depend on each other.
+    fn cuts(&self, range: &Range<usize>) -> Vec<usize> {
+        match self.interpolator {
+            Interpolator::Sarfraz => range.clone().step_by(BLOCK).skip(1).collect(),
+            Interpolator::Newton => {
+                let inner = |run: &&Run| run.periods > 0 && run.first + 1 < range.end;
+                let from = self.runs.partition_point(|run| run.first < range.start);
+                self.runs[from..].iter().take_while(inner).map(|run| run.first + 1).collect()
+            }
+        }
+    }
+
+    /// The run that leads to a setpoint other than the first.
+    fn run_of(&self, index: usize) -> &Run {
+        &self.runs[self.runs.partition_point(|run| run.first < index) - 1]
+    }
+
+    /// Time in the run of its j-th setpoint; None where the tool has arrived.
+    fn run_time(&self, run: &Run, j: usize) -> Option<f64> {
+        let time = j as f64 * self.period;
+        (j < run.periods && time < run.time).then_some(time)
+    }
+
+    fn fill_by_time(&self, mut part: Slices<M>) -> Effort {
+        let mut effort = Effort::default();
+        let mut cursor = Cursor::new(self, false);
+        let mut i = 0;
+        while i < part.t.len() {
+            let index = part.start + i;
+            if index == 0 {
+                self.set_start(&mut part);
+                i += 1;
+                continue;
+            }
+            let run = self.run_of(index);
+            let stop = part.t.len().min(run.first + run.periods + 1 - part.start);
+            for i in i..stop {
+                let Some(time) = self.run_time(run, part.start + i - run.first) else {
+                    self.set_end(run, &mut part, i);
+                    continue;
+                };
+                let arc = cursor.seek(run, time);
+                let state = cursor.motion().at_time(time - self.starts[arc], self.period);
+                effort.raise(state.iterations, state.error * self.arcs[arc].duration / self.period);
+                self.set(&mut part, i, arc, cursor.motion(), &state);
+            }
+            i = stop;
+        }
+        effort
+    }
+
+    /// Zhang 4.2, corrected. The paper's step v·T is of first order and stands still at rest: here it is of third
+    /// order on the arc that it ends on, and is repeated for the time that the profile still has to go from the
+    /// place reached, so that errors do not add up and every run ends on time.
+    fn fill_by_steps(&self, mut part: Slices<M>, resume: Option<Resume>) -> (Effort, Option<Resume>) {
+        let mut effort = Effort::default();
+        if part.start == 0 && !part.t.is_empty() {
+            self.set_start(&mut part);
+            if part.t.len() == 1 {
+                return (effort, None);
+            }
+        }
+        let begin = usize::from(part.start == 0);
+        let run = self.run_of(part.start + begin);
+        let mut cursor = Cursor::new(self, true);
+        let fresh = Resume { index: run.first, arc: run.arcs.start, u: f64::NAN };
+        let known = resume.filter(|known| known.index + 1 == part.start + begin && known.index > run.first);
+        let mut at = known.unwrap_or(fresh);
+        while at.index + 1 < part.start + part.t.len() {
+            at.index += 1;
+            let out = (at.index >= part.start).then(|| at.index - part.start);
+            let Some(time) = self.run_time(run, at.index - run.first) else {
+                if let Some(i) = out {
+                    self.set_end(run, &mut part, i);
+                }
+                continue;
+            };
+            cursor.from(at.arc);
+            let arc = cursor.seek(run, time);
+            let motion = cursor.motion();
+            if arc != at.arc || at.u.is_nan() {
+                at = Resume { arc, u: self.arcs[arc].u0, ..at };
+            }
+            let (rounds, error) = self.step(motion, time - self.starts[arc], &mut at.u);
+            effort.raise(rounds, error);
+            if let Some(i) = out {
+                self.set(&mut part, i, arc, motion, &motion.at(at.u));
+            }
+        }
+        (effort, Some(at))
+    }
+
+    /// Moves u to `time` on the arc; returns the rounds of Newton–Raphson and the length error left, in steps.
+    fn step(&self, motion: &Motion<M>, time: f64, u: &mut f64) -> (u32, f64) {
+        let table = motion.lengths();
+        let (mut low, mut high) = (table.nodes[0].u, table.nodes[table.nodes.len() - 1].u);
+        let (mut rounds, mut whole) = (0, 0.0);
+        for repeat in 0.. {
+            let state = motion.at(*u);
+            let left = time - motion.time(&state);
+            let rates = motion.rates(&state);
+            let step = step_length(&rates, left);
+            if repeat == 0 {
+                // The step may have begun on an earlier arc.
+                whole = step_length(&rates, self.period).max(step.abs());
+            }
+            if left > 0.0 {
+                low = low.max(*u);
+            } else {
+                high = high.min(*u);
+            }
+            let middle = 0.5 * (low + high);
+            if step.abs() <= STEP_ERROR * whole + 2.0 * table.rounding() || !(low < middle && middle < high) {
+                let error = if whole > 0.0 { (step.abs() + motion.length_error()) / whole } else { 0.0 };
+                return (rounds, error);
+            }
+            let tolerance = 0.1 * STEP_ERROR * whole + table.rounding();
+            let (located, _) = newton::advance(&table, (*u, table.integral(*u)), step, tolerance);
+            rounds += located.iterations;
+            // A large period can be too much for the series.
+            let usable = low < located.u && located.u < high && repeat < MAX_REPEATS;
+            *u = if usable { located.u } else { middle };
+        }
+        unreachable!("halving comes to an end")
+    }
+
+    fn set(&self, part: &mut Slices<M>, i: usize, arc: usize, motion: &Motion<M>, state: &State) {
+        let Rates { velocity, acceleration, jerk } = motion.rates(state);
+        let piece = self.arcs[arc].piece;
+        part.t[i] = self.time(part.start + i);
+        part.position[i] = motion.point(state);
+        part.velocity[i] = velocity;
+        part.acceleration[i] = acceleration;
+        part.jerk[i] = jerk;
+        part.line[i] = self.path.lines[piece as usize];
+        part.piece[i] = piece;
+        part.u[i] = state.u;
+    }
+
+    fn set_start(&self, part: &mut Slices<M>) {
+        let run = &self.runs[0];
+        if let Some(arc) = self.arcs[run.arcs.clone()].first() {
+            let motion = Motion::new(&self.path.pieces[arc.piece as usize], arc, false);
+            let state = motion.at(arc.u0);
+            self.set(part, 0, run.arcs.start, &motion, &state);
+            if norm(&part.velocity[0]) <= STANDSTILL * norm(&motion.rates(&motion.at(arc.u1)).velocity) {
+                (part.velocity[0], part.acceleration[0], part.jerk[0]) = ([0.0; M], [0.0; M], [0.0; M]);
+            }
+        }
+        part.position[0] = self.path.pieces[0].control[0];
+        part.line[0] = self.path.lines[0];
+        part.piece[0] = 0;
+        part.u[0] = 0.0;
+    }
+
+    fn set_end(&self, run: &Run, part: &mut Slices<M>, i: usize) {
+        let piece = &self.path.pieces[run.last_piece];
+        let last = self.ends_moving && part.start + i == self.count - 1;
+        if let (true, Some(arc)) = (last, self.arcs[run.arcs.clone()].last()) {
+            let motion = Motion::new(&self.path.pieces[arc.piece as usize], arc, false);
+            self.set(part, i, run.arcs.end - 1, &motion, &motion.at(arc.u1));
+        }
+        part.t[i] = self.time(part.start + i);
+        part.position[i] = piece.control[2];
+        part.line[i] = self.path.lines[run.last_piece];
+        part.piece[i] = run.last_piece as u32;
+        part.u[i] = piece.width;
+    }
+}
+
+/// Length of the step over `time`: v t + a t²/2 + j t³/6 with the first derivatives of the speed v, at most to
+/// the standstill that a < 0 leads to.
+fn step_length<const M: usize>(rates: &Rates<M>, time: f64) -> f64 {
+    let Rates { velocity, acceleration, jerk } = rates;
+    let v = norm(velocity);
+    if v == 0.0 {
+        // Away from the standstill, forward or back in time.
+        return 0.5 * norm(acceleration) * time * time.abs();
+    }
+    let a = dot(velocity, acceleration) / v;
+    let across: [f64; M] = std::array::from_fn(|k| acceleration[k] - a * velocity[k] / v);
+    let j = (dot(velocity, jerk) + dot(&across, &across)) / v;
+    let time = if a < 0.0 { time.min(-v / a) } else { time };
+    time * (v + time * (0.5 * a + time * j / 6.0))
+}
+
+/// Whole periods of a run, as f64 so that absurd numbers stay numbers.
+fn periods_of(time: f64, period: f64) -> f64 {
+    let exact = time / period;
+    match time > 0.0 {
+        true => (exact * (1.0 - 4.0 * f64::EPSILON) - SLACK).ceil().max(1.0),
+        false => 0.0,
+    }
+}
+
+/// The arc at a time, kept from one setpoint to the next.
+struct Cursor<'a, const M: usize> {
+    sampler: &'a Sampler<M>,
+    arc: usize,
+    motion: Option<(usize, Motion<M>)>,
+    with_lengths: bool,
+}
+
+impl<'a, const M: usize> Cursor<'a, M> {
+    fn new(sampler: &'a Sampler<M>, with_lengths: bool) -> Self {
+        Self { sampler, arc: usize::MAX, motion: None, with_lengths }
+    }
+
+    fn from(&mut self, arc: usize) {
+        self.arc = arc;
+    }
+
+    /// Goes to the arc of a run that contains the time.
+    fn seek(&mut self, run: &Run, time: f64) -> usize {
+        let starts = &self.sampler.starts;
+        if !run.arcs.contains(&self.arc) || starts[self.arc] > time {
+            self.arc = run.arcs.start + starts[run.arcs.clone()].partition_point(|&start| start <= time) - 1;
+        }
+        while self.arc + 1 < run.arcs.end && starts[self.arc + 1] <= time {
+            self.arc += 1;
+        }
+        if self.motion.as_ref().is_none_or(|(arc, _)| *arc != self.arc) {
+            let arc = &self.sampler.arcs[self.arc];
+            let piece = &self.sampler.path.pieces[arc.piece as usize];
+            self.motion = Some((self.arc, Motion::new(piece, arc, self.with_lengths)));
+        }
+        self.arc
+    }
+
+    fn motion(&self) -> &Motion<M> {
+        &self.motion.as_ref().expect("seek comes first").1
+    }
+}

@@ -1,0 +1,154 @@
+//! The parameter at a given length: a monotone rational cubic predicts it from a table row, the same curve on
+//! the shrinking bracket corrects it.
+//!
+//! Source: Cheatham 2007, sections 3.2.3 and 3.2.4 (equations 3.11–3.14), after Sarfraz. S is the integral that
+//! a `Table` holds, S' its integrand, d = 1/S' the slope of u(S).
+
+use crate::arc_length::{quadrature, Integrand, Node, Table};
+
+/// Each round of the corrector divides the miss by four or is followed by a halving of the bracket. From the
+/// width of a panel to the last digit that takes fewer rounds than this, whatever the curve.
+pub const MAX_ITERATIONS: u32 = 200;
+
+/// A parameter and how it was found.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Located {
+    pub u: f64,
+    /// The remaining miss |S(u) − S|, in the unit of S.
+    pub miss: f64,
+    /// Evaluations of S(u): 1 when the prediction was good enough, 0 at the ends.
+    pub iterations: u32,
+}
+
+/// The Sarfraz curve u(S) between two rows; NaN where S' vanishes at one of them.
+///
+/// Over the common denominator the terms of (3.12) collect to d₀ΔS θ(1−θ) + Δu θ³, all positive, so that even
+/// slopes far apart cost no digits.
+#[inline]
+pub fn predict(from: &Node, to: &Node, s: f64) -> f64 {
+    let (width, rise) = (to.u - from.u, to.sum - from.sum);
+    let (d0, d1) = (1.0 / from.rate, 1.0 / to.rate);
+    let theta = (s - from.sum) / rise;
+    let mixed = theta * (1.0 - theta);
+    let omega = (d1 + d0) * rise / width;
+    // θ³ + (1−θ)³ = 1 − 3 θ(1−θ).
+    from.u + (d0 * rise * mixed + width * theta * theta * theta) / (1.0 + (omega - 3.0) * mixed)
+}
+
+/// The u with S(u) = s within `tolerance`; beyond either end that end.
+pub fn locate<F: Integrand>(table: &Table<F>, s: f64, tolerance: f64) -> Located {
+    let first = table.panel(|node| node.sum <= s);
+    let start = table.nodes[first];
+    let (mut low, mut high) = (start, table.nodes[first + 1]);
+    if s <= low.sum {
+        return Located { u: low.u, ..Located::default() };
+    }
+    if s >= high.sum {
+        return Located { u: high.u, ..Located::default() };
+    }
+    let (mut best, mut halve, mut last_miss) = (Located::default(), false, f64::INFINITY);
+    for iterations in 1..=MAX_ITERATIONS {
+        let middle = 0.5 * (low.u + high.u);
+        let mut u = if halve { middle } else { predict(&low, &high, s) };
+        // Next to a cusp, and when only rounding is left, the curve says nothing new.
+        if !(low.u < u && u < high.u) {
+            u = middle;
+        }
+        let sum = start.sum + quadrature(&table.f, start.u, u);
+        let miss = (sum - s).abs();
+        best = if miss < last_miss || iterations == 1 { Located { u, miss, iterations } } else { best };
+        best.iterations = iterations;
+        if miss <= tolerance || !(low.u < middle && middle < high.u) {
+            break;
+        }
+        let before = high.u - low.u;
+        let row = Node { u, sum, rate: table.f.at(u) };
+        if sum > s {
+            high = row;
+        } else {
+            low = row;
+        }
+        halve = miss > 0.25 * last_miss && high.u - low.u > 0.5 * before;
+        last_miss = miss.min(last_miss);
+    }
+    best
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::arc_length::{tabulate, Hodograph, Length};
+    use crate::quadratic::Quadratic;
+
+    fn row(u: f64, sum: f64, rate: f64) -> Node {
+        Node { u, sum, rate }
+    }
+
+    #[test]
+    fn equal_slopes_give_the_straight_line() {
+        let (from, to) = (row(1.0, 0.0, 2.0), row(3.0, 4.0, 2.0));
+        for s in [0.0, 1.0, 2.5, 4.0] {
+            assert!((predict(&from, &to, s) - (1.0 + s / 2.0)).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn the_curve_has_the_given_ends_and_slopes() {
+        let (from, to) = (row(0.0, 0.0, 0.5), row(1.0, 2.0, 4.0));
+        let step = 1e-7;
+        assert_eq!((predict(&from, &to, 0.0), predict(&from, &to, 2.0)), (0.0, 1.0));
+        assert!((predict(&from, &to, step) / step - 2.0).abs() < 1e-5);
+        assert!(((1.0 - predict(&from, &to, 2.0 - step)) / step - 0.25).abs() < 1e-5);
+    }
+
+    #[test]
+    fn one_prediction_is_enough_on_a_line() {
+        let line = Quadratic::line([0.0, 0.0], [3.0, 4.0]);
+        let mut nodes = Vec::new();
+        let f = Length(Hodograph::new(&line));
+        tabulate(f, 0.0, 5.0, 1e-12, &mut nodes);
+        let located = locate(&Table { f, nodes: &nodes }, 1.25, 1e-12);
+        assert_eq!(located.iterations, 1);
+        assert!((located.u - 1.25).abs() < 1e-14);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(400))]
+
+        #[test]
+        fn the_prediction_never_turns_back(
+            rates in prop::array::uniform2(-6.0..6.0f64), width in 0.01..10.0f64, rise in 0.01..10.0f64
+        ) {
+            let from = row(0.0, 0.0, 10f64.powf(rates[0]));
+            let to = row(width, rise, 10f64.powf(rates[1]));
+            let mut last = 0.0;
+            for i in 1..=200 {
+                let u = predict(&from, &to, rise * (i as f64 / 200.0));
+                prop_assert!(u >= last * (1.0 - 1e-15) && u <= width * (1.0 + 1e-15));
+                last = u;
+            }
+        }
+
+        #[test]
+        fn every_length_is_found_in_few_rounds_near_cusps_too(
+            a in prop::array::uniform2(-5.0..5.0), b in prop::array::uniform2(-5.0..5.0),
+            c in prop::array::uniform2(-5.0..5.0), along in -1.0..2.0f64, exponent in -14.0..0.0f64,
+            at in 0.0..1.0f64,
+        ) {
+            let off = 10f64.powf(exponent);
+            let middle = std::array::from_fn(|k| a[k] + along * (c[k] - a[k]) + off * b[k]);
+            let piece = Quadratic::<2> { control: [a, middle, c], width: 3.0 };
+            let f = Length(Hodograph::new(&piece));
+            let mut nodes = Vec::new();
+            tabulate(f, 0.0, 3.0, 1e-13 * quadrature(&f, 0.0, 3.0), &mut nodes);
+            let table = Table { f, nodes: &nodes };
+            let (s, tolerance) = (at * table.total(), 1e-13 * table.total());
+            let located = locate(&table, s, tolerance);
+            prop_assert!(located.miss <= tolerance, "{located:?}");
+            prop_assert!((table.integral(located.u) - s).abs() <= 2.0 * tolerance);
+            prop_assert!(located.iterations <= 30, "{located:?}");
+        }
+    }
+}
