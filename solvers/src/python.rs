@@ -4,6 +4,7 @@ mod arrays;
 mod fit;
 mod gcode;
 mod path;
+mod audit;
 mod plan;
 mod sampling;
 mod text;
@@ -53,6 +54,7 @@ fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     fit::register(module)?;
     path::register(module)?;
     text::register(module)?;
+    audit::register(module)?;
     sampling::register(module)?;
     plan::register(module)?;
     gcode::register(module)?;
