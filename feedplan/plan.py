@@ -13,12 +13,12 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from feedplan.audit import Audit, audit
+from feedplan.bound import lower_bound
 from feedplan.constraints.problem import Problem, build_problem
 from feedplan.geometry.build import build_path
 from feedplan.geometry.length import PathLength
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
-from feedplan.bound import lower_bound
 from feedplan.planners import planner
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program

@@ -2,8 +2,8 @@
 //! `python` alone binds them (feature `python`). Lengths are millimetres, times seconds.
 
 pub mod arc;
-pub mod audit;
 pub mod arc_length;
+pub mod audit;
 pub mod bang_bang_quadratic;
 pub mod bernstein;
 pub mod corner;

@@ -1,10 +1,10 @@
 //! The Python module `feedplan._solvers`: arrays in, arrays out, one submodule file per kernel.
 
 mod arrays;
+mod audit;
 mod fit;
 mod gcode;
 mod path;
-mod audit;
 mod plan;
 mod sampling;
 mod text;
@@ -58,9 +58,5 @@ fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     sampling::register(module)?;
     plan::register(module)?;
     gcode::register(module)?;
-    gcode::register(module)?;
-    path::register(module)?;
-    plan::register(module)?;
-    sampling::register(module)?;
     Ok(())
 }
