@@ -5,10 +5,17 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.audit import _Limits
+from feedplan.constraints.problem import Problem
+from feedplan.profile import SpeedProfile
+from feedplan.program.program import Program
+
 __all__ = [
     "PathLength",
     "Sampler",
+    "SetpointAudit",
     "__version__",
+    "audit_plan",
 ]
 
 __version__: str
@@ -65,3 +72,33 @@ class Sampler:
         int,
         float,
     ]: ...
+
+# Per limit: name, axis (-1: none), worst value, limit, ratio, time, source line; and the number of samples.
+_Findings = tuple[list[tuple[str, int, float, float, float, float, int]], int]
+
+def audit_plan(
+    problem: Problem,
+    limits: _Limits,
+    profile: SpeedProfile | None = None,
+    program: Program | None = None,
+) -> _Findings: ...
+
+@final
+class SetpointAudit:
+    def __new__(
+        cls,
+        limits: _Limits,
+        resolution: float = 0.0,
+        problem: Problem | None = None,
+        profile: SpeedProfile | None = None,
+        program: Program | None = None,
+    ) -> SetpointAudit: ...
+    def push(
+        self,
+        t: NDArray[np.float64],
+        position: NDArray[np.float64],
+        velocity: NDArray[np.float64] | None = None,
+        acceleration: NDArray[np.float64] | None = None,
+        line: NDArray[np.int32] | None = None,
+    ) -> None: ...
+    def finish(self) -> _Findings: ...

@@ -170,6 +170,7 @@ impl<const M: usize> Tally<M> {
         // The negated comparison also holds for a NaN, which must not get lost.
         #[allow(clippy::neg_cmp_op_on_partial_ord)]
         if !(ratio <= self.worst[check as usize][axis].ratio) {
+            let value = if value < 0.0 { 0.0 } else { value };
             self.offer_ratio(check, axis, Worst { value, limit, ratio, time, line });
         }
     }

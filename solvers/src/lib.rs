@@ -1,8 +1,8 @@
 //! Native kernels of feedplan. Every kernel takes slices and returns vectors; it knows no file and no Python.
 //! `python` alone binds them (feature `python`). Lengths are millimetres, times seconds.
 
-pub mod audit;
 pub mod arc_length;
+pub mod audit;
 pub mod bang_bang_quadratic;
 pub mod bernstein;
 pub mod limit_curve;

@@ -95,11 +95,13 @@ impl Arcs<'_> {
             AXIS_VELOCITY => Law::AxisVelocity { axis, speed: self.value[i].sqrt() },
             _ => Law::Chord { value: self.value[i] },
         };
+        let bend = curve.second_derivative();
         let width = self.u1[i] - self.u0[i];
         Motion {
             tangent,
-            bend: curve.second_derivative(),
+            bend,
             law,
+            pole: law.pole(&tangent, &bend, p_anchor),
             direction: if anchored_at_end { -1.0 } else { 1.0 },
             width,
             root_anchor: p_anchor.sqrt(),
@@ -133,6 +135,26 @@ enum Law {
     },
 }
 
+impl Law {
+    fn pole<const M: usize>(&self, tangent: &[f64; M], bend: &[f64; M], p_anchor: f64) -> Option<Pole> {
+        match *self {
+            // p − a/q''_k falls off as (q'_k(anchor) / q'_k)².
+            Law::AxisAcceleration { axis, value, .. } if bend[axis] != 0.0 => Some(Pole {
+                at: -tangent[axis] / bend[axis],
+                beside: 0.0,
+                strength: (1.0 - bend[axis] * p_anchor / value).abs(),
+            }),
+            Law::Feed { .. } | Law::Chord { .. } if bend.iter().any(|&c| c != 0.0) => {
+                let square = inner(bend, bend);
+                let at = -inner(tangent, bend) / square;
+                let nearest: [f64; M] = std::array::from_fn(|k| tangent[k] + at * bend[k]);
+                Some(Pole { at, beside: length(&nearest) / square.sqrt(), strength: 1.0 })
+            }
+            _ => None,
+        }
+    }
+}
+
 /// One arc, ready to be evaluated at any distance from its anchor.
 #[derive(Clone, Copy, Debug)]
 pub struct Motion<const M: usize> {
@@ -149,6 +171,17 @@ pub struct Motion<const M: usize> {
     pub root_far: f64,
     /// Whether the anchor is the end of the arc.
     pub anchored_at_end: bool,
+    pole: Option<Pole>,
+}
+
+/// Where p would grow without bound, or turn sharply: the zero of what it is divided by.
+#[derive(Clone, Copy, Debug)]
+struct Pole {
+    /// Signed distance from the anchor, and how far the pole lies beside the real line.
+    at: f64,
+    beside: f64,
+    /// Share of p that changes in its neighbourhood.
+    strength: f64,
 }
 
 /// The motion at one place of an arc.
@@ -174,6 +207,9 @@ const INNER_WEIGHTS: [f64; 2] = [5.0 / 9.0, 8.0 / 9.0];
 
 /// Where the two rules differ by no more than this, the better one is good to about its square, 1e-11.
 const RULES_AGREE: f64 = 3e-6;
+
+/// A boundary layer that takes less than this share of an interval's time is left out.
+const THIN: f64 = 1e-12;
 
 /// Halvings of an interval before its integral is taken as it is.
 const MOST_HALVINGS: u32 = 40;
@@ -246,9 +282,20 @@ impl<const M: usize> Motion<M> {
         linear / self.root_p(d, &tangent)
     }
 
+    /// Whether the integrand is smooth enough between two distances for the rule: no longer than they are far
+    /// from where p has a pole or a kink. A boundary layer too thin to matter counts as smooth.
+    #[inline]
+    fn is_smooth(&self, d0: f64, d1: f64) -> bool {
+        let Some(pole) = &self.pole else { return true };
+        let along = (d0.min(d1) - pole.at).max(pole.at - d0.max(d1)).max(0.0);
+        let (length, away) = ((d1 - d0).abs(), along.hypot(pole.beside));
+        length <= away || pole.strength * away <= THIN * length
+    }
+
     /// Time from `y0` to `y1`, in s, and whether the rule could be trusted there.
     #[inline]
     fn rule(&self, y0: f64, y1: f64) -> (f64, bool) {
+        let smooth = self.is_smooth(self.distance(y0), self.distance(y1));
         let (middle, half) = (0.5 * (y0 + y1), 0.5 * (y1 - y0));
         let centre = self.integrand(middle);
         let mut fine = WEIGHTS[3] * centre;
@@ -261,7 +308,7 @@ impl<const M: usize> Motion<M> {
             }
         }
         let scale = 2.0 * self.width / (self.root_anchor + self.root_far) * half;
-        (fine * scale, (fine - coarse).abs() <= RULES_AGREE * fine)
+        (fine * scale, smooth && (fine - coarse).abs() <= RULES_AGREE * fine)
     }
 
     /// Walks from `from` to `to` and calls `step` for every interval whose time is known well enough.
@@ -305,10 +352,14 @@ impl<const M: usize> Motion<M> {
         self.time_between(y0, middle, halvings - 1) + self.time_between(middle, y1, halvings - 1)
     }
 
-    /// Axis accelerations near `y` as a difference quotient over a thousandth of the arc, in mm/s², and how much
-    /// of each may be rounding.
+    /// Axis accelerations near `y` as a difference quotient over a thousandth of the arc, or less where p changes
+    /// fast, in mm/s², and how much of each may be rounding.
     pub fn acceleration_near(&self, y: f64) -> ([f64; M], [f64; M]) {
-        let (from, to) = (self.state((y - 5e-4).max(0.0)), self.state((y + 5e-4).min(1.0)));
+        let d = self.distance(y);
+        let away = self.pole.map_or(f64::INFINITY, |pole| (d - pole.at).hypot(pole.beside));
+        // Around y, so that the mean is that at y to second order; at an end one-sided and very short.
+        let half = f64::min(5e-4, 0.01 * away / self.width).min(y.min(1.0 - y).max(1e-6));
+        let (from, to) = (self.state((y - half).max(0.0)), self.state((y + half).min(1.0)));
         let time = self.direction * self.time_between(from.y, to.y, MOST_HALVINGS);
         (
             std::array::from_fn(|k| (to.velocity[k] - from.velocity[k]) / time),

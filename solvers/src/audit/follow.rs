@@ -282,8 +282,7 @@ impl Plan<'_> {
             let at_joint = row.spot.place.u.min(rest) <= PLACE_TOLERANCE;
             for k in 0..M {
                 // From rest, a place known to `away` is passed at a speed known to this.
-                let unknown =
-                    (2.0 * limits.acceleration[k] * (rounding + PLACE_TOLERANCE * EPS.sqrt())).sqrt();
+                let unknown = (2.0 * limits.acceleration[k] * away).sqrt();
                 let off = (recorded[k] - state.velocity[k]).abs() - unknown;
                 let jump = if at_joint { limits.jump[k] } else { 0.0 };
                 let limit = VELOCITY_SHARE * limits.acceleration[k] * limits.period + jump;

@@ -278,7 +278,8 @@ impl<'a, const M: usize> Probe<'a, M> {
         let last = self.motion.state(1.0);
         self.place(&state);
         let step = 1.0 / INTERVALS as f64;
-        let [head, tail] = [&state, &last].map(|end| Some(self.short_interval(end)).filter(|y| *y < step));
+        let [head, tail] =
+            [&state, &last].map(|end| Some(self.short_interval(end)).filter(|y| *y > 0.0 && *y < step));
         let inner = (1..INTERVALS).map(|i| i as f64 * step);
         for y in head.into_iter().chain(inner).chain(tail.map(|y| 1.0 - y)) {
             let next = self.motion.state(y);
