@@ -4,7 +4,9 @@
 //! of every step. Unknown are the slopes s_j = C'(knot j). C' is linear between knots, so the tangent at the
 //! data is m_j = (h_j s_{j−1} + h_{j−1} s_j)/(h_{j−1} + h_j), and integrating C' over step j gives
 //!
-//!     m_j + 2 s_j + m_{j+1} = 4 (F_{j+1} − F_j)/h_j
+//! ```text
+//! m_j + 2 s_j + m_{j+1} = 4 (F_{j+1} − F_j)/h_j
+//! ```
 //!
 //! which is tridiagonal in s with diagonal 2 + (1 − a) + (1 − c) and off-diagonals a, c in [0, 1]: diagonally
 //! dominant for any spacing, whereas the same system in control points is not. At a free end the knot next to
