@@ -10,6 +10,8 @@ __all__ = [
     "PlanError",
     "Sampler",
     "__version__",
+    "build_path",
+    "csv_rows",
     "fit_points",
     "plan_quadratic",
     "read_gcode",
@@ -97,6 +99,8 @@ class Sampler:
         float,
     ]: ...
 
+def csv_rows(values: NDArray[np.float64], last: NDArray[np.int32]) -> bytes: ...
+
 def read_gcode(
     source: bytes,
     name: str,
@@ -105,6 +109,7 @@ def read_gcode(
     block_delete: bool,
     max_moves: int,
 ) -> dict[str, Any]: ...
+
 def fit_points(
     points: NDArray[np.float64],
     tolerance: float,
@@ -113,4 +118,40 @@ def fit_points(
     corner_angle: float,
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.uint32]
+]: ...
+
+def build_path(
+    name: str,
+    start: NDArray[np.float64],
+    kind: NDArray[np.uint8],
+    target: NDArray[np.float64],
+    feed: NDArray[np.float64],
+    line: NDArray[np.int32],
+    tolerance: NDArray[np.float64],
+    fit_tolerance: NDArray[np.float64],
+    halt: NDArray[np.bool_],
+    arc_move: NDArray[np.int64],
+    arc_plane: NDArray[np.int64],
+    arc_centre: NDArray[np.float64],
+    arc_sweep: NDArray[np.float64],
+    max_velocity: NDArray[np.float64],
+    max_acceleration: NDArray[np.float64],
+    travel: NDArray[np.float64],
+    jump: bool,
+    exact_tolerance: float,
+    max_chord: float,
+    corner_acceleration: float,
+    max_speed: float,
+    corner_angle: float,
+) -> tuple[
+    tuple[
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.int64],
+        NDArray[np.float64],
+        NDArray[np.int64],
+    ],
+    tuple[int, int, int, float],
+    tuple[int, int, float] | None,
 ]: ...

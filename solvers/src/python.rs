@@ -3,8 +3,11 @@
 mod arrays;
 mod fit;
 mod gcode;
+mod path;
+mod audit;
 mod plan;
 mod sampling;
+mod text;
 
 use pyo3::prelude::*;
 
@@ -48,9 +51,16 @@ pub(crate) use with_axes;
 #[pymodule]
 fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    fit::register(module)?;
+    path::register(module)?;
+    text::register(module)?;
+    audit::register(module)?;
     sampling::register(module)?;
     plan::register(module)?;
     gcode::register(module)?;
-    fit::register(module)?;
+    gcode::register(module)?;
+    path::register(module)?;
+    plan::register(module)?;
+    sampling::register(module)?;
     Ok(())
 }

@@ -19,11 +19,17 @@ const FARTHEST: f64 = 1e6;
 /// rotary axes may wind up, in degrees.
 const FARTHEST_TURN: f64 = 1e8;
 
+/// Feeds and spindle speeds of the program beyond these are mistakes.
+pub(super) const RATES: std::ops::RangeInclusive<f64> = 1e-6..=1e9;
+
 /// Longer dwells are probably milliseconds taken for seconds.
 const LONG_DWELL: f64 = 100.0;
 
 /// Words that need no G code in their block. D names a cutter radius, which only G41 and G42 would use.
 const FREE_WORDS: u32 = bits(b"FSTD");
+
+/// Words of G2 and G3 beside the axes.
+const ARC_WORDS: u32 = bits(b"IJKRP");
 
 /// Codes that name no motion but take the axis words of their block.
 const TAKES_AXES: [u16; 5] = [100, 280, 300, 520, 920];
@@ -68,17 +74,30 @@ impl<'a> Interpreter<'a> {
     #[inline]
     pub fn run(&mut self, block: &Block, line: u32) -> Outcome<bool> {
         self.line = line;
-        if block.only_motion() && block.words & !(AXIS_WORDS | FREE_WORDS) == 0 {
-            self.set_feed_and_speed(block)?;
-            let motion = self.motion_of(block, block.words & AXIS_WORDS)?;
-            if let Some(motion @ (0 | 10)) = motion {
+        if !block.only_motion() {
+            return self.run_all(block);
+        }
+        // Nearly all blocks are a straight move or an arc and nothing else.
+        let axes = block.words & AXIS_WORDS;
+        let rest = block.words & !(AXIS_WORDS | FREE_WORDS);
+        match self.motion_of(block, axes)? {
+            Some(motion @ (0 | 10)) if rest == 0 => {
+                self.set_feed_and_speed(block)?;
                 self.state.motion = motion;
                 self.state.sticky.initial = None;
                 self.straight(block, motion == 0, false)?;
-                return Ok(false);
+                Ok(false)
             }
+            Some(motion @ (20 | 30)) if rest & !ARC_WORDS == 0 => {
+                self.set_feed_and_speed(block)?;
+                self.state.motion = motion;
+                self.state.sticky.initial = None;
+                self.arc(block, motion == 20)?;
+                Ok(false)
+            }
+            None if block.is_empty() => Ok(false),
+            _ => self.run_all(block),
         }
-        self.run_all(block)
     }
 
     fn run_all(&mut self, block: &Block) -> Outcome<bool> {
@@ -94,7 +113,7 @@ impl<'a> Interpreter<'a> {
         self.set_modes(block)?;
         self.set_offsets(block)?;
         match block.code(Group::Once) {
-            Some(code @ (280 | 300)) => self.go_home(block, code)?,
+            Some(280 | 300) => self.go_home(block)?,
             Some(100) => self.set_work_offset(block)?,
             Some(code @ (520 | 920)) => self.shift(block, code)?,
             _ => {}
@@ -107,6 +126,7 @@ impl<'a> Interpreter<'a> {
                 self.state.sticky.initial = None;
             }
             match motion {
+                _ if matches!(block.code(Group::Once), Some(280 | 300)) => {}
                 0 | 10 => self.straight(block, motion == 0, block.code(Group::Once) == Some(530))?,
                 20 | 30 => self.arc(block, motion == 20)?,
                 800 => {}
@@ -137,42 +157,46 @@ impl<'a> Interpreter<'a> {
     /// The motion that the block asks for, by its code or by its words.
     #[inline(always)]
     fn motion_of(&self, block: &Block, axes: u32) -> Outcome<Option<u16>> {
-        let taker = || block.code(Group::Once).filter(|code| TAKES_AXES.contains(code));
-        let tool = || block.code(Group::ToolLength).filter(|code| matches!(code, 431 | 432));
         match block.code(Group::Motion) {
-            Some(code) => {
-                if let Some(other) = taker().or_else(tool).filter(|_| code != 800) {
-                    return fault(format!(
-                        "words {} and {} both take axis words: put them in two blocks",
-                        g_name(other),
-                        g_name(code)
-                    ));
-                }
-                if code == 800 && axes != 0 && taker().or_else(tool).is_none() {
-                    return fault("axis words stand beside G80, which ends motion: give G0 or G1 instead");
-                }
-                if is_cycle(code) && axes == 0 {
-                    return fault(format!(
-                        "word {} has no axis words: give the place of the hole",
-                        g_name(code)
-                    ));
-                }
-                Ok(Some(code))
+            Some(code @ (0 | 10 | 20 | 30)) if block.only_motion() => Ok(Some(code)),
+            None if axes != 0 && block.only_motion() && self.state.motion != 800 => {
+                Ok(Some(self.state.motion))
             }
-            None if taker().is_some() => Ok(None),
-            None if axes != 0 && tool().is_some() => Ok(None),
-            None if axes != 0 && self.state.motion == 800 => {
+            code => self.motion_beside_others(block, axes, code),
+        }
+    }
+
+    fn motion_beside_others(&self, block: &Block, axes: u32, motion: Option<u16>) -> Outcome<Option<u16>> {
+        let once = block.code(Group::Once).filter(|code| TAKES_AXES.contains(code));
+        let tool = block.code(Group::ToolLength).filter(|code| matches!(code, 431 | 432));
+        match (motion, once.or(tool)) {
+            // `G0 G28 Z0` is common: G28 has the axis words, G0 stays in force.
+            (Some(code @ (0 | 800)), Some(280 | 300)) | (Some(code @ 800), Some(_)) => Ok(Some(code)),
+            (Some(code), Some(other)) => fault(format!(
+                "words {} and {} both take axis words: put them in two blocks",
+                g_name(other),
+                g_name(code)
+            )),
+            (Some(800), None) if axes != 0 => {
+                fault("axis words stand beside G80, which ends motion: give G0 or G1 instead")
+            }
+            (Some(code), None) if is_cycle(code) && axes == 0 => {
+                fault(format!("word {} has no axis words: give the place of the hole", g_name(code)))
+            }
+            (Some(code), None) => Ok(Some(code)),
+            (None, Some(_)) if once.is_some() || axes != 0 => Ok(None),
+            (None, _) if axes != 0 && self.state.motion == 800 => {
                 let letter = AXES.into_iter().find(|&letter| axes & bit(letter) != 0).unwrap_or(b'X');
                 fault(format!(
                     "word {} has no motion code in force: give G0 or G1 before it",
                     block.word(letter)
                 ))
             }
-            None if axes != 0 => Ok(Some(self.state.motion)),
-            None if block.words & bits(b"IJK") != 0 && matches!(self.state.motion, 20 | 30) => {
+            (None, _) if axes != 0 => Ok(Some(self.state.motion)),
+            (None, _) if block.words & bits(b"IJK") != 0 && matches!(self.state.motion, 20 | 30) => {
                 Ok(Some(self.state.motion))
             }
-            None => Ok(None),
+            (None, _) => Ok(None),
         }
     }
 
@@ -180,7 +204,7 @@ impl<'a> Interpreter<'a> {
     fn check_use(&self, block: &Block, axes: u32, motion: Option<u16>) -> Outcome<()> {
         let mut used = FREE_WORDS | axes;
         used |= match motion {
-            Some(20 | 30) => bits(b"IJKRP"),
+            Some(20 | 30) => ARC_WORDS,
             Some(730 | 830) => bits(b"RLQ"),
             Some(820 | 740 | 840 | 860 | 890) => bits(b"RLP"),
             Some(810 | 850) => bits(b"RL"),
@@ -194,7 +218,7 @@ impl<'a> Interpreter<'a> {
         if block.code(Group::Control) == Some(640) {
             used |= bits(b"PQ");
         }
-        if matches!(block.code(Group::ToolLength), Some(430 | 432)) {
+        if matches!(block.code(Group::ToolLength), Some(430 | 432 | 490)) {
             used |= bit(b'H');
         }
         if block.m_code(MGroup::User).is_some() || block.m_code(MGroup::Spindle) == Some(19) {
@@ -256,8 +280,15 @@ impl<'a> Interpreter<'a> {
             self.state.constant_surface_speed = code == 960;
             self.state.spindle_speed = None;
         }
+        if let Some(speed) = block.get(b'S') {
+            self.state.spindle_speed = (!self.state.constant_surface_speed).then_some(speed);
+        }
         if block.words & bits(b"SHTD") != 0 {
-            self.set_speed(block)?;
+            for letter in *b"SHTD" {
+                if block.get(letter).is_some_and(|value| value < 0.0) {
+                    return fault(format!("word {} is negative: give a number from 0", block.word(letter)));
+                }
+            }
         }
         Ok(())
     }
@@ -267,23 +298,16 @@ impl<'a> Interpreter<'a> {
         if feed < 0.0 {
             return fault(format!("word {} is a negative feed: give a positive one", block.word(b'F')));
         }
+        if feed != 0.0 && !RATES.contains(&feed) {
+            return fault(format!(
+                "word {} is a feed that no machine has: check the number",
+                block.word(b'F')
+            ));
+        }
         let inches = block.code(Group::Units).map_or(self.state.inches, |code| code == 200);
         let unit = if inches { super::modal::MM_PER_INCH } else { 1.0 };
         let per = if self.state.feed_mode == FeedMode::PerTurn { 1.0 } else { 60.0 };
         self.state.feed = Some(Feed { linear: feed * unit / per, angular: feed / per });
-        Ok(())
-    }
-
-    fn set_speed(&mut self, block: &Block) -> Outcome<()> {
-        for letter in *b"SHD" {
-            if block.get(letter).is_some_and(|value| value < 0.0) {
-                return fault(format!("word {} is negative: give a number from 0", block.word(letter)));
-            }
-        }
-        count(block, b'T', 0, "tool number")?;
-        if let Some(speed) = block.get(b'S') {
-            self.state.spindle_speed = (!self.state.constant_surface_speed).then_some(speed);
-        }
         Ok(())
     }
 
@@ -351,9 +375,9 @@ impl<'a> Interpreter<'a> {
                 let mut control = Control::new(Mode::Tolerance);
                 for (letter, place) in [(b'P', &mut control.blend), (b'Q', &mut control.fit)] {
                     if let Some(value) = block.get(letter) {
-                        if value < 0.0 {
+                        if !(0.0..=FARTHEST).contains(&value) {
                             return fault(format!(
-                                "word {} is a negative tolerance: give one from 0",
+                                "word {} is no tolerance: give one from 0",
                                 block.word(letter)
                             ));
                         }
@@ -417,28 +441,21 @@ impl<'a> Interpreter<'a> {
         let mut target = self.moves.position;
         let zero = if machine { [0.0; 9] } else { *self.state.offsets.sum() };
         let absolute = self.state.absolute;
-        let mut far = false;
         self.places(block, |axis, value| {
             target[axis] = value + if absolute { zero[axis] } else { target[axis] };
-            far |= !(target[axis].abs() <= farthest(axis));
         })?;
-        if far {
-            return self.too_far(&target);
-        }
+        self.check_reach(&target)?;
         Ok(target)
     }
 
-    #[cold]
-    pub(super) fn too_far<T>(&self, target: &Point) -> Outcome<T> {
-        let axis = (0..9).find(|&axis| !(target[axis].abs() <= farthest(axis))).unwrap_or(0);
-        let unit = if rotary(axis) { "degrees" } else { "mm" };
-        fault(format!(
-            "{} would go to {} {unit}, more than {} {unit} from the machine's zero: check the number, the units and \
-             the offsets",
-            AXES[axis] as char,
-            target[axis],
-            farthest(axis),
-        ))
+    /// Refuses places that no machine reaches, and what is not a number.
+    #[inline(always)]
+    pub(super) fn check_reach(&self, target: &Point) -> Outcome<()> {
+        let reached = |axis: usize| target[axis].abs() <= if rotary(axis) { FARTHEST_TURN } else { FARTHEST };
+        match (0..9).find(|&axis| !reached(axis)) {
+            None => Ok(()),
+            Some(axis) => too_far(axis, target[axis]),
+        }
     }
 
     /// Work offset of G10 L2 and L20.
@@ -544,7 +561,7 @@ impl<'a> Interpreter<'a> {
 
     /// G28 and G30: rapid to the place that the block names, then the axes named to the machine's home; all axes
     /// where none is named.
-    fn go_home(&mut self, block: &Block, code: u16) -> Outcome<()> {
+    fn go_home(&mut self, block: &Block) -> Outcome<()> {
         let via = self.target(block, false)?;
         self.rapid(&via)?;
         let mut target = via;
@@ -560,12 +577,7 @@ impl<'a> Interpreter<'a> {
                 target[axis] = home[axis];
             }
         }
-        if target.iter().enumerate().any(|(axis, value)| !(value.abs() <= farthest(axis))) {
-            return fault(format!(
-                "{} goes to a home that is no finite place: check the machine file",
-                g_name(code)
-            ));
-        }
+        self.check_reach(&target)?;
         self.rapid(&target)
     }
 
@@ -583,11 +595,12 @@ pub(super) fn is_cycle(motion: u16) -> bool {
     matches!(motion, 730 | 740 | 810..=890)
 }
 
-#[inline(always)]
-fn farthest(axis: usize) -> f64 {
-    if rotary(axis) {
-        FARTHEST_TURN
-    } else {
-        FARTHEST
-    }
+#[cold]
+fn too_far<T>(axis: usize, value: f64) -> Outcome<T> {
+    let (unit, farthest) = if rotary(axis) { ("degrees", FARTHEST_TURN) } else { ("mm", FARTHEST) };
+    fault(format!(
+        "{} would go to {value} {unit}, more than {farthest} {unit} from the machine's zero: check the number, the units \
+         and the offsets",
+        AXES[axis] as char,
+    ))
 }
