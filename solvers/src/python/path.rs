@@ -7,7 +7,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::arrays::{row, rows, to_array3};
-use super::with_axes;
+use super::with_padded_axes;
 use crate::follow::{ArcShape, Fault, FollowOptions, Moves};
 use crate::path_builder::{build_path as build, Axes, BuiltPath};
 
@@ -16,6 +16,9 @@ pyo3::import_exception!(feedplan.errors, ProgramError);
 pub fn register(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(build_path, module)?)
 }
+
+/// The travel of an axis that is not there.
+const ANYWHERE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
 /// Control points, widths, feeds, first and last moves, tolerances and runs of the path.
 type Columns<'py> = (
@@ -90,10 +93,10 @@ fn build_path<'py>(
         })
         .collect::<PyResult<_>>()?;
     let options = FollowOptions { exact_tolerance, max_chord, corner_acceleration, max_speed, corner_angle };
-    with_axes!(axes, M, {
+    with_padded_axes!(axes, M, {
         let target = rows::<M>(&target)?;
         let moves = Moves {
-            start: row::<M>(&start)?,
+            start: row::<M>(&start, 0.0)?,
             kind: kind.as_slice()?,
             target: &target,
             feed: feed.as_slice()?,
@@ -103,17 +106,17 @@ fn build_path<'py>(
             arcs: &shapes,
         };
         let travel = rows::<2>(&travel)?;
-        let axes = Axes {
-            max_velocity: row::<M>(&max_velocity)?,
-            max_acceleration: row::<M>(&max_acceleration)?,
-            travel: std::array::from_fn(|k| travel[k]),
+        let limits = Axes {
+            max_velocity: row::<M>(&max_velocity, 1.0)?,
+            max_acceleration: row::<M>(&max_acceleration, 1.0)?,
+            travel: std::array::from_fn(|k| travel.get(k).copied().unwrap_or(ANYWHERE)),
             jump,
         };
-        let path = py.detach(|| build(&moves, &options, &axes)).map_err(|error| {
+        let path = py.detach(|| build(&moves, &options, &limits)).map_err(|error| {
             let line = line.as_slice().map_or(0, |lines| lines[error.index]);
             ProgramError::new_err((format!("{name}, line {line}: {}", sentence(error.fault)), line))
         })?;
-        Ok(columns(py, &path))
+        Ok(columns(py, &path, axes))
     })
 }
 
@@ -129,13 +132,14 @@ fn sentence(fault: Fault) -> &'static str {
 fn columns<'py, const M: usize>(
     py: Python<'py>,
     path: &BuiltPath<M>,
+    axes: usize,
 ) -> (Columns<'py>, Summary, Option<Place>) {
     let pieces: Vec<_> = path.pieces.iter().map(|followed| followed.piece).collect();
     let moves: Vec<i64> =
         path.pieces.iter().flat_map(|followed| [followed.first as i64, followed.last as i64]).collect();
     let moves = PyArray1::from_vec(py, moves).reshape([pieces.len(), 2]).expect("n × 2 values");
     let columns = (
-        to_array3(py, &pieces),
+        to_array3(py, &pieces, axes),
         PyArray1::from_iter(py, pieces.iter().map(|piece| piece.width)),
         PyArray1::from_iter(py, path.pieces.iter().map(|followed| followed.feed)),
         moves,
