@@ -331,7 +331,9 @@ mod tests {
         let speed = 1.0 / (pieces.len() as f64 * pieces[0].width);
         for piece in &pieces {
             for tangent in [piece.end_tangents().0, piece.end_tangents().1] {
-                assert!((tangent[2] + 3.25 * speed).abs() < 1e-12 && (tangent[3] - 130.0 * speed).abs() < 1e-10);
+                assert!(
+                    (tangent[2] + 3.25 * speed).abs() < 1e-12 && (tangent[3] - 130.0 * speed).abs() < 1e-10
+                );
             }
         }
         let length: f64 = pieces.iter().map(|piece| piece.width).sum();
