@@ -161,6 +161,7 @@ def build_path(
     tuple[int, int, int, float],
     tuple[int, int, float] | None,
 ]: ...
+
 # Per limit: name, axis (-1: none), worst value, limit, ratio, time, source line; and the number of samples.
 _Findings = tuple[list[tuple[str, int, float, float, float, float, int]], int]
 
