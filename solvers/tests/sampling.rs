@@ -35,12 +35,17 @@ fn a_triangle_is_half_a_t_squared() {
         assert_eq!((up.rates(&state).acceleration[0], up.rates(&state).jerk[0]), (1000.0, 0.0));
         assert!((down.at_time(0.1 - t, 0.001).u - (10.0 - way)).abs() < 1e-14);
     }
+    assert_eq!(up.rates(&up.at(0.0)).velocity, [0.0; 2]);
+    assert_eq!(down.rates(&down.at(10.0)).velocity, [0.0; 2]);
 }
 
 #[test]
 fn a_run_of_a_whole_number_of_periods_ends_on_the_grid() {
     // 0.2 s are 200 periods of 1 ms, whichever way the quotient rounds; 199 and a bit of 1.0001 ms.
-    for (period, count) in [(0.001, 201), (0.2 / 3.0, 4), (0.2 / 7.0, 8), (0.001_000_1, 201), (1.0, 2)] {
+    let below = 0.001 * (1.0 - 1e-13);
+    for (period, count) in
+        [(0.001, 201), (below, 201), (0.2 / 3.0, 4), (0.2 / 7.0, 8), (0.001_000_1, 201), (1.0, 2)]
+    {
         for interpolator in [Interpolator::Sarfraz, Interpolator::Newton] {
             let sampler = sampler(period, interpolator);
             assert_eq!(sampler.count(), count, "{period}");
@@ -58,13 +63,33 @@ fn any_part_of_the_stream_has_the_same_digits() {
         let sampler = sampler(1e-5, interpolator);
         let whole = sampler.chunk(0..sampler.count(), &mut None);
         assert!(whole.t.len() > 20_000);
-        for range in [0..1, 1..2, 4095..4097, 9_999..10_002, 12_345..20_000] {
-            let part = sampler.chunk(range.clone(), &mut None);
-            assert_eq!(part.position, whole.position[range.clone()]);
-            assert_eq!(part.velocity, whole.velocity[range.clone()]);
-            assert_eq!(part.t, whole.t[range]);
+        // Onwards, with gaps, and back; with the state of the part before and without.
+        let mut state = None;
+        for range in [0..1, 1..2, 4095..4097, 4097..4200, 12_345..20_001, 9_999..10_002] {
+            for resume in [&mut None, &mut state] {
+                let part = sampler.chunk(range.clone(), resume);
+                assert_eq!(part.position, whole.position[range.clone()]);
+                assert_eq!(part.velocity, whole.velocity[range.clone()]);
+                assert_eq!(part.t, whole.t[range.clone()]);
+            }
         }
     }
+}
+
+#[test]
+fn an_end_at_rest_is_at_rest_whichever_end_is_slower_in_u() {
+    // x' falls from 4.7 to 0.3: from rest at u = 0.3 to 0.02 mm/s, and the reverse.
+    let piece = Quadratic { control: [[0.0], [7.05], [7.5]], width: 3.0 };
+    let slope = |u: f64| 4.7 + (0.3 - 4.7) * u / 3.0;
+    let duration = 100.0 * 0.5 * (slope(0.3) + slope(2.7)) * 2.4;
+    let p = (0.02 / slope(2.7)).powi(2);
+    let up = arc(ArcKind::AxisAcceleration, 0.02 / duration, (0.3, 2.7), (0.0, p), duration);
+    let motion = Motion::new(&piece, &up, false);
+    assert_eq!(motion.rates(&motion.at(0.3)).velocity, [0.0]);
+    let p = (0.02 / slope(0.3)).powi(2);
+    let down = arc(ArcKind::AxisAcceleration, -0.02 / duration, (0.3, 2.7), (p, 0.0), duration);
+    let motion = Motion::new(&piece, &down, false);
+    assert_eq!(motion.rates(&motion.at(2.7)).velocity, [0.0]);
 }
 
 #[test]
