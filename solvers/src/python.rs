@@ -1,7 +1,13 @@
 //! The Python module `feedplan._solvers`: arrays in, arrays out, one submodule file per kernel.
 
 mod arrays;
+mod audit;
+mod fit;
+mod gcode;
+mod path;
+mod plan;
 mod sampling;
+mod text;
 
 use pyo3::prelude::*;
 
@@ -45,6 +51,12 @@ pub(crate) use with_axes;
 #[pymodule]
 fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    fit::register(module)?;
+    path::register(module)?;
+    text::register(module)?;
+    audit::register(module)?;
     sampling::register(module)?;
+    plan::register(module)?;
+    gcode::register(module)?;
     Ok(())
 }

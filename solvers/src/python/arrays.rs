@@ -39,7 +39,10 @@ pub fn quadratics<const M: usize>(
 }
 
 /// Rows to an (n, M) array.
-pub fn to_array2<'py, const M: usize>(py: Python<'py>, rows: Vec<[f64; M]>) -> Bound<'py, PyArray2<f64>> {
+pub fn to_array2<'py, T: numpy::Element, const M: usize>(
+    py: Python<'py>,
+    rows: Vec<[T; M]>,
+) -> Bound<'py, PyArray2<T>> {
     let count = rows.len();
     let flat = numpy::PyArray1::from_vec(py, rows.into_flattened());
     flat.reshape([count, M]).expect("n × M values")

@@ -1,0 +1,103 @@
+//! An arc of p(x) on a sub-piece: what stays constant on it, its values, its Bernstein form.
+
+use super::curve::{Curve, Denominator};
+use super::subpiece::{Axes, SubPiece};
+
+/// What stays constant on an arc. Acceleration is counted in the sense of travel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Kind {
+    /// Axis at +A, begun at the start of the arc.
+    Accelerating(u8),
+    /// Axis at −A: an accelerating arc of the backward pass seen forward, begun at the end of the arc.
+    Braking(u8),
+    /// p; the axis is at its acceleration limit.
+    Flat(u8),
+    /// The velocity cap of the sub-piece.
+    Cap,
+    /// The velocity limit curve, a straight line in p.
+    LimitCurve,
+}
+
+/// p(x) on [x0, x1].
+#[derive(Clone, Copy, Debug)]
+pub struct Arc {
+    pub x0: f64,
+    pub x1: f64,
+    pub p0: f64,
+    pub p1: f64,
+    pub kind: Kind,
+}
+
+impl Arc {
+    /// The same arc as the opposite direction of travel sees it.
+    #[inline(always)]
+    pub fn reversed(&self, length: f64) -> Self {
+        let kind = match self.kind {
+            Kind::Accelerating(axis) => Kind::Braking(axis),
+            Kind::Braking(axis) => Kind::Accelerating(axis),
+            kind => kind,
+        };
+        // An end of the sub-piece stays exactly that.
+        let mirror = |x: f64| if x == 0.0 { length } else { length - x };
+        Self { x0: mirror(self.x1), x1: mirror(self.x0), p0: self.p1, p1: self.p0, kind }
+    }
+
+    /// p at x.
+    #[inline(always)]
+    pub fn at<const M: usize>(&self, sub: &SubPiece<M>, axes: &Axes<M>, x: f64) -> f64 {
+        if x == self.x0 {
+            return self.p0;
+        }
+        if x == self.x1 {
+            return self.p1;
+        }
+        match self.kind {
+            Kind::Accelerating(k) => {
+                along(sub, k as usize, axes.acceleration[k as usize], self.x0, self.p0, x)
+            }
+            Kind::Braking(k) => along(sub, k as usize, -axes.acceleration[k as usize], self.x1, self.p1, x),
+            Kind::Flat(_) => self.p0,
+            Kind::Cap => sub.cap_at(x),
+            Kind::LimitCurve => self.p0 + (self.p1 - self.p0) * ((x - self.x0) / (self.x1 - self.x0)),
+        }
+    }
+
+    /// p on [a, b], where it is `at_a` and `at_b`.
+    #[inline(always)]
+    pub fn curve<const M: usize>(
+        &self,
+        sub: &SubPiece<M>,
+        axes: &Axes<M>,
+        (a, at_a): (f64, f64),
+        (b, at_b): (f64, f64),
+    ) -> Curve {
+        // n = v_k² and n' = 2 a_k q'_k, from the end where the arc is slower: p may be infinite at the other.
+        let rising = |k: u8| {
+            let (ga, gb) = (sub.axis_tangent(k as usize, a), sub.axis_tangent(k as usize, b));
+            let gain = axes.acceleration[k as usize] * (b - a);
+            let n = ga * ga * at_a;
+            let n = [n, n + gain * ga, n + gain * (ga + gb)];
+            Curve::Quotient { n, d: [ga * ga, ga * gb, gb * gb], tag: Denominator::AxisSq(k) }
+        };
+        let falling = |k: u8| {
+            let (ga, gb) = (sub.axis_tangent(k as usize, a), sub.axis_tangent(k as usize, b));
+            let gain = axes.acceleration[k as usize] * (b - a);
+            let n = gb * gb * at_b;
+            let n = [n + gain * (ga + gb), n + gain * gb, n];
+            Curve::Quotient { n, d: [ga * ga, ga * gb, gb * gb], tag: Denominator::AxisSq(k) }
+        };
+        match self.kind {
+            Kind::Accelerating(k) => rising(k),
+            Kind::Braking(k) => falling(k),
+            Kind::Flat(_) | Kind::LimitCurve => Curve::line(at_a, at_b),
+            Kind::Cap => sub.cap_curve(a, b),
+        }
+    }
+}
+
+/// p at x on the arc through (x0, p0) on which axis k has the acceleration `a`.
+#[inline(always)]
+pub fn along<const M: usize>(sub: &SubPiece<M>, k: usize, a: f64, x0: f64, p0: f64, x: f64) -> f64 {
+    let (g0, g) = (sub.axis_tangent(k, x0), sub.axis_tangent(k, x));
+    p0 + (x - x0) * (g + g0) * (a - sub.bend[k] * p0) / (g * g)
+}

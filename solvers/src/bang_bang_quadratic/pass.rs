@@ -1,0 +1,291 @@
+//! One pass over one curved sub-piece, in the sense of travel: the greatest p that stays under a bound.
+//!
+//! For every λ in [0, 1] a feasible profile p scaled to λp stays feasible, so that the p from which the end can be
+//! reached are an interval [0, K(x)], and two greedy passes are exact. Backward, under the velocity cap and the
+//! limit curve, gives K; forward under K gives the fastest profile. Neither searches for switching points.
+
+use std::cell::OnceCell;
+
+use super::arc::{Arc, Kind};
+use super::bang::{bang, Event};
+use super::curve::Curve;
+use super::slide::slide;
+use super::subpiece::{Axes, SubPiece};
+use crate::limit_curve::limit_curve;
+
+/// p this close below a bound is on it.
+const ON_BOUND: f64 = 1e-13;
+/// Backward, p this close below a falling limit curve is on it.
+const ON_LIMIT_CURVE: f64 = 1e-10;
+/// Where a tangential contact is lost in rounding, the cap is followed with an acceleration too high by a part
+/// that grows from the first to the last of these until the contact is clear.
+const SLACK: [f64; 5] = [1e-14, 1e-13, 1e-12, 1e-11, 1e-10];
+/// More events than this on one sub-piece cannot be: at most M − 1 transitions lie between two slides, and a
+/// slide ends at one of few roots.
+const MAX_EVENTS: u32 = 300;
+
+/// A pass made no headway at this place. Never seen; reported rather than guessed around.
+#[derive(Clone, Copy, Debug)]
+pub struct Stuck(pub f64);
+
+/// Backward over the reversed sub-piece from p: appends the arcs of K and returns K at the far end.
+#[inline(always)]
+pub fn backward<const M: usize>(
+    sub: &SubPiece<M>,
+    axes: &Axes<M>,
+    mut p: f64,
+    out: &mut Vec<Arc>,
+) -> Result<f64, Stuck> {
+    for k in 0..M {
+        if sub.start[k] == 0.0 && sub.bend[k] != 0.0 {
+            p = p.min(axes.acceleration[k] / sub.bend[k].abs());
+        }
+    }
+    let cap =
+        [Arc { x0: 0.0, x1: sub.length, p0: sub.cap_at(0.0), p1: sub.cap_at(sub.length), kind: Kind::Cap }];
+    Pass::<M, true> { sub, axes, bounds: &cap, out, x: 0.0, p: p.min(cap[0].p0), line: OnceCell::new() }.run()
+}
+
+/// Forward over the sub-piece from p, under the arcs of K as the backward pass left them: appends the arcs of
+/// the profile and returns p at the far end.
+#[inline(always)]
+pub fn forward<const M: usize>(
+    sub: &SubPiece<M>,
+    axes: &Axes<M>,
+    p: f64,
+    bounds: &[Arc],
+    out: &mut Vec<Arc>,
+) -> Result<f64, Stuck> {
+    Pass::<M, false> { sub, axes, bounds, out, x: 0.0, p, line: OnceCell::new() }.run()
+}
+
+struct Pass<'a, const M: usize, const BACKWARD: bool> {
+    sub: &'a SubPiece<M>,
+    axes: &'a Axes<M>,
+    /// What p stays under. Forward: K, from the far end to the near one and reversed.
+    bounds: &'a [Arc],
+    out: &'a mut Vec<Arc>,
+    x: f64,
+    p: f64,
+    /// The limit curve at both ends of the sub-piece, once it is needed.
+    line: OnceCell<Option<[f64; 2]>>,
+}
+
+impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
+    #[inline(always)]
+    fn run(mut self) -> Result<f64, Stuck> {
+        let length = self.sub.length;
+        let mut index = 0;
+        let mut bound = self.bound(index);
+        let mut on_limit_curve = BACKWARD && self.meets_falling_limit_curve();
+        // The axis that has just saturated, and the roots at x that the arc and the bound are known to share.
+        let mut control = None;
+        let mut leaving = None;
+        let mut slack = 0;
+        // The same for the limit curve and the cap.
+        let mut line_contact = 0;
+        for _ in 0..MAX_EVENTS {
+            if self.x == length {
+                return Ok(self.p);
+            }
+            while bound.x1 <= self.x {
+                index += 1;
+                bound = self.bound(index);
+            }
+            if on_limit_curve {
+                let moved = self.follow_limit_curve(&bound, line_contact);
+                line_contact = if moved { 1 } else { line_contact + 1 };
+                on_limit_curve = false;
+                continue;
+            }
+            let at_bound = bound.at(self.sub, self.axes, self.x);
+            let on_bound = self.p >= at_bound * (1.0 - ON_BOUND);
+            if on_bound {
+                self.p = at_bound;
+            }
+            let mut contact = 0;
+            if on_bound && leaving.is_none() {
+                match bound.kind {
+                    // Any other motion under an arc of K meets it again later.
+                    Kind::Accelerating(_) | Kind::Braking(_) | Kind::Flat(_) => {
+                        self.push(bound.x1, bound.p1, bound.kind);
+                        control = None;
+                        continue;
+                    }
+                    Kind::LimitCurve => contact = 1,
+                    Kind::Cap => {
+                        let (end, saturated, meets_limit_curve) =
+                            self.slide(&bound, SLACK[slack], line_contact);
+                        let moved = end > self.x;
+                        on_limit_curve = meets_limit_curve;
+                        if meets_limit_curve {
+                            line_contact = if moved { 1 } else { line_contact + 1 };
+                        }
+                        if moved {
+                            self.push(end, bound.at(self.sub, self.axes, end), Kind::Cap);
+                            (control, leaving) = (saturated, saturated.map(|_| 2));
+                        }
+                        if moved || meets_limit_curve {
+                            continue;
+                        }
+                        contact = 1;
+                    }
+                }
+            }
+            let contact = leaving.take().unwrap_or(contact);
+            let arc = bang(self.sub, self.axes, self.x, self.p, control.take(), BACKWARD);
+            if arc.x1 > self.x {
+                let whole = Arc { x0: self.x, x1: arc.x1, p0: self.p, p1: arc.p1, kind: arc.kind };
+                match self.crossing(&whole, index, contact) {
+                    None => {
+                        self.push(arc.x1, arc.p1, arc.kind);
+                        (slack, line_contact) = (0, 0);
+                    }
+                    Some((x, p)) if x > self.x => {
+                        self.push(x, p, arc.kind);
+                        (slack, line_contact) = (0, 0);
+                        continue;
+                    }
+                    // Not above the bound by more than rounding: follow the bound a little further.
+                    Some(_) if on_bound => {
+                        slack += 1;
+                        if slack == SLACK.len() {
+                            return Err(Stuck(self.x));
+                        }
+                        continue;
+                    }
+                    Some((_, p)) => {
+                        self.p = p;
+                        continue;
+                    }
+                }
+            }
+            match arc.event {
+                Event::EndOfSubPiece => {}
+                Event::Transition(axis) => control = Some(axis),
+                Event::LimitCurve => on_limit_curve = BACKWARD && self.x < length,
+            }
+        }
+        Err(Stuck(self.x))
+    }
+
+    /// The bound number `index` along the sub-piece; the last one beyond its end.
+    #[inline(always)]
+    fn bound(&self, index: usize) -> Arc {
+        if BACKWARD {
+            self.bounds[0]
+        } else {
+            self.bounds[self.bounds.len() - 1 - index.min(self.bounds.len() - 1)].reversed(self.sub.length)
+        }
+    }
+
+    #[inline(always)]
+    fn push(&mut self, x1: f64, p1: f64, kind: Kind) {
+        self.out.push(Arc { x0: self.x, x1, p0: self.p, p1, kind });
+        (self.x, self.p) = (x1, p1);
+    }
+
+    /// The end of the slide along the cap, the axis that ends it, and whether the limit curve ends it instead.
+    #[inline(always)]
+    fn slide(&self, bound: &Arc, slack: f64, contact: u32) -> (f64, Option<usize>, bool) {
+        let found = slide(self.sub, self.axes, self.x, bound.x1, slack);
+        if BACKWARD && found.low && found.end > self.x {
+            if let Some(line) = self.limit_curve() {
+                let cap = self.sub.cap_curve(self.x, found.end);
+                let line = self.line_curve(line, self.x, found.end);
+                if let Some(t) = cap.rises_above(&line, contact) {
+                    return (self.x + (found.end - self.x) * t, None, true);
+                }
+            }
+        }
+        (found.end, found.saturated, false)
+    }
+
+    /// Where `arc` rises above the bounds from number `index` on, and the bound there.
+    #[inline(always)]
+    fn crossing(&self, arc: &Arc, mut index: usize, mut contact: u32) -> Option<(f64, f64)> {
+        let (sub, axes) = (self.sub, self.axes);
+        let (mut a, mut at_a) = (arc.x0, arc.p0);
+        loop {
+            let bound = self.bound(index);
+            let b = bound.x1.min(arc.x1);
+            let (at_b, bound_b) = (arc.at(sub, axes, b), bound.at(sub, axes, b));
+            let bound_a = bound.at(sub, axes, a);
+            // p is monotone on an arc.
+            let lowest = match bound.kind {
+                Kind::Cap => sub.lowest_cap(bound_a, bound_b),
+                _ => bound_a.min(bound_b),
+            };
+            if at_a.max(at_b) > lowest {
+                let curve = arc.curve(sub, axes, (a, at_a), (b, at_b));
+                let limit = bound.curve(sub, axes, (a, bound_a), (b, bound_b));
+                if let Some(t) = curve.rises_above(&limit, contact) {
+                    let x = a + (b - a) * t;
+                    return Some((x, bound.at(sub, axes, x)));
+                }
+            }
+            if b == arc.x1 {
+                return None;
+            }
+            (a, at_a) = (b, at_b);
+            contact = 0;
+            index += 1;
+        }
+    }
+
+    /// Puts p on or under the limit curve at the start; says whether it has to be followed.
+    #[inline(always)]
+    fn meets_falling_limit_curve(&mut self) -> bool {
+        if self.p <= self.sub.flat * (1.0 - ON_LIMIT_CURVE) {
+            return false;
+        }
+        match self.limit_curve() {
+            Some([start, end]) if self.p >= start * (1.0 - ON_LIMIT_CURVE) => {
+                self.p = self.p.min(start);
+                end < start
+            }
+            _ => false,
+        }
+    }
+
+    /// Follows the limit curve to the end of the sub-piece or to where the cap is lower; says whether it moved.
+    #[cold]
+    fn follow_limit_curve(&mut self, cap: &Arc, contact: u32) -> bool {
+        let Some(line) = self.limit_curve() else { return false };
+        let length = self.sub.length;
+        let curve = self.line_curve(line, self.x, length);
+        let crossing = curve.rises_above(&self.sub.cap_curve(self.x, length), contact);
+        let Some(t) = crossing else {
+            self.push(length, line[1], Kind::LimitCurve);
+            return true;
+        };
+        let x = self.x + (length - self.x) * t;
+        let p = cap.at(self.sub, self.axes, x);
+        let moved = x > self.x;
+        if moved {
+            self.push(x, p, Kind::LimitCurve);
+        } else {
+            self.p = p;
+        }
+        moved
+    }
+
+    #[inline(always)]
+    fn limit_curve(&self) -> Option<[f64; 2]> {
+        let sub = self.sub;
+        *self.line.get_or_init(|| {
+            limit_curve(&sub.start, &sub.end, &sub.bend, &self.axes.acceleration, |j| sub.twists(j))
+        })
+    }
+
+    fn line_curve(&self, line: [f64; 2], a: f64, b: f64) -> Curve {
+        let at = |x: f64| {
+            if x == self.sub.length {
+                line[1]
+            } else {
+                line[0] + (line[1] - line[0]) * (x / self.sub.length)
+            }
+        };
+        Curve::line(at(a), at(b))
+    }
+}

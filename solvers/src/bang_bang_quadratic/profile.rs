@@ -1,0 +1,168 @@
+//! The profile as columns, one row per arc, in the order of the path and in the parameter of its pieces.
+
+use super::arc::{Arc, Kind};
+use super::duration;
+use super::split::Part;
+use super::subpiece::{Axes, Cap, SubPiece};
+
+/// What is constant on an arc; the numbers are those of `feedplan.profile.ArcKind`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum ArcKind {
+    /// q'_k s + q''_k p = value in mm/s², signed.
+    AxisAcceleration = 0,
+    /// p.
+    Flat = 1,
+    /// |C'|² p = value in mm²/s².
+    Feed = 2,
+    /// q'_k² p = value in mm²/s².
+    AxisVelocity = 3,
+    /// p = value · |C'|.
+    Chord = 4,
+}
+
+/// No axis belongs to the arc.
+pub const NO_AXIS: u8 = 255;
+
+/// Columns of the arcs; see `feedplan.profile.SpeedProfile`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Profile {
+    pub piece: Vec<u32>,
+    pub kind: Vec<u8>,
+    pub axis: Vec<u8>,
+    pub value: Vec<f64>,
+    pub u0: Vec<f64>,
+    pub u1: Vec<f64>,
+    pub p0: Vec<f64>,
+    pub p1: Vec<f64>,
+    pub duration: Vec<f64>,
+    /// Offsets of the runs in the arcs.
+    pub runs: Vec<i64>,
+}
+
+/// One row.
+pub(super) struct Row {
+    pub kind: ArcKind,
+    pub axis: u8,
+    pub value: f64,
+    pub t: [f64; 2],
+    pub p: [f64; 2],
+    pub duration: f64,
+    /// The arc goes on from the one before it if that has the same kind, axis and value.
+    pub joins: bool,
+}
+
+impl Profile {
+    /// Number of arcs.
+    pub fn len(&self) -> usize {
+        self.piece.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.piece.is_empty()
+    }
+
+    /// The time of all arcs, in seconds.
+    pub fn time(&self) -> f64 {
+        self.duration.iter().sum()
+    }
+
+    /// Appends the rows of another profile.
+    pub(super) fn append(&mut self, mut other: Self) {
+        self.piece.append(&mut other.piece);
+        self.kind.append(&mut other.kind);
+        self.axis.append(&mut other.axis);
+        self.value.append(&mut other.value);
+        self.u0.append(&mut other.u0);
+        self.u1.append(&mut other.u1);
+        self.p0.append(&mut other.p0);
+        self.p1.append(&mut other.p1);
+        self.duration.append(&mut other.duration);
+    }
+
+    /// Appends an arc of piece number `piece`; t and p belong to the parameter t = u/width.
+    #[inline(always)]
+    pub(super) fn push(&mut self, piece: u32, width: f64, row: Row) {
+        let (u0, u1) = (row.t[0] * width, row.t[1] * width);
+        let scale = width * width;
+        let (p0, p1) = (row.p[0] * scale, row.p[1] * scale);
+        let value = if row.kind == ArcKind::Chord { row.value * scale * width } else { row.value };
+        let last = self.piece.len().wrapping_sub(1);
+        if row.joins
+            && last < self.piece.len()
+            && self.piece[last] == piece
+            && self.kind[last] == row.kind as u8
+            && self.axis[last] == row.axis
+            && self.value[last] == value
+        {
+            self.u1[last] = u1;
+            self.p1[last] = p1;
+            self.duration[last] += row.duration;
+            return;
+        }
+        self.piece.push(piece);
+        self.kind.push(row.kind as u8);
+        self.axis.push(row.axis);
+        self.value.push(value);
+        self.u0.push(u0);
+        self.u1.push(u1);
+        self.p0.push(p0);
+        self.p1.push(p1);
+        self.duration.push(row.duration);
+    }
+
+    /// Appends the arcs of the forward pass over one part of a curved piece.
+    #[inline(always)]
+    pub(super) fn push_arcs<const M: usize>(
+        &mut self,
+        number: u32,
+        width: f64,
+        part: &Part,
+        sub: &SubPiece<M>,
+        axes: &Axes<M>,
+        arcs: &[Arc],
+    ) {
+        for arc in arcs {
+            let t = |x: f64| if x == sub.length { part.to } else { part.from + x };
+            let t = [t(arc.x0), t(arc.x1)];
+            if t[1] <= t[0] {
+                continue;
+            }
+            let step = arc.x1 - arc.x0;
+            let mut joins = true;
+            // The control axis moves at constant acceleration: its way over its mean speed.
+            let mut by_axis = |k: u8| {
+                let (ga, gb) = (sub.axis_tangent(k as usize, arc.x0), sub.axis_tangent(k as usize, arc.x1));
+                joins = ga > 0.0;
+                step * (ga + gb) / (ga * arc.p0.sqrt() + gb * arc.p1.sqrt())
+            };
+            let signed = |k: u8| {
+                let a = axes.acceleration[k as usize];
+                if part.negative >> k & 1 == 1 {
+                    -a
+                } else {
+                    a
+                }
+            };
+            let (kind, axis, value, duration) = match arc.kind {
+                Kind::Accelerating(k) => (ArcKind::AxisAcceleration, k, signed(k), by_axis(k)),
+                Kind::Braking(k) => (ArcKind::AxisAcceleration, k, -signed(k), by_axis(k)),
+                Kind::Flat(k) => (ArcKind::Flat, k, 0.0, step / arc.p0.sqrt()),
+                // Followed only where it is level.
+                Kind::LimitCurve => (ArcKind::Flat, NO_AXIS, 0.0, step / arc.p0.sqrt()),
+                Kind::Cap => match part.cap {
+                    Cap::SpeedSq(speed_sq) => {
+                        let time = duration::length(sub, arc.x0, arc.x1) / speed_sq.sqrt();
+                        (ArcKind::Feed, NO_AXIS, speed_sq, time)
+                    }
+                    Cap::AxisSq(k, speed_sq) => (ArcKind::AxisVelocity, k, speed_sq, by_axis(k)),
+                    Cap::Chord(factor) => {
+                        let time = duration::at_chord_limit(sub, factor, arc.x0, arc.x1);
+                        (ArcKind::Chord, NO_AXIS, factor, time)
+                    }
+                },
+            };
+            self.push(number, width, Row { kind, axis, value, t, p: [arc.p0, arc.p1], duration, joins });
+        }
+    }
+}

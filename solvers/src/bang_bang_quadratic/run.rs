@@ -1,0 +1,149 @@
+//! Both passes over one run: pieces joined end to end, from a start speed to an end speed.
+
+use super::arc::Arc;
+use super::pass::{self, Stuck};
+use super::piece::{Piece, Straight};
+use super::profile::Profile;
+use super::split::{Part, Splitter};
+use super::{Fault, Task};
+use crate::quadratic::dot;
+
+/// Two directions that differ by more than this at a cusp form a corner.
+const SMOOTH_TURN: f64 = 1e-9;
+/// A speed asked for at an end of the path may exceed what can be had by this part, which is rounding.
+const REACHED: f64 = 1e-12;
+
+/// What the backward pass leaves for the forward pass on one piece.
+enum Way {
+    /// v² allowed at the right end.
+    Straight(f64),
+    /// Number of parts, their arcs following one another.
+    Curved(u32),
+}
+
+/// Space for the passes, kept from run to run.
+#[derive(Default)]
+pub struct Workspace {
+    splitter: Splitter,
+    ways: Vec<Way>,
+    /// Parts of curved pieces and where the arcs of K on them begin, in the order of the backward pass.
+    parts: Vec<(Part, u32)>,
+    bounds: Vec<Arc>,
+    arcs: Vec<Arc>,
+}
+
+/// Plans the pieces `first..last` of the task from one speed squared to another; appends the arcs.
+pub fn plan_run<const M: usize>(
+    task: &Task<M>,
+    (first, last): (usize, usize),
+    (start_sq, end_sq): (f64, f64),
+    space: &mut Workspace,
+    out: &mut Profile,
+) -> Result<(), Fault> {
+    space.ways.clear();
+    space.parts.clear();
+    space.bounds.clear();
+    // Backward: v² = D K at the start of each piece.
+    let mut speed_sq = end_sq;
+    let mut next: Option<Piece<M>> = None;
+    for i in (first..last).rev() {
+        let piece = Piece::new(&task.pieces[i]);
+        if let Some(next) = &next {
+            speed_sq = speed_sq.min(junction(&piece, next, task.junction_speed[i + 1]));
+        }
+        speed_sq = backward(task, i, &piece, speed_sq, space)?;
+        next = Some(piece);
+    }
+    if start_sq > speed_sq * (1.0 + REACHED) {
+        return Err(Fault::Start { piece: first, reachable: speed_sq.sqrt() });
+    }
+    // Forward: the same pieces, their arcs taken from the end of the stack.
+    speed_sq = start_sq.min(speed_sq);
+    let mut previous: Option<Piece<M>> = None;
+    for i in first..last {
+        let piece = Piece::new(&task.pieces[i]);
+        if let Some(previous) = &previous {
+            speed_sq = speed_sq.min(junction(previous, &piece, task.junction_speed[i]));
+        }
+        speed_sq = forward(task, i, &piece, speed_sq, space, out)?;
+        previous = Some(piece);
+    }
+    if speed_sq < end_sq * (1.0 - REACHED) {
+        return Err(Fault::End { piece: last - 1, reachable: speed_sq.sqrt() });
+    }
+    Ok(())
+}
+
+#[inline(always)]
+fn backward<const M: usize>(
+    task: &Task<M>,
+    i: usize,
+    piece: &Piece<M>,
+    speed_sq: f64,
+    space: &mut Workspace,
+) -> Result<f64, Fault> {
+    let feed = task.feed[i];
+    if piece.is_straight(feed, task.axes.least) {
+        space.ways.push(Way::Straight(speed_sq));
+        return Ok(pass_straight(task, i, piece, speed_sq));
+    }
+    let axes = &task.axes;
+    space.splitter.split(piece, axes, feed * feed, task.chord);
+    space.ways.push(Way::Curved(space.splitter.parts.len() as u32));
+    let mut p = speed_sq / piece.speed[2];
+    for part in space.splitter.parts.iter().rev() {
+        space.parts.push((*part, space.bounds.len() as u32));
+        let sub = part.sub_piece(piece, axes, true);
+        p = pass::backward(&sub, axes, p, &mut space.bounds)
+            .map_err(|Stuck(x)| Fault::Stuck { piece: i, u: (part.to - x) * task.pieces[i].width })?;
+    }
+    Ok(p * piece.speed[0])
+}
+
+#[inline(always)]
+fn pass_straight<const M: usize>(task: &Task<M>, i: usize, piece: &Piece<M>, speed_sq: f64) -> f64 {
+    let line = Straight::new(piece, &task.axes, task.feed[i] * task.feed[i]);
+    super::straight::backward(&line, speed_sq)
+}
+
+#[inline(always)]
+fn forward<const M: usize>(
+    task: &Task<M>,
+    i: usize,
+    piece: &Piece<M>,
+    speed_sq: f64,
+    space: &mut Workspace,
+    out: &mut Profile,
+) -> Result<f64, Fault> {
+    let axes = &task.axes;
+    let (number, width) = (i as u32, task.pieces[i].width);
+    let parts = match space.ways.pop() {
+        Some(Way::Straight(end_sq)) => {
+            let line = Straight::new(piece, axes, task.feed[i] * task.feed[i]);
+            return Ok(super::straight::forward(&line, axes, (speed_sq, end_sq), (number, width), out));
+        }
+        Some(Way::Curved(parts)) => parts,
+        None => 0,
+    };
+    let mut p = speed_sq / piece.speed[0];
+    for _ in 0..parts {
+        let Some((part, bounds)) = space.parts.pop() else { break };
+        let sub = part.sub_piece(piece, axes, false);
+        space.arcs.clear();
+        p = pass::forward(&sub, axes, p, &space.bounds[bounds as usize..], &mut space.arcs)
+            .map_err(|Stuck(x)| Fault::Stuck { piece: i, u: (part.from + x) * width })?;
+        space.bounds.truncate(bounds as usize);
+        out.push_arcs(number, width, &part, &sub, axes, &space.arcs);
+    }
+    Ok(p * piece.speed[2])
+}
+
+/// The greatest v² where two pieces meet: the square of `limit`, and a stop in the corner of a cusp.
+#[inline(always)]
+fn junction<const M: usize>(before: &Piece<M>, after: &Piece<M>, limit: f64) -> f64 {
+    let cusp = before.speed[2] == 0.0 || after.speed[0] == 0.0;
+    if cusp && dot(&before.direction(true), &after.direction(false)) < 1.0 - 0.5 * SMOOTH_TURN * SMOOTH_TURN {
+        return 0.0;
+    }
+    limit * limit
+}

@@ -1,0 +1,162 @@
+//! Both passes over a straight piece, by its length: the acceleration along it is constant, so v² is linear.
+//!
+//! However the piece is parametrised, even with a cusp C' = 0 at an end, the motion is the textbook trapezoid. Only
+//! where the tangent reverses does it stop.
+
+use super::piece::Straight;
+use super::profile::{ArcKind, Profile, Row, NO_AXIS};
+use super::subpiece::Axes;
+
+/// Backward: the greatest v² at the start from which `speed_sq` at the end can be met.
+#[inline(always)]
+pub fn backward(line: &Straight, speed_sq: f64) -> f64 {
+    let over = |length: f64, speed_sq: f64| line.speed_sq.min(speed_sq + 2.0 * line.acceleration * length);
+    match line.turn {
+        None => over(0.5 * (line.rate[0] + line.rate[1]), speed_sq),
+        Some(turn) => over(0.5 * line.rate[0] * turn, 0.0),
+    }
+}
+
+/// Forward from `start_sq`, at the end not above `end_sq`: appends the arcs and returns v² at the end.
+/// `start_sq` is at most what `backward` gave for `end_sq`.
+#[inline(always)]
+pub fn forward<const M: usize>(
+    line: &Straight,
+    axes: &Axes<M>,
+    (start_sq, end_sq): (f64, f64),
+    (number, width): (u32, f64),
+    out: &mut Profile,
+) -> f64 {
+    let end_sq = end_sq.min(line.speed_sq);
+    let mut over = |t: [f64; 2], rate: [f64; 2], sign: f64, start_sq: f64, end_sq: f64| {
+        let stretch = Stretch { line, t, rate, signed: sign * axes.acceleration[line.axis], number, width };
+        stretch.forward(start_sq, end_sq, out)
+    };
+    match line.turn {
+        None => over([0.0, 1.0], line.rate, line.sign[0], start_sq, end_sq),
+        Some(turn) => {
+            over([0.0, turn], [line.rate[0], 0.0], line.sign[0], start_sq, 0.0);
+            over([turn, 1.0], [0.0, line.rate[1]], line.sign[1], 0.0, end_sq)
+        }
+    }
+}
+
+/// A part of a straight piece on which the motion does not turn back.
+struct Stretch<'a> {
+    line: &'a Straight,
+    t: [f64; 2],
+    /// |C'| at its ends
+    rate: [f64; 2],
+    /// The acceleration of the limiting axis when the path speeds up.
+    signed: f64,
+    number: u32,
+    width: f64,
+}
+
+/// A place on a stretch: t, |C'| and v² there.
+#[derive(Clone, Copy)]
+struct Place {
+    t: f64,
+    rate: f64,
+    speed_sq: f64,
+}
+
+impl Stretch<'_> {
+    #[inline(always)]
+    fn forward(&self, start_sq: f64, end_sq: f64, out: &mut Profile) -> f64 {
+        let a = self.line.acceleration;
+        let length = 0.5 * (self.rate[0] + self.rate[1]) * (self.t[1] - self.t[0]);
+        let gain = 2.0 * a * length;
+        let top_sq = self.line.speed_sq;
+        let start_sq = start_sq.min(top_sq.min(end_sq + gain));
+        let start = Place { t: self.t[0], rate: self.rate[0], speed_sq: start_sq };
+        let end = |speed_sq: f64| Place { t: self.t[1], rate: self.rate[1], speed_sq };
+        // Too short to reach the speed asked for at the end.
+        if start_sq + gain <= end_sq {
+            let last = end(start_sq + gain);
+            self.push(out, start, last, Motion::SpeedUp);
+            return last.speed_sq;
+        }
+        let last = end(end_sq);
+        let peak_sq = (0.5 * (start_sq + end_sq + gain)).min(top_sq);
+        let first_length = (peak_sq - start_sq) / (2.0 * a);
+        let last_length = (peak_sq - end_sq) / (2.0 * a);
+        let reached = if first_length < length { self.from_start(first_length, peak_sq) } else { last };
+        let left = if last_length < length { self.from_end(last_length, peak_sq) } else { start };
+        let reached = if first_length > 0.0 && reached.t > start.t { reached } else { start };
+        let left = if last_length > 0.0 && left.t < last.t { left } else { last };
+        if peak_sq < top_sq || left.t <= reached.t {
+            // Triangle: one place in the middle, taken from the slower side.
+            let middle = if start_sq < end_sq { reached } else { left };
+            self.push(out, start, middle, Motion::SpeedUp);
+            self.push(out, middle, last, Motion::SlowDown);
+        } else {
+            self.push(out, start, reached, Motion::SpeedUp);
+            self.push(out, reached, left, Motion::Cruise);
+            self.push(out, left, last, Motion::SlowDown);
+        }
+        end_sq
+    }
+
+    /// The place this length after the start; |C'|² is linear in the length.
+    #[inline(always)]
+    fn from_start(&self, length: f64, speed_sq: f64) -> Place {
+        let [r0, r1] = self.rate;
+        let slope = (r1 - r0) / (self.t[1] - self.t[0]);
+        let rate = (r0 * r0 + 2.0 * slope * length).max(0.0).sqrt();
+        Place { t: (self.t[0] + 2.0 * length / (r0 + rate)).min(self.t[1]), rate, speed_sq }
+    }
+
+    /// The place this length before the end.
+    #[inline(always)]
+    fn from_end(&self, length: f64, speed_sq: f64) -> Place {
+        let [r0, r1] = self.rate;
+        let slope = (r1 - r0) / (self.t[1] - self.t[0]);
+        let rate = (r1 * r1 - 2.0 * slope * length).max(0.0).sqrt();
+        Place { t: (self.t[1] - 2.0 * length / (r1 + rate)).max(self.t[0]), rate, speed_sq }
+    }
+
+    #[inline(always)]
+    fn push(&self, out: &mut Profile, from: Place, to: Place, motion: Motion) {
+        if to.t <= from.t {
+            return;
+        }
+        let length = 0.5 * (from.rate + to.rate) * (to.t - from.t);
+        let (v0, v1) = (from.speed_sq.sqrt(), to.speed_sq.sqrt());
+        let duration = 2.0 * length / (v0 + v1);
+        let line = self.line;
+        let axis = line.axis as u8;
+        let (kind, axis, value) = match motion {
+            // From rest at a cusp p is constant.
+            Motion::SpeedUp if from.rate == 0.0 && v0 == 0.0 => (ArcKind::Flat, axis, 0.0),
+            Motion::SlowDown if to.rate == 0.0 && v1 == 0.0 => (ArcKind::Flat, axis, 0.0),
+            Motion::SpeedUp => (ArcKind::AxisAcceleration, axis, self.signed),
+            Motion::SlowDown => (ArcKind::AxisAcceleration, axis, -self.signed),
+            Motion::Cruise => match line.speed_axis {
+                None => (ArcKind::Feed, NO_AXIS, line.speed_sq),
+                Some(axis) => (ArcKind::AxisVelocity, axis as u8, line.axis_speed_sq),
+            },
+        };
+        let p = |here: Place, there: Place| {
+            if here.rate > 0.0 {
+                here.speed_sq / (here.rate * here.rate)
+            } else if here.speed_sq == 0.0 {
+                // The limit: v² and |C'|² both grow in proportion to the length.
+                there.speed_sq / (there.rate * there.rate)
+            } else {
+                f64::INFINITY
+            }
+        };
+        let (t, p) = ([from.t, to.t], [p(from, to), p(to, from)]);
+        let joins = from.rate > 0.0;
+        out.push(self.number, self.width, Row { kind, axis, value, t, p, duration, joins });
+    }
+}
+
+/// What the tool does on a part of a straight piece.
+#[derive(Clone, Copy)]
+enum Motion {
+    SpeedUp,
+    Cruise,
+    SlowDown,
+}

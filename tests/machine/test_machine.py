@@ -1,0 +1,84 @@
+"""Machine files: what is bundled loads, what is wrong is refused in one sentence."""
+
+from pathlib import Path
+
+import pytest
+
+from feedplan import Machine, MachineError
+from feedplan.machine.machine import bundled_machines
+
+GOOD = """
+name = "one"
+period = 0.002
+chord_tolerance = 0.01
+[[axes]]
+name = "X"
+max_velocity = 100.0
+max_acceleration = 1000.0
+travel = [-10.0, 300.0]
+max_velocity_jump = 2.0
+"""
+
+
+def load(text: str, folder: Path) -> Machine:
+    file = folder / "machine.toml"
+    file.write_text(text)
+    return Machine.load(file)
+
+
+def test_tarus_has_the_limits_of_the_thesis() -> None:
+    machine = Machine.load("tarus")
+    rows = [(a.name, a.max_velocity, a.max_acceleration, a.max_jerk) for a in machine.axes]
+    assert rows == [("X", 170, 400, 4000), ("Y", 180, 600, 6000), ("Z", 240, 2000, 20000)]
+    assert machine.chord_tolerance == 0.0254
+
+
+@pytest.mark.parametrize("name", bundled_machines())
+def test_every_bundled_machine_loads_under_its_name(name: str) -> None:
+    assert Machine.load(name).name == name
+
+
+def test_a_file_gives_every_field(tmp_path: Path) -> None:
+    machine = load(GOOD, tmp_path)
+    axis = machine.axis("X")
+    assert (machine.period, machine.chord_tolerance) == (0.002, 0.01)
+    assert (axis.travel, axis.max_velocity_jump) == ((-10.0, 300.0), 2.0)
+    assert machine.with_period(0.004).period == 0.004
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "word"),
+    [
+        ("max_velocity = 100.0", "", "max_velocity"),
+        ("max_velocity = 100.0", "max_velocity = -1", "max_velocity"),
+        ("max_velocity = 100.0", "max_velocity = inf", "max_velocity"),
+        ("max_velocity = 100.0", "max_velocity = nan", "max_velocity"),
+        ("max_velocity = 100.0", 'max_velocity = "fast"', "max_velocity"),
+        ("max_velocity = 100.0", "max_velocity = true", "max_velocity"),
+        ("period = 0.002", "period = 0", "period"),
+        ('name = "X"', 'name = "Q"', "axis name"),
+        ("travel = [-10.0, 300.0]", "travel = [10.0, -300.0]", "travel"),
+        ("travel = [-10.0, 300.0]", "travel = [10.0]", "travel"),
+        ("max_velocity_jump = 2.0", "max_velocity_jump = -2.0", "max_velocity_jump"),
+        ("max_velocity_jump = 2.0", "max_velocitty = 2.0", "max_velocitty"),
+        ("chord_tolerance = 0.01", "speed = 1", "speed"),
+        ("[[axes]]", "[axes]", "axes"),
+        ("period = 0.002", "period = ", "TOML"),
+        ('name = "one"', 'name = "one"\nkinematics = "delta"', "kinematics"),
+        ('name = "one"', 'name = "one"\noffsets = {G54 = [1.0, 2.0]}', "G54"),
+    ],
+)
+def test_what_is_wrong_is_named(old: str, new: str, word: str, tmp_path: Path) -> None:
+    with pytest.raises(MachineError, match=word) as caught:
+        load(GOOD.replace(old, new), tmp_path)
+    assert "machine.toml" in str(caught.value)
+    assert "\n" not in str(caught.value) or word == "TOML"
+
+
+def test_unknown_names_and_files_say_what_there_is(tmp_path: Path) -> None:
+    with pytest.raises(MachineError, match="tarus"):
+        Machine.load("nobody")
+    with pytest.raises(MachineError, match="cannot be read"):
+        Machine.load(tmp_path / "none.toml")
+    with pytest.raises(MachineError, match="no axis W"):
+        Machine.load("mill").axis("W")
