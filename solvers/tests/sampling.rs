@@ -77,19 +77,17 @@ fn any_part_of_the_stream_has_the_same_digits() {
 }
 
 #[test]
-fn an_end_at_rest_is_at_rest_whichever_end_is_slower_in_u() {
-    // x' falls from 4.7 to 0.3: from rest at u = 0.3 to 0.02 mm/s, and the reverse.
-    let piece = Quadratic { control: [[0.0], [7.05], [7.5]], width: 3.0 };
-    let slope = |u: f64| 4.7 + (0.3 - 4.7) * u / 3.0;
-    let duration = 100.0 * 0.5 * (slope(0.3) + slope(2.7)) * 2.4;
-    let p = (0.02 / slope(2.7)).powi(2);
-    let up = arc(ArcKind::AxisAcceleration, 0.02 / duration, (0.3, 2.7), (0.0, p), duration);
-    let motion = Motion::new(&piece, &up, false);
-    assert_eq!(motion.rates(&motion.at(0.3)).velocity, [0.0]);
-    let p = (0.02 / slope(0.3)).powi(2);
-    let down = arc(ArcKind::AxisAcceleration, -0.02 / duration, (0.3, 2.7), (p, 0.0), duration);
+fn the_speed_next_to_a_standstill_keeps_its_digits() {
+    // x' grows from 1 to 4 on [0, 3]: 7.5 mm from 15 mm/s down to rest in 1 s at 15 mm/s².
+    let piece = Quadratic { control: [[0.0], [1.5], [7.5]], width: 3.0 };
+    let down = arc(ArcKind::AxisAcceleration, -15.0, (0.0, 3.0), (225.0, 0.0), 1.0);
     let motion = Motion::new(&piece, &down, false);
-    assert_eq!(motion.rates(&motion.at(2.7)).velocity, [0.0]);
+    for i in 0..50 {
+        let u = 3.0 - 1e-12 * f64::from(i) * 1.7;
+        let expected = (2.0 * 15.0 * 4.0 * (3.0 - u)).sqrt();
+        let [speed] = motion.rates(&motion.at(u)).velocity;
+        assert!((speed - expected).abs() <= 1e-9 * expected, "{speed} {expected}");
+    }
 }
 
 #[test]
@@ -183,7 +181,8 @@ prop_compose! {
         match kind {
             ArcKind::AxisAcceleration => {
                 // Where x' vanishes no finite p has a speed.
-                let (v0, v1) = (speeds[0] * f64::from(x0 > 1e-6), speeds[1] * f64::from(x1 > 1e-6) + 0.01);
+                let (v0, v1) = (speeds[0] * f64::from(x0 > 1e-6), speeds[1] * f64::from(x1 > 1e-6));
+                let v1 = if v0 + v1 == 0.0 { 0.01 } else { v1 };
                 arc.duration = 2.0 * way / (v0 + v1);
                 arc.value = sign * (v1 - v0) / arc.duration;
                 (arc.p0, arc.p1) = (p(v0, x0.max(1e-6)), p(v1, x1.max(1e-6)));
@@ -246,7 +245,7 @@ proptest! {
         if tame(&piece, &arc) {
             let again = motion.time(&motion.at(state.u));
             // A step of 1e-13 of the way costs √1e-13 of the time next to a standstill.
-            let slack = if at < 1e-3 || at > 1.0 - 1e-3 { 1e-6 } else { 1e-9 };
+            let slack = if (1e-3..=1.0 - 1e-3).contains(&at) { 1e-9 } else { 1e-6 };
             prop_assert!((again - t).abs() <= slack * arc.duration, "{again} {t}");
         }
     }
@@ -258,7 +257,12 @@ proptest! {
         }
         let motion = Motion::new(&piece, &arc, false);
         let t = at * arc.duration;
-        let v0 = motion.rates(&motion.at_time(0.0, 1e-3)).velocity[0];
+        let [v0, v1] = [arc.u0, arc.u1].map(|u| motion.rates(&motion.at(u)).velocity[0]);
+        if arc.kind == ArcKind::AxisAcceleration {
+            prop_assert!(v0 != 0.0 || arc.p0 == 0.0);
+            prop_assert!(arc.p0 != 0.0 || v0 == 0.0, "{v0:e} from rest");
+            prop_assert!(arc.p1 != 0.0 || v1 == 0.0, "{v1:e} at rest");
+        }
         let a = if arc.kind == ArcKind::AxisAcceleration { arc.value } else { 0.0 };
         let way = motion.point(&motion.at_time(t, 1e-3))[0] - piece.point(arc.u0)[0];
         prop_assert!((way - (v0 * t + 0.5 * a * t * t)).abs() <= 2e-8 * (1.0 + way.abs()), "{way}");
