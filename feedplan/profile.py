@@ -26,7 +26,12 @@ class SpeedProfile:
     Per arc: `piece` (index into the path), `kind` (ArcKind), `axis` (the axis that the arc's constant
     belongs to, 255 for none), `value` (see ArcKind), `u0`, `u1` (local parameter, u0 < u1), `p0`, `p1` (p at
     both ends [mm²/s²]), `duration` [s]. `runs` (r + 1,) arc offsets of the path's runs.
-    Between the ends p follows exactly from the kind: it is never interpolated.
+    Between the ends p follows exactly from the kind: it is never interpolated. On AXIS_ACCELERATION of axis k
+    axis l accelerates with (q'_l·value − W_kl p)/q'_k, W_kl = q''_k q'_l − q''_l q'_k, which keeps its digits
+    where q'' p is large. On FLAT, `axis` is the one whose acceleration limit holds p.
+    A piece may begin or end with C' = 0 (a straight one with two equal control points). Where such a place
+    is passed at a speed, p is infinite there; the axis velocity follows from the other end of the arc:
+    q'_k0² p0 = q'_k1² p1 − 2·value·Δq_k. Where it is a stop, p is its finite limit.
     """
 
     piece: NDArray[np.uint32]

@@ -214,7 +214,7 @@ proptest! {
         let motion = Motion::new(&piece, &arc, false);
         let t = at * arc.duration;
         let state = motion.at_time(t, 1e-3 * arc.duration);
-        prop_assert!(arc.u0 <= state.u && state.u <= arc.u1);
+        prop_assert!((arc.u0..=arc.u1).contains(&state.u));
         prop_assert_eq!(motion.at_time(0.0, 1e-3).u, arc.u0);
         prop_assert_eq!(motion.at_time(arc.duration, 1e-3).u, arc.u1);
         prop_assert!(state.iterations <= 30 && state.error < 1e-12);

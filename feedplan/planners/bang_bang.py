@@ -1,0 +1,72 @@
+"""The exact time-optimal profile under velocity, acceleration, feed and chord-error limits; no jerk limit."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from feedplan import _solvers
+from feedplan.constraints.problem import Problem
+from feedplan.errors import InfeasibleError, InputError, SolverError
+from feedplan.profile import SpeedProfile
+
+
+def plan(problem: Problem) -> SpeedProfile:
+    """The fastest profile; its time is the least that the limits allow, to rounding.
+
+    Raises InfeasibleError where the start or end speed cannot be had, with the speed that can.
+    """
+    path = problem.path
+
+    def floats(values: object) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+        return np.ascontiguousarray(values, dtype=np.float64)
+
+    try:
+        columns = _solvers.plan_quadratic(
+            floats(path.control_points),
+            floats(path.width),
+            np.ascontiguousarray(path.runs, dtype=np.int64),
+            floats(problem.feed),
+            floats(problem.junction_speed),
+            floats(problem.max_velocity),
+            floats(problem.max_acceleration),
+            float(problem.chord_tolerance),
+            float(problem.period),
+            float(problem.start_speed),
+            float(problem.end_speed),
+        )
+    except _solvers.PlanError as fault:
+        raise _error(problem, *fault.args) from None
+    return SpeedProfile(*columns)
+
+
+def _error(
+    problem: Problem, kind: str, piece: int | None, reachable: float | None, sentence: str
+) -> InfeasibleError | InputError | SolverError:
+    """The planner's fault in our words: with the source line, and a speed that will do."""
+    line = None if piece is None else int(problem.path.line[piece])
+    place = "" if line is None else f"line {line}: "
+    if reachable is not None:
+        shown = _rounded_down(reachable)
+        if kind == "start":
+            sentence = (
+                f"{place}no profile starts at {problem.start_speed:g} mm/s: "
+                f"the limits ahead allow at most {shown} mm/s"
+            )
+        else:
+            sentence = (
+                f"{place}no profile ends at {problem.end_speed:g} mm/s: at most {shown} mm/s can be reached"
+            )
+        return InfeasibleError(sentence, line, reachable)
+    if kind == "stuck":
+        return SolverError(f"{place}{sentence}: this is a fault of the planner; please report the program")
+    return InputError(f"{place}{sentence}")
+
+
+def _rounded_down(speed: float) -> str:
+    """Six digits of a speed, never above it."""
+    if speed <= 0.0:
+        return "0"
+    scale = 10.0 ** (5 - math.floor(math.log10(speed)))
+    return f"{math.floor(speed * scale) / scale:.6g}"
