@@ -124,6 +124,8 @@ class Audit:
     @property
     def failures(self) -> tuple[str, ...]:
         """A sentence for every check that fails: place, value, limit."""
+        if not self.checks:
+            return ("there is nothing that could be measured",)
         return tuple(check.sentence() for check in self.broken)
 
     @property
