@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from feedplan import _solvers
+import feedplan._solvers as _solvers
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InputError
 from feedplan.machine.machine import Axis, Machine

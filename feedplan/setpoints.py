@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from feedplan import _solvers
+import feedplan._solvers as _solvers
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
 from feedplan.profile import SpeedProfile

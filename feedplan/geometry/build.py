@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from feedplan import _solvers
+import feedplan._solvers as _solvers
 from feedplan.errors import InputError, MachineError
 from feedplan.geometry.path import FitSummary, Path
 from feedplan.machine.machine import Machine

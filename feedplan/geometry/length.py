@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from feedplan import _solvers
+import feedplan._solvers as _solvers
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
 

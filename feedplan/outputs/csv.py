@@ -13,7 +13,7 @@ from pathlib import Path as FilePath
 import numpy as np
 from numpy.typing import NDArray
 
-from feedplan import _solvers
+import feedplan._solvers as _solvers
 from feedplan.errors import InputError
 from feedplan.outputs import QUANTITIES, Add
 from feedplan.outputs._arrays import chunk_of

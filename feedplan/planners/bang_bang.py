@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from feedplan import _solvers
+import feedplan._solvers as _solvers
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InfeasibleError, InputError, SolverError
 from feedplan.profile import SpeedProfile
