@@ -227,8 +227,8 @@ def fit(program: str, machine: str, tolerance: float | None, as_json: bool) -> N
     if as_json:
         sys.stdout.write(summary_text(summary))
     else:
-        pieces = ("pieces", f"{summary['pieces']} in {summary['runs']} runs")
-        console.print_rows([("program", program), *console.fit_rows(summary), pieces])
+        path_row = ("path", console.pieces_text(summary))
+        console.print_rows([("program", program), *console.fit_rows(summary), path_row])
 
 
 @cli.command()
