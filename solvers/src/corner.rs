@@ -27,6 +27,7 @@
 //! A parabola is what two axes with constant accelerations draw, so it is where both can be at their limits all
 //! along. Greater ratios also take more of the sides than r = 1/2 does, which short sides do not have.
 
+use crate::follow::Followed;
 use crate::quadratic::{lerp, norm, sub, Quadratic};
 
 /// Corners that turn back are passed at rest anyway: no rounding where cos(turn/2) is below this (177.7°).
@@ -45,8 +46,6 @@ const SMOOTH: f64 = 1e-9;
 pub struct Jump<const M: usize> {
     /// t₊ − t₋.
     pub change: [f64; M],
-    pub before: [f64; M],
-    pub after: [f64; M],
     /// |t₊ − t₋| = 2 sin(turn/2).
     pub size: f64,
     /// Errors of rounding in a length here, in mm.
@@ -56,30 +55,20 @@ pub struct Jump<const M: usize> {
 impl<const M: usize> Jump<M> {
     /// The jump between two pieces, None where a piece ends without a tangent.
     pub fn new(before: &Quadratic<M>, after: &Quadratic<M>) -> Option<Self> {
-        let out = sub(&before.control[2], &before.control[1]);
-        let into = sub(&after.control[1], &after.control[0]);
+        let (out, into) = tangents(before, after);
         let (edge_out, edge_into) = (norm(&out), norm(&into));
         if !(edge_out > 0.0 && edge_into > 0.0) {
             return None;
         }
-        let before_unit = out.map(|x| x / edge_out);
-        let after_unit = into.map(|x| x / edge_into);
-        let change = sub(&after_unit, &before_unit);
+        let change = std::array::from_fn(|k| into[k] / edge_into - out[k] / edge_out);
         let coordinate = after.control[0].iter().fold(0.0, |a: f64, b| a.max(b.abs()));
-        Some(Self {
-            change,
-            before: before_unit,
-            after: after_unit,
-            size: norm(&change),
-            rounding: ROUNDING * f64::EPSILON * coordinate,
-        })
+        Some(Self { change, size: norm(&change), rounding: ROUNDING * f64::EPSILON * coordinate })
     }
 
     /// The pieces meet smoothly, as far as their coordinates can tell.
     pub fn is_smooth(&self, before: &Quadratic<M>, after: &Quadratic<M>) -> bool {
-        let edge = norm(&sub(&before.control[2], &before.control[1]))
-            .min(norm(&sub(&after.control[1], &after.control[0])));
-        self.size <= SMOOTH + self.rounding / edge
+        let (out, into) = tangents(before, after);
+        self.size <= SMOOTH + self.rounding / norm(&out).min(norm(&into))
     }
 
     /// The path turns back on itself.
@@ -87,11 +76,19 @@ impl<const M: usize> Jump<M> {
         self.size * self.size >= 4.0 * (1.0 - LEAST_COSINE * LEAST_COSINE)
     }
 
-    /// The length beyond which a corner passed at `feed` has nothing to gain, in mm.
-    pub fn length_for(&self, feed: f64, max_velocity: &[f64; M], max_acceleration: &[f64; M]) -> f64 {
+    /// The length beyond which a corner between two pieces, passed at `feed`, has nothing to gain, in mm.
+    pub fn length_for(
+        &self,
+        sides: [&Quadratic<M>; 2],
+        feed: f64,
+        max_velocity: &[f64; M],
+        max_acceleration: &[f64; M],
+    ) -> f64 {
+        let (out, into) = tangents(sides[0], sides[1]);
+        let (edge_out, edge_into) = (norm(&out), norm(&into));
         let (mut speed, mut share) = (feed, 0.0f64);
         for k in 0..M {
-            speed = speed.min(max_velocity[k] / self.before[k].abs().max(self.after[k].abs()));
+            speed = speed.min(max_velocity[k] / (out[k].abs() / edge_out).max(into[k].abs() / edge_into));
             share = share.max(self.change[k].abs() / max_acceleration[k]);
         }
         EASE * 0.5 * share * speed * speed
@@ -111,6 +108,11 @@ impl<const M: usize> Jump<M> {
     pub fn displacement(&self, before: f64, after: f64) -> [f64; M] {
         self.change.map(|x| x / (2.0 / before + 2.0 / after))
     }
+}
+
+/// The edges of the control polygons on both sides of a joint.
+fn tangents<const M: usize>(before: &Quadratic<M>, after: &Quadratic<M>) -> ([f64; M], [f64; M]) {
+    (sub(&before.control[2], &before.control[1]), sub(&after.control[1], &after.control[0]))
 }
 
 /// Lengths of corners that share the stretches between them, from what each `need`s; `stretch[k]` lies between
@@ -145,13 +147,54 @@ pub fn share_lengths(need: &[f64], stretch: &[f64]) -> Vec<f64> {
     length
 }
 
-/// Makes the pieces of a side C1 with speed 1 where they meet the corner, and returns the length of the side in
-/// that parameter. The corner is at the end of the side, or at its start.
-pub fn rescale<const M: usize>(side: &mut [Quadratic<M>], corner_at_end: bool) -> f64 {
+/// The two sides of a corner, each in the order of the path.
+#[derive(Default)]
+pub struct Sides<const M: usize> {
+    pub before: Vec<Followed<M>>,
+    pub after: Vec<Followed<M>>,
+}
+
+impl<const M: usize> Sides<M> {
+    /// The one parabola that rounds a corner between two lines of one feed and one tolerance.
+    pub fn parabola(&self, jump: &Jump<M>) -> Option<Followed<M>> {
+        let ([before], [after]) = (&self.before[..], &self.after[..]) else { return None };
+        let alike = before.feed == after.feed && before.tolerance == after.tolerance;
+        if !(alike && is_line(&before.piece) && is_line(&after.piece)) {
+            return None;
+        }
+        let distance = norm(&jump.displacement(before.piece.width, after.piece.width));
+        Some(Followed {
+            piece: Quadratic {
+                control: [before.piece.control[0], before.piece.control[2], after.piece.control[2]],
+                width: before.piece.width + after.piece.width,
+            },
+            last: after.last,
+            deviation: distance + before.deviation.max(after.deviation),
+            ..*before
+        })
+    }
+
+    /// Bends both sides so that they meet smoothly. Returns by what factor this exceeds what is left of the
+    /// tolerance of some piece, None where a side is empty.
+    pub fn bend(&mut self, jump: &Jump<M>) -> Option<f64> {
+        if self.before.is_empty() || self.after.is_empty() {
+            return None;
+        }
+        let length_before = rescale(self.before.iter_mut().rev(), true);
+        let length_after = rescale(self.after.iter_mut(), false);
+        let displacement = jump.displacement(length_before, length_after);
+        // From the far ends to the corner, so that q starts as an exact 0 and ends as an exact length.
+        let before = bend(self.before.iter_mut(), true, &displacement, length_before);
+        let after = bend(self.after.iter_mut().rev(), false, &displacement, length_after);
+        Some(before.max(after))
+    }
+}
+
+/// Makes the pieces of a side, taken from the corner outwards, C1 with speed 1 in the corner, and returns the
+/// length of the side in that parameter.
+fn rescale<'a, const M: usize>(side: impl Iterator<Item = &'a mut Followed<M>>, corner_at_end: bool) -> f64 {
     let (mut speed, mut length) = (1.0, 0.0);
-    let count = side.len();
-    for i in 0..count {
-        let piece = &mut side[if corner_at_end { count - 1 - i } else { i }];
+    for Followed { piece, .. } in side {
         let [a, b, c] = piece.control;
         let (start, end) = (2.0 * norm(&sub(&b, &a)), 2.0 * norm(&sub(&c, &b)));
         let (near, far) = if corner_at_end { (end, start) } else { (start, end) };
@@ -162,34 +205,33 @@ pub fn rescale<const M: usize>(side: &mut [Quadratic<M>], corner_at_end: bool) -
     length
 }
 
-/// Adds the displacement of the corner to the rescaled pieces of a side; `visit` gets for each piece the share
-/// (q/l)² at its end nearer to the corner.
-pub fn bend<const M: usize>(
-    side: &mut [Quadratic<M>],
+/// Adds the displacement of the corner to the pieces of a side, taken from the far end to the corner. Returns by
+/// what factor the tolerance of some piece is exceeded.
+fn bend<'a, const M: usize>(
+    side: impl ExactSizeIterator<Item = &'a mut Followed<M>>,
     corner_at_end: bool,
     displacement: &[f64; M],
     length: f64,
-    mut visit: impl FnMut(usize, f64),
-) {
-    // From the far end to the corner, so that q starts as an exact 0 and ends as an exact length.
-    let (mut far, count) = (0.0, side.len());
-    for i in 0..count {
-        let index = if corner_at_end { i } else { count - 1 - i };
-        let piece = &mut side[index];
-        let near = if i + 1 == count { 1.0 } else { far + piece.width / length };
-        let shares = if corner_at_end {
-            [far * far, far * near, near * near]
-        } else {
-            [near * near, far * near, far * far]
-        };
-        for (point, share) in piece.control.iter_mut().zip(shares) {
+) -> f64 {
+    let distance = norm(displacement);
+    let (mut far, mut excess, count) = (0.0, 0.0f64, side.len());
+    for (i, followed) in side.enumerate() {
+        let near = if i + 1 == count { 1.0 } else { far + followed.piece.width / length };
+        let mut shares = [far * far, far * near, near * near];
+        if !corner_at_end {
+            shares.reverse();
+        }
+        for (point, share) in followed.piece.control.iter_mut().zip(shares) {
             for k in 0..M {
                 point[k] += share * displacement[k];
             }
         }
-        visit(index, near * near);
+        let deviation = near * near * distance;
+        excess = excess.max(deviation / (followed.tolerance - followed.deviation));
+        followed.deviation += deviation;
         far = near;
     }
+    excess
 }
 
 /// The part of a piece between two parameters, None where next to nothing is between them. A cut next to an end
@@ -223,6 +265,6 @@ fn cut<const M: usize>(piece: &Quadratic<M>, from: f64, to: f64) -> Quadratic<M>
 }
 
 /// The piece is a line at constant speed, as `Quadratic::line` makes it.
-pub fn is_line<const M: usize>(piece: &Quadratic<M>) -> bool {
+fn is_line<const M: usize>(piece: &Quadratic<M>) -> bool {
     piece.control[1] == lerp(&piece.control[0], &piece.control[2], 0.5)
 }

@@ -20,7 +20,7 @@ const TASK: usize = 4096;
 /// Parts of a piece that are shorter than this share of it are not cut off.
 const SLIVER: f64 = 1e-6;
 
-/// A program in columns, one row per move; lengths in mm, speeds in mm/s.
+/// A program in columns, one row per move, at most 2³² of them; lengths in mm, speeds in mm/s.
 pub struct Moves<'a, const M: usize> {
     pub start: [f64; M],
     pub kind: &'a [u8],
@@ -64,8 +64,8 @@ pub struct FollowOptions {
 pub struct Followed<const M: usize> {
     pub piece: Quadratic<M>,
     /// First and last move.
-    pub first: usize,
-    pub last: usize,
+    pub first: u32,
+    pub last: u32,
     pub feed: f64,
     /// Upper bound of the distance from the moves, both ways.
     pub deviation: f64,
@@ -73,8 +73,8 @@ pub struct Followed<const M: usize> {
     pub tolerance: f64,
     /// The moves ask for the exact path.
     pub exact: bool,
-    /// How far the piece may lie outside the least box around its moves because it replaces an arc.
-    pub bulge: f64,
+    /// The piece stands for an arc: it may lie as far outside the box around it as it deviates.
+    pub arc: bool,
 }
 
 /// A move that cannot be followed.
@@ -234,7 +234,9 @@ fn plain<const M: usize>(
         let tolerance = if exact { options.exact_tolerance } else { moves.tolerance[i] };
         let feed = if moves.kind[i] == RAPID { f64::INFINITY } else { moves.feed[i] };
         let piece = Quadratic::line(moves.origin(i), moves.target[i]);
-        let line = Followed { piece, first: i, last: i, feed, deviation: 0.0, tolerance, exact, bulge: 0.0 };
+        let index = i as u32;
+        let line =
+            Followed { piece, first: index, last: index, feed, deviation: 0.0, tolerance, exact, arc: false };
         if moves.kind[i] != ARC {
             pieces.push(line);
             continue;
@@ -245,7 +247,7 @@ fn plain<const M: usize>(
             index: i,
             fault: if error == ArcError::Radius { Fault::Radius } else { Fault::Sweep },
         })?;
-        pieces.extend(arc.into_iter().map(|piece| Followed { piece, deviation, bulge: deviation, ..line }));
+        pieces.extend(arc.into_iter().map(|piece| Followed { piece, deviation, arc: true, ..line }));
     }
     Ok(FollowedProgram { pieces, points: 0, splines: 0, polynomials: 0 })
 }
@@ -278,13 +280,13 @@ fn chain<const M: usize>(
         cut_at_feeds(fit, &points, &moves.feed[first..end], |piece, chords, feed| {
             pieces.push(Followed {
                 piece,
-                first: first + chords.0,
-                last: first + chords.1,
+                first: (first + chords.0) as u32,
+                last: (first + chords.1) as u32,
                 feed,
                 deviation: fit.deviation,
                 tolerance: moves.tolerance[first],
                 exact: false,
-                bulge: 0.0,
+                arc: false,
             });
         });
     }
