@@ -183,6 +183,8 @@ def plan(
             interpolator=interpolator,
             progress=progress,
         )
+        if progress:
+            progress("audit", 0.0)
         audit = result.audit()
         files: tuple[FilePath, ...] = ()
         if output:

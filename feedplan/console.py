@@ -71,6 +71,9 @@ def progress_bar(quiet: bool) -> Iterator[Callable[[str, float], None] | None]:
 
         def show(stage: str, done: float) -> None:
             if stage not in tasks:
+                # A stage that begins ends those before it, whether or not they said so.
+                for earlier in tasks.values():
+                    bars.update(earlier, completed=1.0)
                 tasks[stage] = bars.add_task(stage, total=1.0)
             bars.update(tasks[stage], completed=done)
 

@@ -172,7 +172,7 @@
     const sizes = ["x", "y", "z"].map(size);
     const { clientWidth, clientHeight } = element("path");
     const room = Math.min(1, clientWidth / (1.7 * clientHeight));
-    const scale = room * Math.min(2.7 / (Math.hypot(...sizes) || 1), 2.2 / (sizes[2] || 1e-9));
+    const scale = room * Math.min(2.5 / (Math.hypot(...sizes) || 1), 2.2 / (sizes[2] || 1e-9));
     return { x: Math.max(sizes[0] * scale, 1e-3), y: Math.max(sizes[1] * scale, 1e-3), z: Math.max(sizes[2] * scale, 1e-3) };
   }
 
