@@ -183,6 +183,8 @@ def plan(
             interpolator=interpolator,
             progress=progress,
         )
+        if progress:
+            progress("audit", 0.0)
         audit = result.audit()
         files: tuple[FilePath, ...] = ()
         if output:
@@ -227,8 +229,8 @@ def fit(program: str, machine: str, tolerance: float | None, as_json: bool) -> N
     if as_json:
         sys.stdout.write(summary_text(summary))
     else:
-        pieces = ("pieces", f"{summary['pieces']} in {summary['runs']} runs")
-        console.print_rows([("program", program), *console.fit_rows(summary), pieces])
+        path_row = ("path", console.pieces_text(summary))
+        console.print_rows([("program", program), *console.fit_rows(summary), path_row])
 
 
 @cli.command()
