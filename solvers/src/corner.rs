@@ -268,3 +268,142 @@ fn cut<const M: usize>(piece: &Quadratic<M>, from: f64, to: f64) -> Quadratic<M>
 fn is_line<const M: usize>(piece: &Quadratic<M>) -> bool {
     piece.control[1] == lerp(&piece.control[0], &piece.control[2], 0.5)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::quadratic::dot;
+
+    fn followed<const M: usize>(piece: Quadratic<M>) -> Followed<M> {
+        Followed {
+            piece,
+            first: 0,
+            last: 0,
+            feed: 10.0,
+            deviation: 0.0,
+            tolerance: 1.0,
+            exact: false,
+            arc: false,
+        }
+    }
+
+    #[test]
+    fn a_right_angle_becomes_the_parabola_whose_apex_is_at_the_tolerance() {
+        let before = Quadratic::line([0.0, 0.0], [10.0, 0.0]);
+        let after = Quadratic::line([10.0, 0.0], [10.0, 10.0]);
+        let jump = Jump::new(&before, &after).unwrap();
+        assert_eq!(jump.change, [-1.0, 1.0]);
+        let length = jump.length_within(0.1);
+        assert!((length - 0.2 * 2f64.sqrt()).abs() < 1e-15);
+        let sides = Sides {
+            before: vec![followed(between(&before, 10.0 - length, 10.0).unwrap())],
+            after: vec![followed(between(&after, 0.0, length).unwrap())],
+        };
+        let corner = sides.parabola(&jump).unwrap();
+        assert_eq!(corner.piece.control, [[10.0 - length, 0.0], [10.0, 0.0], [10.0, length]]);
+        let apex = corner.piece.point(0.5 * corner.piece.width);
+        assert!(
+            (norm(&sub(&apex, &[10.0, 0.0])) - 0.1).abs() < 1e-15 && (corner.deviation - 0.1).abs() < 1e-15
+        );
+        // Bending the two sides draws the same curve in two pieces.
+        let mut sides = sides;
+        assert!((sides.bend(&jump).unwrap() - 0.1).abs() < 1e-14);
+        assert!(norm(&sub(&sides.before[0].piece.control[2], &apex)) < 1e-15);
+        let half = corner.piece.part(0.0, length);
+        assert!(norm(&sub(&sides.before[0].piece.point(0.07), &half.point(0.07))) < 1e-15);
+    }
+
+    #[test]
+    fn bent_sides_of_several_pieces_are_smooth_and_as_near_as_they_say() {
+        // Two C0 sides in space, smooth in themselves with changing parameter speeds.
+        let curve = |a: [f64; 3], b: [f64; 3], c: [f64; 3]| Quadratic { control: [a, b, c], width: 0.7 };
+        let before = [
+            curve([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.5, 0.1]),
+            curve([2.0, 0.5, 0.1], [4.0, 1.5, 0.3], [5.0, 3.0, 0.0]),
+        ];
+        let after = [
+            curve([5.0, 3.0, 0.0], [4.5, 3.0, 1.0], [4.0, 3.5, 2.0]),
+            curve([4.0, 3.5, 2.0], [3.75, 3.75, 2.5], [3.0, 4.0, 3.0]),
+        ];
+        let jump = Jump::new(&before[1], &after[0]).unwrap();
+        let mut sides = Sides { before: before.map(followed).to_vec(), after: after.map(followed).to_vec() };
+        let excess = sides.bend(&jump).unwrap();
+        let pieces: Vec<_> = sides.before.iter().chain(&sides.after).collect();
+        assert_eq!(pieces[0].piece.control[0], before[0].control[0]);
+        assert_eq!(pieces[3].piece.control[2], after[1].control[2]);
+        assert_eq!(excess, pieces[1].deviation);
+        for pair in pieces.windows(2) {
+            assert!(norm(&sub(&pair[0].piece.control[2], &pair[1].piece.control[0])) < 1e-15);
+            let (out, into) = (pair[0].piece.end_tangents().1, pair[1].piece.end_tangents().0);
+            assert!(norm(&sub(&out, &into)) < 1e-12, "{out:?} {into:?}");
+        }
+        // At the far end the direction is that of the side.
+        let (start, _) = pieces[0].piece.end_tangents();
+        assert!(start[1] == 0.0 && start[2] == 0.0);
+        for (bent, straight) in pieces.iter().zip(before.iter().chain(&after)) {
+            for i in 0..=20 {
+                let t = i as f64 / 20.0;
+                let (a, b) = (bent.piece.point(t * bent.piece.width), straight.point(t * straight.width));
+                assert!(norm(&sub(&a, &b)) <= bent.deviation + 1e-14);
+            }
+        }
+        let moved = sub(&pieces[1].piece.control[2], &before[1].control[2]);
+        assert!((norm(&moved) - pieces[1].deviation).abs() < 1e-14 && dot(&moved, &jump.change) > 0.0);
+    }
+
+    #[test]
+    fn corners_share_a_stretch_by_halves_or_take_what_the_other_leaves() {
+        assert_eq!(share_lengths(&[0.0, 9.0, 9.0, 0.0], &[5.0, 4.0, 5.0]), [0.0, 2.0, 2.0, 0.0]);
+        assert_eq!(share_lengths(&[0.0, 9.0, 1.0, 0.0], &[5.0, 4.0, 5.0]), [0.0, 3.0, 1.0, 0.0]);
+        assert_eq!(share_lengths(&[0.0, 9.0, 0.0], &[5.0, 7.0]), [0.0, 5.0, 0.0]);
+        // The first corner is held by its short side, the second gets the rest.
+        let shared = share_lengths(&[0.0, 9.0, 9.0, 0.0], &[0.25, 4.0, 9.0]);
+        assert_eq!(shared, [0.0, 0.25, 3.75, 0.0]);
+    }
+
+    #[test]
+    fn shared_lengths_never_overlap() {
+        let mut state = 7u64;
+        let mut random = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 40) as f64 / (1u64 << 24) as f64
+        };
+        for _ in 0..2000 {
+            let stretch: Vec<f64> = (0..12).map(|_| random().powi(3)).collect();
+            let mut need: Vec<f64> = (0..13).map(|_| 2.0 * random().powi(3)).collect();
+            need[0] = 0.0;
+            need[12] = 0.0;
+            let length = share_lengths(&need, &stretch);
+            for k in 0..12 {
+                assert!(length[k] + length[k + 1] <= stretch[k] * (1.0 + 1e-15) && length[k] <= need[k]);
+                // Nobody has less than its half without being held elsewhere.
+                let left = if k > 0 { 0.5 * stretch[k - 1] } else { f64::INFINITY };
+                assert!(length[k] >= need[k].min(0.5 * stretch[k]).min(left));
+            }
+        }
+    }
+
+    #[test]
+    fn what_rounding_does_is_no_corner_and_a_small_turn_is() {
+        let smooth = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
+            let (before, after) = (Quadratic::line(a, b), Quadratic::line(b, c));
+            Jump::new(&before, &after).unwrap().is_smooth(&before, &after)
+        };
+        assert!(smooth([0.1, 0.1], [0.2, 0.2], [0.7, 0.7]));
+        assert!(smooth([1e5, 1e5], [1e5 + 1e-6, 1e5 + 1e-6], [1e5 + 3e-6, 1e5 + 3e-6]));
+        assert!(!smooth([0.0, 0.0], [1.0, 0.0], [2.0, 1e-8]));
+        let back = Jump::new(&Quadratic::line([0.0], [1.0]), &Quadratic::line([1.0], [0.0])).unwrap();
+        assert!(back.reverses());
+    }
+
+    #[test]
+    fn cuts_next_to_an_end_leave_no_sliver() {
+        let line = Quadratic::line([0.0, 0.0], [3.0, 4.0]);
+        assert_eq!(between(&line, 1e-9, 5.0 - 1e-9), Some(line));
+        assert_eq!(between(&line, -1.0, 1e-9), None);
+        assert_eq!(between(&line, 2.0, 2.0), None);
+        let (a, b) = (between(&line, 0.0, 1.3).unwrap(), between(&line, 1.3, f64::INFINITY).unwrap());
+        assert_eq!(a.control[2], b.control[0]);
+        assert!(is_line(&a) && is_line(&b) && (a.width + b.width - 5.0).abs() < 1e-15);
+    }
+}

@@ -343,3 +343,116 @@ fn extent<const M: usize>(piece: &Quadratic<M>, axis: usize) -> (f64, f64) {
     }
     (least, greatest)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::follow::LINE;
+    use crate::quadratic::{norm, sub};
+    use proptest::prelude::*;
+
+    const OPTIONS: FollowOptions = FollowOptions {
+        exact_tolerance: 1e-3,
+        max_chord: 5.0,
+        corner_acceleration: 4e3,
+        max_speed: 1e3,
+        corner_angle: 0.48,
+    };
+
+    fn axes<const M: usize>(jump: bool) -> Axes<M> {
+        Axes {
+            max_velocity: [500.0; M],
+            max_acceleration: [1000.0; M],
+            travel: [[f64::NEG_INFINITY, f64::INFINITY]; M],
+            jump,
+        }
+    }
+
+    fn polyline(
+        points: &[[f64; 2]],
+        tolerance: &[f64],
+        fit: bool,
+        jump: bool,
+    ) -> (Vec<Followed<2>>, Vec<usize>) {
+        let count = points.len() - 1;
+        let fit: Vec<f64> =
+            tolerance.iter().map(|tolerance| if fit { 0.5 * tolerance } else { 0.0 }).collect();
+        let moves = Moves {
+            start: points[0],
+            kind: &vec![LINE; count],
+            target: &points[1..],
+            feed: &vec![100.0; count],
+            tolerance,
+            fit_tolerance: &fit,
+            halt: &vec![false; count],
+            arcs: &[],
+        };
+        let path = build_path(&moves, &OPTIONS, &axes(jump)).unwrap();
+        (path.parts.concat(), path.runs)
+    }
+
+    #[test]
+    fn a_square_is_rounded_at_its_corners_and_nowhere_else() {
+        let square = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0], [0.0, 0.0]];
+        let (pieces, runs) = polyline(&square, &[0.01; 4], false, false);
+        let edge = 10.0 - 0.02 * 2f64.sqrt();
+        assert_eq!((pieces.len(), &runs[..]), (7, &[0, 7][..]));
+        assert!(norm(&sub(&pieces[0].piece.control[2], &[edge, 0.0])) < 1e-12);
+        assert_eq!(pieces[1].piece.control[1], [10.0, 0.0]);
+        assert_eq!((pieces[1].first, pieces[1].last), (0, 1));
+        let (exact, stops) = polyline(&square, &[0.0; 4], false, false);
+        assert_eq!((exact.len(), &stops[..]), (4, &[0, 1, 2, 3, 4][..]));
+        let (passed, none) = polyline(&square, &[0.0; 4], false, true);
+        assert_eq!((passed.len(), &none[..]), (4, &[0, 4][..]));
+    }
+
+    #[test]
+    fn a_zig_zag_of_short_edges_is_all_corners_that_touch() {
+        let points: Vec<[f64; 2]> =
+            (0..41).map(|i| [0.02 * i as f64, if i % 2 == 0 { 0.0 } else { 0.02 }]).collect();
+        let (pieces, runs) = polyline(&points, &[0.1; 40], false, false);
+        // 39 corners; of the first and the last edge half is left.
+        assert_eq!((pieces.len(), runs.len()), (41, 2));
+        for pair in pieces.windows(2) {
+            assert_eq!(pair[0].piece.control[2], pair[1].piece.control[0]);
+            assert!(Jump::new(&pair[0].piece, &pair[1].piece).unwrap().size < 1e-9);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn random_polylines_are_joined_smoothly_within_tolerance(
+            steps in prop::collection::vec((-1.0..1.0f64, -1.0..1.0f64, -3..2i32), 2..60),
+            tolerance in prop::sample::select(vec![1e-4, 1e-2, 1.0]),
+            fit: bool,
+            exact_from in 0..60usize,
+        ) {
+            let mut points = vec![[0.0, 0.0]];
+            for (x, y, exponent) in steps {
+                let scale = 10f64.powi(exponent);
+                let [a, b] = points[points.len() - 1];
+                points.push([a + scale * x + 1e-4, b + scale * y]);
+            }
+            let count = points.len() - 1;
+            let limits: Vec<f64> = (0..count).map(|i| if i < exact_from { tolerance } else { 0.0 }).collect();
+            let (pieces, runs) = polyline(&points, &limits, fit, false);
+            prop_assert_eq!(pieces[0].piece.control[0], points[0]);
+            prop_assert_eq!(pieces[pieces.len() - 1].piece.control[2], points[count]);
+            prop_assert!(pieces[0].first == 0 && pieces[pieces.len() - 1].last as usize == count - 1);
+            for (i, pair) in pieces.windows(2).enumerate() {
+                prop_assert_eq!(pair[0].piece.control[2], pair[1].piece.control[0]);
+                prop_assert!(pair[1].first >= pair[0].first && pair[1].first <= pair[0].last + 1);
+                prop_assert!(pair[1].last >= pair[0].last);
+                if runs.binary_search(&(i + 1)).is_err() {
+                    let jump = Jump::new(&pair[0].piece, &pair[1].piece).unwrap();
+                    prop_assert!(jump.is_smooth(&pair[0].piece, &pair[1].piece), "{}", jump.size);
+                }
+            }
+            for piece in &pieces {
+                prop_assert!(piece.deviation <= piece.tolerance * (1.0 + 1e-9));
+                prop_assert!(!piece.exact || piece.deviation == 0.0);
+                prop_assert!(piece.piece.width > 0.0);
+            }
+        }
+    }
+}

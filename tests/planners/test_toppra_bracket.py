@@ -1,8 +1,8 @@
-"""toppra on a mesh aligned with the knots brackets the exact time: from below by collocation, from above one-sided.
+"""toppra on a mesh aligned with the knots brackets the exact time from both sides.
 
-Collocation asks for the limits at the nodes alone and is optimistic. The one-sided scheme asks for them at both
-ends of every cell with the cell's own q''; on a quadratic piece the acceleration is linear in a cell, so that its
-profile is feasible. Both meet at the exact time as the mesh refines.
+Collocation asks for the limits at the nodes alone and is optimistic. The one-sided scheme asks for them at
+both ends of every cell with the cell's own q''; on a quadratic piece the acceleration is linear in a cell, so
+that its profile is feasible. Both meet at the exact time as the mesh refines.
 """
 
 from __future__ import annotations

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::arrays::{row, rows};
 use super::with_padded_axes;
+use crate::arc::ArcError;
 use crate::follow::{ArcShape, Fault, FollowOptions, Followed, Moves};
 use crate::path_builder::{build_path as build, Axes, BuiltPath};
 
@@ -125,8 +126,13 @@ fn sentence(fault: Fault) -> &'static str {
     match fault {
         Fault::Length => "the move has no length, or a coordinate is not a finite number: correct the block",
         Fault::Feed => "the move has no positive feed: give F a value above 0",
-        Fault::Radius => "the arc has no radius, or a coordinate is not a finite number: correct its centre",
-        Fault::Sweep => "the arc does not lead to its end point: correct its centre or its end",
+        Fault::Arc(ArcError::Radius) => {
+            "the arc has no radius, or no finite one: correct its centre or its end"
+        }
+        Fault::Arc(ArcError::Sweep) => {
+            "the arc does not lead to its end point: correct its centre or its end"
+        }
+        Fault::Arc(ArcError::Turns) => "the arc has too many turns to be followed: give fewer",
     }
 }
 
