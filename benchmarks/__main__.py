@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 from rich.console import Console
@@ -24,7 +25,8 @@ def main() -> None:
     if unknown:
         parser.error(f"there is no benchmark {unknown[0]!r}: use {', '.join(BENCHMARKS)}")
 
-    console = Console()
+    # Wide enough for every table where there is no terminal.
+    console = Console() if sys.stdout.isatty() else Console(width=160)
     for name in arguments.names or BENCHMARKS:
         result = BENCHMARKS[name](arguments.quick)
         results.show(result, console)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
+from rich import box
 from rich.console import Console
 from rich.table import Table
 
@@ -27,10 +28,12 @@ class Result:
 
 def show(result: Result, console: Console) -> None:
     """Print the table."""
-    table = Table(title=result.title, title_justify="left", title_style="bold")
+    table = Table(
+        title=result.title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False
+    )
     for column in result.rows[0]:
         words = isinstance(result.rows[0][column], str)
-        table.add_column(column, justify="left" if words else "right")
+        table.add_column(column, justify="left" if words else "right", no_wrap=True)
     for row in result.rows:
         table.add_row(*(_written(cell) for cell in row.values()))
     console.print(table)

@@ -1,4 +1,4 @@
-"""toppra on the same problem, on a mesh aligned with the knots: time, grid size and computing time.
+"""toppra on the same problem, on a mesh aligned with the knots: time, grid size and processor time.
 
 toppra's default scheme asks one path acceleration to serve both values of q'' at a knot and therefore does
 not converge on C1 quadratic splines; its collocation scheme does, from below, and is what is compared here.
@@ -86,17 +86,17 @@ class FeedConstraint(LinearConstraint):  # type: ignore[misc]
 
 @dataclass(frozen=True)
 class Solution:
-    """What toppra found: `time` along the path [s], `cells` a piece, `computing` time [s]."""
+    """What toppra found: `time` along the path [s], `cells` a piece, `processor` time [s]."""
 
     time: float
     cells: int
-    computing: float
+    processor: float
 
 
 def solve(problem: Problem, cells: int) -> Solution:
     """Plan on `cells` equal cells in every piece, from rest to rest.
 
-    `computing` covers the constraints' parameters and both passes; not the path, the mesh, the conversion
+    `processor` covers the constraints' parameters and both passes; not the path, the mesh, the conversion
     of the result to a trajectory, nor toppra's import.
     """
     path = QuadraticPath(problem)
@@ -111,13 +111,13 @@ def solve(problem: Problem, cells: int) -> Solution:
         JointVelocityConstraint(np.column_stack((-velocity, velocity))),
         FeedConstraint(problem.feed, path.dof),
     ]
-    begin = time.perf_counter()
+    begin = time.process_time()
     instance = TOPPRA(constraints, path, gridpoints=grid, solver_wrapper="seidel")
     _, speed, _ = instance.compute_parameterization(0.0, 0.0)
-    computing = time.perf_counter() - begin
+    processor = time.process_time() - begin
     if speed is None:
         raise RuntimeError(f"toppra found no profile on {cells} cells a piece")
-    return Solution(float((2.0 * np.diff(grid) / (speed[1:] + speed[:-1])).sum()), cells, computing)
+    return Solution(float((2.0 * np.diff(grid) / (speed[1:] + speed[:-1])).sum()), cells, processor)
 
 
 def solve_to(problem: Problem, exact: float, accuracy: float) -> tuple[Solution, float]:

@@ -5,11 +5,18 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.audit import _Limits
+from feedplan.constraints.problem import Problem
+from feedplan.profile import SpeedProfile
+from feedplan.program.program import Program
+
 __all__ = [
     "PathLength",
     "PlanError",
     "Sampler",
+    "SetpointAudit",
     "__version__",
+    "audit_plan",
     "build_path",
     "csv_rows",
     "fit_points",
@@ -100,7 +107,6 @@ class Sampler:
     ]: ...
 
 def csv_rows(values: NDArray[np.float64], last: NDArray[np.int32]) -> bytes: ...
-
 def read_gcode(
     source: bytes,
     name: str,
@@ -109,7 +115,6 @@ def read_gcode(
     block_delete: bool,
     max_moves: int,
 ) -> dict[str, Any]: ...
-
 def fit_points(
     points: NDArray[np.float64],
     tolerance: float,
@@ -119,7 +124,6 @@ def fit_points(
 ) -> tuple[
     NDArray[np.float64], NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.uint32]
 ]: ...
-
 def build_path(
     name: str,
     start: NDArray[np.float64],
@@ -155,3 +159,33 @@ def build_path(
     tuple[int, int, int, float],
     tuple[int, int, float] | None,
 ]: ...
+
+# Per limit: name, axis (-1: none), worst value, limit, ratio, time, source line; and the number of samples.
+_Findings = tuple[list[tuple[str, int, float, float, float, float, int]], int]
+
+def audit_plan(
+    problem: Problem,
+    limits: _Limits,
+    profile: SpeedProfile | None = None,
+    program: Program | None = None,
+) -> _Findings: ...
+
+@final
+class SetpointAudit:
+    def __new__(
+        cls,
+        limits: _Limits,
+        resolution: float = 0.0,
+        problem: Problem | None = None,
+        profile: SpeedProfile | None = None,
+        program: Program | None = None,
+    ) -> SetpointAudit: ...
+    def push(
+        self,
+        t: NDArray[np.float64],
+        position: NDArray[np.float64],
+        velocity: NDArray[np.float64] | None = None,
+        acceleration: NDArray[np.float64] | None = None,
+        line: NDArray[np.int32] | None = None,
+    ) -> None: ...
+    def finish(self) -> _Findings: ...

@@ -3,6 +3,7 @@
 
 pub mod arc;
 pub mod arc_length;
+pub mod audit;
 pub mod bang_bang_quadratic;
 pub mod bernstein;
 pub mod corner;

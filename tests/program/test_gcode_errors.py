@@ -192,7 +192,9 @@ def test_other_languages_are_recognised(text: str, line: int, language: str) -> 
     assert found.line == line
 
 
-@pytest.mark.parametrize("text", ["", "\n", "(nothing)\n; to see\n", "%\n%\n", "G21 G90\nM3 S100\nM30\n", "G0\nM2"])
+@pytest.mark.parametrize(
+    "text", ["", "\n", "(nothing)\n; to see\n", "%\n%\n", "G21 G90\nM3 S100\nM30\n", "G0\nM2"]
+)
 def test_a_program_without_motion_is_an_error(text: str) -> None:
     found = error(text)
     assert "the program moves nothing" in str(found)

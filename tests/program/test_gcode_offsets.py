@@ -33,7 +33,17 @@ def test_a_change_of_offset_moves_nothing() -> None:
 
 @pytest.mark.parametrize(
     ("code", "number"),
-    [("G54", 1), ("G55", 2), ("G56", 3), ("G57", 4), ("G58", 5), ("G59", 6), ("G59.1", 7), ("G59.2", 8), ("G59.3", 9)],
+    [
+        ("G54", 1),
+        ("G55", 2),
+        ("G56", 3),
+        ("G57", 4),
+        ("G58", 5),
+        ("G59", 6),
+        ("G59.1", 7),
+        ("G59.2", 8),
+        ("G59.3", 9),
+    ],
 )
 def test_g10_l2_sets_each_offset(code: str, number: int) -> None:
     assert targets(f"G91 G10 L2 P{number} X10 Y20\nG90 {code} G0 X1 Y1") == [[11, 21, 0]]
@@ -105,7 +115,9 @@ def test_g53_needs_absolute_mode_and_a_straight_move() -> None:
 
 
 def test_an_axis_that_the_machine_lacks_is_an_error() -> None:
-    with pytest.raises(ProgramError, match="^program line 3: word A moves an axis that the machine does not have"):
+    with pytest.raises(
+        ProgramError, match=r"^program line 3: word A moves an axis that the machine does not have"
+    ):
         targets("G0 X1\nA90", SHOP)
 
 

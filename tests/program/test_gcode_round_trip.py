@@ -72,7 +72,9 @@ class Writer:
         elif kind == 4:
             place = rng.choice(sorted(self.work))
             self.work[place] = np.array([rng.uniform(-50, 50) for _ in range(3)])
-            words = [f"{axis}{number(v / self.unit)}" for axis, v in zip("XYZ", self.work[place], strict=True)]
+            words = [
+                f"{axis}{number(v / self.unit)}" for axis, v in zip("XYZ", self.work[place], strict=True)
+            ]
             self.block("G10", "L2", f"P{int(place[1:]) - 53}", *words)
         elif kind == 5:
             place = np.array([rng.uniform(-50, 50) for _ in range(3)])

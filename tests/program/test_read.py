@@ -28,7 +28,7 @@ def test_a_missing_file_is_an_error(tmp_path: Path) -> None:
 
 
 def test_a_directory_is_an_error(tmp_path: Path) -> None:
-    with pytest.raises(ProgramError, match="is a directory: give the program file in it$"):
+    with pytest.raises(ProgramError, match=r"is a directory: give the program file in it$"):
         read_program(tmp_path)
 
 
@@ -50,7 +50,9 @@ def test_a_file_that_is_too_large_is_an_error(tmp_path: Path) -> None:
     path = tmp_path / "part.ngc"
     with path.open("wb") as file:
         file.truncate((1 << 30) + 1)
-    with pytest.raises(ProgramError, match="has 1073741825 bytes, more than the 1073741824 that are read: split it"):
+    with pytest.raises(
+        ProgramError, match="has 1073741825 bytes, more than the 1073741824 that are read: split it"
+    ):
         read_program(path)
     with pytest.raises(ProgramError, match="program has 10 bytes, more than the 9"):
         read_gcode(b"G21 G0 X1\n", max_bytes=9)

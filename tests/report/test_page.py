@@ -130,10 +130,10 @@ def test_the_charts_hold_the_setpoints(square: Any, tmp_path: Path) -> None:
 
 
 def test_the_data_cannot_end_its_script(broken_square: Any, tmp_path: Path) -> None:
-    checks = [replace(check, name="</script>") for check in broken_square.verdict.checks]
+    checks = [replace(check, axis="</script>") for check in broken_square.verdict.checks]
     broken_square.verdict = replace(broken_square.verdict, checks=tuple(checks))
     data = data_of(page(broken_square, tmp_path / "report.html"))
-    assert data["failures"][0]["name"] == "</script>"
+    assert data["failures"][0]["axis"] == "</script>"
 
 
 def test_a_program_that_is_gone_costs_only_its_text(square: Any, tmp_path: Path) -> None:
@@ -157,6 +157,10 @@ def test_numbers_are_packed_as_little_endian_32_bit() -> None:
     assert numbers(packed(np.array([7, -8]))).tolist() == [7, -8]
 
 
-def test_axes_other_than_xyz_have_no_place_on_the_tool_path(square: Any) -> None:
-    figures = SetpointFigures(square.problem, 10)
-    assert figures.tool_path()["marks"] == []
+def test_axes_that_turn_have_curves_but_no_place_on_the_tool_path(square: Any, tmp_path: Path) -> None:
+    square.problem = replace(square.problem, path=replace(square.path, axes=("A", "Z", "C")))
+    data = data_of(page(square, tmp_path / "report.html"))
+    assert data["axes"] == ["A", "Z", "C"]
+    assert len(data["time"]["velocity"]) == 3
+    assert numbers(data["path"]["x"]).max() == 0.0
+    assert numbers(data["path"]["z"]).max() == 20.0

@@ -124,7 +124,7 @@ impl Interpreter<'_> {
                     AXES[u] as char, AXES[v] as char
                 ));
             }
-            if !(radius.abs() <= FARTHEST_CENTRE) {
+            if radius.abs() > FARTHEST_CENTRE {
                 return fault(format!("word {} is more than {FARTHEST_CENTRE:e}: check R", block.word(b'R')));
             }
             return Ok(Form::Radius(radius * unit));
@@ -150,7 +150,7 @@ impl Interpreter<'_> {
         }
         let zero = if self.state.absolute_centres { zero } else { position };
         let centre = [zero[u] + words[0].unwrap_or(0.0), zero[v] + words[1].unwrap_or(0.0)];
-        if centre.iter().any(|value| !(value.abs() <= FARTHEST_CENTRE)) {
+        if !centre.iter().all(|value| value.abs() <= FARTHEST_CENTRE) {
             return fault(format!(
                 "the centre of an arc is more than {FARTHEST_CENTRE:e} mm away: check I, J, K"
             ));
