@@ -1,9 +1,9 @@
 """The exact planner: by hand, against the times of an independent implementation, every limit densely.
 
-`data/reference.npz` holds 122 random problems (seeds 700…, 0…11) and their times from an independent planner of
-the same mathematics in numpy: per problem `m` axes, `n` pieces, `time` [s], `v`, `a` limits, `dl` and `dr` the
-tangents (n, m) at the piece ends, `h` widths, `f` feeds, `j` (n + 1) squared junction speeds. They have ties,
-exact zeros, cusps, corners, straight runs and limits over six decades; the last twelve are CAM-like.
+`data/reference.npz` holds 122 random problems (seeds 700…, 0…11) and their times from an independent planner
+of the same mathematics in numpy. Per problem: `m` axes, `n` pieces, `time` [s], `v`, `a` limits, `dl`, `dr`
+the tangents (n, m) at the piece ends, `h` widths, `f` feeds, `j` (n + 1) squared junction speeds. They have
+ties, exact zeros, cusps, corners, straight runs and limits over six decades; the last twelve are CAM-like.
 """
 
 from __future__ import annotations
