@@ -10,8 +10,6 @@ from feedplan.constraints.problem import Problem
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 
-_Findings = tuple[list[tuple[str, int, float, float, float, float, int]], int]
-
 __all__ = [
     "PathLength",
     "PlanError",
@@ -161,6 +159,7 @@ def build_path(
     tuple[int, int, int, float],
     tuple[int, int, float] | None,
 ]: ...
+
 # Per limit: name, axis (-1: none), worst value, limit, ratio, time, source line; and the number of samples.
 _Findings = tuple[list[tuple[str, int, float, float, float, float, int]], int]
 

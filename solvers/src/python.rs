@@ -11,6 +11,27 @@ mod text;
 
 use pyo3::prelude::*;
 
+/// Calls a generic kernel for at most 3 or at most 6 axes, those beyond `count` at rest: an axis that rests changes
+/// no result, and two instances of a kernel are built where six would be.
+macro_rules! with_padded_axes {
+    ($count:expr, $m:ident, $call:expr) => {
+        match $count {
+            1..=3 => {
+                const $m: usize = 3;
+                $call
+            }
+            4..=6 => {
+                const $m: usize = 6;
+                $call
+            }
+            count => {
+                Err(pyo3::exceptions::PyValueError::new_err(format!("{count} axes: 1 to 6 are supported")))
+            }
+        }
+    };
+}
+pub(crate) use with_padded_axes;
+
 /// Calls a generic kernel with the number of axes as a constant: `with_axes!(m, M, expression)`.
 macro_rules! with_axes {
     ($count:expr, $m:ident, $call:expr) => {

@@ -97,15 +97,21 @@ impl Arcs<'_> {
         };
         let bend = curve.second_derivative();
         let width = self.u1[i] - self.u0[i];
+        let direction = if anchored_at_end { -1.0 } else { 1.0 };
+        let (root_anchor, root_far) = (p_anchor.sqrt(), p_far.sqrt());
+        let share = width / (root_anchor + root_far);
         Motion {
             tangent,
             bend,
             law,
             pole: law.pole(&tangent, &bend, p_anchor),
-            direction: if anchored_at_end { -1.0 } else { 1.0 },
+            direction,
             width,
-            root_anchor: p_anchor.sqrt(),
-            root_far: p_far.sqrt(),
+            root_anchor,
+            root_far,
+            first_order: direction * share * 2.0 * root_anchor,
+            second_order: direction * share * (root_far - root_anchor),
+            time_scale: 2.0 * share,
             anchored_at_end,
         }
     }
@@ -169,6 +175,10 @@ pub struct Motion<const M: usize> {
     /// Recorded √p at the anchor and at the other end.
     pub root_anchor: f64,
     pub root_far: f64,
+    /// The distance at y is y (first_order + second_order y), and dt/dy the integrand times `time_scale`.
+    first_order: f64,
+    second_order: f64,
+    time_scale: f64,
     /// Whether the anchor is the end of the arc.
     pub anchored_at_end: bool,
     pole: Option<Pole>,
@@ -218,9 +228,7 @@ impl<const M: usize> Motion<M> {
     /// Distance from the anchor, with its sign, at `y`.
     #[inline(always)]
     fn distance(&self, y: f64) -> f64 {
-        let sum = self.root_anchor + self.root_far;
-        self.direction * self.width * y * (2.0 * self.root_anchor + (self.root_far - self.root_anchor) * y)
-            / sum
+        y * (self.first_order + self.second_order * y)
     }
 
     /// The `y` of a distance `from_anchor` ≥ 0.
@@ -273,13 +281,23 @@ impl<const M: usize> Motion<M> {
         State { y, tangent, root_p, velocity, magnitude }
     }
 
-    /// dt/dy at `y` inside the arc.
+    /// dt/dy at `y` inside the arc, up to `time_scale`.
     #[inline(always)]
     fn integrand(&self, y: f64) -> f64 {
         let d = self.distance(y);
-        let tangent = std::array::from_fn(|k| self.tangent[k] + d * self.bend[k]);
         let linear = self.root_anchor + (self.root_far - self.root_anchor) * y;
-        linear / self.root_p(d, &tangent)
+        match self.law {
+            // The same as below with one axis evaluated and one division saved.
+            Law::AxisAcceleration { axis, value, start_sq } => {
+                let tangent = self.tangent[axis] + d * self.bend[axis];
+                let speed_sq = start_sq + value * d * (self.tangent[axis] + tangent);
+                linear * tangent.abs() / speed_sq.sqrt()
+            }
+            _ => {
+                let tangent = std::array::from_fn(|k| self.tangent[k] + d * self.bend[k]);
+                linear / self.root_p(d, &tangent)
+            }
+        }
     }
 
     /// Whether the integrand is smooth enough between two distances for the rule: no longer than they are far
@@ -288,7 +306,7 @@ impl<const M: usize> Motion<M> {
     fn is_smooth(&self, d0: f64, d1: f64) -> bool {
         let Some(pole) = &self.pole else { return true };
         let along = (d0.min(d1) - pole.at).max(pole.at - d0.max(d1)).max(0.0);
-        let (length, away) = ((d1 - d0).abs(), along.hypot(pole.beside));
+        let (length, away) = ((d1 - d0).abs(), (along * along + pole.beside * pole.beside).sqrt());
         length <= away || pole.strength * away <= THIN * length
     }
 
@@ -307,7 +325,7 @@ impl<const M: usize> Motion<M> {
                 coarse += INNER_WEIGHTS[0] * both;
             }
         }
-        let scale = 2.0 * self.width / (self.root_anchor + self.root_far) * half;
+        let scale = self.time_scale * half;
         (fine * scale, smooth && (fine - coarse).abs() <= RULES_AGREE * fine)
     }
 

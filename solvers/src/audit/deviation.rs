@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::arcs::Arcs;
 use super::curve::{distance, Followed};
-use super::moves::{Move, Programmed};
+use super::moves::{nearest_of, Move, Programmed};
 use super::place::distance_to_piece;
 use super::{Check, Limits, Tally, Worst, EPS, GAP_TOLERANCE, ROUNDINGS};
 
@@ -107,12 +107,18 @@ pub fn audit_deviation<const M: usize>(
     from_path.merge(from_program).merge(ends)
 }
 
-/// The moves that a piece may be compared with: those it follows and one more on each side.
-pub fn window(path: &Followed, piece: usize, moves: usize) -> std::ops::Range<usize> {
+/// The moves that a piece may be compared with: those it follows, then one more on each side.
+pub fn window(path: &Followed, piece: usize, moves: usize) -> impl Iterator<Item = usize> {
     let [first, last] = [path.moves[2 * piece], path.moves[2 * piece + 1]];
-    let first = first.saturating_sub(1).clamp(0, moves as i64) as usize;
-    let last = last.saturating_add(2).clamp(0, moves as i64) as usize;
-    first..last.max(first)
+    let first = first.clamp(0, moves as i64) as usize;
+    let last = last.saturating_add(1).clamp(first as i64, moves as i64) as usize;
+    (first..last).chain(first.checked_sub(1)).chain(Some(last).filter(|&m| m < moves))
+}
+
+/// What a place may be off its nearest neighbour without changing the tally: no more than its worst so far, and not
+/// near the tolerance. The first neighbour within it settles the place.
+pub fn settled<const M: usize>(tally: &Tally<M>) -> f64 {
+    tally.get(Check::Deviation, 0).ratio.clamp(0.0, NEAR)
 }
 
 fn piece_to_moves<const M: usize>(
@@ -125,16 +131,14 @@ fn piece_to_moves<const M: usize>(
     let curve = path.curve::<M>(piece);
     let (line, tolerance) = (path.line[piece], path.tolerance[piece].max(GAP_TOLERANCE));
     let rounding = ROUNDINGS * EPS * curve.magnitude();
-    let moves = window(path, piece, program.len());
-    let off = |t: f64| {
-        let q = curve.at(t * curve.width);
-        let nearest = moves.clone().map(|m| program.get::<M>(m).distance(&q)).fold(f64::INFINITY, lesser);
-        nearest - rounding
+    let moves: Vec<Move<M>> = window(path, piece, program.len()).map(|m| program.get(m)).collect();
+    let off = |t: f64, enough: f64| {
+        nearest_of(moves.iter().copied(), &curve.at(t * curve.width), enough) - rounding
     };
     let (mut worst, mut worst_t) = (0.0_f64, 0.0);
     for i in 0..=PLACES {
         let t = i as f64 / PLACES as f64;
-        let value = off(t);
+        let value = off(t, settled(tally) * tolerance);
         tally.offer(Check::Deviation, 0, value, tolerance, time, line);
         if value > worst {
             (worst, worst_t) = (value, t);
@@ -145,7 +149,7 @@ fn piece_to_moves<const M: usize>(
         let step = 1.0 / (PLACES * PLACES) as f64;
         for i in 0..=2 * PLACES {
             let t = (worst_t + (i as f64 - PLACES as f64) * step).clamp(0.0, 1.0);
-            tally.offer(Check::Deviation, 0, off(t), tolerance, time, line);
+            tally.offer(Check::Deviation, 0, off(t, 0.0), tolerance, time, line);
         }
     }
 }
@@ -195,19 +199,23 @@ fn move_to_pieces<const M: usize>(
         tally.offer(Check::Deviation, 0, f64::INFINITY, GAP_TOLERANCE, 0.0, line);
         return;
     }
-    let first = first.saturating_sub(1).min(path.len() - 1);
-    let last = (last + 1).min(path.len() - 1);
+    let (first, last) = (first.min(path.len() - 1), last.min(path.len() - 1));
+    let wider = [first.saturating_sub(1), (last + 1).min(path.len() - 1)].into_iter();
     let places = programmed.places();
     let rounding = ROUNDINGS * EPS * magnitude(&programmed.to);
     for i in 0..=places {
         let q = programmed.at(i as f64 / places as f64);
         // The nearest piece counts, measured by its own tolerance.
         let mut nearest = (f64::INFINITY, f64::INFINITY, GAP_TOLERANCE);
-        for piece in first..=last {
+        let enough = settled(tally);
+        for piece in (first..=last).chain(wider.clone()) {
             let tolerance = path.tolerance[piece].max(GAP_TOLERANCE);
             let away = distance_to_piece(&path.curve::<M>(piece), &q) - rounding;
             if away / tolerance < nearest.0 {
                 nearest = (away / tolerance, away, tolerance);
+            }
+            if nearest.0 <= enough {
+                break;
             }
         }
         tally.offer(Check::Deviation, 0, nearest.1, nearest.2, times[first], line);
@@ -249,15 +257,6 @@ fn magnitude<const M: usize>(q: &[f64; M]) -> f64 {
     q.iter().fold(0.0, |most, q| q.abs().max(most))
 }
 
-/// The lesser of two, a NaN if there is one.
-fn lesser(a: f64, b: f64) -> f64 {
-    if a.is_nan() || a < b {
-        a
-    } else {
-        b
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -275,7 +274,8 @@ mod tests {
             dwell: &[],
         };
         assert_eq!(followers(&path, 7), [(0, 0), (0, 1), (1, 2), (1, 2), (2, 2), (2, 2), (2, 2)]);
-        assert_eq!(window(&path, 0, 7), 0..3);
-        assert_eq!(window(&path, 2, 7), 3..7);
+        assert_eq!(window(&path, 0, 7).collect::<Vec<_>>(), [0, 1, 2]);
+        assert_eq!(window(&path, 1, 7).collect::<Vec<_>>(), [1, 0, 2]);
+        assert_eq!(window(&path, 2, 6).collect::<Vec<_>>(), [4, 5, 3]);
     }
 }

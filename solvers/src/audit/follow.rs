@@ -7,15 +7,19 @@
 use rayon::prelude::*;
 
 use super::arcs::{Arcs, Motion};
-use super::curve::{distance, distance_to_segment, inner, length, Followed};
-use super::deviation::window;
-use super::moves::Programmed;
+use super::curve::{distance, distance_to_segment, from_to, inner, length, Followed};
+use super::deviation::{settled, window};
+use super::moves::{nearest_of, Programmed};
 use super::place::{Place, Search};
 use super::setpoints::Row;
 use super::{Check, Limits, Tally, EPS, GAP_TOLERANCE, PASS_EXCESS, PLACE_TOLERANCE, ROUNDINGS};
 
 /// Setpoints a thread takes at a time.
 const BLOCK: usize = 4096;
+
+/// After so many setpoints on end that are off the path, the rest of their block counts as off by as much as the
+/// last: the verdict is clear, and searching on would take for ever.
+const MOST_ASTRAY: u32 = 64;
 
 /// A setpoint may lie this share of its step from its place on the path: what sampling promises.
 const STEP_SHARE: f64 = 1e-6;
@@ -76,15 +80,14 @@ impl Default for Spot {
     }
 }
 
-/// When the profile is at a place.
-struct Instant<const M: usize> {
+/// A place on the profile.
+struct Passage<const M: usize> {
     arc: usize,
     run: usize,
     motion: Motion<M>,
+    /// Local parameter, and the same as the arc's integration variable.
+    u: f64,
     y: f64,
-    /// It arrives and leaves, in s.
-    from: f64,
-    until: f64,
 }
 
 impl Timed<'_> {
@@ -117,7 +120,7 @@ impl Timed<'_> {
         Place { piece: self.arcs.piece[arc] as usize, u: self.arcs.u0[arc] }
     }
 
-    fn instant<const M: usize>(&self, path: &Followed, place: Place, period: f64) -> Instant<M> {
+    fn passage<const M: usize>(&self, path: &Followed, place: Place) -> Passage<M> {
         let arcs = &self.arcs;
         let last = arcs.len() - 1;
         let mut arc = arcs.piece.partition_point(|&piece| (piece as usize) < place.piece).min(last);
@@ -126,13 +129,20 @@ impl Timed<'_> {
         }
         let run = arcs.runs.partition_point(|&first| first <= arc as i64) - 1;
         let motion = arcs.motion::<M>(arc, &path.curve(arcs.piece[arc] as usize));
-        let start = self.starts[arc] + self.shift(run);
-        let end = start + arcs.duration[arc];
         // A place on a motionless piece is the start of what comes next.
         let u = if arcs.piece[arc] as usize == place.piece { place.u } else { arcs.u0[arc] };
         let y = motion.y_at(if motion.anchored_at_end { arcs.u1[arc] - u } else { u - arcs.u0[arc] });
-        let from_anchor = motion.time_from_anchor(y);
-        let time = if motion.anchored_at_end { end - from_anchor } else { start + from_anchor };
+        Passage { arc, run, motion, u, y }
+    }
+
+    /// When the profile arrives at a place and when it leaves, in s: at stops it pauses, and the setpoints may wait
+    /// for their next period.
+    fn times<const M: usize>(&self, path: &Followed, here: &Passage<M>, period: f64) -> [f64; 2] {
+        let (arcs, &Passage { arc, run, u, .. }) = (&self.arcs, here);
+        let start = self.starts[arc] + self.shift(run);
+        let end = start + arcs.duration[arc];
+        let from_anchor = here.motion.time_from_anchor(here.y);
+        let time = if here.motion.anchored_at_end { end - from_anchor } else { start + from_anchor };
         let (mut from, mut until) = (time, time);
         if u <= arcs.u0[arc] && arc == self.arcs_of(run).start && run > 0 {
             from = self.clock.get(run - 1).map_or(time, |clock| clock + self.motion_time(run - 1));
@@ -140,18 +150,18 @@ impl Timed<'_> {
         if u >= arcs.u1[arc] && arc + 1 == self.arcs_of(run).end {
             until = self.clock.get(run + 1).copied().unwrap_or(end + path.dwell[run] + period);
         }
-        Instant { arc, run, motion, y, from, until }
+        [from, until]
     }
-}
 
-impl<const M: usize> Instant<M> {
-    /// At most as far as the profile gets between `time` and being here, and how much of that is rounding.
-    fn late(&self, time: f64, limits: &Limits<M>) -> (f64, f64) {
-        let wait = (self.from - time).max(time - self.until).max(0.0);
-        let speed = length(&self.motion.state(self.y).velocity);
+    /// At most how far the profile gets between `time` and being at `place`, in mm, less what may be rounding.
+    fn late<const M: usize>(&self, path: &Followed, place: Place, time: f64, limits: &Limits<M>) -> f64 {
+        let here = self.passage::<M>(path, place);
+        let [from, until] = self.times(path, &here, limits.period);
+        let wait = (from - time).max(time - until).max(0.0);
+        let speed = length(&here.motion.state(here.y).velocity);
         let reach = |wait: f64| wait * (speed + 0.5 * wait * length(&limits.acceleration));
         // Summing the durations of all arcs before has rounded once for each.
-        (reach(wait), reach(EPS * time.abs() * (self.arc as f64 + ROUNDINGS)))
+        reach(wait) - reach(EPS * time.abs() * (here.arc as f64 + ROUNDINGS))
     }
 }
 
@@ -208,8 +218,13 @@ impl Plan<'_> {
         let block = if self.profile.is_some() { BLOCK } else { fresh.len().max(1) };
         fresh.par_chunks_mut(block).enumerate().for_each(|(number, rows)| {
             let mut previous = if number == 0 { previous } else { None };
+            let mut astray = 0;
             for row in rows {
-                self.find_spot(limits, previous.as_ref(), row);
+                match previous {
+                    Some(last) if astray > MOST_ASTRAY => row.spot = last.spot,
+                    _ => self.find_spot(limits, previous.as_ref(), row),
+                }
+                astray = if row.spot.is_good() { 0 } else { astray + 1 };
                 row.line = self.path.line[row.spot.place.piece];
                 previous = Some(*row);
             }
@@ -221,20 +236,22 @@ impl Plan<'_> {
         let known = previous.filter(|row| row.spot.is_good() || by_time.is_none()).map(|row| row.spot.place);
         let from = known.or(by_time).unwrap_or(Place { piece: 0, u: 0.0 });
         let curve = self.path.curve::<M>(from.piece);
-        let step = previous.map_or(0.0, |before| distance(&before.q, &row.q));
         let passed = previous.map_or(limits.period, |before| (row.t - before.t).abs());
-        let ahead = distance(&curve.at(from.u), &row.q) + passed * length(&limits.velocity);
+        let reach = 2.0 * passed * length(&limits.velocity);
+        if !(row.t.is_finite() && row.q.iter().all(|q| q.is_finite()) && reach.is_finite()) {
+            row.spot = Spot { place: from, off: f64::INFINITY, ..Spot::default() };
+            return;
+        }
+        let step = previous.map_or(0.0, |before| distance(&before.q, &row.q));
         let magnitude = row.q.iter().fold(curve.magnitude(), |most, q| most.max(q.abs()));
         let rounding = ROUNDINGS * EPS * magnitude * (M as f64).sqrt();
         let allowed = PLACE_TOLERANCE.max(STEP_SHARE * step);
         let judge = |place: Place| {
-            self.profile.map_or(0.0, |profile| {
-                let (late, rounded) = profile.instant(&self.path, place, limits.period).late(row.t, limits);
-                (late - rounded - rounding).max(0.0)
-            })
+            let late = self.profile.map_or(0.0, |profile| profile.late(&self.path, place, row.t, limits));
+            (late - rounding).max(0.0)
         };
         let close = PLACE_TOLERANCE + rounding;
-        let mut search = Search { path: &self.path, reach: 2.0 * ahead, close, judge, allowed };
+        let mut search = Search { path: &self.path, reach, close, judge, allowed };
         let found = search.next_place(from, &row.q);
         let late = if found.error.is_finite() { found.error } else { 0.0 };
         row.spot = Spot { place: found.place, magnitude, off: found.distance - rounding, late, allowed };
@@ -253,10 +270,9 @@ impl Plan<'_> {
         tally.offer(Check::Place, 0, spot.late, spot.allowed, time, line);
         let piece = spot.place.piece;
         if let Some(program) = &self.program {
-            let away = window(&self.path, piece, program.len())
-                .map(|m| program.get::<M>(m).distance(&row.q))
-                .fold(f64::INFINITY, f64::min);
             let limit = self.path.tolerance[piece] + PLACE_TOLERANCE;
+            let moves = window(&self.path, piece, program.len()).map(|m| program.get::<M>(m));
+            let away = nearest_of(moves, &row.q, settled(tally) * limit);
             tally.offer(Check::Deviation, 0, away - rounding, limit, time, line);
         }
         if let (Some(profile), true) = (&self.profile, spot.is_good()) {
@@ -273,9 +289,9 @@ impl Plan<'_> {
         rounding: f64,
         tally: &mut Tally<M>,
     ) {
-        let instant: Instant<M> = profile.instant(&self.path, row.spot.place, limits.period);
+        let here: Passage<M> = profile.passage(&self.path, row.spot.place);
         if let Some(recorded) = row.velocity {
-            let state = instant.motion.state(instant.y);
+            let state = here.motion.state(here.y);
             let piece = row.spot.place.piece;
             let away = rounding + row.spot.off.max(0.0) + row.spot.late;
             let rest = self.path.width[piece] - row.spot.place.u;
@@ -290,7 +306,7 @@ impl Plan<'_> {
             }
         }
         if let Some(recorded) = row.acceleration {
-            let range = self.accelerations(profile, limits, &instant, row.t);
+            let range = self.accelerations(profile, limits, &here, row.t);
             for k in 0..M {
                 let off = (range[k][0] - recorded[k]).max(recorded[k] - range[k][1]);
                 let limit = ACCELERATION_SHARE * limits.acceleration[k];
@@ -304,7 +320,7 @@ impl Plan<'_> {
         &self,
         profile: &Timed,
         limits: &Limits<M>,
-        here: &Instant<M>,
+        here: &Passage<M>,
         time: f64,
     ) -> [[f64; 2]; M] {
         let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; M];
@@ -375,20 +391,59 @@ impl Plan<'_> {
         tally.offer(Check::Feed, 0, (way - 2.0 * rounding) / step, feed, time, line);
         if limits.chord_tolerance.is_finite() {
             let certain = error - rounding - before.spot.off.max(row.spot.off).max(0.0);
-            tally.offer(Check::Chord, 0, certain, limits.chord_tolerance, time, line);
+            let mut limit = limits.chord_tolerance;
+            if certain > limit {
+                limit += self.chord_beyond_circle(limits, before, row, step);
+            }
+            tally.offer(Check::Chord, 0, certain, limit, time, line);
         }
     }
 
-    /// Corners of the path between two places.
+    /// What the chord error may exceed the tolerance by where the speed limit of the osculating circle holds.
+    ///
+    /// That limit keeps the acceleration across the path at 8 δ/T², and so the distance from the chord, T²/8 times
+    /// the greatest acceleration across the chord, at δ. Where the path turns against the chord by θ, the
+    /// acceleration along the path adds T²/8 · a sin θ; all of it where the path runs back.
+    fn chord_beyond_circle<const M: usize>(
+        &self,
+        limits: &Limits<M>,
+        before: &Row<M>,
+        row: &Row<M>,
+        step: f64,
+    ) -> f64 {
+        let (from, to) = (before.spot.place, row.spot.place);
+        let way = from_to(&before.q, &row.q);
+        let way_length = length(&way);
+        let mut most = 0.0_f64;
+        for piece in from.piece..=to.piece {
+            let curve = self.path.curve::<M>(piece);
+            let start = if piece == from.piece { from.u } else { 0.0 };
+            let end = if piece == to.piece { to.u } else { curve.width };
+            for share in [0.0, 0.25, 0.5, 0.75, 1.0] {
+                let tangent = curve.derivative(start + share * (end - start));
+                let size = length(&tangent);
+                let cos = inner(&tangent, &way) / (size * way_length);
+                let across = if cos > 0.0 { (1.0 - cos * cos).max(0.0).sqrt() } else { 1.0 };
+                let along: f64 = (0..M).map(|k| tangent[k].abs() * limits.acceleration[k]).sum();
+                most = most.max(across * along / size);
+            }
+        }
+        0.125 * step * step * most
+    }
+
+    /// Corners of the path between two places, those included that the places cannot be told from.
     pub fn corners<const M: usize>(&self, from: &Spot, to: &Spot) -> f64 {
+        let at_start = from.place.u <= PLACE_TOLERANCE;
+        let at_end = self.path.width[to.place.piece] - to.place.u <= PLACE_TOLERANCE;
+        let first = if at_start { from.place.piece.max(1) } else { from.place.piece + 1 };
+        let last = (to.place.piece + usize::from(at_end)).min(self.path.len() - 1);
         let mut corners = 0.0;
-        for piece in from.place.piece + 1..=to.place.piece {
+        for piece in first..=last {
             let before = self.path.curve::<M>(piece - 1);
             let after = self.path.curve::<M>(piece);
             let (into, out) = (before.derivative(before.width), after.derivative(0.0));
             let (a, b) = (length(&into), length(&out));
-            let across = distance(&into.map(|x| x / a), &out.map(|x| x / b));
-            if across > SMOOTH || inner(&into, &out) < 0.0 {
+            if distance(&into.map(|x| x / a), &out.map(|x| x / b)) > SMOOTH {
                 corners += 1.0;
             }
         }

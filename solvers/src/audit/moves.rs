@@ -163,6 +163,21 @@ impl<const M: usize> Move<M> {
     }
 }
 
+/// Distance of `q` from the nearest of some moves, or from the first that is within `enough`; a NaN if there is one.
+pub fn nearest_of<const M: usize>(moves: impl Iterator<Item = Move<M>>, q: &[f64; M], enough: f64) -> f64 {
+    let mut nearest = f64::INFINITY;
+    for programmed in moves {
+        let away = programmed.distance(q);
+        if away.is_nan() || away < nearest {
+            nearest = away;
+        }
+        if away.is_nan() || nearest <= enough {
+            break;
+        }
+    }
+    nearest
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -125,7 +125,7 @@ pub struct Found {
 /// What the search may look at.
 pub struct Search<'a, F> {
     pub path: &'a Followed<'a>,
-    /// Length of path to look along, in mm.
+    /// Length of path to look along after the first piece, in mm.
     pub reach: f64,
     /// Distance at which a point is on the path, in mm.
     pub close: f64,
@@ -202,7 +202,10 @@ impl<F: FnMut(Place) -> f64> Search<'_, F> {
             if self.is_good(&best) && !falls_on {
                 break;
             }
-            travelled += distance(&curve.at(start), &curve.at(curve.width));
+            // The first piece does not count: the search may start well before the place looked for.
+            if piece > from.piece {
+                travelled += distance(&curve.at(start), &curve.at(curve.width));
+            }
             if travelled > self.reach {
                 break;
             }

@@ -5,10 +5,12 @@ use numpy::{
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use rayon::prelude::*;
 
-use super::arrays::{row, rows, to_array3};
-use super::with_axes;
-use crate::follow::{ArcShape, Fault, FollowOptions, Moves};
+use super::arrays::{row, rows};
+use super::with_padded_axes;
+use crate::arc::ArcError;
+use crate::follow::{ArcShape, Fault, FollowOptions, Followed, Moves};
 use crate::path_builder::{build_path as build, Axes, BuiltPath};
 
 pyo3::import_exception!(feedplan.errors, ProgramError);
@@ -16,6 +18,9 @@ pyo3::import_exception!(feedplan.errors, ProgramError);
 pub fn register(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(build_path, module)?)
 }
+
+/// The travel of an axis that is not there.
+const ANYWHERE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
 /// Control points, widths, feeds, first and last moves, tolerances and runs of the path.
 type Columns<'py> = (
@@ -90,10 +95,10 @@ fn build_path<'py>(
         })
         .collect::<PyResult<_>>()?;
     let options = FollowOptions { exact_tolerance, max_chord, corner_acceleration, max_speed, corner_angle };
-    with_axes!(axes, M, {
+    with_padded_axes!(axes, M, {
         let target = rows::<M>(&target)?;
         let moves = Moves {
-            start: row::<M>(&start)?,
+            start: row::<M>(&start, 0.0)?,
             kind: kind.as_slice()?,
             target: &target,
             feed: feed.as_slice()?,
@@ -103,17 +108,17 @@ fn build_path<'py>(
             arcs: &shapes,
         };
         let travel = rows::<2>(&travel)?;
-        let axes = Axes {
-            max_velocity: row::<M>(&max_velocity)?,
-            max_acceleration: row::<M>(&max_acceleration)?,
-            travel: std::array::from_fn(|k| travel[k]),
+        let limits = Axes {
+            max_velocity: row::<M>(&max_velocity, 1.0)?,
+            max_acceleration: row::<M>(&max_acceleration, 1.0)?,
+            travel: std::array::from_fn(|k| travel.get(k).copied().unwrap_or(ANYWHERE)),
             jump,
         };
-        let path = py.detach(|| build(&moves, &options, &axes)).map_err(|error| {
+        let path = py.detach(|| build(&moves, &options, &limits)).map_err(|error| {
             let line = line.as_slice().map_or(0, |lines| lines[error.index]);
             ProgramError::new_err((format!("{name}, line {line}: {}", sentence(error.fault)), line))
         })?;
-        Ok(columns(py, &path))
+        Ok(columns(py, &path, axes))
     })
 }
 
@@ -121,27 +126,68 @@ fn sentence(fault: Fault) -> &'static str {
     match fault {
         Fault::Length => "the move has no length, or a coordinate is not a finite number: correct the block",
         Fault::Feed => "the move has no positive feed: give F a value above 0",
-        Fault::Radius => "the arc has no radius, or a coordinate is not a finite number: correct its centre",
-        Fault::Sweep => "the arc does not lead to its end point: correct its centre or its end",
+        Fault::Arc(ArcError::Radius) => {
+            "the arc has no radius, or no finite one: correct its centre or its end"
+        }
+        Fault::Arc(ArcError::Sweep) => {
+            "the arc does not lead to its end point: correct its centre or its end"
+        }
+        Fault::Arc(ArcError::Turns) => "the arc has too many turns to be followed: give fewer",
     }
 }
 
 fn columns<'py, const M: usize>(
     py: Python<'py>,
     path: &BuiltPath<M>,
+    axes: usize,
 ) -> (Columns<'py>, Summary, Option<Place>) {
-    let pieces: Vec<_> = path.pieces.iter().map(|followed| followed.piece).collect();
-    let moves: Vec<i64> =
-        path.pieces.iter().flat_map(|followed| [followed.first as i64, followed.last as i64]).collect();
-    let moves = PyArray1::from_vec(py, moves).reshape([pieces.len(), 2]).expect("n × 2 values");
+    let parts = &path.parts;
+    let count = parts.iter().map(Vec::len).sum();
+    let (control, width, feed, moves, tolerance) = py.detach(|| {
+        (
+            gather(parts, 3 * axes, |followed, out: &mut [f64]| {
+                for (row, point) in out.chunks_exact_mut(axes).zip(&followed.piece.control) {
+                    row.copy_from_slice(&point[..axes]);
+                }
+            }),
+            gather(parts, 1, |followed, out| out[0] = followed.piece.width),
+            gather(parts, 1, |followed, out| out[0] = followed.feed),
+            gather(parts, 2, |followed, out: &mut [i64]| {
+                out.copy_from_slice(&[i64::from(followed.first), i64::from(followed.last)]);
+            }),
+            gather(parts, 1, |followed, out| out[0] = followed.tolerance),
+        )
+    });
     let columns = (
-        to_array3(py, &pieces),
-        PyArray1::from_iter(py, pieces.iter().map(|piece| piece.width)),
-        PyArray1::from_iter(py, path.pieces.iter().map(|followed| followed.feed)),
-        moves,
-        PyArray1::from_iter(py, path.pieces.iter().map(|followed| followed.tolerance)),
-        PyArray1::from_iter(py, path.runs.iter().map(|&start| start as i64)),
+        PyArray1::from_vec(py, control).reshape([count, 3, axes]).expect("n × 3 × axes values"),
+        PyArray1::from_vec(py, width),
+        PyArray1::from_vec(py, feed),
+        PyArray1::from_vec(py, moves).reshape([count, 2]).expect("n × 2 values"),
+        PyArray1::from_vec(py, tolerance),
+        PyArray1::from_vec(py, path.runs.iter().map(|&start| start as i64).collect()),
     );
     let summary = (path.points, path.splines, path.polynomials, path.deviation);
     (columns, summary, path.outside.map(|place| (place.index, place.axis, place.position)))
+}
+
+/// One column, `stride` values a piece, written by all parts at once.
+fn gather<const M: usize, T: Default + Clone + Send>(
+    parts: &[Vec<Followed<M>>],
+    stride: usize,
+    write: impl Fn(&Followed<M>, &mut [T]) + Sync,
+) -> Vec<T> {
+    let mut column = vec![T::default(); stride * parts.iter().map(Vec::len).sum::<usize>()];
+    let mut rest = &mut column[..];
+    let mut slices = Vec::with_capacity(parts.len());
+    for part in parts {
+        let (slice, tail) = rest.split_at_mut(stride * part.len());
+        slices.push(slice);
+        rest = tail;
+    }
+    parts.par_iter().zip(slices).for_each(|(part, slice)| {
+        for (followed, out) in part.iter().zip(slice.chunks_exact_mut(stride)) {
+            write(followed, out);
+        }
+    });
+    column
 }
