@@ -113,7 +113,7 @@ def _point_series(
 def _restricted(
     control_points: Array, width: Array, parts: Array | None, weights: Array | None
 ) -> tuple[Interval, Interval]:
-    """Bézier points, homogeneous with weights, and width of the parts, by the blossom b_i = B(a^(d−i), b^i)."""
+    """Bézier points (homogeneous with weights) and width of parts, by the blossom b_i = B(a^(d−i), b^i)."""
     points = Interval(control_points)
     if weights is not None:
         weighted = points * weights[..., None]

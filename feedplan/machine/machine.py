@@ -89,6 +89,11 @@ class Machine:
         """Every program axis is the joint of its own letter, in the same unit."""
         return self.kinematics == "cartesian" and not self.parameters
 
+    @property
+    def words_are_joints(self) -> bool:
+        """Axis words are joint positions as they stand, unless G43.4 or the like says otherwise."""
+        return self.is_plain or not self.inverse.always
+
     @cached_property
     def inverse(self) -> Kinematics:
         """The kinematics q = K(P) with this machine's dimensions; raises MachineError if they do not fit."""

@@ -1,4 +1,4 @@
-"""Joint positions along a whole tip path: angles followed continuously, singular places and travel ends found.
+"""Joint positions along a whole tip path: continuous angles, singular places, travel ends.
 
 Pieces are cut until interval arithmetic proves on each part that K is differentiable there and that no angle
 turns by half a turn or more. Then the value of an angle at any point of the part is certain up to the part's
@@ -54,8 +54,8 @@ class Place:
         name = kinematics.joint_names[self.joint]
         unit = "deg" if kinematics.rotary[self.joint] else "mm"
         return (
-            f"line {line}: {name} would go to {self.value:.6g} {unit}, its travel ends at {self.limit:g} {unit}: "
-            "place the part elsewhere, or choose another machine"
+            f"line {line}: {name} would go to {self.value:.6g} {unit}, its travel ends at {self.limit:g} "
+            f"{unit}: place the part elsewhere, or choose another machine"
         )
 
 
@@ -63,8 +63,8 @@ class Place:
 class JointPath:
     """Parts of a path on which the joints are smooth, in order, and the places where they are not or leave.
 
-    Per part: `piece`, `part` (m, 2) its fractions of the piece, `range` (m, joints) what the joints' positions
-    lie within [mm, deg], angles on their turn. `places` are in order of the path.
+    Per part: `piece`, `part` (m, 2) its fractions of the piece, `range` (m, joints) what the joints'
+    positions lie within [mm, deg], angles on their turn. `places` are in order of the path.
     """
 
     kinematics: Kinematics
@@ -99,8 +99,8 @@ def survey(
     """The joints along pieces joined end to end; `control_points` and `weights` as in `along`.
 
     `start` (joints,) [mm, deg] is where the joints are before: angles begin on the nearest turn. Without it
-    they begin on the turn that keeps the whole path within `travel`, (least, greatest) of each joint, if there
-    is one; else as K gives them.
+    they begin on the turn that keeps the whole path within `travel`, (least, greatest) of each joint, if
+    there is one; else as K gives them.
     """
     piece, part, reach, singular = _smooth_parts(kinematics, control_points, width, weights)
     reach = _joined(kinematics, control_points, weights, piece, part, reach)
@@ -117,7 +117,7 @@ def survey(
 def _smooth_parts(
     kinematics: Kinematics, control_points: Array, width: Array, weights: Array | None
 ) -> tuple[NDArray[np.int64], Array, Interval, list[tuple[int, float]]]:
-    """Parts with bounded K and K', no angle turning by half a turn; and the middles of those that never are."""
+    """Parts with bounded K and K' and no half turn of an angle; and the middles of parts that never are."""
     turning = np.array(kinematics.turning)
     piece = np.arange(len(control_points))
     part = np.tile([0.0, 1.0], (len(piece), 1))
@@ -186,7 +186,7 @@ def _on_first_turn(
 ) -> Interval:
     """All angles moved together: near `start`, or else into the travel."""
     shift = np.zeros(reach.shape[1])
-    for joint in np.flatnonzero(kinematics.turning):
+    for joint in np.flatnonzero(kinematics.turning).tolist():
         own = reach[:, joint]
         if start is not None:
             shift[joint] = np.round((start[joint] - own.middle[0]) / TURN)
@@ -212,18 +212,23 @@ def _overruns(
     reach: Interval,
     limits: Array,
 ) -> list[Place]:
-    """The first overrun of each joint in each piece, with the greatest value found in the piece."""
+    """The first overrun of each joint in each piece, with the farthest value found in the piece."""
     lo, hi = limits[:, 0] - TRAVEL_TOLERANCE, limits[:, 1] + TRAVEL_TOLERANCE
-    found: dict[tuple[int, int], tuple[float, float]] = {}
+    found: dict[tuple[int, int], tuple[float, float, float]] = {}
     for _ in range(DEEPEST):
         open_ = reach.bounded & ((reach.lo < lo) | (reach.hi > hi))
-        value = reach.middle
         out = reach.bounded & ((reach.hi < lo) | (reach.lo > hi))
-        for row, joint in zip(*np.nonzero(out), strict=True):
-            key = (int(piece[row]), int(joint))
-            fraction, worst = found.get(key, (1.0, value[row, joint]))
-            farther = max(worst, value[row, joint], key=lambda v: max(lo[joint] - v, v - hi[joint]))
-            found[key] = (min(fraction, float(part[row, 0])), float(farther))
+        rows = np.flatnonzero(out.any(axis=1))
+        for side in (0, 1):
+            tips = _points(control_points, weights, piece[rows], part[rows, side])
+            value = _on_turn(positions(kinematics, tips), reach.middle[rows], kinematics)
+            over = np.maximum(lo - value, value - hi)
+            for row, joint in zip(*np.nonzero(out[rows]), strict=True):
+                key = (int(piece[rows[row]]), int(joint))
+                fraction, worst, most = found.get(key, (1.0, 0.0, 0.0))
+                if over[row, joint] > most:
+                    worst, most = float(value[row, joint]), float(over[row, joint])
+                found[key] = (min(fraction, float(part[rows[row], 0])), worst, most)
         keep = (open_ & ~out).any(axis=1)
         if not keep.any():
             break
@@ -234,7 +239,7 @@ def _overruns(
         reach = reach + np.nan_to_num(turns) * TURN
     return [
         Place(i, fraction, joint=j, value=value, limit=float(limits[j, 0 if value < lo[j] else 1]))
-        for (i, j), (fraction, value) in found.items()
+        for (i, j), (fraction, value, _) in found.items()
     ]
 
 

@@ -64,8 +64,9 @@ class Interval:
 
     @property
     def middle(self) -> Array:
-        """A number inside, about half way."""
-        return 0.5 * self.lo + 0.5 * self.hi
+        """A number inside, about half way; not a number where unbounded."""
+        with np.errstate(invalid="ignore"):
+            return 0.5 * self.lo + 0.5 * self.hi
 
     @property
     def bounded(self) -> NDArray[np.bool_]:
