@@ -63,6 +63,18 @@ def test_a_rotary_table_turns_the_part_against_its_count() -> None:
     assert upright.joints((5.0, 0.0, 130.0, 90.0)) == pytest.approx((5, 30, 100, 90))
 
 
+def test_a_reversed_axis_counts_the_other_way() -> None:
+    values = {"pivot_a": [0.0, 0.0, 50.0], "pivot_c": [3.0, 4.0, 0.0]}
+    plain, backwards = (
+        chain("trunnion-ac", "XYZAC", **values),
+        chain("trunnion-ac", "XYZAC", reversed=["C"], **values),
+    )
+    tip = (10.0, 20.0, 30.0)
+    assert backwards.joints((*tip, 30.0, -70.0))[:3] == pytest.approx(plain.joints((*tip, 30.0, 70.0))[:3])
+    pointed = ToolVector(backwards)
+    assert pointed.tip(pointed.joints((*tip, 0.0, 0.6, 0.8))) == pytest.approx((*tip, 0.0, 0.6, 0.8))
+
+
 def test_the_ac_trunnion_tilts_the_part_about_its_pivot() -> None:
     trunnion = made("trunnion-ac", "XYZAC", pivot_a=[0.0, 0.0, 50.0], tool_length=100.0)
     assert trunnion.joints((3.0, 4.0, 5.0, 0.0, 0.0)) == pytest.approx((3, 4, 105, 0, 0))
