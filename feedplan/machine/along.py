@@ -18,11 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.machine.kinematics import Kinematics
-from feedplan.machine.numbers.interval import Interval
+from feedplan.machine.numbers.interval import Interval, dot
 from feedplan.machine.numbers.series import Series
 
 Array = NDArray[np.float64]
 HALF_TURN = 180.0
+CHUNK = 2048
 
 
 def positions(kinematics: Kinematics, tip: Array) -> Array:
@@ -43,9 +44,13 @@ def derivatives(
 
     Exact but for rounding; not finite where K is singular. To have many points of a piece, repeat it.
     """
-    tip = _point_series(control_points, width, fraction, order, weights)
-    joints = [_series(joint, tip[0]).derivatives() for joint in kinematics.joints(tip)]
-    return np.stack(joints, axis=-1)
+    result = []
+    for some in _chunks(len(control_points)):
+        own = None if weights is None else weights[some]
+        tip = _point_series(control_points[some], width[some], fraction[some], order, own)
+        joints = [_series(joint, tip[0]).derivatives() for joint in kinematics.joints(tip)]
+        result.append(np.stack(joints, axis=-1))
+    return np.concatenate(result, axis=1)
 
 
 def enclosures(
@@ -62,11 +67,14 @@ def enclosures(
     K is singular on the part, or too near to singular to tell: cut the part smaller. Angles known up to whole
     turns are continuous over the part, whichever turn they are on.
     """
-    points, length = _restricted(control_points, width, parts, weights)
-    with np.errstate(all="ignore"):
-        whole = _joints(kinematics, _tip_series(points, length, order, weights is not None, None))
-        middle = _joints(kinematics, _tip_series(points, length, order, weights is not None, 0.5))
-        return _drawn_together(whole, middle, length.hi / 2, np.array(kinematics.turning))
+    result = []
+    for some in _chunks(len(control_points)):
+        points, length, rational = _restricted(control_points, width, parts, weights, some)
+        with np.errstate(all="ignore"):
+            whole = _joints(kinematics, _tip_series(points, length, order, rational, None))
+            middle = _joints(kinematics, _tip_series(points, length, order, rational, 0.5))
+            result.append(_drawn_together(whole, middle, length.hi / 2, np.array(kinematics.turning)))
+    return Interval(*(np.concatenate([getattr(r, end) for r in result], axis=1) for end in ("lo", "hi")))
 
 
 def proxy_constants(
@@ -83,11 +91,19 @@ def proxy_constants(
     where the part must be cut smaller. The direct enclosure is used: drawing the highest order together
     would take orders above it, at twice the cost for a third fewer parts.
     """
-    points, length = _restricted(control_points, width, parts, weights)
-    with np.errstate(all="ignore"):
-        tip = _tip_series(points, length, nodes + 2, weights is not None, None)
-        top = _joints(kinematics, tip)[nodes + 2]
-        return np.nextafter(top.magnitude * (nodes + 2), np.inf)
+    result = []
+    for some in _chunks(len(control_points)):
+        points, length, rational = _restricted(control_points, width, parts, weights, some)
+        with np.errstate(all="ignore"):
+            tip = _tip_series(points, length, nodes + 2, rational, None)
+            top = _joints(kinematics, tip)[nodes + 2]
+            result.append(np.nextafter(top.magnitude * (nodes + 2), np.inf))
+    return np.concatenate(result)
+
+
+def _chunks(count: int) -> list[slice]:
+    """Rows to work on at once: long paths must not fill the memory with coefficients of every order."""
+    return [slice(start, start + CHUNK) for start in range(0, max(count, 1), CHUNK)]
 
 
 def _point_series(
@@ -111,18 +127,20 @@ def _point_series(
 
 
 def _restricted(
-    control_points: Array, width: Array, parts: Array | None, weights: Array | None
-) -> tuple[Interval, Interval]:
+    control_points: Array, width: Array, parts: Array | None, weights: Array | None, some: slice
+) -> tuple[Interval, Interval, bool]:
     """Bézier points (homogeneous with weights) and width of parts, by the blossom b_i = B(a^(d−i), b^i)."""
-    points = Interval(control_points)
+    points, length = Interval(control_points[some]), Interval(width[some])
     if weights is not None:
+        weights = weights[some]
         weighted = points * weights[..., None]
         homogeneous = [
             np.concatenate([end, weights[..., None]], axis=-1) for end in (weighted.lo, weighted.hi)
         ]
         points = Interval(*homogeneous)
     if parts is None:
-        return points, Interval(width)
+        return points, length, weights is not None
+    parts = parts[some]
     degree = points.shape[1] - 1
     result = Interval.zeros(points.shape)
     for i in range(degree + 1):
@@ -131,7 +149,7 @@ def _restricted(
             t = Interval(parts[:, 1 if step < i else 0][:, None, None])
             level = level[:, :-1] * (1.0 - t) + level[:, 1:] * t
         result[:, i] = level[:, 0]
-    return result, (Interval(parts[:, 1]) - parts[:, 0]) * width
+    return result, (Interval(parts[:, 1]) - parts[:, 0]) * length, weights is not None
 
 
 def _tip_series(
@@ -170,15 +188,15 @@ def _series(value: Any, like: Series) -> Series:
 def _drawn_together(whole: Interval, middle: Interval, radius: Array, turning: NDArray[np.bool_]) -> Interval:
     """What both the direct enclosure and Taylor's theorem about the middle allow."""
     order = whole.shape[0] - 1
-    reach = Interval(-radius[:, None], radius[:, None])
-    powers = [Interval(np.ones_like(reach.lo)), reach]
+    powers = Interval.zeros((order + 1, len(radius), 1))
+    powers[0], powers[1:2] = 1.0, Interval(-radius[:, None], radius[:, None])
     for j in range(2, order + 1):
-        powers.append(powers[j // 2].square() if j % 2 == 0 else powers[j - 1] * reach)
+        powers[j] = powers[j // 2].square() if j % 2 == 0 else powers[j - 1] * powers[1]
     result = whole[:]
     for k in range(order):
-        value = whole[order] * powers[order - k] * float(math.comb(order, k))
-        for j in range(order - k):
-            value = value + middle[k + j] * powers[j] * float(math.comb(k + j, j))
+        ahead = np.array([float(math.comb(k + j, j)) for j in range(order - k)])[:, None, None]
+        value = dot(middle[k:order], powers[: order - k] * ahead)
+        value = value + whole[order] * powers[order - k] * float(math.comb(order, k))
         if k == 0:
             value = _same_turn(value, whole[0], turning)
         result[k] = whole[k].meet(value)

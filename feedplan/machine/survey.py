@@ -77,11 +77,8 @@ class JointPath:
 
     def positions(self, piece: NDArray[np.int64], fraction: Array) -> Array:
         """Joint positions (n, joints) [mm, deg] at fractions of pieces, angles continuous along the path."""
+        # The end of a part is found as the start of the next: there both are on the same turn.
         found = np.searchsorted(self.piece + self.part[:, 0], piece + fraction, side="right") - 1
-        # A fraction of 1 belongs to its own piece; sums of large indices and fractions lose digits.
-        first = np.searchsorted(self.piece, piece, side="left")
-        last = np.searchsorted(self.piece, piece, side="right") - 1
-        found = np.clip(found, first, last)
         principal = positions(
             self.kinematics, _points(self.control_points, self.weights, piece, np.asarray(fraction))
         )

@@ -128,6 +128,26 @@ def test_an_enclosure_closes_in_on_the_range_as_the_part_shrinks() -> None:
     assert excess[1] < 0.3 * excess[0]
 
 
+def test_enclosures_near_the_axis_and_across_the_cut_hold_the_angle_on_one_turn() -> None:
+    # One piece by hand: the middle of its box is above the cut at 180 degrees, its own middle below.
+    points = np.array([[[-10.0, 3.0, 0.0], [-10.0, -2.0, 0.0], [-10.0, -0.9, 0.0]]])
+    points = np.concatenate([points, np.random.default_rng(9).uniform(-1, 1, size=(20_000, 3, 3))])
+    width = np.ones(len(points))
+    bounds = enclosures(CYLINDER, points, width, 3)
+    known = bounds.bounded[0, :, 0]
+    assert known[0]
+    assert known.mean() > 0.3
+    lo, hi = bounds.lo[0, known, 0] - 1e-9, bounds.hi[0, known, 0] + 1e-9
+    before = None
+    for t in np.linspace(0, 1, 17):
+        angle = derivatives(CYLINDER, points[known], width[known], np.full(known.sum(), t), 0)[0, :, 0]
+        angle = angle + 360 * np.ceil((lo - angle) / 360)
+        assert (angle <= hi).all()
+        # On one turn: from sample to sample the angle goes the short way.
+        assert before is None or np.abs(angle - before).max() < 180
+        before = angle
+
+
 def test_parts_are_the_pieces_they_are_cut_from() -> None:
     points, width = random_curves(CYLINDER, 10, seed=8)
     parts = np.tile([0.25, 0.5], (10, 1))

@@ -1,13 +1,16 @@
 """Along whole paths: angles go on turning, singular places and travel ends are found and named."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
 
 from feedplan import Machine
+from feedplan.machine.kinematics import Kinematics
 from feedplan.machine.kinematics.cylindrical import Cylindrical
 from feedplan.machine.kinematics.polar import Polar
+from feedplan.machine.numbers import Number, atan2, degrees
 from feedplan.machine.rotary import RotaryAxis, RotaryChain, ToolVector
 from feedplan.machine.survey import JointPath, Place, survey
 
@@ -50,6 +53,28 @@ def test_one_curve_round_the_axis_turns_a_whole_turn() -> None:
     assert dense[-1] - dense[0] == pytest.approx(360)
     assert (np.diff(dense) > 0).all()
     assert np.diff(dense).max() < 2
+
+
+class TwoAxes(Kinematics):
+    """An angle that counts turns about two points, as the elbow and shoulder of an arm add up."""
+
+    tip_names = ("X", "Y", "Z")
+    joint_names = ("C", "X", "Z")
+    turning = (True, False, False)
+
+    def joints(self, tip: Sequence[Number]) -> tuple[Number, ...]:
+        x, y, z = tip
+        return degrees(atan2(y, x - 1.0) + atan2(y, x + 1.0)), x, z
+
+
+def test_an_angle_that_is_a_sum_of_two_goes_on_turning() -> None:
+    angle = np.linspace(0, 2 * np.pi, 6)
+    loop = np.stack([3 * np.cos(angle), 3 * np.sin(angle), 0 * angle], axis=1)[None]
+    path = survey(TwoAxes(), loop, np.array([20.0]))
+    dense = path.positions(np.zeros(2001, dtype=int), np.linspace(0, 1, 2001))[:, 0]
+    assert dense[-1] - dense[0] == pytest.approx(720)
+    assert np.abs(np.diff(dense)).max() < 20
+    assert (path.range.width[:, 0] < 180).all()
 
 
 def test_a_clockwise_path_across_the_cut_goes_on_below() -> None:
