@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from feedplan.machine.along import derivatives, enclosures, positions, proxy_constants
+from feedplan.machine.along import _same_turn, derivatives, enclosures, positions, proxy_constants
 from feedplan.machine.kinematics import Kinematics
 from feedplan.machine.kinematics.cylindrical import Cylindrical
-from feedplan.machine.numbers import Number
+from feedplan.machine.numbers import Interval, Number
 from tests.machine.kinematics.bundled import all_kinematics, random_tips
 
 CYLINDER = Cylindrical(("C", "X", "Z"))
@@ -146,6 +146,14 @@ def test_enclosures_near_the_axis_and_across_the_cut_hold_the_angle_on_one_turn(
         # On one turn: from sample to sample the angle goes the short way.
         assert before is None or np.abs(angle - before).max() < 180
         before = angle
+
+
+def test_two_wide_ranges_of_an_angle_are_not_put_on_one_turn() -> None:
+    # 220 degrees is in [100, 250], and as −140 in [−150, 150]: their meeting would lose it.
+    wide = _same_turn(Interval([[-150.0]], [[150.0]]), Interval([[100.0]], [[250.0]]), np.array([True]))
+    assert not wide.bounded.any()
+    moved = _same_turn(Interval([[-150.0]], [[-100.0]]), Interval([[200.0]], [[250.0]]), np.array([True]))
+    assert (moved.lo, moved.hi) == (pytest.approx(210), pytest.approx(260))
 
 
 def test_parts_are_the_pieces_they_are_cut_from() -> None:
