@@ -36,14 +36,20 @@ pub fn backward<const M: usize>(
     mut p: f64,
     out: &mut Vec<Arc>,
 ) -> Result<f64, Stuck> {
-    for k in 0..M {
-        if sub.start[k] == 0.0 && sub.bend[k] != 0.0 {
-            p = p.min(axes.acceleration[k] / sub.bend[k].abs());
-        }
+    if p > sub.flat {
+        p = p.min(axes.limit_at_turns(&sub.start, &sub.bend));
     }
     let cap =
         [Arc { x0: 0.0, x1: sub.length, p0: sub.cap_at(0.0), p1: sub.cap_at(sub.length), kind: Kind::Cap }];
-    Pass::<M, true> { sub, axes, bounds: &cap, out, x: 0.0, p: p.min(cap[0].p0), line: OnceCell::new() }.run()
+    p = Pass::<M, true> { sub, axes, bounds: &cap, out, x: 0.0, p: p.min(cap[0].p0), line: OnceCell::new() }
+        .run()?;
+    if p > sub.flat {
+        p = p.min(axes.limit_at_turns(&sub.end, &sub.bend));
+        if let Some(last) = out.last_mut() {
+            last.p1 = p;
+        }
+    }
+    Ok(p)
 }
 
 /// Forward over the sub-piece from p, under the arcs of K as the backward pass left them: appends the arcs of
@@ -161,7 +167,7 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
                 }
             }
             match arc.event {
-                Event::EndOfSubPiece => {}
+                Event::EndOfArc => {}
                 Event::Transition(axis) => control = Some(axis),
                 Event::LimitCurve => on_limit_curve = BACKWARD && self.x < length,
             }
