@@ -1,16 +1,27 @@
 """Types of the native module."""
 
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
+
+from feedplan.audit import _Limits
+from feedplan.constraints.problem import Problem
+from feedplan.profile import SpeedProfile
+from feedplan.program.program import Program
 
 __all__ = [
     "PathLength",
     "PlanError",
     "Sampler",
+    "SetpointAudit",
     "__version__",
+    "audit_plan",
+    "build_path",
+    "csv_rows",
+    "fit_points",
     "plan_quadratic",
+    "read_gcode",
 ]
 
 __version__: str
@@ -94,3 +105,87 @@ class Sampler:
         int,
         float,
     ]: ...
+
+def csv_rows(values: NDArray[np.float64], last: NDArray[np.int32]) -> bytes: ...
+def read_gcode(
+    source: bytes,
+    name: str,
+    places: NDArray[np.float64],
+    machine_axes: str,
+    block_delete: bool,
+    max_moves: int,
+) -> dict[str, Any]: ...
+def fit_points(
+    points: NDArray[np.float64],
+    tolerance: float,
+    max_chord: float,
+    max_curvature: float,
+    corner_angle: float,
+) -> tuple[
+    NDArray[np.float64], NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.uint32]
+]: ...
+def build_path(
+    name: str,
+    start: NDArray[np.float64],
+    kind: NDArray[np.uint8],
+    target: NDArray[np.float64],
+    feed: NDArray[np.float64],
+    line: NDArray[np.int32],
+    tolerance: NDArray[np.float64],
+    fit_tolerance: NDArray[np.float64],
+    halt: NDArray[np.bool_],
+    arc_move: NDArray[np.int64],
+    arc_plane: NDArray[np.int64],
+    arc_centre: NDArray[np.float64],
+    arc_sweep: NDArray[np.float64],
+    max_velocity: NDArray[np.float64],
+    max_acceleration: NDArray[np.float64],
+    travel: NDArray[np.float64],
+    jump: bool,
+    exact_tolerance: float,
+    max_chord: float,
+    corner_acceleration: float,
+    max_speed: float,
+    corner_angle: float,
+) -> tuple[
+    tuple[
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.float64],
+        NDArray[np.int64],
+        NDArray[np.float64],
+        NDArray[np.int64],
+    ],
+    tuple[int, int, int, float],
+    tuple[int, int, float] | None,
+]: ...
+
+# Per limit: name, axis (-1: none), worst value, limit, ratio, time, source line; and the number of samples.
+_Findings = tuple[list[tuple[str, int, float, float, float, float, int]], int]
+
+def audit_plan(
+    problem: Problem,
+    limits: _Limits,
+    profile: SpeedProfile | None = None,
+    program: Program | None = None,
+) -> _Findings: ...
+
+@final
+class SetpointAudit:
+    def __new__(
+        cls,
+        limits: _Limits,
+        resolution: float = 0.0,
+        problem: Problem | None = None,
+        profile: SpeedProfile | None = None,
+        program: Program | None = None,
+    ) -> SetpointAudit: ...
+    def push(
+        self,
+        t: NDArray[np.float64],
+        position: NDArray[np.float64],
+        velocity: NDArray[np.float64] | None = None,
+        acceleration: NDArray[np.float64] | None = None,
+        line: NDArray[np.int32] | None = None,
+    ) -> None: ...
+    def finish(self) -> _Findings: ...

@@ -1,15 +1,23 @@
 //! Native kernels of feedplan. Every kernel takes slices and returns vectors; it knows no file and no Python.
 //! `python` alone binds them (feature `python`). Lengths are millimetres, times seconds.
 
+pub mod arc;
 pub mod arc_length;
+pub mod audit;
 pub mod bang_bang_quadratic;
 pub mod bernstein;
+pub mod corner;
+pub mod fit;
+pub mod follow;
+pub mod gcode;
 pub mod limit_curve;
 pub mod motion;
 pub mod newton;
+pub mod path_builder;
 pub mod quadratic;
 pub mod sampling;
 pub mod sarfraz;
+pub mod text;
 
 #[cfg(feature = "python")]
 mod python;

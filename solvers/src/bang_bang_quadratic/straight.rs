@@ -87,31 +87,29 @@ impl Stretch<'_> {
         let peak_sq = (0.5 * (start_sq + end_sq + gain)).min(top_sq);
         let (first_part, last_part) = ((peak_sq - start_sq) / (2.0 * a), (peak_sq - end_sq) / (2.0 * a));
         let none = NO_PART * length;
-        if peak_sq < top_sq {
-            // Triangle: its top from the slower side.
-            let top = if start_sq < end_sq {
-                self.from_start(first_part, peak_sq)
+        // Nothing between the two in a triangle.
+        let cruise = if peak_sq < top_sq { 0.0 } else { (length - first_part - last_part).max(0.0) };
+        let place = |before: f64, after: f64| {
+            if before <= none {
+                Place { speed_sq: peak_sq, ..start }
+            } else if after <= none {
+                Place { speed_sq: peak_sq, ..last }
+            } else if before <= after {
+                self.after_start(before, peak_sq)
             } else {
-                self.from_end(last_part, peak_sq)
-            };
-            let top = if first_part <= none { start } else { top };
-            let top = if last_part <= none { last } else { top };
-            self.push(out, start, top, first_part, Motion::SpeedUp);
-            self.push(out, top, last, last_part, Motion::SlowDown);
-        } else {
-            let cruise = length - first_part - last_part;
-            let from = if first_part <= none { start } else { self.from_start(first_part, peak_sq) };
-            let to = if last_part <= none { last } else { self.from_end(last_part, peak_sq) };
-            self.push(out, start, from, first_part, Motion::SpeedUp);
-            self.push(out, from, to, cruise, Motion::Cruise);
-            self.push(out, to, last, last_part, Motion::SlowDown);
-        }
+                self.before_end(after, peak_sq)
+            }
+        };
+        let (from, to) = (place(first_part, cruise + last_part), place(first_part + cruise, last_part));
+        self.push(out, start, from, first_part, Motion::SpeedUp);
+        self.push(out, from, to, cruise, Motion::Cruise);
+        self.push(out, to, last, last_part, Motion::SlowDown);
         end_sq
     }
 
     /// The place this length after the start; |C'|² is linear in the length.
     #[inline(always)]
-    fn from_start(&self, length: f64, speed_sq: f64) -> Place {
+    fn after_start(&self, length: f64, speed_sq: f64) -> Place {
         let [r0, r1] = self.rate;
         let slope = (r1 - r0) / self.span;
         let rate = (r0 * r0 + 2.0 * slope * length).max(0.0).sqrt();
@@ -120,7 +118,7 @@ impl Stretch<'_> {
 
     /// The place this length before the end.
     #[inline(always)]
-    fn from_end(&self, length: f64, speed_sq: f64) -> Place {
+    fn before_end(&self, length: f64, speed_sq: f64) -> Place {
         let [r0, r1] = self.rate;
         let slope = (r1 - r0) / self.span;
         let rate = (r1 * r1 - 2.0 * slope * length).max(0.0).sqrt();

@@ -1,0 +1,170 @@
+"""Sarfraz predictor-corrector against Newton–Raphson: rounds, length error and time on small and large steps.
+
+Run `python -m benchmarks.interpolators`. First the bare inversion: places at equal steps along a curve. Then
+the whole setpoint stream with all derivatives, at constant feed. Lengths are checked by the closed form of a
+quadratic, which neither interpolator uses. Set RAYON_NUM_THREADS=1 to time one thread.
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+
+from feedplan.geometry.length import PathLength
+from feedplan.geometry.path import Path
+from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.setpoints import INTERPOLATORS, setpoints
+
+FEED = 50.0  # [mm/s]
+# The length error that is asked for, in parts of a step.
+STEP_ERROR = 1e-6
+MAX_STEPS = 200_000
+
+
+def spline(points: NDArray[np.float64]) -> Path:
+    """The C1 quadratic B-spline of control points (n + 2, axes)."""
+    edges = np.diff(points, axis=0)
+    lengths = np.linalg.norm(edges, axis=1)
+    width = (lengths[:-1] + lengths[1:]) / 2
+    share = np.concatenate(([0.0], width, [0.0]))
+    joints = points[:-1] + edges * (share[:-1] / (share[:-1] + share[1:]))[:, None]
+    control = np.stack([joints[:-1], points[1:-1], joints[1:]], axis=1)
+    count = len(width)
+    return Path(
+        axes=("X", "Y", "Z")[: points.shape[1]],
+        control_points=control,
+        width=width,
+        feed=np.full(count, FEED),
+        move=np.zeros((count, 2), np.int64),
+        line=np.arange(1, count + 1, dtype=np.int32),
+        runs=np.array([0, count]),
+        dwell=np.zeros(1),
+        tolerance=np.zeros(count),
+    )
+
+
+def curves() -> dict[str, Path]:
+    """A surface pass, large curves, and a fold whose pieces turn by nearly 180 degrees within micrometres."""
+    rng = np.random.default_rng(1)
+    direction = np.cumsum(rng.normal(0, 0.15, (400, 3)), axis=0) + np.array([4.0, 0.0, 0.0])
+    surface = np.cumsum(direction / np.linalg.norm(direction, axis=1)[:, None], axis=0)
+    angle = np.linspace(0, 6 * np.pi, 19)
+    large = np.stack([100 * np.cos(angle), 40 * np.sin(2 * angle)], axis=1)
+    fold = np.stack([np.tile([0.0, 10.0], 40), np.arange(80) * 1e-3], axis=1)
+    return {"surface pass": spline(surface), "large curves": spline(large), "folds": spline(fold)}
+
+
+def exact_lengths(path: Path, piece: NDArray[np.uint32], u: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Length from the start of the piece to u: (u/R) [(R² + (t0 + t1)²)/4 + d² atanh(x)/x]."""
+    a, b, c = np.moveaxis(path.control_points[piece], 1, 0)
+    width = path.width[piece][:, None]
+    start = 2 / width * (b - a)
+    second = (2 / width * (c - b) - start) / width
+    end = start + second * u[:, None]
+    bend = np.maximum(np.linalg.norm(second, axis=1), 1e-300)
+    radii = np.linalg.norm(start, axis=1) + np.linalg.norm(end, axis=1)
+    along = (np.sum(start * second, axis=1) + np.sum(end * second, axis=1)) / bend
+    across_sq = np.maximum(np.sum(start**2, axis=1) - (np.sum(start * second, axis=1) / bend) ** 2, 0.0)
+    x = np.minimum(bend * u / radii, 1 - 1e-16)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        curved = np.where(x > 1e-4, np.arctanh(x) / x, 1 + x * x / 3)
+    return u / radii * ((radii**2 + along**2) / 4 + across_sq * curved)
+
+
+def inversion_rows(path: Path) -> list[tuple[str, ...]]:
+    length = PathLength(path)
+    starts = length.length(np.arange(len(path)), np.zeros(len(path)))
+    rows = []
+    for step in (0.001, 0.01, 0.1, 1.0, 10.0):
+        wanted = np.arange(step, length.total, step)[:MAX_STEPS]
+        for interpolator in INTERPOLATORS:
+            begin = time.perf_counter()
+            places = length.locate(wanted, STEP_ERROR * step, interpolator)
+            seconds = time.perf_counter() - begin
+            reached = starts[places.piece] + exact_lengths(path, places.piece, places.u)
+            rows.append(
+                (
+                    f"{step:g}",
+                    str(len(wanted)),
+                    interpolator,
+                    f"{places.iterations.mean():.2f}",
+                    str(places.iterations.max()),
+                    f"{np.abs(reached - wanted).max() / step:.1e}",
+                    f"{seconds / len(wanted) * 1e9:.0f}",
+                )
+            )
+    return rows
+
+
+def constant_feed(path: Path) -> SpeedProfile:
+    """One arc a piece at `FEED`: the stream starts and ends in motion."""
+    count, length = len(path), PathLength(path)
+    joints = np.append(length.length(np.arange(count), np.zeros(count)), length.total)
+    edges = np.diff(path.control_points, axis=1)
+    p = (FEED * path.width[:, None] / 2 / np.linalg.norm(edges, axis=2)) ** 2
+    return SpeedProfile(
+        piece=np.arange(count, dtype=np.uint32),
+        kind=np.full(count, ArcKind.FEED, np.uint8),
+        axis=np.full(count, 255, np.uint8),
+        value=np.full(count, FEED**2),
+        u0=np.zeros(count),
+        u1=path.width,
+        p0=p[:, 0],
+        p1=p[:, 1],
+        duration=np.diff(joints) / FEED,
+        runs=np.array([0, count]),
+    )
+
+
+def stream_rows(path: Path) -> list[tuple[str, ...]]:
+    profile = constant_feed(path)
+    rows = []
+    for step in (0.001, 0.01, 0.1, 1.0):
+        for interpolator in INTERPOLATORS:
+            stream = setpoints(path, profile, step / FEED, interpolator)
+            begin = time.perf_counter()
+            count = sum(len(chunk) for chunk in stream.chunks())
+            seconds = time.perf_counter() - begin
+            stats = stream.stats
+            rows.append(
+                (
+                    f"{step:g}",
+                    str(count),
+                    interpolator,
+                    str(stats.iterations),
+                    f"{stats.length_error:.1e}",
+                    f"{seconds / count * 1e9:.0f}",
+                )
+            )
+    return rows
+
+
+def print_table(title: str, columns: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
+    table = Table(title=title, title_justify="left")
+    for column in columns:
+        table.add_column(column, justify="left" if column == "interpolator" else "right")
+    for row in rows:
+        table.add_row(*row)
+    Console().print(table)
+
+
+def main() -> None:
+    for name, path in curves().items():
+        print_table(
+            f"{name}: places at equal steps, asked for {STEP_ERROR:g} of a step",
+            ("step [mm]", "steps", "interpolator", "rounds", "worst", "length error [steps]", "ns per step"),
+            inversion_rows(path),
+        )
+        print_table(
+            f"{name}: setpoints with all derivatives at {FEED:g} mm/s",
+            ("step [mm]", "setpoints", "interpolator", "worst rounds", "proven error [steps]", "ns each"),
+            stream_rows(path),
+        )
+
+
+if __name__ == "__main__":
+    main()

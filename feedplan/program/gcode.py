@@ -1,0 +1,122 @@
+"""Reads G-code (RS-274/NGC, as CAM systems post it) into a Program.
+
+| words | meaning |
+|---|---|
+| G0 G1 | rapid, feed |
+| G2 G3 | arc or helix by I J K or R, turns by P; planes G17 G18 G19; centre incremental or G90.1 |
+| G4 P, G4 X | dwell [s] |
+| G20 G21 | inch, mm (mm without either, with a warning) |
+| G28 G30 | rapid by the place named to the machine's home: the axes named, or all |
+| G43 H, G43.1, G43.2, G49 | tool length; lengths by H are not known and count as 0, with a warning |
+| G52, G92 to G92.3, G10 L2 L20 | offsets |
+| G53, G54 to G59.3 | machine coordinates, work offsets (from the machine file, else 0) |
+| G61.1, G61, G64 P Q | exact stop, exact path, blending within P, fitting within Q |
+| G73 G74 G81 to G86 G89, G80, G98 G99 | canned cycles with R Z Q P L D, written out as moves |
+| G90 G91 | absolute, incremental |
+| G93 G94 G95 | F is 1/min, units/min, units a turn (with a known spindle speed) |
+| G96 G97 S | surface or spindle speed |
+| G8 G15 G40 G69 | what they cancel is never on: no effect |
+| M0 M1 M2 M30 M60, M3 to M9, M19, M100 to M199 | full stop; M2 and M30 end the program |
+| M48 M49, S T D | no effect on the path |
+| F, N, O1234 or :1234 at the start, %, ( ) and ; comments | as usual |
+| / at the start of a block | left out, with a warning, unless `block_delete=False` |
+| #1 = [...], #<name>, + - * / ** MOD, EQ to XOR, ABS to TAN | arithmetic, in any word |
+
+Everything else is an error that names the line and the word: cutter radius compensation (G41 G42), splines
+(G5 G6), threading, probing, subprograms and flow control (O words, M97 to M99), words that no code of their
+block uses. Within a block the order is LinuxCNC's, with differences that posts count on: F is in the units of
+its own block, G80 gives way to another motion code beside it, and G0 beside G28 only stays in force. All axes
+start at machine zero; a change of offsets moves nothing. A stop or dwell belongs to the move before it, and a
+dwell before the first move is kept as `start_dwell`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan._solvers import read_gcode as read_native
+from feedplan.errors import MachineError, ProgramError
+from feedplan.machine.machine import AXIS_LETTERS, Machine
+from feedplan.program.program import Program
+
+WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
+
+MAX_BYTES = 1 << 30
+MAX_MOVES = 50_000_000
+
+
+def read_gcode(
+    source: str | Path | bytes,
+    machine: Machine | None = None,
+    name: str | None = None,
+    *,
+    block_delete: bool = True,
+    max_bytes: int = MAX_BYTES,
+    max_moves: int = MAX_MOVES,
+) -> Program:
+    """The moves of a G-code program.
+
+    `source` is a path, or the program itself: bytes, or a str with a line break. `machine` gives the work
+    offsets, the home position and the axes there are; without it offsets and home are 0. `name` stands in
+    messages, instead of the file's name. `block_delete` leaves out blocks that start with `/`, as LinuxCNC
+    does; `max_bytes` and `max_moves` bound what is read.
+    Raises ProgramError naming file, line, word and remedy, MachineError where an offset's name is unknown.
+    """
+    if isinstance(source, str) and ("\n" in source or "\r" in source):
+        source = source.encode("utf-8", "surrogateescape")
+    if isinstance(source, bytes):
+        content, default = source, "program"
+        _check_size(len(content), default if name is None else name, max_bytes)
+    else:
+        default = Path(source).name
+        content = read_bytes(Path(source), max_bytes)
+    columns = read_native(
+        content,
+        default if name is None else name,
+        _places(machine),
+        "" if machine is None else "".join(machine.axis_names),
+        block_delete,
+        max_moves,
+    )
+    return Program(name=default if name is None else name, **columns)
+
+
+def read_bytes(path: Path, max_bytes: int = MAX_BYTES) -> bytes:
+    """The content of a program file; ProgramError where it is missing, no file, empty or too large."""
+    if path.is_dir():
+        raise ProgramError(f"{path} is a directory: give the program file in it")
+    try:
+        _check_size(path.stat().st_size, str(path), max_bytes)
+        content = path.read_bytes()
+    except OSError as error:
+        raise ProgramError(f"{path} cannot be read: {error.strerror or error}") from None
+    except ValueError as error:
+        raise ProgramError(f"{path} is no path of a file: {error}") from None
+    if not content:
+        raise ProgramError(f"{path} is empty: give a part program")
+    return content
+
+
+def _check_size(size: int, place: str, max_bytes: int) -> None:
+    if size > max_bytes:
+        raise ProgramError(
+            f"{place} has {size} bytes, more than the {max_bytes} that are read: split it, or raise max_bytes"
+        )
+
+
+def _places(machine: Machine | None) -> NDArray[np.float64]:
+    """Work offsets and home as rows (10, 9) over XYZABCUVW."""
+    places = np.zeros((len(WORK_OFFSETS) + 1, len(AXIS_LETTERS)))
+    if machine is None:
+        return places
+    columns = [AXIS_LETTERS.index(letter) for letter in machine.axis_names]
+    for key, row in machine.offsets:
+        if key not in WORK_OFFSETS:
+            raise MachineError(f"machine {machine.name}: offsets has {key!r}: use {', '.join(WORK_OFFSETS)}")
+        places[WORK_OFFSETS.index(key), columns] = row
+    if machine.home:
+        places[-1, columns] = machine.home
+    return places

@@ -1,0 +1,102 @@
+//! Time per setpoint with all derivatives, by the law of the arcs, and per inversion of a length table.
+//!
+//! The path is one C1 quadratic spline of 1000 pieces in three axes, about 1.2 mm each; its profile is synthetic
+//! (no planner takes part): constant feed, or X speeding up and slowing down piece by piece.
+
+use criterion::{criterion_group, criterion_main, BenchmarkId, Criterion, Throughput};
+use feedplan_solvers::arc_length::PathLength;
+use feedplan_solvers::motion::{ArcKind, ProfileArc};
+use feedplan_solvers::newton;
+use feedplan_solvers::quadratic::Quadratic;
+use feedplan_solvers::sampling::{Interpolator, PathData, Sampler};
+
+const PIECES: usize = 1000;
+const SETPOINTS: usize = 100_000;
+
+/// x = u; y and z have slopes that waver between the joints.
+fn spline() -> Vec<Quadratic<3>> {
+    let slope = |i: usize| [1.0, (1.7 * i as f64).sin(), 0.5 * (2.3 * i as f64).cos()];
+    let mut pieces = Vec::with_capacity(PIECES);
+    let mut from = [0.0; 3];
+    for i in 0..PIECES {
+        let (a, b) = (slope(i), slope(i + 1));
+        let middle = std::array::from_fn(|k| from[k] + 0.5 * a[k]);
+        let to = std::array::from_fn(|k| middle[k] + 0.5 * b[k]);
+        pieces.push(Quadratic { control: [from, middle, to], width: 1.0 });
+        from = to;
+    }
+    pieces
+}
+
+fn profile(kind: ArcKind, pieces: &[Quadratic<3>]) -> Vec<ProfileArc> {
+    let lengths = PathLength::new(pieces);
+    (0..PIECES)
+        .map(|i| {
+            let arc = ProfileArc {
+                piece: i as u32,
+                kind,
+                axis: 0,
+                value: 1e4,
+                u0: 0.0,
+                u1: 1.0,
+                p0: 1e4,
+                p1: 1e4,
+                duration: 0.01,
+            };
+            match kind {
+                ArcKind::Feed => ProfileArc { duration: lengths.table(i).total() / 100.0, ..arc },
+                // Between 50 and 100 mm/s on 1 mm.
+                ArcKind::AxisAcceleration => {
+                    let (p0, p1) = if i % 2 == 0 { (2500.0, 1e4) } else { (1e4, 2500.0) };
+                    ProfileArc { value: 0.5 * (p1 - p0), p0, p1, duration: 1.0 / 75.0, ..arc }
+                }
+                _ => arc,
+            }
+        })
+        .collect()
+}
+
+fn setpoints(c: &mut Criterion) {
+    let mut group = c.benchmark_group("setpoints");
+    group.throughput(Throughput::Elements(SETPOINTS as u64)).sample_size(20);
+    let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
+    for kind in [ArcKind::AxisAcceleration, ArcKind::Feed] {
+        for interpolator in [Interpolator::Sarfraz, Interpolator::Newton] {
+            let pieces = spline();
+            let arcs = profile(kind, &pieces);
+            let time: f64 = arcs.iter().map(|arc| arc.duration).sum();
+            let lines = vec![1; PIECES];
+            let path = PathData { pieces, lines, runs: vec![0, PIECES], dwell: vec![0.0] };
+            let period = time / (SETPOINTS - 1) as f64;
+            let sampler = Sampler::new(path, arcs, &[0, PIECES], period, interpolator).expect("a profile");
+            let name = BenchmarkId::new(format!("{interpolator:?}"), format!("{kind:?}"));
+            group.bench_function(name, |b| {
+                b.iter(|| one_thread.install(|| sampler.chunk(0..SETPOINTS, &mut None)))
+            });
+        }
+    }
+    group.finish();
+}
+
+fn lengths(c: &mut Criterion) {
+    let mut group = c.benchmark_group("lengths");
+    let pieces = spline();
+    group.throughput(Throughput::Elements(PIECES as u64));
+    group.bench_function("table per piece", |b| b.iter(|| PathLength::new(&pieces)));
+    let table = PathLength::new(&pieces);
+    for count in [500, 50_000] {
+        let wanted: Vec<f64> = (0..count).map(|i| table.total() * i as f64 / count as f64).collect();
+        let tolerance = 1e-6 * table.total() / count as f64;
+        group.throughput(Throughput::Elements(count));
+        group.bench_function(BenchmarkId::new("Sarfraz", count), |b| {
+            b.iter(|| wanted.iter().map(|&s| table.locate(s, tolerance).located.u).sum::<f64>())
+        });
+        group.bench_function(BenchmarkId::new("Newton", count), |b| {
+            b.iter(|| newton::follow(&table, &wanted, tolerance))
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, setpoints, lengths);
+criterion_main!(benches);

@@ -1,0 +1,322 @@
+//! One block of a program: which words it has, and the modal groups that G and M codes belong to.
+//!
+//! A G code is kept in tenths (G5.1 is 51). Codes of one group exclude each other in a block. Groups are
+//! RS-274/NGC's; a code that is in none is not read.
+
+/// Bit of a letter in `Block::words`.
+#[inline(always)]
+pub const fn bit(letter: u8) -> u32 {
+    1 << (letter - b'A')
+}
+
+/// Bits of several letters.
+pub const fn bits(letters: &[u8]) -> u32 {
+    let mut sum = 0;
+    let mut i = 0;
+    while i < letters.len() {
+        sum |= bit(letters[i]);
+        i += 1;
+    }
+    sum
+}
+
+/// Axes in the order of a position.
+pub const AXES: [u8; 9] = *b"XYZABCUVW";
+
+/// Words that name axes.
+pub const AXIS_WORDS: u32 = bits(&AXES);
+
+/// Place of a letter in a position; 255 for letters that name no axis.
+pub const AXIS_OF_LETTER: [u8; 26] = {
+    let mut table = [255; 26];
+    let mut i = 0;
+    while i < AXES.len() {
+        table[(AXES[i] - b'A') as usize] = i as u8;
+        i += 1;
+    }
+    table
+};
+
+/// Rotary axes: A, B, C.
+#[inline(always)]
+pub fn rotary(axis: usize) -> bool {
+    (3..6).contains(&axis)
+}
+
+/// Modal groups of G codes, numbered as in the standard; `OFF` holds cancellations of what is never on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Group {
+    Once = 0,
+    Motion = 1,
+    Plane = 2,
+    Distance = 3,
+    ArcDistance = 4,
+    FeedMode = 5,
+    Units = 6,
+    Compensation = 7,
+    ToolLength = 8,
+    Retract = 10,
+    System = 12,
+    Control = 13,
+    SpindleMode = 14,
+    Lathe = 15,
+    Shift = 16,
+    Off = 17,
+}
+
+const GROUPS: usize = 18;
+const NO_GROUP: u8 = 255;
+
+const GROUP_OF: [u8; 1000] = {
+    let members: [(Group, &[u16]); 16] = [
+        (Group::Once, &[40, 100, 280, 300, 520, 530, 920]),
+        (Group::Motion, &[0, 10, 20, 30, 730, 740, 800, 810, 820, 830, 840, 850, 860, 890]),
+        (Group::Plane, &[170, 180, 190]),
+        (Group::Distance, &[900, 910]),
+        (Group::ArcDistance, &[901, 911]),
+        (Group::FeedMode, &[930, 940, 950]),
+        (Group::Units, &[200, 210]),
+        (Group::Compensation, &[400]),
+        (Group::ToolLength, &[430, 431, 432, 490]),
+        (Group::Retract, &[980, 990]),
+        (Group::System, &[540, 550, 560, 570, 580, 590, 591, 592, 593]),
+        (Group::Control, &[610, 611, 640]),
+        (Group::SpindleMode, &[960, 970]),
+        (Group::Lathe, &[80]),
+        (Group::Shift, &[921, 922, 923]),
+        (Group::Off, &[150, 690]),
+    ];
+    let mut table = [NO_GROUP; 1000];
+    let mut i = 0;
+    while i < members.len() {
+        let mut j = 0;
+        while j < members[i].1.len() {
+            table[members[i].1[j] as usize] = members[i].0 as u8;
+            j += 1;
+        }
+        i += 1;
+    }
+    table
+};
+
+/// Modal groups of M codes, numbered as in the standard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum MGroup {
+    Stop = 4,
+    ToolChange = 6,
+    Spindle = 7,
+    Coolant = 8,
+    Override = 9,
+    User = 10,
+}
+
+const M_GROUPS: usize = 11;
+
+/// The group of an M code; None where it is not read.
+#[inline]
+pub fn m_group(code: u16) -> Option<MGroup> {
+    Some(match code {
+        0 | 1 | 2 | 30 | 60 => MGroup::Stop,
+        6 => MGroup::ToolChange,
+        3 | 4 | 5 | 19 => MGroup::Spindle,
+        7..=9 => MGroup::Coolant,
+        48 | 49 => MGroup::Override,
+        100..=199 => MGroup::User,
+        _ => return None,
+    })
+}
+
+/// The words of a block.
+pub struct Block {
+    /// Letters other than G, M, N and O that the block has, by `bit`.
+    pub words: u32,
+    values: [f64; 26],
+    groups: u32,
+    codes: [u16; GROUPS],
+    m_groups: u32,
+    m_codes: [u16; M_GROUPS],
+}
+
+impl Block {
+    pub fn new() -> Self {
+        Self {
+            words: 0,
+            values: [0.0; 26],
+            groups: 0,
+            codes: [0; GROUPS],
+            m_groups: 0,
+            m_codes: [0; M_GROUPS],
+        }
+    }
+
+    /// Forgets the words; what they held is written over before it is read.
+    #[inline(always)]
+    pub fn clear(&mut self) {
+        self.words = 0;
+        self.groups = 0;
+        self.m_groups = 0;
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.words == 0 && self.groups == 0 && self.m_groups == 0
+    }
+
+    /// Takes a word with a letter A to Z; false where the block has that letter already.
+    #[inline(always)]
+    pub fn set(&mut self, letter: u8, value: f64) -> bool {
+        let fresh = !self.has(letter);
+        self.words |= bit(letter);
+        self.values[(letter - b'A') as usize] = value;
+        fresh
+    }
+
+    #[inline(always)]
+    pub fn has(&self, letter: u8) -> bool {
+        self.words & bit(letter) != 0
+    }
+
+    /// The value of a word that the block has.
+    #[inline(always)]
+    pub fn value(&self, letter: u8) -> f64 {
+        debug_assert!(self.has(letter));
+        self.values[(letter - b'A') as usize]
+    }
+
+    #[inline(always)]
+    pub fn get(&self, letter: u8) -> Option<f64> {
+        self.has(letter).then(|| self.value(letter))
+    }
+
+    /// The word as a message names it.
+    pub fn word(&self, letter: u8) -> String {
+        format!("{}{}", letter as char, self.value(letter))
+    }
+
+    /// Takes a G code in tenths; Err with what stands in its group already, None where it is in no group.
+    #[inline(always)]
+    pub fn set_code(&mut self, code: u16) -> Result<(), Option<u16>> {
+        let group = GROUP_OF.get(code as usize).copied().unwrap_or(NO_GROUP);
+        if group == NO_GROUP {
+            return Err(None);
+        }
+        if self.groups & (1 << group) != 0 {
+            let other = self.codes[group as usize];
+            // Posts write G80 beside the motion that replaces the cycle: that motion counts.
+            match (other, code) {
+                (800, _) if group == Group::Motion as u8 => {}
+                (_, 800) => return Ok(()),
+                _ => return Err(Some(other)),
+            }
+        }
+        self.groups |= 1 << group;
+        self.codes[group as usize] = code;
+        Ok(())
+    }
+
+    #[inline(always)]
+    pub fn code(&self, group: Group) -> Option<u16> {
+        (self.groups & (1 << group as u8) != 0).then(|| self.codes[group as usize])
+    }
+
+    /// True where the block has no G code but one of motion, and no M code.
+    #[inline(always)]
+    pub fn only_motion(&self) -> bool {
+        self.groups & !(1 << Group::Motion as u8) == 0 && self.m_groups == 0
+    }
+
+    /// Takes an M code of a group; Err with what stands in that group already.
+    pub fn set_m_code(&mut self, code: u16, group: MGroup) -> Result<(), u16> {
+        if self.m_groups & (1 << group as u8) != 0 {
+            return Err(self.m_codes[group as usize]);
+        }
+        self.m_groups |= 1 << group as u8;
+        self.m_codes[group as usize] = code;
+        Ok(())
+    }
+
+    #[inline(always)]
+    pub fn m_code(&self, group: MGroup) -> Option<u16> {
+        (self.m_groups & (1 << group as u8) != 0).then(|| self.m_codes[group as usize])
+    }
+}
+
+/// A G code in tenths as people write it: G5.1.
+pub fn g_name(code: u16) -> String {
+    match code % 10 {
+        0 => format!("G{}", code / 10),
+        tenth => format!("G{}.{tenth}", code / 10),
+    }
+}
+
+/// What to do about a G code that is understood and not read; None where it is not understood.
+pub fn g_remedy(code: u16) -> Option<&'static str> {
+    Some(match code {
+        50..=53 | 60..=69 => {
+            "splines in programs are not read: post lines and arcs (and remove Fanuc's G5 P and G5.1 Q)"
+        }
+        70 => "diameters are not read: post radii (G8)",
+        160 => "polar coordinates are not read: post X and Y",
+        171 | 181 | 191 => "arcs and cycles in the planes of U, V and W are not read: use G17, G18 or G19",
+        281 | 301 => "the home position comes from the machine file: set home there and remove this block",
+        330..=339 | 760 => "threading follows the spindle and has no feed of its own: remove it or post it as G1",
+        380..=389 => "probing depends on the part: remove it",
+        410 | 411 | 420 | 421 => {
+            "cutter radius compensation is not computed here: post with the compensation computed by the CAM system"
+        }
+        500..=519 => "scaling is not read: post the coordinates at full size",
+        541 => "only the work offsets G54 to G59.3 are read: post with one of them",
+        680..=689 => "rotated coordinates are not read: post the coordinates as they are cut",
+        700..=729 | 870 | 880 => "this cycle is not read: post it as single moves",
+        _ => return None,
+    })
+}
+
+/// What to do about an M code that is understood and not read; None where it is not understood.
+pub fn m_remedy(code: u16) -> Option<&'static str> {
+    Some(match code {
+        62..=68 => "inputs and outputs are not read: remove it, or make it a user code M100 to M199",
+        82 | 83 | 84 | 104 | 109 | 140 => "it belongs to 3-D printers: remove it",
+        97..=99 => "subprograms are not read: post one program without them",
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn codes_of_one_group_exclude_each_other() {
+        let mut block = Block::new();
+        assert_eq!(block.set_code(10), Ok(()));
+        assert_eq!(block.set_code(910), Ok(()));
+        assert_eq!(block.set_code(810), Err(Some(10)));
+        assert_eq!(block.set_code(51), Err(None));
+        assert_eq!(block.code(Group::Motion), Some(10));
+        assert_eq!(block.set_code(800), Ok(()));
+        assert_eq!(block.code(Group::Motion), Some(10));
+        assert_eq!(block.set_m_code(3, MGroup::Spindle), Ok(()));
+        assert_eq!(block.set_m_code(5, MGroup::Spindle), Err(3));
+        block.clear();
+        assert!(block.is_empty());
+    }
+
+    #[test]
+    fn a_letter_stands_once() {
+        let mut block = Block::new();
+        assert!(block.set(b'X', 1.5));
+        assert_eq!(block.get(b'X'), Some(1.5));
+        assert_eq!(block.get(b'Y'), None);
+        assert_eq!(block.word(b'X'), "X1.5");
+        assert!(!block.set(b'X', 2.0));
+    }
+
+    #[test]
+    fn codes_are_named_as_people_write_them() {
+        assert_eq!(g_name(51), "G5.1");
+        assert_eq!(g_name(800), "G80");
+        assert_eq!(g_name(0), "G0");
+    }
+}

@@ -1,0 +1,206 @@
+//! Canned drilling and boring cycles, G73 and G81 to G89, written out as moves.
+//!
+//! As LinuxCNC: rapid up to R where the tool is below it, across to the hole, down to R, the cycle's own moves, and
+//! back to R (G99) or to where the series began, where that is higher (G98). Between holes the path is exact.
+
+use super::block::{g_name, Block, AXES};
+use super::execute::Interpreter;
+use super::fault::{fault, Outcome};
+use super::modal::FeedMode;
+use super::moves::{Control, Kind, Mode, Point};
+use super::words::count;
+
+/// Where G73 and G83 stop above the last depth, unless D says, in mm: 0.010 inch.
+const PECK_CLEARANCE: f64 = 0.254;
+
+/// More repetitions of one block are a mistake.
+const MOST_REPEATS: u32 = 1_000_000;
+
+/// One hole: its cycle and heights along the tool axis, in machine coordinates.
+struct Hole {
+    motion: u16,
+    retract: f64,
+    bottom: f64,
+    clear: f64,
+    dwell: f64,
+    peck: f64,
+    clearance: f64,
+}
+
+impl Interpreter<'_> {
+    /// Drills where the block says, as often as L says.
+    pub(super) fn cycle(&mut self, block: &Block, motion: u16) -> Outcome<()> {
+        if self.state.feed_mode == FeedMode::Inverse {
+            return fault(format!(
+                "{} does not work with inverse time (G93): give G94 and F",
+                g_name(motion)
+            ));
+        }
+        let feed = self.feed()?.linear;
+        if let Some(letter) = AXES[3..].iter().find(|&&letter| block.has(letter)) {
+            return fault(format!(
+                "word {} stands in the cycle {}: cycles move X, Y and Z only",
+                block.word(*letter),
+                g_name(motion)
+            ));
+        }
+        let repeats = count(block, b'L', 1, "number of repetitions")?.unwrap_or(1);
+        if repeats > MOST_REPEATS {
+            return fault(format!(
+                "word {} is more than {MOST_REPEATS} repetitions: check L",
+                block.word(b'L')
+            ));
+        }
+        let hole = self.hole(block, motion)?;
+
+        let (u, v) = self.state.plane();
+        let normal = self.state.normal;
+        // In absolute mode the axis words are the place, in incremental mode a step before each repetition.
+        let mut place = self.moves.position;
+        let mut step = [0.0; 9];
+        let zero = *self.state.offsets.sum();
+        let absolute = self.state.absolute;
+        self.places(block, |axis, value| match absolute {
+            true => place[axis] = value + zero[axis],
+            false => step[axis] = value,
+        })?;
+        place[normal] = self.moves.position[normal].max(hole.retract);
+
+        let before = self.state.control;
+        if before.mode != Mode::ExactStop {
+            self.state.control = Control::new(Mode::ExactPath);
+        }
+        let mut up = self.moves.position;
+        for height in [hole.bottom, hole.clear, place[normal]] {
+            up[normal] = height;
+            self.check_reach(&up)?;
+        }
+        self.rapid(&up)?;
+        for _ in 0..repeats {
+            place[u] += step[u];
+            place[v] += step[v];
+            self.check_reach(&place)?;
+            self.rapid(&place)?;
+            self.drill(block, &hole, place, normal, feed)?;
+            place[normal] = hole.clear;
+        }
+        self.state.control = before;
+        Ok(())
+    }
+
+    /// Heights and words of the cycle; those not written stay as in the block before, if it was the same cycle.
+    fn hole(&mut self, block: &Block, motion: u16) -> Outcome<Hole> {
+        let normal = self.state.normal;
+        let unit = self.state.unit();
+        let again = self.state.motion == motion;
+        let current = self.moves.position[normal];
+        let zero = self.state.offsets.sum()[normal];
+        let absolute = self.state.absolute;
+        let sticky = &mut self.state.sticky;
+        for (letter, kept) in [(b'R', &mut sticky.retract), (AXES[normal], &mut sticky.bottom)] {
+            match block.get(letter) {
+                Some(value) => *kept = value * unit,
+                None if again => {}
+                None => {
+                    return fault(format!(
+                        "the cycle {} has no {}: give R (retract height) and {} (bottom)",
+                        g_name(motion),
+                        letter as char,
+                        AXES[normal] as char
+                    ))
+                }
+            }
+        }
+        for (letter, scale, kept) in [(b'P', 1.0, &mut sticky.dwell), (b'Q', unit, &mut sticky.peck)] {
+            *kept = block.get(letter).map(|value| value * scale).or(kept.filter(|_| again));
+        }
+        let initial = *sticky.initial.get_or_insert(current);
+        let (retract, bottom) = match absolute {
+            true => (sticky.retract + zero, sticky.bottom + zero),
+            false => (sticky.retract + initial, sticky.retract + initial + sticky.bottom),
+        };
+        if bottom > retract {
+            return fault(format!(
+                "the cycle {} has its bottom {:.4} mm above its retract height R: check R and {}",
+                g_name(motion),
+                bottom - retract,
+                AXES[normal] as char
+            ));
+        }
+        let clearance = match block.get(b'D') {
+            Some(value) if matches!(motion, 730 | 830) => value * unit,
+            _ => PECK_CLEARANCE,
+        };
+        let dwell = match (sticky.dwell, motion) {
+            (None, 820 | 860 | 890) => {
+                return fault(format!("the cycle {} has no dwell: give P in seconds", g_name(motion)))
+            }
+            (dwell, _) => dwell.unwrap_or(0.0),
+        };
+        let peck = match (sticky.peck, motion) {
+            (Some(peck), 730 | 830) if peck > 0.0 => peck,
+            (_, 730 | 830) => {
+                return fault(format!(
+                    "the cycle {} has no depth of one peck: give a positive Q",
+                    g_name(motion)
+                ))
+            }
+            _ => f64::INFINITY,
+        };
+        let clear = if self.state.retract_to_initial { retract.max(initial) } else { retract };
+        Ok(Hole { motion, retract, bottom, clear, dwell, peck, clearance })
+    }
+
+    /// From above the hole, down to R, through the cycle and up.
+    fn drill(
+        &mut self,
+        block: &Block,
+        hole: &Hole,
+        mut place: Point,
+        normal: usize,
+        feed: f64,
+    ) -> Outcome<()> {
+        place[normal] = hole.retract;
+        self.rapid(&place)?;
+        let pecks = ((hole.retract - hole.bottom) / hole.peck).ceil();
+        if pecks > f64::from(MOST_REPEATS) {
+            return fault(format!("the cycle {} takes {pecks} pecks: check Q", g_name(hole.motion)));
+        }
+        for i in 1..pecks as u32 {
+            let depth = hole.retract - f64::from(i) * hole.peck;
+            self.feed_to(&mut place, normal, depth, feed)?;
+            if hole.motion == 830 {
+                self.rapid_to(&mut place, normal, hole.retract)?;
+            }
+            self.rapid_to(&mut place, normal, (depth + hole.clearance).min(hole.retract))?;
+        }
+        self.feed_to(&mut place, normal, hole.bottom, feed)?;
+        match hole.motion {
+            820 => self.dwell(block, b'P', hole.dwell)?,
+            850 => self.feed_to(&mut place, normal, hole.retract, feed)?,
+            860 => self.dwell(block, b'P', hole.dwell)?,
+            890 => {
+                self.dwell(block, b'P', hole.dwell)?;
+                self.feed_to(&mut place, normal, hole.clear, feed)?;
+            }
+            // Tapping: the spindle turns back at the bottom and again at the top.
+            740 | 840 => {
+                self.dwell(block, b'P', hole.dwell)?;
+                self.feed_to(&mut place, normal, hole.clear, feed)?;
+                self.moves.stop();
+            }
+            _ => {}
+        }
+        self.rapid_to(&mut place, normal, hole.clear)
+    }
+
+    fn feed_to(&mut self, place: &mut Point, normal: usize, height: f64, feed: f64) -> Outcome<()> {
+        place[normal] = height;
+        self.moves.straight(Kind::Line, place, feed, &self.state.control, self.line)
+    }
+
+    fn rapid_to(&mut self, place: &mut Point, normal: usize, height: f64) -> Outcome<()> {
+        place[normal] = height;
+        self.rapid(place)
+    }
+}

@@ -1,0 +1,55 @@
+//! Which other language a file that is not understood may be in, from words that only that language has.
+
+/// So much of a file is looked at.
+const LOOK: usize = 1 << 16;
+
+/// Words in capitals, and the language they belong to; the first that is found decides.
+const SIGNS: [(&[&str], &str); 5] = [
+    (&["BEGIN PGM", "TOOL CALL", "TOOL DEF", " FMAX", "CYCL DEF", "BLK FORM"], "Heidenhain conversational"),
+    (
+        &[
+            "%_N_",
+            ";$PATH",
+            "DEF REAL",
+            "DEF INT",
+            "CYCLE8",
+            "CYCLE9",
+            "MSG(\"",
+            "TRAFOORI",
+            "TRAORI",
+            "SUPA",
+            "WORKPIECE(",
+        ],
+        "Siemens Sinumerik",
+    ),
+    (&["IF[", "IF [", "WHILE[", "WHILE [", "GOTO"], "Fanuc macro"),
+    (&["M104 S", "M109 S", "M140 S", "M82\n", "M83\n", "M82\r", "M83\r", ";LAYER", "EXTRUD"], "3-D printer"),
+    (&["<?XML", "<HTML", "<SVG", "SOLID ", "%!PS", "0\nSECTION", "0\r\nSECTION"], "no machine"),
+];
+
+/// The language that the file looks like; None where nothing tells.
+#[cold]
+pub fn guess(source: &[u8]) -> Option<&'static str> {
+    let head = source[..source.len().min(LOOK)].to_ascii_uppercase();
+    let has = |sign: &&str| head.windows(sign.len()).any(|window| window == sign.as_bytes());
+    SIGNS.iter().find(|(signs, _)| signs.iter().any(&has)).map(|&(_, language)| language)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::guess;
+
+    #[test]
+    fn each_language_shows_itself() {
+        for (text, language) in [
+            ("0 BEGIN PGM 12 MM\n1 L X+5 FMAX\n", Some("Heidenhain conversational")),
+            ("%_N_PART_MPF\nDEF REAL A=1\n", Some("Siemens Sinumerik")),
+            ("N10 #1=2\nif [#1 gt 2] goto 10\n", Some("Fanuc macro")),
+            ("M82\nG1 E5\n", Some("3-D printer")),
+            ("G0 X1\nG1 Y2 F100\nM2\n", None),
+            ("", None),
+        ] {
+            assert_eq!(guess(text.as_bytes()), language, "{text}");
+        }
+    }
+}

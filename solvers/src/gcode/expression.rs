@@ -1,0 +1,379 @@
+//! The arithmetic of RS-274/NGC: `[1 + acos[0] - [#3 ** [4.0/2]]]`, parameters and their assignment.
+//!
+//! Operators in rising order of binding: AND OR XOR; EQ NE GT GE LT LE; + -; * / MOD; **. Those of one order go
+//! from left to right, powers too. Angles are degrees; EQ and its kin take numbers closer than 1e-6 as equal.
+
+use std::collections::HashMap;
+
+use super::arithmetic::{apply, call, Function, OPERATORS};
+use super::fault::{fault, foreign, Outcome};
+use super::number::{decimal, spaces};
+
+/// How far a decimal number may be from the integer it stands for.
+const NEAR_INTEGER: f64 = 1e-4;
+
+/// Brackets may be nested so deep.
+const MAX_DEPTH: usize = 64;
+
+/// Parameters from here on belong to the machine: offsets, positions, tool data.
+const FIRST_MACHINE_PARAMETER: u32 = 5001;
+
+/// What `#` names.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+enum Name {
+    Number(u32),
+    Text(String),
+}
+
+impl std::fmt::Display for Name {
+    fn fmt(&self, out: &mut std::fmt::Formatter) -> std::fmt::Result {
+        match self {
+            Name::Number(number) => write!(out, "#{number}"),
+            Name::Text(text) => write!(out, "#<{text}>"),
+        }
+    }
+}
+
+/// The parameters that the program has set; those set in a block count from the next block on.
+#[derive(Default)]
+pub struct Parameters {
+    set: HashMap<Name, f64>,
+    pending: Vec<(Name, f64)>,
+}
+
+impl Parameters {
+    /// Lets the assignments of the block that ends take effect.
+    #[inline]
+    pub fn commit(&mut self) {
+        if !self.pending.is_empty() {
+            self.set.extend(self.pending.drain(..));
+        }
+    }
+
+    /// Reads `#1 = value` from its `#` on; returns the place after it.
+    pub fn assign(&mut self, source: &[u8], at: usize) -> Outcome<usize> {
+        let mut formula = Formula { source, at, parameters: self, depth: 0 };
+        let name = formula.name()?;
+        if formula.peek() != b'=' {
+            return foreign(format!("{name} stands alone: write {name} = value, or a letter before it"));
+        }
+        formula.at += 1;
+        let value = formula.value()?;
+        let at = formula.at;
+        if matches!(name, Name::Number(number) if number >= FIRST_MACHINE_PARAMETER) {
+            return fault(format!(
+                "{name} belongs to the machine and is not set here: use G10 L2 for work offsets"
+            ));
+        }
+        self.pending.push((name, value));
+        Ok(at)
+    }
+
+    /// The value at `at` that is not a plain number: an expression, a parameter, a function, or one of these
+    /// with a sign; with the place after it. None where none of these starts.
+    #[cold]
+    pub fn value(&self, source: &[u8], at: usize) -> Outcome<Option<(f64, usize)>> {
+        let mut formula = Formula { source, at, parameters: self, depth: 0 };
+        let after_sign = match formula.peek() {
+            b'+' | b'-' => spaces(source, formula.at + 1),
+            _ => formula.at,
+        };
+        let starts = match source.get(after_sign) {
+            Some(b'[' | b'#') => true,
+            Some(letter) if letter.is_ascii_alphabetic() => Function::at(source, after_sign).is_some(),
+            _ => false,
+        };
+        if !starts {
+            return Ok(None);
+        }
+        let value = formula.value()?;
+        Ok(Some((value, formula.at)))
+    }
+}
+
+struct Formula<'a> {
+    source: &'a [u8],
+    at: usize,
+    parameters: &'a Parameters,
+    depth: usize,
+}
+
+impl Formula<'_> {
+    /// The next byte that is not blank; a line end at the end.
+    fn peek(&mut self) -> u8 {
+        self.at = spaces(self.source, self.at);
+        self.source.get(self.at).copied().unwrap_or(b'\n')
+    }
+
+    fn value(&mut self) -> Outcome<f64> {
+        self.depth += 1;
+        if self.depth > MAX_DEPTH {
+            return fault(format!(
+                "brackets and parameters are nested more than {MAX_DEPTH} deep: write the formula in steps"
+            ));
+        }
+        let value = match self.peek() {
+            b'[' => self.bracket()?,
+            b'#' => {
+                let name = self.name()?;
+                match self.parameters.set.get(&name) {
+                    Some(&value) => value,
+                    None => {
+                        return fault(format!(
+                            "parameter {name} is used and the program has not set it: set it before, such as {name} = 1"
+                        ))
+                    }
+                }
+            }
+            letter if letter.is_ascii_alphabetic() => self.function()?,
+            sign => match (decimal(self.source, self.at), sign) {
+                (Some((number, end)), _) => {
+                    self.at = end;
+                    number
+                }
+                (None, b'+') => {
+                    self.at += 1;
+                    self.value()?
+                }
+                (None, b'-') => {
+                    self.at += 1;
+                    -self.value()?
+                }
+                _ => return foreign(format!("a number is missing before {}", self.rest())),
+            },
+        };
+        self.depth -= 1;
+        Ok(value)
+    }
+
+    /// From `[` to its `]`.
+    fn bracket(&mut self) -> Outcome<f64> {
+        if self.peek() != b'[' {
+            return foreign(format!("a bracket [ is missing before {}", self.rest()));
+        }
+        self.at += 1;
+        let value = self.chain(1)?;
+        if self.peek() != b']' {
+            return foreign(format!("an operator or a bracket ] is missing before {}", self.rest()));
+        }
+        self.at += 1;
+        Ok(value)
+    }
+
+    /// Values joined by operators that bind at least as `least`.
+    fn chain(&mut self, least: u8) -> Outcome<f64> {
+        let mut left = self.value()?;
+        loop {
+            self.peek();
+            let rest = &self.source[self.at.min(self.source.len())..];
+            let found = OPERATORS.iter().find(|(name, _, _)| {
+                rest.get(..name.len()).is_some_and(|text| text.eq_ignore_ascii_case(name.as_bytes()))
+            });
+            match found {
+                Some(&(name, operator, order)) if order >= least => {
+                    self.at += name.len();
+                    let right = self.chain(order + 1)?;
+                    left = apply(operator, name, left, right)?;
+                }
+                _ => return Ok(left),
+            }
+        }
+    }
+
+    fn function(&mut self) -> Outcome<f64> {
+        let Some((function, name, bracket)) = Function::at(self.source, self.at) else {
+            return foreign(format!("{} is neither a number nor a function", self.rest()));
+        };
+        self.at = bracket;
+        if let Function::Exists = function {
+            return self.exists();
+        }
+        let x = self.bracket()?;
+        let over = match function {
+            Function::Atan if self.peek() != b'/' => {
+                return foreign("ATAN takes two brackets: write ATAN[y]/[x]")
+            }
+            Function::Atan => {
+                self.at += 1;
+                self.bracket()?
+            }
+            _ => 1.0,
+        };
+        call(function, name, x, over)
+    }
+
+    /// `EXISTS[#<name>]`.
+    fn exists(&mut self) -> Outcome<f64> {
+        self.at += 1;
+        if self.peek() != b'#' {
+            return foreign("EXISTS takes a parameter: write EXISTS[#<name>]");
+        }
+        let name = self.name()?;
+        if self.peek() != b']' {
+            return foreign("EXISTS takes one parameter: write EXISTS[#<name>]");
+        }
+        self.at += 1;
+        Ok(f64::from(self.parameters.set.contains_key(&name)))
+    }
+
+    /// `#5`, `##2`, `#[1 + 2]` or `#<name>`, from the `#` on.
+    fn name(&mut self) -> Outcome<Name> {
+        self.peek();
+        self.at += 1;
+        if self.peek() == b'<' {
+            let first = self.at + 1;
+            let end = (first..self.source.len()).find(|&at| matches!(self.source[at], b'>' | b'\n' | b'\r'));
+            let Some(end) = end.filter(|&end| self.source[end] == b'>') else {
+                return foreign(format!("the parameter name {} has no closing >", self.rest()));
+            };
+            self.at = end + 1;
+            let letters = self.source[first..end].iter().filter(|byte| !matches!(byte, b' ' | b'\t'));
+            let text: Vec<u8> = letters.map(u8::to_ascii_lowercase).collect();
+            return Ok(Name::Text(String::from_utf8_lossy(&text).into_owned()));
+        }
+        let number = self.value()?;
+        match integer(number) {
+            Some(index) if (1..=1_000_000).contains(&index) => Ok(Name::Number(index as u32)),
+            _ => fault(format!("#{number} is no parameter: parameters are #1, #2, ... or #<name>")),
+        }
+    }
+
+    /// The start of what is left of the line, for a message.
+    fn rest(&self) -> String {
+        excerpt(self.source, self.at)
+    }
+}
+
+/// The integer that a number stands for, within 1e-4.
+pub fn integer(value: f64) -> Option<i64> {
+    let nearest = value.round();
+    ((value - nearest).abs() <= NEAR_INTEGER && nearest.abs() < 1e15).then_some(nearest as i64)
+}
+
+/// At most 24 characters from `at` to the end of the line, as quoted text that can be printed.
+pub fn excerpt(source: &[u8], at: usize) -> String {
+    let rest = source.get(at..).unwrap_or_default();
+    let line = rest.split(|byte| matches!(byte, b'\n' | b'\r')).next().unwrap_or_default();
+    let text = String::from_utf8_lossy(&line[..line.len().min(96)]);
+    let text: String = text.trim_end().chars().filter(|letter| !letter.is_control()).take(24).collect();
+    if text.is_empty() {
+        "the end of the line".into()
+    } else {
+        format!("'{text}'")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn value(text: &str) -> Result<f64, String> {
+        value_with(&mut Parameters::default(), text)
+    }
+
+    fn value_with(parameters: &mut Parameters, text: &str) -> Result<f64, String> {
+        match parameters.value(text.as_bytes(), 0) {
+            Ok(Some((value, end))) if end == text.len() => Ok(value),
+            Ok(found) => Err(format!("{found:?}")),
+            Err(fault) => Err(fault.message),
+        }
+    }
+
+    #[test]
+    fn operators_bind_as_the_standard_says() {
+        for (text, expected) in [
+            ("[150 * 60]", 9000.0),
+            ("[2.0 / 3 * 1.5 - 5.5 / 11.0]", 0.5),
+            ("[1 + 2 * 3]", 7.0),
+            ("[2 ** 3 ** 2]", 64.0),
+            ("[2 * 3 ** 2]", 18.0),
+            ("[7 mod 4]", 3.0),
+            ("[-7 MOD 4]", 1.0),
+            ("[1 + 1 EQ 2 AND 3 GT 2]", 1.0),
+            ("[1 XOR 1]", 0.0),
+            ("[0 OR 2]", 1.0),
+            ("[1 LE 0.9999999]", 1.0),
+            ("[3 - -2]", 5.0),
+            ("-[1 + 2]", -3.0),
+            ("[[1 + 2] * [3 + 4]]", 21.0),
+        ] {
+            assert_eq!(value(text), Ok(expected), "{text}");
+        }
+    }
+
+    #[test]
+    fn functions_work_in_degrees() {
+        for (text, expected) in [
+            ("[1 + acos[0] - [2 ** [4.0/2]]]", 87.0),
+            ("sin[30]", 0.5),
+            ("COS [60]", 0.5),
+            ("tan[45]", 1.0),
+            ("atan[1]/[-1]", 135.0),
+            ("asin[1]", 90.0),
+            ("fix[-2.8]", -3.0),
+            ("fup[2.2]", 3.0),
+            ("round[2.5]", 3.0),
+            ("abs[-4]", 4.0),
+            ("sqrt[16]", 4.0),
+            ("ln[exp[2]]", 2.0),
+        ] {
+            let found = value(text).unwrap();
+            assert!((found - expected).abs() < 1e-12, "{text} = {found}");
+        }
+    }
+
+    #[test]
+    fn parameters_keep_what_the_block_before_set() {
+        let mut parameters = Parameters::default();
+        for text in ["#1=2.5", "#<Tool Width> = [#1 * 2]", "#2=#1", "#3=2"] {
+            assert_eq!(parameters.assign(text.as_bytes(), 0).unwrap(), text.len());
+            parameters.commit();
+        }
+        assert_eq!(value_with(&mut parameters, "#<toolwidth>"), Ok(5.0));
+        assert_eq!(value_with(&mut parameters, "##3"), Ok(2.5));
+        assert_eq!(value_with(&mut parameters, "#[1 + 1]"), Ok(2.5));
+        assert_eq!(value_with(&mut parameters, "exists[#<toolwidth>]"), Ok(1.0));
+        assert_eq!(value_with(&mut parameters, "exists[#<other>]"), Ok(0.0));
+
+        parameters.assign(b"#1=7", 0).unwrap();
+        assert_eq!(value_with(&mut parameters, "#1"), Ok(2.5));
+        parameters.commit();
+        assert_eq!(value_with(&mut parameters, "#1"), Ok(7.0));
+    }
+
+    #[test]
+    fn what_has_no_value_says_why() {
+        for (text, word) in [
+            ("#5", "#5"),
+            ("#<depth>", "#<depth>"),
+            ("[1 / 0]", "divided by 0"),
+            ("[1 mod 0]", "divided by 0"),
+            ("sqrt[-1]", "SQRT[-1]"),
+            ("ln[0]", "LN[0]"),
+            ("acos[1.5]", "ACOS[1.5]"),
+            ("[[0 - 8] ** 0.5]", "-8 ** 0.5"),
+            ("[10 ** 400]", "finite"),
+            ("[1 + ]", "missing"),
+            ("[1 2]", "missing"),
+            ("[1 + 2", "missing"),
+            ("[sine[3]]", "sine[3]"),
+            ("atan[1]", "ATAN[y]/[x]"),
+            ("#0", "#0"),
+            ("#1.5", "#1.5"),
+            ("#<open", "closing"),
+        ] {
+            let message = value(text).unwrap_err();
+            assert!(message.contains(word), "{text}: {message}");
+        }
+        let deep = "[".repeat(100_000);
+        assert!(value(&deep).unwrap_err().contains("nested"));
+        let deep = "#".repeat(100_000);
+        assert!(value(&deep).unwrap_err().contains("nested"));
+    }
+
+    #[test]
+    fn parameters_of_the_machine_are_not_set() {
+        let fault = Parameters::default().assign(b"#5221=10", 0).unwrap_err();
+        assert!(fault.message.contains("#5221"), "{}", fault.message);
+    }
+}

@@ -1,0 +1,134 @@
+//! What stays in force from block to block: modes, offsets, feed.
+
+use super::moves::{Control, Mode, Point};
+
+pub const MM_PER_INCH: f64 = 25.4;
+
+/// What an F word means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FeedMode {
+    /// G94: units a minute.
+    PerMinute,
+    /// G93: moves a minute.
+    Inverse,
+    /// G95: units a turn of the spindle.
+    PerTurn,
+}
+
+/// The feed in force: what the last F said, for linear and for rotary moves.
+#[derive(Clone, Copy, Debug)]
+pub struct Feed {
+    /// mm/s, or mm a turn with G95.
+    pub linear: f64,
+    /// Degrees/s, or degrees a turn with G95.
+    pub angular: f64,
+}
+
+/// The words that a canned cycle keeps while it is repeated, in mm and seconds as they were written.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sticky {
+    pub retract: f64,
+    pub bottom: f64,
+    pub dwell: Option<f64>,
+    pub peck: Option<f64>,
+    /// Height along the tool axis, in machine coordinates, before the first of a series of cycles.
+    pub initial: Option<f64>,
+}
+
+/// Where the numbers of the program are, in machine coordinates.
+#[derive(Clone, Debug)]
+pub struct Offsets {
+    /// Work offsets G54 to G59.3.
+    pub work: [Point; 9],
+    /// Place in `work` of the one in force.
+    pub system: usize,
+    /// G92 and G52: in force, and as G92.3 brings it back.
+    pub shift: Point,
+    pub saved_shift: Point,
+    /// Tool length, G43.
+    pub tool: Point,
+    /// Their sum.
+    sum: Point,
+}
+
+impl Offsets {
+    pub fn new(work: [Point; 9]) -> Self {
+        let zero = [0.0; 9];
+        let mut offsets = Self { work, system: 0, shift: zero, saved_shift: zero, tool: zero, sum: zero };
+        offsets.update();
+        offsets
+    }
+
+    /// Machine coordinates of the program's zero.
+    #[inline(always)]
+    pub fn sum(&self) -> &Point {
+        &self.sum
+    }
+
+    /// To be called after a change.
+    pub fn update(&mut self) {
+        self.sum = std::array::from_fn(|k| self.work[self.system][k] + self.shift[k] + self.tool[k]);
+    }
+}
+
+/// Everything modal.
+pub struct State {
+    pub offsets: Offsets,
+    /// The motion code in tenths; 800 (G80) where there is none.
+    pub motion: u16,
+    /// The axis that arcs turn about and cycles go along: 2 for G17, 1 for G18, 0 for G19.
+    pub normal: usize,
+    pub absolute: bool,
+    pub absolute_centres: bool,
+    pub inches: bool,
+    /// G20 or G21 was given.
+    pub units_given: bool,
+    pub feed_mode: FeedMode,
+    pub feed: Option<Feed>,
+    pub control: Control,
+    /// G98: cycles go back to where they came from, not only to R.
+    pub retract_to_initial: bool,
+    pub spindle_on: bool,
+    /// Turns a minute; None where they are not known (G96, or no S yet).
+    pub spindle_speed: Option<f64>,
+    pub constant_surface_speed: bool,
+    pub sticky: Sticky,
+}
+
+impl State {
+    /// As LinuxCNC starts: no motion code, G17 G21 G90 G91.1 G94 G54 G64 G98.
+    pub fn new(work: [Point; 9]) -> Self {
+        Self {
+            offsets: Offsets::new(work),
+            motion: 800,
+            normal: 2,
+            absolute: true,
+            absolute_centres: false,
+            inches: false,
+            units_given: false,
+            feed_mode: FeedMode::PerMinute,
+            feed: None,
+            control: Control::new(Mode::Tolerance),
+            retract_to_initial: true,
+            spindle_on: false,
+            spindle_speed: None,
+            constant_surface_speed: false,
+            sticky: Sticky::default(),
+        }
+    }
+
+    /// mm of one unit of the program.
+    #[inline(always)]
+    pub fn unit(&self) -> f64 {
+        if self.inches {
+            MM_PER_INCH
+        } else {
+            1.0
+        }
+    }
+
+    /// The two axes of the plane, in the order that makes it right-handed with `normal`.
+    pub fn plane(&self) -> (usize, usize) {
+        ((self.normal + 1) % 3, (self.normal + 2) % 3)
+    }
+}

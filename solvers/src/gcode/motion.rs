@@ -1,0 +1,160 @@
+//! Straight moves and arcs of one block, with their feed.
+
+use super::arc::{arc, arc_length, Form};
+use super::block::{bits, Block, AXES};
+use super::execute::{Interpreter, RATES};
+use super::fault::{fault, Outcome};
+use super::modal::{Feed, FeedMode};
+use super::moves::{only_turns, straight_length, Arc, Kind, Point};
+use super::words::count;
+
+/// Words of the centre along X, Y, Z.
+const CENTRE: [u8; 3] = *b"IJK";
+
+/// More turns of one arc are a mistake.
+const MOST_TURNS: u32 = 10_000;
+
+/// Centres farther away than this [mm] leave an arc no digits.
+const FARTHEST_CENTRE: f64 = 1e9;
+
+impl Interpreter<'_> {
+    /// G0 and G1 to the block's axis words.
+    #[inline(always)]
+    pub(super) fn straight(&mut self, block: &Block, rapid: bool, machine: bool) -> Outcome<()> {
+        let target = self.target(block, machine)?;
+        if rapid {
+            return self.rapid(&target);
+        }
+        // A G1 alone only selects the motion; its feed may follow.
+        if block.words & super::block::AXIS_WORDS == 0 {
+            return Ok(());
+        }
+        let feed = match self.state.feed_mode {
+            FeedMode::Inverse => {
+                let length = straight_length(&self.moves.position, &target);
+                self.inverse_feed(block, length)?
+            }
+            _ => {
+                let feed = self.feed()?;
+                if block.words & bits(b"ABC") != 0 && only_turns(&self.moves.position, &target) {
+                    feed.angular
+                } else {
+                    feed.linear
+                }
+            }
+        };
+        self.moves.straight(Kind::Line, &target, feed, &self.state.control, self.line)
+    }
+
+    /// The feed in force, a second.
+    #[inline(always)]
+    pub(super) fn feed(&self) -> Outcome<Feed> {
+        let Some(feed) = self.state.feed else {
+            return fault("a feed move has no feed: give F before or in this block");
+        };
+        if feed.angular == 0.0 {
+            return fault("a feed move has the feed F0: give a positive F before or in this block");
+        }
+        if self.state.feed_mode == FeedMode::PerTurn {
+            return self.feed_per_turn(feed);
+        }
+        Ok(feed)
+    }
+
+    #[cold]
+    fn feed_per_turn(&self, feed: Feed) -> Outcome<Feed> {
+        match self.state.spindle_speed.filter(|speed| self.state.spindle_on && RATES.contains(speed)) {
+            Some(speed) => {
+                let turns = speed / 60.0;
+                Ok(Feed { linear: feed.linear * turns, angular: feed.angular * turns })
+            }
+            None => fault("the feed is per turn (G95) and the spindle speed is not known: give S and M3 before, or use G94"),
+        }
+    }
+
+    /// G93: the block's F is one over its minutes.
+    fn inverse_feed(&self, block: &Block, length: f64) -> Outcome<f64> {
+        match block.get(b'F') {
+            Some(rate) if rate > 0.0 => Ok(length * rate / 60.0),
+            Some(_) => fault(format!("word {} is no inverse time: give a positive F", block.word(b'F'))),
+            None => {
+                fault("a feed move with inverse time (G93) has no F of its own: give F in each such block")
+            }
+        }
+    }
+
+    /// G2 (clockwise) and G3.
+    pub(super) fn arc(&mut self, block: &Block, clockwise: bool) -> Outcome<()> {
+        let target = self.target(block, false)?;
+        let normal = self.state.normal;
+        let (u, v) = self.state.plane();
+        let position = self.moves.position;
+        let form = self.arc_form(block, &position, u, v)?;
+        let turns = count(block, b'P', 1, "number of turns")?.unwrap_or(1);
+        if turns > MOST_TURNS {
+            return fault(format!("word {} is more than {MOST_TURNS} turns: check P", block.word(b'P')));
+        }
+        let (start, end) = ([position[u], position[v]], [target[u], target[v]]);
+        let (centre, angle) = arc(start, end, form, clockwise, turns)?;
+        let feed = match self.state.feed_mode {
+            FeedMode::Inverse => {
+                let rise = target[normal] - position[normal];
+                self.inverse_feed(block, arc_length(start, end, centre, angle, rise))?
+            }
+            _ => self.feed()?.linear,
+        };
+        let mut place = [position[0], position[1], position[2]];
+        place[u] = centre[0];
+        place[v] = centre[1];
+        let arc = Arc { centre: place, normal, angle };
+        self.moves.arc(arc, &target, feed, &self.state.control, self.line)
+    }
+
+    /// R, or the two centre words of the plane.
+    fn arc_form(&self, block: &Block, position: &Point, u: usize, v: usize) -> Outcome<Form> {
+        let unit = self.state.unit();
+        let plane = 19 - self.state.normal;
+        if let Some(radius) = block.get(b'R') {
+            if block.words & bits(b"IJK") != 0 {
+                return fault("an arc has both R and a centre: give R, or I, J, K");
+            }
+            if !block.has(AXES[u]) && !block.has(AXES[v]) {
+                return fault(format!(
+                    "an arc with R has no end in the plane G{plane}: give {} or {}",
+                    AXES[u] as char, AXES[v] as char
+                ));
+            }
+            if radius.abs() > FARTHEST_CENTRE {
+                return fault(format!("word {} is more than {FARTHEST_CENTRE:e}: check R", block.word(b'R')));
+            }
+            return Ok(Form::Radius(radius * unit));
+        }
+        let normal = CENTRE[self.state.normal];
+        if block.has(normal) {
+            return fault(format!(
+                "word {} is no centre in the plane G{plane}: give {} and {}, or another plane",
+                block.word(normal),
+                CENTRE[u] as char,
+                CENTRE[v] as char
+            ));
+        }
+        let words = [CENTRE[u], CENTRE[v]].map(|letter| block.get(letter).map(|value| value * unit));
+        let missing = words.iter().filter(|word| word.is_none()).count();
+        let zero = self.state.offsets.sum();
+        if missing == 2 || (missing == 1 && self.state.absolute_centres) {
+            let both = if self.state.absolute_centres { "both " } else { "" };
+            return fault(format!(
+                "an arc in the plane G{plane} has no centre: give {both}{} and {}, or R",
+                CENTRE[u] as char, CENTRE[v] as char
+            ));
+        }
+        let zero = if self.state.absolute_centres { zero } else { position };
+        let centre = [zero[u] + words[0].unwrap_or(0.0), zero[v] + words[1].unwrap_or(0.0)];
+        if !centre.iter().all(|value| value.abs() <= FARTHEST_CENTRE) {
+            return fault(format!(
+                "the centre of an arc is more than {FARTHEST_CENTRE:e} mm away: check I, J, K"
+            ));
+        }
+        Ok(Form::Centre { centre, inches: self.state.inches })
+    }
+}

@@ -1,0 +1,327 @@
+//! The moves of a program as columns, built directly while it is read.
+//!
+//! What changes seldom (path control, stops, dwells) is kept as changes and spread over the rows at the end.
+
+use super::block::{rotary, AXES};
+use super::fault::{fault, Outcome};
+
+/// A point of the machine: X Y Z A B C U V W in mm and degrees.
+pub type Point = [f64; 9];
+
+/// What a move is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Kind {
+    Rapid = 0,
+    Line = 1,
+    Arc = 2,
+}
+
+/// How closely the path is followed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Mode {
+    ExactStop = 0,
+    ExactPath = 1,
+    Tolerance = 2,
+}
+
+/// Path control of a move: G61.1, G61 or G64 with its P and Q in mm, NaN where they are not given.
+#[derive(Clone, Copy, Debug)]
+pub struct Control {
+    pub mode: Mode,
+    pub blend: f64,
+    pub fit: f64,
+}
+
+impl Control {
+    pub fn new(mode: Mode) -> Self {
+        Self { mode, blend: f64::NAN, fit: f64::NAN }
+    }
+
+    /// Equal, NaN to NaN.
+    fn same(&self, other: &Self) -> bool {
+        self.mode == other.mode
+            && self.blend.to_bits() == other.blend.to_bits()
+            && self.fit.to_bits() == other.fit.to_bits()
+    }
+}
+
+/// A circular or helical move: centre in X, Y, Z; the axis it turns about; signed sweep in radians,
+/// counter-clockwise seen from the tip of that axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Arc {
+    pub centre: [f64; 3],
+    pub normal: usize,
+    pub angle: f64,
+}
+
+/// Steps up to this long, in mm or degrees, are rounding of offsets and no motion.
+const NO_MOTION: f64 = 1e-9;
+
+/// The moves so far.
+pub struct Moves {
+    /// Places in a `Point` of the columns of `target`.
+    axes: Vec<usize>,
+    limit: usize,
+    /// Where the last move ends.
+    pub position: Point,
+    kind: Vec<u8>,
+    target: Vec<f64>,
+    feed: Vec<f64>,
+    line: Vec<i32>,
+    control: Vec<(usize, Control)>,
+    stops: Vec<usize>,
+    dwells: Vec<(usize, f64)>,
+    start_dwell: f64,
+    arcs: Vec<(usize, Arc)>,
+}
+
+/// A program's moves, one row each; see `Program` in the Python package.
+#[derive(Debug)]
+pub struct Columns {
+    pub axes: Vec<u8>,
+    pub kind: Vec<u8>,
+    pub target: Vec<f64>,
+    pub feed: Vec<f64>,
+    pub line: Vec<i32>,
+    pub control: Vec<u8>,
+    pub blend_tolerance: Vec<f64>,
+    pub fit_tolerance: Vec<f64>,
+    pub stop: Vec<bool>,
+    pub dwell: Vec<f64>,
+    pub arc_move: Vec<i64>,
+    pub arc_centre: Vec<[f64; 3]>,
+    pub arc_normal: Vec<u8>,
+    pub arc_angle: Vec<f64>,
+    pub start_dwell: f64,
+    pub warnings: Vec<String>,
+}
+
+impl Moves {
+    /// Room for `expected` rows, and an error past `limit`.
+    pub fn new(expected: usize, limit: usize) -> Self {
+        let expected = expected.min(limit);
+        Self {
+            axes: vec![0, 1, 2],
+            limit,
+            position: [0.0; 9],
+            kind: Vec::with_capacity(expected),
+            target: Vec::with_capacity(3 * expected),
+            feed: Vec::with_capacity(expected),
+            line: Vec::with_capacity(expected),
+            control: Vec::new(),
+            stops: Vec::new(),
+            dwells: Vec::new(),
+            start_dwell: 0.0,
+            arcs: Vec::new(),
+        }
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.kind.is_empty()
+    }
+
+    /// Gives an axis a column; so far it stood at zero.
+    #[cold]
+    pub fn add_axis(&mut self, axis: usize) {
+        let Err(place) = self.axes.binary_search(&axis) else { return };
+        let width = self.axes.len();
+        let mut wider = Vec::with_capacity((self.target.capacity() / width) * (width + 1));
+        for row in self.target.chunks_exact(width) {
+            wider.extend_from_slice(&row[..place]);
+            wider.push(0.0);
+            wider.extend_from_slice(&row[place..]);
+        }
+        self.target = wider;
+        self.axes.insert(place, axis);
+    }
+
+    /// The axes that have a column.
+    pub fn axes(&self) -> &[usize] {
+        &self.axes
+    }
+
+    /// Adds a straight move; none where nothing moves.
+    #[inline(always)]
+    pub fn straight(
+        &mut self,
+        kind: Kind,
+        target: &Point,
+        feed: f64,
+        control: &Control,
+        line: u32,
+    ) -> Outcome<()> {
+        let mut step = 0.0f64;
+        for k in 0..9 {
+            step = step.max((target[k] - self.position[k]).abs());
+        }
+        if step <= NO_MOTION {
+            return Ok(());
+        }
+        self.row(kind, target, feed, control, line)
+    }
+
+    /// Adds an arc.
+    pub fn arc(&mut self, arc: Arc, target: &Point, feed: f64, control: &Control, line: u32) -> Outcome<()> {
+        self.arcs.push((self.kind.len(), arc));
+        self.row(Kind::Arc, target, feed, control, line)
+    }
+
+    #[inline(always)]
+    fn row(&mut self, kind: Kind, target: &Point, feed: f64, control: &Control, line: u32) -> Outcome<()> {
+        if self.kind.len() >= self.limit {
+            return fault(format!(
+                "the program has more than {} moves: split it, or raise max_moves",
+                self.limit
+            ));
+        }
+        if self.control.last().is_none_or(|(_, last)| !last.same(control)) {
+            self.control.push((self.kind.len(), *control));
+        }
+        if self.axes.len() == 3 {
+            self.target.extend_from_slice(&target[..3]);
+        } else {
+            self.target.extend(self.axes.iter().map(|&axis| target[axis]));
+        }
+        self.kind.push(kind as u8);
+        self.feed.push(feed);
+        self.line.push(line as i32);
+        self.position = *target;
+        Ok(())
+    }
+
+    /// A full stop where the program is now.
+    pub fn stop(&mut self) {
+        // Before the first move everything stands still already.
+        let Some(last) = self.kind.len().checked_sub(1) else { return };
+        if self.stops.last() != Some(&last) {
+            self.stops.push(last);
+        }
+    }
+
+    /// A full stop and a pause in seconds.
+    pub fn dwell(&mut self, seconds: f64) {
+        self.stop();
+        match self.kind.len().checked_sub(1) {
+            Some(last) => self.dwells.push((last, seconds)),
+            None => self.start_dwell += seconds,
+        }
+    }
+
+    /// The columns; the last move ends with a stop.
+    pub fn finish(mut self, warnings: Vec<String>) -> Columns {
+        self.stop();
+        let count = self.kind.len();
+        let mut stop = vec![false; count];
+        for &row in &self.stops {
+            stop[row] = true;
+        }
+        let mut dwell = vec![0.0; count];
+        for &(row, seconds) in &self.dwells {
+            dwell[row] += seconds;
+        }
+        let mut control = Vec::with_capacity(count);
+        let mut blend_tolerance = Vec::with_capacity(count);
+        let mut fit_tolerance = Vec::with_capacity(count);
+        for (i, (_, now)) in self.control.iter().enumerate() {
+            let end = self.control.get(i + 1).map_or(count, |next| next.0);
+            control.resize(end, now.mode as u8);
+            blend_tolerance.resize(end, now.blend);
+            fit_tolerance.resize(end, now.fit);
+        }
+        self.kind.shrink_to_fit();
+        self.target.shrink_to_fit();
+        self.feed.shrink_to_fit();
+        self.line.shrink_to_fit();
+        Columns {
+            axes: self.axes.iter().map(|&axis| AXES[axis]).collect(),
+            kind: self.kind,
+            target: self.target,
+            feed: self.feed,
+            line: self.line,
+            control,
+            blend_tolerance,
+            fit_tolerance,
+            stop,
+            dwell,
+            arc_move: self.arcs.iter().map(|&(row, _)| row as i64).collect(),
+            arc_centre: self.arcs.iter().map(|(_, arc)| arc.centre).collect(),
+            arc_normal: self.arcs.iter().map(|(_, arc)| arc.normal as u8).collect(),
+            arc_angle: self.arcs.iter().map(|(_, arc)| arc.angle).collect(),
+            start_dwell: self.start_dwell,
+            warnings,
+        }
+    }
+}
+
+/// The length that a feed counts along a straight move, as LinuxCNC: in X, Y, Z where one of these moves, else in
+/// U, V, W, else the degrees of A, B, C.
+pub fn straight_length(from: &Point, to: &Point) -> f64 {
+    let length = |axes: std::ops::Range<usize>| axes.map(|k| (to[k] - from[k]).powi(2)).sum::<f64>().sqrt();
+    [0..3, 6..9, 3..6].into_iter().map(length).find(|&length| length > NO_MOTION).unwrap_or(0.0)
+}
+
+/// True where only rotary axes move, so that the feed is in degrees.
+pub fn only_turns(from: &Point, to: &Point) -> bool {
+    (0..9).all(|k| rotary(k) || (to[k] - from[k]).abs() <= NO_MOTION)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(x: f64, y: f64) -> Point {
+        let mut point = [0.0; 9];
+        point[0] = x;
+        point[1] = y;
+        point
+    }
+
+    #[test]
+    fn a_new_axis_gets_its_column_in_order() {
+        let mut moves = Moves::new(4, 10);
+        let control = Control::new(Mode::Tolerance);
+        moves.straight(Kind::Rapid, &point(1.0, 2.0), f64::INFINITY, &control, 1).unwrap();
+        moves.add_axis(8);
+        moves.add_axis(3);
+        moves.add_axis(3);
+        let mut target = point(1.0, 2.0);
+        target[3] = 90.0;
+        target[8] = 5.0;
+        moves.straight(Kind::Line, &target, 10.0, &control, 2).unwrap();
+        let columns = moves.finish(Vec::new());
+        assert_eq!(columns.axes, b"XYZAW");
+        assert_eq!(columns.target, [1.0, 2.0, 0.0, 0.0, 0.0, 1.0, 2.0, 0.0, 90.0, 5.0]);
+    }
+
+    #[test]
+    fn stops_and_dwells_stay_where_nothing_moves() {
+        let mut moves = Moves::new(4, 10);
+        let control = Control::new(Mode::ExactPath);
+        moves.stop();
+        moves.dwell(0.5);
+        moves.straight(Kind::Line, &point(1.0, 0.0), 1.0, &control, 1).unwrap();
+        moves.straight(Kind::Line, &point(1.0, 1e-13), 1.0, &control, 2).unwrap();
+        moves.dwell(1.0);
+        moves.dwell(0.25);
+        moves.straight(Kind::Line, &point(2.0, 0.0), 1.0, &Control::new(Mode::Tolerance), 3).unwrap();
+        moves.straight(Kind::Line, &point(3.0, 0.0), 1.0, &Control::new(Mode::Tolerance), 4).unwrap();
+        let columns = moves.finish(Vec::new());
+        assert_eq!(columns.line, [1, 3, 4]);
+        assert_eq!(columns.stop, [true, false, true]);
+        assert_eq!(columns.dwell, [1.25, 0.0, 0.0]);
+        assert_eq!(columns.start_dwell, 0.5);
+        assert_eq!(columns.control, [1, 2, 2]);
+    }
+
+    #[test]
+    fn the_feed_counts_along_the_leading_axes() {
+        let from = [0.0; 9];
+        assert_eq!(straight_length(&from, &[3.0, 4.0, 0.0, 90.0, 0.0, 0.0, 7.0, 0.0, 0.0]), 5.0);
+        assert_eq!(straight_length(&from, &[0.0, 0.0, 0.0, 90.0, 0.0, 0.0, 0.0, 6.0, 8.0]), 10.0);
+        assert_eq!(straight_length(&from, &[0.0, 0.0, 0.0, 0.0, 0.0, 30.0, 0.0, 0.0, 0.0]), 30.0);
+        assert!(only_turns(&from, &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0]));
+        assert!(!only_turns(&from, &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0]));
+    }
+}

@@ -1,0 +1,70 @@
+//! `read_gcode`: the bytes of a program to the arrays of `Program`.
+
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use super::arrays;
+use crate::gcode::{read, Options};
+
+pyo3::import_exception!(feedplan.errors, ProgramError);
+
+/// Reads a G-code program; see `feedplan.program.gcode`.
+///
+/// `places` (10, 9): the work offsets G54 to G59.3, then the home position, in X Y Z A B C U V W; `machine_axes`
+/// empty where there is no machine. Returns the fields of `Program` but its name.
+#[pyfunction]
+#[pyo3(signature = (source, name, places, machine_axes, block_delete, max_moves))]
+fn read_gcode<'py>(
+    py: Python<'py>,
+    source: &[u8],
+    name: &str,
+    places: PyReadonlyArray2<f64>,
+    machine_axes: &str,
+    block_delete: bool,
+    max_moves: usize,
+) -> PyResult<Bound<'py, PyDict>> {
+    let places = arrays::rows::<9>(&places)?;
+    let Ok(places) = <[[f64; 9]; 10]>::try_from(places) else {
+        return Err(pyo3::exceptions::PyValueError::new_err("nine work offsets and the home are ten rows"));
+    };
+    let options = Options {
+        offsets: std::array::from_fn(|system| places[system]),
+        home: places[9],
+        machine_axes: machine_axes.as_bytes().to_vec(),
+        block_delete,
+        max_moves,
+    };
+    let columns = py.detach(|| read(source, &options)).map_err(|error| {
+        let place = error.line.map_or(name.to_string(), |line| format!("{name} line {line}"));
+        ProgramError::new_err((format!("{place}: {}", error.message), error.line))
+    })?;
+
+    let axes: Vec<String> = columns.axes.iter().map(|&letter| char::from(letter).to_string()).collect();
+    let (count, arcs) = (columns.kind.len(), columns.arc_move.len());
+    let fields = PyDict::new(py);
+    fields.set_item("start", PyArray1::from_vec(py, vec![0.0; axes.len()]))?;
+    fields.set_item("kind", PyArray1::from_vec(py, columns.kind))?;
+    fields.set_item("target", PyArray1::from_vec(py, columns.target).reshape([count, axes.len()])?)?;
+    fields.set_item("feed", PyArray1::from_vec(py, columns.feed))?;
+    fields.set_item("line", PyArray1::from_vec(py, columns.line))?;
+    fields.set_item("control", PyArray1::from_vec(py, columns.control))?;
+    fields.set_item("blend_tolerance", PyArray1::from_vec(py, columns.blend_tolerance))?;
+    fields.set_item("fit_tolerance", PyArray1::from_vec(py, columns.fit_tolerance))?;
+    fields.set_item("stop", PyArray1::from_vec(py, columns.stop))?;
+    fields.set_item("dwell", PyArray1::from_vec(py, columns.dwell))?;
+    fields.set_item("arc_move", PyArray1::from_vec(py, columns.arc_move))?;
+    let centres = columns.arc_centre.into_flattened();
+    fields.set_item("arc_centre", PyArray1::from_vec(py, centres).reshape([arcs, 3])?)?;
+    fields.set_item("arc_normal", PyArray1::from_vec(py, columns.arc_normal))?;
+    fields.set_item("arc_angle", PyArray1::from_vec(py, columns.arc_angle))?;
+    fields.set_item("start_dwell", columns.start_dwell)?;
+    fields.set_item("warnings", pyo3::types::PyTuple::new(py, columns.warnings)?)?;
+    fields.set_item("axes", pyo3::types::PyTuple::new(py, axes)?)?;
+    Ok(fields)
+}
+
+/// Adds the functions of this file to the module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(read_gcode, module)?)
+}

@@ -1,0 +1,193 @@
+//! `build_path`: the columns of a program to the columns of its path.
+
+use numpy::{
+    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
+};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use rayon::prelude::*;
+
+use super::arrays::{row, rows};
+use super::with_padded_axes;
+use crate::arc::ArcError;
+use crate::follow::{ArcShape, Fault, FollowOptions, Followed, Moves};
+use crate::path_builder::{build_path as build, Axes, BuiltPath};
+
+pyo3::import_exception!(feedplan.errors, ProgramError);
+
+pub fn register(module: &Bound<PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(build_path, module)?)
+}
+
+/// The travel of an axis that is not there.
+const ANYWHERE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
+
+/// Control points, widths, feeds, first and last moves, tolerances and runs of the path.
+type Columns<'py> = (
+    Bound<'py, PyArray3<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray2<i64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<i64>>,
+);
+/// Points, splines and polynomials of the fit, and the deviation.
+type Summary = (usize, usize, usize, f64);
+/// Move, axis and position of the first place outside the travel.
+type Place = (usize, usize, f64);
+
+/// The path of a program. `line` and `name` are for messages.
+#[pyfunction]
+#[pyo3(signature = (
+    name, start, kind, target, feed, line, tolerance, fit_tolerance, halt, arc_move, arc_plane, arc_centre,
+    arc_sweep, max_velocity, max_acceleration, travel, jump, exact_tolerance, max_chord, corner_acceleration,
+    max_speed, corner_angle
+))]
+#[allow(clippy::too_many_arguments)]
+fn build_path<'py>(
+    py: Python<'py>,
+    name: &str,
+    start: PyReadonlyArray1<'py, f64>,
+    kind: PyReadonlyArray1<'py, u8>,
+    target: PyReadonlyArray2<'py, f64>,
+    feed: PyReadonlyArray1<'py, f64>,
+    line: PyReadonlyArray1<'py, i32>,
+    tolerance: PyReadonlyArray1<'py, f64>,
+    fit_tolerance: PyReadonlyArray1<'py, f64>,
+    halt: PyReadonlyArray1<'py, bool>,
+    arc_move: PyReadonlyArray1<'py, i64>,
+    arc_plane: PyReadonlyArray2<'py, i64>,
+    arc_centre: PyReadonlyArray2<'py, f64>,
+    arc_sweep: PyReadonlyArray1<'py, f64>,
+    max_velocity: PyReadonlyArray1<'py, f64>,
+    max_acceleration: PyReadonlyArray1<'py, f64>,
+    travel: PyReadonlyArray2<'py, f64>,
+    jump: bool,
+    exact_tolerance: f64,
+    max_chord: f64,
+    corner_acceleration: f64,
+    max_speed: f64,
+    corner_angle: f64,
+) -> PyResult<(Columns<'py>, Summary, Option<Place>)> {
+    let axes = start.len();
+    let count = kind.len();
+    let same = [feed.len(), line.len(), tolerance.len(), fit_tolerance.len(), halt.len()];
+    let arcs = arc_move.len();
+    if target.shape() != [count, axes]
+        || same.iter().any(|&len| len != count)
+        || arc_plane.shape() != [arcs, 2]
+        || arc_centre.shape() != [arcs, 2]
+        || arc_sweep.len() != arcs
+        || travel.shape() != [axes, 2]
+    {
+        return Err(PyValueError::new_err("the columns of the program differ in length"));
+    }
+    let shapes: Vec<(usize, ArcShape)> = (0..arcs)
+        .map(|i| -> PyResult<_> {
+            let index = usize::try_from(arc_move.as_slice()?[i])?;
+            let plane = [arc_plane.as_slice()?[2 * i], arc_plane.as_slice()?[2 * i + 1]];
+            let plane = [usize::try_from(plane[0])?, usize::try_from(plane[1])?];
+            if plane[0] >= axes || plane[1] >= axes || index >= count {
+                return Err(PyValueError::new_err("an arc refers to a move or an axis that does not exist"));
+            }
+            let centre = [arc_centre.as_slice()?[2 * i], arc_centre.as_slice()?[2 * i + 1]];
+            Ok((index, ArcShape { plane, centre, sweep: arc_sweep.as_slice()?[i] }))
+        })
+        .collect::<PyResult<_>>()?;
+    let options = FollowOptions { exact_tolerance, max_chord, corner_acceleration, max_speed, corner_angle };
+    with_padded_axes!(axes, M, {
+        let target = rows::<M>(&target)?;
+        let moves = Moves {
+            start: row::<M>(&start, 0.0)?,
+            kind: kind.as_slice()?,
+            target: &target,
+            feed: feed.as_slice()?,
+            tolerance: tolerance.as_slice()?,
+            fit_tolerance: fit_tolerance.as_slice()?,
+            halt: halt.as_slice()?,
+            arcs: &shapes,
+        };
+        let travel = rows::<2>(&travel)?;
+        let limits = Axes {
+            max_velocity: row::<M>(&max_velocity, 1.0)?,
+            max_acceleration: row::<M>(&max_acceleration, 1.0)?,
+            travel: std::array::from_fn(|k| travel.get(k).copied().unwrap_or(ANYWHERE)),
+            jump,
+        };
+        let path = py.detach(|| build(&moves, &options, &limits)).map_err(|error| {
+            let line = line.as_slice().map_or(0, |lines| lines[error.index]);
+            ProgramError::new_err((format!("{name}, line {line}: {}", sentence(error.fault)), line))
+        })?;
+        Ok(columns(py, &path, axes))
+    })
+}
+
+fn sentence(fault: Fault) -> &'static str {
+    match fault {
+        Fault::Length => "the move has no length, or a coordinate is not a finite number: correct the block",
+        Fault::Feed => "the move has no positive feed: give F a value above 0",
+        Fault::Arc(ArcError::Radius) => {
+            "the arc has no radius, or no finite one: correct its centre or its end"
+        }
+        Fault::Arc(ArcError::Sweep) => {
+            "the arc does not lead to its end point: correct its centre or its end"
+        }
+        Fault::Arc(ArcError::Turns) => "the arc has too many turns to be followed: give fewer",
+    }
+}
+
+fn columns<'py, const M: usize>(
+    py: Python<'py>,
+    path: &BuiltPath<M>,
+    axes: usize,
+) -> (Columns<'py>, Summary, Option<Place>) {
+    let parts = &path.parts;
+    let count = parts.iter().map(Vec::len).sum();
+    let (control, width, feed, moves, tolerance) = py.detach(|| {
+        (
+            gather(parts, 3 * axes, |followed, out: &mut [f64]| {
+                for (row, point) in out.chunks_exact_mut(axes).zip(&followed.piece.control) {
+                    row.copy_from_slice(&point[..axes]);
+                }
+            }),
+            gather(parts, 1, |followed, out| out[0] = followed.piece.width),
+            gather(parts, 1, |followed, out| out[0] = followed.feed),
+            gather(parts, 2, |followed, out: &mut [i64]| {
+                out.copy_from_slice(&[i64::from(followed.first), i64::from(followed.last)]);
+            }),
+            gather(parts, 1, |followed, out| out[0] = followed.tolerance),
+        )
+    });
+    let columns = (
+        PyArray1::from_vec(py, control).reshape([count, 3, axes]).expect("n × 3 × axes values"),
+        PyArray1::from_vec(py, width),
+        PyArray1::from_vec(py, feed),
+        PyArray1::from_vec(py, moves).reshape([count, 2]).expect("n × 2 values"),
+        PyArray1::from_vec(py, tolerance),
+        PyArray1::from_vec(py, path.runs.iter().map(|&start| start as i64).collect()),
+    );
+    let summary = (path.points, path.splines, path.polynomials, path.deviation);
+    (columns, summary, path.outside.map(|place| (place.index, place.axis, place.position)))
+}
+
+/// One column, `stride` values a piece, written by all parts at once.
+fn gather<const M: usize, T: Default + Clone + Send>(
+    parts: &[Vec<Followed<M>>],
+    stride: usize,
+    write: impl Fn(&Followed<M>, &mut [T]) + Sync,
+) -> Vec<T> {
+    let mut column = vec![T::default(); stride * parts.iter().map(Vec::len).sum::<usize>()];
+    let mut rest = &mut column[..];
+    let mut slices = Vec::with_capacity(parts.len());
+    for part in parts {
+        let (slice, tail) = rest.split_at_mut(stride * part.len());
+        slices.push(slice);
+        rest = tail;
+    }
+    parts.par_iter().zip(slices).for_each(|(part, slice)| {
+        for (followed, out) in part.iter().zip(slice.chunks_exact_mut(stride)) {
+            write(followed, out);
+        }
+    });
+    column
+}
