@@ -18,7 +18,7 @@ fn campaign(seeds: std::ops::Range<u64>) -> (Audit, Vec<String>) {
                 Ok(profile) => {
                     let found = audit(&case, &profile, 20);
                     if !(found.excess() < 1e-9
-                        && found.idle < 1e-9
+                        && found.idle < 1e-6
                         && found.jump < 1e-12
                         && found.duration < 1e-6)
                     {
@@ -73,24 +73,24 @@ fn changes(seeds: std::ops::Range<u64>) -> ([f64; 6], Vec<String>) {
 
 #[test]
 fn every_limit_holds_and_one_is_active_everywhere() {
-    let (worst, failures) = campaign(0..20_000);
+    let (worst, failures) = campaign(0..200_000);
     println!("{worst:?}");
     assert!(
         failures.is_empty(),
         "{} failures\n{}",
         failures.len(),
-        failures[..failures.len().min(4000)].join("\n")
+        failures[..failures.len().min(400)].join("\n")
     );
 }
 
 #[test]
 fn the_time_depends_on_the_path_alone() {
-    let (worst, failures) = changes(0..10_000);
+    let (worst, failures) = changes(0..100_000);
     println!("{worst:?}");
     assert!(
         failures.is_empty(),
         "{} failures\n{}",
         failures.len(),
-        failures[..failures.len().min(4000)].join("\n")
+        failures[..failures.len().min(400)].join("\n")
     );
 }
