@@ -3,7 +3,13 @@
 
 mod support;
 
-use support::{audit, random_case, Audit, Random};
+use feedplan_solvers::quadratic::Quadratic;
+use support::{audit, random_case, Audit, Case, Random};
+
+/// As many seeds, or as many as FEEDPLAN_SEEDS says for a long campaign.
+fn seeds(count: u64) -> std::ops::Range<u64> {
+    0..std::env::var("FEEDPLAN_SEEDS").map_or(count, |text| text.parse().expect("a number of seeds"))
+}
 
 /// The worst figures over cases with these seeds, and every failure as a sentence.
 fn campaign(seeds: std::ops::Range<u64>) -> (Audit, Vec<String>) {
@@ -59,7 +65,7 @@ fn changes(seeds: std::ops::Range<u64>) -> ([f64; 6], Vec<String>) {
                     Err(fault) => failures.push(format!("seed {seed} {name}: {fault}")),
                     Ok(changed) => {
                         let change = (changed.time() / profile.time() - 1.0).abs();
-                        if change > 1e-10 {
+                        if change > 1e-9 {
                             failures.push(format!("seed {seed} {name}: {change:.1e}"));
                         }
                         *worst = change.max(*worst);
@@ -73,24 +79,50 @@ fn changes(seeds: std::ops::Range<u64>) -> ([f64; 6], Vec<String>) {
 
 #[test]
 fn every_limit_holds_and_one_is_active_everywhere() {
-    let (worst, failures) = campaign(0..200_000);
+    let (worst, failures) = campaign(seeds(20_000));
     println!("{worst:?}");
     assert!(
         failures.is_empty(),
         "{} failures\n{}",
         failures.len(),
-        failures[..failures.len().min(400)].join("\n")
+        failures[..failures.len().min(40)].join("\n")
     );
 }
 
 #[test]
 fn the_time_depends_on_the_path_alone() {
-    let (worst, failures) = changes(0..100_000);
+    let (worst, failures) = changes(seeds(10_000));
     println!("{worst:?}");
     assert!(
         failures.is_empty(),
         "{} failures\n{}",
         failures.len(),
-        failures[..failures.len().min(400)].join("\n")
+        failures[..failures.len().min(40)].join("\n")
     );
+}
+
+/// Two right angles rounded by parabolas between axes of equal strength: on the parabolas the limit curve is level,
+/// and falls or rises by rounding alone.
+#[test]
+fn a_level_limit_curve_is_passed() {
+    let (x, middle, end) = ([-31.9377, -31.9066, -31.8755], 0.0311, 0.2474);
+    let corners = [
+        [[x[0], 119.96885], [x[0], 59.999975], [x[0], middle]],
+        [[x[0], middle], [x[0], 0.0], [x[1], 0.0]],
+        [[x[1], 0.0], [x[2], 0.0], [x[2], middle]],
+        [[x[2], middle], [x[2], 0.5 * (middle + end)], [x[2], end]],
+    ];
+    let width = [119.93775, 0.0622, 0.0622, 0.2163];
+    for nudge in 0..1000 {
+        // The places of the points in the last digits decide.
+        let shift = 1e-9 * f64::from(nudge);
+        let pieces = corners.iter().zip(width).map(|(control, width)| Quadratic {
+            control: control.map(|[x, y]| [x + shift, y + 3.0 * shift]),
+            width,
+        });
+        let case: Case<2> = Case::new(pieces.collect(), 100.0, [500.0; 2], [3000.0; 2]);
+        let profile = case.plan().expect("a profile");
+        let found = audit(&case, &profile, 100);
+        assert!(found.excess() < 1e-9 && found.jump < 1e-12, "{nudge}: {found:?}");
+    }
 }

@@ -5,6 +5,10 @@ use crate::quadratic::{dot, norm, Quadratic};
 
 /// Tangents whose cross product is below this part of the square of the longer one are parallel to rounding.
 const PARALLEL: f64 = 1e-15;
+/// A tangent shorter than this part of the other one is its rounding: it has no direction.
+const ROUNDING: f64 = 1e-13;
+/// Parallel tangents differ in direction by less, in rad.
+const ALIGNED: f64 = 1e-9;
 /// A piece is straight if bending it back changes no acceleration by more than this part of the least limit.
 const STRAIGHT: f64 = 1e-13;
 
@@ -76,8 +80,11 @@ impl<const M: usize> Piece<M> {
     #[inline(always)]
     pub fn is_straight(&self, feed: f64, least_acceleration: f64) -> bool {
         let [d0, d1, d2] = self.speed;
-        if self.twist <= PARALLEL * d0.max(d2) {
-            return true;
+        let (shorter, longer) = (d0.min(d2), d0.max(d2));
+        if self.twist <= PARALLEL * longer {
+            // Where the shorter tangent has a direction, it must be that of the longer one.
+            return shorter <= ROUNDING * ROUNDING * longer
+                || self.twist * self.twist <= ALIGNED * ALIGNED * shorter * longer;
         }
         // The normal acceleration feed²/ρ, ρ = D^1.5/|W|, and the turn of the tangent.
         let least = d0.min(d1).min(d2);

@@ -81,7 +81,11 @@ pub fn audit<const M: usize>(case: &Case<M>, profile: &Profile, samples: usize) 
             0 | 3 => {
                 let k = profile.axis[row] as usize;
                 let least = ends[0].g[k].abs().min(ends[1].g[k].abs());
-                if least > 0.0 { arc.left[k].abs().max(arc.right[k].abs()) / least } else { 1.0 }
+                if least > 0.0 {
+                    arc.left[k].abs().max(arc.right[k].abs()) / least
+                } else {
+                    1.0
+                }
             }
             _ => 1.0,
         };

@@ -73,13 +73,18 @@ impl<const M: usize> Case<M> {
                 width,
             })
             .collect();
+        Self::new(pieces, 1e6, [1e6; M], [1.0; M])
+    }
+
+    /// A path from rest to rest under these limits.
+    pub fn new(pieces: Vec<Quadratic<M>>, feed: f64, velocity: [f64; M], acceleration: [f64; M]) -> Self {
         let count = pieces.len();
         Self {
             pieces,
-            feed: vec![1e6; count],
+            feed: vec![feed; count],
             junction: vec![f64::INFINITY; count + 1],
-            velocity: [1e6; M],
-            acceleration: [1.0; M],
+            velocity,
+            acceleration,
             chord_tolerance: f64::INFINITY,
             period: 0.001,
             start_speed: 0.0,
@@ -176,35 +181,6 @@ impl<const M: usize> Case<M> {
         }
         other
     }
-}
-
-/// A C1 quadratic B-spline as a CAM system's points give it: edges of 0.3 to 3 mm, small turns, 8 % sharp ones.
-pub fn cam_case<const M: usize>(count: usize, seed: u64) -> Case<M> {
-    let mut random = Random(seed);
-    let unit = |v: [f64; M]| {
-        let length = v.iter().map(|x| x * x).sum::<f64>().sqrt();
-        v.map(|x| x / length)
-    };
-    let mut direction = unit(random.normals());
-    let mut edges = vec![];
-    for _ in 0..=count {
-        let length = random.exponential(0.3f64.ln(), 3f64.ln());
-        let (keep, turn) = if random.chance(0.08) { (random.between(-0.5, 0.5), 0.6) } else { (1.0, 0.15) };
-        direction = unit(direction.map(|x| keep * x + turn * random.normal()));
-        edges.push((length, direction));
-    }
-    let width: Vec<f64> = (0..count).map(|i| 0.5 * (edges[i].0 + edges[i + 1].0)).collect();
-    let tangent = |i: usize| {
-        let before = if i == 0 { 0.0 } else { width[i - 1] };
-        let after = if i == count { 0.0 } else { width[i] };
-        edges[i].1.map(|x| 2.0 * edges[i].0 * x / (before + after))
-    };
-    let tangents: Vec<_> = (0..count).map(|i| (tangent(i), tangent(i + 1))).collect();
-    let mut case = Case::from_tangents(&tangents, &width);
-    case.feed = vec![100.0; count];
-    case.velocity = [250.0; M];
-    case.acceleration = std::array::from_fn(|k| if k == 2 { 1000.0 } else { 3000.0 });
-    case
 }
 
 /// A short path with something wrong with it: exact zeros, ties, cusps, straight runs, corners, jumps of the

@@ -5,7 +5,7 @@ mod audit;
 mod cases;
 
 pub use audit::{audit, Audit};
-pub use cases::{cam_case, random_case, Case, Random};
+pub use cases::{random_case, Case, Random};
 
 /// Runs an expression for a number of axes known at run time: `for_axes!(count, M, expression)`.
 #[macro_export]
