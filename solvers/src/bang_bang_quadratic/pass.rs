@@ -45,11 +45,9 @@ pub fn backward<const M: usize>(
         [Arc { x0: 0.0, x1: sub.length, p0: sub.cap_at(0.0), p1: sub.cap_at(sub.length), kind: Kind::Cap }];
     p = Pass::<M, true> { sub, axes, bounds: &cap, out, x: 0.0, p: p.min(cap[0].p0), line: OnceCell::new() }
         .run()?;
+    // The arc that led here stays as it is: forward, p begins below it.
     if p > sub.flat {
         p = p.min(axes.limit_at_turns(&sub.end, &sub.bend));
-        if let Some(last) = out.last_mut() {
-            last.p1 = p;
-        }
     }
     Ok(p)
 }
