@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from feedplan.machine.along import _same_turn, derivatives, enclosures, positions, proxy_constants
 from feedplan.machine.kinematics import Kinematics
 from feedplan.machine.kinematics.cylindrical import Cylindrical
-from feedplan.machine.numbers import Interval, Number
+from feedplan.machine.numbers import Interval, Number, Series
 from tests.machine.kinematics.bundled import all_kinematics, random_tips
 
 CYLINDER = Cylindrical(("C", "X", "Z"))
@@ -88,6 +88,18 @@ def test_order_zero_is_the_position(name: str) -> None:
     points, width = random_curves(kinematics, 50, seed=6)
     q = derivatives(kinematics, points, width, np.zeros(50))
     assert q[0] == pytest.approx(positions(kinematics, points[:, 0]), rel=1e-13)
+
+
+@pytest.mark.parametrize("name", [name for name in all_kinematics() if "direction" not in name])
+def test_the_tip_comes_back_with_all_its_derivatives(name: str) -> None:
+    # The feed counts along the tip, also where joints are programmed: tip(joints) is differentiated alike.
+    kinematics = all_kinematics()[name]
+    generator = np.random.default_rng(4)
+    tip = [Series(generator.normal(size=(6, 10))) for _ in kinematics.tip_names]
+    for axis in tip:
+        axis.coefficients[0] += 80.0
+    for axis, back in zip(tip, kinematics.tip(kinematics.joints(tip)), strict=True):
+        assert back.coefficients == pytest.approx(axis.coefficients, abs=1e-9)
 
 
 @pytest.mark.parametrize("name", all_kinematics())
