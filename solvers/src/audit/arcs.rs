@@ -221,8 +221,8 @@ const RULES_AGREE: f64 = 3e-6;
 /// A boundary layer that takes less than this share of an interval's time is left out.
 const THIN: f64 = 1e-12;
 
-/// Halvings of an interval before its integral is taken as it is.
-const MOST_HALVINGS: u32 = 40;
+/// Halvings of an interval before it counts as one that cannot be integrated; right arcs need some forty.
+const MOST_HALVINGS: u32 = 400;
 
 impl<const M: usize> Motion<M> {
     /// Distance from the anchor, with its sign, at `y`.
@@ -329,45 +329,58 @@ impl<const M: usize> Motion<M> {
         (fine * scale, smooth && (fine - coarse).abs() <= RULES_AGREE * fine)
     }
 
-    /// Walks from `from` to `to` and calls `step` for every interval whose time is known well enough.
+    /// Walks from `from` to `to` and calls `step` for every interval whose time is known well enough; for what
+    /// cannot be integrated the time is NaN.
     #[inline]
     pub fn walk(&self, from: &State<M>, to: &State<M>, step: &mut impl FnMut(&State<M>, &State<M>, f64)) {
-        self.walk_halving(from, to, MOST_HALVINGS, step);
+        self.walk_halving(from, to, &mut { MOST_HALVINGS }, step);
     }
 
     fn walk_halving(
         &self,
         from: &State<M>,
         to: &State<M>,
-        halvings: u32,
+        halvings: &mut u32,
         step: &mut impl FnMut(&State<M>, &State<M>, f64),
     ) {
-        let (time, trusted) = self.rule(from.y, to.y);
-        let middle = 0.5 * (from.y + to.y);
-        if trusted || halvings == 0 || time.is_nan() || middle <= from.y || middle >= to.y {
-            step(from, to, time);
-        } else {
-            let middle = self.state(middle);
-            self.walk_halving(from, &middle, halvings - 1, step);
-            self.walk_halving(&middle, to, halvings - 1, step);
+        match self.integrate(from.y, to.y, halvings) {
+            Ok(time) => step(from, to, time),
+            Err(middle) => {
+                let middle = self.state(middle);
+                self.walk_halving(from, &middle, halvings, step);
+                self.walk_halving(&middle, to, halvings, step);
+            }
         }
     }
 
-    /// Time from the anchor to `y`, in s.
+    /// Time from the anchor to `y`, in s; NaN where it cannot be integrated.
     pub fn time_from_anchor(&self, y: f64) -> f64 {
         if y <= 0.0 {
             return 0.0;
         }
-        self.time_between(0.0, y, MOST_HALVINGS)
+        self.time_between(0.0, y, &mut { MOST_HALVINGS })
     }
 
-    fn time_between(&self, y0: f64, y1: f64, halvings: u32) -> f64 {
+    fn time_between(&self, y0: f64, y1: f64, halvings: &mut u32) -> f64 {
+        match self.integrate(y0, y1, halvings) {
+            Ok(time) => time,
+            Err(middle) => self.time_between(y0, middle, halvings) + self.time_between(middle, y1, halvings),
+        }
+    }
+
+    /// The time between two places, or the place between them at which the interval has to be halved.
+    #[inline]
+    fn integrate(&self, y0: f64, y1: f64, halvings: &mut u32) -> Result<f64, f64> {
         let (time, trusted) = self.rule(y0, y1);
         let middle = 0.5 * (y0 + y1);
-        if trusted || halvings == 0 || time.is_nan() || middle <= y0 || middle >= y1 {
-            return time;
+        if trusted || middle <= y0 || middle >= y1 {
+            return Ok(time);
         }
-        self.time_between(y0, middle, halvings - 1) + self.time_between(middle, y1, halvings - 1)
+        if *halvings == 0 || !time.is_finite() {
+            return Ok(f64::NAN);
+        }
+        *halvings -= 1;
+        Err(middle)
     }
 
     /// Axis accelerations near `y` as a difference quotient over a thousandth of the arc, or less where p changes
@@ -378,7 +391,7 @@ impl<const M: usize> Motion<M> {
         // Around y, so that the mean is that at y to second order; at an end one-sided and very short.
         let half = f64::min(5e-4, 0.01 * away / self.width).min(y.min(1.0 - y).max(1e-6));
         let (from, to) = (self.state((y - half).max(0.0)), self.state((y + half).min(1.0)));
-        let time = self.direction * self.time_between(from.y, to.y, MOST_HALVINGS);
+        let time = self.direction * self.time_between(from.y, to.y, &mut { MOST_HALVINGS });
         (
             std::array::from_fn(|k| (to.velocity[k] - from.velocity[k]) / time),
             std::array::from_fn(|k| ROUNDINGS * EPS * (from.magnitude[k] + to.magnitude[k]) / time.abs()),

@@ -232,9 +232,13 @@ impl Plan<'_> {
     }
 
     fn find_spot<const M: usize>(&self, limits: &Limits<M>, previous: Option<&Row<M>>, row: &mut Row<M>) {
-        let by_time = self.profile.map(|profile| profile.place_before(&self.path, row.t - limits.period));
-        let known = previous.filter(|row| row.spot.is_good() || by_time.is_none()).map(|row| row.spot.place);
-        let from = known.or(by_time).unwrap_or(Place { piece: 0, u: 0.0 });
+        // From the place before; where that is not known or not to be trusted, from where the profile was then.
+        let known = previous.filter(|row| row.spot.is_good() || self.profile.is_none());
+        let from = match (known, &self.profile) {
+            (Some(row), _) => row.spot.place,
+            (None, Some(profile)) => profile.place_before(&self.path, row.t - limits.period),
+            (None, None) => Place { piece: 0, u: 0.0 },
+        };
         let curve = self.path.curve::<M>(from.piece);
         let passed = previous.map_or(limits.period, |before| (row.t - before.t).abs());
         let reach = 2.0 * passed * length(&limits.velocity);
@@ -349,9 +353,16 @@ impl Plan<'_> {
             last += 1;
             neighbour(last, false);
         }
-        let at_rest = time - starts[run.start] < switch
-            || starts[run.end - 1] + arcs.duration[run.end - 1] - time < switch;
-        if at_rest {
+        // At a stop the tool may stand, or already start the next run.
+        let at_start = time - starts[run.start] < switch;
+        let at_end = starts[run.end - 1] + arcs.duration[run.end - 1] - time < switch;
+        if at_start && run.start > 0 {
+            neighbour(run.start - 1, true);
+        }
+        if at_end && run.end < arcs.len() {
+            neighbour(run.end, false);
+        }
+        if at_start || at_end {
             include(([0.0; M], [0.0; M]));
         }
         range

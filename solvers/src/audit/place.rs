@@ -1,7 +1,6 @@
 //! Finds the place of a point on the path: the nearest place of a piece, and the next place along the path.
 
 use super::curve::{distance, Curve, Followed};
-use super::EPS;
 
 /// A place on the path.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -10,6 +9,9 @@ pub struct Place {
     /// Local parameter in mm.
     pub u: f64,
 }
+
+/// A Newton step of this share of the piece is the last one.
+const CLOSE: f64 = 1e-9;
 
 /// (C(u) − q)·C'(u) and its derivative, up to a factor, with t = u / width: where it turns from negative to
 /// positive the distance has a local minimum.
@@ -32,11 +34,18 @@ fn root<const M: usize>(curve: &Curve<M>, q: &[f64; M], mut a: f64, mut b: f64) 
     let (mut f, mut df) = slope(curve, q, t);
     for _ in 0..100 {
         let newton = t - f / df;
-        let next = if newton > a && newton < b { newton } else { 0.5 * (a + b) };
-        if (next - t).abs() <= EPS * b {
-            break;
+        if newton > a && newton < b {
+            // Its error is about the square of the step.
+            if (newton - t).abs() <= CLOSE {
+                return newton;
+            }
+            t = newton;
+        } else {
+            t = 0.5 * (a + b);
+            if t <= a || t >= b {
+                break;
+            }
         }
-        t = next;
         (f, df) = slope(curve, q, t);
         if f < 0.0 {
             a = t;
