@@ -11,6 +11,7 @@ from pathlib import Path
 
 from rich import box
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 Cell = float | int | str
@@ -33,7 +34,7 @@ def show(result: Result, console: Console) -> None:
     )
     for column in result.rows[0]:
         words = isinstance(result.rows[0][column], str)
-        table.add_column(column, justify="left" if words else "right", no_wrap=True)
+        table.add_column(escape(column), justify="left" if words else "right", no_wrap=True)
     for row in result.rows:
         table.add_row(*(_written(cell) for cell in row.values()))
     console.print(table)

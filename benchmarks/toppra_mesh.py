@@ -121,15 +121,22 @@ def solve(problem: Problem, cells: int) -> Solution:
 
 
 def solve_to(problem: Problem, exact: float, accuracy: float) -> tuple[Solution, float]:
-    """The coarsest mesh found whose time is within `accuracy` (relative) of `exact`, and its error.
+    """The coarsest mesh, to a tenth, whose time is within `accuracy` (relative) of `exact`, and its error.
 
-    The error falls about as 1/cells, so each try is sized by the one before: toppra is given no finer mesh
-    than it needs.
+    The error falls about as 1/cells: each try is sized by the one before, until one is accurate enough; then
+    the mesh is coarsened again between the last that was not and the first that was.
     """
-    cells = 8
-    while True:
+    too_coarse, cells = 0, 8
+    solution = solve(problem, cells)
+    while (error := abs(solution.time / exact - 1.0)) > accuracy:
+        too_coarse, cells = cells, max(cells + 1, math.ceil(1.03 * cells * error / accuracy))
         solution = solve(problem, cells)
-        error = abs(solution.time / exact - 1.0)
-        if error <= accuracy:
-            return solution, error
-        cells = max(cells + 1, math.ceil(1.03 * cells * error / accuracy))
+    while solution.cells > 1.1 * too_coarse + 1:
+        cells = math.isqrt(max(too_coarse, 1) * solution.cells)
+        candidate = solve(problem, cells)
+        candidate_error = abs(candidate.time / exact - 1.0)
+        if candidate_error > accuracy:
+            too_coarse = cells
+        else:
+            solution, error = candidate, candidate_error
+    return solution, error

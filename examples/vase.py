@@ -91,7 +91,7 @@ def program(
     *,
     step_over: float = 0.1,
     feed: float = 6000.0,
-    tolerance: float = 0.01,
+    tolerance: float = 0.02,
     decimals: int = 4,
 ) -> str:
     """The part program with about `blocks` blocks: whole passes of 486 points each.
@@ -146,7 +146,7 @@ def main() -> None:
     parser.add_argument("--blocks", type=int, default=2000, help="about how many blocks (default 2000)")
     parser.add_argument("--step-over", type=float, default=0.1, help="between passes [mm] (default 0.1)")
     parser.add_argument("--feed", type=float, default=6000.0, help="[mm/min] (default 6000)")
-    parser.add_argument("--tolerance", type=float, default=0.01, help="G64 P [mm] (default 0.01)")
+    parser.add_argument("--tolerance", type=float, default=0.02, help="G64 P [mm] (default 0.02)")
     parser.add_argument("--decimals", type=int, default=4, help="of the coordinates (default 4)")
     parser.add_argument("--output", type=Path, default=Path("out/vase.ngc"))
     arguments = parser.parse_args()

@@ -10,8 +10,6 @@ from feedplan.constraints.problem import Problem
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 
-_Findings = tuple[list[tuple[str, int, float, float, float, float, int]], int]
-
 __all__ = [
     "PathLength",
     "PlanError",

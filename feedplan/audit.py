@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from feedplan import _solvers
+from feedplan._solvers import SetpointAudit, audit_plan
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InputError
 from feedplan.machine.machine import Axis, Machine
@@ -204,12 +204,12 @@ def audit(
     )
     try:
         problem, profile, program = _native(problem, profile, program)
-        results = [_solvers.audit_plan(problem, limits, profile, program)]
+        results = [audit_plan(problem, limits, profile, program)]
         if setpoints is not None:
             if isinstance(setpoints, Setpoints):
                 limits = replace(limits, period=setpoints.period)
                 setpoints = setpoints.chunks(CHUNK)
-            stream = _solvers.SetpointAudit(limits, 0.0, problem, profile, program)
+            stream = SetpointAudit(limits, 0.0, problem, profile, program)
             for chunk in setpoints:
                 stream.push(
                     _array(chunk.t, np.float64),
@@ -275,7 +275,7 @@ def audit_setpoints(
         period=_period(times, machine.period),
         end_speeds=(0.0, 0.0),
     )
-    stream = _solvers.SetpointAudit(limits, float(resolution))
+    stream = SetpointAudit(limits, float(resolution))
     for start in range(0, len(times), CHUNK):
         part = slice(start, start + CHUNK)
         stream.push(

@@ -9,7 +9,6 @@ from __future__ import annotations
 import io
 import math
 import os
-import pkgutil
 import sys
 from collections.abc import Sequence
 from pathlib import Path as FilePath
@@ -95,12 +94,6 @@ class _Number(NumberType):
         self.fail(f"{value}: give a number {'≥ 0' if self._or_zero else '> 0'}", param, ctx)
 
 
-def methods() -> tuple[str, ...]:
-    """The planning methods that there are: one file each."""
-    files = (m.name for m in pkgutil.iter_modules(planners.__path__) if not m.name.startswith("_"))
-    return tuple(sorted(name.replace("_", "-") for name in files))
-
-
 _MACHINE_HELP = "A bundled machine or a TOML file."
 _MACHINE = click.option(
     "--machine", "-m", default="mill", show_default=True, metavar="NAME|FILE", help=_MACHINE_HELP
@@ -130,7 +123,7 @@ def cli(context: click.Context) -> int:
 @cli.command()
 @click.argument("program")
 @_MACHINE
-@click.option("--method", type=click.Choice(methods()), default="bang-bang", show_default=True)
+@click.option("--method", type=click.Choice(planners.methods()), default="bang-bang", show_default=True)
 @_TOLERANCE
 @click.option("--feed", type=_Number(), metavar="MM/S", help="Feed in place of the programmed one.")
 @click.option("--feed-override", type=_Number(), default=1.0, metavar="FACTOR", help="Factor on the feed.")
@@ -187,8 +180,11 @@ def plan(
             period=period,
             start_speed=start_speed,
             end_speed=end_speed,
+            interpolator=interpolator,
             progress=progress,
         )
+        if progress:
+            progress("audit", 0.0)
         audit = result.audit()
         files: tuple[FilePath, ...] = ()
         if output:
@@ -196,7 +192,6 @@ def plan(
                 result,
                 output,
                 formats or ("npz",),
-                interpolator=interpolator,
                 source=FilePath(program),
                 progress=progress,
             )
@@ -234,8 +229,8 @@ def fit(program: str, machine: str, tolerance: float | None, as_json: bool) -> N
     if as_json:
         sys.stdout.write(summary_text(summary))
     else:
-        pieces = ("pieces", f"{summary['pieces']} in {summary['runs']} runs")
-        console.print_rows([("program", program), *console.fit_rows(summary), pieces])
+        path_row = ("path", console.pieces_text(summary))
+        console.print_rows([("program", program), *console.fit_rows(summary), path_row])
 
 
 @cli.command()

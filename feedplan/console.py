@@ -14,6 +14,7 @@ from feedplan.units import duration_text, mm_per_min
 if TYPE_CHECKING:
     from feedplan.audit import Audit, LimitCheck
 
+_LIMITS = {"feed", "velocity", "acceleration", "jerk", "chord", "deviation", "travel"}
 Rows = Sequence[tuple[str, str]]
 
 
@@ -70,6 +71,9 @@ def progress_bar(quiet: bool) -> Iterator[Callable[[str, float], None] | None]:
 
         def show(stage: str, done: float) -> None:
             if stage not in tasks:
+                # A stage that begins ends those before it, whether or not they said so.
+                for earlier in tasks.values():
+                    bars.update(earlier, completed=1.0)
                 tasks[stage] = bars.add_task(stage, total=1.0)
             bars.update(tasks[stage], completed=done)
 
@@ -93,7 +97,7 @@ def plan_rows(summary: Mapping[str, Any], audit: Audit, files: Sequence[FilePath
         rows.append(("lower bound", f"{summary['lower_bound']:.6f} s, gap {gap:.3g} %"))
     mean = length / time if time > 0 else 0.0
     rows.append(("length", f"{length:.3f} mm, mean {mean:.4g} mm/s ({mm_per_min(mean):.5g} mm/min)"))
-    rows.append(("pieces", f"{summary['pieces']} in {summary['runs']} runs, {summary['stops']} stops"))
+    rows.append(("path", f"{pieces_text(summary)}, {counted(summary['stops'], 'stop')} on the way"))
     rows += fit_rows(summary.get("fit") or {})
     rows.append(("audit", audit_text(audit)))
     compute: Mapping[str, float] = summary.get("compute") or {}
@@ -102,6 +106,16 @@ def plan_rows(summary: Mapping[str, Any], audit: Audit, files: Sequence[FilePath
     if files:
         rows.append(("files", " ".join(str(file) for file in files)))
     return rows
+
+
+def pieces_text(summary: Mapping[str, Any]) -> str:
+    """`605 pieces in 29 runs`."""
+    return f"{counted(summary['pieces'], 'piece')} in {counted(summary['runs'], 'run')}"
+
+
+def counted(number: int, noun: str) -> str:
+    """`1 run`, `2 runs`."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def fit_rows(fit: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -120,17 +134,26 @@ def audit_text(audit: Audit) -> str:
     samples = f"{audit.checked_samples} samples"
     if not audit.ok:
         return f"FAILED, {len(audit.broken)} of {len(audit.checks)} limits broken, {samples}"
-    judged = [check for check in audit.checks if check.judged and math.isfinite(check.ratio)]
-    nearest = max(judged, key=lambda check: check.ratio, default=None)
+    nearest = nearest_limit(audit)
     use = f", nearest {check_name(nearest)} {100 * nearest.ratio:.2f} %" if nearest else ""
     return f"passed, {samples}{use}"
 
 
+def nearest_limit(audit: Audit) -> LimitCheck | None:
+    """The limit of the machine or the program that is used most; checks of consistency are none."""
+    used = (check for check in audit.checks if check.judged and check.name in _LIMITS)
+    return max(used, key=lambda check: check.ratio, default=None)
+
+
 def failure_sentence(audit: Audit) -> str:
     """What is broken, in one sentence."""
-    return f"the audit failed: {'; '.join(audit.failures) or 'nothing was checked'}"
+    shown = audit.failures[:_FAILURES_SHOWN]
+    more = len(audit.failures) - len(shown)
+    rest = f"; and {counted(more, 'limit')} more" if more else ""
+    return f"the audit failed: {'; '.join(shown) or 'nothing was checked'}{rest}"
 
 
+_FAILURES_SHOWN = 3
 AUDIT_HEADER = ("limit", "worst", "allowed", "use", "time s", "line", "verdict")
 
 
@@ -147,6 +170,7 @@ def audit_rows(audit: Audit) -> list[tuple[str, ...]]:
             "not judged" if not check.judged else "holds" if check.ok else "BROKEN",
         )
         for check in audit.checks
+        if not check.ok or math.isfinite(check.limit)
     ]
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from feedplan.outputs._staging import require_folder, staged
 
 if TYPE_CHECKING:
     from feedplan.plan import Plan
+    from feedplan.setpoints import SetpointChunk
 
 SUMMARY_FILE = "plan.json"
 _ROWS_AT_ONCE = 100_000
@@ -25,7 +27,6 @@ def write_plan(
     folder: str | FilePath,
     formats: Sequence[str] = ("npz",),
     *,
-    interpolator: str = "sarfraz",
     source: FilePath | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> tuple[FilePath, ...]:
@@ -42,8 +43,8 @@ def write_plan(
     folder = FilePath(folder)
     require_folder(folder)
     outputs = [format_named(name) for name in dict.fromkeys(formats)]
-    audit, summary = plan.audit(), plan.summary()
-    setpoints = plan.setpoints(interpolator=interpolator)
+    audit = plan.audit()
+    setpoints = plan.setpoints()
     figures = SetpointFigures(plan.problem, setpoints.count, [check.time for check in audit.broken])
     with staged(folder, last=SUMMARY_FILE) as stage:
         with ExitStack() as stack:
@@ -51,11 +52,12 @@ def write_plan(
                 stack.enter_context(output.writer(stage / output.FILE, plan.path.axes, setpoints.count))
                 for output in outputs
             ]
-            for chunk in setpoints.chunks(_ROWS_AT_ONCE):
+            for chunk in _timed(setpoints.chunks(_ROWS_AT_ONCE), plan.compute):
                 for sink in (*sinks, figures.add):
                     sink(chunk)
                 if progress:
                     progress("write", 0.95 * figures.count / max(setpoints.count, 1))
+        summary = plan.summary()
         write_report(
             stage / REPORT_FILE,
             summary=summary,
@@ -70,6 +72,18 @@ def write_plan(
     if progress:
         progress("write", 1.0)
     return tuple(folder / name for name in names)
+
+
+def _timed(chunks: Iterator[SetpointChunk], compute: dict[str, float]) -> Iterator[SetpointChunk]:
+    """The same chunks; the time that computing them took is added to `compute` as `sample` [s]."""
+    compute["sample"] = 0.0
+    while True:
+        start = time.perf_counter()
+        chunk = next(chunks, None)
+        compute["sample"] += time.perf_counter() - start
+        if chunk is None:
+            return
+        yield chunk
 
 
 def planned_machine(place: FilePath) -> str:

@@ -165,8 +165,17 @@ def plan(
         lower_bound=least,
         compute=compute,
         interpolator=interpolator,
-        warnings=program.warnings if program else (),
+        warnings=_warnings(program),
     )
+
+
+def _warnings(program: Program | None) -> tuple[str, ...]:
+    if program is None:
+        return ()
+    if program.start_dwell > 0:
+        pause = f"the pause of {program.start_dwell:g} s before the first move is not part of the plan"
+        return (*program.warnings, pause)
+    return program.warnings
 
 
 @contextmanager

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -29,13 +29,14 @@ class SquarePlan:
     profile: SpeedProfile
     chunk: SetpointChunk
     verdict: Audit
+    compute: dict[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
     @property
     def path(self) -> Path:
         return self.problem.path
 
-    def setpoints(self, period: float | None = None, interpolator: str = "sarfraz") -> Any:
+    def setpoints(self) -> Any:
         return _Stream(self.chunk)
 
     def audit(self) -> Audit:

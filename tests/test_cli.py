@@ -15,6 +15,7 @@ import pytest
 from feedplan.cli import main
 from feedplan.errors import InfeasibleError, MissingPackageError, ProgramError, SolverError
 from feedplan.machine.machine import bundled_machines
+from feedplan.outputs import formats
 
 
 @pytest.fixture
@@ -160,6 +161,97 @@ def test_bad_usage_is_one_sentence_and_exits_2(arguments: list[str], words: str,
     assert err.startswith("error: ")
     assert words in err
     assert err.count("\n") == 1
+
+
+SQUARE = "G21 G90\nG61\nF3000\nG1 X20\nG1 Y20\nG1 X0\nG1 Y0\nM2\n"
+
+
+@pytest.fixture
+def program(tmp_path: Path) -> Path:
+    file = tmp_path / "square.ngc"
+    file.write_text(SQUARE)
+    return file
+
+
+def test_a_program_is_planned_and_its_folder_checked(program: Path, tmp_path: Path, capsys: Any) -> None:
+    out = tmp_path / "out"
+    assert main(["plan", str(program), "-m", "router", "-o", str(out), "--json"]) == 0
+    printed, warned = capsys.readouterr()
+    summary = json.loads(printed)
+    # Four sides of 20 mm at 50 mm/s and 500 mm/s², with a stop at every corner.
+    assert summary["time"] == pytest.approx(2.0, abs=1e-9)
+    assert summary["length"] == pytest.approx(80.0)
+    assert summary["audit"]["ok"]
+    assert summary["compute"]["sample"] > 0
+    assert json.loads((out / "plan.json").read_text()) == summary
+    assert warned == ""
+
+    assert main(["check", str(out)]) == 0
+    assert "X acceleration" in capsys.readouterr().out
+    assert main(["check", str(out), "--machine", "mill", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["ok"] is True
+    assert main(["check", str(out / "setpoints.npz"), "--machine", "tarus"]) == 1
+    out_text, err = capsys.readouterr()
+    assert "BROKEN" in out_text
+    assert err.startswith("error: the audit failed: ")
+
+
+def test_every_format_passes_the_check(program: Path, tmp_path: Path) -> None:
+    for name in formats():
+        folder = tmp_path / name
+        assert main(["plan", str(program), "-m", "router", "-o", str(folder), "--format", name, "-q"]) == 0
+        assert main(["check", str(folder / f"setpoints.{name}")]) == 0
+
+
+def test_a_check_without_a_machine_asks_for_one(program: Path, tmp_path: Path, capsys: Any) -> None:
+    main(["plan", str(program), "-o", str(tmp_path / "out"), "-q"])
+    (tmp_path / "out" / "plan.json").unlink()
+    assert main(["check", str(tmp_path / "out")]) == 2
+    assert capsys.readouterr().err.endswith("names no machine: give the machine with --machine\n")
+
+
+def test_fit_tells_what_became_of_the_points(program: Path, capsys: Any) -> None:
+    assert main(["fit", str(program)]) == 0
+    assert "4 pieces in 4 runs" in capsys.readouterr().out
+    assert main(["fit", str(program), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["pieces"] == 4
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"\x00\x01\xff\xfe",
+        b"G1 X",
+        b"G1 Xnan\n",
+        b"M2\n",
+        b"(only a comment)\n",
+        b"G1 X1e400 F100\n",
+        None,
+    ],
+)
+@pytest.mark.parametrize("command", ["plan", "fit"])
+def test_a_program_that_is_none_is_one_sentence_and_writes_nothing(
+    command: str, content: bytes | None, tmp_path: Path, capsys: Any
+) -> None:
+    file = tmp_path / "a.ngc"
+    if content is not None:
+        file.write_bytes(content)
+    out = tmp_path / "out"
+    assert main([command, str(file), *(["-o", str(out)] if command == "plan" else [])]) == 2
+    printed, err = capsys.readouterr()
+    assert printed == ""
+    assert err.startswith("error: ")
+    assert "a.ngc" in err
+    assert err.count("\n") == 1
+    assert not out.exists()
+
+
+def test_an_end_speed_out_of_reach_exits_1(program: Path, tmp_path: Path, capsys: Any) -> None:
+    arguments = ["plan", str(program), "-m", "router", "--end-speed", "999", "-o", str(tmp_path / "out")]
+    assert main(arguments) == 1
+    assert "999" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 def test_no_command_shows_the_help_and_exits_2(capsys: Any) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from feedplan import _solvers
+from feedplan._solvers import fit_points as native_fit_points
 from feedplan.errors import InputError
 
 CORNER_ANGLE = math.radians(30.0)
@@ -80,4 +80,4 @@ def fit_points(
         )
     if math.isnan(tolerance):
         raise InputError("the fitting tolerance is not a number: give it in mm")
-    return FittedCurve(*_solvers.fit_points(array, tolerance, max_chord, max_curvature, corner_angle))
+    return FittedCurve(*native_fit_points(array, tolerance, max_chord, max_curvature, corner_angle))

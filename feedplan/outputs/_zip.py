@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 
 _ESCAPE = 0xFFFFFFFF  # in a 32-bit field: the number is in the 64-bit fields
 _WIDE_FROM = _ESCAPE  # the least number that needs them
+_HEAD_ROOM = 1024  # more than a .npy head takes
+_ALIGNMENT = 64
 _DATE_1980 = (0, 0x21)  # midnight of 1 January 1980: the same setpoints make the same file
 _VERSION_64 = 45
 _VERSION = 20
@@ -31,12 +33,9 @@ class _Member:
     size: int
     place: int
     data: int
+    is_large: bool
     written: int = 0
     checksum: int = 0
-
-    @property
-    def is_large(self) -> bool:
-        return self.size >= _WIDE_FROM
 
 
 class NpyArchive:
@@ -47,14 +46,15 @@ class NpyArchive:
         self._members: dict[str, _Member] = {}
         place = 0
         for name, (shape, dtype) in arrays.items():
-            head = _npy_head(shape, dtype)
             member_name = f"{name}.npy".encode()
-            size = len(head) + int(np.prod(shape, dtype=np.int64)) * dtype.itemsize
-            member = _Member(member_name, dtype, size, place, place + 30 + len(member_name))
-            member.data += 20 if member.is_large else 0
+            body = int(np.prod(shape, dtype=np.int64)) * dtype.itemsize
+            is_large = body + _HEAD_ROOM >= _WIDE_FROM
+            data = place + 30 + len(member_name) + (20 if is_large else 0)
+            head = _npy_head(shape, dtype, data)
+            member = _Member(member_name, dtype, len(head) + body, place, data, is_large)
             self._members[name] = member
             self._write(member, head)
-            place = member.data + size
+            place = member.data + member.size
         self._end = place
 
     def append(self, name: str, rows: NDArray[Any]) -> None:
@@ -85,11 +85,14 @@ class NpyArchive:
         member.checksum = zlib.crc32(data, member.checksum)
 
 
-def _npy_head(shape: tuple[int, ...], dtype: np.dtype[Any]) -> bytes:
+def _npy_head(shape: tuple[int, ...], dtype: np.dtype[Any], place: int) -> bytes:
+    """The head of a .npy file at this place of the archive, padded so that its rows can be mapped."""
     buffer = io.BytesIO()
     header = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
     np.lib.format.write_array_header_1_0(buffer, header)
-    return buffer.getvalue()
+    head = buffer.getvalue()
+    text = head[10:-1] + b" " * (-(place + len(head)) % _ALIGNMENT) + b"\n"
+    return head[:8] + struct.pack("<H", len(text)) + text
 
 
 def _common(member: _Member) -> bytes:

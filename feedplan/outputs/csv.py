@@ -13,7 +13,7 @@ from pathlib import Path as FilePath
 import numpy as np
 from numpy.typing import NDArray
 
-from feedplan import _solvers
+from feedplan._solvers import csv_rows
 from feedplan.errors import InputError
 from feedplan.outputs import QUANTITIES, Add
 from feedplan.outputs._arrays import chunk_of
@@ -38,7 +38,7 @@ def writer(file: FilePath, axes: Sequence[str], count: int) -> Iterator[Add]:
         def add(chunk: SetpointChunk) -> None:
             values = np.column_stack([chunk.t, *(getattr(chunk, name) for name in QUANTITIES)])
             line = np.ascontiguousarray(chunk.line, dtype=np.int32)
-            stream.write(_solvers.csv_rows(np.ascontiguousarray(values, dtype=np.float64), line))
+            stream.write(csv_rows(np.ascontiguousarray(values, dtype=np.float64), line))
 
         yield add
 

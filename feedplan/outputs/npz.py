@@ -76,6 +76,7 @@ def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo, file: FilePath) -> 
         stored.seek(info.header_offset + 26)
         lengths = np.frombuffer(stored.read(4), dtype="<u2")
     start = info.header_offset + 30 + int(lengths.sum()) + head
-    if int(np.prod(shape)) == 0:
-        return np.empty(shape, dtype)
+    count = int(np.prod(shape))
+    if count == 0 or start % dtype.itemsize:  # what other writers left unaligned cannot be mapped
+        return np.fromfile(file, dtype, count, offset=start).reshape(shape)
     return np.memmap(file, dtype=dtype, mode="r", offset=start, shape=shape)

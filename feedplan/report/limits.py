@@ -69,6 +69,17 @@ def arc_lengths(path: Path, profile: SpeedProfile) -> Floats:
     return np.concatenate(parts) if parts else np.empty(0)
 
 
+def least_times(problem: Problem, profile: SpeedProfile) -> Floats:
+    """The time of each arc if only its feed and the axis velocities held [s], shape (arcs,)."""
+    path = problem.path
+    piece = profile.piece.astype(np.int64)
+    first, second = _tangents(path, piece)
+    u0, u1 = profile.u0[:, None], profile.u1[:, None]
+    step = np.abs((u1 - u0) * (first + 0.5 * (u0 + u1) * second))
+    at_velocity = (step / problem.max_velocity).max(axis=1, initial=0.0)
+    return np.asarray(np.maximum(arc_lengths(path, profile) / problem.feed[piece], at_velocity))
+
+
 def _lengths(path: Path, profile: SpeedProfile, arcs: NDArray[np.int64]) -> Floats:
     u0, u1 = profile.u0[arcs], profile.u1[arcs]
     return _integral(path, profile.piece[arcs].astype(np.int64), u0, u1)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
 from feedplan.profile import ArcKind, SpeedProfile
-from feedplan.report.limits import arc_lengths
+from feedplan.report.limits import arc_lengths, least_times
 
 
 @dataclass(frozen=True)
@@ -23,20 +23,22 @@ class Share:
 
 @dataclass(frozen=True)
 class SlowLine:
-    """A source line that takes longer than its feed asks for.
+    """A source line that takes longer than its feed and the axis velocities ask for.
 
-    `time` spent and `lost` against the feed [s], mean `speed` and `feed` [mm/s], the `limit` that costs most
-    and its part of the loss; `stops` where the tool stands still at an end of the line.
+    `time` spent and `lost` [s], mean `speed` and the mean speed `wanted` [mm/s], the `limit` that costs most
+    and its part of the loss; `stops` where the tool stands still at an end of the line, `rapid` where no feed
+    is programmed.
     """
 
     line: int
     time: float
     lost: float
     speed: float
-    feed: float
+    wanted: float
     limit: str
     part: float
     stops: bool
+    rapid: bool
 
 
 def limit_names(problem: Problem, profile: SpeedProfile) -> tuple[NDArray[np.int64], list[str]]:
@@ -70,16 +72,16 @@ def time_per_limit(problem: Problem, profile: SpeedProfile) -> list[Share]:
 
 
 def slowest_lines(problem: Problem, profile: SpeedProfile, count: int = 20) -> list[SlowLine]:
-    """The source lines that lose most time against their feed, the worst first."""
+    """The source lines that lose most time, the worst first."""
     if len(profile) == 0:
         return []
     path = problem.path
     piece = profile.piece.astype(np.int64)
     lines, row = np.unique(path.line[piece], return_inverse=True)
     length = arc_lengths(path, profile)
-    at_feed = length / problem.feed[piece]
+    least = least_times(problem, profile)
     time = np.bincount(row, weights=profile.duration)
-    wanted = np.bincount(row, weights=at_feed)
+    wanted = np.bincount(row, weights=least)
     distance = np.bincount(row, weights=length)
     lost = time - wanted
     worst = np.argsort(-lost, kind="stable")[:count]
@@ -92,7 +94,7 @@ def slowest_lines(problem: Problem, profile: SpeedProfile, count: int = 20) -> l
     result = []
     for index in worst:
         arcs = np.flatnonzero(row == index)
-        costs = np.bincount(number[arcs], weights=profile.duration[arcs] - at_feed[arcs])
+        costs = np.bincount(number[arcs], weights=profile.duration[arcs] - least[arcs])
         active = int(costs.argmax())
         result.append(
             SlowLine(
@@ -100,10 +102,11 @@ def slowest_lines(problem: Problem, profile: SpeedProfile, count: int = 20) -> l
                 time=float(time[index]),
                 lost=float(lost[index]),
                 speed=float(distance[index] / time[index]),
-                feed=float(distance[index] / wanted[index]),
+                wanted=float(distance[index] / wanted[index]),
                 limit=names[active],
                 part=min(1.0, float(costs[active] / lost[index])),
                 stops=bool(ends[index]),
+                rapid=bool(np.isinf(path.feed[piece[arcs]]).all()),
             )
         )
     return result

@@ -107,7 +107,7 @@
     const bare = { line: { width: 0 }, showlegend: false, fill: "none" };
     return [
       line(x, low, { ...bare, hovertemplate: `%{y:.4~g} ${unit} least` }),
-      line(x, high, { ...bare, fill: "tonexty", fillcolor: wash(colour, 0.22), hovertemplate: `%{y:.4~g} ${unit} greatest` }),
+      line(x, high, { ...bare, fill: "tonexty", fillcolor: wash(colour, 0.18), hovertemplate: `%{y:.4~g} ${unit} greatest` }),
       line(mean.x, mean.y, { name: more.legendgroup ? more.name : `${more.name}, mean and range`, line: { color: style(colour), width: 1.4 }, fill: "none", hovertemplate: `%{y:.4~g} ${unit} mean` }),
     ];
   }
@@ -118,9 +118,14 @@
     return `rgba(${r},${g},${b},${alpha})`;
   }
 
+  /* Rapids much faster than cutting would flatten the rest: they run out of the charts of speed. */
+  const { top_speed: topSpeed, cutting_speed: cuttingSpeed } = data.length;
+  const hidesRapids = topSpeed > 1.5 * cuttingSpeed;
+  const shownSpeed = (hidesRapids ? cuttingSpeed : topSpeed) || 1;
+
   /* Tool path ------------------------------------------------------------------------------------ */
   const path = data.path;
-  const topColour = data.length.cutting_speed || 1;
+  const topColour = cuttingSpeed || 1;
   const size = (name) => path[name].reduce(([a, b], v) => [Math.min(a, v), Math.max(b, v)], [Infinity, -Infinity]).reduce((a, b) => b - a);
   const EYE = { x: -1.1, y: -1.5, z: 1.1 };
   /* What goes right and what goes up, from x, y, z; `xyz` is the same view as the first one in 3D. */
@@ -167,7 +172,7 @@
     const sizes = ["x", "y", "z"].map(size);
     const { clientWidth, clientHeight } = element("path");
     const room = Math.min(1, clientWidth / (1.7 * clientHeight));
-    const scale = room * Math.min(2.7 / (Math.hypot(...sizes) || 1), 2.2 / (sizes[2] || 1e-9));
+    const scale = room * Math.min(2.5 / (Math.hypot(...sizes) || 1), 2.2 / (sizes[2] || 1e-9));
     return { x: Math.max(sizes[0] * scale, 1e-3), y: Math.max(sizes[1] * scale, 1e-3), z: Math.max(sizes[2] * scale, 1e-3) };
   }
 
@@ -258,7 +263,7 @@
   function drawLength(from = -Infinity, to = Infinity) {
     const traces = [];
     const pixels = element("length").clientWidth;
-    const top = 1.25 * (data.length.top_speed || 1);
+    const top = 1.25 * shownSpeed;
     for (const [name, [label, colour, dash]] of Object.entries(LIMITS)) {
       if (!data.length[name]) continue;
       const more = { name: label, line: { dash } };
@@ -279,6 +284,12 @@
   /* Axes over time ------------------------------------------------------------------------------- */
   const ROWS = [["speed", "mm/s"], ["velocity", "mm/s"], ["acceleration", "mm/s²"], ["jerk", "mm/s³"]];
   const tops = Object.fromEntries(ROWS.slice(1).map(([name]) => [name, data.time[name].map((c) => greatest(c.y))]));
+  /* What is no limit may have lone spikes; they run out of the chart rather than flatten it. */
+  const usual = Object.fromEntries(ROWS.slice(1).map(([name]) => [name, data.time[name].map((c, k) => {
+    const sorted = Float32Array.from(c.y, Math.abs).sort();
+    const common = 2 * (sorted[Math.floor(0.98 * sorted.length)] || 0);
+    return common > 0 ? Math.min(tops[name][k], common) : tops[name][k];
+  })]));
   let relative = false;
   function drawTime(from = -Infinity, to = Infinity) {
     const traces = [];
@@ -296,7 +307,7 @@
       if (name === "speed") {
         const more = { name: "speed", yaxis: id, showlegend: false, fill: "tozeroy", fillcolor: wash("--accent", 0.12) };
         traces.push(...curveTraces(data.time.speed, from, to, { colour: "--accent", width: 1.6, pixels, more, unit }));
-        range = [0, 1.1 * (greatest(data.time.speed.y) || 1)];
+        range = [0, (hidesRapids ? 1.25 : 1.1) * shownSpeed];
       } else {
         const limits = data.limits[name];
         const percent = relative && limits.every((limit) => limit);
@@ -306,7 +317,7 @@
           const more = { name: data.axes[k], legendgroup: data.axes[k], yaxis: id, showlegend: name === "velocity" };
           const colour = `--axis-${k % 6}`;
           traces.push(...curveTraces(curve, from, to, { colour, scale: scale[k], pixels, more, unit: percent ? "%" : unit }));
-          top = Math.max(top, tops[name][k] * scale[k]);
+          top = Math.max(top, (data.judged.includes(name) ? tops : usual)[name][k] * scale[k]);
         });
         /* A limit far outside would squeeze the curves: it is named beside the chart and drawn only when near. */
         const lines = [...new Set(limits.map((limit, k) => limit && limit * scale[k]))].filter((v) => v && v <= 2 * top);
@@ -323,7 +334,8 @@
       const limits = data.limits[name];
       const known = limits ? limits.map((limit, k) => (limit ? `${data.axes[k]} ${Number(limit.toPrecision(6))}` : null)).filter(Boolean) : [];
       const shownUnit = relative && limits && limits.every(Boolean) ? "% of limit" : unit;
-      const note = !known.length || isNarrow ? "" : data.judged.includes(name) ? `limits ${known.join(", ")} ${unit}` : `not limited by this method (machine: ${known.join(", ")} ${unit})`;
+      const rapids = name === "speed" && hidesRapids && !isNarrow ? `rapids up to ${Number(topSpeed.toPrecision(4))} mm/s run out of the chart` : "";
+      const note = rapids ? rapids : !known.length || isNarrow ? "" : data.judged.includes(name) ? `limits ${known.join(", ")} ${unit}` : `not limited by this method (machine: ${known.join(", ")} ${unit})`;
       annotations.push({
         xref: "paper", yref: "paper", x: 0, y: bottom + height, xanchor: "left", yanchor: "bottom", showarrow: false,
         text: `<b>${name}</b> [${shownUnit}]&nbsp; ${note}`, font: { size: 13, color: style("--soft") },

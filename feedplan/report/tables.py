@@ -11,6 +11,11 @@ from feedplan.audit import Audit, LimitCheck
 from feedplan.report.losses import Share, SlowLine
 from feedplan.units import duration_text, mm_per_min
 
+# Limits of the machine and the program; every other check is one of consistency.
+_LIMITS = {"feed", "velocity", "acceleration", "jerk", "chord", "deviation", "travel", "jump"}
+
+_NO_JUMP = 1e-3  # [mm/s]
+
 # What a check is called where its own name says too little.
 _NAMES = {
     "chord": "chord error",
@@ -33,9 +38,9 @@ def verdict(audit: Audit) -> str:
     """The audit's verdict in one line, with what is broken."""
     samples = f"{audit.checked_samples:,}".replace(",", " ")
     if audit.ok:
-        judged = [check for check in audit.checks if check.judged and math.isfinite(check.ratio)]
-        nearest = max(judged, key=lambda check: check.ratio, default=None)
-        tight = f" Nearest to its limit: {_name(nearest)}, {_percent(nearest.ratio)}." if nearest else ""
+        used = [check for check in audit.checks if check.judged and _is_limit(check)]
+        nearest = max(used, key=lambda check: check.ratio, default=None)
+        tight = f" Nearest to its limit: {_name(nearest)}, {100 * nearest.ratio:.2f} %." if nearest else ""
         text = f"<p>Every limit holds at {samples} checked samples.{tight}</p>"
         return f'<div class="verdict passed"><span class="mark">Audit passed</span>{text}</div>'
     broken = "".join(f"<li>{escape(sentence)}</li>" for sentence in audit.failures)
@@ -57,7 +62,7 @@ def numbers(summary: Mapping[str, Any], setpoints: int) -> str:
         ("Time", *_value_unit(duration_text(time)), f"{time:.6g} s" if time >= 60 else ""),
         ("Length", *_length(length), f"{summary['pieces']} pieces"),
         ("Mean speed", f"{mean:.4g}", "mm/s", f"{mm_per_min(mean):.5g} mm/min"),
-        ("Stops", str(summary["stops"]), "", f"{summary['runs']} runs"),
+        ("Stops on the way", str(summary["stops"]), "", _counted(summary["runs"], "run")),
         ("Setpoints", f"{setpoints:,}".replace(",", " "), "", ""),
     ]
     if bound is not None:
@@ -106,7 +111,7 @@ def fit_table(summary: Mapping[str, Any]) -> str:
         rows.append(("Fit", "nothing to fit"))
     if fit.get("deviation") is not None:
         rows.append(("Deviation from the program", f"{_short(fit['deviation'] * 1e3)} µm"))
-    rows.append(("Pieces planned", f"{summary['pieces']} in {summary['runs']} runs"))
+    rows.append(("Pieces planned", f"{summary['pieces']} in {_counted(summary['runs'], 'run')}"))
     compute = summary.get("compute") or {}
     rows += [(f"Time to {name}", duration_text(float(seconds))) for name, seconds in compute.items()]
     body = "".join(f'<tr><td>{escape(name)}</td><td class="n">{value}</td></tr>' for name, value in rows)
@@ -116,12 +121,12 @@ def fit_table(summary: Mapping[str, Any]) -> str:
 def slowest_table(rows: Sequence[SlowLine], texts: Mapping[int, str]) -> str:
     """The lines that lose most time, with their text where it is known."""
     if not rows:
-        return "<table><tr><td>No line is slower than its feed.</td></tr></table>"
+        return "<table><tr><td>No line is slower than its feed and its axes allow.</td></tr></table>"
     head = '<th class="n">Line</th>' + ("<th>Source</th>" if texts else "")
     body = "".join(_slow_row(row, texts) for row in rows)
     return (
         f'<table><tr>{head}<th class="n">Lost</th><th class="n">Time</th><th class="n">Mean speed [mm/s]</th>'
-        f'<th class="n">Feed [mm/s]</th><th>Because of</th></tr>{body}</table>'
+        f'<th class="n">Wanted [mm/s]</th><th>Because of</th></tr>{body}</table>'
     )
 
 
@@ -131,30 +136,45 @@ def _slow_row(row: SlowLine, texts: Mapping[int, str]) -> str:
         f'<td class="n">{row.line}</td>',
         f'<td class="code"><code>{text}</code></td>' if texts else "",
         f'<td class="n">{duration_text(row.lost)}</td><td class="n">{duration_text(row.time)}</td>',
-        f'<td class="n">{row.speed:.4g}</td><td class="n">{row.feed:.4g}</td>',
+        f'<td class="n">{row.speed:.4g}</td><td class="n">{row.wanted:.4g}</td>',
         f"<td>{escape(row.limit)} <span class='tag'>{100 * row.part:.0f} %</span>",
-        "<span class='tag'>stop</span></td>" if row.stops else "</td>",
+        "<span class='tag'>stop</span>" if row.stops else "",
+        "<span class='tag'>rapid</span></td>" if row.rapid else "</td>",
     ]
     return f"<tr>{''.join(cells)}</tr>"
 
 
 def audit_table(audit: Audit) -> str:
-    """Every check: the worst value, the limit, their ratio, when and on which line."""
-    body = "".join(_audit_row(check) for check in audit.checks)
-    head = "".join(
-        f'<th class="{kind}">{text}</th>'
-        for kind, text in (
-            ("", "Limit"),
-            ("n", "Worst"),
-            ("n", "Allowed"),
-            ("", "Use"),
-            ("n", ""),
-            ("n", "At time [s]"),
-            ("n", "Line"),
-            ("", ""),
-        )
+    """Every check: the worst value, the limit, their ratio, when and on which line.
+
+    Limits come first; the checks of consistency fold away unless one of them fails.
+    """
+    known = [check for check in audit.checks if not check.ok or math.isfinite(check.limit)]
+    limits = [check for check in known if _is_limit(check)]
+    others = [check for check in known if not _is_limit(check)]
+    table = _audit_rows(limits)
+    if not others:
+        return table
+    failed = sum(not check.ok for check in others)
+    word = f"{failed} of {len(others)} fail" if failed else f"all {len(others)} hold"
+    state = " open" if failed else ""
+    title = f"<summary>Consistency of path, profile and setpoints: {word}</summary>"
+    return f"{table}<details{state}>{title}{_audit_rows(others)}</details>"
+
+
+def _audit_rows(checks: Sequence[LimitCheck]) -> str:
+    columns = (
+        ("", "Limit"),
+        ("n", "Worst"),
+        ("n", "Allowed"),
+        ("", "Use"),
+        ("n", ""),
+        ("n", "At time [s]"),
+        ("n", "Line"),
+        ("", ""),
     )
-    return f"<table><tr>{head}</tr>{body}</table>"
+    head = "".join(f'<th class="{kind}">{text}</th>' for kind, text in columns)
+    return f"<table><tr>{head}</tr>{''.join(_audit_row(check) for check in checks)}</table>"
 
 
 def _audit_row(check: LimitCheck) -> str:
@@ -170,6 +190,11 @@ def _audit_row(check: LimitCheck) -> str:
         f'<td class="n">{f"{check.time:.4f}" if math.isfinite(check.time) else "–"}</td>'
         f'<td class="n">{check.line or "–"}</td><td class="verdict-cell">{word}</td></tr>'
     )
+
+
+def _is_limit(check: LimitCheck) -> bool:
+    # Where no velocity jump is allowed at corners, its check only confirms that there is none.
+    return check.name in _LIMITS and (check.name != "jump" or check.limit > _NO_JUMP)
 
 
 def _name(check: LimitCheck) -> str:
@@ -194,6 +219,10 @@ def _percent(ratio: float) -> str:
 
 def _short(value: float) -> str:
     return "0" if abs(value) < 1e-9 else f"{value:.3g}"
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def _length(length: float) -> tuple[str, str]:

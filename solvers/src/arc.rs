@@ -24,6 +24,11 @@ const ANGLE_ERROR: f64 = 0.0715;
 /// A programmed sweep is corrected to the end point that the program gives; more than this is no rounding.
 const SWEEP_SLACK: f64 = 0.1;
 
+/// Nobody means an arc of more pieces than this; it would fill the memory.
+const MAX_PIECES: f64 = 1e7;
+/// An arc whose radius changes by more than this times itself per rad is no arc but a line along a radius.
+const STEEPEST: f64 = 1e6;
+
 /// An arc in the plane of two axes; all other axes run linearly with the angle.
 ///
 /// Where start and end differ in their distance from the centre, the radius changes linearly with the angle.
@@ -42,10 +47,12 @@ pub struct Arc<const M: usize> {
 /// Why an arc cannot be followed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ArcError {
-    /// Start or end lies in the centre, or a number is not finite.
+    /// Start or end lies in the centre, the arc runs along a radius, or a number is not finite.
     Radius,
     /// The sweep is zero or does not lead from the start to the end.
     Sweep,
+    /// The turns take more than MAX_PIECES pieces.
+    Turns,
 }
 
 /// The polar form of an arc about its centre.
@@ -80,13 +87,12 @@ impl Polar {
         let mut other = sub(&arc.end, &arc.start);
         other[x] = 0.0;
         other[y] = 0.0;
-        Ok(Self {
-            direction: [from[0] / radius, from[1] / radius],
-            radius,
-            growth: (end_radius - radius) / sweep.abs(),
-            pitch: norm(&other) / sweep.abs(),
-            sweep,
-        })
+        let growth = (end_radius - radius) / sweep.abs();
+        let pitch = norm(&other) / sweep.abs();
+        if !(growth.abs() <= STEEPEST * radius.min(end_radius) && pitch.is_finite()) {
+            return Err(ArcError::Radius);
+        }
+        Ok(Self { direction: [from[0] / radius, from[1] / radius], radius, growth, pitch, sweep })
     }
 
     /// An upper bound of the distance between arc and pieces of half angle α, both ways: radial error and,
@@ -106,22 +112,24 @@ impl Polar {
         radial.hypot(angle * self.pitch.min(large))
     }
 
-    /// The least number of pieces within `tolerance`.
-    fn count(&self, tolerance: f64) -> usize {
-        let (mut low, mut high) = (0.0, MAX_HALF_ANGLE);
-        if self.deviation(high) > tolerance {
-            for _ in 0..50 {
-                let middle = 0.5 * (low + high);
-                if self.deviation(middle) > tolerance {
-                    high = middle;
-                } else {
-                    low = middle;
-                }
+    /// The number of pieces within `tolerance`, hardly more than the least.
+    fn count(&self, tolerance: f64) -> Result<usize, ArcError> {
+        let mut alpha = MAX_HALF_ANGLE;
+        loop {
+            let excess = self.deviation(alpha) / tolerance;
+            if excess <= 1.0 {
+                break;
             }
-        } else {
-            low = high;
+            // The error falls with α⁴ on a circle, where one or two steps do, and with α² at the slowest; the
+            // last digit that is given away ends the loop.
+            alpha *= (0.999 / excess).sqrt().sqrt();
         }
-        (self.sweep.abs() / (2.0 * low) * (1.0 - 1e-12)).ceil().max(1.0) as usize
+        let count = (self.sweep.abs() / (2.0 * alpha) * (1.0 - 1e-12)).ceil().max(1.0);
+        if count <= MAX_PIECES {
+            Ok(count as usize)
+        } else {
+            Err(ArcError::Turns)
+        }
     }
 }
 
@@ -133,7 +141,7 @@ pub fn arc_pieces<const M: usize>(
     tolerance: f64,
 ) -> Result<(Vec<Quadratic<M>>, f64), ArcError> {
     let polar = Polar::new(arc)?;
-    let n = polar.count(tolerance);
+    let n = polar.count(tolerance)?;
     let alpha = polar.sweep.abs() / (2.0 * n as f64);
     let Polar { radius, growth, sweep, direction: [e0, e1], .. } = polar;
     let [x, y] = arc.plane;
@@ -359,11 +367,16 @@ mod tests {
         let mut arc = planar(1.0, 1.0);
         arc.start = [0.0; 3];
         assert_eq!(arc_pieces(&arc, 1e-3).unwrap_err(), ArcError::Radius);
+        arc = planar(1.0, 1e-8);
+        arc.end[0] = 2.0;
+        assert_eq!(arc_pieces(&arc, 1e-3).unwrap_err(), ArcError::Radius);
         arc = planar(1.0, 1.0);
         arc.sweep = 2.0;
         assert_eq!(arc_pieces(&arc, 1e-3).unwrap_err(), ArcError::Sweep);
         arc.sweep = f64::NAN;
         assert_eq!(arc_pieces(&arc, 1e-3).unwrap_err(), ArcError::Sweep);
+        arc.sweep = 1.0 + 1e9 * TAU;
+        assert_eq!(arc_pieces(&arc, 1e-3).unwrap_err(), ArcError::Turns);
         arc.centre[1] = f64::INFINITY;
         assert_eq!(arc_pieces(&arc, 1e-3).unwrap_err(), ArcError::Radius);
     }

@@ -27,6 +27,7 @@
 //! A parabola is what two axes with constant accelerations draw, so it is where both can be at their limits all
 //! along. Greater ratios also take more of the sides than r = 1/2 does, which short sides do not have.
 
+use crate::follow::Followed;
 use crate::quadratic::{lerp, norm, sub, Quadratic};
 
 /// Corners that turn back are passed at rest anyway: no rounding where cos(turn/2) is below this (177.7°).
@@ -45,8 +46,6 @@ const SMOOTH: f64 = 1e-9;
 pub struct Jump<const M: usize> {
     /// t₊ − t₋.
     pub change: [f64; M],
-    pub before: [f64; M],
-    pub after: [f64; M],
     /// |t₊ − t₋| = 2 sin(turn/2).
     pub size: f64,
     /// Errors of rounding in a length here, in mm.
@@ -56,30 +55,20 @@ pub struct Jump<const M: usize> {
 impl<const M: usize> Jump<M> {
     /// The jump between two pieces, None where a piece ends without a tangent.
     pub fn new(before: &Quadratic<M>, after: &Quadratic<M>) -> Option<Self> {
-        let out = sub(&before.control[2], &before.control[1]);
-        let into = sub(&after.control[1], &after.control[0]);
+        let (out, into) = tangents(before, after);
         let (edge_out, edge_into) = (norm(&out), norm(&into));
         if !(edge_out > 0.0 && edge_into > 0.0) {
             return None;
         }
-        let before_unit = out.map(|x| x / edge_out);
-        let after_unit = into.map(|x| x / edge_into);
-        let change = sub(&after_unit, &before_unit);
+        let change = std::array::from_fn(|k| into[k] / edge_into - out[k] / edge_out);
         let coordinate = after.control[0].iter().fold(0.0, |a: f64, b| a.max(b.abs()));
-        Some(Self {
-            change,
-            before: before_unit,
-            after: after_unit,
-            size: norm(&change),
-            rounding: ROUNDING * f64::EPSILON * coordinate,
-        })
+        Some(Self { change, size: norm(&change), rounding: ROUNDING * f64::EPSILON * coordinate })
     }
 
     /// The pieces meet smoothly, as far as their coordinates can tell.
     pub fn is_smooth(&self, before: &Quadratic<M>, after: &Quadratic<M>) -> bool {
-        let edge = norm(&sub(&before.control[2], &before.control[1]))
-            .min(norm(&sub(&after.control[1], &after.control[0])));
-        self.size <= SMOOTH + self.rounding / edge
+        let (out, into) = tangents(before, after);
+        self.size <= SMOOTH + self.rounding / norm(&out).min(norm(&into))
     }
 
     /// The path turns back on itself.
@@ -87,11 +76,19 @@ impl<const M: usize> Jump<M> {
         self.size * self.size >= 4.0 * (1.0 - LEAST_COSINE * LEAST_COSINE)
     }
 
-    /// The length beyond which a corner passed at `feed` has nothing to gain, in mm.
-    pub fn length_for(&self, feed: f64, max_velocity: &[f64; M], max_acceleration: &[f64; M]) -> f64 {
+    /// The length beyond which a corner between two pieces, passed at `feed`, has nothing to gain, in mm.
+    pub fn length_for(
+        &self,
+        sides: [&Quadratic<M>; 2],
+        feed: f64,
+        max_velocity: &[f64; M],
+        max_acceleration: &[f64; M],
+    ) -> f64 {
+        let (out, into) = tangents(sides[0], sides[1]);
+        let (edge_out, edge_into) = (norm(&out), norm(&into));
         let (mut speed, mut share) = (feed, 0.0f64);
         for k in 0..M {
-            speed = speed.min(max_velocity[k] / self.before[k].abs().max(self.after[k].abs()));
+            speed = speed.min(max_velocity[k] / (out[k].abs() / edge_out).max(into[k].abs() / edge_into));
             share = share.max(self.change[k].abs() / max_acceleration[k]);
         }
         EASE * 0.5 * share * speed * speed
@@ -111,6 +108,11 @@ impl<const M: usize> Jump<M> {
     pub fn displacement(&self, before: f64, after: f64) -> [f64; M] {
         self.change.map(|x| x / (2.0 / before + 2.0 / after))
     }
+}
+
+/// The edges of the control polygons on both sides of a joint.
+fn tangents<const M: usize>(before: &Quadratic<M>, after: &Quadratic<M>) -> ([f64; M], [f64; M]) {
+    (sub(&before.control[2], &before.control[1]), sub(&after.control[1], &after.control[0]))
 }
 
 /// Lengths of corners that share the stretches between them, from what each `need`s; `stretch[k]` lies between
@@ -145,13 +147,54 @@ pub fn share_lengths(need: &[f64], stretch: &[f64]) -> Vec<f64> {
     length
 }
 
-/// Makes the pieces of a side C1 with speed 1 where they meet the corner, and returns the length of the side in
-/// that parameter. The corner is at the end of the side, or at its start.
-pub fn rescale<const M: usize>(side: &mut [Quadratic<M>], corner_at_end: bool) -> f64 {
+/// The two sides of a corner, each in the order of the path.
+#[derive(Default)]
+pub struct Sides<const M: usize> {
+    pub before: Vec<Followed<M>>,
+    pub after: Vec<Followed<M>>,
+}
+
+impl<const M: usize> Sides<M> {
+    /// The one parabola that rounds a corner between two lines of one feed and one tolerance.
+    pub fn parabola(&self, jump: &Jump<M>) -> Option<Followed<M>> {
+        let ([before], [after]) = (&self.before[..], &self.after[..]) else { return None };
+        let alike = before.feed == after.feed && before.tolerance == after.tolerance;
+        if !(alike && is_line(&before.piece) && is_line(&after.piece)) {
+            return None;
+        }
+        let distance = norm(&jump.displacement(before.piece.width, after.piece.width));
+        Some(Followed {
+            piece: Quadratic {
+                control: [before.piece.control[0], before.piece.control[2], after.piece.control[2]],
+                width: before.piece.width + after.piece.width,
+            },
+            last: after.last,
+            deviation: distance + before.deviation.max(after.deviation),
+            ..*before
+        })
+    }
+
+    /// Bends both sides so that they meet smoothly. Returns by what factor this exceeds what is left of the
+    /// tolerance of some piece, None where a side is empty.
+    pub fn bend(&mut self, jump: &Jump<M>) -> Option<f64> {
+        if self.before.is_empty() || self.after.is_empty() {
+            return None;
+        }
+        let length_before = rescale(self.before.iter_mut().rev(), true);
+        let length_after = rescale(self.after.iter_mut(), false);
+        let displacement = jump.displacement(length_before, length_after);
+        // From the far ends to the corner, so that q starts as an exact 0 and ends as an exact length.
+        let before = bend(self.before.iter_mut(), true, &displacement, length_before);
+        let after = bend(self.after.iter_mut().rev(), false, &displacement, length_after);
+        Some(before.max(after))
+    }
+}
+
+/// Makes the pieces of a side, taken from the corner outwards, C1 with speed 1 in the corner, and returns the
+/// length of the side in that parameter.
+fn rescale<'a, const M: usize>(side: impl Iterator<Item = &'a mut Followed<M>>, corner_at_end: bool) -> f64 {
     let (mut speed, mut length) = (1.0, 0.0);
-    let count = side.len();
-    for i in 0..count {
-        let piece = &mut side[if corner_at_end { count - 1 - i } else { i }];
+    for Followed { piece, .. } in side {
         let [a, b, c] = piece.control;
         let (start, end) = (2.0 * norm(&sub(&b, &a)), 2.0 * norm(&sub(&c, &b)));
         let (near, far) = if corner_at_end { (end, start) } else { (start, end) };
@@ -162,34 +205,33 @@ pub fn rescale<const M: usize>(side: &mut [Quadratic<M>], corner_at_end: bool) -
     length
 }
 
-/// Adds the displacement of the corner to the rescaled pieces of a side; `visit` gets for each piece the share
-/// (q/l)² at its end nearer to the corner.
-pub fn bend<const M: usize>(
-    side: &mut [Quadratic<M>],
+/// Adds the displacement of the corner to the pieces of a side, taken from the far end to the corner. Returns by
+/// what factor the tolerance of some piece is exceeded.
+fn bend<'a, const M: usize>(
+    side: impl ExactSizeIterator<Item = &'a mut Followed<M>>,
     corner_at_end: bool,
     displacement: &[f64; M],
     length: f64,
-    mut visit: impl FnMut(usize, f64),
-) {
-    // From the far end to the corner, so that q starts as an exact 0 and ends as an exact length.
-    let (mut far, count) = (0.0, side.len());
-    for i in 0..count {
-        let index = if corner_at_end { i } else { count - 1 - i };
-        let piece = &mut side[index];
-        let near = if i + 1 == count { 1.0 } else { far + piece.width / length };
-        let shares = if corner_at_end {
-            [far * far, far * near, near * near]
-        } else {
-            [near * near, far * near, far * far]
-        };
-        for (point, share) in piece.control.iter_mut().zip(shares) {
+) -> f64 {
+    let distance = norm(displacement);
+    let (mut far, mut excess, count) = (0.0, 0.0f64, side.len());
+    for (i, followed) in side.enumerate() {
+        let near = if i + 1 == count { 1.0 } else { far + followed.piece.width / length };
+        let mut shares = [far * far, far * near, near * near];
+        if !corner_at_end {
+            shares.reverse();
+        }
+        for (point, share) in followed.piece.control.iter_mut().zip(shares) {
             for k in 0..M {
                 point[k] += share * displacement[k];
             }
         }
-        visit(index, near * near);
+        let deviation = near * near * distance;
+        excess = excess.max(deviation / (followed.tolerance - followed.deviation));
+        followed.deviation += deviation;
         far = near;
     }
+    excess
 }
 
 /// The part of a piece between two parameters, None where next to nothing is between them. A cut next to an end
@@ -223,6 +265,145 @@ fn cut<const M: usize>(piece: &Quadratic<M>, from: f64, to: f64) -> Quadratic<M>
 }
 
 /// The piece is a line at constant speed, as `Quadratic::line` makes it.
-pub fn is_line<const M: usize>(piece: &Quadratic<M>) -> bool {
+fn is_line<const M: usize>(piece: &Quadratic<M>) -> bool {
     piece.control[1] == lerp(&piece.control[0], &piece.control[2], 0.5)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::quadratic::dot;
+
+    fn followed<const M: usize>(piece: Quadratic<M>) -> Followed<M> {
+        Followed {
+            piece,
+            first: 0,
+            last: 0,
+            feed: 10.0,
+            deviation: 0.0,
+            tolerance: 1.0,
+            exact: false,
+            arc: false,
+        }
+    }
+
+    #[test]
+    fn a_right_angle_becomes_the_parabola_whose_apex_is_at_the_tolerance() {
+        let before = Quadratic::line([0.0, 0.0], [10.0, 0.0]);
+        let after = Quadratic::line([10.0, 0.0], [10.0, 10.0]);
+        let jump = Jump::new(&before, &after).unwrap();
+        assert_eq!(jump.change, [-1.0, 1.0]);
+        let length = jump.length_within(0.1);
+        assert!((length - 0.2 * 2f64.sqrt()).abs() < 1e-15);
+        let sides = Sides {
+            before: vec![followed(between(&before, 10.0 - length, 10.0).unwrap())],
+            after: vec![followed(between(&after, 0.0, length).unwrap())],
+        };
+        let corner = sides.parabola(&jump).unwrap();
+        assert_eq!(corner.piece.control, [[10.0 - length, 0.0], [10.0, 0.0], [10.0, length]]);
+        let apex = corner.piece.point(0.5 * corner.piece.width);
+        assert!(
+            (norm(&sub(&apex, &[10.0, 0.0])) - 0.1).abs() < 1e-15 && (corner.deviation - 0.1).abs() < 1e-15
+        );
+        // Bending the two sides draws the same curve in two pieces.
+        let mut sides = sides;
+        assert!((sides.bend(&jump).unwrap() - 0.1).abs() < 1e-14);
+        assert!(norm(&sub(&sides.before[0].piece.control[2], &apex)) < 1e-15);
+        let half = corner.piece.part(0.0, length);
+        assert!(norm(&sub(&sides.before[0].piece.point(0.07), &half.point(0.07))) < 1e-15);
+    }
+
+    #[test]
+    fn bent_sides_of_several_pieces_are_smooth_and_as_near_as_they_say() {
+        // Two C0 sides in space, smooth in themselves with changing parameter speeds.
+        let curve = |a: [f64; 3], b: [f64; 3], c: [f64; 3]| Quadratic { control: [a, b, c], width: 0.7 };
+        let before = [
+            curve([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.5, 0.1]),
+            curve([2.0, 0.5, 0.1], [4.0, 1.5, 0.3], [5.0, 3.0, 0.0]),
+        ];
+        let after = [
+            curve([5.0, 3.0, 0.0], [4.5, 3.0, 1.0], [4.0, 3.5, 2.0]),
+            curve([4.0, 3.5, 2.0], [3.75, 3.75, 2.5], [3.0, 4.0, 3.0]),
+        ];
+        let jump = Jump::new(&before[1], &after[0]).unwrap();
+        let mut sides = Sides { before: before.map(followed).to_vec(), after: after.map(followed).to_vec() };
+        let excess = sides.bend(&jump).unwrap();
+        let pieces: Vec<_> = sides.before.iter().chain(&sides.after).collect();
+        assert_eq!(pieces[0].piece.control[0], before[0].control[0]);
+        assert_eq!(pieces[3].piece.control[2], after[1].control[2]);
+        assert_eq!(excess, pieces[1].deviation);
+        for pair in pieces.windows(2) {
+            assert!(norm(&sub(&pair[0].piece.control[2], &pair[1].piece.control[0])) < 1e-15);
+            let (out, into) = (pair[0].piece.end_tangents().1, pair[1].piece.end_tangents().0);
+            assert!(norm(&sub(&out, &into)) < 1e-12, "{out:?} {into:?}");
+        }
+        // At the far end the direction is that of the side.
+        let (start, _) = pieces[0].piece.end_tangents();
+        assert!(start[1] == 0.0 && start[2] == 0.0);
+        for (bent, straight) in pieces.iter().zip(before.iter().chain(&after)) {
+            for i in 0..=20 {
+                let t = i as f64 / 20.0;
+                let (a, b) = (bent.piece.point(t * bent.piece.width), straight.point(t * straight.width));
+                assert!(norm(&sub(&a, &b)) <= bent.deviation + 1e-14);
+            }
+        }
+        let moved = sub(&pieces[1].piece.control[2], &before[1].control[2]);
+        assert!((norm(&moved) - pieces[1].deviation).abs() < 1e-14 && dot(&moved, &jump.change) > 0.0);
+    }
+
+    #[test]
+    fn corners_share_a_stretch_by_halves_or_take_what_the_other_leaves() {
+        assert_eq!(share_lengths(&[0.0, 9.0, 9.0, 0.0], &[5.0, 4.0, 5.0]), [0.0, 2.0, 2.0, 0.0]);
+        assert_eq!(share_lengths(&[0.0, 9.0, 1.0, 0.0], &[5.0, 4.0, 5.0]), [0.0, 3.0, 1.0, 0.0]);
+        assert_eq!(share_lengths(&[0.0, 9.0, 0.0], &[5.0, 7.0]), [0.0, 5.0, 0.0]);
+        // The first corner is held by its short side, the second gets the rest.
+        let shared = share_lengths(&[0.0, 9.0, 9.0, 0.0], &[0.25, 4.0, 9.0]);
+        assert_eq!(shared, [0.0, 0.25, 3.75, 0.0]);
+    }
+
+    #[test]
+    fn shared_lengths_never_overlap() {
+        let mut state = 7u64;
+        let mut random = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 40) as f64 / (1u64 << 24) as f64
+        };
+        for _ in 0..2000 {
+            let stretch: Vec<f64> = (0..12).map(|_| random().powi(3)).collect();
+            let mut need: Vec<f64> = (0..13).map(|_| 2.0 * random().powi(3)).collect();
+            need[0] = 0.0;
+            need[12] = 0.0;
+            let length = share_lengths(&need, &stretch);
+            for k in 0..12 {
+                assert!(length[k] + length[k + 1] <= stretch[k] * (1.0 + 1e-15) && length[k] <= need[k]);
+                // Nobody has less than its half without being held elsewhere.
+                let left = if k > 0 { 0.5 * stretch[k - 1] } else { f64::INFINITY };
+                assert!(length[k] >= need[k].min(0.5 * stretch[k]).min(left));
+            }
+        }
+    }
+
+    #[test]
+    fn what_rounding_does_is_no_corner_and_a_small_turn_is() {
+        let smooth = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
+            let (before, after) = (Quadratic::line(a, b), Quadratic::line(b, c));
+            Jump::new(&before, &after).unwrap().is_smooth(&before, &after)
+        };
+        assert!(smooth([0.1, 0.1], [0.2, 0.2], [0.7, 0.7]));
+        assert!(smooth([1e5, 1e5], [1e5 + 1e-6, 1e5 + 1e-6], [1e5 + 3e-6, 1e5 + 3e-6]));
+        assert!(!smooth([0.0, 0.0], [1.0, 0.0], [2.0, 1e-8]));
+        let back = Jump::new(&Quadratic::line([0.0], [1.0]), &Quadratic::line([1.0], [0.0])).unwrap();
+        assert!(back.reverses());
+    }
+
+    #[test]
+    fn cuts_next_to_an_end_leave_no_sliver() {
+        let line = Quadratic::line([0.0, 0.0], [3.0, 4.0]);
+        assert_eq!(between(&line, 1e-9, 5.0 - 1e-9), Some(line));
+        assert_eq!(between(&line, -1.0, 1e-9), None);
+        assert_eq!(between(&line, 2.0, 2.0), None);
+        let (a, b) = (between(&line, 0.0, 1.3).unwrap(), between(&line, 1.3, f64::INFINITY).unwrap());
+        assert_eq!(a.control[2], b.control[0]);
+        assert!(is_line(&a) && is_line(&b) && (a.width + b.width - 5.0).abs() < 1e-15);
+    }
 }

@@ -20,7 +20,7 @@ const TASK: usize = 4096;
 /// Parts of a piece that are shorter than this share of it are not cut off.
 const SLIVER: f64 = 1e-6;
 
-/// A program in columns, one row per move; lengths in mm, speeds in mm/s.
+/// A program in columns, one row per move, at most 2³² of them; lengths in mm, speeds in mm/s.
 pub struct Moves<'a, const M: usize> {
     pub start: [f64; M],
     pub kind: &'a [u8],
@@ -64,8 +64,8 @@ pub struct FollowOptions {
 pub struct Followed<const M: usize> {
     pub piece: Quadratic<M>,
     /// First and last move.
-    pub first: usize,
-    pub last: usize,
+    pub first: u32,
+    pub last: u32,
     pub feed: f64,
     /// Upper bound of the distance from the moves, both ways.
     pub deviation: f64,
@@ -73,8 +73,8 @@ pub struct Followed<const M: usize> {
     pub tolerance: f64,
     /// The moves ask for the exact path.
     pub exact: bool,
-    /// How far the piece may lie outside the least box around its moves because it replaces an arc.
-    pub bulge: f64,
+    /// The piece stands for an arc: it may lie as far outside the box around it as it deviates.
+    pub arc: bool,
 }
 
 /// A move that cannot be followed.
@@ -91,10 +91,7 @@ pub enum Fault {
     Length,
     /// The feed is not positive.
     Feed,
-    /// Start or end of an arc is its centre.
-    Radius,
-    /// The sweep of an arc is missing or does not lead to its end.
-    Sweep,
+    Arc(ArcError),
 }
 
 /// The pieces of a program and what was fitted.
@@ -184,7 +181,7 @@ impl<const M: usize> Moves<'_, M> {
                 plane: *plane,
                 sweep: *sweep,
             }),
-            _ => Err(FollowError { index: i, fault: Fault::Sweep }),
+            _ => Err(FollowError { index: i, fault: Fault::Arc(ArcError::Sweep) }),
         }
     }
 
@@ -234,18 +231,18 @@ fn plain<const M: usize>(
         let tolerance = if exact { options.exact_tolerance } else { moves.tolerance[i] };
         let feed = if moves.kind[i] == RAPID { f64::INFINITY } else { moves.feed[i] };
         let piece = Quadratic::line(moves.origin(i), moves.target[i]);
-        let line = Followed { piece, first: i, last: i, feed, deviation: 0.0, tolerance, exact, bulge: 0.0 };
+        let index = i as u32;
+        let line =
+            Followed { piece, first: index, last: index, feed, deviation: 0.0, tolerance, exact, arc: false };
         if moves.kind[i] != ARC {
             pieces.push(line);
             continue;
         }
         // Arcs take half of what there is, so that joints with their neighbours can be smoothed as well.
         let budget = 0.5 * tolerance.min(options.exact_tolerance);
-        let (arc, deviation) = arc_pieces(&moves.arc(i)?, budget).map_err(|error| FollowError {
-            index: i,
-            fault: if error == ArcError::Radius { Fault::Radius } else { Fault::Sweep },
-        })?;
-        pieces.extend(arc.into_iter().map(|piece| Followed { piece, deviation, bulge: deviation, ..line }));
+        let (arc, deviation) = arc_pieces(&moves.arc(i)?, budget)
+            .map_err(|error| FollowError { index: i, fault: Fault::Arc(error) })?;
+        pieces.extend(arc.into_iter().map(|piece| Followed { piece, deviation, arc: true, ..line }));
     }
     Ok(FollowedProgram { pieces, points: 0, splines: 0, polynomials: 0 })
 }
@@ -278,13 +275,13 @@ fn chain<const M: usize>(
         cut_at_feeds(fit, &points, &moves.feed[first..end], |piece, chords, feed| {
             pieces.push(Followed {
                 piece,
-                first: first + chords.0,
-                last: first + chords.1,
+                first: (first + chords.0) as u32,
+                last: (first + chords.1) as u32,
                 feed,
                 deviation: fit.deviation,
                 tolerance: moves.tolerance[first],
                 exact: false,
-                bulge: 0.0,
+                arc: false,
             });
         });
     }
@@ -351,4 +348,123 @@ fn nearest<const M: usize>(piece: &Quadratic<M>, point: &[f64; M]) -> f64 {
         }
     }
     0.5 * (low + high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const OPTIONS: FollowOptions = FollowOptions {
+        exact_tolerance: 1e-3,
+        max_chord: 5.0,
+        corner_acceleration: f64::INFINITY,
+        max_speed: 1e3,
+        corner_angle: 0.5,
+    };
+
+    /// Moves on a circle of radius 10 in chords of 0.02 rad.
+    fn circle(count: usize) -> Vec<[f64; 2]> {
+        (1..=count).map(|i| (0.02 * i as f64).sin_cos()).map(|(sin, cos)| [10.0 * cos, 10.0 * sin]).collect()
+    }
+
+    fn follow_lines(
+        target: &[[f64; 2]],
+        feed: &[f64],
+        fit_tolerance: &[f64],
+        halt: &[bool],
+    ) -> FollowedProgram<2> {
+        let moves = Moves {
+            start: [10.0, 0.0],
+            kind: &vec![LINE; target.len()],
+            target,
+            feed,
+            tolerance: &vec![0.01; target.len()],
+            fit_tolerance,
+            halt,
+            arcs: &[],
+        };
+        follow(&moves, &OPTIONS).unwrap()
+    }
+
+    #[test]
+    fn a_change_of_feed_cuts_the_curve_at_the_vertex_and_leaves_it_whole() {
+        let target = circle(100);
+        let (even, halt, fit) = (vec![10.0; 100], vec![false; 100], vec![0.005; 100]);
+        let whole = follow_lines(&target, &even, &fit, &halt).pieces;
+        let mut feed = even;
+        feed[37..].fill(20.0);
+        let cut = follow_lines(&target, &feed, &fit, &halt).pieces;
+        assert!(cut.len() <= whole.len() + 1 && cut.len() < 40);
+        let fast = cut.iter().position(|piece| piece.feed == 20.0).unwrap();
+        assert!(cut[..fast].iter().all(|piece| piece.feed == 10.0 && piece.last <= 37));
+        assert!(cut[fast..].iter().all(|piece| piece.feed == 20.0 && piece.first >= 37));
+        assert!(norm(&sub(&cut[fast].piece.control[0], &target[36])) < 0.005);
+        // Both halves lie on the one curve, with one tangent.
+        let (out, into) = (cut[fast - 1].piece.end_tangents().1, cut[fast].piece.end_tangents().0);
+        assert!(norm(&sub(&out, &into)) < 1e-12);
+        assert_eq!(cut[fast - 1].piece.control[2], cut[fast].piece.control[0]);
+    }
+
+    #[test]
+    fn no_piece_is_faster_than_a_block_it_covers() {
+        let target = circle(200);
+        let feed: Vec<f64> = (0..200).map(|i| [30.0, 10.0, 20.0][i * i % 3] + (i / 50) as f64).collect();
+        let pieces = follow_lines(&target, &feed, &[0.005; 200], &[false; 200]).pieces;
+        for piece in &pieces {
+            let slowest =
+                feed[piece.first as usize..=piece.last as usize].iter().fold(f64::MAX, |a, &b| a.min(b));
+            assert_eq!(piece.feed, slowest);
+        }
+        for pair in pieces.windows(2) {
+            assert!(pair[1].first <= pair[0].last + 1 && pair[1].last >= pair[0].last);
+        }
+    }
+
+    #[test]
+    fn halts_and_changes_of_tolerance_end_a_chain() {
+        let target = circle(100);
+        let (feed, mut halt, mut fit) = (vec![10.0; 100], vec![false; 100], vec![0.005; 100]);
+        halt[29] = true;
+        fit[60..].fill(0.004);
+        let pieces = follow_lines(&target, &feed, &fit, &halt).pieces;
+        for end in [30, 60] {
+            assert!(pieces.iter().all(|piece| piece.last < end || piece.first >= end));
+        }
+        fit.fill(0.0);
+        let lines = follow_lines(&target, &feed, &fit, &halt);
+        assert_eq!((lines.pieces.len(), lines.points), (100, 0));
+    }
+
+    #[test]
+    fn faults_name_their_move() {
+        let mut target = circle(5);
+        target[3] = target[2];
+        let moves = Moves {
+            start: [10.0, 0.0],
+            kind: &[LINE; 5],
+            target: &target,
+            feed: &[1.0; 5],
+            tolerance: &[0.0; 5],
+            fit_tolerance: &[0.0; 5],
+            halt: &[false; 5],
+            arcs: &[],
+        };
+        let error = |moves: &Moves<2>| follow(moves, &OPTIONS).err().unwrap();
+        assert_eq!(error(&moves), FollowError { index: 3, fault: Fault::Length });
+        let target = circle(5);
+        let sound = Moves { target: &target, ..moves };
+        assert!(follow(&sound, &OPTIONS).is_ok());
+        let no_feed = Moves { feed: &[1.0, 1.0, f64::NAN, 0.0, 1.0], ..sound };
+        assert_eq!(error(&no_feed), FollowError { index: 2, fault: Fault::Feed });
+        let no_arc = Moves { kind: &[LINE, ARC, LINE, LINE, LINE], feed: &[1.0; 5], ..no_feed };
+        assert_eq!(error(&no_arc), FollowError { index: 1, fault: Fault::Arc(ArcError::Sweep) });
+    }
+
+    #[test]
+    fn the_nearest_place_is_found_on_either_half_of_a_hairpin() {
+        let piece = Quadratic { control: [[0.0, 0.0], [10.0, 1.0], [0.0, 2.0]], width: 12.0 };
+        for u in [0.0, 0.1, 2.0, 5.9, 6.1, 11.0, 12.0] {
+            assert!((nearest(&piece, &piece.point(u)) - u).abs() < 1e-9);
+        }
+    }
 }

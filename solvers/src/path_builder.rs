@@ -8,9 +8,9 @@
 
 use rayon::prelude::*;
 
-use crate::corner::{bend, between, is_line, rescale, share_lengths, Jump};
+use crate::corner::{between, share_lengths, Jump, Sides};
 use crate::follow::{follow, FollowError, FollowOptions, Followed, FollowedProgram, Moves};
-use crate::quadratic::{norm, Quadratic};
+use crate::quadratic::Quadratic;
 
 /// Exact paths are smoothed only where an arc meets its neighbour with a turn below this (rad): that is what
 /// rounded coordinates leave of a tangent joint.
@@ -33,7 +33,8 @@ pub struct Axes<const M: usize> {
 
 /// The path of a program.
 pub struct BuiltPath<const M: usize> {
-    pub pieces: Vec<Followed<M>>,
+    /// The pieces in order, in the parts that were made in parallel.
+    pub parts: Vec<Vec<Followed<M>>>,
     /// Index of the first piece of each run, and the number of pieces.
     pub runs: Vec<usize>,
     /// Upper bound of the distance between path and program, both ways.
@@ -71,11 +72,11 @@ struct Stretches<'a, const M: usize> {
     length: Vec<f64>,
 }
 
-/// A rounded corner: its pieces, and what is cut off the stretches before and after.
-struct Rounded<const M: usize> {
-    pieces: Vec<Followed<M>>,
-    end_cut: f64,
-    start_cut: f64,
+/// The stations where a rounded corner begins in the stretch before it and ends in the stretch after it.
+#[derive(Clone, Copy)]
+struct Cuts {
+    before: f64,
+    after: f64,
 }
 
 /// The path of a program.
@@ -85,21 +86,24 @@ pub fn build_path<const M: usize>(
     axes: &Axes<M>,
 ) -> Result<BuiltPath<M>, FollowError> {
     let FollowedProgram { pieces, points, splines, polynomials } = follow(moves, options)?;
-    if pieces.is_empty() {
-        let (pieces, runs) = (pieces, vec![0]);
-        return Ok(BuiltPath { pieces, runs, deviation: 0.0, points, splines, polynomials, outside: None });
+    let (mut parts, mut runs) = (Vec::new(), vec![0]);
+    if !pieces.is_empty() {
+        let stretches = Stretches::new(&pieces, moves.halt);
+        let joints = 0..stretches.joints.len();
+        let need: Vec<f64> = joints.clone().into_par_iter().map(|k| stretches.need(k, axes)).collect();
+        let length = share_lengths(&need, &stretches.length);
+        let corners: Vec<Option<Cuts>> = joints
+            .into_par_iter()
+            .with_min_len(TASK)
+            .map_init(Sides::default, |sides, k| stretches.settle(k, &length, sides))
+            .collect();
+        (parts, runs) = stretches.assemble(&corners, axes.jump);
     }
-    let stretches = Stretches::new(&pieces, moves.halt);
-    let joints = 0..stretches.joints.len();
-    let need: Vec<f64> = joints.clone().into_par_iter().map(|k| stretches.need(k, axes)).collect();
-    let length = share_lengths(&need, &stretches.length);
-    let corners: Vec<Option<Rounded<M>>> =
-        joints.into_par_iter().with_min_len(TASK).map(|k| stretches.round(k, &length)).collect();
-    let (pieces, runs) = stretches.assemble(&corners, axes.jump);
+    let deviation = |part: &Vec<Followed<M>>| part.iter().map(|piece| piece.deviation).fold(0.0, f64::max);
     Ok(BuiltPath {
-        deviation: pieces.iter().map(|followed| followed.deviation).fold(0.0, f64::max),
-        outside: outside(&pieces, moves, &axes.travel),
-        pieces,
+        deviation: parts.iter().map(deviation).fold(0.0, f64::max),
+        outside: outside(&parts, moves, &axes.travel),
+        parts,
         runs,
         points,
         splines,
@@ -112,7 +116,7 @@ impl<'a, const M: usize> Stretches<'a, M> {
         let end = |at| Joint { at, jump: None };
         let inner = (1..pieces.len()).into_par_iter().filter_map(|at| {
             let (before, after) = (&pieces[at - 1], &pieces[at]);
-            if after.first > before.last && halt[before.last] {
+            if after.first > before.last && halt[before.last as usize] {
                 return Some(end(at));
             }
             let jump = Jump::new(&before.piece, &after.piece);
@@ -153,13 +157,18 @@ impl<'a, const M: usize> Stretches<'a, M> {
         let at = self.joints[k].at;
         let (before, after) = (&self.pieces[at - 1], &self.pieces[at]);
         let exact = before.exact || after.exact;
-        let meets_arc = before.bulge > 0.0 || after.bulge > 0.0;
+        let meets_arc = before.arc || after.arc;
         if jump.reverses() || exact && !(meets_arc && jump.size <= ARC_JOINT) {
             return 0.0;
         }
         // Small turns need little, but no less than what the tolerance calls small.
         let wanted = jump
-            .length_for(before.feed.min(after.feed), &axes.max_velocity, &axes.max_acceleration)
+            .length_for(
+                [&before.piece, &after.piece],
+                before.feed.min(after.feed),
+                &axes.max_velocity,
+                &axes.max_acceleration,
+            )
             .max(before.tolerance.min(after.tolerance));
         let (backwards, forwards) = self.sides(k);
         reach(forwards, jump, exact, reach(backwards, jump, exact, wanted))
@@ -180,71 +189,88 @@ impl<'a, const M: usize> Stretches<'a, M> {
         }
     }
 
-    /// Rounds corner `k`, None where the tolerance leaves no room for it.
-    fn round(&self, k: usize, length: &[f64]) -> Option<Rounded<M>> {
+    /// The sides of corner `k` between its cuts.
+    fn cut_sides(&self, k: usize, cuts: Cuts, sides: &mut Sides<M>) {
+        sides.before.clear();
+        sides.after.clear();
+        self.region(k - 1, cuts.before, f64::INFINITY, &mut sides.before);
+        self.region(k, 0.0, cuts.after, &mut sides.after);
+    }
+
+    /// Where corner `k` begins and ends, None where the tolerance leaves no room for it.
+    fn settle(&self, k: usize, length: &[f64], sides: &mut Sides<M>) -> Option<Cuts> {
         const TRIALS: usize = 40;
         let jump = self.joints[k].jump.as_ref().filter(|jump| !jump.vanishes(length[k]))?;
-        // Corners that touch must cut at the same place.
-        let mut end_cut = self.length[k - 1] - length[k];
-        if end_cut - length[k - 1] <= TOUCHING * self.length[k - 1] {
-            end_cut = length[k - 1];
-        }
-        let mut start_cut = length[k];
+        let (mut before, mut after) = (length[k], length[k]);
         for _ in 0..TRIALS {
-            let (mut before, mut after) = (Vec::new(), Vec::new());
-            self.region(k - 1, end_cut, f64::INFINITY, &mut before);
-            self.region(k, 0.0, start_cut, &mut after);
-            match bent(jump, &before, &after)? {
-                Ok(pieces) => return Some(Rounded { pieces, end_cut, start_cut }),
-                Err(excess) => {
-                    // The tolerance allows less than the lengths promised, because the parameter of a curved
-                    // side is not its length.
-                    let shorter = (1.0 - 1e-5) / excess;
-                    start_cut *= shorter;
-                    end_cut = self.length[k - 1] - shorter * (self.length[k - 1] - end_cut);
-                    if jump.vanishes(start_cut) {
-                        return None;
-                    }
-                }
+            let mut cuts = Cuts { before: self.length[k - 1] - before, after };
+            // Corners that touch must cut at the same place.
+            if cuts.before - length[k - 1] <= TOUCHING * self.length[k - 1] {
+                cuts.before = length[k - 1];
+            }
+            self.cut_sides(k, cuts, sides);
+            let excess = match sides.parabola(jump) {
+                Some(corner) => corner.deviation / corner.tolerance,
+                None => sides.bend(jump)?,
+            };
+            // The bounds are sums, which may be rounded up.
+            if excess <= 1.0 + 1e-9 {
+                return Some(cuts);
+            }
+            // The parameter of a curved side is not its length, so it can allow less than it promised.
+            let shorter = (1.0 - 1e-5) / excess;
+            (before, after) = (shorter * before, shorter * after);
+            if jump.vanishes(after) {
+                return None;
             }
         }
         None
     }
 
-    /// Corners and what they leave of the stretches, in order, and the runs.
-    fn assemble(&self, corners: &[Option<Rounded<M>>], jump: bool) -> (Vec<Followed<M>>, Vec<usize>) {
+    /// Corners and what they leave of the stretches, in order and in parts, and the runs.
+    fn assemble(&self, corners: &[Option<Cuts>], jump: bool) -> (Vec<Vec<Followed<M>>>, Vec<usize>) {
         let count = self.length.len();
         let tasks: Vec<(Vec<Followed<M>>, Vec<usize>)> = (0..count.div_ceil(TASK))
             .into_par_iter()
             .map(|task| {
-                let (mut pieces, mut runs) = (Vec::new(), Vec::new());
-                for k in task * TASK..count.min((task + 1) * TASK) {
-                    let start = match &corners[k] {
-                        Some(rounded) => {
-                            pieces.extend_from_slice(&rounded.pieces);
-                            rounded.start_cut
+                let stretches = task * TASK..count.min((task + 1) * TASK);
+                let inside = self.joints[stretches.end].at - self.joints[stretches.start].at;
+                let mut pieces = Vec::with_capacity(inside + 2 * stretches.len());
+                let (mut runs, mut sides) = (Vec::new(), Sides::default());
+                for k in stretches {
+                    let start = match (corners[k], &self.joints[k].jump) {
+                        (Some(cuts), Some(turn)) => {
+                            self.cut_sides(k, cuts, &mut sides);
+                            if let Some(corner) = sides.parabola(turn) {
+                                pieces.push(corner);
+                            } else {
+                                sides.bend(turn);
+                                pieces.extend_from_slice(&sides.before);
+                                pieces.extend_from_slice(&sides.after);
+                            }
+                            cuts.after
                         }
-                        None => {
-                            if !(jump && self.joints[k].jump.is_some()) {
+                        (_, turn) => {
+                            if !(jump && turn.is_some()) {
                                 runs.push(pieces.len());
                             }
                             0.0
                         }
                     };
-                    let end = corners[k + 1].as_ref().map_or(f64::INFINITY, |rounded| rounded.end_cut);
+                    let end = corners[k + 1].map_or(f64::INFINITY, |cuts| cuts.before);
                     self.region(k, start, end, &mut pieces);
                 }
                 (pieces, runs)
             })
             .collect();
-        let mut pieces = Vec::with_capacity(tasks.iter().map(|(pieces, _)| pieces.len()).sum());
-        let mut runs = Vec::new();
+        let (mut parts, mut runs, mut total) = (Vec::with_capacity(tasks.len()), Vec::new(), 0);
         for (part, starts) in tasks {
-            runs.extend(starts.iter().map(|start| start + pieces.len()));
-            pieces.extend_from_slice(&part);
+            runs.extend(starts.iter().map(|start| start + total));
+            total += part.len();
+            parts.push(part);
         }
-        runs.push(pieces.len());
-        (pieces, runs)
+        runs.push(total);
+        (parts, runs)
     }
 }
 
@@ -270,60 +296,9 @@ fn reach<'a, const M: usize>(
     length.min(station)
 }
 
-/// The pieces of a rounded corner. None: a side is empty. Err: by what factor a tolerance is exceeded.
-fn bent<const M: usize>(
-    jump: &Jump<M>,
-    before: &[Followed<M>],
-    after: &[Followed<M>],
-) -> Option<Result<Vec<Followed<M>>, f64>> {
-    let mut side_before: Vec<Quadratic<M>> = before.iter().map(|followed| followed.piece).collect();
-    let mut side_after: Vec<Quadratic<M>> = after.iter().map(|followed| followed.piece).collect();
-    let (last, first) = (before.last()?, after.first()?);
-    let (length_before, length_after) = (rescale(&mut side_before, true), rescale(&mut side_after, false));
-    let displacement = jump.displacement(length_before, length_after);
-    let distance = norm(&displacement);
-
-    let one_parabola = before.len() == 1
-        && after.len() == 1
-        && is_line(&last.piece)
-        && is_line(&first.piece)
-        && last.feed == first.feed
-        && last.tolerance == first.tolerance;
-    let mut pieces: Vec<Followed<M>> = before.iter().chain(after).copied().collect();
-    let mut excess: f64 = 0.0;
-    let mut deviate = |index: usize, share: f64| {
-        let followed = &mut pieces[index];
-        let room = followed.tolerance - followed.deviation;
-        excess = excess.max(distance * share / room);
-        followed.deviation += distance * share;
-    };
-    bend(&mut side_before, true, &displacement, length_before, &mut deviate);
-    bend(&mut side_after, false, &displacement, length_after, |index, share| {
-        deviate(before.len() + index, share)
-    });
-    // The bounds are sums, which may be rounded up.
-    if excess > 1.0 + 1e-9 {
-        return Some(Err(excess));
-    }
-    if one_parabola {
-        let control = [last.piece.control[0], last.piece.control[2], first.piece.control[2]];
-        return Some(Ok(vec![Followed {
-            piece: Quadratic { control, width: length_before + length_after },
-            first: last.first,
-            last: first.last,
-            deviation: distance + last.deviation.max(first.deviation),
-            ..*last
-        }]));
-    }
-    for (followed, piece) in pieces.iter_mut().zip(side_before.into_iter().chain(side_after)) {
-        followed.piece = piece;
-    }
-    Some(Ok(pieces))
-}
-
 /// The first position outside the travel: of arcs as programmed, of everything else as followed.
 fn outside<const M: usize>(
-    pieces: &[Followed<M>],
+    parts: &[Vec<Followed<M>>],
     moves: &Moves<M>,
     travel: &[[f64; 2]; M],
 ) -> Option<Outside> {
@@ -346,8 +321,12 @@ fn outside<const M: usize>(
     let arcs = moves.arcs.par_iter().find_map_first(|&(index, shape)| {
         shape.plane.iter().find_map(|&axis| beyond(index, axis, moves.arc_extent(index, axis)?, 0.0))
     });
-    let curves = pieces.par_iter().find_map_first(|followed| {
-        (0..M).find_map(|axis| beyond(followed.first, axis, extent(&followed.piece, axis), followed.bulge))
+    let curves = parts.par_iter().find_map_first(|part| {
+        part.iter().find_map(|followed| {
+            let bulge = if followed.arc { followed.deviation } else { 0.0 };
+            let index = followed.first as usize;
+            (0..M).find_map(|axis| beyond(index, axis, extent(&followed.piece, axis), bulge))
+        })
     });
     [arcs, curves].into_iter().flatten().min_by_key(|place| place.index)
 }
@@ -363,4 +342,117 @@ fn extent<const M: usize>(piece: &Quadratic<M>, axis: usize) -> (f64, f64) {
         greatest = greatest.max(turn);
     }
     (least, greatest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::follow::LINE;
+    use crate::quadratic::{norm, sub};
+    use proptest::prelude::*;
+
+    const OPTIONS: FollowOptions = FollowOptions {
+        exact_tolerance: 1e-3,
+        max_chord: 5.0,
+        corner_acceleration: 4e3,
+        max_speed: 1e3,
+        corner_angle: 0.48,
+    };
+
+    fn axes<const M: usize>(jump: bool) -> Axes<M> {
+        Axes {
+            max_velocity: [500.0; M],
+            max_acceleration: [1000.0; M],
+            travel: [[f64::NEG_INFINITY, f64::INFINITY]; M],
+            jump,
+        }
+    }
+
+    fn polyline(
+        points: &[[f64; 2]],
+        tolerance: &[f64],
+        fit: bool,
+        jump: bool,
+    ) -> (Vec<Followed<2>>, Vec<usize>) {
+        let count = points.len() - 1;
+        let fit: Vec<f64> =
+            tolerance.iter().map(|tolerance| if fit { 0.5 * tolerance } else { 0.0 }).collect();
+        let moves = Moves {
+            start: points[0],
+            kind: &vec![LINE; count],
+            target: &points[1..],
+            feed: &vec![100.0; count],
+            tolerance,
+            fit_tolerance: &fit,
+            halt: &vec![false; count],
+            arcs: &[],
+        };
+        let path = build_path(&moves, &OPTIONS, &axes(jump)).unwrap();
+        (path.parts.concat(), path.runs)
+    }
+
+    #[test]
+    fn a_square_is_rounded_at_its_corners_and_nowhere_else() {
+        let square = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0], [0.0, 0.0]];
+        let (pieces, runs) = polyline(&square, &[0.01; 4], false, false);
+        let edge = 10.0 - 0.02 * 2f64.sqrt();
+        assert_eq!((pieces.len(), &runs[..]), (7, &[0, 7][..]));
+        assert!(norm(&sub(&pieces[0].piece.control[2], &[edge, 0.0])) < 1e-12);
+        assert_eq!(pieces[1].piece.control[1], [10.0, 0.0]);
+        assert_eq!((pieces[1].first, pieces[1].last), (0, 1));
+        let (exact, stops) = polyline(&square, &[0.0; 4], false, false);
+        assert_eq!((exact.len(), &stops[..]), (4, &[0, 1, 2, 3, 4][..]));
+        let (passed, none) = polyline(&square, &[0.0; 4], false, true);
+        assert_eq!((passed.len(), &none[..]), (4, &[0, 4][..]));
+    }
+
+    #[test]
+    fn a_zig_zag_of_short_edges_is_all_corners_that_touch() {
+        let points: Vec<[f64; 2]> =
+            (0..41).map(|i| [0.02 * i as f64, if i % 2 == 0 { 0.0 } else { 0.02 }]).collect();
+        let (pieces, runs) = polyline(&points, &[0.1; 40], false, false);
+        // 39 corners; of the first and the last edge half is left.
+        assert_eq!((pieces.len(), runs.len()), (41, 2));
+        for pair in pieces.windows(2) {
+            assert_eq!(pair[0].piece.control[2], pair[1].piece.control[0]);
+            assert!(Jump::new(&pair[0].piece, &pair[1].piece).unwrap().size < 1e-9);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn random_polylines_are_joined_smoothly_within_tolerance(
+            steps in prop::collection::vec((-1.0..1.0f64, -1.0..1.0f64, -3..2i32), 2..60),
+            tolerance in prop::sample::select(vec![1e-4, 1e-2, 1.0]),
+            fit: bool,
+            exact_from in 0..60usize,
+        ) {
+            let mut points = vec![[0.0, 0.0]];
+            for (x, y, exponent) in steps {
+                let scale = 10f64.powi(exponent);
+                let [a, b] = points[points.len() - 1];
+                points.push([a + scale * x + 1e-4, b + scale * y]);
+            }
+            let count = points.len() - 1;
+            let limits: Vec<f64> = (0..count).map(|i| if i < exact_from { tolerance } else { 0.0 }).collect();
+            let (pieces, runs) = polyline(&points, &limits, fit, false);
+            prop_assert_eq!(pieces[0].piece.control[0], points[0]);
+            prop_assert_eq!(pieces[pieces.len() - 1].piece.control[2], points[count]);
+            prop_assert!(pieces[0].first == 0 && pieces[pieces.len() - 1].last as usize == count - 1);
+            for (i, pair) in pieces.windows(2).enumerate() {
+                prop_assert_eq!(pair[0].piece.control[2], pair[1].piece.control[0]);
+                prop_assert!(pair[1].first >= pair[0].first && pair[1].first <= pair[0].last + 1);
+                prop_assert!(pair[1].last >= pair[0].last);
+                if runs.binary_search(&(i + 1)).is_err() {
+                    let jump = Jump::new(&pair[0].piece, &pair[1].piece).unwrap();
+                    prop_assert!(jump.is_smooth(&pair[0].piece, &pair[1].piece), "{}", jump.size);
+                }
+            }
+            for piece in &pieces {
+                prop_assert!(piece.deviation <= piece.tolerance * (1.0 + 1e-9));
+                prop_assert!(!piece.exact || piece.deviation == 0.0);
+                prop_assert!(piece.piece.width > 0.0);
+            }
+        }
+    }
 }

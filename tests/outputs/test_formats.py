@@ -131,7 +131,18 @@ def test_npz_is_what_numpy_reads_and_maps_instead_of_loading(tmp_path: Path) -> 
         assert arrays["axes"].tolist() == ["X", "Y", "Z"]
         for name in NAMES:
             np.testing.assert_array_equal(arrays[name], getattr(whole, name))
-    assert isinstance(load_setpoints(file).position, np.memmap)
+    read = load_setpoints(file)
+    assert isinstance(read.position, np.memmap)
+    assert all(getattr(read, name).flags.aligned for name in NAMES)
+
+
+def test_npz_that_numpy_wrote_is_read_aligned(tmp_path: Path) -> None:
+    whole = chunk(50)
+    file = tmp_path / "other.npz"
+    np.savez(file, axes=np.array(whole.axes), **{name: getattr(whole, name) for name in NAMES})
+    read = load_setpoints(file)
+    assert same(read, whole)
+    assert all(getattr(read, name).flags.aligned for name in NAMES)
 
 
 def test_npz_that_numpy_compressed_is_read_too(tmp_path: Path) -> None:

@@ -45,10 +45,21 @@ def test_each_side_loses_a_tenth_of_a_second_to_its_axis(square: Any) -> None:
     for row, axis in zip(rows, "XYXY", strict=True):
         assert row.time == pytest.approx(0.5)
         assert row.lost == pytest.approx(0.1)
-        assert (row.speed, row.feed) == (pytest.approx(40.0), pytest.approx(50.0))
+        assert (row.speed, row.wanted) == (pytest.approx(40.0), pytest.approx(50.0))
         assert row.limit == f"{axis} acceleration"
         assert row.part == pytest.approx(1.0)
         assert row.stops
+        assert not row.rapid
+
+
+def test_a_rapid_is_measured_against_its_axes(square: Any) -> None:
+    path = replace(square.path, feed=np.full(4, np.inf))
+    problem = replace(square.problem, path=path, feed=np.full(4, 1000.0))
+    row = slowest_lines(problem, square.profile)[0]
+    assert row.rapid
+    # 20 mm at the 100 mm/s of the axis would take 0.2 s, not the 0.02 s that 1000 mm/s suggest.
+    assert row.lost == pytest.approx(0.3)
+    assert row.wanted == pytest.approx(100.0)
 
 
 def test_the_worst_lines_come_first_and_no_more_than_asked(square: Any) -> None:

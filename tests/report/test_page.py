@@ -130,10 +130,10 @@ def test_the_charts_hold_the_setpoints(square: Any, tmp_path: Path) -> None:
 
 
 def test_the_data_cannot_end_its_script(broken_square: Any, tmp_path: Path) -> None:
-    checks = [replace(check, name="</script>") for check in broken_square.verdict.checks]
+    checks = [replace(check, axis="</script>") for check in broken_square.verdict.checks]
     broken_square.verdict = replace(broken_square.verdict, checks=tuple(checks))
     data = data_of(page(broken_square, tmp_path / "report.html"))
-    assert data["failures"][0]["name"] == "</script>"
+    assert data["failures"][0]["axis"] == "</script>"
 
 
 def test_a_program_that_is_gone_costs_only_its_text(square: Any, tmp_path: Path) -> None:

@@ -242,7 +242,11 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
         match self.limit_curve() {
             Some([start, end]) if self.p >= start * (1.0 - ON_LIMIT_CURVE) => {
                 self.p = self.p.min(start);
-                end < start
+                if end < start * (1.0 - ON_LIMIT_CURVE) {
+                    return true;
+                }
+                self.p = self.p.min(end);
+                false
             }
             _ => false,
         }

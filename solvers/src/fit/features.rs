@@ -118,6 +118,7 @@ fn worst_point<const M: usize>(chain: &Chain<M>, q1: usize, q2: usize, q3: usize
 mod tests {
     use super::*;
     use crate::fit::lengths_along;
+    use crate::quadratic::Quadratic;
 
     fn features(points: &[[f64; 2]], extremes: &[usize], tolerance: f64) -> Vec<usize> {
         let along = lengths_along(points);
@@ -125,9 +126,20 @@ mod tests {
         let features = select(&chain, 0, points.len() - 1, extremes);
         assert!(features.windows(2).all(|pair| pair[0] < pair[1]));
         assert_eq!((features[0], features[features.len() - 1]), (0, points.len() - 1));
-        // What Algorithm 1 promises: every triple stands for the points between.
+        // What Algorithm 1 promises: the Bézier curve through a triple is near all points between.
         for triple in features.windows(3) {
-            assert_eq!(worst_point(&chain, triple[0], triple[1], triple[2]), None);
+            let [q1, q2, q3] = [triple[0], triple[1], triple[2]];
+            let u = (along[q2] - along[q1]) / (along[q3] - along[q1]);
+            let middle: [f64; 2] = std::array::from_fn(|k| {
+                (points[q2][k] - (1.0 - u) * (1.0 - u) * points[q1][k] - u * u * points[q3][k])
+                    / (2.0 * u * (1.0 - u))
+            });
+            let bezier = Quadratic { control: [points[q1], middle, points[q3]], width: 1.0 };
+            let curve: Vec<[f64; 2]> = (0..=1000).map(|i| bezier.point(f64::from(i) / 1000.0)).collect();
+            for point in &points[q1..q3] {
+                let off_sq = curve.windows(2).map(|c| Segment::new(&c[0], &c[1]).distance_sq(point));
+                assert!(off_sq.fold(f64::INFINITY, f64::min).sqrt() <= 1.001 * tolerance);
+            }
         }
         features
     }

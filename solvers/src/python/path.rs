@@ -5,10 +5,12 @@ use numpy::{
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use rayon::prelude::*;
 
-use super::arrays::{row, rows, to_array3};
+use super::arrays::{row, rows};
 use super::with_padded_axes;
-use crate::follow::{ArcShape, Fault, FollowOptions, Moves};
+use crate::arc::ArcError;
+use crate::follow::{ArcShape, Fault, FollowOptions, Followed, Moves};
 use crate::path_builder::{build_path as build, Axes, BuiltPath};
 
 pyo3::import_exception!(feedplan.errors, ProgramError);
@@ -124,8 +126,13 @@ fn sentence(fault: Fault) -> &'static str {
     match fault {
         Fault::Length => "the move has no length, or a coordinate is not a finite number: correct the block",
         Fault::Feed => "the move has no positive feed: give F a value above 0",
-        Fault::Radius => "the arc has no radius, or a coordinate is not a finite number: correct its centre",
-        Fault::Sweep => "the arc does not lead to its end point: correct its centre or its end",
+        Fault::Arc(ArcError::Radius) => {
+            "the arc has no radius, or no finite one: correct its centre or its end"
+        }
+        Fault::Arc(ArcError::Sweep) => {
+            "the arc does not lead to its end point: correct its centre or its end"
+        }
+        Fault::Arc(ArcError::Turns) => "the arc has too many turns to be followed: give fewer",
     }
 }
 
@@ -134,18 +141,53 @@ fn columns<'py, const M: usize>(
     path: &BuiltPath<M>,
     axes: usize,
 ) -> (Columns<'py>, Summary, Option<Place>) {
-    let pieces: Vec<_> = path.pieces.iter().map(|followed| followed.piece).collect();
-    let moves: Vec<i64> =
-        path.pieces.iter().flat_map(|followed| [followed.first as i64, followed.last as i64]).collect();
-    let moves = PyArray1::from_vec(py, moves).reshape([pieces.len(), 2]).expect("n × 2 values");
+    let parts = &path.parts;
+    let count = parts.iter().map(Vec::len).sum();
+    let (control, width, feed, moves, tolerance) = py.detach(|| {
+        (
+            gather(parts, 3 * axes, |followed, out: &mut [f64]| {
+                for (row, point) in out.chunks_exact_mut(axes).zip(&followed.piece.control) {
+                    row.copy_from_slice(&point[..axes]);
+                }
+            }),
+            gather(parts, 1, |followed, out| out[0] = followed.piece.width),
+            gather(parts, 1, |followed, out| out[0] = followed.feed),
+            gather(parts, 2, |followed, out: &mut [i64]| {
+                out.copy_from_slice(&[i64::from(followed.first), i64::from(followed.last)]);
+            }),
+            gather(parts, 1, |followed, out| out[0] = followed.tolerance),
+        )
+    });
     let columns = (
-        to_array3(py, &pieces, axes),
-        PyArray1::from_iter(py, pieces.iter().map(|piece| piece.width)),
-        PyArray1::from_iter(py, path.pieces.iter().map(|followed| followed.feed)),
-        moves,
-        PyArray1::from_iter(py, path.pieces.iter().map(|followed| followed.tolerance)),
-        PyArray1::from_iter(py, path.runs.iter().map(|&start| start as i64)),
+        PyArray1::from_vec(py, control).reshape([count, 3, axes]).expect("n × 3 × axes values"),
+        PyArray1::from_vec(py, width),
+        PyArray1::from_vec(py, feed),
+        PyArray1::from_vec(py, moves).reshape([count, 2]).expect("n × 2 values"),
+        PyArray1::from_vec(py, tolerance),
+        PyArray1::from_vec(py, path.runs.iter().map(|&start| start as i64).collect()),
     );
     let summary = (path.points, path.splines, path.polynomials, path.deviation);
     (columns, summary, path.outside.map(|place| (place.index, place.axis, place.position)))
+}
+
+/// One column, `stride` values a piece, written by all parts at once.
+fn gather<const M: usize, T: Default + Clone + Send>(
+    parts: &[Vec<Followed<M>>],
+    stride: usize,
+    write: impl Fn(&Followed<M>, &mut [T]) + Sync,
+) -> Vec<T> {
+    let mut column = vec![T::default(); stride * parts.iter().map(Vec::len).sum::<usize>()];
+    let mut rest = &mut column[..];
+    let mut slices = Vec::with_capacity(parts.len());
+    for part in parts {
+        let (slice, tail) = rest.split_at_mut(stride * part.len());
+        slices.push(slice);
+        rest = tail;
+    }
+    parts.par_iter().zip(slices).for_each(|(part, slice)| {
+        for (followed, out) in part.iter().zip(slice.chunks_exact_mut(stride)) {
+            write(followed, out);
+        }
+    });
+    column
 }

@@ -142,6 +142,13 @@ impl PySampler {
         let arc_runs = offsets(&arc_runs)?;
         let interpolator = if newton { Interpolator::Newton } else { Interpolator::Sarfraz };
         let axes = control_points.shape()[2];
+        let of_axis = |kind| matches!(kind, ArcKind::AxisAcceleration | ArcKind::AxisVelocity);
+        if let Some(i) = arcs.iter().position(|arc| of_axis(arc.kind) && arc.axis as usize >= axes) {
+            return Err(InputError::new_err(format!(
+                "arc {i} of the profile is governed by axis {}, but the path has {axes}: plan this path again",
+                arcs[i].axis
+            )));
+        }
         let stream = with_padded_axes!(axes, M, {
             let path = PathData::<M> {
                 pieces: quadratics(&control_points, &width)?,
