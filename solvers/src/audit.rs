@@ -8,10 +8,13 @@ pub mod arcs;
 pub mod curve;
 pub mod deviation;
 pub mod follow;
+pub mod integral;
+pub mod motion;
 pub mod moves;
 pub mod place;
 pub mod profile;
 pub mod setpoints;
+pub mod timed;
 
 /// A ratio of measured value to limit passes up to here: a millionth covers the planner's own rounding over
 /// 100 000 pieces (some 1e-10) and means nothing to a machine.

@@ -8,8 +8,9 @@
 
 use rayon::prelude::*;
 
-use super::arcs::{Arcs, Motion, State};
+use super::arcs::Arcs;
 use super::curve::{length, Followed};
+use super::motion::{Motion, State};
 use super::{Check, Limits, Tally, EPS, GAP_TOLERANCE, PASS_EXCESS, ROUNDINGS};
 
 /// Even intervals of an arc.

@@ -8,10 +8,11 @@ use super::with_axes;
 use crate::audit::arcs::Arcs;
 use crate::audit::curve::Followed;
 use crate::audit::deviation::{audit_deviation, audit_path};
-use crate::audit::follow::{Plan, Timed};
+use crate::audit::follow::Plan;
 use crate::audit::moves::Programmed;
 use crate::audit::profile::audit_profile;
 use crate::audit::setpoints::{Chunk, Stream};
+use crate::audit::timed::Timed;
 use crate::audit::{Check, Limits, Tally};
 
 /// Name, axis (−1: none), worst value, limit, ratio, time, source line of one limit.
