@@ -5,8 +5,10 @@
 //! exceeds a limit only where the motion does, so a broken limit found here is truly broken.
 
 pub mod arcs;
+pub mod compare;
 pub mod curve;
 pub mod deviation;
+pub mod differences;
 pub mod follow;
 pub mod integral;
 pub mod motion;

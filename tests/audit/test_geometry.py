@@ -195,5 +195,5 @@ def test_the_audit_uses_nothing_of_what_it_audits() -> None:
     assert len(files) > 5
     for file in files:
         text = file.read_text()
-        assert "crate::" not in text, file.name
+        assert "crate::" not in text.replace("crate::audit::", ""), file.name
         assert "super::super" not in text, file.name

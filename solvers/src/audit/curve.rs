@@ -139,19 +139,36 @@ pub fn distance<const M: usize>(a: &[f64; M], b: &[f64; M]) -> f64 {
     length(&from_to(a, b))
 }
 
-/// Distance of `q` from the straight line from `a` to `b`, ends included.
-#[inline]
-pub fn distance_to_segment<const M: usize>(q: &[f64; M], a: &[f64; M], b: &[f64; M]) -> f64 {
-    let along = from_to(a, b);
-    let to = from_to(a, q);
-    let length_sq = inner(&along, &along);
-    let t = if length_sq > 0.0 { (inner(&to, &along) / length_sq).clamp(0.0, 1.0) } else { 0.0 };
-    let mut sum = 0.0;
-    for k in 0..M {
-        let d = to[k] - t * along[k];
-        sum += d * d;
+/// A straight line from one point to another, ends included.
+#[derive(Clone, Copy, Debug)]
+pub struct Segment<const M: usize> {
+    start: [f64; M],
+    /// To the other end, and the inverse of its square; 0 where that would be infinite.
+    along: [f64; M],
+    per_length_sq: f64,
+}
+
+impl<const M: usize> Segment<M> {
+    #[inline]
+    pub fn new(a: &[f64; M], b: &[f64; M]) -> Self {
+        let along = from_to(a, b);
+        let length_sq = inner(&along, &along);
+        let per_length_sq = Some(length_sq.recip()).filter(|inverse| inverse.is_finite()).unwrap_or(0.0);
+        Self { start: *a, along, per_length_sq }
     }
-    sum.sqrt()
+
+    /// Square of the distance of `q` from the nearest point.
+    #[inline]
+    pub fn distance_sq(&self, q: &[f64; M]) -> f64 {
+        let to = from_to(&self.start, q);
+        let t = (inner(&to, &self.along) * self.per_length_sq).clamp(0.0, 1.0);
+        let mut sum = 0.0;
+        for k in 0..M {
+            let d = to[k] - t * self.along[k];
+            sum += d * d;
+        }
+        sum
+    }
 }
 
 #[cfg(test)]
@@ -184,9 +201,10 @@ mod tests {
     #[test]
     fn a_point_beside_a_segment_is_as_far_as_the_nearest_end_or_foot() {
         let (a, b) = ([0.0, 0.0], [4.0, 0.0]);
-        assert_eq!(distance_to_segment(&[2.0, 3.0], &a, &b), 3.0);
-        assert_eq!(distance_to_segment(&[7.0, 4.0], &a, &b), 5.0);
-        assert_eq!(distance_to_segment(&[-3.0, 4.0], &a, &b), 5.0);
-        assert_eq!(distance_to_segment(&[3.0, 4.0], &a, &a), 5.0);
+        let segment = Segment::new(&a, &b);
+        assert_eq!(segment.distance_sq(&[2.0, 3.0]), 9.0);
+        assert_eq!(segment.distance_sq(&[7.0, 4.0]), 25.0);
+        assert_eq!(segment.distance_sq(&[-3.0, 4.0]), 25.0);
+        assert_eq!(Segment::new(&a, &a).distance_sq(&[3.0, 4.0]), 25.0);
     }
 }

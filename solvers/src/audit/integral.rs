@@ -124,6 +124,15 @@ impl<const M: usize> Motion<M> {
         Err(middle)
     }
 
+    /// Time of an interval so short that the 3-point rule is enough, in s.
+    #[inline]
+    fn short_time(&self, y0: f64, y1: f64) -> f64 {
+        let (middle, half) = (0.5 * (y0 + y1), 0.5 * (y1 - y0));
+        let both = self.integrand(middle - half * NODES[1]) + self.integrand(middle + half * NODES[1]);
+        let sum = INNER_WEIGHTS[1] * self.integrand(middle) + INNER_WEIGHTS[0] * both;
+        self.time_scale * half * sum
+    }
+
     /// Axis accelerations near `y` as a difference quotient over a thousandth of the arc, or less where p changes
     /// fast, in mm/s², and how much of each may be rounding.
     pub fn acceleration_near(&self, y: f64) -> ([f64; M], [f64; M]) {
@@ -132,7 +141,7 @@ impl<const M: usize> Motion<M> {
         // Around y, so that the mean is that at y to second order; at an end one-sided and very short.
         let half = f64::min(5e-4, 0.01 * away / self.width).min(y.min(1.0 - y).max(1e-6));
         let (from, to) = (self.state((y - half).max(0.0)), self.state((y + half).min(1.0)));
-        let time = self.direction * self.time_between(from.y, to.y, &mut { MOST_HALVINGS });
+        let time = self.direction * self.short_time(from.y, to.y);
         (
             std::array::from_fn(|k| (to.velocity[k] - from.velocity[k]) / time),
             std::array::from_fn(|k| ROUNDINGS * EPS * (from.magnitude[k] + to.magnitude[k]) / time.abs()),

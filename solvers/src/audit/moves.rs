@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::curve::{distance, distance_to_segment, from_to, inner};
+use super::curve::{distance, from_to, inner, Segment};
 
 /// The program's arrays, one entry a move; see `feedplan.Program`.
 #[derive(Clone, Copy)]
@@ -119,7 +119,7 @@ impl<const M: usize> Move<M> {
     /// Distance of `q` from the nearest place of the move, in mm.
     pub fn distance(&self, q: &[f64; M]) -> f64 {
         match &self.arc {
-            None => distance_to_segment(q, &self.from, &self.to),
+            None => Segment::new(&self.from, &self.to).distance_sq(q).sqrt(),
             Some(arc) => self.distance_to_arc(arc, q),
         }
     }
@@ -163,19 +163,40 @@ impl<const M: usize> Move<M> {
     }
 }
 
-/// Distance of `q` from the nearest of some moves, or from the first that is within `enough`; a NaN if there is one.
-pub fn nearest_of<const M: usize>(moves: impl Iterator<Item = Move<M>>, q: &[f64; M], enough: f64) -> f64 {
-    let mut nearest = f64::INFINITY;
-    for programmed in moves {
-        let away = programmed.distance(q);
-        if away.is_nan() || away < nearest {
-            nearest = away;
-        }
-        if away.is_nan() || nearest <= enough {
-            break;
-        }
+/// Some moves that places along a path are measured against, one after the other.
+#[derive(Clone, Debug, Default)]
+pub struct Neighbours<const M: usize> {
+    moves: Vec<Move<M>>,
+    /// The one nearest to the place before: mostly nearest to the next one too.
+    nearest: usize,
+}
+
+impl<const M: usize> Neighbours<M> {
+    /// Takes other moves.
+    pub fn replace(&mut self, moves: impl Iterator<Item = Move<M>>) {
+        self.moves.clear();
+        self.moves.extend(moves);
+        self.nearest = 0;
     }
-    nearest
+
+    /// Distance of `q` from the nearest move, or from the first that is within `enough`; a NaN if there is one.
+    pub fn distance(&mut self, q: &[f64; M], enough: f64) -> f64 {
+        let mut least = f64::INFINITY;
+        let first = self.nearest;
+        for m in (first..self.moves.len()).chain(0..first) {
+            let away = self.moves[m].distance(q);
+            if away.is_nan() {
+                return away;
+            }
+            if away < least {
+                (least, self.nearest) = (away, m);
+            }
+            if least <= enough {
+                break;
+            }
+        }
+        least
+    }
 }
 
 #[cfg(test)]

@@ -29,9 +29,10 @@ fn slope<const M: usize>(curve: &Curve<M>, q: &[f64; M], t: f64) -> (f64, f64) {
 }
 
 /// The root between `a`, where the slope is negative, and `b`, where it is not: Newton, halved when it strays.
-fn root<const M: usize>(curve: &Curve<M>, q: &[f64; M], mut a: f64, mut b: f64) -> f64 {
+/// `at_a` are the slope and its derivative at `a`.
+fn root<const M: usize>(curve: &Curve<M>, q: &[f64; M], mut a: f64, at_a: (f64, f64), mut b: f64) -> f64 {
     let mut t = a;
-    let (mut f, mut df) = slope(curve, q, t);
+    let (mut f, mut df) = at_a;
     for _ in 0..100 {
         let newton = t - f / df;
         if newton > a && newton < b {
@@ -80,14 +81,20 @@ fn monotone_parts<const M: usize>(curve: &Curve<M>, q: &[f64; M], t0: f64) -> [f
 pub fn first_minimum<const M: usize>(curve: &Curve<M>, q: &[f64; M], from: f64) -> (f64, f64, bool) {
     let t0 = (from / curve.width).clamp(0.0, 1.0);
     let (mut u, mut falls) = (from, false);
-    if slope(curve, q, t0).0 < 0.0 {
+    let mut before = slope(curve, q, t0);
+    if before.0 < 0.0 {
         (u, falls) = (curve.width, true);
         let ends = monotone_parts(curve, q, t0);
         for i in 0..3 {
-            if slope(curve, q, ends[i + 1]).0 >= 0.0 {
-                (u, falls) = (root(curve, q, ends[i], ends[i + 1]) * curve.width, false);
+            if ends[i + 1] <= ends[i] {
+                continue;
+            }
+            let after = slope(curve, q, ends[i + 1]);
+            if after.0 >= 0.0 {
+                (u, falls) = (root(curve, q, ends[i], before, ends[i + 1]) * curve.width, false);
                 break;
             }
+            before = after;
         }
     }
     (u, distance(q, &curve.at(u)), falls)
@@ -103,11 +110,11 @@ pub fn all_minima<const M: usize>(
 ) {
     let t0 = (from / curve.width).clamp(0.0, 1.0);
     let ends = monotone_parts(curve, q, t0);
-    let falls = ends.map(|t| slope(curve, q, t).0 < 0.0);
+    let slopes = ends.map(|t| slope(curve, q, t));
     found(from, distance(q, &curve.at(from)));
     for i in 0..3 {
-        if falls[i] && !falls[i + 1] {
-            let u = root(curve, q, ends[i], ends[i + 1]) * curve.width;
+        if slopes[i].0 < 0.0 && slopes[i + 1].0 >= 0.0 {
+            let u = root(curve, q, ends[i], slopes[i], ends[i + 1]) * curve.width;
             found(u, distance(q, &curve.at(u)));
         }
     }
