@@ -58,14 +58,14 @@ impl<'a, const M: usize> Comparison<'a, M> {
         let (Some(profile), limits, spot) = (&mut self.profile, self.limits, &row.spot) else { return };
         let here = profile.go_to(spot.place);
         if let Some(recorded) = row.velocity {
-            let state = profile.motion.state(here.y);
+            let velocity = profile.motion.velocity(here.y);
             let away = rounding + spot.off.max(0.0) + spot.late;
             let rest = self.plan.path.width[spot.place.piece] - spot.place.u;
             let at_joint = spot.place.u.min(rest) <= PLACE_TOLERANCE;
             for k in 0..M {
                 // From rest, a place known to `away` is passed at a speed known to this.
                 let unknown = (2.0 * limits.acceleration[k] * away).sqrt();
-                let off = (recorded[k] - state.velocity[k]).abs() - unknown;
+                let off = (recorded[k] - velocity[k]).abs() - unknown;
                 let jump = if at_joint { limits.jump[k] } else { 0.0 };
                 let limit = VELOCITY_SHARE * limits.acceleration[k] * limits.period + jump;
                 tally.offer(Check::RecordedVelocity, k, off, limit, row.t, row.line);

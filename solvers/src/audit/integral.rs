@@ -137,14 +137,17 @@ impl<const M: usize> Motion<M> {
     /// fast, in mm/s², and how much of each may be rounding.
     pub fn acceleration_near(&self, y: f64) -> ([f64; M], [f64; M]) {
         let d = self.distance(y);
-        let away = self.pole.map_or(f64::INFINITY, |pole| (d - pole.at).hypot(pole.beside));
+        let away = self
+            .pole
+            .map_or(f64::INFINITY, |pole| ((d - pole.at) * (d - pole.at) + pole.beside * pole.beside).sqrt());
         // Around y, so that the mean is that at y to second order; at an end one-sided and very short.
         let half = f64::min(5e-4, 0.01 * away / self.width).min(y.min(1.0 - y).max(1e-6));
         let (from, to) = (self.state((y - half).max(0.0)), self.state((y + half).min(1.0)));
-        let time = self.direction * self.short_time(from.y, to.y);
+        let per_time = self.direction / self.short_time(from.y, to.y);
+        let rounding = ROUNDINGS * EPS * per_time.abs();
         (
-            std::array::from_fn(|k| (to.velocity[k] - from.velocity[k]) / time),
-            std::array::from_fn(|k| ROUNDINGS * EPS * (from.magnitude[k] + to.magnitude[k]) / time.abs()),
+            std::array::from_fn(|k| (to.velocity[k] - from.velocity[k]) * per_time),
+            std::array::from_fn(|k| (from.magnitude[k] + to.magnitude[k]) * rounding),
         )
     }
 }

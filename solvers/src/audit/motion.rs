@@ -160,19 +160,39 @@ impl<const M: usize> Motion<M> {
         }
     }
 
+    /// Distance from the anchor, C' and √p at `y`.
+    #[inline(always)]
+    fn place(&self, y: f64) -> (f64, [f64; M], f64) {
+        let d = self.distance(y);
+        let tangent = std::array::from_fn(|k| self.tangent[k] + d * self.bend[k]);
+        let root_p = if self.keeps_recorded(y) { self.root_anchor } else { self.root_p(d, &tangent) };
+        (d, tangent, root_p)
+    }
+
+    /// At the anchor of an accelerating arc the recorded p stands for itself, also where C'_k is 0.
+    #[inline(always)]
+    fn keeps_recorded(&self, y: f64) -> bool {
+        y == 0.0 && matches!(self.law, Law::AxisAcceleration { .. })
+    }
+
+    /// Axis velocities at `y` in mm/s.
+    #[inline]
+    pub fn velocity(&self, y: f64) -> [f64; M] {
+        let (_, tangent, root_p) = self.place(y);
+        tangent.map(|g| g * root_p)
+    }
+
     /// The motion at `y`.
     #[inline]
     pub fn state(&self, y: f64) -> State<M> {
-        let d = self.distance(y);
-        let tangent: [f64; M] = std::array::from_fn(|k| self.tangent[k] + d * self.bend[k]);
+        let (d, tangent, root_p) = self.place(y);
         let terms: [f64; M] = std::array::from_fn(|k| self.tangent[k].abs() + (d * self.bend[k]).abs());
-        // At the anchor of an accelerating arc the recorded p stands for itself, also where C'_k is 0.
-        let at_anchor = y == 0.0 && matches!(self.law, Law::AxisAcceleration { .. });
-        let root_p = if at_anchor { self.root_anchor } else { self.root_p(d, &tangent) };
-        let velocity: [f64; M] = std::array::from_fn(|k| tangent[k] * root_p);
+        let velocity = tangent.map(|g| g * root_p);
         // How much the rounding of C' is enlarged in p.
         let enlarged = match self.law {
-            Law::AxisAcceleration { axis, .. } | Law::AxisVelocity { axis, .. } if !at_anchor => {
+            Law::AxisAcceleration { axis, .. } | Law::AxisVelocity { axis, .. }
+                if !self.keeps_recorded(y) =>
+            {
                 terms[axis] / tangent[axis].abs()
             }
             Law::Feed { .. } | Law::Chord { .. } => length(&terms) / length(&tangent),

@@ -138,10 +138,14 @@ impl<'a, const M: usize> Reader<'a, M> {
         let here = self.go_to(place);
         let [from, until] = self.times(here, limits.period);
         let wait = (from - time).max(time - until).max(0.0);
-        let speed = length(&self.motion.state(here.y).velocity);
-        let reach = |wait: f64| wait * (speed + 0.5 * wait * length(&limits.acceleration));
         // Summing the durations of all arcs before has rounded once for each.
-        reach(wait) - reach(EPS * time.abs() * (self.arc as f64 + ROUNDINGS))
+        let rounding = EPS * time.abs() * (self.arc as f64 + ROUNDINGS);
+        if wait <= rounding {
+            return 0.0;
+        }
+        let speed = length(&self.motion.velocity(here.y));
+        let reach = |wait: f64| wait * (speed + 0.5 * wait * length(&limits.acceleration));
+        reach(wait) - reach(rounding)
     }
 
     /// Least and greatest acceleration of each axis just before and just after `time`, at a place of the reader's arc.
