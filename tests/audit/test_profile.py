@@ -193,7 +193,7 @@ def test_bad_numbers_in_the_profile_are_never_fine(
     arc = len(part.profile) // 2
     result = part.with_profile(**{field: changed(getattr(part.profile, field), arc, bad)}).audit()
     assert not result.ok
-    if not math.isfinite(bad):
+    if not math.isfinite(bad) or field in ("p0", "p1", "duration"):
         assert ("numbers", None) in broken(result)
         assert result.check("numbers").line == part.path.line[part.profile.piece[arc]]
 
@@ -362,6 +362,33 @@ def test_the_position_of_an_axis_is_kept_within_its_travel() -> None:
     # The parabola's lowest point lies between its ends.
     low = replace(plane(), axes=(plane().axes[0], replace(plane().axes[1], travel=(0.001, 2.0))))
     assert broken(audit(problem_of(PARABOLA, **THROUGH), STEADY_X, low)) == {("travel", "Y")}
+
+
+def test_numbers_with_hardly_a_digit_left_end_in_a_verdict() -> None:
+    # p has one or two significant bits: no rule ever agrees with another, however short the interval.
+    p0, p1 = 2e-323, 8e-323
+    for value in (p1 - p0, 5e-324):
+        arc = (0, ArcKind.AXIS_ACCELERATION, 0, value, 0.0, 10.0, p0, p1, 1e150)
+        assert not audit(problem_of(LINE), profile_of(arc), plane()).ok
+    bent = (0, ArcKind.AXIS_ACCELERATION, 1, 1e-322, 0.0, 2.0, p0, p1, 1e150)
+    assert not audit(problem_of(PARABOLA), profile_of(bent), plane()).ok
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_profile_of_rubbish_ends_in_a_verdict(part: Any, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    strange = np.array([0.0, -0.0, -1.0, 5e-324, 1e-310, 1e-160, 1e160, 1e308, math.inf, math.nan])
+    changes: dict[str, NDArray[Any]] = {}
+    for name in ("value", "u0", "u1", "p0", "p1", "duration"):
+        column = getattr(part.profile, name)
+        hit = rng.random(len(column)) < (0.02, 0.2, 1.0)[seed % 3]
+        # In every other case only what counts as a number, to get past the first look.
+        values = strange if seed % 2 else strange[[0, 3, 4, 5, 6]]
+        changes[name] = np.where(hit, rng.choice(values, len(column)), column)
+    piece = rng.integers(0, 2**32, len(part.profile), dtype=np.uint32)
+    changes["piece"] = piece if seed % 4 == 3 else rng.permutation(part.profile.piece)
+    for case in (part.with_profile(**{**changes, "piece": part.profile.piece}), part.with_profile(**changes)):
+        assert not case.audit().ok
 
 
 def test_limits_that_are_no_numbers_fail() -> None:

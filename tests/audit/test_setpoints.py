@@ -186,12 +186,48 @@ def test_recorded_velocities_and_accelerations_must_be_those_of_the_motion(
         assert result.check(f"recorded_{name}", "XYZ"[k]).time == pytest.approx(part.points.t[row])
 
 
+def test_setpoints_off_the_program_are_found_where_the_path_is_not(part: Any, changed: Change) -> None:
+    # The path's own places are an eighth of a piece apart and a setpoint falls between two of them.
+    row = moving(part, 100)
+    assert part.program is not None
+    case = part.with_path(tolerance=np.full(len(part.path), 1e-3))
+    base = case.audit().check("deviation").worst
+    z = changed(part.points.position, (row, 2), lambda z: z + 10 * base + 1.0)
+    result = audit(case.problem, None, case.machine, case.program, case.with_points(position=z).chunks(1000))
+    assert result.check("deviation").worst > 0.9
+    assert result.check("deviation").time == pytest.approx(part.points.t[row])
+
+
+def test_the_progress_grows_from_nothing_to_all(part: Any) -> None:
+    shares: list[float] = []
+    stream = setpoints(part.path, part.profile, part.problem.period)
+    audit(part.problem, part.profile, part.machine, part.program, stream, progress=shares.append)
+    assert shares == sorted(shares)
+    assert (shares[0], shares[-1]) == (0.0, 1.0)
+    assert len(shares) > 3
+
+
 def test_setpoints_far_off_the_path_are_found_without_searching_for_ever(part: Any) -> None:
     for shift in (100.0, 1e300):
         for profile in (part.profile, None):
             case = part.with_points(position=part.points.position + shift)
             result = audit(case.problem, profile, case.machine, part.program, case.chunks(1000))
             assert ("place", None) in broken(result)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_setpoints_of_rubbish_end_in_a_verdict(part: Any, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    count = len(part.points.t)
+    order = rng.integers(0, count, 20_000)
+    strange = np.array([0.0, -1.0, 5e-324, 1e160, 1e308, -1e308, math.inf, math.nan])
+    case = part.rows(lambda column: column[order])
+    for name in ("t", "position"):
+        values = getattr(case.points, name)
+        hit = rng.random(values.shape) < (0.0, 0.01, 0.5)[seed % 3]
+        case = case.with_points(**{name: np.where(hit, rng.choice(strange, values.shape), values)})
+    for profile in (case.profile, None):
+        assert not audit(case.problem, profile, case.machine, case.program, case.chunks(7000)).ok
 
 
 def test_a_corner_cut_by_a_step_is_a_chord_error() -> None:

@@ -2,7 +2,7 @@
 
 use super::curve::{distance, from_to, inner, length, Segment};
 use super::deviation::{settled, window};
-use super::follow::{Plan, Spot};
+use super::follow::{is_step, Plan};
 use super::moves::Neighbours;
 use super::setpoints::Row;
 use super::timed::Reader;
@@ -84,6 +84,9 @@ impl<'a, const M: usize> Comparison<'a, M> {
     /// What the step between two setpoints shows: its speed, and the path between them.
     pub fn step(&self, before: &Row<M>, row: &Row<M>, step: f64, rounding: f64, tally: &mut Tally<M>) {
         let (path, limits) = (&self.plan.path, self.limits);
+        if !is_step(before.t, row.t, limits.period) {
+            return;
+        }
         let (from, to) = (before.spot.place, row.spot.place);
         let (time, line) = (row.t, row.line);
         let chord = Segment::new(&before.q, &row.q);
@@ -143,9 +146,13 @@ impl<'a, const M: usize> Comparison<'a, M> {
         0.125 * step * step * most
     }
 
-    /// Corners of the path between two places, those included that the places cannot be told from.
-    pub fn corners(&self, from: &Spot, to: &Spot) -> f64 {
-        let path = &self.plan.path;
+    /// Corners of the path in two steps, those included that the places at their ends cannot be told from.
+    pub fn corners(&self, rows: [&Row<M>; 3]) -> f64 {
+        let (path, period) = (&self.plan.path, self.limits.period);
+        if rows.windows(2).any(|pair| !is_step(pair[0].t, pair[1].t, period)) {
+            return 0.0;
+        }
+        let (from, to) = (&rows[0].spot, &rows[2].spot);
         let at_start = from.place.u <= PLACE_TOLERANCE;
         let at_end = path.width[to.place.piece] - to.place.u <= PLACE_TOLERANCE;
         let first = if at_start { from.place.piece.max(1) } else { from.place.piece + 1 };

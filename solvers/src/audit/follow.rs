@@ -130,27 +130,29 @@ struct Finder<'a, const M: usize> {
     plan: &'a Plan<'a>,
     limits: &'a Limits<M>,
     profile: Option<Reader<'a, M>>,
-    /// No setpoint moves faster, in mm/s, unless it breaks a limit.
-    fastest: f64,
+    /// No setpoint gets farther in a period or two, in mm, unless it breaks a limit.
+    reach: f64,
 }
 
 impl<'a, const M: usize> Finder<'a, M> {
     fn new(plan: &'a Plan<'a>, limits: &'a Limits<M>) -> Self {
         let profile = plan.profile.as_ref().map(|profile| Reader::new(profile, &plan.path));
-        Self { plan, limits, profile, fastest: 2.0 * length(&limits.velocity) }
+        Self { plan, limits, profile, reach: 2.0 * limits.period * length(&limits.velocity) }
     }
 
     fn find(&mut self, previous: Option<&Row<M>>, row: &Row<M>) -> Spot {
         let (path, limits) = (&self.plan.path, self.limits);
         // From the place before; where that is not known or not to be trusted, from where the profile was then.
-        let known = previous.filter(|row| row.spot.is_good() || self.profile.is_none());
+        let known = previous.filter(|before| {
+            let near = (row.t - before.t).abs() <= 2.0 * limits.period;
+            self.profile.is_none() || (before.spot.is_good() && near)
+        });
         let from = match (known, &self.plan.profile) {
             (Some(row), _) => row.spot.place,
             (None, Some(profile)) => profile.place_before(path, row.t - limits.period),
             (None, None) => Place { piece: 0, u: 0.0 },
         };
-        let reach = self.fastest * previous.map_or(limits.period, |before| (row.t - before.t).abs());
-        if !(row.t.is_finite() && row.q.iter().all(|q| q.is_finite()) && reach.is_finite()) {
+        if !(row.t.is_finite() && row.q.iter().all(|q| q.is_finite()) && self.reach.is_finite()) {
             return Spot { place: from, off: f64::INFINITY, ..Spot::default() };
         }
         let step = previous.map_or(0.0, |before| distance(&before.q, &row.q));
@@ -163,11 +165,17 @@ impl<'a, const M: usize> Finder<'a, M> {
             (late - rounding).max(0.0)
         };
         let close = PLACE_TOLERANCE + rounding;
-        let mut search = Search { path, reach, close, judge, allowed };
+        let mut search = Search { path, reach: self.reach, close, judge, allowed };
         let found = search.next_place(from, &row.q);
         let late = if found.error.is_finite() { found.error } else { 0.0 };
         Spot { place: found.place, magnitude, off: found.distance - rounding, late, allowed }
     }
+}
+
+/// Whether one setpoint can be followed to the next: what is out of step is broken already, and whatever path lies
+/// between is not looked at.
+pub fn is_step(from: f64, to: f64, period: f64) -> bool {
+    to > from && to - from <= 2.0 * period
 }
 
 impl Spot {

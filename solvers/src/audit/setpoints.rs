@@ -299,7 +299,7 @@ impl<const M: usize> View<'_, M> {
             let mut limit = limits.acceleration[k];
             if value > limit && limits.jump[k] > 0.0 {
                 let corners = *corners.get_or_insert_with(|| match comparison {
-                    Some(comparison) => comparison.corners(&rows[c - 1].spot, &rows[c + 1].spot),
+                    Some(comparison) => comparison.corners([&rows[c - 1], &rows[c], &rows[c + 1]]),
                     None if self.differences.looks_like_a_corner(c) => 1.0,
                     None => 0.0,
                 });
