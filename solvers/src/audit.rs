@@ -211,6 +211,8 @@ impl<const M: usize> Tally<M> {
 /// The limits that hold everywhere.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits<const M: usize> {
+    /// Those beyond are 0, and their travel is not limited.
+    pub axes: usize,
     /// In mm/s, mm/s² and mm/s³.
     pub velocity: [f64; M],
     pub acceleration: [f64; M],

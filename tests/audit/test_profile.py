@@ -163,6 +163,23 @@ def test_right_plans_pass_large_and_small_near_and_far(
     assert max(result.check("acceleration", name).ratio for name in "XYZ") > 1 - 1e-9
 
 
+@pytest.mark.parametrize("names", ["X", "XY", "XYZA", "XYZAB", "XYZABC"])
+def test_every_number_of_axes_is_audited_and_each_by_its_own_limit(
+    spline: Any, changed: Change, names: str
+) -> None:
+    axes = tuple(Axis(name, 300.0, 800.0 + 100.0 * k) for k, name in enumerate(names))
+    case = spline(Machine("many", axes, 0.001, 0.01), 1)
+    result = case.audit()
+    assert result.failures == ()
+    assert {check.axis for check in result.checks} == {None, *names}
+    last = len(names) - 1
+    for name, field in (("acceleration", "max_acceleration"), ("velocity", "max_velocity")):
+        limit = changed(getattr(case.problem, field), last, 0.99 * result.check(name, names[-1]).worst)
+        found = broken(case.with_problem(**{field: limit}).audit())
+        assert (name, names[-1]) in found
+        assert {axis for _, axis in found} == {names[-1]}
+
+
 def test_a_part_with_arcs_corners_pauses_and_stops_passes(part: Any) -> None:
     result = part.audit()
     assert result.failures == ()

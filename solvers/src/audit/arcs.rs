@@ -55,14 +55,14 @@ impl Arcs<'_> {
     }
 
     /// What is wrong with the numbers of arc `i` taken alone, if anything.
-    pub fn has_bad_numbers<const M: usize>(&self, i: usize, path: &Followed) -> bool {
+    pub fn has_bad_numbers(&self, i: usize, path: &Followed) -> bool {
         let piece = self.piece[i] as usize;
         if piece >= path.len() || self.kind[i] > CHORD {
             return true;
         }
         let needs_axis = matches!(self.kind[i], AXIS_ACCELERATION | AXIS_VELOCITY);
         let numbers = [self.value[i], self.u0[i], self.u1[i], self.p0[i], self.p1[i], self.duration[i]];
-        (needs_axis && self.axis[i] as usize >= M)
+        (needs_axis && self.axis[i] as usize >= path.axes)
             || numbers.iter().any(|number| !number.is_finite())
             || self.p0[i] < 0.0
             || self.p1[i] < 0.0

@@ -1,8 +1,12 @@
 //! The followed geometry as the audit sees it: a start point and two differences per piece.
+//!
+//! The kernels take `M` axes; where there are fewer, the last ones rest at 0 and have nothing to break.
 
 /// The path's arrays, one entry a piece; see `feedplan.Path`.
 #[derive(Clone, Copy)]
 pub struct Followed<'a> {
+    /// At most as many as the kernels take.
+    pub axes: usize,
     /// Control points, 3 × axes numbers a piece, in mm.
     pub control: &'a [f64],
     /// Parameter interval, in mm.
@@ -35,8 +39,7 @@ impl Followed<'_> {
     /// The control points of piece `i`.
     #[inline]
     pub fn points<const M: usize>(&self, i: usize) -> [[f64; M]; 3] {
-        let flat = &self.control[3 * M * i..3 * M * (i + 1)];
-        std::array::from_fn(|j| std::array::from_fn(|k| flat[j * M + k]))
+        std::array::from_fn(|j| vector(self.control, self.axes, 3 * i + j))
     }
 
     /// Piece `i` by its differences.
@@ -109,6 +112,13 @@ impl<const M: usize> Curve<M> {
         }
         most
     }
+}
+
+/// Row `i` of a table with a column for each axis.
+#[inline(always)]
+pub fn vector<const M: usize>(table: &[f64], axes: usize, i: usize) -> [f64; M] {
+    let row = &table[i * axes..(i + 1) * axes];
+    std::array::from_fn(|k| if k < row.len() { row[k] } else { 0.0 })
 }
 
 /// Length of a vector.

@@ -263,6 +263,7 @@ mod tests {
     #[test]
     fn a_move_without_a_piece_lies_between_its_neighbours() {
         let path = Followed {
+            axes: 2,
             control: &[],
             width: &[1.0; 3],
             feed: &[],

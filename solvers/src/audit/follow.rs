@@ -158,7 +158,7 @@ impl<'a, const M: usize> Finder<'a, M> {
         let step = previous.map_or(0.0, |before| distance(&before.q, &row.q));
         let most = path.curve::<M>(from.piece).magnitude();
         let magnitude = row.q.iter().fold(most, |most, q| most.max(q.abs()));
-        let rounding = ROUNDINGS * EPS * magnitude * (M as f64).sqrt();
+        let rounding = ROUNDINGS * EPS * magnitude * (path.axes as f64).sqrt();
         let allowed = PLACE_TOLERANCE.max(STEP_SHARE * step);
         let judge = |place: Place| {
             let late = self.profile.as_mut().map_or(0.0, |profile| profile.late(place, row.t, limits));

@@ -2,11 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use super::curve::{distance, from_to, inner, Segment};
+use super::curve::{distance, from_to, inner, vector, Segment};
 
 /// The program's arrays, one entry a move; see `feedplan.Program`.
 #[derive(Clone, Copy)]
 pub struct Programmed<'a> {
+    /// At most as many as the kernels take.
+    pub axes: usize,
     /// Where the first move begins, in mm.
     pub start: &'a [f64],
     /// Ends of the moves, axes numbers a move, in mm.
@@ -57,8 +59,8 @@ impl Programmed<'_> {
     /// End of move `i`; of the move before the first: the start.
     pub fn end<const M: usize>(&self, i: Option<usize>) -> [f64; M] {
         match i {
-            Some(i) => std::array::from_fn(|k| self.target[M * i + k]),
-            None => std::array::from_fn(|k| self.start[k]),
+            Some(i) => vector(self.target, self.axes, i),
+            None => vector(self.start, self.axes, 0),
         }
     }
 
@@ -207,6 +209,7 @@ mod tests {
     /// A helix about Z: radius 10, two turns and a quarter, 9 mm up.
     fn helix() -> Move<3> {
         Programmed {
+            axes: 3,
             start: &[10.0, 0.0, 0.0],
             target: &[0.0, 10.0, 9.0],
             line: &[1],
@@ -222,6 +225,7 @@ mod tests {
     #[test]
     fn a_quarter_circle_is_as_far_as_the_radii_differ() {
         let quarter = Programmed {
+            axes: 2,
             start: &[10.0, 0.0],
             target: &[0.0, 10.0],
             line: &[1],
@@ -244,6 +248,7 @@ mod tests {
         // G18 and G19: counter-clockwise seen from the tip of Y, of X.
         for (normal, target) in [(1_u8, [0.0, 0.0, -1.0]), (2, [0.0, 1.0, 0.0])] {
             let quarter = Programmed {
+                axes: 3,
                 start: &[1.0, 0.0, 0.0],
                 target: &target,
                 line: &[1],

@@ -241,6 +241,7 @@ mod tests {
 
     /// Two pieces: along X to 10 and back again.
     const THERE_AND_BACK: Followed = Followed {
+        axes: 2,
         control: &[0.0, 0.0, 5.0, 0.0, 10.0, 0.0, 10.0, 0.0, 5.0, 0.0, 0.0, 0.0],
         width: &[10.0, 10.0],
         feed: &[1.0, 1.0],

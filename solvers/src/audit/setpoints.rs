@@ -7,7 +7,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::compare::Comparison;
-use super::curve::{distance, length};
+use super::curve::{distance, length, vector};
 use super::deviation::offer_travel;
 use super::differences::{Differences, Quotient};
 use super::follow::{Plan, Spot};
@@ -25,6 +25,8 @@ const BLOCK: usize = 2048;
 /// Setpoints in order: times, positions of all axes, and what else is recorded.
 #[derive(Clone, Copy)]
 pub struct Chunk<'a> {
+    /// At most as many as the kernels take.
+    pub axes: usize,
     pub t: &'a [f64],
     pub position: &'a [f64],
     pub velocity: Option<&'a [f64]>,
@@ -68,15 +70,19 @@ impl<const M: usize> Stream<M> {
         Self { limits, resolution, kept: Vec::new(), count: 0, clock: Vec::new(), tally: Tally::default() }
     }
 
+    pub fn axes(&self) -> usize {
+        self.limits.axes
+    }
+
     /// The next setpoints; `plan` must be the same every time.
     pub fn push(&mut self, plan: Option<&Plan>, chunk: &Chunk) {
         let old = self.kept.len();
         let mut rows = std::mem::take(&mut self.kept);
         rows.par_extend((0..chunk.t.len()).into_par_iter().map(|i| Row {
             t: chunk.t[i],
-            q: vector(chunk.position, i),
-            velocity: chunk.velocity.map(|flat| vector(flat, i)),
-            acceleration: chunk.acceleration.map(|flat| vector(flat, i)),
+            q: vector(chunk.position, chunk.axes, i),
+            velocity: chunk.velocity.map(|table| vector(table, chunk.axes, i)),
+            acceleration: chunk.acceleration.map(|table| vector(table, chunk.axes, i)),
             line: chunk.line.map_or(0, |line| line[i]),
             spot: Spot::default(),
         }));
@@ -309,8 +315,4 @@ impl<const M: usize> View<'_, M> {
             tally.offer(Check::Acceleration, k, value, limit, rows[c].t, rows[c].line);
         }
     }
-}
-
-fn vector<const M: usize>(flat: &[f64], i: usize) -> [f64; M] {
-    std::array::from_fn(|k| flat[i * M + k])
 }
