@@ -117,8 +117,14 @@ impl<const M: usize> Curve<M> {
 /// Row `i` of a table with a column for each axis.
 #[inline(always)]
 pub fn vector<const M: usize>(table: &[f64], axes: usize, i: usize) -> [f64; M] {
-    let row = &table[i * axes..(i + 1) * axes];
-    std::array::from_fn(|k| if k < row.len() { row[k] } else { 0.0 })
+    // The usual case on its own: rows of a length that is known are read without a branch.
+    if axes == M {
+        let row = &table[i * M..(i + 1) * M];
+        std::array::from_fn(|k| row[k])
+    } else {
+        let row = &table[i * axes..(i + 1) * axes];
+        std::array::from_fn(|k| if k < row.len() { row[k] } else { 0.0 })
+    }
 }
 
 /// Length of a vector.

@@ -57,14 +57,13 @@ impl<const M: usize> Differences<'_, M> {
         let row = &self.rows[n];
         let before = &self.rows[n.saturating_sub(1)];
         let periods = row.t.abs() / self.limits.period;
-        std::array::from_fn(|k| {
-            if k >= self.limits.axes {
-                return 0.0;
-            }
+        let mut rounding = std::array::from_fn(|k| {
             let magnitude = row.q[k].abs().max(row.spot.magnitude);
             let way = (row.q[k] - before.q[k]).abs() * periods;
             0.5 * self.resolution + ROUNDINGS * EPS * (magnitude + way)
-        })
+        });
+        rounding[self.limits.axes..].fill(0.0);
+        rounding
     }
 
     /// Mean accelerations over the two steps around row `c`, and what of them may be rounding.
