@@ -15,6 +15,8 @@ use crate::quadratic::Quadratic;
 /// Exact paths are smoothed only where an arc meets its neighbour with a turn below this (rad): that is what
 /// rounded coordinates leave of a tangent joint.
 const ARC_JOINT: f64 = 0.0175;
+/// No corner is shorter than this times the tolerance because it needs no more: pieces of no size help nobody.
+const LEAST_LENGTH: f64 = 0.01;
 /// What is left between two corners is dropped below this share of the stretch.
 const TOUCHING: f64 = 1e-9;
 /// Corners and stretches that one task takes at most.
@@ -161,7 +163,6 @@ impl<'a, const M: usize> Stretches<'a, M> {
         if jump.reverses() || exact && !(meets_arc && jump.size <= ARC_JOINT) {
             return 0.0;
         }
-        // Small turns need little, but no less than what the tolerance calls small.
         let wanted = jump
             .length_for(
                 [&before.piece, &after.piece],
@@ -169,7 +170,7 @@ impl<'a, const M: usize> Stretches<'a, M> {
                 &axes.max_velocity,
                 &axes.max_acceleration,
             )
-            .max(before.tolerance.min(after.tolerance));
+            .max(LEAST_LENGTH * before.tolerance.min(after.tolerance));
         let (backwards, forwards) = self.sides(k);
         reach(forwards, jump, exact, reach(backwards, jump, exact, wanted))
     }
