@@ -5,12 +5,20 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.audit import _Limits
+from feedplan.constraints.problem import Problem
+from feedplan.profile import SpeedProfile
+from feedplan.program.program import Program
+
 __all__ = [
     "PathLength",
     "PlanError",
     "Sampler",
+    "SetpointAudit",
     "__version__",
+    "audit_plan",
     "build_path",
+    "csv_rows",
     "fit_points",
     "plan_quadratic",
     "read_gcode",
@@ -98,6 +106,7 @@ class Sampler:
         float,
     ]: ...
 
+def csv_rows(values: NDArray[np.float64], last: NDArray[np.int32]) -> bytes: ...
 def read_gcode(
     source: bytes,
     name: str,
@@ -106,8 +115,6 @@ def read_gcode(
     block_delete: bool,
     max_moves: int,
 ) -> dict[str, Any]: ...
-
-
 def fit_points(
     points: NDArray[np.float64],
     tolerance: float,
@@ -152,3 +159,33 @@ def build_path(
     tuple[int, int, int, float],
     tuple[int, int, float] | None,
 ]: ...
+
+# Per limit: name, axis (-1: none), worst value, limit, ratio, time, source line; and the number of samples.
+_Findings = tuple[list[tuple[str, int, float, float, float, float, int]], int]
+
+def audit_plan(
+    problem: Problem,
+    limits: _Limits,
+    profile: SpeedProfile | None = None,
+    program: Program | None = None,
+) -> _Findings: ...
+
+@final
+class SetpointAudit:
+    def __new__(
+        cls,
+        limits: _Limits,
+        resolution: float = 0.0,
+        problem: Problem | None = None,
+        profile: SpeedProfile | None = None,
+        program: Program | None = None,
+    ) -> SetpointAudit: ...
+    def push(
+        self,
+        t: NDArray[np.float64],
+        position: NDArray[np.float64],
+        velocity: NDArray[np.float64] | None = None,
+        acceleration: NDArray[np.float64] | None = None,
+        line: NDArray[np.int32] | None = None,
+    ) -> None: ...
+    def finish(self) -> _Findings: ...

@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from feedplan import _solvers
+from feedplan._solvers import Sampler
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
 from feedplan.profile import SpeedProfile
@@ -67,7 +67,7 @@ class Setpoints:
             raise InputError(
                 f"there is no interpolator '{interpolator}': use one of {', '.join(INTERPOLATORS)}"
             )
-        self._sampler = _solvers.Sampler(
+        self._sampler = Sampler(
             _array(path.control_points, np.float64),
             _array(path.width, np.float64),
             _array(path.line, np.int32),

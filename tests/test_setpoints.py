@@ -335,6 +335,8 @@ def test_what_does_not_fit_is_refused_with_a_sentence() -> None:
         setpoints(path, first, 0.001)
     with pytest.raises(InputError, match="arc 3 of the profile is on no piece of its run"):
         setpoints(path, replace(profile, runs=np.array([0, 5, 5])), 0.001)
+    with pytest.raises(InputError, match="arc 0 of the profile is governed by axis 1"):
+        setpoints(path, replace(profile, axis=np.ones_like(profile.axis)), 0.001)
     moving, constant = parabola_case()
     with pytest.raises(InputError, match="plan with end speed 0"):
         setpoints(replace(moving, dwell=np.array([1.0])), constant, 0.001)

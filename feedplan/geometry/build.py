@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from feedplan import _solvers
+from feedplan._solvers import build_path as native_build_path
 from feedplan.errors import InputError, MachineError
 from feedplan.geometry.path import FitSummary, Path
 from feedplan.machine.machine import Machine
@@ -94,7 +94,7 @@ def build_path(
     exact = settings.exact_tolerance if not tolerance else min(tolerance, settings.exact_tolerance)
     halt = program.stop | (program.dwell > 0) | (program.control == PathControl.EXACT_STOP)
 
-    (control, width, feed, move, allowed, runs), summary, outside = _solvers.build_path(
+    (control, width, feed, move, allowed, runs), summary, outside = native_build_path(
         program.name,
         start,
         program.kind,

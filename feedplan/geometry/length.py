@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from feedplan import _solvers
+from feedplan._solvers import PathLength as NativePathLength
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
 
@@ -32,7 +32,7 @@ class PathLength:
     def __init__(self, path: Path) -> None:
         if len(path) == 0:
             raise InputError("the path is empty: it has no length table")
-        self._table = _solvers.PathLength(
+        self._table = NativePathLength(
             np.ascontiguousarray(path.control_points, dtype=np.float64),
             np.ascontiguousarray(path.width, dtype=np.float64),
         )

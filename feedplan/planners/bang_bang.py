@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from feedplan import _solvers
+from feedplan._solvers import PlanError, plan_quadratic
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InfeasibleError, InputError, SolverError
 from feedplan.profile import SpeedProfile
@@ -23,7 +23,7 @@ def plan(problem: Problem) -> SpeedProfile:
         return np.ascontiguousarray(values, dtype=np.float64)
 
     try:
-        columns = _solvers.plan_quadratic(
+        columns = plan_quadratic(
             floats(path.control_points),
             floats(path.width),
             np.ascontiguousarray(path.runs, dtype=np.int64),
@@ -36,7 +36,7 @@ def plan(problem: Problem) -> SpeedProfile:
             float(problem.start_speed),
             float(problem.end_speed),
         )
-    except _solvers.PlanError as fault:
+    except PlanError as fault:
         raise _error(problem, *fault.args) from None
     return SpeedProfile(*columns)
 

@@ -3,29 +3,31 @@
 | words | meaning |
 |---|---|
 | G0 G1 | rapid, feed |
-| G2 G3 | arc and helix: I J K, or R; P turns; G17 G18 G19 planes; G90.1 G91.1 absolute or incremental centre |
+| G2 G3 | arc or helix by I J K or R, turns by P; planes G17 G18 G19; centre incremental or G90.1 |
 | G4 P, G4 X | dwell [s] |
 | G20 G21 | inch, mm (mm without either, with a warning) |
-| G28 G30 | rapid through the place named to the machine's home: the axes named, or all |
+| G28 G30 | rapid by the place named to the machine's home: the axes named, or all |
 | G43 H, G43.1, G43.2, G49 | tool length; lengths by H are not known and count as 0, with a warning |
 | G52, G92 to G92.3, G10 L2 L20 | offsets |
 | G53, G54 to G59.3 | machine coordinates, work offsets (from the machine file, else 0) |
 | G61.1, G61, G64 P Q | exact stop, exact path, blending within P, fitting within Q |
-| G73 G74 G81 to G86 G89, G80, G98 G99 | canned cycles with R Z Q P L (and D: peck clearance), written out as moves |
+| G73 G74 G81 to G86 G89, G80, G98 G99 | canned cycles with R Z Q P L D, written out as moves |
 | G90 G91 | absolute, incremental |
 | G93 G94 G95 | F is 1/min, units/min, units a turn (with a known spindle speed) |
 | G96 G97 S | surface or spindle speed |
 | G8 G15 G40 G69 | what they cancel is never on: no effect |
-| M0 M1 M60, M2 M30, M3 M4 M5 M6 M7 M8 M9, M19, M100 to M199 | full stop; M2 and M30 end the program |
+| M0 M1 M2 M30 M60, M3 to M9, M19, M100 to M199 | full stop; M2 and M30 end the program |
 | M48 M49, S T D | no effect on the path |
 | F, N, O1234 or :1234 at the start, %, ( ) and ; comments | as usual |
-| / at the start of a block | left out, unless `block_delete=False` |
-| #1 = [...], #<name>, + - * / ** MOD, EQ ... XOR, ABS ... TAN | arithmetic, in any word |
+| / at the start of a block | left out, with a warning, unless `block_delete=False` |
+| #1 = [...], #<name>, + - * / ** MOD, EQ to XOR, ABS to TAN | arithmetic, in any word |
 
-Everything else is an error that names the line and the word: cutter radius compensation (G41 G42), splines (G5 G6),
-threading, probing, subprograms and flow control (O words, M97 to M99), words that no code of their block uses.
-Within a block the order is LinuxCNC's, only that F counts in the units of its own block. All axes start at machine
-zero; a change of offsets moves nothing. A stop or dwell stands at the end of the move before it.
+Everything else is an error that names the line and the word: cutter radius compensation (G41 G42), splines
+(G5 G6), threading, probing, subprograms and flow control (O words, M97 to M99), words that no code of their
+block uses. Within a block the order is LinuxCNC's, with differences that posts count on: F is in the units of
+its own block, G80 gives way to another motion code beside it, and G0 beside G28 only stays in force. All axes
+start at machine zero; a change of offsets moves nothing. A stop or dwell belongs to the move before it, and a
+dwell before the first move is kept as `start_dwell`.
 """
 
 from __future__ import annotations
@@ -35,7 +37,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from feedplan import _solvers
+from feedplan._solvers import read_gcode as read_native
 from feedplan.errors import MachineError, ProgramError
 from feedplan.machine.machine import AXIS_LETTERS, Machine
 from feedplan.program.program import Program
@@ -57,10 +59,10 @@ def read_gcode(
 ) -> Program:
     """The moves of a G-code program.
 
-    `source` is a path, or the program itself: bytes, or a str with a line break. `machine` gives the work offsets,
-    the home position and the axes there are; without it offsets and home are 0. `name` stands in messages, instead
-    of the file's name. `block_delete` leaves out blocks that start with `/`, as LinuxCNC does; `max_bytes` and
-    `max_moves` bound what is read.
+    `source` is a path, or the program itself: bytes, or a str with a line break. `machine` gives the work
+    offsets, the home position and the axes there are; without it offsets and home are 0. `name` stands in
+    messages, instead of the file's name. `block_delete` leaves out blocks that start with `/`, as LinuxCNC
+    does; `max_bytes` and `max_moves` bound what is read.
     Raises ProgramError naming file, line, word and remedy, MachineError where an offset's name is unknown.
     """
     if isinstance(source, str) and ("\n" in source or "\r" in source):
@@ -71,7 +73,7 @@ def read_gcode(
     else:
         default = Path(source).name
         content = read_bytes(Path(source), max_bytes)
-    columns = _solvers.read_gcode(
+    columns = read_native(
         content,
         default if name is None else name,
         _places(machine),

@@ -18,8 +18,8 @@ def read_program(
 ) -> Program:
     """The moves of the program in a file; every file is taken for G-code, the one language read.
 
-    `machine` gives work offsets and home, see `read_gcode`. Raises ProgramError in one sentence where the file is
-    missing, a directory, empty, binary, larger than `max_bytes` or not understood.
+    `machine` gives work offsets and home, see `read_gcode`. Raises ProgramError in one sentence where the
+    file is missing, a directory, empty, binary, larger than `max_bytes` or not understood.
     """
     file = Path(path)
     content = read_bytes(file, max_bytes)

@@ -34,7 +34,7 @@ use rayon::prelude::*;
 
 pub use profile::{ArcKind, Profile, NO_AXIS};
 
-use crate::quadratic::Quadratic;
+use crate::quadratic::{norm, Quadratic};
 use run::Workspace;
 use split::ChordLimit;
 use subpiece::Axes;
@@ -100,7 +100,6 @@ pub(crate) struct Task<'a, const M: usize> {
     feed: &'a [f64],
     junction_speed: &'a [f64],
     axes: Axes<M>,
-    least_acceleration: f64,
     chord: Option<ChordLimit>,
 }
 
@@ -114,17 +113,10 @@ pub fn plan<const M: usize>(problem: &Problem<M>) -> Result<Profile, Fault> {
         axes: Axes {
             acceleration: problem.max_acceleration,
             inverse: problem.max_acceleration.map(|a| 1.0 / a),
+            least: problem.max_acceleration.iter().fold(f64::INFINITY, |least, &a| least.min(a)),
             velocity_sq: problem.max_velocity.map(|v| v * v),
         },
-        least_acceleration: problem.max_acceleration.iter().fold(f64::INFINITY, |least, &a| least.min(a)),
-        chord: problem.chord_tolerance.is_finite().then(|| {
-            let (delta, period_sq) = (problem.chord_tolerance, problem.period * problem.period);
-            ChordLimit {
-                alpha: 8.0 * delta / period_sq,
-                slow_sq: 4.0 * delta * delta / period_sq,
-                tolerance: delta,
-            }
-        }),
+        chord: ChordLimit::new(problem.chord_tolerance, problem.period, norm(&problem.max_acceleration)),
     };
     let groups = group(problem.runs);
     let last_run = problem.runs.len() - 2;

@@ -133,12 +133,32 @@ fn isolate<const C: usize>(b: &[f64; C], lo: f64, hi: f64, depth: u32, found: &m
     isolate(&right, middle, hi, depth + 1, found);
 }
 
+/// The same for a parabola, in closed form: with z = t/(1 − t) it is b₀ + 2 b₁ z + b₂ z² over (1 + z)².
+pub fn parabola_sign_changes(b: &[f64; 3], found: &mut impl FnMut(f64)) {
+    let [c, half, a] = *b;
+    let discriminant = half * half - a * c;
+    if discriminant <= 0.0 || b.iter().all(|&value| value > 0.0) || b.iter().all(|&value| value < 0.0) {
+        return;
+    }
+    let q = -(half + discriminant.sqrt().copysign(half));
+    let mut roots = [q / a, c / q].map(|z| if z > 0.0 { z / (1.0 + z) } else { 0.0 });
+    roots.sort_by(f64::total_cmp);
+    for t in roots {
+        if t > 0.0 && t < 1.0 {
+            found(t);
+        }
+    }
+}
+
 /// The root of a polynomial that is positive before it and negative after it, by Newton's method kept inside
 /// the bracket by bisection.
 #[inline(always)]
 fn bracketed_newton<const C: usize>(b: &[f64; C]) -> f64 {
     let (mut lo, mut hi) = (0.0, 1.0);
-    let mut t = if b[0] > 0.0 { b[0] / (b[0] - b[C - 1]) } else { 0.5 };
+    // Start where the control polygon crosses zero.
+    let right = b.iter().position(|&value| value < 0.0).unwrap_or(C - 1).max(1);
+    let (above, below) = (b[right - 1], b[right]);
+    let mut t = (right as f64 - below / (below - above)) / (C - 1) as f64;
     for _ in 0..100 {
         let (value, slope) = evaluate(b, t);
         if value >= 0.0 {
@@ -147,11 +167,12 @@ fn bracketed_newton<const C: usize>(b: &[f64; C]) -> f64 {
             hi = t;
         }
         let newton = t - value / slope;
+        if (newton - t).abs() <= LAST_STEP * t.min(1.0 - t + 1e-3) {
+            return newton.clamp(lo, hi);
+        }
         let inside = newton > lo && newton < hi;
-        let next = if inside { newton } else { 0.5 * (lo + hi) };
-        let step = (next - t).abs();
-        t = next;
-        if (inside && step <= LAST_STEP * t.min(1.0 - t + 1e-3)) || hi - lo <= f64::EPSILON * hi {
+        t = if inside { newton } else { 0.5 * (lo + hi) };
+        if hi - lo <= f64::EPSILON * hi {
             break;
         }
     }
@@ -252,6 +273,17 @@ mod tests {
                 prop_assert!((found.unwrap() - roots[0]).abs() < 1e-9);
             } else {
                 prop_assert_eq!(found, None);
+            }
+        }
+
+        #[test]
+        fn parabolas_have_the_same_roots_in_closed_form(b in prop::array::uniform3(-1.0..1.0f64)) {
+            let (mut general, mut closed) = (vec![], vec![]);
+            sign_changes(&b, &mut |t| general.push(t));
+            parabola_sign_changes(&b, &mut |t| closed.push(t));
+            prop_assert_eq!(general.len(), closed.len());
+            for (general, closed) in general.iter().zip(&closed) {
+                prop_assert!((general - closed).abs() < 1e-7);
             }
         }
 

@@ -1,18 +1,19 @@
 //! A chain of G01 points as C1 quadratic B-splines within a tolerance that is certified both ways.
 //!
-//! The method of Zhang, Yan, Yuan, Wang and Gao, "Curve fitting and optimal interpolation on CNC machines based
-//! on quadratic B-splines", Sci. China Inf. Sci. 53 (2010), section 3, step by step:
-//! `breaking` groups the points (3.1), `features` selects those to interpolate (3.2, Algorithm 1), `spline`
-//! interpolates them (3.3). The paper tests its tolerance on the Bézier curves of Algorithm 1 only; here
-//! `certificate` bounds the distance of the final spline from the programmed polygon and `refine` adds feature
-//! points until it holds.
+//! The method of Zhang, Yan, Yuan, Wang and Gao, "Curve fitting and optimal interpolation on CNC machines
+//! based on quadratic B-splines", Sci. China Inf. Sci. 53 (2010), section 3, step by step: `breaking` groups
+//! the points (3.1), `features` selects those to interpolate (3.2, Algorithm 1), `spline` interpolates them
+//! (3.3). The paper tests its tolerance on the Bézier curves of Algorithm 1 only; here `certificate` bounds
+//! the distance of the final spline from the programmed polygon and `refine` adds feature points until it
+//! holds, and breaks the spline where none of them helps.
 //!
-//! The tangent at a breaking point that is no corner is the one of the spline through the groups on both sides,
-//! so that the path stays C1 there and every group can be refined by itself, in parallel.
+//! The tangent at a breaking point that is no corner is the one of the spline through the groups on both
+//! sides, so that the path stays C1 there and every group can be refined by itself, in parallel.
 
 mod breaking;
 mod certificate;
 mod features;
+mod pieces;
 mod refine;
 mod spline;
 
@@ -34,7 +35,8 @@ pub struct FitOptions {
     pub tolerance: f64,
     /// Longer chords stay lines, in mm; infinite: none.
     pub max_chord: f64,
-    /// Extreme points of a larger curvature separate the groups, in 1/mm (Zhang eq. 2: α a_max / F²); infinite: none.
+    /// Extreme points of a larger curvature separate the groups, in 1/mm (Zhang eq. 2: α a_max / F²);
+    /// infinite: none.
     pub max_curvature: f64,
     /// A breaking point that turns by more is a corner, in rad: the tangent may jump there.
     pub corner_angle: f64,
@@ -54,9 +56,11 @@ pub struct FittedPiece<const M: usize> {
 
 /// Fits the chain by lines and C1 quadratic B-splines, each within the tolerance of the polygon both ways.
 ///
-/// At least two points, neighbours distinct. Breaking points and both ends are interpolated exactly. Where no
-/// smooth curve through the points holds the tolerance, the chords themselves are kept, and their corners. With no
-/// positive tolerance, or points that are not finite, every chord is kept. The result does not depend on threads.
+/// At least two points, neighbours distinct. Breaking points and both ends are interpolated exactly. Other
+/// features are too, unless that breaks the tolerance on a chord beside them and passing them at an offset
+/// does not. Where nothing smooth holds the tolerance, the chords themselves are kept, and their corners.
+/// With no positive tolerance, or points that are not finite, every chord is kept. The result does not depend
+/// on threads.
 pub fn fit_points<const M: usize>(points: &[[f64; M]], options: &FitOptions) -> Vec<FittedPiece<M>> {
     if points.len() < 2 {
         return Vec::new();
@@ -64,7 +68,14 @@ pub fn fit_points<const M: usize>(points: &[[f64; M]], options: &FitOptions) -> 
     let along = lengths_along(points);
     let measurable = along.windows(2).all(|pair| pair[1] > pair[0]) && along[points.len() - 1].is_finite();
     if options.tolerance.is_nan() || options.tolerance <= 0.0 || !measurable {
-        return (0..points.len() - 1).map(|i| chord(points, i, i as u32)).collect();
+        let chord = |i: usize| FittedPiece {
+            piece: Quadratic::line(points[i], points[i + 1]),
+            first: i,
+            last: i,
+            deviation: 0.0,
+            spline: i as u32,
+        };
+        return (0..points.len() - 1).map(chord).collect();
     }
     let chain = Chain {
         points,
@@ -145,11 +156,6 @@ fn lengths_along<const M: usize>(points: &[[f64; M]]) -> Vec<f64> {
             total
         }))
         .collect()
-}
-
-fn chord<const M: usize>(points: &[[f64; M]], i: usize, spline: u32) -> FittedPiece<M> {
-    let piece = Quadratic::line(points[i], points[i + 1]);
-    FittedPiece { piece, first: i, last: i, deviation: 0.0, spline }
 }
 
 /// Cuts the chain at its breaking points, and long groups at feature points, with the tangent of each cut.

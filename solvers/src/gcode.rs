@@ -1,20 +1,23 @@
 //! G-code (RS-274/NGC) to moves in machine coordinates.
 //!
-//! `words` cuts lines into blocks, `execute` runs them in LinuxCNC's order with the modes of `modal`, `motion`,
-//! `arc` and `cycle` make moves, `moves` holds them as columns. What is not understood is an error with its line
+//! `words` cuts lines into blocks, `intent` says what a block asks for, `execute` runs it in LinuxCNC's order with the
+//! modes of `modal` and the offsets of `places`; `motion`, `arc` and `cycle` make moves, `moves` holds them as columns. What is not understood is an error with its line
 //! and word; nothing is skipped silently.
 
 mod arc;
+mod arithmetic;
 mod block;
 mod cycle;
 mod dialect;
 mod execute;
 mod expression;
 mod fault;
+mod intent;
 mod modal;
 mod motion;
 mod moves;
 mod number;
+mod places;
 mod words;
 
 pub use moves::{Columns, Point};

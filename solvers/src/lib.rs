@@ -3,6 +3,7 @@
 
 pub mod arc;
 pub mod arc_length;
+pub mod audit;
 pub mod bang_bang_quadratic;
 pub mod bernstein;
 pub mod corner;
@@ -16,6 +17,7 @@ pub mod path_builder;
 pub mod quadratic;
 pub mod sampling;
 pub mod sarfraz;
+pub mod text;
 
 #[cfg(feature = "python")]
 mod python;

@@ -22,7 +22,8 @@ pub fn limit_curve<const M: usize>(
             if twist[k] == 0.0 {
                 continue;
             }
-            let at = |g: &[f64; M]| (acceleration[j] * g[k] + acceleration[k] * g[j]) / twist[k].abs();
+            let inverse = 1.0 / twist[k].abs();
+            let at = |g: &[f64; M]| (acceleration[j] * g[k] + acceleration[k] * g[j]) * inverse;
             let line = [at(g_start), at(g_end)];
             if lowest.is_none_or(|best| line[0] + line[1] < best[0] + best[1]) {
                 lowest = Some(line);

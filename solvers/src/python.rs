@@ -1,13 +1,36 @@
 //! The Python module `feedplan._solvers`: arrays in, arrays out, one submodule file per kernel.
 
 mod arrays;
+mod audit;
 mod fit;
 mod gcode;
 mod path;
 mod plan;
 mod sampling;
+mod text;
 
 use pyo3::prelude::*;
+
+/// Calls a generic kernel for at most 3 or at most 6 axes, those beyond `count` at rest: an axis that rests changes
+/// no result, and two instances of a kernel are built where six would be.
+macro_rules! with_padded_axes {
+    ($count:expr, $m:ident, $call:expr) => {
+        match $count {
+            1..=3 => {
+                const $m: usize = 3;
+                $call
+            }
+            4..=6 => {
+                const $m: usize = 6;
+                $call
+            }
+            count => {
+                Err(pyo3::exceptions::PyValueError::new_err(format!("{count} axes: 1 to 6 are supported")))
+            }
+        }
+    };
+}
+pub(crate) use with_padded_axes;
 
 /// Calls a generic kernel with the number of axes as a constant: `with_axes!(m, M, expression)`.
 macro_rules! with_axes {
@@ -50,9 +73,11 @@ pub(crate) use with_axes;
 fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     fit::register(module)?;
-    gcode::register(module)?;
     path::register(module)?;
-    plan::register(module)?;
+    text::register(module)?;
+    audit::register(module)?;
     sampling::register(module)?;
+    plan::register(module)?;
+    gcode::register(module)?;
     Ok(())
 }

@@ -173,7 +173,7 @@ impl<const M: usize> Sampler<M> {
     }
 
     /// The setpoints in a range. `resume` carries the state of the Newton–Raphson interpolator from one range to
-    /// the next; without it, or out of order, a run is followed again from its start.
+    /// the next; without it, or going back, a run is followed again from its start.
     pub fn chunk(&self, range: Range<usize>, resume: &mut Option<Resume>) -> Chunk<M> {
         let mut chunk = Chunk::with_size(range.len());
         let parts = chunk.slices(range.start).split(&self.cuts(&range));
@@ -259,7 +259,7 @@ impl<const M: usize> Sampler<M> {
         let run = self.run_of(part.start + begin);
         let mut cursor = Cursor::new(self, true);
         let fresh = Resume { index: run.first, arc: run.arcs.start, u: f64::NAN };
-        let known = resume.filter(|known| known.index + 1 == part.start + begin && known.index > run.first);
+        let known = resume.filter(|known| run.first < known.index && known.index < part.start + begin);
         let mut at = known.unwrap_or(fresh);
         while at.index + 1 < part.start + part.t.len() {
             at.index += 1;

@@ -35,12 +35,17 @@ fn a_triangle_is_half_a_t_squared() {
         assert_eq!((up.rates(&state).acceleration[0], up.rates(&state).jerk[0]), (1000.0, 0.0));
         assert!((down.at_time(0.1 - t, 0.001).u - (10.0 - way)).abs() < 1e-14);
     }
+    assert_eq!(up.rates(&up.at(0.0)).velocity, [0.0; 2]);
+    assert_eq!(down.rates(&down.at(10.0)).velocity, [0.0; 2]);
 }
 
 #[test]
 fn a_run_of_a_whole_number_of_periods_ends_on_the_grid() {
     // 0.2 s are 200 periods of 1 ms, whichever way the quotient rounds; 199 and a bit of 1.0001 ms.
-    for (period, count) in [(0.001, 201), (0.2 / 3.0, 4), (0.2 / 7.0, 8), (0.001_000_1, 201), (1.0, 2)] {
+    let below = 0.001 * (1.0 - 1e-13);
+    for (period, count) in
+        [(0.001, 201), (below, 201), (0.2 / 3.0, 4), (0.2 / 7.0, 8), (0.001_000_1, 201), (1.0, 2)]
+    {
         for interpolator in [Interpolator::Sarfraz, Interpolator::Newton] {
             let sampler = sampler(period, interpolator);
             assert_eq!(sampler.count(), count, "{period}");
@@ -58,12 +63,30 @@ fn any_part_of_the_stream_has_the_same_digits() {
         let sampler = sampler(1e-5, interpolator);
         let whole = sampler.chunk(0..sampler.count(), &mut None);
         assert!(whole.t.len() > 20_000);
-        for range in [0..1, 1..2, 4095..4097, 9_999..10_002, 12_345..20_000] {
-            let part = sampler.chunk(range.clone(), &mut None);
-            assert_eq!(part.position, whole.position[range.clone()]);
-            assert_eq!(part.velocity, whole.velocity[range.clone()]);
-            assert_eq!(part.t, whole.t[range]);
+        // Onwards, with gaps, and back; with the state of the part before and without.
+        let mut state = None;
+        for range in [0..1, 1..2, 4095..4097, 4097..4200, 12_345..20_001, 9_999..10_002] {
+            for resume in [&mut None, &mut state] {
+                let part = sampler.chunk(range.clone(), resume);
+                assert_eq!(part.position, whole.position[range.clone()]);
+                assert_eq!(part.velocity, whole.velocity[range.clone()]);
+                assert_eq!(part.t, whole.t[range.clone()]);
+            }
         }
+    }
+}
+
+#[test]
+fn the_speed_next_to_a_standstill_keeps_its_digits() {
+    // x' grows from 1 to 4 on [0, 3]: 7.5 mm from 15 mm/s down to rest in 1 s at 15 mm/s².
+    let piece = Quadratic { control: [[0.0], [1.5], [7.5]], width: 3.0 };
+    let down = arc(ArcKind::AxisAcceleration, -15.0, (0.0, 3.0), (225.0, 0.0), 1.0);
+    let motion = Motion::new(&piece, &down, false);
+    for i in 0..50 {
+        let u = 3.0 - 1e-12 * f64::from(i) * 1.7;
+        let expected = (2.0 * 15.0 * 4.0 * (3.0 - u)).sqrt();
+        let [speed] = motion.rates(&motion.at(u)).velocity;
+        assert!((speed - expected).abs() <= 1e-9 * expected, "{speed} {expected}");
     }
 }
 
@@ -158,7 +181,8 @@ prop_compose! {
         match kind {
             ArcKind::AxisAcceleration => {
                 // Where x' vanishes no finite p has a speed.
-                let (v0, v1) = (speeds[0] * f64::from(x0 > 1e-6), speeds[1] * f64::from(x1 > 1e-6) + 0.01);
+                let (v0, v1) = (speeds[0] * f64::from(x0 > 1e-6), speeds[1] * f64::from(x1 > 1e-6));
+                let v1 = if v0 + v1 == 0.0 { 0.01 } else { v1 };
                 arc.duration = 2.0 * way / (v0 + v1);
                 arc.value = sign * (v1 - v0) / arc.duration;
                 (arc.p0, arc.p1) = (p(v0, x0.max(1e-6)), p(v1, x1.max(1e-6)));
@@ -221,7 +245,7 @@ proptest! {
         if tame(&piece, &arc) {
             let again = motion.time(&motion.at(state.u));
             // A step of 1e-13 of the way costs √1e-13 of the time next to a standstill.
-            let slack = if at < 1e-3 || at > 1.0 - 1e-3 { 1e-6 } else { 1e-9 };
+            let slack = if (1e-3..=1.0 - 1e-3).contains(&at) { 1e-9 } else { 1e-6 };
             prop_assert!((again - t).abs() <= slack * arc.duration, "{again} {t}");
         }
     }
@@ -233,7 +257,12 @@ proptest! {
         }
         let motion = Motion::new(&piece, &arc, false);
         let t = at * arc.duration;
-        let v0 = motion.rates(&motion.at_time(0.0, 1e-3)).velocity[0];
+        let [v0, v1] = [arc.u0, arc.u1].map(|u| motion.rates(&motion.at(u)).velocity[0]);
+        if arc.kind == ArcKind::AxisAcceleration {
+            prop_assert!(v0 != 0.0 || arc.p0 == 0.0);
+            prop_assert!(arc.p0 != 0.0 || v0 == 0.0, "{v0:e} from rest");
+            prop_assert!(arc.p1 != 0.0 || v1 == 0.0, "{v1:e} at rest");
+        }
         let a = if arc.kind == ArcKind::AxisAcceleration { arc.value } else { 0.0 };
         let way = motion.point(&motion.at_time(t, 1e-3))[0] - piece.point(arc.u0)[0];
         prop_assert!((way - (v0 * t + 0.5 * a * t * t)).abs() <= 2e-8 * (1.0 + way.abs()), "{way}");

@@ -80,7 +80,7 @@ pub fn bang<const M: usize>(
             return Bang { kind, x1: sub.length, p1: p, event: Event::EndOfSubPiece };
         }
         let kind = Kind::Accelerating(j as u8);
-        let twist = sub.twist(j);
+        let twist = sub.twists(j);
         let mut first_y = f64::INFINITY;
         let mut event = Event::EndOfSubPiece;
         for l in 0..M {

@@ -4,6 +4,8 @@
 //! reached are an interval [0, K(x)], and two greedy passes are exact. Backward, under the velocity cap and the
 //! limit curve, gives K; forward under K gives the fastest profile. Neither searches for switching points.
 
+use std::cell::OnceCell;
+
 use super::arc::{Arc, Kind};
 use super::bang::{bang, Event};
 use super::curve::Curve;
@@ -41,7 +43,7 @@ pub fn backward<const M: usize>(
     }
     let cap =
         [Arc { x0: 0.0, x1: sub.length, p0: sub.cap_at(0.0), p1: sub.cap_at(sub.length), kind: Kind::Cap }];
-    Pass::<M, true> { sub, axes, bounds: &cap, out, x: 0.0, p: p.min(cap[0].p0) }.run()
+    Pass::<M, true> { sub, axes, bounds: &cap, out, x: 0.0, p: p.min(cap[0].p0), line: OnceCell::new() }.run()
 }
 
 /// Forward over the sub-piece from p, under the arcs of K as the backward pass left them: appends the arcs of
@@ -54,7 +56,7 @@ pub fn forward<const M: usize>(
     bounds: &[Arc],
     out: &mut Vec<Arc>,
 ) -> Result<f64, Stuck> {
-    Pass::<M, false> { sub, axes, bounds, out, x: 0.0, p }.run()
+    Pass::<M, false> { sub, axes, bounds, out, x: 0.0, p, line: OnceCell::new() }.run()
 }
 
 struct Pass<'a, const M: usize, const BACKWARD: bool> {
@@ -65,6 +67,8 @@ struct Pass<'a, const M: usize, const BACKWARD: bool> {
     out: &'a mut Vec<Arc>,
     x: f64,
     p: f64,
+    /// The limit curve at both ends of the sub-piece, once it is needed.
+    line: OnceCell<Option<[f64; 2]>>,
 }
 
 impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
@@ -238,7 +242,11 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
         match self.limit_curve() {
             Some([start, end]) if self.p >= start * (1.0 - ON_LIMIT_CURVE) => {
                 self.p = self.p.min(start);
-                end < start
+                if end < start * (1.0 - ON_LIMIT_CURVE) {
+                    return true;
+                }
+                self.p = self.p.min(end);
+                false
             }
             _ => false,
         }
@@ -266,10 +274,12 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
         moved
     }
 
-    #[cold]
+    #[inline(always)]
     fn limit_curve(&self) -> Option<[f64; 2]> {
         let sub = self.sub;
-        limit_curve(&sub.start, &sub.end, &sub.bend, &self.axes.acceleration, |j| sub.twist(j))
+        *self.line.get_or_init(|| {
+            limit_curve(&sub.start, &sub.end, &sub.bend, &self.axes.acceleration, |j| sub.twists(j))
+        })
     }
 
     fn line_curve(&self, line: [f64; 2], a: f64, b: f64) -> Curve {

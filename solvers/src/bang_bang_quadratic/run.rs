@@ -83,7 +83,7 @@ fn backward<const M: usize>(
     space: &mut Workspace,
 ) -> Result<f64, Fault> {
     let feed = task.feed[i];
-    if piece.is_straight(feed, task.least_acceleration) {
+    if piece.is_straight(feed, task.axes.least) {
         space.ways.push(Way::Straight(speed_sq));
         return Ok(pass_straight(task, i, piece, speed_sq));
     }

@@ -41,12 +41,16 @@ fn at_speed<const M: usize>(
     speed_sq: f64,
     slack: f64,
 ) -> Slide {
-    let (ga, gb) = (sub.tangent(a), sub.tangent(b));
     let d = sub.speed_form(a, b);
     let least = d[0].min(d[1]).min(d[2]).max(0.0);
     let mut found = Slide { end: b, saturated: None, low: false };
+    // The whole acceleration is v²/ρ, ρ = D^1.5/|C' × C''|.
+    if speed_sq * sub.twist <= axes.least * least * least.sqrt() {
+        return found;
+    }
+    let (ga, gb) = (sub.tangent(a), sub.tangent(b));
     for k in 0..M {
-        let twist = sub.twist(k);
+        let twist = sub.twists(k);
         let (need_a, need_b) = (speed_sq * dot(&ga, &twist), speed_sq * dot(&gb, &twist));
         if need_a.abs().max(need_b.abs()) <= axes.acceleration[k] * least * least {
             continue;
@@ -73,7 +77,7 @@ fn at_axis_speed<const M: usize>(
     slack: f64,
 ) -> Slide {
     let (ga, gb) = (sub.axis_tangent(j, a), sub.axis_tangent(j, b));
-    let twist = sub.twist(j);
+    let twist = sub.twists(j);
     let mut found = Slide { end: b, saturated: None, low: false };
     for k in 0..M {
         // W_kj = −W_jk.

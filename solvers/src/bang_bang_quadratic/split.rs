@@ -7,7 +7,7 @@
 
 use super::piece::Piece;
 use super::subpiece::{Axes, Cap, SubPiece};
-use crate::bernstein::{multiply, product, sign_changes};
+use crate::bernstein::{multiply, parabola_sign_changes, product, sign_changes};
 use crate::quadratic::dot;
 
 /// Cuts closer than this part of the piece are one.
@@ -17,12 +17,36 @@ const ZERO: f64 = 1e-14;
 /// Beyond this many δ the radius varies without a difference to the chord-error limit.
 const LAST_DOUBLING: f64 = 512.0;
 
-/// The chord-error limit: alpha = 8 δ/T², slow_sq = 4 δ²/T², and δ.
+/// The chord-error limit where it can be lower than what the accelerations allow.
 #[derive(Clone, Copy)]
 pub struct ChordLimit {
-    pub alpha: f64,
-    pub slow_sq: f64,
-    pub tolerance: f64,
+    /// α = 8 δ/T²
+    alpha: f64,
+    /// 4 δ²/T²
+    slow_sq: f64,
+    /// δ
+    tolerance: f64,
+    /// The greatest acceleration that all axes have together.
+    acceleration: f64,
+}
+
+impl ChordLimit {
+    /// None if the limit never binds: v²/ρ is at most `acceleration` on any curve, and the limit nowhere below
+    /// ρ α/2.
+    pub fn new(tolerance: f64, period: f64, acceleration: f64) -> Option<Self> {
+        let alpha = 8.0 * tolerance / (period * period);
+        let slow_sq = 0.5 * alpha * tolerance;
+        let binds = tolerance.is_finite() && alpha < 2.0 * acceleration;
+        binds.then_some(Self { alpha, slow_sq, tolerance, acceleration })
+    }
+
+    /// Whether the limit can bind on the piece.
+    fn binds<const M: usize>(&self, piece: &Piece<M>, feed_sq: f64) -> bool {
+        let least = piece.least_speed_sq();
+        let least_cube = least * least.sqrt();
+        let least_limit = self.alpha * least_cube - self.slow_sq * piece.twist;
+        least_limit < feed_sq * piece.twist && least_limit < self.acceleration * least_cube
+    }
 }
 
 /// A part [from, to] of a curved piece with what the passes need to know of it.
@@ -51,9 +75,9 @@ impl Part {
         }
         let length = self.to - self.from;
         if backward {
-            SubPiece::new(length, end, start, bend.map(|value| -value), self.cap, axes)
+            SubPiece::new(length, end, start, bend.map(|value| -value), piece.twist, self.cap, axes)
         } else {
-            SubPiece::new(length, start, end, bend, self.cap, axes)
+            SubPiece::new(length, start, end, bend, piece.twist, self.cap, axes)
         }
     }
 }
@@ -100,10 +124,7 @@ impl Splitter {
                 fast |= bit;
             }
         }
-        let chord = chord.filter(|chord| {
-            let least = piece.least_speed_sq();
-            (feed_sq + chord.slow_sq) * piece.twist > chord.alpha * least * least.sqrt()
-        });
+        let chord = chord.filter(|chord| chord.binds(piece, feed_sq));
         if fast | turning == 0 && chord.is_none() {
             let cap = Cap::SpeedSq(feed_sq);
             self.parts.push(Part { from: 0.0, to: 1.0, cap, zero_left, zero_right, negative });
@@ -165,7 +186,7 @@ impl Splitter {
         while radius <= (chord.tolerance * LAST_DOUBLING).min(2.0 * no_limit) {
             // D where ρ = D^1.5/|W| has this value.
             let d = (radius * piece.twist).powf(2.0 / 3.0);
-            sign_changes(&piece.speed.map(|value| value - d), &mut |t| levels.push(t));
+            parabola_sign_changes(&piece.speed.map(|value| value - d), &mut |t| levels.push(t));
             radius *= 2.0;
         }
         levels.retain(|&t| t >= from && t <= to);
@@ -215,7 +236,7 @@ impl Splitter {
         for j in (0..M).filter(|&j| is_fast(j)) {
             let v_sq = axes.velocity_sq[j];
             // Against the speed: v² q'_j² = V_j² D.
-            sign_changes(&excess(piece, j, v_sq, speed_sq), &mut cut);
+            parabola_sign_changes(&excess(piece, j, v_sq, speed_sq), &mut cut);
             // Against another axis: V_j |q'_k| = V_k |q'_j|.
             for k in (j + 1..M).filter(|&k| is_fast(k)) {
                 let (v_j, v_k) = (v_sq.sqrt(), axes.velocity_sq[k].sqrt());
@@ -233,7 +254,7 @@ impl Splitter {
         }
         if let Some(factor) = chord {
             let d = (speed_sq / factor).powf(2.0 / 3.0);
-            sign_changes(&piece.speed.map(|value| value - d), &mut cut);
+            parabola_sign_changes(&piece.speed.map(|value| value - d), &mut cut);
         }
         cuts.sort_by(f64::total_cmp);
         cuts.push(to);

@@ -81,8 +81,8 @@ impl Stretch<'_> {
         let peak_sq = (0.5 * (start_sq + end_sq + gain)).min(top_sq);
         let first_length = (peak_sq - start_sq) / (2.0 * a);
         let last_length = (peak_sq - end_sq) / (2.0 * a);
-        let reached = if first_length < length { self.from_start(first_length, peak_sq) } else { last };
-        let left = if last_length < length { self.from_end(last_length, peak_sq) } else { start };
+        let reached = if first_length < length { self.after_start(first_length, peak_sq) } else { last };
+        let left = if last_length < length { self.before_end(last_length, peak_sq) } else { start };
         let reached = if first_length > 0.0 && reached.t > start.t { reached } else { start };
         let left = if last_length > 0.0 && left.t < last.t { left } else { last };
         if peak_sq < top_sq || left.t <= reached.t {
@@ -100,7 +100,7 @@ impl Stretch<'_> {
 
     /// The place this length after the start; |C'|² is linear in the length.
     #[inline(always)]
-    fn from_start(&self, length: f64, speed_sq: f64) -> Place {
+    fn after_start(&self, length: f64, speed_sq: f64) -> Place {
         let [r0, r1] = self.rate;
         let slope = (r1 - r0) / (self.t[1] - self.t[0]);
         let rate = (r0 * r0 + 2.0 * slope * length).max(0.0).sqrt();
@@ -109,7 +109,7 @@ impl Stretch<'_> {
 
     /// The place this length before the end.
     #[inline(always)]
-    fn from_end(&self, length: f64, speed_sq: f64) -> Place {
+    fn before_end(&self, length: f64, speed_sq: f64) -> Place {
         let [r0, r1] = self.rate;
         let slope = (r1 - r0) / (self.t[1] - self.t[0]);
         let rate = (r1 * r1 - 2.0 * slope * length).max(0.0).sqrt();

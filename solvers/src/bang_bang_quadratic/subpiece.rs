@@ -16,6 +16,8 @@ pub struct Axes<const M: usize> {
     pub acceleration: [f64; M],
     /// 1/A
     pub inverse: [f64; M],
+    /// The least A
+    pub least: f64,
     /// V², in mm²/s²
     pub velocity_sq: [f64; M],
 }
@@ -41,6 +43,8 @@ pub struct SubPiece<const M: usize> {
     pub bend: [f64; M],
     /// D at the ends and, between them, its middle Bernstein coefficient.
     pub speed: [f64; 3],
+    /// |C' × C''|
+    pub twist: f64,
     /// min A_k/|c_k|: below it every constant p is feasible.
     pub flat: f64,
     pub cap: Cap,
@@ -52,6 +56,7 @@ impl<const M: usize> SubPiece<M> {
         start: [f64; M],
         end: [f64; M],
         bend: [f64; M],
+        twist: f64,
         cap: Cap,
         axes: &Axes<M>,
     ) -> Self {
@@ -60,7 +65,7 @@ impl<const M: usize> SubPiece<M> {
             steepest = f64::max(steepest, bend[k].abs() * axes.inverse[k]);
         }
         let speed = [dot(&start, &start), dot(&start, &end), dot(&end, &end)];
-        Self { length, start, end, bend, speed, flat: 1.0 / steepest, cap }
+        Self { length, start, end, bend, speed, twist, flat: 1.0 / steepest, cap }
     }
 
     /// g_k at x, from the nearer end, so that it keeps its digits next to a zero.
@@ -93,7 +98,7 @@ impl<const M: usize> SubPiece<M> {
 
     /// W_jk = c_j g_k − c_k g_j for all k: constant along the piece, antisymmetric to the last bit.
     #[inline(always)]
-    pub fn twist(&self, j: usize) -> [f64; M] {
+    pub fn twists(&self, j: usize) -> [f64; M] {
         // Fewer digits are lost where the tangent is shorter.
         let g = if self.speed[0] < self.speed[2] { &self.start } else { &self.end };
         std::array::from_fn(|k| {

@@ -1,14 +1,15 @@
 //! Breaking points and first feature points, by the discrete curvature of the points (Zhang 3.1).
 //!
-//! The curvature at a point is that of the circle through it and one point on each side. They are its neighbours where
-//! those already show the curve; where they lie closer than the tolerance can tell from a line, or in noise, they are
-//! taken 2, 4, 8 … points away until the point is off their chord by more than the tolerance (after Coeurjolly and
-//! Svensson, who use the longest digital segments); if it never is, the curvature is 0. A point where the curvature is greatest between two places where it
-//! is a fifth lower is an extreme, unless what it saw belongs to a sharper extreme as near as its look reaches;
-//! plateaus and ripples have none.
+//! The curvature at a point is that of the circle through it and one point on each side. They are its
+//! neighbours where those already show the curve; where they lie closer than the tolerance can tell from a
+//! line, or in noise, they are taken 2, 4, 8 … points away until the point is off their chord by more than
+//! the tolerance (after Coeurjolly and Svensson, who use the longest digital segments); if it never is, the
+//! curvature is 0. A point where the curvature is greatest between two places where it is a fifth lower is an
+//! extreme, unless what it saw belongs to a sharper extreme as near as its look reaches; plateaus and ripples
+//! have none.
 //!
-//! Breaking points are: ends of the chain; ends of lines, which are long chords and runs of colinear points; extremes
-//! above the curvature threshold; and corners above it, extremes or not.
+//! Breaking points are: ends of the chain; ends of lines, which are long chords and runs of colinear points;
+//! extremes above the curvature threshold; and corners above it, extremes or not.
 
 use rayon::prelude::*;
 
@@ -17,7 +18,7 @@ use super::Chain;
 use crate::quadratic::{dot, norm, sub};
 
 /// Widest look for the curvature, in points to each side.
-const WIDEST: usize = 256;
+const WIDEST: usize = 2048;
 /// An extreme rises this many times above the lowest curvature on both sides.
 const PROMINENCE: f64 = 1.2;
 /// Points this much off a line are on it: a share of the tolerance, and roundings of the largest coordinate.
@@ -100,8 +101,8 @@ fn end_of_line<const M: usize>(
     Break { at, sides: [left, right], corner: is_corner(chain, at, [left, right]), line }
 }
 
-/// A corner turns at the point itself and at the scale of the tolerance: noise does not do the one, nor a small
-/// smooth bend the other.
+/// A corner turns at the point itself and at the scale of the tolerance: noise does not do the one, nor a
+/// small smooth bend the other.
 fn is_corner<const M: usize>(chain: &Chain<M>, at: usize, [left, right]: [usize; 2]) -> bool {
     chain.is_corner(at)
         && left < at
@@ -149,8 +150,9 @@ fn lines<const M: usize>(chain: &Chain<M>, max_chord: f64) -> Vec<(usize, usize)
     lines
 }
 
-/// Whether the path leaves the line of a run by more than the tolerance within half its length beyond either end: then
-/// a curve that is smooth around the run would bow it by as much. Always if there is no path beyond.
+/// Whether the path leaves the line of a run by more than the tolerance within half its length beyond either
+/// end: then a curve that is smooth around the run would bow it by as much. Always if there is no path
+/// beyond.
 fn departs<const M: usize>(chain: &Chain<M>, from: usize, to: usize) -> bool {
     let Chain { points, along, tolerance, .. } = *chain;
     let last = points.len() - 1;
@@ -235,7 +237,8 @@ fn curvature<const M: usize>(chain: &Chain<M>, a: usize, b: usize, k: usize) -> 
     }
 }
 
-/// Maxima that are `PROMINENCE` above the minima next to them and the greatest within their look, offset by `first`.
+/// Maxima that are `PROMINENCE` above the minima next to them and the greatest within their look, offset by
+/// `first`.
 fn peaks(curvature: &[(f64, usize)], first: usize, extremes: &mut Vec<usize>) {
     let mut peaks = Vec::new();
     let mut rising = false;
@@ -262,5 +265,119 @@ fn peaks(curvature: &[(f64, usize)], first: usize, extremes: &mut Vec<usize>) {
         if !before.chain(after).any(sharper) {
             extremes.push(first + peak);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::lengths_along;
+
+    /// Breaks as (point, corner, line) and extremes.
+    fn grouped<const M: usize>(
+        points: &[[f64; M]],
+        max_chord: f64,
+        max_curvature: f64,
+    ) -> (Vec<(usize, bool, bool)>, Vec<usize>) {
+        let along = lengths_along(points);
+        let corner_cosine = 0.5_f64.cos();
+        let chain = Chain { points, along: &along, tolerance: 0.01, corner_cosine, parallel: false };
+        let (breaks, extremes) = group(&chain, max_chord, max_curvature);
+        (breaks.iter().map(|b| (b.at, b.corner, b.line)).collect(), extremes)
+    }
+
+    fn ellipse(count: usize) -> Vec<[f64; 2]> {
+        // From the flat top round by the sharp left end, of curvature 1, to the bottom.
+        (0..=count)
+            .map(|i| {
+                let angle = std::f64::consts::PI * (0.5 + i as f64 / count as f64);
+                [4.0 * angle.cos(), 2.0 * angle.sin()]
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_curvature_is_that_of_the_circle_through_three_points() {
+        let points = [[0.0, 0.0], [1.0, 1.0], [2.0, 0.0], [3.0, 5.0]];
+        let along = lengths_along(&points);
+        let chain =
+            Chain { points: &points, along: &along, tolerance: 0.01, corner_cosine: 0.0, parallel: false };
+        let (kappa, look) = curvature(&chain, 0, 3, 1);
+        assert!((kappa - 1.0).abs() < 1e-15 && look == 1);
+    }
+
+    #[test]
+    fn a_square_breaks_into_its_sides() {
+        let side = |i: usize| i as f64 * 0.5;
+        let mut points: Vec<[f64; 2]> = (0..=10).map(|i| [side(i), 0.0]).collect();
+        points.extend((1..=10).map(|i| [5.0, side(i)]));
+        points.extend((1..=10).map(|i| [5.0 - side(i), 5.0]));
+        let (breaks, _) = grouped(&points, f64::INFINITY, f64::INFINITY);
+        assert_eq!(breaks, [(0, false, true), (10, true, true), (20, true, true), (30, false, false)]);
+    }
+
+    #[test]
+    fn a_long_chord_is_a_line_and_its_ends_are_breaks() {
+        let mut points = ellipse(40);
+        let [x, y] = points[40];
+        points.push([x + 5.0, y]);
+        points.extend((1..9).map(|i| [x + 5.0 + 0.3 * i as f64, y + 0.02 * (i * i) as f64]));
+        let (breaks, _) = grouped(&points, 4.0, f64::INFINITY);
+        assert_eq!(breaks, [(0, false, false), (40, false, true), (41, false, false), (49, false, false)]);
+    }
+
+    #[test]
+    fn the_vertex_of_an_ellipse_is_an_extreme_and_breaks_above_the_threshold() {
+        for count in [20, 80, 2000, 20_000] {
+            let points = ellipse(count);
+            let (breaks, extremes) = grouped(&points, f64::INFINITY, f64::INFINITY);
+            assert_eq!(breaks.len(), 2);
+            assert_eq!(extremes.len(), 1, "{count}");
+            assert!(extremes[0].abs_diff(count / 2) <= 1 + count / 200, "{count}: {extremes:?}");
+            assert_eq!(grouped(&points, f64::INFINITY, 0.9).0.len(), 3, "{count}");
+            assert_eq!(grouped(&points, f64::INFINITY, 1.1).0.len(), 2, "{count}");
+        }
+    }
+
+    #[test]
+    fn a_circle_has_no_extremes_on_a_grid_either() {
+        for grid in [1e-12, 1e-3] {
+            let points: Vec<[f64; 2]> = (0..=720)
+                .map(|i| f64::from(i).to_radians() * 0.4)
+                .map(|angle| [10.0 * angle.cos(), 10.0 * angle.sin()].map(|v: f64| (v / grid).round() * grid))
+                .collect();
+            let (breaks, extremes) = grouped(&points, f64::INFINITY, 0.05);
+            assert_eq!((breaks.len(), extremes.len()), (2, 0), "{grid}");
+        }
+    }
+
+    #[test]
+    fn noise_on_dense_points_makes_no_breaks() {
+        // Neighbours turn by up to 70°, their circles have radii below 0.01 mm.
+        let points: Vec<[f64; 2]> =
+            (0..20_000).map(|i| [0.01 * f64::from(i), 0.003 * f64::from((i * 7919) % 3 - 1)]).collect();
+        let (breaks, extremes) = grouped(&points, f64::INFINITY, 0.4);
+        assert_eq!((breaks.len(), extremes.len()), (2, 0));
+    }
+
+    #[test]
+    fn a_corner_between_dense_points_is_seen_once() {
+        let bow = |i: i32| 0.002 * f64::from(i * i) * 1e-2;
+        let mut points: Vec<[f64; 2]> = (0..200).map(|i| [0.05 * f64::from(i), bow(i)]).collect();
+        let [x, y] = points[199];
+        points.extend((1..200).map(|i| [x + bow(i), y + 0.05 * f64::from(i)]));
+        let (breaks, extremes) = grouped(&points, f64::INFINITY, 0.4);
+        assert_eq!(breaks.iter().filter(|b| b.1).map(|b| b.0).collect::<Vec<_>>(), [199]);
+        assert_eq!((breaks.len(), extremes.len()), (3, 1));
+    }
+
+    #[test]
+    fn a_tangent_is_that_of_the_circle() {
+        let points = [[1.0, 0.0], [0.6, 0.8], [-1.0, 0.0]];
+        let along = lengths_along(&points);
+        let chain =
+            Chain { points: &points, along: &along, tolerance: 0.01, corner_cosine: 0.0, parallel: false };
+        let [x, y] = Break { at: 1, sides: [0, 2], corner: false, line: false }.tangent(&chain);
+        assert!((x + 0.8).abs() < 1e-15 && (y - 0.6).abs() < 1e-15);
     }
 }

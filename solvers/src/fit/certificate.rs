@@ -1,9 +1,10 @@
 //! A rigorous bound of the distance between one step of the spline and the polygon it replaces, both ways.
 //!
 //! The curve is cut at a foot point of every vertex, in order, and at the knot. The distance to a segment is
-//! convex, so a quadratic part is no farther from its chord than the farthest of its three control points. For the
-//! other way, the part starts within |C(x_k) − P_k| of one end of the chord and ends as near to the other, so by
-//! continuity every point of the chord is that near to the part. A bound that is too large is sharpened by halving.
+//! convex, so a quadratic part is no farther from its chord than the farthest of its three control points.
+//! For the other way, the part starts within |C(x_k) − P_k| of one end of the chord and ends as near to the
+//! other, so by continuity every point of the chord is that near to the part. A bound that is too large is
+//! sharpened by halving.
 
 use crate::quadratic::{dot, lerp, sub};
 
@@ -76,15 +77,15 @@ pub struct Segment<const M: usize> {
 impl<const M: usize> Segment<M> {
     pub fn new(start: &[f64; M], end: &[f64; M]) -> Self {
         let vector = sub(end, start);
-        Self { start: *start, vector, length_sq: dot(&vector, &vector) }
+        // Any positive length does for a segment that is a point.
+        Self { start: *start, vector, length_sq: dot(&vector, &vector).max(f64::MIN_POSITIVE) }
     }
 
     /// Squared distance from `p`, also if the segment is a point.
     #[inline(always)]
     pub fn distance_sq(&self, p: &[f64; M]) -> f64 {
         let w = sub(p, &self.start);
-        // Not `clamp`: it would keep the NaN of a segment without length.
-        let t = (dot(&w, &self.vector) / self.length_sq).max(0.0).min(1.0);
+        let t = (dot(&w, &self.vector) / self.length_sq).clamp(0.0, 1.0);
         let rest: [f64; M] = std::array::from_fn(|k| w[k] - t * self.vector[k]);
         dot(&rest, &rest)
     }
@@ -206,7 +207,8 @@ impl<const M: usize> Step<M> {
     }
 }
 
-/// Bound of the squared distance from the part on [x0, x1] to the segment; its two ends are bounded by the caller.
+/// Bound of the squared distance from the part on [x0, x1] to the segment; its two ends are bounded by the
+/// caller.
 #[inline(always)]
 fn part_bound_sq<const M: usize>(
     half: &Half<M>,
@@ -255,4 +257,107 @@ fn sharpen<const M: usize>(
         }
     };
     segment.distance_sq(&middle).max(side(a, &left, &middle)).max(side(&middle, &right, c))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::spline::{interpolate, End};
+    use crate::quadratic::norm;
+    use proptest::prelude::*;
+
+    /// The step on [0, 1] from (0, 0) to (1, 0) that leaves and arrives at the given slopes.
+    fn step(start: f64, end: f64) -> Step<2> {
+        let features = [[0.0, 0.0], [1.0, 0.0]];
+        let spline = interpolate(&features, End::Tangent([1.0, start]), End::Tangent([1.0, end]));
+        Step {
+            start: features[0],
+            end: features[1],
+            width: spline.step[0],
+            tangent: [spline.tangent[0], spline.slope[0], spline.tangent[1]],
+        }
+    }
+
+    /// Greatest distance from dense points of the curve to the chords, and from dense points of the chords to
+    /// the curve.
+    fn sampled(step: &Step<2>, points: &[[f64; 2]]) -> (f64, f64) {
+        let halves = step.halves();
+        let curve: Vec<[f64; 2]> = (0..=4000)
+            .map(|i| halves[usize::from(i >= 2000)].point(step.width * i as f64 / 4000.0))
+            .collect();
+        let to_chords = |p: &[f64; 2]| {
+            points.windows(2).map(|c| Segment::new(&c[0], &c[1]).distance_sq(p)).fold(f64::INFINITY, f64::min)
+        };
+        let to_curve = |p: &[f64; 2]| curve.iter().map(|c| norm(&sub(p, c))).fold(f64::INFINITY, f64::min);
+        let chords = points.windows(2).flat_map(|c| (0..=20).map(|i| lerp(&c[0], &c[1], i as f64 / 20.0)));
+        (
+            curve.iter().map(to_chords).fold(0.0, f64::max).sqrt(),
+            chords.map(|p| to_curve(&p)).fold(0.0, f64::max),
+        )
+    }
+
+    #[test]
+    fn a_straight_step_is_as_far_from_a_bump_as_the_bump_is_high() {
+        let points = [[0.0, 0.0], [0.5, 0.1], [1.0, 0.0]];
+        let along = [0.0, 0.51, 1.02];
+        let verdict = step(0.0, 0.0).certify(&points, &along, 0, 2, 0.2);
+        assert_eq!(verdict.fault, None);
+        for deviation in verdict.deviation {
+            assert!((deviation - 0.1).abs() < 1e-9, "{deviation}");
+        }
+        assert_eq!(step(0.0, 0.0).certify(&points, &along, 0, 2, 0.09).fault, Some(Fault::Point(1)));
+    }
+
+    #[test]
+    fn a_bulge_over_a_chord_is_the_fault_of_the_chord() {
+        // The bulge of slopes ±0.4 over a chord of 1 is 0.1.
+        let arch = step(0.4, -0.4);
+        let (points, along) = ([[0.0, 0.0], [1.0, 0.0]], [0.0, 1.0]);
+        assert!((arch.knot()[1] - 0.1).abs() < 1e-15);
+        let verdict = arch.certify(&points, &along, 0, 1, 0.101);
+        assert_eq!(verdict.fault, None);
+        assert!(verdict.deviation[0] >= 0.1 - 1e-15 && verdict.deviation[0] <= 0.101);
+        assert_eq!(arch.certify(&points, &along, 0, 1, 0.099).fault, Some(Fault::Chord(0)));
+    }
+
+    #[test]
+    fn a_step_that_starts_backwards_is_refused() {
+        let mut back = step(0.0, 0.0);
+        back.tangent[0] = [-0.2, 0.0];
+        assert_eq!(
+            back.certify(&[[0.0, 0.0], [1.0, 0.0]], &[0.0, 1.0], 0, 1, 10.0).fault,
+            Some(Fault::Direction)
+        );
+        back.tangent[0] = [f64::NAN, 0.0];
+        assert_eq!(
+            back.certify(&[[0.0, 0.0], [1.0, 0.0]], &[0.0, 1.0], 0, 1, 10.0).fault,
+            Some(Fault::Direction)
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn the_bound_holds_both_ways(
+            slopes in (-1.0..1.0, -1.0..1.0),
+            inner in proptest::collection::vec((0.02..0.98, -0.2..0.2), 0..8),
+        ) {
+            let step = step(slopes.0, slopes.1);
+            let mut inner: Vec<(f64, f64)> = inner;
+            inner.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let mut points = vec![[0.0, 0.0]];
+            points.extend(inner.iter().map(|&(x, y)| [x, y]));
+            points.push([1.0, 0.0]);
+            let mut along = vec![0.0];
+            for pair in points.windows(2) {
+                along.push(along[along.len() - 1] + norm(&sub(&pair[1], &pair[0])));
+            }
+            let last = points.len() - 1;
+            let verdict = step.certify(&points, &along, 0, last, 0.05);
+            let bound = verdict.deviation[0].max(verdict.deviation[1]);
+            let (curve, chords) = sampled(&step, &points);
+            prop_assert!(curve <= bound + 1e-12, "{curve} {bound}");
+            prop_assert!(chords <= bound + 1e-6, "{chords} {bound}");
+            prop_assert_eq!(verdict.fault.is_none(), bound <= 0.05 + 1e-15);
+        }
+    }
 }

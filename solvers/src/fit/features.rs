@@ -1,10 +1,10 @@
 //! Feature points: the fewer points that the spline interpolates (Zhang 3.2, Algorithm 1).
 //!
-//! A quadratic Bézier curve through three features Q1, Q2, Q3 stands for all points between. Where one of them is too
-//! far from it, the worst becomes a feature and the triple shrinks; when all are near, the triple moves on by one.
-//! Two additions keep the cost linear. A triple looks ahead to the next feature only as far as four times its last
-//! step, so that a failed attempt costs no more than what was accepted before. And a long triple that keeps
-//! failing is halved at every fourth attempt.
+//! A quadratic Bézier curve through three features Q1, Q2, Q3 stands for all points between. Where one of
+//! them is too far from it, the worst becomes a feature and the triple shrinks; when all are near, the triple
+//! moves on by one. Two additions keep the cost linear. A triple looks ahead to the next feature only as far
+//! as four times its last step, so that a failed attempt costs no more than what was accepted before. And a
+//! long triple that keeps failing is halved at every fourth attempt.
 
 use super::certificate::Segment;
 use super::Chain;
@@ -12,12 +12,12 @@ use crate::quadratic::dot;
 
 /// How many times its last step a triple looks ahead, and its first look, in points.
 const REACH: usize = 4;
-const FIRST: usize = 8;
+const FIRST: usize = 32;
 /// Triples of fewer points shrink as the paper says, however slowly.
 const SMALL: usize = 32;
 
-/// The feature points of the group from point `a` to point `b`, both included; `extremes` are those to begin with,
-/// strictly between, in order.
+/// The feature points of the group from point `a` to point `b`, both included; `extremes` are those to begin
+/// with, strictly between, in order.
 pub fn select<const M: usize>(chain: &Chain<M>, a: usize, b: usize, mut extremes: &[usize]) -> Vec<usize> {
     let next_extreme =
         |extremes: &[usize], after: usize| extremes.iter().copied().find(|&next| next > after).unwrap_or(b);
@@ -30,8 +30,8 @@ pub fn select<const M: usize>(chain: &Chain<M>, a: usize, b: usize, mut extremes
             None => return vec![a, b],
         }
     }
-    // Features that an earlier triple has accepted, q2 and beyond, nearest last. A triple that steps back before q2
-    // leaves several.
+    // Features that an earlier triple has accepted, q2 and beyond, nearest last. A triple that steps back
+    // before q2 leaves several.
     let mut accepted: Vec<usize> = Vec::new();
     while q2 < b {
         let mut q3 = match accepted.iter().rev().find(|&&next| next > q2) {
@@ -112,4 +112,68 @@ fn worst_point<const M: usize>(chain: &Chain<M>, q1: usize, q2: usize, q3: usize
         }
     }
     worst
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::lengths_along;
+    use crate::quadratic::Quadratic;
+
+    fn features(points: &[[f64; 2]], extremes: &[usize], tolerance: f64) -> Vec<usize> {
+        let along = lengths_along(points);
+        let chain = Chain { points, along: &along, tolerance, corner_cosine: 0.0, parallel: false };
+        let features = select(&chain, 0, points.len() - 1, extremes);
+        assert!(features.windows(2).all(|pair| pair[0] < pair[1]));
+        assert_eq!((features[0], features[features.len() - 1]), (0, points.len() - 1));
+        // What Algorithm 1 promises: the Bézier curve through a triple is near all points between.
+        for triple in features.windows(3) {
+            let [q1, q2, q3] = [triple[0], triple[1], triple[2]];
+            let u = (along[q2] - along[q1]) / (along[q3] - along[q1]);
+            let middle: [f64; 2] = std::array::from_fn(|k| {
+                (points[q2][k] - (1.0 - u) * (1.0 - u) * points[q1][k] - u * u * points[q3][k])
+                    / (2.0 * u * (1.0 - u))
+            });
+            let bezier = Quadratic { control: [points[q1], middle, points[q3]], width: 1.0 };
+            let curve: Vec<[f64; 2]> = (0..=1000).map(|i| bezier.point(f64::from(i) / 1000.0)).collect();
+            for point in &points[q1..q3] {
+                let off_sq = curve.windows(2).map(|c| Segment::new(&c[0], &c[1]).distance_sq(point));
+                assert!(off_sq.fold(f64::INFINITY, f64::min).sqrt() <= 1.001 * tolerance);
+            }
+        }
+        features
+    }
+
+    #[test]
+    fn points_near_a_chord_need_no_feature() {
+        let points: Vec<[f64; 2]> = (0..=20).map(|i| [i as f64, 0.009 * (i % 2) as f64]).collect();
+        assert_eq!(features(&points, &[], 0.01), [0, 20]);
+    }
+
+    #[test]
+    fn a_shallow_parabola_needs_one_feature_between_its_ends() {
+        let points: Vec<[f64; 2]> = (-15..=15).map(|i| [i as f64, 0.002 * (i * i) as f64]).collect();
+        assert_eq!(features(&points, &[], 0.01), [0, 15, 30]);
+    }
+
+    #[test]
+    fn extremes_become_features() {
+        let points: Vec<[f64; 2]> = (0..=20).map(|i| [i as f64, 0.0]).collect();
+        assert_eq!(features(&points, &[7, 13], 0.01), [0, 7, 13, 20]);
+    }
+
+    #[test]
+    fn the_tighter_the_tolerance_the_more_features() {
+        let points: Vec<[f64; 2]> = (0..2000).map(|i| [0.01 * i as f64, (0.01 * i as f64).sin()]).collect();
+        let counts = [1e-1, 1e-2, 1e-3, 1e-4].map(|tolerance| features(&points, &[], tolerance).len());
+        assert!(counts.windows(2).all(|pair| pair[0] < pair[1]), "{counts:?}");
+        // The error of a triple is of third order in its length: ten times tighter is 2.15 times as many.
+        assert!(counts[3] < 3 * counts[2] && counts[0] < 30, "{counts:?}");
+    }
+
+    #[test]
+    fn rough_points_all_become_features() {
+        let points: Vec<[f64; 2]> = (0..500).map(|i| [0.01 * i as f64, ((i * i) % 7) as f64]).collect();
+        assert!(features(&points, &[], 0.01).len() > 300);
+    }
 }

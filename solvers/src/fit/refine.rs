@@ -1,18 +1,20 @@
 //! A block of points between two given tangents, interpolated again and again with more features until the
 //! certificate holds on every step.
 //!
-//! A step that fails gets its worst point as a feature (both ends of the chord, where it is the curve that leaves the
-//! polygon). A step of a single chord that fails although the next points on both sides are features as well cannot
-//! be helped by more of them. Then the spline is broken, in this order: at the sharper end of the chord if that
-//! turns like a corner; at an end whose tangent was prescribed, which is given up; and at last the chord becomes a
-//! line. Every change is for good, and their number is bounded, so this ends; the rounds are bounded as well,
-//! against chains made to need many.
+//! A step that fails gets its worst point as a feature (both ends of the chord, where it is the curve that
+//! leaves the polygon). A step of a single chord that fails although the next points on both sides are
+//! features as well cannot be helped by more of them. Then the spline gives way, in this order: it is broken
+//! at the sharper end of the chord if that turns like a corner; it passes the ends of the chord at an offset,
+//! so that its bulge is shared between points and chords; a tangent at its end is given up, be it prescribed
+//! or free; and at last the chord becomes a line. Every change is for good, and their number is bounded, so
+//! this ends; the rounds are bounded as well, against chains made to need many.
 
 use super::breaking::turn_cosine;
-use super::certificate::{Fault, Segment, Step, Verdict};
+use super::certificate::{Fault, Step, Verdict};
+use super::pieces::{line, Pen};
 use super::spline::{interpolate, End};
-use super::{chord, Chain, FittedPiece};
-use crate::quadratic::{norm, sub, Quadratic};
+use super::{Chain, FittedPiece};
+use crate::quadratic::{norm, sub};
 
 /// From this round on, a step that fails is halved as well.
 const HALVE: usize = 4;
@@ -22,6 +24,8 @@ const LINES: usize = 24;
 const LAST: usize = 40;
 /// An offset makes a bulge of up to twice the tolerance fit; beyond that and some allowance none does.
 const HOPELESS: f64 = 2.25;
+/// Deviations up to this ratio are alike.
+const LIKE: f64 = 1.1;
 /// Largest offset of the curve from a feature, of the tolerance.
 const SHIFT: f64 = 0.75;
 
@@ -52,7 +56,7 @@ impl<const M: usize> Block<M> {
 
     pub fn fit(&self, chain: &Chain<M>) -> FittedBlock<M> {
         if self.line {
-            let pieces = vec![line(chain, self.features[0], self.features[1])];
+            let pieces = vec![line(chain, self.features[0], self.features[1], 0)];
             return FittedBlock { pieces, starts_smooth: false, ends_smooth: false };
         }
         let mut refinement = Refinement::new(chain, &self.features, self.ends);
@@ -64,20 +68,21 @@ impl<const M: usize> Block<M> {
         }
         let (first, last) = (&refinement.steps[0], &refinement.steps[refinement.steps.len() - 1]);
         FittedBlock {
-            starts_smooth: !first.line && !first.broken,
-            ends_smooth: !last.line && !refinement.end_broken,
+            starts_smooth: !first.line && first.joints[0] == Joint::Smooth,
+            ends_smooth: !last.line && last.joints[1] == Joint::Smooth,
             pieces: refinement.pieces(),
         }
     }
 }
 
-/// The line from point `a` to point `b`, all between being on it.
-fn line<const M: usize>(chain: &Chain<M>, a: usize, b: usize) -> FittedPiece<M> {
-    let points = chain.points;
-    let segment = Segment::new(&points[a], &points[b]);
-    let deviation =
-        points[a + 1..b].iter().fold(0.0_f64, |worst, p| worst.max(segment.distance_sq(p))).sqrt();
-    FittedPiece { piece: Quadratic::line(points[a], points[b]), first: a, last: b - 1, deviation, spline: 0 }
+/// The tangent of a spline at one side of a feature.
+#[derive(Clone, Copy, PartialEq)]
+enum Joint {
+    /// As the other side of the feature has it.
+    Smooth,
+    Free,
+    /// Along the chord, where a free one makes too much of a bulge.
+    Along,
 }
 
 /// From one feature to the next.
@@ -87,9 +92,9 @@ struct State<const M: usize> {
     to: usize,
     /// A chord that stays a line.
     line: bool,
-    /// The tangent may jump at the start.
-    broken: bool,
-    /// From the first feature to where the spline passes it: 0 unless that was of no use.
+    /// What becomes of the tangent at the start and at the end.
+    joints: [Joint; 2],
+    /// From the first feature to where the spline passes it, once passing through it was of no use.
     offset: Option<[f64; M]>,
     /// Filled in by `interpolate`; a step that is new or has a new neighbour has none.
     fitted: Option<(Step<M>, Verdict)>,
@@ -99,16 +104,22 @@ struct Refinement<'a, const M: usize> {
     chain: &'a Chain<'a, M>,
     ends: [End<M>; 2],
     steps: Vec<State<M>>,
-    end_broken: bool,
 }
 
 impl<'a, const M: usize> Refinement<'a, M> {
     fn new(chain: &'a Chain<M>, features: &[usize], ends: [End<M>; 2]) -> Self {
         let steps = features
             .windows(2)
-            .map(|f| State { from: f[0], to: f[1], line: false, broken: false, offset: None, fitted: None })
+            .map(|f| State {
+                from: f[0],
+                to: f[1],
+                line: false,
+                joints: [Joint::Smooth; 2],
+                offset: None,
+                fitted: None,
+            })
             .collect();
-        Self { chain, ends, steps, end_broken: false }
+        Self { chain, ends, steps }
     }
 
     /// Steps `[first, end)` of every spline.
@@ -116,7 +127,8 @@ impl<'a, const M: usize> Refinement<'a, M> {
         let mut splines = Vec::new();
         let mut first = 0;
         for j in 0..=self.steps.len() {
-            let stop = j == self.steps.len() || self.steps[j].line || self.steps[j].broken;
+            let stop =
+                j == self.steps.len() || self.steps[j].line || self.steps[j].joints[0] != Joint::Smooth;
             if stop && first < j {
                 splines.push((first, j));
                 first = j;
@@ -128,20 +140,17 @@ impl<'a, const M: usize> Refinement<'a, M> {
         splines
     }
 
-    /// What holds where step `j` starts, for a spline that starts there (`side` 0) or ends there (`side` 1).
+    /// What holds at the start (`side` 0) or at the end (1) of step `j`, where a spline starts or ends.
     fn end(&self, j: usize, side: usize) -> End<M> {
-        let broken = if j == self.steps.len() { self.end_broken } else { self.steps[j].broken };
-        if broken {
-            return End::Free;
-        }
-        let neighbour = match side {
-            0 if j == 0 => return self.ends[0],
-            1 if j == self.steps.len() => return self.ends[1],
-            0 => &self.steps[j - 1],
-            _ => &self.steps[j],
+        let step = &self.steps[j];
+        let neighbour = match step.joints[side] {
+            Joint::Free => return End::Free,
+            Joint::Along => return End::Tangent(self.chain.direction(step.from, step.to)),
+            Joint::Smooth if side == 0 && j == 0 => return self.ends[0],
+            Joint::Smooth if side == 1 && j + 1 == self.steps.len() => return self.ends[1],
+            Joint::Smooth => &self.steps[j + 2 * side - 1],
         };
-        let at = if side == 0 { neighbour.to } else { neighbour.from };
-        match neighbour.line && !self.chain.is_corner(at) {
+        match neighbour.line && !self.chain.is_corner([step.from, step.to][side]) {
             true => End::Tangent(self.chain.direction(neighbour.from, neighbour.to)),
             false => End::Free,
         }
@@ -154,8 +163,8 @@ impl<'a, const M: usize> Refinement<'a, M> {
         step.offset.map_or(*point, |offset| std::array::from_fn(|k| point[k] + offset[k]))
     }
 
-    /// Half of what a smooth curve through the points bulges over the chords at point `at`, towards their inside: by
-    /// so much the curve can cut the corner to share its deviation between points and chords.
+    /// Half of what a smooth curve through the points bulges over the chords at point `at`, towards their
+    /// inside: by so much the curve can cut the corner to share its deviation between points and chords.
     fn inward(&self, at: usize) -> [f64; M] {
         let points = self.chain.points;
         let (before, after) = (sub(&points[at], &points[at - 1]), sub(&points[at + 1], &points[at]));
@@ -179,7 +188,7 @@ impl<'a, const M: usize> Refinement<'a, M> {
             features.push(chain.points[self.steps[first].from]);
             features.extend((first + 1..end).map(|j| self.passage(j)));
             features.push(chain.points[self.steps[end - 1].to]);
-            let spline = interpolate(&features, self.end(first, 0), self.end(end, 1));
+            let spline = interpolate(&features, self.end(first, 0), self.end(end - 1, 1));
             for (i, state) in self.steps[first..end].iter_mut().enumerate() {
                 let step = Step {
                     start: features[i],
@@ -220,7 +229,8 @@ impl<'a, const M: usize> Refinement<'a, M> {
                     continue;
                 }
                 if self.is_hopeless(j) {
-                    self.make_line(j);
+                    self.steps[j].line = true;
+                    self.refit(j);
                     continue;
                 }
                 let count = added.len();
@@ -233,7 +243,8 @@ impl<'a, const M: usize> Refinement<'a, M> {
                     }
                 }
                 // Of neighbours that fail together the worst is broken first: it may have spoilt the others.
-                let worst = (j.saturating_sub(2)..(j + 3).min(end)).all(|i| self.excess(i) <= self.excess(j));
+                let enough = LIKE * self.excess(j);
+                let worst = (j.saturating_sub(2)..(j + 3).min(end)).all(|i| self.excess(i) <= enough);
                 if added.len() == count && (worst || round >= LINES) {
                     self.break_at(first, j, end, round);
                 }
@@ -267,13 +278,6 @@ impl<'a, const M: usize> Refinement<'a, M> {
         bulge.min(self.excess(j)) > HOPELESS * self.chain.tolerance
     }
 
-    fn make_line(&mut self, j: usize) {
-        self.steps[j].line = true;
-        for k in j.saturating_sub(1)..(j + 2).min(self.steps.len()) {
-            self.steps[k].fitted = None;
-        }
-    }
-
     /// No feature helps the chord of step `j` of the spline `[first, end)`.
     fn break_at(&mut self, first: usize, j: usize, end: usize, round: usize) {
         let State { from, to, .. } = self.steps[j];
@@ -284,36 +288,43 @@ impl<'a, const M: usize> Refinement<'a, M> {
             false => 1.0,
         };
         let (left, right) = (corner(from, j > first), corner(to, j + 1 < end));
-        let shift = [j, j + 1].iter().any(|&k| first < k && k < end && self.steps[k].offset.is_none());
-        let given = |end: End<M>| end != End::Free;
+        let shifts = [j, j + 1].map(|k| first < k && k < end && self.steps[k].offset.is_none());
+        let outer = [j == first, j + 1 == end];
+        let joints = self.steps[j].joints;
+        let given =
+            |&side: &usize| outer[side] && joints[side] == Joint::Smooth && self.end(j, side) != End::Free;
+        // A chord with two free ends is a line anyway.
+        let loose = |&side: &usize| outer[side] && !outer[1 - side] && joints[side] != Joint::Along;
         if round >= LINES {
             self.steps[j].line = true;
         } else if left < 1.0 && left <= right {
-            self.set_broken(j);
+            self.break_between(j);
         } else if right < 1.0 {
-            self.set_broken(j + 1);
-        } else if shift {
-            for k in [j, j + 1] {
-                if first < k && k < end && self.steps[k].offset.is_none() {
-                    self.steps[k].offset = Some(self.inward(self.steps[k].from));
-                }
+            self.break_between(j + 1);
+        } else if shifts != [false; 2] {
+            for k in (j..j + 2).filter(|k| shifts[k - j]) {
+                self.steps[k].offset = Some(self.inward(self.steps[k].from));
             }
-        } else if j == first && given(self.end(j, 0)) {
-            self.set_broken(j);
-        } else if j + 1 == end && given(self.end(end, 1)) {
-            self.set_broken(end);
+        } else if let Some(side) = (0..2).find(given) {
+            self.steps[j].joints[side] = Joint::Free;
+        } else if let Some(side) = (0..2).find(loose) {
+            self.steps[j].joints[side] = Joint::Along;
         } else {
             self.steps[j].line = true;
         }
-        for k in j.saturating_sub(1)..(j + 2).min(self.steps.len()) {
-            self.steps[k].fitted = None;
-        }
+        self.refit(j);
     }
 
-    fn set_broken(&mut self, j: usize) {
-        match self.steps.get_mut(j) {
-            Some(step) => step.broken = true,
-            None => self.end_broken = true,
+    fn break_between(&mut self, j: usize) {
+        self.steps[j - 1].joints[1] = Joint::Free;
+        self.steps[j].joints[0] = Joint::Free;
+        self.refit(j - 1);
+    }
+
+    /// Step `j` or one of its ends has changed.
+    fn refit(&mut self, j: usize) {
+        for k in j.saturating_sub(1)..(j + 2).min(self.steps.len()) {
+            self.steps[k].fitted = None;
         }
     }
 
@@ -337,8 +348,10 @@ impl<'a, const M: usize> Refinement<'a, M> {
                 next += 1;
             }
             while next < added.len() && added[next] < rest.to {
-                steps.push(State { to: added[next], fitted: None, ..rest });
-                rest = State { from: added[next], broken: false, offset: None, fitted: None, ..rest };
+                let [start, finish] = rest.joints;
+                steps.push(State { to: added[next], joints: [start, Joint::Smooth], fitted: None, ..rest });
+                let joints = [Joint::Smooth, finish];
+                rest = State { from: added[next], joints, offset: None, fitted: None, ..rest };
                 next += 1;
             }
             steps.push(rest);
@@ -359,7 +372,7 @@ impl<'a, const M: usize> Refinement<'a, M> {
                     j = end;
                 }
                 None => {
-                    pieces.push(chord(self.chain.points, self.steps[j].from, spline));
+                    pieces.push(line(self.chain, self.steps[j].from, self.steps[j].to, spline));
                     j += 1;
                 }
             }
@@ -369,51 +382,26 @@ impl<'a, const M: usize> Refinement<'a, M> {
     }
 
     fn knots_to_pieces(&self, first: usize, end: usize, spline: u32, pieces: &mut Vec<FittedPiece<M>>) {
-        // A knot next to a free end is none: both sides are the same quadratic.
-        let [free_start, free_end] = [self.end(first, 0), self.end(end, 1)].map(|end| end == End::Free);
-        let fitted = |j: usize| self.steps[j].fitted.as_ref().expect("the last round has fitted all");
+        let [free_start, free_end] = [self.end(first, 0), self.end(end - 1, 1)].map(|end| end == End::Free);
         if end - first == 1 && free_start && free_end {
-            let (from, to) = (self.steps[first].from, self.steps[first].to);
-            pieces.push(FittedPiece { spline, ..line(self.chain, from, to) });
+            pieces.push(line(self.chain, self.steps[first].from, self.steps[first].to, spline));
             return;
         }
-        let start = &fitted(first).0;
-        let mut at = (start.start, start.tangent[0], self.steps[first].from);
-        let (mut width, mut deviation) = (0.0, 0.0_f64);
-        let mut finish = |point: [f64; M],
-                          slope: [f64; M],
-                          chord: usize,
-                          next: usize,
-                          width: &mut f64,
-                          deviation: &mut f64| {
-            let quarter = 0.25 * *width;
-            let (from, tangent, first) = at;
-            let middle =
-                std::array::from_fn(|k| 0.5 * (from[k] + point[k]) + quarter * (tangent[k] - slope[k]));
-            let piece = Quadratic { control: [from, middle, point], width: *width };
-            pieces.push(FittedPiece { piece, first, last: chord, deviation: *deviation, spline });
-            at = (point, slope, next);
-            (*width, *deviation) = (0.0, 0.0);
-        };
+        let fitted = |j: usize| self.steps[j].fitted.as_ref().expect("the last round has fitted all");
+        let Step { start: point, tangent: [tangent, ..], .. } = fitted(first).0;
+        let chord = self.steps[first].from;
+        let mut pen = Pen { point, tangent, chord, spline, width: 0.0, deviation: 0.0 };
         for j in first..end {
             let (step, verdict) = fitted(j);
-            width += 0.5 * step.width;
-            deviation = deviation.max(verdict.deviation[0]);
+            pen.pass(0.5 * step.width, verdict.deviation[0]);
+            // A knot next to a free end is none: both sides are the same quadratic.
             if !((j == first && free_start) || (j + 1 == end && free_end)) {
-                finish(
-                    step.knot(),
-                    step.tangent[1],
-                    verdict.knot_chord,
-                    verdict.knot_chord,
-                    &mut width,
-                    &mut deviation,
-                );
+                let chord = verdict.knot_chord;
+                pieces.push(pen.piece(step.knot(), step.tangent[1], chord, chord));
             }
-            width += 0.5 * step.width;
-            deviation = deviation.max(verdict.deviation[1]);
+            pen.pass(0.5 * step.width, verdict.deviation[1]);
         }
-        let last = &self.steps[end - 1];
-        let step = &fitted(end - 1).0;
-        finish(step.end, step.tangent[2], last.to - 1, last.to, &mut width, &mut deviation);
+        let (step, to) = (&fitted(end - 1).0, self.steps[end - 1].to);
+        pieces.push(pen.piece(step.end, step.tangent[2], to - 1, to));
     }
 }

@@ -202,7 +202,13 @@ impl Block {
             return Err(None);
         }
         if self.groups & (1 << group) != 0 {
-            return Err(Some(self.codes[group as usize]));
+            let other = self.codes[group as usize];
+            // Posts write G80 beside the motion that replaces the cycle: that motion counts.
+            match (other, code) {
+                (800, _) if group == Group::Motion as u8 => {}
+                (_, 800) => return Ok(()),
+                _ => return Err(Some(other)),
+            }
         }
         self.groups |= 1 << group;
         self.codes[group as usize] = code;
@@ -244,35 +250,37 @@ pub fn g_name(code: u16) -> String {
     }
 }
 
-/// Why a G code that is in no group is not read, and what to do.
-pub fn g_remedy(code: u16) -> &'static str {
-    match code {
-        50..=53 | 60..=69 => "splines in programs are not read: post lines and arcs",
-        171 | 181 | 191 => "arcs and cycles in the planes of U, V and W are not read: use G17, G18 or G19",
-        281 | 301 => "the home position comes from the machine file: set home there and remove this block",
-        330..=339 | 760 | 920..=929 => "threading follows the spindle and has no feed of its own: remove it or post it as G1",
-        380..=389 => "probing depends on the part: remove it",
-        410 | 420 | 411 | 421 => {
-            "cutter radius compensation is not computed here: post with the compensation computed by the CAM system"
+/// What to do about a G code that is understood and not read; None where it is not understood.
+pub fn g_remedy(code: u16) -> Option<&'static str> {
+    Some(match code {
+        50..=53 | 60..=69 => {
+            "splines in programs are not read: post lines and arcs (and remove Fanuc's G5 P and G5.1 Q)"
         }
-        541 => "only the work offsets G54 to G59.3 are read: post with one of them",
         70 => "diameters are not read: post radii (G8)",
         160 => "polar coordinates are not read: post X and Y",
+        171 | 181 | 191 => "arcs and cycles in the planes of U, V and W are not read: use G17, G18 or G19",
+        281 | 301 => "the home position comes from the machine file: set home there and remove this block",
+        330..=339 | 760 => "threading follows the spindle and has no feed of its own: remove it or post it as G1",
+        380..=389 => "probing depends on the part: remove it",
+        410 | 411 | 420 | 421 => {
+            "cutter radius compensation is not computed here: post with the compensation computed by the CAM system"
+        }
         500..=519 => "scaling is not read: post the coordinates at full size",
+        541 => "only the work offsets G54 to G59.3 are read: post with one of them",
         680..=689 => "rotated coordinates are not read: post the coordinates as they are cut",
         700..=729 | 870 | 880 => "this cycle is not read: post it as single moves",
-        _ => "it is not understood: remove it, or post the program for LinuxCNC (RS-274/NGC)",
-    }
+        _ => return None,
+    })
 }
 
-/// Why an M code that is in no group is not read, and what to do.
-pub fn m_remedy(code: u16) -> &'static str {
-    match code {
-        97..=99 => "subprograms are not read: post one program without them",
+/// What to do about an M code that is understood and not read; None where it is not understood.
+pub fn m_remedy(code: u16) -> Option<&'static str> {
+    Some(match code {
         62..=68 => "inputs and outputs are not read: remove it, or make it a user code M100 to M199",
-        82 | 83 | 84 | 104..=109 => "it belongs to 3-D printers: remove it",
-        _ => "it is not understood: remove it, or make it a user code M100 to M199",
-    }
+        82 | 83 | 84 | 104 | 109 | 140 => "it belongs to 3-D printers: remove it",
+        97..=99 => "subprograms are not read: post one program without them",
+        _ => return None,
+    })
 }
 
 #[cfg(test)]
@@ -286,6 +294,8 @@ mod tests {
         assert_eq!(block.set_code(910), Ok(()));
         assert_eq!(block.set_code(810), Err(Some(10)));
         assert_eq!(block.set_code(51), Err(None));
+        assert_eq!(block.code(Group::Motion), Some(10));
+        assert_eq!(block.set_code(800), Ok(()));
         assert_eq!(block.code(Group::Motion), Some(10));
         assert_eq!(block.set_m_code(3, MGroup::Spindle), Ok(()));
         assert_eq!(block.set_m_code(5, MGroup::Spindle), Err(3));

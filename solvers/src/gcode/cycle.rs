@@ -71,15 +71,15 @@ impl Interpreter<'_> {
             self.state.control = Control::new(Mode::ExactPath);
         }
         let mut up = self.moves.position;
-        up[normal] = place[normal];
+        for height in [hole.bottom, hole.clear, place[normal]] {
+            up[normal] = height;
+            self.check_reach(&up)?;
+        }
         self.rapid(&up)?;
         for _ in 0..repeats {
             place[u] += step[u];
             place[v] += step[v];
-            if [place[u], place[v], hole.retract, hole.bottom].iter().any(|value| !(value.abs() <= 1e6)) {
-                place[normal] = hole.bottom;
-                return self.too_far(&place);
-            }
+            self.check_reach(&place)?;
             self.rapid(&place)?;
             self.drill(block, &hole, place, normal, feed)?;
             place[normal] = hole.clear;

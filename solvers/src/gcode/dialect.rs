@@ -32,7 +32,7 @@ const SIGNS: [(&[&str], &str); 5] = [
 pub fn guess(source: &[u8]) -> Option<&'static str> {
     let head = source[..source.len().min(LOOK)].to_ascii_uppercase();
     let has = |sign: &&str| head.windows(sign.len()).any(|window| window == sign.as_bytes());
-    SIGNS.iter().find(|(signs, _)| signs.iter().any(|sign| has(sign))).map(|&(_, language)| language)
+    SIGNS.iter().find(|(signs, _)| signs.iter().any(&has)).map(|&(_, language)| language)
 }
 
 #[cfg(test)]

@@ -6,11 +6,11 @@
 //! One difference: F counts in the units of its own block (`G20 F10` is 10 inch/min), as most controls and all posts
 //! have it; LinuxCNC reads it before the units change.
 
-use super::block::{bit, bits, g_name, rotary, Block, Group, MGroup, AXES, AXIS_OF_LETTER, AXIS_WORDS};
+use super::block::{bit, bits, rotary, Block, Group, MGroup, AXES, AXIS_OF_LETTER, AXIS_WORDS};
 use super::fault::{fault, Outcome};
+use super::intent::{axis_words, check_use, is_cycle, motion_of, ARC_WORDS, FREE_WORDS};
 use super::modal::{Feed, FeedMode, State};
 use super::moves::{Control, Kind, Mode, Moves, Point};
-use super::words::count;
 use super::Options;
 
 /// Farther than this from the machine's zero is a mistake, in mm;
@@ -19,26 +19,23 @@ const FARTHEST: f64 = 1e6;
 /// rotary axes may wind up, in degrees.
 const FARTHEST_TURN: f64 = 1e8;
 
+/// Feeds and spindle speeds of the program beyond these are mistakes.
+pub(super) const RATES: std::ops::RangeInclusive<f64> = 1e-6..=1e9;
+
 /// Longer dwells are probably milliseconds taken for seconds.
 const LONG_DWELL: f64 = 100.0;
-
-/// Words that need no G code in their block. D names a cutter radius, which only G41 and G42 would use.
-const FREE_WORDS: u32 = bits(b"FSTD");
-
-/// Codes that name no motion but take the axis words of their block.
-const TAKES_AXES: [u16; 5] = [100, 280, 300, 520, 920];
 
 /// Runs blocks.
 pub struct Interpreter<'a> {
     pub(super) state: State,
     pub(super) moves: Moves,
     pub(super) line: u32,
-    options: &'a Options,
+    pub(super) options: &'a Options,
     /// Letters of the axes that the program has named.
-    known: u32,
+    pub(super) known: u32,
     warnings: Vec<String>,
     warned_codes: Vec<u16>,
-    warned_tool: bool,
+    pub(super) warned_tool: bool,
     warned_dwell: bool,
 }
 
@@ -68,23 +65,36 @@ impl<'a> Interpreter<'a> {
     #[inline]
     pub fn run(&mut self, block: &Block, line: u32) -> Outcome<bool> {
         self.line = line;
-        if block.only_motion() && block.words & !(AXIS_WORDS | FREE_WORDS) == 0 {
-            self.set_feed_and_speed(block)?;
-            let motion = self.motion_of(block, block.words & AXIS_WORDS)?;
-            if let Some(motion @ (0 | 10)) = motion {
+        if !block.only_motion() {
+            return self.run_all(block);
+        }
+        // Nearly all blocks are a straight move or an arc and nothing else.
+        let axes = block.words & AXIS_WORDS;
+        let rest = block.words & !(AXIS_WORDS | FREE_WORDS);
+        match motion_of(block, axes, self.state.motion)? {
+            Some(motion @ (0 | 10)) if rest == 0 => {
+                self.set_feed_and_speed(block)?;
                 self.state.motion = motion;
                 self.state.sticky.initial = None;
                 self.straight(block, motion == 0, false)?;
-                return Ok(false);
+                Ok(false)
             }
+            Some(motion @ (20 | 30)) if rest & !ARC_WORDS == 0 => {
+                self.set_feed_and_speed(block)?;
+                self.state.motion = motion;
+                self.state.sticky.initial = None;
+                self.arc(block, motion == 20)?;
+                Ok(false)
+            }
+            None if block.is_empty() => Ok(false),
+            _ => self.run_all(block),
         }
-        self.run_all(block)
     }
 
     fn run_all(&mut self, block: &Block) -> Outcome<bool> {
-        let axes = self.axis_words(block);
-        let motion = self.motion_of(block, axes)?;
-        self.check_use(block, axes, motion)?;
+        let axes = axis_words(block);
+        let motion = motion_of(block, axes, self.state.motion)?;
+        check_use(block, axes, motion, self.state.absolute)?;
 
         self.set_feed_and_speed(block)?;
         self.switch(block)?;
@@ -94,7 +104,7 @@ impl<'a> Interpreter<'a> {
         self.set_modes(block)?;
         self.set_offsets(block)?;
         match block.code(Group::Once) {
-            Some(code @ (280 | 300)) => self.go_home(block, code)?,
+            Some(280 | 300) => self.go_home(block)?,
             Some(100) => self.set_work_offset(block)?,
             Some(code @ (520 | 920)) => self.shift(block, code)?,
             _ => {}
@@ -107,6 +117,7 @@ impl<'a> Interpreter<'a> {
                 self.state.sticky.initial = None;
             }
             match motion {
+                _ if matches!(block.code(Group::Once), Some(280 | 300)) => {}
                 0 | 10 => self.straight(block, motion == 0, block.code(Group::Once) == Some(530))?,
                 20 | 30 => self.arc(block, motion == 20)?,
                 800 => {}
@@ -120,118 +131,6 @@ impl<'a> Interpreter<'a> {
                 Ok(matches!(code, 2 | 30))
             }
             None => Ok(false),
-        }
-    }
-
-    /// The axis words of the block that are places; with G4 a lone X is a time.
-    fn axis_words(&self, block: &Block) -> u32 {
-        let axes = block.words & AXIS_WORDS;
-        let timed = axes == bit(b'X') && block.code(Group::Once) == Some(40) && !block.has(b'P');
-        if timed && block.code(Group::Motion).is_none() {
-            0
-        } else {
-            axes
-        }
-    }
-
-    /// The motion that the block asks for, by its code or by its words.
-    #[inline(always)]
-    fn motion_of(&self, block: &Block, axes: u32) -> Outcome<Option<u16>> {
-        let taker = || block.code(Group::Once).filter(|code| TAKES_AXES.contains(code));
-        let tool = || block.code(Group::ToolLength).filter(|code| matches!(code, 431 | 432));
-        match block.code(Group::Motion) {
-            Some(code) => {
-                if let Some(other) = taker().or_else(tool).filter(|_| code != 800) {
-                    return fault(format!(
-                        "words {} and {} both take axis words: put them in two blocks",
-                        g_name(other),
-                        g_name(code)
-                    ));
-                }
-                if code == 800 && axes != 0 && taker().or_else(tool).is_none() {
-                    return fault("axis words stand beside G80, which ends motion: give G0 or G1 instead");
-                }
-                if is_cycle(code) && axes == 0 {
-                    return fault(format!(
-                        "word {} has no axis words: give the place of the hole",
-                        g_name(code)
-                    ));
-                }
-                Ok(Some(code))
-            }
-            None if taker().is_some() => Ok(None),
-            None if axes != 0 && tool().is_some() => Ok(None),
-            None if axes != 0 && self.state.motion == 800 => {
-                let letter = AXES.into_iter().find(|&letter| axes & bit(letter) != 0).unwrap_or(b'X');
-                fault(format!(
-                    "word {} has no motion code in force: give G0 or G1 before it",
-                    block.word(letter)
-                ))
-            }
-            None if axes != 0 => Ok(Some(self.state.motion)),
-            None if block.words & bits(b"IJK") != 0 && matches!(self.state.motion, 20 | 30) => {
-                Ok(Some(self.state.motion))
-            }
-            None => Ok(None),
-        }
-    }
-
-    /// Every word must mean something: one that nothing uses is a misunderstanding.
-    fn check_use(&self, block: &Block, axes: u32, motion: Option<u16>) -> Outcome<()> {
-        let mut used = FREE_WORDS | axes;
-        used |= match motion {
-            Some(20 | 30) => bits(b"IJKRP"),
-            Some(730 | 830) => bits(b"RLQ"),
-            Some(820 | 740 | 840 | 860 | 890) => bits(b"RLP"),
-            Some(810 | 850) => bits(b"RL"),
-            _ => 0,
-        };
-        used |= match block.code(Group::Once) {
-            Some(40) => bits(b"PX"),
-            Some(100) => bits(b"PLR"),
-            _ => 0,
-        };
-        if block.code(Group::Control) == Some(640) {
-            used |= bits(b"PQ");
-        }
-        if matches!(block.code(Group::ToolLength), Some(430 | 432)) {
-            used |= bit(b'H');
-        }
-        if block.m_code(MGroup::User).is_some() || block.m_code(MGroup::Spindle) == Some(19) {
-            used |= bits(b"PQR");
-        }
-        let unused = block.words & !used;
-        if unused == 0 {
-            return self.check_once(block, motion);
-        }
-        let letter = b'A' + unused.trailing_zeros() as u8;
-        let remedy = match (letter, motion) {
-            (b'P', Some(730 | 830)) => "this cycle has no dwell: remove it, or use G82",
-            (b'H', _) => "put it beside G43",
-            (b'K', Some(motion)) if is_cycle(motion) => "repetitions are counted by L",
-            _ => "no code of the block uses it; remove it",
-        };
-        fault(format!("word {} has no meaning here: {remedy}", block.word(letter)))
-    }
-
-    /// Combinations that controls refuse.
-    fn check_once(&self, block: &Block, motion: Option<u16>) -> Outcome<()> {
-        match (block.code(Group::Once), motion) {
-            (Some(40), Some(20 | 30)) => fault("G4 and an arc both use P: put them in two blocks"),
-            (Some(530), Some(0 | 10)) => {
-                let absolute = block.code(Group::Distance).map_or(self.state.absolute, |code| code == 900);
-                if absolute {
-                    return Ok(());
-                }
-                fault("G53 takes machine coordinates and G91 is in force: give G90 in its block")
-            }
-            (Some(530), _) => {
-                fault("G53 goes with straight moves only: give G0 or G1 and axis words in its block")
-            }
-            (Some(520 | 920), _) if block.words & AXIS_WORDS == 0 => {
-                fault("G52 and G92 need the axes they set: give axis words")
-            }
-            _ => Ok(()),
         }
     }
 
@@ -256,8 +155,15 @@ impl<'a> Interpreter<'a> {
             self.state.constant_surface_speed = code == 960;
             self.state.spindle_speed = None;
         }
+        if let Some(speed) = block.get(b'S') {
+            self.state.spindle_speed = (!self.state.constant_surface_speed).then_some(speed);
+        }
         if block.words & bits(b"SHTD") != 0 {
-            self.set_speed(block)?;
+            for letter in *b"SHTD" {
+                if block.get(letter).is_some_and(|value| value < 0.0) {
+                    return fault(format!("word {} is negative: give a number from 0", block.word(letter)));
+                }
+            }
         }
         Ok(())
     }
@@ -267,23 +173,16 @@ impl<'a> Interpreter<'a> {
         if feed < 0.0 {
             return fault(format!("word {} is a negative feed: give a positive one", block.word(b'F')));
         }
+        if feed != 0.0 && !RATES.contains(&feed) {
+            return fault(format!(
+                "word {} is a feed that no machine has: check the number",
+                block.word(b'F')
+            ));
+        }
         let inches = block.code(Group::Units).map_or(self.state.inches, |code| code == 200);
         let unit = if inches { super::modal::MM_PER_INCH } else { 1.0 };
         let per = if self.state.feed_mode == FeedMode::PerTurn { 1.0 } else { 60.0 };
         self.state.feed = Some(Feed { linear: feed * unit / per, angular: feed / per });
-        Ok(())
-    }
-
-    fn set_speed(&mut self, block: &Block) -> Outcome<()> {
-        for letter in *b"SHD" {
-            if block.get(letter).is_some_and(|value| value < 0.0) {
-                return fault(format!("word {} is negative: give a number from 0", block.word(letter)));
-            }
-        }
-        count(block, b'T', 0, "tool number")?;
-        if let Some(speed) = block.get(b'S') {
-            self.state.spindle_speed = (!self.state.constant_surface_speed).then_some(speed);
-        }
         Ok(())
     }
 
@@ -351,9 +250,9 @@ impl<'a> Interpreter<'a> {
                 let mut control = Control::new(Mode::Tolerance);
                 for (letter, place) in [(b'P', &mut control.blend), (b'Q', &mut control.fit)] {
                     if let Some(value) = block.get(letter) {
-                        if value < 0.0 {
+                        if !(0.0..=FARTHEST).contains(&value) {
                             return fault(format!(
-                                "word {} is a negative tolerance: give one from 0",
+                                "word {} is no tolerance: give one from 0",
                                 block.word(letter)
                             ));
                         }
@@ -396,7 +295,7 @@ impl<'a> Interpreter<'a> {
 
     /// Axes named for the first time: the machine must have them.
     #[cold]
-    fn meet(&mut self, words: u32) -> Outcome<()> {
+    pub(super) fn meet(&mut self, words: u32) -> Outcome<()> {
         for (axis, &letter) in AXES.iter().enumerate().filter(|(_, &letter)| words & bit(letter) != 0) {
             if !self.options.machine_axes.is_empty() && !self.options.machine_axes.contains(&letter) {
                 let letter = letter as char;
@@ -417,156 +316,21 @@ impl<'a> Interpreter<'a> {
         let mut target = self.moves.position;
         let zero = if machine { [0.0; 9] } else { *self.state.offsets.sum() };
         let absolute = self.state.absolute;
-        let mut far = false;
         self.places(block, |axis, value| {
             target[axis] = value + if absolute { zero[axis] } else { target[axis] };
-            far |= !(target[axis].abs() <= farthest(axis));
         })?;
-        if far {
-            return self.too_far(&target);
-        }
+        self.check_reach(&target)?;
         Ok(target)
     }
 
-    #[cold]
-    pub(super) fn too_far<T>(&self, target: &Point) -> Outcome<T> {
-        let axis = (0..9).find(|&axis| !(target[axis].abs() <= farthest(axis))).unwrap_or(0);
-        let unit = if rotary(axis) { "degrees" } else { "mm" };
-        fault(format!(
-            "{} would go to {} {unit}, more than {} {unit} from the machine's zero: check the number, the units and \
-             the offsets",
-            AXES[axis] as char,
-            target[axis],
-            farthest(axis),
-        ))
-    }
-
-    /// Work offset of G10 L2 and L20.
-    fn set_work_offset(&mut self, block: &Block) -> Outcome<()> {
-        let from_here = match block.get(b'L') {
-            Some(2.0) => false,
-            Some(20.0) => true,
-            _ => return fault("G10 sets something else than work offsets: only G10 L2 and G10 L20 are read"),
-        };
-        if block.get(b'R').is_some_and(|angle| angle != 0.0) {
-            return fault(format!(
-                "word {} turns the work coordinates, which is not read: post the coordinates as they are cut",
-                block.word(b'R')
-            ));
+    /// Refuses places that no machine reaches, and what is not a number.
+    #[inline(always)]
+    pub(super) fn check_reach(&self, target: &Point) -> Outcome<()> {
+        let reached = |axis: usize| target[axis].abs() <= if rotary(axis) { FARTHEST_TURN } else { FARTHEST };
+        match (0..9).find(|&axis| !reached(axis)) {
+            None => Ok(()),
+            Some(axis) => too_far(axis, target[axis]),
         }
-        let system = match count(block, b'P', 0, "work offset")? {
-            Some(0) => self.state.offsets.system,
-            Some(number @ 1..=9) => number as usize - 1,
-            _ => return fault("G10 needs P0 to P9: P0 is the offset in force, P1 is G54, P9 is G59.3"),
-        };
-        let position = self.moves.position;
-        let (shift, tool) = (self.state.offsets.shift, self.state.offsets.tool);
-        let mut work = self.state.offsets.work[system];
-        self.places(block, |axis, value| {
-            work[axis] = if from_here { position[axis] - shift[axis] - tool[axis] - value } else { value };
-        })?;
-        self.state.offsets.work[system] = work;
-        self.state.offsets.update();
-        Ok(())
-    }
-
-    /// G52 sets the shift, G92 lets the axes named stand at the values given; both share one offset.
-    fn shift(&mut self, block: &Block, code: u16) -> Outcome<()> {
-        let position = self.moves.position;
-        let sum = *self.state.offsets.sum();
-        let mut shift = self.state.offsets.shift;
-        self.places(block, |axis, value| {
-            shift[axis] =
-                if code == 520 { value } else { position[axis] - (sum[axis] - shift[axis]) - value };
-        })?;
-        self.state.offsets.shift = shift;
-        self.state.offsets.saved_shift = shift;
-        self.state.offsets.update();
-        Ok(())
-    }
-
-    /// G92.1 forgets the shift, G92.2 suspends it, G92.3 brings it back.
-    fn reset_shift(&mut self, code: u16) {
-        let offsets = &mut self.state.offsets;
-        offsets.shift = if code == 923 { offsets.saved_shift } else { [0.0; 9] };
-        if code == 921 {
-            offsets.saved_shift = [0.0; 9];
-        }
-        offsets.update();
-    }
-
-    /// Tool length and work offset.
-    fn set_offsets(&mut self, block: &Block) -> Outcome<()> {
-        match block.code(Group::ToolLength) {
-            Some(code @ (430 | 432)) if block.words & AXIS_WORDS == 0 || code == 430 => {
-                if code == 432 && !block.has(b'H') {
-                    return fault("G43.2 adds nothing: give it H or axis words");
-                }
-                if code == 430 {
-                    self.state.offsets.tool = [0.0; 9];
-                }
-                self.warn_of_tool();
-            }
-            Some(code @ (431 | 432)) => {
-                if block.has(b'H') {
-                    return fault(format!("{} has both H and axis words: give one of them", g_name(code)));
-                }
-                if block.words & AXIS_WORDS == 0 {
-                    return fault("G43.1 sets nothing: give it axis words");
-                }
-                let mut tool = self.state.offsets.tool;
-                self.places(block, |axis, value| {
-                    tool[axis] = value + if code == 432 { tool[axis] } else { 0.0 }
-                })?;
-                self.state.offsets.tool = tool;
-            }
-            Some(490) => self.state.offsets.tool = [0.0; 9],
-            _ => {}
-        }
-        match block.code(Group::System) {
-            Some(code @ 591..=593) => self.state.offsets.system = usize::from(code - 591) + 6,
-            Some(code) => self.state.offsets.system = usize::from(code - 540) / 10,
-            None => {}
-        }
-        self.state.offsets.update();
-        Ok(())
-    }
-
-    fn warn_of_tool(&mut self) {
-        if !self.warned_tool {
-            self.warned_tool = true;
-            self.warn(
-                "the tool lengths that G43 calls for are not known: 0 is taken for each (G43.1 Z gives one)"
-                    .into(),
-            );
-        }
-    }
-
-    /// G28 and G30: rapid to the place that the block names, then the axes named to the machine's home; all axes
-    /// where none is named.
-    fn go_home(&mut self, block: &Block, code: u16) -> Outcome<()> {
-        let via = self.target(block, false)?;
-        self.rapid(&via)?;
-        let mut target = via;
-        let home = &self.options.home;
-        if block.words & AXIS_WORDS != 0 {
-            self.places(block, |axis, _| target[axis] = home[axis])?;
-        } else {
-            let machine = self.options.machine_axes.iter().fold(0, |sum, &letter| sum | bit(letter));
-            if machine & !self.known != 0 {
-                self.meet(machine)?;
-            }
-            for &axis in self.moves.axes() {
-                target[axis] = home[axis];
-            }
-        }
-        if target.iter().enumerate().any(|(axis, value)| !(value.abs() <= farthest(axis))) {
-            return fault(format!(
-                "{} goes to a home that is no finite place: check the machine file",
-                g_name(code)
-            ));
-        }
-        self.rapid(&target)
     }
 
     pub(super) fn rapid(&mut self, target: &Point) -> Outcome<()> {
@@ -578,16 +342,12 @@ impl<'a> Interpreter<'a> {
     }
 }
 
-/// Canned cycles are 730, 740 and 810 to 890.
-pub(super) fn is_cycle(motion: u16) -> bool {
-    matches!(motion, 730 | 740 | 810..=890)
-}
-
-#[inline(always)]
-fn farthest(axis: usize) -> f64 {
-    if rotary(axis) {
-        FARTHEST_TURN
-    } else {
-        FARTHEST
-    }
+#[cold]
+fn too_far<T>(axis: usize, value: f64) -> Outcome<T> {
+    let (unit, farthest) = if rotary(axis) { ("degrees", FARTHEST_TURN) } else { ("mm", FARTHEST) };
+    fault(format!(
+        "{} would go to {value} {unit}, more than {farthest} {unit} from the machine's zero: check the number, the units \
+         and the offsets",
+        AXES[axis] as char,
+    ))
 }

@@ -5,11 +5,9 @@
 
 use std::collections::HashMap;
 
+use super::arithmetic::{apply, call, Function, OPERATORS};
 use super::fault::{fault, foreign, Outcome};
 use super::number::{decimal, spaces};
-
-/// Closer numbers are equal to EQ, NE, GE and LE.
-const EQUAL: f64 = 1e-6;
 
 /// How far a decimal number may be from the integer it stands for.
 const NEAR_INTEGER: f64 = 1e-4;
@@ -93,91 +91,6 @@ impl Parameters {
     }
 }
 
-#[derive(Clone, Copy)]
-enum Function {
-    Abs,
-    Acos,
-    Asin,
-    Atan,
-    Cos,
-    Exists,
-    Exp,
-    Fix,
-    Fup,
-    Ln,
-    Round,
-    Sin,
-    Sqrt,
-    Tan,
-}
-
-const FUNCTIONS: [(&str, Function); 14] = [
-    ("ABS", Function::Abs),
-    ("ACOS", Function::Acos),
-    ("ASIN", Function::Asin),
-    ("ATAN", Function::Atan),
-    ("COS", Function::Cos),
-    ("EXISTS", Function::Exists),
-    ("EXP", Function::Exp),
-    ("FIX", Function::Fix),
-    ("FUP", Function::Fup),
-    ("LN", Function::Ln),
-    ("ROUND", Function::Round),
-    ("SIN", Function::Sin),
-    ("SQRT", Function::Sqrt),
-    ("TAN", Function::Tan),
-];
-
-impl Function {
-    /// The function whose name and bracket start at `at`, its name, and the place of the bracket.
-    fn at(source: &[u8], at: usize) -> Option<(Function, &'static str, usize)> {
-        FUNCTIONS.iter().find_map(|&(name, function)| {
-            let text = source.get(at..at + name.len())?;
-            let bracket = spaces(source, at + name.len());
-            (text.eq_ignore_ascii_case(name.as_bytes()) && source.get(bracket) == Some(&b'['))
-                .then_some((function, name, bracket))
-        })
-    }
-}
-
-#[derive(Clone, Copy)]
-enum Operator {
-    And,
-    Or,
-    Xor,
-    Eq,
-    Ne,
-    Gt,
-    Ge,
-    Lt,
-    Le,
-    Plus,
-    Minus,
-    Times,
-    Over,
-    Mod,
-    Power,
-}
-
-/// `**` stands before `*`: the first that fits is taken.
-const OPERATORS: [(&str, Operator, u8); 15] = [
-    ("**", Operator::Power, 5),
-    ("*", Operator::Times, 4),
-    ("/", Operator::Over, 4),
-    ("MOD", Operator::Mod, 4),
-    ("+", Operator::Plus, 3),
-    ("-", Operator::Minus, 3),
-    ("EQ", Operator::Eq, 2),
-    ("NE", Operator::Ne, 2),
-    ("GT", Operator::Gt, 2),
-    ("GE", Operator::Ge, 2),
-    ("LT", Operator::Lt, 2),
-    ("LE", Operator::Le, 2),
-    ("AND", Operator::And, 1),
-    ("OR", Operator::Or, 1),
-    ("XOR", Operator::Xor, 1),
-];
-
 struct Formula<'a> {
     source: &'a [u8],
     at: usize,
@@ -260,7 +173,7 @@ impl Formula<'_> {
                 Some(&(name, operator, order)) if order >= least => {
                     self.at += name.len();
                     let right = self.chain(order + 1)?;
-                    left = finite(apply(operator, left, right)?, name)?;
+                    left = apply(operator, name, left, right)?;
                 }
                 _ => return Ok(left),
             }
@@ -276,32 +189,17 @@ impl Formula<'_> {
             return self.exists();
         }
         let x = self.bracket()?;
-        if !domain(function, x) {
-            return fault(format!("{name}[{x}] has no value: check the parameters"));
-        }
-        let value = match function {
-            Function::Abs => x.abs(),
-            Function::Acos => x.acos().to_degrees(),
-            Function::Asin => x.asin().to_degrees(),
-            Function::Atan => {
-                if self.peek() != b'/' {
-                    return foreign("ATAN takes two brackets: write ATAN[y]/[x]");
-                }
-                self.at += 1;
-                x.atan2(self.bracket()?).to_degrees()
+        let over = match function {
+            Function::Atan if self.peek() != b'/' => {
+                return foreign("ATAN takes two brackets: write ATAN[y]/[x]")
             }
-            Function::Cos => x.to_radians().cos(),
-            Function::Exp => x.exp(),
-            Function::Fix => x.floor(),
-            Function::Fup => x.ceil(),
-            Function::Ln => x.ln(),
-            Function::Round => x.round(),
-            Function::Sin => x.to_radians().sin(),
-            Function::Sqrt => x.sqrt(),
-            Function::Tan => x.to_radians().tan(),
-            Function::Exists => unreachable!("handled above"),
+            Function::Atan => {
+                self.at += 1;
+                self.bracket()?
+            }
+            _ => 1.0,
         };
-        finite(value, name)
+        call(function, name, x, over)
     }
 
     /// `EXISTS[#<name>]`.
@@ -344,58 +242,6 @@ impl Formula<'_> {
     fn rest(&self) -> String {
         excerpt(self.source, self.at)
     }
-}
-
-fn domain(function: Function, x: f64) -> bool {
-    match function {
-        Function::Acos | Function::Asin => x.abs() <= 1.0,
-        Function::Ln => x > 0.0,
-        Function::Sqrt => x >= 0.0,
-        _ => true,
-    }
-}
-
-fn apply(operator: Operator, left: f64, right: f64) -> Outcome<f64> {
-    let truth = |value: bool| f64::from(value);
-    let equal = (left - right).abs() < EQUAL;
-    Ok(match operator {
-        Operator::And => truth(left != 0.0 && right != 0.0),
-        Operator::Or => truth(left != 0.0 || right != 0.0),
-        Operator::Xor => truth((left != 0.0) != (right != 0.0)),
-        Operator::Eq => truth(equal),
-        Operator::Ne => truth(!equal),
-        Operator::Gt => truth(left > right),
-        Operator::Ge => truth(left >= right || equal),
-        Operator::Lt => truth(left < right),
-        Operator::Le => truth(left <= right || equal),
-        Operator::Plus => left + right,
-        Operator::Minus => left - right,
-        Operator::Times => left * right,
-        Operator::Over | Operator::Mod if right == 0.0 => {
-            return fault(format!("{left} is divided by 0: check the parameters"));
-        }
-        Operator::Over => left / right,
-        // Of the divisor's size and never negative, whatever the signs.
-        Operator::Mod => {
-            let rest = left % right;
-            if rest < 0.0 {
-                rest + right.abs()
-            } else {
-                rest
-            }
-        }
-        Operator::Power if left < 0.0 && right != right.floor() => {
-            return fault(format!("{left} ** {right} has no value: check the parameters"));
-        }
-        Operator::Power => left.powf(right),
-    })
-}
-
-fn finite(value: f64, what: &str) -> Outcome<f64> {
-    if value.is_finite() {
-        return Ok(value);
-    }
-    fault(format!("the result of {what} is not a finite number: check the parameters"))
 }
 
 /// The integer that a number stands for, within 1e-4.

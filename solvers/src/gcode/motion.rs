@@ -2,7 +2,7 @@
 
 use super::arc::{arc, arc_length, Form};
 use super::block::{bits, Block, AXES};
-use super::execute::Interpreter;
+use super::execute::{Interpreter, RATES};
 use super::fault::{fault, Outcome};
 use super::modal::{Feed, FeedMode};
 use super::moves::{only_turns, straight_length, Arc, Kind, Point};
@@ -63,7 +63,7 @@ impl Interpreter<'_> {
 
     #[cold]
     fn feed_per_turn(&self, feed: Feed) -> Outcome<Feed> {
-        match self.state.spindle_speed.filter(|&speed| speed > 0.0 && self.state.spindle_on) {
+        match self.state.spindle_speed.filter(|speed| self.state.spindle_on && RATES.contains(speed)) {
             Some(speed) => {
                 let turns = speed / 60.0;
                 Ok(Feed { linear: feed.linear * turns, angular: feed.angular * turns })
@@ -124,6 +124,9 @@ impl Interpreter<'_> {
                     AXES[u] as char, AXES[v] as char
                 ));
             }
+            if radius.abs() > FARTHEST_CENTRE {
+                return fault(format!("word {} is more than {FARTHEST_CENTRE:e}: check R", block.word(b'R')));
+            }
             return Ok(Form::Radius(radius * unit));
         }
         let normal = CENTRE[self.state.normal];
@@ -147,7 +150,7 @@ impl Interpreter<'_> {
         }
         let zero = if self.state.absolute_centres { zero } else { position };
         let centre = [zero[u] + words[0].unwrap_or(0.0), zero[v] + words[1].unwrap_or(0.0)];
-        if centre.iter().any(|value| !(value.abs() <= FARTHEST_CENTRE)) {
+        if !centre.iter().all(|value| value.abs() <= FARTHEST_CENTRE) {
             return fault(format!(
                 "the centre of an arc is more than {FARTHEST_CENTRE:e} mm away: check I, J, K"
             ));

@@ -159,7 +159,7 @@ impl<'a> Lexer<'a> {
         // Negative and huge values saturate and are in no group.
         let code = (tenths + 0.5) as u16;
         if (tenths - f64::from(code)).abs() > 1e-3 {
-            return self.unknown_word(at, end, g_remedy(u16::MAX));
+            return self.unknown_word(at, end, None);
         }
         match block.set_code(code) {
             Ok(()) => Ok(()),
@@ -175,7 +175,7 @@ impl<'a> Lexer<'a> {
     fn m_word(&self, value: f64, at: usize, end: usize, block: &mut Block) -> Outcome<()> {
         let code = value as u16;
         if f64::from(code) != value {
-            return self.unknown_word(at, end, m_remedy(u16::MAX));
+            return self.unknown_word(at, end, None);
         }
         match m_group(code).map(|group| block.set_m_code(code, group)) {
             Some(Ok(())) => Ok(()),
@@ -239,7 +239,7 @@ impl<'a> Lexer<'a> {
         let rest = &self.source[at..];
         let letters = rest.iter().take_while(|byte| byte.is_ascii_alphanumeric() || **byte == b'_').count();
         if letters > 1 {
-            return self.unknown_word(at, at + letters, g_remedy(u16::MAX));
+            return self.unknown_word(at, at + letters, None);
         }
         let letter = rest[0] as char;
         if spaces(self.source, at + 1) >= self.source.len() {
@@ -249,8 +249,14 @@ impl<'a> Lexer<'a> {
     }
 
     #[cold]
-    fn unknown_word<T>(&self, at: usize, end: usize, remedy: &str) -> Outcome<T> {
-        foreign(format!("word {} is not read: {remedy}", self.text(at, end)))
+    fn unknown_word<T>(&self, at: usize, end: usize, remedy: Option<&str>) -> Outcome<T> {
+        let word = self.text(at, end);
+        match remedy {
+            Some(remedy) => fault(format!("word {word} is not read: {remedy}")),
+            None => foreign(format!(
+                "word {word} is not understood: remove it, or post the program for LinuxCNC (RS-274/NGC)"
+            )),
+        }
     }
 
     #[cold]

@@ -1,57 +1,79 @@
 //! numpy arrays to and from the types of the kernels, each length checked once here.
 
-use numpy::{PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
+use numpy::{
+    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
+    PyUntypedArrayMethods,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::quadratic::Quadratic;
 
-/// (n, M) array to rows.
+/// (n, m) array to rows of M ≥ m axes; the axes beyond m rest at 0.
 pub fn rows<const M: usize>(array: &PyReadonlyArray2<f64>) -> PyResult<Vec<[f64; M]>> {
     let flat = array.as_slice().map_err(|_| contiguous())?;
-    Ok(flat.chunks_exact(M).map(|row| std::array::from_fn(|k| row[k])).collect())
+    let axes = array.shape()[1];
+    Ok(flat.chunks_exact(axes).map(|row| padded(row, 0.0)).collect())
 }
 
-/// (M,) array to one row.
-pub fn row<const M: usize>(array: &PyReadonlyArray1<f64>) -> PyResult<[f64; M]> {
+/// (m,) array to one row of M ≥ m axes; the axes beyond m get `rest`.
+pub fn row<const M: usize>(array: &PyReadonlyArray1<f64>, rest: f64) -> PyResult<[f64; M]> {
     let flat = array.as_slice().map_err(|_| contiguous())?;
-    flat.try_into().map_err(|_| PyValueError::new_err(format!("{} values where {M} axes are", flat.len())))
+    if flat.len() > M {
+        return Err(PyValueError::new_err(format!("{} values where {M} axes are", flat.len())));
+    }
+    Ok(padded(flat, rest))
 }
 
-/// (n, 3, M) control points and (n,) widths to pieces.
+fn padded<const M: usize>(values: &[f64], rest: f64) -> [f64; M] {
+    std::array::from_fn(|k| values.get(k).copied().unwrap_or(rest))
+}
+
+/// (n, 3, m) control points and (n,) widths to pieces in M ≥ m axes; the axes beyond m rest at 0.
 pub fn quadratics<const M: usize>(
     control: &PyReadonlyArray3<f64>,
     width: &PyReadonlyArray1<f64>,
 ) -> PyResult<Vec<Quadratic<M>>> {
     let flat = control.as_slice().map_err(|_| contiguous())?;
     let width = width.as_slice().map_err(|_| contiguous())?;
-    if flat.len() != 3 * M * width.len() {
+    let axes = control.shape()[2];
+    if control.shape() != [width.len(), 3, axes] {
         return Err(PyValueError::new_err("control points and widths differ in number"));
     }
     Ok(flat
-        .chunks_exact(3 * M)
+        .chunks_exact(3 * axes)
         .zip(width)
         .map(|(c, &width)| Quadratic {
-            control: std::array::from_fn(|i| std::array::from_fn(|k| c[i * M + k])),
+            control: std::array::from_fn(|i| padded(&c[i * axes..(i + 1) * axes], 0.0)),
             width,
         })
         .collect())
 }
 
-/// Rows to an (n, M) array.
-pub fn to_array2<'py, T: numpy::Element, const M: usize>(
+/// The first `axes` columns of rows to an (n, axes) array.
+pub fn to_array2<'py, T: numpy::Element + Copy, const M: usize>(
     py: Python<'py>,
     rows: Vec<[T; M]>,
+    axes: usize,
 ) -> Bound<'py, PyArray2<T>> {
     let count = rows.len();
-    let flat = numpy::PyArray1::from_vec(py, rows.into_flattened());
-    flat.reshape([count, M]).expect("n × M values")
+    let flat = if axes == M {
+        rows.into_flattened()
+    } else {
+        rows.iter().flat_map(|row| &row[..axes]).copied().collect()
+    };
+    PyArray1::from_vec(py, flat).reshape([count, axes]).expect("n × axes values")
 }
 
-/// Control points of pieces to an (n, 3, M) array.
-pub fn to_array3<'py, const M: usize>(py: Python<'py>, pieces: &[Quadratic<M>]) -> Bound<'py, PyArray3<f64>> {
-    let flat: Vec<f64> = pieces.iter().flat_map(|piece| piece.control).flatten().collect();
-    numpy::PyArray1::from_vec(py, flat).reshape([pieces.len(), 3, M]).expect("n × 3 × M values")
+/// Control points of pieces, the first `axes` columns of them, to an (n, 3, axes) array.
+pub fn to_array3<'py, const M: usize>(
+    py: Python<'py>,
+    pieces: &[Quadratic<M>],
+    axes: usize,
+) -> Bound<'py, PyArray3<f64>> {
+    let flat: Vec<f64> =
+        pieces.iter().flat_map(|piece| &piece.control).flat_map(|point| &point[..axes]).copied().collect();
+    PyArray1::from_vec(py, flat).reshape([pieces.len(), 3, axes]).expect("n × 3 × axes values")
 }
 
 fn contiguous() -> PyErr {

@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray2, PyUntypedArrayMethod
 use pyo3::prelude::*;
 
 use super::arrays::{rows, to_array2, to_array3};
-use super::with_axes;
+use super::with_padded_axes;
 use crate::fit::{fit_points, FitOptions};
 
 type Fitted<'py> = (
@@ -26,15 +26,16 @@ fn fit<'py>(
     corner_angle: f64,
 ) -> PyResult<Fitted<'py>> {
     let options = FitOptions { tolerance, max_chord, max_curvature, corner_angle };
-    with_axes!(points.shape()[1], M, {
+    let axes = points.shape()[1];
+    with_padded_axes!(axes, M, {
         let points = rows::<M>(&points)?;
         let pieces = py.detach(|| fit_points(&points, &options));
         let curves: Vec<_> = pieces.iter().map(|piece| piece.piece).collect();
         let chords = pieces.iter().map(|piece| [piece.first as i64, piece.last as i64]).collect();
         Ok((
-            to_array3(py, &curves),
+            to_array3(py, &curves, axes),
             PyArray1::from_iter(py, curves.iter().map(|piece| piece.width)),
-            to_array2(py, chords),
+            to_array2(py, chords, 2),
             PyArray1::from_iter(py, pieces.iter().map(|piece| piece.deviation)),
             PyArray1::from_iter(py, pieces.iter().map(|piece| piece.spline)),
         ))

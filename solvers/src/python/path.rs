@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 
 use super::arrays::{row, rows};
-use super::with_axes;
+use super::with_padded_axes;
 use crate::arc::ArcError;
 use crate::follow::{ArcShape, Fault, FollowOptions, Followed, Moves};
 use crate::path_builder::{build_path as build, Axes, BuiltPath};
@@ -18,6 +18,9 @@ pyo3::import_exception!(feedplan.errors, ProgramError);
 pub fn register(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(build_path, module)?)
 }
+
+/// The travel of an axis that is not there.
+const ANYWHERE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
 /// Control points, widths, feeds, first and last moves, tolerances and runs of the path.
 type Columns<'py> = (
@@ -92,10 +95,10 @@ fn build_path<'py>(
         })
         .collect::<PyResult<_>>()?;
     let options = FollowOptions { exact_tolerance, max_chord, corner_acceleration, max_speed, corner_angle };
-    with_axes!(axes, M, {
+    with_padded_axes!(axes, M, {
         let target = rows::<M>(&target)?;
         let moves = Moves {
-            start: row::<M>(&start)?,
+            start: row::<M>(&start, 0.0)?,
             kind: kind.as_slice()?,
             target: &target,
             feed: feed.as_slice()?,
@@ -105,17 +108,17 @@ fn build_path<'py>(
             arcs: &shapes,
         };
         let travel = rows::<2>(&travel)?;
-        let axes = Axes {
-            max_velocity: row::<M>(&max_velocity)?,
-            max_acceleration: row::<M>(&max_acceleration)?,
-            travel: std::array::from_fn(|k| travel[k]),
+        let limits = Axes {
+            max_velocity: row::<M>(&max_velocity, 1.0)?,
+            max_acceleration: row::<M>(&max_acceleration, 1.0)?,
+            travel: std::array::from_fn(|k| travel.get(k).copied().unwrap_or(ANYWHERE)),
             jump,
         };
-        let path = py.detach(|| build(&moves, &options, &axes)).map_err(|error| {
+        let path = py.detach(|| build(&moves, &options, &limits)).map_err(|error| {
             let line = line.as_slice().map_or(0, |lines| lines[error.index]);
             ProgramError::new_err((format!("{name}, line {line}: {}", sentence(error.fault)), line))
         })?;
-        Ok(columns(py, &path))
+        Ok(columns(py, &path, axes))
     })
 }
 
@@ -136,12 +139,17 @@ fn sentence(fault: Fault) -> &'static str {
 fn columns<'py, const M: usize>(
     py: Python<'py>,
     path: &BuiltPath<M>,
+    axes: usize,
 ) -> (Columns<'py>, Summary, Option<Place>) {
     let parts = &path.parts;
     let count = parts.iter().map(Vec::len).sum();
     let (control, width, feed, moves, tolerance) = py.detach(|| {
         (
-            gather(parts, 3 * M, |followed, out| out.copy_from_slice(followed.piece.control.as_flattened())),
+            gather(parts, 3 * axes, |followed, out: &mut [f64]| {
+                for (row, point) in out.chunks_exact_mut(axes).zip(&followed.piece.control) {
+                    row.copy_from_slice(&point[..axes]);
+                }
+            }),
             gather(parts, 1, |followed, out| out[0] = followed.piece.width),
             gather(parts, 1, |followed, out| out[0] = followed.feed),
             gather(parts, 2, |followed, out: &mut [i64]| {
@@ -151,7 +159,7 @@ fn columns<'py, const M: usize>(
         )
     });
     let columns = (
-        PyArray1::from_vec(py, control).reshape([count, 3, M]).expect("n × 3 × M values"),
+        PyArray1::from_vec(py, control).reshape([count, 3, axes]).expect("n × 3 × axes values"),
         PyArray1::from_vec(py, width),
         PyArray1::from_vec(py, feed),
         PyArray1::from_vec(py, moves).reshape([count, 2]).expect("n × 2 values"),

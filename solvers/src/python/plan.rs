@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray3, PyUntypedArrayMethods}
 use pyo3::prelude::*;
 
 use super::arrays::{quadratics, row};
-use super::with_axes;
+use super::with_padded_axes;
 use crate::bang_bang_quadratic::{plan, Fault, Problem, Profile};
 
 pyo3::create_exception!(
@@ -48,15 +48,15 @@ fn plan_quadratic<'py>(
 ) -> PyResult<Columns<'py>> {
     let runs: Vec<usize> =
         runs.as_array().iter().map(|&run| usize::try_from(run).unwrap_or(usize::MAX)).collect();
-    with_axes!(control_points.shape()[2], M, {
+    with_padded_axes!(control_points.shape()[2], M, {
         let pieces = quadratics::<M>(&control_points, &width)?;
         let problem = Problem {
             pieces: &pieces,
             runs: &runs,
             feed: feed.as_slice()?,
             junction_speed: junction_speed.as_slice()?,
-            max_velocity: row(&max_velocity)?,
-            max_acceleration: row(&max_acceleration)?,
+            max_velocity: row(&max_velocity, 1.0)?,
+            max_acceleration: row(&max_acceleration, 1.0)?,
             chord_tolerance,
             period,
             start_speed,

@@ -8,7 +8,7 @@ use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 
 use super::arrays::{quadratics, to_array2};
-use super::with_axes;
+use super::with_padded_axes;
 use crate::arc_length::{PathLength, Place};
 use crate::motion::{ArcKind, ProfileArc};
 use crate::newton;
@@ -39,6 +39,7 @@ trait Stream: Send + Sync {
         py: Python<'py>,
         range: Range<usize>,
         resume: &Mutex<Option<Resume>>,
+        axes: usize,
     ) -> ChunkArrays<'py>;
 }
 
@@ -56,6 +57,7 @@ impl<const M: usize> Stream for Sampler<M> {
         py: Python<'py>,
         range: Range<usize>,
         resume: &Mutex<Option<Resume>>,
+        axes: usize,
     ) -> ChunkArrays<'py> {
         let chunk = py.detach(|| {
             let mut state = *resume.lock().unwrap_or_else(PoisonError::into_inner);
@@ -65,10 +67,10 @@ impl<const M: usize> Stream for Sampler<M> {
         });
         (
             PyArray1::from_vec(py, chunk.t),
-            to_array2(py, chunk.position),
-            to_array2(py, chunk.velocity),
-            to_array2(py, chunk.acceleration),
-            to_array2(py, chunk.jerk),
+            to_array2(py, chunk.position, axes),
+            to_array2(py, chunk.velocity, axes),
+            to_array2(py, chunk.acceleration, axes),
+            to_array2(py, chunk.jerk, axes),
             PyArray1::from_vec(py, chunk.line),
             PyArray1::from_vec(py, chunk.piece),
             PyArray1::from_vec(py, chunk.u),
@@ -82,6 +84,7 @@ impl<const M: usize> Stream for Sampler<M> {
 #[pyclass(name = "Sampler", module = "feedplan._solvers", frozen)]
 struct PySampler {
     stream: Box<dyn Stream>,
+    axes: usize,
     resume: Mutex<Option<Resume>>,
 }
 
@@ -139,7 +142,14 @@ impl PySampler {
         let arc_runs = offsets(&arc_runs)?;
         let interpolator = if newton { Interpolator::Newton } else { Interpolator::Sarfraz };
         let axes = control_points.shape()[2];
-        let stream = with_axes!(axes, M, {
+        let of_axis = |kind| matches!(kind, ArcKind::AxisAcceleration | ArcKind::AxisVelocity);
+        if let Some(i) = arcs.iter().position(|arc| of_axis(arc.kind) && arc.axis as usize >= axes) {
+            return Err(InputError::new_err(format!(
+                "arc {i} of the profile is governed by axis {}, but the path has {axes}: plan this path again",
+                arcs[i].axis
+            )));
+        }
+        let stream = with_padded_axes!(axes, M, {
             let path = PathData::<M> {
                 pieces: quadratics(&control_points, &width)?,
                 lines: slice(&line)?.to_vec(),
@@ -149,7 +159,7 @@ impl PySampler {
             let sampler = py.detach(|| Sampler::new(path, arcs, &arc_runs, period, interpolator));
             sampler.map(|sampler| Box::new(sampler) as Box<dyn Stream>).map_err(InputError::new_err)
         })?;
-        Ok(Self { stream, resume: Mutex::new(None) })
+        Ok(Self { stream, axes, resume: Mutex::new(None) })
     }
 
     /// Number of setpoints.
@@ -172,7 +182,7 @@ impl PySampler {
                 self.stream.count()
             )));
         }
-        Ok(self.stream.chunk(py, start..stop, &self.resume))
+        Ok(self.stream.chunk(py, start..stop, &self.resume, self.axes))
     }
 }
 
@@ -191,7 +201,7 @@ impl PyPathLength {
         if control_points.shape()[0] == 0 {
             return Err(PyValueError::new_err("the path is empty"));
         }
-        with_axes!(control_points.shape()[2], M, {
+        with_padded_axes!(control_points.shape()[2], M, {
             let pieces = quadratics::<M>(&control_points, &width)?;
             Ok(Self(py.detach(|| PathLength::new(&pieces))))
         })

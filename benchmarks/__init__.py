@@ -1,0 +1,1 @@
+"""Benchmarks of feedplan: named problems, one runner (`python -m benchmarks`), see README.md."""

@@ -1,0 +1,37 @@
+"""Run benchmarks by name: a table on the terminal, a JSON file each."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from rich.console import Console
+
+from benchmarks import against_toppra, end_to_end, planner_cost, results
+
+BENCHMARKS = {module.NAME: module.run for module in (planner_cost, against_toppra, end_to_end)}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(BENCHMARKS)} (default all)")
+    parser.add_argument("--quick", action="store_true", help="small sizes, some seconds")
+    parser.add_argument(
+        "--output", type=Path, default=Path("out/benchmarks"), help="directory of the JSON files"
+    )
+    arguments = parser.parse_args()
+    unknown = sorted(set(arguments.names) - set(BENCHMARKS))
+    if unknown:
+        parser.error(f"there is no benchmark {unknown[0]!r}: use {', '.join(BENCHMARKS)}")
+
+    # Wide enough for every table where there is no terminal.
+    console = Console() if sys.stdout.isatty() else Console(width=160)
+    for name in arguments.names or BENCHMARKS:
+        result = BENCHMARKS[name](arguments.quick)
+        results.show(result, console)
+        results.store(result, arguments.output)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,397 @@
+"""The independent audit: every limit measured again on path, profile and setpoints, by differences alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from feedplan._solvers import SetpointAudit, audit_plan
+from feedplan.constraints.problem import Problem
+from feedplan.errors import InputError
+from feedplan.machine.machine import Axis, Machine
+from feedplan.profile import SpeedProfile
+from feedplan.program.program import Program
+from feedplan.setpoints import SetpointChunk, Setpoints
+
+# A ratio of measured value to limit passes up to here: a millionth covers the planner's own rounding over
+# long paths (some 1e-10) and means nothing to a machine.
+PASS_MARK = 1.0 + 1e-6
+
+# Chunk of setpoints that goes through the audit at once when they are all at hand.
+CHUNK = 100_000
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """How a check is called in a sentence, and its unit."""
+
+    quantity: str
+    unit: str
+
+
+_KINDS = {
+    "feed": _Kind("speed", "mm/s"),
+    "velocity": _Kind("velocity", "mm/s"),
+    "acceleration": _Kind("acceleration", "mm/s²"),
+    "jerk": _Kind("jerk", "mm/s³"),
+    "chord": _Kind("chord error", "mm"),
+    "deviation": _Kind("distance between followed and programmed path", "mm"),
+    "travel": _Kind("position", "mm"),
+    "jump": _Kind("jump of velocity", "mm/s"),
+    "continuity": _Kind("jump of speed where pieces meet", "mm/s"),
+    "junction": _Kind("speed beyond what is allowed where pieces meet or runs end,", "mm/s"),
+    "duration": _Kind("relative error of a recorded duration", ""),
+    "order": _Kind("gap between the arcs of the profile", "mm"),
+    "gap": _Kind("gap in the path", "mm"),
+    "place": _Kind("distance of a setpoint from its place on the path", "mm"),
+    "grid": _Kind("irregularity of the time steps", "s"),
+    "recorded_velocity": _Kind("error of the recorded velocity", "mm/s"),
+    "recorded_acceleration": _Kind("error of the recorded acceleration", "mm/s²"),
+    "numbers": _Kind("number that is not finite or out of its range", ""),
+}
+
+
+@dataclass(frozen=True)
+class LimitCheck:
+    """The worst place of one limit.
+
+    `worst` is the value measured there, less what rounding may have added, `limit` what is allowed, `ratio`
+    their quotient; `time` [s] and source `line` say where (line 0: not known). `axis` is None where the check
+    belongs to no axis. What is not `judged` is reported only. In `travel` the ratio is the share of half the
+    travel. The unit is in `unit`.
+    """
+
+    name: str
+    axis: str | None
+    worst: float
+    limit: float
+    ratio: float
+    time: float
+    line: int
+    judged: bool
+
+    @property
+    def ok(self) -> bool:
+        """Whether the limit holds, or is not judged. What is not a number never holds."""
+        return not self.judged or self.ratio <= PASS_MARK
+
+    @property
+    def unit(self) -> str:
+        """Unit of `worst` and `limit`."""
+        return _KINDS[self.name].unit
+
+    def sentence(self) -> str:
+        """Place, value and limit in words."""
+        place = f"line {self.line}, {self.time:.6f} s" if self.line else f"{self.time:.6f} s"
+        kind = _KINDS[self.name]
+        what = f"{self.axis} {kind.quantity}" if self.axis else kind.quantity
+        if self.name == "numbers":
+            return f"{place}: {what}"
+        unit = f" {kind.unit}" if kind.unit else ""
+        times = f" ({self.ratio:.7g} times)" if math.isfinite(self.ratio) else ""
+        return f"{place}: {what} {self.worst:.7g}{unit}, the limit is {self.limit:.7g}{unit}{times}"
+
+    def to_json(self) -> dict[str, Any]:
+        """The numbers by name; what is not finite is None."""
+        return {
+            "ok": self.ok,
+            "worst": _finite(self.worst),
+            "limit": _finite(self.limit),
+            "ratio": _finite(self.ratio),
+            "time": _finite(self.time),
+            "line": self.line,
+            "judged": self.judged,
+        }
+
+
+@dataclass(frozen=True)
+class Audit:
+    """The verdict: the worst place of every limit, from `checked_samples` samples."""
+
+    checks: tuple[LimitCheck, ...]
+    checked_samples: int
+
+    @property
+    def broken(self) -> tuple[LimitCheck, ...]:
+        """The checks that fail."""
+        return tuple(check for check in self.checks if not check.ok)
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """A sentence for every check that fails: place, value, limit."""
+        if not self.checks:
+            return ("there is nothing that could be measured",)
+        return tuple(check.sentence() for check in self.broken)
+
+    @property
+    def ok(self) -> bool:
+        """Whether everything was measured and every limit holds."""
+        return bool(self.checks) and not self.broken
+
+    def check(self, name: str, axis: str | None = None) -> LimitCheck:
+        """One check by its name and axis. Raises KeyError where it was not made."""
+        for check in self.checks:
+            if (check.name, check.axis) == (name, axis):
+                return check
+        raise KeyError((name, axis))
+
+    def to_json(self) -> dict[str, Any]:
+        """`ok`, `checked_samples`, `failures`, and the checks by name, those of an axis by name and axis."""
+        result: dict[str, Any] = {
+            "ok": self.ok,
+            "checked_samples": self.checked_samples,
+            "failures": list(self.failures),
+        }
+        for check in self.checks:
+            if check.axis is None:
+                result[check.name] = check.to_json()
+            else:
+                result.setdefault(check.name, {})[check.axis] = check.to_json()
+        return result
+
+
+@dataclass(frozen=True)
+class _Limits:
+    """What the native audit needs to know of machine and problem, one number an axis."""
+
+    max_velocity: list[float]
+    max_acceleration: list[float]
+    max_jerk: list[float]
+    max_velocity_jump: list[float]
+    travel: list[tuple[float, float]]
+    chord_tolerance: float
+    period: float
+    end_speeds: tuple[float, float]
+
+
+def audit(
+    problem: Problem,
+    profile: SpeedProfile | None,
+    machine: Machine,
+    program: Program | None = None,
+    setpoints: Setpoints | Iterable[SetpointChunk] | None = None,
+    jerk: bool = False,
+) -> Audit:
+    """Measures a plan against every limit of its problem and machine.
+
+    The `profile` on its path; with a `program` the distance between followed and programmed path; with
+    `setpoints`, which are read chunk by chunk, their differences and their places on the path. Jerk is judged
+    only if the method claims it (`jerk`).
+    Raises InputError where path, machine, program and setpoints do not belong together.
+    """
+    path = problem.path
+    axes = path.axes
+    if program is not None and program.axes != axes:
+        raise InputError(
+            f"the program has the axes {' '.join(program.axes)}, its path {' '.join(axes)}: audit a path "
+            "with the program that it was built from"
+        )
+    machine_axes = _machine_axes(machine, axes)
+    limits = _Limits(
+        max_velocity=_numbers(problem.max_velocity),
+        max_acceleration=_numbers(problem.max_acceleration),
+        max_jerk=_numbers(problem.max_jerk),
+        max_velocity_jump=[axis.max_velocity_jump for axis in machine_axes],
+        travel=[axis.travel for axis in machine_axes],
+        chord_tolerance=float(problem.chord_tolerance),
+        period=float(problem.period),
+        end_speeds=(float(problem.start_speed), float(problem.end_speed)),
+    )
+    try:
+        problem, profile, program = _native(problem, profile, program)
+        results = [audit_plan(problem, limits, profile, program)]
+        if setpoints is not None:
+            if isinstance(setpoints, Setpoints):
+                limits = replace(limits, period=setpoints.period)
+                setpoints = setpoints.chunks(CHUNK)
+            stream = SetpointAudit(limits, 0.0, problem, profile, program)
+            for chunk in setpoints:
+                stream.push(
+                    _array(chunk.t, np.float64),
+                    _array(chunk.position, np.float64),
+                    _array(chunk.velocity, np.float64),
+                    _array(chunk.acceleration, np.float64),
+                    _array(chunk.line, np.int32),
+                )
+            results.append(stream.finish())
+    except ValueError as error:
+        raise InputError(f"this plan cannot be audited: {error}") from None
+    return _join(results, axes, jerk)
+
+
+def audit_setpoints(
+    t: ArrayLike,
+    position: ArrayLike,
+    machine: Machine,
+    *,
+    axes: tuple[str, ...] | None = None,
+    velocity: ArrayLike | None = None,
+    acceleration: ArrayLike | None = None,
+    line: ArrayLike | None = None,
+    resolution: float = 0.0,
+    jerk: bool = False,
+) -> Audit:
+    """Measures setpoints from anywhere against the limits of a machine, by finite differences alone.
+
+    `t` (n,) [s] and `position` (n, axes) [mm]; optional `velocity` [mm/s] and `acceleration` [mm/s²] of the
+    same shape as position, and source `line` (n,). `axes` names the columns (default: the machine's axes).
+    `resolution` [mm] is the last digit of positions that were written as text: what its rounding adds to a
+    difference is allowed. The period is that of the times. Jerk is judged only if `jerk` says so.
+    A jump of velocity that the machine allows at corners shows as one or two accelerations above the limit
+    where the direction turns; only there it is allowed for.
+    Raises InputError for arrays that do not belong together.
+    """
+    names = machine.axis_names if axes is None else axes
+    machine_axes = _machine_axes(machine, names)
+    times, positions = _array(t, np.float64), _array(position, np.float64)
+    if times.ndim != 1 or positions.shape != (len(times), len(names)):
+        raise InputError(
+            f"{positions.shape} positions at {times.shape} times: give one row for each time and one column "
+            f"for each of the axes {' '.join(names)}"
+        )
+    if len(times) < 2:
+        raise InputError(f"{len(times)} setpoints cannot be audited: give at least two")
+    if not resolution >= 0:
+        raise InputError(f"the resolution is {resolution} mm: give 0 or more")
+    velocities = None if velocity is None else _array(velocity, np.float64)
+    accelerations = None if acceleration is None else _array(acceleration, np.float64)
+    if any(rates is not None and rates.shape != positions.shape for rates in (velocities, accelerations)):
+        raise InputError("recorded velocities and accelerations must have the shape of the positions")
+    lines = None if line is None else _array(line, np.int32)
+    if lines is not None and lines.shape != times.shape:
+        raise InputError("source lines must be as many as the times")
+    limits = _Limits(
+        max_velocity=[axis.max_velocity for axis in machine_axes],
+        max_acceleration=[axis.max_acceleration for axis in machine_axes],
+        max_jerk=[axis.max_jerk for axis in machine_axes],
+        max_velocity_jump=[axis.max_velocity_jump for axis in machine_axes],
+        travel=[axis.travel for axis in machine_axes],
+        chord_tolerance=math.inf,
+        period=_period(times, machine.period),
+        end_speeds=(0.0, 0.0),
+    )
+    stream = SetpointAudit(limits, float(resolution))
+    for start in range(0, len(times), CHUNK):
+        part = slice(start, start + CHUNK)
+        stream.push(
+            times[part],
+            positions[part],
+            None if velocities is None else velocities[part],
+            None if accelerations is None else accelerations[part],
+            None if lines is None else lines[part],
+        )
+    return _join([stream.finish()], names, jerk)
+
+
+def _machine_axes(machine: Machine, names: tuple[str, ...]) -> list[Axis]:
+    by_name = {axis.name: axis for axis in machine.axes}
+    missing = [name for name in names if name not in by_name]
+    if missing:
+        raise InputError(
+            f"machine {machine.name} has no axis {missing[0]}: use a machine with {' '.join(names)}"
+        )
+    return [by_name[name] for name in names]
+
+
+def _period(times: NDArray[np.float64], default: float) -> float:
+    """The usual time step; the machine's where the times show none."""
+    step = float(np.median(np.diff(times[:CHUNK])))
+    return step if math.isfinite(step) and step > 0 else default
+
+
+def _join(
+    results: Iterable[tuple[list[tuple[str, int, float, float, float, float, int]], int]],
+    axes: tuple[str, ...],
+    jerk: bool,
+) -> Audit:
+    """The worst of all results for every check, in the order of `_KINDS`."""
+    worst: dict[tuple[str, int], LimitCheck] = {}
+    samples = 0
+    for findings, count in results:
+        samples += count
+        for name, axis, value, limit, ratio, time, line in findings:
+            check = LimitCheck(
+                name=name,
+                axis=axes[axis] if axis >= 0 else None,
+                worst=value,
+                limit=limit,
+                ratio=ratio,
+                time=time,
+                line=line,
+                judged=jerk or name != "jerk",
+            )
+            known = worst.get((name, axis))
+            if known is None or not check.ratio <= known.ratio:
+                worst[name, axis] = check
+    order = list(_KINDS)
+    keys = sorted(worst, key=lambda key: (order.index(key[0]), key[1]))
+    return Audit(tuple(worst[key] for key in keys), samples)
+
+
+Record = TypeVar("Record")
+Scalar = TypeVar("Scalar", bound=np.generic)
+
+_Dtypes = dict[str, np.dtype[Any]]
+
+
+def _dtypes(dtype: type[np.generic], *names: str) -> _Dtypes:
+    return {name: np.dtype(dtype) for name in names}
+
+
+_PATH = {
+    **_dtypes(np.float64, "control_points", "width", "dwell", "tolerance"),
+    **_dtypes(np.int64, "move", "runs"),
+    **_dtypes(np.int32, "line"),
+}
+_PROBLEM = _dtypes(np.float64, "feed", "junction_speed")
+_PROFILE = {
+    **_dtypes(np.float64, "value", "u0", "u1", "p0", "p1", "duration"),
+    **_dtypes(np.uint8, "kind", "axis"),
+    **_dtypes(np.uint32, "piece"),
+    **_dtypes(np.int64, "runs"),
+}
+_PROGRAM = {
+    **_dtypes(np.float64, "start", "target", "arc_centre", "arc_angle"),
+    **_dtypes(np.int32, "line"),
+    **_dtypes(np.int64, "arc_move"),
+    **_dtypes(np.uint8, "arc_normal"),
+}
+
+
+def _native(
+    problem: Problem, profile: SpeedProfile | None, program: Program | None
+) -> tuple[Problem, SpeedProfile | None, Program | None]:
+    """The same with arrays as the native module takes them; nothing is copied that is so already."""
+    path = _with_dtypes(problem.path, _PATH)
+    problem = _with_dtypes(replace(problem, path=path), _PROBLEM)
+    return (
+        problem,
+        None if profile is None else _with_dtypes(profile, _PROFILE),
+        None if program is None else _with_dtypes(program, _PROGRAM),
+    )
+
+
+def _with_dtypes(record: Record, dtypes: _Dtypes) -> Record:
+    changes = {}
+    for name, dtype in dtypes.items():
+        array = np.asarray(getattr(record, name))
+        if array.dtype != dtype or not array.flags.c_contiguous:
+            changes[name] = np.ascontiguousarray(array, dtype)
+    return replace(record, **changes) if changes else record  # type: ignore[type-var]
+
+
+def _array(values: ArrayLike, dtype: type[Scalar]) -> NDArray[Scalar]:
+    return np.ascontiguousarray(values, dtype=dtype)
+
+
+def _numbers(values: NDArray[np.float64]) -> list[float]:
+    return [float(value) for value in values]
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,302 @@
+"""The command line: results on standard output, everything else on standard error.
+
+Exit codes: 0 done, 1 a limit is broken or no plan is feasible, 2 bad input or usage, 70 a defect in feedplan.
+What is slow to import is imported by the command that needs it.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from feedplan import console, outputs, planners
+from feedplan.errors import FeedplanError, InfeasibleError, SolverError
+from feedplan.machine.machine import Axis, Machine, bundled_machines
+from feedplan.setpoints import INTERPOLATORS
+
+if TYPE_CHECKING:
+    NumberType = click.ParamType[float]
+else:
+    NumberType = click.ParamType  # generic only in the newest click
+
+DONE, BROKEN, BAD_INPUT, DEFECT, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 70, 130, 141
+_TRACEBACK = "FEEDPLAN_TRACEBACK"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the command line and returns the exit code."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+    try:
+        code = cli.main(arguments, prog_name="feedplan", standalone_mode=False)
+        sys.stdout.flush()
+        return code if isinstance(code, int) else DONE
+    except (click.Abort, KeyboardInterrupt):
+        return _fail("interrupted", INTERRUPTED)
+    except click.ClickException as error:
+        return _fail(_usage(error), BAD_INPUT)
+    except BrokenPipeError:
+        # The reader has gone; without this the interpreter complains while closing.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return PIPE_CLOSED
+    except Exception as error:
+        if os.environ.get(_TRACEBACK):
+            raise
+        return _fail(*_explained(error))
+
+
+def _explained(error: Exception) -> tuple[str, int]:
+    """An error as a sentence and an exit code."""
+    if isinstance(error, (InfeasibleError, SolverError)):
+        return str(error), BROKEN
+    if isinstance(error, FeedplanError):
+        return str(error), BAD_INPUT
+    if isinstance(error, MemoryError):
+        return "the memory of this computer does not suffice: split the program", BAD_INPUT
+    what = f"this is a defect in feedplan ({type(error).__name__}: {error})"
+    remedy = f"please report it with the command and the program; {_TRACEBACK}=1 shows where it happened"
+    return f"{what}: {remedy}", DEFECT
+
+
+def _fail(sentence: str, code: int) -> int:
+    print(f"error: {' '.join(sentence.split())}", file=sys.stderr)
+    return code
+
+
+def _usage(error: click.ClickException) -> str:
+    command = error.ctx.command_path if isinstance(error, click.UsageError) and error.ctx else "feedplan"
+    return f"{error.format_message().rstrip('.')} (`{command} --help` shows the usage)"
+
+
+class _Number(NumberType):
+    """A finite number greater than 0, or also 0."""
+
+    name = "number"
+
+    def __init__(self, or_zero: bool = False) -> None:
+        self._or_zero = or_zero
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        try:
+            number = float(value)
+        except ValueError:
+            self.fail(f"'{value}' is not a number", param, ctx)
+        if math.isfinite(number) and (number > 0 or (self._or_zero and number == 0)):
+            return number
+        self.fail(f"{value}: give a number {'≥ 0' if self._or_zero else '> 0'}", param, ctx)
+
+
+_MACHINE_HELP = "A bundled machine or a TOML file."
+_MACHINE = click.option(
+    "--machine", "-m", default="mill", show_default=True, metavar="NAME|FILE", help=_MACHINE_HELP
+)
+_TOLERANCE = click.option(
+    "--tolerance", type=_Number(), metavar="MM", help="Allowed distance from the programmed path."
+)
+_JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+_QUIET = click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
+_ZERO_OR_MORE = _Number(or_zero=True)
+
+
+@click.group(
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    invoke_without_command=True,
+)
+@click.version_option(package_name="feedplan", message="%(prog)s %(version)s")
+@click.pass_context
+def cli(context: click.Context) -> int:
+    """Time-optimal speed along the exact tool path of a part program, with proof and audit."""
+    if context.invoked_subcommand is None:
+        print(context.get_help(), file=sys.stderr)
+        return BAD_INPUT
+    return DONE
+
+
+@cli.command()
+@click.argument("program")
+@_MACHINE
+@click.option("--method", type=click.Choice(planners.methods()), default="bang-bang", show_default=True)
+@_TOLERANCE
+@click.option("--feed", type=_Number(), metavar="MM/S", help="Feed in place of the programmed one.")
+@click.option("--feed-override", type=_Number(), default=1.0, metavar="FACTOR", help="Factor on the feed.")
+@click.option("--period", type=_Number(), metavar="S", help="Servo period in place of the machine's.")
+@click.option("--interpolator", type=click.Choice(INTERPOLATORS), default="sarfraz", show_default=True)
+@click.option("--start-speed", type=_ZERO_OR_MORE, default=0.0, metavar="MM/S", help="Speed at the start.")
+@click.option("--end-speed", type=_ZERO_OR_MORE, default=0.0, metavar="MM/S", help="Speed at the end.")
+@click.option("--output", "-o", metavar="DIR", help="Write plan.json, setpoints and report.html there.")
+@click.option(
+    "--format",
+    "formats",
+    type=click.Choice(outputs.formats()),
+    multiple=True,
+    help="Format of the setpoints, npz by default; may be given several times.",
+)
+@_JSON
+@_QUIET
+def plan(
+    program: str,
+    machine: str,
+    method: str,
+    tolerance: float | None,
+    feed: float | None,
+    feed_override: float,
+    period: float | None,
+    interpolator: str,
+    start_speed: float,
+    end_speed: float,
+    output: str | None,
+    formats: tuple[str, ...],
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Plan PROGRAM: G-code, or a path file (.json).
+
+    Exit code 1: a limit is broken, or no plan is feasible.
+    """
+    from feedplan.files import summary_text, write_plan
+    from feedplan.outputs._staging import require_folder
+    from feedplan.plan import plan as make_plan
+
+    if formats and not output:
+        raise click.UsageError("--format needs a folder to write to: give -o DIR as well")
+    if output:
+        require_folder(FilePath(output))
+    with console.progress_bar(quiet) as progress:
+        result = make_plan(
+            program,
+            Machine.load(machine),
+            method=method,
+            tolerance=tolerance,
+            feed=feed,
+            feed_override=feed_override,
+            period=period,
+            start_speed=start_speed,
+            end_speed=end_speed,
+            interpolator=interpolator,
+            progress=progress,
+        )
+        if progress:
+            progress("audit", 0.0)
+        audit = result.audit()
+        files: tuple[FilePath, ...] = ()
+        if output:
+            files = write_plan(
+                result,
+                output,
+                formats or ("npz",),
+                source=FilePath(program),
+                progress=progress,
+            )
+    warnings = list(result.warnings)
+    if output:
+        earlier = (file for file in outputs.files_in(FilePath(output)) if file not in files)
+        warnings += [f"{file} is of an earlier plan" for file in earlier]
+    if not quiet:
+        for warning in warnings:
+            print(f"warning: {warning}", file=sys.stderr)
+        if as_json:
+            sys.stdout.write(summary_text(result.summary()))
+        else:
+            console.print_rows(console.plan_rows(result.summary(), audit, files))
+    return DONE if audit.ok else _fail(console.failure_sentence(audit), BROKEN)
+
+
+@cli.command()
+@click.argument("program")
+@_MACHINE
+@_TOLERANCE
+@_JSON
+def fit(program: str, machine: str, tolerance: float | None, as_json: bool) -> None:
+    """Fit PROGRAM's points by splines, without planning."""
+    from dataclasses import asdict
+
+    from feedplan.files import summary_text
+    from feedplan.geometry.build import build_path
+    from feedplan.program.read import read_program
+
+    known = Machine.load(machine)
+    path = build_path(read_program(program, known), known, tolerance)
+    ratios = {"spline_ratio": path.fit.spline_ratio, "polynomial_ratio": path.fit.polynomial_ratio}
+    summary = asdict(path.fit) | ratios | {"pieces": len(path), "runs": len(path.runs) - 1}
+    if as_json:
+        sys.stdout.write(summary_text(summary))
+    else:
+        path_row = ("path", console.pieces_text(summary))
+        console.print_rows([("program", program), *console.fit_rows(summary), path_row])
+
+
+@cli.command()
+@click.argument("place", metavar="DIR|SETPOINTS")
+@click.option("--machine", "-m", metavar="NAME|FILE", help=f"{_MACHINE_HELP}  [default: the plan's]")
+@click.option(
+    "--resolution", type=_ZERO_OR_MORE, default=0.0, metavar="MM", help="Last digit of rounded positions."
+)
+@click.option("--jerk", is_flag=True, help="Judge jerk as well.")
+@_JSON
+def check(place: str, machine: str | None, resolution: float, jerk: bool, as_json: bool) -> int:
+    """Audit setpoints against the limits of a machine.
+
+    Positions, velocities and accelerations are measured by differences alone. Exit code 1: a limit is broken.
+    """
+    from feedplan.audit import audit_setpoints
+    from feedplan.files import planned_machine, summary_text
+
+    points = outputs.load_setpoints(place)
+    audit = audit_setpoints(
+        points.t,
+        points.position,
+        Machine.load(machine or planned_machine(FilePath(place))),
+        axes=points.axes,
+        velocity=points.velocity,
+        acceleration=points.acceleration,
+        line=points.line,
+        resolution=resolution,
+        jerk=jerk,
+    )
+    if as_json:
+        sys.stdout.write(summary_text(audit.to_json()))
+    else:
+        console.print_table(console.AUDIT_HEADER, console.audit_rows(audit))
+    return DONE if audit.ok else _fail(console.failure_sentence(audit), BROKEN)
+
+
+@cli.command()
+@click.argument("name", required=False)
+def machines(name: str | None) -> None:
+    """Show the bundled machines, or the limits of one.
+
+    NAME is a bundled machine or a TOML file.
+    """
+    if name is None:
+        names = ["machine", "axes", "velocity mm/s", "acceleration mm/s²", "period ms", "chord mm"]
+        console.print_table(names, [_machine_row(Machine.load(known)) for known in bundled_machines()])
+    else:
+        names = ["axis", "velocity mm/s", "acceleration mm/s²", "jerk mm/s³", "travel mm"]
+        console.print_table(names, [_axis_row(axis) for axis in Machine.load(name).axes])
+
+
+def _machine_row(machine: Machine) -> tuple[str, ...]:
+    limits = (
+        " ".join(f"{getattr(axis, limit):g}" for axis in machine.axes)
+        for limit in ("max_velocity", "max_acceleration")
+    )
+    axes = "".join(machine.axis_names)
+    return (machine.name, axes, *limits, f"{1e3 * machine.period:g}", _or_none(machine.chord_tolerance))
+
+
+def _axis_row(axis: Axis) -> tuple[str, ...]:
+    limits = (axis.max_velocity, axis.max_acceleration, axis.max_jerk)
+    travel = " to ".join(f"{end:g}" for end in axis.travel) if math.isfinite(axis.travel[0]) else "-"
+    return (axis.name, *(_or_none(limit) for limit in limits), travel)
+
+
+def _or_none(limit: float) -> str:
+    return f"{limit:g}" if math.isfinite(limit) else "-"

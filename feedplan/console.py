@@ -1,0 +1,179 @@
+"""What the command line prints: tables on a terminal, plain text in a pipe, progress on a terminal only."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING, Any
+
+from feedplan.units import duration_text, mm_per_min
+
+if TYPE_CHECKING:
+    from feedplan.audit import Audit, LimitCheck
+
+_LIMITS = {"feed", "velocity", "acceleration", "jerk", "chord", "deviation", "travel"}
+Rows = Sequence[tuple[str, str]]
+
+
+def print_rows(rows: Rows) -> None:
+    """Names and values, one pair a line."""
+    if sys.stdout.isatty():
+        from rich.console import Console
+        from rich.table import Table
+        from rich.text import Text
+
+        table = Table(box=None, show_header=False, pad_edge=False, padding=(0, 2, 0, 0))
+        table.add_column(style="dim", no_wrap=True)
+        table.add_column(overflow="fold")
+        for name, value in rows:
+            table.add_row(name, Text(value, style=_style(name, value)))
+        Console().print(table)
+        return
+    width = max(len(name) for name, _ in rows)
+    for name, value in rows:
+        print(f"{name:<{width}}  {value}")
+
+
+def print_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """A table; the first column is text, the others are numbers."""
+    if sys.stdout.isatty():
+        from rich.console import Console
+        from rich.table import Table
+
+        table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="dim")
+        for column, name in enumerate(header):
+            table.add_column(name, justify="right" if column else "left", no_wrap=True)
+        for row in rows:
+            table.add_row(*row)
+        Console().print(table, markup=False)
+        return
+    widths = [max(len(row[k]) for row in (header, *rows)) for k in range(len(header))]
+    for row in (header, *rows):
+        cells = [f"{cell:>{widths[k]}}" if k else f"{cell:<{widths[0]}}" for k, cell in enumerate(row)]
+        print("  ".join(cells).rstrip())
+
+
+@contextmanager
+def progress_bar(quiet: bool) -> Iterator[Callable[[str, float], None] | None]:
+    """A function that shows how far a stage is, on a terminal; None elsewhere."""
+    if quiet or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description:<7}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"))
+    tasks: dict[str, TaskID] = {}
+    with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True) as bars:
+
+        def show(stage: str, done: float) -> None:
+            if stage not in tasks:
+                # A stage that begins ends those before it, whether or not they said so.
+                for earlier in tasks.values():
+                    bars.update(earlier, completed=1.0)
+                tasks[stage] = bars.add_task(stage, total=1.0)
+            bars.update(tasks[stage], completed=done)
+
+        yield show
+
+
+def _style(name: str, value: str) -> str:
+    if name == "audit":
+        return "bold green" if value.startswith("passed") else "bold red"
+    return "bold" if name == "time" else ""
+
+
+def plan_rows(summary: Mapping[str, Any], audit: Audit, files: Sequence[FilePath]) -> Rows:
+    """The result of a plan as names and values."""
+    time, length = float(summary["time"]), float(summary["length"])
+    rows = [(name, str(summary[name])) for name in ("program", "machine", "method")]
+    seconds = f" ({time:.6f} s)" if time >= 60 else ""
+    rows.append(("time", duration_text(time) + seconds))
+    if summary.get("lower_bound") is not None:
+        gap = 100.0 * float(summary.get("gap") or 0.0)
+        rows.append(("lower bound", f"{summary['lower_bound']:.6f} s, gap {gap:.3g} %"))
+    mean = length / time if time > 0 else 0.0
+    rows.append(("length", f"{length:.3f} mm, mean {mean:.4g} mm/s ({mm_per_min(mean):.5g} mm/min)"))
+    rows.append(("path", f"{pieces_text(summary)}, {counted(summary['stops'], 'stop')} on the way"))
+    rows += fit_rows(summary.get("fit") or {})
+    rows.append(("audit", audit_text(audit)))
+    compute: Mapping[str, float] = summary.get("compute") or {}
+    if compute:
+        rows.append(("computing", ", ".join(f"{k} {duration_text(v)}" for k, v in compute.items())))
+    if files:
+        rows.append(("files", " ".join(str(file) for file in files)))
+    return rows
+
+
+def pieces_text(summary: Mapping[str, Any]) -> str:
+    """`605 pieces in 29 runs`."""
+    return f"{counted(summary['pieces'], 'piece')} in {counted(summary['runs'], 'run')}"
+
+
+def counted(number: int, noun: str) -> str:
+    """`1 run`, `2 runs`."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def fit_rows(fit: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """What a fit did; nothing where there was nothing to fit."""
+    points, splines, polynomials = (int(fit.get(key) or 0) for key in ("points", "splines", "polynomials"))
+    if not points or not splines:
+        return []
+    text = f"{points} points as {splines} splines ({points / splines:.1f} : 1)"
+    if polynomials:
+        text += f" of {polynomials} polynomials ({points / polynomials:.1f} : 1)"
+    return [("fit", text), ("deviation", f"{float(fit['deviation']):.3g} mm")]
+
+
+def audit_text(audit: Audit) -> str:
+    """The verdict in one line."""
+    samples = f"{audit.checked_samples} samples"
+    if not audit.ok:
+        return f"FAILED, {len(audit.broken)} of {len(audit.checks)} limits broken, {samples}"
+    nearest = nearest_limit(audit)
+    use = f", nearest {check_name(nearest)} {100 * nearest.ratio:.2f} %" if nearest else ""
+    return f"passed, {samples}{use}"
+
+
+def nearest_limit(audit: Audit) -> LimitCheck | None:
+    """The limit of the machine or the program that is used most; checks of consistency are none."""
+    used = (check for check in audit.checks if check.judged and check.name in _LIMITS)
+    return max(used, key=lambda check: check.ratio, default=None)
+
+
+def failure_sentence(audit: Audit) -> str:
+    """What is broken, in one sentence."""
+    shown = audit.failures[:_FAILURES_SHOWN]
+    more = len(audit.failures) - len(shown)
+    rest = f"; and {counted(more, 'limit')} more" if more else ""
+    return f"the audit failed: {'; '.join(shown) or 'nothing was checked'}{rest}"
+
+
+_FAILURES_SHOWN = 3
+AUDIT_HEADER = ("limit", "worst", "allowed", "use", "time s", "line", "verdict")
+
+
+def audit_rows(audit: Audit) -> list[tuple[str, ...]]:
+    """The checks as rows under `AUDIT_HEADER`."""
+    return [
+        (
+            check_name(check),
+            f"{check.worst:.6g}",
+            f"{check.limit:.6g} {check.unit}".strip(),
+            f"{100 * check.ratio:.2f} %" if math.isfinite(check.ratio) else "-",
+            f"{check.time:.4f}",
+            str(check.line or "-"),
+            "not judged" if not check.judged else "holds" if check.ok else "BROKEN",
+        )
+        for check in audit.checks
+        if not check.ok or math.isfinite(check.limit)
+    ]
+
+
+def check_name(check: LimitCheck) -> str:
+    """`X acceleration`, `feed`."""
+    return f"{check.axis or ''} {check.name.replace('_', ' ')}".strip()

@@ -1,0 +1,111 @@
+"""The folder of a plan: plan.json, the setpoints and the report, which appear whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING, Any
+
+from feedplan.errors import InputError
+from feedplan.outputs import format_named
+from feedplan.outputs._staging import require_folder, staged
+
+if TYPE_CHECKING:
+    from feedplan.plan import Plan
+    from feedplan.setpoints import SetpointChunk
+
+SUMMARY_FILE = "plan.json"
+_ROWS_AT_ONCE = 100_000
+
+
+def write_plan(
+    plan: Plan,
+    folder: str | FilePath,
+    formats: Sequence[str] = ("npz",),
+    *,
+    source: FilePath | None = None,
+    progress: Callable[[str, float], None] | None = None,
+) -> tuple[FilePath, ...]:
+    """Writes the plan, its setpoints in these formats, and its report; returns the files.
+
+    All is written beside and renamed at the end, so `folder` never holds half a plan; other files in it stay.
+    `source` is the part program, quoted in the report; `progress` is called with a stage and 0 to 1. Raises
+    InputError where the folder or the file system refuses.
+    """
+    from feedplan.report.figures import SetpointFigures
+    from feedplan.report.page import FILE as REPORT_FILE
+    from feedplan.report.page import write_report
+
+    folder = FilePath(folder)
+    require_folder(folder)
+    outputs = [format_named(name) for name in dict.fromkeys(formats)]
+    audit = plan.audit()
+    setpoints = plan.setpoints()
+    figures = SetpointFigures(plan.problem, setpoints.count, [check.time for check in audit.broken])
+    with staged(folder, last=SUMMARY_FILE) as stage:
+        with ExitStack() as stack:
+            sinks = [
+                stack.enter_context(output.writer(stage / output.FILE, plan.path.axes, setpoints.count))
+                for output in outputs
+            ]
+            for chunk in _timed(setpoints.chunks(_ROWS_AT_ONCE), plan.compute):
+                for sink in (*sinks, figures.add):
+                    sink(chunk)
+                if progress:
+                    progress("write", 0.95 * figures.count / max(setpoints.count, 1))
+        summary = plan.summary()
+        write_report(
+            stage / REPORT_FILE,
+            summary=summary,
+            problem=plan.problem,
+            profile=plan.profile,
+            audit=audit,
+            figures=figures,
+            source=source,
+        )
+        (stage / SUMMARY_FILE).write_text(summary_text(summary), encoding="utf-8")
+        names = sorted(file.name for file in stage.iterdir())
+    if progress:
+        progress("write", 1.0)
+    return tuple(folder / name for name in names)
+
+
+def _timed(chunks: Iterator[SetpointChunk], compute: dict[str, float]) -> Iterator[SetpointChunk]:
+    """The same chunks; the time that computing them took is added to `compute` as `sample` [s]."""
+    compute["sample"] = 0.0
+    while True:
+        start = time.perf_counter()
+        chunk = next(chunks, None)
+        compute["sample"] += time.perf_counter() - start
+        if chunk is None:
+            return
+        yield chunk
+
+
+def planned_machine(place: FilePath) -> str:
+    """The machine that these setpoints were planned for. Raises InputError where none is known."""
+    file = (place if place.is_dir() else place.parent) / SUMMARY_FILE
+    try:
+        name = json.loads(file.read_text(encoding="utf-8"))["machine"]
+    except (OSError, ValueError, KeyError, TypeError):
+        raise InputError(f"{file} names no machine: give the machine with --machine") from None
+    return str(name)
+
+
+def summary_text(summary: dict[str, Any]) -> str:
+    """A summary as JSON; what is not finite becomes null."""
+    return json.dumps(_plain(summary), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _plain(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(entry) for entry in value]
+    if hasattr(value, "item"):  # a numpy scalar
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,129 @@
+"""A zip archive of .npy members that are filled side by side, in one pass over the rows.
+
+The standard library writes one member after the other, which would take one pass over all setpoints for
+each member or all of them in memory. Sizes are known beforehand here and nothing is compressed, so every
+member has its place from the start; only the checksums are written at the end. Format: PKWARE's APPNOTE 6.3,
+with the 64-bit fields only where a size or an offset needs them.
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+import zlib
+from dataclasses import dataclass
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+_ESCAPE = 0xFFFFFFFF  # in a 32-bit field: the number is in the 64-bit fields
+_WIDE_FROM = _ESCAPE  # the least number that needs them
+_HEAD_ROOM = 1024  # more than a .npy head takes
+_ALIGNMENT = 64
+_DATE_1980 = (0, 0x21)  # midnight of 1 January 1980: the same setpoints make the same file
+_VERSION_64 = 45
+_VERSION = 20
+
+
+@dataclass
+class _Member:
+    name: bytes
+    dtype: np.dtype[Any]
+    size: int
+    place: int
+    data: int
+    is_large: bool
+    written: int = 0
+    checksum: int = 0
+
+
+class NpyArchive:
+    """Opens the archive for arrays of these shapes and types; rows come by `append`."""
+
+    def __init__(self, file: BinaryIO, arrays: dict[str, tuple[tuple[int, ...], np.dtype[Any]]]) -> None:
+        self._file = file
+        self._members: dict[str, _Member] = {}
+        place = 0
+        for name, (shape, dtype) in arrays.items():
+            member_name = f"{name}.npy".encode()
+            body = int(np.prod(shape, dtype=np.int64)) * dtype.itemsize
+            is_large = body + _HEAD_ROOM >= _WIDE_FROM
+            data = place + 30 + len(member_name) + (20 if is_large else 0)
+            head = _npy_head(shape, dtype, data)
+            member = _Member(member_name, dtype, len(head) + body, place, data, is_large)
+            self._members[name] = member
+            self._write(member, head)
+            place = member.data + member.size
+        self._end = place
+
+    def append(self, name: str, rows: NDArray[Any]) -> None:
+        """The next rows of the array of that name."""
+        if len(rows) == 0:
+            return
+        member = self._members[name]
+        self._write(member, np.ascontiguousarray(rows, dtype=member.dtype).data.cast("B"))
+
+    def close(self) -> None:
+        """Writes the heads, now that the checksums are known, and the directory."""
+        for name, member in self._members.items():
+            if member.written != member.size:
+                missing = member.size - member.written
+                raise ValueError(f"{name} lacks {missing} of {member.size} bytes")
+            self._file.seek(member.place)
+            self._file.write(_local_head(member))
+        self._file.seek(self._end)
+        directory = b"".join(_directory_entry(member) for member in self._members.values())
+        self._file.write(directory + _directory_end(len(self._members), len(directory), self._end))
+
+    def _write(self, member: _Member, data: bytes | memoryview) -> None:
+        if member.written + len(data) > member.size:
+            raise ValueError(f"{member.name.decode()} has more rows than announced")
+        self._file.seek(member.data + member.written)
+        self._file.write(data)
+        member.written += len(data)
+        member.checksum = zlib.crc32(data, member.checksum)
+
+
+def _npy_head(shape: tuple[int, ...], dtype: np.dtype[Any], place: int) -> bytes:
+    """The head of a .npy file at this place of the archive, padded so that its rows can be mapped."""
+    buffer = io.BytesIO()
+    header = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
+    np.lib.format.write_array_header_1_0(buffer, header)
+    head = buffer.getvalue()
+    text = head[10:-1] + b" " * (-(place + len(head)) % _ALIGNMENT) + b"\n"
+    return head[:8] + struct.pack("<H", len(text)) + text
+
+
+def _common(member: _Member) -> bytes:
+    """What the local head and the directory entry share: from the version to the size."""
+    version = _VERSION_64 if member.is_large else _VERSION
+    size = _ESCAPE if member.is_large else member.size
+    return struct.pack("<HHHHHIII", version, 0, 0, *_DATE_1980, member.checksum, size, size)
+
+
+def _local_head(member: _Member) -> bytes:
+    extra = struct.pack("<HHQQ", 1, 16, member.size, member.size) if member.is_large else b""
+    lengths = struct.pack("<HH", len(member.name), len(extra))
+    return b"PK\3\4" + _common(member) + lengths + member.name + extra
+
+
+def _directory_entry(member: _Member) -> bytes:
+    wide = [member.size, member.size] if member.is_large else []
+    is_far = member.place >= _WIDE_FROM
+    wide += [member.place] if is_far else []
+    extra = struct.pack(f"<HH{len(wide)}Q", 1, 8 * len(wide), *wide) if wide else b""
+    version = struct.pack("<H", _VERSION_64 if wide else _VERSION)
+    lengths = struct.pack("<HHHHH", len(member.name), len(extra), 0, 0, 0)
+    place = struct.pack("<II", 0, _ESCAPE if is_far else member.place)
+    return b"PK\1\2" + version + _common(member) + lengths + place + member.name + extra
+
+
+def _directory_end(count: int, size: int, place: int) -> bytes:
+    is_far = place >= _WIDE_FROM
+    end = struct.pack("<HHHHIIH", 0, 0, count, count, size, _ESCAPE if is_far else place, 0)
+    if not is_far:
+        return b"PK\5\6" + end
+    record = struct.pack("<QHHIIQQQQ", 44, _VERSION_64, _VERSION_64, 0, 0, count, count, size, place)
+    locator = struct.pack("<IQI", 0, place + size, 1)
+    return b"PK\6\6" + record + b"PK\6\7" + locator + b"PK\5\6" + end

@@ -1,0 +1,82 @@
+"""Setpoints as numpy's npz: `t`, `position`, `velocity`, `acceleration`, `jerk`, `line`, `axes`.
+
+Uncompressed: servo setpoints hardly shrink, and so they can be mapped into memory instead of read.
+"""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from feedplan.errors import InputError
+from feedplan.outputs import QUANTITIES, Add
+from feedplan.outputs._arrays import chunk_of
+from feedplan.outputs._zip import NpyArchive
+from feedplan.setpoints import SetpointChunk
+
+FILE = "setpoints.npz"
+
+
+@contextmanager
+def writer(file: FilePath, axes: Sequence[str], count: int) -> Iterator[Add]:
+    """Writes `count` setpoints in one pass; only the chunk at hand is in memory."""
+    names = np.array(axes, dtype=np.str_)
+    double, integer = np.dtype("<f8"), np.dtype("<i4")
+    arrays: dict[str, tuple[tuple[int, ...], np.dtype[Any]]] = {
+        "t": ((count,), double),
+        **{name: ((count, len(axes)), double) for name in QUANTITIES},
+        "line": ((count,), integer),
+        "axes": (names.shape, names.dtype),
+    }
+    with file.open("wb") as stream:
+        archive = NpyArchive(stream, arrays)
+        archive.append("axes", names)
+
+        def add(chunk: SetpointChunk) -> None:
+            for name in ("t", *QUANTITIES, "line"):
+                archive.append(name, getattr(chunk, name))
+
+        yield add
+        archive.close()
+
+
+def load(file: FilePath) -> SetpointChunk:
+    """The setpoints of an npz file; arrays that are not compressed stay on disk until they are used."""
+    try:
+        with zipfile.ZipFile(file) as archive:
+            arrays = {
+                info.filename.removesuffix(".npy"): _member(archive, info, file)
+                for info in archive.infolist()
+                if info.filename.endswith(".npy")
+            }
+    except (zipfile.BadZipFile, ValueError, EOFError, zipfile.LargeZipFile) as error:
+        raise InputError(f"{file} is not a whole npz file: {error}") from None
+    return chunk_of(arrays, file)
+
+
+def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo, file: FilePath) -> Any:
+    with archive.open(info) as stream:
+        version = np.lib.format.read_magic(stream)
+        read_head = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+        if version not in read_head:
+            raise ValueError(f"{info.filename} has the unknown npy version {version}")
+        shape, fortran_order, dtype = read_head[version](stream)
+        head = stream.tell()
+        if dtype.hasobject or fortran_order:
+            raise ValueError(f"{info.filename} holds {dtype}, not plain rows of numbers")
+        if info.compress_type != zipfile.ZIP_STORED or dtype.kind not in "fiu":
+            with archive.open(info) as again:
+                return np.lib.format.read_array(again, allow_pickle=False)
+    with file.open("rb") as stored:
+        stored.seek(info.header_offset + 26)
+        lengths = np.frombuffer(stored.read(4), dtype="<u2")
+    start = info.header_offset + 30 + int(lengths.sum()) + head
+    count = int(np.prod(shape))
+    if count == 0 or start % dtype.itemsize:  # what other writers left unaligned cannot be mapped
+        return np.fromfile(file, dtype, count, offset=start).reshape(shape)
+    return np.memmap(file, dtype=dtype, mode="r", offset=start, shape=shape)

@@ -1,0 +1,187 @@
+"""From a part program to a plan: read, build the path, state the problem, plan, and hand out setpoints."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path as FilePath
+from typing import Any
+
+from feedplan.audit import Audit, audit
+from feedplan.bound import lower_bound
+from feedplan.constraints.problem import Problem, build_problem
+from feedplan.geometry.build import build_path
+from feedplan.geometry.length import PathLength
+from feedplan.geometry.path import Path
+from feedplan.machine.machine import Machine
+from feedplan.planners import planner
+from feedplan.profile import SpeedProfile
+from feedplan.program.program import Program
+from feedplan.program.read import read_program
+from feedplan.setpoints import Setpoints, setpoints
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A planned program.
+
+    `profile` is the speed along `problem.path`; `lower_bound` [s] is proven: no feasible profile of this path
+    is faster; `compute` is the computing time of each stage [s].
+    """
+
+    program: Program | None
+    machine: Machine
+    problem: Problem
+    profile: SpeedProfile
+    method: str
+    lower_bound: float
+    compute: dict[str, float]
+    interpolator: str = "sarfraz"
+    warnings: tuple[str, ...] = field(default=())
+
+    @property
+    def path(self) -> Path:
+        """The path that is followed."""
+        return self.problem.path
+
+    @property
+    def time(self) -> float:
+        """Time of the whole program, dwells included [s]."""
+        return self.profile.time + float(self.path.dwell.sum())
+
+    @property
+    def gap(self) -> float:
+        """How far the time can be from the optimum at most: (time − lower_bound) / time."""
+        return (self.time - self.lower_bound) / self.time if self.time > 0 else 0.0
+
+    def setpoints(self, period: float | None = None, interpolator: str | None = None) -> Setpoints:
+        """Setpoints at the servo period [s] (the machine's unless given), computed as they are read."""
+        return setpoints(
+            self.path, self.profile, period or self.machine.period, interpolator or self.interpolator
+        )
+
+    @cached_property
+    def _audit(self) -> Audit:
+        with _timed(self.compute, "audit"):
+            return audit(self.problem, self.profile, self.machine, self.program, self.setpoints())
+
+    def audit(self) -> Audit:
+        """The independent check of profile, geometry and setpoints; computed once."""
+        return self._audit
+
+    def summary(self) -> dict[str, Any]:
+        """What `plan.json` holds: plain numbers and strings."""
+        fit = self.path.fit
+        return {
+            "time": self.time,
+            "lower_bound": self.lower_bound,
+            "gap": self.gap,
+            "method": self.method,
+            "machine": self.machine.name,
+            "program": self.program.name if self.program else None,
+            "length": PathLength(self.path).total,
+            "pieces": len(self.path),
+            "runs": len(self.path.runs) - 1,
+            "stops": len(self.path.runs) - 2,
+            "fit": {
+                "points": fit.points,
+                "splines": fit.splines,
+                "polynomials": fit.polynomials,
+                "deviation": fit.deviation,
+            },
+            "compute": dict(self.compute),
+            "audit": self.audit().to_json(),
+            "warnings": list(self.warnings),
+        }
+
+
+def plan(
+    source: str | os.PathLike[str] | Program | Path,
+    machine: Machine | str,
+    method: str = "bang-bang",
+    *,
+    tolerance: float | None = None,
+    feed: float | None = None,
+    feed_override: float = 1.0,
+    period: float | None = None,
+    start_speed: float = 0.0,
+    end_speed: float = 0.0,
+    interpolator: str = "sarfraz",
+    progress: Progress | None = None,
+) -> Plan:
+    """The time-optimal plan of a part program on a machine.
+
+    `source`: a file, a Program or a Path. `machine`: a Machine, or the name or file of one. `tolerance` [mm]
+    is the greatest distance from the programmed path where the program lets the tool leave it (default: the
+    program's own, else 0.01). `feed` [mm/s] replaces the programmed feeds, `feed_override` multiplies them.
+    `period` [s] replaces the machine's servo period; `start_speed` and `end_speed` [mm/s] hold at the ends.
+    `progress(stage, done)` is called as the work goes on.
+    Raises ProgramError, MachineError, InputError or InfeasibleError, each a sentence with place and remedy.
+    """
+    solve = planner(method)
+    if not isinstance(machine, Machine):
+        machine = Machine.load(machine)
+    if period is not None:
+        machine = machine.with_period(period)
+    report = progress or (lambda stage, done: None)
+    compute: dict[str, float] = {}
+    program: Program | None = None
+    if isinstance(source, Path):
+        path = source
+    else:
+        report("read", 0.0)
+        with _timed(compute, "read"):
+            program = source if isinstance(source, Program) else read_program(FilePath(source), machine)
+        report("fit", 0.0)
+        with _timed(compute, "fit"):
+            path = build_path(program, machine, tolerance)
+    report("plan", 0.0)
+    with _timed(compute, "plan"):
+        problem = build_problem(
+            path,
+            machine,
+            feed=feed,
+            feed_override=feed_override,
+            start_speed=start_speed,
+            end_speed=end_speed,
+        )
+        profile = solve(problem)
+    with _timed(compute, "bound"):
+        least = lower_bound(problem) + math.fsum(path.dwell)
+    report("plan", 1.0)
+    return Plan(
+        program=program,
+        machine=machine,
+        problem=problem,
+        profile=profile,
+        method=method,
+        lower_bound=least,
+        compute=compute,
+        interpolator=interpolator,
+        warnings=_warnings(program),
+    )
+
+
+def _warnings(program: Program | None) -> tuple[str, ...]:
+    if program is None:
+        return ()
+    if program.start_dwell > 0:
+        pause = f"the pause of {program.start_dwell:g} s before the first move is not part of the plan"
+        return (*program.warnings, pause)
+    return program.warnings
+
+
+@contextmanager
+def _timed(compute: dict[str, float], stage: str) -> Iterator[None]:
+    start = time.perf_counter()
+    try:
+        yield
+    finally:
+        compute[stage] = time.perf_counter() - start

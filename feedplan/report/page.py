@@ -1,0 +1,94 @@
+"""The report: one self-contained page that needs no network."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from html import escape
+from importlib import resources
+from pathlib import Path as FilePath
+from string import Template
+from typing import Any
+
+from feedplan.audit import Audit
+from feedplan.constraints.problem import Problem
+from feedplan.profile import SpeedProfile
+from feedplan.report.figures import SetpointFigures, chart_data
+from feedplan.report.losses import slowest_lines, time_per_limit
+from feedplan.report.tables import audit_table, fit_table, limits_table, numbers, slowest_table, verdict
+
+FILE = "report.html"
+
+
+def write_report(
+    file: FilePath,
+    *,
+    summary: Mapping[str, Any],
+    problem: Problem,
+    profile: SpeedProfile,
+    audit: Audit,
+    figures: SetpointFigures,
+    source: FilePath | None = None,
+) -> None:
+    """Writes the page. `summary` is the content of plan.json, `source` the text of the part program."""
+    from plotly.offline import get_plotlyjs
+
+    slow = slowest_lines(problem, profile)
+    texts = _lines(source, {row.line for row in slow}) if source else {}
+    data = chart_data(problem, profile, figures, audit)
+    name = FilePath(str(summary.get("program") or "path")).name
+    page = Template(_asset("page.html")).substitute(
+        title=escape(name),
+        style=_asset("page.css"),
+        about=_about(summary, problem),
+        verdict=verdict(audit),
+        numbers=numbers(summary, figures.count),
+        warnings=_warnings(summary.get("warnings") or ()),
+        fast=f"{data['length']['cutting_speed']:.4g}",
+        limits=limits_table(time_per_limit(problem, profile)),
+        fit=fit_table(summary),
+        slowest=slowest_table(slow, texts),
+        audit=audit_table(audit),
+        # A script ends at the first "</", whatever stands around it.
+        data=json.dumps(data, allow_nan=False, separators=(",", ":")).replace("</", "<\\/"),
+        plotly=get_plotlyjs().replace("</script", "<\\/script"),
+        script=_asset("page.js"),
+    )
+    file.write_text(page, encoding="utf-8")
+
+
+def _lines(source: FilePath, wanted: set[int]) -> dict[int, str]:
+    """The text of these lines; none where the file is gone or is no text."""
+    texts: dict[int, str] = {}
+    try:
+        with source.open("rb") as stream:
+            for number, line in enumerate(stream, start=1):
+                if number in wanted:
+                    texts[number] = line.decode("utf-8", errors="replace")
+                    if len(texts) == len(wanted):
+                        break
+    except OSError:
+        return {}
+    return texts
+
+
+def _asset(name: str) -> str:
+    return resources.files(__package__).joinpath(name).read_text("utf-8")
+
+
+def _about(summary: Mapping[str, Any], problem: Problem) -> str:
+    parts = [
+        f"machine <b>{escape(str(summary.get('machine')))}</b>",
+        f"method <b>{escape(str(summary.get('method')))}</b>",
+        f"servo period <b>{problem.period * 1e3:g} ms</b>",
+        f"axes <b>{' '.join(problem.path.axes)}</b>",
+    ]
+    return " · ".join(parts)
+
+
+def _warnings(warnings: Sequence[str]) -> str:
+    if not warnings:
+        return ""
+    shown = "".join(f"<li>{escape(text)}</li>" for text in warnings[:12])
+    more = f"<li>and {len(warnings) - 12} more, all in plan.json</li>" if len(warnings) > 12 else ""
+    return f'<ul class="warnings">{shown}{more}</ul>'

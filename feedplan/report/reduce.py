@@ -1,0 +1,160 @@
+"""Millions of samples as the few thousand points that a chart can show, without losing a peak or a corner."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+class Envelope:
+    """The least and the greatest value of each bucket of consecutive samples, for several columns at once.
+
+    `count` samples will come by `add`; at most about `points` are kept a column, both extremes of a bucket
+    where they stand, so that no peak vanishes. With fewer samples than `points` all are kept.
+    """
+
+    def __init__(self, count: int, points: int) -> None:
+        self._width = 1 if count <= points else -(-2 * count // points)
+        self._rest: tuple[Floats, Floats, NDArray[np.int64]] | None = None
+        self._parts: list[tuple[NDArray[np.int64], Floats, Floats, NDArray[np.int64]]] = []
+        self._means: list[tuple[Floats, Floats]] = []
+        self._last: float | None = None
+        self._done = 0
+
+    def add(self, x: Floats, values: Floats, tag: NDArray[np.int64] | None = None) -> None:
+        """The next samples: `x` (n,), `values` (n, columns), and an integer that each sample carries."""
+        tag = np.zeros(len(x), np.int64) if tag is None else tag.astype(np.int64)
+        if self._rest is not None:
+            x = np.concatenate((self._rest[0], x))
+            values = np.concatenate((self._rest[1], values))
+            tag = np.concatenate((self._rest[2], tag))
+        whole = len(x) // self._width * self._width
+        self._keep(x[:whole], values[:whole], tag[:whole], self._width)
+        self._rest = (x[whole:], values[whole:], tag[whole:])
+
+    def curve(self, column: int) -> tuple[Floats, Floats, NDArray[np.int64]]:
+        """x, value and tag of the points kept in one column, in order."""
+        self._finish()
+        if not self._parts:
+            return np.empty(0), np.empty(0), np.empty(0, np.int64)
+        place, x, value, tag = (
+            np.concatenate([part[i][column].ravel() for part in self._parts]) for i in range(4)
+        )
+        single = np.concatenate(([True], np.diff(place) != 0))
+        return x[single], value[single], tag[single]
+
+    def mean(self, column: int, points: int) -> tuple[Floats, Floats]:
+        """x and mean over x of at most `points` stretches of one column: what a band of extremes hides."""
+        self._finish()
+        if not self._means:
+            return np.empty(0), np.empty(0)
+        x = np.concatenate([part[0] for part in self._means])
+        value = np.concatenate([part[1][column] for part in self._means])
+        starts = np.arange(0, len(x), max(1, -(-len(x) // points)))
+        sizes = np.diff(np.append(starts, len(x)))
+        return np.add.reduceat(x, starts) / sizes, np.add.reduceat(value, starts) / sizes
+
+    def _finish(self) -> None:
+        if self._rest is not None and len(self._rest[0]):
+            self._keep(*self._rest, len(self._rest[0]))
+        self._rest = None
+
+    def _keep(self, x: Floats, values: Floats, tag: NDArray[np.int64], width: int) -> None:
+        if len(x) == 0:
+            return
+        columns = np.ascontiguousarray(values.T).reshape(values.shape[1], -1, width)
+        # A gap (NaN) is no extreme: it may neither hide a peak nor be lost where all of the bucket is one.
+        least = np.where(np.isnan(columns), np.inf, columns).argmin(axis=2)
+        greatest = np.where(np.isnan(columns), -np.inf, columns).argmax(axis=2)
+        start = np.arange(columns.shape[1]) * width
+        pick = np.sort(np.stack([start + least, start + greatest], axis=-1), axis=-1)
+        value = np.take_along_axis(values.T[:, :, None], pick.reshape(len(pick), -1, 1), axis=1)
+        self._parts.append((pick + self._done, x[pick], value.reshape(pick.shape), tag[pick]))
+        # Each sample stands for the way from the one before; where there is none, all count alike.
+        before = x[0] if self._last is None else self._last
+        weight = np.diff(x, prepend=before).reshape(-1, width)
+        weight[weight.sum(axis=1) <= 0] = 1.0
+        with np.errstate(invalid="ignore"):
+            mean = np.einsum("cbw,bw->cb", columns, weight) / weight.sum(axis=1)
+        self._means.append((x.reshape(-1, width).mean(axis=1), mean))
+        self._last = float(x[-1])
+        self._done += len(x)
+
+
+class Polyline:
+    """A polyline with few points that stays near the one of all samples, corners kept.
+
+    A point goes when it lies, in all its columns, within a tolerance of the straight line between its
+    neighbours; what earlier removals have cost is added up, so the bound holds for every sample. The
+    tolerance starts at `tolerance` and doubles until at most `limit` points are left.
+    """
+
+    def __init__(self, limit: int, tolerance: float) -> None:
+        self._limit = limit
+        self.tolerance = tolerance
+        self._kept: list[tuple[Floats, NDArray[np.int64], Floats]] = []
+        self._pending: list[tuple[Floats, NDArray[np.int64]]] = []
+        self._pending_count = 0
+
+    def add(self, points: Floats, tag: NDArray[np.int64]) -> None:
+        """The next samples: `points` (n, columns), scaled so that one tolerance suits all, and their tags."""
+        self._pending.append((points, tag))
+        self._pending_count += len(points)
+        if self._pending_count >= 2 * self._limit:
+            self._settle()
+
+    def result(self) -> tuple[Floats, NDArray[np.int64]]:
+        """The points kept and their tags."""
+        self._settle()
+        if not self._kept:
+            return np.empty((0, 0)), np.empty(0, np.int64)
+        points, tag, _ = self._kept[0]
+        return points, tag
+
+    def _settle(self) -> None:
+        if self._pending:
+            points = np.concatenate([part[0] for part in self._pending])
+            tag = np.concatenate([part[1] for part in self._pending])
+            self._kept.append(_thin(points, tag, np.zeros(len(points)), self.tolerance))
+            self._pending, self._pending_count = [], 0
+        if not self._kept:
+            return
+        points, tag, cost = (np.concatenate([part[i] for part in self._kept]) for i in range(3))
+        if len(self._kept) > 1:
+            points, tag, cost = _thin(points, tag, cost, self.tolerance)
+        while len(points) > self._limit:
+            self.tolerance *= 2
+            points, tag, cost = _thin(points, tag, cost, self.tolerance)
+        self._kept = [(points, tag, cost)]
+
+
+def _thin(
+    points: Floats, tag: NDArray[np.int64], cost: Floats, tolerance: float
+) -> tuple[Floats, NDArray[np.int64], Floats]:
+    """Removes points within `tolerance`; `cost` is what was spent between each point and the next."""
+    idle = 0
+    parity = 1
+    while idle < 2 and len(points) > 2:
+        # Every second point is a candidate: its neighbours stay, so all can be judged at once.
+        middle = np.arange(parity, len(points) - 1, 2)
+        spent = np.maximum(cost[middle - 1], cost[middle])
+        total = spent + _distance(points[middle], points[middle - 1], points[middle + 1])
+        gone = total <= tolerance
+        keep = np.ones(len(points), dtype=bool)
+        keep[middle[gone]] = False
+        cost[middle[gone] - 1] = total[gone]
+        points, tag, cost = points[keep], tag[keep], cost[keep]
+        idle = idle + 1 if np.count_nonzero(gone) <= len(points) // 50 else 0
+        parity = 3 - parity
+    return points, tag, cost
+
+
+def _distance(points: Floats, a: Floats, b: Floats) -> Floats:
+    """Distance of each point from the segment a–b of its row."""
+    along = b - a
+    square = np.einsum("ij,ij->i", along, along)
+    t = np.einsum("ij,ij->i", points - a, along) / np.where(square > 0, square, 1.0)
+    off = points - a - np.clip(t, 0.0, 1.0)[:, None] * along
+    return np.asarray(np.sqrt(np.einsum("ij,ij->i", off, off)))

@@ -1,0 +1,235 @@
+"""The numbers and tables of the page as HTML; they need no script and print as they are."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from html import escape
+from typing import Any
+
+from feedplan.audit import Audit, LimitCheck
+from feedplan.report.losses import Share, SlowLine
+from feedplan.units import duration_text, mm_per_min
+
+# Limits of the machine and the program; every other check is one of consistency.
+_LIMITS = {"feed", "velocity", "acceleration", "jerk", "chord", "deviation", "travel", "jump"}
+
+_NO_JUMP = 1e-3  # [mm/s]
+
+# What a check is called where its own name says too little.
+_NAMES = {
+    "chord": "chord error",
+    "deviation": "deviation from the program",
+    "jump": "velocity jump at corners",
+    "continuity": "speed jump between pieces",
+    "junction": "speed at corners and stops",
+    "duration": "recorded durations",
+    "order": "order of the arcs",
+    "gap": "gaps in the path",
+    "place": "setpoints off the path",
+    "grid": "time grid",
+    "recorded_velocity": "recorded velocity",
+    "recorded_acceleration": "recorded acceleration",
+    "numbers": "numbers that are not finite",
+}
+
+
+def verdict(audit: Audit) -> str:
+    """The audit's verdict in one line, with what is broken."""
+    samples = f"{audit.checked_samples:,}".replace(",", " ")
+    if audit.ok:
+        used = [check for check in audit.checks if check.judged and _is_limit(check)]
+        nearest = max(used, key=lambda check: check.ratio, default=None)
+        tight = f" Nearest to its limit: {_name(nearest)}, {100 * nearest.ratio:.2f} %." if nearest else ""
+        text = f"<p>Every limit holds at {samples} checked samples.{tight}</p>"
+        return f'<div class="verdict passed"><span class="mark">Audit passed</span>{text}</div>'
+    broken = "".join(f"<li>{escape(sentence)}</li>" for sentence in audit.failures)
+    count = len(audit.failures)
+    limits = "limit is" if count == 1 else "limits are"
+    head = f"{count} {limits} broken at {samples} checked samples. Do not run this plan."
+    return (
+        f'<div class="verdict failed"><span class="mark">Audit FAILED</span>'
+        f"<div><p>{head}</p><ul>{broken}</ul></div></div>"
+    )
+
+
+def numbers(summary: Mapping[str, Any], setpoints: int) -> str:
+    """The big numbers under the title."""
+    time, length = float(summary["time"]), float(summary["length"])
+    mean = length / time if time > 0 else 0.0
+    bound, gap = summary.get("lower_bound"), summary.get("gap")
+    cells = [
+        ("Time", *_value_unit(duration_text(time)), f"{time:.6g} s" if time >= 60 else ""),
+        ("Length", *_length(length), f"{summary['pieces']} pieces"),
+        ("Mean speed", f"{mean:.4g}", "mm/s", f"{mm_per_min(mean):.5g} mm/min"),
+        ("Stops on the way", str(summary["stops"]), "", _counted(summary["runs"], "run")),
+        ("Setpoints", f"{setpoints:,}".replace(",", " "), "", ""),
+    ]
+    if bound is not None:
+        proof = (
+            "proved optimal" if gap is not None and gap <= 1e-9 else f"no plan is faster than {bound:.6g} s"
+        )
+        cells.insert(1, ("Gap to the bound", _short(100.0 * (gap or 0.0)), "%", proof))
+    items = "".join(_number(*cell) for cell in cells)
+    return f'<dl class="numbers card">{items}</dl>'
+
+
+def _number(label: str, value: str, unit: str, more: str) -> str:
+    size = "long" if len(value) > 9 else "short"
+    shown = f'<dd class="{size}">{value}<small>{unit}</small></dd>'
+    return f'<div><dt>{label}</dt>{shown}<p class="more">{more}</p></div>'
+
+
+def limits_table(shares: Sequence[Share]) -> str:
+    """Time per limit with bars."""
+    head = '<th>Limit</th><th></th><th class="n">Part</th><th class="n">Time</th>'
+    longest = max((share.part for share in shares), default=0.0) or 1.0
+    rows = "".join(
+        f"<tr><td>{escape(share.limit)}</td>"
+        f'<td class="bar"><i style="width:{100 * share.part / longest:.1f}%"></i></td>'
+        f'<td class="n">{100 * share.part:.1f} %</td><td class="n">{duration_text(share.time)}</td></tr>'
+        for share in shares
+    )
+    return f"<table><tr>{head}</tr>{rows}</table>"
+
+
+def fit_table(summary: Mapping[str, Any]) -> str:
+    """What the fit did and how long each stage took."""
+    fit = summary.get("fit") or {}
+    rows: list[tuple[str, str]] = []
+    points, splines, polynomials = (int(fit.get(key) or 0) for key in ("points", "splines", "polynomials"))
+    if points and splines:
+        rows += [
+            ("Points fitted", f"{points}"),
+            ("B-splines", f"{splines} <span class='tag'>{points / splines:.1f} : 1</span>"),
+        ]
+        if polynomials:
+            rows.append(
+                ("Polynomials", f"{polynomials} <span class='tag'>{points / polynomials:.1f} : 1</span>")
+            )
+    else:
+        rows.append(("Fit", "nothing to fit"))
+    if fit.get("deviation") is not None:
+        rows.append(("Deviation from the program", f"{_short(fit['deviation'] * 1e3)} µm"))
+    rows.append(("Pieces planned", f"{summary['pieces']} in {_counted(summary['runs'], 'run')}"))
+    compute = summary.get("compute") or {}
+    rows += [(f"Time to {name}", duration_text(float(seconds))) for name, seconds in compute.items()]
+    body = "".join(f'<tr><td>{escape(name)}</td><td class="n">{value}</td></tr>' for name, value in rows)
+    return f"<table>{body}</table>"
+
+
+def slowest_table(rows: Sequence[SlowLine], texts: Mapping[int, str]) -> str:
+    """The lines that lose most time, with their text where it is known."""
+    if not rows:
+        return "<table><tr><td>No line is slower than its feed and its axes allow.</td></tr></table>"
+    head = '<th class="n">Line</th>' + ("<th>Source</th>" if texts else "")
+    body = "".join(_slow_row(row, texts) for row in rows)
+    return (
+        f'<table><tr>{head}<th class="n">Lost</th><th class="n">Time</th><th class="n">Mean speed [mm/s]</th>'
+        f'<th class="n">Wanted [mm/s]</th><th>Because of</th></tr>{body}</table>'
+    )
+
+
+def _slow_row(row: SlowLine, texts: Mapping[int, str]) -> str:
+    text = escape(texts.get(row.line, "").strip()[:120])
+    cells = [
+        f'<td class="n">{row.line}</td>',
+        f'<td class="code"><code>{text}</code></td>' if texts else "",
+        f'<td class="n">{duration_text(row.lost)}</td><td class="n">{duration_text(row.time)}</td>',
+        f'<td class="n">{row.speed:.4g}</td><td class="n">{row.wanted:.4g}</td>',
+        f"<td>{escape(row.limit)} <span class='tag'>{100 * row.part:.0f} %</span>",
+        "<span class='tag'>stop</span>" if row.stops else "",
+        "<span class='tag'>rapid</span></td>" if row.rapid else "</td>",
+    ]
+    return f"<tr>{''.join(cells)}</tr>"
+
+
+def audit_table(audit: Audit) -> str:
+    """Every check: the worst value, the limit, their ratio, when and on which line.
+
+    Limits come first; the checks of consistency fold away unless one of them fails.
+    """
+    known = [check for check in audit.checks if not check.ok or math.isfinite(check.limit)]
+    limits = [check for check in known if _is_limit(check)]
+    others = [check for check in known if not _is_limit(check)]
+    table = _audit_rows(limits)
+    if not others:
+        return table
+    failed = sum(not check.ok for check in others)
+    word = f"{failed} of {len(others)} fail" if failed else f"all {len(others)} hold"
+    state = " open" if failed else ""
+    title = f"<summary>Consistency of path, profile and setpoints: {word}</summary>"
+    return f"{table}<details{state}>{title}{_audit_rows(others)}</details>"
+
+
+def _audit_rows(checks: Sequence[LimitCheck]) -> str:
+    columns = (
+        ("", "Limit"),
+        ("n", "Worst"),
+        ("n", "Allowed"),
+        ("", "Use"),
+        ("n", ""),
+        ("n", "At time [s]"),
+        ("n", "Line"),
+        ("", ""),
+    )
+    head = "".join(f'<th class="{kind}">{text}</th>' for kind, text in columns)
+    return f"<table><tr>{head}</tr>{''.join(_audit_row(check) for check in checks)}</table>"
+
+
+def _audit_row(check: LimitCheck) -> str:
+    kind, word = ("", "holds") if check.ok else ("broken", "broken")
+    if not check.judged:
+        kind, word = "unjudged", "not judged"
+    width = 100 * min(max(check.ratio, 0.0), 1.0) if math.isfinite(check.ratio) else 100.0
+    bar = f'<span class="ratio {kind}"><i style="width:{width:.1f}%"></i></span>'
+    return (
+        f'<tr class="{kind}-row"><td>{_name(check)}</td><td class="n">{_with_unit(check, check.worst)}</td>'
+        f'<td class="n">{_with_unit(check, check.limit)}</td><td class="bar">{bar}</td>'
+        f'<td class="n">{_percent(check.ratio)}</td>'
+        f'<td class="n">{f"{check.time:.4f}" if math.isfinite(check.time) else "–"}</td>'
+        f'<td class="n">{check.line or "–"}</td><td class="verdict-cell">{word}</td></tr>'
+    )
+
+
+def _is_limit(check: LimitCheck) -> bool:
+    # Where no velocity jump is allowed at corners, its check only confirms that there is none.
+    return check.name in _LIMITS and (check.name != "jump" or check.limit > _NO_JUMP)
+
+
+def _name(check: LimitCheck) -> str:
+    return escape(f"{check.axis or ''} {_NAMES.get(check.name, check.name)}".strip())
+
+
+def _with_unit(check: LimitCheck, value: float) -> str:
+    if not math.isfinite(value):
+        return "no limit" if value > 0 else "–"
+    return f"{value:.6g} {check.unit}".strip()
+
+
+def _percent(ratio: float) -> str:
+    """A ratio as percent; near 100 with the digits that tell on which side it is."""
+    if not math.isfinite(ratio):
+        return "–"
+    percent = 100.0 * ratio
+    if percent != 100.0 and abs(percent - 100.0) < 0.01:
+        return f"100 % {'+' if percent > 100 else '-'} {abs(percent - 100.0):.1g}"
+    return f"{percent:.2f} %"
+
+
+def _short(value: float) -> str:
+    return "0" if abs(value) < 1e-9 else f"{value:.3g}"
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def _length(length: float) -> tuple[str, str]:
+    return (f"{length:.1f}", "mm") if length < 10_000 else (f"{length / 1000:,.1f}".replace(",", " "), "m")
+
+
+def _value_unit(text: str) -> tuple[str, str]:
+    """`1.234 s` as value and unit; texts of several parts stay whole."""
+    value, _, unit = text.partition(" ")
+    return (value, unit) if " " not in unit else (text, "")

@@ -1,0 +1,265 @@
+//! The independent audit: samples what a plan claims and measures every limit by differences of its own.
+//!
+//! Nothing here comes from a planner, a fit or a sampler: positions are evaluated from the control points, times
+//! are integrated numerically, accelerations are difference quotients. By the mean value theorem a quotient
+//! exceeds a limit only where the motion does, so a broken limit found here is truly broken.
+
+pub mod arcs;
+pub mod curve;
+pub mod deviation;
+pub mod follow;
+pub mod moves;
+pub mod place;
+pub mod profile;
+pub mod setpoints;
+
+/// A ratio of measured value to limit passes up to here: a millionth covers the planner's own rounding over
+/// 100 000 pieces (some 1e-10) and means nothing to a machine.
+pub const PASS_MARK: f64 = 1.0 + PASS_EXCESS;
+
+/// What the pass mark allows beyond the limit.
+pub const PASS_EXCESS: f64 = 1e-6;
+
+/// Spacing of the numbers at 1.
+pub const EPS: f64 = f64::EPSILON;
+
+/// Roundings, in units of `EPS` of the magnitude, that one evaluated position or velocity may carry: some
+/// sixteen operations of half a unit each lie on the way from the stored numbers to it.
+pub const ROUNDINGS: f64 = 8.0;
+
+/// How far, in mm, a setpoint may lie from its place on the path, beyond rounding: a nanometre.
+pub const PLACE_TOLERANCE: f64 = 1e-6;
+
+/// How far, in mm, the end of one piece may lie from the start of the next, beyond rounding.
+pub const GAP_TOLERANCE: f64 = 1e-9;
+
+/// What is checked. The name is how it appears to users.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(usize)]
+pub enum Check {
+    /// Numbers that are not finite, or out of their range.
+    Numbers,
+    /// Arcs that do not cover the pieces in order, in mm of parameter.
+    Order,
+    /// Speed, in mm/s.
+    Feed,
+    /// Distance of the straight line between setpoints from the path, in mm.
+    Chord,
+    /// Speed at the ends of runs and at junctions, in mm/s.
+    Junction,
+    /// Jump of the speed at a junction, in mm/s.
+    Continuity,
+    /// Recorded duration against the audit's own integral, relative.
+    Duration,
+    /// Distance between followed and programmed path, in mm.
+    Deviation,
+    /// Gap between pieces, and between the ends of path and program, in mm.
+    Gap,
+    /// Uneven time steps, in s.
+    Grid,
+    /// Distance of a setpoint from its place on the path, in mm.
+    Place,
+    /// Velocity of an axis, in mm/s.
+    Velocity,
+    /// Acceleration of an axis, in mm/s².
+    Acceleration,
+    /// Jerk of an axis, in mm/s³.
+    Jerk,
+    /// Jump of an axis velocity, in mm/s.
+    Jump,
+    /// Position of an axis against its travel, in mm.
+    Travel,
+    /// Recorded velocity of an axis against the change of position, in mm/s.
+    RecordedVelocity,
+    /// Recorded acceleration of an axis against the change of velocity, in mm/s².
+    RecordedAcceleration,
+}
+
+/// Number of checks.
+pub const CHECKS: usize = 18;
+
+impl Check {
+    /// All checks in the order of their numbers.
+    pub const ALL: [Check; CHECKS] = [
+        Check::Numbers,
+        Check::Order,
+        Check::Feed,
+        Check::Chord,
+        Check::Junction,
+        Check::Continuity,
+        Check::Duration,
+        Check::Deviation,
+        Check::Gap,
+        Check::Grid,
+        Check::Place,
+        Check::Velocity,
+        Check::Acceleration,
+        Check::Jerk,
+        Check::Jump,
+        Check::Travel,
+        Check::RecordedVelocity,
+        Check::RecordedAcceleration,
+    ];
+
+    /// The name users see.
+    pub fn name(self) -> &'static str {
+        match self {
+            Check::Numbers => "numbers",
+            Check::Order => "order",
+            Check::Feed => "feed",
+            Check::Chord => "chord",
+            Check::Junction => "junction",
+            Check::Continuity => "continuity",
+            Check::Duration => "duration",
+            Check::Deviation => "deviation",
+            Check::Gap => "gap",
+            Check::Grid => "grid",
+            Check::Place => "place",
+            Check::Velocity => "velocity",
+            Check::Acceleration => "acceleration",
+            Check::Jerk => "jerk",
+            Check::Jump => "jump",
+            Check::Travel => "travel",
+            Check::RecordedVelocity => "recorded_velocity",
+            Check::RecordedAcceleration => "recorded_acceleration",
+        }
+    }
+
+    /// Whether the check is kept for each axis on its own.
+    pub fn per_axis(self) -> bool {
+        self as usize >= Check::Velocity as usize
+    }
+}
+
+/// The worst place found of one limit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Worst {
+    /// The value measured there, less its rounding allowance.
+    pub value: f64,
+    pub limit: f64,
+    /// `value / limit`; negative while nothing was measured, infinite for what is not a number.
+    pub ratio: f64,
+    /// In s from the start of the program.
+    pub time: f64,
+    /// Source line; 0 where none is known.
+    pub line: i32,
+}
+
+impl Worst {
+    const NONE: Worst = Worst { value: 0.0, limit: f64::INFINITY, ratio: -1.0, time: 0.0, line: 0 };
+}
+
+/// The worst of every limit, and how many samples were looked at.
+#[derive(Clone, Debug)]
+pub struct Tally<const M: usize> {
+    pub worst: [[Worst; M]; CHECKS],
+    pub samples: u64,
+}
+
+impl<const M: usize> Default for Tally<M> {
+    fn default() -> Self {
+        Self { worst: [[Worst::NONE; M]; CHECKS], samples: 0 }
+    }
+}
+
+impl<const M: usize> Tally<M> {
+    /// Keeps the value if no worse one was seen. What is not a number is the worst there is.
+    #[inline(always)]
+    pub fn offer(&mut self, check: Check, axis: usize, value: f64, limit: f64, time: f64, line: i32) {
+        let ratio = if value <= 0.0 { 0.0 } else { value / limit };
+        // The negated comparison also holds for a NaN, which must not get lost.
+        #[allow(clippy::neg_cmp_op_on_partial_ord)]
+        if !(ratio <= self.worst[check as usize][axis].ratio) {
+            let value = if value < 0.0 { 0.0 } else { value };
+            self.offer_ratio(check, axis, Worst { value, limit, ratio, time, line });
+        }
+    }
+
+    /// The same where the ratio is not that of value and limit.
+    pub fn offer_ratio(&mut self, check: Check, axis: usize, mut found: Worst) {
+        if found.ratio.is_nan() {
+            found.ratio = f64::INFINITY;
+        }
+        let worst = &mut self.worst[check as usize][axis];
+        if found.ratio > worst.ratio {
+            *worst = found;
+        }
+    }
+
+    /// The worse of both, for every limit.
+    pub fn merge(mut self, other: Self) -> Self {
+        for (mine, theirs) in self.worst.iter_mut().flatten().zip(other.worst.iter().flatten()) {
+            if theirs.ratio > mine.ratio {
+                *mine = *theirs;
+            }
+        }
+        self.samples += other.samples;
+        self
+    }
+
+    /// The worst of one check.
+    pub fn get(&self, check: Check, axis: usize) -> &Worst {
+        &self.worst[check as usize][axis]
+    }
+}
+
+/// The limits that hold everywhere.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits<const M: usize> {
+    /// In mm/s, mm/s² and mm/s³.
+    pub velocity: [f64; M],
+    pub acceleration: [f64; M],
+    pub jerk: [f64; M],
+    /// Jump of each axis velocity that is allowed at a corner, in mm/s.
+    pub jump: [f64; M],
+    /// Least and greatest position, in mm.
+    pub travel: [[f64; 2]; M],
+    /// In mm; infinite: not limited.
+    pub chord_tolerance: f64,
+    /// Servo period in s.
+    pub period: f64,
+    /// Speeds at the two ends of the path, in mm/s.
+    pub end_speeds: [f64; 2],
+}
+
+impl<const M: usize> Limits<M> {
+    /// The jump of one axis velocity that means nothing: over a servo period it adds no more than the pass mark
+    /// to the acceleration.
+    #[inline]
+    pub fn negligible_jump(&self, axis: usize) -> f64 {
+        PASS_EXCESS * self.acceleration[axis] * self.period
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_a_number_stays_the_worst() {
+        let mut tally = Tally::<1>::default();
+        tally.offer(Check::Feed, 0, 5.0, 10.0, 1.0, 7);
+        tally.offer(Check::Feed, 0, f64::NAN, 10.0, 2.0, 8);
+        tally.offer(Check::Feed, 0, 9.0, 10.0, 3.0, 9);
+        let worst = tally.get(Check::Feed, 0);
+        assert_eq!((worst.ratio, worst.line), (f64::INFINITY, 8));
+        let merged = Tally::<1>::default().merge(tally);
+        assert_eq!(merged.get(Check::Feed, 0).line, 8);
+    }
+
+    #[test]
+    fn a_value_against_no_limit_at_all_fails_only_above_zero() {
+        let mut tally = Tally::<1>::default();
+        tally.offer(Check::Order, 0, 0.0, 0.0, 0.0, 1);
+        assert_eq!(tally.get(Check::Order, 0).ratio, 0.0);
+        tally.offer(Check::Order, 0, 1e-300, 0.0, 0.0, 2);
+        assert_eq!(tally.get(Check::Order, 0).ratio, f64::INFINITY);
+    }
+
+    #[test]
+    fn the_numbers_of_the_checks_are_their_places() {
+        for (number, check) in Check::ALL.into_iter().enumerate() {
+            assert_eq!(check as usize, number);
+        }
+    }
+}

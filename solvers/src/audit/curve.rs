@@ -1,0 +1,192 @@
+//! The followed geometry as the audit sees it: a start point and two differences per piece.
+
+/// The path's arrays, one entry a piece; see `feedplan.Path`.
+#[derive(Clone, Copy)]
+pub struct Followed<'a> {
+    /// Control points, 3 × axes numbers a piece, in mm.
+    pub control: &'a [f64],
+    /// Parameter interval, in mm.
+    pub width: &'a [f64],
+    /// Greatest speed, in mm/s: the problem's feed.
+    pub feed: &'a [f64],
+    /// Source line.
+    pub line: &'a [i32],
+    /// First and last program move that the piece follows, two numbers a piece.
+    pub moves: &'a [i64],
+    /// Allowed distance from the programmed path, in mm.
+    pub tolerance: &'a [f64],
+    /// Piece offsets of the runs.
+    pub runs: &'a [i64],
+    /// Pause after each run, in s.
+    pub dwell: &'a [f64],
+}
+
+impl Followed<'_> {
+    /// Number of pieces.
+    pub fn len(&self) -> usize {
+        self.width.len()
+    }
+
+    /// Whether there is nothing to follow.
+    pub fn is_empty(&self) -> bool {
+        self.width.is_empty()
+    }
+
+    /// The control points of piece `i`.
+    #[inline]
+    pub fn points<const M: usize>(&self, i: usize) -> [[f64; M]; 3] {
+        let flat = &self.control[3 * M * i..3 * M * (i + 1)];
+        std::array::from_fn(|j| std::array::from_fn(|k| flat[j * M + k]))
+    }
+
+    /// Piece `i` by its differences.
+    #[inline]
+    pub fn curve<const M: usize>(&self, i: usize) -> Curve<M> {
+        Curve::new(&self.points(i), self.width[i])
+    }
+}
+
+/// C(t) = start + t (2 first + t (second − first)) with t = u / width.
+#[derive(Clone, Copy, Debug)]
+pub struct Curve<const M: usize> {
+    pub start: [f64; M],
+    /// From the first control point to the second, and from the second to the third.
+    pub first: [f64; M],
+    pub second: [f64; M],
+    pub width: f64,
+}
+
+impl<const M: usize> Curve<M> {
+    pub fn new(points: &[[f64; M]; 3], width: f64) -> Self {
+        Self {
+            start: points[0],
+            first: std::array::from_fn(|k| points[1][k] - points[0][k]),
+            second: std::array::from_fn(|k| points[2][k] - points[1][k]),
+            width,
+        }
+    }
+
+    /// C(u).
+    #[inline]
+    pub fn at(&self, u: f64) -> [f64; M] {
+        let t = u / self.width;
+        std::array::from_fn(|k| {
+            self.start[k] + t * (2.0 * self.first[k] + t * (self.second[k] - self.first[k]))
+        })
+    }
+
+    /// C'(u), counted from the nearer end so that both ends are exact.
+    #[inline]
+    pub fn derivative(&self, u: f64) -> [f64; M] {
+        let t = u / self.width;
+        let scale = 2.0 / self.width;
+        if t <= 0.5 {
+            std::array::from_fn(|k| scale * (self.first[k] + t * (self.second[k] - self.first[k])))
+        } else {
+            let rest = (self.width - u) / self.width;
+            std::array::from_fn(|k| scale * (self.second[k] + rest * (self.first[k] - self.second[k])))
+        }
+    }
+
+    /// C'', the same everywhere on the piece.
+    #[inline]
+    pub fn second_derivative(&self) -> [f64; M] {
+        let scale = 2.0 / (self.width * self.width);
+        std::array::from_fn(|k| scale * (self.second[k] - self.first[k]))
+    }
+
+    /// Whether the piece goes nowhere.
+    pub fn is_motionless(&self) -> bool {
+        self.first.iter().chain(&self.second).all(|&d| d == 0.0)
+    }
+
+    /// Greatest coordinate: what rounding is relative to.
+    #[inline]
+    pub fn magnitude(&self) -> f64 {
+        let mut most = 0.0_f64;
+        for k in 0..M {
+            most = most.max(self.start[k].abs()).max((self.start[k] + self.first[k] + self.second[k]).abs());
+        }
+        most
+    }
+}
+
+/// Length of a vector.
+#[inline(always)]
+pub fn length<const M: usize>(a: &[f64; M]) -> f64 {
+    inner(a, a).sqrt()
+}
+
+/// Inner product of two vectors.
+#[inline(always)]
+pub fn inner<const M: usize>(a: &[f64; M], b: &[f64; M]) -> f64 {
+    let mut sum = 0.0;
+    for k in 0..M {
+        sum += a[k] * b[k];
+    }
+    sum
+}
+
+/// From `a` to `b`.
+#[inline(always)]
+pub fn from_to<const M: usize>(a: &[f64; M], b: &[f64; M]) -> [f64; M] {
+    std::array::from_fn(|k| b[k] - a[k])
+}
+
+/// Distance of two points.
+#[inline(always)]
+pub fn distance<const M: usize>(a: &[f64; M], b: &[f64; M]) -> f64 {
+    length(&from_to(a, b))
+}
+
+/// Distance of `q` from the straight line from `a` to `b`, ends included.
+#[inline]
+pub fn distance_to_segment<const M: usize>(q: &[f64; M], a: &[f64; M], b: &[f64; M]) -> f64 {
+    let along = from_to(a, b);
+    let to = from_to(a, q);
+    let length_sq = inner(&along, &along);
+    let t = if length_sq > 0.0 { (inner(&to, &along) / length_sq).clamp(0.0, 1.0) } else { 0.0 };
+    let mut sum = 0.0;
+    for k in 0..M {
+        let d = to[k] - t * along[k];
+        sum += d * d;
+    }
+    sum.sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parabola() -> Curve<2> {
+        Curve::new(&[[0.0, 0.0], [1.0, 2.0], [3.0, 0.0]], 4.0)
+    }
+
+    #[test]
+    fn the_middle_is_the_mean_of_the_polygon_middles() {
+        assert_eq!(parabola().at(2.0), [1.25, 1.0]);
+        assert_eq!(parabola().at(4.0), [3.0, 0.0]);
+    }
+
+    #[test]
+    fn derivatives_agree_with_difference_quotients() {
+        let curve = parabola();
+        for u in [0.5, 1.9, 2.1, 3.5] {
+            let (before, after) = (curve.at(u - 1e-5), curve.at(u + 1e-5));
+            let (left, right) = (curve.derivative(u - 1e-5), curve.derivative(u + 1e-5));
+            for k in 0..2 {
+                assert!((curve.derivative(u)[k] - (after[k] - before[k]) / 2e-5).abs() < 1e-9);
+                assert!((curve.second_derivative()[k] - (right[k] - left[k]) / 2e-5).abs() < 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn a_point_beside_a_segment_is_as_far_as_the_nearest_end_or_foot() {
+        let (a, b) = ([0.0, 0.0], [4.0, 0.0]);
+        assert_eq!(distance_to_segment(&[2.0, 3.0], &a, &b), 3.0);
+        assert_eq!(distance_to_segment(&[7.0, 4.0], &a, &b), 5.0);
+        assert_eq!(distance_to_segment(&[-3.0, 4.0], &a, &b), 5.0);
+        assert_eq!(distance_to_segment(&[3.0, 4.0], &a, &a), 5.0);
+    }
+}

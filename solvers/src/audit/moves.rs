@@ -1,0 +1,263 @@
+//! The programmed path as the audit sees it: straight moves, true arcs and helices, and distances from them.
+
+use std::f64::consts::TAU;
+
+use super::curve::{distance, distance_to_segment, from_to, inner};
+
+/// The program's arrays, one entry a move; see `feedplan.Program`.
+#[derive(Clone, Copy)]
+pub struct Programmed<'a> {
+    /// Where the first move begins, in mm.
+    pub start: &'a [f64],
+    /// Ends of the moves, axes numbers a move, in mm.
+    pub target: &'a [f64],
+    pub line: &'a [i32],
+    /// Arcs, in the order of their moves: the move, the centre in X, Y, Z, the normal axis 0, 1 or 2 among
+    /// these, the signed sweep in rad.
+    pub arc_move: &'a [i64],
+    pub arc_centre: &'a [f64],
+    pub arc_normal: &'a [u8],
+    pub arc_angle: &'a [f64],
+    /// Where X, Y, Z are among the axes.
+    pub xyz: [Option<usize>; 3],
+}
+
+/// One move.
+#[derive(Clone, Copy, Debug)]
+pub struct Move<const M: usize> {
+    pub from: [f64; M],
+    pub to: [f64; M],
+    arc: Option<Arc>,
+}
+
+/// What makes a move an arc: it turns in the plane of the axes `a` and `b`, all others move evenly.
+#[derive(Clone, Copy, Debug)]
+struct Arc {
+    a: usize,
+    b: usize,
+    centre: [f64; 2],
+    start_angle: f64,
+    sweep: f64,
+    /// Radius at the start and its change to the end: programs round their numbers.
+    radius: f64,
+    widening: f64,
+}
+
+impl Programmed<'_> {
+    /// Number of moves.
+    pub fn len(&self) -> usize {
+        self.line.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.line.is_empty()
+    }
+
+    /// End of move `i`; of the move before the first: the start.
+    pub fn end<const M: usize>(&self, i: Option<usize>) -> [f64; M] {
+        match i {
+            Some(i) => std::array::from_fn(|k| self.target[M * i + k]),
+            None => std::array::from_fn(|k| self.start[k]),
+        }
+    }
+
+    /// Move `i`.
+    pub fn get<const M: usize>(&self, i: usize) -> Move<M> {
+        let (from, to) = (self.end(i.checked_sub(1)), self.end(Some(i)));
+        let arc = self.arc_move.binary_search(&(i as i64)).ok().and_then(|row| self.arc(row, &from, &to));
+        Move { from, to, arc }
+    }
+
+    fn arc<const M: usize>(&self, row: usize, from: &[f64; M], to: &[f64; M]) -> Option<Arc> {
+        let normal = self.arc_normal[row] as usize;
+        let [first, second] = [(normal + 1) % 3, (normal + 2) % 3];
+        let (a, b) = (self.xyz[first]?, self.xyz[second]?);
+        let centre = [first, second].map(|axis| self.arc_centre[3 * row + axis]);
+        let arm = |point: &[f64; M]| [point[a] - centre[0], point[b] - centre[1]];
+        let (start, end) = (arm(from), arm(to));
+        let radius = start[0].hypot(start[1]);
+        Some(Arc {
+            a,
+            b,
+            centre,
+            start_angle: start[1].atan2(start[0]),
+            sweep: self.arc_angle[row],
+            radius,
+            widening: end[0].hypot(end[1]) - radius,
+        })
+    }
+}
+
+impl<const M: usize> Move<M> {
+    /// The place at the share `t` of the move.
+    pub fn at(&self, t: f64) -> [f64; M] {
+        let mut point = std::array::from_fn(|k| self.from[k] + t * (self.to[k] - self.from[k]));
+        if let Some(arc) = &self.arc {
+            let (sin, cos) = (arc.start_angle + t * arc.sweep).sin_cos();
+            let radius = arc.radius + t * arc.widening;
+            point[arc.a] = arc.centre[0] + radius * cos;
+            point[arc.b] = arc.centre[1] + radius * sin;
+        }
+        point
+    }
+
+    /// Whether the move goes anywhere.
+    pub fn is_motion(&self) -> bool {
+        self.from != self.to || self.arc.is_some()
+    }
+
+    /// How many even places show the shape of the move: more on arcs.
+    pub fn places(&self) -> usize {
+        match &self.arc {
+            // Every 7.5 degrees: between such places a circle is 0.2 % of the radius from its chord.
+            Some(arc) => 4 + (arc.sweep.abs() / (TAU / 48.0)) as usize,
+            None => 4,
+        }
+    }
+
+    /// Distance of `q` from the nearest place of the move, in mm.
+    pub fn distance(&self, q: &[f64; M]) -> f64 {
+        match &self.arc {
+            None => distance_to_segment(q, &self.from, &self.to),
+            Some(arc) => self.distance_to_arc(arc, q),
+        }
+    }
+
+    /// The nearest place is an end, or lies near where the arc's angle is that of `q`, once in every turn.
+    fn distance_to_arc(&self, arc: &Arc, q: &[f64; M]) -> f64 {
+        let mut nearest = distance(q, &self.from).min(distance(q, &self.to));
+        let angle = (q[arc.b] - arc.centre[1]).atan2(q[arc.a] - arc.centre[0]);
+        let ahead = ((angle - arc.start_angle) * arc.sweep.signum()).rem_euclid(TAU);
+        let sweep = arc.sweep.abs();
+        // One turn before the start and one after the end: Newton's step may lead back into the arc.
+        let turns = (sweep / TAU).ceil() as i64;
+        for turn in -1..=turns {
+            let t = (ahead + turn as f64 * TAU) / sweep;
+            if (-0.5..=1.5).contains(&t) {
+                nearest = nearest.min(self.descend(q, t.clamp(0.0, 1.0)));
+            }
+        }
+        nearest
+    }
+
+    /// Distance at the local minimum near `t`, by Newton steps on numerical slopes kept while they improve.
+    fn descend(&self, q: &[f64; M], mut t: f64) -> f64 {
+        let mut best = distance(q, &self.at(t));
+        for _ in 0..8 {
+            let h = 1e-4;
+            let [before, here, after] = [t - h, t, t + h].map(|t| self.at(t));
+            let slope: [f64; M] = std::array::from_fn(|k| (after[k] - before[k]) / (2.0 * h));
+            let bend: [f64; M] = std::array::from_fn(|k| (after[k] - 2.0 * here[k] + before[k]) / (h * h));
+            let off = from_to(q, &here);
+            let curvature = inner(&slope, &slope) + inner(&off, &bend);
+            let steepest = if curvature > 0.0 { curvature } else { inner(&slope, &slope) };
+            let next = (t - inner(&off, &slope) / steepest).clamp(0.0, 1.0);
+            let there = distance(q, &self.at(next));
+            if there.is_nan() || there >= best {
+                break;
+            }
+            (best, t) = (there, next);
+        }
+        best
+    }
+}
+
+/// Distance of `q` from the nearest of some moves, or from the first that is within `enough`; a NaN if there is one.
+pub fn nearest_of<const M: usize>(moves: impl Iterator<Item = Move<M>>, q: &[f64; M], enough: f64) -> f64 {
+    let mut nearest = f64::INFINITY;
+    for programmed in moves {
+        let away = programmed.distance(q);
+        if away.is_nan() || away < nearest {
+            nearest = away;
+        }
+        if away.is_nan() || nearest <= enough {
+            break;
+        }
+    }
+    nearest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// A helix about Z: radius 10, two turns and a quarter, 9 mm up.
+    fn helix() -> Move<3> {
+        Programmed {
+            start: &[10.0, 0.0, 0.0],
+            target: &[0.0, 10.0, 9.0],
+            line: &[1],
+            arc_move: &[0],
+            arc_centre: &[0.0, 0.0, 0.0],
+            arc_normal: &[2],
+            arc_angle: &[2.25 * TAU],
+            xyz: [Some(0), Some(1), Some(2)],
+        }
+        .get(0)
+    }
+
+    #[test]
+    fn a_quarter_circle_is_as_far_as_the_radii_differ() {
+        let quarter = Programmed {
+            start: &[10.0, 0.0],
+            target: &[0.0, 10.0],
+            line: &[1],
+            arc_move: &[0],
+            arc_centre: &[0.0, 0.0, 0.0],
+            arc_normal: &[2],
+            arc_angle: &[TAU / 4.0],
+            xyz: [Some(0), Some(1), None],
+        }
+        .get::<2>(0);
+        assert!((quarter.distance(&[6.0, 9.0]) - (117.0_f64.sqrt() - 10.0)).abs() < 1e-14);
+        assert!((quarter.distance(&[3.0, 4.0]) - 5.0).abs() < 1e-14);
+        // Beyond the ends the ends are nearest.
+        assert_eq!(quarter.distance(&[10.0, -2.0]), 2.0);
+        assert_eq!(quarter.distance(&[-3.0, 14.0]), 5.0);
+    }
+
+    #[test]
+    fn arcs_in_the_other_planes_turn_about_their_normal() {
+        // G18 and G19: counter-clockwise seen from the tip of Y, of X.
+        for (normal, target) in [(1_u8, [0.0, 0.0, -1.0]), (2, [0.0, 1.0, 0.0])] {
+            let quarter = Programmed {
+                start: &[1.0, 0.0, 0.0],
+                target: &target,
+                line: &[1],
+                arc_move: &[0],
+                arc_centre: &[0.0, 0.0, 0.0],
+                arc_normal: &[normal],
+                arc_angle: &[TAU / 4.0],
+                xyz: [Some(0), Some(1), Some(2)],
+            }
+            .get::<3>(0);
+            assert!(distance(&quarter.at(1.0), &target) < 1e-15, "normal {normal}");
+        }
+    }
+
+    #[test]
+    fn a_place_on_a_helix_is_on_it() {
+        let helix = helix();
+        for i in 0..=200 {
+            let t = f64::from(i) / 200.0;
+            assert!(helix.distance(&helix.at(t)) < 1e-12, "t = {t}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn no_place_of_a_helix_is_nearer_than_its_distance(x in -20.0..20.0_f64, y in -20.0..20.0_f64, z in -5.0..15.0_f64) {
+            let helix = helix();
+            let q = [x, y, z];
+            let places: Vec<_> = (0..=20_000).map(|i| helix.at(f64::from(i) / 20_000.0)).collect();
+            let dense = places.iter().map(|place| distance(&q, place)).fold(f64::INFINITY, f64::min);
+            let found = helix.distance(&q);
+            prop_assert!(found <= dense + 1e-12);
+            // The nearest place is at most half a step from one of these, at right angles to the way to it; the
+            // curve bends away from `q` by less than its radius does.
+            prop_assert!(dense <= found.hypot(distance(&places[0], &places[1])) + 1e-12);
+        }
+    }
+}

@@ -1,0 +1,276 @@
+//! Finds the place of a point on the path: the nearest place of a piece, and the next place along the path.
+
+use super::curve::{distance, Curve, Followed};
+use super::EPS;
+
+/// A place on the path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    pub piece: usize,
+    /// Local parameter in mm.
+    pub u: f64,
+}
+
+/// (C(u) − q)·C'(u) and its derivative, up to a factor, with t = u / width: where it turns from negative to
+/// positive the distance has a local minimum.
+#[inline(always)]
+fn slope<const M: usize>(curve: &Curve<M>, q: &[f64; M], t: f64) -> (f64, f64) {
+    let (mut f, mut df) = (0.0, 0.0);
+    for k in 0..M {
+        let bend = curve.second[k] - curve.first[k];
+        let tangent = curve.first[k] + t * bend;
+        let off = curve.start[k] - q[k] + t * (curve.first[k] + tangent);
+        f += off * tangent;
+        df += 2.0 * tangent * tangent + off * bend;
+    }
+    (f, df)
+}
+
+/// The root between `a`, where the slope is negative, and `b`, where it is not: Newton, halved when it strays.
+fn root<const M: usize>(curve: &Curve<M>, q: &[f64; M], mut a: f64, mut b: f64) -> f64 {
+    let mut t = a;
+    let (mut f, mut df) = slope(curve, q, t);
+    for _ in 0..100 {
+        let newton = t - f / df;
+        let next = if newton > a && newton < b { newton } else { 0.5 * (a + b) };
+        if (next - t).abs() <= EPS * b {
+            break;
+        }
+        t = next;
+        (f, df) = slope(curve, q, t);
+        if f < 0.0 {
+            a = t;
+        } else {
+            b = t;
+        }
+    }
+    t
+}
+
+/// The ends of the parts of [t0, 1] on which the slope, a cubic in t, only rises or only falls.
+fn monotone_parts<const M: usize>(curve: &Curve<M>, q: &[f64; M], t0: f64) -> [f64; 4] {
+    let (mut square, mut mixed, mut bend_sq) = (0.0, 0.0, 0.0);
+    for k in 0..M {
+        let (tangent, bend) = (curve.first[k], curve.second[k] - curve.first[k]);
+        square += 2.0 * tangent * tangent + (curve.start[k] - q[k]) * bend;
+        mixed += 3.0 * tangent * bend;
+        bend_sq += 3.0 * bend * bend;
+    }
+    // Its derivative is square + 2 mixed t + bend_sq t².
+    let discriminant = mixed * mixed - bend_sq * square;
+    if bend_sq == 0.0 || discriminant <= 0.0 {
+        return [t0, t0, 1.0, 1.0];
+    }
+    let root = discriminant.sqrt();
+    [t0, ((-mixed - root) / bend_sq).clamp(t0, 1.0), ((-mixed + root) / bend_sq).clamp(t0, 1.0), 1.0]
+}
+
+/// The first local minimum of the distance at or after `from`: its parameter and distance, and whether the
+/// distance still falls at the end of the piece.
+#[inline]
+pub fn first_minimum<const M: usize>(curve: &Curve<M>, q: &[f64; M], from: f64) -> (f64, f64, bool) {
+    let t0 = (from / curve.width).clamp(0.0, 1.0);
+    let (mut u, mut falls) = (from, false);
+    if slope(curve, q, t0).0 < 0.0 {
+        (u, falls) = (curve.width, true);
+        let ends = monotone_parts(curve, q, t0);
+        for i in 0..3 {
+            if slope(curve, q, ends[i + 1]).0 >= 0.0 {
+                (u, falls) = (root(curve, q, ends[i], ends[i + 1]) * curve.width, false);
+                break;
+            }
+        }
+    }
+    (u, distance(q, &curve.at(u)), falls)
+}
+
+/// Calls `found` with the local minima of the distance at or after `from`, at most four with the ends: parameter
+/// and distance.
+pub fn all_minima<const M: usize>(
+    curve: &Curve<M>,
+    q: &[f64; M],
+    from: f64,
+    mut found: impl FnMut(f64, f64),
+) {
+    let t0 = (from / curve.width).clamp(0.0, 1.0);
+    let ends = monotone_parts(curve, q, t0);
+    let falls = ends.map(|t| slope(curve, q, t).0 < 0.0);
+    found(from, distance(q, &curve.at(from)));
+    for i in 0..3 {
+        if falls[i] && !falls[i + 1] {
+            let u = root(curve, q, ends[i], ends[i + 1]) * curve.width;
+            found(u, distance(q, &curve.at(u)));
+        }
+    }
+    found(curve.width, distance(q, &curve.at(curve.width)));
+}
+
+/// Distance of `q` from the nearest place of the piece.
+pub fn distance_to_piece<const M: usize>(curve: &Curve<M>, q: &[f64; M]) -> f64 {
+    let mut nearest = f64::INFINITY;
+    all_minima(curve, q, 0.0, |_, distance| nearest = nearest.min(distance));
+    nearest
+}
+
+/// A place found for a point.
+#[derive(Clone, Copy, Debug)]
+pub struct Found {
+    pub place: Place,
+    /// Distance of the point from the place in mm.
+    pub distance: f64,
+    /// What `judge` says of the place in mm.
+    pub error: f64,
+}
+
+/// What the search may look at.
+pub struct Search<'a, F> {
+    pub path: &'a Followed<'a>,
+    /// Length of path to look along after the first piece, in mm.
+    pub reach: f64,
+    /// Distance at which a point is on the path, in mm.
+    pub close: f64,
+    /// How wrong a place is for other reasons than its distance, in mm, and how wrong it may be.
+    pub judge: F,
+    pub allowed: f64,
+}
+
+impl<F: FnMut(Place) -> f64> Search<'_, F> {
+    /// The first place at or after `from` that is close and judged good; else the least bad within reach.
+    ///
+    /// The second, thorough look takes all minima of every piece: where the path turns back within a step, the
+    /// first minimum may be a wrong one.
+    pub fn next_place<const M: usize>(&mut self, from: Place, q: &[f64; M]) -> Found {
+        let quick = self.look::<M>(from, q, false);
+        if self.is_good(&quick) {
+            return quick;
+        }
+        let thorough = self.look::<M>(from, q, true);
+        if self.badness(&thorough) <= self.badness(&quick) {
+            thorough
+        } else {
+            quick
+        }
+    }
+
+    fn is_good(&self, found: &Found) -> bool {
+        found.distance <= self.close && found.error <= self.allowed
+    }
+
+    /// On the path by the larger of both errors; off it by the distance, and always worse.
+    fn badness(&self, found: &Found) -> f64 {
+        if found.distance <= self.close {
+            found.error.max(found.distance)
+        } else {
+            1e9 + found.distance
+        }
+    }
+
+    fn candidate(&mut self, piece: usize, u: f64, distance: f64) -> Found {
+        let place = Place { piece, u };
+        let error = if distance <= self.close { (self.judge)(place) } else { f64::INFINITY };
+        Found { place, distance, error }
+    }
+
+    fn look<const M: usize>(&mut self, from: Place, q: &[f64; M], thorough: bool) -> Found {
+        let mut best = Found { place: from, distance: f64::INFINITY, error: f64::INFINITY };
+        let (mut travelled, mut start) = (0.0, from.u);
+        for piece in from.piece..self.path.len() {
+            let curve = self.path.curve::<M>(piece);
+            let mut falls_on = false;
+            if thorough {
+                let mut minima = [(0.0, f64::INFINITY); 4];
+                let mut count = 0;
+                all_minima(&curve, q, start, |u, distance| {
+                    minima[count] = (u, distance);
+                    count += 1;
+                });
+                for &(u, distance) in &minima[..count] {
+                    let found = self.candidate(piece, u, distance);
+                    if self.badness(&found) <= self.badness(&best) {
+                        best = found;
+                    }
+                }
+            } else {
+                let (u, distance, falls) = first_minimum(&curve, q, start);
+                let found = self.candidate(piece, u, distance);
+                if self.badness(&found) <= self.badness(&best) {
+                    best = found;
+                    // Its neighbour may hold the true minimum, a rounding further on.
+                    falls_on = falls;
+                }
+            }
+            if self.is_good(&best) && !falls_on {
+                break;
+            }
+            // The first piece does not count: the search may start well before the place looked for.
+            if piece > from.piece {
+                travelled += distance(&curve.at(start), &curve.at(curve.width));
+            }
+            if travelled > self.reach {
+                break;
+            }
+            start = 0.0;
+        }
+        best
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Two pieces: along X to 10 and back again.
+    const THERE_AND_BACK: Followed = Followed {
+        control: &[0.0, 0.0, 5.0, 0.0, 10.0, 0.0, 10.0, 0.0, 5.0, 0.0, 0.0, 0.0],
+        width: &[10.0, 10.0],
+        feed: &[1.0, 1.0],
+        line: &[1, 2],
+        moves: &[0, 0, 1, 1],
+        tolerance: &[0.0, 0.0],
+        runs: &[0, 2],
+        dwell: &[0.0],
+    };
+
+    fn next(from: Place, q: [f64; 2], judge: impl FnMut(Place) -> f64) -> Found {
+        Search { path: &THERE_AND_BACK, reach: 20.0, close: 1e-9, judge, allowed: 1e-9 }.next_place(from, &q)
+    }
+
+    #[test]
+    fn a_point_ahead_is_found_ahead() {
+        let found = next(Place { piece: 0, u: 2.0 }, [3.0, 0.0], |_| 0.0);
+        assert!(found.place.piece == 0 && found.distance < 1e-15);
+        assert!((found.place.u - 3.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn a_point_behind_is_found_on_the_way_back_and_never_behind() {
+        let found = next(Place { piece: 0, u: 4.0 }, [3.0, 0.0], |_| 0.0);
+        assert_eq!(found.place.piece, 1);
+        assert!((found.place.u - 7.0).abs() < 1e-14);
+        let beside = next(Place { piece: 1, u: 8.0 }, [3.0, 0.0], |_| 0.0);
+        assert_eq!((beside.place, beside.distance), (Place { piece: 1, u: 8.0 }, 1.0));
+    }
+
+    #[test]
+    fn of_two_places_the_one_judged_good_is_taken() {
+        let on_the_way_back = |place: Place| if place.piece == 1 { 0.0 } else { 1.0 };
+        let found = next(Place { piece: 0, u: 2.0 }, [3.0, 0.0], on_the_way_back);
+        assert_eq!((found.place.piece, found.error), (1, 0.0));
+    }
+
+    proptest! {
+        #[test]
+        fn no_place_of_a_piece_is_nearer_than_its_distance(
+            c in prop::array::uniform6(-2.0..2.0_f64), x in -3.0..3.0_f64, y in -3.0..3.0_f64,
+        ) {
+            let curve = Curve::new(&[[c[0], c[1]], [c[2], c[3]], [c[4], c[5]]], 3.0);
+            let dense = (0..=5000)
+                .map(|i| distance(&[x, y], &curve.at(3.0 * f64::from(i) / 5000.0)))
+                .fold(f64::INFINITY, f64::min);
+            let found = distance_to_piece(&curve, &[x, y]);
+            prop_assert!(found <= dense + 1e-12);
+            prop_assert!(found >= dense - 2e-3);
+        }
+    }
+}

@@ -1,0 +1,381 @@
+//! Audits a speed profile: every arc sampled in time, and the joints between the arcs.
+//!
+//! On each arc the axis velocities C'√p are taken at some ten places, closer together where p changes fast and
+//! very close at both ends, where accelerations have their extremes. Between two places the acceleration is the
+//! difference of the velocities over the time that the audit integrates itself. A velocity is known to `EPS`
+//! times its magnitude; that over the time is what rounding may add to an acceleration, and it is subtracted.
+//! A profile cannot hide in it: over all arcs together it allows `EPS` of the velocity per arc.
+
+use rayon::prelude::*;
+
+use super::arcs::{Arcs, Motion, State};
+use super::curve::{length, Followed};
+use super::{Check, Limits, Tally, EPS, GAP_TOLERANCE, PASS_EXCESS, ROUNDINGS};
+
+/// Even intervals of an arc.
+const INTERVALS: usize = 8;
+
+/// Intervals of a slide on which some acceleration comes near its limit.
+const SLIDE_INTERVALS: usize = 64;
+
+/// Share of an acceleration limit from which a slide is looked at more closely.
+const NEAR: f64 = 0.9;
+
+/// The end intervals are as short as lets rounding hide this share of the acceleration limit.
+const HIDDEN: f64 = 1e-7;
+
+/// Arcs a thread takes at a time.
+const BLOCK: usize = 4096;
+
+/// The whole profile: arcs, joints, ends of runs. `junction_speed` has one more entry than the path has pieces.
+pub fn audit_profile<const M: usize>(
+    path: &Followed,
+    junction_speed: &[f64],
+    arcs: &Arcs,
+    limits: &Limits<M>,
+) -> Tally<M> {
+    let starts = arcs.starts(path.dwell);
+    let auditor = Auditor { path, junction_speed, arcs, limits, starts: &starts };
+    let blocks = arcs.len().div_ceil(BLOCK);
+    let inside = (0..blocks)
+        .into_par_iter()
+        .map(|block| {
+            let mut tally = Tally::default();
+            for i in block * BLOCK..((block + 1) * BLOCK).min(arcs.len()) {
+                auditor.arc(i, &mut tally);
+                if i > 0 && arcs.runs.binary_search(&(i as i64)).is_err() {
+                    auditor.joint(i - 1, i, &mut tally);
+                }
+            }
+            tally
+        })
+        .reduce(Tally::default, Tally::merge);
+    let mut order = Tally::default();
+    auditor.order(&mut order);
+    inside.merge(order)
+}
+
+struct Auditor<'a, const M: usize> {
+    path: &'a Followed<'a>,
+    junction_speed: &'a [f64],
+    arcs: &'a Arcs<'a>,
+    limits: &'a Limits<M>,
+    starts: &'a [f64],
+}
+
+impl<const M: usize> Auditor<'_, M> {
+    fn arc(&self, i: usize, tally: &mut Tally<M>) {
+        let (arcs, time) = (self.arcs, self.starts[i]);
+        let piece = arcs.piece[i] as usize;
+        let line = self.path.line.get(piece).copied().unwrap_or(0);
+        if arcs.has_bad_numbers::<M>(i, self.path) {
+            tally.offer(Check::Numbers, 0, f64::INFINITY, 0.0, time, line);
+            return;
+        }
+        let width = self.path.width[piece];
+        let (u0, u1) = (arcs.u0[i], arcs.u1[i]);
+        let slack = ROUNDINGS * EPS * width;
+        if u1 <= u0 || u0 < 0.0 || u1 > width + slack {
+            tally.offer(Check::Order, 0, f64::INFINITY, GAP_TOLERANCE, time, line);
+            return;
+        }
+        let curve = self.path.curve::<M>(piece);
+        let motion = arcs.motion(i, &curve);
+        let mut probe = Probe::new(self, &motion, tally, i, line);
+        probe.run();
+        let (elapsed, near) = (probe.elapsed, probe.nearest_limit >= NEAR);
+        if near && motion.is_slide() {
+            let mut probe = Probe::new(self, &motion, tally, i, line);
+            probe.run_evenly(SLIDE_INTERVALS);
+        }
+        self.recorded_ends(i, &motion, width, line, tally);
+
+        // A rounding of u0 or u1 changes the width, and with it the time, by this share.
+        let rounding = ROUNDINGS * motion.width_rounding(width);
+        let error = (arcs.duration[i] - elapsed).abs() / elapsed - rounding;
+        tally.offer(Check::Duration, 0, error, PASS_EXCESS, time, line);
+    }
+
+    /// The recorded p at both ends against what the arc's definition gives there, as a jump of axis velocity.
+    fn recorded_ends(&self, i: usize, motion: &Motion<M>, width: f64, line: i32, tally: &mut Tally<M>) {
+        let spread = (motion.root_anchor - motion.root_far).abs() * motion.width_rounding(width);
+        for (y, recorded) in [(0.0, motion.root_anchor), (1.0, motion.root_far)] {
+            let state = motion.state(y);
+            let at_end = (y == 1.0) != motion.anchored_at_end;
+            let time = self.starts[i] + if at_end { self.arcs.duration[i] } else { 0.0 };
+            for k in 0..M {
+                let rounding = ROUNDINGS * (EPS * state.magnitude[k] + state.tangent[k].abs() * spread);
+                let jump = state.tangent[k].abs() * (state.root_p - recorded).abs() - rounding;
+                tally.offer(Check::Jump, k, jump, self.limits.negligible_jump(k), time, line);
+            }
+        }
+    }
+
+    /// Arcs must follow each other without gap over every piece, and runs begin and end at rest.
+    fn order(&self, tally: &mut Tally<M>) {
+        let (arcs, path) = (self.arcs, self.path);
+        let runs = path.runs.len().saturating_sub(1);
+        if arcs.runs.len() != path.runs.len()
+            || arcs.runs.first().is_some_and(|&first| first != 0)
+            || arcs.runs.last().is_some_and(|&last| last != arcs.len() as i64)
+            || arcs.runs.windows(2).any(|pair| pair[0] > pair[1])
+        {
+            tally.offer(Check::Order, 0, f64::INFINITY, GAP_TOLERANCE, 0.0, self.line(0));
+            return;
+        }
+        for run in 0..runs {
+            let [first, last] = [run, run + 1].map(|r| path.runs[r] as usize);
+            let mut next = Next { piece: first, u: 0.0 };
+            let here = arcs.runs[run] as usize..arcs.runs[run + 1] as usize;
+            for i in here.clone() {
+                if arcs.has_bad_numbers::<M>(i, path) {
+                    return; // reported with the arc itself
+                }
+                let entered = arcs.piece[i] as usize;
+                if entered != next.piece {
+                    self.finish_piece(&mut next, entered.min(last), self.starts[i], tally);
+                }
+                let gap = if entered == next.piece { (arcs.u0[i] - next.u).abs() } else { f64::INFINITY };
+                let slack = ROUNDINGS * EPS * path.width[entered];
+                tally.offer(Check::Order, 0, gap - slack, GAP_TOLERANCE, self.starts[i], self.line(entered));
+                next.u = arcs.u1[i];
+                if i == here.start {
+                    let at_path_start = run == 0;
+                    let wanted = if at_path_start { self.limits.end_speeds[0] } else { 0.0 };
+                    self.run_end(i, arcs.u0[i], arcs.p0[i], wanted, self.starts[i], tally);
+                }
+                if i + 1 == here.end {
+                    let at_path_end = run + 1 == runs;
+                    let wanted = if at_path_end { self.limits.end_speeds[1] } else { 0.0 };
+                    let time = self.starts[i] + arcs.duration[i];
+                    self.run_end(i, arcs.u1[i], arcs.p1[i], wanted, time, tally);
+                }
+            }
+            let time = here.end.checked_sub(1).map_or(0.0, |i| self.starts[i] + arcs.duration[i]);
+            self.finish_piece(&mut next, last, time, tally);
+        }
+    }
+
+    /// Moves on to `piece`: what is left of the pieces before it has been passed over.
+    fn finish_piece(&self, next: &mut Next, piece: usize, time: f64, tally: &mut Tally<M>) {
+        while next.piece < piece {
+            let left = self.path.width[next.piece] - next.u;
+            if !self.path.curve::<M>(next.piece).is_motionless() {
+                let slack = ROUNDINGS * EPS * self.path.width[next.piece];
+                tally.offer(Check::Order, 0, left - slack, GAP_TOLERANCE, time, self.line(next.piece));
+            }
+            *next = Next { piece: next.piece + 1, u: 0.0 };
+        }
+    }
+
+    /// The step from one arc to the next: no jump of the speed, and of the axis velocities only at corners.
+    fn joint(&self, i: usize, j: usize, tally: &mut Tally<M>) {
+        let arcs = self.arcs;
+        if [i, j].iter().any(|&arc| arcs.has_bad_numbers::<M>(arc, self.path)) {
+            return; // reported with the arc itself
+        }
+        let (before, after) = (arcs.piece[i] as usize, arcs.piece[j] as usize);
+        let ends = [(before, arcs.u1[i], arcs.p1[i]), (after, arcs.u0[j], arcs.p0[j])];
+        let mut velocity = [[0.0; M]; 2];
+        let mut rounding = [0.0; M];
+        for (side, (piece, u, p)) in ends.into_iter().enumerate() {
+            let curve = self.path.curve::<M>(piece);
+            let (tangent, root_p) = (curve.derivative(u), p.sqrt());
+            let scale = ROUNDINGS * EPS * 2.0 / curve.width * root_p;
+            // Between two pieces the control points' own rounding turns the tangent.
+            let turned = if before == after { 0.0 } else { 2.0 * curve.magnitude() };
+            for k in 0..M {
+                velocity[side][k] = tangent[k] * root_p;
+                rounding[k] += scale * (curve.first[k].abs() + curve.second[k].abs() + turned);
+            }
+        }
+        let (time, line) = (self.starts[j], self.line(after));
+        let at_corner = if before == after { 0.0 } else { 1.0 };
+        for k in 0..M {
+            let jump = (velocity[1][k] - velocity[0][k]).abs() - rounding[k];
+            let limit = at_corner * self.limits.jump[k] + self.limits.negligible_jump(k);
+            tally.offer(Check::Jump, k, jump, limit, time, line);
+        }
+        if before != after {
+            let speeds = velocity.map(|v| length(&v));
+            let jump = (speeds[1] - speeds[0]).abs() - length(&rounding);
+            tally.offer(Check::Continuity, 0, jump, self.negligible_speed(), time, line);
+            // Motionless pieces in between have junctions of their own.
+            for junction in before + 1..=after {
+                let allowed = self.junction_speed[junction] + self.negligible_speed();
+                tally.offer(Check::Junction, 0, speeds[0].max(speeds[1]), allowed, time, line);
+                if !self.path.curve::<M>(junction).is_motionless() {
+                    break;
+                }
+            }
+        }
+    }
+
+    /// The speed at the start or the end of a run.
+    fn run_end(&self, i: usize, u: f64, p: f64, wanted: f64, time: f64, tally: &mut Tally<M>) {
+        let piece = self.arcs.piece[i] as usize;
+        let speed = length(&self.path.curve::<M>(piece).derivative(u)) * p.sqrt();
+        let rounding = ROUNDINGS * EPS * (speed + wanted);
+        let limit = self.negligible_speed();
+        tally.offer(Check::Junction, 0, (speed - wanted).abs() - rounding, limit, time, self.line(piece));
+    }
+
+    /// A jump of the speed that means nothing to any axis.
+    fn negligible_speed(&self) -> f64 {
+        (0..M).map(|k| self.limits.negligible_jump(k)).fold(f64::INFINITY, f64::min)
+    }
+
+    fn line(&self, piece: usize) -> i32 {
+        self.path.line.get(piece).copied().unwrap_or(0)
+    }
+}
+
+/// Where the next arc has to begin.
+struct Next {
+    piece: usize,
+    u: f64,
+}
+
+/// Walks one arc and offers what it meets.
+struct Probe<'a, const M: usize> {
+    motion: &'a Motion<M>,
+    limits: &'a Limits<M>,
+    tally: &'a mut Tally<M>,
+    feed: f64,
+    start: f64,
+    duration: f64,
+    line: i32,
+    /// Time from the anchor.
+    elapsed: f64,
+    /// Greatest share of an acceleration limit met so far.
+    nearest_limit: f64,
+}
+
+impl<'a, const M: usize> Probe<'a, M> {
+    fn new(
+        auditor: &'a Auditor<'a, M>,
+        motion: &'a Motion<M>,
+        tally: &'a mut Tally<M>,
+        i: usize,
+        line: i32,
+    ) -> Self {
+        Self {
+            motion,
+            limits: auditor.limits,
+            tally,
+            feed: auditor.path.feed[auditor.arcs.piece[i] as usize],
+            start: auditor.starts[i],
+            duration: auditor.arcs.duration[i],
+            line,
+            elapsed: 0.0,
+            nearest_limit: 0.0,
+        }
+    }
+
+    /// Even intervals with a short one at each end.
+    fn run(&mut self) {
+        let mut state = self.motion.state(0.0);
+        let last = self.motion.state(1.0);
+        self.place(&state);
+        let step = 1.0 / INTERVALS as f64;
+        let [head, tail] =
+            [&state, &last].map(|end| Some(self.short_interval(end)).filter(|y| *y > 0.0 && *y < step));
+        let inner = (1..INTERVALS).map(|i| i as f64 * step);
+        for y in head.into_iter().chain(inner).chain(tail.map(|y| 1.0 - y)) {
+            let next = self.motion.state(y);
+            self.advance(&state, &next);
+            state = next;
+        }
+        self.advance(&state, &last);
+    }
+
+    fn run_evenly(&mut self, intervals: usize) {
+        let mut state = self.motion.state(0.0);
+        for i in 1..=intervals {
+            let next = self.motion.state(i as f64 / intervals as f64);
+            self.advance(&state, &next);
+            state = next;
+        }
+    }
+
+    /// The length in y of an end interval that lets rounding hide no more than `HIDDEN` of any limit.
+    fn short_interval(&self, end: &State<M>) -> f64 {
+        let mut time = 0.0_f64;
+        for k in 0..M {
+            let rounding = 2.0 * ROUNDINGS * EPS * end.magnitude[k];
+            time = time.max(rounding / (HIDDEN * self.limits.acceleration[k]));
+        }
+        time / self.duration
+    }
+
+    fn advance(&mut self, from: &State<M>, to: &State<M>) {
+        let motion = self.motion;
+        motion.walk(from, to, &mut |from, to, time| self.interval(from, to, time));
+    }
+
+    fn interval(&mut self, from: &State<M>, to: &State<M>, time: f64) {
+        let middle = self.clock(self.elapsed + 0.5 * time);
+        self.elapsed += time;
+        let held = self.motion.held_axis();
+        for k in 0..M {
+            let rounding = ROUNDINGS * EPS * (from.magnitude[k] + to.magnitude[k]) / time;
+            let acceleration = (to.velocity[k] - from.velocity[k]).abs() / time - rounding;
+            let limit = self.limits.acceleration[k];
+            self.tally.offer(Check::Acceleration, k, acceleration, limit, middle, self.line);
+            if held != Some(k) {
+                self.nearest_limit = self.nearest_limit.max(acceleration / limit);
+            }
+        }
+        self.place(to);
+    }
+
+    /// The velocities at one place.
+    fn place(&mut self, state: &State<M>) {
+        let time = self.clock(self.elapsed);
+        self.tally.samples += 1;
+        for k in 0..M {
+            let velocity = state.velocity[k].abs() - ROUNDINGS * EPS * state.magnitude[k];
+            self.tally.offer(Check::Velocity, k, velocity, self.limits.velocity[k], time, self.line);
+        }
+        let speed = length(&state.velocity);
+        let rounding = ROUNDINGS * EPS * length(&state.magnitude);
+        self.tally.offer(Check::Feed, 0, speed - rounding, self.feed, time, self.line);
+        if self.limits.chord_tolerance.is_finite() {
+            let error =
+                chord_error((speed - rounding) * self.limits.period, self.motion.curvature(&state.tangent));
+            self.tally.offer(Check::Chord, 0, error, self.limits.chord_tolerance, time, self.line);
+        }
+    }
+
+    /// The program's time at a time from the anchor.
+    fn clock(&self, elapsed: f64) -> f64 {
+        self.start + if self.motion.anchored_at_end { self.duration - elapsed } else { elapsed }
+    }
+}
+
+/// How far a circle of this curvature leaves its chord of length `step`. Chords longer than the diameter do not
+/// exist; a path of length `step` stays within half of it of one of its ends.
+pub fn chord_error(step: f64, curvature: f64) -> f64 {
+    let half = 0.5 * step;
+    let reach = half * curvature;
+    if reach < 1.0 {
+        // ρ − √(ρ² − half²), without the cancellation.
+        half * reach / (1.0 + (1.0 - reach * reach).sqrt())
+    } else {
+        half
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_chord_error_is_the_sagitta() {
+        // A 3-4-5 triangle: chord 6 on radius 5 leaves the circle by 1.
+        assert!((chord_error(6.0, 0.2) - 1.0).abs() < 1e-15);
+        assert_eq!(chord_error(6.0, 0.0), 0.0);
+        assert_eq!(chord_error(10.0, 0.2), 5.0);
+        assert_eq!(chord_error(12.0, 0.2), 6.0);
+    }
+}

@@ -1,0 +1,127 @@
+//! What a block asks for: its motion, by its code or by its words, and that every word has a use.
+
+use super::block::{bit, bits, g_name, Block, Group, MGroup, AXES, AXIS_WORDS};
+use super::fault::{fault, Outcome};
+
+/// Words that need no G code in their block. D names a cutter radius, which only G41 and G42 would use.
+pub const FREE_WORDS: u32 = bits(b"FSTD");
+
+/// Words of G2 and G3 beside the axes.
+pub const ARC_WORDS: u32 = bits(b"IJKRP");
+
+/// Codes that name no motion but take the axis words of their block.
+const TAKES_AXES: [u16; 5] = [100, 280, 300, 520, 920];
+
+/// The axis words of the block that are places; with G4 a lone X is a time.
+pub fn axis_words(block: &Block) -> u32 {
+    let axes = block.words & AXIS_WORDS;
+    let timed = axes == bit(b'X') && block.code(Group::Once) == Some(40) && !block.has(b'P');
+    if timed && block.code(Group::Motion).is_none() {
+        0
+    } else {
+        axes
+    }
+}
+
+/// The motion that the block asks for, by its code or by its words.
+#[inline(always)]
+pub fn motion_of(block: &Block, axes: u32, modal: u16) -> Outcome<Option<u16>> {
+    match block.code(Group::Motion) {
+        Some(code @ (0 | 10 | 20 | 30)) if block.only_motion() => Ok(Some(code)),
+        None if axes != 0 && block.only_motion() && modal != 800 => Ok(Some(modal)),
+        code => motion_beside_others(block, axes, modal, code),
+    }
+}
+
+fn motion_beside_others(block: &Block, axes: u32, modal: u16, motion: Option<u16>) -> Outcome<Option<u16>> {
+    let once = block.code(Group::Once).filter(|code| TAKES_AXES.contains(code));
+    let tool = block.code(Group::ToolLength).filter(|code| matches!(code, 431 | 432));
+    match (motion, once.or(tool)) {
+        // `G0 G28 Z0` is common: G28 has the axis words, G0 stays in force.
+        (Some(code @ (0 | 800)), Some(280 | 300)) | (Some(code @ 800), Some(_)) => Ok(Some(code)),
+        (Some(code), Some(other)) => fault(format!(
+            "words {} and {} both take axis words: put them in two blocks",
+            g_name(other),
+            g_name(code)
+        )),
+        (Some(800), None) if axes != 0 => {
+            fault("axis words stand beside G80, which ends motion: give G0 or G1 instead")
+        }
+        (Some(code), None) if is_cycle(code) && axes == 0 => {
+            fault(format!("word {} has no axis words: give the place of the hole", g_name(code)))
+        }
+        (Some(code), None) => Ok(Some(code)),
+        (None, Some(_)) if once.is_some() || axes != 0 => Ok(None),
+        (None, _) if axes != 0 && modal == 800 => {
+            let letter = AXES.into_iter().find(|&letter| axes & bit(letter) != 0).unwrap_or(b'X');
+            fault(format!("word {} has no motion code in force: give G0 or G1 before it", block.word(letter)))
+        }
+        (None, _) if axes != 0 => Ok(Some(modal)),
+        (None, _) if block.words & bits(b"IJK") != 0 && matches!(modal, 20 | 30) => Ok(Some(modal)),
+        (None, _) => Ok(None),
+    }
+}
+
+/// Every word must mean something: one that nothing uses is a misunderstanding.
+pub fn check_use(block: &Block, axes: u32, motion: Option<u16>, absolute: bool) -> Outcome<()> {
+    let mut used = FREE_WORDS | axes;
+    used |= match motion {
+        Some(20 | 30) => ARC_WORDS,
+        Some(730 | 830) => bits(b"RLQ"),
+        Some(820 | 740 | 840 | 860 | 890) => bits(b"RLP"),
+        Some(810 | 850) => bits(b"RL"),
+        _ => 0,
+    };
+    used |= match block.code(Group::Once) {
+        Some(40) => bits(b"PX"),
+        Some(100) => bits(b"PLR"),
+        _ => 0,
+    };
+    if block.code(Group::Control) == Some(640) {
+        used |= bits(b"PQ");
+    }
+    if matches!(block.code(Group::ToolLength), Some(430 | 432 | 490)) {
+        used |= bit(b'H');
+    }
+    if block.m_code(MGroup::User).is_some() || block.m_code(MGroup::Spindle) == Some(19) {
+        used |= bits(b"PQR");
+    }
+    let unused = block.words & !used;
+    if unused == 0 {
+        return check_together(block, motion, absolute);
+    }
+    let letter = b'A' + unused.trailing_zeros() as u8;
+    let remedy = match (letter, motion) {
+        (b'P', Some(730 | 830)) => "this cycle has no dwell: remove it, or use G82",
+        (b'H', _) => "put it beside G43",
+        (b'K', Some(motion)) if is_cycle(motion) => "repetitions are counted by L",
+        _ => "no code of the block uses it; remove it",
+    };
+    fault(format!("word {} has no meaning here: {remedy}", block.word(letter)))
+}
+
+/// Combinations that controls refuse.
+fn check_together(block: &Block, motion: Option<u16>, absolute: bool) -> Outcome<()> {
+    match (block.code(Group::Once), motion) {
+        (Some(40), Some(20 | 30)) => fault("G4 and an arc both use P: put them in two blocks"),
+        (Some(530), Some(0 | 10)) => {
+            let absolute = block.code(Group::Distance).map_or(absolute, |code| code == 900);
+            if absolute {
+                return Ok(());
+            }
+            fault("G53 takes machine coordinates and G91 is in force: give G90 in its block")
+        }
+        (Some(530), _) => {
+            fault("G53 goes with straight moves only: give G0 or G1 and axis words in its block")
+        }
+        (Some(520 | 920), _) if block.words & AXIS_WORDS == 0 => {
+            fault("G52 and G92 need the axes they set: give axis words")
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Canned cycles are 730, 740 and 810 to 890.
+pub fn is_cycle(motion: u16) -> bool {
+    matches!(motion, 730 | 740 | 810..=890)
+}

@@ -1,0 +1,388 @@
+//! The audit of plans and setpoints: the package's own types in, findings out.
+
+use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use super::with_axes;
+use crate::audit::arcs::Arcs;
+use crate::audit::curve::Followed;
+use crate::audit::deviation::{audit_deviation, audit_path};
+use crate::audit::follow::{Plan, Timed};
+use crate::audit::moves::Programmed;
+use crate::audit::profile::audit_profile;
+use crate::audit::setpoints::{Chunk, Stream};
+use crate::audit::{Check, Limits, Tally};
+
+/// Name, axis (−1: none), worst value, limit, ratio, time, source line of one limit.
+type Finding = (&'static str, i64, f64, f64, f64, f64, i32);
+
+/// The findings, and how many samples were looked at.
+type Findings = (Vec<Finding>, u64);
+
+fn findings<const M: usize>(tally: &Tally<M>) -> Findings {
+    let mut found = Vec::new();
+    for check in Check::ALL {
+        for axis in 0..if check.per_axis() { M } else { 1 } {
+            let worst = tally.get(check, axis);
+            if worst.ratio >= 0.0 {
+                let axis = if check.per_axis() { axis as i64 } else { -1 };
+                let name = check.name();
+                found.push((name, axis, worst.value, worst.limit, worst.ratio, worst.time, worst.line));
+            }
+        }
+    }
+    (found, tally.samples)
+}
+
+fn require(good: bool, what: &str) -> PyResult<()> {
+    if good {
+        Ok(())
+    } else {
+        Err(PyValueError::new_err(format!("the arrays of the {what} differ in length")))
+    }
+}
+
+/// `feedplan.Path`.
+#[derive(FromPyObject)]
+struct PathArrays<'py> {
+    control_points: PyReadonlyArray3<'py, f64>,
+    width: PyReadonlyArray1<'py, f64>,
+    line: PyReadonlyArray1<'py, i32>,
+    #[pyo3(attribute("move"))]
+    moves: PyReadonlyArray2<'py, i64>,
+    tolerance: PyReadonlyArray1<'py, f64>,
+    runs: PyReadonlyArray1<'py, i64>,
+    dwell: PyReadonlyArray1<'py, f64>,
+}
+
+/// `feedplan.constraints.problem.Problem`; its other limits come in `LimitArrays`.
+#[derive(FromPyObject)]
+struct ProblemArrays<'py> {
+    path: PathArrays<'py>,
+    feed: PyReadonlyArray1<'py, f64>,
+    junction_speed: PyReadonlyArray1<'py, f64>,
+}
+
+impl ProblemArrays<'_> {
+    fn axes(&self) -> usize {
+        self.path.control_points.shape()[2]
+    }
+
+    fn followed(&self) -> PyResult<Followed<'_>> {
+        let path = &self.path;
+        let followed = Followed {
+            control: path.control_points.as_slice()?,
+            width: path.width.as_slice()?,
+            feed: self.feed.as_slice()?,
+            line: path.line.as_slice()?,
+            moves: path.moves.as_slice()?,
+            tolerance: path.tolerance.as_slice()?,
+            runs: path.runs.as_slice()?,
+            dwell: path.dwell.as_slice()?,
+        };
+        let pieces = followed.len();
+        let runs = followed.runs;
+        let ordered = runs.windows(2).all(|pair| pair[0] <= pair[1]);
+        let spanned = runs.first() == Some(&0) && runs.last() == Some(&(pieces as i64));
+        let good = followed.control.len() == 3 * self.axes() * pieces
+            && [followed.feed.len(), followed.line.len(), followed.tolerance.len()] == [pieces; 3]
+            && followed.moves.len() == 2 * pieces
+            && followed.dwell.len() + 1 == runs.len()
+            && self.junction_speed.as_slice()?.len() == pieces + 1
+            && ordered
+            && spanned;
+        require(good, "path")?;
+        Ok(followed)
+    }
+}
+
+/// `feedplan.profile.SpeedProfile`.
+#[derive(FromPyObject)]
+struct ProfileArrays<'py> {
+    piece: PyReadonlyArray1<'py, u32>,
+    kind: PyReadonlyArray1<'py, u8>,
+    axis: PyReadonlyArray1<'py, u8>,
+    value: PyReadonlyArray1<'py, f64>,
+    u0: PyReadonlyArray1<'py, f64>,
+    u1: PyReadonlyArray1<'py, f64>,
+    p0: PyReadonlyArray1<'py, f64>,
+    p1: PyReadonlyArray1<'py, f64>,
+    duration: PyReadonlyArray1<'py, f64>,
+    runs: PyReadonlyArray1<'py, i64>,
+}
+
+impl ProfileArrays<'_> {
+    fn arcs(&self) -> PyResult<Arcs<'_>> {
+        let arcs = Arcs {
+            piece: self.piece.as_slice()?,
+            kind: self.kind.as_slice()?,
+            axis: self.axis.as_slice()?,
+            value: self.value.as_slice()?,
+            u0: self.u0.as_slice()?,
+            u1: self.u1.as_slice()?,
+            p0: self.p0.as_slice()?,
+            p1: self.p1.as_slice()?,
+            duration: self.duration.as_slice()?,
+            runs: self.runs.as_slice()?,
+        };
+        let ends = [arcs.u0, arcs.u1, arcs.p0, arcs.p1, arcs.value, arcs.duration];
+        let good = ends.iter().all(|array| array.len() == arcs.len())
+            && [arcs.kind.len(), arcs.axis.len()] == [arcs.len(); 2];
+        require(good, "profile")?;
+        Ok(arcs)
+    }
+}
+
+/// `feedplan.Program`.
+#[derive(FromPyObject)]
+struct ProgramArrays<'py> {
+    axes: Vec<String>,
+    start: PyReadonlyArray1<'py, f64>,
+    target: PyReadonlyArray2<'py, f64>,
+    line: PyReadonlyArray1<'py, i32>,
+    arc_move: PyReadonlyArray1<'py, i64>,
+    arc_centre: PyReadonlyArray2<'py, f64>,
+    arc_normal: PyReadonlyArray1<'py, u8>,
+    arc_angle: PyReadonlyArray1<'py, f64>,
+}
+
+impl ProgramArrays<'_> {
+    fn programmed(&self, axes: usize) -> PyResult<Programmed<'_>> {
+        let program = Programmed {
+            start: self.start.as_slice()?,
+            target: self.target.as_slice()?,
+            line: self.line.as_slice()?,
+            arc_move: self.arc_move.as_slice()?,
+            arc_centre: self.arc_centre.as_slice()?,
+            arc_normal: self.arc_normal.as_slice()?,
+            arc_angle: self.arc_angle.as_slice()?,
+            xyz: ["X", "Y", "Z"].map(|letter| self.axes.iter().position(|axis| axis == letter)),
+        };
+        let arcs = program.arc_move.len();
+        let good = program.start.len() == axes
+            && self.axes.len() == axes
+            && program.target.len() == axes * program.len()
+            && program.arc_centre.len() == 3 * arcs
+            && [program.arc_normal.len(), program.arc_angle.len()] == [arcs; 2]
+            && program.arc_normal.iter().all(|&normal| normal < 3);
+        require(good, "program")?;
+        Ok(program)
+    }
+}
+
+/// `feedplan.audit.Limits`: what holds everywhere, one number an axis.
+#[derive(FromPyObject)]
+struct LimitArrays {
+    max_velocity: Vec<f64>,
+    max_acceleration: Vec<f64>,
+    max_jerk: Vec<f64>,
+    max_velocity_jump: Vec<f64>,
+    travel: Vec<[f64; 2]>,
+    chord_tolerance: f64,
+    period: f64,
+    end_speeds: [f64; 2],
+}
+
+impl LimitArrays {
+    fn limits<const M: usize>(&self) -> PyResult<Limits<M>> {
+        fn row<T: Copy, const M: usize>(values: &[T]) -> PyResult<[T; M]> {
+            values.try_into().map_err(|_| PyValueError::new_err(format!("limits of {M} axes are expected")))
+        }
+        Ok(Limits {
+            velocity: row(&self.max_velocity)?,
+            acceleration: row(&self.max_acceleration)?,
+            jerk: row(&self.max_jerk)?,
+            jump: row(&self.max_velocity_jump)?,
+            travel: row(&self.travel)?,
+            chord_tolerance: self.chord_tolerance,
+            period: self.period,
+            end_speeds: self.end_speeds,
+        })
+    }
+}
+
+/// Audits path and profile, and the path against the program.
+#[pyfunction]
+#[pyo3(signature = (problem, limits, profile=None, program=None))]
+fn audit_plan(
+    py: Python<'_>,
+    problem: ProblemArrays<'_>,
+    limits: LimitArrays,
+    profile: Option<ProfileArrays<'_>>,
+    program: Option<ProgramArrays<'_>>,
+) -> PyResult<Findings> {
+    let path = problem.followed()?;
+    let junction_speed = problem.junction_speed.as_slice()?;
+    let arcs = profile.as_ref().map(ProfileArrays::arcs).transpose()?;
+    let program = program.as_ref().map(|program| program.programmed(problem.axes())).transpose()?;
+    with_axes!(problem.axes(), M, {
+        let limits = limits.limits::<M>()?;
+        Ok(py.detach(|| {
+            let mut tally = audit_path(&path, arcs.as_ref(), &limits);
+            if let Some(arcs) = &arcs {
+                tally = tally.merge(audit_profile(&path, junction_speed, arcs, &limits));
+            }
+            if let Some(program) = &program {
+                tally = tally.merge(audit_deviation(&path, program, arcs.as_ref()));
+            }
+            findings(&tally)
+        }))
+    })
+}
+
+/// A stream whatever its number of axes.
+trait AnyStream: Send + Sync {
+    fn push(&mut self, plan: Option<&Plan>, chunk: &Chunk);
+    fn finish(self: Box<Self>, plan: Option<&Plan>) -> Findings;
+}
+
+impl<const M: usize> AnyStream for Stream<M> {
+    fn push(&mut self, plan: Option<&Plan>, chunk: &Chunk) {
+        Stream::push(self, plan, chunk);
+    }
+
+    fn finish(self: Box<Self>, plan: Option<&Plan>) -> Findings {
+        findings(&Stream::finish(*self, plan))
+    }
+}
+
+/// What a stream of setpoints is compared with, kept as Python holds it.
+struct Compared {
+    problem: Py<PyAny>,
+    profile: Option<Py<PyAny>>,
+    program: Option<Py<PyAny>>,
+    /// When every arc of the profile begins.
+    starts: Vec<f64>,
+}
+
+impl Compared {
+    /// Calls `work` with the plan, free of Python's lock.
+    fn with_plan<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&Plan) -> T + Send) -> PyResult<T> {
+        let problem: ProblemArrays = self.problem.bind(py).extract()?;
+        let profile: Option<ProfileArrays> =
+            self.profile.as_ref().map(|profile| profile.bind(py).extract()).transpose()?;
+        let program: Option<ProgramArrays> =
+            self.program.as_ref().map(|program| program.bind(py).extract()).transpose()?;
+        let path = problem.followed()?;
+        let arcs = profile.as_ref().map(ProfileArrays::arcs).transpose()?;
+        let program = program.as_ref().map(|program| program.programmed(problem.axes())).transpose()?;
+        let profile = arcs.map(|arcs| Timed { arcs, starts: &self.starts, clock: &[] });
+        let plan = Plan { path, profile, program };
+        Ok(py.detach(|| work(&plan)))
+    }
+}
+
+/// Audits setpoints chunk by chunk; with a problem also their places on its path.
+#[pyclass]
+struct SetpointAudit {
+    axes: usize,
+    stream: Option<Box<dyn AnyStream>>,
+    compared: Option<Compared>,
+}
+
+#[pymethods]
+impl SetpointAudit {
+    #[new]
+    #[pyo3(signature = (limits, resolution=0.0, problem=None, profile=None, program=None))]
+    fn new(
+        limits: LimitArrays,
+        resolution: f64,
+        problem: Option<Bound<'_, PyAny>>,
+        profile: Option<Bound<'_, PyAny>>,
+        program: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let axes = limits.max_velocity.len();
+        let stream: Box<dyn AnyStream> =
+            with_axes!(axes, M, Ok(Box::new(Stream::new(limits.limits::<M>()?, resolution)) as _))?;
+        let compared = problem.map(|problem| compare(axes, problem, profile, program)).transpose()?;
+        Ok(Self { axes, stream: Some(stream), compared: compared.flatten() })
+    }
+
+    /// The next setpoints.
+    #[pyo3(signature = (t, position, velocity=None, acceleration=None, line=None))]
+    fn push(
+        &mut self,
+        py: Python<'_>,
+        t: PyReadonlyArray1<'_, f64>,
+        position: PyReadonlyArray2<'_, f64>,
+        velocity: Option<PyReadonlyArray2<'_, f64>>,
+        acceleration: Option<PyReadonlyArray2<'_, f64>>,
+        line: Option<PyReadonlyArray1<'_, i32>>,
+    ) -> PyResult<()> {
+        let chunk = Chunk {
+            t: t.as_slice()?,
+            position: position.as_slice()?,
+            velocity: velocity.as_ref().map(|array| array.as_slice()).transpose()?,
+            acceleration: acceleration.as_ref().map(|array| array.as_slice()).transpose()?,
+            line: line.as_ref().map(|array| array.as_slice()).transpose()?,
+        };
+        let count = chunk.t.len();
+        let rows = self.axes * count;
+        let good = chunk.position.len() == rows
+            && chunk.velocity.is_none_or(|flat| flat.len() == rows)
+            && chunk.acceleration.is_none_or(|flat| flat.len() == rows)
+            && chunk.line.is_none_or(|flat| flat.len() == count);
+        require(good, "setpoints")?;
+        let stream = self.stream.as_mut().ok_or_else(finished)?;
+        match &self.compared {
+            Some(compared) => compared.with_plan(py, |plan| stream.push(Some(plan), &chunk)),
+            None => {
+                py.detach(|| stream.push(None, &chunk));
+                Ok(())
+            }
+        }
+    }
+
+    /// What was found; nothing can be pushed afterwards.
+    fn finish(&mut self, py: Python<'_>) -> PyResult<Findings> {
+        let stream = self.stream.take().ok_or_else(finished)?;
+        match &self.compared {
+            Some(compared) => compared.with_plan(py, |plan| stream.finish(Some(plan))),
+            None => Ok(stream.finish(None)),
+        }
+    }
+}
+
+/// A plan to compare with, if the path has pieces; the profile only where its numbers can be used.
+fn compare(
+    axes: usize,
+    problem: Bound<'_, PyAny>,
+    profile: Option<Bound<'_, PyAny>>,
+    program: Option<Bound<'_, PyAny>>,
+) -> PyResult<Option<Compared>> {
+    let arrays: ProblemArrays = problem.extract()?;
+    let path = arrays.followed()?;
+    require(arrays.axes() == axes, "limits and the path")?;
+    if path.is_empty() {
+        return Ok(None);
+    }
+    let mut starts = Vec::new();
+    let mut usable = None;
+    if let Some(profile) = profile {
+        let extracted: ProfileArrays = profile.extract()?;
+        let arcs = extracted.arcs()?;
+        let runs = arcs.runs;
+        let good = !arcs.is_empty()
+            && runs.len() == path.runs.len()
+            && runs.first() == Some(&0)
+            && runs.last() == Some(&(arcs.len() as i64))
+            && runs.windows(2).all(|pair| pair[0] <= pair[1])
+            && with_axes!(axes, M, Ok((0..arcs.len()).all(|i| !arcs.has_bad_numbers::<M>(i, &path))))?;
+        if good {
+            starts = arcs.starts(path.dwell);
+            usable = Some(profile.unbind());
+        }
+    }
+    let program = program.map(Bound::unbind);
+    Ok(Some(Compared { problem: problem.unbind(), profile: usable, program, starts }))
+}
+
+fn finished() -> PyErr {
+    PyValueError::new_err("this audit is finished")
+}
+
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(audit_plan, module)?)?;
+    module.add_class::<SetpointAudit>()
+}

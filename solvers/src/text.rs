@@ -1,0 +1,90 @@
+//! Rows of numbers as comma-separated text, each number the shortest that reads back the same.
+
+use std::fmt::Write;
+
+use rayon::prelude::*;
+
+/// Rows handed to one thread at a time: long enough to hide the hand-over, short enough to share evenly.
+const BLOCK: usize = 4096;
+
+/// One line for each `width` values, closed by the integer of its row and a line feed.
+///
+/// Numbers that are not finite become `nan`, `inf` and `-inf`, which numpy and pandas read.
+pub fn rows(values: &[f64], width: usize, last: &[i32]) -> Vec<u8> {
+    assert_eq!(values.len(), width * last.len(), "every row has its values");
+    let blocks: Vec<String> = values
+        .par_chunks(BLOCK * width)
+        .zip(last.par_chunks(BLOCK))
+        .map(|(values, last)| {
+            let mut text = String::with_capacity(values.len() * 20 + last.len() * 8);
+            for (row, integer) in values.chunks_exact(width).zip(last) {
+                for &value in row {
+                    push(&mut text, value);
+                    text.push(',');
+                }
+                writeln!(text, "{integer}").expect("a string takes all text");
+            }
+            text
+        })
+        .collect();
+    blocks.concat().into_bytes()
+}
+
+/// Debug rather than Display: it turns to exponents where Display would print hundreds of zeros.
+fn push(text: &mut String, value: f64) {
+    if value == 0.0 {
+        text.push('0');
+    } else if value.is_nan() {
+        text.push_str("nan");
+    } else {
+        write!(text, "{value:?}").expect("a string takes all text");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn two_rows_of_two_values() {
+        let text = rows(&[0.0, -1.5, 1e-9, 0.1], 2, &[7, -8]);
+        assert_eq!(String::from_utf8(text).unwrap(), "0,-1.5,7\n1e-9,0.1,-8\n");
+    }
+
+    #[test]
+    fn what_is_not_finite_has_the_names_other_readers_know() {
+        let text = rows(&[f64::NAN, f64::INFINITY, f64::NEG_INFINITY], 3, &[1]);
+        assert_eq!(String::from_utf8(text).unwrap(), "nan,inf,-inf,1\n");
+    }
+
+    #[test]
+    fn no_rows_are_no_text() {
+        assert!(rows(&[], 3, &[]).is_empty());
+    }
+
+    proptest! {
+        #[test]
+        fn every_number_reads_back_the_same(values in prop::collection::vec(any::<f64>(), 1..200)) {
+            let last = vec![1; values.len()];
+            let text = String::from_utf8(rows(&values, 1, &last)).unwrap();
+            for (line, value) in text.lines().zip(&values) {
+                let read: f64 = line.strip_suffix(",1").unwrap().parse().unwrap();
+                prop_assert!(read == *value || (read.is_nan() && value.is_nan()));
+            }
+        }
+
+        #[test]
+        fn rows_keep_their_order_across_blocks(count in 1usize..3 * BLOCK) {
+            let values: Vec<f64> = (0..count).map(|i| i as f64).collect();
+            let last: Vec<i32> = (0..count as i32).collect();
+            let text = String::from_utf8(rows(&values, 1, &last)).unwrap();
+            prop_assert_eq!(text.lines().count(), count);
+            for (i, line) in text.lines().enumerate() {
+                let (value, integer) = line.split_once(',').unwrap();
+                prop_assert_eq!(value.parse::<f64>().unwrap(), i as f64);
+                prop_assert_eq!(integer.parse::<usize>().unwrap(), i);
+            }
+        }
+    }
+}

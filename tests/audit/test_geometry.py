@@ -1,0 +1,199 @@
+"""The audit of the followed path: its distance from the programmed one, both ways, and its joints."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from feedplan.audit import Audit, audit
+from feedplan.constraints.problem import Problem
+from feedplan.geometry.path import Path
+from feedplan.machine.machine import Axis, Machine
+from feedplan.program.program import MoveKind, Program
+
+Change = Callable[..., NDArray[Any]]
+PLANE = Machine("plane", (Axis("X", 100.0, 1000.0), Axis("Y", 100.0, 1000.0)))
+
+
+def broken(result: Audit) -> set[tuple[str, str | None]]:
+    return {(check.name, check.axis) for check in result.broken}
+
+
+def program_of(targets: list[list[float]], **arcs: Any) -> Program:
+    """Moves from the origin; line numbers 10, 20, …"""
+    count = len(targets)
+    return Program(
+        name="moves",
+        axes=("X", "Y"),
+        start=np.zeros(2),
+        kind=np.full(count, MoveKind.LINE, np.uint8),
+        target=np.array(targets),
+        feed=np.full(count, 50.0),
+        line=np.asarray(10 * np.arange(1, count + 1), dtype=np.int32),
+        control=np.zeros(count, np.uint8),
+        blend_tolerance=np.full(count, math.nan),
+        fit_tolerance=np.full(count, math.nan),
+        stop=np.zeros(count, np.bool_),
+        dwell=np.zeros(count),
+        arc_move=np.asarray(arcs.get("move", []), dtype=np.int64),
+        arc_centre=np.asarray(arcs.get("centre", []), dtype=float).reshape(-1, 3),
+        arc_normal=np.asarray(arcs.get("normal", []), dtype=np.uint8),
+        arc_angle=np.asarray(arcs.get("angle", []), dtype=float),
+    )
+
+
+def problem_of(points: list[list[list[float]]], move: list[list[int]], tolerance: float) -> Problem:
+    control = np.array(points)
+    count = len(control)
+    path = Path(
+        axes=("X", "Y"),
+        control_points=control,
+        width=np.linalg.norm(np.diff(control, axis=1), axis=2).sum(axis=1),
+        feed=np.full(count, 50.0),
+        move=np.array(move),
+        line=np.asarray([10 * (first + 1) for first, _ in move], dtype=np.int32),
+        runs=np.array([0, count]),
+        dwell=np.zeros(1),
+        tolerance=np.full(count, tolerance),
+    )
+    ones = np.ones(2)
+    return Problem(
+        path, 100 * ones, 1000 * ones, ones * math.inf, path.feed, np.zeros(count + 1), math.inf, 0.001
+    )
+
+
+def test_a_parabola_is_as_far_from_its_chord_as_half_its_control_point() -> None:
+    program = program_of([[4.0, 0.0]])
+    bulge = problem_of([[[0.0, 0.0], [2.0, 0.5], [4.0, 0.0]]], [[0, 0]], 0.25)
+    result = audit(bulge, None, PLANE, program)
+    assert result.ok
+    assert result.check("deviation").worst == pytest.approx(0.25, rel=1e-12)
+    tight = problem_of([[[0.0, 0.0], [2.0, 0.5], [4.0, 0.0]]], [[0, 0]], 0.2499)
+    assert broken(audit(tight, None, PLANE, program)) == {("deviation", None)}
+
+
+def test_a_peak_between_the_samples_is_found() -> None:
+    # The parabola is farthest from the line at t = 0.3, which no eighth and no sixty-fourth hits.
+    peak = 0.3
+    a, c = 1 / (2 * peak), 0.0
+    points = [[[0.0, 0.0], [1.0, 0.5 * a], [2.0, a - 1 + c]]]
+    program = program_of([[2.0, a - 1.0]])
+    height = audit(problem_of(points, [[0, 0]], 1.0), None, PLANE, program).check("deviation").worst
+    # The greatest distance of a parabola from its own chord is half way, whatever its ends.
+    exact = 0.25 * abs(a - 1 - a) * 2.0 / math.hypot(2.0, a - 1)
+    assert height == pytest.approx(exact, rel=1e-12)
+
+
+def test_a_corner_cut_off_is_as_far_as_the_corner_from_the_path() -> None:
+    program = program_of([[10.0, 0.0], [10.0, 10.0]])
+    points = [
+        [[0.0, 0.0], [4.5, 0.0], [9.0, 0.0]],
+        [[9.0, 0.0], [10.0, 0.0], [10.0, 1.0]],
+        [[10.0, 1.0], [10.0, 5.5], [10.0, 10.0]],
+    ]
+    result = audit(problem_of(points, [[0, 0], [0, 1], [1, 1]], 1.0), None, PLANE, program)
+    # (9.75, 0.25) is the middle of the corner piece.
+    assert result.check("deviation").worst == pytest.approx(0.25 * math.sqrt(2.0), rel=1e-12)
+    assert result.check("deviation").ok
+
+
+def test_a_detour_of_the_program_that_the_path_leaves_out_is_found() -> None:
+    program = program_of([[5.0, 0.0], [5.0, 0.3], [5.1, 0.0], [10.0, 0.0]])
+    straight = problem_of([[[0.0, 0.0], [5.0, 0.0], [10.0, 0.0]]], [[0, 3]], 0.01)
+    result = audit(straight, None, PLANE, program)
+    assert broken(result) == {("deviation", None)}
+    assert result.check("deviation").worst == pytest.approx(0.3)
+    assert result.check("deviation").line in (20, 30)
+    # Also where no piece claims to follow it.
+    unnamed = problem_of([[[0.0, 0.0], [5.0, 0.0], [10.0, 0.0]]], [[0, 0]], 0.01)
+    assert ("deviation", None) in broken(audit(unnamed, None, PLANE, program))
+
+
+def test_arcs_are_measured_against_the_true_circle() -> None:
+    # A quarter of a circle of 10 mm as one parabola: its middle is off by 10 (1 − ¾ √2).
+    program = program_of(
+        [[10.0, 0.0], [0.0, 10.0]], move=[1], centre=[[0.0, 0.0, 0.0]], normal=[2], angle=[math.pi / 2]
+    )
+    points = [[[0.0, 0.0], [5.0, 0.0], [10.0, 0.0]], [[10.0, 0.0], [10.0, 10.0], [0.0, 10.0]]]
+    result = audit(problem_of(points, [[0, 0], [1, 1]], 1.0), None, PLANE, program)
+    assert result.check("deviation").worst == pytest.approx(10 * (0.75 * math.sqrt(2.0) - 1), rel=1e-6)
+    clockwise = program_of(
+        [[10.0, 0.0], [0.0, 10.0]], move=[1], centre=[[0.0, 0.0, 0.0]], normal=[2], angle=[-1.5 * math.pi]
+    )
+    wrong_way = audit(problem_of(points, [[0, 0], [1, 1]], 1.0), None, PLANE, clockwise)
+    assert wrong_way.check("deviation").worst == pytest.approx(10 * math.sqrt(2.0), rel=0.3)
+
+
+def test_a_path_with_a_gap_or_other_ends_is_found() -> None:
+    program = program_of([[5.0, 0.0], [10.0, 0.0]])
+
+    def gap(middle: float, start: float = 0.0, end: float = 10.0) -> set[tuple[str, str | None]]:
+        points = [[[start, 0.0], [2.5, 0.0], [5.0, 0.0]], [[middle, 0.0], [7.5, 0.0], [end, 0.0]]]
+        return broken(audit(problem_of(points, [[0, 0], [1, 1]], 0.01), None, PLANE, program))
+
+    assert gap(5.0) == set()
+    assert gap(5.0 + 1e-8) == {("gap", None)}
+    assert gap(5.0, start=1e-7) == {("gap", None)}
+    assert gap(5.0, end=10.0 - 1e-7) == {("gap", None)}
+
+
+@pytest.mark.parametrize("piece", [5, 30, -2])
+def test_a_control_point_moved_by_twice_the_tolerance_is_found(
+    part: Any, changed: Change, piece: int
+) -> None:
+    piece = piece % len(part.path)
+    tolerance = part.path.tolerance[piece]
+    for corner in (0, 2):
+        points = changed(part.path.control_points, (piece, corner, 2), lambda z: z + 2 * tolerance)
+        result = part.with_path(control_points=points).audit()
+        assert {("deviation", None), ("gap", None)} <= broken(result)
+        assert abs(result.check("deviation").line - part.path.line[piece]) <= 1
+    # The middle one pulls the curve along by half as much.
+    points = changed(part.path.control_points, (piece, 1, 2), lambda z: z + 5 * tolerance)
+    result = part.with_path(control_points=points).audit()
+    assert ("deviation", None) in broken(result)
+    assert result.check("deviation").worst == pytest.approx(2.5 * tolerance, rel=0.3)
+    assert "jump" in {name for name, _ in broken(result)}
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_bad_numbers_in_the_path_are_never_fine(part: Any, changed: Change, bad: float) -> None:
+    points = changed(part.path.control_points, (20, 1, 0), bad)
+    result = part.with_path(control_points=points).audit()
+    assert ("numbers", None) in broken(result)
+    assert result.check("numbers").line == part.path.line[20]
+    assert not part.with_path(width=changed(part.path.width, 20, bad)).audit().ok
+
+
+def test_another_program_is_not_the_one_that_is_followed(part: Any, changed: Change) -> None:
+    assert part.program is not None
+    for move in (7, 40, 61):
+        target = changed(part.program.target, (move, 1), lambda y: y + 0.05)
+        result = part.with_program(target=target).audit()
+        assert ("deviation", None) in broken(result)
+        assert abs(result.check("deviation").line - part.program.line[move]) <= 2
+    assert not part.with_program(target=changed(part.program.target, (7, 1), math.nan)).audit().ok
+    assert not part.with_program(arc_angle=-part.program.arc_angle).audit().ok
+
+
+def test_pieces_that_follow_other_moves_than_they_say_are_found(part: Any, changed: Change) -> None:
+    moves = changed(part.path.move, 10, part.path.move[40])
+    assert ("deviation", None) in broken(part.with_path(move=moves).audit())
+    beyond = changed(part.path.move, 10, np.array([10**6, 10**6]))
+    assert ("deviation", None) in broken(part.with_path(move=beyond).audit())
+
+
+def test_the_audit_uses_nothing_of_what_it_audits() -> None:
+    sources = FilePath(__file__).parents[2] / "solvers" / "src"
+    files = [sources / "audit.rs", *(sources / "audit").glob("*.rs")]
+    assert len(files) > 5
+    for file in files:
+        text = file.read_text()
+        assert "crate::" not in text, file.name
+        assert "super::super" not in text, file.name

@@ -1,0 +1,211 @@
+"""Every format that is found gives back what was written, and says plainly when a file is none of its own."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from feedplan.errors import InputError
+from feedplan.outputs import format_named, formats, load_setpoints
+from feedplan.outputs.csv import header
+from feedplan.setpoints import SetpointChunk
+
+NAMES = ("t", "position", "velocity", "acceleration", "jerk", "line")
+
+
+def chunk(count: int, axes: str = "XYZ", seed: int = 1) -> SetpointChunk:
+    random = np.random.default_rng(seed)
+    tables = (random.normal(size=(count, len(axes))) * 10.0 ** random.integers(-9, 9) for _ in range(4))
+    line = random.integers(1, 2**31 - 1, count).astype(np.int32)
+    return SetpointChunk(np.arange(count) * 1e-3, *tables, line, tuple(axes))
+
+
+def part_of(whole: SetpointChunk, first: int, last: int) -> SetpointChunk:
+    return SetpointChunk(**{name: getattr(whole, name)[first:last] for name in NAMES}, axes=whole.axes)
+
+
+def written(name: str, folder: Path, whole: SetpointChunk, cuts: tuple[int, ...] = ()) -> Path:
+    output = format_named(name)
+    with output.writer(folder / output.FILE, whole.axes, len(whole.t)) as add:
+        for first, last in zip((0, *cuts), (*cuts, len(whole.t)), strict=True):
+            add(part_of(whole, first, last))
+    return folder / output.FILE
+
+
+def same(a: SetpointChunk, b: SetpointChunk) -> bool:
+    return a.axes == b.axes and all(np.array_equal(getattr(a, name), getattr(b, name)) for name in NAMES)
+
+
+def test_the_three_formats_are_found() -> None:
+    assert set(formats()) >= {"npz", "csv", "json"}
+
+
+@pytest.mark.parametrize("name", formats())
+@pytest.mark.parametrize("axes", ["X", "XYZ", "XYZABC"])
+def test_what_is_read_is_what_was_written(name: str, axes: str, tmp_path: Path) -> None:
+    whole = chunk(1000, axes)
+    assert same(load_setpoints(written(name, tmp_path, whole)), whole)
+
+
+@pytest.mark.parametrize("name", formats())
+def test_the_cuts_into_chunks_leave_no_trace(name: str, tmp_path: Path) -> None:
+    (tmp_path / "cut").mkdir()
+    whole = chunk(1000)
+    in_one = written(name, tmp_path, whole)
+    in_parts = written(name, tmp_path / "cut", whole, (1, 1, 500, 999))
+    assert in_one.read_bytes() == in_parts.read_bytes()
+
+
+@pytest.mark.parametrize("name", formats())
+def test_a_folder_gives_its_newest_setpoints(name: str, tmp_path: Path) -> None:
+    for other in formats():
+        written(other, tmp_path, chunk(5))
+    whole = chunk(7, seed=2)
+    written(name, tmp_path, whole)
+    assert same(load_setpoints(tmp_path), whole)
+
+
+@pytest.mark.parametrize("name", formats())
+def test_a_single_setpoint_is_enough(name: str, tmp_path: Path) -> None:
+    whole = chunk(1)
+    assert same(load_setpoints(written(name, tmp_path, whole)), whole)
+
+
+@pytest.mark.parametrize("name", formats())
+@pytest.mark.parametrize("content", [b"", b"\x00\xff\x80 not text", b"[1, 2]", b"a,b\n1,2\n", b"PK\x03\x04"])
+def test_a_file_of_something_else_is_refused_in_one_sentence(
+    name: str, content: bytes, tmp_path: Path
+) -> None:
+    file = tmp_path / f"other.{name}"
+    file.write_bytes(content)
+    with pytest.raises(InputError, match=str(file)) as error:
+        load_setpoints(file)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("name", formats())
+def test_a_truncated_file_is_refused(name: str, tmp_path: Path) -> None:
+    file = written(name, tmp_path, chunk(100))
+    file.write_bytes(file.read_bytes()[:-50])
+    with pytest.raises(InputError, match=str(file)):
+        load_setpoints(file)
+
+
+@pytest.mark.parametrize("name", formats())
+def test_a_missing_file_is_named(name: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"none\.\w+ does not exist"):
+        load_setpoints(tmp_path / f"none.{name}")
+
+
+@pytest.mark.parametrize("name", formats())
+def test_an_interrupted_write_raises_what_interrupted_it(name: str, tmp_path: Path) -> None:
+    def write() -> None:
+        output = format_named(name)
+        with output.writer(tmp_path / output.FILE, ("X",), 100) as add:
+            add(chunk(10, "X"))
+            raise KeyError
+
+    with pytest.raises(KeyError):
+        write()
+
+
+def test_an_unknown_ending_and_an_empty_folder_name_the_remedy(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"give a file in \.csv, \.json, \.npz"):
+        load_setpoints(tmp_path / "setpoints.txt")
+    with pytest.raises(InputError, match="feedplan plan PROGRAM -o"):
+        load_setpoints(tmp_path)
+    with pytest.raises(InputError, match="use one of csv, json, npz"):
+        format_named("parquet")
+
+
+def test_npz_is_what_numpy_reads_and_maps_instead_of_loading(tmp_path: Path) -> None:
+    whole = chunk(50)
+    file = written("npz", tmp_path, whole)
+    with np.load(file) as arrays:
+        assert sorted(arrays) == sorted((*NAMES, "axes"))
+        assert arrays["axes"].tolist() == ["X", "Y", "Z"]
+        for name in NAMES:
+            np.testing.assert_array_equal(arrays[name], getattr(whole, name))
+    read = load_setpoints(file)
+    assert isinstance(read.position, np.memmap)
+    assert all(getattr(read, name).flags.aligned for name in NAMES)
+
+
+def test_npz_that_numpy_wrote_is_read_aligned(tmp_path: Path) -> None:
+    whole = chunk(50)
+    file = tmp_path / "other.npz"
+    np.savez(file, axes=np.array(whole.axes), **{name: getattr(whole, name) for name in NAMES})
+    read = load_setpoints(file)
+    assert same(read, whole)
+    assert all(getattr(read, name).flags.aligned for name in NAMES)
+
+
+def test_npz_that_numpy_compressed_is_read_too(tmp_path: Path) -> None:
+    whole = chunk(50)
+    file = tmp_path / "other.npz"
+    np.savez_compressed(file, axes=np.array(whole.axes), **{name: getattr(whole, name) for name in NAMES})
+    assert same(load_setpoints(file), whole)
+
+
+def test_npz_of_another_shape_or_with_objects_is_refused(tmp_path: Path) -> None:
+    whole = chunk(50)
+    arrays = {name: getattr(whole, name) for name in NAMES} | {"axes": np.array(whole.axes)}
+    np.savez(tmp_path / "shape.npz", **(arrays | {"jerk": whole.jerk[:, :2]}))
+    with pytest.raises(InputError, match=r"jerk has the shape \(50, 2\)"):
+        load_setpoints(tmp_path / "shape.npz")
+    np.savez(tmp_path / "lacks.npz", t=whole.t)
+    with pytest.raises(InputError, match="position, velocity, acceleration, jerk, line, axes is missing"):
+        load_setpoints(tmp_path / "lacks.npz")
+    np.savez(tmp_path / "objects.npz", **(arrays | {"t": np.array([None] * 50)}))
+    with pytest.raises(InputError, match="not a whole npz file"):
+        load_setpoints(tmp_path / "objects.npz")
+
+
+def test_csv_has_a_header_with_units_and_exact_numbers(tmp_path: Path) -> None:
+    values = (np.array([[value]]) for value in (0.1, -2.0, 1e-9, 0.0))
+    whole = SetpointChunk(np.array([1e-3]), *values, np.array([7], np.int32), ("X",))
+    file = written("csv", tmp_path, whole)
+    assert file.read_text().splitlines() == [
+        "t [s],position X [mm],velocity X [mm/s],acceleration X [mm/s^2],jerk X [mm/s^3],line",
+        "0.001,0.1,-2.0,1e-9,0,7",
+    ]
+
+
+def test_csv_errors_name_the_line(tmp_path: Path) -> None:
+    file = tmp_path / "a.csv"
+    rows = f"{header('X')}\n0,0,0,0,0,1\n"
+    file.write_text(rows + "0,0,0,0,0\n")
+    with pytest.raises(InputError, match="line 3: 5 values where 6 are needed"):
+        load_setpoints(file)
+    file.write_text(rows + "0,0,zero,0,0,1\n")
+    with pytest.raises(InputError, match="line 3: 'zero' is not a number"):
+        load_setpoints(file)
+
+
+def test_json_has_the_names_of_npz_and_null_for_what_is_not_finite(tmp_path: Path) -> None:
+    whole = chunk(3, "XY")
+    whole.jerk[1, 0] = np.inf
+    file = written("json", tmp_path, whole)
+    table = json.loads(file.read_text())
+    assert table["axes"] == ["X", "Y"]
+    assert table["units"]["jerk"] == "mm/s^3"
+    assert table["position"] == whole.position.tolist()
+    assert table["jerk"][1][0] is None
+    assert np.isnan(load_setpoints(file).jerk[1, 0])
+
+
+def test_fewer_rows_than_announced_are_a_defect(tmp_path: Path) -> None:
+    output = format_named("npz")
+    with pytest.raises(ValueError, match="lacks"), output.writer(tmp_path / "a.npz", ("X",), 100) as add:
+        add(chunk(10, "X"))
+
+
+def test_the_archive_is_whole_for_other_readers(tmp_path: Path) -> None:
+    file = written("npz", tmp_path, chunk(100))
+    with zipfile.ZipFile(io.BytesIO(file.read_bytes())) as archive:
+        assert archive.testzip() is None

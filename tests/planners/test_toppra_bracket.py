@@ -1,0 +1,105 @@
+"""toppra on a mesh aligned with the knots brackets the exact time from both sides.
+
+Collocation asks for the limits at the nodes alone and is optimistic. The one-sided scheme asks for them at
+both ends of every cell with the cell's own q''; on a quadratic piece the acceleration is linear in a cell, so
+that its profile is feasible. Both meet at the exact time as the mesh refines.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("toppra", reason="toppra has wheels for Linux on x86-64 only")
+
+from toppra.algorithm import TOPPRA
+from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
+
+from benchmarks.toppra_mesh import FeedConstraint, QuadraticPath, solve
+from feedplan import Path
+from feedplan.constraints.problem import Problem
+from feedplan.planners.bang_bang import plan
+
+
+def cam_problem(count: int, seed: int) -> Problem:
+    """A C1 quadratic B-spline with steps of 0.3 to 3 mm and some sharp bends, its limits drawn at random."""
+    rng = np.random.default_rng(seed)
+    heading, polygon = np.array([1.0, 0.0, 0.0]), [np.zeros(3)]
+    for _ in range(count + 1):
+        bend = 1.0 if rng.random() < 0.08 else 0.15
+        heading = heading + bend * rng.normal(size=3)
+        heading /= np.linalg.norm(heading)
+        polygon.append(polygon[-1] + heading * np.exp(rng.uniform(np.log(0.3), np.log(3.0))))
+    edges = np.diff(polygon, axis=0)
+    length = np.linalg.norm(edges, axis=1)
+    width = 0.5 * (length[:-1] + length[1:])
+    tangent = 2 * edges / (np.append(0, width) + np.append(width, 0))[:, None]
+    start = np.vstack([np.zeros(3), np.cumsum(0.5 * (tangent[:-1] + tangent[1:]) * width[:, None], axis=0)])
+    middle = start[:-1] + 0.5 * tangent[:-1] * width[:, None]
+    feed = np.full(count, rng.uniform(20.0, 60.0))
+    path = Path(
+        axes=("X", "Y", "Z"),
+        control_points=np.stack([start[:-1], middle, start[1:]], axis=1),
+        width=width,
+        feed=feed,
+        move=np.zeros((count, 2), dtype=np.int64),
+        line=np.arange(1, count + 1, dtype=np.int32),
+        runs=np.array([0, count]),
+        dwell=np.zeros(1),
+        tolerance=np.zeros(count),
+    )
+    acceleration, velocity = np.exp(rng.uniform(5.0, 7.0, 3)), rng.uniform(20.0, 60.0, 3)
+    return Problem(
+        path, velocity, acceleration, np.full(3, np.inf), feed, np.full(count + 1, np.inf), np.inf, 0.001
+    )
+
+
+class OneSided(JointAccelerationConstraint):  # type: ignore[misc]
+    """|q' s + q'' p| ≤ A at both ends of each cell, the far end with the q'' of this cell."""
+
+    def compute_constraint_params(self, path: QuadraticPath, gridpoints: Any) -> tuple[Any, ...]:
+        axes, cells = path.dof, len(gridpoints) - 1
+        near = path.piece(gridpoints)
+        near[:-1] = path.piece(0.5 * (gridpoints[1:] + gridpoints[:-1]))
+        bend = path.second[near]
+
+        def tangent(u: Any) -> Any:
+            return path.first[near] + (u - path.knots[near])[:, None] * bend
+
+        step = np.append(np.diff(gridpoints), 0.0)
+        # The squared speed at the far end is x + 2 step s.
+        far = tangent(gridpoints + step) + 2 * step[:, None] * bend
+        first, second = np.hstack([tangent(gridpoints), far]), np.hstack([bend, bend])
+        signs = np.vstack([np.eye(axes), -np.eye(axes)])
+        rows = np.zeros((4 * axes, 2 * axes))
+        rows[: 2 * axes, :axes] = rows[2 * axes :, axes:] = signs
+        limits = np.concatenate([self.alim[:, 1], -self.alim[:, 0]])
+        assert len(first) == cells + 1
+        return first, second, np.zeros_like(first), rows, np.concatenate([limits, limits]), None, None
+
+
+def one_sided_time(problem: Problem, cells: int) -> float:
+    path = QuadraticPath(problem)
+    steps = np.diff(path.knots)[:, None] * (np.arange(cells) / cells)
+    grid = np.append((path.knots[:-1, None] + steps).ravel(), path.knots[-1])
+    acceleration, velocity = problem.max_acceleration, problem.max_velocity
+    constraints = [
+        OneSided(np.column_stack((-acceleration, acceleration))),
+        JointVelocityConstraint(np.column_stack((-velocity, velocity))),
+        FeedConstraint(problem.feed, path.dof),
+    ]
+    instance = TOPPRA(constraints, path, gridpoints=grid, solver_wrapper="seidel")
+    _, speed, _ = instance.compute_parameterization(0.0, 0.0)
+    return float((2.0 * np.diff(grid) / (speed[1:] + speed[:-1])).sum())
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_both_schemes_close_in_on_the_exact_time(seed: int) -> None:
+    problem = cam_problem(30, seed)
+    exact = plan(problem).time
+    below = [1 - solve(problem, cells).time / exact for cells in (40, 160)]
+    above = [one_sided_time(problem, cells) / exact - 1 for cells in (40, 160)]
+    for coarse, fine in (below, above):
+        assert 0 < fine < 0.4 * coarse < 0.01

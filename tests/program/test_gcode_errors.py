@@ -1,0 +1,216 @@
+"""What is not understood or cannot be followed is one sentence with file, line and word."""
+
+import re
+
+import pytest
+
+from feedplan.errors import ProgramError
+from feedplan.program.gcode import read_gcode
+
+
+def error(text: str | bytes) -> ProgramError:
+    data = text.encode() if isinstance(text, str) else text
+    with pytest.raises(ProgramError) as caught:
+        read_gcode(data, name="part.ngc")
+    message = str(caught.value)
+    assert "\n" not in message
+    line = re.match(r"part\.ngc(?: line (\d+))?: \S", message)
+    assert line, message
+    assert caught.value.line == (int(line[1]) if line[1] else None)
+    return caught.value
+
+
+def test_the_sentence_names_file_line_and_word() -> None:
+    found = error("G21\nG1 X1 F60\nG1 X2 E1.1\nM2\n")
+    assert str(found).startswith("part.ngc line 3: word E1.1 is not understood: ")
+    assert found.line == 3
+
+
+@pytest.mark.parametrize(
+    ("block", "words"),
+    [
+        # Numbers.
+        ("X", "word X has no number"),
+        ("X Y1", "word X has no number"),
+        ("X-", "word X has no number"),
+        ("X.", "word X has no number"),
+        ("X--1", "word X has no number"),
+        ("X1.2.3", "'.3' is not understood"),
+        ("X1 2", "'2' is not understood: a letter is missing"),
+        ("X1,5", "',5' is not understood: numbers have a decimal point"),
+        ("X1e3", "word e3 is not understood"),
+        ("X1E3", "numbers have no exponents"),
+        ("XNAN", "word XNAN is not understood"),
+        ("Xinf", "word Xinf is not understood"),
+        ("X1000001", "X would go to 1000001 mm, more than 1000000 mm from the machine's zero"),
+        ("X1" + "0" * 400, "X would go to inf mm"),
+        ("G91 X600000\nX600000", "X would go to 1200000 mm"),
+        ("G20 X40000", "X would go to 1016000 mm"),
+        ("A200000000", "A would go to 200000000 degrees"),
+        ("X[1/0]", "1 is divided by 0"),
+        ("X[10**400]", "not a finite number"),
+        ("X#5", "parameter #5 is used and the program has not set it"),
+        ("X#<depth>", "parameter #<depth>"),
+        ("X[1", "bracket ] is missing"),
+        ("#5", "#5 stands alone"),
+        ("#5221=1", "#5221 belongs to the machine"),
+        # Words.
+        ("X1 X2", "word X2 is the second X"),
+        ("G0 G1 X1", "words G0 and G1 belong to one modal group"),
+        ("G90 G91", "words G90 and G91"),
+        ("M3 M5", "words M3 and M5"),
+        ("G123", "word G123 is not understood"),
+        ("G1234567", "word G1234567 is not understood"),
+        ("G-1", "word G-1 is not understood"),
+        ("G1.05", "word G1.05 is not understood"),
+        ("M20", "word M20 is not understood"),
+        ("M3.5", "word M3.5 is not understood"),
+        ("M-3", "word M-3 is not understood"),
+        ("M200", "word M200 is not understood"),
+        ("M428 ;TCP", "word M428 is not understood"),
+        ("HELLO", "word HELLO is not understood"),
+        ("G1 X1 N10", "word N10 is not the first of its block"),
+        ("N-1 X1", "word N-1 is no block number"),
+        ("X1 / Y2", "'/ Y2' is not understood"),
+        ("X1 = 2", "'= 2' is not understood"),
+        ("X1 % 2", "'% 2' is not understood: % stands alone"),
+        ("@1 ^90", "'@1 ^90' is not understood"),
+        ("X1 \u00e4", "'ä' is not understood"),
+        ("S-100", "word S-100 is negative"),
+        ("T-1", "word T-1 is negative"),
+        # Words without a use.
+        ("R5", "word R5 has no meaning here"),
+        ("G1 X1 F60 I1", "word I1 has no meaning here"),
+        ("G1 X1 F60 P1", "word P1 has no meaning here"),
+        ("H1", "word H1 has no meaning here: put it beside G43"),
+        ("L20", "word L20 has no meaning here"),
+        ("M3 P1", "word P1 has no meaning here"),
+        # Comments.
+        ("(open", "comment '(open' is not closed"),
+        ("(a (b) c)", "has another ( inside"),
+        ("X1 )", "')' is not understood"),
+        # Feeds.
+        ("G1 X1", "a feed move has no feed: give F"),
+        ("G2 X2 I1", "a feed move has no feed"),
+        ("G81 X1 Z-1 R1", "a feed move has no feed"),
+        ("G1 X1 F0", "a feed move has the feed F0"),
+        ("G1 X1 F-60", "word F-60 is a negative feed"),
+        ("G1 X1 F0.0000001", "word F0.0000001 is a feed that no machine has"),
+        ("G1 X1 F[10 ** 10]", "word F10000000000 is a feed that no machine has"),
+        ("G93 G1 X1", "inverse time (G93) has no F of its own"),
+        ("G93 G1 X1 F60\nX2", "inverse time (G93) has no F of its own"),
+        ("G93 G1 X1 F0", "word F0 is no inverse time"),
+        ("F60 G93\nG94 G1 X1", "a feed move has no feed"),
+        ("G95 F1 G1 X1", "the spindle speed is not known"),
+        ("G95 F1 S100\nG1 X1", "the spindle speed is not known"),
+        ("G95 F1 G96 S100 M3\nG1 X1", "the spindle speed is not known"),
+        # Arcs.
+        ("G3 X2 F60", "an arc in the plane G17 has no centre: give I and J, or R"),
+        ("G3 F60", "an arc in the plane G17 has no centre"),
+        ("G18 G3 X2 F60", "an arc in the plane G18 has no centre: give K and I, or R"),
+        ("G3 X2 K1 F60", "word K1 is no centre in the plane G17"),
+        ("G3 X2 I1 R1 F60", "an arc has both R and a centre"),
+        ("G3 Z2 R1 F60", "an arc with R has no end in the plane G17"),
+        ("G90.1 G3 X2 I1 F60", "no centre: give both I and J"),
+        ("G3 X2 I0 F60", "the arc has no radius"),
+        ("G3 X2 I2 F60", "the arc has no radius"),
+        ("G3 X2 I0.9 F60", "the radius of the arc is 0.9000 mm at its start and 1.1000 mm at its end"),
+        ("G3 X2 R0.9 F60", "the radius 0.9000 mm of the arc is too small to reach its end 2.0000 mm away"),
+        ("G3 X2 R0 F60", "the radius 0.0000 mm of the arc"),
+        ("G3 X2 F60 R" + "9" * 400, "word Rinf is more than 1e9"),
+        ("G3 X0 R1 F60", "an arc with R ends where it starts"),
+        ("G3 X2 I1 P0 F60", "word P0 is no number of turns"),
+        ("G3 X2 I1 P1.5 F60", "word P1.5 is no number of turns"),
+        ("G3 X2 I1 P20000 F60", "word P20000 is more than 10000 turns"),
+        ("G3 I2000000000 F60", "the centre of an arc is more than 1e9 mm away"),
+        # Codes.
+        ("G41 D1", "word G41 is not read: cutter radius compensation is not computed here: post with"),
+        ("G42.1", "word G42.1 is not read: cutter radius"),
+        ("G5 X1", "word G5 is not read: splines"),
+        ("G5.1 X1", "word G5.1 is not read: splines"),
+        ("G5.2 P1", "word G5.2 is not read: splines"),
+        ("G6.2 P1", "word G6.2 is not read: splines"),
+        ("G17.1", "word G17.1 is not read"),
+        ("G28.1", "word G28.1 is not read: the home position"),
+        ("G30.1", "word G30.1 is not read: the home position"),
+        ("G33 Z-1 K1", "word G33 is not read: threading"),
+        ("G38.2 Z-1", "word G38.2 is not read: probing"),
+        ("G68 X0 Y0 R45", "word G68 is not read: rotated"),
+        ("G54.1 P3", "word G54.1 is not read: only the work offsets"),
+        ("M98 P1000", "word M98 is not read: subprograms"),
+        ("M99", "word M99 is not read: subprograms"),
+        ("M66 P0", "word M66 is not read: inputs"),
+        ("O100 sub", "word 'O100 sub' controls the flow of the program"),
+        ("o<x> call", "word 'o<x> call' controls the flow of the program"),
+        ("N5 O100 WHILE [1]", "controls the flow of the program"),
+        ("X1\nO0002", "word O0002 opens a second program"),
+        ("G4", "G4 has no time"),
+        ("G4 U2", "G4 has no time"),
+        ("G4 X1 Y2", "G4 has no time"),
+        ("G4 P-1", "word P-1 is no dwell time"),
+        ("G4 P9999999", "word P9999999 is no dwell time"),
+        ("G2 X1 I1 G4 P1 F60", "G4 and an arc both use P"),
+        ("G64 P-1", "word P-1 is no tolerance"),
+        ("G10 L1 P1 Z1", "only G10 L2 and G10 L20 are read"),
+        ("G10 P1 Z1", "only G10 L2 and G10 L20 are read"),
+        ("G10 L2 P10 Z1", "G10 needs P0 to P9"),
+        ("G10 L2 P1.5 Z1", "word P1.5 is no work offset"),
+        ("G10 L2 P1 R45", "word R45 turns the work coordinates"),
+        ("G92", "G52 and G92 need the axes they set"),
+        ("G0 G92 X0", "words G92 and G0 both take axis words"),
+        ("G43.1", "G43.1 sets nothing"),
+        ("G43.1 G0 Z1", "words G43.1 and G0 both take axis words"),
+        ("G43.2", "G43.2 adds nothing"),
+        ("G43.2 H1 Z1", "both H and axis words"),
+    ],
+)
+def test_what_cannot_be_read_names_the_word(block: str, words: str) -> None:
+    found = error(f"G21 G0 Y0 Z0\n{block}\nM2\n")
+    assert words in str(found)
+    assert found.line is not None
+    assert found.line >= 2
+
+
+def test_axis_words_need_a_motion_code() -> None:
+    assert "word X1 has no motion code in force: give G0 or G1 before it" in str(error("X1\n"))
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "language"),
+    [
+        ("0 BEGIN PGM 12 MM\n1 L X+30 FMAX\n", 1, "Heidenhain conversational"),
+        ("%_N_PART_MPF\n;$PATH=/_N_MPF_DIR\nG0 X1\n", 1, "Siemens Sinumerik"),
+        ("G0 X1\nDEF REAL WIDTH=12\n", 2, "Siemens Sinumerik"),
+        ("G0 X1\nIF[#1 GT 2] GOTO 10\n", 2, "Fanuc macro"),
+        ("G21\nG92 E0\nM82\nG1 X1 E2\n", 2, "3-D printer"),
+        ("<?xml version='1.0'?>\n", 1, "no machine"),
+    ],
+)
+def test_other_languages_are_recognised(text: str, line: int, language: str) -> None:
+    found = error(text)
+    assert str(found).endswith(f"; the file looks like {language} code, and only RS-274 (G-code) is read")
+    assert found.line == line
+
+
+@pytest.mark.parametrize(
+    "text", ["", "\n", "(nothing)\n; to see\n", "%\n%\n", "G21 G90\nM3 S100\nM30\n", "G0\nM2"]
+)
+def test_a_program_without_motion_is_an_error(text: str) -> None:
+    found = error(text)
+    assert "the program moves nothing" in str(found)
+    assert found.line is None
+
+
+def test_a_binary_file_is_an_error() -> None:
+    assert "binary or UTF-16" in str(error(b"G21 G0 X1\n\x00\x01"))
+    assert "binary or UTF-16" in str(error("G21 G0 X1\n".encode("utf-16")))
+
+
+def test_a_program_cut_within_a_word_is_an_error() -> None:
+    found = error("G21\nG1 X1 F60\nG1 X2 Y")
+    assert "word Y has no number: the file ends here and may be truncated" in str(found)
+    assert found.line == 3
+
+
+def test_deep_nesting_is_an_error() -> None:
+    assert "nested" in str(error("G0 X" + "[" * 100_000))

@@ -1,0 +1,118 @@
+"""The limit curve and the caps over length: by hand, against linear programming, and along a profile."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from feedplan.geometry.path import Path
+from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.report.limits import LimitSamples, arc_lengths, limit_curve, limit_samples
+
+
+def sampled(problem: Any, profile: SpeedProfile) -> LimitSamples:
+    blocks = list(limit_samples(problem, profile))
+    names = ("length", "speed", "acceleration", "feed", "velocity", "chord", "arc")
+    return LimitSamples(*(np.concatenate([getattr(block, name) for block in blocks]) for name in names))
+
+
+def test_on_a_bend_the_cross_axis_carries_all() -> None:
+    # Along X with a curvature of 1/10 mm: Y carries v²/10, so 500 mm/s² allow v² = 5000.
+    p = limit_curve(np.array([[1.0, 0.0]]), np.array([[0.0, 0.1]]), np.array([300.0, 500.0]))
+    assert p == pytest.approx([5000.0])
+
+
+def test_straight_pieces_and_one_axis_have_no_limit_curve() -> None:
+    tangent = np.array([[0.6, 0.8], [1.0, 0.0]])
+    assert np.isinf(limit_curve(tangent, 0.3 * tangent, np.array([1.0, 1.0]))).all()
+    assert np.isinf(limit_curve(np.array([[1.0]]), np.array([[1.0]]), np.array([1.0]))).all()
+
+
+@pytest.mark.parametrize("axes", [2, 3, 6])
+def test_the_limit_curve_is_the_optimum_of_the_linear_programme(axes: int) -> None:
+    random = np.random.default_rng(axes)
+    tangent, second = random.normal(size=(2, 40, axes))
+    tangent[::5, 0] = 0.0
+    limit = random.uniform(0.5, 3.0, axes)
+    best = limit_curve(tangent, second, limit)
+    for q, bend, p in zip(tangent, second, best, strict=True):
+        rows = np.vstack([np.stack([q, bend], axis=1), -np.stack([q, bend], axis=1)])
+        found = linprog([0, -1], A_ub=rows, b_ub=np.tile(limit, 2), bounds=[(None, None), (0, None)])
+        assert p == pytest.approx(found.x[1], rel=1e-9)
+
+
+def test_the_square_rises_to_its_feed_and_stops_at_its_corners(square: Any) -> None:
+    samples = sampled(square.problem, square.profile)
+    assert samples.length[-1] == pytest.approx(80.0, abs=1e-12)
+    assert (np.diff(samples.length) >= 0).all()
+    side = samples.length % 20.0
+    to_corner = np.minimum(side, 20.0 - side)
+    assert samples.speed == pytest.approx(np.minimum(np.sqrt(2 * 500.0 * to_corner), 50.0), abs=1e-5)
+    assert (samples.feed == 50.0).all()
+    assert samples.velocity == pytest.approx(100.0)
+    assert np.isinf(samples.acceleration).all()
+    assert np.isinf(samples.chord).all()
+
+
+def test_arcs_are_as_long_as_they_are(square: Any) -> None:
+    assert arc_lengths(square.path, square.profile) == pytest.approx([2.5, 15.0, 2.5] * 4)
+
+
+def bend(
+    square: Any, kind: ArcKind, axis: int, value: float, p: tuple[float, float]
+) -> tuple[Any, SpeedProfile]:
+    """A quarter turn as a parabola from X to Y, of width 10, in one arc."""
+    path: Path = replace(
+        square.path,
+        control_points=np.array([[[0.0, 0, 0], [10, 0, 0], [10, 10, 0]]]),
+        width=np.array([10.0]),
+        line=np.array([1], np.int32),
+        runs=np.array([0, 1]),
+    )
+    one = {
+        "piece": np.array([0], np.uint32),
+        "kind": np.array([kind], np.uint8),
+        "axis": np.array([axis], np.uint8),
+    }
+    ends = {"u0": np.array([0.0]), "u1": np.array([10.0]), "p0": np.array([p[0]]), "p1": np.array([p[1]])}
+    profile = SpeedProfile(
+        **one, **ends, value=np.array([value]), duration=np.array([1.0]), runs=np.array([0, 1])
+    )
+    return replace(square.problem, path=path, feed=np.array([50.0])), profile
+
+
+# C' = (2 − 0.2 u, 0.2 u), so |C'|² is 4 at both ends and 2 in the middle.
+@pytest.mark.parametrize(
+    ("kind", "axis", "value", "ends", "middle"),
+    [
+        (ArcKind.FLAT, 0, 0.0, (100.0, 100.0), np.sqrt(200.0)),
+        (ArcKind.FEED, 255, 1600.0, (400.0, 400.0), 40.0),
+        (ArcKind.CHORD, 255, 30.0, (60.0, 60.0), np.sqrt(2.0 * 30.0 * np.sqrt(2.0))),
+        # X: p q'² grows by 2·A·Δx from 0; at u = 5 the tool is at x = 7.5 and q'_x = 1.
+        (ArcKind.AXIS_ACCELERATION, 0, 100.0, (0.0, np.inf), np.sqrt(2.0 * 1500.0)),
+        (ArcKind.AXIS_VELOCITY, 0, 900.0, (225.0, np.inf), np.sqrt(2.0 * 900.0)),
+    ],
+)
+def test_each_kind_of_arc_has_its_speed_in_the_middle(
+    square: Any, kind: ArcKind, axis: int, value: float, ends: tuple[float, float], middle: float
+) -> None:
+    samples = sampled(*bend(square, kind, axis, value, ends))
+    assert samples.speed[len(samples.speed) // 2] == pytest.approx(middle, rel=1e-12)
+    assert samples.length[-1] == pytest.approx(16.23225240140230, rel=1e-5)
+
+
+def test_the_chord_error_limits_the_bend(square: Any) -> None:
+    samples = sampled(*bend(square, ArcKind.FLAT, 0, 0.0, (100.0, 100.0)))
+    # In the middle |C'| = √2 and |C' × C''| = 0.4: the radius is 2√2/0.4 = 5√2 mm.
+    radius, tolerance, period = 5.0 * np.sqrt(2.0), 0.02, 0.001
+    step = 2.0 * np.sqrt(2.0 * radius * tolerance - tolerance**2)
+    assert samples.chord.min() == pytest.approx(step / period, rel=1e-12)
+    assert samples.chord.argmin() == len(samples.chord) // 2
+
+    problem, profile = bend(square, ArcKind.FLAT, 0, 0.0, (100.0, 100.0))
+    coarse = sampled(replace(problem, chord_tolerance=100.0), profile)
+    assert coarse.chord.min() == pytest.approx(2.0 * 100.0 / period)

@@ -1,0 +1,86 @@
+"""Time per limit and slowest lines of the square, by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.report.losses import slowest_lines, time_per_limit
+
+
+def test_the_square_is_at_its_feed_for_three_fifths(square: Any) -> None:
+    shares = {share.limit: share for share in time_per_limit(square.problem, square.profile)}
+    assert shares["feed"].time == pytest.approx(1.2)
+    assert shares["feed"].part == pytest.approx(0.6)
+    assert shares["X acceleration"].time == pytest.approx(0.4)
+    assert shares["Y acceleration"].time == pytest.approx(0.4)
+    assert set(shares) == {"feed", "X acceleration", "Y acceleration"}
+
+
+def test_shares_come_longest_first_and_dwells_count(square: Any) -> None:
+    path = replace(square.path, dwell=np.array([0.0, 8.0, 0.0, 0.0]))
+    shares = time_per_limit(replace(square.problem, path=path), square.profile)
+    assert (shares[0].limit, shares[0].time, shares[0].part) == ("dwell", 8.0, pytest.approx(0.8))
+    assert [share.time for share in shares] == sorted((share.time for share in shares), reverse=True)
+    assert sum(share.part for share in shares) == pytest.approx(1.0)
+
+
+def test_a_flat_arc_counts_for_the_axis_that_holds_it(square: Any) -> None:
+    kind = square.profile.kind.copy()
+    kind[0] = ArcKind.FLAT
+    shares = {
+        share.limit: share.time
+        for share in time_per_limit(square.problem, replace(square.profile, kind=kind))
+    }
+    assert shares["X acceleration"] == pytest.approx(0.4)
+
+
+def test_each_side_loses_a_tenth_of_a_second_to_its_axis(square: Any) -> None:
+    rows = slowest_lines(square.problem, square.profile)
+    assert [row.line for row in rows] == [3, 4, 5, 6]
+    for row, axis in zip(rows, "XYXY", strict=True):
+        assert row.time == pytest.approx(0.5)
+        assert row.lost == pytest.approx(0.1)
+        assert (row.speed, row.wanted) == (pytest.approx(40.0), pytest.approx(50.0))
+        assert row.limit == f"{axis} acceleration"
+        assert row.part == pytest.approx(1.0)
+        assert row.stops
+        assert not row.rapid
+
+
+def test_a_rapid_is_measured_against_its_axes(square: Any) -> None:
+    path = replace(square.path, feed=np.full(4, np.inf))
+    problem = replace(square.problem, path=path, feed=np.full(4, 1000.0))
+    row = slowest_lines(problem, square.profile)[0]
+    assert row.rapid
+    # 20 mm at the 100 mm/s of the axis would take 0.2 s, not the 0.02 s that 1000 mm/s suggest.
+    assert row.lost == pytest.approx(0.3)
+    assert row.wanted == pytest.approx(100.0)
+
+
+def test_the_worst_lines_come_first_and_no_more_than_asked(square: Any) -> None:
+    duration = square.profile.duration.copy()
+    duration[6] += 0.3
+    rows = slowest_lines(square.problem, replace(square.profile, duration=duration), count=2)
+    assert [row.line for row in rows] == [5, 3]
+    assert rows[0].lost == pytest.approx(0.4)
+
+
+def test_a_line_at_its_feed_all_the_time_loses_nothing(square: Any) -> None:
+    steady = SpeedProfile(
+        piece=np.arange(4, dtype=np.uint32),
+        kind=np.full(4, ArcKind.FEED, np.uint8),
+        axis=np.full(4, 255, np.uint8),
+        value=np.full(4, 2500.0),
+        u0=np.zeros(4),
+        u1=np.full(4, 20.0),
+        p0=np.full(4, 2500.0),
+        p1=np.full(4, 2500.0),
+        duration=np.full(4, 0.4),
+        runs=np.arange(5),
+    )
+    assert slowest_lines(square.problem, steady) == []

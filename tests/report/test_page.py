@@ -1,0 +1,166 @@
+"""The page holds what the plan says, loads nothing, and takes no markup from a part program."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from feedplan.report.figures import SetpointFigures, packed
+from feedplan.report.page import write_report
+
+
+def page(plan: Any, file: Path, source: Path | None = None) -> str:
+    marks = [check.time for check in plan.verdict.broken]
+    figures = SetpointFigures(plan.problem, len(plan.chunk.t), marks)
+    figures.add(plan.chunk)
+    write_report(
+        file,
+        summary=plan.summary(),
+        problem=plan.problem,
+        profile=plan.profile,
+        audit=plan.verdict,
+        figures=figures,
+        source=source,
+    )
+    return file.read_text(encoding="utf-8")
+
+
+def without_plotly(text: str) -> str:
+    scripts = list(re.finditer(r"<script[^>]*>.*?</script>", text, flags=re.S))
+    longest = max(scripts, key=lambda match: match.end() - match.start())
+    assert longest.end() - longest.start() > 1_000_000
+    return text[: longest.start()] + text[longest.end() :]
+
+
+def data_of(text: str) -> dict[str, Any]:
+    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', text, flags=re.S)
+    assert found
+    data = json.loads(found.group(1))
+    assert isinstance(data, dict)
+    return data
+
+
+def numbers(entry: dict[str, str]) -> np.ndarray:
+    ((kind, text),) = entry.items()
+    return np.frombuffer(base64.b64decode(text), dtype={"f4": "<f4", "i4": "<i4"}[kind])
+
+
+class _Reader(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.tags: list[str] = []
+        self.loads: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.loads += [value or "" for name, value in attrs if name in ("src", "href", "action", "data")]
+
+
+def test_the_page_loads_nothing_and_forbids_the_browser_to(square: Any, tmp_path: Path) -> None:
+    text = page(square, tmp_path / "report.html")
+    reader = _Reader()
+    reader.feed(without_plotly(text))
+    assert reader.loads == []
+    assert not {"link", "iframe", "img", "object", "embed"} & set(reader.tags)
+    assert "default-src 'none'" in text
+    assert "url(" not in without_plotly(text)
+    assert "://" not in without_plotly(text)
+
+
+def test_a_name_with_markup_stays_text(square: Any, tmp_path: Path) -> None:
+    square.warnings = ("line 3: </script><b>bold</b>",)
+    program = tmp_path / "a.ngc"
+    program.write_bytes(b"a\nb\nG1 X20 (<img src=x>) \xff\nG1 Y20\nG1 X0\nG1 Y0\n")
+    text = without_plotly(page(square, tmp_path / "report.html", program))
+    assert "<title>square &lt;1&gt;.ngc" in text
+    assert "&lt;/script&gt;&lt;b&gt;bold" in text
+    assert "G1 X20 (&lt;img src=x&gt;) \N{REPLACEMENT CHARACTER}" in text
+    assert "<img" not in text
+
+
+def test_a_passed_audit_says_so(square: Any, tmp_path: Path) -> None:
+    text = page(square, tmp_path / "report.html")
+    assert "Audit passed" in text
+    assert "2 001 checked samples" in text
+    assert "FAILED" not in without_plotly(text)
+
+
+def test_a_failed_audit_names_what_is_broken_where(broken_square: Any, tmp_path: Path) -> None:
+    text = page(broken_square, tmp_path / "report.html")
+    assert "Audit FAILED" in text
+    assert "1 limit is broken" in text
+    assert f"<li>{broken_square.verdict.failures[0]}</li>" in text
+    data = data_of(text)
+    assert data["failures"] == [{"name": "acceleration", "axis": "X", "time": 0.05}]
+    assert data["path"]["marks"] == [pytest.approx([0.625, 0.0, 0.0])]
+
+
+def test_the_numbers_of_the_plan_are_there(square: Any, tmp_path: Path) -> None:
+    text = without_plotly(page(square, tmp_path / "report.html"))
+    for shown in ("2.000<small>s", "proved optimal", "80.0<small>mm", "2400 mm/min", "60.0 %", "not judged"):
+        assert shown in text
+
+
+def test_the_charts_hold_the_setpoints(square: Any, tmp_path: Path) -> None:
+    data = data_of(page(square, tmp_path / "report.html"))
+    assert data["axes"] == ["X", "Y", "Z"]
+    assert data["limits"]["jerk"] == [50_000.0, 50_000.0, None]
+    speed = data["time"]["speed"]
+    np.testing.assert_allclose(numbers(speed["x"]), square.chunk.t, rtol=1e-7)
+    assert numbers(speed["y"]).max() == 50.0
+    assert set(numbers(speed["line"])) == {3, 4, 5, 6}
+    assert numbers(data["time"]["acceleration"][0]["y"]).min() == -500.0
+    assert data["length"]["cutting_speed"] == pytest.approx(50.0)
+    assert "acceleration" not in data["length"]
+    path = data["path"]
+    corners = {
+        (round(float(x), 3), round(float(y), 3))
+        for x, y in zip(numbers(path["x"]), numbers(path["y"]), strict=True)
+    }
+    assert {(0, 0), (20, 0), (20, 20), (0, 20)} <= corners
+    assert len(numbers(path["x"])) < 400
+
+
+def test_the_data_cannot_end_its_script(broken_square: Any, tmp_path: Path) -> None:
+    checks = [replace(check, axis="</script>") for check in broken_square.verdict.checks]
+    broken_square.verdict = replace(broken_square.verdict, checks=tuple(checks))
+    data = data_of(page(broken_square, tmp_path / "report.html"))
+    assert data["failures"][0]["axis"] == "</script>"
+
+
+def test_a_program_that_is_gone_costs_only_its_text(square: Any, tmp_path: Path) -> None:
+    assert "<th>Source</th>" not in page(square, tmp_path / "report.html", tmp_path / "gone.ngc")
+
+
+def test_the_page_of_a_million_setpoints_stays_small(square: Any) -> None:
+    figures = SetpointFigures(square.problem, 1_000_000)
+    random = np.random.default_rng(5)
+    chunk = square.chunk
+    for first in range(0, 1_000_000, 50_000):
+        tables = [random.normal(size=(50_000, 3)) for _ in range(4)]
+        t = (first + np.arange(50_000)) * 1e-3
+        figures.add(type(chunk)(t, *tables, np.full(50_000, 3, np.int32), chunk.axes))
+    assert len(json.dumps([figures.over_time(), figures.tool_path()])) < 5_000_000
+    assert len(numbers(figures.tool_path()["x"])) <= 60_000
+
+
+def test_numbers_are_packed_as_little_endian_32_bit() -> None:
+    assert numbers(packed(np.array([1.5, -2.0]))).tolist() == [1.5, -2.0]
+    assert numbers(packed(np.array([7, -8]))).tolist() == [7, -8]
+
+
+def test_axes_that_turn_have_curves_but_no_place_on_the_tool_path(square: Any, tmp_path: Path) -> None:
+    square.problem = replace(square.problem, path=replace(square.path, axes=("A", "Z", "C")))
+    data = data_of(page(square, tmp_path / "report.html"))
+    assert data["axes"] == ["A", "Z", "C"]
+    assert len(data["time"]["velocity"]) == 3
+    assert numbers(data["path"]["x"]).max() == 0.0
+    assert numbers(data["path"]["z"]).max() == 20.0

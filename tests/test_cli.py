@@ -1,0 +1,305 @@
+"""The command line: results on standard output, everything else on standard error, and the exit codes."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+from feedplan.cli import main
+from feedplan.errors import InfeasibleError, MissingPackageError, ProgramError, SolverError
+from feedplan.machine.machine import bundled_machines
+from feedplan.outputs import formats
+
+
+@pytest.fixture
+def planned(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """Replaces the planner by one that returns or raises `result` and keeps its arguments."""
+    box: dict[str, Any] = {}
+
+    def fake(program: str, machine: Any, **options: Any) -> Any:
+        box.update(program=program, machine=machine, **options)
+        if isinstance(box["result"], BaseException):
+            raise box["result"]
+        return box["result"]
+
+    module = ModuleType("feedplan.plan")
+    module.plan = fake  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "feedplan.plan", module)
+    return box
+
+
+def test_a_plan_prints_its_result_and_nothing_else(planned: Any, square: Any, capsys: Any) -> None:
+    planned["result"] = square
+    assert main(["plan", "a.ngc", "--machine", "router"]) == 0
+    out, err = capsys.readouterr()
+    rows = dict(line.split(None, 1) for line in out.splitlines() if not line.startswith("lower"))
+    assert rows["time"] == "2.000 s"
+    assert rows["length"] == "80.000 mm, mean 40 mm/s (2400 mm/min)"
+    assert rows["audit"] == "passed, 2001 samples, nearest X acceleration 100.00 %"
+    assert err == ""
+
+
+def test_all_options_reach_the_planner(planned: Any, square: Any) -> None:
+    planned["result"] = square
+    options = "--tolerance 0.02 --feed 80 --feed-override 1.5 --period 0.002 --start-speed 1 --end-speed 0"
+    assert main(["plan", "a.ngc", "-m", "tarus", "--method", "bang-bang", *options.split()]) == 0
+    assert planned["machine"].name == "tarus"
+    names = ("program", "method", "tolerance", "feed", "feed_override", "period", "start_speed", "end_speed")
+    assert [planned[name] for name in names] == ["a.ngc", "bang-bang", 0.02, 80, 1.5, 0.002, 1, 0]
+
+
+def test_json_is_the_summary_and_warnings_go_to_the_other_stream(
+    planned: Any, square: Any, capsys: Any
+) -> None:
+    square.warnings = ("line 3: slow",)
+    planned["result"] = square
+    assert main(["plan", "a.ngc", "--json"]) == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out)["time"] == 2.0
+    assert err == "warning: line 3: slow\n"
+
+
+def test_quiet_prints_nothing(planned: Any, square: Any, capsys: Any) -> None:
+    square.warnings = ("line 3: slow",)
+    planned["result"] = square
+    assert main(["plan", "a.ngc", "-q"]) == 0
+    assert capsys.readouterr() == ("", "")
+
+
+def test_the_folder_is_written_and_named(planned: Any, square: Any, tmp_path: Path, capsys: Any) -> None:
+    planned["result"] = square
+    assert main(["plan", "a.ngc", "-o", str(tmp_path / "out"), "--format", "csv", "--format", "npz"]) == 0
+    files = ["plan.json", "report.html", "setpoints.csv", "setpoints.npz"]
+    assert sorted(entry.name for entry in (tmp_path / "out").iterdir()) == files
+    assert str(tmp_path / "out" / "report.html") in capsys.readouterr().out
+
+
+def test_setpoints_of_an_earlier_plan_are_pointed_out(
+    planned: Any, square: Any, tmp_path: Path, capsys: Any
+) -> None:
+    planned["result"] = square
+    assert main(["plan", "a.ngc", "-o", str(tmp_path), "--format", "csv"]) == 0
+    assert main(["plan", "a.ngc", "-o", str(tmp_path)]) == 0
+    assert capsys.readouterr().err == f"warning: {tmp_path / 'setpoints.csv'} is of an earlier plan\n"
+
+
+def test_a_broken_limit_is_written_reported_and_exits_1(
+    planned: Any, broken_square: Any, tmp_path: Path, capsys: Any
+) -> None:
+    planned["result"] = broken_square
+    assert main(["plan", "a.ngc", "-o", str(tmp_path)]) == 1
+    out, err = capsys.readouterr()
+    assert "FAILED, 1 of 2 limits broken" in out
+    assert err == f"error: the audit failed: {broken_square.verdict.failures[0]}\n"
+    assert "Audit FAILED" in (tmp_path / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "sentence"),
+    [
+        (InfeasibleError("line 4: no profile ends\nat 120 mm/s"), 1, "line 4: no profile ends at 120 mm/s"),
+        (SolverError("gave up"), 1, "gave up"),
+        (ProgramError("a.ngc, line 2: 'Q' is unknown", 2), 2, "a.ngc, line 2: 'Q' is unknown"),
+        (MissingPackageError("pip install toppra"), 2, "pip install toppra"),
+        (MemoryError(), 2, "the memory of this computer does not suffice: split the program"),
+        (KeyboardInterrupt(), 130, "interrupted"),
+    ],
+)
+def test_each_error_is_one_sentence_and_writes_nothing(
+    error: BaseException, code: int, sentence: str, planned: Any, tmp_path: Path, capsys: Any
+) -> None:
+    planned["result"] = error
+    assert main(["plan", "a.ngc", "-o", str(tmp_path / "out")]) == code
+    out, err = capsys.readouterr()
+    assert (out, err.strip()) == ("", f"error: {sentence}")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_defect_is_named_as_one_and_the_traceback_is_there_for_the_asking(
+    planned: Any, capsys: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    planned["result"] = IndexError("7")
+    monkeypatch.delenv("FEEDPLAN_TRACEBACK", raising=False)
+    assert main(["plan", "a.ngc"]) == 70
+    err = capsys.readouterr().err
+    assert err.startswith("error: this is a defect in feedplan (IndexError: 7): please report it")
+    assert "FEEDPLAN_TRACEBACK=1" in err
+    monkeypatch.setenv("FEEDPLAN_TRACEBACK", "1")
+    with pytest.raises(IndexError):
+        main(["plan", "a.ngc"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["plan"], "Missing argument 'PROGRAM' (`feedplan plan --help` shows the usage)"),
+        (["plan", "a", "b"], "unexpected extra argument"),
+        (["plan", "a", "--feed", "nan"], "nan: give a number > 0"),
+        (["plan", "a", "--feed", "0"], "0: give a number > 0"),
+        (["plan", "a", "--start-speed", "-1"], "-1: give a number ≥ 0"),
+        (["plan", "a", "--period", "soon"], "'soon' is not a number"),
+        (["plan", "a", "--method", "magic"], "'magic' is not"),
+        (["plan", "a", "--format", "xml"], "'xml' is not one of"),
+        (["plan", "a", "--format", "csv"], "--format needs a folder"),
+        (["plan", "a", "--machine", "toaster"], "there is no bundled machine 'toaster'"),
+        (["plan", "a", "-o", __file__], "test_cli.py is a file, not a folder"),
+        (["machines", "toaster"], "there is no bundled machine 'toaster'"),
+        (["plna"], "No such command 'plna'"),
+    ],
+)
+def test_bad_usage_is_one_sentence_and_exits_2(arguments: list[str], words: str, capsys: Any) -> None:
+    assert main(arguments) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith("error: ")
+    assert words in err
+    assert err.count("\n") == 1
+
+
+SQUARE = "G21 G90\nG61\nF3000\nG1 X20\nG1 Y20\nG1 X0\nG1 Y0\nM2\n"
+
+
+@pytest.fixture
+def program(tmp_path: Path) -> Path:
+    file = tmp_path / "square.ngc"
+    file.write_text(SQUARE)
+    return file
+
+
+def test_a_program_is_planned_and_its_folder_checked(program: Path, tmp_path: Path, capsys: Any) -> None:
+    out = tmp_path / "out"
+    assert main(["plan", str(program), "-m", "router", "-o", str(out), "--json"]) == 0
+    printed, warned = capsys.readouterr()
+    summary = json.loads(printed)
+    # Four sides of 20 mm at 50 mm/s and 500 mm/s², with a stop at every corner.
+    assert summary["time"] == pytest.approx(2.0, abs=1e-9)
+    assert summary["length"] == pytest.approx(80.0)
+    assert summary["audit"]["ok"]
+    assert summary["compute"]["sample"] > 0
+    assert json.loads((out / "plan.json").read_text()) == summary
+    assert warned == ""
+
+    assert main(["check", str(out)]) == 0
+    assert "X acceleration" in capsys.readouterr().out
+    assert main(["check", str(out), "--machine", "mill", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["ok"] is True
+    assert main(["check", str(out / "setpoints.npz"), "--machine", "tarus"]) == 1
+    out_text, err = capsys.readouterr()
+    assert "BROKEN" in out_text
+    assert err.startswith("error: the audit failed: ")
+
+
+def test_every_format_passes_the_check(program: Path, tmp_path: Path) -> None:
+    for name in formats():
+        folder = tmp_path / name
+        assert main(["plan", str(program), "-m", "router", "-o", str(folder), "--format", name, "-q"]) == 0
+        assert main(["check", str(folder / f"setpoints.{name}")]) == 0
+
+
+def test_a_check_without_a_machine_asks_for_one(program: Path, tmp_path: Path, capsys: Any) -> None:
+    main(["plan", str(program), "-o", str(tmp_path / "out"), "-q"])
+    (tmp_path / "out" / "plan.json").unlink()
+    assert main(["check", str(tmp_path / "out")]) == 2
+    assert capsys.readouterr().err.endswith("names no machine: give the machine with --machine\n")
+
+
+def test_fit_tells_what_became_of_the_points(program: Path, capsys: Any) -> None:
+    assert main(["fit", str(program)]) == 0
+    assert "4 pieces in 4 runs" in capsys.readouterr().out
+    assert main(["fit", str(program), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["pieces"] == 4
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"\x00\x01\xff\xfe",
+        b"G1 X",
+        b"G1 Xnan\n",
+        b"M2\n",
+        b"(only a comment)\n",
+        b"G1 X1e400 F100\n",
+        None,
+    ],
+)
+@pytest.mark.parametrize("command", ["plan", "fit"])
+def test_a_program_that_is_none_is_one_sentence_and_writes_nothing(
+    command: str, content: bytes | None, tmp_path: Path, capsys: Any
+) -> None:
+    file = tmp_path / "a.ngc"
+    if content is not None:
+        file.write_bytes(content)
+    out = tmp_path / "out"
+    assert main([command, str(file), *(["-o", str(out)] if command == "plan" else [])]) == 2
+    printed, err = capsys.readouterr()
+    assert printed == ""
+    assert err.startswith("error: ")
+    assert "a.ngc" in err
+    assert err.count("\n") == 1
+    assert not out.exists()
+
+
+def test_an_end_speed_out_of_reach_exits_1(program: Path, tmp_path: Path, capsys: Any) -> None:
+    arguments = ["plan", str(program), "-m", "router", "--end-speed", "999", "-o", str(tmp_path / "out")]
+    assert main(arguments) == 1
+    assert "999" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_no_command_shows_the_help_and_exits_2(capsys: Any) -> None:
+    assert main([]) == 2
+    assert "Commands:" in capsys.readouterr().err
+
+
+def test_help_and_version_exit_0(capsys: Any) -> None:
+    assert main(["--help"]) == 0
+    assert main(["plan", "-h"]) == 0
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out.splitlines()[-1].startswith("feedplan ")
+
+
+def test_machines_lists_every_one_and_shows_each(capsys: Any) -> None:
+    assert main(["machines"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines[1:]] == list(bundled_machines())
+    assert main(["machines", "tarus"]) == 0
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()[1:]]
+    assert rows == [
+        ["X", "170", "400", "4000", "-"],
+        ["Y", "180", "600", "6000", "-"],
+        ["Z", "240", "2000", "20000", "-"],
+    ]
+
+
+MAIN = "import sys; from feedplan.cli import main; sys.exit(main())"
+
+
+def run(*arguments: str, **more: Any) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", MAIN, *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False, **more)
+
+
+def test_a_terminal_that_knows_no_unicode_gets_what_it_can_show() -> None:
+    done = run("machines", env={**os.environ, "PYTHONIOENCODING": "ascii"})
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "mm/s?" in done.stdout
+
+
+def test_a_reader_that_goes_away_is_no_error() -> None:
+    shell = f"{sys.executable} -c '{MAIN}' machines | true"
+    done = subprocess.run(["sh", "-c", shell], capture_output=True, text=True, check=False)
+    assert done.stderr == ""
+
+
+def test_nothing_slow_is_imported_for_the_help() -> None:
+    code = "import sys, feedplan.cli; print({'plotly', 'rich', 'scipy', 'toppra'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "set()\n"

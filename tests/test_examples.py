@@ -1,0 +1,180 @@
+"""Every script in examples/ runs, and the programs they write are what they say."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+SCRIPTS = sorted(path.name for path in EXAMPLES.glob("*.py"))
+
+
+def load(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def moves(text: str, words: str) -> NDArray[np.float64]:
+    """The numbers of the lines that hold all of `words`, one row each."""
+    pattern = ".*".join(
+        rf"\b{word}(-?[\d.]+)" if i == 0 else rf"{word}(-?[\d.]+)" for i, word in enumerate(words)
+    )
+    found = [re.search(pattern, line) for line in text.splitlines()]
+    return np.array([[float(number) for number in match.groups()] for match in found if match])
+
+
+@pytest.mark.parametrize("script", SCRIPTS)
+def test_the_script_runs_and_writes_below_out(script: str, tmp_path: Path) -> None:
+    if "matplotlib" in (EXAMPLES / script).read_text(encoding="utf-8"):
+        pytest.importorskip("matplotlib")
+    environment = dict(os.environ, PYTHONWARNINGS="error", MPLCONFIGDIR=str(tmp_path / "matplotlib"))
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLES / script)],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert done.stdout.strip()
+    written = [path for path in (tmp_path / "out").rglob("*") if path.is_file()]
+    assert written
+    assert all(path.stat().st_size > 0 for path in written)
+
+
+@pytest.mark.parametrize("name", ["vase", "lettering", "head"])
+@pytest.mark.parametrize("blocks", [500, 5000, 20_000])
+def test_a_program_has_about_as_many_blocks_as_asked(name: str, blocks: int) -> None:
+    text = load(name).program(blocks)
+    assert text.count("\n") == pytest.approx(blocks, rel=0.12, abs=60)
+
+
+@pytest.mark.parametrize("name", ["vase", "lettering", "head"])
+def test_a_program_is_the_same_every_time_and_complete(name: str) -> None:
+    text = load(name).program(1000)
+    assert text == load(name).program(1000)
+    lines = text.splitlines()
+    assert (lines[0], lines[-2], lines[-1]) == ("%", "M30", "%")
+    assert lines[1].startswith("(")
+    words = " ".join(line for line in lines if not line.startswith("(")).split()
+    assert {"G21", "G90", "G17", "M3", "M5"} <= set(words)
+    assert any(word.startswith("F") for word in words)
+    assert any(word.startswith("S") for word in words)
+
+
+def test_a_vase_pass_has_486_points_in_one_plane() -> None:
+    vase = load("vase")
+    text = vase.program(3 * 486)
+    passes = re.split(r"\(pass \d+\)\n", text)[1:]
+    assert len(passes) == 3
+    for number, block in enumerate(passes):
+        points = moves(block, "YZ")
+        assert points.shape == (486, 2)
+        assert len(moves(block, "X")) == 1, "x moves only on the way to the pass"
+        direction = np.sign(np.diff(points[:, 0]))
+        assert np.all(direction == (1.0 if number % 2 == 0 else -1.0))
+
+
+def test_a_vase_pass_has_creases_and_smooth_stretches_between_them() -> None:
+    points = load("vase").pass_points(0.0)
+    edges = np.diff(points, axis=0)
+    turn = np.abs(np.diff(np.arctan2(edges[:, 1], edges[:, 0])))
+    curvature = turn / (0.5 * np.linalg.norm(points[2:] - points[:-2], axis=1))
+    # Zhang's equation 2 with α = 4 at 100 mm/s and the two axes' accelerations together.
+    threshold = 4.0 * math.hypot(3000.0, 1000.0) / 100.0**2
+    creases = np.count_nonzero(curvature > threshold)
+    assert 25 <= creases <= 70, "each crease shows at one point or two"
+    assert np.median(curvature) < 0.4 * threshold
+
+
+def test_the_passes_of_a_vase_never_leave_its_field() -> None:
+    vase = load("vase")
+    assert np.allclose(vase.planes(3, 0.1), [-0.1, 0.0, 0.1])
+    many = vase.planes(100_000, 0.1)
+    assert many[0] == pytest.approx(-vase.HALF_WIDTH)
+    assert many[-1] == pytest.approx(vase.HALF_WIDTH)
+    assert vase.height(vase.HALF_WIDTH, np.linspace(0.0, vase.LENGTH, 500)).max() == 0.0
+
+
+def test_arcs_of_the_lettering_end_on_their_circles() -> None:
+    lettering = load("lettering")
+    text = lettering.program(2000, text="".join(lettering.FONT))
+    x = y = 0.0
+    arcs = 0
+    for line in text.splitlines():
+        words = {word[0]: float(word[1:]) for word in line.split() if word[0] in "XYIJ"}
+        target = words.get("X", x), words.get("Y", y)
+        if "I" in words:
+            arcs += 1
+            middle = x + words["I"], y + words["J"]
+            radius = math.hypot(words["I"], words["J"])
+            assert math.dist(middle, target) == pytest.approx(radius, abs=2e-4)
+        x, y = target
+    assert arcs > 100
+
+
+def test_a_half_circle_and_a_quarter_have_their_centres_by_hand() -> None:
+    lettering = load("lettering")
+    assert lettering.centre((0.0, 0.0), (2.0, 0.0), 1.0) == pytest.approx((1.0, 0.0))
+    # Counter-clockwise from (1, 0) to (0, 1): about the origin.
+    assert lettering.centre((1.0, 0.0), (0.0, 1.0), math.tan(math.pi / 8)) == pytest.approx((0.0, 0.0))
+    assert lettering.centre((0.0, 1.0), (1.0, 0.0), -math.tan(math.pi / 8)) == pytest.approx((0.0, 0.0))
+
+
+def test_the_tool_is_up_on_every_rapid_of_the_lettering() -> None:
+    z = math.inf
+    for line in load("lettering").program(1000).splitlines():
+        match = re.search(r"Z(-?[\d.]+)", line)
+        if line.startswith("G0") and not match:
+            assert z > 0.0
+        z = float(match.group(1)) if match else z
+
+
+def test_letters_that_the_font_lacks_are_refused() -> None:
+    with pytest.raises(ValueError, match="FEED!"):
+        load("lettering").program(100, text="feed!")
+
+
+def test_blocks_of_the_head_are_as_long_as_their_curvature_allows() -> None:
+    head = load("head")
+    points = head.pass_points(0.3, 0.002)
+    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    assert lengths.min() >= 0.9 * 0.05
+    assert lengths.max() <= 1.001
+    assert lengths.max() > 5.0 * lengths.min()
+    # The chord error: from the middle of a block across to the path that the points lie on.
+    path = head.tool_tip(0.3, np.linspace(points[0, 1], points[-1, 1], 20_000))
+    middle = 0.5 * (points[1:] + points[:-1])
+    beside = np.column_stack([np.interp(middle[:, 1], path[:, 1], path[:, k]) for k in range(3)])
+    along = np.diff(points, axis=0) / lengths[:, None]
+    error = np.linalg.norm(np.cross(beside - middle, along), axis=1)
+    assert error.max() <= 1.1 * 0.002
+    assert np.median(error) >= 0.4 * 0.002
+
+
+def test_the_ball_does_not_gouge_the_head() -> None:
+    head = load("head")
+    for x in np.linspace(-0.5 * head.WIDTH, 0.5 * head.WIDTH, 30):
+        points = head.pass_points(float(x), 0.002)
+        assert np.all(np.diff(points[:, 1]) > 0.0), "a gouge would turn the pass back"
+
+
+def test_the_head_moves_all_three_axes() -> None:
+    points = moves(load("head").program(2000), "XYZ")
+    assert np.all(np.mean(np.abs(np.diff(points, axis=0)) > 0.0, axis=0) > 0.8)

@@ -1,0 +1,61 @@
+"""The folder of a plan: whole, exact, and never half-written."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from feedplan import files
+from feedplan.errors import InputError
+from feedplan.files import write_plan
+from feedplan.outputs import formats, load_setpoints
+
+
+def test_a_folder_holds_summary_setpoints_and_report(square: Any, tmp_path: Path) -> None:
+    stages: list[tuple[str, float]] = []
+    written = write_plan(square, tmp_path / "out", progress=lambda stage, done: stages.append((stage, done)))
+    assert [file.name for file in written] == ["plan.json", "report.html", "setpoints.npz"]
+    assert all(file.is_file() for file in written)
+    assert sorted(entry.name for entry in (tmp_path / "out").iterdir()) == [file.name for file in written]
+    summary = json.loads((tmp_path / "out" / "plan.json").read_text())
+    assert summary["time"] == 2.0
+    assert summary["audit"]["jerk"] is None
+    assert stages[-1] == ("write", 1.0)
+    assert [done for _, done in stages] == sorted(done for _, done in stages)
+
+
+@pytest.mark.parametrize("name", formats())
+def test_the_setpoints_are_the_plans_in_every_format(name: str, square: Any, tmp_path: Path) -> None:
+    write_plan(square, tmp_path, [name])
+    read = load_setpoints(tmp_path)
+    np.testing.assert_array_equal(read.position, square.chunk.position)
+    np.testing.assert_array_equal(read.line, square.chunk.line)
+
+
+def test_all_formats_at_once_and_each_only_once(square: Any, tmp_path: Path) -> None:
+    written = write_plan(square, tmp_path, [*formats(), *formats()])
+    assert len(written) == 2 + len(formats())
+
+
+def test_a_failure_while_writing_leaves_nothing(
+    square: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("feedplan.report.page.write_report", lambda *_, **__: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        write_plan(square, tmp_path / "out")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_in_the_way_is_seen_before_any_work(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="is a file, not a folder"):
+        write_plan(object(), tmp_path / "file")  # type: ignore[arg-type]
+
+
+def test_numbers_of_numpy_are_plain_in_the_summary() -> None:
+    text = files.summary_text({"a": np.float64(0.1), "b": [np.int32(3), (float("nan"),)], "c": {"µ": True}})
+    assert json.loads(text) == {"a": 0.1, "b": [3, [None]], "c": {"µ": True}}
