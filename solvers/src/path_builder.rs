@@ -297,7 +297,8 @@ fn reach<'a, const M: usize>(
     length.min(station)
 }
 
-/// The first position outside the travel: of arcs as programmed, of everything else as followed.
+/// The first position outside the travel: of the moves as programmed, and of the path, whose arcs may be as far
+/// beyond as they deviate.
 fn outside<const M: usize>(
     parts: &[Vec<Followed<M>>],
     moves: &Moves<M>,
@@ -319,6 +320,9 @@ fn outside<const M: usize>(
             None
         }
     };
+    let targets = moves.target.par_iter().enumerate().find_map_first(|(index, target)| {
+        (0..M).find_map(|axis| beyond(index, axis, (target[axis], target[axis]), 0.0))
+    });
     let arcs = moves.arcs.par_iter().find_map_first(|&(index, shape)| {
         shape.plane.iter().find_map(|&axis| beyond(index, axis, moves.arc_extent(index, axis)?, 0.0))
     });
@@ -329,7 +333,7 @@ fn outside<const M: usize>(
             (0..M).find_map(|axis| beyond(index, axis, extent(&followed.piece, axis), bulge))
         })
     });
-    [arcs, curves].into_iter().flatten().min_by_key(|place| place.index)
+    [targets, arcs, curves].into_iter().flatten().min_by_key(|place| place.index)
 }
 
 /// Least and greatest value of an axis on a piece.
