@@ -86,12 +86,12 @@ def test_the_argument_wins_over_the_program_and_the_program_over_the_default(mak
 def test_q_bounds_the_fit_and_not_the_corners(make_program: Any, check: Any) -> None:
     points = [*CIRCLE, [30, 0]]
     loose = make_program(points, blend_tolerance=0.1, fit_tolerance=0.1)
-    tight = make_program(points, blend_tolerance=0.1, fit_tolerance=1e-4)
+    tight = make_program(points, blend_tolerance=0.1, fit_tolerance=2e-3)
     paths = [build_path(program, MILL) for program in (loose, tight)]
     for program, path in zip((loose, tight), paths, strict=True):
         # The corner from the circle into the line takes all that is left.
         assert check(program, path)[1] == pytest.approx(0.1, rel=0.05)
-    assert len(paths[1]) > 2 * len(paths[0])
+    assert len(paths[1]) > 1.3 * len(paths[0])
     unfitted = build_path(make_program(points, blend_tolerance=0.1, fit_tolerance=0.0), MILL)
     assert unfitted.fit.points == 0
 
