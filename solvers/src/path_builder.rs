@@ -8,7 +8,7 @@
 
 use rayon::prelude::*;
 
-use crate::corner::{between, share_lengths, Jump, Sides};
+use crate::corner::{cut, share_lengths, Jump, Sides};
 use crate::follow::{follow, FollowError, FollowOptions, Followed, FollowedProgram, Moves};
 use crate::quadratic::Quadratic;
 
@@ -175,17 +175,50 @@ impl<'a, const M: usize> Stretches<'a, M> {
         reach(forwards, jump, exact, reach(backwards, jump, exact, wanted))
     }
 
+    /// Where piece `i` of stretch `k` ends.
+    fn end_station(&self, k: usize, i: usize) -> f64 {
+        if i + 1 < self.joints[k + 1].at {
+            self.station[i + 1]
+        } else {
+            self.length[k]
+        }
+    }
+
+    /// The piece of stretch `k` at a station.
+    fn piece_at(&self, k: usize, station: f64) -> usize {
+        let (start, end) = (self.joints[k].at, self.joints[k + 1].at);
+        start + self.station[start..end].partition_point(|&other| other <= station).max(1) - 1
+    }
+
+    /// A cut at a station of stretch `k`, moved to the end of a piece that is next to it, so that no sliver is
+    /// left. Both corners that touch in a cut move it alike, and none loses a side by it.
+    fn snapped(&self, k: usize, station: f64) -> f64 {
+        const NEXT: f64 = 1e-6;
+        const SMALL: f64 = 1e-3;
+        let i = self.piece_at(k, station);
+        let (from, to) = (self.station[i], self.end_station(k, i));
+        let near = (NEXT * (to - from)).min(SMALL * station.min(self.length[k] - station));
+        if station - from <= near {
+            from
+        } else if to - station <= near {
+            to
+        } else {
+            station
+        }
+    }
+
     /// Stretch `k` between two stations.
     fn region(&self, k: usize, from: f64, to: f64, pieces: &mut Vec<Followed<M>>) {
-        let (start, end) = (self.joints[k].at, self.joints[k + 1].at);
-        let first = start + self.station[start..end].partition_point(|&station| station <= from).max(1) - 1;
-        for i in first..end {
-            let station = self.station[i];
-            if station >= to {
+        for i in self.piece_at(k, from)..self.joints[k + 1].at {
+            let (start, end) = (self.station[i], self.end_station(k, i));
+            if start >= to {
                 break;
             }
-            if let Some(piece) = between(&self.pieces[i].piece, from - station, to - station) {
-                pieces.push(Followed { piece, ..self.pieces[i] });
+            let piece = &self.pieces[i].piece;
+            let low = if from <= start { 0.0 } else { from - start };
+            let high = if to >= end { piece.width } else { to - start };
+            if from < end && low < high {
+                pieces.push(Followed { piece: cut(piece, low, high), ..self.pieces[i] });
             }
         }
     }
@@ -209,6 +242,7 @@ impl<'a, const M: usize> Stretches<'a, M> {
             if cuts.before - length[k - 1] <= TOUCHING * self.length[k - 1] {
                 cuts.before = length[k - 1];
             }
+            cuts = Cuts { before: self.snapped(k - 1, cuts.before), after: self.snapped(k, cuts.after) };
             self.cut_sides(k, cuts, sides);
             let excess = match sides.parabola(jump) {
                 Some(corner) => corner.deviation / corner.tolerance,
@@ -421,6 +455,35 @@ mod tests {
         for pair in pieces.windows(2) {
             assert_eq!(pair[0].piece.control[2], pair[1].piece.control[0]);
             assert!(Jump::new(&pair[0].piece, &pair[1].piece).unwrap().size < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_corner_far_shorter_than_its_sides_is_rounded_all_the_same() {
+        for (turn, tolerance) in [(1e-4, 1e-3), (1.5, 1e-5), (1.5, 1e-6)] {
+            let end = [100.0 + 100.0 * f64::cos(turn), 100.0 * f64::sin(turn)];
+            let (pieces, runs) = polyline(&[[0.0, 0.0], [100.0, 0.0], end], &[tolerance; 2], false, false);
+            assert_eq!((pieces.len(), &runs[..]), (3, &[0, 3][..]), "{turn} {tolerance}");
+            assert!(pieces[1].deviation <= tolerance * (1.0 + 1e-9));
+        }
+    }
+
+    #[test]
+    fn cuts_next_to_the_end_of_a_piece_leave_no_sliver() {
+        // A line of 10 mm in two pieces.
+        let points = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]];
+        let (lines, _) = polyline(&points, &[0.0; 2], false, false);
+        let side = [cut(&lines[0].piece, 0.0, 4.0), cut(&lines[0].piece, 4.0, 10.0), lines[1].piece]
+            .map(|piece| Followed { piece, ..lines[0] });
+        let stretches = Stretches::new(&side, &[false; 2]);
+        assert_eq!(stretches.length, [10.0, 10.0]);
+        for (station, moved) in [(4.0 + 1e-9, 4.0), (4.0 - 1e-9, 4.0), (4.1, 4.1), (1e-9, 1e-9)] {
+            assert_eq!(stretches.snapped(0, station), moved);
+            let (mut before, mut after) = (Vec::new(), Vec::new());
+            stretches.region(0, 0.0, moved, &mut before);
+            stretches.region(0, moved, f64::INFINITY, &mut after);
+            assert_eq!(before.last().unwrap().piece.control[2], after[0].piece.control[0]);
+            assert_eq!(before.len() + after.len(), if moved == 4.0 { 2 } else { 3 });
         }
     }
 
