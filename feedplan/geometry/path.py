@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,10 +13,10 @@ from numpy.typing import NDArray
 class FitSummary:
     """What fitting did: G1 `points` in, B-`splines` and `polynomials` out, `deviation` [mm] of the path.
 
-    `points` are the G1 moves of the chains that were fitted, lines that stayed lines among them; each of those
-    counts as a spline and a polynomial. `splines` and `polynomials` count what the fit made, before pieces are
-    cut at changes of feed and at corners. `deviation` is a certified upper bound of the distance between the
-    whole path (arcs and corners too) and the programmed one, both ways.
+    `points` are the G1 moves of the chains that were fitted, lines that stayed lines among them; each of
+    those counts as a spline and a polynomial. `splines` and `polynomials` count what the fit made, before
+    pieces are cut at changes of feed and at corners. `deviation` is a certified upper bound of the distance
+    between the whole path (arcs and corners too) and the programmed one, both ways.
     """
 
     points: int = 0
@@ -60,3 +61,8 @@ class Path:
 
     def __len__(self) -> int:
         return len(self.width)
+
+    @property
+    def pauses(self) -> float:
+        """Time of all pauses, before the first run and after each [s]."""
+        return self.start_dwell + math.fsum(self.dwell)

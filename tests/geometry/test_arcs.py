@@ -57,13 +57,23 @@ def test_a_helix_of_three_and_a_quarter_turns(make_program: Any, check: Any, nor
     assert path.width.sum() == pytest.approx(6.5 * math.pi * math.hypot(4, 1.5 / math.pi), rel=1e-12)
 
 
-@pytest.mark.parametrize("radius", [1e-3, 0.1, 100.0, 1e5])
+@pytest.mark.parametrize("radius", [1e-6, 1e-3, 0.1, 100.0, 1e6])
 def test_tiny_and_huge_radii(make_program: Any, check: Any, radius: float) -> None:
     for angle in (math.pi, 1e-2, 2 * math.pi):
         program = arc_program(make_program, radius, angle, 2)
         path = build_path(program, MILL)
         check(program, path)
         assert len(path) <= 2 + angle / (2 * min(math.pi / 8, (8 * 0.5e-3 / radius) ** 0.25))
+
+
+def test_a_helix_of_a_thousand_turns_ends_where_it_should(make_program: Any) -> None:
+    program = arc_program(make_program, 4.0, 2000 * math.pi, 2, rise=50.0)
+    path = build_path(program, MILL)
+    np.testing.assert_array_equal(path.runs, [0, len(path)])
+    np.testing.assert_array_equal(path.control_points[-1, 2], program.target[-1])
+    radius = np.hypot(*(path.control_points[:, 0, :2] - [1, 2]).T)
+    np.testing.assert_allclose(radius, 4.0, rtol=1e-9)
+    assert path.width.sum() == pytest.approx(2000 * math.pi * math.hypot(4, 0.025 / math.pi), rel=1e-9)
 
 
 def test_arcs_are_no_looser_than_the_tolerance(make_program: Any, check: Any) -> None:

@@ -116,3 +116,37 @@ def test_tiny_moves_and_far_origins(make_program: Any, check: Any, scale: float,
         points = origin + scale * np.cumsum(random.normal(size=(60, 3)), axis=0)
         program = make_program(points, control=control)
         check(program, build_path(program, MILL))
+
+
+def test_moves_shorter_than_a_picometre_are_followed(make_program: Any, check: Any) -> None:
+    points = [[0, 0], [10, 0], [10 + 1e-12, 0], [20, 0], [20, 1e-12], [20, 10]]
+    for control in (PathControl.TOLERANCE, PathControl.EXACT_PATH):
+        program = make_program(points, control=control)
+        check(program, build_path(program, MILL))
+
+
+@pytest.mark.parametrize("tolerance", [1.0, 100.0])
+def test_a_tolerance_larger_than_the_moves_is_kept_all_the_same(
+    make_program: Any, check: Any, tolerance: float
+) -> None:
+    points = np.cumsum(np.random.default_rng(4).normal(size=(60, 3)), axis=0)
+    for fit in (np.nan, 0.0):
+        program = make_program(points, blend_tolerance=tolerance, fit_tolerance=fit)
+        check(program, build_path(program, MILL))
+
+
+def test_a_closed_contour_starts_and_ends_at_rest_in_its_first_corner(make_program: Any, check: Any) -> None:
+    program = make_program([[0, 0], [10, 0], [5, 8], [0, 0]])
+    path = build_path(program, MILL)
+    check(program, path)
+    np.testing.assert_array_equal(path.runs, [0, 5])
+    np.testing.assert_array_equal(path.control_points[0, 0], path.control_points[-1, 2])
+
+
+def test_a_slight_turn_between_long_moves_is_no_stop(make_program: Any, check: Any) -> None:
+    # So little turn that the feed needs nanometres of a move of 100 mm.
+    for tolerance in (None, 1e-3, 1e-5):
+        program = make_program([[0, 0], [100, 0], [200, 0.01]], feed=1.0)
+        path = build_path(program, MILL, tolerance)
+        check(program, path)
+        np.testing.assert_array_equal(path.runs, [0, 3])

@@ -144,8 +144,11 @@ impl Timed<'_> {
         let from_anchor = here.motion.time_from_anchor(here.y);
         let time = if here.motion.anchored_at_end { end - from_anchor } else { start + from_anchor };
         let (mut from, mut until) = (time, time);
-        if u <= arcs.u0[arc] && arc == self.arcs_of(run).start && run > 0 {
-            from = self.clock.get(run - 1).map_or(time, |clock| clock + self.motion_time(run - 1));
+        if u <= arcs.u0[arc] && arc == self.arcs_of(run).start {
+            from = match run {
+                0 => 0.0,
+                _ => self.clock.get(run - 1).map_or(time, |clock| clock + self.motion_time(run - 1)),
+            };
         }
         if u >= arcs.u1[arc] && arc + 1 == self.arcs_of(run).end {
             until = self.clock.get(run + 1).copied().unwrap_or(end + path.dwell[run] + period);
@@ -185,16 +188,17 @@ impl Plan<'_> {
     /// over or, where the setpoints stand still on the stop for it, at the next of them.
     pub fn extend_clock<const M: usize>(&self, limits: &Limits<M>, rows: &[Row<M>], clock: &mut Vec<f64>) {
         let Some(profile) = &self.profile else { return };
-        if clock.is_empty() {
-            clock.push(0.0);
-        }
         while clock.len() + 1 < profile.arcs.runs.len() {
-            let run = clock.len() - 1;
-            let due = clock[run] + profile.motion_time(run) + self.path.dwell[run];
+            let (due, stop) = match clock.len().checked_sub(1) {
+                None => (self.path.start_dwell, self.start::<M>()),
+                Some(run) => {
+                    let piece = (self.path.runs[run + 1] as usize).max(1) - 1;
+                    let due = clock[run] + profile.motion_time(run) + self.path.dwell[run];
+                    (due, self.path.points::<M>(piece)[2])
+                }
+            };
             let slack = PASS_EXCESS * limits.period + ROUNDINGS * EPS * due;
             let next = rows.partition_point(|row| row.t < due - slack);
-            let piece = (self.path.runs[run + 1] as usize).max(1) - 1;
-            let stop = self.path.points::<M>(piece)[2];
             let magnitude = stop.iter().fold(0.0_f64, |most, q| most.max(q.abs()));
             let stands =
                 |row: &Row<M>| distance(&row.q, &stop) <= GAP_TOLERANCE + ROUNDINGS * EPS * magnitude;

@@ -53,6 +53,7 @@ struct PathArrays<'py> {
     moves: PyReadonlyArray2<'py, i64>,
     tolerance: PyReadonlyArray1<'py, f64>,
     runs: PyReadonlyArray1<'py, i64>,
+    start_dwell: f64,
     dwell: PyReadonlyArray1<'py, f64>,
 }
 
@@ -79,6 +80,7 @@ impl ProblemArrays<'_> {
             moves: path.moves.as_slice()?,
             tolerance: path.tolerance.as_slice()?,
             runs: path.runs.as_slice()?,
+            start_dwell: path.start_dwell,
             dwell: path.dwell.as_slice()?,
         };
         let pieces = followed.len();
@@ -370,7 +372,7 @@ fn compare(
             && runs.windows(2).all(|pair| pair[0] <= pair[1])
             && with_axes!(axes, M, Ok((0..arcs.len()).all(|i| !arcs.has_bad_numbers::<M>(i, &path))))?;
         if good {
-            starts = arcs.starts(path.dwell);
+            starts = arcs.starts(&path);
             usable = Some(profile.unbind());
         }
     }
