@@ -7,8 +7,8 @@
 //! bound below. All pieces being congruent, the derivative is continuous.
 //!
 //! Z interpolates f = (1 + τ²) atan τ at τ = −T cos(jπ/d), T = tan(θ/4). Where d is odd it does so at 0 too, both
-//! being odd. With n points in all |Z − f| ≤ max|f⁽ⁿ⁾|/n! · Tⁿ/2ᵈ⁻¹, and |atan⁽ᵐ⁾| ≤ (m − 1)! gives
-//! |f⁽ⁿ⁾|/n! ≤ (1 + T²)/n + 2T/(n − 1) + 1/(n − 2).
+//! being odd. With n points in all |Z − f| ≤ max|f⁽ⁿ⁾|/n! · Tⁿ/2ᵈ⁻¹, and f''' = 4/(1 + τ²)², whose poles ±i are
+//! not nearer than 1 to any real τ, gives |f⁽ⁿ⁾|/n! ≤ 2/(n(n − 2)), n ≥ 4.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -86,7 +86,7 @@ impl<const M: usize> Turn<M> {
     fn axial_error(&self, rise: f64, degree: usize, count: f64) -> f64 {
         let theta = self.sweep.abs() / count;
         let (t, n) = ((0.25 * theta).tan(), (degree + 1 + degree % 2) as f64);
-        let derivative = (1.0 + t * t) / n + 2.0 * t / (n - 1.0) + 1.0 / (n - 2.0);
+        let derivative = 2.0 / (n * (n - 2.0));
         rise / count * (2.0 / theta) * derivative * t.powf(n) / (degree as f64 - 1.0).exp2()
     }
 
@@ -259,7 +259,7 @@ mod tests {
             let rounding = 1e-13;
             assert!(worst <= bound + rounding, "degree {degree}: {worst:e}, bound {bound:e}");
             // The bound is not idle: the true error is within a small factor of it.
-            assert!(worst + rounding > 0.05 * bound, "degree {degree}: {worst:e}, bound {bound:e}");
+            assert!(worst + rounding > 0.2 * bound, "degree {degree}: {worst:e}, bound {bound:e}");
             let joint = JointTolerance { gap: 0.0, angle: 1e-12, derivative: 1e-12 };
             assert!(joints(&curve, false, &joint).iter().all(|joint| joint.kind >= Continuity::C1));
             let length = CurveLength::new(&curve, 1e-13).total();
