@@ -1,4 +1,4 @@
-"""Arrays as users give them to the geometry kernels: real numbers of the right shape, or a sentence why not."""
+"""Arrays as users give them to the geometry kernels: numbers of the right shape, or a sentence why not."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from feedplan._solvers import turn_pieces
 from feedplan.errors import InputError
 from feedplan.geometry._arrays import MAX_AXES, floats
-from feedplan.geometry.spline import CompositeCurve
+from feedplan.geometry.spline import MAX_DEGREE, CompositeCurve
 
 
 def arc(
@@ -56,6 +56,8 @@ def helix(
     """
     if not 0 < tolerance < math.inf:
         raise InputError(f"the tolerance of the helix is {tolerance} mm: give a positive number")
+    if degree not in range(3, MAX_DEGREE + 1):
+        raise InputError(f"the degree of the helix is {degree}: give 3 to {MAX_DEGREE}")
     rise = floats(travel, "the travel", 1)
     if len(rise) != np.size(start) or rise[list(plane)].any():
         raise InputError(

@@ -88,6 +88,7 @@ class CompositeCurve:
 
     def __post_init__(self) -> None:
         control, weights = points(self.control_points, self.weights)
+        check_control_points(control, weights, 1)
         offsets = np.ascontiguousarray(self.offsets, dtype=np.int64)
         width = floats(self.width, "widths", 1)
         if len(width) == 0 or len(offsets) != len(width) + 1:
@@ -111,7 +112,6 @@ class CompositeCurve:
             ~((width > 1e-60) & (width < 1e60)),
             lambda i: f"piece {i} has the width {width[i]}: widths must be positive and finite; correct it",
         )
-        check_control_points(control, weights, 1)
         for name, value in zip(
             ("control_points", "weights", "offsets", "width"), (control, weights, offsets, width), strict=True
         ):

@@ -21,7 +21,8 @@ fn winding(degree: usize, rational: bool) -> Spline<3> {
         })
         .collect();
     let knots = (0..points + degree + 1).map(|i| i.clamp(degree, points) as f64).collect();
-    let weights = if rational { (0..points).map(|i| 2f64.powf((1.7 * i as f64).sin())).collect() } else { vec![] };
+    let weights =
+        if rational { (0..points).map(|i| 2f64.powf((1.7 * i as f64).sin())).collect() } else { vec![] };
     Spline::new(degree, knots, control, weights).expect("a checked spline")
 }
 

@@ -57,7 +57,8 @@ fn with_count<const M: usize, const N: usize>(piece: &Piece<M>, u: f64) -> [[f64
 /// De Casteljau's triangle: its last four rows hold the value and the derivatives by t.
 #[inline(always)]
 fn triangle<const M: usize, const N: usize>(b: &mut [[f64; M]; N], count: usize, t: f64) -> [[f64; M]; 4] {
-    let d = (count - 1) as f64;
+    // Weights far apart keep their digits in this form of the mean, which takes no differences.
+    let (d, s) = ((count - 1) as f64, 1.0 - t);
     let mut out = [[0.0; M]; 4];
     for left in (0..count).rev() {
         for k in 0..M {
@@ -75,7 +76,7 @@ fn triangle<const M: usize, const N: usize>(b: &mut [[f64; M]; N], count: usize,
         }
         for i in 0..left {
             for k in 0..M {
-                b[i][k] += t * (b[i + 1][k] - b[i][k]);
+                b[i][k] = s * b[i][k] + t * b[i + 1][k];
             }
         }
     }

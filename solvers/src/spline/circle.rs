@@ -107,7 +107,13 @@ impl<const M: usize> Turn<M> {
                 (true, 1) => (1.0, 0.0),
                 (true, 2) => (0.0, -1.0),
                 (true, _) => (-1.0, 0.0),
-                _ => (i * theta).sin_cos(),
+                _ => {
+                    // With what the product loses, or pieces far round would not be of one size.
+                    let angle = i * theta;
+                    let lost = i.mul_add(theta, -angle);
+                    let (sin, cos) = angle.sin_cos();
+                    (sin + lost * cos, cos - lost * sin)
+                }
             };
             let sin = if quarters { sin * theta.signum() } else { sin };
             [radius[0] * cos - radius[1] * sin, radius[0] * sin + radius[1] * cos]
