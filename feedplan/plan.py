@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -45,6 +44,7 @@ class Plan:
     compute: dict[str, float]
     interpolator: str = "sarfraz"
     warnings: tuple[str, ...] = field(default=())
+    _verdict: list[Audit] = field(default_factory=list, init=False, repr=False, compare=False)
 
     @property
     def path(self) -> Path:
@@ -67,14 +67,24 @@ class Plan:
             self.path, self.profile, period or self.machine.period, interpolator or self.interpolator
         )
 
-    @cached_property
-    def _audit(self) -> Audit:
-        with _timed(self.compute, "audit"):
-            return audit(self.problem, self.profile, self.machine, self.program, self.setpoints())
+    def audit(self, progress: Progress | None = None) -> Audit:
+        """The independent check of profile, geometry and setpoints; computed once.
 
-    def audit(self) -> Audit:
-        """The independent check of profile, geometry and setpoints; computed once."""
-        return self._audit
+        `progress("audit", done)` is called as it goes on.
+        """
+        if not self._verdict:
+            share = (lambda done: progress("audit", done)) if progress else None
+            with _timed(self.compute, "audit"):
+                verdict = audit(
+                    self.problem,
+                    self.profile,
+                    self.machine,
+                    self.program,
+                    self.setpoints(),
+                    progress=share,
+                )
+            self._verdict.append(verdict)
+        return self._verdict[0]
 
     def summary(self) -> dict[str, Any]:
         """What `plan.json` holds: plain numbers and strings."""

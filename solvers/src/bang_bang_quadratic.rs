@@ -9,7 +9,7 @@
 //! | file | idea |
 //! |---|---|
 //! | `piece` | straight or curved |
-//! | `split` | cut where an axis turns round or another velocity cap is the lowest |
+//! | `turns`, `split` | cut where an axis turns round, and where another velocity cap is the lowest |
 //! | `subpiece` | a part as a pass travels it |
 //! | `arc`, `curve` | p(x) of an arc, and where one rises above another |
 //! | `bang` | the arc of greatest acceleration and the event that ends it |
@@ -29,6 +29,7 @@ mod slide;
 mod split;
 mod straight;
 mod subpiece;
+mod turns;
 
 use rayon::prelude::*;
 

@@ -9,18 +9,18 @@
 //! sub-piece, so that at most M − 1 transitions follow one another and ties cannot loop.
 
 use super::arc::{along, Kind};
-use super::subpiece::{Axes, SubPiece};
+use super::subpiece::{Axes, SubPiece, NEAR_TURN};
 
 /// A_k − c_k p is zero below this part of A_k: the axis holds p where it is.
 const FLAT: f64 = 8.0 * f64::EPSILON;
-/// The same where the axis turns round. An arc begun closer below A_k/|c_k| would have no digits left in s; it
-/// would gain less than this part of p.
-const FLAT_AT_TURN: f64 = 1e-9;
+/// A step shorter than this part of the sub-piece does not survive being seen from its other end. At rest it would
+/// take its time all the same.
+const TIE: f64 = 4.0 * f64::EPSILON;
 
 /// How an arc ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
-    EndOfSubPiece,
+    EndOfArc,
     /// This axis takes over.
     Transition(usize),
     /// Another axis reaches −A: the velocity limit curve.
@@ -49,18 +49,18 @@ pub fn bang<const M: usize>(
     let (g, c) = (sub.tangent(x), &sub.bend);
     let s: [f64; M] = std::array::from_fn(|k| {
         let rest = axes.acceleration[k] - c[k] * p;
-        if g[k] == 0.0 {
-            if rest > FLAT_AT_TURN * axes.acceleration[k] {
-                f64::INFINITY
-            } else {
-                0.0
-            }
-        } else if rest.abs() > FLAT * axes.acceleration[k] {
-            rest / g[k]
+        if rest.abs() > FLAT * axes.acceleration[k] {
+            // An axis that does not move yet (g_k = 0, of either sign) is no control axis.
+            rest / g[k].abs()
         } else {
             0.0
         }
     });
+    if p > sub.flat * (1.0 - NEAR_TURN) {
+        if let Some(arc) = hold(sub, axes, x, p) {
+            return arc;
+        }
+    }
     let mut j = 0;
     for k in 1..M {
         if s[k] < s[j] {
@@ -77,12 +77,12 @@ pub fn bang<const M: usize>(
     loop {
         if s[j] == 0.0 {
             let kind = Kind::Flat(j as u8);
-            return Bang { kind, x1: sub.length, p1: p, event: Event::EndOfSubPiece };
+            return Bang { kind, x1: sub.length, p1: p, event: Event::EndOfArc };
         }
         let kind = Kind::Accelerating(j as u8);
         let twist = sub.twists(j);
         let mut first_y = f64::INFINITY;
-        let mut event = Event::EndOfSubPiece;
+        let mut event = Event::EndOfArc;
         for l in 0..M {
             let fall = twist[l] * s[j];
             if fall == 0.0 || (fall > 0.0 && !limit_curve) {
@@ -106,22 +106,47 @@ pub fn bang<const M: usize>(
             let cube = 1.0 - c[j] * y;
             if cube > 0.0 {
                 let root = cube.cbrt();
-                let x1 = x + g0 * y / (root * (1.0 + root + root * root));
-                if x1 > x && x1 < sub.length {
-                    return Bang { kind, x1, p1: along(sub, j, axes.acceleration[j], x, p, x1), event };
-                }
+                let step = g0 * y / (root * (1.0 + root + root * root));
+                let x1 = x + step;
+                let moves = step > TIE * sub.length && x1 > x;
                 match event {
-                    Event::Transition(l) if x1 <= x && ties < M && s[l].is_finite() => {
+                    _ if moves && x1 < sub.length => {
+                        return Bang { kind, x1, p1: along(sub, j, axes.acceleration[j], x, p, x1), event };
+                    }
+                    Event::Transition(l) if !moves && ties < M && s[l].is_finite() => {
                         j = l;
                         ties += 1;
                         continue;
                     }
-                    Event::LimitCurve if x1 <= x => return Bang { kind, x1: x, p1: p, event },
+                    Event::LimitCurve if !moves => return Bang { kind, x1: x, p1: p, event },
                     _ => {}
                 }
             }
         }
         let p1 = along(sub, j, axes.acceleration[j], x, p, sub.length);
-        return Bang { kind, x1: sub.length, p1, event: Event::EndOfSubPiece };
+        return Bang { kind, x1: sub.length, p1, event: Event::EndOfArc };
     }
+}
+
+/// Holds p where an axis has just turned and p is a little below A_k/|c_k|: an arc begun there would take its s from
+/// a difference without digits. It is begun when the axis has some speed; until then less than the part `NEAR_TURN`
+/// of p is given away, and soon regained.
+#[cold]
+fn hold<const M: usize>(sub: &SubPiece<M>, axes: &Axes<M>, x: f64, p: f64) -> Option<Bang> {
+    if p > sub.flat {
+        return None;
+    }
+    let g = sub.tangent(x);
+    let most = axes.most_moved(&g);
+    (0..M).find_map(|k| {
+        let (a, c) = (axes.acceleration[k], sub.bend[k]);
+        let enough = 2.0 * NEAR_TURN * most * a;
+        let rest = a - c * p;
+        let near = g[k] < 0.5 * enough && rest > FLAT * a && rest < NEAR_TURN * a;
+        near.then(|| {
+            let x1 = x + (enough - g[k]) / c;
+            let x1 = if x1 < sub.length { x1 } else { sub.length };
+            Bang { kind: Kind::Flat(k as u8), x1, p1: p, event: Event::EndOfArc }
+        })
+    })
 }

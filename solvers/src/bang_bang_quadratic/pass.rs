@@ -20,6 +20,8 @@ const ON_LIMIT_CURVE: f64 = 1e-10;
 /// Where a tangential contact is lost in rounding, the cap is followed with an acceleration too high by a part
 /// that grows from the first to the last of these until the contact is clear.
 const SLACK: [f64; 5] = [1e-14, 1e-13, 1e-12, 1e-11, 1e-10];
+/// An arc and its bound agree to this part where they cross.
+const MET: f64 = 1e-12;
 /// More events than this on one sub-piece cannot be: at most M − 1 transitions lie between two slides, and a
 /// slide ends at one of few roots.
 const MAX_EVENTS: u32 = 300;
@@ -36,14 +38,18 @@ pub fn backward<const M: usize>(
     mut p: f64,
     out: &mut Vec<Arc>,
 ) -> Result<f64, Stuck> {
-    for k in 0..M {
-        if sub.start[k] == 0.0 && sub.bend[k] != 0.0 {
-            p = p.min(axes.acceleration[k] / sub.bend[k].abs());
-        }
+    if p > sub.flat {
+        p = p.min(axes.limit_at_turns(&sub.start, &sub.bend));
     }
     let cap =
         [Arc { x0: 0.0, x1: sub.length, p0: sub.cap_at(0.0), p1: sub.cap_at(sub.length), kind: Kind::Cap }];
-    Pass::<M, true> { sub, axes, bounds: &cap, out, x: 0.0, p: p.min(cap[0].p0), line: OnceCell::new() }.run()
+    p = Pass::<M, true> { sub, axes, bounds: &cap, out, x: 0.0, p: p.min(cap[0].p0), line: OnceCell::new() }
+        .run()?;
+    // The arc that led here stays as it is: forward, p begins below it.
+    if p > sub.flat {
+        p = p.min(axes.limit_at_turns(&sub.end, &sub.bend));
+    }
+    Ok(p)
 }
 
 /// Forward over the sub-piece from p, under the arcs of K as the backward pass left them: appends the arcs of
@@ -161,7 +167,7 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
                 }
             }
             match arc.event {
-                Event::EndOfSubPiece => {}
+                Event::EndOfArc => {}
                 Event::Transition(axis) => control = Some(axis),
                 Event::LimitCurve => on_limit_curve = BACKWARD && self.x < length,
             }
@@ -221,7 +227,13 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
                 let limit = bound.curve(sub, axes, (a, bound_a), (b, bound_b));
                 if let Some(t) = curve.rises_above(&limit, contact) {
                     let x = a + (b - a) * t;
-                    return Some((x, bound.at(sub, axes, x)));
+                    let limit = bound.at(sub, axes, x);
+                    if (arc.at(sub, axes, x) - limit).abs() <= MET * limit {
+                        return Some((x, limit));
+                    }
+                    if let Some(found) = self.search(arc, &bound, a, b) {
+                        return Some(found);
+                    }
                 }
             }
             if b == arc.x1 {
@@ -230,6 +242,34 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
             (a, at_a) = (b, at_b);
             contact = 0;
             index += 1;
+        }
+    }
+
+    /// The same where the root has lost its digits, because an axis that hardly moves at a makes the curves too
+    /// uneven for one polynomial: by doubling steps from a, then by halving.
+    #[cold]
+    fn search(&self, arc: &Arc, bound: &Arc, a: f64, b: f64) -> Option<(f64, f64)> {
+        let above = |x: f64| arc.at(self.sub, self.axes, x) > bound.at(self.sub, self.axes, x);
+        let (mut below, mut step) = (a, (b - a) * f64::EPSILON);
+        let mut beyond = (a + step).min(b);
+        while !above(beyond) {
+            if beyond == b {
+                return None;
+            }
+            below = beyond;
+            step += step;
+            beyond = (a + step).min(b);
+        }
+        loop {
+            let middle = 0.5 * (below + beyond);
+            if middle <= below || middle >= beyond {
+                return Some((below, bound.at(self.sub, self.axes, below)));
+            }
+            if above(middle) {
+                beyond = middle;
+            } else {
+                below = middle;
+            }
         }
     }
 

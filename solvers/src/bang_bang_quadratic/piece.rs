@@ -5,8 +5,15 @@ use crate::quadratic::{dot, norm, Quadratic};
 
 /// Tangents whose cross product is below this part of the square of the longer one are parallel to rounding.
 const PARALLEL: f64 = 1e-15;
+/// A tangent shorter than this part of the other one is its rounding: it has no direction.
+const ROUNDING: f64 = 1e-13;
+/// Parallel tangents differ in direction by less, in rad.
+const ALIGNED: f64 = 1e-9;
 /// A piece is straight if bending it back changes no acceleration by more than this part of the least limit.
 const STRAIGHT: f64 = 1e-13;
+
+/// A tangent component this small beside the whole tangent and the component at the other end is zero.
+const ZERO: f64 = 1e-14;
 
 /// Tangents at the ends of a piece; the tangent is linear in t between them.
 #[derive(Clone, Copy)]
@@ -24,9 +31,17 @@ impl<const M: usize> Piece<M> {
     #[inline(always)]
     pub fn new(piece: &Quadratic<M>) -> Self {
         let [a, b, c] = &piece.control;
-        let left: [f64; M] = std::array::from_fn(|k| 2.0 * (b[k] - a[k]));
-        let right: [f64; M] = std::array::from_fn(|k| 2.0 * (c[k] - b[k]));
+        let mut left: [f64; M] = std::array::from_fn(|k| 2.0 * (b[k] - a[k]));
+        let mut right: [f64; M] = std::array::from_fn(|k| 2.0 * (c[k] - b[k]));
         let speed = [dot(&left, &left), dot(&left, &right), dot(&right, &right)];
+        let (left_zero, right_zero) = (ZERO * speed[0].sqrt(), ZERO * speed[2].sqrt());
+        for k in 0..M {
+            if left[k].abs() <= left_zero && left[k].abs() <= ZERO * right[k].abs() {
+                left[k] = 0.0;
+            } else if right[k].abs() <= right_zero && right[k].abs() <= ZERO * left[k].abs() {
+                right[k] = 0.0;
+            }
+        }
         // The sum of the squared 2 × 2 minors (Lagrange's identity): nothing cancels but within a minor.
         let mut twist_sq = 0.0;
         for j in 0..M {
@@ -36,6 +51,18 @@ impl<const M: usize> Piece<M> {
             }
         }
         Self { left, right, speed, twist: twist_sq.sqrt() }
+    }
+
+    /// The same with all its digits where the piece nearly has a cusp.
+    #[cold]
+    pub fn exact_twist(&self) -> f64 {
+        let mut twist: f64 = 0.0;
+        for j in 0..M {
+            for k in j + 1..M {
+                twist = twist.hypot(self.minor(j, k));
+            }
+        }
+        twist
     }
 
     /// The least D on the piece.
@@ -53,8 +80,11 @@ impl<const M: usize> Piece<M> {
     #[inline(always)]
     pub fn is_straight(&self, feed: f64, least_acceleration: f64) -> bool {
         let [d0, d1, d2] = self.speed;
-        if self.twist <= PARALLEL * d0.max(d2) {
-            return true;
+        let (shorter, longer) = (d0.min(d2), d0.max(d2));
+        if self.twist <= PARALLEL * longer {
+            // Where the shorter tangent has a direction, it must be that of the longer one.
+            return shorter <= ROUNDING * ROUNDING * longer
+                || self.twist * self.twist <= ALIGNED * ALIGNED * shorter * longer;
         }
         // The normal acceleration feed²/ρ, ρ = D^1.5/|W|, and the turn of the tangent.
         let least = d0.min(d1).min(d2);
@@ -65,13 +95,9 @@ impl<const M: usize> Piece<M> {
 
     /// The unit tangent at an end, at a cusp there its limit.
     pub fn direction(&self, at_right: bool) -> [f64; M] {
-        let (here, sign) = match (at_right, self.speed) {
-            (false, [0.0, ..]) => (&self.right, 1.0),
-            (false, _) => (&self.left, 1.0),
-            (true, [.., 0.0]) => (&self.left, 1.0),
-            (true, _) => (&self.right, 1.0),
-        };
-        let length = norm(here) * sign;
+        let other = if at_right { self.speed[2] == 0.0 } else { self.speed[0] == 0.0 };
+        let here = if at_right != other { &self.right } else { &self.left };
+        let length = norm(here);
         here.map(|value| value / length)
     }
 

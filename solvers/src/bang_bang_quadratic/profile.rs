@@ -2,8 +2,8 @@
 
 use super::arc::{Arc, Kind};
 use super::duration;
-use super::split::Part;
-use super::subpiece::{Axes, Cap, SubPiece};
+use super::split::{Part, Placed};
+use super::subpiece::{Axes, Cap};
 
 /// What is constant on an arc; the numbers are those of `feedplan.profile.ArcKind`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,6 +38,7 @@ pub struct Profile {
     pub duration: Vec<f64>,
     /// Offsets of the runs in the arcs.
     pub runs: Vec<i64>,
+    left_out: f64,
 }
 
 /// One row.
@@ -45,7 +46,8 @@ pub(super) struct Row {
     pub kind: ArcKind,
     pub axis: u8,
     pub value: f64,
-    pub t: [f64; 2],
+    /// t at the end; at the start it is that of the row before.
+    pub t: f64,
     pub p: [f64; 2],
     pub duration: f64,
     /// The arc goes on from the one before it if that has the same kind, axis and value.
@@ -67,6 +69,14 @@ impl Profile {
         self.duration.iter().sum()
     }
 
+    /// Closes a run.
+    pub(super) fn end_run(&mut self) {
+        let left_out = std::mem::take(&mut self.left_out);
+        if let Some(last) = self.duration.last_mut() {
+            *last += left_out;
+        }
+    }
+
     /// Appends the rows of another profile.
     pub(super) fn append(&mut self, mut other: Self) {
         self.piece.append(&mut other.piece);
@@ -80,24 +90,33 @@ impl Profile {
         self.duration.append(&mut other.duration);
     }
 
-    /// Appends an arc of piece number `piece`; t and p belong to the parameter t = u/width.
+    /// Appends an arc of piece number `piece`; t and p belong to the parameter t = u/width. An arc too short for u
+    /// to show it is left out, its time goes to the next one.
     #[inline(always)]
     pub(super) fn push(&mut self, piece: u32, width: f64, row: Row) {
-        let (u0, u1) = (row.t[0] * width, row.t[1] * width);
+        let last = self.piece.len().wrapping_sub(1);
+        let goes_on = last < self.piece.len() && self.piece[last] == piece;
+        let (u0, u1) = (if goes_on { self.u1[last] } else { 0.0 }, row.t * width);
+        let duration = row.duration + std::mem::take(&mut self.left_out);
         let scale = width * width;
         let (p0, p1) = (row.p[0] * scale, row.p[1] * scale);
+        if u1 <= u0 {
+            self.left_out = duration;
+            if goes_on {
+                self.p1[last] = p1;
+            }
+            return;
+        }
         let value = if row.kind == ArcKind::Chord { row.value * scale * width } else { row.value };
-        let last = self.piece.len().wrapping_sub(1);
         if row.joins
-            && last < self.piece.len()
-            && self.piece[last] == piece
+            && goes_on
             && self.kind[last] == row.kind as u8
             && self.axis[last] == row.axis
             && self.value[last] == value
         {
             self.u1[last] = u1;
             self.p1[last] = p1;
-            self.duration[last] += row.duration;
+            self.duration[last] += duration;
             return;
         }
         self.piece.push(piece);
@@ -108,7 +127,7 @@ impl Profile {
         self.u1.push(u1);
         self.p0.push(p0);
         self.p1.push(p1);
-        self.duration.push(row.duration);
+        self.duration.push(duration);
     }
 
     /// Appends the arcs of the forward pass over one part of a curved piece.
@@ -118,16 +137,14 @@ impl Profile {
         number: u32,
         width: f64,
         part: &Part,
-        sub: &SubPiece<M>,
+        placed: &Placed<M>,
         axes: &Axes<M>,
         arcs: &[Arc],
     ) {
+        let sub = &placed.sub;
         for arc in arcs {
-            let t = |x: f64| if x == sub.length { part.to } else { part.from + x };
-            let t = [t(arc.x0), t(arc.x1)];
-            if t[1] <= t[0] {
-                continue;
-            }
+            let t = |x: f64| if x == sub.length { placed.to } else { (placed.from + x).min(placed.to) };
+            let t = t(arc.x1);
             let step = arc.x1 - arc.x0;
             let mut joins = true;
             // The control axis moves at constant acceleration: its way over its mean speed.

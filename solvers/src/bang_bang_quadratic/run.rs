@@ -6,7 +6,7 @@ use super::piece::{Piece, Straight};
 use super::profile::Profile;
 use super::split::{Part, Splitter};
 use super::{Fault, Task};
-use crate::quadratic::dot;
+use crate::quadratic::{norm, sub};
 
 /// Two directions that differ by more than this at a cusp form a corner.
 const SMOOTH_TURN: f64 = 1e-9;
@@ -68,6 +68,7 @@ pub fn plan_run<const M: usize>(
         speed_sq = forward(task, i, &piece, speed_sq, space, out)?;
         previous = Some(piece);
     }
+    out.end_run();
     if speed_sq < end_sq * (1.0 - REACHED) {
         return Err(Fault::End { piece: last - 1, reachable: speed_sq.sqrt() });
     }
@@ -93,9 +94,9 @@ fn backward<const M: usize>(
     let mut p = speed_sq / piece.speed[2];
     for part in space.splitter.parts.iter().rev() {
         space.parts.push((*part, space.bounds.len() as u32));
-        let sub = part.sub_piece(piece, axes, true);
-        p = pass::backward(&sub, axes, p, &mut space.bounds)
-            .map_err(|Stuck(x)| Fault::Stuck { piece: i, u: (part.to - x) * task.pieces[i].width })?;
+        let placed = part.place(piece, axes, true);
+        p = pass::backward(&placed.sub, axes, p, &mut space.bounds)
+            .map_err(|Stuck(x)| Fault::Stuck { piece: i, u: (placed.to - x) * task.pieces[i].width })?;
     }
     Ok(p * piece.speed[0])
 }
@@ -128,12 +129,12 @@ fn forward<const M: usize>(
     let mut p = speed_sq / piece.speed[0];
     for _ in 0..parts {
         let Some((part, bounds)) = space.parts.pop() else { break };
-        let sub = part.sub_piece(piece, axes, false);
+        let placed = part.place(piece, axes, false);
         space.arcs.clear();
-        p = pass::forward(&sub, axes, p, &space.bounds[bounds as usize..], &mut space.arcs)
-            .map_err(|Stuck(x)| Fault::Stuck { piece: i, u: (part.from + x) * width })?;
+        p = pass::forward(&placed.sub, axes, p, &space.bounds[bounds as usize..], &mut space.arcs)
+            .map_err(|Stuck(x)| Fault::Stuck { piece: i, u: (placed.from + x) * width })?;
         space.bounds.truncate(bounds as usize);
-        out.push_arcs(number, width, &part, &sub, axes, &space.arcs);
+        out.push_arcs(number, width, &part, &placed, axes, &space.arcs);
     }
     Ok(p * piece.speed[2])
 }
@@ -141,9 +142,11 @@ fn forward<const M: usize>(
 /// The greatest v² where two pieces meet: the square of `limit`, and a stop in the corner of a cusp.
 #[inline(always)]
 fn junction<const M: usize>(before: &Piece<M>, after: &Piece<M>, limit: f64) -> f64 {
-    let cusp = before.speed[2] == 0.0 || after.speed[0] == 0.0;
-    if cusp && dot(&before.direction(true), &after.direction(false)) < 1.0 - 0.5 * SMOOTH_TURN * SMOOTH_TURN {
-        return 0.0;
+    if before.speed[2] == 0.0 || after.speed[0] == 0.0 {
+        let turn = norm(&sub(&before.direction(true), &after.direction(false)));
+        if turn > SMOOTH_TURN {
+            return 0.0;
+        }
     }
     limit * limit
 }

@@ -7,13 +7,12 @@
 
 use super::piece::Piece;
 use super::subpiece::{Axes, Cap, SubPiece};
+use super::turns::{Mark, EDGE};
 use crate::bernstein::{multiply, parabola_sign_changes, product, sign_changes};
 use crate::quadratic::dot;
 
-/// Cuts closer than this part of the piece are one.
+/// Cuts closer than this part of a stretch are one.
 const SAME_CUT: f64 = 1e-14;
-/// A tangent component this small beside the one at the other end is zero.
-const ZERO: f64 = 1e-14;
 /// Beyond this many δ the radius varies without a difference to the chord-error limit.
 const LAST_DOUBLING: f64 = 512.0;
 
@@ -49,45 +48,69 @@ impl ChordLimit {
     }
 }
 
-/// A part [from, to] of a curved piece with what the passes need to know of it.
+/// A part of a curved piece under one velocity cap, and what the passes need to know of it.
 #[derive(Clone, Copy, Debug)]
 pub struct Part {
+    /// The marks of its stretch, and where it begins and ends on that, from 0 to 1.
+    marks: [Mark; 2],
+    from: f64,
+    to: f64,
+    pub cap: Cap,
+    /// Bit k: axis k moves backward.
+    pub negative: u8,
+}
+
+/// A part with its place on the piece.
+pub struct Placed<const M: usize> {
+    pub sub: SubPiece<M>,
+    /// t at both ends
     pub from: f64,
     pub to: f64,
-    pub cap: Cap,
-    /// Bit k: axis k turns round at the left or right end; moves backward in between.
-    pub zero_left: u8,
-    pub zero_right: u8,
-    pub negative: u8,
 }
 
 impl Part {
     /// The part as a sub-piece travelled forward, or backward.
     #[inline(always)]
-    pub fn sub_piece<const M: usize>(&self, piece: &Piece<M>, axes: &Axes<M>, backward: bool) -> SubPiece<M> {
-        let (left, right) = (piece.tangent(self.from), piece.tangent(self.to));
-        let (mut start, mut end, mut bend) = ([0.0; M], [0.0; M], [0.0; M]);
-        for k in 0..M {
-            let sign = if self.negative >> k & 1 == 1 { -1.0 } else { 1.0 };
-            start[k] = if self.zero_left >> k & 1 == 1 { 0.0 } else { (sign * left[k]).max(0.0) };
-            end[k] = if self.zero_right >> k & 1 == 1 { 0.0 } else { (sign * right[k]).max(0.0) };
-            bend[k] = sign * (piece.right[k] - piece.left[k]);
-        }
-        let length = self.to - self.from;
-        if backward {
-            SubPiece::new(length, end, start, bend.map(|value| -value), piece.twist, self.cap, axes)
+    pub fn place<const M: usize>(&self, piece: &Piece<M>, axes: &Axes<M>, backward: bool) -> Placed<M> {
+        let reflect = |tangent: &[f64; M]| -> [f64; M] {
+            std::array::from_fn(|k| if self.negative >> k & 1 == 1 { -tangent[k] } else { tangent[k] })
+        };
+        let edges = [reflect(&piece.left), reflect(&piece.right)];
+        let (length, from, to, ends);
+        if self.marks == [EDGE, EDGE] && self.from == 0.0 && self.to == 1.0 {
+            (length, from, to, ends) = (1.0, 0.0, 1.0, edges);
         } else {
-            SubPiece::new(length, start, end, bend, piece.twist, self.cap, axes)
+            let stretch = piece.stretch(self.marks[0], self.marks[1]);
+            length = (self.to - self.from) * stretch.length;
+            let place = |part: f64| match part {
+                0.0 => stretch.begin,
+                1.0 => stretch.end,
+                _ => stretch.begin + part * stretch.length,
+            };
+            (from, to) = (place(self.from), place(self.to));
+            // An axis that does not turn may come out on the wrong side of zero by rounding.
+            let tangent = |part: f64| reflect(&stretch.piece.tangent(part)).map(|value| value.max(0.0));
+            ends = [tangent(self.from), tangent(self.to)];
         }
+        let swap = |[a, b]: [[f64; M]; 2]| if backward { [b, a] } else { [a, b] };
+        Placed { sub: SubPiece::new(length, swap(ends), swap(edges), piece.twist, self.cap, axes), from, to }
     }
 }
 
 /// Cuts pieces; holds the space for it.
 #[derive(Default)]
 pub struct Splitter {
-    turns: Vec<(f64, u8)>,
     cuts: Vec<f64>,
     pub parts: Vec<Part>,
+}
+
+/// What the cuts depend on.
+struct Limits<'a, const M: usize> {
+    axes: &'a Axes<M>,
+    feed_sq: f64,
+    chord: Option<ChordLimit>,
+    /// Bit k: axis k can be faster than its limit at the feed.
+    fast: u8,
 }
 
 impl Splitter {
@@ -102,129 +125,103 @@ impl Splitter {
     ) {
         let (left, right) = (&piece.left, &piece.right);
         self.parts.clear();
-        let mut fast = 0u8;
-        let mut turning = 0u8;
-        let mut negative = 0u8;
-        let (mut zero_left, mut zero_right) = (0u8, 0u8);
+        let (mut fast, mut negative) = (0u8, 0u8);
+        let mut turns = false;
         for k in 0..M {
-            let bit = 1 << k;
             if left[k] + right[k] < 0.0 {
-                negative |= bit;
+                negative |= 1 << k;
             }
-            if left[k].abs() <= ZERO * right[k].abs() {
-                zero_left |= bit;
-            }
-            if right[k].abs() <= ZERO * left[k].abs() {
-                zero_right |= bit;
-            }
-            if left[k] * right[k] < 0.0 && (zero_left | zero_right) & bit == 0 {
-                turning |= bit;
-            }
+            turns |= left[k] * right[k] < 0.0;
             if axes.velocity_sq[k] < feed_sq && too_fast(piece, k, axes.velocity_sq[k], feed_sq) {
-                fast |= bit;
+                fast |= 1 << k;
             }
         }
         let chord = chord.filter(|chord| chord.binds(piece, feed_sq));
-        if fast | turning == 0 && chord.is_none() {
+        if fast == 0 && !turns && chord.is_none() {
             let cap = Cap::SpeedSq(feed_sq);
-            self.parts.push(Part { from: 0.0, to: 1.0, cap, zero_left, zero_right, negative });
-            return;
-        }
-        self.turns.clear();
-        for k in (0..M).filter(|k| turning >> k & 1 == 1) {
-            let t = left[k] / (left[k] - right[k]);
-            let bit = 1 << k;
-            if t <= SAME_CUT {
-                zero_left |= bit;
-            } else if t >= 1.0 - SAME_CUT {
-                zero_right |= bit;
-            } else {
-                self.turns.push((t, bit));
-            }
-        }
-        self.turns.push((1.0, zero_right));
-        self.turns.sort_by(|a, b| a.0.total_cmp(&b.0));
-        self.turns.dedup_by(|b, a| {
-            let same = b.0 - a.0 <= SAME_CUT;
-            a.1 |= if same { b.1 } else { 0 };
-            same
-        });
-        // Between two turns, then between two doublings of the radius, then between two changes of the cap.
-        let (mut from, mut zero) = (0.0, zero_left);
-        for i in 0..self.turns.len() {
-            let (to, zero_to) = self.turns[i];
-            let middle = piece.tangent(0.5 * (from + to));
-            let negative = (0..M).fold(0, |bits, k| bits | u8::from(middle[k] < 0.0) << k);
-            let first = self.parts.len();
-            match chord {
-                Some(chord) => self.cut_by_radius(piece, axes, feed_sq, chord, fast, (from, to)),
-                None => self.cut_by_cap(piece, axes, feed_sq, None, fast, (from, to)),
-            }
-            for part in &mut self.parts[first..] {
-                part.negative = negative;
-                part.zero_left = if part.from == from { zero } else { 0 };
-                part.zero_right = if part.to == to { zero_to } else { 0 };
-            }
-            (from, zero) = (to, zero_to);
+            self.parts.push(Part { marks: [EDGE, EDGE], from: 0.0, to: 1.0, cap, negative });
+        } else {
+            self.cut(piece, &Limits { axes, feed_sq, chord, fast });
         }
     }
 
-    /// Cuts [from, to] where the radius doubles.
+    /// Cuts between two turns, then between two doublings of the radius, then between two changes of the cap.
+    fn cut<const M: usize>(&mut self, piece: &Piece<M>, limits: &Limits<M>) {
+        let (turns, count) = piece.turns();
+        let mut from = EDGE;
+        for i in 0..=count {
+            let to = if i == count { EDGE } else { turns[i] };
+            let stretch = piece.stretch(from, to);
+            if stretch.length > 0.0 {
+                let first = self.parts.len();
+                match limits.chord {
+                    Some(chord) => self.cut_by_radius(&stretch.piece, limits, chord, piece.exact_twist()),
+                    None => self.cut_by_cap(&stretch.piece, limits, limits.feed_sq, None, (0.0, 1.0)),
+                }
+                let (left, right) = (&stretch.piece.left, &stretch.piece.right);
+                let negative = (0..M).fold(0, |bits, k| bits | u8::from(left[k] + right[k] < 0.0) << k);
+                for part in &mut self.parts[first..] {
+                    part.marks = [from, to];
+                    part.negative = negative;
+                }
+            }
+            from = to;
+        }
+    }
+
+    /// Cuts a stretch where the radius doubles.
     #[cold]
     fn cut_by_radius<const M: usize>(
         &mut self,
-        piece: &Piece<M>,
-        axes: &Axes<M>,
-        feed_sq: f64,
+        stretch: &Piece<M>,
+        limits: &Limits<M>,
         chord: ChordLimit,
-        fast: u8,
-        (from, to): (f64, f64),
+        twist: f64,
     ) {
-        let mut levels = vec![from, to];
+        let mut levels = vec![0.0, 1.0];
         let mut radius = chord.tolerance;
-        let no_limit = (feed_sq + chord.slow_sq) / chord.alpha;
+        let no_limit = (limits.feed_sq + chord.slow_sq) / chord.alpha;
         while radius <= (chord.tolerance * LAST_DOUBLING).min(2.0 * no_limit) {
             // D where ρ = D^1.5/|W| has this value.
-            let d = (radius * piece.twist).powf(2.0 / 3.0);
-            parabola_sign_changes(&piece.speed.map(|value| value - d), &mut |t| levels.push(t));
+            let d = (radius * twist).powf(2.0 / 3.0);
+            parabola_sign_changes(&stretch.speed.map(|value| value - d), &mut |t| levels.push(t));
             radius *= 2.0;
         }
-        levels.retain(|&t| t >= from && t <= to);
         levels.sort_by(f64::total_cmp);
         levels.dedup_by(|b, a| *b - *a <= SAME_CUT);
         if let Some(last) = levels.last_mut() {
-            *last = to;
+            *last = 1.0;
         }
+        let bend: [f64; M] = std::array::from_fn(|k| stretch.right[k] - stretch.left[k]);
+        let lowest = -dot(&stretch.left, &bend) / dot(&bend, &bend);
         for level in levels.windows(2) {
             let (a, b) = (level[0], level[1]);
             let radius_at = |t: f64| {
-                let g = piece.tangent(t);
+                let g = stretch.tangent(t);
                 let d = dot(&g, &g);
-                d * d.sqrt() / piece.twist
+                d * d.sqrt() / twist
             };
-            let middle = radius_at(0.5 * (a + b));
-            if middle < chord.tolerance {
-                self.cut_by_cap(piece, axes, feed_sq.min(chord.slow_sq), None, fast, (a, b));
+            if radius_at(0.5 * (a + b)) < chord.tolerance {
+                self.cut_by_cap(stretch, limits, limits.feed_sq.min(chord.slow_sq), None, (a, b));
                 continue;
             }
-            let bend: [f64; M] = std::array::from_fn(|k| piece.right[k] - piece.left[k]);
-            let lowest = (-dot(&piece.left, &bend) / dot(&bend, &bend)).clamp(a, b);
-            let least_radius = radius_at(a).min(radius_at(b)).min(radius_at(lowest)).max(chord.tolerance);
-            let factor = chord.alpha / piece.twist * (1.0 - chord.tolerance / (2.0 * least_radius));
-            self.cut_by_cap(piece, axes, feed_sq, Some(factor), fast, (a, b));
+            let least =
+                radius_at(a).min(radius_at(b)).min(radius_at(lowest.clamp(a, b))).max(chord.tolerance);
+            let factor = chord.alpha / twist * (1.0 - chord.tolerance / (2.0 * least));
+            self.cut_by_cap(stretch, limits, limits.feed_sq, Some(factor), (a, b));
         }
     }
 
-    /// Cuts [from, to] where the lowest cap changes, and names it on each part.
+    /// Cuts [from, to] of a stretch where the lowest cap changes, and names it on each part.
     fn cut_by_cap<const M: usize>(
         &mut self,
-        piece: &Piece<M>,
-        axes: &Axes<M>,
+        stretch: &Piece<M>,
+        limits: &Limits<M>,
         speed_sq: f64,
         chord: Option<f64>,
-        fast: u8,
         (from, to): (f64, f64),
     ) {
+        let (axes, fast) = (limits.axes, limits.fast);
         let cuts = &mut self.cuts;
         cuts.clear();
         let mut cut = |t: f64| {
@@ -236,25 +233,25 @@ impl Splitter {
         for j in (0..M).filter(|&j| is_fast(j)) {
             let v_sq = axes.velocity_sq[j];
             // Against the speed: v² q'_j² = V_j² D.
-            parabola_sign_changes(&excess(piece, j, v_sq, speed_sq), &mut cut);
+            parabola_sign_changes(&excess(stretch, j, v_sq, speed_sq), &mut cut);
             // Against another axis: V_j |q'_k| = V_k |q'_j|.
             for k in (j + 1..M).filter(|&k| is_fast(k)) {
                 let (v_j, v_k) = (v_sq.sqrt(), axes.velocity_sq[k].sqrt());
                 for sign in [1.0, -1.0] {
                     let at = |g: &[f64; M]| v_j * g[k] - sign * v_k * g[j];
-                    sign_changes(&[at(&piece.left), at(&piece.right)], &mut cut);
+                    sign_changes(&[at(&stretch.left), at(&stretch.right)], &mut cut);
                 }
             }
             // Against the chord error: V_j⁴ = f² D q'_j⁴.
             if let Some(factor) = chord {
-                let g_sq = axis_sq(piece, j);
-                let six: [f64; 7] = product(&multiply(&g_sq, &g_sq), &piece.speed);
+                let g_sq = axis_sq(stretch, j);
+                let six: [f64; 7] = product(&multiply(&g_sq, &g_sq), &stretch.speed);
                 sign_changes(&six.map(|value| factor * factor * value - v_sq * v_sq), &mut cut);
             }
         }
         if let Some(factor) = chord {
             let d = (speed_sq / factor).powf(2.0 / 3.0);
-            parabola_sign_changes(&piece.speed.map(|value| value - d), &mut cut);
+            parabola_sign_changes(&stretch.speed.map(|value| value - d), &mut cut);
         }
         cuts.sort_by(f64::total_cmp);
         cuts.push(to);
@@ -263,7 +260,7 @@ impl Splitter {
             if to - from <= SAME_CUT {
                 continue;
             }
-            let g = piece.tangent(0.5 * (from + to));
+            let g = stretch.tangent(0.5 * (from + to));
             let d = dot(&g, &g);
             let mut lowest = speed_sq / d;
             let mut cap = Cap::SpeedSq(speed_sq);
@@ -280,7 +277,7 @@ impl Splitter {
             }
             match self.parts.last_mut() {
                 Some(part) if part.to == from && part.from >= start && part.cap == cap => part.to = to,
-                _ => self.parts.push(Part { from, to, cap, zero_left: 0, zero_right: 0, negative: 0 }),
+                _ => self.parts.push(Part { marks: [EDGE, EDGE], from, to, cap, negative: 0 }),
             }
             from = to;
         }

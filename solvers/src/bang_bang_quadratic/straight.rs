@@ -7,6 +7,9 @@ use super::piece::Straight;
 use super::profile::{ArcKind, Profile, Row, NO_AXIS};
 use super::subpiece::Axes;
 
+/// A shorter part of the length than this is rounding.
+const NO_PART: f64 = 1e-15;
+
 /// Backward: the greatest v² at the start from which `speed_sq` at the end can be met.
 #[inline(always)]
 pub fn backward(line: &Straight, speed_sq: f64) -> f64 {
@@ -28,15 +31,16 @@ pub fn forward<const M: usize>(
     out: &mut Profile,
 ) -> f64 {
     let end_sq = end_sq.min(line.speed_sq);
-    let mut over = |t: [f64; 2], rate: [f64; 2], sign: f64, start_sq: f64, end_sq: f64| {
-        let stretch = Stretch { line, t, rate, signed: sign * axes.acceleration[line.axis], number, width };
-        stretch.forward(start_sq, end_sq, out)
+    let [r0, r1] = line.rate;
+    let mut over = |t: [f64; 2], span: f64, rate: [f64; 2], sign: f64, start_sq: f64, end_sq: f64| {
+        let signed = sign * axes.acceleration[line.axis];
+        Stretch { line, t, span, rate, signed, number, width }.forward(start_sq, end_sq, out)
     };
     match line.turn {
-        None => over([0.0, 1.0], line.rate, line.sign[0], start_sq, end_sq),
+        None => over([0.0, 1.0], 1.0, line.rate, line.sign[0], start_sq, end_sq),
         Some(turn) => {
-            over([0.0, turn], [line.rate[0], 0.0], line.sign[0], start_sq, 0.0);
-            over([turn, 1.0], [0.0, line.rate[1]], line.sign[1], 0.0, end_sq)
+            over([0.0, turn], turn, [r0, 0.0], line.sign[0], start_sq, 0.0);
+            over([turn, 1.0], r1 / (r0 + r1), [0.0, r1], line.sign[1], 0.0, end_sq)
         }
     }
 }
@@ -45,6 +49,8 @@ pub fn forward<const M: usize>(
 struct Stretch<'a> {
     line: &'a Straight,
     t: [f64; 2],
+    /// t[1] − t[0], with all its digits
+    span: f64,
     /// |C'| at its ends
     rate: [f64; 2],
     /// The acceleration of the limiting axis when the path speeds up.
@@ -65,7 +71,7 @@ impl Stretch<'_> {
     #[inline(always)]
     fn forward(&self, start_sq: f64, end_sq: f64, out: &mut Profile) -> f64 {
         let a = self.line.acceleration;
-        let length = 0.5 * (self.rate[0] + self.rate[1]) * (self.t[1] - self.t[0]);
+        let length = 0.5 * (self.rate[0] + self.rate[1]) * self.span;
         let gain = 2.0 * a * length;
         let top_sq = self.line.speed_sq;
         let start_sq = start_sq.min(top_sq.min(end_sq + gain));
@@ -74,27 +80,30 @@ impl Stretch<'_> {
         // Too short to reach the speed asked for at the end.
         if start_sq + gain <= end_sq {
             let last = end(start_sq + gain);
-            self.push(out, start, last, Motion::SpeedUp);
+            self.push(out, start, last, length, Motion::SpeedUp);
             return last.speed_sq;
         }
         let last = end(end_sq);
         let peak_sq = (0.5 * (start_sq + end_sq + gain)).min(top_sq);
-        let first_length = (peak_sq - start_sq) / (2.0 * a);
-        let last_length = (peak_sq - end_sq) / (2.0 * a);
-        let reached = if first_length < length { self.after_start(first_length, peak_sq) } else { last };
-        let left = if last_length < length { self.before_end(last_length, peak_sq) } else { start };
-        let reached = if first_length > 0.0 && reached.t > start.t { reached } else { start };
-        let left = if last_length > 0.0 && left.t < last.t { left } else { last };
-        if peak_sq < top_sq || left.t <= reached.t {
-            // Triangle: one place in the middle, taken from the slower side.
-            let middle = if start_sq < end_sq { reached } else { left };
-            self.push(out, start, middle, Motion::SpeedUp);
-            self.push(out, middle, last, Motion::SlowDown);
-        } else {
-            self.push(out, start, reached, Motion::SpeedUp);
-            self.push(out, reached, left, Motion::Cruise);
-            self.push(out, left, last, Motion::SlowDown);
-        }
+        let (first_part, last_part) = ((peak_sq - start_sq) / (2.0 * a), (peak_sq - end_sq) / (2.0 * a));
+        let none = NO_PART * length;
+        // Nothing between the two in a triangle.
+        let cruise = if peak_sq < top_sq { 0.0 } else { (length - first_part - last_part).max(0.0) };
+        let place = |before: f64, after: f64| {
+            if before <= none {
+                Place { speed_sq: peak_sq, ..start }
+            } else if after <= none {
+                Place { speed_sq: peak_sq, ..last }
+            } else if before <= after {
+                self.after_start(before, peak_sq)
+            } else {
+                self.before_end(after, peak_sq)
+            }
+        };
+        let (from, to) = (place(first_part, cruise + last_part), place(first_part + cruise, last_part));
+        self.push(out, start, from, first_part, Motion::SpeedUp);
+        self.push(out, from, to, cruise, Motion::Cruise);
+        self.push(out, to, last, last_part, Motion::SlowDown);
         end_sq
     }
 
@@ -102,7 +111,7 @@ impl Stretch<'_> {
     #[inline(always)]
     fn after_start(&self, length: f64, speed_sq: f64) -> Place {
         let [r0, r1] = self.rate;
-        let slope = (r1 - r0) / (self.t[1] - self.t[0]);
+        let slope = (r1 - r0) / self.span;
         let rate = (r0 * r0 + 2.0 * slope * length).max(0.0).sqrt();
         Place { t: (self.t[0] + 2.0 * length / (r0 + rate)).min(self.t[1]), rate, speed_sq }
     }
@@ -111,17 +120,16 @@ impl Stretch<'_> {
     #[inline(always)]
     fn before_end(&self, length: f64, speed_sq: f64) -> Place {
         let [r0, r1] = self.rate;
-        let slope = (r1 - r0) / (self.t[1] - self.t[0]);
+        let slope = (r1 - r0) / self.span;
         let rate = (r1 * r1 - 2.0 * slope * length).max(0.0).sqrt();
         Place { t: (self.t[1] - 2.0 * length / (r1 + rate)).max(self.t[0]), rate, speed_sq }
     }
 
     #[inline(always)]
-    fn push(&self, out: &mut Profile, from: Place, to: Place, motion: Motion) {
+    fn push(&self, out: &mut Profile, from: Place, to: Place, length: f64, motion: Motion) {
         if to.t <= from.t {
             return;
         }
-        let length = 0.5 * (from.rate + to.rate) * (to.t - from.t);
         let (v0, v1) = (from.speed_sq.sqrt(), to.speed_sq.sqrt());
         let duration = 2.0 * length / (v0 + v1);
         let line = self.line;
@@ -147,7 +155,7 @@ impl Stretch<'_> {
                 f64::INFINITY
             }
         };
-        let (t, p) = ([from.t, to.t], [p(from, to), p(to, from)]);
+        let (t, p) = (to.t, [p(from, to), p(to, from)]);
         let joins = from.rate > 0.0;
         out.push(self.number, self.width, Row { kind, axis, value, t, p, duration, joins });
     }

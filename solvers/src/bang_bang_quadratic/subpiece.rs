@@ -5,10 +5,12 @@
 //! g = |q'|, c = g' = dg/dx (constant), p = (dx/dt)², s = p'/2, D = |g|², a_k = g_k s + c_k p.
 
 use super::curve::{Curve, Denominator};
+use super::turns::difference_of_products;
 use crate::quadratic::dot;
 
-/// Below this part of its own terms a twist W is rounding noise: the two axes move in proportion.
-const TWIST_NOISE: f64 = 64.0 * f64::EPSILON;
+/// An axis whose tangent is below this part of the others', each measured by its acceleration limit, is as good as
+/// turning round. Between s and p ≤ A_k/|c_k| a part eps/NEAR_TURN of the digits is lost.
+pub const NEAR_TURN: f64 = 1e-6;
 
 /// The limits of the axes, with what the passes need of them again and again.
 pub struct Axes<const M: usize> {
@@ -20,6 +22,23 @@ pub struct Axes<const M: usize> {
     pub least: f64,
     /// V², in mm²/s²
     pub velocity_sq: [f64; M],
+}
+
+impl<const M: usize> Axes<M> {
+    /// max g_k/A_k
+    #[inline(always)]
+    pub fn most_moved(&self, g: &[f64; M]) -> f64 {
+        (0..M).fold(0.0, |most: f64, k| most.max(g[k] * self.inverse[k]))
+    }
+
+    /// The least A_k/|c_k| of the axes that turn round or nearly so where the tangent is g: the limit of p there.
+    #[cold]
+    pub fn limit_at_turns(&self, g: &[f64; M], c: &[f64; M]) -> f64 {
+        let most = self.most_moved(g);
+        (0..M)
+            .filter(|&k| g[k] * self.inverse[k] <= NEAR_TURN * most)
+            .fold(f64::INFINITY, |limit, k| limit.min(self.acceleration[k] / c[k].abs()))
+    }
 }
 
 /// The lowest velocity cap of a sub-piece.
@@ -41,6 +60,8 @@ pub struct SubPiece<const M: usize> {
     pub end: [f64; M],
     /// c
     pub bend: [f64; M],
+    /// The tangents of the whole piece, reflected and travelled alike: W comes from them.
+    pub edges: [[f64; M]; 2],
     /// D at the ends and, between them, its middle Bernstein coefficient.
     pub speed: [f64; 3],
     /// |C' × C''|
@@ -51,21 +72,23 @@ pub struct SubPiece<const M: usize> {
 }
 
 impl<const M: usize> SubPiece<M> {
+    /// From the reflected tangents at the ends of the sub-piece and of its piece.
+    #[inline(always)]
     pub fn new(
         length: f64,
-        start: [f64; M],
-        end: [f64; M],
-        bend: [f64; M],
+        [start, end]: [[f64; M]; 2],
+        edges: [[f64; M]; 2],
         twist: f64,
         cap: Cap,
         axes: &Axes<M>,
     ) -> Self {
+        let bend: [f64; M] = std::array::from_fn(|k| edges[1][k] - edges[0][k]);
         let mut steepest = 0.0;
         for k in 0..M {
             steepest = f64::max(steepest, bend[k].abs() * axes.inverse[k]);
         }
         let speed = [dot(&start, &start), dot(&start, &end), dot(&end, &end)];
-        Self { length, start, end, bend, speed, twist, flat: 1.0 / steepest, cap }
+        Self { length, start, end, bend, edges, speed, twist, flat: 1.0 / steepest, cap }
     }
 
     /// g_k at x, from the nearer end, so that it keeps its digits next to a zero.
@@ -96,20 +119,11 @@ impl<const M: usize> SubPiece<M> {
         }
     }
 
-    /// W_jk = c_j g_k − c_k g_j for all k: constant along the piece, antisymmetric to the last bit.
+    /// W_jk = c_j g_k − c_k g_j for all k: constant along the piece, antisymmetric, its sign exact.
     #[inline(always)]
     pub fn twists(&self, j: usize) -> [f64; M] {
-        // Fewer digits are lost where the tangent is shorter.
-        let g = if self.speed[0] < self.speed[2] { &self.start } else { &self.end };
-        std::array::from_fn(|k| {
-            let (a, b) = (self.bend[j] * g[k], self.bend[k] * g[j]);
-            let twist = a - b;
-            if twist.abs() > TWIST_NOISE * (a.abs() + b.abs()) {
-                twist
-            } else {
-                0.0
-            }
-        })
+        let [left, right] = &self.edges;
+        std::array::from_fn(|k| difference_of_products(right[j], left[k], right[k], left[j]))
     }
 
     /// The velocity cap at x.

@@ -1,0 +1,41 @@
+//! Random planning problems and an audit of profiles that shares no formula with the planner.
+#![allow(dead_code)]
+
+mod audit;
+mod cases;
+
+pub use audit::{audit, Audit};
+pub use cases::{random_case, Case, Random};
+
+/// Runs an expression for a number of axes known at run time: `for_axes!(count, M, expression)`.
+#[macro_export]
+macro_rules! for_axes {
+    ($count:expr, $m:ident, $call:expr) => {
+        match $count {
+            1 => {
+                const $m: usize = 1;
+                $call
+            }
+            2 => {
+                const $m: usize = 2;
+                $call
+            }
+            3 => {
+                const $m: usize = 3;
+                $call
+            }
+            4 => {
+                const $m: usize = 4;
+                $call
+            }
+            5 => {
+                const $m: usize = 5;
+                $call
+            }
+            _ => {
+                const $m: usize = 6;
+                $call
+            }
+        }
+    };
+}
