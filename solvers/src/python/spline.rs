@@ -35,6 +35,9 @@ pub fn register(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(curve_cusps, module)?)
 }
 
+/// Places that one thread evaluates at a time.
+const BLOCK: usize = 4096;
+
 type Array1<'py> = PyReadonlyArray1<'py, f64>;
 type Array2<'py> = PyReadonlyArray2<'py, f64>;
 /// Control points (total, axes), weights (total,) if any piece is rational, offsets (n + 1,), widths (n,).
@@ -208,17 +211,27 @@ fn curve_evaluate<'py>(
         let curve = curve::<M>(&control_points, weights.as_ref(), &offsets, &width)?;
         let (piece, u) = (piece.as_slice()?, u.as_slice()?);
         check_places(&curve.width, piece, u)?;
-        let values: Vec<f64> = py.detach(|| {
-            let at: Vec<[[f64; M]; 4]> = piece
-                .par_iter()
-                .zip(u)
-                .with_min_len(4096)
-                .map(|(&piece, &u)| derivatives(&curve.piece(piece as usize), u))
+        let order = order.min(3);
+        let mut values = vec![0.0; (order + 1) * u.len() * axes];
+        py.detach(|| {
+            let mut orders: Vec<_> = values
+                .chunks_mut((u.len() * axes).max(1))
+                .map(|of_order| of_order.chunks_mut(BLOCK * axes))
                 .collect();
-            let of_order = |r: usize| at.iter().flat_map(move |c| c[r][..axes].iter().copied());
-            (0..=order.min(3)).flat_map(of_order).collect()
+            let blocks: Vec<Vec<&mut [f64]>> = (0..u.len().div_ceil(BLOCK))
+                .map(|_| orders.iter_mut().filter_map(Iterator::next).collect())
+                .collect();
+            let places = piece.par_chunks(BLOCK).zip(u.par_chunks(BLOCK));
+            blocks.into_par_iter().zip(places).for_each(|(mut block, (piece, u))| {
+                for (i, (&piece, &u)) in piece.iter().zip(u).enumerate() {
+                    let c = derivatives(&curve.piece(piece as usize), u);
+                    for (rows, value) in block.iter_mut().zip(&c) {
+                        rows[i * axes..(i + 1) * axes].copy_from_slice(&value[..axes]);
+                    }
+                }
+            });
         });
-        PyArray1::from_vec(py, values).reshape([order.min(3) + 1, u.len(), axes])
+        PyArray1::from_vec(py, values).reshape([order + 1, u.len(), axes])
     })
 }
 
