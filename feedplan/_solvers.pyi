@@ -84,6 +84,7 @@ class Sampler:
         width: NDArray[np.float64],
         line: NDArray[np.int32],
         runs: NDArray[np.int64],
+        start_dwell: float,
         dwell: NDArray[np.float64],
         piece: NDArray[np.uint32],
         kind: NDArray[np.uint8],

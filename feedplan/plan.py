@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import time
 from collections.abc import Callable, Iterator
@@ -54,7 +53,7 @@ class Plan:
     @property
     def time(self) -> float:
         """Time of the whole program, dwells included [s]."""
-        return self.profile.time + float(self.path.dwell.sum())
+        return self.profile.time + self.path.pauses
 
     @property
     def gap(self) -> float:
@@ -164,7 +163,7 @@ def plan(
         )
         profile = solve(problem)
     with _timed(compute, "bound"):
-        least = lower_bound(problem) + math.fsum(path.dwell)
+        least = lower_bound(problem) + path.pauses
     report("plan", 1.0)
     return Plan(
         program=program,
@@ -175,17 +174,8 @@ def plan(
         lower_bound=least,
         compute=compute,
         interpolator=interpolator,
-        warnings=_warnings(program),
+        warnings=program.warnings if program else (),
     )
-
-
-def _warnings(program: Program | None) -> tuple[str, ...]:
-    if program is None:
-        return ()
-    if program.start_dwell > 0:
-        pause = f"the pause of {program.start_dwell:g} s before the first move is not part of the plan"
-        return (*program.warnings, pause)
-    return program.warnings
 
 
 @contextmanager

@@ -38,13 +38,13 @@ impl Arcs<'_> {
         self.piece.is_empty()
     }
 
-    /// When each arc begins, and when the last one ends, in s; pauses between the runs included.
-    pub fn starts(&self, dwell: &[f64]) -> Vec<f64> {
+    /// When each arc begins, and when the last one ends, in s; pauses before and between the runs included.
+    pub fn starts(&self, path: &Followed) -> Vec<f64> {
         let mut starts = Vec::with_capacity(self.len() + 1);
-        let (mut time, mut run) = (0.0, 0);
+        let (mut time, mut run) = (path.start_dwell, 0);
         for (i, duration) in self.duration.iter().enumerate() {
             while run + 1 < self.runs.len() && self.runs[run + 1] <= i as i64 {
-                time += dwell.get(run).copied().unwrap_or(0.0);
+                time += path.dwell.get(run).copied().unwrap_or(0.0);
                 run += 1;
             }
             starts.push(time);

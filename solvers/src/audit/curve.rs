@@ -21,6 +21,8 @@ pub struct Followed<'a> {
     pub tolerance: &'a [f64],
     /// Piece offsets of the runs.
     pub runs: &'a [i64],
+    /// Pause before the first run, in s.
+    pub start_dwell: f64,
     /// Pause after each run, in s.
     pub dwell: &'a [f64],
 }

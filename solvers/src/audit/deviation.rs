@@ -226,7 +226,7 @@ fn move_to_pieces<const M: usize>(
 fn entry_times(path: &Followed, arcs: Option<&Arcs>) -> Vec<f64> {
     let mut times = vec![0.0; path.len() + 1];
     let Some(arcs) = arcs else { return times };
-    let starts = arcs.starts(path.dwell);
+    let starts = arcs.starts(path);
     let mut piece = 0;
     for (i, &entered) in arcs.piece.iter().enumerate() {
         while piece <= (entered as usize).min(path.len()) {
@@ -271,6 +271,7 @@ mod tests {
             moves: &[0, 1, 1, 1, 4, 5],
             tolerance: &[],
             runs: &[],
+            start_dwell: 0.0,
             dwell: &[],
         };
         assert_eq!(followers(&path, 7), [(0, 0), (0, 1), (1, 2), (1, 2), (2, 2), (2, 2), (2, 2)]);

@@ -77,16 +77,17 @@ impl Plan<'_> {
     /// over or, where the setpoints stand still on the stop for it, at the next of them.
     pub fn extend_clock<const M: usize>(&self, limits: &Limits<M>, rows: &[Row<M>], clock: &mut Vec<f64>) {
         let Some(profile) = &self.profile else { return };
-        if clock.is_empty() {
-            clock.push(0.0);
-        }
         while clock.len() + 1 < profile.arcs.runs.len() {
-            let run = clock.len() - 1;
-            let due = clock[run] + profile.motion_time(run) + self.path.dwell[run];
+            let (due, stop) = match clock.len().checked_sub(1) {
+                None => (self.path.start_dwell, self.start::<M>()),
+                Some(run) => {
+                    let piece = (self.path.runs[run + 1] as usize).max(1) - 1;
+                    let due = clock[run] + profile.motion_time(run) + self.path.dwell[run];
+                    (due, self.path.points::<M>(piece)[2])
+                }
+            };
             let slack = PASS_EXCESS * limits.period + ROUNDINGS * EPS * due;
             let next = rows.partition_point(|row| row.t < due - slack);
-            let piece = (self.path.runs[run + 1] as usize).max(1) - 1;
-            let stop = self.path.points::<M>(piece)[2];
             let magnitude = stop.iter().fold(0.0_f64, |most, q| most.max(q.abs()));
             let stands =
                 |row: &Row<M>| distance(&row.q, &stop) <= GAP_TOLERANCE + ROUNDINGS * EPS * magnitude;

@@ -35,7 +35,7 @@ pub fn audit_profile<const M: usize>(
     arcs: &Arcs,
     limits: &Limits<M>,
 ) -> Tally<M> {
-    let starts = arcs.starts(path.dwell);
+    let starts = arcs.starts(path);
     let auditor = Auditor { path, junction_speed, arcs, limits, starts: &starts };
     let blocks = arcs.len().div_ceil(BLOCK);
     let inside = (0..blocks)

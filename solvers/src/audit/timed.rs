@@ -124,8 +124,11 @@ impl<'a, const M: usize> Reader<'a, M> {
         let from_anchor = self.motion.time_from_anchor(here.y);
         let time = if self.motion.anchored_at_end { end - from_anchor } else { start + from_anchor };
         let (mut from, mut until) = (time, time);
-        if here.u <= arcs.u0[arc] && arc == timed.arcs_of(run).start && run > 0 {
-            from = timed.clock.get(run - 1).map_or(time, |clock| clock + timed.motion_time(run - 1));
+        if here.u <= arcs.u0[arc] && arc == timed.arcs_of(run).start {
+            from = match run {
+                0 => 0.0,
+                _ => timed.clock.get(run - 1).map_or(time, |clock| clock + timed.motion_time(run - 1)),
+            };
         }
         if here.u >= arcs.u1[arc] && arc + 1 == timed.arcs_of(run).end {
             until = timed.clock.get(run + 1).copied().unwrap_or(end + self.path.dwell[run] + period);

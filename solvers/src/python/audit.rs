@@ -54,6 +54,7 @@ struct PathArrays<'py> {
     moves: PyReadonlyArray2<'py, i64>,
     tolerance: PyReadonlyArray1<'py, f64>,
     runs: PyReadonlyArray1<'py, i64>,
+    start_dwell: f64,
     dwell: PyReadonlyArray1<'py, f64>,
 }
 
@@ -81,6 +82,7 @@ impl ProblemArrays<'_> {
             moves: path.moves.as_slice()?,
             tolerance: path.tolerance.as_slice()?,
             runs: path.runs.as_slice()?,
+            start_dwell: path.start_dwell,
             dwell: path.dwell.as_slice()?,
         };
         let pieces = followed.len();
@@ -384,7 +386,7 @@ fn compare(
             && runs.windows(2).all(|pair| pair[0] <= pair[1])
             && (0..arcs.len()).all(|i| !arcs.has_bad_numbers(i, &path));
         if good {
-            starts = arcs.starts(path.dwell);
+            starts = arcs.starts(&path);
             usable = Some(profile.unbind());
         }
     }
