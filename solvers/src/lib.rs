@@ -17,6 +17,7 @@ pub mod path_builder;
 pub mod quadratic;
 pub mod sampling;
 pub mod sarfraz;
+pub mod spline;
 pub mod text;
 
 #[cfg(feature = "python")]

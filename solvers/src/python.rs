@@ -7,6 +7,7 @@ mod gcode;
 mod path;
 mod plan;
 mod sampling;
+mod spline;
 mod text;
 
 use pyo3::prelude::*;
@@ -41,6 +42,7 @@ fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     text::register(module)?;
     audit::register(module)?;
     sampling::register(module)?;
+    spline::register(module)?;
     plan::register(module)?;
     gcode::register(module)?;
     Ok(())
