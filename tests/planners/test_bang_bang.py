@@ -11,9 +11,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path as FilePath
+from random import Random
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from feedplan import InfeasibleError, InputError, Path
@@ -133,6 +136,54 @@ def worst_excess(task: Problem, profile: SpeedProfile, samples: int = 100) -> tu
         most = np.maximum(np.maximum(acceleration.max(axis=1), velocity.max(axis=1)), feed)
         excess, use = max(excess, float(most.max()) - 1), min(use, float(most.min()))
     return excess, use
+
+
+@st.composite
+def paths(draw: st.DrawFn) -> Problem:
+    """Smooth paths with tangents of small whole numbers: with zeros, ties, straight pieces, reversals."""
+    axes, count = draw(st.integers(1, 4)), draw(st.integers(1, 8))
+    whole = st.integers(-3, 3)
+    knots = [draw(st.lists(whole, min_size=axes, max_size=axes)) for _ in range(count + 1)]
+    for knot in knots:
+        knot[0] = knot[0] if any(knot) else 1
+    tangents = np.array(knots, dtype=float)
+    positive = st.floats(0.1, 10.0)
+
+    def numbers(size: int) -> Array:
+        return np.array(draw(st.lists(positive, min_size=size, max_size=size)))
+
+    return problem(
+        tangents[:-1],
+        tangents[1:],
+        numbers(count),
+        numbers(count),
+        numbers(axes),
+        numbers(axes),
+        np.full(count + 1, np.inf),
+    )
+
+
+@given(paths())
+def test_any_small_path_keeps_every_limit_and_uses_one_everywhere(task: Problem) -> None:
+    excess, use = worst_excess(task, plan(task), samples=20)
+    assert excess <= 1e-9
+    assert use >= 1 - 1e-6
+
+
+@given(paths(), st.randoms(use_true_random=False))
+def test_direction_and_order_of_the_axes_do_not_matter(task: Problem, random: Random) -> None:
+    order = random.sample(range(len(task.max_velocity)), len(task.max_velocity))
+    path = task.path
+    other = replace(
+        task,
+        path=replace(
+            path, control_points=path.control_points[::-1, ::-1, order].copy(), width=path.width[::-1].copy()
+        ),
+        feed=task.feed[::-1].copy(),
+        max_velocity=task.max_velocity[order],
+        max_acceleration=task.max_acceleration[order],
+    )
+    assert plan(other).time == pytest.approx(plan(task).time, rel=1e-10)
 
 
 def test_a_short_line_is_a_triangle() -> None:
