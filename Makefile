@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 NATIVE := $(wildcard solvers/src/*.rs solvers/src/*/*.rs) solvers/Cargo.toml pyproject.toml
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: demo test lint bench clean
+.PHONY: demo test lint bench campaign clean
 
 demo: $(VENV)/built
 	@$(BIN)/python examples/vase.py --blocks 2000 --output out/vase.ngc
@@ -28,6 +28,10 @@ lint: $(VENV)/built
 bench: $(VENV)/built
 	cargo bench --manifest-path solvers/Cargo.toml
 	$(BIN)/python -m benchmarks
+
+# Random paths by the million; the figures it prints stand in benchmarks/README.md.
+campaign:
+	FEEDPLAN_SEEDS=1000000 cargo test --release --manifest-path solvers/Cargo.toml --test bang_bang_random -- --nocapture
 
 clean:
 	rm -rf $(VENV) out solvers/target

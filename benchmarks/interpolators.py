@@ -1,8 +1,7 @@
 """Sarfraz predictor-corrector against Newton–Raphson: rounds, length error and time on small and large steps.
 
-Run `python -m benchmarks.interpolators`. First the bare inversion: places at equal steps along a curve. Then
-the whole setpoint stream with all derivatives, at constant feed. Lengths are checked by the closed form of a
-quadratic, which neither interpolator uses. Set RAYON_NUM_THREADS=1 to time one thread.
+First the bare inversion: places at equal steps along a curve. Then the whole setpoint stream with all
+derivatives, at constant feed. Lengths are checked by the closed form of a quadratic, which neither uses.
 """
 
 from __future__ import annotations
@@ -11,14 +10,14 @@ import time
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
-from rich.table import Table
 
+from benchmarks.results import Cell, Result
 from feedplan.geometry.length import PathLength
 from feedplan.geometry.path import Path
 from feedplan.profile import ArcKind, SpeedProfile
 from feedplan.setpoints import INTERPOLATORS, setpoints
 
+NAME = "interpolators"
 FEED = 50.0  # [mm/s]
 # The length error that is asked for, in parts of a step.
 STEP_ERROR = 1e-6
@@ -75,11 +74,12 @@ def exact_lengths(path: Path, piece: NDArray[np.uint32], u: NDArray[np.float64])
     return u / radii * ((radii**2 + along**2) / 4 + across_sq * curved)
 
 
-def inversion_rows(path: Path) -> list[tuple[str, ...]]:
+def inversion_rows(name: str, path: Path, steps: tuple[float, ...]) -> list[dict[str, Cell]]:
+    """Places at equal steps."""
     length = PathLength(path)
     starts = length.length(np.arange(len(path)), np.zeros(len(path)))
-    rows = []
-    for step in (0.001, 0.01, 0.1, 1.0, 10.0):
+    rows: list[dict[str, Cell]] = []
+    for step in steps:
         wanted = np.arange(step, length.total, step)[:MAX_STEPS]
         for interpolator in INTERPOLATORS:
             begin = time.perf_counter()
@@ -87,15 +87,17 @@ def inversion_rows(path: Path) -> list[tuple[str, ...]]:
             seconds = time.perf_counter() - begin
             reached = starts[places.piece] + exact_lengths(path, places.piece, places.u)
             rows.append(
-                (
-                    f"{step:g}",
-                    str(len(wanted)),
-                    interpolator,
-                    f"{places.iterations.mean():.2f}",
-                    str(places.iterations.max()),
-                    f"{np.abs(reached - wanted).max() / step:.1e}",
-                    f"{seconds / len(wanted) * 1e9:.0f}",
-                )
+                {
+                    "curve": name,
+                    "what": "places",
+                    "step [mm]": step,
+                    "steps": len(wanted),
+                    "interpolator": interpolator,
+                    "rounds": float(places.iterations.mean()),
+                    "worst rounds": int(places.iterations.max()),
+                    "error [steps]": float(np.abs(reached - wanted).max() / step),
+                    "ns a step": seconds / len(wanted) * 1e9,
+                }
             )
     return rows
 
@@ -120,10 +122,11 @@ def constant_feed(path: Path) -> SpeedProfile:
     )
 
 
-def stream_rows(path: Path) -> list[tuple[str, ...]]:
+def stream_rows(name: str, path: Path, steps: tuple[float, ...]) -> list[dict[str, Cell]]:
+    """The setpoint stream."""
     profile = constant_feed(path)
-    rows = []
-    for step in (0.001, 0.01, 0.1, 1.0):
+    rows: list[dict[str, Cell]] = []
+    for step in steps:
         for interpolator in INTERPOLATORS:
             stream = setpoints(path, profile, step / FEED, interpolator)
             begin = time.perf_counter()
@@ -131,40 +134,34 @@ def stream_rows(path: Path) -> list[tuple[str, ...]]:
             seconds = time.perf_counter() - begin
             stats = stream.stats
             rows.append(
-                (
-                    f"{step:g}",
-                    str(count),
-                    interpolator,
-                    str(stats.iterations),
-                    f"{stats.length_error:.1e}",
-                    f"{seconds / count * 1e9:.0f}",
-                )
+                {
+                    "curve": name,
+                    "what": "stream",
+                    "step [mm]": step,
+                    "steps": count,
+                    "interpolator": interpolator,
+                    "rounds": "",
+                    "worst rounds": stats.iterations,
+                    "error [steps]": stats.length_error,
+                    "ns a step": seconds / count * 1e9,
+                }
             )
     return rows
 
 
-def print_table(title: str, columns: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
-    table = Table(title=title, title_justify="left")
-    for column in columns:
-        table.add_column(column, justify="left" if column == "interpolator" else "right")
-    for row in rows:
-        table.add_row(*row)
-    Console().print(table)
-
-
-def main() -> None:
+def run(quick: bool = False) -> Result:
+    """Both interpolators on small and large steps."""
+    steps = (0.1, 1.0) if quick else (0.001, 0.01, 0.1, 1.0)
+    rows: list[dict[str, Cell]] = []
     for name, path in curves().items():
-        print_table(
-            f"{name}: places at equal steps, asked for {STEP_ERROR:g} of a step",
-            ("step [mm]", "steps", "interpolator", "rounds", "worst", "length error [steps]", "ns per step"),
-            inversion_rows(path),
-        )
-        print_table(
-            f"{name}: setpoints with all derivatives at {FEED:g} mm/s",
-            ("step [mm]", "setpoints", "interpolator", "worst rounds", "proven error [steps]", "ns each"),
-            stream_rows(path),
-        )
-
-
-if __name__ == "__main__":
-    main()
+        rows += inversion_rows(name, path, steps if quick else (*steps, 10.0))
+        rows += stream_rows(name, path, steps)
+    return Result(
+        NAME,
+        f"Interpolators, asked for a length error of {STEP_ERROR:g} of a step",
+        tuple(rows),
+        (
+            f"places: the bare inversion; stream: setpoints with all derivatives at {FEED:g} mm/s.",
+            "The error of places is measured, that of a stream is the proven bound.",
+        ),
+    )

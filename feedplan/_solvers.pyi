@@ -11,6 +11,7 @@ from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 
 __all__ = [
+    "CurveLength",
     "PathLength",
     "PlanError",
     "Sampler",
@@ -18,10 +19,20 @@ __all__ = [
     "__version__",
     "audit_plan",
     "build_path",
+    "check_control_points",
     "csv_rows",
+    "curve_cusps",
+    "curve_elevate",
+    "curve_evaluate",
+    "curve_joints",
+    "curve_reverse",
+    "curve_split",
     "fit_points",
     "plan_quadratic",
     "read_gcode",
+    "spline_insert",
+    "spline_pieces",
+    "turn_pieces",
 ]
 
 __version__: str
@@ -73,6 +84,7 @@ class Sampler:
         width: NDArray[np.float64],
         line: NDArray[np.int32],
         runs: NDArray[np.int64],
+        start_dwell: float,
         dwell: NDArray[np.float64],
         piece: NDArray[np.uint32],
         kind: NDArray[np.uint8],
@@ -189,3 +201,102 @@ class SetpointAudit:
         line: NDArray[np.int32] | None = None,
     ) -> None: ...
     def finish(self) -> _Findings: ...
+
+# Control points (total, axes), weights (total,) if any piece is rational, offsets (n + 1,), widths (n,).
+_CurveColumns = tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.int64], NDArray[np.float64]]
+
+def spline_pieces(
+    control_points: NDArray[np.float64],
+    weights: NDArray[np.float64] | None,
+    knots: NDArray[np.float64],
+    degree: int,
+    periodic: bool,
+) -> _CurveColumns: ...
+def spline_insert(
+    control_points: NDArray[np.float64],
+    weights: NDArray[np.float64] | None,
+    knots: NDArray[np.float64],
+    degree: int,
+    value: float,
+    times: int,
+) -> tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.float64]]: ...
+def turn_pieces(
+    start: NDArray[np.float64],
+    plane: tuple[int, int],
+    centre: tuple[float, float],
+    sweep: float,
+    travel: NDArray[np.float64] | None,
+    degree: int,
+    tolerance: float,
+) -> tuple[_CurveColumns, float]: ...
+def check_control_points(
+    control_points: NDArray[np.float64], weights: NDArray[np.float64] | None, degree: int
+) -> None: ...
+def curve_evaluate(
+    control_points: NDArray[np.float64],
+    weights: NDArray[np.float64] | None,
+    offsets: NDArray[np.int64],
+    width: NDArray[np.float64],
+    piece: NDArray[np.uint32],
+    u: NDArray[np.float64],
+    order: int,
+) -> NDArray[np.float64]: ...
+def curve_elevate(
+    control_points: NDArray[np.float64],
+    weights: NDArray[np.float64] | None,
+    offsets: NDArray[np.int64],
+    width: NDArray[np.float64],
+    degree: int,
+) -> _CurveColumns: ...
+def curve_split(
+    control_points: NDArray[np.float64],
+    weights: NDArray[np.float64] | None,
+    offsets: NDArray[np.int64],
+    width: NDArray[np.float64],
+    piece: NDArray[np.uint32],
+    u: NDArray[np.float64],
+) -> _CurveColumns: ...
+def curve_reverse(
+    control_points: NDArray[np.float64],
+    weights: NDArray[np.float64] | None,
+    offsets: NDArray[np.int64],
+    width: NDArray[np.float64],
+) -> _CurveColumns: ...
+def curve_joints(
+    control_points: NDArray[np.float64],
+    weights: NDArray[np.float64] | None,
+    offsets: NDArray[np.int64],
+    width: NDArray[np.float64],
+    closed: bool,
+    gap: float,
+    angle: float,
+    derivative: float,
+) -> tuple[
+    NDArray[np.uint32], NDArray[np.uint8], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
+]: ...
+def curve_cusps(
+    control_points: NDArray[np.float64],
+    weights: NDArray[np.float64] | None,
+    offsets: NDArray[np.int64],
+    width: NDArray[np.float64],
+    tolerance: float,
+) -> tuple[NDArray[np.uint32], NDArray[np.float64]]: ...
+
+@final
+class CurveLength:
+    def __new__(
+        cls,
+        control_points: NDArray[np.float64],
+        weights: NDArray[np.float64] | None,
+        offsets: NDArray[np.int64],
+        width: NDArray[np.float64],
+        accuracy: float,
+    ) -> CurveLength: ...
+    @property
+    def total(self) -> float: ...
+    @property
+    def error(self) -> float: ...
+    def lengths(self, piece: NDArray[np.uint32], u: NDArray[np.float64]) -> NDArray[np.float64]: ...
+    def locate(
+        self, lengths: NDArray[np.float64], tolerance: float
+    ) -> tuple[NDArray[np.uint32], NDArray[np.float64], NDArray[np.uint32], NDArray[np.float64]]: ...

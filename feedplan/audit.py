@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
@@ -21,6 +21,9 @@ from feedplan.setpoints import SetpointChunk, Setpoints
 # A ratio of measured value to limit passes up to here: a millionth covers the planner's own rounding over
 # long paths (some 1e-10) and means nothing to a machine.
 PASS_MARK = 1.0 + 1e-6
+
+# Share of the audit's time that path and profile take where setpoints follow, for the progress shown.
+PLAN_SHARE = 0.25
 
 # Chunk of setpoints that goes through the audit at once when they are all at hand.
 CHUNK = 100_000
@@ -176,12 +179,13 @@ def audit(
     program: Program | None = None,
     setpoints: Setpoints | Iterable[SetpointChunk] | None = None,
     jerk: bool = False,
+    progress: Callable[[float], None] | None = None,
 ) -> Audit:
     """Measures a plan against every limit of its problem and machine.
 
     The `profile` on its path; with a `program` the distance between followed and programmed path; with
     `setpoints`, which are read chunk by chunk, their differences and their places on the path. Jerk is judged
-    only if the method claims it (`jerk`).
+    only if the method claims it (`jerk`). `progress` is called with the share done, 0 to 1.
     Raises InputError where path, machine, program and setpoints do not belong together.
     """
     path = problem.path
@@ -204,11 +208,14 @@ def audit(
     )
     try:
         problem, profile, program = _native(problem, profile, program)
+        report = progress or (lambda done: None)
+        report(0.0)
         results = [audit_plan(problem, limits, profile, program)]
         if setpoints is not None:
+            report(PLAN_SHARE)
             if isinstance(setpoints, Setpoints):
                 limits = replace(limits, period=setpoints.period)
-                setpoints = setpoints.chunks(CHUNK)
+                setpoints = _reported(setpoints, report)
             stream = SetpointAudit(limits, 0.0, problem, profile, program)
             for chunk in setpoints:
                 stream.push(
@@ -219,6 +226,7 @@ def audit(
                     _array(chunk.line, np.int32),
                 )
             results.append(stream.finish())
+        report(1.0)
     except ValueError as error:
         raise InputError(f"this plan cannot be audited: {error}") from None
     return _join(results, axes, jerk)
@@ -286,6 +294,15 @@ def audit_setpoints(
             None if lines is None else lines[part],
         )
     return _join([stream.finish()], names, jerk)
+
+
+def _reported(setpoints: Setpoints, report: Callable[[float], None]) -> Iterator[SetpointChunk]:
+    """The setpoints in chunks; says how far they are when the next one is asked for."""
+    done = 0
+    for chunk in setpoints.chunks(CHUNK):
+        yield chunk
+        done += len(chunk)
+        report(PLAN_SHARE + (1.0 - PLAN_SHARE) * done / setpoints.count)
 
 
 def _machine_axes(machine: Machine, names: tuple[str, ...]) -> list[Axis]:

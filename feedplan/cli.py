@@ -183,9 +183,7 @@ def plan(
             interpolator=interpolator,
             progress=progress,
         )
-        if progress:
-            progress("audit", 0.0)
-        audit = result.audit()
+        audit = result.audit(progress)
         files: tuple[FilePath, ...] = ()
         if output:
             files = write_plan(

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import math
 import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path as FilePath
 from typing import Any
 
 from feedplan.audit import Audit, audit
 from feedplan.bound import lower_bound
 from feedplan.constraints.problem import Problem, build_problem
+from feedplan.errors import MachineError
 from feedplan.geometry.build import build_path
 from feedplan.geometry.length import PathLength
 from feedplan.geometry.path import Path
@@ -45,6 +44,7 @@ class Plan:
     compute: dict[str, float]
     interpolator: str = "sarfraz"
     warnings: tuple[str, ...] = field(default=())
+    _verdict: list[Audit] = field(default_factory=list, init=False, repr=False, compare=False)
 
     @property
     def path(self) -> Path:
@@ -54,7 +54,7 @@ class Plan:
     @property
     def time(self) -> float:
         """Time of the whole program, dwells included [s]."""
-        return self.profile.time + float(self.path.dwell.sum())
+        return self.profile.time + self.path.pauses
 
     @property
     def gap(self) -> float:
@@ -67,14 +67,24 @@ class Plan:
             self.path, self.profile, period or self.machine.period, interpolator or self.interpolator
         )
 
-    @cached_property
-    def _audit(self) -> Audit:
-        with _timed(self.compute, "audit"):
-            return audit(self.problem, self.profile, self.machine, self.program, self.setpoints())
+    def audit(self, progress: Progress | None = None) -> Audit:
+        """The independent check of profile, geometry and setpoints; computed once.
 
-    def audit(self) -> Audit:
-        """The independent check of profile, geometry and setpoints; computed once."""
-        return self._audit
+        `progress("audit", done)` is called as it goes on.
+        """
+        if not self._verdict:
+            share = (lambda done: progress("audit", done)) if progress else None
+            with _timed(self.compute, "audit"):
+                verdict = audit(
+                    self.problem,
+                    self.profile,
+                    self.machine,
+                    self.program,
+                    self.setpoints(),
+                    progress=share,
+                )
+            self._verdict.append(verdict)
+        return self._verdict[0]
 
     def summary(self) -> dict[str, Any]:
         """What `plan.json` holds: plain numbers and strings."""
@@ -130,6 +140,11 @@ def plan(
         machine = Machine.load(machine)
     if period is not None:
         machine = machine.with_period(period)
+    if not machine.words_are_joints:
+        raise MachineError(
+            f"machine {machine.name}: its kinematics '{machine.kinematics}' cannot be planned over yet: "
+            "use a machine whose joints are the program's axes"
+        )
     report = progress or (lambda stage, done: None)
     compute: dict[str, float] = {}
     program: Program | None = None
@@ -154,7 +169,7 @@ def plan(
         )
         profile = solve(problem)
     with _timed(compute, "bound"):
-        least = lower_bound(problem) + math.fsum(path.dwell)
+        least = lower_bound(problem) + path.pauses
     report("plan", 1.0)
     return Plan(
         program=program,
@@ -165,17 +180,8 @@ def plan(
         lower_bound=least,
         compute=compute,
         interpolator=interpolator,
-        warnings=_warnings(program),
+        warnings=program.warnings if program else (),
     )
-
-
-def _warnings(program: Program | None) -> tuple[str, ...]:
-    if program is None:
-        return ()
-    if program.start_dwell > 0:
-        pause = f"the pause of {program.start_dwell:g} s before the first move is not part of the plan"
-        return (*program.warnings, pause)
-    return program.warnings
 
 
 @contextmanager

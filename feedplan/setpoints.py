@@ -55,11 +55,12 @@ class SamplingStats:
 class Setpoints:
     """The stream of setpoints, computed as it is read.
 
-    Setpoint 0 is the start of the path. A run with time T and pause D takes ceil((T + D)/period) periods:
-    each stop is hit exactly and the stream waits less than one period there, so that `duration` [s], the time
-    of the last of `count` setpoints, is a little longer than the plan's time. A path that ends in motion ends
-    at its true time, after a shorter last step. At a stop velocity, acceleration and jerk are 0; at a
-    switching point, where the acceleration jumps, a setpoint has the values of the arc that begins there.
+    Setpoint 0 is the start of the path. A pause D before the first run takes ceil(D/period) periods there. A
+    run with time T and pause D takes ceil((T + D)/period) periods: each stop is hit exactly and the stream
+    waits less than one period there, so that `duration` [s], the time of the last of `count` setpoints, is a
+    little longer than the plan's time. A path that ends in motion ends at its true time, after a shorter last
+    step. At a stop velocity, acceleration and jerk are 0; at a switching point, where the acceleration jumps,
+    a setpoint has the values of the arc that begins there.
     """
 
     def __init__(self, path: Path, profile: SpeedProfile, period: float, interpolator: str) -> None:
@@ -72,6 +73,7 @@ class Setpoints:
             _array(path.width, np.float64),
             _array(path.line, np.int32),
             _array(path.runs, np.int64),
+            float(path.start_dwell),
             _array(path.dwell, np.float64),
             _array(profile.piece, np.uint32),
             _array(profile.kind, np.uint8),

@@ -39,7 +39,7 @@ class SquarePlan:
     def setpoints(self) -> Any:
         return _Stream(self.chunk)
 
-    def audit(self) -> Audit:
+    def audit(self, progress: object = None) -> Audit:
         return self.verdict
 
     def summary(self) -> dict[str, Any]:

@@ -31,7 +31,14 @@ def test_every_benchmark_runs_and_stores_its_table(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stderr
     tables = {path.stem: json.loads(path.read_text(encoding="utf-8")) for path in tmp_path.glob("*.json")}
-    assert set(tables) == {"planner-cost", "against-toppra", "end-to-end"}
+    assert set(tables) == {
+        "planner-cost",
+        "against-toppra",
+        "end-to-end",
+        "interpolators",
+        "kinematics-cost",
+    }
+    assert all(row["error [steps]"] <= 1.001e-6 for row in tables["interpolators"]["rows"])
     assert all(row["audit"] == "ok" for row in tables["end-to-end"]["rows"])
     assert all(row["toppra's error"] <= row["accuracy"] for row in tables["against-toppra"]["rows"])
     assert all(table["computer"]["cores"] for table in tables.values())

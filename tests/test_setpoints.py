@@ -205,6 +205,26 @@ def test_every_run_starts_on_the_grid_and_waits_less_than_a_period(interpolator:
 
 
 @INTERPOLATOR
+@pytest.mark.parametrize(("pause", "waiting"), [(0.02, 5), (0.021, 6), (1e-6, 1)])
+def test_a_pause_before_the_first_run_delays_the_stream_by_whole_periods(
+    interpolator: str, pause: float, waiting: int
+) -> None:
+    path, profile = two_runs(dwell=0.1)
+    period = 0.004
+    stream = setpoints(replace(path, start_dwell=pause), profile, period, interpolator)
+    whole, prompt = stream.all(), setpoints(path, profile, period, interpolator).all()
+    assert len(whole) == len(prompt) + waiting
+    np.testing.assert_array_equal(whole.t, period * np.arange(len(whole)))
+    for name in ("position", "velocity", "acceleration", "jerk", "line", "piece", "u"):
+        column = getattr(whole, name)
+        np.testing.assert_array_equal(column[waiting:], getattr(prompt, name), err_msg=name)
+        assert (column[:waiting] == column[waiting]).all(), name
+    for size in (1, 3, waiting, waiting + 1):
+        chunks = list(stream.chunks(size))
+        np.testing.assert_array_equal(np.concatenate([chunk.position for chunk in chunks]), whole.position)
+
+
+@INTERPOLATOR
 def test_a_period_longer_than_the_run_hits_its_end(interpolator: str) -> None:
     path, profile = two_runs(dwell=0.0)
     stream = setpoints(path, profile, 5.0, interpolator)
@@ -340,6 +360,11 @@ def test_what_does_not_fit_is_refused_with_a_sentence() -> None:
     moving, constant = parabola_case()
     with pytest.raises(InputError, match="plan with end speed 0"):
         setpoints(replace(moving, dwell=np.array([1.0])), constant, 0.001)
+    with pytest.raises(InputError, match=r"line 10: .* pauses 1 s there: plan with start speed 0"):
+        setpoints(replace(moving, start_dwell=1.0), constant, 0.001)
+    for pause in (-1.0, math.nan, math.inf):
+        with pytest.raises(InputError, match="a pause that is negative or not finite"):
+            setpoints(replace(path, start_dwell=pause), profile, 0.001)
     nothing = replace(path, control_points=np.empty((0, 3, 1)), width=np.empty(0), runs=np.array([0]))
     with pytest.raises(InputError, match="the path is empty"):
         setpoints(replace(nothing, dwell=np.empty(0)), profile, 0.001)

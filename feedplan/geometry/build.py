@@ -138,6 +138,7 @@ def build_path(
         dwell=program.dwell[move[runs[1:] - 1, 1]],
         tolerance=allowed,
         fit=FitSummary(points, splines, polynomials, deviation),
+        start_dwell=program.start_dwell,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,8 +11,13 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class FitSummary:
-    """What fitting did: G1 `points` in, B-`splines` and `polynomials` out, true `deviation` [mm] of the
-    followed path from the programmed one (both ways)."""
+    """What fitting did: G1 `points` in, B-`splines` and `polynomials` out, `deviation` [mm] of the path.
+
+    `points` are the G1 moves of the chains that were fitted, lines that stayed lines among them; each of
+    those counts as a spline and a polynomial. `splines` and `polynomials` count what the fit made, before
+    pieces are cut at changes of feed and at corners. `deviation` is a certified upper bound of the distance
+    between the whole path (arcs and corners too) and the programmed one, both ways.
+    """
 
     points: int = 0
     splines: int = 0
@@ -37,7 +43,7 @@ class Path:
     the length]; `feed` (n,) commanded feed [mm/s], infinite on rapids; `move` (n, 2) first and last program
     move that the piece follows; `line` (n,) source line of the first; `runs` (r + 1,) piece offsets: the tool
     stands still at the start and the end of each run; `dwell` (r,) pause after each run [s]; `tolerance` (n,)
-    allowed distance from the programmed path [mm].
+    allowed distance from the programmed path [mm]; `start_dwell` pause before the first run [s].
     Within a run the tangent is continuous, unless corners are passed with a velocity jump.
     """
 
@@ -51,6 +57,12 @@ class Path:
     dwell: NDArray[np.float64]
     tolerance: NDArray[np.float64]
     fit: FitSummary = field(default_factory=FitSummary)
+    start_dwell: float = 0.0
 
     def __len__(self) -> int:
         return len(self.width)
+
+    @property
+    def pauses(self) -> float:
+        """Time of all pauses, before the first run and after each [s]."""
+        return self.start_dwell + math.fsum(self.dwell)

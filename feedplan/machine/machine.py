@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 import sys
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from importlib import resources
 from pathlib import Path as FilePath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from feedplan.errors import MachineError
 
@@ -16,16 +18,21 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
+if TYPE_CHECKING:
+    from feedplan.machine.kinematics import Kinematics
+
 MAX_AXES = 6
 AXIS_LETTERS = "XYZABCUVW"
 
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis and its limits.
+    """One axis, a joint of the machine, and its limits.
 
     `max_velocity` [mm/s], `max_acceleration` [mm/s²], `max_jerk` [mm/s³] (infinite: not limited),
     `travel` (least, greatest) [mm], `max_velocity_jump` [mm/s] allowed at a corner (0: corners stop).
+    On a rotary axis every mm is a degree. `kind` is "linear" or "rotary"; empty, the letter decides: A, B and
+    C are rotary.
     """
 
     name: str
@@ -34,6 +41,16 @@ class Axis:
     max_jerk: float = math.inf
     travel: tuple[float, float] = (-math.inf, math.inf)
     max_velocity_jump: float = 0.0
+    kind: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.kind:
+            object.__setattr__(self, "kind", _kind_of(self.name))
+
+    @property
+    def unit(self) -> str:
+        """The unit its positions are in: mm or deg."""
+        return "deg" if self.kind == "rotary" else "mm"
 
 
 @dataclass(frozen=True)
@@ -42,7 +59,8 @@ class Machine:
 
     `period` is the servo period [s], `chord_tolerance` the allowed distance [mm] between the path and the
     straight line from one setpoint to the next (infinite: not limited), `home` the position [mm] that G28
-    and G30 go to, `offsets` the work offsets by name (`"G54"`: one number an axis) [mm].
+    and G30 go to, `offsets` the work offsets by name (`"G54"`: one number an axis) [mm]. `kinematics` is the
+    type that turns the tool tip into joint positions, `parameters` its keys in the machine file.
     """
 
     name: str
@@ -52,6 +70,7 @@ class Machine:
     kinematics: str = "cartesian"
     home: tuple[float, ...] = ()
     offsets: tuple[tuple[str, tuple[float, ...]], ...] = ()
+    parameters: Mapping[str, Any] = field(default_factory=dict, hash=False)
 
     @property
     def axis_names(self) -> tuple[str, ...]:
@@ -64,6 +83,23 @@ class Machine:
             if axis.name == name:
                 return axis
         raise MachineError(f"machine {self.name} has no axis {name}: it has {', '.join(self.axis_names)}")
+
+    @property
+    def is_plain(self) -> bool:
+        """Every program axis is the joint of its own letter, in the same unit."""
+        return self.kinematics == "cartesian" and not self.parameters
+
+    @property
+    def words_are_joints(self) -> bool:
+        """Axis words are joint positions as they stand, unless G43.4 or the like says otherwise."""
+        return self.is_plain or not self.inverse.always
+
+    @cached_property
+    def inverse(self) -> Kinematics:
+        """The kinematics q = K(P) with this machine's dimensions; raises MachineError if they do not fit."""
+        from feedplan.machine import kinematics
+
+        return kinematics.create(self.kinematics, self.axes, self.parameters, self.name)
 
     @classmethod
     def load(cls, source: str | FilePath) -> Machine:
@@ -101,7 +137,7 @@ def bundled_machines() -> tuple[str, ...]:
 
 
 _MACHINE_KEYS = {"name", "description", "period", "chord_tolerance", "kinematics", "home", "offsets", "axes"}
-_AXIS_KEYS = {"name", "max_velocity", "max_acceleration", "max_jerk", "travel", "max_velocity_jump"}
+_AXIS_KEYS = {"name", "max_velocity", "max_acceleration", "max_jerk", "travel", "max_velocity_jump", "kind"}
 
 
 def _require(condition: bool, place: str, key: str, value: object, remedy: str) -> None:
@@ -144,19 +180,36 @@ def _parse(text: str, place: str) -> Machine:
     names = [axis.name for axis in axes]
     _require(len(set(names)) == len(names), place, "axes", names, "each axis letter once")
     kinematics = table.get("kinematics", "cartesian")
-    _require(kinematics == "cartesian", place, "kinematics", kinematics, "'cartesian'")
+    parameters = {"type": kinematics} if isinstance(kinematics, str) else kinematics
+    good_type = isinstance(parameters, dict) and isinstance(parameters.get("type"), str)
+    _require(good_type, place, "kinematics", kinematics, 'a name, or a table with type = "cartesian"')
     home = table.get("home", [0.0] * len(axes))
     offsets = table.get("offsets", {})
     _require(isinstance(offsets, dict), place, "offsets", offsets, "a table such as G54 = [0.0, 0.0, 0.0]")
-    return Machine(
+    machine = Machine(
         name=str(table.get("name", place)),
         axes=axes,
         period=_number(table, "period", place, 0.001, "s"),
         chord_tolerance=_number(table, "chord_tolerance", place, math.inf, "mm"),
-        kinematics=kinematics,
+        kinematics=parameters["type"],
         home=_numbers(home, len(axes), place, "home"),
         offsets=tuple((key, _numbers(row, len(axes), place, key)) for key, row in offsets.items()),
+        parameters={key: value for key, value in parameters.items() if key != "type"},
     )
+    if not machine.is_plain:
+        _check_kinematics(machine, place)
+    return machine
+
+
+def _check_kinematics(machine: Machine, place: str) -> None:
+    """A wrong kinematics is refused when the file is read, with the file's name."""
+    from feedplan.machine import kinematics
+
+    kinematics.create(machine.kinematics, machine.axes, machine.parameters, place)
+
+
+def _kind_of(letter: str) -> str:
+    return "rotary" if letter in "ABC" else "linear"
 
 
 def _parse_axis(row: dict[str, Any], machine: str) -> Axis:
@@ -164,18 +217,22 @@ def _parse_axis(row: dict[str, Any], machine: str) -> Axis:
     good = isinstance(name, str) and len(name) == 1 and name in AXIS_LETTERS
     _require(good, machine, "axis name", name, f"one of the letters {AXIS_LETTERS}")
     place = f"{machine}, axis {name}"
+    kind = row.get("kind", _kind_of(str(name)))
+    _require(kind in ("linear", "rotary"), place, "kind", kind, '"linear" or "rotary"')
+    unit = "deg" if kind == "rotary" else "mm"
     unknown = sorted(set(row) - _AXIS_KEYS)
     _require(not unknown, place, "keys", unknown, f"only {', '.join(sorted(_AXIS_KEYS))}")
     travel = _numbers(row["travel"], 2, place, "travel") if "travel" in row else (-math.inf, math.inf)
     _require(travel[0] < travel[1], place, "travel", travel, "[least, greatest] with least < greatest")
     jump = row.get("max_velocity_jump", 0.0)
     good_jump = isinstance(jump, (int, float)) and not isinstance(jump, bool) and 0 <= jump < math.inf
-    _require(good_jump, place, "max_velocity_jump", jump, "a finite number ≥ 0 [mm/s]")
+    _require(good_jump, place, "max_velocity_jump", jump, f"a finite number ≥ 0 [{unit}/s]")
     return Axis(
         name=str(name),
-        max_velocity=_number(row, "max_velocity", place, None, "mm/s"),
-        max_acceleration=_number(row, "max_acceleration", place, None, "mm/s²"),
-        max_jerk=_number(row, "max_jerk", place, math.inf, "mm/s³"),
+        max_velocity=_number(row, "max_velocity", place, None, f"{unit}/s"),
+        max_acceleration=_number(row, "max_acceleration", place, None, f"{unit}/s²"),
+        max_jerk=_number(row, "max_jerk", place, math.inf, f"{unit}/s³"),
         travel=(travel[0], travel[1]),
         max_velocity_jump=float(jump),
+        kind=kind,
     )

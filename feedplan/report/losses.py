@@ -64,7 +64,7 @@ def time_per_limit(problem: Problem, profile: SpeedProfile) -> list[Share]:
     """The time each limit is active, the longest first; dwells stand as a limit of their own."""
     number, names = limit_names(problem, profile)
     times = np.bincount(number, weights=profile.duration, minlength=len(names))
-    dwell = float(problem.path.dwell.sum())
+    dwell = problem.path.pauses
     total = float(times.sum()) + dwell
     rows = [*zip(names, times.tolist(), strict=True), *([("dwell", dwell)] if dwell > 0 else [])]
     shares = [Share(name, time, time / total if total > 0 else 0.0) for name, time in rows]

@@ -66,7 +66,7 @@ fn setpoints(c: &mut Criterion) {
             let arcs = profile(kind, &pieces);
             let time: f64 = arcs.iter().map(|arc| arc.duration).sum();
             let lines = vec![1; PIECES];
-            let path = PathData { pieces, lines, runs: vec![0, PIECES], dwell: vec![0.0] };
+            let path = PathData { pieces, lines, runs: vec![0, PIECES], start_dwell: 0.0, dwell: vec![0.0] };
             let period = time / (SETPOINTS - 1) as f64;
             let sampler = Sampler::new(path, arcs, &[0, PIECES], period, interpolator).expect("a profile");
             let name = BenchmarkId::new(format!("{interpolator:?}"), format!("{kind:?}"));

@@ -112,21 +112,26 @@ impl Polar {
         radial.hypot(angle * self.pitch.min(large))
     }
 
-    /// The number of pieces within `tolerance`, hardly more than the least.
+    /// The least number of pieces within `tolerance`.
     fn count(&self, tolerance: f64) -> Result<usize, ArcError> {
-        let mut alpha = MAX_HALF_ANGLE;
-        loop {
-            let excess = self.deviation(alpha) / tolerance;
-            if excess <= 1.0 {
-                break;
-            }
-            // The error falls with α⁴ on a circle, where one or two steps do, and with α² at the slowest; the
-            // last digit that is given away ends the loop.
-            alpha *= (0.999 / excess).sqrt().sqrt();
+        let half = 0.5 * self.sweep.abs();
+        let fits = |count: f64| self.deviation(half / count) <= tolerance;
+        let mut enough = (half / MAX_HALF_ANGLE * (1.0 - 1e-12)).ceil().max(1.0);
+        let mut short = enough - 1.0;
+        while enough <= MAX_PIECES && !fits(enough) {
+            short = enough;
+            enough *= 2.0;
         }
-        let count = (self.sweep.abs() / (2.0 * alpha) * (1.0 - 1e-12)).ceil().max(1.0);
-        if count <= MAX_PIECES {
-            Ok(count as usize)
+        while enough - short > 1.0 && short < MAX_PIECES {
+            let middle = (0.5 * (short + enough)).floor();
+            if fits(middle) {
+                enough = middle;
+            } else {
+                short = middle;
+            }
+        }
+        if enough <= MAX_PIECES {
+            Ok(enough as usize)
         } else {
             Err(ArcError::Turns)
         }

@@ -5,13 +5,18 @@
 //! exceeds a limit only where the motion does, so a broken limit found here is truly broken.
 
 pub mod arcs;
+pub mod compare;
 pub mod curve;
 pub mod deviation;
+pub mod differences;
 pub mod follow;
+pub mod integral;
+pub mod motion;
 pub mod moves;
 pub mod place;
 pub mod profile;
 pub mod setpoints;
+pub mod timed;
 
 /// A ratio of measured value to limit passes up to here: a millionth covers the planner's own rounding over
 /// 100 000 pieces (some 1e-10) and means nothing to a machine.
@@ -206,6 +211,8 @@ impl<const M: usize> Tally<M> {
 /// The limits that hold everywhere.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits<const M: usize> {
+    /// Those beyond are 0, and their travel is not limited.
+    pub axes: usize,
     /// In mm/s, mm/s² and mm/s³.
     pub velocity: [f64; M],
     pub acceleration: [f64; M],

@@ -125,8 +125,9 @@ pub fn plan<const M: usize>(problem: &Problem<M>) -> Result<Profile, Fault> {
     let plans: Result<Vec<Profile>, Fault> = groups
         .par_iter()
         .map(|group| {
+            let pieces = problem.runs[group.end] - problem.runs[group.start];
             let mut space = Workspace::default();
-            let mut profile = Profile::default();
+            let mut profile = Profile::with_capacity(2 * pieces);
             for run in group.clone() {
                 let ends = (problem.runs[run], problem.runs[run + 1]);
                 let start = if run == 0 { problem.start_speed } else { 0.0 };

@@ -234,25 +234,8 @@ fn bend<'a, const M: usize>(
     excess
 }
 
-/// The part of a piece between two parameters, None where next to nothing is between them. A cut next to an end
-/// is moved to it, so that no sliver is left.
-pub fn between<const M: usize>(piece: &Quadratic<M>, from: f64, to: f64) -> Option<Quadratic<M>> {
-    const NEXT: f64 = 1e-6;
-    let snap = |u: f64| {
-        if u <= NEXT * piece.width {
-            0.0
-        } else if u >= (1.0 - NEXT) * piece.width {
-            piece.width
-        } else {
-            u
-        }
-    };
-    let (low, high) = (snap(from), snap(to));
-    (low < high).then(|| cut(piece, low, high))
-}
-
 /// The part of a piece; the part of a line is made as a line, free of what rounding does to a middle point.
-fn cut<const M: usize>(piece: &Quadratic<M>, from: f64, to: f64) -> Quadratic<M> {
+pub fn cut<const M: usize>(piece: &Quadratic<M>, from: f64, to: f64) -> Quadratic<M> {
     if from == 0.0 && to == piece.width {
         return *piece;
     }
@@ -296,8 +279,8 @@ mod tests {
         let length = jump.length_within(0.1);
         assert!((length - 0.2 * 2f64.sqrt()).abs() < 1e-15);
         let sides = Sides {
-            before: vec![followed(between(&before, 10.0 - length, 10.0).unwrap())],
-            after: vec![followed(between(&after, 0.0, length).unwrap())],
+            before: vec![followed(cut(&before, 10.0 - length, 10.0))],
+            after: vec![followed(cut(&after, 0.0, length))],
         };
         let corner = sides.parabola(&jump).unwrap();
         assert_eq!(corner.piece.control, [[10.0 - length, 0.0], [10.0, 0.0], [10.0, length]]);
@@ -397,12 +380,10 @@ mod tests {
     }
 
     #[test]
-    fn cuts_next_to_an_end_leave_no_sliver() {
+    fn parts_of_a_line_are_lines_that_meet() {
         let line = Quadratic::line([0.0, 0.0], [3.0, 4.0]);
-        assert_eq!(between(&line, 1e-9, 5.0 - 1e-9), Some(line));
-        assert_eq!(between(&line, -1.0, 1e-9), None);
-        assert_eq!(between(&line, 2.0, 2.0), None);
-        let (a, b) = (between(&line, 0.0, 1.3).unwrap(), between(&line, 1.3, f64::INFINITY).unwrap());
+        assert_eq!(cut(&line, 0.0, 5.0), line);
+        let (a, b) = (cut(&line, 0.0, 1.3), cut(&line, 1.3, 5.0));
         assert_eq!(a.control[2], b.control[0]);
         assert!(is_line(&a) && is_line(&b) && (a.width + b.width - 5.0).abs() < 1e-15);
     }

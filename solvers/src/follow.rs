@@ -1,14 +1,16 @@
 //! The moves of a program as pieces, corners still sharp: lines, arcs and fitted chains of lines.
 //!
 //! A chain is a maximal sequence of feed moves along lines that may be fitted together: one tolerance, no
-//! halt in between. A change of feed inside a chain leaves the curve whole; the piece is cut where it passes
-//! the programmed point, so that every piece has one feed and none is faster than a block it covers.
+//! halt in between. A change of feed inside a chain leaves the curve whole; `feed_cuts` cuts its pieces.
+
+mod feed_cuts;
 
 use rayon::prelude::*;
 
 use crate::arc::{arc_extent, arc_pieces, Arc, ArcError};
-use crate::fit::{fit_points, FitOptions, FittedPiece};
-use crate::quadratic::{dot, norm, sub, Quadratic};
+use crate::fit::{fit_points, FitOptions};
+use crate::quadratic::{norm, sub, Quadratic};
+use feed_cuts::cut_at_feeds;
 
 /// What a move is, in the numbers of the Python `MoveKind`.
 pub const RAPID: u8 = 0;
@@ -17,8 +19,6 @@ pub const ARC: u8 = 2;
 
 /// Moves in plain sequence that one task takes at most.
 const TASK: usize = 4096;
-/// Parts of a piece that are shorter than this share of it are not cut off.
-const SLIVER: f64 = 1e-6;
 
 /// A program in columns, one row per move, at most 2³² of them; lengths in mm, speeds in mm/s.
 pub struct Moves<'a, const M: usize> {
@@ -295,61 +295,6 @@ fn chain<const M: usize>(
     })
 }
 
-/// Cuts a piece where it passes the points at which the feed changes; `emit` gets part, chords and feed.
-fn cut_at_feeds<const M: usize>(
-    fit: &FittedPiece<M>,
-    points: &[[f64; M]],
-    feed: &[f64],
-    mut emit: impl FnMut(Quadratic<M>, (usize, usize), f64),
-) {
-    let width = fit.piece.width;
-    let (mut begin, mut chord, mut slowest) = (0.0, fit.first, feed[fit.first]);
-    for k in fit.first + 1..=fit.last {
-        if feed[k] != feed[k - 1] {
-            let u = nearest(&fit.piece, &points[k]);
-            if u - begin > SLIVER * width && width - u > SLIVER * width {
-                emit(fit.piece.part(begin, u), (chord, k - 1), slowest);
-                (begin, chord, slowest) = (u, k, f64::INFINITY);
-            }
-        }
-        slowest = slowest.min(feed[k]);
-    }
-    let rest = if begin == 0.0 { fit.piece } else { fit.piece.part(begin, width) };
-    emit(rest, (chord, fit.last), slowest);
-}
-
-/// The parameter at which a piece comes nearest to a point: the best of a few samples, then bisection of the
-/// derivative of the distance around it.
-fn nearest<const M: usize>(piece: &Quadratic<M>, point: &[f64; M]) -> f64 {
-    const SAMPLES: usize = 8;
-    let (start, end) = piece.end_tangents();
-    let away = |u: f64| {
-        let t = u / piece.width;
-        let tangent: [f64; M] = std::array::from_fn(|k| start[k] + t * (end[k] - start[k]));
-        dot(&tangent, &sub(&piece.point(u), point))
-    };
-    let step = piece.width / SAMPLES as f64;
-    let distance = |i: usize| norm(&sub(&piece.point(i as f64 * step), point));
-    let best = (0..=SAMPLES).min_by(|&a, &b| distance(a).total_cmp(&distance(b))).unwrap_or(0);
-    let mut low = step * best.saturating_sub(1) as f64;
-    let mut high = (step * (best + 1) as f64).min(piece.width);
-    if away(low) >= 0.0 {
-        return low;
-    }
-    if away(high) <= 0.0 {
-        return high;
-    }
-    for _ in 0..50 {
-        let middle = 0.5 * (low + high);
-        if away(middle) > 0.0 {
-            high = middle;
-        } else {
-            low = middle;
-        }
-    }
-    0.5 * (low + high)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -458,13 +403,5 @@ mod tests {
         assert_eq!(error(&no_feed), FollowError { index: 2, fault: Fault::Feed });
         let no_arc = Moves { kind: &[LINE, ARC, LINE, LINE, LINE], feed: &[1.0; 5], ..no_feed };
         assert_eq!(error(&no_arc), FollowError { index: 1, fault: Fault::Arc(ArcError::Sweep) });
-    }
-
-    #[test]
-    fn the_nearest_place_is_found_on_either_half_of_a_hairpin() {
-        let piece = Quadratic { control: [[0.0, 0.0], [10.0, 1.0], [0.0, 2.0]], width: 12.0 };
-        for u in [0.0, 0.1, 2.0, 5.9, 6.1, 11.0, 12.0] {
-            assert!((nearest(&piece, &piece.point(u)) - u).abs() < 1e-9);
-        }
     }
 }

@@ -19,6 +19,7 @@ pub mod polynomial;
 pub mod quadratic;
 pub mod sampling;
 pub mod sarfraz;
+pub mod spline;
 pub mod text;
 
 #[cfg(feature = "python")]

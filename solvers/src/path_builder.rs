@@ -6,19 +6,15 @@
 //! cuts away their ends; what is left of them in the middle stays as it is. All stages run over stretches in
 //! parallel and join their results in order, so the path does not depend on the number of threads.
 
+mod stretches;
+mod travel;
+
 use rayon::prelude::*;
 
-use crate::corner::{between, share_lengths, Jump, Sides};
+use crate::corner::{share_lengths, Sides};
 use crate::follow::{follow, FollowError, FollowOptions, Followed, FollowedProgram, Moves};
-use crate::quadratic::Quadratic;
-
-/// Exact paths are smoothed only where an arc meets its neighbour with a turn below this (rad): that is what
-/// rounded coordinates leave of a tangent joint.
-const ARC_JOINT: f64 = 0.0175;
-/// What is left between two corners is dropped below this share of the stretch.
-const TOUCHING: f64 = 1e-9;
-/// Corners and stretches that one task takes at most.
-const TASK: usize = 1024;
+use stretches::{Cuts, Stretches, TASK};
+use travel::{outside, Outside};
 
 /// What the axes allow.
 pub struct Axes<const M: usize> {
@@ -47,38 +43,6 @@ pub struct BuiltPath<const M: usize> {
     pub outside: Option<Outside>,
 }
 
-/// A position that an axis cannot reach.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Outside {
-    pub index: usize,
-    pub axis: usize,
-    pub position: f64,
-}
-
-/// Where one stretch ends and the next begins.
-struct Joint<const M: usize> {
-    /// The first piece after it.
-    at: usize,
-    /// None at a halt, at the ends of the path and where there is no tangent.
-    jump: Option<Jump<M>>,
-}
-
-/// The pieces in stretches, with the stations that cuts refer to.
-struct Stretches<'a, const M: usize> {
-    pieces: &'a [Followed<M>],
-    joints: Vec<Joint<M>>,
-    /// For each piece, the sum of the widths before it in its stretch.
-    station: Vec<f64>,
-    length: Vec<f64>,
-}
-
-/// The stations where a rounded corner begins in the stretch before it and ends in the stretch after it.
-#[derive(Clone, Copy)]
-struct Cuts {
-    before: f64,
-    after: f64,
-}
-
 /// The path of a program.
 pub fn build_path<const M: usize>(
     moves: &Moves<M>,
@@ -89,7 +53,7 @@ pub fn build_path<const M: usize>(
     let (mut parts, mut runs) = (Vec::new(), vec![0]);
     if !pieces.is_empty() {
         let stretches = Stretches::new(&pieces, moves.halt);
-        let joints = 0..stretches.joints.len();
+        let joints = 0..stretches.joint_count();
         let need: Vec<f64> = joints.clone().into_par_iter().map(|k| stretches.need(k, axes)).collect();
         let length = share_lengths(&need, &stretches.length);
         let corners: Vec<Option<Cuts>> = joints
@@ -111,242 +75,10 @@ pub fn build_path<const M: usize>(
     })
 }
 
-impl<'a, const M: usize> Stretches<'a, M> {
-    fn new(pieces: &'a [Followed<M>], halt: &[bool]) -> Self {
-        let end = |at| Joint { at, jump: None };
-        let inner = (1..pieces.len()).into_par_iter().filter_map(|at| {
-            let (before, after) = (&pieces[at - 1], &pieces[at]);
-            if after.first > before.last && halt[before.last as usize] {
-                return Some(end(at));
-            }
-            let jump = Jump::new(&before.piece, &after.piece);
-            match jump {
-                Some(jump) if jump.is_smooth(&before.piece, &after.piece) => None,
-                _ => Some(Joint { at, jump }),
-            }
-        });
-        let mut joints = vec![end(0)];
-        joints.par_extend(inner);
-        joints.push(end(pieces.len()));
-
-        let mut station = Vec::with_capacity(pieces.len());
-        let mut length = Vec::with_capacity(joints.len());
-        for pair in joints.windows(2) {
-            let mut sum = 0.0;
-            for followed in &pieces[pair[0].at..pair[1].at] {
-                station.push(sum);
-                sum += followed.piece.width;
-            }
-            length.push(sum);
-        }
-        Self { pieces, joints, station, length }
-    }
-
-    /// The pieces before joint `k`, from the joint backwards, and those after it.
-    fn sides(&self, k: usize) -> (impl Iterator<Item = &Followed<M>>, impl Iterator<Item = &Followed<M>>) {
-        let at = self.joints[k].at;
-        let before = &self.pieces[self.joints[k - 1].at..at];
-        let after = &self.pieces[at..self.joints[k + 1].at];
-        (before.iter().rev(), after.iter())
-    }
-
-    /// The length at which rounding corner `k` is as fast as the feed, or all that the tolerance allows on both
-    /// sides; 0 where it is not rounded.
-    fn need(&self, k: usize, axes: &Axes<M>) -> f64 {
-        let Some(jump) = &self.joints[k].jump else { return 0.0 };
-        let at = self.joints[k].at;
-        let (before, after) = (&self.pieces[at - 1], &self.pieces[at]);
-        let exact = before.exact || after.exact;
-        let meets_arc = before.arc || after.arc;
-        if jump.reverses() || exact && !(meets_arc && jump.size <= ARC_JOINT) {
-            return 0.0;
-        }
-        // Small turns need little, but no less than what the tolerance calls small.
-        let wanted = jump
-            .length_for(
-                [&before.piece, &after.piece],
-                before.feed.min(after.feed),
-                &axes.max_velocity,
-                &axes.max_acceleration,
-            )
-            .max(before.tolerance.min(after.tolerance));
-        let (backwards, forwards) = self.sides(k);
-        reach(forwards, jump, exact, reach(backwards, jump, exact, wanted))
-    }
-
-    /// Stretch `k` between two stations.
-    fn region(&self, k: usize, from: f64, to: f64, pieces: &mut Vec<Followed<M>>) {
-        let (start, end) = (self.joints[k].at, self.joints[k + 1].at);
-        let first = start + self.station[start..end].partition_point(|&station| station <= from).max(1) - 1;
-        for i in first..end {
-            let station = self.station[i];
-            if station >= to {
-                break;
-            }
-            if let Some(piece) = between(&self.pieces[i].piece, from - station, to - station) {
-                pieces.push(Followed { piece, ..self.pieces[i] });
-            }
-        }
-    }
-
-    /// The sides of corner `k` between its cuts.
-    fn cut_sides(&self, k: usize, cuts: Cuts, sides: &mut Sides<M>) {
-        sides.before.clear();
-        sides.after.clear();
-        self.region(k - 1, cuts.before, f64::INFINITY, &mut sides.before);
-        self.region(k, 0.0, cuts.after, &mut sides.after);
-    }
-
-    /// Where corner `k` begins and ends, None where the tolerance leaves no room for it.
-    fn settle(&self, k: usize, length: &[f64], sides: &mut Sides<M>) -> Option<Cuts> {
-        const TRIALS: usize = 40;
-        let jump = self.joints[k].jump.as_ref().filter(|jump| !jump.vanishes(length[k]))?;
-        let (mut before, mut after) = (length[k], length[k]);
-        for _ in 0..TRIALS {
-            let mut cuts = Cuts { before: self.length[k - 1] - before, after };
-            // Corners that touch must cut at the same place.
-            if cuts.before - length[k - 1] <= TOUCHING * self.length[k - 1] {
-                cuts.before = length[k - 1];
-            }
-            self.cut_sides(k, cuts, sides);
-            let excess = match sides.parabola(jump) {
-                Some(corner) => corner.deviation / corner.tolerance,
-                None => sides.bend(jump)?,
-            };
-            // The bounds are sums, which may be rounded up.
-            if excess <= 1.0 + 1e-9 {
-                return Some(cuts);
-            }
-            // The parameter of a curved side is not its length, so it can allow less than it promised.
-            let shorter = (1.0 - 1e-5) / excess;
-            (before, after) = (shorter * before, shorter * after);
-            if jump.vanishes(after) {
-                return None;
-            }
-        }
-        None
-    }
-
-    /// Corners and what they leave of the stretches, in order and in parts, and the runs.
-    fn assemble(&self, corners: &[Option<Cuts>], jump: bool) -> (Vec<Vec<Followed<M>>>, Vec<usize>) {
-        let count = self.length.len();
-        let tasks: Vec<(Vec<Followed<M>>, Vec<usize>)> = (0..count.div_ceil(TASK))
-            .into_par_iter()
-            .map(|task| {
-                let stretches = task * TASK..count.min((task + 1) * TASK);
-                let inside = self.joints[stretches.end].at - self.joints[stretches.start].at;
-                let mut pieces = Vec::with_capacity(inside + 2 * stretches.len());
-                let (mut runs, mut sides) = (Vec::new(), Sides::default());
-                for k in stretches {
-                    let start = match (corners[k], &self.joints[k].jump) {
-                        (Some(cuts), Some(turn)) => {
-                            self.cut_sides(k, cuts, &mut sides);
-                            if let Some(corner) = sides.parabola(turn) {
-                                pieces.push(corner);
-                            } else {
-                                sides.bend(turn);
-                                pieces.extend_from_slice(&sides.before);
-                                pieces.extend_from_slice(&sides.after);
-                            }
-                            cuts.after
-                        }
-                        (_, turn) => {
-                            if !(jump && turn.is_some()) {
-                                runs.push(pieces.len());
-                            }
-                            0.0
-                        }
-                    };
-                    let end = corners[k + 1].map_or(f64::INFINITY, |cuts| cuts.before);
-                    self.region(k, start, end, &mut pieces);
-                }
-                (pieces, runs)
-            })
-            .collect();
-        let (mut parts, mut runs, mut total) = (Vec::with_capacity(tasks.len()), Vec::new(), 0);
-        for (part, starts) in tasks {
-            runs.extend(starts.iter().map(|start| start + total));
-            total += part.len();
-            parts.push(part);
-        }
-        runs.push(total);
-        (parts, runs)
-    }
-}
-
-/// How much of `wanted` a side of a corner allows: what its pieces have left of their tolerance, and its length.
-fn reach<'a, const M: usize>(
-    side: impl Iterator<Item = &'a Followed<M>>,
-    jump: &Jump<M>,
-    exact: bool,
-    wanted: f64,
-) -> f64 {
-    let (mut length, mut station) = (wanted, 0.0);
-    for followed in side {
-        if followed.exact && !exact {
-            break;
-        }
-        let room = jump.length_within(followed.tolerance - followed.deviation);
-        length = length.min(room.max(station));
-        station += followed.piece.width;
-        if station >= length {
-            return length;
-        }
-    }
-    length.min(station)
-}
-
-/// The first position outside the travel: of arcs as programmed, of everything else as followed.
-fn outside<const M: usize>(
-    parts: &[Vec<Followed<M>>],
-    moves: &Moves<M>,
-    travel: &[[f64; 2]; M],
-) -> Option<Outside> {
-    // Positions come from sums of offsets; a nanometre more is no fault.
-    const SLACK: f64 = 1e-6;
-    if travel.iter().flatten().all(|limit| limit.is_infinite()) {
-        return None;
-    }
-    let beyond = |index: usize, axis: usize, (least, greatest): (f64, f64), bulge: f64| {
-        let [low, high] = travel[axis];
-        let slack = SLACK + bulge;
-        if least < low - slack {
-            Some(Outside { index, axis, position: least })
-        } else if greatest > high + slack {
-            Some(Outside { index, axis, position: greatest })
-        } else {
-            None
-        }
-    };
-    let arcs = moves.arcs.par_iter().find_map_first(|&(index, shape)| {
-        shape.plane.iter().find_map(|&axis| beyond(index, axis, moves.arc_extent(index, axis)?, 0.0))
-    });
-    let curves = parts.par_iter().find_map_first(|part| {
-        part.iter().find_map(|followed| {
-            let bulge = if followed.arc { followed.deviation } else { 0.0 };
-            let index = followed.first as usize;
-            (0..M).find_map(|axis| beyond(index, axis, extent(&followed.piece, axis), bulge))
-        })
-    });
-    [arcs, curves].into_iter().flatten().min_by_key(|place| place.index)
-}
-
-/// Least and greatest value of an axis on a piece.
-fn extent<const M: usize>(piece: &Quadratic<M>, axis: usize) -> (f64, f64) {
-    let [a, b, c] = piece.control.map(|point| point[axis]);
-    let (mut least, mut greatest) = (a.min(c), a.max(c));
-    if b < least || b > greatest {
-        let t = (a - b) / (a - 2.0 * b + c);
-        let turn = a + t * (b - a);
-        least = least.min(turn);
-        greatest = greatest.max(turn);
-    }
-    (least, greatest)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::corner::Jump;
     use crate::follow::LINE;
     use crate::quadratic::{norm, sub};
     use proptest::prelude::*;
@@ -416,6 +148,16 @@ mod tests {
         for pair in pieces.windows(2) {
             assert_eq!(pair[0].piece.control[2], pair[1].piece.control[0]);
             assert!(Jump::new(&pair[0].piece, &pair[1].piece).unwrap().size < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_corner_far_shorter_than_its_sides_is_rounded_all_the_same() {
+        for (turn, tolerance) in [(1e-4, 1e-3), (1.5, 1e-5), (1.5, 1e-6)] {
+            let end = [100.0 + 100.0 * f64::cos(turn), 100.0 * f64::sin(turn)];
+            let (pieces, runs) = polyline(&[[0.0, 0.0], [100.0, 0.0], end], &[tolerance; 2], false, false);
+            assert_eq!((pieces.len(), &runs[..]), (3, &[0, 3][..]), "{turn} {tolerance}");
+            assert!(pieces[1].deviation <= tolerance * (1.0 + 1e-9));
         }
     }
 

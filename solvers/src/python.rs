@@ -7,6 +7,7 @@ mod gcode;
 mod path;
 mod plan;
 mod sampling;
+mod spline;
 mod text;
 
 use pyo3::prelude::*;
@@ -32,42 +33,6 @@ macro_rules! with_padded_axes {
 }
 pub(crate) use with_padded_axes;
 
-/// Calls a generic kernel with the number of axes as a constant: `with_axes!(m, M, expression)`.
-macro_rules! with_axes {
-    ($count:expr, $m:ident, $call:expr) => {
-        match $count {
-            1 => {
-                const $m: usize = 1;
-                $call
-            }
-            2 => {
-                const $m: usize = 2;
-                $call
-            }
-            3 => {
-                const $m: usize = 3;
-                $call
-            }
-            4 => {
-                const $m: usize = 4;
-                $call
-            }
-            5 => {
-                const $m: usize = 5;
-                $call
-            }
-            6 => {
-                const $m: usize = 6;
-                $call
-            }
-            count => {
-                Err(pyo3::exceptions::PyValueError::new_err(format!("{count} axes: 1 to 6 are supported")))
-            }
-        }
-    };
-}
-pub(crate) use with_axes;
-
 /// The native module of feedplan.
 #[pymodule]
 fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -77,6 +42,7 @@ fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     text::register(module)?;
     audit::register(module)?;
     sampling::register(module)?;
+    spline::register(module)?;
     plan::register(module)?;
     gcode::register(module)?;
     Ok(())

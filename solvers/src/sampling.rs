@@ -1,7 +1,8 @@
 //! Setpoints at the servo period: positions, velocities, accelerations and jerks of a profile on its path.
 //!
 //! Every run starts on a setpoint and its end is hit exactly: run r with time T_r and pause D_r takes
-//! ceil((T_r + D_r)/period) periods, so the stream waits less than one period at a stop. A setpoint is found
+//! ceil((T_r + D_r)/period) periods, so the stream waits less than one period at a stop; a pause before the first
+//! run takes whole periods as well. A setpoint is found
 //! from its index alone (run, time in the run, arc, place on the arc), so any part of the stream can be computed
 //! on its own, in parallel and with the same digits. The Newton–Raphson interpolator goes step by step instead.
 //!
@@ -67,11 +68,13 @@ pub struct Resume {
     u: f64,
 }
 
-/// What a path gives: pieces, their source lines, runs as piece offsets, and the pause after each run.
+/// What a path gives: pieces, their source lines, runs as piece offsets, and the pauses before the first run and
+/// after each.
 pub struct PathData<const M: usize> {
     pub pieces: Vec<Quadratic<M>>,
     pub lines: Vec<i32>,
     pub runs: Vec<usize>,
+    pub start_dwell: f64,
     pub dwell: Vec<f64>,
 }
 
@@ -103,7 +106,8 @@ impl<const M: usize> Sampler<M> {
             return Err(format!("the period is {period} s: give a positive one"));
         }
         let mut starts = Vec::with_capacity(arcs.len());
-        let (mut runs, mut first, mut ends_moving) = (Vec::with_capacity(path.dwell.len()), 0.0, false);
+        let (mut runs, mut ends_moving) = (Vec::with_capacity(path.dwell.len()), false);
+        let mut first = periods_of(path.start_dwell, period);
         for r in 0..path.dwell.len() {
             let (arc_range, pieces) = (arc_runs[r]..arc_runs[r + 1], path.runs[r]..path.runs[r + 1]);
             let mut time = 0.0;
@@ -149,7 +153,15 @@ impl<const M: usize> Sampler<M> {
             });
             first += periods;
         }
-        Ok(Self { path, arcs, starts, runs, period, interpolator, count: first as usize + 1, ends_moving })
+        let count = first as usize + 1;
+        let sampler = Self { path, arcs, starts, runs, period, interpolator, count, ends_moving };
+        match sampler.start() {
+            Some((speed, ..)) if speed > 0.0 && sampler.path.start_dwell > 0.0 => Err(format!(
+                "line {}: the plan begins at {speed:.6} mm/s, but the program pauses {} s there: plan with start speed 0",
+                sampler.path.lines[0], sampler.path.start_dwell
+            )),
+            _ => Ok(sampler),
+        }
     }
 
     /// Number of setpoints, the start of the path included.
@@ -222,8 +234,8 @@ impl<const M: usize> Sampler<M> {
         let mut i = 0;
         while i < part.t.len() {
             let index = part.start + i;
-            if index == 0 {
-                self.set_start(&mut part);
+            if index <= self.runs[0].first {
+                self.set_start(&mut part, i);
                 i += 1;
                 continue;
             }
@@ -249,13 +261,13 @@ impl<const M: usize> Sampler<M> {
     /// place reached, so that errors do not add up and every run ends on time.
     fn fill_by_steps(&self, mut part: Slices<M>, resume: Option<Resume>) -> (Effort, Option<Resume>) {
         let mut effort = Effort::default();
-        if part.start == 0 && !part.t.is_empty() {
-            self.set_start(&mut part);
-            if part.t.len() == 1 {
-                return (effort, None);
-            }
+        let begin = (self.runs[0].first + 1).saturating_sub(part.start).min(part.t.len());
+        for i in 0..begin {
+            self.set_start(&mut part, i);
         }
-        let begin = usize::from(part.start == 0);
+        if begin == part.t.len() {
+            return (effort, None);
+        }
         let run = self.run_of(part.start + begin);
         let mut cursor = Cursor::new(self, true);
         let fresh = Resume { index: run.first, arc: run.arcs.start, u: f64::NAN };
@@ -332,20 +344,26 @@ impl<const M: usize> Sampler<M> {
         part.u[i] = state.u;
     }
 
-    fn set_start(&self, part: &mut Slices<M>) {
-        let run = &self.runs[0];
-        if let Some(arc) = self.arcs[run.arcs.clone()].first() {
-            let motion = Motion::new(&self.path.pieces[arc.piece as usize], arc, false);
-            let state = motion.at(arc.u0);
-            self.set(part, 0, run.arcs.start, &motion, &state);
-            if norm(&part.velocity[0]) <= STANDSTILL * norm(&motion.rates(&motion.at(arc.u1)).velocity) {
-                (part.velocity[0], part.acceleration[0], part.jerk[0]) = ([0.0; M], [0.0; M], [0.0; M]);
+    /// Speed, first arc and its motion where the path begins; a speed of 0 is exact.
+    fn start(&self) -> Option<(f64, usize, Motion<M>)> {
+        let first = self.runs[0].arcs.clone().next()?;
+        let arc = &self.arcs[first];
+        let motion = Motion::new(&self.path.pieces[arc.piece as usize], arc, false);
+        let [begin, end] = [arc.u0, arc.u1].map(|u| norm(&motion.rates(&motion.at(u)).velocity));
+        Some((if begin <= STANDSTILL * end { 0.0 } else { begin }, first, motion))
+    }
+
+    fn set_start(&self, part: &mut Slices<M>, i: usize) {
+        if let Some((speed, arc, motion)) = self.start() {
+            if speed > 0.0 {
+                self.set(part, i, arc, &motion, &motion.at(self.arcs[arc].u0));
             }
         }
-        part.position[0] = self.path.pieces[0].control[0];
-        part.line[0] = self.path.lines[0];
-        part.piece[0] = 0;
-        part.u[0] = 0.0;
+        part.t[i] = self.time(part.start + i);
+        part.position[i] = self.path.pieces[0].control[0];
+        part.line[i] = self.path.lines[0];
+        part.piece[i] = 0;
+        part.u[i] = 0.0;
     }
 
     fn set_end(&self, run: &Run, part: &mut Slices<M>, i: usize) {

@@ -19,7 +19,8 @@ fn triangle() -> (Quadratic<2>, [ProfileArc; 2]) {
 
 fn sampler(period: f64, interpolator: Interpolator) -> Sampler<2> {
     let (line, arcs) = triangle();
-    let path = PathData { pieces: vec![line], lines: vec![7], runs: vec![0, 1], dwell: vec![0.0] };
+    let path =
+        PathData { pieces: vec![line], lines: vec![7], runs: vec![0, 1], start_dwell: 0.0, dwell: vec![0.0] };
     Sampler::new(path, arcs.to_vec(), &[0, 2], period, interpolator).unwrap()
 }
 
@@ -129,7 +130,13 @@ fn nonsense_is_refused_with_a_sentence() {
     let build = |change: &dyn Fn(&mut ProfileArc), period: f64| {
         let (line, mut arcs) = triangle();
         change(&mut arcs[1]);
-        let path = PathData { pieces: vec![line], lines: vec![7], runs: vec![0, 1], dwell: vec![0.0] };
+        let path = PathData {
+            pieces: vec![line],
+            lines: vec![7],
+            runs: vec![0, 1],
+            start_dwell: 0.0,
+            dwell: vec![0.0],
+        };
         Sampler::new(path, arcs.to_vec(), &[0, 2], period, Interpolator::Sarfraz).err()
     };
     assert!(build(&|_| (), 0.001).is_none());

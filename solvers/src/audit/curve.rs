@@ -1,8 +1,12 @@
 //! The followed geometry as the audit sees it: a start point and two differences per piece.
+//!
+//! The kernels take `M` axes; where there are fewer, the last ones rest at 0 and have nothing to break.
 
 /// The path's arrays, one entry a piece; see `feedplan.Path`.
 #[derive(Clone, Copy)]
 pub struct Followed<'a> {
+    /// At most as many as the kernels take.
+    pub axes: usize,
     /// Control points, 3 × axes numbers a piece, in mm.
     pub control: &'a [f64],
     /// Parameter interval, in mm.
@@ -17,6 +21,8 @@ pub struct Followed<'a> {
     pub tolerance: &'a [f64],
     /// Piece offsets of the runs.
     pub runs: &'a [i64],
+    /// Pause before the first run, in s.
+    pub start_dwell: f64,
     /// Pause after each run, in s.
     pub dwell: &'a [f64],
 }
@@ -35,8 +41,7 @@ impl Followed<'_> {
     /// The control points of piece `i`.
     #[inline]
     pub fn points<const M: usize>(&self, i: usize) -> [[f64; M]; 3] {
-        let flat = &self.control[3 * M * i..3 * M * (i + 1)];
-        std::array::from_fn(|j| std::array::from_fn(|k| flat[j * M + k]))
+        std::array::from_fn(|j| vector(self.control, self.axes, 3 * i + j))
     }
 
     /// Piece `i` by its differences.
@@ -111,6 +116,19 @@ impl<const M: usize> Curve<M> {
     }
 }
 
+/// Row `i` of a table with a column for each axis.
+#[inline(always)]
+pub fn vector<const M: usize>(table: &[f64], axes: usize, i: usize) -> [f64; M] {
+    // The usual case on its own: rows of a length that is known are read without a branch.
+    if axes == M {
+        let row = &table[i * M..(i + 1) * M];
+        std::array::from_fn(|k| row[k])
+    } else {
+        let row = &table[i * axes..(i + 1) * axes];
+        std::array::from_fn(|k| if k < row.len() { row[k] } else { 0.0 })
+    }
+}
+
 /// Length of a vector.
 #[inline(always)]
 pub fn length<const M: usize>(a: &[f64; M]) -> f64 {
@@ -139,19 +157,36 @@ pub fn distance<const M: usize>(a: &[f64; M], b: &[f64; M]) -> f64 {
     length(&from_to(a, b))
 }
 
-/// Distance of `q` from the straight line from `a` to `b`, ends included.
-#[inline]
-pub fn distance_to_segment<const M: usize>(q: &[f64; M], a: &[f64; M], b: &[f64; M]) -> f64 {
-    let along = from_to(a, b);
-    let to = from_to(a, q);
-    let length_sq = inner(&along, &along);
-    let t = if length_sq > 0.0 { (inner(&to, &along) / length_sq).clamp(0.0, 1.0) } else { 0.0 };
-    let mut sum = 0.0;
-    for k in 0..M {
-        let d = to[k] - t * along[k];
-        sum += d * d;
+/// A straight line from one point to another, ends included.
+#[derive(Clone, Copy, Debug)]
+pub struct Segment<const M: usize> {
+    start: [f64; M],
+    /// To the other end, and the inverse of its square; 0 where that would be infinite.
+    along: [f64; M],
+    per_length_sq: f64,
+}
+
+impl<const M: usize> Segment<M> {
+    #[inline]
+    pub fn new(a: &[f64; M], b: &[f64; M]) -> Self {
+        let along = from_to(a, b);
+        let length_sq = inner(&along, &along);
+        let per_length_sq = Some(length_sq.recip()).filter(|inverse| inverse.is_finite()).unwrap_or(0.0);
+        Self { start: *a, along, per_length_sq }
     }
-    sum.sqrt()
+
+    /// Square of the distance of `q` from the nearest point.
+    #[inline]
+    pub fn distance_sq(&self, q: &[f64; M]) -> f64 {
+        let to = from_to(&self.start, q);
+        let t = (inner(&to, &self.along) * self.per_length_sq).clamp(0.0, 1.0);
+        let mut sum = 0.0;
+        for k in 0..M {
+            let d = to[k] - t * self.along[k];
+            sum += d * d;
+        }
+        sum
+    }
 }
 
 #[cfg(test)]
@@ -184,9 +219,10 @@ mod tests {
     #[test]
     fn a_point_beside_a_segment_is_as_far_as_the_nearest_end_or_foot() {
         let (a, b) = ([0.0, 0.0], [4.0, 0.0]);
-        assert_eq!(distance_to_segment(&[2.0, 3.0], &a, &b), 3.0);
-        assert_eq!(distance_to_segment(&[7.0, 4.0], &a, &b), 5.0);
-        assert_eq!(distance_to_segment(&[-3.0, 4.0], &a, &b), 5.0);
-        assert_eq!(distance_to_segment(&[3.0, 4.0], &a, &a), 5.0);
+        let segment = Segment::new(&a, &b);
+        assert_eq!(segment.distance_sq(&[2.0, 3.0]), 9.0);
+        assert_eq!(segment.distance_sq(&[7.0, 4.0]), 25.0);
+        assert_eq!(segment.distance_sq(&[-3.0, 4.0]), 25.0);
+        assert_eq!(Segment::new(&a, &a).distance_sq(&[3.0, 4.0]), 25.0);
     }
 }

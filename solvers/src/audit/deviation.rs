@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::arcs::Arcs;
 use super::curve::{distance, Followed};
-use super::moves::{nearest_of, Move, Programmed};
+use super::moves::{Move, Neighbours, Programmed};
 use super::place::distance_to_piece;
 use super::{Check, Limits, Tally, Worst, EPS, GAP_TOLERANCE, ROUNDINGS};
 
@@ -131,10 +131,9 @@ fn piece_to_moves<const M: usize>(
     let curve = path.curve::<M>(piece);
     let (line, tolerance) = (path.line[piece], path.tolerance[piece].max(GAP_TOLERANCE));
     let rounding = ROUNDINGS * EPS * curve.magnitude();
-    let moves: Vec<Move<M>> = window(path, piece, program.len()).map(|m| program.get(m)).collect();
-    let off = |t: f64, enough: f64| {
-        nearest_of(moves.iter().copied(), &curve.at(t * curve.width), enough) - rounding
-    };
+    let mut near = Neighbours::default();
+    near.replace(window(path, piece, program.len()).map(|m| program.get(m)));
+    let mut off = |t: f64, enough: f64| near.distance(&curve.at(t * curve.width), enough) - rounding;
     let (mut worst, mut worst_t) = (0.0_f64, 0.0);
     for i in 0..=PLACES {
         let t = i as f64 / PLACES as f64;
@@ -227,7 +226,7 @@ fn move_to_pieces<const M: usize>(
 fn entry_times(path: &Followed, arcs: Option<&Arcs>) -> Vec<f64> {
     let mut times = vec![0.0; path.len() + 1];
     let Some(arcs) = arcs else { return times };
-    let starts = arcs.starts(path.dwell);
+    let starts = arcs.starts(path);
     let mut piece = 0;
     for (i, &entered) in arcs.piece.iter().enumerate() {
         while piece <= (entered as usize).min(path.len()) {
@@ -264,6 +263,7 @@ mod tests {
     #[test]
     fn a_move_without_a_piece_lies_between_its_neighbours() {
         let path = Followed {
+            axes: 2,
             control: &[],
             width: &[1.0; 3],
             feed: &[],
@@ -271,6 +271,7 @@ mod tests {
             moves: &[0, 1, 1, 1, 4, 5],
             tolerance: &[],
             runs: &[],
+            start_dwell: 0.0,
             dwell: &[],
         };
         assert_eq!(followers(&path, 7), [(0, 0), (0, 1), (1, 2), (1, 2), (2, 2), (2, 2), (2, 2)]);

@@ -2,11 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use super::curve::{distance, distance_to_segment, from_to, inner};
+use super::curve::{distance, from_to, inner, vector, Segment};
 
 /// The program's arrays, one entry a move; see `feedplan.Program`.
 #[derive(Clone, Copy)]
 pub struct Programmed<'a> {
+    /// At most as many as the kernels take.
+    pub axes: usize,
     /// Where the first move begins, in mm.
     pub start: &'a [f64],
     /// Ends of the moves, axes numbers a move, in mm.
@@ -57,8 +59,8 @@ impl Programmed<'_> {
     /// End of move `i`; of the move before the first: the start.
     pub fn end<const M: usize>(&self, i: Option<usize>) -> [f64; M] {
         match i {
-            Some(i) => std::array::from_fn(|k| self.target[M * i + k]),
-            None => std::array::from_fn(|k| self.start[k]),
+            Some(i) => vector(self.target, self.axes, i),
+            None => vector(self.start, self.axes, 0),
         }
     }
 
@@ -119,7 +121,7 @@ impl<const M: usize> Move<M> {
     /// Distance of `q` from the nearest place of the move, in mm.
     pub fn distance(&self, q: &[f64; M]) -> f64 {
         match &self.arc {
-            None => distance_to_segment(q, &self.from, &self.to),
+            None => Segment::new(&self.from, &self.to).distance_sq(q).sqrt(),
             Some(arc) => self.distance_to_arc(arc, q),
         }
     }
@@ -163,19 +165,40 @@ impl<const M: usize> Move<M> {
     }
 }
 
-/// Distance of `q` from the nearest of some moves, or from the first that is within `enough`; a NaN if there is one.
-pub fn nearest_of<const M: usize>(moves: impl Iterator<Item = Move<M>>, q: &[f64; M], enough: f64) -> f64 {
-    let mut nearest = f64::INFINITY;
-    for programmed in moves {
-        let away = programmed.distance(q);
-        if away.is_nan() || away < nearest {
-            nearest = away;
-        }
-        if away.is_nan() || nearest <= enough {
-            break;
-        }
+/// Some moves that places along a path are measured against, one after the other.
+#[derive(Clone, Debug, Default)]
+pub struct Neighbours<const M: usize> {
+    moves: Vec<Move<M>>,
+    /// The one nearest to the place before: mostly nearest to the next one too.
+    nearest: usize,
+}
+
+impl<const M: usize> Neighbours<M> {
+    /// Takes other moves.
+    pub fn replace(&mut self, moves: impl Iterator<Item = Move<M>>) {
+        self.moves.clear();
+        self.moves.extend(moves);
+        self.nearest = 0;
     }
-    nearest
+
+    /// Distance of `q` from the nearest move, or from the first that is within `enough`; a NaN if there is one.
+    pub fn distance(&mut self, q: &[f64; M], enough: f64) -> f64 {
+        let mut least = f64::INFINITY;
+        let first = self.nearest;
+        for m in (first..self.moves.len()).chain(0..first) {
+            let away = self.moves[m].distance(q);
+            if away.is_nan() {
+                return away;
+            }
+            if away < least {
+                (least, self.nearest) = (away, m);
+            }
+            if least <= enough {
+                break;
+            }
+        }
+        least
+    }
 }
 
 #[cfg(test)]
@@ -186,6 +209,7 @@ mod tests {
     /// A helix about Z: radius 10, two turns and a quarter, 9 mm up.
     fn helix() -> Move<3> {
         Programmed {
+            axes: 3,
             start: &[10.0, 0.0, 0.0],
             target: &[0.0, 10.0, 9.0],
             line: &[1],
@@ -201,6 +225,7 @@ mod tests {
     #[test]
     fn a_quarter_circle_is_as_far_as_the_radii_differ() {
         let quarter = Programmed {
+            axes: 2,
             start: &[10.0, 0.0],
             target: &[0.0, 10.0],
             line: &[1],
@@ -223,6 +248,7 @@ mod tests {
         // G18 and G19: counter-clockwise seen from the tip of Y, of X.
         for (normal, target) in [(1_u8, [0.0, 0.0, -1.0]), (2, [0.0, 1.0, 0.0])] {
             let quarter = Programmed {
+                axes: 3,
                 start: &[1.0, 0.0, 0.0],
                 target: &target,
                 line: &[1],

@@ -1,7 +1,6 @@
 //! Finds the place of a point on the path: the nearest place of a piece, and the next place along the path.
 
 use super::curve::{distance, Curve, Followed};
-use super::EPS;
 
 /// A place on the path.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,58 +10,76 @@ pub struct Place {
     pub u: f64,
 }
 
-/// (C(u) − q)·C'(u) and its derivative, up to a factor, with t = u / width: where it turns from negative to
-/// positive the distance has a local minimum.
-#[inline(always)]
-fn slope<const M: usize>(curve: &Curve<M>, q: &[f64; M], t: f64) -> (f64, f64) {
-    let (mut f, mut df) = (0.0, 0.0);
-    for k in 0..M {
-        let bend = curve.second[k] - curve.first[k];
-        let tangent = curve.first[k] + t * bend;
-        let off = curve.start[k] - q[k] + t * (curve.first[k] + tangent);
-        f += off * tangent;
-        df += 2.0 * tangent * tangent + off * bend;
-    }
-    (f, df)
-}
+/// A Newton step of this share of the piece is the last one: its error is about the square of that.
+const CLOSE: f64 = 1e-7;
 
-/// The root between `a`, where the slope is negative, and `b`, where it is not: Newton, halved when it strays.
-fn root<const M: usize>(curve: &Curve<M>, q: &[f64; M], mut a: f64, mut b: f64) -> f64 {
-    let mut t = a;
-    let (mut f, mut df) = slope(curve, q, t);
-    for _ in 0..100 {
-        let newton = t - f / df;
-        let next = if newton > a && newton < b { newton } else { 0.5 * (a + b) };
-        if (next - t).abs() <= EPS * b {
-            break;
-        }
-        t = next;
-        (f, df) = slope(curve, q, t);
-        if f < 0.0 {
-            a = t;
-        } else {
-            b = t;
-        }
-    }
-    t
-}
+/// (C(u) − q)·C'(u) as a cubic in t = u / width, up to a factor: where it turns from negative to positive the
+/// distance has a local minimum.
+struct Slope([f64; 4]);
 
-/// The ends of the parts of [t0, 1] on which the slope, a cubic in t, only rises or only falls.
-fn monotone_parts<const M: usize>(curve: &Curve<M>, q: &[f64; M], t0: f64) -> [f64; 4] {
-    let (mut square, mut mixed, mut bend_sq) = (0.0, 0.0, 0.0);
-    for k in 0..M {
-        let (tangent, bend) = (curve.first[k], curve.second[k] - curve.first[k]);
-        square += 2.0 * tangent * tangent + (curve.start[k] - q[k]) * bend;
-        mixed += 3.0 * tangent * bend;
-        bend_sq += 3.0 * bend * bend;
+impl Slope {
+    #[inline]
+    fn new<const M: usize>(curve: &Curve<M>, q: &[f64; M]) -> Self {
+        let mut cubic = [0.0; 4];
+        for k in 0..M {
+            let (first, bend, off) =
+                (curve.first[k], curve.second[k] - curve.first[k], curve.start[k] - q[k]);
+            cubic[0] += off * first;
+            cubic[1] += 2.0 * first * first + off * bend;
+            cubic[2] += 3.0 * first * bend;
+            cubic[3] += bend * bend;
+        }
+        Self(cubic)
     }
-    // Its derivative is square + 2 mixed t + bend_sq t².
-    let discriminant = mixed * mixed - bend_sq * square;
-    if bend_sq == 0.0 || discriminant <= 0.0 {
-        return [t0, t0, 1.0, 1.0];
+
+    #[inline(always)]
+    fn at(&self, t: f64) -> f64 {
+        let [c0, c1, c2, c3] = self.0;
+        c0 + t * (c1 + t * (c2 + t * c3))
     }
-    let root = discriminant.sqrt();
-    [t0, ((-mixed - root) / bend_sq).clamp(t0, 1.0), ((-mixed + root) / bend_sq).clamp(t0, 1.0), 1.0]
+
+    #[inline(always)]
+    fn derivative(&self, t: f64) -> f64 {
+        let [_, c1, c2, c3] = self.0;
+        c1 + t * (2.0 * c2 + t * (3.0 * c3))
+    }
+
+    /// The root between `a`, where the slope is negative, and `b`, where it is not: Newton, halved when it strays.
+    fn root(&self, mut a: f64, mut b: f64) -> f64 {
+        let mut t = a;
+        for _ in 0..100 {
+            let f = self.at(t);
+            if f < 0.0 {
+                a = t;
+            } else {
+                b = t;
+            }
+            let newton = t - f / self.derivative(t);
+            if newton > a && newton < b {
+                if (newton - t).abs() <= CLOSE {
+                    return newton;
+                }
+                t = newton;
+            } else {
+                t = 0.5 * (a + b);
+                if t <= a || t >= b {
+                    break;
+                }
+            }
+        }
+        t
+    }
+
+    /// The ends of the parts of [t0, 1] on which the slope only rises or only falls.
+    fn monotone_parts(&self, t0: f64) -> [f64; 4] {
+        let [_, c1, c2, c3] = self.0;
+        let discriminant = c2 * c2 - 3.0 * c3 * c1;
+        if c3 == 0.0 || discriminant <= 0.0 {
+            return [t0, t0, 1.0, 1.0];
+        }
+        let (root, per) = (discriminant.sqrt(), (3.0 * c3).recip());
+        [t0, ((-c2 - root) * per).clamp(t0, 1.0), ((root - c2) * per).clamp(t0, 1.0), 1.0]
+    }
 }
 
 /// The first local minimum of the distance at or after `from`: its parameter and distance, and whether the
@@ -71,12 +88,13 @@ fn monotone_parts<const M: usize>(curve: &Curve<M>, q: &[f64; M], t0: f64) -> [f
 pub fn first_minimum<const M: usize>(curve: &Curve<M>, q: &[f64; M], from: f64) -> (f64, f64, bool) {
     let t0 = (from / curve.width).clamp(0.0, 1.0);
     let (mut u, mut falls) = (from, false);
-    if slope(curve, q, t0).0 < 0.0 {
+    let slope = Slope::new(curve, q);
+    if slope.at(t0) < 0.0 {
         (u, falls) = (curve.width, true);
-        let ends = monotone_parts(curve, q, t0);
+        let ends = slope.monotone_parts(t0);
         for i in 0..3 {
-            if slope(curve, q, ends[i + 1]).0 >= 0.0 {
-                (u, falls) = (root(curve, q, ends[i], ends[i + 1]) * curve.width, false);
+            if slope.at(ends[i + 1]) >= 0.0 {
+                (u, falls) = (slope.root(ends[i], ends[i + 1]) * curve.width, false);
                 break;
             }
         }
@@ -93,12 +111,13 @@ pub fn all_minima<const M: usize>(
     mut found: impl FnMut(f64, f64),
 ) {
     let t0 = (from / curve.width).clamp(0.0, 1.0);
-    let ends = monotone_parts(curve, q, t0);
-    let falls = ends.map(|t| slope(curve, q, t).0 < 0.0);
+    let slope = Slope::new(curve, q);
+    let ends = slope.monotone_parts(t0);
+    let falls = ends.map(|t| slope.at(t) < 0.0);
     found(from, distance(q, &curve.at(from)));
     for i in 0..3 {
         if falls[i] && !falls[i + 1] {
-            let u = root(curve, q, ends[i], ends[i + 1]) * curve.width;
+            let u = slope.root(ends[i], ends[i + 1]) * curve.width;
             found(u, distance(q, &curve.at(u)));
         }
     }
@@ -222,6 +241,7 @@ mod tests {
 
     /// Two pieces: along X to 10 and back again.
     const THERE_AND_BACK: Followed = Followed {
+        axes: 2,
         control: &[0.0, 0.0, 5.0, 0.0, 10.0, 0.0, 10.0, 0.0, 5.0, 0.0, 0.0, 0.0],
         width: &[10.0, 10.0],
         feed: &[1.0, 1.0],
@@ -229,6 +249,7 @@ mod tests {
         moves: &[0, 0, 1, 1],
         tolerance: &[0.0, 0.0],
         runs: &[0, 2],
+        start_dwell: 0.0,
         dwell: &[0.0],
     };
 

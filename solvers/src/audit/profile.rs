@@ -8,8 +8,9 @@
 
 use rayon::prelude::*;
 
-use super::arcs::{Arcs, Motion, State};
+use super::arcs::Arcs;
 use super::curve::{length, Followed};
+use super::motion::{Motion, State};
 use super::{Check, Limits, Tally, EPS, GAP_TOLERANCE, PASS_EXCESS, ROUNDINGS};
 
 /// Even intervals of an arc.
@@ -34,7 +35,7 @@ pub fn audit_profile<const M: usize>(
     arcs: &Arcs,
     limits: &Limits<M>,
 ) -> Tally<M> {
-    let starts = arcs.starts(path.dwell);
+    let starts = arcs.starts(path);
     let auditor = Auditor { path, junction_speed, arcs, limits, starts: &starts };
     let blocks = arcs.len().div_ceil(BLOCK);
     let inside = (0..blocks)
@@ -68,7 +69,7 @@ impl<const M: usize> Auditor<'_, M> {
         let (arcs, time) = (self.arcs, self.starts[i]);
         let piece = arcs.piece[i] as usize;
         let line = self.path.line.get(piece).copied().unwrap_or(0);
-        if arcs.has_bad_numbers::<M>(i, self.path) {
+        if arcs.has_bad_numbers(i, self.path) {
             tally.offer(Check::Numbers, 0, f64::INFINITY, 0.0, time, line);
             return;
         }
@@ -128,7 +129,7 @@ impl<const M: usize> Auditor<'_, M> {
             let mut next = Next { piece: first, u: 0.0 };
             let here = arcs.runs[run] as usize..arcs.runs[run + 1] as usize;
             for i in here.clone() {
-                if arcs.has_bad_numbers::<M>(i, path) {
+                if arcs.has_bad_numbers(i, path) {
                     return; // reported with the arc itself
                 }
                 let entered = arcs.piece[i] as usize;
@@ -171,7 +172,7 @@ impl<const M: usize> Auditor<'_, M> {
     /// The step from one arc to the next: no jump of the speed, and of the axis velocities only at corners.
     fn joint(&self, i: usize, j: usize, tally: &mut Tally<M>) {
         let arcs = self.arcs;
-        if [i, j].iter().any(|&arc| arcs.has_bad_numbers::<M>(arc, self.path)) {
+        if [i, j].iter().any(|&arc| arcs.has_bad_numbers(arc, self.path)) {
             return; // reported with the arc itself
         }
         let (before, after) = (arcs.piece[i] as usize, arcs.piece[j] as usize);
@@ -222,7 +223,7 @@ impl<const M: usize> Auditor<'_, M> {
 
     /// A jump of the speed that means nothing to any axis.
     fn negligible_speed(&self) -> f64 {
-        (0..M).map(|k| self.limits.negligible_jump(k)).fold(f64::INFINITY, f64::min)
+        (0..self.path.axes).map(|k| self.limits.negligible_jump(k)).fold(f64::INFINITY, f64::min)
     }
 
     fn line(&self, piece: usize) -> i32 {

@@ -1,15 +1,17 @@
 //! Audits a stream of setpoints: difference quotients against the limits, and each setpoint's place on the path.
 //!
-//! A first difference over its time is a mean velocity, a second difference a mean acceleration: where one
-//! exceeds a limit the motion does. A position is known to `EPS` of its magnitude and a time to `EPS` of its own;
-//! what these add to a quotient is subtracted. Between chunks the last few setpoints are kept, nothing else.
+//! Between chunks the last few setpoints are kept, nothing else.
+
+use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::curve::{distance, from_to, inner, length};
+use super::compare::Comparison;
+use super::curve::{distance, length, vector};
 use super::deviation::offer_travel;
+use super::differences::{Differences, Quotient};
 use super::follow::{Plan, Spot};
-use super::{Check, Limits, Tally, EPS, PASS_EXCESS, PASS_MARK, PLACE_TOLERANCE, ROUNDINGS};
+use super::{Check, Limits, Tally, PLACE_TOLERANCE};
 
 /// Setpoints before and after the one at which an acceleration is judged.
 const AROUND: usize = 3;
@@ -18,11 +20,13 @@ const AROUND: usize = 3;
 const KEPT: usize = 2 * AROUND + 1;
 
 /// Setpoints a thread takes at a time.
-const BLOCK: usize = 4096;
+const BLOCK: usize = 2048;
 
 /// Setpoints in order: times, positions of all axes, and what else is recorded.
 #[derive(Clone, Copy)]
 pub struct Chunk<'a> {
+    /// At most as many as the kernels take.
+    pub axes: usize,
     pub t: &'a [f64],
     pub position: &'a [f64],
     pub velocity: Option<&'a [f64]>,
@@ -42,6 +46,13 @@ pub struct Row<const M: usize> {
     pub spot: Spot,
 }
 
+impl<const M: usize> Row<M> {
+    fn is_finite(&self) -> bool {
+        let recorded = self.velocity.iter().chain(&self.acceleration).flatten();
+        self.t.is_finite() && self.q.iter().chain(recorded).all(|number| number.is_finite())
+    }
+}
+
 /// The audit of a stream.
 pub struct Stream<const M: usize> {
     limits: Limits<M>,
@@ -59,26 +70,22 @@ impl<const M: usize> Stream<M> {
         Self { limits, resolution, kept: Vec::new(), count: 0, clock: Vec::new(), tally: Tally::default() }
     }
 
+    pub fn axes(&self) -> usize {
+        self.limits.axes
+    }
+
     /// The next setpoints; `plan` must be the same every time.
     pub fn push(&mut self, plan: Option<&Plan>, chunk: &Chunk) {
         let old = self.kept.len();
         let mut rows = std::mem::take(&mut self.kept);
-        rows.extend((0..chunk.t.len()).map(|i| Row {
+        rows.par_extend((0..chunk.t.len()).into_par_iter().map(|i| Row {
             t: chunk.t[i],
-            q: vector(chunk.position, i),
-            velocity: chunk.velocity.map(|flat| vector(flat, i)),
-            acceleration: chunk.acceleration.map(|flat| vector(flat, i)),
+            q: vector(chunk.position, chunk.axes, i),
+            velocity: chunk.velocity.map(|table| vector(table, chunk.axes, i)),
+            acceleration: chunk.acceleration.map(|table| vector(table, chunk.axes, i)),
             line: chunk.line.map_or(0, |line| line[i]),
             spot: Spot::default(),
         }));
-        let numbers = |row: &Row<M>| {
-            let recorded = row.velocity.iter().chain(&row.acceleration).flatten();
-            row.t.is_finite() && row.q.iter().chain(recorded).all(|number| number.is_finite())
-        };
-        for row in &rows[old..] {
-            let bad = if numbers(row) { 0.0 } else { f64::INFINITY };
-            self.tally.offer(Check::Numbers, 0, bad, 0.0, row.t, row.line);
-        }
         if let Some(plan) = plan {
             plan.extend_clock(&self.limits, &rows, &mut self.clock);
         }
@@ -87,267 +94,225 @@ impl<const M: usize> Stream<M> {
         if let Some(plan) = plan {
             plan.find_spots(&self.limits, &mut rows, old);
         }
-        let view = View { limits: &self.limits, resolution: self.resolution, plan, rows: &rows };
+        let view = View { differences: self.differences(&rows), plan };
         let found = (old..rows.len())
+            .step_by(BLOCK)
+            .collect::<Vec<_>>()
             .into_par_iter()
-            .with_min_len(BLOCK)
-            .fold(Tally::default, |mut tally, n| {
-                view.arrival(n, &mut tally);
-                if n > AROUND {
-                    view.centre(n - AROUND, &mut tally);
-                }
-                tally
-            })
+            .map(|first| view.block(first..(first + BLOCK).min(rows.len())))
             .reduce(Tally::default, Tally::merge);
+        let mut first = Tally::default();
         if self.count == 0 && !rows.is_empty() {
-            view.first(&mut self.tally);
+            view.first(&mut first);
         }
-        self.tally = std::mem::take(&mut self.tally).merge(found);
+        self.tally = std::mem::take(&mut self.tally).merge(first).merge(found);
         self.count += chunk.t.len() as u64;
-        self.kept = rows.split_off(rows.len().saturating_sub(KEPT));
+        rows.drain(..rows.len().saturating_sub(KEPT));
+        self.kept = rows;
     }
 
     /// The end of the stream: what the last setpoints alone can show.
-    pub fn finish(mut self, plan: Option<&Plan>) -> Tally<M> {
-        let rows = std::mem::take(&mut self.kept);
+    pub fn finish(self, plan: Option<&Plan>) -> Tally<M> {
         let plan = plan.map(|plan| plan.with_clock(&self.clock));
         let plan = plan.as_ref();
-        let view = View { limits: &self.limits, resolution: self.resolution, plan, rows: &rows };
+        let rows = &self.kept;
+        let view = View { differences: self.differences(rows), plan };
+        let comparison = plan.map(|plan| Comparison::new(plan, &self.limits));
+        let mut tally = Tally::default();
         for centre in rows.len().saturating_sub(AROUND).max(1)..rows.len().saturating_sub(1) {
-            view.centre(centre, &mut self.tally);
+            view.centre(centre, &view.differences.acceleration(centre), comparison.as_ref(), &mut tally);
         }
-        view.last(&mut self.tally);
-        self.tally
+        view.last(&mut tally);
+        self.tally.merge(tally)
+    }
+
+    fn differences<'a>(&'a self, rows: &'a [Row<M>]) -> Differences<'a, M> {
+        Differences { limits: &self.limits, resolution: self.resolution, rows }
     }
 }
 
-/// Rows that can be compared with each other.
+/// Rows that can be compared with each other, and with the plan.
 struct View<'a, const M: usize> {
-    limits: &'a Limits<M>,
-    resolution: f64,
+    differences: Differences<'a, M>,
     plan: Option<&'a Plan<'a>>,
-    rows: &'a [Row<M>],
+}
+
+/// What row `n` and those before it have in common with the next row.
+struct Recent<const M: usize> {
+    /// The steps to rows `n` − 2, `n` − 1 and `n`.
+    steps: [f64; 3],
+    /// The accelerations around rows `n` − 3, `n` − 2 and `n` − 1.
+    accelerations: [Quotient<M>; 3],
 }
 
 impl<const M: usize> View<'_, M> {
+    /// The first setpoint must be the start of the path, at time 0.
     fn first(&self, tally: &mut Tally<M>) {
-        let (Some(plan), row) = (self.plan, &self.rows[0]) else { return };
-        let away = distance(&row.q, &plan.start()) - length(&self.rounding(0));
+        let (Some(plan), row) = (self.plan, &self.differences.rows[0]) else { return };
+        let away = distance(&row.q, &plan.start()) - length(&self.differences.rounding(0));
         tally.offer(Check::Place, 0, away, PLACE_TOLERANCE, row.t, row.line);
-        tally.offer(Check::Grid, 0, row.t.abs(), self.uneven(), row.t, row.line);
+        tally.offer(Check::Grid, 0, row.t.abs(), self.differences.uneven(), row.t, row.line);
     }
 
+    /// The last setpoint must be the end of the path.
     fn last(&self, tally: &mut Tally<M>) {
-        let Some(plan) = self.plan else { return };
-        match self.rows.last() {
+        let (Some(plan), rows) = (self.plan, self.differences.rows) else { return };
+        match rows.last() {
             Some(row) => {
-                let away = distance(&row.q, &plan.end()) - length(&self.rounding(self.rows.len() - 1));
+                let away = distance(&row.q, &plan.end()) - length(&self.differences.rounding(rows.len() - 1));
                 tally.offer(Check::Place, 0, away, PLACE_TOLERANCE, row.t, row.line);
             }
             None => tally.offer(Check::Place, 0, f64::INFINITY, PLACE_TOLERANCE, 0.0, 0),
         }
     }
 
-    /// What a time step may differ from the period, in s.
-    fn uneven(&self) -> f64 {
-        PASS_EXCESS * self.limits.period
-    }
-
-    /// Time from row `n` − 1 to row `n`: the period itself where the times round to it.
-    fn step(&self, n: usize) -> f64 {
-        let step = self.rows[n].t - self.rows[n - 1].t;
-        if self.is_even(step, self.rows[n].t) {
-            self.limits.period
-        } else {
-            step
+    /// All that some rows show, together with those before them.
+    fn block(&self, rows: Range<usize>) -> Tally<M> {
+        let mut tally = Tally::default();
+        let mut comparison = self.plan.map(|plan| Comparison::new(plan, self.differences.limits));
+        let mut recent = self.recent(rows.start);
+        for n in rows {
+            recent.steps = [recent.steps[1], recent.steps[2], self.differences.step(n)];
+            let rounding = self.differences.rounding(n);
+            if n >= 2 {
+                let newest =
+                    self.differences.acceleration_by(n - 1, recent.steps[1], recent.steps[2], &rounding);
+                let [_, early, late] = recent.accelerations;
+                recent.accelerations = [early, late, newest];
+            }
+            self.arrival(n, &recent, &rounding, comparison.as_mut(), &mut tally);
+            if n > AROUND {
+                self.centre(n - AROUND, &recent.accelerations[0], comparison.as_ref(), &mut tally);
+            }
         }
+        tally
     }
 
-    fn is_even(&self, step: f64, t: f64) -> bool {
-        (step - self.limits.period).abs() <= self.uneven() + ROUNDINGS * EPS * t.abs()
-    }
-
-    /// What is not known of the position of each axis at row `n`, in mm.
-    fn rounding(&self, n: usize) -> [f64; M] {
-        let row = &self.rows[n];
-        let before = &self.rows[n.saturating_sub(1)];
-        std::array::from_fn(|k| {
-            let magnitude = row.q[k].abs().max(row.spot.magnitude);
-            let way = (row.q[k] - before.q[k]).abs() / self.limits.period * row.t.abs();
-            0.5 * self.resolution + ROUNDINGS * EPS * (magnitude + way)
-        })
+    /// What row `n` − 1 leaves for row `n`.
+    fn recent(&self, n: usize) -> Recent<M> {
+        let step = |back: usize| n.checked_sub(back).map_or(0.0, |row| self.differences.step(row));
+        let around = |back: usize| match n.checked_sub(back) {
+            Some(centre) if centre >= 1 => self.differences.acceleration(centre),
+            _ => Quotient::default(),
+        };
+        Recent { steps: [step(3), step(2), step(1)], accelerations: [around(4), around(3), around(2)] }
     }
 
     /// What row `n` shows together with the rows before it.
-    fn arrival(&self, n: usize, tally: &mut Tally<M>) {
-        let row = &self.rows[n];
+    fn arrival(
+        &self,
+        n: usize,
+        recent: &Recent<M>,
+        rounding: &[f64; M],
+        comparison: Option<&mut Comparison<M>>,
+        tally: &mut Tally<M>,
+    ) {
+        let (limits, rows) = (self.differences.limits, self.differences.rows);
+        let row = &rows[n];
         let (time, line) = (row.t, row.line);
         tally.samples += 1;
+        let bad = if row.is_finite() { 0.0 } else { f64::INFINITY };
+        tally.offer(Check::Numbers, 0, bad, 0.0, time, line);
         for k in 0..M {
-            offer_travel(tally, self.limits, k, row.q[k], time, line);
+            offer_travel(tally, limits, k, row.q[k], time, line);
         }
-        if let Some(plan) = self.plan {
-            plan.spot(self.limits, row, length(&self.rounding(n)), tally);
+        if n > 0 {
+            let (before, step) = (&rows[n - 1], recent.steps[2]);
+            self.grid(n, tally);
+            for k in 0..M {
+                let velocity = ((row.q[k] - before.q[k]).abs() - 2.0 * rounding[k]) / step;
+                tally.offer(Check::Velocity, k, velocity, limits.velocity[k], time, line);
+            }
+            self.recorded(n, step, rounding, tally);
         }
-        if n == 0 {
-            return;
-        }
-        self.grid(n, tally);
-        let (before, step) = (&self.rows[n - 1], self.step(n));
-        let rounding = self.rounding(n);
-        for k in 0..M {
-            let velocity = ((row.q[k] - before.q[k]).abs() - 2.0 * rounding[k]) / step;
-            tally.offer(Check::Velocity, k, velocity, self.limits.velocity[k], time, line);
-        }
-        if let Some(plan) = self.plan {
-            plan.step(self.limits, before, row, step, length(&rounding), tally);
-        }
-        self.recorded(n, tally);
         if n >= 3 {
-            self.jerk(n, tally);
+            self.jerk(n, recent, tally);
+        }
+        if let Some(comparison) = comparison {
+            let rounding = length(rounding);
+            comparison.spot(row, rounding, tally);
+            if n > 0 {
+                comparison.step(&rows[n - 1], row, recent.steps[2], rounding, tally);
+            }
         }
     }
 
     /// Every step is one period long; only the very last may be shorter.
     fn grid(&self, n: usize, tally: &mut Tally<M>) {
-        let (row, before) = (&self.rows[n], &self.rows[n - 1]);
+        let (differences, rows) = (&self.differences, self.differences.rows);
+        let (row, before, period) = (&rows[n], &rows[n - 1], differences.limits.period);
         let step = row.t - before.t;
-        let off = if self.is_even(step, row.t) || (step > 0.0 && step < self.limits.period) {
+        let off = if differences.is_even(step, row.t) || (step > 0.0 && step < period) {
             0.0
         } else {
-            (step - self.limits.period).abs()
+            (step - period).abs()
         };
-        tally.offer(Check::Grid, 0, off, self.uneven(), row.t, row.line);
+        tally.offer(Check::Grid, 0, off, differences.uneven(), row.t, row.line);
         if n >= 2 {
-            let step_before = before.t - self.rows[n - 2].t;
-            if !self.is_even(step_before, before.t) {
-                let off = (step_before - self.limits.period).abs();
-                tally.offer(Check::Grid, 0, off, self.uneven(), before.t, before.line);
+            let step_before = before.t - rows[n - 2].t;
+            if !differences.is_even(step_before, before.t) {
+                let off = (step_before - period).abs();
+                tally.offer(Check::Grid, 0, off, differences.uneven(), before.t, before.line);
             }
         }
     }
 
     /// Recorded velocities: their mean over a step differs from the mean velocity by at most a quarter of what
     /// the acceleration can change in it. Recorded accelerations: within the limit.
-    fn recorded(&self, n: usize, tally: &mut Tally<M>) {
-        let (row, before, step) = (&self.rows[n], &self.rows[n - 1], self.step(n));
+    fn recorded(&self, n: usize, step: f64, rounding: &[f64; M], tally: &mut Tally<M>) {
+        let (limits, rows) = (self.differences.limits, self.differences.rows);
+        let (row, before) = (&rows[n], &rows[n - 1]);
         if let (Some(new), Some(old)) = (row.velocity, before.velocity) {
-            let rounding = self.rounding(n);
             for k in 0..M {
                 let mean = (row.q[k] - before.q[k]) / step;
                 let off = (mean - 0.5 * (new[k] + old[k])).abs() - 2.0 * rounding[k] / step;
-                let limit = 0.25 * self.limits.acceleration[k] * step + 0.5 * self.limits.jump[k];
+                let limit = 0.25 * limits.acceleration[k] * step + 0.5 * limits.jump[k];
                 tally.offer(Check::RecordedVelocity, k, off, limit, row.t, row.line);
             }
         }
         if let Some(acceleration) = row.acceleration {
             for k in 0..M {
-                let (value, limit) = (acceleration[k].abs(), self.limits.acceleration[k]);
+                let (value, limit) = (acceleration[k].abs(), limits.acceleration[k]);
                 tally.offer(Check::RecordedAcceleration, k, value, limit, row.t, row.line);
             }
         }
     }
 
     /// Mean jerk over three steps.
-    fn jerk(&self, n: usize, tally: &mut Tally<M>) {
-        let span: f64 = (n - 2..=n).map(|i| self.step(i)).sum();
-        let (early, late) = (self.acceleration(n - 2), self.acceleration(n - 1));
-        let row = &self.rows[n];
+    fn jerk(&self, n: usize, recent: &Recent<M>, tally: &mut Tally<M>) {
+        let (row, limits) = (&self.differences.rows[n], self.differences.limits);
+        let span: f64 = recent.steps.iter().sum();
+        let [_, early, late] = &recent.accelerations;
         for k in 0..M {
             // The means hold for triangles whose centres lie a third of all three steps apart.
-            let change = (late.0[k] - early.0[k]).abs() - late.1[k] - early.1[k];
-            tally.offer(Check::Jerk, k, 3.0 * change / span, self.limits.jerk[k], row.t, row.line);
+            let change = (late.value[k] - early.value[k]).abs() - late.rounding[k] - early.rounding[k];
+            tally.offer(Check::Jerk, k, 3.0 * change / span, limits.jerk[k], row.t, row.line);
         }
-    }
-
-    /// Mean accelerations over the two steps around row `c`, and what of them may be rounding.
-    fn acceleration(&self, c: usize) -> ([f64; M], [f64; M]) {
-        let (h0, h1) = (self.step(c), self.step(c + 1));
-        let [q0, q1, q2] = [c - 1, c, c + 1].map(|n| &self.rows[n].q);
-        let rounding = self.rounding(c + 1);
-        (
-            std::array::from_fn(|k| 2.0 * ((q2[k] - q1[k]) / h1 - (q1[k] - q0[k]) / h0) / (h0 + h1)),
-            std::array::from_fn(|k| 4.0 * rounding[k] / (h0 * h1)),
-        )
     }
 
     /// The accelerations around row `c` against their limits, the jumps of velocity at corners allowed for.
-    fn centre(&self, c: usize, tally: &mut Tally<M>) {
-        let (acceleration, rounding) = self.acceleration(c);
-        let row = &self.rows[c];
-        let weight = 2.0 / (self.step(c) + self.step(c + 1));
+    fn centre(
+        &self,
+        c: usize,
+        acceleration: &Quotient<M>,
+        comparison: Option<&Comparison<M>>,
+        tally: &mut Tally<M>,
+    ) {
+        let (limits, rows) = (self.differences.limits, self.differences.rows);
         let mut corners = None;
         for k in 0..M {
-            let value = acceleration[k].abs() - rounding[k];
-            let mut limit = self.limits.acceleration[k];
-            if value > limit && self.limits.jump[k] > 0.0 {
-                let corners = *corners.get_or_insert_with(|| self.corners(c));
-                limit += corners * self.limits.jump[k] * weight;
+            let value = acceleration.value[k].abs() - acceleration.rounding[k];
+            let mut limit = limits.acceleration[k];
+            if value > limit && limits.jump[k] > 0.0 {
+                let corners = *corners.get_or_insert_with(|| match comparison {
+                    Some(comparison) => comparison.corners([&rows[c - 1], &rows[c], &rows[c + 1]]),
+                    None if self.differences.looks_like_a_corner(c) => 1.0,
+                    None => 0.0,
+                });
+                let time = 0.5 * (self.differences.step(c) + self.differences.step(c + 1));
+                limit += corners * limits.jump[k] / time;
             }
-            tally.offer(Check::Acceleration, k, value, limit, row.t, row.line);
+            tally.offer(Check::Acceleration, k, value, limit, rows[c].t, rows[c].line);
         }
     }
-
-    /// Corners passed in the two steps around row `c`.
-    fn corners(&self, c: usize) -> f64 {
-        match self.plan {
-            Some(plan) => plan.corners::<M>(&self.rows[c - 1].spot, &self.rows[c + 1].spot),
-            None if self.looks_like_a_corner(c) => 1.0,
-            None => 0.0,
-        }
-    }
-
-    /// Without a path: a corner shows in at most two neighbouring accelerations, whose excess adds up to the jump,
-    /// and the velocities before and after differ by no more than a turn at the same speed explains.
-    fn looks_like_a_corner(&self, c: usize) -> bool {
-        let last = self.rows.len() - 1;
-        let exceeds = |i: usize| i >= 1 && i < last && self.excess(i).iter().any(|&excess| excess > 0.0);
-        let mut first = c;
-        while first > c.saturating_sub(2) && exceeds(first - 1) {
-            first -= 1;
-        }
-        let mut end = c + 1;
-        while end < c + 3 && exceeds(end) {
-            end += 1;
-        }
-        if end - first > 2 {
-            return false;
-        }
-        let mut total = [0.0; M];
-        for i in first..end {
-            let excess = self.excess(i);
-            for k in 0..M {
-                total[k] += excess[k].max(0.0) * self.limits.period;
-            }
-        }
-        if (0..M).any(|k| total[k] > self.limits.jump[k] * PASS_MARK) {
-            return false;
-        }
-        // Steps wholly before and wholly after the corner.
-        let (into, out) = (first.saturating_sub(1).max(1), (end + 1).min(last));
-        let [before, after] = [into, out].map(|n| {
-            let step = self.step(n);
-            from_to(&self.rows[n - 1].q, &self.rows[n].q).map(|way| way / step)
-        });
-        let speeds = [length(&before), length(&after)];
-        let steps = (out - into) as f64;
-        let explained = length(&self.limits.acceleration) * steps * self.limits.period;
-        let turn = if speeds[0] * speeds[1] > 0.0 {
-            (1.0 - inner(&before, &after) / (speeds[0] * speeds[1])).max(0.0)
-        } else {
-            0.0
-        };
-        let turned = speeds[0].max(speeds[1]) * (2.0 * turn).sqrt();
-        (speeds[1] - speeds[0]).abs() <= explained && length(&total) <= turned + explained
-    }
-
-    /// By how much each acceleration around row `i` is above its limit.
-    fn excess(&self, i: usize) -> [f64; M] {
-        let (acceleration, rounding) = self.acceleration(i);
-        std::array::from_fn(|k| acceleration[k].abs() - rounding[k] - self.limits.acceleration[k])
-    }
-}
-
-fn vector<const M: usize>(flat: &[f64], i: usize) -> [f64; M] {
-    std::array::from_fn(|k| flat[i * M + k])
 }

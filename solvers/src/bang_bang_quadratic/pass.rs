@@ -66,7 +66,7 @@ pub fn forward<const M: usize>(
 }
 
 struct Pass<'a, const M: usize, const BACKWARD: bool> {
-    sub: &'a SubPiece<M>,
+    sub: &'a SubPiece<'a, M>,
     axes: &'a Axes<M>,
     /// What p stays under. Forward: K, from the far end to the near one and reversed.
     bounds: &'a [Arc],

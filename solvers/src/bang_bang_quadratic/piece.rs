@@ -1,6 +1,7 @@
 //! One piece of the path, its parameter t running from 0 to 1: straight or curved.
 
 use super::subpiece::Axes;
+use super::turns::difference_of_products;
 use crate::quadratic::{dot, norm, Quadratic};
 
 /// Tangents whose cross product is below this part of the square of the longer one are parallel to rounding.
@@ -23,7 +24,9 @@ pub struct Piece<const M: usize> {
     pub right: [f64; M],
     /// D = |C'|² at the ends and, between them, its middle Bernstein coefficient
     pub speed: [f64; 3],
-    /// |C' × C''|, constant along the piece
+    /// W_jk = c_j q'_k − c_k q'_j, c = q'', constant along the piece
+    pub minors: [[f64; M]; M],
+    /// |C' × C''|, its length
     pub twist: f64,
 }
 
@@ -42,27 +45,16 @@ impl<const M: usize> Piece<M> {
                 right[k] = 0.0;
             }
         }
-        // The sum of the squared 2 × 2 minors (Lagrange's identity): nothing cancels but within a minor.
+        let mut minors = [[0.0; M]; M];
         let mut twist_sq = 0.0;
         for j in 0..M {
             for k in j + 1..M {
-                let minor = left[j] * right[k] - left[k] * right[j];
+                let minor = difference_of_products(right[j], left[k], right[k], left[j]);
+                (minors[j][k], minors[k][j]) = (minor, -minor);
                 twist_sq += minor * minor;
             }
         }
-        Self { left, right, speed, twist: twist_sq.sqrt() }
-    }
-
-    /// The same with all its digits where the piece nearly has a cusp.
-    #[cold]
-    pub fn exact_twist(&self) -> f64 {
-        let mut twist: f64 = 0.0;
-        for j in 0..M {
-            for k in j + 1..M {
-                twist = twist.hypot(self.minor(j, k));
-            }
-        }
-        twist
+        Self { left, right, speed, minors, twist: twist_sq.sqrt() }
     }
 
     /// The least D on the piece.

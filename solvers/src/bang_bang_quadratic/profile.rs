@@ -57,6 +57,22 @@ pub(crate) struct Row {
 }
 
 impl Profile {
+    /// No arcs, with space for some.
+    pub(crate) fn with_capacity(arcs: usize) -> Self {
+        Self {
+            piece: Vec::with_capacity(arcs),
+            kind: Vec::with_capacity(arcs),
+            axis: Vec::with_capacity(arcs),
+            value: Vec::with_capacity(arcs),
+            u0: Vec::with_capacity(arcs),
+            u1: Vec::with_capacity(arcs),
+            p0: Vec::with_capacity(arcs),
+            p1: Vec::with_capacity(arcs),
+            duration: Vec::with_capacity(arcs),
+            ..Self::default()
+        }
+    }
+
     /// Number of arcs.
     pub fn len(&self) -> usize {
         self.piece.len()

@@ -13,6 +13,12 @@ const SMOOTH_TURN: f64 = 1e-9;
 /// A speed asked for at an end of the path may exceed what can be had by this part, which is rounding.
 const REACHED: f64 = 1e-12;
 
+/// Pieces of a block, and how many of those after it decide K at its end almost always.
+const BLOCK: usize = 2048;
+const LOOK_AHEAD: usize = 32;
+/// Backward passes that agree to this part have met.
+const MET: f64 = 1e-15;
+
 /// What the backward pass leaves for the forward pass on one piece.
 enum Way {
     /// v² allowed at the right end.
@@ -33,6 +39,9 @@ pub struct Workspace {
 }
 
 /// Plans the pieces `first..last` of the task from one speed squared to another; appends the arcs.
+///
+/// K depends on what comes next only as far as the next place where the backward passes from rest and from any speed
+/// meet, a few pieces ahead. So a run is planned block by block, in memory that stays near the processor.
 pub fn plan_run<const M: usize>(
     task: &Task<M>,
     (first, last): (usize, usize),
@@ -40,13 +49,67 @@ pub fn plan_run<const M: usize>(
     space: &mut Workspace,
     out: &mut Profile,
 ) -> Result<(), Fault> {
+    let mut speed_sq = start_sq;
+    let mut begin = first;
+    while begin < last {
+        let (end, reachable_end) = block(task, (begin, last), end_sq, space)?;
+        let reachable = backward_over(task, (begin, end), last, reachable_end, space)?;
+        if begin == first {
+            if start_sq > reachable * (1.0 + REACHED) {
+                return Err(Fault::Start { piece: first, reachable: reachable.sqrt() });
+            }
+            speed_sq = start_sq.min(reachable);
+        }
+        speed_sq = forward_over(task, (begin, end), first, speed_sq, space, out)?;
+        begin = end;
+    }
+    out.end_run();
+    if speed_sq < end_sq * (1.0 - REACHED) {
+        return Err(Fault::End { piece: last - 1, reachable: speed_sq.sqrt() });
+    }
+    Ok(())
+}
+
+/// The end of the block that begins a run, and v² = D K there.
+fn block<const M: usize>(
+    task: &Task<M>,
+    (begin, last): (usize, usize),
+    end_sq: f64,
+    space: &mut Workspace,
+) -> Result<(usize, f64), Fault> {
+    let mut size = BLOCK;
+    loop {
+        let end = begin + size;
+        if end + LOOK_AHEAD >= last {
+            return Ok((last, end_sq));
+        }
+        for ahead in [LOOK_AHEAD, size / 4] {
+            let pieces = (end, (end + ahead).min(last));
+            let least = backward_over(task, pieces, last, 0.0, space)?;
+            let most = backward_over(task, pieces, last, f64::INFINITY, space)?;
+            if most - least <= MET * least {
+                return Ok((end, least));
+            }
+        }
+        size *= 4;
+    }
+}
+
+/// Backward over the pieces `begin..end` of a run up to `last`: v² at the start from v² at the end. Leaves the arcs of K
+/// in the workspace.
+fn backward_over<const M: usize>(
+    task: &Task<M>,
+    (begin, end): (usize, usize),
+    last: usize,
+    end_sq: f64,
+    space: &mut Workspace,
+) -> Result<f64, Fault> {
     space.ways.clear();
     space.parts.clear();
     space.bounds.clear();
-    // Backward: v² = D K at the start of each piece.
     let mut speed_sq = end_sq;
-    let mut next: Option<Piece<M>> = None;
-    for i in (first..last).rev() {
+    let mut next = (end < last).then(|| Piece::new(&task.pieces[end]));
+    for i in (begin..end).rev() {
         let piece = Piece::new(&task.pieces[i]);
         if let Some(next) = &next {
             speed_sq = speed_sq.min(junction(&piece, next, task.junction_speed[i + 1]));
@@ -54,13 +117,21 @@ pub fn plan_run<const M: usize>(
         speed_sq = backward(task, i, &piece, speed_sq, space)?;
         next = Some(piece);
     }
-    if start_sq > speed_sq * (1.0 + REACHED) {
-        return Err(Fault::Start { piece: first, reachable: speed_sq.sqrt() });
-    }
-    // Forward: the same pieces, their arcs taken from the end of the stack.
-    speed_sq = start_sq.min(speed_sq);
-    let mut previous: Option<Piece<M>> = None;
-    for i in first..last {
+    Ok(speed_sq)
+}
+
+/// Forward over the same pieces of a run from `first` on, their arcs taken from the end of the stack; v² at the end.
+fn forward_over<const M: usize>(
+    task: &Task<M>,
+    (begin, end): (usize, usize),
+    first: usize,
+    start_sq: f64,
+    space: &mut Workspace,
+    out: &mut Profile,
+) -> Result<f64, Fault> {
+    let mut speed_sq = start_sq;
+    let mut previous = (begin > first).then(|| Piece::new(&task.pieces[begin - 1]));
+    for i in begin..end {
         let piece = Piece::new(&task.pieces[i]);
         if let Some(previous) = &previous {
             speed_sq = speed_sq.min(junction(previous, &piece, task.junction_speed[i]));
@@ -68,11 +139,7 @@ pub fn plan_run<const M: usize>(
         speed_sq = forward(task, i, &piece, speed_sq, space, out)?;
         previous = Some(piece);
     }
-    out.end_run();
-    if speed_sq < end_sq * (1.0 - REACHED) {
-        return Err(Fault::End { piece: last - 1, reachable: speed_sq.sqrt() });
-    }
-    Ok(())
+    Ok(speed_sq)
 }
 
 #[inline(always)]

@@ -6,7 +6,7 @@
 //! ρ < δ no part of the path shorter than 2 δ leaves its chord by δ: the limit is the constant speed 2 δ/T.
 
 use super::piece::Piece;
-use super::subpiece::{Axes, Cap, SubPiece};
+use super::subpiece::{Axes, Cap, Orientation, SubPiece};
 use super::turns::{Mark, EDGE};
 use crate::bernstein::{multiply, parabola_sign_changes, product, sign_changes};
 use crate::quadratic::dot;
@@ -61,8 +61,8 @@ pub struct Part {
 }
 
 /// A part with its place on the piece.
-pub struct Placed<const M: usize> {
-    pub sub: SubPiece<M>,
+pub struct Placed<'a, const M: usize> {
+    pub sub: SubPiece<'a, M>,
     /// t at both ends
     pub from: f64,
     pub to: f64,
@@ -71,14 +71,17 @@ pub struct Placed<const M: usize> {
 impl Part {
     /// The part as a sub-piece travelled forward, or backward.
     #[inline(always)]
-    pub fn place<const M: usize>(&self, piece: &Piece<M>, axes: &Axes<M>, backward: bool) -> Placed<M> {
-        let reflect = |tangent: &[f64; M]| -> [f64; M] {
-            std::array::from_fn(|k| if self.negative >> k & 1 == 1 { -tangent[k] } else { tangent[k] })
-        };
-        let edges = [reflect(&piece.left), reflect(&piece.right)];
+    pub fn place<'a, const M: usize>(
+        &self,
+        piece: &'a Piece<M>,
+        axes: &Axes<M>,
+        backward: bool,
+    ) -> Placed<'a, M> {
+        let sign: [f64; M] = std::array::from_fn(|k| if self.negative >> k & 1 == 1 { -1.0 } else { 1.0 });
+        let reflect = |tangent: &[f64; M]| -> [f64; M] { std::array::from_fn(|k| sign[k] * tangent[k]) };
         let (length, from, to, ends);
         if self.marks == [EDGE, EDGE] && self.from == 0.0 && self.to == 1.0 {
-            (length, from, to, ends) = (1.0, 0.0, 1.0, edges);
+            (length, from, to, ends) = (1.0, 0.0, 1.0, [reflect(&piece.left), reflect(&piece.right)]);
         } else {
             let stretch = piece.stretch(self.marks[0], self.marks[1]);
             length = (self.to - self.from) * stretch.length;
@@ -92,8 +95,11 @@ impl Part {
             let tangent = |part: f64| reflect(&stretch.piece.tangent(part)).map(|value| value.max(0.0));
             ends = [tangent(self.from), tangent(self.to)];
         }
-        let swap = |[a, b]: [[f64; M]; 2]| if backward { [b, a] } else { [a, b] };
-        Placed { sub: SubPiece::new(length, swap(ends), swap(edges), piece.twist, self.cap, axes), from, to }
+        let [left, right] = ends;
+        let (ends, travel) = if backward { ([right, left], -1.0) } else { ([left, right], 1.0) };
+        let bend = std::array::from_fn(|k| travel * sign[k] * (piece.right[k] - piece.left[k]));
+        let orientation = Orientation { sign, travel };
+        Placed { sub: SubPiece::new(length, ends, bend, piece, orientation, self.cap, axes), from, to }
     }
 }
 
@@ -155,7 +161,7 @@ impl Splitter {
             if stretch.length > 0.0 {
                 let first = self.parts.len();
                 match limits.chord {
-                    Some(chord) => self.cut_by_radius(&stretch.piece, limits, chord, piece.exact_twist()),
+                    Some(chord) => self.cut_by_radius(&stretch.piece, limits, chord, piece.twist),
                     None => self.cut_by_cap(&stretch.piece, limits, limits.feed_sq, None, (0.0, 1.0)),
                 }
                 let (left, right) = (&stretch.piece.left, &stretch.piece.right);

@@ -5,7 +5,7 @@
 //! g = |q'|, c = g' = dg/dx (constant), p = (dx/dt)², s = p'/2, D = |g|², a_k = g_k s + c_k p.
 
 use super::curve::{Curve, Denominator};
-use super::turns::difference_of_products;
+use super::piece::Piece;
 use crate::quadratic::dot;
 
 /// An axis whose tangent is below this part of the others', each measured by its acceleration limit, is as good as
@@ -52,16 +52,26 @@ pub enum Cap {
     Chord(f64),
 }
 
+/// How a sub-piece lies on its piece.
+#[derive(Clone, Copy)]
+pub struct Orientation<const M: usize> {
+    /// −1 for axes that move backward on the piece.
+    pub sign: [f64; M],
+    /// −1 for the backward pass.
+    pub travel: f64,
+}
+
 /// A sub-piece in the sense of travel.
-pub struct SubPiece<const M: usize> {
+pub struct SubPiece<'a, const M: usize> {
     pub length: f64,
     /// g at x = 0 and at x = length; exactly 0 where the axis turns round.
     pub start: [f64; M],
     pub end: [f64; M],
     /// c
     pub bend: [f64; M],
-    /// The tangents of the whole piece, reflected and travelled alike: W comes from them.
-    pub edges: [[f64; M]; 2],
+    /// W of the piece.
+    minors: &'a [[f64; M]; M],
+    orientation: Orientation<M>,
     /// D at the ends and, between them, its middle Bernstein coefficient.
     pub speed: [f64; 3],
     /// |C' × C''|
@@ -71,24 +81,25 @@ pub struct SubPiece<const M: usize> {
     pub cap: Cap,
 }
 
-impl<const M: usize> SubPiece<M> {
-    /// From the reflected tangents at the ends of the sub-piece and of its piece.
+impl<'a, const M: usize> SubPiece<'a, M> {
+    /// From the tangents at both ends and the bend, as travelled.
     #[inline(always)]
     pub fn new(
         length: f64,
         [start, end]: [[f64; M]; 2],
-        edges: [[f64; M]; 2],
-        twist: f64,
+        bend: [f64; M],
+        piece: &'a Piece<M>,
+        orientation: Orientation<M>,
         cap: Cap,
         axes: &Axes<M>,
     ) -> Self {
-        let bend: [f64; M] = std::array::from_fn(|k| edges[1][k] - edges[0][k]);
         let mut steepest = 0.0;
         for k in 0..M {
             steepest = f64::max(steepest, bend[k].abs() * axes.inverse[k]);
         }
         let speed = [dot(&start, &start), dot(&start, &end), dot(&end, &end)];
-        Self { length, start, end, bend, edges, speed, twist, flat: 1.0 / steepest, cap }
+        let (minors, twist) = (&piece.minors, piece.twist);
+        Self { length, start, end, bend, minors, orientation, speed, twist, flat: 1.0 / steepest, cap }
     }
 
     /// g_k at x, from the nearer end, so that it keeps its digits next to a zero.
@@ -122,8 +133,9 @@ impl<const M: usize> SubPiece<M> {
     /// W_jk = c_j g_k − c_k g_j for all k: constant along the piece, antisymmetric, its sign exact.
     #[inline(always)]
     pub fn twists(&self, j: usize) -> [f64; M] {
-        let [left, right] = &self.edges;
-        std::array::from_fn(|k| difference_of_products(right[j], left[k], right[k], left[j]))
+        let Orientation { sign, travel } = &self.orientation;
+        let factor = travel * sign[j];
+        std::array::from_fn(|k| factor * sign[k] * self.minors[j][k])
     }
 
     /// The velocity cap at x.

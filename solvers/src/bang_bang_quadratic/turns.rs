@@ -8,7 +8,7 @@ use super::piece::Piece;
 use crate::quadratic::dot;
 
 /// Below this part of its terms a difference of products is computed with their rounding errors.
-const CANCELLED: f64 = 1e-3;
+const CANCELLED: f64 = 1e-5;
 
 /// The start or end of a stretch: an axis that turns there, or the edge of the piece.
 pub type Mark = u8;
@@ -48,12 +48,6 @@ fn rounding_error(a: f64, b: f64, rounded: f64) -> f64 {
 }
 
 impl<const M: usize> Piece<M> {
-    /// W_jk.
-    #[inline(always)]
-    pub fn minor(&self, j: usize, k: usize) -> f64 {
-        difference_of_products(self.right[j], self.left[k], self.right[k], self.left[j])
-    }
-
     /// The axes that turn inside the piece, in order along it, and their number.
     pub fn turns(&self) -> ([Mark; M], usize) {
         let mut order = [EDGE; M];
@@ -76,13 +70,13 @@ impl<const M: usize> Piece<M> {
     /// From the turn of axis a to the turn of axis b.
     fn distance(&self, a: usize, b: usize) -> f64 {
         let bend = |k: usize| self.right[k] - self.left[k];
-        -self.minor(a, b) / (bend(a) * bend(b))
+        -self.minors[a][b] / (bend(a) * bend(b))
     }
 
     /// The tangent where axis a turns.
     fn tangent_at_turn(&self, a: usize) -> [f64; M] {
         let bend = self.right[a] - self.left[a];
-        std::array::from_fn(|k| if k == a { 0.0 } else { self.minor(a, k) / bend })
+        std::array::from_fn(|k| if k == a { 0.0 } else { self.minors[a][k] / bend })
     }
 
     /// The part between two marks that follow one another.
@@ -103,7 +97,7 @@ impl<const M: usize> Piece<M> {
             begin: if from == EDGE { 0.0 } else { place(a) },
             end: if to == EDGE { 1.0 } else { place(b) },
             length,
-            piece: Piece { left, right, speed, twist: self.twist },
+            piece: Piece { left, right, speed, ..*self },
         }
     }
 }

@@ -4,14 +4,15 @@ use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArray
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::with_axes;
+use super::with_padded_axes;
 use crate::audit::arcs::Arcs;
 use crate::audit::curve::Followed;
 use crate::audit::deviation::{audit_deviation, audit_path};
-use crate::audit::follow::{Plan, Timed};
+use crate::audit::follow::Plan;
 use crate::audit::moves::Programmed;
 use crate::audit::profile::audit_profile;
 use crate::audit::setpoints::{Chunk, Stream};
+use crate::audit::timed::Timed;
 use crate::audit::{Check, Limits, Tally};
 
 /// Name, axis (−1: none), worst value, limit, ratio, time, source line of one limit.
@@ -20,10 +21,10 @@ type Finding = (&'static str, i64, f64, f64, f64, f64, i32);
 /// The findings, and how many samples were looked at.
 type Findings = (Vec<Finding>, u64);
 
-fn findings<const M: usize>(tally: &Tally<M>) -> Findings {
+fn findings<const M: usize>(tally: &Tally<M>, axes: usize) -> Findings {
     let mut found = Vec::new();
     for check in Check::ALL {
-        for axis in 0..if check.per_axis() { M } else { 1 } {
+        for axis in 0..if check.per_axis() { axes } else { 1 } {
             let worst = tally.get(check, axis);
             if worst.ratio >= 0.0 {
                 let axis = if check.per_axis() { axis as i64 } else { -1 };
@@ -53,6 +54,7 @@ struct PathArrays<'py> {
     moves: PyReadonlyArray2<'py, i64>,
     tolerance: PyReadonlyArray1<'py, f64>,
     runs: PyReadonlyArray1<'py, i64>,
+    start_dwell: f64,
     dwell: PyReadonlyArray1<'py, f64>,
 }
 
@@ -72,6 +74,7 @@ impl ProblemArrays<'_> {
     fn followed(&self) -> PyResult<Followed<'_>> {
         let path = &self.path;
         let followed = Followed {
+            axes: self.axes(),
             control: path.control_points.as_slice()?,
             width: path.width.as_slice()?,
             feed: self.feed.as_slice()?,
@@ -79,6 +82,7 @@ impl ProblemArrays<'_> {
             moves: path.moves.as_slice()?,
             tolerance: path.tolerance.as_slice()?,
             runs: path.runs.as_slice()?,
+            start_dwell: path.start_dwell,
             dwell: path.dwell.as_slice()?,
         };
         let pieces = followed.len();
@@ -150,6 +154,7 @@ struct ProgramArrays<'py> {
 impl ProgramArrays<'_> {
     fn programmed(&self, axes: usize) -> PyResult<Programmed<'_>> {
         let program = Programmed {
+            axes,
             start: self.start.as_slice()?,
             target: self.target.as_slice()?,
             line: self.line.as_slice()?,
@@ -185,16 +190,22 @@ struct LimitArrays {
 }
 
 impl LimitArrays {
-    fn limits<const M: usize>(&self) -> PyResult<Limits<M>> {
-        fn row<T: Copy, const M: usize>(values: &[T]) -> PyResult<[T; M]> {
-            values.try_into().map_err(|_| PyValueError::new_err(format!("limits of {M} axes are expected")))
+    /// For `axes` axes, those beyond at rest.
+    fn limits<const M: usize>(&self, axes: usize) -> PyResult<Limits<M>> {
+        let lengths = [&self.max_velocity, &self.max_acceleration, &self.max_jerk, &self.max_velocity_jump];
+        let good = axes <= M && lengths.iter().all(|row| row.len() == axes) && self.travel.len() == axes;
+        require(good, "limits")?;
+        fn padded<const M: usize>(values: &[f64]) -> [f64; M] {
+            std::array::from_fn(|k| values.get(k).copied().unwrap_or(0.0))
         }
+        let anywhere = [f64::NEG_INFINITY, f64::INFINITY];
         Ok(Limits {
-            velocity: row(&self.max_velocity)?,
-            acceleration: row(&self.max_acceleration)?,
-            jerk: row(&self.max_jerk)?,
-            jump: row(&self.max_velocity_jump)?,
-            travel: row(&self.travel)?,
+            axes,
+            velocity: padded(&self.max_velocity),
+            acceleration: padded(&self.max_acceleration),
+            jerk: padded(&self.max_jerk),
+            jump: padded(&self.max_velocity_jump),
+            travel: std::array::from_fn(|k| self.travel.get(k).copied().unwrap_or(anywhere)),
             chord_tolerance: self.chord_tolerance,
             period: self.period,
             end_speeds: self.end_speeds,
@@ -216,8 +227,8 @@ fn audit_plan(
     let junction_speed = problem.junction_speed.as_slice()?;
     let arcs = profile.as_ref().map(ProfileArrays::arcs).transpose()?;
     let program = program.as_ref().map(|program| program.programmed(problem.axes())).transpose()?;
-    with_axes!(problem.axes(), M, {
-        let limits = limits.limits::<M>()?;
+    with_padded_axes!(problem.axes(), M, {
+        let limits = limits.limits::<M>(path.axes)?;
         Ok(py.detach(|| {
             let mut tally = audit_path(&path, arcs.as_ref(), &limits);
             if let Some(arcs) = &arcs {
@@ -226,7 +237,7 @@ fn audit_plan(
             if let Some(program) = &program {
                 tally = tally.merge(audit_deviation(&path, program, arcs.as_ref()));
             }
-            findings(&tally)
+            findings(&tally, path.axes)
         }))
     })
 }
@@ -243,7 +254,8 @@ impl<const M: usize> AnyStream for Stream<M> {
     }
 
     fn finish(self: Box<Self>, plan: Option<&Plan>) -> Findings {
-        findings(&Stream::finish(*self, plan))
+        let axes = self.axes();
+        findings(&Stream::finish(*self, plan), axes)
     }
 }
 
@@ -293,8 +305,11 @@ impl SetpointAudit {
         program: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let axes = limits.max_velocity.len();
-        let stream: Box<dyn AnyStream> =
-            with_axes!(axes, M, Ok(Box::new(Stream::new(limits.limits::<M>()?, resolution)) as _))?;
+        let stream: Box<dyn AnyStream> = with_padded_axes!(
+            axes,
+            M,
+            Ok(Box::new(Stream::new(limits.limits::<M>(axes)?, resolution)) as _)
+        )?;
         let compared = problem.map(|problem| compare(axes, problem, profile, program)).transpose()?;
         Ok(Self { axes, stream: Some(stream), compared: compared.flatten() })
     }
@@ -311,6 +326,7 @@ impl SetpointAudit {
         line: Option<PyReadonlyArray1<'_, i32>>,
     ) -> PyResult<()> {
         let chunk = Chunk {
+            axes: self.axes,
             t: t.as_slice()?,
             position: position.as_slice()?,
             velocity: velocity.as_ref().map(|array| array.as_slice()).transpose()?,
@@ -368,9 +384,9 @@ fn compare(
             && runs.first() == Some(&0)
             && runs.last() == Some(&(arcs.len() as i64))
             && runs.windows(2).all(|pair| pair[0] <= pair[1])
-            && with_axes!(axes, M, Ok((0..arcs.len()).all(|i| !arcs.has_bad_numbers::<M>(i, &path))))?;
+            && (0..arcs.len()).all(|i| !arcs.has_bad_numbers(i, &path));
         if good {
-            starts = arcs.starts(path.dwell);
+            starts = arcs.starts(&path);
             usable = Some(profile.unbind());
         }
     }

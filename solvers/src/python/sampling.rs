@@ -98,6 +98,7 @@ impl PySampler {
         width: PyReadonlyArray1<'_, f64>,
         line: PyReadonlyArray1<'_, i32>,
         runs: PyReadonlyArray1<'_, i64>,
+        start_dwell: f64,
         dwell: PyReadonlyArray1<'_, f64>,
         piece: PyReadonlyArray1<'_, u32>,
         kind: PyReadonlyArray1<'_, u8>,
@@ -154,6 +155,7 @@ impl PySampler {
                 pieces: quadratics(&control_points, &width)?,
                 lines: slice(&line)?.to_vec(),
                 runs: offsets(&runs)?,
+                start_dwell,
                 dwell: slice(&dwell)?.to_vec(),
             };
             let sampler = py.detach(|| Sampler::new(path, arcs, &arc_runs, period, interpolator));

@@ -25,7 +25,7 @@ pub(super) fn check<const M: usize>(
     {
         return Err("the arrays of the path do not fit together".into());
     }
-    if path.dwell.iter().any(|dwell| !(dwell.is_finite() && *dwell >= 0.0)) {
+    if path.dwell.iter().chain([&path.start_dwell]).any(|dwell| !(dwell.is_finite() && *dwell >= 0.0)) {
         return Err("the path has a pause that is negative or not finite".into());
     }
     if !offsets(arc_runs, arcs.len()) {

@@ -1,0 +1,349 @@
+"""Curves of any degree: Bézier curves, B-splines and NURBS as Bézier pieces joined end to end."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from feedplan._solvers import (
+    check_control_points,
+    curve_cusps,
+    curve_elevate,
+    curve_evaluate,
+    curve_joints,
+    curve_reverse,
+    curve_split,
+    spline_insert,
+    spline_pieces,
+)
+from feedplan.errors import InputError
+from feedplan.geometry._arrays import floats, places, points, refuse
+
+MAX_DEGREE = 9
+
+Columns = tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.int64], NDArray[np.float64]]
+
+
+class JointKind(IntEnum):
+    """What holds where two pieces meet; each kind implies those before it."""
+
+    GAP = 0
+    """The ends are apart."""
+    CORNER = 1
+    """The ends meet and the direction of motion breaks (C0)."""
+    TANGENT = 2
+    """The direction agrees and the derivative jumps (G1)."""
+    C1 = 3
+    C2 = 4
+    C3 = 5
+
+
+@dataclass(frozen=True)
+class Joints:
+    """The joints (j,) of a curve: `piece` before each, `kind` (a `JointKind`), `gap` between the ends [mm],
+    `turn` of the direction of motion [rad], `speed` (j, 2) = |C'| before and after, 0 at a cusp."""
+
+    piece: NDArray[np.uint32]
+    kind: NDArray[np.uint8]
+    gap: NDArray[np.float64]
+    turn: NDArray[np.float64]
+    speed: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.piece)
+
+
+@dataclass(frozen=True)
+class Cusps:
+    """Places (c,) where the derivative vanishes: `piece` and local `u`."""
+
+    piece: NDArray[np.uint32]
+    u: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.piece)
+
+
+@dataclass(frozen=True)
+class CompositeCurve:
+    """Bézier pieces C_i(u), u in [0, width_i], each of its own degree 1 to 9, polynomial or rational.
+
+    `control_points` (total, axes) [mm, or degrees on rotary axes], the degree_i + 1 points of piece i from
+    `offsets[i]` to `offsets[i + 1]`; `weights` (total,), ones where a piece is polynomial, or None where all
+    are; `offsets` (n + 1,); `width` (n,) of the parameter intervals.
+
+    Raises InputError for columns that do not fit together and values that cannot be used.
+    """
+
+    control_points: NDArray[np.float64]
+    weights: NDArray[np.float64] | None
+    offsets: NDArray[np.int64]
+    width: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        control, weights = points(self.control_points, self.weights)
+        check_control_points(control, weights, 1)
+        offsets = np.ascontiguousarray(self.offsets, dtype=np.int64)
+        width = floats(self.width, "widths", 1)
+        if len(width) == 0 or len(offsets) != len(width) + 1:
+            raise InputError(
+                f"{len(offsets)} offsets for {len(width)} widths: give one width for each of at least one "
+                "piece, and one offset more"
+            )
+        degree = np.diff(offsets) - 1
+        if offsets[0] != 0 or offsets[-1] != len(control):
+            raise InputError(
+                f"the offsets go from {offsets[0]} to {offsets[-1]}: they must go from 0 to {len(control)}, "
+                "the number of control points"
+            )
+        refuse(
+            (degree < 1) | (degree > MAX_DEGREE),
+            lambda i: (
+                f"piece {i} has degree {degree[i]}: degrees 1 to {MAX_DEGREE} are supported; correct offsets"
+            ),
+        )
+        refuse(
+            ~((width > 1e-60) & (width < 1e60)),
+            lambda i: f"piece {i} has the width {width[i]}: widths must be positive and finite; correct it",
+        )
+        for name, value in zip(
+            ("control_points", "weights", "offsets", "width"), (control, weights, offsets, width), strict=True
+        ):
+            object.__setattr__(self, name, value)
+
+    @classmethod
+    def from_bezier(
+        cls, control_points: ArrayLike, weights: ArrayLike | None = None, width: float = 1.0
+    ) -> CompositeCurve:
+        """One piece by its control points (degree + 1, axes), rational with `weights` (degree + 1,)."""
+        control, weight = points(control_points, weights)
+        if not 2 <= len(control) <= MAX_DEGREE + 1:
+            raise InputError(
+                f"a Bézier curve of {len(control)} control points: 2 to {MAX_DEGREE + 1} are supported "
+                f"(degrees 1 to {MAX_DEGREE}); split the curve"
+            )
+        return cls(control, weight, np.array([0, len(control)]), np.array([width], dtype=np.float64))
+
+    @classmethod
+    def from_bspline(
+        cls,
+        control_points: Any,
+        knots: ArrayLike | None = None,
+        degree: int | None = None,
+        *,
+        periodic: bool = False,
+    ) -> CompositeCurve:
+        """A B-spline by n control points (n, axes), n + degree + 1 `knots` and `degree`, as for `from_nurbs`;
+        or a `scipy.interpolate.BSpline` as it is.
+
+        Of scipy's spline the base interval [t[k], t[n]] is taken, on which every way to extrapolate agrees; a
+        periodic one is closed there.
+        """
+        if knots is None and degree is None:
+            spline = control_points
+            if not all(hasattr(spline, name) for name in "tck"):
+                raise InputError(
+                    f"a B-spline is given as {type(spline).__name__}: give control points, knots and degree, "
+                    "or an object with t, c and k as scipy's BSpline"
+                )
+            knots, degree = spline.t, int(spline.k)
+            # scipy allows coefficients beyond those that the knots use.
+            control_points = np.asarray(spline.c)[: max(len(spline.t) - degree - 1, 0)]
+        if knots is None or degree is None:
+            raise InputError("a B-spline needs control points, knots and degree: one of them is missing")
+        return cls.from_nurbs(control_points, knots, degree, None, periodic=periodic)
+
+    @classmethod
+    def from_nurbs(
+        cls,
+        control_points: ArrayLike,
+        knots: ArrayLike,
+        degree: int,
+        weights: ArrayLike | None = None,
+        *,
+        periodic: bool = False,
+    ) -> CompositeCurve:
+        """A NURBS curve by n control points (n, axes), n + degree + 1 `knots` and `weights` (n,).
+
+        The knots may be clamped or not: the curve is on [knots[degree], knots[n]], and its pieces are the
+        spans. With `periodic` the n control points and n + 1 knots are one period of a closed curve, of which
+        the first span belongs to the first degree + 1 points.
+
+        Raises InputError for lists that do not fit together and values that cannot be used.
+        """
+        control, weight = points(control_points, weights)
+        return cls(*spline_pieces(control, weight, floats(knots, "knots", 1), _degree(degree), periodic))
+
+    @classmethod
+    def joined(cls, curves: Sequence[CompositeCurve], gap: float = 1e-6) -> CompositeCurve:
+        """Curves one after the other; the end of each is the start of the next within `gap` [mm]."""
+        if not curves:
+            raise InputError("no curves to join: give at least one")
+        for i, (before, after) in enumerate(pairwise(curves)):
+            if before.axes != after.axes:
+                raise InputError(
+                    f"curve {i} has {before.axes} axes and curve {i + 1} has {after.axes}: give all the same"
+                )
+            miss = float(np.linalg.norm(after.control_points[0] - before.control_points[-1]))
+            if not miss <= gap:
+                raise InputError(
+                    f"curve {i + 1} starts {miss:g} mm from the end of curve {i}: at most {gap:g} mm is "
+                    "allowed; add a line between them or move one"
+                )
+        weights = None
+        if any(curve.weights is not None for curve in curves):
+            weights = np.concatenate(
+                [np.ones(len(c.control_points)) if c.weights is None else c.weights for c in curves]
+            )
+        counts = np.concatenate([np.diff(curve.offsets) for curve in curves])
+        return cls(
+            np.concatenate([curve.control_points for curve in curves]),
+            weights,
+            np.concatenate([[0], np.cumsum(counts)]),
+            np.concatenate([curve.width for curve in curves]),
+        )
+
+    def __len__(self) -> int:
+        return len(self.width)
+
+    @property
+    def axes(self) -> int:
+        """Number of axes."""
+        return int(self.control_points.shape[1])
+
+    @property
+    def degree(self) -> NDArray[np.int64]:
+        """Degree of each piece (n,)."""
+        return np.diff(self.offsets) - 1
+
+    @property
+    def breakpoints(self) -> NDArray[np.float64]:
+        """The parameter from the start of the curve to each joint (n + 1,)."""
+        return np.concatenate([[0.0], np.cumsum(self.width)])
+
+    @property
+    def closed(self) -> bool:
+        """Whether the curve ends where it starts, to rounding."""
+        ends = self.control_points[[0, -1]]
+        return bool(np.abs(ends[1] - ends[0]).max() <= 1e-12 * np.abs(self.control_points).max())
+
+    def evaluate(self, piece: ArrayLike, u: ArrayLike, order: int = 0) -> NDArray[np.float64]:
+        """C and its derivatives by u to `order` ≤ 3 at places (m,): (order + 1, m, axes)."""
+        if order not in (0, 1, 2, 3):
+            raise InputError(f"derivatives to order {order}: orders 0 to 3 are supported")
+        return curve_evaluate(*self.columns(), *places(piece, u), order)
+
+    def at(self, parameter: ArrayLike, order: int = 0) -> NDArray[np.float64]:
+        """The same at parameters (m,) from the start of the curve, 0 to breakpoints[-1]; at a joint, of the
+        piece that starts there."""
+        breaks, x = self.breakpoints, floats(parameter, "parameters", 1)
+        refuse(
+            ~((x >= 0) & (x <= breaks[-1])),
+            lambda i: f"parameter {i} is {x[i]}: the curve goes from 0 to {breaks[-1]}; stay within",
+        )
+        piece = np.searchsorted(breaks[1:-1], x, side="right")
+        return self.evaluate(piece, np.minimum(x - breaks[piece], self.width[piece]), order)
+
+    def reversed(self) -> CompositeCurve:
+        """The curve traversed backwards."""
+        return CompositeCurve(*curve_reverse(*self.columns()))
+
+    def elevated(self, degree: int) -> CompositeCurve:
+        """The same curve with every piece of a lower degree raised to `degree`."""
+        return CompositeCurve(*curve_elevate(*self.columns(), _degree(degree)))
+
+    def split(self, piece: ArrayLike, u: ArrayLike) -> CompositeCurve:
+        """The same curve with pieces cut at places (m,) inside them; cuts at their ends and repeated ones are
+        passed over."""
+        pieces, at = places(piece, u)
+        order = np.lexsort((at, pieces))
+        pieces, at = pieces[order], at[order]
+        new = np.ones(len(at), dtype=bool)
+        new[1:] = (np.diff(pieces) != 0) | (np.diff(at) != 0)
+        inside = pieces < len(self)
+        new[inside] &= (at[inside] != 0) & (at[inside] != self.width[pieces[inside]])
+        return CompositeCurve(*curve_split(*self.columns(), pieces[new], at[new]))
+
+    def with_width(self, width: ArrayLike) -> CompositeCurve:
+        """The same pieces on parameter intervals of other widths (n,), or all of one width."""
+        array = np.asarray(width, dtype=np.float64)
+        if array.ndim and array.shape != self.width.shape:
+            raise InputError(f"{array.shape} widths for {len(self)} pieces: give one for each, or one number")
+        return CompositeCurve(
+            self.control_points, self.weights, self.offsets, np.broadcast_to(array, self.width.shape)
+        )
+
+    def joints(
+        self, gap: float = 1e-6, angle: float = 1e-6, derivative: float = 1e-9, closed: bool | None = None
+    ) -> Joints:
+        """How neighbouring pieces meet, and in a closed curve the last and the first one.
+
+        The same are points within `gap` [mm], directions within `angle` [rad], and derivatives within the
+        part `derivative` of what the size of the pieces lets expect. `closed` includes the joint from end to
+        start; by default where the curve is closed.
+        """
+        around = self.closed if closed is None else closed
+        return Joints(*curve_joints(*self.columns(), around, gap, angle, derivative))
+
+    def cusps(self, tolerance: float = 1e-9) -> Cusps:
+        """Every place where |C'| is at most `tolerance` of the greatest on the piece, ends included.
+
+        Proven to be all; of rational pieces ω²C' is meant. Of neighbouring places the slowest is given. A
+        piece of length zero has one at u = 0.
+        """
+        if not 1e-12 <= tolerance < 1:
+            raise InputError(f"the tolerance of cusps is {tolerance:g}: give a part from 1e-12 to 1")
+        return Cusps(*curve_cusps(*self.columns(), tolerance))
+
+    @property
+    def zero_length(self) -> NDArray[np.int64]:
+        """The pieces whose control points all coincide."""
+        first = np.repeat(self.control_points[self.offsets[:-1]], np.diff(self.offsets), axis=0)
+        apart = (self.control_points != first).any(axis=1)
+        return np.flatnonzero(~np.logical_or.reduceat(apart, self.offsets[:-1]))
+
+    def columns(self) -> Columns:
+        """The four arrays, as the kernels take them."""
+        return self.control_points, self.weights, self.offsets, self.width
+
+
+def insert_knot(
+    control_points: ArrayLike,
+    knots: ArrayLike,
+    degree: int,
+    value: float,
+    weights: ArrayLike | None = None,
+    times: int = 1,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None]:
+    """Control points, knots and weights of the same spline with the knot `value` inserted `times` times."""
+    control, weight = points(control_points, weights)
+    if times < 1:
+        raise InputError(f"the knot {value} is to be inserted {times} times: give 1 or more")
+    new, new_weights, new_knots = spline_insert(
+        control, weight, floats(knots, "knots", 1), _degree(degree), value, times
+    )
+    return new, new_knots, new_weights
+
+
+def knot_continuity(knots: ArrayLike, degree: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """The distinct knots inside the curve, and degree − multiplicity: the continuity each guarantees."""
+    t = floats(knots, "knots", 1)
+    if len(t) < 2 * _degree(degree) + 2:
+        raise InputError(f"{len(t)} knots for degree {degree}: at least {2 * degree + 2} are needed")
+    inner = t[(t > t[degree]) & (t < t[len(t) - degree - 1])]
+    values, multiplicity = np.unique(inner, return_counts=True)
+    return values, degree - multiplicity
+
+
+def _degree(degree: int) -> int:
+    if degree != int(degree) or not 1 <= degree <= MAX_DEGREE:
+        raise InputError(
+            f"the degree is {degree}: degrees 1 to {MAX_DEGREE} are supported; convert the curve"
+        )
+    return int(degree)

@@ -1,0 +1,117 @@
+"""Kinematics q = K(P): the tool tip's coordinates in, the joints' out; one file a machine type.
+
+A module has `build(axes, parameters) -> Kinematics` and is found by its name: the type `trunnion-ac` is the
+module `trunnion_ac`. Users add their own with `register`. K is written once, with the functions of
+`feedplan.machine.numbers`: arrays give positions, series exact derivatives along a curve, series of intervals
+proven bounds of them.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from feedplan.errors import MachineError
+from feedplan.machine.numbers.elementary import Number
+from feedplan.machine.parameters import Parameters
+
+if TYPE_CHECKING:
+    from feedplan.machine.machine import Axis
+
+
+class Kinematics(ABC):
+    """A machine type with its dimensions.
+
+    `tip_names` are the program letters that `joints` takes in this order, `joint_names` the machine's axis
+    letters in its file's order. `rotary` tells which joints are angles [deg]; the others are lengths [mm].
+    `turning` tells which joints are known up to whole turns only, since they come from `atan2`: along a path
+    they are followed continuously. `always` is true where a program's words always mean the tip, as X, Y, Z
+    on a cylindrical machine; false where they are joint positions until G43.4 or the like.
+    """
+
+    tip_names: tuple[str, ...]
+    joint_names: tuple[str, ...]
+    always: bool = True
+
+    @property
+    def rotary(self) -> tuple[bool, ...]:
+        """Which joints are angles; those named A, B or C unless a subclass says otherwise."""
+        return tuple(name in "ABC" for name in self.joint_names)
+
+    @property
+    def turning(self) -> tuple[bool, ...]:
+        """Which joints are known up to whole turns only; none unless a subclass says otherwise."""
+        return (False,) * len(self.joint_names)
+
+    @abstractmethod
+    def joints(self, tip: Sequence[Number]) -> tuple[Number, ...]:
+        """Joint positions [mm, deg] for the tip [mm, deg], numbers of any one type."""
+
+    def tip(self, joints: Sequence[Number]) -> tuple[Number, ...]:
+        """The tip [mm, deg] for joint positions [mm, deg]: the inverse of `joints`, where there is one."""
+        raise MachineError(f"the kinematics {type(self).__name__} has no tip(joints): write that method")
+
+    def singular(self, tip: Sequence[Number]) -> dict[str, Number]:
+        """What vanishes where K is singular, by a name that completes "the tool is at …"; none by default."""
+        return {}
+
+
+Factory = Callable[[tuple["Axis", ...], Parameters], Kinematics]
+
+_registered: dict[str, Factory] = {}
+
+
+def register(name: str, factory: Factory) -> None:
+    """Makes a kinematics known under a name for machine files; a later one of the same name replaces it.
+
+    `factory(axes, parameters)` gets the machine's axes in order and its `[kinematics]` keys.
+    """
+    if name in _bundled():
+        raise MachineError(f"the kinematics '{name}' comes with feedplan: register yours under another name")
+    _registered[name] = factory
+
+
+def types() -> tuple[str, ...]:
+    """The names of all kinematics, bundled and registered."""
+    return tuple(sorted({*_bundled(), *_registered}))
+
+
+def create(name: str, axes: tuple[Axis, ...], values: Mapping[str, Any], machine: str) -> Kinematics:
+    """The kinematics of that name for a machine's axes; raises MachineError with the remedy."""
+    if name in _registered:
+        factory = _registered[name]
+    elif name in _bundled():
+        factory = importlib.import_module(f"{__name__}.{name.replace('-', '_')}").build
+    else:
+        raise MachineError(
+            f"machine {machine}: kinematics is {name!r}: give one of {', '.join(types())}, "
+            "or register it with feedplan.machine.kinematics.register before loading the machine"
+        )
+    parameters = Parameters(values, machine)
+    kinematics = factory(axes, parameters)
+    parameters.finish()
+    _check_axes(kinematics, axes, parameters)
+    return kinematics
+
+
+def _bundled() -> tuple[str, ...]:
+    return tuple(module.name.replace("_", "-") for module in pkgutil.iter_modules(__path__))
+
+
+def _check_axes(kinematics: Kinematics, axes: tuple[Axis, ...], parameters: Parameters) -> None:
+    names = tuple(axis.name for axis in axes)
+    if names != kinematics.joint_names:
+        raise MachineError(
+            f"machine {parameters.machine}: the axes are {', '.join(names)}: this kinematics needs "
+            f"{', '.join(kinematics.joint_names)} in that order"
+        )
+    for axis, rotary in zip(axes, kinematics.rotary, strict=True):
+        kind = "rotary" if rotary else "linear"
+        if axis.kind != kind:
+            raise MachineError(
+                f"machine {parameters.machine}: axis {axis.name} is {axis.kind}, but this kinematics needs "
+                f'it {kind}: give kind = "{kind}" and limits in {"deg" if rotary else "mm"}'
+            )

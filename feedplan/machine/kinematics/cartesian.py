@@ -1,0 +1,74 @@
+"""Cartesian machines: each joint is one program axis times a scale, as on any three-axis mill or gantry.
+
+    q_j = scale_j · P_axis(j)
+
+Without keys every joint has the program axis of its own letter. `map` gives joints another program axis: two
+joints may share one, as the two motors of a gantry do. `scale` turns mm of the tip into mm of the joint.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from feedplan.errors import MachineError
+from feedplan.machine.kinematics import Kinematics
+from feedplan.machine.machine import AXIS_LETTERS, Axis
+from feedplan.machine.numbers.elementary import Number
+from feedplan.machine.parameters import Parameters
+
+
+@dataclass(frozen=True)
+class Cartesian(Kinematics):
+    """`source[j]` is the index in `tip_names` of the program axis that joint j follows, times `scale[j]`."""
+
+    tip_names: tuple[str, ...]
+    joint_names: tuple[str, ...]
+    rotary_joints: tuple[bool, ...]
+    source: tuple[int, ...]
+    scale: tuple[float, ...]
+
+    @property
+    def rotary(self) -> tuple[bool, ...]:
+        """As the machine's axes are."""
+        return self.rotary_joints
+
+    def joints(self, tip: Sequence[Number]) -> tuple[Number, ...]:
+        """Scaled program axes."""
+        return tuple(tip[i] * scale for i, scale in zip(self.source, self.scale, strict=True))
+
+    def tip(self, joints: Sequence[Number]) -> tuple[Number, ...]:
+        """Each program axis from the first joint that follows it."""
+        first = [self.source.index(i) for i in range(len(self.tip_names))]
+        return tuple(joints[j] / self.scale[j] for j in first)
+
+
+def build(axes: tuple[Axis, ...], parameters: Parameters) -> Cartesian:
+    """Keys `map = {joint = "program axis"}` and `scale = {joint = factor}`."""
+    names = tuple(axis.name for axis in axes)
+    mapped, scales = parameters.table("map"), parameters.table("scale")
+    for key, table in (("map", mapped), ("scale", scales)):
+        for letter in table:
+            parameters.require(letter in names, key, letter, f"one of the joints {', '.join(names)}")
+    follows = [mapped.get(name, name) for name in names]
+    for letter in follows:
+        good = isinstance(letter, str) and len(letter) == 1 and letter in AXIS_LETTERS
+        parameters.require(good, "map", letter, f"one of the letters {AXIS_LETTERS}")
+    scale = [scales.get(name, 1.0) for name in names]
+    for value in scale:
+        good = isinstance(value, (int, float)) and not isinstance(value, bool) and 0 < abs(value) < 1e6
+        parameters.require(good, "scale", value, "a number other than 0")
+    for axis, letter in zip(axes, follows, strict=True):
+        if (letter in "ABC") != (axis.kind == "rotary") and letter != axis.name:
+            raise MachineError(
+                f"machine {parameters.machine}: the {axis.kind} joint {axis.name} follows {letter}: "
+                "map linear joints to X, Y, Z, U, V, W and rotary ones to A, B, C"
+            )
+    tip_names = tuple(letter for letter in AXIS_LETTERS if letter in follows)
+    return Cartesian(
+        tip_names=tip_names,
+        joint_names=names,
+        rotary_joints=tuple(axis.kind == "rotary" for axis in axes),
+        source=tuple(tip_names.index(letter) for letter in follows),
+        scale=tuple(float(value) for value in scale),
+    )

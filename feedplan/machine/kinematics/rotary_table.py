@@ -1,0 +1,13 @@
+"""Four-axis machines: X, Y, Z and one rotary table, C flat or A or B upright, followed by the tip."""
+
+from __future__ import annotations
+
+from feedplan.machine.machine import Axis
+from feedplan.machine.parameters import Parameters
+from feedplan.machine.rotary import RotaryChain, build_chain
+
+
+def build(axes: tuple[Axis, ...], parameters: Parameters) -> RotaryChain:
+    """Keys `table` (letter, C by default), its `pivot_…` in machine coordinates and `tool_length` [mm]."""
+    table = parameters.choice("table", "C", ("A", "B", "C"))
+    return build_chain(axes, parameters, tables=(table,), heads=())

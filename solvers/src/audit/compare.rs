@@ -1,0 +1,172 @@
+//! Compares setpoints with the plan that they follow: each with its place, and the steps with the path between.
+
+use super::curve::{distance, from_to, inner, length, Segment};
+use super::deviation::{settled, window};
+use super::follow::{is_step, Plan};
+use super::moves::Neighbours;
+use super::setpoints::Row;
+use super::timed::Reader;
+use super::{Check, Limits, Tally, PLACE_TOLERANCE};
+
+/// A recorded velocity may differ from the profile's by this share of what one period of acceleration changes.
+const VELOCITY_SHARE: f64 = 1e-3;
+
+/// A recorded acceleration may differ from the profile's by this share of its limit.
+const ACCELERATION_SHARE: f64 = 1e-2;
+
+/// Pieces that meet at a smaller angle than this, in rad, meet without a corner.
+const SMOOTH: f64 = 1e-9;
+
+/// Looks at setpoints one after the other, with what belongs to their place at hand.
+pub struct Comparison<'a, const M: usize> {
+    plan: &'a Plan<'a>,
+    limits: &'a Limits<M>,
+    profile: Option<Reader<'a, M>>,
+    /// The programmed moves near `piece`.
+    near: Neighbours<M>,
+    piece: Option<usize>,
+}
+
+impl<'a, const M: usize> Comparison<'a, M> {
+    pub fn new(plan: &'a Plan<'a>, limits: &'a Limits<M>) -> Self {
+        let profile = plan.profile.as_ref().map(|profile| Reader::new(profile, &plan.path));
+        Self { plan, limits, profile, near: Neighbours::default(), piece: None }
+    }
+
+    /// What one setpoint shows: its distance from path and program, and what it records.
+    pub fn spot(&mut self, row: &Row<M>, rounding: f64, tally: &mut Tally<M>) {
+        let (spot, time, line) = (&row.spot, row.t, row.line);
+        tally.offer(Check::Place, 0, spot.off, PLACE_TOLERANCE, time, line);
+        tally.offer(Check::Place, 0, spot.late, spot.allowed, time, line);
+        let (path, piece) = (&self.plan.path, spot.place.piece);
+        if let Some(program) = &self.plan.program {
+            if self.piece != Some(piece) {
+                self.near.replace(window(path, piece, program.len()).map(|m| program.get(m)));
+                self.piece = Some(piece);
+            }
+            let limit = path.tolerance[piece] + PLACE_TOLERANCE;
+            let away = self.near.distance(&row.q, settled(tally) * limit);
+            tally.offer(Check::Deviation, 0, away - rounding, limit, time, line);
+        }
+        if spot.is_good() {
+            self.recorded(row, rounding, tally);
+        }
+    }
+
+    /// Recorded velocity and acceleration against the profile's.
+    fn recorded(&mut self, row: &Row<M>, rounding: f64, tally: &mut Tally<M>) {
+        let (Some(profile), limits, spot) = (&mut self.profile, self.limits, &row.spot) else { return };
+        let here = profile.go_to(spot.place);
+        if let Some(recorded) = row.velocity {
+            let velocity = profile.motion.velocity(here.y);
+            let away = rounding + spot.off.max(0.0) + spot.late;
+            let rest = self.plan.path.width[spot.place.piece] - spot.place.u;
+            let at_joint = spot.place.u.min(rest) <= PLACE_TOLERANCE;
+            for k in 0..M {
+                // From rest, a place known to `away` is passed at a speed known to this.
+                let unknown = (2.0 * limits.acceleration[k] * away).sqrt();
+                let off = (recorded[k] - velocity[k]).abs() - unknown;
+                let jump = if at_joint { limits.jump[k] } else { 0.0 };
+                let limit = VELOCITY_SHARE * limits.acceleration[k] * limits.period + jump;
+                tally.offer(Check::RecordedVelocity, k, off, limit, row.t, row.line);
+            }
+        }
+        if let Some(recorded) = row.acceleration {
+            let range = profile.accelerations(here, row.t, limits.period);
+            for k in 0..M {
+                let off = (range[k][0] - recorded[k]).max(recorded[k] - range[k][1]);
+                let limit = ACCELERATION_SHARE * limits.acceleration[k];
+                tally.offer(Check::RecordedAcceleration, k, off, limit, row.t, row.line);
+            }
+        }
+    }
+
+    /// What the step between two setpoints shows: its speed, and the path between them.
+    pub fn step(&self, before: &Row<M>, row: &Row<M>, step: f64, rounding: f64, tally: &mut Tally<M>) {
+        let (path, limits) = (&self.plan.path, self.limits);
+        if !is_step(before.t, row.t, limits.period) {
+            return;
+        }
+        let (from, to) = (before.spot.place, row.spot.place);
+        let (time, line) = (row.t, row.line);
+        let chord = Segment::new(&before.q, &row.q);
+        let (mut way, mut least_time, mut error_sq) = (0.0, 0.0, 0.0_f64);
+        let mut last = before.q;
+        for piece in from.piece..=to.piece {
+            let curve = path.curve::<M>(piece);
+            let start = if piece == from.piece { from.u } else { 0.0 };
+            let end = if piece == to.piece { to.u } else { curve.width };
+            let next = if piece == to.piece { row.q } else { curve.at(end) };
+            let part = distance(&last, &next);
+            way += part;
+            least_time += part / path.feed[piece];
+            last = next;
+            if limits.chord_tolerance.is_finite() && end > start {
+                for share in [0.25, 0.5, 0.75, 1.0] {
+                    error_sq = error_sq.max(chord.distance_sq(&curve.at(start + share * (end - start))));
+                }
+            }
+        }
+        let feed = if least_time > 0.0 { way / least_time } else { f64::INFINITY };
+        tally.offer(Check::Feed, 0, (way - 2.0 * rounding) / step, feed, time, line);
+        if limits.chord_tolerance.is_finite() {
+            let certain = error_sq.sqrt() - rounding - before.spot.off.max(row.spot.off).max(0.0);
+            let mut limit = limits.chord_tolerance;
+            if certain > limit {
+                limit += self.chord_beyond_circle(before, row, step);
+            }
+            tally.offer(Check::Chord, 0, certain, limit, time, line);
+        }
+    }
+
+    /// What the chord error may exceed the tolerance by where the speed limit of the osculating circle holds.
+    ///
+    /// That limit keeps the acceleration across the path at 8 δ/T², and so the distance from the chord, T²/8 times
+    /// the greatest acceleration across the chord, at δ. Where the path turns against the chord by θ, the
+    /// acceleration along the path adds T²/8 · a sin θ; all of it where the path runs back.
+    fn chord_beyond_circle(&self, before: &Row<M>, row: &Row<M>, step: f64) -> f64 {
+        let (path, limits) = (&self.plan.path, self.limits);
+        let (from, to) = (before.spot.place, row.spot.place);
+        let way = from_to(&before.q, &row.q);
+        let way_length = length(&way);
+        let mut most = 0.0_f64;
+        for piece in from.piece..=to.piece {
+            let curve = path.curve::<M>(piece);
+            let start = if piece == from.piece { from.u } else { 0.0 };
+            let end = if piece == to.piece { to.u } else { curve.width };
+            for share in [0.0, 0.25, 0.5, 0.75, 1.0] {
+                let tangent = curve.derivative(start + share * (end - start));
+                let size = length(&tangent);
+                let cos = inner(&tangent, &way) / (size * way_length);
+                let across = if cos > 0.0 { (1.0 - cos * cos).max(0.0).sqrt() } else { 1.0 };
+                let along: f64 = (0..M).map(|k| tangent[k].abs() * limits.acceleration[k]).sum();
+                most = most.max(across * along / size);
+            }
+        }
+        0.125 * step * step * most
+    }
+
+    /// Corners of the path in two steps, those included that the places at their ends cannot be told from.
+    pub fn corners(&self, rows: [&Row<M>; 3]) -> f64 {
+        let (path, period) = (&self.plan.path, self.limits.period);
+        if rows.windows(2).any(|pair| !is_step(pair[0].t, pair[1].t, period)) {
+            return 0.0;
+        }
+        let (from, to) = (&rows[0].spot, &rows[2].spot);
+        let at_start = from.place.u <= PLACE_TOLERANCE;
+        let at_end = path.width[to.place.piece] - to.place.u <= PLACE_TOLERANCE;
+        let first = if at_start { from.place.piece.max(1) } else { from.place.piece + 1 };
+        let last = (to.place.piece + usize::from(at_end)).min(path.len() - 1);
+        let mut corners = 0.0;
+        for piece in first..=last {
+            let before = path.curve::<M>(piece - 1);
+            let after = path.curve::<M>(piece);
+            let (into, out) = (before.derivative(before.width), after.derivative(0.0));
+            let (a, b) = (length(&into), length(&out));
+            if distance(&into.map(|x| x / a), &out.map(|x| x / b)) > SMOOTH {
+                corners += 1.0;
+            }
+        }
+        corners
+    }
+}

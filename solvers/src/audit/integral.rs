@@ -1,0 +1,240 @@
+//! The time of an arc, or of part of it, by numerical integration.
+//!
+//! Times are ∫ du/√p in the variable y in [0, 1] in which √p would be linear if p were: du/√p is then finite at
+//! a standstill, and constant where p is linear in u.
+
+use super::motion::{Law, Motion, State};
+use super::{EPS, ROUNDINGS};
+
+/// Nodes and weights of Kronrod's 7-point rule on [−1, 1], the middle one last, and the weights of the 3-point Gauss rule inside it.
+const NODES: [f64; 3] = [0.960_491_268_708_020_3, 0.774_596_669_241_483_4, 0.434_243_749_346_802_55];
+const WEIGHTS: [f64; 4] =
+    [0.104_656_226_026_467_27, 0.268_488_089_868_333_44, 0.401_397_414_775_962_2, 0.450_916_538_658_474_14];
+const INNER_WEIGHTS: [f64; 2] = [5.0 / 9.0, 8.0 / 9.0];
+
+/// Where the two rules differ by no more than this, the better one is good to about its square, 1e-11.
+const RULES_AGREE: f64 = 3e-6;
+
+/// A boundary layer that takes less than this share of an interval's time is left out.
+const THIN: f64 = 1e-12;
+
+/// Halvings of an interval before it counts as one that cannot be integrated; right arcs need some forty.
+const MOST_HALVINGS: u32 = 400;
+
+impl<const M: usize> Motion<M> {
+    /// dt/dy at `y` inside the arc, up to `time_scale`.
+    #[inline(always)]
+    fn integrand(&self, y: f64) -> f64 {
+        let d = self.distance(y);
+        let linear = self.root_anchor + (self.root_far - self.root_anchor) * y;
+        match self.law {
+            // The same as below with one axis evaluated and one division saved.
+            Law::AxisAcceleration { axis, value, start_sq } => {
+                let tangent = self.tangent[axis] + d * self.bend[axis];
+                let speed_sq = start_sq + value * d * (self.tangent[axis] + tangent);
+                linear * tangent.abs() / speed_sq.sqrt()
+            }
+            _ => {
+                let tangent = std::array::from_fn(|k| self.tangent[k] + d * self.bend[k]);
+                linear / self.root_p(d, &tangent)
+            }
+        }
+    }
+
+    /// Whether the integrand is smooth enough between two distances for the rule: no longer than they are far
+    /// from where p has a pole or a kink. A boundary layer too thin to matter counts as smooth.
+    #[inline]
+    fn is_smooth(&self, d0: f64, d1: f64) -> bool {
+        let Some(pole) = &self.pole else { return true };
+        let along = (d0.min(d1) - pole.at).max(pole.at - d0.max(d1)).max(0.0);
+        let (length, away) = ((d1 - d0).abs(), (along * along + pole.beside * pole.beside).sqrt());
+        length <= away || pole.strength * away <= THIN * length
+    }
+
+    /// Time from `y0` to `y1`, in s, and whether the rule could be trusted there.
+    #[inline]
+    fn rule(&self, y0: f64, y1: f64) -> (f64, bool) {
+        let smooth = self.is_smooth(self.distance(y0), self.distance(y1));
+        let (middle, half) = (0.5 * (y0 + y1), 0.5 * (y1 - y0));
+        let centre = self.integrand(middle);
+        let mut fine = WEIGHTS[3] * centre;
+        let mut coarse = INNER_WEIGHTS[1] * centre;
+        for (i, node) in NODES.iter().enumerate() {
+            let both = self.integrand(middle - half * node) + self.integrand(middle + half * node);
+            fine += WEIGHTS[i] * both;
+            if i == 1 {
+                coarse += INNER_WEIGHTS[0] * both;
+            }
+        }
+        let scale = self.time_scale * half;
+        (fine * scale, smooth && (fine - coarse).abs() <= RULES_AGREE * fine)
+    }
+
+    /// Walks from `from` to `to` and calls `step` for every interval whose time is known well enough; for what
+    /// cannot be integrated the time is NaN.
+    #[inline]
+    pub fn walk(&self, from: &State<M>, to: &State<M>, step: &mut impl FnMut(&State<M>, &State<M>, f64)) {
+        self.walk_halving(from, to, &mut { MOST_HALVINGS }, step);
+    }
+
+    fn walk_halving(
+        &self,
+        from: &State<M>,
+        to: &State<M>,
+        halvings: &mut u32,
+        step: &mut impl FnMut(&State<M>, &State<M>, f64),
+    ) {
+        match self.integrate(from.y, to.y, halvings) {
+            Ok(time) => step(from, to, time),
+            Err(middle) => {
+                let middle = self.state(middle);
+                self.walk_halving(from, &middle, halvings, step);
+                self.walk_halving(&middle, to, halvings, step);
+            }
+        }
+    }
+
+    /// Time from the anchor to `y`, in s; NaN where it cannot be integrated.
+    pub fn time_from_anchor(&self, y: f64) -> f64 {
+        if y <= 0.0 {
+            return 0.0;
+        }
+        self.time_between(0.0, y, &mut { MOST_HALVINGS })
+    }
+
+    fn time_between(&self, y0: f64, y1: f64, halvings: &mut u32) -> f64 {
+        match self.integrate(y0, y1, halvings) {
+            Ok(time) => time,
+            Err(middle) => self.time_between(y0, middle, halvings) + self.time_between(middle, y1, halvings),
+        }
+    }
+
+    /// The time between two places, or the place between them at which the interval has to be halved.
+    #[inline]
+    fn integrate(&self, y0: f64, y1: f64, halvings: &mut u32) -> Result<f64, f64> {
+        let (time, trusted) = self.rule(y0, y1);
+        let middle = 0.5 * (y0 + y1);
+        if trusted || middle <= y0 || middle >= y1 {
+            return Ok(time);
+        }
+        if *halvings == 0 || !time.is_finite() {
+            return Ok(f64::NAN);
+        }
+        *halvings -= 1;
+        Err(middle)
+    }
+
+    /// Time of an interval so short that the 3-point rule is enough, in s.
+    #[inline]
+    fn short_time(&self, y0: f64, y1: f64) -> f64 {
+        let (middle, half) = (0.5 * (y0 + y1), 0.5 * (y1 - y0));
+        let both = self.integrand(middle - half * NODES[1]) + self.integrand(middle + half * NODES[1]);
+        let sum = INNER_WEIGHTS[1] * self.integrand(middle) + INNER_WEIGHTS[0] * both;
+        self.time_scale * half * sum
+    }
+
+    /// Axis accelerations near `y` as a difference quotient over a thousandth of the arc, or less where p changes
+    /// fast, in mm/s², and how much of each may be rounding.
+    pub fn acceleration_near(&self, y: f64) -> ([f64; M], [f64; M]) {
+        let d = self.distance(y);
+        let away = self
+            .pole
+            .map_or(f64::INFINITY, |pole| ((d - pole.at) * (d - pole.at) + pole.beside * pole.beside).sqrt());
+        // Around y, so that the mean is that at y to second order; at an end one-sided and very short.
+        let half = f64::min(5e-4, 0.01 * away / self.width).min(y.min(1.0 - y).max(1e-6));
+        let (from, to) = (self.state((y - half).max(0.0)), self.state((y + half).min(1.0)));
+        let per_time = self.direction / self.short_time(from.y, to.y);
+        let rounding = ROUNDINGS * EPS * per_time.abs();
+        (
+            std::array::from_fn(|k| (to.velocity[k] - from.velocity[k]) * per_time),
+            std::array::from_fn(|k| (from.magnitude[k] + to.magnitude[k]) * rounding),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::audit::arcs::Arcs;
+    use crate::audit::curve::{inner, Curve};
+
+    /// One arc on one piece.
+    fn one_arc(kind: u8, axis: u8, value: f64, u: [f64; 2], p: [f64; 2], curve: &Curve<2>) -> Motion<2> {
+        Arcs {
+            piece: &[0],
+            kind: &[kind],
+            axis: &[axis],
+            value: &[value],
+            u0: &[u[0]],
+            u1: &[u[1]],
+            p0: &[p[0]],
+            p1: &[p[1]],
+            duration: &[1.0],
+            runs: &[0, 1],
+        }
+        .motion(0, curve)
+    }
+
+    fn line() -> Curve<2> {
+        Curve::new(&[[0.0, 0.0], [4.0, 3.0], [8.0, 6.0]], 10.0)
+    }
+
+    fn total(motion: &Motion<2>) -> f64 {
+        let mut sum = 0.0;
+        motion.walk(&motion.state(0.0), &motion.state(1.0), &mut |_, _, time| sum += time);
+        sum
+    }
+
+    #[test]
+    fn the_rule_integrates_degree_eleven_exactly() {
+        for degree in 0..=11 {
+            let mut sum = WEIGHTS[3] * if degree == 0 { 1.0 } else { 0.0 };
+            for i in 0..3 {
+                sum += WEIGHTS[i] * (NODES[i].powi(degree) + (-NODES[i]).powi(degree));
+            }
+            let exact = if degree % 2 == 0 { 2.0 / f64::from(degree + 1) } else { 0.0 };
+            assert!((sum - exact).abs() < 1e-15, "degree {degree}: {sum} instead of {exact}");
+        }
+    }
+
+    #[test]
+    fn from_rest_along_a_line_takes_the_schoolbook_time() {
+        // X at 8 mm/s² over 8 mm: t = √(2 · 8 / 8).
+        let motion = one_arc(0, 0, 8.0, [0.0, 10.0], [0.0, 200.0], &line());
+        assert!((total(&motion) - 2.0_f64.sqrt()).abs() < 1e-14);
+        assert!((motion.state(1.0).velocity[0] - 128.0_f64.sqrt()).abs() < 1e-13);
+        let braking = one_arc(0, 0, -8.0, [0.0, 10.0], [200.0, 0.0], &line());
+        assert!(braking.anchored_at_end);
+        assert!((total(&braking) - 2.0_f64.sqrt()).abs() < 1e-14);
+    }
+
+    #[test]
+    fn an_axis_at_constant_acceleration_takes_its_change_of_velocity_over_it() {
+        // A bend from 45 degrees to nearly straight up: q'_x falls by a factor of 100.
+        let curve = Curve::new(&[[0.0, 0.0], [1.0, 1.0], [1.01, 2.0]], 2.0);
+        let (g0, g1) = (curve.derivative(0.0)[0], curve.derivative(2.0)[0]);
+        let (p0, value) = (9.0, 3.0);
+        let p1 = (g0 * g0 * p0 + 2.0 * value * 1.01) / (g1 * g1);
+        let motion = one_arc(0, 0, value, [0.0, 2.0], [p0, p1], &curve);
+        let exact = (g1 * p1.sqrt() - g0 * p0.sqrt()) / value;
+        assert!((total(&motion) / exact - 1.0).abs() < 1e-10);
+    }
+
+    #[test]
+    fn part_of_an_arc_takes_the_time_of_that_part() {
+        let motion = one_arc(0, 0, 8.0, [0.0, 10.0], [0.0, 200.0], &line());
+        let y = motion.y_at(2.5);
+        assert!((motion.time_from_anchor(y) - 0.5 * 2.0_f64.sqrt()).abs() < 1e-14);
+        assert_eq!(motion.y_at(0.0), 0.0);
+        assert_eq!(motion.y_at(10.0), 1.0);
+    }
+
+    #[test]
+    fn a_slide_at_constant_speed_takes_length_over_speed() {
+        let curve = Curve::new(&[[-1.0, 0.5], [0.0, -0.5], [1.0, 0.5]], 2.0);
+        let d = |u| inner(&curve.derivative(u), &curve.derivative(u));
+        let motion = one_arc(2, 255, 9.0, [0.0, 2.0], [9.0 / d(0.0), 9.0 / d(2.0)], &curve);
+        let arc_length = 2.0_f64.sqrt() + 1.0_f64.asinh();
+        assert!((total(&motion) - arc_length / 3.0).abs() < 1e-11);
+    }
+}

@@ -1,0 +1,258 @@
+//! What one arc of a speed profile claims: p(u) from its definition.
+//!
+//! p = (du/dt)² on an arc follows from what the arc holds constant (`feedplan.profile.ArcKind`). Distances `d` are
+//! counted from the arc's *anchor*. On an arc of constant axis acceleration that is the end where the axis is
+//! slower: from there v_k² = v_k(anchor)² + 2 a (q_k − q_k(anchor)) adds two terms of one sign and loses nothing.
+
+use super::curve::{inner, length};
+use super::EPS;
+
+/// What an arc holds constant.
+#[derive(Clone, Copy, Debug)]
+pub enum Law {
+    /// `start_sq` is the square of the axis velocity at the anchor.
+    AxisAcceleration {
+        axis: usize,
+        value: f64,
+        start_sq: f64,
+    },
+    Flat {
+        root_p: f64,
+    },
+    Feed {
+        speed: f64,
+    },
+    AxisVelocity {
+        axis: usize,
+        speed: f64,
+    },
+    Chord {
+        value: f64,
+    },
+}
+
+impl Law {
+    fn pole<const M: usize>(&self, tangent: &[f64; M], bend: &[f64; M], p_anchor: f64) -> Option<Pole> {
+        match *self {
+            // p − a/q''_k falls off as (q'_k(anchor) / q'_k)².
+            Law::AxisAcceleration { axis, value, .. } if bend[axis] != 0.0 => Some(Pole {
+                at: -tangent[axis] / bend[axis],
+                beside: 0.0,
+                strength: (1.0 - bend[axis] * p_anchor / value).abs(),
+            }),
+            Law::Feed { .. } | Law::Chord { .. } if bend.iter().any(|&c| c != 0.0) => {
+                let square = inner(bend, bend);
+                let at = -inner(tangent, bend) / square;
+                let nearest: [f64; M] = std::array::from_fn(|k| tangent[k] + at * bend[k]);
+                Some(Pole { at, beside: length(&nearest) / square.sqrt(), strength: 1.0 })
+            }
+            _ => None,
+        }
+    }
+}
+
+/// One arc, ready to be evaluated at any distance from its anchor.
+#[derive(Clone, Copy, Debug)]
+pub struct Motion<const M: usize> {
+    /// C' at the anchor, and C''.
+    pub(super) tangent: [f64; M],
+    pub(super) bend: [f64; M],
+    pub(super) law: Law,
+    /// +1 where u grows from the anchor, −1 where it falls.
+    pub(super) direction: f64,
+    /// Length of the arc in u.
+    pub width: f64,
+    /// Recorded √p at the anchor and at the other end.
+    pub root_anchor: f64,
+    pub root_far: f64,
+    /// The distance at y is y (first_order + second_order y), and dt/dy the integrand times `time_scale`.
+    first_order: f64,
+    second_order: f64,
+    pub(super) time_scale: f64,
+    /// Whether the anchor is the end of the arc.
+    pub anchored_at_end: bool,
+    pub(super) pole: Option<Pole>,
+}
+
+/// Where p would grow without bound, or turn sharply: the zero of what it is divided by.
+#[derive(Clone, Copy, Debug)]
+pub struct Pole {
+    /// Signed distance from the anchor, and how far the pole lies beside the real line.
+    pub at: f64,
+    pub beside: f64,
+    /// Share of p that changes in its neighbourhood.
+    pub strength: f64,
+}
+
+/// The motion at one place of an arc.
+#[derive(Clone, Copy, Debug)]
+pub struct State<const M: usize> {
+    /// Integration variable, 0 at the anchor and 1 at the other end.
+    pub y: f64,
+    /// C'.
+    pub tangent: [f64; M],
+    /// √p in mm/s (of parameter).
+    pub root_p: f64,
+    /// Axis velocities in mm/s.
+    pub velocity: [f64; M],
+    /// What the rounding of each axis velocity is relative to, in mm/s.
+    pub magnitude: [f64; M],
+}
+
+impl<const M: usize> Motion<M> {
+    /// `tangent` is C' at the anchor, `p` are the recorded values at the anchor and at the other end.
+    pub fn new(
+        law: Law,
+        tangent: [f64; M],
+        bend: [f64; M],
+        width: f64,
+        p: [f64; 2],
+        anchored_at_end: bool,
+    ) -> Self {
+        let direction = if anchored_at_end { -1.0 } else { 1.0 };
+        let [root_anchor, root_far] = p.map(f64::sqrt);
+        let share = width / (root_anchor + root_far);
+        Self {
+            tangent,
+            bend,
+            law,
+            pole: law.pole(&tangent, &bend, p[0]),
+            direction,
+            width,
+            root_anchor,
+            root_far,
+            first_order: direction * share * 2.0 * root_anchor,
+            second_order: direction * share * (root_far - root_anchor),
+            time_scale: 2.0 * share,
+            anchored_at_end,
+        }
+    }
+
+    /// Distance from the anchor, with its sign, at `y`.
+    #[inline(always)]
+    pub(super) fn distance(&self, y: f64) -> f64 {
+        y * (self.first_order + self.second_order * y)
+    }
+
+    /// The `y` of a distance `from_anchor` ≥ 0.
+    pub fn y_at(&self, from_anchor: f64) -> f64 {
+        if from_anchor <= 0.0 {
+            return 0.0;
+        }
+        let change = self.root_far - self.root_anchor;
+        let c = (self.root_anchor + self.root_far) * (from_anchor / self.width).min(1.0);
+        (c / (self.root_anchor + (self.root_anchor * self.root_anchor + change * c).max(0.0).sqrt())).min(1.0)
+    }
+
+    /// √p at the signed distance `d` from the anchor, where C' is `tangent`.
+    #[inline(always)]
+    pub(super) fn root_p(&self, d: f64, tangent: &[f64; M]) -> f64 {
+        match self.law {
+            Law::AxisAcceleration { axis, value, start_sq } => {
+                // 2 (q_k − q_k(anchor)) = d (q'_k(anchor) + q'_k), the trapezoid.
+                let speed_sq = start_sq + value * d * (self.tangent[axis] + tangent[axis]);
+                speed_sq.sqrt() / tangent[axis].abs()
+            }
+            Law::Flat { root_p } => root_p,
+            Law::Feed { speed } => speed / length(tangent),
+            Law::AxisVelocity { axis, speed } => speed / tangent[axis].abs(),
+            Law::Chord { value } => (value * length(tangent)).sqrt(),
+        }
+    }
+
+    /// Distance from the anchor, C' and √p at `y`.
+    #[inline(always)]
+    fn place(&self, y: f64) -> (f64, [f64; M], f64) {
+        let d = self.distance(y);
+        let tangent = std::array::from_fn(|k| self.tangent[k] + d * self.bend[k]);
+        let root_p = if self.keeps_recorded(y) { self.root_anchor } else { self.root_p(d, &tangent) };
+        (d, tangent, root_p)
+    }
+
+    /// At the anchor of an accelerating arc the recorded p stands for itself, also where C'_k is 0.
+    #[inline(always)]
+    fn keeps_recorded(&self, y: f64) -> bool {
+        y == 0.0 && matches!(self.law, Law::AxisAcceleration { .. })
+    }
+
+    /// Axis velocities at `y` in mm/s.
+    #[inline]
+    pub fn velocity(&self, y: f64) -> [f64; M] {
+        let (_, tangent, root_p) = self.place(y);
+        tangent.map(|g| g * root_p)
+    }
+
+    /// The motion at `y`.
+    #[inline]
+    pub fn state(&self, y: f64) -> State<M> {
+        let (d, tangent, root_p) = self.place(y);
+        let terms: [f64; M] = std::array::from_fn(|k| self.tangent[k].abs() + (d * self.bend[k]).abs());
+        let velocity = tangent.map(|g| g * root_p);
+        // How much the rounding of C' is enlarged in p.
+        let enlarged = match self.law {
+            Law::AxisAcceleration { axis, .. } | Law::AxisVelocity { axis, .. }
+                if !self.keeps_recorded(y) =>
+            {
+                terms[axis] / tangent[axis].abs()
+            }
+            Law::Feed { .. } | Law::Chord { .. } => length(&terms) / length(&tangent),
+            _ => 1.0,
+        };
+        let magnitude = std::array::from_fn(|k| {
+            terms[k] * root_p + if velocity[k] == 0.0 { 0.0 } else { velocity[k].abs() * enlarged }
+        });
+        State { y, tangent, root_p, velocity, magnitude }
+    }
+
+    /// Whether the arc's own axis is the one that its definition holds at constant acceleration.
+    pub fn held_axis(&self) -> Option<usize> {
+        match self.law {
+            Law::AxisAcceleration { axis, .. } => Some(axis),
+            _ => None,
+        }
+    }
+
+    /// Whether the accelerations can have a maximum inside the arc: on slides along a velocity limit.
+    pub fn is_slide(&self) -> bool {
+        !matches!(self.law, Law::AxisAcceleration { .. } | Law::Flat { .. })
+    }
+
+    /// Curvature of the path in 1/mm where C' is `tangent`; 0 where the path has no direction.
+    #[inline]
+    pub fn curvature(&self, tangent: &[f64; M]) -> f64 {
+        curvature(tangent, &self.bend)
+    }
+
+    /// What one rounding of the parameter does to the recorded p: the relative error of the arc's width.
+    pub fn width_rounding(&self, piece_width: f64) -> f64 {
+        EPS * piece_width / self.width
+    }
+}
+
+/// Curvature in 1/mm from C' and C'': the part of C'' across the path over |C'|².
+#[inline]
+pub fn curvature<const M: usize>(tangent: &[f64; M], bend: &[f64; M]) -> f64 {
+    let square = inner(tangent, tangent);
+    if square == 0.0 {
+        return 0.0;
+    }
+    let along = inner(tangent, bend) / square;
+    let across: [f64; M] = std::array::from_fn(|k| bend[k] - along * tangent[k]);
+    length(&across) / square
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::audit::curve::Curve;
+
+    #[test]
+    fn a_parabola_is_most_curved_at_its_tip() {
+        // y = x²/2 has curvature 1 at x = 0 and 1/√8 at x = 1.
+        let curve = Curve::new(&[[-1.0, 0.5], [0.0, -0.5], [1.0, 0.5]], 2.0);
+        let bend = curve.second_derivative();
+        assert!((curvature(&curve.derivative(1.0), &bend) - 1.0).abs() < 1e-15);
+        assert!((curvature(&curve.derivative(2.0), &bend) - 8.0_f64.sqrt().recip()).abs() < 1e-15);
+        assert_eq!(curvature(&[0.0, 0.0], &bend), 0.0);
+    }
+}

@@ -1,0 +1,196 @@
+//! Where a speed profile is at which time, on the clock of the setpoints, and what it does there.
+//!
+//! The clock starts every run anew: setpoints may wait at a stop for their next period.
+
+use super::arcs::Arcs;
+use super::curve::{length, Followed};
+use super::motion::Motion;
+use super::place::Place;
+use super::{Limits, EPS, ROUNDINGS};
+
+/// A switch of the acceleration this share of a period away counts as at the setpoint.
+const SWITCH_SHARE: f64 = 1e-4;
+
+/// Switches on each side that are looked at; right profiles have a few at most in so short a time.
+const MOST_SWITCHES: usize = 64;
+
+/// A profile of good numbers on the clock of the setpoints.
+#[derive(Clone, Copy)]
+pub struct Timed<'a> {
+    pub arcs: Arcs<'a>,
+    /// When every arc begins and the last one ends, pauses included; see `Arcs::starts`.
+    pub starts: &'a [f64],
+    /// When every run begins, as far as the setpoints have shown: a stream may wait at a stop for its next period.
+    pub clock: &'a [f64],
+}
+
+/// Reads a profile along the setpoints; keeps the arc it is on, since the next place is mostly on it too.
+pub struct Reader<'a, const M: usize> {
+    timed: Timed<'a>,
+    path: Followed<'a>,
+    pub arc: usize,
+    pub run: usize,
+    pub motion: Motion<M>,
+}
+
+/// A place on the reader's arc: its local parameter, and the same as the arc's integration variable.
+#[derive(Clone, Copy)]
+pub struct Passage {
+    u: f64,
+    pub y: f64,
+}
+
+impl Timed<'_> {
+    pub fn arcs_of(&self, run: usize) -> std::ops::Range<usize> {
+        self.arcs.runs[run] as usize..self.arcs.runs[run + 1] as usize
+    }
+
+    /// Time in motion of a run, in s.
+    pub fn motion_time(&self, run: usize) -> f64 {
+        self.arcs_of(run).last().map_or(0.0, |last| {
+            self.starts[last] + self.arcs.duration[last] - self.starts[self.arcs_of(run).start]
+        })
+    }
+
+    /// What has to be added to the profile's times in a run; without a clock for it, the run is never reached.
+    pub fn shift(&self, run: usize) -> f64 {
+        self.clock.get(run).map_or(f64::INFINITY, |clock| clock - self.starts[self.arcs_of(run).start])
+    }
+
+    /// The start of the arc that `time` falls into.
+    pub fn place_before(&self, path: &Followed, time: f64) -> Place {
+        let run = self.clock.partition_point(|&clock| clock <= time).saturating_sub(1);
+        let arcs = self.arcs_of(run);
+        if arcs.is_empty() {
+            return Place { piece: (path.runs[run] as usize).min(path.len() - 1), u: 0.0 };
+        }
+        let time = time - self.shift(run);
+        let passed = self.starts[arcs.clone()].partition_point(|&start| start <= time);
+        let arc = arcs.start + passed.saturating_sub(1);
+        Place { piece: self.arcs.piece[arc] as usize, u: self.arcs.u0[arc] }
+    }
+}
+
+impl<'a, const M: usize> Reader<'a, M> {
+    /// On the first arc; there must be one, and a run of the path for it.
+    pub fn new(timed: &Timed<'a>, path: &Followed<'a>) -> Self {
+        let motion = timed.arcs.motion(0, &path.curve(timed.arcs.piece[0] as usize));
+        let mut reader = Self { timed: *timed, path: *path, arc: 0, run: 0, motion };
+        reader.enter(0);
+        reader
+    }
+
+    fn enter(&mut self, arc: usize) {
+        let arcs = &self.timed.arcs;
+        self.arc = arc;
+        self.run = arcs.runs.partition_point(|&first| first <= arc as i64) - 1;
+        self.motion = arcs.motion(arc, &self.path.curve(arcs.piece[arc] as usize));
+    }
+
+    /// Goes to the arc that holds a place, the earlier one of two that meet there. A place on a motionless piece
+    /// is the start of what comes next.
+    pub fn go_to(&mut self, place: Place) -> Passage {
+        if !self.holds(self.arc, place) {
+            let next = (self.arc + 1).min(self.timed.arcs.len() - 1);
+            let arc = if self.holds(next, place) { next } else { self.find(place) };
+            self.enter(arc);
+        }
+        let (arcs, arc) = (&self.timed.arcs, self.arc);
+        let u = if arcs.piece[arc] as usize == place.piece { place.u } else { arcs.u0[arc] };
+        let from_anchor = if self.motion.anchored_at_end { arcs.u1[arc] - u } else { u - arcs.u0[arc] };
+        Passage { u, y: self.motion.y_at(from_anchor) }
+    }
+
+    fn holds(&self, arc: usize, place: Place) -> bool {
+        let arcs = &self.timed.arcs;
+        arcs.piece[arc] as usize == place.piece && arcs.u0[arc] < place.u && place.u <= arcs.u1[arc]
+    }
+
+    fn find(&self, place: Place) -> usize {
+        let arcs = &self.timed.arcs;
+        let first = arcs.piece.partition_point(|&piece| (piece as usize) < place.piece).min(arcs.len() - 1);
+        let count = arcs.piece[first..].partition_point(|&piece| piece as usize == place.piece);
+        let passed = arcs.u1[first..first + count].partition_point(|&end| end < place.u);
+        first + passed.min(count.saturating_sub(1))
+    }
+
+    /// When the profile arrives at a place of the reader's arc and when it leaves, in s: at stops it pauses, and the
+    /// setpoints may wait for their next period.
+    fn times(&self, here: Passage, period: f64) -> [f64; 2] {
+        let (timed, arc, run) = (&self.timed, self.arc, self.run);
+        let arcs = &timed.arcs;
+        let start = timed.starts[arc] + timed.shift(run);
+        let end = start + arcs.duration[arc];
+        let from_anchor = self.motion.time_from_anchor(here.y);
+        let time = if self.motion.anchored_at_end { end - from_anchor } else { start + from_anchor };
+        let (mut from, mut until) = (time, time);
+        if here.u <= arcs.u0[arc] && arc == timed.arcs_of(run).start {
+            from = match run {
+                0 => 0.0,
+                _ => timed.clock.get(run - 1).map_or(time, |clock| clock + timed.motion_time(run - 1)),
+            };
+        }
+        if here.u >= arcs.u1[arc] && arc + 1 == timed.arcs_of(run).end {
+            until = timed.clock.get(run + 1).copied().unwrap_or(end + self.path.dwell[run] + period);
+        }
+        [from, until]
+    }
+
+    /// At most how far the profile gets between `time` and being at `place`, in mm, less what may be rounding.
+    pub fn late(&mut self, place: Place, time: f64, limits: &Limits<M>) -> f64 {
+        let here = self.go_to(place);
+        let [from, until] = self.times(here, limits.period);
+        let wait = (from - time).max(time - until).max(0.0);
+        // Summing the durations of all arcs before has rounded once for each.
+        let rounding = EPS * time.abs() * (self.arc as f64 + ROUNDINGS);
+        if wait <= rounding {
+            return 0.0;
+        }
+        let speed = length(&self.motion.velocity(here.y));
+        let reach = |wait: f64| wait * (speed + 0.5 * wait * length(&limits.acceleration));
+        reach(wait) - reach(rounding)
+    }
+
+    /// Least and greatest acceleration of each axis just before and just after `time`, at a place of the reader's arc.
+    pub fn accelerations(&self, here: Passage, time: f64, period: f64) -> [[f64; 2]; M] {
+        let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; M];
+        let mut include = |(value, rounding): ([f64; M], [f64; M])| {
+            for k in 0..M {
+                range[k] = [range[k][0].min(value[k] - rounding[k]), range[k][1].max(value[k] + rounding[k])];
+            }
+        };
+        include(self.motion.acceleration_near(here.y));
+        let switch = SWITCH_SHARE * period;
+        let (arcs, starts) = (&self.timed.arcs, self.timed.starts);
+        let mut neighbour = |arc: usize, at_end: bool| {
+            let motion = arcs.motion::<M>(arc, &self.path.curve(arcs.piece[arc] as usize));
+            let y = if at_end != motion.anchored_at_end { 1.0 } else { 0.0 };
+            include(motion.acceleration_near(y));
+        };
+        let time = time - self.timed.shift(self.run);
+        let run = self.timed.arcs_of(self.run);
+        let mut first = self.arc;
+        while first > run.start.max(self.arc.saturating_sub(MOST_SWITCHES)) && time - starts[first] < switch {
+            first -= 1;
+            neighbour(first, true);
+        }
+        let mut last = self.arc;
+        while last + 1 < run.end.min(self.arc + MOST_SWITCHES) && starts[last + 1] - time < switch {
+            last += 1;
+            neighbour(last, false);
+        }
+        // At a stop the tool may stand, or already start the next run.
+        let at_start = time - starts[run.start] < switch;
+        let at_end = starts[run.end - 1] + arcs.duration[run.end - 1] - time < switch;
+        if at_start && run.start > 0 {
+            neighbour(run.start - 1, true);
+        }
+        if at_end && run.end < arcs.len() {
+            neighbour(run.end, false);
+        }
+        if at_start || at_end {
+            include(([0.0; M], [0.0; M]));
+        }
+        range
+    }
+}

@@ -1,0 +1,272 @@
+//! One Bézier piece: value and derivatives to the third, splitting, degree elevation and reversal.
+//!
+//! All by corner cutting. The control points are first taken from the nearer end of the piece, so that a small
+//! piece far from the origin loses no digits of its derivatives, and both ends are met exactly.
+
+use super::rational::{cut_corners, quotient};
+use super::{CompositeCurve, Piece, MAX_DEGREE};
+use crate::quadratic::sub;
+
+/// C, C', C'' and C''' at u, by u.
+#[inline]
+pub fn derivatives<const M: usize>(piece: &Piece<M>, u: f64) -> [[f64; M]; 4] {
+    // The degrees of most paths as constants: their triangles unroll.
+    match piece.control.len() {
+        2 => with_count::<M, 2>(piece, u),
+        3 => with_count::<M, 3>(piece, u),
+        4 => with_count::<M, 4>(piece, u),
+        6 => with_count::<M, 6>(piece, u),
+        _ => with_count::<M, { MAX_DEGREE + 1 }>(piece, u),
+    }
+}
+
+/// The same for at most N control points.
+#[inline(always)]
+fn with_count<const M: usize, const N: usize>(piece: &Piece<M>, u: f64) -> [[f64; M]; 4] {
+    let count = if N > MAX_DEGREE { piece.control.len() } else { N };
+    let (t, scale) = (u / piece.width, 1.0 / piece.width);
+    let control = &piece.control[..count];
+    let anchor = if t <= 0.5 { control[0] } else { control[count - 1] };
+    let mut local = [[0.0; M]; N];
+    for i in 0..count {
+        local[i] = sub(&control[i], &anchor);
+    }
+    let mut c = if piece.is_rational() {
+        let mut weights = [[0.0]; N];
+        for i in 0..count {
+            weights[i] = [piece.weights[i]];
+            local[i] = local[i].map(|value| value * piece.weights[i]);
+        }
+        quotient(&triangle(&mut local, count, t), &triangle(&mut weights, count, t))
+    } else {
+        triangle(&mut local, count, t)
+    };
+    let mut power = 1.0;
+    for order in 1..4 {
+        power *= scale;
+        for k in 0..M {
+            c[order][k] *= power;
+        }
+    }
+    for k in 0..M {
+        c[0][k] += anchor[k];
+    }
+    c
+}
+
+/// De Casteljau's triangle: its last four rows hold the value and the derivatives by t.
+#[inline(always)]
+fn triangle<const M: usize, const N: usize>(b: &mut [[f64; M]; N], count: usize, t: f64) -> [[f64; M]; 4] {
+    // Weights far apart keep their digits in this form of the mean, which takes no differences.
+    let (d, s) = ((count - 1) as f64, 1.0 - t);
+    let mut out = [[0.0; M]; 4];
+    for left in (0..count).rev() {
+        for k in 0..M {
+            match left {
+                3 => {
+                    let (first, middle, last) =
+                        (b[1][k] - b[0][k], b[2][k] - b[1][k], b[3.min(N - 1)][k] - b[2][k]);
+                    out[3][k] = d * (d - 1.0) * (d - 2.0) * ((last - middle) - (middle - first));
+                }
+                2 => out[2][k] = d * (d - 1.0) * ((b[2.min(N - 1)][k] - b[1][k]) - (b[1][k] - b[0][k])),
+                1 => out[1][k] = d * (b[1][k] - b[0][k]),
+                0 => out[0][k] = b[0][k],
+                _ => {}
+            }
+        }
+        for i in 0..left {
+            for k in 0..M {
+                b[i][k] = s * b[i][k] + t * b[i + 1][k];
+            }
+        }
+    }
+    out
+}
+
+/// C(u).
+#[inline]
+pub fn point<const M: usize>(piece: &Piece<M>, u: f64) -> [f64; M] {
+    derivatives(piece, u)[0]
+}
+
+/// Control points and weights, worked on in place.
+struct Polygon<const M: usize> {
+    points: [[f64; M]; MAX_DEGREE + 1],
+    weights: [f64; MAX_DEGREE + 1],
+    count: usize,
+    rational: bool,
+}
+
+impl<const M: usize> Polygon<M> {
+    fn new(piece: &Piece<M>) -> Self {
+        let mut polygon = Self {
+            points: [[0.0; M]; MAX_DEGREE + 1],
+            weights: [1.0; MAX_DEGREE + 1],
+            count: piece.control.len(),
+            rational: piece.is_rational(),
+        };
+        polygon.points[..polygon.count].copy_from_slice(piece.control);
+        if polygon.rational {
+            polygon.weights[..polygon.count].copy_from_slice(piece.weights);
+        }
+        polygon
+    }
+
+    fn cut(&mut self, count: usize, alpha: impl Fn(usize) -> f64) {
+        let weights = if self.rational { &mut self.weights[..] } else { &mut [] };
+        cut_corners(&mut self.points, weights, count, alpha);
+    }
+
+    fn append_to(&self, curve: &mut CompositeCurve<M>, width: f64) {
+        let weights = if self.rational { &self.weights[..self.count] } else { &[] };
+        curve.push(&self.points[..self.count], weights, width);
+    }
+}
+
+/// Appends the parts of a piece between 0, the increasing places `cuts` inside it, and its end.
+pub fn split<const M: usize>(piece: &Piece<M>, cuts: &[f64], curve: &mut CompositeCurve<M>) {
+    let mut right = Polygon::new(piece);
+    let last = right.count - 1;
+    let mut start = 0.0;
+    for &cut in cuts {
+        let t = (cut - start) / (piece.width - start);
+        let mut left = Polygon::new(piece);
+        for row in 0..=last {
+            left.points[row] = right.points[0];
+            left.weights[row] = right.weights[0];
+            right.cut(last - row, |_| t);
+        }
+        left.append_to(curve, cut - start);
+        start = cut;
+    }
+    right.append_to(curve, piece.width - start);
+}
+
+/// Appends the piece with its degree raised by `by`; the sum must stay within `MAX_DEGREE`.
+pub fn elevate<const M: usize>(piece: &Piece<M>, by: usize, curve: &mut CompositeCurve<M>) {
+    let mut polygon = Polygon::new(piece);
+    for _ in 0..by {
+        let n = polygon.count;
+        // The new point i is the mean of the old i − 1 and i; the last stays and moves up by one.
+        let (first, weight) = (polygon.points[0], polygon.weights[0]);
+        let (last, last_weight) = (polygon.points[n - 1], polygon.weights[n - 1]);
+        polygon.cut(n - 1, |i| (n - 1 - i) as f64 / n as f64);
+        polygon.points.copy_within(0..n - 1, 1);
+        polygon.weights.copy_within(0..n - 1, 1);
+        (polygon.points[0], polygon.weights[0]) = (first, weight);
+        (polygon.points[n], polygon.weights[n]) = (last, last_weight);
+        polygon.count += 1;
+    }
+    polygon.append_to(curve, piece.width);
+}
+
+/// Appends the piece traversed backwards.
+pub fn reverse<const M: usize>(piece: &Piece<M>, curve: &mut CompositeCurve<M>) {
+    let mut polygon = Polygon::new(piece);
+    polygon.points[..polygon.count].reverse();
+    polygon.weights[..polygon.count].reverse();
+    polygon.append_to(curve, piece.width);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::quadratic::norm;
+    use proptest::prelude::*;
+
+    #[test]
+    fn derivatives_of_a_cubic_by_hand() {
+        // x = t³, y = t² on [0, 2], t = u/2.
+        let piece = Piece {
+            control: &[[0.0, 0.0], [0.0, 0.0], [0.0, 1.0 / 3.0], [1.0, 1.0]],
+            weights: &[],
+            width: 2.0,
+        };
+        let c = derivatives(&piece, 1.0);
+        let expected = [[0.125, 0.25], [0.375, 0.5], [0.75, 0.5], [0.75, 0.0]];
+        for order in 0..4 {
+            assert!(norm(&sub(&c[order], &expected[order])) < 1e-15, "{order}: {:?}", c[order]);
+        }
+    }
+
+    #[test]
+    fn a_quarter_circle_keeps_its_radius_and_its_ends() {
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        let quarter =
+            Piece { control: &[[1.0, 0.0], [1.0, 1.0], [0.0, 1.0]], weights: &[1.0, half, 1.0], width: 1.0 };
+        for i in 0..=20 {
+            let c = derivatives(&quarter, i as f64 / 20.0);
+            let radial = c[0][0] * c[1][0] + c[0][1] * c[1][1];
+            // |C|² = 1 differentiated three times.
+            let second = c[0][0] * c[2][0] + c[0][1] * c[2][1] + c[1][0] * c[1][0] + c[1][1] * c[1][1];
+            let third = c[0][0] * c[3][0] + c[0][1] * c[3][1] + 3.0 * (c[1][0] * c[2][0] + c[1][1] * c[2][1]);
+            assert!((norm(&c[0]) - 1.0).abs() < 4e-16);
+            assert!(radial.abs() < 2e-15 && second.abs() < 1e-14 && third.abs() < 4e-14);
+        }
+        assert_eq!(point(&quarter, 0.0), [1.0, 0.0]);
+        assert_eq!(point(&quarter, 1.0), [0.0, 1.0]);
+    }
+
+    #[test]
+    fn a_small_piece_far_away_keeps_the_digits_of_its_derivatives() {
+        let near = [[0.0], [0.25], [0.125], [0.5]];
+        let far = near.map(|[x]| [x + (1u64 << 40) as f64]);
+        let piece = |control| Piece { control, weights: &[], width: 1.0 };
+        for u in [0.1, 0.37, 0.8] {
+            let (a, b) = (derivatives(&piece(&near), u), derivatives(&piece(&far), u));
+            assert_eq!(a[1..], b[1..]);
+        }
+    }
+
+    fn pieces() -> impl Strategy<Value = (Vec<[f64; 3]>, Vec<f64>)> {
+        (1..=7usize, any::<bool>()).prop_flat_map(|(degree, rational)| {
+            let weights = if rational { degree + 1 } else { 0 };
+            (
+                prop::collection::vec(prop::array::uniform3(-10.0..10.0f64), degree + 1),
+                prop::collection::vec(0.1..10.0f64, weights),
+            )
+        })
+    }
+
+    fn close(a: &[[f64; 3]; 4], b: &[[f64; 3]; 4]) -> bool {
+        (0..4).all(|order| {
+            norm(&sub(&a[order], &b[order])) <= 1e-11 * (1.0 + norm(&b[order])) * 100f64.powi(order as i32)
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn parts_lie_on_the_whole((control, weights) in pieces(), cut in 0.1..0.8f64, at in 0.0..1.0f64) {
+            let whole = Piece { control: &control, weights: &weights, width: 2.0 };
+            let mut parts = CompositeCurve::default();
+            split(&whole, &[cut, 1.0 + 0.5 * cut], &mut parts);
+            prop_assert_eq!(parts.len(), 3);
+            let starts = [0.0, cut, 1.0 + 0.5 * cut];
+            for (i, part) in parts.pieces().enumerate() {
+                let u = at * part.width;
+                prop_assert!(close(&derivatives(&part, u), &derivatives(&whole, (starts[i] + u).min(2.0))));
+            }
+        }
+
+        #[test]
+        fn elevation_changes_no_value((control, weights) in pieces(), by in 0..3usize, u in 0.0..1.0f64) {
+            let piece = Piece { control: &control, weights: &weights, width: 1.0 };
+            let mut raised = CompositeCurve::default();
+            elevate(&piece, by, &mut raised);
+            prop_assert_eq!(raised.piece(0).degree(), piece.degree() + by);
+            prop_assert!(close(&derivatives(&raised.piece(0), u), &derivatives(&piece, u)));
+        }
+
+        #[test]
+        fn backwards_the_odd_derivatives_change_sign((control, weights) in pieces(), u in 0.0..1.0f64) {
+            let piece = Piece { control: &control, weights: &weights, width: 1.0 };
+            let mut reversed = CompositeCurve::default();
+            reverse(&piece, &mut reversed);
+            let mut back = derivatives(&reversed.piece(0), 1.0 - u);
+            for order in [1, 3] {
+                back[order] = back[order].map(|value| -value);
+            }
+            prop_assert!(close(&back, &derivatives(&piece, u)));
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! What can be wrong with a spline that a user gives, each in one sentence with its remedy.
+
+use std::fmt;
+
+use super::MAX_DEGREE;
+
+/// Coordinates beyond this overflow when a hodograph is squared; it is far beyond any machine, in mm.
+pub const MAX_COORDINATE: f64 = 1e60;
+/// Weights beyond this, or below its inverse, overflow in the fourth power.
+pub const MAX_WEIGHT: f64 = 1e30;
+/// Knots closer than this part of the greatest one have lost the digits that tell them apart.
+pub const MIN_SPAN: f64 = 1e-13;
+
+/// Why a spline cannot be used.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SplineError {
+    Degree { degree: usize },
+    TooFewPoints { points: usize, degree: usize },
+    KnotCount { knots: usize, points: usize, degree: usize },
+    PeriodCount { knots: usize, points: usize },
+    WeightCount { weights: usize, points: usize },
+    Coordinate { point: usize, axis: usize, value: f64 },
+    KnotNotFinite { knot: usize, value: f64 },
+    Decreasing { knot: usize, before: f64, value: f64 },
+    Multiplicity { knot: usize, value: f64, count: usize, degree: usize },
+    KnotsTooClose { knot: usize, gap: f64, least: f64 },
+    EmptyDomain { first: usize, last: usize, value: f64 },
+    Broken { knot: usize, value: f64, gap: f64, degree: usize },
+    Weight { index: usize, value: f64 },
+    Outside { value: f64, start: f64, end: f64 },
+    Insertion { value: f64, count: usize, degree: usize },
+    Helix { tolerance: f64, pieces: f64 },
+}
+
+impl std::error::Error for SplineError {}
+
+impl fmt::Display for SplineError {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match *self {
+            Self::Degree { degree } => {
+                write!(f, "the degree is {degree}: degrees 1 to {MAX_DEGREE} are supported; convert the curve")
+            }
+            Self::TooFewPoints { points, degree } => write!(
+                f,
+                "{points} control points for degree {degree}: at least {} are needed; add points or lower the degree",
+                degree + 1
+            ),
+            Self::KnotCount { knots, points, degree } => {
+                let needed = points + degree + 1;
+                write!(
+                    f,
+                    "{knots} knots for {points} control points of degree {degree}: {needed} are needed{}",
+                    if knots + 2 == needed {
+                        "; repeat the first and the last one, which this notation leaves out"
+                    } else {
+                        " (points + degree + 1); correct the lists"
+                    }
+                )
+            }
+            Self::PeriodCount { knots, points } => write!(
+                f,
+                "{knots} knots for {points} control points of a periodic curve: {} (points + 1), one period with \
+                 both ends, are needed; correct the lists",
+                points + 1
+            ),
+            Self::WeightCount { weights, points } => {
+                write!(f, "{weights} weights for {points} control points: give one weight for each")
+            }
+            Self::Coordinate { point, axis, value } => write!(
+                f,
+                "control point {point}, axis {axis}, is {value}: coordinates must be finite and below \
+                 {MAX_COORDINATE:e} mm; correct it"
+            ),
+            Self::KnotNotFinite { knot, value } => {
+                write!(f, "knot {knot} is {value}: knots must be finite numbers; correct it")
+            }
+            Self::Decreasing { knot, before, value } => {
+                write!(f, "knot {knot} is {value} after {before}: knots must not decrease; correct their order")
+            }
+            Self::Multiplicity { knot, value, count, degree } => write!(
+                f,
+                "the knot {value} stands {count} times from knot {knot} on: at most {} (degree + 1) are possible; \
+                 remove the others and their control points",
+                degree + 1
+            ),
+            Self::KnotsTooClose { knot, gap, least } => write!(
+                f,
+                "knots {} and {knot} are {gap:e} apart, where rounding begins at {least:e}: make them equal or \
+                 move them apart",
+                knot - 1
+            ),
+            Self::EmptyDomain { first, last, value } => write!(
+                f,
+                "knots {first} and {last}, where the curve starts and ends, are both {value}: the knots between \
+                 them must grow"
+            ),
+            Self::Broken { knot, value, gap, degree } => write!(
+                f,
+                "the curve has a gap of {gap} mm at the knot {value} (knot {knot}), which stands {} times: at \
+                 most {degree} times keep it together; give it as two curves",
+                degree + 1
+            ),
+            Self::Weight { index, value } => write!(
+                f,
+                "weight {index} is {value}: weights must be positive, from {:e} to {MAX_WEIGHT:e}; correct it or \
+                 scale all by one factor",
+                1.0 / MAX_WEIGHT
+            ),
+            Self::Outside { value, start, end } => {
+                write!(f, "the knot {value} is not inside ({start}, {end}), where the curve is: choose one that is")
+            }
+            Self::Insertion { value, count, degree } => write!(
+                f,
+                "the knot {value} would stand {count} times: at most {degree} (the degree) keep the curve \
+                 together; insert it fewer times"
+            ),
+            Self::Helix { tolerance, pieces } => write!(
+                f,
+                "a helix within {tolerance} mm would take {pieces:.0} pieces: allow a greater tolerance"
+            ),
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! What is special to weights: weighted means of points, the numerator of the hodograph, and the quotient rule.
+//!
+//! C = M/ω with M = Σ wᵢ Pᵢ Bᵢ, ω = Σ wᵢ Bᵢ. Weights are positive, so that every mean is one of points with
+//! positive parts, and differences of points are taken before anything is multiplied: the result depends on the
+//! size of the piece, not on where it lies.
+
+use std::array::from_fn;
+
+use super::{binomial, Piece, MAX_HODOGRAPH};
+use crate::quadratic::{lerp, sub};
+
+/// The point at `alpha` between two points, exactly `b` at 1.
+#[inline(always)]
+fn mean<const M: usize>(a: &[f64; M], b: &[f64; M], alpha: f64) -> [f64; M] {
+    if alpha == 1.0 {
+        *b
+    } else {
+        lerp(a, b, alpha)
+    }
+}
+
+/// Replaces the first `count` points by their means with the next one at `alpha(i)`; empty weights are ones.
+/// This is one step of every corner-cutting algorithm: de Casteljau's, de Boor's, elevation.
+#[inline(always)]
+pub fn cut_corners<const M: usize>(
+    points: &mut [[f64; M]],
+    weights: &mut [f64],
+    count: usize,
+    alpha: impl Fn(usize) -> f64,
+) {
+    if weights.is_empty() {
+        for i in 0..count {
+            points[i] = mean(&points[i], &points[i + 1], alpha(i));
+        }
+    } else {
+        for i in 0..count {
+            let alpha = alpha(i);
+            let (left, right) = ((1.0 - alpha) * weights[i], alpha * weights[i + 1]);
+            weights[i] = left + right;
+            points[i] = mean(&points[i], &points[i + 1], right / weights[i]);
+        }
+    }
+}
+
+/// Bernstein coefficients of a direction field along C': C' itself for a polynomial piece, C'ω² for a rational
+/// one; by t = u / width.
+#[derive(Clone, Copy, Debug)]
+pub struct Hodograph<const M: usize> {
+    coefficients: [[f64; M]; MAX_HODOGRAPH],
+    count: usize,
+}
+
+impl<const M: usize> Hodograph<M> {
+    /// The numerator is M'ω − Mω' of degree 2d − 2, as the sum over pairs of points
+    /// Σ (j−i) (d over i)(d over j) wᵢ wⱼ (Pⱼ − Pᵢ), i + j = k + 1 (Sederberg & Wang 1987).
+    pub fn new(piece: &Piece<M>) -> Self {
+        let (d, control, w) = (piece.degree(), piece.control, piece.weights);
+        let mut coefficients = [[0.0; M]; MAX_HODOGRAPH];
+        if !piece.is_rational() {
+            for i in 0..d {
+                coefficients[i] = sub(&control[i + 1], &control[i]).map(|value| d as f64 * value);
+            }
+            return Self { coefficients, count: d };
+        }
+        for k in 0..2 * d - 1 {
+            for i in (k + 1).saturating_sub(d)..=k / 2 {
+                let j = k + 1 - i;
+                let factor = (j - i) as f64 * binomial(d, i) * binomial(d, j) * w[i] * w[j];
+                let difference = sub(&control[j], &control[i]);
+                for axis in 0..M {
+                    coefficients[k][axis] += factor * difference[axis] / binomial(2 * d - 2, k);
+                }
+            }
+        }
+        Self { coefficients, count: 2 * d - 1 }
+    }
+
+    #[inline(always)]
+    pub fn coefficients(&self) -> &[[f64; M]] {
+        &self.coefficients[..self.count]
+    }
+}
+
+/// The derivatives of M/ω from those of M and ω.
+#[inline(always)]
+pub fn quotient<const M: usize>(m: &[[f64; M]; 4], w: &[[f64; 1]; 4]) -> [[f64; M]; 4] {
+    let inverse = 1.0 / w[0][0];
+    let [w1, w2, w3] = [w[1][0] * inverse, w[2][0] * inverse, w[3][0] * inverse];
+    let c0: [f64; M] = from_fn(|k| m[0][k] * inverse);
+    let c1: [f64; M] = from_fn(|k| m[1][k] * inverse - w1 * c0[k]);
+    let c2: [f64; M] = from_fn(|k| m[2][k] * inverse - 2.0 * w1 * c1[k] - w2 * c0[k]);
+    let c3: [f64; M] = from_fn(|k| m[3][k] * inverse - 3.0 * (w1 * c2[k] + w2 * c1[k]) - w3 * c0[k]);
+    [c0, c1, c2, c3]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spline::bezier::derivatives;
+    use proptest::prelude::*;
+
+    #[test]
+    fn the_numerator_of_a_weighted_line_is_one_vector() {
+        // C' = w₀ w₁ (P₁ − P₀) / ω².
+        let piece = Piece { control: &[[1.0, 0.0], [4.0, 1.0]], weights: &[2.0, 5.0], width: 1.0 };
+        assert_eq!(Hodograph::new(&piece).coefficients(), [[30.0, 10.0]]);
+    }
+
+    proptest! {
+        #[test]
+        fn the_numerator_over_the_denominator_is_the_derivative(
+            control in prop::collection::vec(prop::array::uniform2(-5.0..5.0f64), 10),
+            weights in prop::collection::vec(0.1..10.0f64, 10),
+            degree in 1..=9usize,
+            t in 0.0..1.0f64,
+        ) {
+            let piece = Piece { control: &control[..=degree], weights: &weights[..=degree], width: 1.0 };
+            let hodograph = Hodograph::new(&piece);
+            let n = hodograph.coefficients().len() - 1;
+            let bernstein = |n: usize, i: usize| {
+                binomial(n, i) * t.powi(i as i32) * (1.0 - t).powi((n - i) as i32)
+            };
+            let w: f64 = (0..=degree).map(|i| bernstein(degree, i) * weights[i]).sum();
+            let derivative = derivatives(&piece, t)[1];
+            for axis in 0..2 {
+                let numerator: f64 = (0..=n).map(|i| bernstein(n, i) * hodograph.coefficients()[i][axis]).sum();
+                prop_assert!((numerator / (w * w) - derivative[axis]).abs() < 1e-10);
+            }
+        }
+    }
+}

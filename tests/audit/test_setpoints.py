@@ -1,0 +1,386 @@
+"""The audit of setpoints: their differences, their places on the path, and setpoints from anywhere."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from feedplan.audit import Audit, audit, audit_setpoints
+from feedplan.constraints.problem import build_problem
+from feedplan.errors import InputError
+from feedplan.geometry.path import Path
+from feedplan.machine.machine import Axis, Machine
+from feedplan.planners import planner
+from feedplan.setpoints import setpoints
+
+Change = Callable[..., NDArray[Any]]
+
+
+def broken(result: Audit) -> set[tuple[str, str | None]]:
+    return {(check.name, check.axis) for check in result.broken}
+
+
+def moving(part: Any, row: int) -> int:
+    """The first row from `row` on where the tool is fast and turns little."""
+    speed = np.linalg.norm(part.points.velocity, axis=1)
+    return int(row + np.flatnonzero(speed[row:] > 0.5 * speed.max())[0])
+
+
+def test_a_square_is_measured_as_a_person_would(square: Any) -> None:
+    result = audit(square.problem, square.profile, square.machine, setpoints=[square.chunk])
+    assert result.failures == ()
+    assert result.check("acceleration", "X").ratio == pytest.approx(1.0, rel=1e-9)
+    assert result.check("velocity", "Y").worst == pytest.approx(50.0, rel=1e-12)
+    assert result.check("place").worst < 1e-11
+    # From 0 to 500 mm/s² at a setpoint: half of it in each of two steps, 2.5e5 mm/s³.
+    assert result.check("jerk", "X").worst == pytest.approx(2.5e5, rel=1e-6)
+    assert result.check("jerk", "X").ok
+
+
+def test_the_size_of_the_chunks_changes_nothing(part: Any) -> None:
+    whole = part.audit(10**9).to_json()
+    for size in (1, 2, 7, 4096):
+        assert part.audit(size).to_json() == whole
+
+
+def test_without_a_profile_the_places_are_found_along_the_path(part: Any) -> None:
+    result = audit(part.problem, None, part.machine, part.program, part.chunks(1000))
+    assert result.failures == ()
+    assert {"feed", "chord", "place", "deviation"} <= {check.name for check in result.checks}
+
+
+def test_both_interpolators_pass(part: Any) -> None:
+    stream = setpoints(part.path, part.profile, part.problem.period, "newton")
+    assert audit(part.problem, part.profile, part.machine, part.program, stream).failures == ()
+
+
+def test_another_period_than_the_machines_passes(part: Any) -> None:
+    stream = setpoints(part.path, part.profile, 0.0037)
+    result = audit(replace(part.problem, chord_tolerance=math.inf), part.profile, part.machine, None, stream)
+    assert result.failures == ()
+
+
+@pytest.mark.parametrize("start", [40, 400, 700])
+def test_a_setpoint_shifted_by_a_micrometre_is_found(part: Any, changed: Change, start: int) -> None:
+    row = moving(part, start)
+    along = part.points.velocity[row] / np.linalg.norm(part.points.velocity[row])
+    across = np.cross(along, [0.0, 0.0, 1.0])
+    for shift in (1e-3 * along, -1e-3 * along, 1e-3 * across, [0.0, 0.0, 1e-3]):
+        position = changed(part.points.position, row, lambda q, shift=shift: q + shift)
+        result = part.with_points(position=position).audit()
+        assert ("place", None) in broken(result)
+        check = result.check("place")
+        assert check.worst == pytest.approx(1e-3, rel=0.05)
+        assert check.time == pytest.approx(part.points.t[row])
+        assert check.line == part.points.line[row]
+
+
+def test_two_setpoints_swapped_are_found(part: Any) -> None:
+    row = moving(part, 100)
+    order = np.arange(len(part.points.t))
+    order[[row, row + 1]] = order[[row + 1, row]]
+    result = part.with_points(position=part.points.position[order]).audit()
+    assert ("place", None) in broken(result)
+    assert result.check("place").time == pytest.approx(part.points.t[row], abs=0.0021)
+    assert "acceleration" in {name for name, _ in broken(result)}
+    assert {("place", None), ("grid", None)} <= broken(part.rows(lambda column: column[order]).audit())
+
+
+def test_a_step_backwards_is_found_even_on_the_path_and_without_a_profile(part: Any, changed: Change) -> None:
+    row = moving(part, 100)
+    position = changed(part.points.position, row, part.points.position[row - 2])
+    case = part.with_points(position=position)
+    for profile in (part.profile, None):
+        result = audit(case.problem, profile, case.machine, None, case.chunks(1000))
+        assert ("place", None) in broken(result)
+        assert result.check("place").time == pytest.approx(part.points.t[row], abs=0.0011)
+
+
+def test_setpoints_that_hurry_or_dawdle_on_the_path_are_found(spline: Any) -> None:
+    # The same path planned 1 % slower: every difference holds, but it is not this plan.
+    machine = Machine.load("mill")
+    case, slower = spline(machine, 3, feed=20.0), spline(machine, 3, feed=19.8)
+    result = audit(case.problem, case.profile, machine, None, slower.chunks(1000))
+    assert broken(result) >= {("place", None)}
+    assert "acceleration" not in {name for name, _ in broken(result)}
+
+
+def test_faster_setpoints_break_the_limits_of_the_slower_machine(spline: Any) -> None:
+    mill = Machine.load("mill")
+    axes = (
+        replace(mill.axes[0], max_velocity=70.0),
+        mill.axes[1],
+        replace(mill.axes[2], max_acceleration=900.0),
+    )
+    case = spline(mill, 5, feed=150.0)
+    slow = replace(mill, axes=axes)
+    limits = {
+        "max_velocity": np.array([70.0, 500.0, 400.0]),
+        "max_acceleration": np.array([3000.0, 3000.0, 900.0]),
+    }
+    result = audit(replace(case.problem, **limits), None, slow, None, case.chunks(1000))
+    assert {("velocity", "X"), ("acceleration", "Z")} <= broken(result)
+    assert {axis for name, axis in broken(result) if name in ("velocity", "acceleration")} == {"X", "Z"}
+    ratio = np.abs(np.diff(case.points.position[:, 0])).max() / 0.001 / 70.0
+    assert result.check("velocity", "X").ratio == pytest.approx(ratio, rel=1e-9)
+
+
+def test_a_feed_exceeded_by_the_setpoints_of_one_line_is_found_there(spline: Any, changed: Change) -> None:
+    case = spline(Machine.load("mill"), 2, feed=30.0)
+    feed = changed(case.problem.feed, 30, 29.9)
+    result = audit(replace(case.problem, feed=feed), None, case.machine, None, case.chunks(1000))
+    assert broken(result) == {("feed", None)}
+    assert result.check("feed").line == 31
+    assert result.check("feed").limit == pytest.approx(29.9)
+
+
+@pytest.mark.parametrize("column", ["t", "position", "velocity", "acceleration"])
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_bad_numbers_in_the_setpoints_are_never_fine(
+    part: Any, changed: Change, column: str, bad: float
+) -> None:
+    for row in (0, 500, len(part.points.t) - 1):
+        values = getattr(part.points, column)
+        place = row if values.ndim == 1 else (row, 1)
+        result = part.with_points(**{column: changed(values, place, bad)}).audit()
+        assert ("numbers", None) in broken(result)
+        if column != "t":
+            assert result.check("numbers").time == pytest.approx(part.points.t[row])
+
+
+def test_setpoints_left_out_are_found(part: Any) -> None:
+    row = moving(part, 200)
+    result = part.rows(lambda column: np.delete(column, row, axis=0)).audit()
+    assert ("grid", None) in broken(result)
+    assert result.check("grid").time == pytest.approx(part.points.t[row + 1])
+    for keep in (slice(None, -1), slice(1, None), slice(0, 0)):
+        assert ("place", None) in broken(part.rows(lambda column, keep=keep: column[keep]).audit())
+
+
+def test_uneven_times_are_found(part: Any, changed: Change) -> None:
+    for error in (1e-8, -1e-8):
+        t = changed(part.points.t, 300, lambda time, error=error: time + error)
+        result = part.with_points(t=t).audit()
+        assert ("grid", None) in broken(result)
+        assert result.check("grid").worst == pytest.approx(1e-8, rel=1e-3)
+    assert ("grid", None) in broken(part.with_points(t=part.points.t + 0.5).audit())
+    assert ("grid", None) in broken(part.with_points(t=part.points.t[::-1].copy()).audit())
+
+
+def test_recorded_velocities_and_accelerations_must_be_those_of_the_motion(
+    part: Any, changed: Change
+) -> None:
+    row = moving(part, 100)
+    k = int(np.abs(part.points.acceleration[row]).argmax())
+    assert abs(part.points.acceleration[row, k]) > 100
+    for name, change in (("velocity", lambda v: v + 0.1), ("acceleration", lambda a: -a)):
+        values = changed(getattr(part.points, name), (row, k), change)
+        result = part.with_points(**{name: values}).audit()
+        assert broken(result) == {(f"recorded_{name}", "XYZ"[k])}
+        assert result.check(f"recorded_{name}", "XYZ"[k]).time == pytest.approx(part.points.t[row])
+
+
+def test_setpoints_off_the_program_are_found_where_the_path_is_not(part: Any, changed: Change) -> None:
+    # The path's own places are an eighth of a piece apart and a setpoint falls between two of them.
+    row = moving(part, 100)
+    assert part.program is not None
+    case = part.with_path(tolerance=np.full(len(part.path), 1e-3))
+    base = case.audit().check("deviation").worst
+    z = changed(part.points.position, (row, 2), lambda z: z + 10 * base + 1.0)
+    result = audit(case.problem, None, case.machine, case.program, case.with_points(position=z).chunks(1000))
+    assert result.check("deviation").worst > 0.9
+    assert result.check("deviation").time == pytest.approx(part.points.t[row])
+
+
+def test_the_progress_grows_from_nothing_to_all(part: Any) -> None:
+    shares: list[float] = []
+    stream = setpoints(part.path, part.profile, part.problem.period)
+    audit(part.problem, part.profile, part.machine, part.program, stream, progress=shares.append)
+    assert shares == sorted(shares)
+    assert (shares[0], shares[-1]) == (0.0, 1.0)
+    assert len(shares) > 3
+
+
+def test_setpoints_far_off_the_path_are_found_without_searching_for_ever(part: Any) -> None:
+    for shift in (100.0, 1e300):
+        for profile in (part.profile, None):
+            case = part.with_points(position=part.points.position + shift)
+            result = audit(case.problem, profile, case.machine, part.program, case.chunks(1000))
+            assert ("place", None) in broken(result)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_setpoints_of_rubbish_end_in_a_verdict(part: Any, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    count = len(part.points.t)
+    order = rng.integers(0, count, 20_000)
+    strange = np.array([0.0, -1.0, 5e-324, 1e160, 1e308, -1e308, math.inf, math.nan])
+    case = part.rows(lambda column: column[order])
+    for name in ("t", "position"):
+        values = getattr(case.points, name)
+        hit = rng.random(values.shape) < (0.0, 0.01, 0.5)[seed % 3]
+        case = case.with_points(**{name: np.where(hit, rng.choice(strange, values.shape), values)})
+    for profile in (case.profile, None):
+        assert not audit(case.problem, profile, case.machine, case.program, case.chunks(7000)).ok
+
+
+def test_a_corner_cut_by_a_step_is_a_chord_error() -> None:
+    # Two sides of a square at 10 mm/s: the step across the corner, half on each side, leaves it by 5 µm / √2.
+    machine = Machine(
+        "jumpy", tuple(Axis(n, 100.0, 1000.0, max_velocity_jump=10.0) for n in "XY"), 0.001, 0.004
+    )
+    half = 0.305  # the corner comes 35.5 ms after the start
+    corners = np.array([[0.0, 0.0], [half, 0.0], [half, half]])
+    path = Path(
+        axes=("X", "Y"),
+        control_points=np.stack([corners[:-1], 0.5 * (corners[:-1] + corners[1:]), corners[1:]], axis=1),
+        width=np.full(2, half),
+        feed=np.full(2, 10.0),
+        move=np.array([[0, 0], [1, 1]]),
+        line=np.array([1, 2], np.int32),
+        runs=np.array([0, 2]),
+        dwell=np.zeros(1),
+        tolerance=np.zeros(2),
+    )
+    problem = build_problem(path, machine)
+    profile = planner("bang-bang")(problem)
+    points = setpoints(path, profile, 0.001).all()
+    row = int(np.flatnonzero(points.position[:, 1] > 0)[0])
+    before, after = half - points.position[row - 1, 0], points.position[row, 1]
+    cut = before * after / math.hypot(before, after)
+    result = audit(problem, profile, machine, setpoints=[points])
+    assert result.check("chord").worst == pytest.approx(cut, rel=1e-6)
+    assert result.check("acceleration", "X").ok
+    narrow = replace(problem, chord_tolerance=cut / 2)
+    assert ("chord", None) in broken(audit(narrow, profile, machine, setpoints=[points]))
+
+
+# Setpoints from anywhere, without a path.
+
+PLANE = Machine("plane", (Axis("X", 60.0, 1000.0), Axis("Y", 60.0, 1000.0)))
+JUMPY = replace(PLANE, axes=tuple(replace(axis, max_velocity_jump=20.0) for axis in PLANE.axes))
+
+
+def trapezoid(t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """10 mm at 1000 mm/s² to 50 mm/s: 0.25 s."""
+    up, down = np.minimum(t, 0.05), np.clip(t - 0.2, 0.0, 0.05)
+    return np.asarray(500 * up**2 + 50 * np.clip(t - 0.05, 0, 0.15) + 50 * down - 500 * down**2)
+
+
+T = np.arange(251) / 1000
+STRAIGHT = np.column_stack([trapezoid(T), np.zeros(251)])
+
+
+def through_a_corner(jump_x: float, jump_y: float, share: float = 0.5) -> NDArray[np.float64]:
+    """At 20 mm/s in X; within step 100 the velocity jumps by these amounts."""
+    steps = np.tile([0.020, 0.0], (200, 1))
+    steps[100:] += [1e-3 * jump_x, 1e-3 * jump_y]
+    steps[99] += [share * 1e-3 * jump_x, share * 1e-3 * jump_y]
+    return np.concatenate(([[0.0, 0.0]], np.cumsum(steps, axis=0)))
+
+
+def test_a_trapezoid_from_a_file_is_measured_by_differences_alone() -> None:
+    result = audit_setpoints(T, STRAIGHT, PLANE)
+    assert result.failures == ()
+    assert result.check("acceleration", "X").worst == pytest.approx(1000.0, rel=1e-9)
+    assert result.check("velocity", "X").worst == pytest.approx(50.0, rel=1e-12)
+    assert {check.name for check in result.checks} == {
+        "velocity",
+        "acceleration",
+        "jerk",
+        "travel",
+        "grid",
+        "numbers",
+    }
+    assert audit_setpoints(T, STRAIGHT, PLANE, jerk=True).check("jerk", "X").judged
+
+
+def test_each_limit_of_the_machine_is_found_with_its_line() -> None:
+    lines = np.arange(251, dtype=np.int32)
+    slow = replace(PLANE, axes=(replace(PLANE.axes[0], max_velocity=49.0), PLANE.axes[1]))
+    result = audit_setpoints(T, STRAIGHT, slow, line=lines)
+    assert broken(result) == {("velocity", "X")}
+    assert result.check("velocity", "X").line == round(1000 * result.check("velocity", "X").time)
+    weak = replace(PLANE, axes=(replace(PLANE.axes[0], max_acceleration=999.0), PLANE.axes[1]))
+    assert broken(audit_setpoints(T, STRAIGHT, weak)) == {("acceleration", "X")}
+    short = replace(PLANE, axes=(replace(PLANE.axes[0], travel=(0.0, 9.0)), PLANE.axes[1]))
+    assert broken(audit_setpoints(T, STRAIGHT, short)) == {("travel", "X")}
+    stiff = replace(PLANE, axes=(replace(PLANE.axes[0], max_jerk=1e5), PLANE.axes[1]))
+    assert audit_setpoints(T, STRAIGHT, stiff).ok
+    assert broken(audit_setpoints(T, STRAIGHT, stiff, jerk=True)) == {("jerk", "X")}
+
+
+def test_positions_rounded_in_a_file_are_measured_within_their_last_digit() -> None:
+    rounded = np.round(0.9999 * STRAIGHT, 6)
+    assert broken(audit_setpoints(T, rounded, PLANE)) == {("acceleration", "X")}
+    assert audit_setpoints(T, rounded, PLANE, resolution=1e-6).ok
+    faster = np.round(STRAIGHT * 1.005, 6)
+    assert ("acceleration", "X") in broken(audit_setpoints(T, faster, PLANE, resolution=1e-6))
+
+
+def test_coordinates_far_out_at_a_short_period_pass() -> None:
+    t = np.arange(2501) / 10000
+    far = np.column_stack([1e4 + trapezoid(t), np.full(2501, -1e4)])
+    assert audit_setpoints(t, far, PLANE).failures == ()
+    weak = replace(PLANE, axes=(replace(PLANE.axes[0], max_acceleration=999.9), PLANE.axes[1]))
+    assert broken(audit_setpoints(t, far, weak)) == {("acceleration", "X")}
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.5, 1.0])
+def test_a_turn_within_the_allowed_jump_is_a_corner_and_nothing_else_is(share: float) -> None:
+    times = np.arange(201) / 1000
+    turn = through_a_corner(-20.0, 20.0, share)
+    assert audit_setpoints(times, turn, JUMPY).failures == ()
+    assert broken(audit_setpoints(times, turn, PLANE)) == {("acceleration", "X"), ("acceleration", "Y")}
+    # More than is allowed in Y, also with 1 mm/s of acceleration a step; a burst ahead; a faster turn.
+    assert ("acceleration", "Y") in broken(
+        audit_setpoints(times, through_a_corner(-20.0, 22.2, share), JUMPY)
+    )
+    assert ("acceleration", "X") in broken(audit_setpoints(times, through_a_corner(10.0, 0.0, share), JUMPY))
+    assert ("acceleration", "Y") in broken(audit_setpoints(times, through_a_corner(0.0, 20.0, share), JUMPY))
+
+
+def test_an_acceleration_kept_up_is_no_corner() -> None:
+    # A circle of 0.5 mm at 30 mm/s: 1800 mm/s² all the way round.
+    angle = np.arange(201) * 0.06
+    circle = 0.5 * np.column_stack([np.cos(angle), np.sin(angle)])
+    result = audit_setpoints(np.arange(201) / 1000, circle, JUMPY)
+    assert broken(result) == {("acceleration", "X"), ("acceleration", "Y")}
+
+
+def test_recorded_columns_are_compared_where_there_are_any() -> None:
+    speed = np.gradient(STRAIGHT, 0.001, axis=0)
+    assert audit_setpoints(T, STRAIGHT, PLANE, velocity=speed).failures == ()
+    result = audit_setpoints(
+        T, STRAIGHT, PLANE, velocity=1.05 * speed, acceleration=np.full((251, 2), 1001.0)
+    )
+    assert {name for name, _ in broken(result)} == {"recorded_velocity", "recorded_acceleration"}
+
+
+@pytest.mark.parametrize("place", [(0, 0), (100, 1), (250, 0)])
+def test_a_nan_in_a_file_is_never_fine(changed: Change, place: tuple[int, int]) -> None:
+    result = audit_setpoints(T, changed(STRAIGHT, place, math.nan), PLANE)
+    assert ("numbers", None) in broken(result)
+    assert not audit_setpoints(changed(T, 7, math.nan), STRAIGHT, PLANE).ok
+
+
+def test_columns_by_name_and_wrong_shapes() -> None:
+    assert audit_setpoints(T, STRAIGHT[:, :1], PLANE, axes=("X",)).ok
+    assert audit_setpoints(T, STRAIGHT[:, ::-1], PLANE, axes=("Y", "X")).check("velocity", "X").worst > 49
+    for arguments, message in (
+        ({"axes": ("X", "Q")}, "no axis Q"),
+        ({"axes": ("X",)}, "one column"),
+        ({"velocity": STRAIGHT[:5]}, "shape of the positions"),
+        ({"line": np.zeros(3, np.int32)}, "as many as the times"),
+        ({"resolution": -1.0}, "resolution"),
+    ):
+        with pytest.raises(InputError, match=message):
+            audit_setpoints(T, STRAIGHT, PLANE, **arguments)
+    with pytest.raises(InputError, match="at least two"):
+        audit_setpoints(T[:1], STRAIGHT[:1], PLANE)

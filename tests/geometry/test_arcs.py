@@ -1,0 +1,126 @@
+"""Arcs and helices of programs: every plane, several turns, tiny and huge radii."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from feedplan.geometry.build import build_path
+from feedplan.machine.machine import Machine
+from feedplan.program.program import PathControl, Program
+
+MILL = Machine.load("mill")
+
+
+def arc_program(make_program: Any, radius: float, angle: float, normal: int, rise: float = 0.0) -> Program:
+    """One arc about the point (1, 2, 3), starting 0.4 rad past the first axis of its plane."""
+    centre = np.array([1.0, 2.0, 3.0])
+    points = np.tile(centre, (2, 1))
+    first, second = (normal + 1) % 3, (normal + 2) % 3
+    for row, turned in enumerate((0.4, 0.4 + angle)):
+        points[row, first] += radius * math.cos(turned)
+        points[row, second] += radius * math.sin(turned)
+    points[1, normal] += rise
+    program: Program = make_program(points, arcs={0: (centre, normal, angle)}, control=PathControl.EXACT_PATH)
+    return program
+
+
+@pytest.mark.parametrize("normal", [0, 1, 2])
+@pytest.mark.parametrize("angle", [math.pi / 2, -math.pi / 2, 2 * math.pi, -2 * math.pi])
+def test_quarter_and_full_circles_in_every_plane(
+    make_program: Any, check: Any, normal: int, angle: float
+) -> None:
+    program = arc_program(make_program, 10.0, angle, normal)
+    path = build_path(program, MILL)
+    off, _ = check(program, path)
+    np.testing.assert_array_equal(path.runs, [0, len(path)])
+    # Half of the exact tolerance is for the arc, and the bound is met.
+    assert 0.2e-3 < path.fit.deviation <= 0.5e-3
+    assert off == pytest.approx(path.fit.deviation, rel=1e-6)
+    # At the turned angle 0 the direction is that of the second axis.
+    spoke = path.control_points[0, 0] - [1, 2, 3]
+    step = path.control_points[0, 1] - path.control_points[0, 0]
+    turning = np.cross(spoke, step)
+    assert np.sign(turning[normal]) == np.sign(angle)
+
+
+@pytest.mark.parametrize("normal", [0, 1, 2])
+def test_a_helix_of_three_and_a_quarter_turns(make_program: Any, check: Any, normal: int) -> None:
+    program = arc_program(make_program, 4.0, 6.5 * math.pi, normal, rise=-9.75)
+    path = build_path(program, MILL)
+    check(program, path)
+    axis = path.control_points[:, :, normal]
+    np.testing.assert_allclose(np.diff(axis, axis=1), axis[0, 1] - axis[0, 0], rtol=1e-9)
+    assert path.width.sum() == pytest.approx(6.5 * math.pi * math.hypot(4, 1.5 / math.pi), rel=1e-12)
+
+
+@pytest.mark.parametrize("radius", [1e-6, 1e-3, 0.1, 100.0, 1e6])
+def test_tiny_and_huge_radii(make_program: Any, check: Any, radius: float) -> None:
+    for angle in (math.pi, 1e-2, 2 * math.pi):
+        program = arc_program(make_program, radius, angle, 2)
+        path = build_path(program, MILL)
+        check(program, path)
+        assert len(path) <= 2 + angle / (2 * min(math.pi / 8, (8 * 0.5e-3 / radius) ** 0.25))
+
+
+def test_a_helix_of_a_thousand_turns_ends_where_it_should(make_program: Any) -> None:
+    program = arc_program(make_program, 4.0, 2000 * math.pi, 2, rise=50.0)
+    path = build_path(program, MILL)
+    np.testing.assert_array_equal(path.runs, [0, len(path)])
+    np.testing.assert_array_equal(path.control_points[-1, 2], program.target[-1])
+    radius = np.hypot(*(path.control_points[:, 0, :2] - [1, 2]).T)
+    np.testing.assert_allclose(radius, 4.0, rtol=1e-9)
+    assert path.width.sum() == pytest.approx(2000 * math.pi * math.hypot(4, 0.025 / math.pi), rel=1e-9)
+
+
+def test_arcs_are_no_looser_than_the_tolerance(make_program: Any, check: Any) -> None:
+    program = arc_program(make_program, 10.0, math.pi, 2)
+    assert build_path(program, MILL, tolerance=1e-5).fit.deviation <= 1e-5
+    assert build_path(program, MILL, tolerance=1.0).fit.deviation <= 1e-3
+    assert build_path(program, MILL, tolerance=0.0).fit.deviation <= 1e-3
+
+
+def test_rounded_coordinates_leave_arcs_joined_to_their_neighbours(make_program: Any, check: Any) -> None:
+    # A slot with 3 decimals: its arcs are tangent to its lines but for rounding.
+    points = [[0.003, -2.5], [10, -2.5], [12.165, 1.25], [6.667, 4.773], [0, 3]]
+    arc = ((10.0, 0.0, 0.0), 2, math.atan2(1.25, 2.165) + math.pi / 2)
+    for control in (PathControl.EXACT_PATH, PathControl.TOLERANCE):
+        program = make_program(points[:3], arcs={1: arc}, control=control)
+        path = build_path(program, MILL)
+        check(program, path)
+        np.testing.assert_array_equal(path.runs, [0, len(path)])
+    kinked = make_program([[0, -2.4], *points[1:3]], arcs={1: arc}, control=PathControl.EXACT_PATH)
+    np.testing.assert_array_equal(build_path(kinked, MILL).runs, [0, len(build_path(kinked, MILL))])
+    corner = make_program([[0, -1.0], *points[1:3]], arcs={1: arc}, control=PathControl.EXACT_PATH)
+    assert len(build_path(corner, MILL).runs) == 3
+
+
+def test_corners_between_arcs_and_lines_are_rounded_within_tolerance(make_program: Any, check: Any) -> None:
+    # Into the half circle smoothly, out of it into a line at a right angle.
+    points = [[0, 0], [10, 0], [10, 20], [10, 40]]
+    arcs = {1: ((10.0, 10.0, 0.0), 2, math.pi)}
+    for tolerance in (0.02, 0.5):
+        program = make_program(points, arcs=arcs, blend_tolerance=tolerance, feed=500.0)
+        path = build_path(program, MILL)
+        _, off = check(program, path)
+        np.testing.assert_array_equal(path.runs, [0, len(path)])
+        assert 0.9 * tolerance < off <= tolerance
+
+
+def test_a_trochoid_of_many_arcs_is_one_run(make_program: Any, check: Any) -> None:
+    count = 60
+    points = np.stack(
+        [np.repeat(np.arange(count // 2 + 1) * 0.5, 2)[: count + 1], np.zeros(count + 1)], axis=1
+    )
+    points[1::2, 0] += 4.0
+    arcs = {}
+    for i in range(count):
+        middle = (points[i] + points[i + 1]) / 2
+        arcs[i] = ((middle[0], 0.0, 0.0), 2, math.pi)
+    program = make_program(points, arcs=arcs)
+    path = build_path(program, MILL)
+    check(program, path)
+    np.testing.assert_array_equal(path.runs, [0, len(path)])
