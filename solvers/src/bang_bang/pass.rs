@@ -97,15 +97,7 @@ pub fn run<const M: usize, const C: usize, const BACK: bool>(
     out: &mut Vec<Arc>,
 ) -> Result<State, Stuck> {
     let (order, direction) = cusp(sub);
-    let straight = (0..M).all(|k| {
-        (0..k).all(|j| {
-            let (w, size) = (sub.g[k].wronskian(&sub.g[j]), sub.g[k].wronskian_magnitude(&sub.g[j]));
-            w.coefficients()
-                .iter()
-                .zip(size.coefficients())
-                .all(|(w, size)| w.abs() <= 64.0 * f64::EPSILON * size)
-        })
-    });
+    let straight = sub.straight;
     let pi = if order == 0 { state.speed_sq / sub.speed.first() } else { f64::INFINITY };
     let first = out.len();
     let mut pass = Pass::<M, C, BACK> {
@@ -133,6 +125,10 @@ pub fn run<const M: usize, const C: usize, const BACK: bool>(
         pass.under(bounds)?;
     }
     let pi = pass.pi;
+    let sound = |arc: &Arc| arc.pi.iter().all(|&pi| pi >= 0.0) && arc.slow_sq >= 0.0 && arc.slow_sq.is_finite();
+    if !out[first..].iter().all(sound) {
+        return Err(Stuck);
+    }
     let (end_order, end_direction) = cusp(&sub.reversed());
     let speed_sq = if end_order == 0 {
         pi * sub.speed.last()
@@ -279,10 +275,9 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                 }
                 continue;
             }
-            let bound = self.window.bound_at_start();
-            let on_bound = self.order == 0 && self.pi >= bound * (1.0 - ON_BOUND);
+            let on_bound = self.is_on_bound();
             if on_bound {
-                self.pi = bound;
+                self.pi = self.window.bound_at_start();
                 if !self.leaving && self.follow_bound()? {
                     continue;
                 }
@@ -290,6 +285,20 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             self.accelerate(on_bound)?;
         }
         Err(Stuck)
+    }
+
+    /// Whether the state is on the bound; in the cusp of a straight line its velocities say so.
+    fn is_on_bound(&self) -> bool {
+        if self.order == 0 {
+            return self.pi >= self.window.bound_at_start() * (1.0 - ON_BOUND);
+        }
+        let near = |value: f64, limit: f64| self.straight && value >= limit * (1.0 - ON_BOUND);
+        match &self.window.bound {
+            Bound::Speed(f) => near(self.cusp_sq.iter().sum(), f.first()),
+            Bound::Axis(k, v_sq) => near(self.cusp_sq[*k], *v_sq),
+            Bound::Arc(k, w) => near(self.cusp_sq[*k], w.first() / self.window.weight.first()),
+            Bound::Hold(_) | Bound::LimitCurve => false,
+        }
     }
 
     fn start(&self) -> Start<M> {

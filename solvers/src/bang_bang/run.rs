@@ -5,6 +5,7 @@ use super::piece::Piece;
 use super::split::{split, Axes, Cap, Part, SubPiece};
 use super::Task;
 use crate::bang_bang_quadratic::{ArcKind, Fault, Profile, Row, NO_AXIS};
+use crate::polynomial::Polynomial;
 
 /// Two directions that differ by more than this at a cusp form a corner.
 const SMOOTH_TURN: f64 = 1e-9;
@@ -211,31 +212,33 @@ fn forward<const M: usize, const C: usize>(
     Ok(state.speed_sq)
 }
 
-/// Whether every axis keeps its acceleration at some places of the arcs: a guard against rounding.
+/// Whether every axis keeps its limits at some places of the arcs: a guard against rounding.
 fn keeps_limits<const M: usize, const C: usize>(sub: &SubPiece<M, C>, axes: &Axes<M>, arcs: &[Arc]) -> bool {
     arcs.iter().all(|arc| {
-        let (Kind::Accelerating(j) | Kind::Braking(j)) = arc.kind else { return true };
-        let slow_at = if matches!(arc.kind, Kind::Accelerating(_)) { arc.x0 } else { arc.x1 };
-        let signed = if matches!(arc.kind, Kind::Accelerating(_)) {
-            axes.acceleration[j]
-        } else {
-            -axes.acceleration[j]
+        let (j, slow_at, signed) = match arc.kind {
+            Kind::Accelerating(j) => (j, arc.x0, axes.acceleration[j]),
+            Kind::Braking(j) => (j, arc.x1, -axes.acceleration[j]),
+            _ => return true,
         };
+        let twist: [Polynomial<C>; M] = std::array::from_fn(|l| {
+            if sub.straight || l == j {
+                Polynomial::constant(0.0)
+            } else {
+                sub.g[l].wronskian(&sub.g[j])
+            }
+        });
         [0.02, 0.35, 0.7, 0.98].iter().all(|&part| {
             let x = arc.x0 + part * (arc.x1 - arc.x0);
-            if arc.x1 - arc.x0 < 1e-9 {
-                return true;
-            }
             let weight = sub.weight.value(x);
             let way = if x > slow_at { distance(sub, j, slow_at, x) } else { distance(sub, j, x, slow_at) };
-            let g: [f64; M] = std::array::from_fn(|k| sub.g[k].value(x));
-            let c: [f64; M] = std::array::from_fn(|k| sub.g[k].derivative().value(x));
-            let pi = (arc.slow_sq + 2.0 * axes.acceleration[j] * way) / (g[j] * g[j]);
-            let s = (signed / (weight * weight) - c[j] * pi) / g[j];
-            (0..M).all(|k| {
-                let acceleration = weight * weight * (g[k] * s + c[k] * pi);
-                acceleration.abs() <= axes.acceleration[k] * (1.0 + EXCESS)
-                    && g[k] * g[k] * pi <= axes.velocity_sq[k] * (1.0 + EXCESS)
+            let g = sub.g[j].value(x);
+            let pi = (arc.slow_sq + 2.0 * axes.acceleration[j] * way) / (g * g);
+            (0..M).all(|l| {
+                let other = sub.g[l].value(x);
+                // ω² (g_l s + g_l' π) with s from axis j, without the difference of large terms.
+                let acceleration = (signed * other + weight * weight * pi * twist[l].value(x)) / g;
+                acceleration.abs() <= axes.acceleration[l] * (1.0 + EXCESS)
+                    && other * other * pi <= axes.velocity_sq[l] * (1.0 + EXCESS)
             })
         })
     })

@@ -6,6 +6,11 @@ use crate::polynomial::Polynomial;
 
 /// Cuts closer than this part of the piece are one.
 const SAME_CUT: f64 = 1e-13;
+/// Turns closer than this part of the piece are one.
+const SAME_TURN: f64 = 1e-8;
+/// Closer than this to a turn where |C'|² is below this part of its greatest value, no velocity cap counts.
+const NEAR_CUSP: f64 = 1e-5;
+const SLOW: f64 = 1e-10;
 /// The value of a polynomial is rounding below this part of its terms.
 const NOISE: f64 = 1e-14;
 /// A tangent coefficient this small beside the greatest one is zero.
@@ -52,6 +57,7 @@ pub struct SubPiece<const M: usize, const C: usize> {
     pub moving: u8,
     /// Degree of the curve itself.
     pub degree: usize,
+    pub straight: bool,
 }
 
 /// Appends the parts of the piece from left to right.
@@ -77,7 +83,14 @@ pub fn split<const M: usize, const C: usize>(
                 cuts.push((t, 1 << k));
             }
         }
-        g.sign_changes(&mut |t| cuts.push((t, 1 << k)));
+        if !piece.straight {
+            g.sign_changes(&mut |t| cuts.push((t, 1 << k)));
+        }
+    }
+    if piece.straight {
+        // All axes turn at once, in a cusp.
+        let greatest = (0..M).max_by(|&a, &b| size(&piece.g[a]).total_cmp(&size(&piece.g[b]))).unwrap_or(0);
+        piece.g[greatest].sign_changes(&mut |t| cuts.push((t, moving)));
     }
     let mut lines = vec![];
     match chord {
@@ -90,6 +103,7 @@ pub fn split<const M: usize, const C: usize>(
         cuts.push((line.from, 0));
         fast |= cut_by_cap(piece, axes, &squares, line, moving, &mut cuts);
     }
+    merge_near_cusps(piece, &mut cuts);
     cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
     cuts.dedup_by(|b, a| {
         let same = b.0 - a.0 <= SAME_CUT;
@@ -120,6 +134,31 @@ pub fn split<const M: usize, const C: usize>(
             moving,
         });
     }
+}
+
+/// Near a cusp the axes turn within what rounding can tell apart: there they turn at once, and no velocity cap counts,
+/// for the tool hardly moves.
+fn merge_near_cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, cuts: &mut Vec<(f64, u8)>) {
+    let fastest = piece.speed.range().1;
+    let is_end = |t: f64| t == 0.0 || t == 1.0;
+    let mut turns: Vec<(f64, u8)> =
+        cuts.iter().copied().filter(|&(t, axes)| axes != 0 || is_end(t)).collect();
+    turns.sort_by(|a, b| a.0.total_cmp(&b.0));
+    turns.dedup_by(|b, a| {
+        let same = b.0 - a.0 <= SAME_TURN;
+        if same {
+            a.1 |= b.1;
+            // The ends of the piece stay where they are.
+            a.0 = if b.0 == 1.0 { 1.0 } else { a.0 };
+        }
+        same
+    });
+    let slow = |t: f64| piece.speed.value(t) <= SLOW * fastest;
+    let near = |t: f64| turns.iter().any(|&(turn, _)| (t - turn).abs() <= NEAR_CUSP && slow(turn));
+    let rest: Vec<(f64, u8)> =
+        cuts.iter().copied().filter(|&(t, axes)| axes == 0 && !is_end(t) && !near(t)).collect();
+    cuts.clear();
+    cuts.extend(turns.iter().copied().chain(rest));
 }
 
 /// Cuts the places where the caps cross on a line; says which axes can be faster than their limits.
@@ -185,6 +224,7 @@ impl Part {
             cap: self.cap,
             moving: self.moving,
             degree: piece.degree,
+            straight: piece.straight,
         }
     }
 }
@@ -203,11 +243,6 @@ impl<const M: usize, const C: usize> SubPiece<M, C> {
             cap,
             ..*self
         }
-    }
-
-    #[inline(always)]
-    pub fn is_moving(&self, k: usize) -> bool {
-        self.moving >> k & 1 == 1
     }
 }
 
