@@ -297,7 +297,9 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             Bound::Speed(f) => near(self.cusp_sq.iter().sum(), f.first()),
             Bound::Axis(k, v_sq) => near(self.cusp_sq[*k], *v_sq),
             Bound::Arc(k, w) => near(self.cusp_sq[*k], w.first() / self.window.weight.first()),
-            Bound::Hold(_) | Bound::LimitCurve => false,
+            // At rest p is free.
+            Bound::Hold(_) => true,
+            Bound::LimitCurve => false,
         }
     }
 
@@ -614,6 +616,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                     let lead = self.window.g[j].coefficients()[1];
                     self.axes.acceleration[j] / (lead * self.window.weight.first().powi(2)) * scale
                 }
+                Kind::Hold => slow_sq / self.window.weight.first().powi(4),
                 _ => f64::INFINITY,
             };
         }
@@ -680,6 +683,9 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
     }
 
     fn slide_at_speed(&self, f: &Polynomial<C>) -> (f64, Option<usize>, Option<(usize, usize)>) {
+        if self.straight && f.degree() == 0 {
+            return (1.0, None, None);
+        }
         let window = &self.window;
         let d = &window.speed;
         let (d_slope, d_sq) = (d.derivative(), d.multiply(d));
