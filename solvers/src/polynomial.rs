@@ -9,6 +9,9 @@ pub const MOST: usize = 72;
 /// Halving stops here: the interval is then as short as the spacing of numbers near 1.
 const MAX_DEPTH: u32 = 52;
 
+/// A Newton step this small, quadratically convergent, leaves an error below rounding.
+const LAST_STEP: f64 = 3e-9;
+
 /// Pascal's triangle.
 static BINOMIALS: [[f64; MOST]; MOST] = binomials();
 
@@ -374,30 +377,46 @@ impl<const C: usize> Polynomial<C> {
     }
 
     /// The root of a polynomial with one change of sign, from positive to negative: Newton's method inside a bracket.
+    ///
+    /// With z = x/(1 − x) the polynomial is Σ c_i z^i over (1 + z)^n; roots beyond ½ are sought from the other end.
     fn single_root(&self) -> f64 {
-        let slope = self.derivative();
-        let (mut low, mut high) = (0.0, 1.0);
-        let (first, last) = (self.first(), self.last());
-        let mut x = if first > 0.0 && last < 0.0 { first / (first - last) } else { 0.5 };
-        for _ in 0..120 {
-            let value = self.value(x);
-            if value >= 0.0 {
-                low = x;
-            } else {
-                high = x;
-            }
-            if high - low <= f64::EPSILON * low.max(f64::MIN_POSITIVE) {
-                return low;
-            }
-            let newton = x - value / slope.value(x);
-            let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-            if (next - x).abs() <= f64::EPSILON * x {
-                return next;
-            }
-            x = next;
+        let c = self.coefficients();
+        if self.value(0.5) < 0.0 {
+            let z = root_below_one(|i| c[i], self.n, true);
+            z / (1.0 + z)
+        } else {
+            let z = root_below_one(|i| c[self.n - i], self.n, false);
+            1.0 / (1.0 + z)
         }
-        x
     }
+}
+
+/// The root of Σ c_i z^i in [0, 1], where the sum changes its sign once: from positive to negative, or else upward.
+#[inline(always)]
+fn root_below_one(c: impl Fn(usize) -> f64, n: usize, falls: bool) -> f64 {
+    let (mut low, mut high) = (0.0, 1.0);
+    let mut z = 0.5;
+    for _ in 0..120 {
+        let (mut value, mut slope) = (c(n), 0.0);
+        for i in (0..n).rev() {
+            slope = slope * z + value;
+            value = value * z + c(i);
+        }
+        if (value >= 0.0) == falls {
+            low = z;
+        } else {
+            high = z;
+        }
+        let newton = z - value / slope;
+        if (newton - z).abs() <= LAST_STEP * z {
+            return newton.clamp(low, high);
+        }
+        if high - low <= f64::EPSILON * high {
+            return low;
+        }
+        z = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+    }
+    z
 }
 
 /// Changes of sign, zeros left out.

@@ -75,14 +75,15 @@ pub struct State {
     pub speed_sq: f64,
 }
 
-/// The order of the zero that every tangent component has at the start, and the limit direction there.
-pub fn cusp<const M: usize, const C: usize>(sub: &SubPiece<M, C>) -> (usize, [f64; M]) {
+/// The order of the zero that every tangent component has at an end, and the limit direction there.
+pub fn cusp<const M: usize, const C: usize>(sub: &SubPiece<M, C>, at_end: bool) -> (usize, [f64; M]) {
     let degree = sub.g[0].degree();
+    let coefficient = |k: usize, r: usize| sub.g[k].coefficients()[if at_end { degree - r } else { r }];
     let mut r = 0;
-    while r < degree && (0..M).all(|k| sub.g[k].coefficients()[r] == 0.0) {
+    while r < degree && (0..M).all(|k| coefficient(k, r) == 0.0) {
         r += 1;
     }
-    let lead: [f64; M] = std::array::from_fn(|k| sub.g[k].coefficients()[r]);
+    let lead: [f64; M] = std::array::from_fn(|k| coefficient(k, r));
     let length = lead.iter().map(|x| x * x).sum::<f64>().sqrt();
     (r, lead.map(|x| x / length))
 }
@@ -96,7 +97,7 @@ pub fn run<const M: usize, const C: usize, const BACK: bool>(
     bounds: &[Arc],
     out: &mut Vec<Arc>,
 ) -> Result<State, Stuck> {
-    let (order, direction) = cusp(sub);
+    let (order, direction) = cusp(sub, false);
     let straight = sub.straight;
     let pi = if order == 0 { state.speed_sq / sub.speed.first() } else { f64::INFINITY };
     let first = out.len();
@@ -129,7 +130,7 @@ pub fn run<const M: usize, const C: usize, const BACK: bool>(
     if !out[first..].iter().all(sound) {
         return Err(Stuck);
     }
-    let (end_order, end_direction) = cusp(&sub.reversed());
+    let (end_order, end_direction) = cusp(sub, true);
     let speed_sq = if end_order == 0 {
         pi * sub.speed.last()
     } else if straight {
@@ -688,6 +689,9 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         }
         let window = &self.window;
         let d = &window.speed;
+        if f.degree() == 0 && window.weight.degree() == 0 && self.bends_little(f.first()) {
+            return (1.0, None, None);
+        }
         let (d_slope, d_sq) = (d.derivative(), d.multiply(d));
         let f_slope = f.derivative();
         let weight_sq = window.weight.multiply(&window.weight);
@@ -707,6 +711,22 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             }
             (d_sq, weight_sq.multiply(&need), weight_sq.multiply(&size))
         })
+    }
+
+    /// Whether v²/ρ = v² |g × g'|/D^1.5 stays below the least acceleration limit.
+    fn bends_little(&self, speed_sq: f64) -> bool {
+        let g = &self.window.g;
+        let mut twist_sq = 0.0;
+        for j in 0..M {
+            for k in 0..j {
+                let w = g[j].wronskian(&g[k]);
+                let most = (0..=w.degree()).fold(0.0_f64, |most, i| most.max(w.bernstein(i).abs()));
+                twist_sq += most * most;
+            }
+        }
+        let least = self.window.speed.range().0.max(0.0);
+        let limit = self.axes.acceleration.iter().fold(f64::INFINITY, |least, &a| least.min(a));
+        speed_sq * twist_sq.sqrt() <= limit * least * least.sqrt()
     }
 
     fn slide_at_axis_speed(&self, k: usize, v_sq: f64) -> (f64, Option<usize>, Option<(usize, usize)>) {

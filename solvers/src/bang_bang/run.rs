@@ -87,7 +87,7 @@ fn end_direction<const M: usize, const C: usize>(
     negative: u8,
     at_end: bool,
 ) -> (bool, [f64; M]) {
-    let (order, direction) = if at_end { cusp(&sub.reversed()) } else { cusp(sub) };
+    let (order, direction) = cusp(sub, at_end);
     let signed = std::array::from_fn(|k| if negative >> k & 1 == 1 { -direction[k] } else { direction[k] });
     (order > 0, signed)
 }
