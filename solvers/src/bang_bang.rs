@@ -59,7 +59,8 @@ struct Task<'a, const M: usize> {
     chord: Option<ChordLimit>,
 }
 
-/// The fastest profile. Pieces of a degree up to `(C − 2)/4` can be planned, rational ones up to `(C − 2)/8`.
+/// The fastest profile. `C` coefficients suffice for polynomial pieces
+/// of a degree up to (C + 2)/4 and rational ones of a degree up to (C + 6)/8.
 pub fn plan<const M: usize, const C: usize>(problem: &Problem<M>) -> Result<Profile, Fault> {
     let task = Task {
         problem,

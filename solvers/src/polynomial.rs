@@ -305,11 +305,51 @@ impl<const C: usize> Polynomial<C> {
         (Self { n, c: left }, Self { n, c: b })
     }
 
+    /// p on [0, t], on [0, 1] again.
+    #[inline(always)]
+    pub fn left(&self, t: f64) -> Self {
+        let n = self.n;
+        let row = &BINOMIALS[n];
+        let mut b = [0.0; C];
+        for i in 0..=n {
+            b[i] = self.c[i] / row[i];
+        }
+        let mut c = [0.0; C];
+        c[0] = b[0];
+        for level in 1..=n {
+            for i in 0..=n - level {
+                b[i] = (1.0 - t) * b[i] + t * b[i + 1];
+            }
+            c[level] = b[0] * row[level];
+        }
+        Self { n, c }
+    }
+
+    /// p on [t, 1], on [0, 1] again.
+    #[inline(always)]
+    pub fn right(&self, t: f64) -> Self {
+        let n = self.n;
+        let row = &BINOMIALS[n];
+        let mut c = [0.0; C];
+        for i in 0..=n {
+            c[i] = self.c[i] / row[i];
+        }
+        for level in 1..=n {
+            for i in 0..=n - level {
+                c[i] = (1.0 - t) * c[i] + t * c[i + 1];
+            }
+        }
+        for i in 0..=n {
+            c[i] *= row[i];
+        }
+        Self { n, c }
+    }
+
     /// p on [a, b], on [0, 1] again.
     pub fn part(&self, a: f64, b: f64) -> Self {
-        let right = if a > 0.0 { self.split(a).1 } else { *self };
+        let right = if a > 0.0 { self.right(a) } else { *self };
         if b < 1.0 {
-            right.split((b - a) / (1.0 - a)).0
+            right.left((b - a) / (1.0 - a))
         } else {
             right
         }

@@ -226,7 +226,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             let mut window = rest;
             if i + 1 < bounds.len() {
                 let t = (x1 - rest.x0) / rest.length();
-                (window, rest) = rest.divide(t);
+                (window, rest) = (rest.before(t), rest.after(t));
                 // Not rounded: π of the next window starts where this one ends.
                 window.x1 = x1;
                 rest.x0 = x1;
@@ -596,8 +596,8 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
     fn push(&mut self, t: f64, kind: Kind, w: Option<&Polynomial<C>>, slow_sq: f64) {
         let length = self.window.length();
         let scale = length * length;
-        let (before, after) = if t < 1.0 { self.window.divide(t) } else { (self.window, self.window) };
-        let x1 = before.x1;
+        let after = (t < 1.0).then(|| self.window.after(t));
+        let x1 = after.as_ref().map_or(self.window.x1, |after| after.x0);
         // π at the end, of the sub-piece.
         let pi_end = match (w, kind) {
             (Some(w), Kind::Accelerating(j)) => {
@@ -606,8 +606,10 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                 let turn = if g > 0.0 { None } else { self.at_turn(j) };
                 turn.unwrap_or(pi) * scale
             }
-            _ if t < 1.0 => after.bound_at_start() * after.length().powi(2),
-            _ => before.bound_at_end(),
+            _ => match &after {
+                Some(after) => after.bound_at_start() * after.length().powi(2),
+                None => self.window.bound_at_end(),
+            },
         };
         let mut pi_start = self.pi * scale;
         if self.order > 0 {
@@ -623,9 +625,9 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         }
         self.out.push(Arc { x0: self.window.x0, x1, kind, pi: [pi_start, pi_end], slow_sq });
         self.order = 0;
-        if t < 1.0 {
-            self.window = after;
+        if let Some(after) = after {
             self.pi = pi_end / after.length().powi(2);
+            self.window = after;
         } else {
             self.window.x0 = self.window.x1;
             self.pi = pi_end;

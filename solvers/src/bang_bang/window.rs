@@ -49,46 +49,43 @@ impl<const M: usize, const C: usize> Window<M, C> {
         self.x1 - self.x0
     }
 
-    /// Divides the window at t: what lies before and after.
-    pub fn divide(&self, t: f64) -> (Self, Self) {
-        let (weight, rest_weight) = self.weight.split(t);
-        let (speed, rest_speed) = self.speed.split(t);
-        let (bound, rest_bound) = match &self.bound {
-            Bound::Speed(f) => {
-                let (left, right) = f.split(t);
-                (Bound::Speed(left), Bound::Speed(right))
-            }
-            Bound::Arc(k, w) => {
-                let (left, right) = w.split(t);
-                (Bound::Arc(*k, left), Bound::Arc(*k, right))
-            }
-            Bound::Hold(p) => (Bound::Hold(p / (t * t)), Bound::Hold(p / ((1.0 - t) * (1.0 - t)))),
-            bound => (*bound, *bound),
+    /// What lies before t.
+    pub fn before(&self, t: f64) -> Self {
+        let bound = match &self.bound {
+            Bound::Speed(f) => Bound::Speed(f.left(t)),
+            Bound::Arc(k, w) => Bound::Arc(*k, w.left(t)),
+            Bound::Hold(p) => Bound::Hold(p / (t * t)),
+            bound => *bound,
         };
-        let middle = self.x0 + t * self.length();
-        let mut before = Self {
-            g: self.g,
-            weight,
-            speed: speed.scale(t * t),
+        Self {
+            g: std::array::from_fn(|k| self.g[k].left(t).scale(t)),
+            weight: self.weight.left(t),
+            speed: self.speed.left(t).scale(t * t),
             bound,
             known: [self.known[0], None],
             x0: self.x0,
-            x1: middle,
-        };
-        let mut after = Self {
-            g: self.g,
-            weight: rest_weight,
-            speed: rest_speed.scale((1.0 - t) * (1.0 - t)),
-            bound: rest_bound,
-            known: [None, self.known[1]],
-            x0: middle,
-            x1: self.x1,
-        };
-        for k in 0..M {
-            let (left, right) = self.g[k].split(t);
-            (before.g[k], after.g[k]) = (left.scale(t), right.scale(1.0 - t));
+            x1: self.x0 + t * self.length(),
         }
-        (before, after)
+    }
+
+    /// What lies after t.
+    pub fn after(&self, t: f64) -> Self {
+        let rest = 1.0 - t;
+        let bound = match &self.bound {
+            Bound::Speed(f) => Bound::Speed(f.right(t)),
+            Bound::Arc(k, w) => Bound::Arc(*k, w.right(t)),
+            Bound::Hold(p) => Bound::Hold(p / (rest * rest)),
+            bound => *bound,
+        };
+        Self {
+            g: std::array::from_fn(|k| self.g[k].right(t).scale(rest)),
+            weight: self.weight.right(t),
+            speed: self.speed.right(t).scale(rest * rest),
+            bound,
+            known: [None, self.known[1]],
+            x0: self.x0 + t * self.length(),
+            x1: self.x1,
+        }
     }
 
     /// The greatest π at the start, infinite for no limit.

@@ -124,7 +124,7 @@ fn plan_curves<'py>(
         let profile = py
             .detach(|| {
                 if small {
-                    bang_bang::plan::<M, 16>(&problem)
+                    bang_bang::plan::<M, 10>(&problem)
                 } else {
                     bang_bang::plan::<M, MOST>(&problem)
                 }
