@@ -471,3 +471,79 @@ fn sign_changes(c: &[f64]) -> usize {
     }
     changes
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    type Quintic = Polynomial<8>;
+
+    /// The product of (root − x) over some roots, by Bernstein products.
+    fn from_roots(roots: &[f64]) -> Quintic {
+        roots.iter().fold(Polynomial::constant(1.0), |product, &root| {
+            product.multiply(&Polynomial::from_bernstein([root, root - 1.0].into_iter()))
+        })
+    }
+
+    #[test]
+    fn sums_products_and_derivatives_by_hand() {
+        // p = 1 + 2 x and q = x²: p q = x² + 2 x³, p' q − p q' of equal degrees, p'' = 0.
+        let p = Quintic::from_bernstein([1.0, 3.0].into_iter());
+        let q = Quintic::from_bernstein([0.0, 0.0, 1.0].into_iter());
+        let x: f64 = 0.3;
+        assert!((p.multiply(&q).value(x) - (x * x + 2.0 * x.powi(3))).abs() < 1e-16);
+        assert!((p.combine(2.0, &q, -3.0).value(x) - (2.0 + 4.0 * x - 3.0 * x * x)).abs() < 1e-15);
+        assert_eq!(q.derivative().coefficients(), [0.0, 2.0]);
+        let raised = p.elevate(2);
+        assert!((raised.wronskian(&q).value(x) - (2.0 * x * x - (1.0 + 2.0 * x) * 2.0 * x)).abs() < 1e-15);
+        assert_eq!((raised.first_slope(), raised.first_bend(), q.first_bend()), (2.0, 0.0, 2.0));
+    }
+
+    #[test]
+    fn an_antiderivative_over_a_weight_by_hand() {
+        // (m/w)' = p/w² with w = 1 + x and m = 3 x: p = 3 (1 + x) − 3 x = 3, as a form of degree 0.
+        let w = Quintic::from_bernstein([1.0, 2.0].into_iter());
+        let m = Quintic::constant(3.0).antiderivative(&w, 1);
+        assert_eq!(m.coefficients(), [0.0, 3.0]);
+    }
+
+    proptest! {
+        #[test]
+        fn the_first_root_is_the_smallest_one(mut roots in prop::collection::vec(0.01..2.0_f64, 1..6)) {
+            roots.sort_by(f64::total_cmp);
+            prop_assume!(roots.windows(2).all(|pair| pair[1] - pair[0] > 1e-3));
+            let found = from_roots(&roots).first_root();
+            if roots[0] < 1.0 {
+                prop_assert!((found.unwrap() - roots[0]).abs() < 1e-9);
+            } else {
+                prop_assert_eq!(found, None);
+            }
+        }
+
+        #[test]
+        fn a_single_change_of_sign_is_found_wherever_it_is(c in prop::collection::vec(0.0..1.0_f64, 2..7), change in 1_usize..6) {
+            let mut c = c;
+            let n = c.len() - 1;
+            let change = 1 + change % n;
+            c[change..].iter_mut().for_each(|value| *value = -*value);
+            c[0] += 1e-3;
+            c[n] -= 1e-3;
+            let p = Quintic::from_bernstein(c.iter().copied());
+            let root = p.first_root().unwrap();
+            let slope = p.derivative().value(root).abs();
+            prop_assert!(p.value(root).abs() <= 1e-14 + 1e-14 * slope, "{root} {}", p.value(root));
+            prop_assert!(p.value((root - 1e-6).max(0.0)) > -1e-15 && p.value((root + 1e-6).min(1.0)) < 1e-15);
+        }
+
+        #[test]
+        fn parts_are_the_same_polynomial(c in prop::collection::vec(-1.0..1.0_f64, 6), a in 0.0..0.5_f64, b in 0.5..1.0_f64, x in 0.0..1.0_f64) {
+            let p = Quintic::from_bernstein(c.into_iter());
+            let part = p.part(a, b);
+            prop_assert!((part.value(x) - p.value(a + x * (b - a))).abs() < 1e-14);
+            let (left, right) = p.split(a);
+            prop_assert!((left.value(x) - p.value(a * x)).abs() < 1e-14);
+            prop_assert!((right.value(x) - p.value(a + (1.0 - a) * x)).abs() < 1e-14);
+        }
+    }
+}

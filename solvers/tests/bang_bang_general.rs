@@ -5,7 +5,7 @@ mod support;
 
 use feedplan_solvers::bang_bang::{plan, Problem};
 use feedplan_solvers::bang_bang_quadratic::{Fault, Profile};
-use support::{random_case, Case};
+use support::{milder_case, Case};
 
 /// The case planned as pieces of degree 2, or elevated.
 fn general<const M: usize, const C: usize>(case: &Case<M>, elevate: usize) -> Result<Profile, Fault> {
@@ -48,73 +48,43 @@ fn general<const M: usize, const C: usize>(case: &Case<M>, elevate: usize) -> Re
 #[test]
 fn quadratics_take_the_time_of_the_quadratic_planner() {
     let mut failures = vec![];
-    let (mut worst, mut count) = (0.0_f64, 0);
-    for seed in 0..std::env::var("SEEDS").map_or(600, |n| n.parse().unwrap()) {
+    for seed in 0..3000 {
         let axes = 1 + (seed % 6) as usize;
         for_axes!(axes, M, {
-            let mut case = random_case::<M>(seed);
+            let mut case = milder_case::<M>(seed);
             case.chord_tolerance = f64::INFINITY;
             let exact = case.time();
-            count += 1;
             for elevate in [0, 1] {
-                match general::<M, 16>(&case, elevate) {
-                    Err(fault) => failures.push(format!("seed {seed} +{elevate}: {fault}")),
+                match general::<M, 10>(&case, elevate) {
+                    Err(fault) => failures.push(format!("seed {seed} elevated by {elevate}: {fault}")),
                     Ok(profile) => {
                         let change = (profile.time() / exact - 1.0).abs();
-                        worst = worst.max(change);
-                        if !(change < 1e-9) {
-                            failures.push(format!(
-                                "seed {seed} +{elevate}: {change:.1e} {} {exact}",
-                                profile.time()
-                            ));
+                        if change.is_nan() || change > 1e-12 {
+                            failures.push(format!("seed {seed} elevated by {elevate}: {change:.1e}"));
                         }
                     }
                 }
             }
         });
     }
-    println!("worst {worst:e} of {count}");
     assert!(
         failures.is_empty(),
         "{} failures\n{}",
         failures.len(),
-        failures[..failures.len().min(60)].join("\n")
+        failures[..failures.len().min(40)].join("\n")
     );
 }
 
+/// The chord-error limit is taken with a margin, by each planner in its own way.
 #[test]
-fn one() {
-    let Ok(seed) = std::env::var("SEED") else { return };
-    let seed: u64 = seed.parse().unwrap();
-    let axes = 1 + (seed % 6) as usize;
-    for_axes!(axes, M, {
-        let mut case = random_case::<M>(seed);
-        case.chord_tolerance = f64::INFINITY;
-        let a = case.plan().unwrap();
-        let b = general::<M, 16>(&case, 0).unwrap();
-        let show = |name: &str, p: &Profile, i: usize| {
-            for r in 0..p.len() {
-                if p.piece[r] as usize == i {
-                    println!(
-                        "   {name} kind {} axis {} value {:e} u {:e} {:e} p {:e} {:e} t {:e}",
-                        p.kind[r], p.axis[r], p.value[r], p.u0[r], p.u1[r], p.p0[r], p.p1[r], p.duration[r]
-                    );
-                }
-            }
-        };
-        for i in 0..case.pieces.len() {
-            let t = |p: &Profile| {
-                (0..p.len()).filter(|&r| p.piece[r] as usize == i).map(|r| p.duration[r]).sum::<f64>()
-            };
-            if std::env::var("ALL").is_ok() || !((t(&a) - t(&b)).abs() < 1e-9 * t(&a)) {
-                println!(
-                    "piece {i} feed {} control {:?} width {}",
-                    case.feed[i], case.pieces[i].control, case.pieces[i].width
-                );
-                show("A", &a, i);
-                show("B", &b, i);
-            }
+fn with_a_chord_error_limit_the_times_agree_to_the_margin() {
+    for seed in 0..600 {
+        let case = milder_case::<3>(seed);
+        if case.chord_tolerance.is_finite() {
+            let profile = general::<3, 10>(&case, 0).expect("a profile");
+            let change = profile.time() / case.time() - 1.0;
+            // The quadratic planner gives away δ/(4 ρ) where ρ doubles, this one 4e-4 of v² at most.
+            assert!(change > -0.05 && change < 1e-3, "seed {seed}: {change:.1e}");
         }
-        println!("V {:?} A {:?} junction {:?}", case.velocity, case.acceleration, case.junction);
-    });
+    }
 }

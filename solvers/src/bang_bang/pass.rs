@@ -126,7 +126,8 @@ pub fn run<const M: usize, const C: usize, const BACK: bool>(
         pass.under(bounds)?;
     }
     let pi = pass.pi;
-    let sound = |arc: &Arc| arc.pi.iter().all(|&pi| pi >= 0.0) && arc.slow_sq >= 0.0 && arc.slow_sq.is_finite();
+    let sound =
+        |arc: &Arc| arc.pi.iter().all(|&pi| pi >= 0.0) && arc.slow_sq >= 0.0 && arc.slow_sq.is_finite();
     if !out[first..].iter().all(sound) {
         return Err(Stuck);
     }
@@ -524,7 +525,8 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             return Err(Stuck);
         }
         match event {
-            Event::Transition(l) => (self.control, self.tied) = (Some(l), 1 << j),
+            // Whether the two are tied shows in their accelerations.
+            Event::Transition(l) => (self.control, self.tied) = (Some(l), 0),
             Event::Low(l) => {
                 self.limit_curve = Some((j, l));
                 self.low = None;
@@ -686,12 +688,13 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
     }
 
     fn slide_at_speed(&self, f: &Polynomial<C>) -> (f64, Option<usize>, Option<(usize, usize)>) {
-        if self.straight && f.degree() == 0 {
+        if self.straight && self.sub.own_speed && f.degree() == 0 {
             return (1.0, None, None);
         }
         let window = &self.window;
         let d = &window.speed;
-        if f.degree() == 0 && window.weight.degree() == 0 && self.bends_little(f.first()) {
+        let constant = f.degree() == 0 && window.weight.degree() == 0 && self.sub.own_speed;
+        if constant && self.bends_little(f.first()) {
             return (1.0, None, None);
         }
         let (d_slope, d_sq) = (d.derivative(), d.multiply(d));

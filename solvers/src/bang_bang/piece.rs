@@ -17,6 +17,8 @@ pub struct Piece<const M: usize, const C: usize> {
     pub degree: usize,
     /// All of g has one direction.
     pub straight: bool,
+    /// D = |g|²: the axes are those of the tool.
+    pub own_speed: bool,
 }
 
 /// A tangent is off a straight line by no more than this part of the longest one, which is rounding, and of itself,
@@ -57,7 +59,7 @@ impl<const M: usize, const C: usize> Piece<M, C> {
             Some(values) => Polynomial::from_bernstein(values.iter().copied()),
             None => sum_of_squares(&g),
         };
-        Self { g, weight, speed, degree, straight: along.is_some() }
+        Self { g, weight, speed, degree, straight: along.is_some(), own_speed: speed_sq.is_none() }
     }
 }
 

@@ -273,7 +273,8 @@ fn push<const M: usize, const C: usize>(
         let mut by_acceleration = |k: usize| {
             // Way over mean speed, the faster speed from the way.
             let way = way(k);
-            joins = arc.pi[0].is_finite() && arc.pi[1].is_finite();
+            // An arc that begins where its axis turns has another formula for p.
+            joins = arc.pi[0].is_finite() && arc.pi[1].is_finite() && sub.g[k].value(arc.x0) > 0.0;
             2.0 * way / (arc.slow_sq.sqrt() + (arc.slow_sq + 2.0 * task.axes.acceleration[k] * way).sqrt())
         };
         let (kind, axis, value, duration) = match arc.kind {

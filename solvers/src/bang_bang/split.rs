@@ -58,6 +58,7 @@ pub struct SubPiece<const M: usize, const C: usize> {
     /// Degree of the curve itself.
     pub degree: usize,
     pub straight: bool,
+    pub own_speed: bool,
 }
 
 /// Appends the parts of the piece from left to right.
@@ -225,6 +226,7 @@ impl Part {
             moving: self.moving,
             degree: piece.degree,
             straight: piece.straight,
+            own_speed: piece.own_speed,
         }
     }
 }

@@ -99,7 +99,9 @@ fn plan_curves<'py>(
         || offsets.last() != Some(&count)
         || offsets.windows(2).any(|pair| pair[1] < pair[0] + 2 || pair[1] > pair[0] + 10)
     {
-        return Err(PyValueError::new_err("the offsets do not divide the control points into pieces of degree 1 to 9"));
+        return Err(PyValueError::new_err(
+            "the offsets do not divide the control points into pieces of degree 1 to 9",
+        ));
     }
     let small = weights.as_slice()?.is_empty() && offsets.windows(2).all(|pair| pair[1] - pair[0] <= 4);
     with_padded_axes!(control_points.shape()[1], M, {
