@@ -47,11 +47,13 @@ class Planned:
             0.0,
             0.0,
         )
-        self.piece, self.kind, self.axis, self.value, self.u0, self.u1, self.p0, self.p1, duration, _ = columns
+        self.piece, self.kind, self.axis, self.value, self.u0, self.u1, self.p0, self.p1, duration, _ = (
+            columns
+        )
         self.time = float(duration.sum())
 
     def worst_excess(self, samples: int = 10) -> tuple[float, float]:
-        """Greatest relative excess of any limit, least use of the most used one, at places inside the arcs."""
+        """Greatest relative excess of any limit and least use of the most used one, inside the arcs."""
         # u is rounded: where an arc is as short as that, its places cannot be told apart.
         long = (self.u1 - self.u0) > 1e-6 * self.curve.width[self.piece]
         piece, kind, value = self.piece[long], self.kind[long, None], self.value[long, None]
