@@ -33,6 +33,7 @@ mod turns;
 
 use rayon::prelude::*;
 
+pub(crate) use profile::Row;
 pub use profile::{ArcKind, Profile, NO_AXIS};
 
 use crate::quadratic::{norm, Quadratic};
@@ -141,7 +142,7 @@ pub fn plan<const M: usize>(problem: &Problem<M>) -> Result<Profile, Fault> {
 }
 
 /// Groups of neighbouring runs with about `GROUP` pieces each.
-fn group(runs: &[usize]) -> Vec<std::ops::Range<usize>> {
+pub(crate) fn group(runs: &[usize]) -> Vec<std::ops::Range<usize>> {
     let mut groups = vec![];
     let mut first = 0;
     for run in 0..runs.len() - 1 {
@@ -154,7 +155,7 @@ fn group(runs: &[usize]) -> Vec<std::ops::Range<usize>> {
 }
 
 /// One profile of all groups.
-fn join(plans: Vec<Profile>) -> Profile {
+pub(crate) fn join(plans: Vec<Profile>) -> Profile {
     let mut plans = plans.into_iter();
     let mut all = plans.next().unwrap_or_default();
     for plan in plans {

@@ -4,6 +4,7 @@
 pub mod arc;
 pub mod arc_length;
 pub mod audit;
+pub mod bang_bang;
 pub mod bang_bang_quadratic;
 pub mod bernstein;
 pub mod corner;
@@ -14,6 +15,7 @@ pub mod limit_curve;
 pub mod motion;
 pub mod newton;
 pub mod path_builder;
+pub mod polynomial;
 pub mod quadratic;
 pub mod sampling;
 pub mod sarfraz;

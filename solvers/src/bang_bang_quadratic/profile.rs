@@ -19,6 +19,8 @@ pub enum ArcKind {
     AxisVelocity = 3,
     /// p = value · |C'|.
     Chord = 4,
+    /// |C'|² p is linear in u between its ends.
+    SpeedLine = 5,
 }
 
 /// No axis belongs to the arc.
@@ -42,7 +44,7 @@ pub struct Profile {
 }
 
 /// One row.
-pub(super) struct Row {
+pub(crate) struct Row {
     pub kind: ArcKind,
     pub axis: u8,
     pub value: f64,
@@ -86,11 +88,25 @@ impl Profile {
     }
 
     /// Closes a run.
-    pub(super) fn end_run(&mut self) {
+    pub(crate) fn end_run(&mut self) {
         let left_out = std::mem::take(&mut self.left_out);
         if let Some(last) = self.duration.last_mut() {
             *last += left_out;
         }
+    }
+
+    /// Drops all but the first rows.
+    pub(crate) fn truncate(&mut self, rows: usize) {
+        self.piece.truncate(rows);
+        self.kind.truncate(rows);
+        self.axis.truncate(rows);
+        self.value.truncate(rows);
+        self.u0.truncate(rows);
+        self.u1.truncate(rows);
+        self.p0.truncate(rows);
+        self.p1.truncate(rows);
+        self.duration.truncate(rows);
+        self.left_out = 0.0;
     }
 
     /// Appends the rows of another profile.
@@ -109,7 +125,7 @@ impl Profile {
     /// Appends an arc of piece number `piece`; t and p belong to the parameter t = u/width. An arc too short for u
     /// to show it is left out, its time goes to the next one.
     #[inline(always)]
-    pub(super) fn push(&mut self, piece: u32, width: f64, row: Row) {
+    pub(crate) fn push(&mut self, piece: u32, width: f64, row: Row) {
         let last = self.piece.len().wrapping_sub(1);
         let goes_on = last < self.piece.len() && self.piece[last] == piece;
         let (u0, u1) = (if goes_on { self.u1[last] } else { 0.0 }, row.t * width);

@@ -1,11 +1,14 @@
-//! `plan_quadratic`: the exact planner on quadratic pieces.
+//! `plan_quadratic` and `plan_curves`: the exact planner on quadratic pieces, and on pieces of any degree.
 
-use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::arrays::{quadratics, row};
+use super::arrays::{quadratics, row, rows};
 use super::with_padded_axes;
+use crate::bang_bang;
 use crate::bang_bang_quadratic::{plan, Fault, Problem, Profile};
+use crate::polynomial::MOST;
 
 pyo3::create_exception!(
     _solvers,
@@ -67,6 +70,72 @@ fn plan_quadratic<'py>(
     })
 }
 
+/// The fastest profile along pieces of any degree, polynomial and rational: the same columns.
+#[pyfunction]
+#[pyo3(signature = (control_points, weights, offsets, width, runs, feed, junction_speed, max_velocity, max_acceleration, chord_tolerance, period, start_speed, end_speed))]
+#[allow(clippy::too_many_arguments)]
+fn plan_curves<'py>(
+    py: Python<'py>,
+    control_points: PyReadonlyArray2<'py, f64>,
+    weights: PyReadonlyArray1<'py, f64>,
+    offsets: PyReadonlyArray1<'py, i64>,
+    width: PyReadonlyArray1<'py, f64>,
+    runs: PyReadonlyArray1<'py, i64>,
+    feed: PyReadonlyArray1<'py, f64>,
+    junction_speed: PyReadonlyArray1<'py, f64>,
+    max_velocity: PyReadonlyArray1<'py, f64>,
+    max_acceleration: PyReadonlyArray1<'py, f64>,
+    chord_tolerance: f64,
+    period: f64,
+    start_speed: f64,
+    end_speed: f64,
+) -> PyResult<Columns<'py>> {
+    let index = |array: &PyReadonlyArray1<i64>| -> Vec<usize> {
+        array.as_array().iter().map(|&value| usize::try_from(value).unwrap_or(usize::MAX)).collect()
+    };
+    let (runs, offsets) = (index(&runs), index(&offsets));
+    let count = control_points.shape()[0];
+    if offsets.first() != Some(&0)
+        || offsets.last() != Some(&count)
+        || offsets.windows(2).any(|pair| pair[1] < pair[0] + 2 || pair[1] > pair[0] + 10)
+    {
+        return Err(PyValueError::new_err(
+            "the offsets do not divide the control points into pieces of degree 1 to 9",
+        ));
+    }
+    let small = weights.as_slice()?.is_empty() && offsets.windows(2).all(|pair| pair[1] - pair[0] <= 4);
+    with_padded_axes!(control_points.shape()[1], M, {
+        let control = rows::<M>(&control_points)?;
+        let problem = bang_bang::Problem {
+            control: &control,
+            weight: weights.as_slice()?,
+            offset: &offsets,
+            width: width.as_slice()?,
+            tip_speed: None,
+            runs: &runs,
+            feed: feed.as_slice()?,
+            junction_speed: junction_speed.as_slice()?,
+            max_velocity: row(&max_velocity, 1.0)?,
+            max_acceleration: row(&max_acceleration, 1.0)?,
+            chord_tolerance,
+            period,
+            start_speed,
+            end_speed,
+        };
+        // Polynomials of small degree stay short.
+        let profile = py
+            .detach(|| {
+                if small {
+                    bang_bang::plan::<M, 10>(&problem)
+                } else {
+                    bang_bang::plan::<M, MOST>(&problem)
+                }
+            })
+            .map_err(|fault| to_exception(&fault))?;
+        Ok(to_columns(py, profile))
+    })
+}
+
 fn to_columns(py: Python<'_>, profile: Profile) -> Columns<'_> {
     let floats = |column| PyArray1::from_vec(py, column);
     (
@@ -97,5 +166,6 @@ fn to_exception(fault: &Fault) -> PyErr {
 /// Adds the function and its exception to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("PlanError", module.py().get_type::<PlanError>())?;
+    module.add_function(wrap_pyfunction!(plan_curves, module)?)?;
     module.add_function(wrap_pyfunction!(plan_quadratic, module)?)
 }

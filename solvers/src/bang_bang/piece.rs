@@ -1,0 +1,85 @@
+//! One piece of the path as the planner sees it: the hodograph over its parameter t in [0, 1].
+
+use crate::polynomial::Polynomial;
+use crate::quadratic::{dot, norm};
+
+/// C'(t) = g(t)/ω(t)² by axis, with ω = 1 on polynomial pieces, and the square of the tool's speed over π.
+///
+/// The state of the planner is π = (dt/dτ)²/ω⁴, τ the time, so that rational pieces keep polynomials everywhere:
+/// axis k has the velocity g_k √π and the acceleration ω² (g_k π'/2 + g_k' π).
+#[derive(Clone, Copy, Debug)]
+pub struct Piece<const M: usize, const C: usize> {
+    pub g: [Polynomial<C>; M],
+    pub weight: Polynomial<C>,
+    /// D: the speed squared is D π.
+    pub speed: Polynomial<C>,
+    /// Degree of the curve itself.
+    pub degree: usize,
+    /// All of g has one direction.
+    pub straight: bool,
+    /// D = |g|²: the axes are those of the tool.
+    pub own_speed: bool,
+}
+
+/// A tangent is off a straight line by no more than this part of the longest one, which is rounding, and of itself,
+/// or it is itself as short as rounding.
+const OFF_LINE: f64 = 2e-15;
+const OFF_ITSELF: f64 = 1e-9;
+const NO_TANGENT: f64 = 1e-13;
+
+impl<const M: usize, const C: usize> Piece<M, C> {
+    /// The piece with these control points, their weights (none: polynomial) and, where the path is one of joints,
+    /// the Bernstein coefficients of the tool's speed squared |dC/dt|².
+    pub fn new(control: &[[f64; M]], weights: &[f64], speed_sq: Option<&[f64]>) -> Self {
+        let degree = control.len() - 1;
+        let rational = weights.iter().any(|&weight| weight != weights[0]);
+        let (g, weight) = if rational {
+            let weight = Polynomial::from_bernstein(weights.iter().map(|&weight| weight / weights[0]));
+            let g = std::array::from_fn(|k| {
+                // About the first point, for the digits.
+                let numerator = Polynomial::from_bernstein(
+                    control
+                        .iter()
+                        .zip(weights)
+                        .map(|(point, &w)| (point[k] - control[0][k]) * (w / weights[0])),
+                );
+                numerator.wronskian(&weight)
+            });
+            (g, weight)
+        } else {
+            let scale = degree as f64;
+            let g = std::array::from_fn(|k| {
+                Polynomial::from_bernstein(control.windows(2).map(|pair| scale * (pair[1][k] - pair[0][k])))
+            });
+            (g, Polynomial::constant(1.0))
+        };
+        let along = straight_line(&g);
+        let g = along.unwrap_or(g);
+        let speed = match speed_sq {
+            Some(values) => Polynomial::from_bernstein(values.iter().copied()),
+            None => sum_of_squares(&g),
+        };
+        Self { g, weight, speed, degree, straight: along.is_some(), own_speed: speed_sq.is_none() }
+    }
+}
+
+/// The same tangents with exactly one direction, if they have one but for rounding.
+fn straight_line<const M: usize, const C: usize>(g: &[Polynomial<C>; M]) -> Option<[Polynomial<C>; M]> {
+    let tangents: Vec<[f64; M]> =
+        (0..=g[0].degree()).map(|i| std::array::from_fn(|k| g[k].bernstein(i))).collect();
+    let longest = tangents.iter().max_by(|a, b| norm(a).total_cmp(&norm(b)))?;
+    let length = norm(longest);
+    let direction = longest.map(|x| x / length);
+    let on_line = tangents.iter().all(|tangent| {
+        let along = dot(tangent, &direction);
+        let off = norm(&std::array::from_fn::<f64, M, _>(|k| tangent[k] - along * direction[k]));
+        let own = norm(tangent);
+        off <= OFF_LINE * length && (off <= OFF_ITSELF * own || own <= NO_TANGENT * length)
+    });
+    let rate = Polynomial::from_bernstein(tangents.iter().map(|tangent| dot(tangent, &direction)));
+    on_line.then(|| direction.map(|x| rate.scale(x)))
+}
+
+fn sum_of_squares<const M: usize, const C: usize>(g: &[Polynomial<C>; M]) -> Polynomial<C> {
+    g.iter().fold(Polynomial::constant(0.0), |sum, g| sum.combine(1.0, &g.multiply(g), 1.0))
+}

@@ -1,0 +1,335 @@
+//! Both passes over one run, its arcs into the columns of the profile.
+
+use super::pass::{self, cusp, distance, Arc, Kind, State};
+use super::piece::Piece;
+use super::split::{split, Axes, Cap, Part, SubPiece};
+use super::Task;
+use crate::bang_bang_quadratic::{ArcKind, Fault, Profile, Row, NO_AXIS};
+use crate::polynomial::Polynomial;
+
+/// Two directions that differ by more than this at a cusp form a corner.
+const SMOOTH_TURN: f64 = 1e-9;
+/// A speed asked for at an end of the path may exceed what can be had by this part, which is rounding.
+const REACHED: f64 = 1e-12;
+/// An arc may exceed a limit by this part.
+const EXCESS: f64 = 1e-9;
+/// Sub-pieces on which p is held instead, at most, in a run.
+const MOST_HELD: usize = 100;
+
+/// Space for the passes, kept from run to run.
+#[derive(Default)]
+pub struct Workspace {
+    parts: Vec<Part>,
+    /// Of each piece: its parts, of each part: its arcs of the backward pass, last piece and last part first.
+    pieces: Vec<std::ops::Range<usize>>,
+    bounds: Vec<Arc>,
+    offsets: Vec<usize>,
+    arcs: Vec<Arc>,
+    /// Parts where p is held, because a pass came to no end there.
+    held: Vec<(usize, usize)>,
+}
+
+/// A part where the forward pass fails.
+struct Failed {
+    piece: usize,
+    part: usize,
+}
+
+/// Plans the pieces `first..last` of the task from one speed squared to another; appends the arcs.
+pub fn plan_run<const M: usize, const C: usize>(
+    task: &Task<M>,
+    (first, last): (usize, usize),
+    (start_sq, end_sq): (f64, f64),
+    space: &mut Workspace,
+    out: &mut Profile,
+) -> Result<(), Fault> {
+    space.held.clear();
+    let rows = out.len();
+    loop {
+        let reachable = backward::<M, C>(task, (first, last), end_sq, space);
+        if start_sq > reachable * (1.0 + REACHED) {
+            return Err(Fault::Start { piece: first, reachable: reachable.sqrt() });
+        }
+        match forward::<M, C>(task, (first, last), start_sq.min(reachable), space, out) {
+            Ok(reached) if reached < end_sq * (1.0 - REACHED) => {
+                return Err(Fault::End { piece: last - 1, reachable: reached.sqrt() });
+            }
+            Ok(_) => break,
+            Err(Failed { piece, part }) => {
+                if space.held.len() == MOST_HELD || space.held.contains(&(piece, part)) {
+                    return Err(Fault::Stuck {
+                        piece,
+                        u: space.parts[part].from * task.problem.width[piece],
+                    });
+                }
+                space.held.push((piece, part));
+                out.truncate(rows);
+            }
+        }
+    }
+    out.end_run();
+    Ok(())
+}
+
+impl<const M: usize> Task<'_, M> {
+    fn piece<const C: usize>(&self, i: usize) -> Piece<M, C> {
+        let problem = self.problem;
+        let range = problem.offset[i]..problem.offset[i + 1];
+        let weights = if problem.weight.is_empty() { &[][..] } else { &problem.weight[range.clone()] };
+        let tip = problem.tip_speed.map(|(values, offsets)| &values[offsets[i]..offsets[i + 1]]);
+        Piece::new(&problem.control[range], weights, tip)
+    }
+}
+
+/// The signed limit direction at one end of a part, and whether the tangent itself is zero there.
+fn end_direction<const M: usize, const C: usize>(
+    sub: &SubPiece<M, C>,
+    negative: u8,
+    at_end: bool,
+) -> (bool, [f64; M]) {
+    let (order, direction) = cusp(sub, at_end);
+    let signed = std::array::from_fn(|k| if negative >> k & 1 == 1 { -direction[k] } else { direction[k] });
+    (order > 0, signed)
+}
+
+/// The greatest v² where two parts meet: none in the corner of a cusp.
+fn at_cusp<const M: usize>(before: &(bool, [f64; M]), after: &(bool, [f64; M]), speed_sq: f64) -> f64 {
+    let turn: f64 = before.1.iter().zip(&after.1).map(|(a, b)| (a - b) * (a - b)).sum();
+    if (before.0 || after.0) && turn > SMOOTH_TURN * SMOOTH_TURN {
+        0.0
+    } else {
+        speed_sq
+    }
+}
+
+/// The greatest v² at the start of the run from which `end_sq` can be met; leaves the arcs in the workspace.
+fn backward<const M: usize, const C: usize>(
+    task: &Task<M>,
+    (first, last): (usize, usize),
+    end_sq: f64,
+    space: &mut Workspace,
+) -> f64 {
+    space.parts.clear();
+    space.pieces.clear();
+    space.bounds.clear();
+    space.offsets.clear();
+    let mut state = State { speed_sq: end_sq };
+    let mut after: Option<(bool, [f64; M])> = None;
+    for i in (first..last).rev() {
+        let piece = task.piece::<C>(i);
+        let feed = task.problem.feed[i];
+        let start = space.parts.len();
+        split(&piece, &task.axes, feed * feed, task.chord.as_ref(), &mut space.parts);
+        space.pieces.push(start..space.parts.len());
+        if i + 1 < last {
+            let limit = task.problem.junction_speed[i + 1];
+            state.speed_sq = state.speed_sq.min(limit * limit);
+        }
+        for number in (start..space.parts.len()).rev() {
+            let part = space.parts[number];
+            let sub = part.sub_piece(&piece);
+            let end = end_direction(&sub, part.negative, true);
+            if let Some(after) = &after {
+                state.speed_sq = at_cusp(&end, after, state.speed_sq);
+            }
+            after = Some(end_direction(&sub, part.negative, false));
+            space.offsets.push(space.bounds.len());
+            let reversed = sub.reversed();
+            let held = space.held.contains(&(i, number));
+            let arcs = space.bounds.len();
+            let tried = if held {
+                Err(pass::Stuck)
+            } else {
+                pass::run::<M, C, true>(&reversed, &task.axes, state, &[], &mut space.bounds)
+            };
+            state = tried.unwrap_or_else(|_| {
+                space.bounds.truncate(arcs);
+                hold(&reversed, &task.axes, state, &mut space.bounds)
+            });
+        }
+    }
+    state.speed_sq
+}
+
+/// Holds p over a sub-piece, as high as the limits and the state allow.
+fn hold<const M: usize, const C: usize>(
+    sub: &SubPiece<M, C>,
+    axes: &Axes<M>,
+    state: State,
+    out: &mut Vec<Arc>,
+) -> State {
+    let (first, last) = (sub.weight.first().powi(4), sub.weight.last().powi(4));
+    let mut p = pass::hold(sub, axes);
+    if sub.speed.first() > 0.0 {
+        p = p.min(state.speed_sq / sub.speed.first() * first);
+    }
+    out.push(Arc { x0: 0.0, x1: 1.0, kind: Kind::Hold, pi: [p / first, p / last], slow_sq: p });
+    State { speed_sq: p / last * sub.speed.last() }
+}
+
+/// From `start_sq` under the arcs of the backward pass; appends the rows and returns v² at the end.
+fn forward<const M: usize, const C: usize>(
+    task: &Task<M>,
+    (first, last): (usize, usize),
+    start_sq: f64,
+    space: &mut Workspace,
+    out: &mut Profile,
+) -> Result<f64, Failed> {
+    let mut state = State { speed_sq: start_sq };
+    let mut before: Option<(bool, [f64; M])> = None;
+    let mut index = space.offsets.len();
+    for i in first..last {
+        let piece = task.piece::<C>(i);
+        if i > first {
+            let limit = task.problem.junction_speed[i];
+            state.speed_sq = state.speed_sq.min(limit * limit);
+        }
+        for number in space.pieces[last - 1 - i].clone() {
+            let part = space.parts[number];
+            let sub = part.sub_piece(&piece);
+            let start = end_direction(&sub, part.negative, false);
+            if let Some(before) = &before {
+                state.speed_sq = at_cusp(before, &start, state.speed_sq);
+            }
+            before = Some(end_direction(&sub, part.negative, true));
+            index -= 1;
+            let end = space.offsets.get(index + 1).copied().unwrap_or(space.bounds.len());
+            let bounds = &space.bounds[space.offsets[index]..end];
+            space.arcs.clear();
+            let failed = |_| Failed { piece: i, part: number };
+            state = match pass::run::<M, C, false>(&sub, &task.axes, state, bounds, &mut space.arcs) {
+                Ok(next) if keeps_limits(&sub, &task.axes, &space.arcs) => next,
+                // Below the held p of the backward pass p can be held too.
+                _ if bounds.iter().all(|arc| arc.kind == Kind::Hold) => {
+                    space.arcs.clear();
+                    hold(&sub, &task.axes, state, &mut space.arcs)
+                }
+                _ => return Err(failed(pass::Stuck)),
+            };
+            push(task, i, &part, &sub, &space.arcs, out);
+        }
+    }
+    Ok(state.speed_sq)
+}
+
+/// Whether every axis keeps its limits at some places of the arcs: a guard against rounding.
+fn keeps_limits<const M: usize, const C: usize>(sub: &SubPiece<M, C>, axes: &Axes<M>, arcs: &[Arc]) -> bool {
+    arcs.iter().all(|arc| {
+        let (j, slow_at, signed) = match arc.kind {
+            Kind::Accelerating(j) => (j, arc.x0, axes.acceleration[j]),
+            Kind::Braking(j) => (j, arc.x1, -axes.acceleration[j]),
+            _ => return true,
+        };
+        let twist: [Polynomial<C>; M] = std::array::from_fn(|l| {
+            if sub.straight || l == j {
+                Polynomial::constant(0.0)
+            } else {
+                sub.g[l].wronskian(&sub.g[j])
+            }
+        });
+        [0.02, 0.35, 0.7, 0.98].iter().all(|&part| {
+            let x = arc.x0 + part * (arc.x1 - arc.x0);
+            let weight = sub.weight.value(x);
+            let way = if x > slow_at { distance(sub, j, slow_at, x) } else { distance(sub, j, x, slow_at) };
+            let g = sub.g[j].value(x);
+            let pi = (arc.slow_sq + 2.0 * axes.acceleration[j] * way) / (g * g);
+            (0..M).all(|l| {
+                let other = sub.g[l].value(x);
+                // ω² (g_l s + g_l' π) with s from axis j, without the difference of large terms.
+                let acceleration = (signed * other + weight * weight * pi * twist[l].value(x)) / g;
+                acceleration.abs() <= axes.acceleration[l] * (1.0 + EXCESS)
+                    && other * other * pi <= axes.velocity_sq[l] * (1.0 + EXCESS)
+            })
+        })
+    })
+}
+
+/// Appends the arcs of the forward pass over one part.
+fn push<const M: usize, const C: usize>(
+    task: &Task<M>,
+    number: usize,
+    part: &Part,
+    sub: &SubPiece<M, C>,
+    arcs: &[Arc],
+    out: &mut Profile,
+) {
+    let width = task.problem.width[number];
+    let span = part.to - part.from;
+    for arc in arcs {
+        let t = if arc.x1 == 1.0 { part.to } else { part.from + span * arc.x1 };
+        let weight = |x: f64| sub.weight.value(x);
+        // p = (dt/dτ)² from π of x.
+        let p = |pi: f64, x: f64| pi * weight(x).powi(4) * span * span;
+        let way = |k: usize| distance(sub, k, arc.x0, arc.x1);
+        let signed = |k: usize| {
+            let a = task.axes.acceleration[k];
+            if part.negative >> k & 1 == 1 {
+                -a
+            } else {
+                a
+            }
+        };
+        let mut joins = true;
+        let mut by_acceleration = |k: usize| {
+            // Way over mean speed, the faster speed from the way.
+            let way = way(k);
+            // An arc that begins where its axis turns has another formula for p.
+            joins = arc.pi[0].is_finite() && arc.pi[1].is_finite() && sub.g[k].value(arc.x0) > 0.0;
+            2.0 * way / (arc.slow_sq.sqrt() + (arc.slow_sq + 2.0 * task.axes.acceleration[k] * way).sqrt())
+        };
+        let (kind, axis, value, duration) = match arc.kind {
+            Kind::Accelerating(k) => (ArcKind::AxisAcceleration, k as u8, signed(k), by_acceleration(k)),
+            Kind::Braking(k) => (ArcKind::AxisAcceleration, k as u8, -signed(k), by_acceleration(k)),
+            Kind::LimitCurve => continue,
+            Kind::Hold => (ArcKind::Flat, NO_AXIS, 0.0, (arc.x1 - arc.x0) / arc.slow_sq.sqrt()),
+            Kind::Cap => match sub.cap {
+                Cap::Axis(k, v_sq) => (ArcKind::AxisVelocity, k as u8, v_sq, way(k) / v_sq.sqrt()),
+                Cap::Speed([f0, f1]) => {
+                    let time = time_at_speed(sub, (f0, f1), arc.x0, arc.x1);
+                    if f0 == f1 {
+                        (ArcKind::Feed, NO_AXIS, f0, time)
+                    } else {
+                        (ArcKind::SpeedLine, NO_AXIS, 0.0, time)
+                    }
+                }
+            },
+        };
+        let joins = joins && !matches!(kind, ArcKind::SpeedLine);
+        let p = [p(arc.pi[0], arc.x0), p(arc.pi[1], arc.x1)];
+        out.push(number as u32, width, Row { kind, axis, value, t, p, duration, joins });
+    }
+}
+
+/// ∫ √D/(ω² √f) dx from x0 to x1: length over speed, by Gauss's rule of order 12, halved until it agrees.
+fn time_at_speed<const M: usize, const C: usize>(
+    sub: &SubPiece<M, C>,
+    (f0, f1): (f64, f64),
+    x0: f64,
+    x1: f64,
+) -> f64 {
+    let rate = |x: f64| {
+        let weight = sub.weight.value(x);
+        (sub.speed.value(x).max(0.0) / (f0 + x * (f1 - f0))).sqrt() / (weight * weight)
+    };
+    gauss(&rate, x0, x1, rule(&rate, x0, x1), 0)
+}
+
+fn gauss(rate: &impl Fn(f64) -> f64, a: f64, b: f64, whole: f64, depth: u32) -> f64 {
+    let middle = 0.5 * (a + b);
+    let (left, right) = (rule(rate, a, middle), rule(rate, middle, b));
+    if (left + right - whole).abs() <= 1e-14 * whole || depth == 40 {
+        return left + right;
+    }
+    gauss(rate, a, middle, left, depth + 1) + gauss(rate, middle, b, right, depth + 1)
+}
+
+/// Gauss's rule of six places.
+fn rule(rate: &impl Fn(f64) -> f64, a: f64, b: f64) -> f64 {
+    const NODES: [(f64, f64); 3] = [
+        (0.238_619_186_083_196_9, 0.467_913_934_572_691_04),
+        (0.661_209_386_466_264_5, 0.360_761_573_048_138_6),
+        (0.932_469_514_203_152, 0.171_324_492_379_170_35),
+    ];
+    let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
+    half * NODES.iter().map(|(x, w)| w * (rate(middle - half * x) + rate(middle + half * x))).sum::<f64>()
+}

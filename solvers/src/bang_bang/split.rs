@@ -1,0 +1,289 @@
+//! Cuts a piece where an axis turns round and where the lowest velocity cap changes.
+
+use super::chord::{ChordLimit, SpeedLine};
+use super::piece::Piece;
+use crate::polynomial::Polynomial;
+
+/// Cuts closer than this part of the piece are one.
+const SAME_CUT: f64 = 1e-13;
+/// Turns closer than this part of the piece are one.
+const SAME_TURN: f64 = 1e-8;
+/// Closer than this to a turn where |C'|² is below this part of its greatest value, no velocity cap counts.
+const NEAR_CUSP: f64 = 1e-5;
+const SLOW: f64 = 1e-10;
+/// The value of a polynomial is rounding below this part of its terms.
+const NOISE: f64 = 1e-14;
+/// A tangent coefficient this small beside the greatest one is zero.
+const ZERO: f64 = 1e-14;
+
+/// The lowest velocity cap of a sub-piece.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Cap {
+    /// The speed squared, linear in t between its two ends: the feed, or a bound below the chord-error limit.
+    Speed([f64; 2]),
+    /// The square of the velocity limit of an axis.
+    Axis(usize, f64),
+}
+
+/// Limits of the axes.
+pub struct Axes<const M: usize> {
+    pub acceleration: [f64; M],
+    pub velocity_sq: [f64; M],
+}
+
+/// A part [from, to] of a piece on which no axis turns round and one velocity cap is the lowest.
+#[derive(Clone, Copy, Debug)]
+pub struct Part {
+    pub from: f64,
+    pub to: f64,
+    pub cap: Cap,
+    /// Bit k: axis k turns round at the left or right end, moves backward in between, moves at all.
+    zero_left: u8,
+    zero_right: u8,
+    pub negative: u8,
+    moving: u8,
+}
+
+/// A part as a pass travels it, its polynomials over x in [0, 1], every axis moving forward.
+///
+/// Here g and π belong to x: π = (dx/dτ)²/ω⁴.
+#[derive(Clone, Copy, Debug)]
+pub struct SubPiece<const M: usize, const C: usize> {
+    pub g: [Polynomial<C>; M],
+    pub weight: Polynomial<C>,
+    pub speed: Polynomial<C>,
+    pub cap: Cap,
+    /// Bit k: axis k moves at all.
+    pub moving: u8,
+    /// Degree of the curve itself.
+    pub degree: usize,
+    pub straight: bool,
+    pub own_speed: bool,
+}
+
+/// Appends the parts of the piece from left to right.
+pub fn split<const M: usize, const C: usize>(
+    piece: &Piece<M, C>,
+    axes: &Axes<M>,
+    feed_sq: f64,
+    chord: Option<&ChordLimit>,
+    out: &mut Vec<Part>,
+) {
+    let size = |g: &Polynomial<C>| g.coefficients().iter().fold(0.0, |most: f64, c| most.max(c.abs()));
+    let greatest = piece.g.iter().map(size).fold(0.0, f64::max);
+    let mut moving = 0u8;
+    // Places, and the axes that turn there.
+    let mut cuts = vec![(0.0, 0u8), (1.0, 0u8)];
+    for (k, g) in piece.g.iter().enumerate() {
+        if size(g) <= ZERO * greatest {
+            continue;
+        }
+        moving |= 1 << k;
+        for (end, t) in [(g.first(), 0.0), (g.last(), 1.0)] {
+            if end.abs() <= ZERO * size(g) {
+                cuts.push((t, 1 << k));
+            }
+        }
+        if !piece.straight {
+            g.sign_changes(&mut |t| cuts.push((t, 1 << k)));
+        }
+    }
+    if piece.straight {
+        // All axes turn at once, in a cusp.
+        let greatest = (0..M).max_by(|&a, &b| size(&piece.g[a]).total_cmp(&size(&piece.g[b]))).unwrap_or(0);
+        piece.g[greatest].sign_changes(&mut |t| cuts.push((t, moving)));
+    }
+    let mut lines = vec![];
+    match chord {
+        Some(chord) => chord.lines(piece, feed_sq, &mut lines),
+        None => lines.push(SpeedLine { from: 0.0, to: 1.0, speed_sq: [feed_sq; 2] }),
+    }
+    let squares: [Polynomial<C>; M] = std::array::from_fn(|k| piece.g[k].multiply(&piece.g[k]));
+    let mut fast = 0u8;
+    for line in &lines {
+        cuts.push((line.from, 0));
+        fast |= cut_by_cap(piece, axes, &squares, line, moving, &mut cuts);
+    }
+    merge_near_cusps(piece, &mut cuts);
+    cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
+    cuts.dedup_by(|b, a| {
+        let same = b.0 - a.0 <= SAME_CUT;
+        if same {
+            a.1 |= b.1;
+        }
+        same
+    });
+    if let Some(last) = cuts.last_mut() {
+        last.0 = 1.0;
+    }
+    let mut lines = lines.iter().peekable();
+    for pair in cuts.windows(2) {
+        let ((from, left), (to, right)) = (pair[0], pair[1]);
+        while lines.peek().is_some_and(|line| line.to <= 0.5 * (from + to)) {
+            lines.next();
+        }
+        let Some(line) = lines.peek() else { break };
+        let middle = 0.5 * (from + to);
+        let g: [f64; M] = std::array::from_fn(|k| piece.g[k].value(middle));
+        out.push(Part {
+            from,
+            to,
+            cap: lowest_cap(&g, piece.speed.value(middle), axes, line, (from, to), fast),
+            zero_left: left,
+            zero_right: right,
+            negative: (0..M).fold(0, |bits, k| bits | u8::from(g[k] < 0.0) << k),
+            moving,
+        });
+    }
+}
+
+/// Near a cusp the axes turn within what rounding can tell apart: there they turn at once, and no velocity cap counts,
+/// for the tool hardly moves.
+fn merge_near_cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, cuts: &mut Vec<(f64, u8)>) {
+    let fastest = piece.speed.range().1;
+    let is_end = |t: f64| t == 0.0 || t == 1.0;
+    let mut turns: Vec<(f64, u8)> =
+        cuts.iter().copied().filter(|&(t, axes)| axes != 0 || is_end(t)).collect();
+    turns.sort_by(|a, b| a.0.total_cmp(&b.0));
+    turns.dedup_by(|b, a| {
+        let same = b.0 - a.0 <= SAME_TURN;
+        if same {
+            a.1 |= b.1;
+            // The ends of the piece stay where they are.
+            a.0 = if b.0 == 1.0 { 1.0 } else { a.0 };
+        }
+        same
+    });
+    let slow = |t: f64| piece.speed.value(t) <= SLOW * fastest;
+    let near = |t: f64| turns.iter().any(|&(turn, _)| (t - turn).abs() <= NEAR_CUSP && slow(turn));
+    let rest: Vec<(f64, u8)> =
+        cuts.iter().copied().filter(|&(t, axes)| axes == 0 && !is_end(t) && !near(t)).collect();
+    cuts.clear();
+    cuts.extend(turns.iter().copied().chain(rest));
+}
+
+/// Cuts the places where the caps cross on a line; says which axes can be faster than their limits.
+fn cut_by_cap<const M: usize, const C: usize>(
+    piece: &Piece<M, C>,
+    axes: &Axes<M>,
+    squares: &[Polynomial<C>; M],
+    line: &SpeedLine,
+    moving: u8,
+    cuts: &mut Vec<(f64, u8)>,
+) -> u8 {
+    let mut fast = 0u8;
+    let mut cut = |t: f64| cuts.push((line.from + t * (line.to - line.from), 0));
+    let whole = line.from == 0.0 && line.to == 1.0;
+    let on_line = |p: &Polynomial<C>| if whole { *p } else { p.part(line.from, line.to) };
+    let speed = on_line(&piece.speed);
+    let [f0, f1] = line.speed_sq;
+    let bound =
+        if f0 == f1 { Polynomial::constant(f0) } else { Polynomial::from_bernstein([f0, f1].into_iter()) };
+    for k in (0..M).filter(|&k| moving >> k & 1 == 1 && axes.velocity_sq[k] < f64::MAX) {
+        if f0.is_finite() && f1.is_finite() {
+            let excess = on_line(&squares[k]).multiply(&bound).combine(1.0, &speed, -axes.velocity_sq[k]);
+            if excess.coefficients().iter().all(|&value| value <= 0.0) {
+                continue;
+            }
+            crossings(&excess, &mut cut);
+        }
+        fast |= 1 << k;
+    }
+    for j in (0..M).filter(|&j| fast >> j & 1 == 1) {
+        for k in (j + 1..M).filter(|&k| fast >> k & 1 == 1) {
+            let (v_j, v_k) = (axes.velocity_sq[j].sqrt(), axes.velocity_sq[k].sqrt());
+            for sign in [1.0, -1.0] {
+                crossings(&on_line(&piece.g[k].combine(v_j, &piece.g[j], sign * v_k)), &mut cut);
+            }
+        }
+    }
+    fast
+}
+
+impl Part {
+    /// The part as travelled forward.
+    pub fn sub_piece<const M: usize, const C: usize>(&self, piece: &Piece<M, C>) -> SubPiece<M, C> {
+        let length = self.to - self.from;
+        let g = std::array::from_fn(|k| {
+            if self.moving >> k & 1 == 0 {
+                return Polynomial::constant(0.0).elevate(piece.g[k].degree());
+            }
+            let sign = if self.negative >> k & 1 == 1 { -length } else { length };
+            let mut g = piece.g[k].part(self.from, self.to).scale(sign);
+            if self.zero_left >> k & 1 == 1 {
+                g.set_first(0.0);
+            }
+            if self.zero_right >> k & 1 == 1 {
+                g.set_last(0.0);
+            }
+            g
+        });
+        SubPiece {
+            g,
+            weight: piece.weight.part(self.from, self.to),
+            speed: piece.speed.part(self.from, self.to).scale(length * length),
+            cap: self.cap,
+            moving: self.moving,
+            degree: piece.degree,
+            straight: piece.straight,
+            own_speed: piece.own_speed,
+        }
+    }
+}
+
+impl<const M: usize, const C: usize> SubPiece<M, C> {
+    /// The same as the backward pass travels it.
+    pub fn reversed(&self) -> Self {
+        let cap = match self.cap {
+            Cap::Speed([f0, f1]) => Cap::Speed([f1, f0]),
+            cap => cap,
+        };
+        Self {
+            g: std::array::from_fn(|k| self.g[k].reverse()),
+            weight: self.weight.reverse(),
+            speed: self.speed.reverse(),
+            cap,
+            ..*self
+        }
+    }
+}
+
+/// Where a polynomial changes its sign by more than rounding: between two places that rounding alone keeps apart, as
+/// next to a double root, it does not.
+fn crossings<const C: usize>(p: &Polynomial<C>, cut: &mut impl FnMut(f64)) {
+    let mut places: Vec<f64> = vec![];
+    p.sign_changes(&mut |t| {
+        if let Some(&last) = places.last() {
+            let middle = 0.5 * (last + t);
+            if p.value(middle).abs() <= NOISE * p.magnitude().value(middle) {
+                places.pop();
+                return;
+            }
+        }
+        places.push(t);
+    });
+    places.into_iter().for_each(cut);
+}
+
+/// The lowest cap in the middle of a part, where it is so everywhere; g and D are those of the middle.
+fn lowest_cap<const M: usize>(
+    g: &[f64; M],
+    speed: f64,
+    axes: &Axes<M>,
+    line: &SpeedLine,
+    (from, to): (f64, f64),
+    fast: u8,
+) -> Cap {
+    let [f0, f1] = line.speed_sq;
+    let at = |t: f64| if f0 == f1 { f0 } else { f0 + (f1 - f0) * ((t - line.from) / (line.to - line.from)) };
+    let ends = [at(from), at(to)];
+    let mut lowest = 0.5 * (ends[0] + ends[1]) / speed;
+    let mut cap = Cap::Speed(ends);
+    for k in (0..M).filter(|&k| fast >> k & 1 == 1) {
+        if g[k] * g[k] * lowest > axes.velocity_sq[k] {
+            lowest = axes.velocity_sq[k] / (g[k] * g[k]);
+            cap = Cap::Axis(k, axes.velocity_sq[k]);
+        }
+    }
+    cap
+}

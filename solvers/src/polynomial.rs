@@ -1,0 +1,549 @@
+//! Polynomials on [0, 1] of a degree known at run time, in scaled Bernstein form: p(x) = Σ c_i x^i (1 − x)^(n−i).
+//!
+//! The scaled coefficients are the Bernstein coefficients times binomials, so that they have the same signs; a product
+//! is a plain convolution, and a root of known order at 0 is divided out by dropping the first coefficients. `C` bounds
+//! the number of coefficients; no operation allocates.
+
+/// Most coefficients of any polynomial.
+pub const MOST: usize = 72;
+/// Halving stops here: the interval is then as short as the spacing of numbers near 1.
+const MAX_DEPTH: u32 = 52;
+
+/// A Newton step this small, quadratically convergent, leaves an error below rounding.
+const LAST_STEP: f64 = 3e-9;
+
+/// Pascal's triangle.
+static BINOMIALS: [[f64; MOST]; MOST] = binomials();
+
+const fn binomials() -> [[f64; MOST]; MOST] {
+    let mut table = [[0.0; MOST]; MOST];
+    let mut n = 0;
+    while n < MOST {
+        table[n][0] = 1.0;
+        let mut i = 1;
+        while i <= n {
+            table[n][i] = table[n - 1][i - 1] + if i < n { table[n - 1][i] } else { 0.0 };
+            i += 1;
+        }
+        n += 1;
+    }
+    table
+}
+
+/// A polynomial of degree `n` with its scaled Bernstein coefficients `c[0..=n]`; the others are 0.
+#[derive(Clone, Copy, Debug)]
+pub struct Polynomial<const C: usize> {
+    n: usize,
+    c: [f64; C],
+}
+
+impl<const C: usize> Polynomial<C> {
+    /// A constant.
+    #[inline(always)]
+    pub fn constant(value: f64) -> Self {
+        let mut c = [0.0; C];
+        c[0] = value;
+        Self { n: 0, c }
+    }
+
+    /// The polynomial with these Bernstein coefficients.
+    #[inline]
+    pub fn from_bernstein(coefficients: impl ExactSizeIterator<Item = f64>) -> Self {
+        let n = coefficients.len() - 1;
+        let mut c = [0.0; C];
+        for (i, value) in coefficients.enumerate() {
+            c[i] = value * BINOMIALS[n][i];
+        }
+        Self { n, c }
+    }
+
+    #[inline(always)]
+    pub fn degree(&self) -> usize {
+        self.n
+    }
+
+    /// Its scaled coefficients.
+    #[inline(always)]
+    pub fn coefficients(&self) -> &[f64] {
+        &self.c[..=self.n]
+    }
+
+    /// Bernstein coefficient `i`.
+    #[inline(always)]
+    pub fn bernstein(&self, i: usize) -> f64 {
+        self.c[i] / BINOMIALS[self.n][i]
+    }
+
+    /// The greatest and the least Bernstein coefficient: the polynomial lies between them.
+    pub fn range(&self) -> (f64, f64) {
+        (0..=self.n)
+            .map(|i| self.bernstein(i))
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
+    }
+
+    /// p(0).
+    #[inline(always)]
+    pub fn first(&self) -> f64 {
+        self.c[0]
+    }
+
+    /// p(1).
+    #[inline(always)]
+    pub fn last(&self) -> f64 {
+        self.c[self.n]
+    }
+
+    pub fn set_first(&mut self, value: f64) {
+        self.c[0] = value;
+    }
+
+    pub fn set_last(&mut self, value: f64) {
+        self.c[self.n] = value;
+    }
+
+    /// p'(0).
+    #[inline(always)]
+    pub fn first_slope(&self) -> f64 {
+        if self.n == 0 {
+            0.0
+        } else {
+            self.c[1] - self.n as f64 * self.c[0]
+        }
+    }
+
+    /// p''(0).
+    #[inline(always)]
+    pub fn first_bend(&self) -> f64 {
+        if self.n < 2 {
+            return 0.0;
+        }
+        let n = self.n as f64;
+        2.0 * self.c[2] - 2.0 * (n - 1.0) * self.c[1] + n * (n - 1.0) * self.c[0]
+    }
+
+    /// Every coefficient changed.
+    #[inline(always)]
+    pub fn map(&self, change: impl Fn(f64) -> f64) -> Self {
+        let mut c = [0.0; C];
+        for i in 0..=self.n {
+            c[i] = change(self.c[i]);
+        }
+        Self { n: self.n, c }
+    }
+
+    #[inline(always)]
+    pub fn scale(&self, factor: f64) -> Self {
+        self.map(|value| factor * value)
+    }
+
+    /// Every coefficient by its size.
+    #[inline(always)]
+    pub fn magnitude(&self) -> Self {
+        self.map(f64::abs)
+    }
+
+    #[inline(always)]
+    pub fn multiply(&self, other: &Self) -> Self {
+        let mut c = [0.0; C];
+        for i in 0..=self.n {
+            for j in 0..=other.n {
+                c[i + j] += self.c[i] * other.c[j];
+            }
+        }
+        Self { n: self.n + other.n, c }
+    }
+
+    /// The same polynomial as one of degree `n`.
+    #[inline(always)]
+    pub fn elevate(&self, n: usize) -> Self {
+        let mut c = self.c;
+        for degree in self.n + 1..=n {
+            for i in (1..=degree).rev() {
+                c[i] += c[i - 1];
+            }
+        }
+        Self { n: n.max(self.n), c }
+    }
+
+    /// a p + b q.
+    #[inline(always)]
+    pub fn combine(&self, a: f64, other: &Self, b: f64) -> Self {
+        let n = self.n.max(other.n);
+        let (p, q) = (self.elevate(n), other.elevate(n));
+        let mut c = [0.0; C];
+        for i in 0..=n {
+            c[i] = a * p.c[i] + b * q.c[i];
+        }
+        Self { n, c }
+    }
+
+    #[inline(always)]
+    pub fn derivative(&self) -> Self {
+        let mut c = [0.0; C];
+        if self.n == 0 {
+            return Self { n: 0, c };
+        }
+        for i in 0..self.n {
+            c[i] = (i + 1) as f64 * self.c[i + 1] - (self.n - i) as f64 * self.c[i];
+        }
+        Self { n: self.n - 1, c }
+    }
+
+    /// p' q − p q' of two polynomials of one degree; its degree is 2 n − 2.
+    #[inline(always)]
+    pub fn wronskian(&self, other: &Self) -> Self {
+        let n = self.n;
+        debug_assert_eq!(n, other.n);
+        if n == 0 {
+            return Self::constant(0.0);
+        }
+        let mut c = [0.0; C];
+        for a in 0..=n {
+            for b in a + 1..=n {
+                c[a + b - 1] += (b - a) as f64 * (self.c[b] * other.c[a] - self.c[a] * other.c[b]);
+            }
+        }
+        Self { n: 2 * n - 2, c }
+    }
+
+    /// The wronskian's terms by their sizes: how much rounding it can hold.
+    pub fn wronskian_magnitude(&self, other: &Self) -> Self {
+        let n = self.n;
+        if n == 0 {
+            return Self::constant(0.0);
+        }
+        let mut c = [0.0; C];
+        for a in 0..=n {
+            for b in a + 1..=n {
+                let size = (self.c[b] * other.c[a]).abs() + (self.c[a] * other.c[b]).abs();
+                c[a + b - 1] += (b - a) as f64 * size;
+            }
+        }
+        Self { n: 2 * n - 2, c }
+    }
+
+    /// The m of degree `degree` with m' w − m w' = p and m(0) = 0, so that (m/w)' = p/w².
+    #[inline(always)]
+    pub fn antiderivative(&self, weight: &Self, degree: usize) -> Self {
+        let mut c = [0.0; C];
+        if weight.n == 0 {
+            // w = 1: the plain integral, of degree n + 1.
+            let n = self.n + 1;
+            for i in 0..n {
+                c[i + 1] = (self.c[i] + (n - i) as f64 * c[i]) / (i + 1) as f64;
+            }
+            return Self { n, c };
+        }
+        for i in 0..degree {
+            let mut rest = self.c[i];
+            for a in 1..=i {
+                rest -= (2.0 * a as f64 - (i + 1) as f64) * c[a] * weight.c[i + 1 - a];
+            }
+            c[i + 1] = rest / ((i + 1) as f64 * weight.c[0]);
+        }
+        Self { n: degree, c }
+    }
+
+    /// The polynomial without its known root of order `r` at 0.
+    #[inline(always)]
+    pub fn deflate(&self, r: usize) -> Self {
+        let r = r.min(self.n);
+        let mut c = [0.0; C];
+        c[..=self.n - r].copy_from_slice(&self.c[r..=self.n]);
+        Self { n: self.n - r, c }
+    }
+
+    /// p(1 − x).
+    #[inline(always)]
+    pub fn reverse(&self) -> Self {
+        let mut c = self.c;
+        c[..=self.n].reverse();
+        Self { n: self.n, c }
+    }
+
+    /// p(x), by Horner's rule from the nearer end.
+    #[inline(always)]
+    pub fn value(&self, x: f64) -> f64 {
+        let n = self.n;
+        if x <= 0.5 {
+            let ratio = x / (1.0 - x);
+            let mut sum = self.c[n];
+            for i in (0..n).rev() {
+                sum = sum * ratio + self.c[i];
+            }
+            sum * (1.0 - x).powi(n as i32)
+        } else {
+            let ratio = (1.0 - x) / x;
+            let mut sum = self.c[0];
+            for i in 1..=n {
+                sum = sum * ratio + self.c[i];
+            }
+            sum * x.powi(n as i32)
+        }
+    }
+
+    /// p on [0, t] and on [t, 1], each on [0, 1] again (de Casteljau).
+    #[inline(always)]
+    pub fn split(&self, t: f64) -> (Self, Self) {
+        let n = self.n;
+        let row = &BINOMIALS[n];
+        let mut b = [0.0; C];
+        for i in 0..=n {
+            b[i] = self.c[i] / row[i];
+        }
+        let mut left = [0.0; C];
+        left[0] = b[0];
+        for level in 1..=n {
+            for i in 0..=n - level {
+                b[i] = (1.0 - t) * b[i] + t * b[i + 1];
+            }
+            left[level] = b[0] * row[level];
+        }
+        for i in 0..=n {
+            b[i] *= row[i];
+        }
+        (Self { n, c: left }, Self { n, c: b })
+    }
+
+    /// p on [0, t], on [0, 1] again.
+    #[inline(always)]
+    pub fn left(&self, t: f64) -> Self {
+        let n = self.n;
+        let row = &BINOMIALS[n];
+        let mut b = [0.0; C];
+        for i in 0..=n {
+            b[i] = self.c[i] / row[i];
+        }
+        let mut c = [0.0; C];
+        c[0] = b[0];
+        for level in 1..=n {
+            for i in 0..=n - level {
+                b[i] = (1.0 - t) * b[i] + t * b[i + 1];
+            }
+            c[level] = b[0] * row[level];
+        }
+        Self { n, c }
+    }
+
+    /// p on [t, 1], on [0, 1] again.
+    #[inline(always)]
+    pub fn right(&self, t: f64) -> Self {
+        let n = self.n;
+        let row = &BINOMIALS[n];
+        let mut c = [0.0; C];
+        for i in 0..=n {
+            c[i] = self.c[i] / row[i];
+        }
+        for level in 1..=n {
+            for i in 0..=n - level {
+                c[i] = (1.0 - t) * c[i] + t * c[i + 1];
+            }
+        }
+        for i in 0..=n {
+            c[i] *= row[i];
+        }
+        Self { n, c }
+    }
+
+    /// p on [a, b], on [0, 1] again.
+    pub fn part(&self, a: f64, b: f64) -> Self {
+        let right = if a > 0.0 { self.right(a) } else { *self };
+        if b < 1.0 {
+            right.left((b - a) / (1.0 - a))
+        } else {
+            right
+        }
+    }
+
+    /// Whether no coefficient is negative, so that the polynomial is not either.
+    #[inline(always)]
+    pub fn is_positive(&self) -> bool {
+        self.coefficients().iter().all(|&value| value >= 0.0)
+    }
+
+    /// First x in [0, 1] after which the polynomial is negative; one that starts negative answers 0.
+    #[inline(always)]
+    pub fn first_root(&self) -> Option<f64> {
+        if self.is_positive() {
+            None
+        } else {
+            self.search(0.0, 1.0, 0)
+        }
+    }
+
+    #[inline(never)]
+    fn search(&self, from: f64, to: f64, depth: u32) -> Option<f64> {
+        let c = self.coefficients();
+        if c[0] < 0.0 {
+            return Some(from);
+        }
+        match sign_changes(c) {
+            0 => None,
+            1 => Some(from + (to - from) * self.single_root()),
+            _ if depth == MAX_DEPTH => Some(from),
+            _ => {
+                let (left, right) = self.split(0.5);
+                let middle = 0.5 * (from + to);
+                left.search(from, middle, depth + 1).or_else(|| right.search(middle, to, depth + 1))
+            }
+        }
+    }
+
+    /// Every x in (0, 1) where the polynomial changes its sign, in order.
+    pub fn sign_changes(&self, found: &mut impl FnMut(f64)) {
+        self.isolate(0.0, 1.0, 0, found);
+    }
+
+    fn isolate(&self, from: f64, to: f64, depth: u32, found: &mut impl FnMut(f64)) {
+        let c = self.coefficients();
+        let changes = sign_changes(c);
+        let middle = 0.5 * (from + to);
+        if changes == 0 {
+            return;
+        }
+        if changes == 1 && c[0] != 0.0 && c[self.n] != 0.0 {
+            let sign = if c[0] < 0.0 { -1.0 } else { 1.0 };
+            found(from + (to - from) * self.scale(sign).single_root());
+        } else if depth == MAX_DEPTH {
+            found(middle);
+        } else {
+            let (left, right) = self.split(0.5);
+            if left.last() == 0.0 && left.c[self.n - 1] * right.c[1] < 0.0 {
+                found(middle);
+            }
+            left.isolate(from, middle, depth + 1, found);
+            right.isolate(middle, to, depth + 1, found);
+        }
+    }
+
+    /// The root of a polynomial with one change of sign, from positive to negative: Newton's method inside a bracket.
+    ///
+    /// With z = x/(1 − x) the polynomial is Σ c_i z^i over (1 + z)^n; roots beyond ½ are sought from the other end.
+    fn single_root(&self) -> f64 {
+        let c = self.coefficients();
+        if self.value(0.5) < 0.0 {
+            let z = root_below_one(|i| c[i], self.n, true);
+            z / (1.0 + z)
+        } else {
+            let z = root_below_one(|i| c[self.n - i], self.n, false);
+            1.0 / (1.0 + z)
+        }
+    }
+}
+
+/// The root of Σ c_i z^i in [0, 1], where the sum changes its sign once: from positive to negative, or else upward.
+#[inline(always)]
+fn root_below_one(c: impl Fn(usize) -> f64, n: usize, falls: bool) -> f64 {
+    let (mut low, mut high) = (0.0, 1.0);
+    let mut z = 0.5;
+    for _ in 0..120 {
+        let (mut value, mut slope) = (c(n), 0.0);
+        for i in (0..n).rev() {
+            slope = slope * z + value;
+            value = value * z + c(i);
+        }
+        if (value >= 0.0) == falls {
+            low = z;
+        } else {
+            high = z;
+        }
+        let newton = z - value / slope;
+        if (newton - z).abs() <= LAST_STEP * z {
+            return newton.clamp(low, high);
+        }
+        if high - low <= f64::EPSILON * high {
+            return low;
+        }
+        z = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+    }
+    z
+}
+
+/// Changes of sign, zeros left out.
+#[inline(always)]
+fn sign_changes(c: &[f64]) -> usize {
+    let (mut changes, mut last) = (0, 0.0);
+    for &value in c {
+        if value != 0.0 {
+            changes += usize::from(value * last < 0.0);
+            last = value;
+        }
+    }
+    changes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    type Quintic = Polynomial<8>;
+
+    /// The product of (root − x) over some roots, by Bernstein products.
+    fn from_roots(roots: &[f64]) -> Quintic {
+        roots.iter().fold(Polynomial::constant(1.0), |product, &root| {
+            product.multiply(&Polynomial::from_bernstein([root, root - 1.0].into_iter()))
+        })
+    }
+
+    #[test]
+    fn sums_products_and_derivatives_by_hand() {
+        // p = 1 + 2 x and q = x²: p q = x² + 2 x³, p' q − p q' of equal degrees, p'' = 0.
+        let p = Quintic::from_bernstein([1.0, 3.0].into_iter());
+        let q = Quintic::from_bernstein([0.0, 0.0, 1.0].into_iter());
+        let x: f64 = 0.3;
+        assert!((p.multiply(&q).value(x) - (x * x + 2.0 * x.powi(3))).abs() < 1e-16);
+        assert!((p.combine(2.0, &q, -3.0).value(x) - (2.0 + 4.0 * x - 3.0 * x * x)).abs() < 1e-15);
+        assert_eq!(q.derivative().coefficients(), [0.0, 2.0]);
+        let raised = p.elevate(2);
+        assert!((raised.wronskian(&q).value(x) - (2.0 * x * x - (1.0 + 2.0 * x) * 2.0 * x)).abs() < 1e-15);
+        assert_eq!((raised.first_slope(), raised.first_bend(), q.first_bend()), (2.0, 0.0, 2.0));
+    }
+
+    #[test]
+    fn an_antiderivative_over_a_weight_by_hand() {
+        // (m/w)' = p/w² with w = 1 + x and m = 3 x: p = 3 (1 + x) − 3 x = 3, as a form of degree 0.
+        let w = Quintic::from_bernstein([1.0, 2.0].into_iter());
+        let m = Quintic::constant(3.0).antiderivative(&w, 1);
+        assert_eq!(m.coefficients(), [0.0, 3.0]);
+    }
+
+    proptest! {
+        #[test]
+        fn the_first_root_is_the_smallest_one(mut roots in prop::collection::vec(0.01..2.0_f64, 1..6)) {
+            roots.sort_by(f64::total_cmp);
+            prop_assume!(roots.windows(2).all(|pair| pair[1] - pair[0] > 1e-3));
+            let found = from_roots(&roots).first_root();
+            if roots[0] < 1.0 {
+                prop_assert!((found.unwrap() - roots[0]).abs() < 1e-9);
+            } else {
+                prop_assert_eq!(found, None);
+            }
+        }
+
+        #[test]
+        fn a_single_change_of_sign_is_found_wherever_it_is(c in prop::collection::vec(0.0..1.0_f64, 2..7), change in 1_usize..6) {
+            let mut c = c;
+            let n = c.len() - 1;
+            let change = 1 + change % n;
+            c[change..].iter_mut().for_each(|value| *value = -*value);
+            c[0] += 1e-3;
+            c[n] -= 1e-3;
+            let p = Quintic::from_bernstein(c.iter().copied());
+            let root = p.first_root().unwrap();
+            let slope = p.derivative().value(root).abs();
+            prop_assert!(p.value(root).abs() <= 1e-14 + 1e-14 * slope, "{root} {}", p.value(root));
+            prop_assert!(p.value((root - 1e-6).max(0.0)) > -1e-15 && p.value((root + 1e-6).min(1.0)) < 1e-15);
+        }
+
+        #[test]
+        fn parts_are_the_same_polynomial(c in prop::collection::vec(-1.0..1.0_f64, 6), a in 0.0..0.5_f64, b in 0.5..1.0_f64, x in 0.0..1.0_f64) {
+            let p = Quintic::from_bernstein(c.into_iter());
+            let part = p.part(a, b);
+            prop_assert!((part.value(x) - p.value(a + x * (b - a))).abs() < 1e-14);
+            let (left, right) = p.split(a);
+            prop_assert!((left.value(x) - p.value(a * x)).abs() < 1e-14);
+            prop_assert!((right.value(x) - p.value(a + (1.0 - a) * x)).abs() < 1e-14);
+        }
+    }
+}

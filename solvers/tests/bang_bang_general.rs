@@ -1,0 +1,90 @@
+//! The planner for pieces of any degree: on quadratics it agrees with the quadratic planner, and what does not matter
+//! to the path does not change its time.
+
+mod support;
+
+use feedplan_solvers::bang_bang::{plan, Problem};
+use feedplan_solvers::bang_bang_quadratic::{Fault, Profile};
+use support::{milder_case, Case};
+
+/// The case planned as pieces of degree 2, or elevated.
+fn general<const M: usize, const C: usize>(case: &Case<M>, elevate: usize) -> Result<Profile, Fault> {
+    let mut control: Vec<[f64; M]> = vec![];
+    let mut offset = vec![0];
+    for piece in &case.pieces {
+        let mut points = piece.control.to_vec();
+        for _ in 0..elevate {
+            let n = points.len() as f64;
+            let mut higher = vec![points[0]];
+            for i in 1..points.len() {
+                let t = i as f64 / n;
+                higher.push(std::array::from_fn(|k| t * points[i - 1][k] + (1.0 - t) * points[i][k]));
+            }
+            higher.push(points[points.len() - 1]);
+            points = higher;
+        }
+        control.extend(points);
+        offset.push(control.len());
+    }
+    let width: Vec<f64> = case.pieces.iter().map(|piece| piece.width).collect();
+    plan::<M, C>(&Problem {
+        control: &control,
+        weight: &[],
+        offset: &offset,
+        width: &width,
+        tip_speed: None,
+        runs: &[0, case.pieces.len()],
+        feed: &case.feed,
+        junction_speed: &case.junction,
+        max_velocity: case.velocity,
+        max_acceleration: case.acceleration,
+        chord_tolerance: case.chord_tolerance,
+        period: case.period,
+        start_speed: case.start_speed,
+        end_speed: case.end_speed,
+    })
+}
+
+#[test]
+fn quadratics_take_the_time_of_the_quadratic_planner() {
+    let mut failures = vec![];
+    for seed in 0..3000 {
+        let axes = 1 + (seed % 6) as usize;
+        for_axes!(axes, M, {
+            let mut case = milder_case::<M>(seed);
+            case.chord_tolerance = f64::INFINITY;
+            let exact = case.time();
+            for elevate in [0, 1] {
+                match general::<M, 10>(&case, elevate) {
+                    Err(fault) => failures.push(format!("seed {seed} elevated by {elevate}: {fault}")),
+                    Ok(profile) => {
+                        let change = (profile.time() / exact - 1.0).abs();
+                        if change.is_nan() || change > 1e-12 {
+                            failures.push(format!("seed {seed} elevated by {elevate}: {change:.1e}"));
+                        }
+                    }
+                }
+            }
+        });
+    }
+    assert!(
+        failures.is_empty(),
+        "{} failures\n{}",
+        failures.len(),
+        failures[..failures.len().min(40)].join("\n")
+    );
+}
+
+/// The chord-error limit is taken with a margin, by each planner in its own way.
+#[test]
+fn with_a_chord_error_limit_the_times_agree_to_the_margin() {
+    for seed in 0..600 {
+        let case = milder_case::<3>(seed);
+        if case.chord_tolerance.is_finite() {
+            let profile = general::<3, 10>(&case, 0).expect("a profile");
+            let change = profile.time() / case.time() - 1.0;
+            // The quadratic planner gives away δ/(4 ρ) where ρ doubles, this one 4e-4 of v² at most.
+            assert!(change > -0.05 && change < 1e-3, "seed {seed}: {change:.1e}");
+        }
+    }
+}

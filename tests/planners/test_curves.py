@@ -1,0 +1,165 @@
+"""The exact planner on pieces of any degree: published figures, what must not matter, every limit densely.
+
+The times of the butterfly and the circle are those of an independent implementation of the same problem on
+polynomial proxies of the curves, to 1e-12 s; the circle's switching place also follows by hand.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path as FilePath
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from feedplan._solvers import plan_curves
+from feedplan.geometry.arc import circle
+from feedplan.geometry.spline import CompositeCurve, insert_knot
+from feedplan.profile import ArcKind
+
+Array = NDArray[np.float64]
+BUTTERFLY = FilePath(__file__).parents[2] / "benchmarks" / "curves" / "butterfly.json"
+
+
+class Planned:
+    """The profile along one curve, from rest to rest unless a speed is given."""
+
+    def __init__(
+        self, curve: CompositeCurve, velocity: float | Array, acceleration: float | Array, feed: float = 1e9
+    ) -> None:
+        count, axes = len(curve), curve.axes
+        self.curve, self.feed = curve, feed
+        self.velocity = np.broadcast_to(np.asarray(velocity, float), axes).copy()
+        self.acceleration = np.broadcast_to(np.asarray(acceleration, float), axes).copy()
+        columns = plan_curves(
+            curve.control_points,
+            np.zeros(0) if curve.weights is None else curve.weights,
+            curve.offsets.astype(np.int64),
+            curve.width,
+            np.array([0, count]),
+            np.full(count, feed),
+            np.full(count + 1, np.inf),
+            self.velocity,
+            self.acceleration,
+            np.inf,
+            0.001,
+            0.0,
+            0.0,
+        )
+        self.piece, self.kind, self.axis, self.value, self.u0, self.u1, self.p0, self.p1, duration, _ = (
+            columns
+        )
+        self.time = float(duration.sum())
+
+    def worst_excess(self, samples: int = 10) -> tuple[float, float]:
+        """Greatest relative excess of any limit and least use of the most used one, inside the arcs."""
+        # u is rounded: where an arc is as short as that, its places cannot be told apart.
+        long = (self.u1 - self.u0) > 1e-6 * self.curve.width[self.piece]
+        piece, kind, value = self.piece[long], self.kind[long, None], self.value[long, None]
+        axis = np.where(self.axis[long] == 255, 0, self.axis[long])
+        u0, u1, p0, p1 = (column[long] for column in (self.u0, self.u1, self.p0, self.p1))
+        rows = np.arange(len(piece))
+
+        def derivatives(u: Array) -> tuple[Array, Array]:
+            """C' and C'' at places (rows, …)."""
+            flat = self.curve.evaluate(np.repeat(piece, u[0].size), u.ravel(), 2)
+            return flat[1].reshape(*u.shape, -1), flat[2].reshape(*u.shape, -1)
+
+        u = u0[:, None] + (u1 - u0)[:, None] * (np.arange(samples) + 0.5) / samples
+        q1, q2 = derivatives(u)
+        g, c = q1[rows, :, axis], q2[rows, :, axis]
+        # v_j² of an arc from its slower end, the way of its axis by Gauss's rule.
+        ends = derivatives(np.stack([u0, u1], axis=1))[0][rows, :, axis]
+        v_sq = np.stack([p0, p1], axis=1) * ends**2
+        slow = np.argmin(np.where(np.isfinite(v_sq), v_sq, np.inf), axis=1)
+        anchor = np.stack([u0, u1], axis=1)[rows, slow]
+        nodes, weights = np.polynomial.legendre.leggauss(12)
+        between = anchor[:, None, None] + (u - anchor[:, None])[..., None] * (nodes + 1) / 2
+        way = (u - anchor[:, None]) / 2 * (derivatives(between)[0][rows, :, :, axis] @ weights)
+        speed_sq = (q1**2).sum(axis=2)
+        kinds = [kind == ArcKind.AXIS_ACCELERATION, kind == ArcKind.FEED, kind == ArcKind.AXIS_VELOCITY]
+        p = np.select(
+            kinds,
+            [(v_sq[rows, slow][:, None] + 2 * value * way) / g**2, value / speed_sq, value / g**2],
+            p0[:, None],
+        )
+        s = np.select(kinds, [(value - c * p) / g, -p * (q1 * q2).sum(axis=2) / speed_sq, -p * c / g], 0.0)
+        used = np.concatenate(
+            [
+                np.abs(q1 * s[..., None] + q2 * p[..., None]) / self.acceleration,
+                np.abs(q1) * np.sqrt(p)[..., None] / self.velocity,
+                (np.sqrt(speed_sq * p) / self.feed)[..., None],
+            ],
+            axis=2,
+        ).max(axis=2)
+        return float(used.max()) - 1, float(used.min())
+
+
+def butterfly() -> tuple[Array, Array, int, Array]:
+    data = json.loads(BUTTERFLY.read_text(encoding="utf-8"))
+    return (
+        np.array(data["control_points"]),
+        # The figures belong to the knots as they are mostly printed.
+        np.round(np.array(data["knots"], dtype=float), 4),
+        data["degree"],
+        np.array(data["weights"], dtype=float),
+    )
+
+
+def random_curve(seed: int, weights: bool = True) -> CompositeCurve:
+    rng = np.random.default_rng(seed)
+    degree, axes, count = int(rng.integers(2, 6)), int(rng.integers(2, 5)), int(rng.integers(1, 12))
+    points = np.cumsum(rng.normal(size=(count + degree, axes)), axis=0)
+    if seed % 3 == 0:
+        # Nearly a cusp: a control point next to the one before the last.
+        points[1 + count // 2] = points[count // 2] + 1e-3 * rng.normal(size=axes)
+    inner = np.cumsum(rng.uniform(0.3, 3.0, count))
+    knots = np.concatenate([np.zeros(degree + 1), inner, np.full(degree, inner[-1])])
+    weight = np.exp(rng.uniform(np.log(0.1), np.log(10.0), len(points))) if weights else None
+    return CompositeCurve.from_nurbs(points, knots, degree, weight)
+
+
+@pytest.mark.parametrize(("feed", "time"), [(1e9, 2.573254566377), (250.0, 2.622026012553)])
+def test_the_butterfly_takes_its_published_time(feed: float, time: float) -> None:
+    planned = Planned(CompositeCurve.from_nurbs(*butterfly()), 250.0, 3000.0, feed)
+    assert planned.time == pytest.approx(time, rel=1e-11)
+    excess, use = planned.worst_excess()
+    assert excess <= 1e-8
+    assert use >= 1 - 1e-6
+
+
+def test_what_leaves_the_curve_alone_leaves_its_time() -> None:
+    points, knots, degree, weights = butterfly()
+    curve = CompositeCurve.from_nurbs(points, knots, degree, weights)
+    time = Planned(curve, 250.0, 3000.0).time
+    middle = 0.5 * (knots[10] + knots[11])
+    finer_points, finer_knots, finer_weights = insert_knot(points, knots, degree, middle, weights)
+    for other in (
+        curve.reversed(),
+        curve.elevated(5),
+        curve.with_width(np.linspace(0.1, 3.0, len(curve))),
+        CompositeCurve.from_nurbs(finer_points, finer_knots, degree, finer_weights),
+    ):
+        assert Planned(other, 250.0, 3000.0).time == pytest.approx(time, rel=1e-10)
+
+
+def test_a_lap_of_a_circle_from_rest_to_rest() -> None:
+    planned = Planned(circle([0.0, 0.0], 10.0), 1e9, 3000.0)
+    assert planned.time == pytest.approx(0.412407376368, rel=1e-11)
+
+
+@pytest.mark.parametrize("weights", [False, True])
+def test_random_curves_keep_every_limit_and_use_one_everywhere(weights: bool) -> None:
+    for seed in range(150):
+        rng = np.random.default_rng(seed + 10_000)
+        curve = random_curve(seed, weights)
+        planned = Planned(
+            curve,
+            np.exp(rng.uniform(0.0, 3.0, curve.axes)),
+            np.exp(rng.uniform(0.0, 5.0, curve.axes)),
+            float(np.exp(rng.uniform(0.0, 3.0))),
+        )
+        excess, use = planned.worst_excess()
+        assert excess <= 1e-8, seed
+        assert use >= 1 - 1e-6, seed
