@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from feedplan.audit import Audit, LimitCheck
 from feedplan.constraints.problem import Problem
@@ -15,6 +16,10 @@ from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
 from feedplan.profile import ArcKind, SpeedProfile
 from feedplan.setpoints import SetpointChunk
+
+# No test depends on how fast the machine is.
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
 
 SIDE, FEED, ACCELERATION = 20.0, 50.0, 500.0
 RAMP = ArcKind.AXIS_ACCELERATION
