@@ -10,7 +10,7 @@
 //! | `chord` | the chord-error limit as speeds linear in the parameter |
 //! | `split` | cut where an axis turns round or another velocity cap is the lowest |
 //! | `window` | what is left of a sub-piece ahead of a pass, with the bound on it |
-//! | `pass` | one pass over one sub-piece |
+//! | `pass` | one pass over one sub-piece: arcs (`bang`), along the cap (`slide`), along the `limit_curve` |
 //! | `run` | both passes over a run, into columns, in seconds |
 
 mod chord;
@@ -20,11 +20,9 @@ mod run;
 mod split;
 mod window;
 
-use rayon::prelude::*;
-
-use crate::bang_bang_quadratic::{group, join, Fault, Profile};
+use crate::bang_bang_quadratic::{Fault, Profile};
+use crate::planning::{ChordLimit, Limits};
 use crate::quadratic::norm;
-use chord::ChordLimit;
 use split::Axes;
 
 /// A path of pieces of any degree with its limits.
@@ -62,6 +60,19 @@ struct Task<'a, const M: usize> {
 /// The fastest profile. `C` coefficients suffice for polynomial pieces
 /// of a degree up to (C + 2)/4 and rational ones of a degree up to (C + 6)/8.
 pub fn plan<const M: usize, const C: usize>(problem: &Problem<M>) -> Result<Profile, Fault> {
+    let limits = Limits {
+        runs: problem.runs,
+        feed: problem.feed,
+        junction_speed: problem.junction_speed,
+        max_velocity: problem.max_velocity,
+        max_acceleration: problem.max_acceleration,
+        chord_tolerance: problem.chord_tolerance,
+        period: problem.period,
+        start_speed: problem.start_speed,
+        end_speed: problem.end_speed,
+    };
+    limits.check(problem.width.len())?;
+    check_pieces(problem)?;
     let task = Task {
         problem,
         axes: Axes {
@@ -73,22 +84,41 @@ pub fn plan<const M: usize, const C: usize>(problem: &Problem<M>) -> Result<Prof
             Some(_) => None,
         },
     };
-    let groups = group(problem.runs);
-    let last_run = problem.runs.len() - 2;
-    let plans: Result<Vec<Profile>, Fault> = groups
-        .par_iter()
-        .map(|group| {
-            let mut space = run::Workspace::default();
-            let mut profile = Profile::default();
-            for run in group.clone() {
-                let ends = (problem.runs[run], problem.runs[run + 1]);
-                let start = if run == 0 { problem.start_speed } else { 0.0 };
-                let end = if run == last_run { problem.end_speed } else { 0.0 };
-                profile.runs.push(profile.len() as i64);
-                run::plan_run::<M, C>(&task, ends, (start * start, end * end), &mut space, &mut profile)?;
-            }
-            Ok(profile)
-        })
-        .collect();
-    Ok(join(plans?))
+    limits.over_runs(|pieces, speeds_sq, space: &mut run::Workspace, profile| {
+        run::plan_run::<M, C>(&task, pieces, speeds_sq, space, profile)
+    })
+}
+
+/// Every piece: finite, of some length and width, its weights positive.
+fn check_pieces<const M: usize>(problem: &Problem<M>) -> Result<(), Fault> {
+    let (offset, count) = (problem.offset, problem.width.len());
+    if offset.len() != count + 1
+        || offset[0] != 0
+        || offset[count] != problem.control.len()
+        || offset.windows(2).any(|pair| pair[1] < pair[0] + 2)
+        || !(problem.weight.is_empty() || problem.weight.len() == problem.control.len())
+    {
+        let what = format!(
+            "offsets and weights do not fit {count} pieces: give two control points or more for each"
+        );
+        return Err(Fault::Input { piece: None, what });
+    }
+    for i in 0..count {
+        let wrong = |what: &str| Err(Fault::Input { piece: Some(i), what: what.into() });
+        let points = &problem.control[offset[i]..offset[i + 1]];
+        if !points.iter().flatten().all(|value| value.is_finite()) {
+            return wrong("a control point is not a finite number");
+        }
+        if points.iter().all(|point| *point == points[0]) {
+            return wrong("the piece has no length: leave it out");
+        }
+        if !(problem.width[i] > 0.0 && problem.width[i].is_finite()) {
+            return wrong("the parameter width is not a positive number");
+        }
+        let weights = problem.weight.get(offset[i]..offset[i + 1]).unwrap_or(&[]);
+        if !weights.iter().all(|weight| *weight > 0.0 && weight.is_finite()) {
+            return wrong("a weight is not a positive number");
+        }
+    }
+    Ok(())
 }

@@ -31,18 +31,13 @@ mod straight;
 mod subpiece;
 mod turns;
 
-use rayon::prelude::*;
-
 pub(crate) use profile::Row;
 pub use profile::{ArcKind, Profile, NO_AXIS};
 
+use crate::planning::{ChordLimit, Limits};
 use crate::quadratic::{norm, Quadratic};
 use run::Workspace;
-use split::ChordLimit;
 use subpiece::Axes;
-
-/// Runs are planned in parallel in groups of about this many pieces.
-const GROUP: usize = 8192;
 
 /// A path with its limits.
 #[derive(Clone, Copy)]
@@ -107,7 +102,19 @@ pub(crate) struct Task<'a, const M: usize> {
 
 /// The fastest profile.
 pub fn plan<const M: usize>(problem: &Problem<M>) -> Result<Profile, Fault> {
-    check(problem)?;
+    let limits = Limits {
+        runs: problem.runs,
+        feed: problem.feed,
+        junction_speed: problem.junction_speed,
+        max_velocity: problem.max_velocity,
+        max_acceleration: problem.max_acceleration,
+        chord_tolerance: problem.chord_tolerance,
+        period: problem.period,
+        start_speed: problem.start_speed,
+        end_speed: problem.end_speed,
+    };
+    limits.check(problem.pieces.len())?;
+    check_pieces(problem.pieces)?;
     let task = Task {
         pieces: problem.pieces,
         feed: problem.feed,
@@ -120,99 +127,14 @@ pub fn plan<const M: usize>(problem: &Problem<M>) -> Result<Profile, Fault> {
         },
         chord: ChordLimit::new(problem.chord_tolerance, problem.period, norm(&problem.max_acceleration)),
     };
-    let groups = group(problem.runs);
-    let last_run = problem.runs.len() - 2;
-    let plans: Result<Vec<Profile>, Fault> = groups
-        .par_iter()
-        .map(|group| {
-            let pieces = problem.runs[group.end] - problem.runs[group.start];
-            let mut space = Workspace::default();
-            let mut profile = Profile::with_capacity(2 * pieces);
-            for run in group.clone() {
-                let ends = (problem.runs[run], problem.runs[run + 1]);
-                let start = if run == 0 { problem.start_speed } else { 0.0 };
-                let end = if run == last_run { problem.end_speed } else { 0.0 };
-                profile.runs.push(profile.len() as i64);
-                run::plan_run(&task, ends, (start * start, end * end), &mut space, &mut profile)?;
-            }
-            Ok(profile)
-        })
-        .collect();
-    Ok(join(plans?))
+    limits.over_runs(|pieces, speeds_sq, space: &mut Workspace, profile| {
+        run::plan_run(&task, pieces, speeds_sq, space, profile)
+    })
 }
 
-/// Groups of neighbouring runs with about `GROUP` pieces each.
-pub(crate) fn group(runs: &[usize]) -> Vec<std::ops::Range<usize>> {
-    let mut groups = vec![];
-    let mut first = 0;
-    for run in 0..runs.len() - 1 {
-        if runs[run + 1] - runs[first] >= GROUP || run + 2 == runs.len() {
-            groups.push(first..run + 1);
-            first = run + 1;
-        }
-    }
-    groups
-}
-
-/// One profile of all groups.
-pub(crate) fn join(plans: Vec<Profile>) -> Profile {
-    let mut plans = plans.into_iter();
-    let mut all = plans.next().unwrap_or_default();
-    for plan in plans {
-        let offset = all.len() as i64;
-        all.runs.extend(plan.runs.iter().map(|start| start + offset));
-        all.append(plan);
-    }
-    all.runs.push(all.len() as i64);
-    all
-}
-
-/// Every argument once: lengths, ranges, finite numbers, pieces of some length.
-fn check<const M: usize>(problem: &Problem<M>) -> Result<(), Fault> {
-    let count = problem.pieces.len();
-    let wrong = |what: String| Err(Fault::Input { piece: None, what });
-    let positive = |value: f64| value > 0.0 && value.is_finite();
-    for (name, length, expected) in
-        [("feeds", problem.feed.len(), count), ("junction speeds", problem.junction_speed.len(), count + 1)]
-    {
-        if length != expected {
-            return wrong(format!("{length} {name} for {count} pieces: {expected} are needed"));
-        }
-    }
-    let runs = problem.runs;
-    if runs.len() < 2
-        || runs[0] != 0
-        || runs[runs.len() - 1] != count
-        || runs.windows(2).any(|run| run[0] >= run[1])
-    {
-        return wrong(format!(
-            "the runs do not divide the {count} pieces: give rising offsets from 0 to {count}"
-        ));
-    }
-    for k in 0..M {
-        let (v, a) = (problem.max_velocity[k], problem.max_acceleration[k]);
-        if !positive(v) {
-            return wrong(format!("the velocity limit of axis {k} is {v} mm/s: give a positive number"));
-        }
-        if !positive(a) {
-            return wrong(format!("the acceleration limit of axis {k} is {a} mm/s²: give a positive number"));
-        }
-    }
-    for (name, speed) in [("start", problem.start_speed), ("end", problem.end_speed)] {
-        if !(speed >= 0.0 && speed.is_finite()) {
-            return wrong(format!("the {name} speed is {speed} mm/s: give a finite number, 0 or more"));
-        }
-    }
-    if problem.chord_tolerance.is_nan() || problem.chord_tolerance <= 0.0 {
-        return wrong(format!(
-            "the chord tolerance is {} mm: give a positive number",
-            problem.chord_tolerance
-        ));
-    }
-    if problem.chord_tolerance.is_finite() && !positive(problem.period) {
-        return wrong(format!("the servo period is {} s: give a positive number", problem.period));
-    }
-    for (i, piece) in problem.pieces.iter().enumerate() {
+/// Every piece: finite, of some length and width.
+fn check_pieces<const M: usize>(pieces: &[Quadratic<M>]) -> Result<(), Fault> {
+    for (i, piece) in pieces.iter().enumerate() {
         let wrong = |what: String| Err(Fault::Input { piece: Some(i), what });
         if !piece.control.iter().flatten().all(|value| value.is_finite()) {
             return wrong("a control point is not a finite number".into());
@@ -220,19 +142,8 @@ fn check<const M: usize>(problem: &Problem<M>) -> Result<(), Fault> {
         if piece.control[0] == piece.control[1] && piece.control[1] == piece.control[2] {
             return wrong("the piece has no length: leave it out".into());
         }
-        if !positive(piece.width) {
+        if !(piece.width > 0.0 && piece.width.is_finite()) {
             return wrong(format!("the parameter width is {}: give a positive number", piece.width));
-        }
-        if !positive(problem.feed[i]) {
-            return wrong(format!("the feed is {} mm/s: give a positive finite number", problem.feed[i]));
-        }
-    }
-    for (i, &speed) in problem.junction_speed.iter().enumerate() {
-        if speed.is_nan() || speed < 0.0 {
-            return Err(Fault::Input {
-                piece: Some(i.min(count - 1)),
-                what: format!("the junction speed is {speed} mm/s: give 0 or more"),
-            });
         }
     }
     Ok(())

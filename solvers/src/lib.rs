@@ -15,6 +15,7 @@ pub mod limit_curve;
 pub mod motion;
 pub mod newton;
 pub mod path_builder;
+mod planning;
 pub mod polynomial;
 pub mod quadratic;
 pub mod sampling;

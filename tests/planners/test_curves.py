@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from feedplan._solvers import plan_curves
+from feedplan._solvers import PlanError, plan_curves
 from feedplan.geometry.arc import circle
 from feedplan.geometry.spline import CompositeCurve, insert_knot
 from feedplan.profile import ArcKind
@@ -163,3 +163,47 @@ def test_random_curves_keep_every_limit_and_use_one_everywhere(weights: bool) ->
         excess, use = planned.worst_excess()
         assert excess <= 1e-8, seed
         assert use >= 1 - 1e-6, seed
+
+
+@pytest.mark.parametrize(
+    ("velocity", "acceleration", "feed", "words"),
+    [
+        (np.nan, 1.0, 1.0, "the velocity limit of axis 0 is NaN mm/s: give a positive number"),
+        (1.0, 0.0, 1.0, "the acceleration limit of axis 0 is 0 mm/s²: give a positive number"),
+        (1.0, 1.0, -1.0, "the feed is -1 mm/s: give a positive finite number"),
+    ],
+)
+def test_limits_that_are_no_limits_are_refused(
+    velocity: float, acceleration: float, feed: float, words: str
+) -> None:
+    with pytest.raises(PlanError) as caught:
+        Planned(random_curve(0), velocity, acceleration, feed)
+    assert caught.value.args[3] == words
+
+
+@pytest.mark.parametrize(
+    ("runs", "weight", "words"),
+    [
+        ([0], 1.0, "the runs do not divide the 1 pieces"),
+        ([0, 1], -1.0, "a weight is not a positive number"),
+        ([0, 1], np.nan, "a weight is not a positive number"),
+    ],
+)
+def test_a_path_that_is_none_is_refused(runs: list[int], weight: float, words: str) -> None:
+    with pytest.raises(PlanError) as caught:
+        plan_curves(
+            np.array([[0.0], [1.0], [2.0]]),
+            np.array([1.0, weight, 1.0]),
+            np.array([0, 3]),
+            np.ones(1),
+            np.array(runs),
+            np.ones(1),
+            np.full(2, np.inf),
+            np.ones(1),
+            np.ones(1),
+            np.inf,
+            0.001,
+            0.0,
+            0.0,
+        )
+    assert words in caught.value.args[3]

@@ -4,6 +4,7 @@
 //! a set part of it; how far the line must lie below is four times what is seen at places between its ends.
 
 use super::piece::Piece;
+use crate::planning::ChordLimit;
 
 /// Part of the limit that may be given away.
 const GIVEN_AWAY: f64 = 2e-4;
@@ -11,19 +12,6 @@ const GIVEN_AWAY: f64 = 2e-4;
 const MAX_DEPTH: u32 = 14;
 /// Places looked at on a part, its ends among them.
 const PLACES: usize = 9;
-
-/// The limit where it can be lower than what the accelerations allow.
-#[derive(Clone, Copy)]
-pub struct ChordLimit {
-    /// α = 8 δ/T²
-    alpha: f64,
-    /// 4 δ²/T²
-    slow_sq: f64,
-    /// δ
-    tolerance: f64,
-    /// The greatest acceleration that all axes have together.
-    acceleration: f64,
-}
 
 /// The greatest v² on [from, to] of a piece, linear in t from one end to the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,14 +22,6 @@ pub struct SpeedLine {
 }
 
 impl ChordLimit {
-    /// None if the limit never binds: v²/ρ is at most `acceleration` on any curve, and the limit nowhere below ρ α/2.
-    pub fn new(tolerance: f64, period: f64, acceleration: f64) -> Option<Self> {
-        let alpha = 8.0 * tolerance / (period * period);
-        let slow_sq = 0.5 * alpha * tolerance;
-        let binds = tolerance.is_finite() && alpha < 2.0 * acceleration;
-        binds.then_some(Self { alpha, slow_sq, tolerance, acceleration })
-    }
-
     /// Appends the greatest v² over the piece, at most `feed_sq`.
     pub fn lines<const M: usize, const C: usize>(
         &self,

@@ -1,7 +1,8 @@
 //! Cuts a piece where an axis turns round and where the lowest velocity cap changes.
 
-use super::chord::{ChordLimit, SpeedLine};
+use super::chord::SpeedLine;
 use super::piece::Piece;
+use crate::planning::ChordLimit;
 use crate::polynomial::Polynomial;
 
 /// Cuts closer than this part of the piece are one.

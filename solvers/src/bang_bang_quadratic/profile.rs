@@ -110,7 +110,7 @@ impl Profile {
     }
 
     /// Appends the rows of another profile.
-    pub(super) fn append(&mut self, mut other: Self) {
+    pub(crate) fn append(&mut self, mut other: Self) {
         self.piece.append(&mut other.piece);
         self.kind.append(&mut other.kind);
         self.axis.append(&mut other.axis);

@@ -9,6 +9,7 @@ use super::piece::Piece;
 use super::subpiece::{Axes, Cap, Orientation, SubPiece};
 use super::turns::{Mark, EDGE};
 use crate::bernstein::{multiply, parabola_sign_changes, product, sign_changes};
+use crate::planning::ChordLimit;
 use crate::quadratic::dot;
 
 /// Cuts closer than this part of a stretch are one.
@@ -16,29 +17,7 @@ const SAME_CUT: f64 = 1e-14;
 /// Beyond this many δ the radius varies without a difference to the chord-error limit.
 const LAST_DOUBLING: f64 = 512.0;
 
-/// The chord-error limit where it can be lower than what the accelerations allow.
-#[derive(Clone, Copy)]
-pub struct ChordLimit {
-    /// α = 8 δ/T²
-    alpha: f64,
-    /// 4 δ²/T²
-    slow_sq: f64,
-    /// δ
-    tolerance: f64,
-    /// The greatest acceleration that all axes have together.
-    acceleration: f64,
-}
-
 impl ChordLimit {
-    /// None if the limit never binds: v²/ρ is at most `acceleration` on any curve, and the limit nowhere below
-    /// ρ α/2.
-    pub fn new(tolerance: f64, period: f64, acceleration: f64) -> Option<Self> {
-        let alpha = 8.0 * tolerance / (period * period);
-        let slow_sq = 0.5 * alpha * tolerance;
-        let binds = tolerance.is_finite() && alpha < 2.0 * acceleration;
-        binds.then_some(Self { alpha, slow_sq, tolerance, acceleration })
-    }
-
     /// Whether the limit can bind on the piece.
     fn binds<const M: usize>(&self, piece: &Piece<M>, feed_sq: f64) -> bool {
         let least = piece.least_speed_sq();

@@ -1,0 +1,248 @@
+//! The arc of greatest acceleration: its control axis, and the event that ends it.
+
+use super::{kept_until, Kind, Pass, Start, Stuck, AT_END, FLAT, MAX_HOPS, NOISE, NO_STEP, TIE};
+use crate::bang_bang::window::Bound;
+use crate::polynomial::Polynomial;
+
+/// What ends an arc.
+enum Event {
+    Transition(usize),
+    Low(usize),
+    Bound,
+}
+
+impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
+    /// The control axis of greatest acceleration: the axis, s = π'/2, bits of the axes tied with it, and whether it
+    /// turns here.
+    pub(super) fn least(&self, start: &Start<M>) -> Option<(usize, f64, u8, bool)> {
+        let mut s = [f64::INFINITY; M];
+        let mut turns = 0u8;
+        for k in self.moving() {
+            let rest = start.limit[k] - start.c[k] * self.pi;
+            if start.g[k] > 0.0 {
+                s[k] = rest / start.g[k];
+            } else if start.c[k] > 0.0 && rest <= FLAT * start.limit[k] {
+                s[k] = (start.limit_slope[k] - start.e[k] * self.pi) / (3.0 * start.c[k]);
+                turns |= 1 << k;
+            }
+        }
+        let turning = |k: usize| turns >> k & 1 == 1;
+        let mut j = 0;
+        for k in 1..M {
+            if s[k] < s[j] {
+                j = k;
+            }
+        }
+        if !s[j].is_finite() {
+            return None;
+        }
+        let least = s[j];
+        let mut tied = turns;
+        let mut steepest = f64::INFINITY;
+        for k in self.moving().filter(|&k| s[k].is_finite()) {
+            let same = if turning(k) {
+                (s[k] - least).abs() <= 1e-9 * (least.abs() + s[k].abs())
+            } else {
+                start.limit[k] - (start.g[k] * least + start.c[k] * self.pi) <= TIE * start.limit[k]
+            };
+            if !same {
+                continue;
+            }
+            tied |= 1 << k;
+            // The tie goes to the axis whose acceleration would grow the most.
+            let slope = if turning(k) {
+                f64::INFINITY
+            } else {
+                (start.limit_slope[k] - 3.0 * start.c[k] * s[k] - start.e[k] * self.pi) / start.g[k]
+            };
+            if slope < steepest {
+                (steepest, j) = (slope, k);
+            }
+        }
+        if let Some(axis) = self.control {
+            if tied >> axis & 1 == 1 || s[axis].is_finite() {
+                j = axis;
+            }
+        }
+        Some((j, s[j], tied, turning(j)))
+    }
+
+    /// The control axis from a cusp: s is infinite, the tangents' leading coefficients decide.
+    fn least_from_cusp(&self) -> Option<(usize, u8)> {
+        let lead = |k: usize| self.window.g[k].coefficients()[self.order];
+        let ratio = |k: usize| self.axes.acceleration[k] / lead(k);
+        let j = self.moving().filter(|&k| lead(k) > 0.0).min_by(|&a, &b| ratio(a).total_cmp(&ratio(b)))?;
+        let tied = self
+            .moving()
+            .filter(|&k| k != j && lead(k) > 0.0 && ratio(k) <= ratio(j) * (1.0 + TIE))
+            .fold(0u8, |bits, k| bits | 1 << k);
+        Some((j, tied))
+    }
+
+    /// Along an arc of greatest acceleration to the event that ends it.
+    pub(super) fn accelerate(&mut self, on_bound: bool) -> Result<(), Stuck> {
+        let order = self.order;
+        let (j, mut tied, turns) = if order > 0 {
+            let (j, tied) = self.least_from_cusp().ok_or(Stuck)?;
+            (j, tied, false)
+        } else {
+            let (j, _, tied, turns) = self.least(&self.start()).ok_or(Stuck)?;
+            (j, tied, turns)
+        };
+        tied = (tied | self.tied) & !(1 << j);
+        let window = &self.window;
+        let a = &self.axes.acceleration;
+        let g = &window.g[j];
+        let slow_sq = match (order, turns) {
+            (0, false) => self.pi * g.first() * g.first(),
+            (0, true) => 0.0,
+            _ => self.cusp_sq[j],
+        };
+        let gain = g.antiderivative(&window.weight, self.sub.degree);
+        // w = ω v_j²
+        let w = window.weight.combine(slow_sq, &gain, 2.0 * a[j]);
+        let (square, known) = (
+            g.multiply(g),
+            if order > 0 {
+                3 * order
+            } else if turns {
+                3
+            } else {
+                0
+            },
+        );
+        let mut first = 1.0;
+        let mut event = None;
+        let mut found = |t: Option<f64>, what: Event| {
+            if let Some(t) = t.filter(|&t| t < first) {
+                (first, event) = (t, Some(what));
+            }
+        };
+        if !self.straight {
+            let cube = square.multiply(g);
+            let weighted = window.weight.multiply(&w);
+            for l in self.moving().filter(|&l| l != j) {
+                let twist = weighted.multiply(&window.g[l].wronskian(g));
+                let need = window.g[l].multiply(&square).combine(a[j], &twist, 1.0);
+                let size = || {
+                    let twist = weighted.magnitude().multiply(&window.g[l].wronskian_magnitude(g));
+                    cube.combine(a[l], &window.g[l].multiply(&square), a[j]).combine(NOISE, &twist, NOISE)
+                };
+                let roots = known + usize::from(tied >> l & 1 == 1);
+                let above = cube.combine(a[l], &need, -1.0);
+                found(kept_until(&above, size, roots, 1e-9 * a[l] * cube.first()), Event::Transition(l));
+                if BACK {
+                    let below = cube.combine(a[l], &need, 1.0);
+                    let contact = if self.low != Some(l) {
+                        0
+                    } else if self.tangent {
+                        2
+                    } else {
+                        1
+                    };
+                    found(kept_until(&below, size, known + contact, 0.0), Event::Low(l));
+                }
+            }
+        }
+        found(self.gap(j, &w, &square, turns, on_bound), Event::Bound);
+        if first > 1.0 - AT_END && first < 1.0 {
+            (first, event) = (1.0, None);
+        }
+        let Some(event) = event else {
+            self.push(1.0, Kind::Accelerating(j), Some(&w), slow_sq);
+            self.arrived();
+            return Ok(());
+        };
+        if first * self.window.length() < NO_STEP {
+            return self.hop(event, j, on_bound);
+        }
+        let kind = match event {
+            Event::Bound => None,
+            _ => Some(&w),
+        };
+        self.push(first, Kind::Accelerating(j), kind, slow_sq);
+        self.arrived();
+        match event {
+            Event::Transition(l) => (self.control, self.tied) = (Some(l), 1 << j),
+            Event::Low(l) => self.limit_curve = Some((j, l)),
+            Event::Bound => {}
+        }
+        Ok(())
+    }
+
+    /// An event at the very start of an arc.
+    fn hop(&mut self, event: Event, j: usize, on_bound: bool) -> Result<(), Stuck> {
+        self.hops += 1;
+        if self.hops > MAX_HOPS {
+            return Err(Stuck);
+        }
+        match event {
+            // Whether the two are tied shows in their accelerations.
+            Event::Transition(l) => (self.control, self.tied) = (Some(l), 0),
+            Event::Low(l) => {
+                self.limit_curve = Some((j, l));
+                self.low = None;
+            }
+            Event::Bound => {
+                if !on_bound {
+                    return Err(Stuck);
+                }
+                self.leaving = false;
+                self.control = None;
+                if self.hops > 4 {
+                    return Err(Stuck);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// After a step along an arc.
+    pub(super) fn arrived(&mut self) {
+        (self.hops, self.control, self.tied, self.low) = (0, None, 0, None);
+        (self.tangent, self.leaving) = (false, false);
+    }
+
+    /// Where the arc of axis j with w = ω v_j² rises above the bound.
+    fn gap(
+        &self,
+        j: usize,
+        w: &Polynomial<C>,
+        square: &Polynomial<C>,
+        turns: bool,
+        on_bound: bool,
+    ) -> Option<f64> {
+        let window = &self.window;
+        let weight = &window.weight;
+        let (limit, used, mut known) = match &window.bound {
+            Bound::Axis(k, v_sq) if *k == j => (weight.scale(*v_sq), *w, 0),
+            Bound::Arc(k, bound) if *k == j => (*bound, *w, 0),
+            Bound::Arc(k, bound) => {
+                (bound.multiply(square), w.multiply(&window.g[*k].multiply(&window.g[*k])), 2)
+            }
+            _ => {
+                let (n, d) = window.quotient()?;
+                if !n.first().is_finite() {
+                    return None;
+                }
+                let known = if matches!(window.bound, Bound::Hold(_)) { 0 } else { 2 };
+                (n.multiply(&weight.multiply(square)), w.multiply(&d), known)
+            }
+        };
+        let same = known == 0;
+        known = if self.order > 0 {
+            known * self.order
+        } else if turns {
+            known
+        } else {
+            0
+        };
+        if on_bound {
+            known += if self.tangent && self.leaving && !same { 2 } else { 1 };
+        }
+        let gap = limit.combine(1.0, &used, -1.0);
+        let size = || limit.combine(0.1 * NOISE, &used, 0.1 * NOISE);
+        let slack = if on_bound && self.leaving { f64::INFINITY } else { 0.0 };
+        kept_until(&gap, size, known, slack)
+    }
+}

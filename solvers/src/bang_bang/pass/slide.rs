@@ -1,0 +1,156 @@
+//! Along the bound: an arc of the backward pass to its end, the velocity cap while no axis needs more than it has.
+
+use super::{kept_until, Kind, Pass, NOISE, NO_STEP};
+use crate::bang_bang::window::Bound;
+use crate::polynomial::Polynomial;
+
+impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
+    /// From a place on the bound: along it as far as possible; says whether that moved or led to the limit curve.
+    pub(super) fn follow_bound(&mut self) -> bool {
+        let (end, saturated, pair) = match &self.window.bound {
+            // Any other motion under an arc of the backward pass meets it again later.
+            Bound::Arc(k, w) => {
+                let k = *k;
+                let slow_sq = (w.last() / self.window.weight.last()).max(0.0);
+                self.push(1.0, Kind::Braking(k), None, slow_sq);
+                self.arrived();
+                return true;
+            }
+            Bound::Hold(p) => {
+                let p = p * self.window.length().powi(2);
+                self.push(1.0, Kind::Hold, None, p);
+                self.arrived();
+                return true;
+            }
+            Bound::LimitCurve => return false,
+            Bound::Speed(f) => self.slide_at_speed(f),
+            Bound::Axis(k, v_sq) => self.slide_at_axis_speed(*k, *v_sq),
+        };
+        let moved = end * self.window.length() >= NO_STEP;
+        if moved {
+            self.push(end, Kind::Cap, None, 0.0);
+            self.hops = 0;
+            self.control = None;
+            self.tied = 0;
+        }
+        if let Some(pair) = pair {
+            self.hops += 1;
+            if self.hops < 5 {
+                self.limit_curve = Some(pair);
+                return true;
+            }
+        }
+        if end == 1.0 && saturated.is_none() {
+            return true;
+        }
+        self.leaving = true;
+        self.control = saturated;
+        self.tangent = saturated.is_some() && moved;
+        // The state is on the bound still: the arc that leaves it follows at once.
+        moved && self.window.x0 >= self.window.x1
+    }
+
+    fn slide_at_speed(&self, f: &Polynomial<C>) -> (f64, Option<usize>, Option<(usize, usize)>) {
+        if self.straight && self.sub.own_speed && f.degree() == 0 {
+            return (1.0, None, None);
+        }
+        let window = &self.window;
+        let d = &window.speed;
+        let constant = f.degree() == 0 && window.weight.degree() == 0 && self.sub.own_speed;
+        if constant && self.bends_little(f.first()) {
+            return (1.0, None, None);
+        }
+        let (d_slope, d_sq) = (d.derivative(), d.multiply(d));
+        let f_slope = f.derivative();
+        let weight_sq = window.weight.multiply(&window.weight);
+        self.slide(&|l: usize| {
+            let g = &window.g[l];
+            let along = g.derivative().multiply(d).combine(1.0, &g.multiply(&d_slope), -0.5);
+            let mut need = along.multiply(f);
+            let mut size = g
+                .derivative()
+                .magnitude()
+                .multiply(d)
+                .combine(1.0, &g.multiply(&d_slope.magnitude()), 0.5)
+                .multiply(&f.magnitude());
+            if f.degree() > 0 {
+                need = need.combine(1.0, &g.multiply(d).multiply(&f_slope), 0.5);
+                size = size.combine(1.0, &g.multiply(d).multiply(&f_slope.magnitude()), 0.5);
+            }
+            (d_sq, weight_sq.multiply(&need), weight_sq.multiply(&size))
+        })
+    }
+
+    /// Whether v²/ρ = v² |g × g'|/D^1.5 stays below the least acceleration limit.
+    fn bends_little(&self, speed_sq: f64) -> bool {
+        let g = &self.window.g;
+        let mut twist_sq = 0.0;
+        for j in 0..M {
+            for k in 0..j {
+                let w = g[j].wronskian(&g[k]);
+                let most = (0..=w.degree()).fold(0.0_f64, |most, i| most.max(w.bernstein(i).abs()));
+                twist_sq += most * most;
+            }
+        }
+        let least = self.window.speed.range().0.max(0.0);
+        let limit = self.axes.acceleration.iter().fold(f64::INFINITY, |least, &a| least.min(a));
+        speed_sq * twist_sq.sqrt() <= limit * least * least.sqrt()
+    }
+
+    fn slide_at_axis_speed(&self, k: usize, v_sq: f64) -> (f64, Option<usize>, Option<(usize, usize)>) {
+        let window = &self.window;
+        let g = &window.g[k];
+        let cube = g.multiply(g).multiply(g);
+        let weight_sq = window.weight.multiply(&window.weight).scale(v_sq);
+        self.slide(&|l: usize| {
+            let (twist, size) = (window.g[l].wronskian(g), window.g[l].wronskian_magnitude(g));
+            (cube, weight_sq.multiply(&twist), weight_sq.multiply(&size))
+        })
+    }
+
+    /// How far the velocity cap can be followed: `terms` gives x, y and the size of y for each axis, whose
+    /// acceleration is y/x; the axis that saturates, and the axes of the limit curve where that falls below the cap.
+    fn slide(
+        &self,
+        terms: &dyn Fn(usize) -> (Polynomial<C>, Polynomial<C>, Polynomial<C>),
+    ) -> (f64, Option<usize>, Option<(usize, usize)>) {
+        let mut end = 1.0;
+        let mut saturated = None;
+        let mut low = false;
+        if self.straight && matches!(self.window.bound, Bound::Axis(..)) {
+            return (end, None, None);
+        }
+        for l in self.moving() {
+            let (x, y, size) = terms(l);
+            let a = self.axes.acceleration[l];
+            let inside = x.combine(a, &y, -1.0);
+            if let Some(t) = kept_until(&inside, || x.combine(NOISE * a, &size, NOISE), 0, 0.0) {
+                if t < end {
+                    (end, saturated) = (t, Some(l));
+                }
+            }
+            low |= BACK && !x.combine(a, &y, 1.0).is_positive();
+        }
+        let mut pair = None;
+        if low && !self.straight {
+            let Some((n, d)) = self.window.quotient() else { return (end, saturated, pair) };
+            let weight_sq = self.window.weight.multiply(&self.window.weight);
+            for j in self.moving() {
+                for l in self.moving().filter(|&l| l != j) {
+                    let (over, under) = self.limit_quotient(j, l);
+                    if under.coefficients().iter().all(|&value| value <= 0.0) {
+                        continue;
+                    }
+                    let over = over.multiply(&d);
+                    let above = over.combine(1.0, &n.multiply(&weight_sq).multiply(&under), -1.0);
+                    if let Some(t) = kept_until(&above, || over.magnitude().scale(NOISE), 0, 0.0) {
+                        if t < end {
+                            (end, saturated, pair) = (t, None, Some((j, l)));
+                        }
+                    }
+                }
+            }
+        }
+        (end, saturated, pair)
+    }
+}
