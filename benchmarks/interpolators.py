@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from benchmarks.results import Cell, Result
 from feedplan.geometry.length import PathLength
 from feedplan.geometry.path import Path
+from feedplan.geometry.spline import CompositeCurve
 from feedplan.profile import ArcKind, SpeedProfile
 from feedplan.setpoints import INTERPOLATORS, setpoints
 
@@ -35,8 +36,7 @@ def spline(points: NDArray[np.float64]) -> Path:
     count = len(width)
     return Path(
         axes=("X", "Y", "Z")[: points.shape[1]],
-        control_points=control,
-        width=width,
+        curve=CompositeCurve.from_pieces(control, width),
         feed=np.full(count, FEED),
         move=np.zeros((count, 2), np.int64),
         line=np.arange(1, count + 1, dtype=np.int32),
@@ -59,7 +59,7 @@ def curves() -> dict[str, Path]:
 
 def exact_lengths(path: Path, piece: NDArray[np.uint32], u: NDArray[np.float64]) -> NDArray[np.float64]:
     """Length from the start of the piece to u: (u/R) [(R² + (t0 + t1)²)/4 + d² atanh(x)/x]."""
-    a, b, c = np.moveaxis(path.control_points[piece], 1, 0)
+    a, b, c = np.moveaxis(path.curve.by_piece[piece], 1, 0)
     width = path.width[piece][:, None]
     start = 2 / width * (b - a)
     second = (2 / width * (c - b) - start) / width
@@ -106,7 +106,7 @@ def constant_feed(path: Path) -> SpeedProfile:
     """One arc a piece at `FEED`: the stream starts and ends in motion."""
     count, length = len(path), PathLength(path)
     joints = np.append(length.length(np.arange(count), np.zeros(count)), length.total)
-    edges = np.diff(path.control_points, axis=1)
+    edges = np.diff(path.curve.by_piece, axis=1)
     p = (FEED * path.width[:, None] / 2 / np.linalg.norm(edges, axis=2)) ** 2
     return SpeedProfile(
         piece=np.arange(count, dtype=np.uint32),

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from feedplan import Axis, Machine, Path
 from feedplan.constraints.problem import Problem, build_problem
+from feedplan.geometry.spline import CompositeCurve
 
 # The accelerations of Zhang et al. 2010, section 4.3, and speeds that some pieces reach.
 MACHINE = Machine(
@@ -48,8 +49,7 @@ def spline_path(control_points: NDArray[np.float64], width: NDArray[np.float64])
     count = len(width)
     return Path(
         axes=("X", "Y", "Z"),
-        control_points=control_points,
-        width=width,
+        curve=CompositeCurve.from_pieces(control_points, width),
         feed=np.full(count, FEED),
         move=np.column_stack((np.arange(count), np.arange(count))),
         line=np.arange(1, count + 1, dtype=np.int32),

@@ -35,7 +35,7 @@ class QuadraticPath(AbstractGeometricPath):  # type: ignore[misc]
     """The path's pieces laid end to end on one parameter."""
 
     def __init__(self, problem: Problem) -> None:
-        points, width = problem.path.control_points, problem.path.width
+        points, width = problem.path.curve.by_piece, problem.path.width
         self.knots = np.concatenate(([0.0], np.cumsum(width)))
         self.position = points[:, 0]
         self.first = 2.0 * (points[:, 1] - points[:, 0]) / width[:, None]

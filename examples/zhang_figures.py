@@ -90,7 +90,7 @@ class Motion:
 
 def pieces_of(path: feedplan.Path, begin: int) -> Pieces:
     """The pieces from index `begin` on."""
-    points = path.control_points[begin:][:, :, [path.axes.index("Y"), path.axes.index("Z")]]
+    points = path.curve.by_piece[begin:][:, :, [path.axes.index("Y"), path.axes.index("Z")]]
     width = path.width[begin:]
     first = 2.0 * (points[:, 1] - points[:, 0]) / width[:, None]
     last = 2.0 * (points[:, 2] - points[:, 1]) / width[:, None]

@@ -361,7 +361,7 @@ def _dtypes(dtype: type[np.generic], *names: str) -> _Dtypes:
 
 
 _PATH = {
-    **_dtypes(np.float64, "control_points", "width", "dwell", "tolerance"),
+    **_dtypes(np.float64, "dwell", "tolerance"),
     **_dtypes(np.int64, "move", "runs"),
     **_dtypes(np.int32, "line"),
 }

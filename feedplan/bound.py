@@ -12,7 +12,7 @@ def lower_bound(problem: Problem) -> float:
 
     No piece is passed faster than its chord at its feed, nor faster than each axis at its greatest velocity.
     """
-    points = problem.path.control_points
+    points = problem.path.curve.by_piece
     step = np.abs(points[:, 2] - points[:, 0])
     at_feed = np.linalg.norm(step, axis=1) / problem.feed
     at_velocity = (step / problem.max_velocity).max(axis=1, initial=0.0)

@@ -69,7 +69,7 @@ class Setpoints:
                 f"there is no interpolator '{interpolator}': use one of {', '.join(INTERPOLATORS)}"
             )
         self._sampler = Sampler(
-            _array(path.control_points, np.float64),
+            _array(path.curve.by_piece, np.float64),
             _array(path.width, np.float64),
             _array(path.line, np.int32),
             _array(path.runs, np.int64),

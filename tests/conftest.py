@@ -13,6 +13,7 @@ from hypothesis import settings
 from feedplan.audit import Audit, LimitCheck
 from feedplan.constraints.problem import Problem
 from feedplan.geometry.path import Path
+from feedplan.geometry.spline import CompositeCurve
 from feedplan.machine.machine import Machine
 from feedplan.profile import ArcKind, SpeedProfile
 from feedplan.setpoints import SetpointChunk
@@ -97,8 +98,7 @@ def _square(check: LimitCheck) -> SquarePlan:
     four = np.arange(4)
     path = Path(
         axes=("X", "Y", "Z"),
-        control_points=control,
-        width=np.full(4, SIDE),
+        curve=CompositeCurve.from_pieces(control, np.full(4, SIDE)),
         feed=np.full(4, FEED),
         move=np.stack([four, four], axis=1),
         line=np.arange(3, 7, dtype=np.int32),

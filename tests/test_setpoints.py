@@ -16,6 +16,7 @@ from scipy.optimize import brentq
 
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
+from feedplan.geometry.spline import CompositeCurve
 from feedplan.profile import ArcKind, SpeedProfile
 from feedplan.setpoints import INTERPOLATORS, Setpoints, setpoints
 
@@ -29,8 +30,7 @@ def path_of(
     count = len(width)
     return Path(
         axes=tuple("XYZ"[: len(control_points[0][0])]),
-        control_points=np.array(control_points),
-        width=np.array(width),
+        curve=CompositeCurve.from_pieces(np.array(control_points), np.array(width)),
         feed=np.full(count, 100.0),
         move=np.zeros((count, 2), np.int64),
         line=np.arange(10, 10 * (count + 1), 10, dtype=np.int32),
@@ -295,7 +295,7 @@ def test_second_differences_stay_within_the_acceleration(interpolator: str, seed
     x = np.diff(chunk.position[:, 0], 2) / period**2
     assert np.abs(x).max(initial=0.0) <= 100 * (1 + 1e-6)
     assert (np.diff(chunk.position[:, 0]) >= 0).all()
-    assert chunk.position[-1].tolist() == path.control_points[-1, 2].tolist()
+    assert chunk.position[-1].tolist() == path.curve.by_piece[-1, 2].tolist()
 
 
 def test_axis_velocity_flat_and_chord_arcs_follow_their_law() -> None:
@@ -365,7 +365,7 @@ def test_what_does_not_fit_is_refused_with_a_sentence() -> None:
     for pause in (-1.0, math.nan, math.inf):
         with pytest.raises(InputError, match="a pause that is negative or not finite"):
             setpoints(replace(path, start_dwell=pause), profile, 0.001)
-    nothing = replace(path, control_points=np.empty((0, 3, 1)), width=np.empty(0), runs=np.array([0]))
+    nothing = replace(path, curve=CompositeCurve.from_pieces(np.empty((0, 3, 1)), []), runs=np.array([0]))
     with pytest.raises(InputError, match="the path is empty"):
         setpoints(replace(nothing, dwell=np.empty(0)), profile, 0.001)
 
@@ -382,7 +382,7 @@ def test_numbers_do_not_depend_on_the_unit() -> None:
     # The same part in micrometres.
     path, profile = zigzag(3)
     scale = 1000.0
-    micro = replace(path, control_points=path.control_points * scale)
+    micro = replace(path, curve=CompositeCurve.from_pieces(path.curve.by_piece * scale, path.width))
     # C' grows with the scale; u and p stay.
     faster = replace(profile, value=profile.value * scale)
     first, second = setpoints(path, profile, 0.003).all(), setpoints(micro, faster, 0.003).all()

@@ -19,7 +19,7 @@ def junction_limit(path: Path, max_velocity_jump: NDArray[np.float64]) -> NDArra
     0 at the ends of runs. Within a run, where the unit tangent jumps by ΔT, min over the axes of
     `max_velocity_jump` [mm/s] / |ΔT|, and infinite where it does not jump.
     """
-    points = path.control_points
+    points = path.curve.by_piece
     edge_out, edge_in = points[:-1, 2] - points[:-1, 1], points[1:, 1] - points[1:, 0]
     length_out, length_in = np.linalg.norm(edge_out, axis=1), np.linalg.norm(edge_in, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):

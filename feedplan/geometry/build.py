@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from feedplan._solvers import build_path as native_build_path
 from feedplan.errors import InputError, MachineError
 from feedplan.geometry.path import FitSummary, Path
+from feedplan.geometry.spline import CompositeCurve
 from feedplan.machine.machine import Machine
 from feedplan.program.program import MoveKind, PathControl, Program
 
@@ -129,8 +130,7 @@ def build_path(
     points, splines, polynomials, deviation = summary
     return Path(
         axes=names,
-        control_points=control,
-        width=width,
+        curve=CompositeCurve.from_pieces(control, width),
         feed=feed,
         move=move,
         line=program.line[move[:, 0]],

@@ -33,7 +33,7 @@ class PathLength:
         if len(path) == 0:
             raise InputError("the path is empty: it has no length table")
         self._table = NativePathLength(
-            np.ascontiguousarray(path.control_points, dtype=np.float64),
+            np.ascontiguousarray(path.curve.by_piece, dtype=np.float64),
             np.ascontiguousarray(path.width, dtype=np.float64),
         )
 

@@ -1,4 +1,4 @@
-"""A path: polynomial pieces in Bernstein form, grouped into runs between full stops."""
+"""A path: polynomial and rational Bézier pieces, grouped into runs between full stops."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+
+from feedplan.geometry.spline import CompositeCurve
 
 
 @dataclass(frozen=True)
@@ -37,19 +39,18 @@ class FitSummary:
 
 @dataclass(frozen=True)
 class Path:
-    """Quadratic pieces C_i(u), u in [0, width_i], joined end to end.
+    """Pieces C_i(u), u in [0, width_i], joined end to end.
 
-    `axes` names; `control_points` (n, 3, axes) Bézier points [mm]; `width` (n,) parameter interval [mm: about
-    the length]; `feed` (n,) commanded feed [mm/s], infinite on rapids; `move` (n, 2) first and last program
-    move that the piece follows; `line` (n,) source line of the first; `runs` (r + 1,) piece offsets: the tool
-    stands still at the start and the end of each run; `dwell` (r,) pause after each run [s]; `tolerance` (n,)
-    allowed distance from the programmed path [mm]; `start_dwell` pause before the first run [s].
+    `axes` names; `curve` the n pieces [mm, deg], each of its own degree, polynomial or rational; `feed` (n,)
+    commanded feed [mm/s], infinite on rapids; `move` (n, 2) first and last program move that the piece
+    follows; `line` (n,) source line of the first; `runs` (r + 1,) piece offsets: the tool stands still at the
+    start and the end of each run; `dwell` (r,) pause after each run [s]; `tolerance` (n,) allowed distance
+    from the programmed path [mm]; `start_dwell` pause before the first run [s].
     Within a run the tangent is continuous, unless corners are passed with a velocity jump.
     """
 
     axes: tuple[str, ...]
-    control_points: NDArray[np.float64]
-    width: NDArray[np.float64]
+    curve: CompositeCurve
     feed: NDArray[np.float64]
     move: NDArray[np.int64]
     line: NDArray[np.int32]
@@ -60,7 +61,12 @@ class Path:
     start_dwell: float = 0.0
 
     def __len__(self) -> int:
-        return len(self.width)
+        return len(self.curve)
+
+    @property
+    def width(self) -> NDArray[np.float64]:
+        """The parameter interval of each piece (n,) [mm: about the length]."""
+        return self.curve.width
 
     @property
     def pauses(self) -> float:

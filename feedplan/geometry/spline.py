@@ -88,13 +88,14 @@ class CompositeCurve:
 
     def __post_init__(self) -> None:
         control, weights = points(self.control_points, self.weights)
-        check_control_points(control, weights, 1)
+        if len(control):
+            check_control_points(control, weights, 1)
         offsets = np.ascontiguousarray(self.offsets, dtype=np.int64)
         width = floats(self.width, "widths", 1)
-        if len(width) == 0 or len(offsets) != len(width) + 1:
+        if len(offsets) != len(width) + 1:
             raise InputError(
-                f"{len(offsets)} offsets for {len(width)} widths: give one width for each of at least one "
-                "piece, and one offset more"
+                f"{len(offsets)} offsets for {len(width)} widths: give one width for each piece, and one "
+                "offset more"
             )
         degree = np.diff(offsets) - 1
         if offsets[0] != 0 or offsets[-1] != len(control):
@@ -116,6 +117,15 @@ class CompositeCurve:
             ("control_points", "weights", "offsets", "width"), (control, weights, offsets, width), strict=True
         ):
             object.__setattr__(self, name, value)
+
+    @classmethod
+    def from_pieces(cls, control_points: ArrayLike, width: ArrayLike) -> CompositeCurve:
+        """Polynomial pieces of one degree d by their control points (n, d + 1, axes) and widths (n,)."""
+        control = floats(control_points, "control points", 3)
+        count, points_each, axes = control.shape
+        return cls(
+            control.reshape(-1, axes), None, np.arange(count + 1) * points_each, floats(width, "widths")
+        )
 
     @classmethod
     def from_bezier(
@@ -221,6 +231,23 @@ class CompositeCurve:
     def degree(self) -> NDArray[np.int64]:
         """Degree of each piece (n,)."""
         return np.diff(self.offsets) - 1
+
+    @property
+    def by_piece(self) -> NDArray[np.float64]:
+        """Control points (n, d + 1, axes) of pieces that all have one degree d.
+
+        Raises InputError where the degrees differ.
+        """
+        if len(self) == 0:
+            return np.empty((0, 3, self.axes))
+        degree = int(self.offsets[1] - self.offsets[0]) - 1
+        refuse(self.degree != degree, lambda i: f"piece {i} has degree {self.degree[i]}, others {degree}")
+        return self.control_points.reshape(len(self), degree + 1, self.axes)
+
+    @property
+    def is_quadratic(self) -> bool:
+        """Whether all pieces are polynomials of degree 2."""
+        return self.weights is None and bool((self.degree == 2).all())
 
     @property
     def breakpoints(self) -> NDArray[np.float64]:

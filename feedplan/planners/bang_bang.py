@@ -24,7 +24,7 @@ def plan(problem: Problem) -> SpeedProfile:
 
     try:
         columns = plan_quadratic(
-            floats(path.control_points),
+            floats(path.curve.by_piece),
             floats(path.width),
             np.ascontiguousarray(path.runs, dtype=np.int64),
             floats(problem.feed),

@@ -87,7 +87,7 @@ def _lengths(path: Path, profile: SpeedProfile, arcs: NDArray[np.int64]) -> Floa
 
 def _tangents(path: Path, piece: NDArray[np.int64]) -> tuple[Floats, Floats]:
     """C' at the start of each piece and C'', shapes (n, axes)."""
-    control, width = path.control_points[piece], path.width[piece][:, None]
+    control, width = path.curve.by_piece[piece], path.width[piece][:, None]
     first = 2.0 * (control[:, 1] - control[:, 0]) / width
     last = 2.0 * (control[:, 2] - control[:, 1]) / width
     return first, (last - first) / width

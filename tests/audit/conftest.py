@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from feedplan.audit import Audit, audit
 from feedplan.constraints.problem import Problem, build_problem
 from feedplan.geometry.path import Path
+from feedplan.geometry.spline import CompositeCurve
 from feedplan.machine.machine import Machine
 from feedplan.plan import plan
 from feedplan.planners import planner
@@ -149,8 +150,7 @@ def spline() -> Callable[..., Case]:
         number = np.arange(count)
         path = Path(
             axes=machine.axis_names,
-            control_points=np.stack([knots[:-1], polygon[1:-1], knots[1:]], axis=1),
-            width=width,
+            curve=CompositeCurve.from_pieces(np.stack([knots[:-1], polygon[1:-1], knots[1:]], axis=1), width),
             feed=np.full(count, feed),
             move=np.stack([number, number], axis=1),
             line=np.asarray(number + 1, dtype=np.int32),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from copy import copy
 from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from feedplan.audit import Audit, audit
 from feedplan.constraints.problem import Problem
 from feedplan.geometry.path import Path
+from feedplan.geometry.spline import CompositeCurve
 from feedplan.machine.machine import Axis, Machine
 from feedplan.program.program import MoveKind, Program
 
@@ -54,8 +56,9 @@ def problem_of(points: list[list[list[float]]], move: list[list[int]], tolerance
     count = len(control)
     path = Path(
         axes=("X", "Y"),
-        control_points=control,
-        width=np.linalg.norm(np.diff(control, axis=1), axis=2).sum(axis=1),
+        curve=CompositeCurve.from_pieces(
+            control, np.linalg.norm(np.diff(control, axis=1), axis=2).sum(axis=1)
+        ),
         feed=np.full(count, 50.0),
         move=np.array(move),
         line=np.asarray([10 * (first + 1) for first, _ in move], dtype=np.int32),
@@ -112,8 +115,7 @@ def test_a_program_that_nothing_follows_is_not_followed() -> None:
     nothing = problem_of([[[0.0, 0.0], [2.0, 0.0], [4.0, 0.0]]], [[0, 0]], 0.01)
     path = replace(
         nothing.path,
-        control_points=np.empty((0, 3, 2)),
-        width=np.empty(0),
+        curve=CompositeCurve.from_pieces(np.empty((0, 3, 2)), np.empty(0)),
         feed=np.empty(0),
         move=np.empty((0, 2), np.int64),
         line=np.empty(0, np.int32),
@@ -185,25 +187,34 @@ def test_a_control_point_moved_by_twice_the_tolerance_is_found(
     piece = piece % len(part.path)
     tolerance = part.path.tolerance[piece]
     for corner in (0, 2):
-        points = changed(part.path.control_points, (piece, corner, 2), lambda z: z + 2 * tolerance)
-        result = part.with_path(control_points=points).audit()
+        points = changed(part.path.curve.by_piece, (piece, corner, 2), lambda z: z + 2 * tolerance)
+        result = part.with_path(curve=CompositeCurve.from_pieces(points, part.path.width)).audit()
         assert {("deviation", None), ("gap", None)} <= broken(result)
         assert abs(result.check("deviation").line - part.path.line[piece]) <= 1
     # The middle one pulls the curve along by half as much.
-    points = changed(part.path.control_points, (piece, 1, 2), lambda z: z + 5 * tolerance)
-    result = part.with_path(control_points=points).audit()
+    points = changed(part.path.curve.by_piece, (piece, 1, 2), lambda z: z + 5 * tolerance)
+    result = part.with_path(curve=CompositeCurve.from_pieces(points, part.path.width)).audit()
     assert ("deviation", None) in broken(result)
     assert result.check("deviation").worst == pytest.approx(2.5 * tolerance, rel=0.3)
     assert "jump" in {name for name, _ in broken(result)}
 
 
+def unchecked(curve: CompositeCurve, **columns: Any) -> CompositeCurve:
+    """A curve with columns that its own checks would refuse."""
+    other = copy(curve)
+    for name, column in columns.items():
+        object.__setattr__(other, name, column)
+    return other
+
+
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 def test_bad_numbers_in_the_path_are_never_fine(part: Any, changed: Change, bad: float) -> None:
-    points = changed(part.path.control_points, (20, 1, 0), bad)
-    result = part.with_path(control_points=points).audit()
+    points = changed(part.path.curve.by_piece, (20, 1, 0), bad)
+    result = part.with_path(curve=unchecked(part.path.curve, control_points=points.reshape(-1, 3))).audit()
     assert ("numbers", None) in broken(result)
     assert result.check("numbers").line == part.path.line[20]
-    assert not part.with_path(width=changed(part.path.width, 20, bad)).audit().ok
+    width = changed(part.path.width, 20, bad)
+    assert not part.with_path(curve=unchecked(part.path.curve, width=width)).audit().ok
 
 
 def test_another_program_is_not_the_one_that_is_followed(part: Any, changed: Change) -> None:

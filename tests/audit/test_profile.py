@@ -16,6 +16,7 @@ from feedplan.audit import PASS_MARK, Audit, LimitCheck, audit
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
+from feedplan.geometry.spline import CompositeCurve
 from feedplan.machine.machine import Axis, Machine
 from feedplan.profile import ArcKind, SpeedProfile
 
@@ -35,8 +36,7 @@ def path_of(points: list[list[list[float]]], width: list[float]) -> Path:
     number = np.arange(count)
     return Path(
         axes=("X", "Y"),
-        control_points=np.array(points),
-        width=np.array(width),
+        curve=CompositeCurve.from_pieces(np.array(points), np.array(width)),
         feed=np.full(count, 100.0),
         move=np.stack([number, number], axis=1),
         line=np.asarray(10 * (number + 1), dtype=np.int32),
@@ -126,7 +126,7 @@ def test_a_limit_just_above_the_pass_mark_fails_and_just_below_passes() -> None:
 
 
 def test_arcs_of_a_nanosecond_pass_and_still_show_what_breaks_a_limit() -> None:
-    far = replace(LINE, control_points=LINE.control_points + 1e4)
+    far = replace(LINE, curve=CompositeCurve.from_pieces(LINE.curve.by_piece + 1e4, LINE.width))
     v, width = 50.0, 5e-8
     pieces = [(1.25 + i * width, 1.25 + (i + 1) * width) for i in range(20)]
     tiny = [(0, ArcKind.FEED, 255, v * v, a, b, v * v, v * v, (b - a) / v) for a, b in pieces]

@@ -15,6 +15,7 @@ from feedplan.audit import Audit, audit, audit_setpoints
 from feedplan.constraints.problem import build_problem
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
+from feedplan.geometry.spline import CompositeCurve
 from feedplan.machine.machine import Axis, Machine
 from feedplan.planners import planner
 from feedplan.setpoints import setpoints
@@ -239,8 +240,10 @@ def test_a_corner_cut_by_a_step_is_a_chord_error() -> None:
     corners = np.array([[0.0, 0.0], [half, 0.0], [half, half]])
     path = Path(
         axes=("X", "Y"),
-        control_points=np.stack([corners[:-1], 0.5 * (corners[:-1] + corners[1:]), corners[1:]], axis=1),
-        width=np.full(2, half),
+        curve=CompositeCurve.from_pieces(
+            np.stack([corners[:-1], 0.5 * (corners[:-1] + corners[1:]), corners[1:]], axis=1),
+            np.full(2, half),
+        ),
         feed=np.full(2, 10.0),
         move=np.array([[0, 0], [1, 1]]),
         line=np.array([1, 2], np.int32),

@@ -5,6 +5,7 @@ import pytest
 
 from feedplan import InputError, Machine, Path
 from feedplan.constraints.problem import build_problem
+from feedplan.geometry.spline import CompositeCurve
 from feedplan.machine.machine import Axis
 
 
@@ -14,8 +15,7 @@ def polyline(points: list[list[float]], feed: float = 10.0, runs: list[int] | No
     n = len(control)
     return Path(
         axes=("X", "Y"),
-        control_points=control,
-        width=np.linalg.norm(control[:, 2] - control[:, 0], axis=1),
+        curve=CompositeCurve.from_pieces(control, np.linalg.norm(control[:, 2] - control[:, 0], axis=1)),
         feed=np.full(n, feed),
         move=np.repeat(np.arange(n)[:, None], 2, axis=1),
         line=np.arange(1, n + 1, dtype=np.int32),

@@ -139,7 +139,7 @@ def _deviations(program: Program, path: Path) -> tuple[Array, Array]:
         own_piece, own_move = piece[rows], move[rows]
         for turns in np.unique(moves.turns[move]):
             chosen = moves.turns[own_move] == turns
-            on_piece = partial(_curve, path.control_points[own_piece[chosen]])
+            on_piece = partial(_curve, path.curve.by_piece[own_piece[chosen]])
             on_move = partial(moves.points, own_move[chosen])
             if owner is piece:
                 nearest[chosen] = _nearest(on_piece(share[chosen]), on_move, 2 + int(100 * turns))
@@ -154,7 +154,7 @@ def _deviations(program: Program, path: Path) -> tuple[Array, Array]:
 
 def _check(program: Program, path: Path) -> tuple[float, float]:
     """Asserts what every path without velocity jumps must fulfil; the greatest distances found, both ways."""
-    control, columns = path.control_points, [program.axes.index(name) for name in path.axes]
+    control, columns = path.curve.by_piece, [program.axes.index(name) for name in path.axes]
     rounding = 1e-13 + 1e-14 * np.abs(control).max()
     assert np.isfinite(control).all()
     assert (path.width > 0).all()

@@ -41,8 +41,8 @@ def test_quarter_and_full_circles_in_every_plane(
     assert 0.2e-3 < path.fit.deviation <= 0.5e-3
     assert off == pytest.approx(path.fit.deviation, rel=1e-6)
     # At the turned angle 0 the direction is that of the second axis.
-    spoke = path.control_points[0, 0] - [1, 2, 3]
-    step = path.control_points[0, 1] - path.control_points[0, 0]
+    spoke = path.curve.by_piece[0, 0] - [1, 2, 3]
+    step = path.curve.by_piece[0, 1] - path.curve.by_piece[0, 0]
     turning = np.cross(spoke, step)
     assert np.sign(turning[normal]) == np.sign(angle)
 
@@ -52,7 +52,7 @@ def test_a_helix_of_three_and_a_quarter_turns(make_program: Any, check: Any, nor
     program = arc_program(make_program, 4.0, 6.5 * math.pi, normal, rise=-9.75)
     path = build_path(program, MILL)
     check(program, path)
-    axis = path.control_points[:, :, normal]
+    axis = path.curve.by_piece[:, :, normal]
     np.testing.assert_allclose(np.diff(axis, axis=1), axis[0, 1] - axis[0, 0], rtol=1e-9)
     assert path.width.sum() == pytest.approx(6.5 * math.pi * math.hypot(4, 1.5 / math.pi), rel=1e-12)
 
@@ -70,8 +70,8 @@ def test_a_helix_of_a_thousand_turns_ends_where_it_should(make_program: Any) -> 
     program = arc_program(make_program, 4.0, 2000 * math.pi, 2, rise=50.0)
     path = build_path(program, MILL)
     np.testing.assert_array_equal(path.runs, [0, len(path)])
-    np.testing.assert_array_equal(path.control_points[-1, 2], program.target[-1])
-    radius = np.hypot(*(path.control_points[:, 0, :2] - [1, 2]).T)
+    np.testing.assert_array_equal(path.curve.by_piece[-1, 2], program.target[-1])
+    radius = np.hypot(*(path.curve.by_piece[:, 0, :2] - [1, 2]).T)
     np.testing.assert_allclose(radius, 4.0, rtol=1e-9)
     assert path.width.sum() == pytest.approx(2000 * math.pi * math.hypot(4, 0.025 / math.pi), rel=1e-9)
 

@@ -49,7 +49,7 @@ def test_tolerance_rounds_the_corners_of_a_square_as_far_as_it_allows(make_progr
     np.testing.assert_array_equal(path.move, [[0, 0], [0, 1], [1, 1], [1, 2], [2, 2], [2, 3], [3, 3]])
     length = 2 * 0.05 / math.sin(math.pi / 4)
     np.testing.assert_allclose(
-        path.control_points[1, :, :2], [[10 - length, 0], [10, 0], [10, length]], atol=1e-12
+        path.curve.by_piece[1, :, :2], [[10 - length, 0], [10, 0], [10, length]], atol=1e-12
     )
     np.testing.assert_array_equal(path.tolerance, 0.05)
 
@@ -102,7 +102,7 @@ def test_the_stricter_of_two_modes_governs_the_joint(make_program: Any, check: A
     path = build_path(program, MILL)
     check(program, path)
     np.testing.assert_array_equal(path.move[path.runs[1:] - 1, 1], [1, 2, 3])
-    exact = path.control_points[(path.move == 2).all(axis=1)]
+    exact = path.curve.by_piece[(path.move == 2).all(axis=1)]
     np.testing.assert_array_equal(exact[:, [0, 2], :2], [[[10, 10], [0, 10]]])
 
 
@@ -114,7 +114,7 @@ def test_stops_and_dwells_end_runs(make_program: Any, check: Any) -> None:
     check(program, path)
     np.testing.assert_array_equal(path.dwell, [0, 0.5, 0])
     np.testing.assert_array_equal(path.move[path.runs[1:] - 1, 1], [49, 99, 199])
-    np.testing.assert_array_equal(path.control_points[path.runs[1], 0], program.target[49])
+    np.testing.assert_array_equal(path.curve.by_piece[path.runs[1], 0], program.target[49])
 
 
 def test_rapids_are_lines_without_a_feed_and_share_corners(make_program: Any, check: Any) -> None:
@@ -135,7 +135,7 @@ def test_feeds_change_at_the_vertex_and_leave_the_curve_whole(make_program: Any,
     check(program, path)
     np.testing.assert_array_equal(path.runs, [0, len(path)])
     (change,) = np.flatnonzero(np.diff(path.feed))
-    assert np.linalg.norm(path.control_points[change, 2] - program.target[69]) < 0.005
+    assert np.linalg.norm(path.curve.by_piece[change, 2] - program.target[69]) < 0.005
     assert path.fit.polynomials in (len(path), len(path) - 1)
 
 
@@ -157,7 +157,7 @@ def test_the_path_has_the_axes_of_the_machine_in_its_order(make_program: Any, ch
     path = build_path(program, machine)
     check(program, path)
     assert path.axes == ("Y", "X")
-    np.testing.assert_array_equal(path.control_points[0, [0, 2]], [[2, 1], [6, 4]])
+    np.testing.assert_array_equal(path.curve.by_piece[0, [0, 2]], [[2, 1], [6, 4]])
 
 
 def test_an_axis_that_moves_must_be_there(make_program: Any) -> None:

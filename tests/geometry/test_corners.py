@@ -28,7 +28,7 @@ def test_a_corner_is_symmetric_with_its_apex_at_the_tolerance(
     _, off = check(program, path)
     assert off == pytest.approx(0.01, rel=1e-6)
     assert len(path) == 3
-    start, middle, end = path.control_points[1]
+    start, middle, end = path.curve.by_piece[1]
     length = 2 * 0.01 / math.sin(math.radians(turn) / 2)
     np.testing.assert_allclose(middle, vertex, atol=1e-14)
     np.testing.assert_allclose([start, end], [vertex - length * before, vertex + length * after], atol=1e-12)
@@ -56,7 +56,7 @@ def test_neighbours_share_a_short_edge_by_halves(make_program: Any, check: Any) 
     np.testing.assert_array_equal(path.runs, [0, len(path)])
     assert len(path) == 30
     middles = (np.array(points)[1:-2] + np.array(points)[2:-1]) / 2
-    np.testing.assert_allclose(path.control_points[2:-1, 0, :2], middles, atol=1e-12)
+    np.testing.assert_allclose(path.curve.by_piece[2:-1, 0, :2], middles, atol=1e-12)
 
 
 def test_a_neighbour_that_needs_little_leaves_the_rest(make_program: Any, check: Any) -> None:
@@ -81,7 +81,7 @@ def test_a_corner_reaches_over_short_pieces(make_program: Any, check: Any) -> No
     assert off == pytest.approx(0.1, rel=1e-3)
     np.testing.assert_array_equal(path.runs, [0, len(path)])
     start = 10 * np.stack([np.sin(np.linspace(0, 1, 100)), 1 - np.cos(np.linspace(0, 1, 100))], axis=1)
-    distance = [np.linalg.norm(start - joint[:2], axis=1).min() for joint in path.control_points[:-1, 2]]
+    distance = [np.linalg.norm(start - joint[:2], axis=1).min() for joint in path.curve.by_piece[:-1, 2]]
     assert (np.array(distance) > 0.02).sum() >= 3
 
 
@@ -140,7 +140,7 @@ def test_a_closed_contour_starts_and_ends_at_rest_in_its_first_corner(make_progr
     path = build_path(program, MILL)
     check(program, path)
     np.testing.assert_array_equal(path.runs, [0, 5])
-    np.testing.assert_array_equal(path.control_points[0, 0], path.control_points[-1, 2])
+    np.testing.assert_array_equal(path.curve.by_piece[0, 0], path.curve.by_piece[-1, 2])
 
 
 def test_a_slight_turn_between_long_moves_is_no_stop(make_program: Any, check: Any) -> None:

@@ -14,14 +14,14 @@ from scipy.integrate import quad
 from feedplan.errors import InputError
 from feedplan.geometry.length import PathLength
 from feedplan.geometry.path import Path
+from feedplan.geometry.spline import CompositeCurve
 
 
 def path_of(control_points: NDArray[np.float64], width: NDArray[np.float64]) -> Path:
     count, axes = len(width), control_points.shape[2]
     return Path(
         axes=tuple("XYZABC"[:axes]),
-        control_points=control_points,
-        width=width,
+        curve=CompositeCurve.from_pieces(control_points, width),
         feed=np.full(count, 100.0),
         move=np.zeros((count, 2), np.int64),
         line=np.arange(1, count + 1, dtype=np.int32),
@@ -38,7 +38,7 @@ def chain(points: NDArray[np.float64]) -> Path:
 
 
 def speed(path: Path, piece: int, u: float) -> float:
-    a, b, c = path.control_points[piece]
+    a, b, c = path.curve.by_piece[piece]
     t = u / path.width[piece]
     return float(np.linalg.norm(2 / path.width[piece] * ((1 - t) * (b - a) + t * (c - b))))
 

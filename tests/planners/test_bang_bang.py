@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from feedplan import InfeasibleError, InputError, Path
 from feedplan.constraints.problem import Problem
+from feedplan.geometry.spline import CompositeCurve
 from feedplan.planners.bang_bang import plan
 from feedplan.profile import ArcKind, SpeedProfile
 
@@ -42,8 +43,7 @@ def problem(
     control = np.stack([np.zeros_like(left), second, second + right * width[:, None] / 2], axis=1)
     path = Path(
         axes=tuple("XYZABC"[:axes]),
-        control_points=control,
-        width=width,
+        curve=CompositeCurve.from_pieces(control, width),
         feed=feed,
         move=np.zeros((count, 2), dtype=np.int64),
         line=np.arange(1, count + 1, dtype=np.int32),
@@ -106,7 +106,7 @@ def axis_count(data: NDArray[np.float64], piece: int) -> int:
 
 def worst_excess(task: Problem, profile: SpeedProfile, samples: int = 100) -> tuple[float, float]:
     """Greatest relative excess over any limit, and the least use of the most used limit, densely sampled."""
-    points, width = task.path.control_points, task.path.width
+    points, width = task.path.curve.by_piece, task.path.width
     left = 2 * (points[:, 1] - points[:, 0]) / width[:, None]
     bend = (2 * (points[:, 2] - points[:, 1]) / width[:, None] - left) / width[:, None]
     inner = (np.arange(samples) + 0.5) / samples
@@ -177,7 +177,7 @@ def test_direction_and_order_of_the_axes_do_not_matter(task: Problem, random: Ra
     other = replace(
         task,
         path=replace(
-            path, control_points=path.control_points[::-1, ::-1, order].copy(), width=path.width[::-1].copy()
+            path, curve=CompositeCurve.from_pieces(path.curve.by_piece[::-1, ::-1, order], path.width[::-1])
         ),
         feed=task.feed[::-1].copy(),
         max_velocity=task.max_velocity[order],

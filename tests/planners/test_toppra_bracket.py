@@ -20,6 +20,7 @@ from toppra.constraint import JointAccelerationConstraint, JointVelocityConstrai
 from benchmarks.toppra_mesh import FeedConstraint, QuadraticPath, solve
 from feedplan import Path
 from feedplan.constraints.problem import Problem
+from feedplan.geometry.spline import CompositeCurve
 from feedplan.planners.bang_bang import plan
 
 
@@ -41,8 +42,7 @@ def cam_problem(count: int, seed: int) -> Problem:
     feed = np.full(count, rng.uniform(20.0, 60.0))
     path = Path(
         axes=("X", "Y", "Z"),
-        control_points=np.stack([start[:-1], middle, start[1:]], axis=1),
-        width=width,
+        curve=CompositeCurve.from_pieces(np.stack([start[:-1], middle, start[1:]], axis=1), width),
         feed=feed,
         move=np.zeros((count, 2), dtype=np.int64),
         line=np.arange(1, count + 1, dtype=np.int32),

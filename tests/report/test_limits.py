@@ -10,6 +10,7 @@ import pytest
 from scipy.optimize import linprog
 
 from feedplan.geometry.path import Path
+from feedplan.geometry.spline import CompositeCurve
 from feedplan.profile import ArcKind, SpeedProfile
 from feedplan.report.limits import LimitSamples, arc_lengths, limit_curve, limit_samples
 
@@ -68,8 +69,7 @@ def bend(
     """A quarter turn as a parabola from X to Y, of width 10, in one arc."""
     path: Path = replace(
         square.path,
-        control_points=np.array([[[0.0, 0, 0], [10, 0, 0], [10, 10, 0]]]),
-        width=np.array([10.0]),
+        curve=CompositeCurve.from_pieces([[[0.0, 0, 0], [10, 0, 0], [10, 10, 0]]], [10.0]),
         line=np.array([1], np.int32),
         runs=np.array([0, 1]),
     )

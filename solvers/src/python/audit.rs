@@ -1,6 +1,6 @@
 //! The audit of plans and setpoints: the package's own types in, findings out.
 
-use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -44,11 +44,17 @@ fn require(good: bool, what: &str) -> PyResult<()> {
     }
 }
 
+/// `feedplan.geometry.spline.CompositeCurve`.
+#[derive(FromPyObject)]
+struct CurveArrays<'py> {
+    control_points: PyReadonlyArray2<'py, f64>,
+    width: PyReadonlyArray1<'py, f64>,
+}
+
 /// `feedplan.Path`.
 #[derive(FromPyObject)]
 struct PathArrays<'py> {
-    control_points: PyReadonlyArray3<'py, f64>,
-    width: PyReadonlyArray1<'py, f64>,
+    curve: CurveArrays<'py>,
     line: PyReadonlyArray1<'py, i32>,
     #[pyo3(attribute("move"))]
     moves: PyReadonlyArray2<'py, i64>,
@@ -68,15 +74,15 @@ struct ProblemArrays<'py> {
 
 impl ProblemArrays<'_> {
     fn axes(&self) -> usize {
-        self.path.control_points.shape()[2]
+        self.path.curve.control_points.shape()[1]
     }
 
     fn followed(&self) -> PyResult<Followed<'_>> {
         let path = &self.path;
         let followed = Followed {
             axes: self.axes(),
-            control: path.control_points.as_slice()?,
-            width: path.width.as_slice()?,
+            control: path.curve.control_points.as_slice()?,
+            width: path.curve.width.as_slice()?,
             feed: self.feed.as_slice()?,
             line: path.line.as_slice()?,
             moves: path.moves.as_slice()?,
