@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from feedplan import Axis, Machine, Path
 from feedplan.constraints.problem import Problem, build_problem
-from feedplan.geometry.spline import CompositeCurve
+from feedplan.curves.composite import CompositeCurve
 
 # The accelerations of Zhang et al. 2010, section 4.3, and speeds that some pieces reach.
 MACHINE = Machine(

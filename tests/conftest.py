@@ -12,8 +12,8 @@ from hypothesis import settings
 
 from feedplan.audit import Audit, LimitCheck
 from feedplan.constraints.problem import Problem
+from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Path
-from feedplan.geometry.spline import CompositeCurve
 from feedplan.machine.machine import Machine
 from feedplan.profile import ArcKind, SpeedProfile
 from feedplan.setpoints import SetpointChunk

@@ -9,16 +9,30 @@ from numpy.typing import NDArray
 
 from feedplan.constraints.feed import feed_limit
 from feedplan.constraints.junction import junction_limit
+from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
+from feedplan.machine.words import AxisWords
+
+
+@dataclass(frozen=True)
+class TipSpeed:
+    """|C'|² of the tool tip as a polynomial of u on each piece: Bernstein `coefficients` (total,), those of
+    piece i from `offsets[i]` to `offsets[i + 1]`."""
+
+    coefficients: NDArray[np.float64]
+    offsets: NDArray[np.int64]
 
 
 @dataclass(frozen=True)
 class Problem:
     """Minimise the time along `path` under these limits.
 
-    Per axis: `max_velocity` [mm/s], `max_acceleration` [mm/s²], `max_jerk` [mm/s³] (may be infinite). Per
+    Where the path's axes are not the joints of the machine, `joints` is the motion of the joints [mm, deg],
+    one piece for each of the path and over the same parameter; `tip_speed` the square of the speed that the
+    feed is about, per u̇²; and `words` (one a run) the kinematics from the path to the joints. Per joint,
+    `axes` names them: `max_velocity` [mm/s], `max_acceleration` [mm/s²], `max_jerk` [mm/s³] (may be infinite). Per
     piece: `feed` (n,) greatest speed [mm/s], finite. At piece ends: `junction_speed` (n + 1,) greatest speed
     [mm/s]: 0 at a stop, infinite where nothing but the other limits holds. `chord_tolerance` [mm] and
     `period` [s] limit the speed on a curve of radius ρ to (2/T)·√(2ρδ − δ²); an infinite tolerance switches
@@ -35,6 +49,20 @@ class Problem:
     period: float
     start_speed: float = 0.0
     end_speed: float = 0.0
+    joint_axes: tuple[str, ...] = ()
+    joints: CompositeCurve | None = None
+    tip_speed: TipSpeed | None = None
+    words: tuple[AxisWords, ...] = ()
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the joints that the limits belong to."""
+        return self.joint_axes or self.path.axes
+
+    @property
+    def curve(self) -> CompositeCurve:
+        """The motion of the joints."""
+        return self.path.curve if self.joints is None else self.joints
 
 
 def build_problem(

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan._solvers import build_path as native_build_path
+from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError, MachineError
 from feedplan.geometry.path import FitSummary, Path
-from feedplan.geometry.spline import CompositeCurve
 from feedplan.machine.machine import Machine
 from feedplan.program.program import MoveKind, PathControl, Program
 

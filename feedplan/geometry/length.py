@@ -2,25 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import PathLength as NativePathLength
+from feedplan.curves.length import Places
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
-
-
-@dataclass(frozen=True)
-class Places:
-    """Places on a path (n,): `piece` and local `u`; `iterations` that the search took (0 at an end) and the
-    remaining `miss` of the length [mm]."""
-
-    piece: NDArray[np.uint32]
-    u: NDArray[np.float64]
-    iterations: NDArray[np.uint32]
-    miss: NDArray[np.float64]
 
 
 class PathLength:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from feedplan.geometry.spline import CompositeCurve
+from feedplan.curves.composite import CompositeCurve
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,8 @@ class Path:
     follows; `line` (n,) source line of the first; `runs` (r + 1,) piece offsets: the tool stands still at the
     start and the end of each run; `dwell` (r,) pause after each run [s]; `tolerance` (n,) allowed distance
     from the programmed path [mm]; `start_dwell` pause before the first run [s].
+    `meaning` (r,) what the axes are on the machine in each run (`feedplan.machine.words.Meaning`) and
+    `tool_length` (r,) [mm], NaN for the machine file's; None where the machine knows one meaning only.
     Within a run the tangent is continuous, unless corners are passed with a velocity jump.
     """
 
@@ -59,6 +61,8 @@ class Path:
     tolerance: NDArray[np.float64]
     fit: FitSummary = field(default_factory=FitSummary)
     start_dwell: float = 0.0
+    meaning: NDArray[np.uint8] | None = None
+    tool_length: NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
         return len(self.curve)

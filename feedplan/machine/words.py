@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from enum import Enum
+from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,15 +20,15 @@ from feedplan.machine.machine import Machine
 from feedplan.machine.rotary import RotaryChain, ToolVector
 
 
-class Meaning(Enum):
+class Meaning(IntEnum):
     """Of axis words."""
 
     # Every word is the position of the joint of its letter.
-    JOINTS = "joints"
+    JOINTS = 0
     # X, Y, Z are the tip on the part, rotary words the angles of the rotary joints (G43.4).
-    TIP = "tip"
+    TIP = 1
     # X, Y, Z are the tip on the part, I, J, K the tool's direction (G43.5).
-    VECTOR = "vector"
+    VECTOR = 2
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,8 @@ def axis_words(
     chooses between the two poses that point the tool along a direction.
     """
     kinematics = machine.inverse
-    meaning = meaning or (Meaning.TIP if kinematics.always else Meaning.JOINTS)
+    if meaning is None:
+        meaning = Meaning.TIP if kinematics.always else Meaning.JOINTS
     if tool_length is not None and isinstance(kinematics, RotaryChain):
         kinematics = kinematics.with_tool(tool_length)
     if meaning is Meaning.JOINTS:

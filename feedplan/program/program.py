@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
+
+from feedplan.curves.composite import CompositeCurve
 
 
 class MoveKind(IntEnum):
@@ -15,6 +17,7 @@ class MoveKind(IntEnum):
     RAPID = 0
     LINE = 1
     ARC = 2
+    SPLINE = 3
 
 
 class PathControl(IntEnum):
@@ -40,6 +43,10 @@ class Program:
     (k,) the axis 0, 1, 2 the arc turns about, `arc_angle` (k,) signed sweep [rad], positive
     counter-clockwise seen from the tip of the normal; it may exceed a turn. All other axes move linearly with
     the angle, and so does the radius where it differs at both ends, as rounded coordinates make it.
+    Splines, one row each: `spline_move` (index of the move), `spline_pieces` (k + 1,) which pieces of
+    `splines` it takes, a curve in all `axes` [mm, deg] from the move's start to its target.
+    What the words mean: `meaning` (n,) (`feedplan.machine.words.Meaning`), `tool_length` (n,) [mm] under TIP
+    and VECTOR, NaN for the machine file's; None where the machine knows one meaning only.
     `warnings` are sentences for the user.
     """
 
@@ -60,6 +67,11 @@ class Program:
     arc_normal: NDArray[np.uint8]
     arc_angle: NDArray[np.float64]
     start_dwell: float = 0.0
+    spline_move: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+    spline_pieces: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, np.int64))
+    splines: CompositeCurve | None = None
+    meaning: NDArray[np.uint8] | None = None
+    tool_length: NDArray[np.float64] | None = None
     warnings: tuple[str, ...] = ()
 
     def __len__(self) -> int:

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from feedplan.audit import Audit, audit
 from feedplan.constraints.problem import Problem, build_problem
+from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Path
-from feedplan.geometry.spline import CompositeCurve
 from feedplan.machine.machine import Machine
 from feedplan.plan import plan
 from feedplan.planners import planner

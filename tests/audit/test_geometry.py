@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from feedplan.audit import Audit, audit
 from feedplan.constraints.problem import Problem
+from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Path
-from feedplan.geometry.spline import CompositeCurve
 from feedplan.machine.machine import Axis, Machine
 from feedplan.program.program import MoveKind, Program
 

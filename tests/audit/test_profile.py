@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from feedplan.audit import PASS_MARK, Audit, LimitCheck, audit
 from feedplan.constraints.problem import Problem
+from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
-from feedplan.geometry.spline import CompositeCurve
 from feedplan.machine.machine import Axis, Machine
 from feedplan.profile import ArcKind, SpeedProfile
 

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from feedplan.audit import Audit, audit, audit_setpoints
 from feedplan.constraints.problem import build_problem
+from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
-from feedplan.geometry.spline import CompositeCurve
 from feedplan.machine.machine import Axis, Machine
 from feedplan.planners import planner
 from feedplan.setpoints import setpoints

@@ -5,7 +5,7 @@ import pytest
 
 from feedplan import InputError, Machine, Path
 from feedplan.constraints.problem import build_problem
-from feedplan.geometry.spline import CompositeCurve
+from feedplan.curves.composite import CompositeCurve
 from feedplan.machine.machine import Axis
 
 

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import quad
 
+from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
 from feedplan.geometry.length import PathLength
 from feedplan.geometry.path import Path
-from feedplan.geometry.spline import CompositeCurve
 
 
 def path_of(control_points: NDArray[np.float64], width: NDArray[np.float64]) -> Path:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from feedplan import InfeasibleError, InputError, Path
 from feedplan.constraints.problem import Problem
-from feedplan.geometry.spline import CompositeCurve
+from feedplan.curves.composite import CompositeCurve
 from feedplan.planners.bang_bang import plan
 from feedplan.profile import ArcKind, SpeedProfile
 

@@ -14,8 +14,8 @@ import pytest
 from numpy.typing import NDArray
 
 from feedplan._solvers import PlanError, plan_curves
-from feedplan.geometry.arc import circle
-from feedplan.geometry.spline import CompositeCurve, insert_knot
+from feedplan.curves.arc import circle
+from feedplan.curves.composite import CompositeCurve, insert_knot
 from feedplan.profile import ArcKind
 
 Array = NDArray[np.float64]

@@ -20,7 +20,7 @@ from toppra.constraint import JointAccelerationConstraint, JointVelocityConstrai
 from benchmarks.toppra_mesh import FeedConstraint, QuadraticPath, solve
 from feedplan import Path
 from feedplan.constraints.problem import Problem
-from feedplan.geometry.spline import CompositeCurve
+from feedplan.curves.composite import CompositeCurve
 from feedplan.planners.bang_bang import plan
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
+from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Path
-from feedplan.geometry.spline import CompositeCurve
 from feedplan.profile import ArcKind, SpeedProfile
 from feedplan.report.limits import LimitSamples, arc_lengths, limit_curve, limit_samples
 

@@ -44,7 +44,7 @@ fn require(good: bool, what: &str) -> PyResult<()> {
     }
 }
 
-/// `feedplan.geometry.spline.CompositeCurve`.
+/// `feedplan.curves.composite.CompositeCurve`.
 #[derive(FromPyObject)]
 struct CurveArrays<'py> {
     control_points: PyReadonlyArray2<'py, f64>,

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import turn_pieces
+from feedplan.curves._arrays import MAX_AXES, floats
+from feedplan.curves.composite import MAX_DEGREE, CompositeCurve
 from feedplan.errors import InputError
-from feedplan.geometry._arrays import MAX_AXES, floats
-from feedplan.geometry.spline import MAX_DEGREE, CompositeCurve
 
 
 def arc(

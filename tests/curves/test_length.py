@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
+from feedplan.curves.composite import CompositeCurve
+from feedplan.curves.length import CurveLength
 from feedplan.errors import InputError
-from feedplan.geometry.curve_length import CurveLength
-from feedplan.geometry.spline import CompositeCurve
 
 BUTTERFLY = Path(__file__).parents[2] / "benchmarks/curves/butterfly.json"
 

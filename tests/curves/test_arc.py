@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from feedplan.curves.arc import arc, circle, helix
+from feedplan.curves.composite import CompositeCurve, JointKind
+from feedplan.curves.length import CurveLength
 from feedplan.errors import InputError
-from feedplan.geometry.arc import arc, circle, helix
-from feedplan.geometry.curve_length import CurveLength
-from feedplan.geometry.spline import CompositeCurve, JointKind
 
 SWEEPS = st.floats(1e-3, 30.0) | st.floats(-30.0, -1e-3)
 

@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import CurveLength as NativeCurveLength
+from feedplan.curves._arrays import floats, places
+from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
-from feedplan.geometry._arrays import floats, places
-from feedplan.geometry.length import Places
-from feedplan.geometry.spline import CompositeCurve
+
+
+@dataclass(frozen=True)
+class Places:
+    """Places on a path (n,): `piece` and local `u`; `iterations` that the search took (0 at an end) and the
+    remaining `miss` of the length [mm]."""
+
+    piece: NDArray[np.uint32]
+    u: NDArray[np.float64]
+    iterations: NDArray[np.uint32]
+    miss: NDArray[np.float64]
 
 
 class CurveLength:

@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline, make_interp_spline
 
+from feedplan.curves.composite import CompositeCurve, JointKind, insert_knot, knot_continuity
 from feedplan.errors import InputError
-from feedplan.geometry.spline import CompositeCurve, JointKind, insert_knot, knot_continuity
 
 BUTTERFLY = Path(__file__).parents[2] / "benchmarks/curves/butterfly.json"
 SEEDS = st.integers(0, 2**32 - 1)

@@ -22,8 +22,8 @@ from feedplan._solvers import (
     spline_insert,
     spline_pieces,
 )
+from feedplan.curves._arrays import floats, places, points, refuse
 from feedplan.errors import InputError
-from feedplan.geometry._arrays import floats, places, points, refuse
 
 MAX_DEGREE = 9
 

@@ -1,0 +1,1 @@
+"""Curves of any degree, polynomial and rational, and their lengths: what programs and paths are made of."""
