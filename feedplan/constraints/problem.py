@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,14 +30,15 @@ class TipSpeed:
 class Problem:
     """Minimise the time along `path` under these limits.
 
+    Per joint (`axes` names them): `max_velocity` [mm/s], `max_acceleration` [mm/s²], `max_jerk` [mm/s³] (may
+    be infinite). Per piece: `feed` (n,) greatest speed [mm/s], finite. At piece ends: `junction_speed`
+    (n + 1,) greatest speed [mm/s]: 0 at a stop, infinite where nothing but the other limits holds.
+    `chord_tolerance` [mm] and `period` [s] limit the speed on a curve of radius ρ to (2/T)·√(2ρδ − δ²); an
+    infinite tolerance switches that off. `start_speed` and `end_speed` [mm/s] hold at the ends of the path.
+
     Where the path's axes are not the joints of the machine, `joints` is the motion of the joints [mm, deg],
-    one piece for each of the path and over the same parameter; `tip_speed` the square of the speed that the
-    feed is about, per u̇²; and `words` (one a run) the kinematics from the path to the joints. Per joint,
-    `axes` names them: `max_velocity` [mm/s], `max_acceleration` [mm/s²], `max_jerk` [mm/s³] (may be infinite). Per
-    piece: `feed` (n,) greatest speed [mm/s], finite. At piece ends: `junction_speed` (n + 1,) greatest speed
-    [mm/s]: 0 at a stop, infinite where nothing but the other limits holds. `chord_tolerance` [mm] and
-    `period` [s] limit the speed on a curve of radius ρ to (2/T)·√(2ρδ − δ²); an infinite tolerance switches
-    that off. `start_speed` and `end_speed` [mm/s] hold at the two ends of the path.
+    one polynomial piece for each of the path and over the same parameter; `tip_speed` the square of the speed
+    that feed and junctions are about, per u̇²; and `words` (one a run) the kinematics from path to joints.
     """
 
     path: Path
@@ -54,6 +56,11 @@ class Problem:
     tip_speed: TipSpeed | None = None
     words: tuple[AxisWords, ...] = ()
 
+    def __post_init__(self) -> None:
+        for name in ("max_velocity", "max_acceleration", "max_jerk", "feed", "junction_speed"):
+            column = np.ascontiguousarray(getattr(self, name), dtype=np.float64)
+            object.__setattr__(self, name, column)
+
     @property
     def axes(self) -> tuple[str, ...]:
         """Names of the joints that the limits belong to."""
@@ -63,6 +70,17 @@ class Problem:
     def curve(self) -> CompositeCurve:
         """The motion of the joints."""
         return self.path.curve if self.joints is None else self.joints
+
+    @cached_property
+    def tip_curve(self) -> CompositeCurve | None:
+        """The tool's motion in X, Y, Z where the joints have pieces of their own."""
+        if self.joints is None:
+            return None
+        points = np.zeros((len(self.path.curve.control_points), 3))
+        for column, name in enumerate(self.path.axes):
+            if name in "XYZ":
+                points[:, "XYZ".index(name)] = self.path.curve.control_points[:, column]
+        return replace(self.path.curve, control_points=points)
 
 
 def build_problem(

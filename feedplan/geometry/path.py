@@ -64,6 +64,11 @@ class Path:
     meaning: NDArray[np.uint8] | None = None
     tool_length: NDArray[np.float64] | None = None
 
+    def __post_init__(self) -> None:
+        dtypes = {"feed": float, "move": np.int64, "line": np.int32, "runs": np.int64, "dwell": float}
+        for name, dtype in {**dtypes, "tolerance": float}.items():
+            object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name), dtype=dtype))
+
     def __len__(self) -> int:
         return len(self.curve)
 

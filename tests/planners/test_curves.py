@@ -7,6 +7,7 @@ polynomial proxies of the curves, to 1e-12 s; the circle's switching place also 
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -14,12 +15,39 @@ import pytest
 from numpy.typing import NDArray
 
 from feedplan._solvers import PlanError, plan_curves
+from feedplan.constraints.problem import Problem
 from feedplan.curves.arc import circle
 from feedplan.curves.composite import CompositeCurve, insert_knot
+from feedplan.geometry.path import Path
 from feedplan.profile import ArcKind
 
 Array = NDArray[np.float64]
 BUTTERFLY = FilePath(__file__).parents[2] / "benchmarks" / "curves" / "butterfly.json"
+
+
+def problem_of(curve: CompositeCurve, velocity: Array, acceleration: Array, feed: float) -> Problem:
+    """One run from rest to rest, nothing but the axes' limits and the feed."""
+    count = len(curve)
+    path = Path(
+        axes=tuple("XYZABC"[: curve.axes]),
+        curve=curve,
+        feed=np.full(count, feed),
+        move=np.zeros((count, 2)),
+        line=np.zeros(count),
+        runs=np.array([0, count]),
+        dwell=np.zeros(1),
+        tolerance=np.zeros(count),
+    )
+    return Problem(
+        path=path,
+        max_velocity=velocity,
+        max_acceleration=acceleration,
+        max_jerk=np.full(curve.axes, np.inf),
+        feed=path.feed,
+        junction_speed=np.full(count + 1, np.inf),
+        chord_tolerance=np.inf,
+        period=0.001,
+    )
 
 
 class Planned:
@@ -28,25 +56,11 @@ class Planned:
     def __init__(
         self, curve: CompositeCurve, velocity: float | Array, acceleration: float | Array, feed: float = 1e9
     ) -> None:
-        count, axes = len(curve), curve.axes
+        axes = curve.axes
         self.curve, self.feed = curve, feed
         self.velocity = np.broadcast_to(np.asarray(velocity, float), axes).copy()
         self.acceleration = np.broadcast_to(np.asarray(acceleration, float), axes).copy()
-        columns = plan_curves(
-            curve.control_points,
-            np.zeros(0) if curve.weights is None else curve.weights,
-            curve.offsets.astype(np.int64),
-            curve.width,
-            np.array([0, count]),
-            np.full(count, feed),
-            np.full(count + 1, np.inf),
-            self.velocity,
-            self.acceleration,
-            np.inf,
-            0.001,
-            0.0,
-            0.0,
-        )
+        columns = plan_curves(problem_of(curve, self.velocity, self.acceleration, feed))
         self.piece, self.kind, self.axis, self.value, self.u0, self.u1, self.p0, self.p1, duration, _ = (
             columns
         )
@@ -190,20 +204,9 @@ def test_limits_that_are_no_limits_are_refused(
     ],
 )
 def test_a_path_that_is_none_is_refused(runs: list[int], weight: float, words: str) -> None:
+    curve = CompositeCurve.from_bezier([[0.0], [1.0], [2.0]])
+    object.__setattr__(curve, "weights", np.array([1.0, weight, 1.0]))
+    problem = problem_of(curve, np.ones(1), np.ones(1), 1.0)
     with pytest.raises(PlanError) as caught:
-        plan_curves(
-            np.array([[0.0], [1.0], [2.0]]),
-            np.array([1.0, weight, 1.0]),
-            np.array([0, 3]),
-            np.ones(1),
-            np.array(runs),
-            np.ones(1),
-            np.full(2, np.inf),
-            np.ones(1),
-            np.ones(1),
-            np.inf,
-            0.001,
-            0.0,
-            0.0,
-        )
+        plan_curves(replace(problem, path=replace(problem.path, runs=np.array(runs))))
     assert words in caught.value.args[3]
