@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +15,20 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
-from feedplan.machine.words import AxisWords
+
+if TYPE_CHECKING:
+    from feedplan.machine.words import AxisWords
+
+# No tool is as fast [mm/s]: what a rapid has where joints set its speed.
+NO_FEED = 1e9
 
 
 @dataclass(frozen=True)
 class TipSpeed:
-    """|C'|² of the tool tip as a polynomial of u on each piece: Bernstein `coefficients` (total,), those of
-    piece i from `offsets[i]` to `offsets[i + 1]`."""
+    """|C'(u)|² ω⁴ of the tool as a polynomial on each piece.
+
+    Bernstein `coefficients` (total,), those of piece i from `offsets[i]` to `offsets[i + 1]`; ω is the weight
+    function of the joints' piece over its first weight, 1 where that is polynomial."""
 
     coefficients: NDArray[np.float64]
     offsets: NDArray[np.int64]
@@ -101,19 +109,56 @@ def build_problem(
     for name, value in (("start speed", start_speed), ("end speed", end_speed)):
         if not (np.isfinite(value) and value >= 0):
             raise InputError(f"{name} is {value} mm/s: give a finite speed of 0 or more")
+    if not machine.is_plain:
+        # Kinematics are loaded where they are needed.
+        from feedplan.constraints.joints import has_joints_of_its_own
+
+        if has_joints_of_its_own(path, machine):
+            return _joint_problem(path, machine, feed, feed_override, (start_speed, end_speed))
     axes = [machine.axis(name) for name in path.axes]
     max_velocity = np.array([axis.max_velocity for axis in axes])
-    junction_speed = junction_limit(path, np.array([axis.max_velocity_jump for axis in axes]))
-    junction_speed[0], junction_speed[-1] = start_speed, end_speed
+    jump = np.array([axis.max_velocity_jump for axis in axes])
     return Problem(
         path=path,
         max_velocity=max_velocity,
         max_acceleration=np.array([axis.max_acceleration for axis in axes]),
         max_jerk=np.array([axis.max_jerk for axis in axes]),
-        feed=feed_limit(path, max_velocity, feed, feed_override),
-        junction_speed=junction_speed,
+        feed=feed_limit(path, 2.0 * float(np.linalg.norm(max_velocity)), feed, feed_override),
+        junction_speed=_with_ends(junction_limit(path, jump), start_speed, end_speed),
         chord_tolerance=machine.chord_tolerance,
         period=machine.period,
         start_speed=start_speed,
         end_speed=end_speed,
     )
+
+
+def _joint_problem(
+    path: Path, machine: Machine, feed: float | None, override: float, ends: tuple[float, float]
+) -> Problem:
+    """The problem where the joints move in another way than the path's axes; corners are stops."""
+    from feedplan.constraints.joints import joint_motion
+
+    limit = feed_limit(path, NO_FEED, feed, override)
+    motion = joint_motion(path, machine, limit)
+    path = motion.path
+    return Problem(
+        path=path,
+        max_velocity=np.array([axis.max_velocity for axis in machine.axes]),
+        max_acceleration=np.array([axis.max_acceleration for axis in machine.axes]),
+        max_jerk=np.array([axis.max_jerk for axis in machine.axes]),
+        feed=feed_limit(path, NO_FEED, feed, override),
+        junction_speed=_with_ends(junction_limit(path, np.zeros(len(path.axes))), *ends),
+        chord_tolerance=machine.chord_tolerance,
+        period=machine.period,
+        start_speed=ends[0],
+        end_speed=ends[1],
+        joint_axes=machine.axis_names,
+        joints=motion.joints,
+        tip_speed=motion.tip_speed,
+        words=motion.words,
+    )
+
+
+def _with_ends(junction_speed: NDArray[np.float64], start: float, end: float) -> NDArray[np.float64]:
+    junction_speed[0], junction_speed[-1] = start, end
+    return junction_speed
