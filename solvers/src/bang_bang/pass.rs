@@ -26,6 +26,8 @@ use crate::polynomial::Polynomial;
 const NOISE: f64 = 1e-13;
 /// π this close below a bound is on it.
 const ON_BOUND: f64 = 1e-12;
+/// π this close below a bound that an arc meets at once is on it.
+const NEARLY_ON_BOUND: f64 = 1e-10;
 /// Backward, π this close below the limit curve is on it.
 const ON_LIMIT_CURVE: f64 = 1e-11;
 /// Accelerations this close to each other are equal.

@@ -1,6 +1,8 @@
 //! The arc of greatest acceleration: its control axis, and the event that ends it.
 
-use super::{kept_until, Kind, Pass, Start, Stuck, AT_END, FLAT, MAX_HOPS, NOISE, NO_STEP, TIE};
+use super::{
+    kept_until, Kind, Pass, Start, Stuck, AT_END, FLAT, MAX_HOPS, NEARLY_ON_BOUND, NOISE, NO_STEP, TIE,
+};
 use crate::bang_bang::window::Bound;
 use crate::polynomial::Polynomial;
 
@@ -185,7 +187,12 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             }
             Event::Bound => {
                 if !on_bound {
-                    return Err(Stuck);
+                    // So near that the arc meets it at once.
+                    let bound = self.window.bound_at_start();
+                    if self.order > 0 || self.pi < bound * (1.0 - NEARLY_ON_BOUND) {
+                        return Err(Stuck);
+                    }
+                    self.pi = bound;
                 }
                 self.leaving = false;
                 self.control = None;
