@@ -20,7 +20,7 @@ mod run;
 mod split;
 mod window;
 
-use crate::bang_bang_quadratic::{Fault, Profile, Task as QuadraticTask, Workspace as QuadraticWorkspace};
+use crate::bang_bang_quadratic::{Fault, Profile, Task as QuadraticTask};
 use crate::planning::{ChordLimit, Limits};
 use crate::quadratic::{norm, Quadratic};
 use split::Axes;
@@ -69,14 +69,26 @@ struct Task<'a, const M: usize> {
     problem: &'a Problem<'a, M>,
     axes: Axes<M>,
     chord: Option<ChordLimit>,
+    /// The planner of polynomial quadratics, for those that are.
+    quadratic: Option<QuadraticTask<'a, M>>,
+}
+
+impl<const M: usize> Task<'_, M> {
+    /// The planner of quadratics, if piece `i` is for it.
+    fn quadratic(&self, i: usize) -> Option<&QuadraticTask<'_, M>> {
+        let range = self.problem.offset[i]..self.problem.offset[i + 1];
+        let weights = self.problem.weight.get(range.clone()).unwrap_or(&[]);
+        let is_one = range.len() == 3 && weights.windows(2).all(|pair| pair[0] == pair[1]);
+        self.quadratic.as_ref().filter(|_| is_one)
+    }
 }
 
 /// The fastest profile.
 pub fn plan<const M: usize>(problem: &Problem<M>) -> Result<Profile, Fault> {
-    plan_with(problem, &[])
+    plan_with(problem, None)
 }
 
-/// The same; runs of polynomial quadratics alone go to the planner made for them.
+/// The same; polynomial quadratics go to the planner made for them.
 pub fn plan_each<const M: usize>(problem: &Problem<M>) -> Result<Profile, Fault> {
     if problem.tip.is_some() {
         return plan(problem);
@@ -88,10 +100,13 @@ pub fn plan_each<const M: usize>(problem: &Problem<M>) -> Result<Profile, Fault>
         Some(Quadratic { control: control.try_into().ok()?, width: problem.width[i] })
     };
     let pieces: Vec<_> = (0..problem.width.len()).map(|i| quadratic(i).unwrap_or(nothing)).collect();
-    plan_with(problem, &pieces)
+    plan_with(problem, Some(&pieces))
 }
 
-fn plan_with<const M: usize>(problem: &Problem<M>, quadratics: &[Quadratic<M>]) -> Result<Profile, Fault> {
+fn plan_with<const M: usize>(
+    problem: &Problem<M>,
+    quadratics: Option<&[Quadratic<M>]>,
+) -> Result<Profile, Fault> {
     let limits = Limits {
         runs: problem.runs,
         feed: problem.feed,
@@ -117,19 +132,13 @@ fn plan_with<const M: usize>(problem: &Problem<M>, quadratics: &[Quadratic<M>]) 
             // What the joints' limits let the tool have is not known.
             if problem.tip.is_some() { f64::INFINITY } else { norm(&problem.max_acceleration) },
         ),
+        quadratic: quadratics.map(|pieces| QuadraticTask::new(pieces, &limits)),
     };
-    let quadratic_task = QuadraticTask::new(quadratics, &limits);
-    let is_quadratic = |i: usize| {
-        let range = problem.offset[i]..problem.offset[i + 1];
-        let weights = problem.weight.get(range.clone()).unwrap_or(&[]);
-        range.len() == 3 && weights.windows(2).all(|pair| pair[0] == pair[1])
-    };
-    type Spaces = (run::Workspace, QuadraticWorkspace);
-    limits.over_runs(|pieces, speeds_sq, space: &mut Spaces, profile| {
-        if !quadratics.is_empty() && (pieces.0..pieces.1).all(is_quadratic) {
-            quadratic_task.plan_run(pieces, speeds_sq, &mut space.1, profile)
-        } else {
-            run::plan_run(&task, pieces, speeds_sq, &mut space.0, profile)
+    limits.over_runs(|pieces, speeds_sq, space: &mut run::Workspace, profile| {
+        let (first, last) = pieces;
+        match task.quadratic.as_ref().filter(|_| (first..last).all(|i| task.quadratic(i).is_some())) {
+            Some(quadratic) => quadratic.plan_run(pieces, speeds_sq, &mut space.quadratic, profile),
+            None => run::plan_run(&task, pieces, speeds_sq, space, profile),
         }
     })
 }

@@ -36,6 +36,7 @@ pub use profile::{ArcKind, Profile, NO_AXIS};
 
 use crate::planning::{ChordLimit, Limits};
 use crate::quadratic::{norm, Quadratic};
+use piece::Piece;
 pub(crate) use run::Workspace;
 use subpiece::Axes;
 
@@ -137,6 +138,28 @@ impl<'a, const M: usize> Task<'a, M> {
             },
             chord: ChordLimit::new(limits.chord_tolerance, limits.period, norm(&acceleration)),
         }
+    }
+
+    /// Backward over one piece: v² at its start from v² at its end. `space` holds what `forward_over` takes.
+    pub(crate) fn backward_over(&self, i: usize, speed_sq: f64, space: &mut Workspace) -> Result<f64, Fault> {
+        run::backward(self, i, &Piece::new(&self.pieces[i]), speed_sq, space)
+    }
+
+    /// Forward over the last piece that `backward_over` has left in `space`: v² at its end; appends the arcs.
+    pub(crate) fn forward_over(
+        &self,
+        i: usize,
+        speed_sq: f64,
+        space: &mut Workspace,
+        out: &mut Profile,
+    ) -> Result<f64, Fault> {
+        run::forward(self, i, &Piece::new(&self.pieces[i]), speed_sq, space, out)
+    }
+
+    /// Whether the piece has a cusp at its start and at its end, and its direction there.
+    pub(crate) fn ends(&self, i: usize) -> [(bool, [f64; M]); 2] {
+        let piece = Piece::new(&self.pieces[i]);
+        [(piece.speed[0] == 0.0, piece.direction(false)), (piece.speed[2] == 0.0, piece.direction(true))]
     }
 
     /// Plans the pieces from the first up to the last from one speed squared to another; appends the arcs.

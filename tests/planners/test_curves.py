@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from feedplan._solvers import PlanError, plan_curves
+from feedplan._solvers import PlanError, plan_bang_bang, plan_curves
 from feedplan.constraints.problem import Problem
 from feedplan.curves.arc import circle
 from feedplan.curves.composite import CompositeCurve, insert_knot
@@ -166,3 +166,23 @@ def test_a_path_that_is_none_is_refused(runs: list[int], weight: float, words: s
     with pytest.raises(PlanError) as caught:
         plan_curves(replace(problem, path=replace(problem.path, runs=np.array(runs))))
     assert words in caught.value.args[3]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_quadratics_among_other_pieces_are_planned_by_their_own_planner(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    # A C1 quadratic spline, every piece as it is, or every other one elevated.
+    points = np.cumsum(rng.normal(size=(40, 3)), axis=0)
+    knots = np.concatenate([[0.0] * 3, np.cumsum(rng.uniform(0.3, 2.0, 37)), [37.0 * 2] * 3])
+    knots[-3:] = knots[-4] + 1.0
+    curve = CompositeCurve.from_nurbs(points, knots, 2)
+    pieces = [curve[i : i + 1] for i in range(len(curve))]
+    mixed = CompositeCurve.joined([p.elevated(2 + int(rng.integers(0, 3))) for p in pieces])
+    limits = np.exp(rng.uniform(0.0, 3.0, 3)), np.exp(rng.uniform(0.0, 5.0, 3))
+    feed = float(np.exp(rng.uniform(0.0, 3.0)))
+    problem = problem_of(mixed, *limits, feed)
+    profile = SpeedProfile(*plan_bang_bang(problem))
+    assert profile.time == pytest.approx(Planned(curve, *limits, feed).time, rel=1e-11)
+    excess, use = worst_excess(problem, profile)
+    assert excess <= 1e-8
+    assert use >= 1 - 1e-6

@@ -4,7 +4,7 @@ use super::pass::{self, cusp, distance, Arc, Kind, State};
 use super::piece::Piece;
 use super::split::{split, Axes, Cap, Part, SubPiece};
 use super::{Task, TIP_AXES};
-use crate::bang_bang_quadratic::{ArcKind, Fault, Profile, Row, NO_AXIS};
+use crate::bang_bang_quadratic::{ArcKind, Fault, Profile, Row, Workspace as QuadraticWorkspace, NO_AXIS};
 use crate::polynomial::{Polynomial, MOST};
 
 /// Two directions that differ by more than this at a cusp form a corner.
@@ -27,12 +27,15 @@ pub struct Workspace {
     arcs: Vec<Arc>,
     /// Parts where p is held, because a pass came to no end there.
     held: Vec<(usize, usize)>,
+    /// For the pieces that the planner of quadratics takes.
+    pub quadratic: QuadraticWorkspace,
 }
 
-/// A part where the forward pass fails.
-struct Failed {
-    piece: usize,
-    part: usize,
+/// Why the forward pass fails.
+enum Failed {
+    /// On a part of a piece, where p can be held instead.
+    Part(usize, usize),
+    Quadratic(Fault),
 }
 
 /// Plans the pieces `first..last` of the task from one speed squared of the tool to another; appends the arcs.
@@ -46,7 +49,7 @@ pub fn plan_run<const M: usize>(
     space.held.clear();
     let rows = out.len();
     loop {
-        let reachable = backward(task, (first, last), end_sq, space);
+        let reachable = backward(task, (first, last), end_sq, space)?;
         if start_sq > reachable * (1.0 + REACHED) {
             return Err(Fault::Start { piece: first, reachable: reachable.sqrt() });
         }
@@ -55,7 +58,8 @@ pub fn plan_run<const M: usize>(
                 return Err(Fault::End { piece: last - 1, reachable: reached.sqrt() });
             }
             Ok(_) => break,
-            Err(Failed { piece, part }) => {
+            Err(Failed::Quadratic(fault)) => return Err(fault),
+            Err(Failed::Part(piece, part)) => {
                 if space.held.len() == MOST_HELD || space.held.contains(&(piece, part)) {
                     return Err(Fault::Stuck {
                         piece,
@@ -171,7 +175,8 @@ fn backward<const M: usize>(
     (first, last): (usize, usize),
     end_sq: f64,
     space: &mut Workspace,
-) -> f64 {
+) -> Result<f64, Fault> {
+    space.quadratic.clear();
     space.parts.clear();
     space.pieces.clear();
     space.bounds.clear();
@@ -181,9 +186,20 @@ fn backward<const M: usize>(
         if i + 1 < last {
             at.tip_sq = task.problem.junction_speed[i + 1].powi(2);
         }
-        with_capacity!(task, i, backward_over(task, i, &mut at, space));
+        if let Some(quadratic) = task.quadratic(i) {
+            let [start, end] = quadratic.ends(i);
+            let mut speed_sq = at.state.speed_sq.min(at.tip_sq);
+            if let Some(after) = &at.end {
+                speed_sq = at_cusp(&end, after, speed_sq);
+            }
+            at.tip_sq = quadratic.backward_over(i, speed_sq, &mut space.quadratic)?;
+            (at.state, at.end) = (State { speed_sq: at.tip_sq }, Some(start));
+            space.pieces.push(space.parts.len()..space.parts.len());
+        } else {
+            with_capacity!(task, i, backward_over(task, i, &mut at, space));
+        }
     }
-    at.tip_sq
+    Ok(at.tip_sq)
 }
 
 /// Backward over piece `i`; `at.tip_sq` is a limit before, and what was reached after it.
@@ -260,8 +276,19 @@ fn forward<const M: usize>(
         if i > first {
             at.tip_sq = task.problem.junction_speed[i].powi(2);
         }
-        let parts = space.pieces[last - 1 - i].clone();
-        with_capacity!(task, i, forward_over(task, i, parts, &mut index, &mut at, space, out))?;
+        if let Some(quadratic) = task.quadratic(i) {
+            let [start, end] = quadratic.ends(i);
+            let mut speed_sq = at.state.speed_sq.min(at.tip_sq);
+            if let Some(before) = &at.end {
+                speed_sq = at_cusp(before, &start, speed_sq);
+            }
+            let reached = quadratic.forward_over(i, speed_sq, &mut space.quadratic, out);
+            at.tip_sq = reached.map_err(Failed::Quadratic)?;
+            (at.state, at.end) = (State { speed_sq: at.tip_sq }, Some(end));
+        } else {
+            let parts = space.pieces[last - 1 - i].clone();
+            with_capacity!(task, i, forward_over(task, i, parts, &mut index, &mut at, space, out))?;
+        }
     }
     Ok(at.tip_sq)
 }
@@ -300,7 +327,7 @@ fn forward_over<const M: usize, const C: usize>(
                 space.arcs.clear();
                 hold(&sub, &task.axes, at.state, &mut space.arcs)
             }
-            _ => return Err(Failed { piece: i, part: number }),
+            _ => return Err(Failed::Part(i, number)),
         };
         at.tip_sq = at.state.speed_sq * sub.tip_share(true);
         push(task, i, &part, &sub, &space.arcs, out);

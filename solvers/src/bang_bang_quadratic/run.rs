@@ -38,6 +38,14 @@ pub struct Workspace {
     arcs: Vec<Arc>,
 }
 
+impl Workspace {
+    pub fn clear(&mut self) {
+        self.ways.clear();
+        self.parts.clear();
+        self.bounds.clear();
+    }
+}
+
 /// Plans the pieces `first..last` of the task from one speed squared to another; appends the arcs.
 ///
 /// K depends on what comes next only as far as the next place where the backward passes from rest and from any speed
@@ -104,9 +112,7 @@ fn backward_over<const M: usize>(
     end_sq: f64,
     space: &mut Workspace,
 ) -> Result<f64, Fault> {
-    space.ways.clear();
-    space.parts.clear();
-    space.bounds.clear();
+    space.clear();
     let mut speed_sq = end_sq;
     let mut next = (end < last).then(|| Piece::new(&task.pieces[end]));
     for i in (begin..end).rev() {
@@ -143,7 +149,7 @@ fn forward_over<const M: usize>(
 }
 
 #[inline(always)]
-fn backward<const M: usize>(
+pub fn backward<const M: usize>(
     task: &Task<M>,
     i: usize,
     piece: &Piece<M>,
@@ -175,7 +181,7 @@ fn pass_straight<const M: usize>(task: &Task<M>, i: usize, piece: &Piece<M>, spe
 }
 
 #[inline(always)]
-fn forward<const M: usize>(
+pub fn forward<const M: usize>(
     task: &Task<M>,
     i: usize,
     piece: &Piece<M>,
