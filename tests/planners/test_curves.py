@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from math import comb
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -186,3 +187,81 @@ def test_quadratics_among_other_pieces_are_planned_by_their_own_planner(seed: in
     excess, use = worst_excess(problem, profile)
     assert excess <= 1e-8
     assert use >= 1 - 1e-6
+
+
+def harmonic(cosines: list[Array], sines: list[Array], start: float) -> CompositeCurve:
+    """Σ cosines[k] cos kθ + sines[k] sin kθ once round from `start`, as rational pieces of quarter turns.
+
+    With x = tan(φ/2), cos φ = (1 − x²)/(1 + x²) and sin φ = 2x/(1 + x²): degree 2m for m harmonics.
+    """
+    m = len(cosines)
+    square = np.polynomial.Polynomial([1.0, 0.0, 1.0])
+    unit = np.polynomial.Polynomial([1.0, 2.0j, -1.0])
+    degree = 2 * m
+    pieces = []
+    for quarter in range(4):
+        turn = start + quarter * np.pi / 2
+        rows = []
+        for axis in range(len(cosines[0])):
+            total = np.zeros(degree + 1, dtype=complex)
+            for k in range(1, m + 1):
+                wave = (unit**k * square ** (m - k)).coef * np.exp(1j * k * turn)
+                total[: len(wave)] += (cosines[k - 1][axis] - 1j * sines[k - 1][axis]) * wave
+            rows.append(total.real)
+        rows.append((square**m).coef)
+        # From powers of x to Bernstein form on [0, 1].
+        to_bernstein = np.array(
+            [[comb(i, j) / comb(degree, j) for j in range(degree + 1)] for i in range(degree + 1)]
+        )
+        homogeneous = to_bernstein @ np.array(rows).T
+        weights = homogeneous[:, -1]
+        pieces.append(CompositeCurve.from_bezier(homogeneous[:, :-1] / weights[:, None], weights))
+    return CompositeCurve.joined(pieces, 1e-9)
+
+
+def test_the_lemniscate_takes_its_known_time() -> None:
+    a = 50.0
+    curve = harmonic([np.array([a, 0.0]), np.zeros(2)], [np.zeros(2), np.array([0.0, a / 2])], np.pi / 2)
+    planned = Planned(curve, 250.0, 3000.0)
+    assert planned.time == pytest.approx(1.239149290199, rel=1e-11)
+    assert worst_excess(planned.problem, planned.profile)[0] <= 1e-9
+
+
+def test_the_trefoil_takes_its_known_time() -> None:
+    b = 20.0
+    cosines = [np.array([0.0, b, 0.0]), np.array([0.0, -2 * b, 0.0]), np.zeros(3)]
+    sines = [np.array([b, 0.0, 0.0]), np.array([2 * b, 0.0, 0.0]), np.array([0.0, 0.0, -b])]
+    planned = Planned(harmonic(cosines, sines, 0.3), 250.0, 3000.0)
+    assert planned.time == pytest.approx(1.955242894798, rel=1e-11)
+    assert worst_excess(planned.problem, planned.profile)[0] <= 1e-9
+
+
+def test_a_flying_lap_of_a_circle_by_hand() -> None:
+    # Each eighth of the circle is at one axis's limit: 8 √((2 − √2) r/A).
+    r, a = 10.0, 3000.0
+    curve = circle([0.0, 0.0], r)
+    problem = problem_of(curve, np.full(2, 1e9), np.full(2, a), 1e9)
+    speed = float(np.sqrt(a * r))
+    flying = replace(problem, start_speed=speed, end_speed=speed)
+    time = SpeedProfile(*plan_curves(flying)).time
+    assert time == pytest.approx(8 * np.sqrt((2 - np.sqrt(2)) * r / a), rel=1e-12)
+
+
+def test_a_cusp_and_a_jump_of_parameter_speed_change_nothing_that_they_should_not() -> None:
+    # A line with a cusp in its parameter, C' = 0 in the middle, is passed as a line.
+    line = CompositeCurve.from_bezier([[0.0], [10.0]])
+    slow = CompositeCurve.joined(
+        [
+            CompositeCurve.from_bezier([[0.0], [5.0], [5.0], [5.0]]),
+            CompositeCurve.from_bezier([[5.0], [5.0], [5.0], [10.0]], width=7.0),
+        ]
+    )
+    time = Planned(line, 40.0, 500.0).time
+    assert time == pytest.approx(10 / 40 + 40 / 500, rel=1e-12)
+    assert Planned(slow, 40.0, 500.0).time == pytest.approx(time, rel=1e-10)
+    # A semicubical parabola turns back in its cusp: both halves from rest to rest.
+    whole = CompositeCurve.from_bezier([[-8.0, 4.0], [8.0, -4.0], [-8.0, -4.0], [8.0, 4.0]])
+    assert whole.cusps().u.tolist() == [0.5]
+    halves = whole.split([0], [0.5])
+    both = sum(Planned(halves[i : i + 1], 1e9, 100.0).time for i in range(2))
+    assert Planned(whole, 1e9, 100.0).time == pytest.approx(both, rel=1e-9)
