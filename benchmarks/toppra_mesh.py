@@ -31,32 +31,37 @@ logging.getLogger("toppra").setLevel(logging.ERROR)
 VERSION = metadata.version("toppra")
 
 
-class QuadraticPath(AbstractGeometricPath):  # type: ignore[misc]
-    """The path's pieces laid end to end on one parameter."""
+class JointPath(AbstractGeometricPath):  # type: ignore[misc]
+    """The joints along the path's pieces, laid end to end on one parameter."""
 
     def __init__(self, problem: Problem) -> None:
-        points, width = problem.path.curve.by_piece, problem.path.width
-        self.knots = np.concatenate(([0.0], np.cumsum(width)))
-        self.position = points[:, 0]
-        self.first = 2.0 * (points[:, 1] - points[:, 0]) / width[:, None]
-        last = 2.0 * (points[:, 2] - points[:, 1]) / width[:, None]
-        self.second = (last - self.first) / width[:, None]
+        self.problem = problem
+        self.knots = np.concatenate(([0.0], np.cumsum(problem.path.width)))
 
     def piece(self, u: NDArray[np.float64], side: str = "right") -> NDArray[np.int64]:
         found = np.searchsorted(self.knots, u, side=side)  # type: ignore[call-overload]
-        return np.asarray(np.clip(found - 1, 0, len(self.position) - 1))
+        return np.asarray(np.clip(found - 1, 0, len(self.knots) - 2))
+
+    def on(self, piece: NDArray[np.int64], u: NDArray[np.float64], order: int) -> NDArray[np.float64]:
+        """The derivative at places of given pieces."""
+        local = np.clip(u - self.knots[piece], 0.0, self.problem.path.width[piece])
+        return self.problem.derivatives(piece, local, order)[order]
 
     def __call__(self, u: Any, order: int = 0) -> NDArray[np.float64]:
-        u = np.asarray(u, dtype=float)
-        i = self.piece(u)
-        t = (u - self.knots[i])[..., None]
-        if order == 0:
-            return np.asarray(self.position[i] + t * (self.first[i] + 0.5 * t * self.second[i]))
-        return np.asarray(self.first[i] + t * self.second[i] if order == 1 else self.second[i])
+        places = np.atleast_1d(np.asarray(u, dtype=float))
+        values = self.on(self.piece(places), places, order)
+        return values if np.ndim(u) else values[0]
+
+    def speed_sq(self, piece: NDArray[np.int64], u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The square of the speed that the feed is about, over that of u."""
+        tool = self.problem.tip_curve or self.problem.path.curve
+        local = np.clip(u - self.knots[piece], 0.0, self.problem.path.width[piece])
+        square: NDArray[np.float64] = (tool.evaluate(piece, local, 1)[1] ** 2).sum(axis=1)
+        return square
 
     @property
     def dof(self) -> int:
-        return int(self.position.shape[1])
+        return len(self.problem.axes)
 
     @property
     def path_interval(self) -> NDArray[np.float64]:
@@ -75,12 +80,10 @@ class FeedConstraint(LinearConstraint):  # type: ignore[misc]
         self.feed = feed
         self.dof = axes
 
-    def compute_constraint_params(
-        self, path: QuadraticPath, gridpoints: NDArray[np.float64]
-    ) -> tuple[Any, ...]:
-        speed_sq = np.einsum("ij,ij->i", path(gridpoints, 1), path(gridpoints, 1))
-        feed = np.minimum(self.feed[path.piece(gridpoints)], self.feed[path.piece(gridpoints, "left")])
-        bound = np.column_stack((np.zeros(len(gridpoints)), feed**2 / speed_sq))
+    def compute_constraint_params(self, path: JointPath, gridpoints: NDArray[np.float64]) -> tuple[Any, ...]:
+        sides = [path.piece(gridpoints), path.piece(gridpoints, "left")]
+        limits = [self.feed[piece] ** 2 / path.speed_sq(piece, gridpoints) for piece in sides]
+        bound = np.column_stack((np.zeros(len(gridpoints)), np.minimum(*limits)))
         return None, None, None, None, None, None, bound
 
 
@@ -99,7 +102,7 @@ def solve(problem: Problem, cells: int) -> Solution:
     `processor` covers the constraints' parameters and both passes; not the path, the mesh, the conversion
     of the result to a trajectory, nor toppra's import.
     """
-    path = QuadraticPath(problem)
+    path = JointPath(problem)
     steps = np.diff(path.knots)[:, None] * (np.arange(cells) / cells)
     grid = np.append((path.knots[:-1, None] + steps).ravel(), path.knots[-1])
     acceleration, velocity = problem.max_acceleration, problem.max_velocity

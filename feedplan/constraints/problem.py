@@ -79,6 +79,39 @@ class Problem:
         """The motion of the joints."""
         return self.path.curve if self.joints is None else self.joints
 
+    def derivatives(
+        self, piece: NDArray[np.integer], u: NDArray[np.float64], order: int
+    ) -> NDArray[np.float64]:
+        """The joints' q, q', … by u at places (m,): (order + 1, m, joints), order ≤ 3.
+
+        Exact to rounding: by the kinematics from the path, not by `joints`; angles up to whole turns.
+        """
+        if not self.words:
+            return self.path.curve.evaluate(piece, u, order)
+        from feedplan.machine.along import derivatives
+
+        run = np.searchsorted(self.path.runs, piece, side="right") - 1
+        result = np.empty((order + 1, len(u), len(self.axes)))
+        for words in dict.fromkeys(self.words):
+            own = np.flatnonzero(np.array([other == words for other in self.words])[run])
+            control, weights = self._even_pieces
+            width = self.path.width[piece[own]]
+            result[:, own] = derivatives(
+                words.kinematics,
+                words.tip(control[piece[own]]),
+                width,
+                u[own] / width,
+                order,
+                None if weights is None else weights[piece[own]],
+            )
+        return result
+
+    @cached_property
+    def _even_pieces(self) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+        """Control points and weights of the path's pieces, all of one degree."""
+        even = self.path.curve.elevated(int(self.path.curve.degree.max()))
+        return even.by_piece, even.weights_by_piece
+
     @cached_property
     def tip_curve(self) -> CompositeCurve | None:
         """The tool's motion in X, Y, Z where the joints have pieces of their own."""

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
-from feedplan.machine.along import derivatives
 from feedplan.profile import ArcKind, SpeedProfile
 
 Array = NDArray[np.float64]
@@ -16,25 +15,10 @@ Array = NDArray[np.float64]
 Motion = Callable[[NDArray[np.uint32], Array, int], Array]
 
 
-def joints_by_kinematics(problem: Problem) -> Motion:
-    """The joints' derivatives by K of the tool's path, never by the planner's stand-ins."""
-    words = problem.words[0]
-    assert all(other == words for other in problem.words)
-    curve = problem.path.curve.elevated(int(problem.path.curve.degree.max()))
-    control, weights = words.tip(curve.by_piece), curve.weights_by_piece
-
-    def motion(piece: NDArray[np.uint32], u: Array, order: int) -> Array:
-        own = None if weights is None else weights[piece]
-        width = curve.width[piece]
-        return derivatives(words.kinematics, control[piece], width, u / width, order, own)
-
-    return motion
-
-
 def worst_excess(problem: Problem, profile: SpeedProfile, samples: int = 10) -> tuple[float, float]:
     """Greatest relative excess of any limit, and least use of the most used one, inside the arcs."""
-    joints = joints_by_kinematics(problem) if problem.words else problem.path.curve.evaluate
-    tool = problem.path.curve.evaluate if problem.tip_curve is None else problem.tip_curve.evaluate
+    joints: Motion = problem.derivatives
+    tool: Motion = problem.path.curve.evaluate if problem.tip_curve is None else problem.tip_curve.evaluate
     # u is rounded: where an arc is as short as that, its places cannot be told apart.
     long = (profile.u1 - profile.u0) > 1e-6 * problem.path.width[profile.piece]
     piece, kind, value = profile.piece[long], profile.kind[long, None], profile.value[long, None]

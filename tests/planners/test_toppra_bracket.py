@@ -2,11 +2,13 @@
 
 Collocation asks for the limits at the nodes alone and is optimistic. The one-sided scheme asks for them at
 both ends of every cell with the cell's own q''; on a quadratic piece the acceleration is linear in a cell, so
-that its profile is feasible. Both meet at the exact time as the mesh refines.
+that its profile is feasible, on other curves and joints it is so to the second order. Both meet at the exact
+time as the mesh refines.
 """
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -17,11 +19,12 @@ pytest.importorskip("toppra", reason="toppra has wheels for Linux on x86-64 only
 from toppra.algorithm import TOPPRA
 from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
 
-from benchmarks.toppra_mesh import FeedConstraint, QuadraticPath, solve
+from benchmarks.toppra_mesh import FeedConstraint, JointPath, solve
 from feedplan import Path
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.planners.bang_bang import plan
+from tests.constraints.test_joints import random_problem
 
 
 def cam_problem(count: int, seed: int) -> Problem:
@@ -59,19 +62,15 @@ def cam_problem(count: int, seed: int) -> Problem:
 class OneSided(JointAccelerationConstraint):  # type: ignore[misc]
     """|q' s + q'' p| ≤ A at both ends of each cell, the far end with the q'' of this cell."""
 
-    def compute_constraint_params(self, path: QuadraticPath, gridpoints: Any) -> tuple[Any, ...]:
+    def compute_constraint_params(self, path: JointPath, gridpoints: Any) -> tuple[Any, ...]:
         axes, cells = path.dof, len(gridpoints) - 1
         near = path.piece(gridpoints)
         near[:-1] = path.piece(0.5 * (gridpoints[1:] + gridpoints[:-1]))
-        bend = path.second[near]
-
-        def tangent(u: Any) -> Any:
-            return path.first[near] + (u - path.knots[near])[:, None] * bend
-
         step = np.append(np.diff(gridpoints), 0.0)
+        tangents, bends = ([path.on(near, gridpoints + h, k) for h in (0.0, step)] for k in (1, 2))
         # The squared speed at the far end is x + 2 step s.
-        far = tangent(gridpoints + step) + 2 * step[:, None] * bend
-        first, second = np.hstack([tangent(gridpoints), far]), np.hstack([bend, bend])
+        far = tangents[1] + 2 * step[:, None] * bends[1]
+        first, second = np.hstack([tangents[0], far]), np.hstack(bends)
         signs = np.vstack([np.eye(axes), -np.eye(axes)])
         rows = np.zeros((4 * axes, 2 * axes))
         rows[: 2 * axes, :axes] = rows[2 * axes :, axes:] = signs
@@ -81,7 +80,7 @@ class OneSided(JointAccelerationConstraint):  # type: ignore[misc]
 
 
 def one_sided_time(problem: Problem, cells: int) -> float:
-    path = QuadraticPath(problem)
+    path = JointPath(problem)
     steps = np.diff(path.knots)[:, None] * (np.arange(cells) / cells)
     grid = np.append((path.knots[:-1, None] + steps).ravel(), path.knots[-1])
     acceleration, velocity = problem.max_acceleration, problem.max_velocity
@@ -103,3 +102,16 @@ def test_both_schemes_close_in_on_the_exact_time(seed: int) -> None:
     above = [one_sided_time(problem, cells) / exact - 1 for cells in (40, 160)]
     for coarse, fine in (below, above):
         assert 0 < fine < 0.4 * coarse < 0.01
+
+
+@pytest.mark.parametrize("name", ["cylindrical", "corexy", "trunnion-ac", "head-head", "polar"])
+def test_both_schemes_close_in_on_the_exact_time_of_joints(name: str) -> None:
+    problem = random_problem(name, 1)
+    exact = plan(problem).time
+    # The pieces are cut already.
+    few, many = (math.ceil(cells / len(problem.path)) for cells in (1000, 4000))
+    below = [abs(1 - solve(problem, cells).time / exact) for cells in (few, many)]
+    above = [abs(one_sided_time(problem, cells) / exact - 1) for cells in (few, many)]
+    for coarse, fine in (below, above):
+        assert fine < 0.6 * coarse + 1e-7
+        assert fine < 0.01
