@@ -103,11 +103,17 @@ pub fn split<const M: usize, const C: usize>(
         (Some(chord), None) if piece.own_speed => chord.lines(piece, feed_sq, &mut lines),
         _ => lines.push(SpeedLine { from: 0.0, to: 1.0, speed_sq: [feed_sq; 2] }),
     }
-    let squares: [Polynomial<C>; M] = std::array::from_fn(|k| piece.g[k].multiply(&piece.g[k]));
+    // Where the axes are the tool's none is faster than the tool.
+    let can_cap = (0..M).fold(0u8, |bits, k| {
+        let slow = piece.own_speed && axes.velocity_sq[k] >= feed_sq;
+        bits | u8::from(!slow && moving >> k & 1 == 1) << k
+    });
     let mut fast = 0u8;
     for line in &lines {
         cuts.push((line.from, 0));
-        fast |= cut_by_cap(piece, axes, &squares, line, moving, &mut cuts);
+        if can_cap != 0 {
+            fast |= cut_by_cap(piece, axes, line, can_cap, &mut cuts);
+        }
     }
     merge_near_cusps(piece, &mut cuts);
     cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -171,9 +177,8 @@ fn merge_near_cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, cuts: &
 fn cut_by_cap<const M: usize, const C: usize>(
     piece: &Piece<M, C>,
     axes: &Axes<M>,
-    squares: &[Polynomial<C>; M],
     line: &SpeedLine,
-    moving: u8,
+    can_cap: u8,
     cuts: &mut Vec<(f64, u8)>,
 ) -> u8 {
     let mut fast = 0u8;
@@ -184,9 +189,10 @@ fn cut_by_cap<const M: usize, const C: usize>(
     let [f0, f1] = line.speed_sq;
     let bound =
         if f0 == f1 { Polynomial::constant(f0) } else { Polynomial::from_bernstein([f0, f1].into_iter()) };
-    for k in (0..M).filter(|&k| moving >> k & 1 == 1 && axes.velocity_sq[k] < f64::MAX) {
+    for k in (0..M).filter(|&k| can_cap >> k & 1 == 1 && axes.velocity_sq[k] < f64::MAX) {
         if f0.is_finite() && f1.is_finite() {
-            let excess = on_line(&squares[k]).multiply(&bound).combine(1.0, &speed, -axes.velocity_sq[k]);
+            let square = on_line(&piece.g[k].multiply(&piece.g[k]));
+            let excess = square.multiply(&bound).combine(1.0, &speed, -axes.velocity_sq[k]);
             if excess.coefficients().iter().all(|&value| value <= 0.0) {
                 continue;
             }
