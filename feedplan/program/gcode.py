@@ -38,9 +38,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan._solvers import read_gcode as read_native
+from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import MachineError, ProgramError
 from feedplan.machine.machine import AXIS_LETTERS, Machine
+from feedplan.machine.rotary import RotaryChain
 from feedplan.program.program import Program
+from feedplan.program.tip import TipControl
 
 WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 
@@ -77,10 +80,17 @@ def read_gcode(
         content,
         default if name is None else name,
         _places(machine),
-        "" if machine is None else "".join(machine.axis_names),
+        "" if machine is None else "".join(machine.program_letters),
+        None if machine is None else TipControl(machine),
         block_delete,
         max_moves,
     )
+    splines = columns.pop("spline_columns")
+    if len(columns["spline_move"]):
+        columns["splines"] = CompositeCurve(*splines)
+    if machine is None or not isinstance(machine.inverse, RotaryChain):
+        # The words of every other machine have one meaning.
+        columns["meaning"] = columns["tool_length"] = None
     return Program(name=default if name is None else name, **columns)
 
 
@@ -112,7 +122,7 @@ def _places(machine: Machine | None) -> NDArray[np.float64]:
     places = np.zeros((len(WORK_OFFSETS) + 1, len(AXIS_LETTERS)))
     if machine is None:
         return places
-    columns = [AXIS_LETTERS.index(letter) for letter in machine.axis_names]
+    columns = [AXIS_LETTERS.index(letter) for letter in machine.program_letters]
     for key, row in machine.offsets:
         if key not in WORK_OFFSETS:
             raise MachineError(f"machine {machine.name}: offsets has {key!r}: use {', '.join(WORK_OFFSETS)}")
