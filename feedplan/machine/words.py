@@ -19,7 +19,6 @@ from feedplan.machine.kinematics import Kinematics
 from feedplan.machine.machine import Machine
 from feedplan.machine.rotary import RotaryChain, ToolVector
 
-
 DIRECTION = ("I", "J", "K")
 
 

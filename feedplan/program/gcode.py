@@ -41,9 +41,7 @@ from feedplan._solvers import read_gcode as read_native
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import MachineError, ProgramError
 from feedplan.machine.machine import AXIS_LETTERS, Machine
-from feedplan.machine.rotary import RotaryChain
 from feedplan.program.program import Program
-from feedplan.program.tip import TipControl
 
 WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 
@@ -76,20 +74,23 @@ def read_gcode(
     else:
         default = Path(source).name
         content = read_bytes(Path(source), max_bytes)
+    # Kinematics are loaded where a program is read, not where feedplan is imported.
+    from feedplan.program.tip import TipControl
+
+    control = None if machine is None else TipControl(machine)
     columns = read_native(
         content,
         default if name is None else name,
         _places(machine),
         "" if machine is None else "".join(machine.program_letters),
-        None if machine is None else TipControl(machine),
+        control,
         block_delete,
         max_moves,
     )
     splines = columns.pop("spline_columns")
     if len(columns["spline_move"]):
         columns["splines"] = CompositeCurve(*splines)
-    if machine is None or not isinstance(machine.inverse, RotaryChain):
-        # The words of every other machine have one meaning.
+    if control is None or not control.applies:
         columns["meaning"] = columns["tool_length"] = None
     return Program(name=default if name is None else name, **columns)
 

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 
 from feedplan.errors import MachineError
 from feedplan.machine.machine import AXIS_LETTERS, Machine
-from feedplan.machine.rotary import LINEAR, RotaryChain, ToolVector, shortest_turn
+from feedplan.machine.rotary import RotaryChain, ToolVector, shortest_turn
 from feedplan.machine.words import Meaning
-
 
 # Sine of the angle up to which the tool counts as parallel to a rotary axis.
 _PARALLEL = 1e-9
@@ -24,6 +23,11 @@ class TipControl:
     """
 
     machine: Machine
+
+    @property
+    def applies(self) -> bool:
+        """Whether words can have more than one meaning on the machine."""
+        return isinstance(self.machine.inverse, RotaryChain)
 
     def check(self, meaning: int) -> None:
         """Whether words can have that meaning."""
@@ -52,10 +56,12 @@ class TipControl:
             for name, angle in zip(angles, turned, strict=True):
                 joints[AXIS_LETTERS.index(name)] = angle
         for name, value in zip(chain.joint_names, chain.joints(_words(chain, joints)), strict=True):
-            joints[AXIS_LETTERS.index(name)] = float(value)  # type: ignore[arg-type]
+            joints[AXIS_LETTERS.index(name)] = float(value)
         return joints
 
-    def place(self, meaning: int, tool_length: float, joints: Sequence[float]) -> tuple[list[float], list[float]]:
+    def place(
+        self, meaning: int, tool_length: float, joints: Sequence[float]
+    ) -> tuple[list[float], list[float]]:
         """Place (9,) and tool direction (3,) in words of a meaning, where the joints (9,) are."""
         place, direction = list(joints), [0.0, 0.0, 1.0]
         if meaning == Meaning.JOINTS:
@@ -63,16 +69,16 @@ class TipControl:
         chain = self._chain(tool_length)
         words = _words(chain, joints)
         for name, value in zip(chain.tip_names, chain.tip(words), strict=True):
-            place[AXIS_LETTERS.index(name)] = float(value)  # type: ignore[arg-type]
+            place[AXIS_LETTERS.index(name)] = float(value)
         if len(chain.joint_names) == 5:
-            direction = [float(v) for v in ToolVector(chain).tip(words)[3:]]  # type: ignore[arg-type]
+            direction = [float(v) for v in ToolVector(chain).tip(words)[3:]]
         return place, direction
 
     def _chain(self, tool_length: float) -> RotaryChain:
         chain = self.machine.inverse
         if not isinstance(chain, RotaryChain):
             raise MachineError(
-                f"machine {self.machine.name} has no rotary axes that the tool's tip could be programmed over: "
+                f"machine {self.machine.name} has no rotary axes to follow the tool's tip with: "
                 "remove G43.4 and G43.5, or use a machine that has them"
             )
         return chain if math.isnan(tool_length) else chain.with_tool(tool_length)
@@ -86,7 +92,9 @@ class TipControl:
         first = ToolVector(chain).from_part[0].name
         side: float | None = None
         for place in places:
-            parallel = min(map(float, ToolVector(chain).singular((*place[:3], *place[9:])).values())) < _PARALLEL  # type: ignore[arg-type]
+            parallel = (
+                min(map(float, ToolVector(chain).singular((*place[:3], *place[9:])).values())) < _PARALLEL
+            )
             if side is None and not parallel:
                 side = min((1.0, -1.0), key=lambda s: _turning(_angles(chain, s, before, place), before))
             found = _angles(chain, 1.0 if side is None else side, before, place)
@@ -105,7 +113,7 @@ def _angles(
 ) -> dict[str, float]:
     """The rotary joints [deg] for a place's direction, in the pose of that side, next to those before."""
     found = ToolVector(chain, side).angles(place[9:])
-    return {name: shortest_turn(angle, float(found[name])) for name, angle in before.items()}  # type: ignore[arg-type]
+    return {name: shortest_turn(angle, float(found[name])) for name, angle in before.items()}
 
 
 def _turning(angles: Mapping[str, float], before: Mapping[str, float]) -> float:

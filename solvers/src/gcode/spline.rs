@@ -176,7 +176,7 @@ impl Interpreter<'_> {
         let own = if code == 62 { AXIS_WORDS | bits(b"KR") } else { bits(b"XYPL") };
         let own = if ends { 0 } else { own };
         if !block.only_motion() || !(ends || motion.is_none_or(|motion| motion == code)) || block.words & !own != 0 {
-            return self.interrupted(block, &nurbs, motion);
+            return interrupted(block, &nurbs, motion, own);
         }
         if ends {
             return self.close(&nurbs);
@@ -189,22 +189,6 @@ impl Interpreter<'_> {
         }
         self.open = Some(nurbs);
         Ok(())
-    }
-
-    #[cold]
-    fn interrupted(&self, block: &Block, nurbs: &Nurbs, motion: Option<u16>) -> Outcome<()> {
-        let (name, line) = (g_name(nurbs.code), nurbs.line);
-        let takes = if nurbs.code == 62 { "axis words, K and R" } else { "X, Y, P and L" };
-        let end = if nurbs.code == 62 { "its last knots" } else { "G5.3" };
-        let letter = (b'A'..=b'Z').find(|&letter| block.has(letter) && motion.is_none());
-        let what = match (motion, letter) {
-            (Some(code), _) => format!("word {}", g_name(code)),
-            (None, Some(letter)) => format!("the block of word {}", block.word(letter)),
-            (None, None) => "this block".into(),
-        };
-        fault(format!(
-            "{what} stands inside the spline {name} of line {line}, which takes {takes} until {end}: end it before"
-        ))
     }
 
     /// A control point of G5.2: X and Y, counted from the start of the spline with G91, and its weight P.
@@ -351,6 +335,24 @@ impl Nurbs {
         }
         Ok(())
     }
+}
+
+/// A block that is none of the spline's; `own` are the words that it takes.
+#[cold]
+fn interrupted(block: &Block, nurbs: &Nurbs, motion: Option<u16>, own: u32) -> Outcome<()> {
+    let (name, line) = (g_name(nurbs.code), nurbs.line);
+    let takes = if nurbs.code == 62 { "axis words, K and R" } else { "X, Y, P and L" };
+    let end = if nurbs.code == 62 { "its last knots" } else { "G5.3" };
+    let foreign = motion.filter(|&motion| motion != nurbs.code && motion != 53);
+    let letter = (b'A'..=b'Z').find(|&letter| block.words & !own & bit(letter) != 0);
+    let what = match (foreign, letter) {
+        (Some(code), _) => format!("word {}", g_name(code)),
+        (None, Some(letter)) => format!("word {}", block.word(letter)),
+        (None, None) => "this block".into(),
+    };
+    fault(format!(
+        "{what} stands inside the spline {name} of line {line}, which takes {takes} until {end}: end it before"
+    ))
 }
 
 fn check_order(block: &Block, letter: u8, order: usize) -> Outcome<()> {
