@@ -116,7 +116,9 @@ def read_dxf(content: bytes, machine: Machine | None = None, name: str = "drawin
     try:
         document: Any = recover.read(io.BytesIO(content))[0]
         units = int(document.header.get("$INSUNITS", 0))
-        scale = conversion_factor(InsertUnits(units), InsertUnits.Millimeters) if units else 1.0
+        # The package has its factors to some digits only: 25.400000000102.
+        factor = conversion_factor(InsertUnits(units), InsertUnits.Millimeters) if units else 1.0
+        scale = float(f"{factor:.9g}")
         entities = list(document.modelspace())
     except Exception as error:  # the package raises whatever a broken file leads it to
         what = " ".join(str(error).split()) or type(error).__name__

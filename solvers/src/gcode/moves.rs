@@ -397,7 +397,12 @@ impl Moves {
                 .map(|piece| piece as i64)
                 .collect(),
             // No spline is programmed while I, J, K are words.
-            spline_control: self.splines.control.iter().flat_map(|point| self.place(point, &UPRIGHT)).collect(),
+            spline_control: self
+                .splines
+                .control
+                .iter()
+                .flat_map(|point| self.place(point, &UPRIGHT))
+                .collect(),
             target: self.directed_target(),
             spline_weights: self.splines.weights,
             spline_offsets: self.splines.offsets.iter().map(|&offset| offset as i64).collect(),

@@ -175,7 +175,10 @@ impl Interpreter<'_> {
         let ends = code == 52 && motion == Some(53);
         let own = if code == 62 { AXIS_WORDS | bits(b"KR") } else { bits(b"XYPL") };
         let own = if ends { 0 } else { own };
-        if !block.only_motion() || !(ends || motion.is_none_or(|motion| motion == code)) || block.words & !own != 0 {
+        if !block.only_motion()
+            || !(ends || motion.is_none_or(|motion| motion == code))
+            || block.words & !own != 0
+        {
             return interrupted(block, &nurbs, motion, own);
         }
         if ends {
@@ -280,7 +283,8 @@ impl Interpreter<'_> {
         };
         let equal = nurbs.weights.iter().all(|weight| *weight == nurbs.weights[0] && *weight > 0.0);
         let weights = if equal { vec![] } else { nurbs.weights.clone() };
-        let curve = Spline::new(k - 1, knots, nurbs.points.clone(), weights).and_then(|spline| extract(&spline));
+        let curve =
+            Spline::new(k - 1, knots, nurbs.points.clone(), weights).and_then(|spline| extract(&spline));
         let mut curve = match curve {
             Ok(curve) => curve,
             Err(error) => {
@@ -320,7 +324,9 @@ impl Interpreter<'_> {
         }
         if !self.warned_look_ahead {
             self.warned_look_ahead = true;
-            self.warn("Fanuc's G5 P and G5.1 Q switch its look-ahead, which has no effect on the path".into());
+            self.warn(
+                "Fanuc's G5 P and G5.1 Q switch its look-ahead, which has no effect on the path".into(),
+            );
         }
         true
     }
@@ -372,4 +378,54 @@ fn beside(point: &Point, offset: [f64; 2]) -> Point {
     moved[0] += offset[0];
     moved[1] += offset[1];
     moved
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::gcode::{read, Columns, Options};
+
+    fn columns(text: &str) -> Columns {
+        read(format!("G21 F600\n{text}\nM2\n").as_bytes(), &Options::default()).unwrap()
+    }
+
+    fn message(text: &str) -> (Option<u32>, String) {
+        let error = read(text.as_bytes(), &Options::default()).unwrap_err();
+        (error.line, error.message)
+    }
+
+    #[test]
+    fn the_curves_of_one_block_by_hand() {
+        let found = columns("G0 X1 Y1\nG5 I0 J3 P0 Q-3 X2 Y2\nP1 Q0 X4 Y2\nG5.1 X5 Y3 J1");
+        let points: Vec<[f64; 2]> =
+            found.spline_control.chunks(3).map(|point| [point[0], point[1]]).collect();
+        assert_eq!(points[..4], [[1.0, 1.0], [1.0, 4.0], [2.0, -1.0], [2.0, 2.0]]);
+        assert_eq!(points[4..8], [[2.0, 2.0], [2.0, 5.0], [5.0, 2.0], [4.0, 2.0]]);
+        assert_eq!(points[8..], [[4.0, 2.0], [4.0, 3.0], [5.0, 3.0]]);
+        assert_eq!((found.spline_pieces, found.spline_move), (vec![0, 1, 2, 3], vec![1, 2, 3]));
+        assert!(found.spline_weights.is_empty());
+    }
+
+    #[test]
+    fn a_quarter_circle_is_one_either_way() {
+        // The weight of the corner is cos 45 degrees.
+        let nurbs = "G5.2 P1\nX10 Y0 P[SQRT[0.5]]\nX10 Y10 P1\nG5.3";
+        let fanuc = "G6.2 P3 K0\nK0 X10 R[SQRT[0.5]]\nK0 Y10\nK1\nK1\nK1";
+        for text in [nurbs, fanuc] {
+            let found = columns(text);
+            assert_eq!(found.spline_control, [0.0, 0.0, 0.0, 10.0, 0.0, 0.0, 10.0, 10.0, 0.0]);
+            assert_eq!(found.spline_weights, [1.0, 0.5_f64.sqrt(), 1.0]);
+            assert_eq!((found.kind, found.line, found.feed), (vec![3], vec![2], vec![10.0]));
+        }
+    }
+
+    #[test]
+    fn a_spline_names_the_line_it_begins_in() {
+        let (line, text) = message("G21 F600\nG5.2 P1\nX1 Y1 P1\nG0 X1\n");
+        assert_eq!(line, Some(4));
+        assert!(text.starts_with(
+            "word G0 stands inside the spline G5.2 of line 2, which takes X, Y, P and L until G5.3"
+        ));
+        let (line, text) = message("G21 F600\nG6.2 K0\nK0 X1\n");
+        assert_eq!((line, text.ends_with("it may be truncated")), (Some(3), true));
+    }
 }

@@ -114,7 +114,9 @@ impl Interpreter<'_> {
             ));
         }
         if matches!(motion, 20 | 30) && block.words & bits(b"IJK") != 0 {
-            return fault("under G43.5 I, J, K are the tool's direction and no centre: give R, or post lines");
+            return fault(
+                "under G43.5 I, J, K are the tool's direction and no centre: give R, or post lines",
+            );
         }
         match (b'A'..=b'C').find(|&letter| block.has(letter)) {
             Some(letter) => fault(format!(

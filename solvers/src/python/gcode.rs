@@ -22,7 +22,9 @@ impl PyTipControl {
         Python::attach(|py| {
             let result = self.0.bind(py).call_method1(method, arguments);
             match result {
-                Ok(value) => value.extract().map_err(|_| format!("{method} of the machine returns no numbers")),
+                Ok(value) => {
+                    value.extract().map_err(|_| format!("{method} of the machine returns no numbers"))
+                }
                 Err(error) => Err(error.value(py).to_string()),
             }
         })
