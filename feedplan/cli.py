@@ -219,10 +219,13 @@ def fit(program: str, machine: str, tolerance: float | None, as_json: bool) -> N
 
     from feedplan.files import summary_text
     from feedplan.geometry.build import build_path
+    from feedplan.plan import require_lines_and_arcs
     from feedplan.program.read import read_program
 
     known = Machine.load(machine)
-    path = build_path(read_program(program, known), known, tolerance)
+    moves = read_program(program, known)
+    require_lines_and_arcs(moves)
+    path = build_path(moves, known, tolerance)
     ratios = {"spline_ratio": path.fit.spline_ratio, "polynomial_ratio": path.fit.polynomial_ratio}
     summary = asdict(path.fit) | ratios | {"pieces": len(path), "runs": len(path.runs) - 1}
     if as_json:

@@ -13,7 +13,7 @@ from typing import Any
 from feedplan.audit import Audit, audit
 from feedplan.bound import lower_bound
 from feedplan.constraints.problem import Problem, build_problem
-from feedplan.errors import MachineError
+from feedplan.errors import MachineError, ProgramError
 from feedplan.geometry.build import build_path
 from feedplan.geometry.length import PathLength
 from feedplan.geometry.path import Path
@@ -154,6 +154,7 @@ def plan(
         report("read", 0.0)
         with _timed(compute, "read"):
             program = source if isinstance(source, Program) else read_program(FilePath(source), machine)
+        require_lines_and_arcs(program)
         report("fit", 0.0)
         with _timed(compute, "fit"):
             path = build_path(program, machine, tolerance)
@@ -182,6 +183,23 @@ def plan(
         interpolator=interpolator,
         warnings=program.warnings if program else (),
     )
+
+
+def require_lines_and_arcs(program: Program) -> None:
+    """Refuses what is read and cannot be followed yet: splines, tool tips and directions."""
+    if len(program.spline_move):
+        line = int(program.line[program.spline_move[0]])
+        raise ProgramError(
+            f"{program.name} line {line}: splines are read and cannot be planned yet: post lines and arcs",
+            line,
+        )
+    if program.meaning is not None and program.meaning.any():
+        line = int(program.line[program.meaning.argmax()])
+        raise ProgramError(
+            f"{program.name} line {line}: words of the tool's tip (G43.4, G43.5) are read and cannot be planned "
+            "yet: post joint positions",
+            line,
+        )
 
 
 @contextmanager

@@ -8,7 +8,7 @@ degrees. "axes" names the columns, X, Y, Z, A, B, C as many as there are by defa
 second and may be given for each curve. Without "knots" degree + 1 control points are a Bézier curve, and more
 of them a B-spline with clamped uniform knots; with knots there are points + degree + 1. Each curve starts
 where the one before ends, or with "rapid": true a rapid goes there. The program starts where its first curve
-does.
+does. Places are machine coordinates; on a five-axis machine they are joint positions, as without G43.4.
 """
 
 from __future__ import annotations

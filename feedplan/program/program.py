@@ -36,9 +36,9 @@ class Program:
     (axes,) is where the first move begins [mm, deg], after standing still for `start_dwell` [s]. Per move,
     `n` rows: `kind` (MoveKind), `target` (n, axes) [mm, deg], `feed` [mm/s] (infinite on rapids alone),
     `line` (1-based source line), `control` (PathControl), `blend_tolerance` and `fit_tolerance` (G64 P and Q
-    [mm], NaN where the program gives none), `stop` (a full stop after the move: M words, dwells, the end), `dwell` [s] after
-    it. A feed counts along X, Y, Z where one of these moves, else along U, V, W, else it is in deg/s of the
-    rotary axes; on an arc it counts along the circle or helix.
+    [mm], NaN where the program gives none), `stop` (a full stop after the move: M words, dwells, the end),
+    `dwell` [s] after it. A feed counts along X, Y, Z where one of these moves, else along U, V, W, else it is
+    in deg/s of the rotary axes; on an arc it counts along the circle or helix.
     Arcs, one row each: `arc_move` (index of the move), `arc_centre` (k, 3) [mm] in X, Y, Z, `arc_normal`
     (k,) the axis 0, 1, 2 the arc turns about, `arc_angle` (k,) signed sweep [rad], positive
     counter-clockwise seen from the tip of the normal; it may exceed a turn. All other axes move linearly with

@@ -80,7 +80,7 @@ struct Change {
 }
 
 /// Steps up to this long, in mm or degrees, are rounding of offsets and no motion.
-pub const NO_MOTION: f64 = 1e-9;
+const NO_MOTION: f64 = 1e-9;
 
 /// The moves so far.
 pub struct Moves {
