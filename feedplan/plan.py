@@ -196,8 +196,8 @@ def require_lines_and_arcs(program: Program) -> None:
     if program.meaning is not None and program.meaning.any():
         line = int(program.line[program.meaning.argmax()])
         raise ProgramError(
-            f"{program.name} line {line}: words of the tool's tip (G43.4, G43.5) are read and cannot be planned "
-            "yet: post joint positions",
+            f"{program.name} line {line}: words of the tool's tip (G43.4, G43.5) are read and cannot be "
+            "planned yet: post joint positions",
             line,
         )
 
