@@ -256,7 +256,7 @@ pub fn g_name(code: u16) -> String {
 /// What to do about a G code that is understood and not read; None where it is not understood.
 pub fn g_remedy(code: u16) -> Option<&'static str> {
     Some(match code {
-        54..=59 | 60..=69 => "these splines are not read: post lines and arcs, or G5 to G5.3 or G6.2",
+        54..=69 => "these splines are not read: post lines and arcs, or G5 to G5.3 or G6.2",
         70 => "diameters are not read: post radii (G8)",
         160 => "polar coordinates are not read: post X and Y",
         171 | 181 | 191 => "arcs and cycles in the planes of U, V and W are not read: use G17, G18 or G19",
