@@ -117,6 +117,7 @@ def read_gcode(
     name: str,
     places: NDArray[np.float64],
     machine_axes: str,
+    tip_control: object | None,
     block_delete: bool,
     max_moves: int,
 ) -> dict[str, Any]: ...

@@ -11,6 +11,7 @@ import math
 import os
 import sys
 from collections.abc import Sequence
+from itertools import groupby
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
@@ -157,7 +158,7 @@ def plan(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Plan PROGRAM: G-code, or a path file (.json).
+    """Plan PROGRAM: G-code, a path file (.json) or a drawing (.dxf).
 
     Exit code 1: a limit is broken, or no plan is feasible.
     """
@@ -221,7 +222,8 @@ def fit(program: str, machine: str, tolerance: float | None, as_json: bool) -> N
     from feedplan.program.read import read_program
 
     known = Machine.load(machine)
-    path = build_path(read_program(program, known), known, tolerance)
+    moves = read_program(program, known)
+    path = build_path(moves, known, tolerance)
     ratios = {"spline_ratio": path.fit.spline_ratio, "polynomial_ratio": path.fit.polynomial_ratio}
     summary = asdict(path.fit) | ratios | {"pieces": len(path), "runs": len(path.runs) - 1}
     if as_json:
@@ -271,29 +273,34 @@ def check(place: str, machine: str | None, resolution: float, jerk: bool, as_jso
 def machines(name: str | None) -> None:
     """Show the bundled machines, or the limits of one.
 
-    NAME is a bundled machine or a TOML file.
+    NAME is a bundled machine or a TOML file. Limits are in mm on linear and in degrees on rotary axes.
     """
     if name is None:
-        names = ["machine", "axes", "velocity mm/s", "acceleration mm/s²", "period ms", "chord mm"]
+        names = ["machine", "axes", "velocity /s", "acceleration /s²", "period ms", "chord mm"]
         console.print_table(names, [_machine_row(Machine.load(known)) for known in bundled_machines()])
     else:
-        names = ["axis", "velocity mm/s", "acceleration mm/s²", "jerk mm/s³", "travel mm"]
+        names = ["axis", "unit", "velocity /s", "acceleration /s²", "jerk /s³", "travel"]
         console.print_table(names, [_axis_row(axis) for axis in Machine.load(name).axes])
 
 
 def _machine_row(machine: Machine) -> tuple[str, ...]:
-    limits = (
-        " ".join(f"{getattr(axis, limit):g}" for axis in machine.axes)
-        for limit in ("max_velocity", "max_acceleration")
-    )
+    limits = (_by_unit(machine, limit) for limit in ("max_velocity", "max_acceleration"))
     axes = "".join(machine.axis_names)
     return (machine.name, axes, *limits, f"{1e3 * machine.period:g}", _or_none(machine.chord_tolerance))
+
+
+def _by_unit(machine: Machine, limit: str) -> str:
+    """A limit of all axes, with a unit after the last of those that have it: `500 500 mm 150 deg`."""
+    groups = groupby(machine.axes, key=lambda axis: axis.unit)
+    return " ".join(
+        " ".join((*(f"{getattr(axis, limit):g}" for axis in axes), unit)) for unit, axes in groups
+    )
 
 
 def _axis_row(axis: Axis) -> tuple[str, ...]:
     limits = (axis.max_velocity, axis.max_acceleration, axis.max_jerk)
     travel = " to ".join(f"{end:g}" for end in axis.travel) if math.isfinite(axis.travel[0]) else "-"
-    return (axis.name, *(_or_none(limit) for limit in limits), travel)
+    return (axis.name, axis.unit, *(_or_none(limit) for limit in limits), travel)
 
 
 def _or_none(limit: float) -> str:

@@ -273,10 +273,19 @@ def test_machines_lists_every_one_and_shows_each(capsys: Any) -> None:
     assert main(["machines", "tarus"]) == 0
     rows = [line.split() for line in capsys.readouterr().out.splitlines()[1:]]
     assert rows == [
-        ["X", "170", "400", "4000", "-"],
-        ["Y", "180", "600", "6000", "-"],
-        ["Z", "240", "2000", "20000", "-"],
+        ["X", "mm", "170", "400", "4000", "-"],
+        ["Y", "mm", "180", "600", "6000", "-"],
+        ["Z", "mm", "240", "2000", "20000", "-"],
     ]
+    assert main(["machines", "cylindrical"]) == 0
+    assert [line.split()[1] for line in capsys.readouterr().out.splitlines()[1:]] == ["deg", "mm", "mm"]
+
+
+def test_limits_in_a_row_have_the_units_of_their_axes(capsys: Any) -> None:
+    assert main(["machines"]) == 0
+    rows = {line.split()[0]: " ".join(line.split()) for line in capsys.readouterr().out.splitlines()}
+    assert rows["cylindrical"].startswith("cylindrical CXZ 170 deg 250 200 mm 1150 deg 2000 1000 mm")
+    assert rows["mill"].startswith("mill XYZ 500 500 400 mm 3000")
 
 
 MAIN = "import sys; from feedplan.cli import main; sys.exit(main())"
@@ -290,7 +299,7 @@ def run(*arguments: str, **more: Any) -> subprocess.CompletedProcess[str]:
 def test_a_terminal_that_knows_no_unicode_gets_what_it_can_show() -> None:
     done = run("machines", env={**os.environ, "PYTHONIOENCODING": "ascii"})
     assert (done.returncode, done.stderr) == (0, "")
-    assert "mm/s?" in done.stdout
+    assert " /s? " in done.stdout
 
 
 def test_a_reader_that_goes_away_is_no_error() -> None:

@@ -15,6 +15,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from feedplan.machine.along import positions
+from feedplan.machine.machine import Machine
+from feedplan.machine.words import Meaning, axis_words
+from feedplan.program.gcode import read_gcode
+from feedplan.program.program import Program
+
 EXAMPLES = Path(__file__).parent.parent / "examples"
 SCRIPTS = sorted(path.name for path in EXAMPLES.glob("*.py"))
 
@@ -178,3 +184,51 @@ def test_the_ball_does_not_gouge_the_head() -> None:
 def test_the_head_moves_all_three_axes() -> None:
     points = moves(load("head").program(2000), "XYZ")
     assert np.all(np.mean(np.abs(np.diff(points, axis=0)) > 0.0, axis=0) > 0.8)
+
+
+def joint_positions(program: Program, machine: Machine) -> NDArray[np.float64]:
+    """The joints at the end of every move, by what its words mean."""
+    assert program.meaning is not None
+    found = np.empty((len(program), len(machine.axes)))
+    for meaning in Meaning:
+        rows = program.meaning == meaning
+        axis = axis_words(machine, program.axes, meaning) if rows.any() else None
+        if axis is not None:
+            found[rows] = positions(axis.kinematics, axis.tip(program.target[rows]))
+    return found
+
+
+@pytest.mark.parametrize("name", ["trunnion-ac", "trunnion-bc", "head-table", "head-head"])
+def test_the_impeller_is_the_same_motion_in_every_form(name: str) -> None:
+    impeller = load("impeller")
+    machine = Machine.load(name)
+    programs = [read_gcode(impeller.program(machine, form, 600), machine) for form in impeller.FORMS]
+    tip, vector, joints = (joint_positions(program, machine) for program in programs)
+    assert len(joints) > 500
+    assert np.abs(tip - joints).max() < 1e-3
+    # Directions leave angles open by whole turns, and the pose by its side.
+    assert programs[1].meaning is not None
+    pointed = programs[1].meaning == Meaning.VECTOR
+    kinematics = axis_words(machine, programs[1].axes, Meaning.VECTOR).kinematics
+    directions = np.array([kinematics.tip(row) for row in joints])
+    assert np.abs(directions[pointed] - programs[1].target[pointed][:, [0, 1, 2, 5, 6, 7]]).max() < 1e-3
+    assert np.abs(vector - joints)[~pointed].max() < 1e-3
+    # The readings agree where the words change: the last move is one of joints in all forms.
+    starts = [program.starts()[-1][:5] for program in programs]
+    assert starts[0] == pytest.approx(starts[2], abs=1e-3)
+    assert starts[1] == pytest.approx(starts[2], abs=1e-3)
+    low, high = (np.array([axis.travel[end] for axis in machine.axes]) for end in (0, 1))
+    assert ((joints >= low) & (joints <= high)).all()
+    feeds = [program.feed[np.isfinite(program.feed)] for program in programs]
+    assert feeds[0] == pytest.approx(np.full(len(feeds[0]), 50))
+
+
+def test_the_flank_of_the_tool_stays_beside_the_blade() -> None:
+    impeller = load("impeller")
+    tips, directions = impeller.blade_pass(0, 9.0, 60)
+    hub, rulings = impeller.ruling(np.linspace(0, 1, 2001), 0)
+    middle = hub + 9.0 * rulings
+    away = np.array([np.linalg.norm(middle - tip, axis=1).min() for tip in tips])
+    reach = impeller.TOOL_RADIUS + 0.5 * impeller.THICKNESS
+    assert away == pytest.approx(np.full(len(tips), reach), abs=0.02)
+    assert np.linalg.norm(directions, axis=1) == pytest.approx(np.ones(len(tips)))

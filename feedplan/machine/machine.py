@@ -59,8 +59,9 @@ class Machine:
 
     `period` is the servo period [s], `chord_tolerance` the allowed distance [mm] between the path and the
     straight line from one setpoint to the next (infinite: not limited), `home` the position [mm] that G28
-    and G30 go to, `offsets` the work offsets by name (`"G54"`: one number an axis) [mm]. `kinematics` is the
-    type that turns the tool tip into joint positions, `parameters` its keys in the machine file.
+    and G30 go to, `offsets` the work offsets by name (`"G54"`) [mm]; both have one number for each of
+    `program_letters`. `kinematics` is the type that turns the tool tip into joint positions, `parameters` its
+    keys in the machine file.
     """
 
     name: str
@@ -93,6 +94,11 @@ class Machine:
     def words_are_joints(self) -> bool:
         """Axis words are joint positions as they stand, unless G43.4 or the like says otherwise."""
         return self.is_plain or not self.inverse.always
+
+    @property
+    def program_letters(self) -> tuple[str, ...]:
+        """The letters of a program's axis words: the tip's where words always mean that, else the joints'."""
+        return self.axis_names if self.words_are_joints else self.inverse.tip_names
 
     @cached_property
     def inverse(self) -> Kinematics:
@@ -183,7 +189,6 @@ def _parse(text: str, place: str) -> Machine:
     parameters = {"type": kinematics} if isinstance(kinematics, str) else kinematics
     good_type = isinstance(parameters, dict) and isinstance(parameters.get("type"), str)
     _require(good_type, place, "kinematics", kinematics, 'a name, or a table with type = "cartesian"')
-    home = table.get("home", [0.0] * len(axes))
     offsets = table.get("offsets", {})
     _require(isinstance(offsets, dict), place, "offsets", offsets, "a table such as G54 = [0.0, 0.0, 0.0]")
     machine = Machine(
@@ -192,13 +197,24 @@ def _parse(text: str, place: str) -> Machine:
         period=_number(table, "period", place, 0.001, "s"),
         chord_tolerance=_number(table, "chord_tolerance", place, math.inf, "mm"),
         kinematics=parameters["type"],
-        home=_numbers(home, len(axes), place, "home"),
-        offsets=tuple((key, _numbers(row, len(axes), place, key)) for key, row in offsets.items()),
         parameters={key: value for key, value in parameters.items() if key != "type"},
     )
     if not machine.is_plain:
         _check_kinematics(machine, place)
-    return machine
+    letters = machine.program_letters
+    home = table.get("home", [0.0] * len(letters))
+    return replace(
+        machine,
+        home=_places(home, letters, place, "home"),
+        offsets=tuple((key, _places(row, letters, place, key)) for key, row in offsets.items()),
+    )
+
+
+def _places(values: Any, letters: tuple[str, ...], place: str, key: str) -> tuple[float, ...]:
+    """One number for each letter of a program."""
+    good = isinstance(values, list) and len(values) == len(letters)
+    _require(good, place, key, values, f"{len(letters)} numbers, for the program's axes {', '.join(letters)}")
+    return _numbers(values, len(letters), place, key)
 
 
 def _check_kinematics(machine: Machine, place: str) -> None:

@@ -128,21 +128,21 @@ class ToolVector(Kinematics):
         """The tip and the unit direction."""
         waves = self.chain._waves(joints[3:])
         direction: tuple[Number, ...] = (0.0, 0.0, 1.0)
-        for axis in reversed(self._from_part()):
+        for axis in reversed(self.from_part):
             direction = _turn(replace(axis, pivot=(0.0, 0.0, 0.0)), direction, *waves[axis.name])
         return (*self.chain.tip(joints)[:3], *direction)
 
     def singular(self, tip: Sequence[Number]) -> dict[str, Number]:
         """The sine of the angle between the tool and the first axis from the part."""
         i, j, k = tip[3:]
-        first = self._from_part()[0].name
+        first = self.from_part[0].name
         across = {"A": hypot(j, k), "B": hypot(i, k), "C": hypot(i, j)}[first]
         return {f"a tool axis parallel to {first}": across / hypot(hypot(i, j), k)}
 
     def angles(self, direction: Sequence[Number]) -> dict[str, Number]:
         """The two rotary axes [deg] that point the tool along a direction."""
         i, j, k = direction
-        first, second = self._from_part()
+        first, second = self.from_part
         s = self.side
         # R(first) R(second) ẑ = (i, j, k), solved for both; the other solution has s = −1.
         match first.name + second.name:
@@ -158,7 +158,8 @@ class ToolVector(Kinematics):
             axis.name: degrees(angle) * axis.sense for axis, angle in zip((first, second), pair, strict=True)
         }
 
-    def _from_part(self) -> tuple[RotaryAxis, ...]:
+    @property
+    def from_part(self) -> tuple[RotaryAxis, ...]:
         """The rotary axes from the part over the frame to the tool."""
         return (*reversed(self.chain.tables), *self.chain.heads)
 

@@ -19,6 +19,8 @@ from feedplan.machine.kinematics import Kinematics
 from feedplan.machine.machine import Machine
 from feedplan.machine.rotary import RotaryChain, ToolVector
 
+DIRECTION = ("I", "J", "K")
+
 
 class Meaning(IntEnum):
     """Of axis words."""
@@ -63,10 +65,13 @@ def axis_words(
 ) -> AxisWords:
     """The program axes `axes` on a machine; MachineError names a letter the machine does not have.
 
+    Letters of the machine's other meanings are left out: I, J, K, or rotary joints beside a direction.
+
     Without a meaning, words mean what they do on that machine before any G43.4. `tool_length` [mm] replaces
     the machine file's; `held` gives positions of axes that the program never moves, 0 by default; `side` ±1
     chooses between the two poses that point the tool along a direction.
     """
+    axes = tuple(axes)
     kinematics = machine.inverse
     if meaning is None:
         meaning = Meaning.TIP if kinematics.always else Meaning.JOINTS
@@ -82,8 +87,10 @@ def axis_words(
             )
         kinematics = ToolVector(kinematics, side)
     known = kinematics.tip_names
+    # The columns of a program with several meanings serve all of them.
+    others = kinematics.joint_names if meaning is Meaning.VECTOR else DIRECTION
     for letter in axes:
-        if letter not in known:
+        if letter not in known and letter not in others:
             raise MachineError(
                 f"the program uses {letter}, but machine {machine.name} takes {', '.join(known)} there: "
                 f"take {letter} out of the program, or use a machine that has it"

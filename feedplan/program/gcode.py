@@ -4,10 +4,14 @@
 |---|---|
 | G0 G1 | rapid, feed |
 | G2 G3 | arc or helix by I J K or R, turns by P; planes G17 G18 G19; centre incremental or G90.1 |
+| G5 I J P Q, G5.1 I J | cubic and quadratic Bézier curve in X and Y, G17; G5 after G5 may leave out I J |
+| G5.2 X Y P L … G5.3 | NURBS in X and Y, weights P, order L from 3, knots clamped and uniform; G17 |
+| G6.2 P K X… R, then K X… R, then K | Fanuc's NURBS: order P (4), knots K, weights R, any axes |
 | G4 P, G4 X | dwell [s] |
 | G20 G21 | inch, mm (mm without either, with a warning) |
 | G28 G30 | rapid by the place named to the machine's home: the axes named, or all |
 | G43 H, G43.1, G43.2, G49 | tool length; lengths by H are not known and count as 0, with a warning |
+| G43.4, G43.5, G49 | X Y Z are the tool's tip on the part, with rotary words or with I J K, its direction |
 | G52, G92 to G92.3, G10 L2 L20 | offsets |
 | G53, G54 to G59.3 | machine coordinates, work offsets (from the machine file, else 0) |
 | G61.1, G61, G64 P Q | exact stop, exact path, blending within P, fitting within Q |
@@ -16,18 +20,32 @@
 | G93 G94 G95 | F is 1/min, units/min, units a turn (with a known spindle speed) |
 | G96 G97 S | surface or spindle speed |
 | G8 G15 G40 G69 | what they cancel is never on: no effect |
+| G5 P, G5.1 Q alone in a block | Fanuc's look-ahead, with a warning: no effect |
 | M0 M1 M2 M30 M60, M3 to M9, M19, M100 to M199 | full stop; M2 and M30 end the program |
 | M48 M49, S T D | no effect on the path |
 | F, N, O1234 or :1234 at the start, %, ( ) and ; comments | as usual |
 | / at the start of a block | left out, with a warning, unless `block_delete=False` |
 | #1 = [...], #<name>, + - * / ** MOD, EQ to XOR, ABS to TAN | arithmetic, in any word |
 
-Everything else is an error that names the line and the word: cutter radius compensation (G41 G42), splines
-(G5 G6), threading, probing, subprograms and flow control (O words, M97 to M99), words that no code of their
-block uses. Within a block the order is LinuxCNC's, with differences that posts count on: F is in the units of
-its own block, G80 gives way to another motion code beside it, and G0 beside G28 only stays in force. All axes
-start at machine zero; a change of offsets moves nothing. A stop or dwell belongs to the move before it, and a
-dwell before the first move is kept as `start_dwell`.
+Everything else is an error that names the line and the word: cutter radius compensation (G41 G42), threading,
+probing, subprograms and flow control (O words, M97 to M99), words that no code of their block uses. Within a
+block the order is LinuxCNC's, with differences that posts count on: F is in the units of its own block, G80
+gives way to another motion code beside it, and G0 beside G28 only stays in force. All axes start at machine
+zero; a change of offsets moves nothing. A stop or dwell belongs to the move before it, and a dwell before the
+first move is kept as `start_dwell`.
+
+A spline of several blocks is one move, in the line and at the feed of its first block; nothing else may stand
+inside it. Its knots and control points are LinuxCNC's and Fanuc's: with G91 those of G5.2 count from its
+start, those of G6.2 from the one before. G93 does not go with splines.
+
+G43.4 and G43.5 take a machine with rotary axes. Under them no word has the tool's length in it: it is that of
+G43.1 Z before, else the machine file's, with a warning. The change moves nothing: where the joints are is
+written in the new words, and what the next block does not name stays there. G49, and G43 or G43.1, go back to
+joint positions; after directions these are followed move by move in the pose they began with, by the shortest
+turn. I, J, K point from the tip to the spindle; any length will do, missing ones are 0, and without all three
+the direction stays. G28, G30, G53 and cycles need G49 before. On machines whose words always are the tip, as
+cylindrical and CoreXY ones, home and work offsets are in the program's letters, and G43 adds to Z as
+elsewhere.
 """
 
 from __future__ import annotations
@@ -38,6 +56,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan._solvers import read_gcode as read_native
+from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import MachineError, ProgramError
 from feedplan.machine.machine import AXIS_LETTERS, Machine
 from feedplan.program.program import Program
@@ -73,14 +92,24 @@ def read_gcode(
     else:
         default = Path(source).name
         content = read_bytes(Path(source), max_bytes)
+    # Kinematics are loaded where a program is read, not where feedplan is imported.
+    from feedplan.program.tip import TipControl
+
+    control = None if machine is None else TipControl(machine)
     columns = read_native(
         content,
         default if name is None else name,
         _places(machine),
-        "" if machine is None else "".join(machine.axis_names),
+        "" if machine is None else "".join(machine.program_letters),
+        control,
         block_delete,
         max_moves,
     )
+    splines = columns.pop("spline_columns")
+    if len(columns["spline_move"]):
+        columns["splines"] = CompositeCurve(*splines)
+    if control is None or not control.applies:
+        columns["meaning"] = columns["tool_length"] = None
     return Program(name=default if name is None else name, **columns)
 
 
@@ -112,7 +141,7 @@ def _places(machine: Machine | None) -> NDArray[np.float64]:
     places = np.zeros((len(WORK_OFFSETS) + 1, len(AXIS_LETTERS)))
     if machine is None:
         return places
-    columns = [AXIS_LETTERS.index(letter) for letter in machine.axis_names]
+    columns = [AXIS_LETTERS.index(letter) for letter in machine.program_letters]
     for key, row in machine.offsets:
         if key not in WORK_OFFSETS:
             raise MachineError(f"machine {machine.name}: offsets has {key!r}: use {', '.join(WORK_OFFSETS)}")

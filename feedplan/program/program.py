@@ -32,13 +32,13 @@ class PathControl(IntEnum):
 class Program:
     """Moves of a part program in order, in machine coordinates.
 
-    `axes` are the letters that the program uses, always X, Y and Z, in the order XYZABCUVW. `start` (axes,)
-    is where the first move begins [mm, deg], after standing still for `start_dwell` [s]. Per move, `n` rows:
-    `kind` (MoveKind), `target` (n, axes) [mm, deg], `feed` [mm/s] (infinite on rapids), `line` (1-based
-    source line), `control` (PathControl), `blend_tolerance` and `fit_tolerance` (G64 P and Q [mm], NaN where
-    the program gives none), `stop` (a full stop after the move: M words, dwells, the end), `dwell` [s] after
-    it. A feed counts along X, Y, Z where one of these moves, else along U, V, W, else it is in deg/s of the
-    rotary axes; on an arc it counts along the circle or helix.
+    `axes` are the letters that the program uses, always X, Y and Z, in the order XYZABCUVWIJK. `start`
+    (axes,) is where the first move begins [mm, deg], after standing still for `start_dwell` [s]. Per move,
+    `n` rows: `kind` (MoveKind), `target` (n, axes) [mm, deg], `feed` [mm/s] (infinite on rapids alone),
+    `line` (1-based source line), `control` (PathControl), `blend_tolerance` and `fit_tolerance` (G64 P and Q
+    [mm], NaN where the program gives none), `stop` (a full stop after the move: M words, dwells, the end),
+    `dwell` [s] after it. A feed counts along X, Y, Z where one of these moves, else along U, V, W, else it is
+    in deg/s of the rotary axes; on an arc it counts along the circle or helix.
     Arcs, one row each: `arc_move` (index of the move), `arc_centre` (k, 3) [mm] in X, Y, Z, `arc_normal`
     (k,) the axis 0, 1, 2 the arc turns about, `arc_angle` (k,) signed sweep [rad], positive
     counter-clockwise seen from the tip of the normal; it may exceed a turn. All other axes move linearly with
@@ -46,7 +46,11 @@ class Program:
     Splines, one row each: `spline_move` (index of the move), `spline_pieces` (k + 1,) which pieces of
     `splines` it takes, a curve in all `axes` [mm, deg] from the move's start to its target.
     What the words mean: `meaning` (n,) (`feedplan.machine.words.Meaning`), `tool_length` (n,) [mm] under TIP
-    and VECTOR, NaN for the machine file's; None where the machine knows one meaning only.
+    and VECTOR, NaN for the machine file's; None where the machine knows one meaning only. Under VECTOR the
+    last columns are I, J, K, the unit vector from the tip to the spindle, and F on a move of these alone is
+    in deg/s of the tool's turning; columns that a meaning does not use stay as they are. A change of meaning
+    is a full stop and moves no joint: `change_move` (c,) are the first moves in a new meaning, and
+    `change_start` (c, axes) where they start in the new words, `starts` takes both into account.
     `warnings` are sentences for the user.
     """
 
@@ -72,7 +76,16 @@ class Program:
     splines: CompositeCurve | None = None
     meaning: NDArray[np.uint8] | None = None
     tool_length: NDArray[np.float64] | None = None
+    change_move: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+    change_start: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0)))
     warnings: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.kind)
+
+    def starts(self) -> NDArray[np.float64]:
+        """Where each move starts, in its own words (n, axes) [mm, deg]."""
+        starts = np.concatenate([self.start[None, :], self.target[:-1]])
+        if len(self.change_move):
+            starts[self.change_move] = self.change_start
+        return starts

@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from feedplan.machine.machine import Machine
+from feedplan.program import path_file
+from feedplan.program.dxf import read_dxf
 from feedplan.program.gcode import MAX_BYTES, read_bytes, read_gcode
+from feedplan.program.path_file import read_path_file
 from feedplan.program.program import Program
+
+Reader = Callable[[bytes, Machine | None, str], Program]
+
+# By the end of the file's name, with the most bytes that are read; everything else is G-code.
+READERS: dict[str, tuple[Reader, int]] = {
+    ".json": (read_path_file, path_file.MAX_BYTES),
+    ".dxf": (read_dxf, path_file.MAX_BYTES),
+}
 
 
 def read_program(
@@ -16,11 +28,15 @@ def read_program(
     block_delete: bool = True,
     max_bytes: int = MAX_BYTES,
 ) -> Program:
-    """The moves of the program in a file; every file is taken for G-code, the one language read.
+    """The moves of the program in a file: a path file (.json), a drawing (.dxf), else G-code.
 
-    `machine` gives work offsets and home, see `read_gcode`. Raises ProgramError in one sentence where the
-    file is missing, a directory, empty, binary, larger than `max_bytes` or not understood.
+    `machine` gives work offsets and home, see `read_gcode`, and the axes there are. Raises ProgramError in
+    one sentence where the file is missing, a directory, empty, binary, larger than `max_bytes` or not
+    understood, MissingPackageError where a drawing needs a package.
     """
     file = Path(path)
-    content = read_bytes(file, max_bytes)
-    return read_gcode(content, machine, file.name, block_delete=block_delete)
+    reader, most = READERS.get(file.suffix.lower(), (None, max_bytes))
+    content = read_bytes(file, min(max_bytes, most))
+    if reader is None:
+        return read_gcode(content, machine, file.name, block_delete=block_delete)
+    return reader(content, machine, file.name)

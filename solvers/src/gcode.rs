@@ -1,7 +1,8 @@
 //! G-code (RS-274/NGC) to moves in machine coordinates.
 //!
 //! `words` cuts lines into blocks, `intent` says what a block asks for, `execute` runs it in LinuxCNC's order with the
-//! modes of `modal` and the offsets of `places`; `motion`, `arc` and `cycle` make moves, `moves` holds them as columns. What is not understood is an error with its line
+//! modes of `modal` and the offsets of `places`; `motion`, `arc`, `spline` and `cycle` make moves, `tip` says what their
+//! words mean, `moves` holds them as columns. What is not understood is an error with its line
 //! and word; nothing is skipped silently.
 
 mod arc;
@@ -18,9 +19,12 @@ mod motion;
 mod moves;
 mod number;
 mod places;
+mod spline;
+mod tip;
 mod words;
 
-pub use moves::{Columns, Point};
+pub use moves::{Columns, Direction, Point};
+pub use tip::{Meaning, Place, TipControl};
 
 use block::Block;
 use execute::Interpreter;
@@ -31,7 +35,6 @@ use words::{Lexer, Line};
 const MOST_EXPECTED: usize = 1 << 24;
 
 /// What the reader must know about the machine and the user's choices.
-#[derive(Clone, Debug)]
 pub struct Options {
     /// Work offsets G54 to G59.3, in mm and degrees.
     pub offsets: [Point; 9],
@@ -39,6 +42,8 @@ pub struct Options {
     pub home: Point,
     /// Letters of the machine's axes; empty where no machine is given.
     pub machine_axes: Vec<u8>,
+    /// What the machine makes of G43.4 and G43.5; None where there is no machine.
+    pub tip_control: Option<Box<dyn TipControl + Send + Sync>>,
     /// Leave out blocks after `/`.
     pub block_delete: bool,
     /// A program with more moves is an error.
@@ -51,6 +56,7 @@ impl Default for Options {
             offsets: [[0.0; 9]; 9],
             home: [0.0; 9],
             machine_axes: Vec::new(),
+            tip_control: None,
             block_delete: true,
             max_moves: 50_000_000,
         }
@@ -105,6 +111,7 @@ fn run(lexer: &mut Lexer, interpreter: &mut Interpreter) -> Result<Vec<String>, 
             None => break None,
         }
     };
+    interpreter.check_end()?;
     if deleted > 0 {
         warnings.push(format!("{deleted} blocks that start with / are left out (block delete)"));
     }

@@ -75,6 +75,28 @@ def test_what_is_wrong_is_named(old: str, new: str, word: str, tmp_path: Path) -
     assert "\n" not in str(caught.value) or word == "TOML"
 
 
+GANTRY = """
+kinematics = {type = "cartesian", map = {U = "X"}}
+home = [1.0, 2.0, 3.0]
+offsets = {G54 = [4.0, 5.0, 6.0]}
+""" + "".join(f"[[axes]]\nname = '{name}'\nmax_velocity = 1.0\nmax_acceleration = 1.0\n" for name in "XUYZ")
+
+
+def test_home_and_offsets_are_in_the_letters_of_a_program(tmp_path: Path) -> None:
+    gantry = load(GANTRY, tmp_path)
+    assert gantry.axis_names == ("X", "U", "Y", "Z")
+    assert gantry.program_letters == ("X", "Y", "Z")
+    assert gantry.home == (1, 2, 3)
+    assert gantry.offsets == (("G54", (4, 5, 6)),)
+    assert load(GANTRY.replace("home", "# home"), tmp_path).home == (0, 0, 0)
+    for key in ("home", "G54"):
+        wrong = GANTRY.replace(f"{key} = [", f"{key} = [0.0, ")
+        with pytest.raises(
+            MachineError, match=f"{key} is .*: give 3 numbers, for the program's axes X, Y, Z"
+        ):
+            load(wrong, tmp_path)
+
+
 def test_unknown_names_and_files_say_what_there_is(tmp_path: Path) -> None:
     with pytest.raises(MachineError, match="tarus"):
         Machine.load("nobody")

@@ -126,10 +126,7 @@ def test_the_sentence_names_file_line_and_word() -> None:
         # Codes.
         ("G41 D1", "word G41 is not read: cutter radius compensation is not computed here: post with"),
         ("G42.1", "word G42.1 is not read: cutter radius"),
-        ("G5 X1", "word G5 is not read: splines"),
-        ("G5.1 X1", "word G5.1 is not read: splines"),
-        ("G5.2 P1", "word G5.2 is not read: splines"),
-        ("G6.2 P1", "word G6.2 is not read: splines"),
+        ("G6 X1", "word G6 is not read: these splines are not read: post lines and arcs, or G5 to G5.3"),
         ("G17.1", "word G17.1 is not read"),
         ("G28.1", "word G28.1 is not read: the home position"),
         ("G30.1", "word G30.1 is not read: the home position"),

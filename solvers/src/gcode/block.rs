@@ -71,14 +71,17 @@ const NO_GROUP: u8 = 255;
 const GROUP_OF: [u8; 1000] = {
     let members: [(Group, &[u16]); 16] = [
         (Group::Once, &[40, 100, 280, 300, 520, 530, 920]),
-        (Group::Motion, &[0, 10, 20, 30, 730, 740, 800, 810, 820, 830, 840, 850, 860, 890]),
+        (
+            Group::Motion,
+            &[0, 10, 20, 30, 50, 51, 52, 53, 62, 730, 740, 800, 810, 820, 830, 840, 850, 860, 890],
+        ),
         (Group::Plane, &[170, 180, 190]),
         (Group::Distance, &[900, 910]),
         (Group::ArcDistance, &[901, 911]),
         (Group::FeedMode, &[930, 940, 950]),
         (Group::Units, &[200, 210]),
         (Group::Compensation, &[400]),
-        (Group::ToolLength, &[430, 431, 432, 490]),
+        (Group::ToolLength, &[430, 431, 432, 434, 435, 490]),
         (Group::Retract, &[980, 990]),
         (Group::System, &[540, 550, 560, 570, 580, 590, 591, 592, 593]),
         (Group::Control, &[610, 611, 640]),
@@ -253,9 +256,7 @@ pub fn g_name(code: u16) -> String {
 /// What to do about a G code that is understood and not read; None where it is not understood.
 pub fn g_remedy(code: u16) -> Option<&'static str> {
     Some(match code {
-        50..=53 | 60..=69 => {
-            "splines in programs are not read: post lines and arcs (and remove Fanuc's G5 P and G5.1 Q)"
-        }
+        54..=69 => "these splines are not read: post lines and arcs, or G5 to G5.3 or G6.2",
         70 => "diameters are not read: post radii (G8)",
         160 => "polar coordinates are not read: post X and Y",
         171 | 181 | 191 => "arcs and cycles in the planes of U, V and W are not read: use G17, G18 or G19",
@@ -293,7 +294,7 @@ mod tests {
         assert_eq!(block.set_code(10), Ok(()));
         assert_eq!(block.set_code(910), Ok(()));
         assert_eq!(block.set_code(810), Err(Some(10)));
-        assert_eq!(block.set_code(51), Err(None));
+        assert_eq!(block.set_code(55), Err(None));
         assert_eq!(block.code(Group::Motion), Some(10));
         assert_eq!(block.set_code(800), Ok(()));
         assert_eq!(block.code(Group::Motion), Some(10));

@@ -11,6 +11,8 @@ use super::fault::{fault, Outcome};
 use super::intent::{axis_words, check_use, is_cycle, motion_of, ARC_WORDS, FREE_WORDS};
 use super::modal::{Feed, FeedMode, State};
 use super::moves::{Control, Kind, Mode, Moves, Point};
+use super::spline::Nurbs;
+use super::tip::{takes_direction, Meaning};
 use super::Options;
 
 /// Farther than this from the machine's zero is a mistake, in mm;
@@ -36,7 +38,13 @@ pub struct Interpreter<'a> {
     warnings: Vec<String>,
     warned_codes: Vec<u16>,
     pub(super) warned_tool: bool,
+    pub(super) warned_length: bool,
     warned_dwell: bool,
+    pub(super) warned_look_ahead: bool,
+    /// The NURBS that is being read.
+    pub(super) open: Option<Box<Nurbs>>,
+    /// Where a G5 may go on without I and J: the row after the G5 before, and the offset in mm.
+    pub(super) mirror: Option<(usize, [f64; 2])>,
 }
 
 impl<'a> Interpreter<'a> {
@@ -50,7 +58,11 @@ impl<'a> Interpreter<'a> {
             warnings: Vec::new(),
             warned_codes: Vec::new(),
             warned_tool: false,
+            warned_length: false,
             warned_dwell: false,
+            warned_look_ahead: false,
+            open: None,
+            mirror: None,
         }
     }
 
@@ -65,13 +77,13 @@ impl<'a> Interpreter<'a> {
     #[inline]
     pub fn run(&mut self, block: &Block, line: u32) -> Outcome<bool> {
         self.line = line;
-        if !block.only_motion() {
+        if !block.only_motion() || self.open.is_some() || self.state.meaning == Meaning::Vector {
             return self.run_all(block);
         }
         // Nearly all blocks are a straight move or an arc and nothing else.
         let axes = block.words & AXIS_WORDS;
         let rest = block.words & !(AXIS_WORDS | FREE_WORDS);
-        match motion_of(block, axes, self.state.motion)? {
+        match motion_of(block, axes, self.state.motion, false)? {
             Some(motion @ (0 | 10)) if rest == 0 => {
                 self.set_feed_and_speed(block)?;
                 self.state.motion = motion;
@@ -92,9 +104,16 @@ impl<'a> Interpreter<'a> {
     }
 
     fn run_all(&mut self, block: &Block) -> Outcome<bool> {
+        if let Some(nurbs) = self.open.take() {
+            return self.continue_spline(block, nurbs).map(|()| false);
+        }
         let axes = axis_words(block);
-        let motion = motion_of(block, axes, self.state.motion)?;
-        check_use(block, axes, motion, self.state.absolute)?;
+        let vector = self.state.meaning == Meaning::Vector;
+        let motion = motion_of(block, axes, self.state.motion, vector)?;
+        let directed = takes_direction(block, self.state.meaning, motion);
+        check_use(block, axes, motion, self.state.absolute, directed)?;
+        self.check_meaning(block, motion)?;
+        let motion = motion.filter(|_| !self.switches_look_ahead(block, motion));
 
         self.set_feed_and_speed(block)?;
         self.switch(block)?;
@@ -120,6 +139,7 @@ impl<'a> Interpreter<'a> {
                 _ if matches!(block.code(Group::Once), Some(280 | 300)) => {}
                 0 | 10 => self.straight(block, motion == 0, block.code(Group::Once) == Some(530))?,
                 20 | 30 => self.arc(block, motion == 20)?,
+                50..=62 => self.spline(block, motion)?,
                 800 => {}
                 _ => self.cycle(block, motion)?,
             }

@@ -23,17 +23,23 @@ pub fn axis_words(block: &Block) -> u32 {
     }
 }
 
-/// The motion that the block asks for, by its code or by its words.
+/// The motion that the block asks for, by its code or by its words; `vector` where I, J, K alone turn the tool.
 #[inline(always)]
-pub fn motion_of(block: &Block, axes: u32, modal: u16) -> Outcome<Option<u16>> {
+pub fn motion_of(block: &Block, axes: u32, modal: u16, vector: bool) -> Outcome<Option<u16>> {
     match block.code(Group::Motion) {
         Some(code @ (0 | 10 | 20 | 30)) if block.only_motion() => Ok(Some(code)),
         None if axes != 0 && block.only_motion() && modal != 800 => Ok(Some(modal)),
-        code => motion_beside_others(block, axes, modal, code),
+        code => motion_beside_others(block, axes, modal, code, vector),
     }
 }
 
-fn motion_beside_others(block: &Block, axes: u32, modal: u16, motion: Option<u16>) -> Outcome<Option<u16>> {
+fn motion_beside_others(
+    block: &Block,
+    axes: u32,
+    modal: u16,
+    motion: Option<u16>,
+    vector: bool,
+) -> Outcome<Option<u16>> {
     let once = block.code(Group::Once).filter(|code| TAKES_AXES.contains(code));
     let tool = block.code(Group::ToolLength).filter(|code| matches!(code, 431 | 432));
     match (motion, once.or(tool)) {
@@ -58,18 +64,29 @@ fn motion_beside_others(block: &Block, axes: u32, modal: u16, motion: Option<u16
         }
         (None, _) if axes != 0 => Ok(Some(modal)),
         (None, _) if block.words & bits(b"IJK") != 0 && matches!(modal, 20 | 30) => Ok(Some(modal)),
+        (None, _) if block.words & bits(b"IJK") != 0 && vector && modal != 800 => Ok(Some(modal)),
         (None, _) => Ok(None),
     }
 }
 
-/// Every word must mean something: one that nothing uses is a misunderstanding.
-pub fn check_use(block: &Block, axes: u32, motion: Option<u16>, absolute: bool) -> Outcome<()> {
-    let mut used = FREE_WORDS | axes;
+/// Every word must mean something: one that nothing uses is a misunderstanding. `directed` where I, J, K are the
+/// tool's direction.
+pub fn check_use(
+    block: &Block,
+    axes: u32,
+    motion: Option<u16>,
+    absolute: bool,
+    directed: bool,
+) -> Outcome<()> {
+    let mut used = FREE_WORDS | axes | if directed { bits(b"IJK") } else { 0 };
     used |= match motion {
         Some(20 | 30) => ARC_WORDS,
         Some(730 | 830) => bits(b"RLQ"),
         Some(820 | 740 | 840 | 860 | 890) => bits(b"RLP"),
         Some(810 | 850) => bits(b"RL"),
+        Some(50 | 51) => bits(b"IJPQ"),
+        Some(52) => bits(b"PL"),
+        Some(62) => bits(b"PKR"),
         _ => 0,
     };
     used |= match block.code(Group::Once) {
@@ -80,7 +97,7 @@ pub fn check_use(block: &Block, axes: u32, motion: Option<u16>, absolute: bool) 
     if block.code(Group::Control) == Some(640) {
         used |= bits(b"PQ");
     }
-    if matches!(block.code(Group::ToolLength), Some(430 | 432 | 490)) {
+    if matches!(block.code(Group::ToolLength), Some(430 | 432 | 434 | 435 | 490)) {
         used |= bit(b'H');
     }
     if block.m_code(MGroup::User).is_some() || block.m_code(MGroup::Spindle) == Some(19) {

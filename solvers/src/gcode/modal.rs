@@ -1,6 +1,7 @@
 //! What stays in force from block to block: modes, offsets, feed.
 
 use super::moves::{Control, Mode, Point};
+use super::tip::Meaning;
 
 pub const MM_PER_INCH: f64 = 25.4;
 
@@ -93,6 +94,10 @@ pub struct State {
     pub spindle_speed: Option<f64>,
     pub constant_surface_speed: bool,
     pub sticky: Sticky,
+    /// What axis words are; the tool's length in mm then, NaN for the machine file's; the joints where this began.
+    pub meaning: Meaning,
+    pub tool_length: f64,
+    pub entry: Point,
 }
 
 impl State {
@@ -114,6 +119,9 @@ impl State {
             spindle_speed: None,
             constant_surface_speed: false,
             sticky: Sticky::default(),
+            meaning: Meaning::Joints,
+            tool_length: f64::NAN,
+            entry: [0.0; 9],
         }
     }
 

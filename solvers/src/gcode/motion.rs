@@ -1,11 +1,12 @@
 //! Straight moves and arcs of one block, with their feed.
 
 use super::arc::{arc, arc_length, Form};
-use super::block::{bits, Block, AXES};
+use super::block::{bits, Block, AXES, AXIS_WORDS};
 use super::execute::{Interpreter, RATES};
 use super::fault::{fault, Outcome};
 use super::modal::{Feed, FeedMode};
 use super::moves::{only_turns, straight_length, Arc, Kind, Point};
+use super::tip::{turn, Meaning};
 use super::words::count;
 
 /// Words of the centre along X, Y, Z.
@@ -21,12 +22,15 @@ impl Interpreter<'_> {
     /// G0 and G1 to the block's axis words.
     #[inline(always)]
     pub(super) fn straight(&mut self, block: &Block, rapid: bool, machine: bool) -> Outcome<()> {
+        if self.state.meaning == Meaning::Vector {
+            return self.pointed(block, rapid);
+        }
         let target = self.target(block, machine)?;
         if rapid {
             return self.rapid(&target);
         }
         // A G1 alone only selects the motion; its feed may follow.
-        if block.words & super::block::AXIS_WORDS == 0 {
+        if block.words & AXIS_WORDS == 0 {
             return Ok(());
         }
         let feed = match self.state.feed_mode {
@@ -44,6 +48,27 @@ impl Interpreter<'_> {
             }
         };
         self.moves.straight(Kind::Line, &target, feed, &self.state.control, self.line)
+    }
+
+    /// G0 and G1 to a tip and a tool direction (G43.5).
+    #[cold]
+    fn pointed(&mut self, block: &Block, rapid: bool) -> Outcome<()> {
+        let target = self.target(block, false)?;
+        let direction = self.direction(block)?;
+        let (kind, mut feed) = (if rapid { Kind::Rapid } else { Kind::Line }, f64::INFINITY);
+        if !rapid {
+            if block.words & (AXIS_WORDS | bits(b"IJK")) == 0 {
+                return Ok(());
+            }
+            let length = straight_length(&self.moves.position, &target);
+            feed = match self.state.feed_mode {
+                FeedMode::Inverse if length > 0.0 => self.inverse_feed(block, length)?,
+                FeedMode::Inverse => self.inverse_feed(block, turn(&self.moves.direction, &direction))?,
+                _ if length > 0.0 => self.feed()?.linear,
+                _ => self.feed()?.angular,
+            };
+        }
+        self.moves.pointed(kind, &target, direction, feed, &self.state.control, self.line)
     }
 
     /// The feed in force, a second.

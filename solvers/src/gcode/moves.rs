@@ -4,6 +4,8 @@
 
 use super::block::{rotary, AXES};
 use super::fault::{fault, Outcome};
+use super::tip::Meaning;
+use crate::spline::CompositeCurve;
 
 /// A point of the machine: X Y Z A B C U V W in mm and degrees.
 pub type Point = [f64; 9];
@@ -15,6 +17,7 @@ pub enum Kind {
     Rapid = 0,
     Line = 1,
     Arc = 2,
+    Spline = 3,
 }
 
 /// How closely the path is followed.
@@ -56,6 +59,26 @@ pub struct Arc {
     pub angle: f64,
 }
 
+/// A tool direction I, J, K: a unit vector from the tip to the spindle.
+pub type Direction = [f64; 3];
+
+/// The tool is upright until the program says otherwise.
+const UPRIGHT: Direction = [0.0, 0.0, 1.0];
+
+/// The letters of a tool direction's columns, after those of the axes.
+const DIRECTION: [u8; 3] = *b"IJK";
+
+/// Where the words get another meaning: the first move in it, the meaning, the tool's length in mm (NaN for the
+/// machine file's), and where that move starts in the new words.
+#[derive(Clone, Copy, Debug)]
+struct Change {
+    row: usize,
+    meaning: Meaning,
+    tool_length: f64,
+    start: Point,
+    direction: Direction,
+}
+
 /// Steps up to this long, in mm or degrees, are rounding of offsets and no motion.
 const NO_MOTION: f64 = 1e-9;
 
@@ -66,6 +89,8 @@ pub struct Moves {
     limit: usize,
     /// Where the last move ends.
     pub position: Point,
+    /// The tool's direction there, where I, J, K are programmed.
+    pub direction: Direction,
     kind: Vec<u8>,
     target: Vec<f64>,
     feed: Vec<f64>,
@@ -75,12 +100,19 @@ pub struct Moves {
     dwells: Vec<(usize, f64)>,
     start_dwell: f64,
     arcs: Vec<(usize, Arc)>,
+    splines: CompositeCurve<9>,
+    /// Rows of the splines, and the first piece of each.
+    spline_rows: Vec<(usize, usize)>,
+    changes: Vec<Change>,
+    /// Rows from which on the tool has another direction.
+    directions: Vec<(usize, Direction)>,
 }
 
 /// A program's moves, one row each; see `Program` in the Python package.
 #[derive(Debug)]
 pub struct Columns {
     pub axes: Vec<u8>,
+    pub start: Vec<f64>,
     pub kind: Vec<u8>,
     pub target: Vec<f64>,
     pub feed: Vec<f64>,
@@ -94,6 +126,20 @@ pub struct Columns {
     pub arc_centre: Vec<[f64; 3]>,
     pub arc_normal: Vec<u8>,
     pub arc_angle: Vec<f64>,
+    pub spline_move: Vec<i64>,
+    /// First piece of each spline, and the end of the last.
+    pub spline_pieces: Vec<i64>,
+    /// The pieces: control points in the columns of `axes`, weights (empty where none is rational), offsets, widths.
+    pub spline_control: Vec<f64>,
+    pub spline_weights: Vec<f64>,
+    pub spline_offsets: Vec<i64>,
+    pub spline_width: Vec<f64>,
+    /// `Meaning` and tool length of each move.
+    pub meaning: Vec<u8>,
+    pub tool_length: Vec<f64>,
+    /// Moves that start where their own words say, not where the move before ends, and these places.
+    pub change_move: Vec<i64>,
+    pub change_start: Vec<f64>,
     pub start_dwell: f64,
     pub warnings: Vec<String>,
 }
@@ -106,6 +152,7 @@ impl Moves {
             axes: vec![0, 1, 2],
             limit,
             position: [0.0; 9],
+            direction: UPRIGHT,
             kind: Vec::with_capacity(expected),
             target: Vec::with_capacity(3 * expected),
             feed: Vec::with_capacity(expected),
@@ -115,7 +162,16 @@ impl Moves {
             dwells: Vec::new(),
             start_dwell: 0.0,
             arcs: Vec::new(),
+            splines: CompositeCurve::default(),
+            spline_rows: Vec::new(),
+            changes: Vec::new(),
+            directions: Vec::new(),
         }
+    }
+
+    /// Number of moves.
+    pub fn len(&self) -> usize {
+        self.kind.len()
     }
 
     pub fn is_empty(&self) -> bool {
@@ -166,6 +222,88 @@ impl Moves {
     pub fn arc(&mut self, arc: Arc, target: &Point, feed: f64, control: &Control, line: u32) -> Outcome<()> {
         self.arcs.push((self.kind.len(), arc));
         self.row(Kind::Arc, target, feed, control, line)
+    }
+
+    /// Adds a spline by its pieces; the first one starts where the tool is.
+    pub fn spline(
+        &mut self,
+        curve: &CompositeCurve<9>,
+        feed: f64,
+        control: &Control,
+        line: u32,
+    ) -> Outcome<()> {
+        let Some(target) = curve.control.last() else { return Ok(()) };
+        if curve.control.iter().all(|point| !apart(point, &self.position)) {
+            return Ok(());
+        }
+        if self.splines.len() + curve.len() > self.limit {
+            return fault(format!(
+                "the splines of the program have more than {} pieces: split it, or raise max_moves",
+                self.limit
+            ));
+        }
+        self.spline_rows.push((self.kind.len(), self.splines.len()));
+        for (i, &width) in curve.width.iter().enumerate() {
+            let range = curve.offsets[i]..curve.offsets[i + 1];
+            let weights = curve.weights.get(range.clone()).unwrap_or_default();
+            self.splines.push(&curve.control[range], weights, width);
+        }
+        self.row(Kind::Spline, target, feed, control, line)
+    }
+
+    /// Adds a straight move that ends with the tool in a direction; none where neither moves.
+    pub fn pointed(
+        &mut self,
+        kind: Kind,
+        target: &Point,
+        direction: Direction,
+        feed: f64,
+        control: &Control,
+        line: u32,
+    ) -> Outcome<()> {
+        let turned = direction != self.direction;
+        if turned {
+            self.direction = direction;
+            self.directions.push((self.kind.len(), direction));
+        } else if !apart(target, &self.position) {
+            return Ok(());
+        }
+        self.row(kind, target, feed, control, line)
+    }
+
+    /// From here on words have another meaning: the same place is `start` and `direction` in the new words.
+    pub fn change(&mut self, meaning: Meaning, tool_length: f64, start: Point, direction: Direction) {
+        self.stop();
+        let row = self.kind.len();
+        if self.changes.last().is_some_and(|last| last.row == row) {
+            self.changes.pop();
+        }
+        self.changes.push(Change { row, meaning, tool_length, start, direction });
+        self.position = start;
+        if direction != self.direction {
+            self.direction = direction;
+            self.directions.push((row, direction));
+        }
+    }
+
+    /// The places and directions from the start of the last change to here.
+    pub fn since_change(&self) -> Vec<(Point, Direction)> {
+        let Some(change) = self.changes.last() else { return vec![(self.position, self.direction)] };
+        let width = self.axes.len();
+        let mut direction = change.direction;
+        let mut later = self.directions.iter().filter(|(row, _)| *row >= change.row).peekable();
+        let mut places = vec![(change.start, direction)];
+        for (row, target) in self.target.chunks_exact(width).enumerate().skip(change.row) {
+            while let Some(&(_, next)) = later.next_if(|(first, _)| *first <= row) {
+                direction = next;
+            }
+            let mut place = change.start;
+            for (&axis, &value) in self.axes.iter().zip(target) {
+                place[axis] = value;
+            }
+            places.push((place, direction));
+        }
+        places
     }
 
     #[inline(always)]
@@ -230,14 +368,46 @@ impl Moves {
             blend_tolerance.resize(end, now.blend);
             fit_tolerance.resize(end, now.fit);
         }
+        // A change after the last move changes nothing.
+        self.changes.retain(|change| change.row < count);
+        let first = self.changes.first().map_or(count, |change| change.row);
+        let mut meaning = vec![Meaning::Joints as u8; first];
+        let mut tool_length = vec![f64::NAN; first];
+        for (i, change) in self.changes.iter().enumerate() {
+            let end = self.changes.get(i + 1).map_or(count, |next| next.row);
+            meaning.resize(end, change.meaning as u8);
+            tool_length.resize(end, change.tool_length);
+        }
         self.kind.shrink_to_fit();
         self.target.shrink_to_fit();
         self.feed.shrink_to_fit();
         self.line.shrink_to_fit();
         Columns {
-            axes: self.axes.iter().map(|&axis| AXES[axis]).collect(),
+            axes: self.letters(),
+            start: self.place(&[0.0; 9], &UPRIGHT),
+            change_move: self.changes.iter().map(|change| change.row as i64).collect(),
+            change_start: self
+                .changes
+                .iter()
+                .flat_map(|change| self.place(&change.start, &change.direction))
+                .collect(),
+            spline_move: self.spline_rows.iter().map(|&(row, _)| row as i64).collect(),
+            spline_pieces: (self.spline_rows.iter().map(|&(_, piece)| piece))
+                .chain([self.splines.len()])
+                .map(|piece| piece as i64)
+                .collect(),
+            // No spline is programmed while I, J, K are words.
+            spline_control: self
+                .splines
+                .control
+                .iter()
+                .flat_map(|point| self.place(point, &UPRIGHT))
+                .collect(),
+            target: self.directed_target(),
+            spline_weights: self.splines.weights,
+            spline_offsets: self.splines.offsets.iter().map(|&offset| offset as i64).collect(),
+            spline_width: self.splines.width,
             kind: self.kind,
-            target: self.target,
             feed: self.feed,
             line: self.line,
             control,
@@ -245,6 +415,8 @@ impl Moves {
             fit_tolerance,
             stop,
             dwell,
+            meaning,
+            tool_length,
             arc_move: self.arcs.iter().map(|&(row, _)| row as i64).collect(),
             arc_centre: self.arcs.iter().map(|(_, arc)| arc.centre).collect(),
             arc_normal: self.arcs.iter().map(|(_, arc)| arc.normal as u8).collect(),
@@ -253,6 +425,53 @@ impl Moves {
             warnings,
         }
     }
+
+    /// True where the tool's direction has columns.
+    fn points_tool(&self) -> bool {
+        self.changes.iter().any(|change| change.meaning == Meaning::Vector)
+    }
+
+    /// The letters of the columns.
+    fn letters(&self) -> Vec<u8> {
+        let mut letters: Vec<u8> = self.axes.iter().map(|&axis| AXES[axis]).collect();
+        if self.points_tool() {
+            letters.extend(DIRECTION);
+        }
+        letters
+    }
+
+    /// A place in these columns.
+    fn place(&self, point: &Point, direction: &Direction) -> Vec<f64> {
+        let mut place: Vec<f64> = self.axes.iter().map(|&axis| point[axis]).collect();
+        if self.points_tool() {
+            place.extend(direction);
+        }
+        place
+    }
+
+    /// Targets, with the tool's directions where these have columns.
+    fn directed_target(&mut self) -> Vec<f64> {
+        let target = std::mem::take(&mut self.target);
+        if !self.points_tool() {
+            return target;
+        }
+        let mut direction = UPRIGHT;
+        let mut later = self.directions.iter().peekable();
+        let mut wider = Vec::with_capacity(target.len() / self.axes.len() * (self.axes.len() + 3));
+        for (row, place) in target.chunks_exact(self.axes.len()).enumerate() {
+            while let Some(&(_, next)) = later.next_if(|(first, _)| *first <= row) {
+                direction = next;
+            }
+            wider.extend_from_slice(place);
+            wider.extend(direction);
+        }
+        wider
+    }
+}
+
+/// True where two places differ by more than rounding.
+fn apart(a: &Point, b: &Point) -> bool {
+    a.iter().zip(b).any(|(a, b)| (a - b).abs() > NO_MOTION)
 }
 
 /// The length that a feed counts along a straight move, as LinuxCNC: in X, Y, Z where one of these moves, else in

@@ -1,8 +1,9 @@
 //! What moves the program's zero: work offsets, G52 and G92, tool lengths; and the way home.
 
-use super::block::{bit, g_name, Block, Group, AXIS_WORDS};
+use super::block::{bit, g_name, Block, Group, AXES, AXIS_WORDS};
 use super::execute::Interpreter;
 use super::fault::{fault, Outcome};
+use super::tip::Meaning;
 use super::words::count;
 
 impl Interpreter<'_> {
@@ -63,6 +64,10 @@ impl Interpreter<'_> {
     /// Tool length and work offset.
     pub(super) fn set_offsets(&mut self, block: &Block) -> Outcome<()> {
         match block.code(Group::ToolLength) {
+            Some(code @ (434 | 435)) => return self.program_tip(block, code),
+            Some(432) if self.state.meaning != Meaning::Joints => {
+                return fault("G43.2 adds to a tool length and G43.4 is in force: cancel it by G49 before");
+            }
             Some(code @ (430 | 432)) if block.words & AXIS_WORDS == 0 || code == 430 => {
                 if code == 432 && !block.has(b'H') {
                     return fault("G43.2 adds nothing: give it H or axis words");
@@ -88,13 +93,55 @@ impl Interpreter<'_> {
             Some(490) => self.state.offsets.tool = [0.0; 9],
             _ => {}
         }
+        if block.code(Group::ToolLength).is_some() {
+            self.set_meaning(Meaning::Joints, f64::NAN)?;
+        }
+        self.set_system(block);
+        Ok(())
+    }
+
+    /// G43.4 and G43.5: words are the tip, so the tool's length is in none of them. It is the one in force, unless H
+    /// calls for another.
+    fn program_tip(&mut self, block: &Block, code: u16) -> Outcome<()> {
+        let meaning = if code == 434 { Meaning::Tip } else { Meaning::Vector };
+        let tool = &mut self.state.offsets.tool;
+        let length = match (block.has(b'H'), self.state.meaning) {
+            (true, _) => f64::NAN,
+            (false, Meaning::Joints) if tool[2] != 0.0 => tool[2],
+            (false, Meaning::Joints) => f64::NAN,
+            (false, _) => self.state.tool_length,
+        };
+        if let Some(axis) = [0, 1].into_iter().chain(3..9).find(|&axis| tool[axis] != 0.0) {
+            return fault(format!(
+                "{} works with a tool length in Z and {} has one too: give G43.1 Z alone before",
+                g_name(code),
+                AXES[axis] as char
+            ));
+        }
+        *tool = [0.0; 9];
+        if length.is_nan() && !self.warned_length {
+            self.warned_length = true;
+            self.warn(format!(
+                "the tool length that {} calls for is not known: the machine file's tool_length is taken (G43.1 Z \
+                 before it gives one)",
+                g_name(code)
+            ));
+        }
+        let machine = self.options.machine_axes.iter().fold(0, |sum, &letter| sum | bit(letter));
+        self.set_meaning(meaning, length)?;
+        // The joints of a tool direction are axes of the program from here on.
+        self.meet(machine)?;
+        self.set_system(block);
+        Ok(())
+    }
+
+    fn set_system(&mut self, block: &Block) {
         match block.code(Group::System) {
             Some(code @ 591..=593) => self.state.offsets.system = usize::from(code - 591) + 6,
             Some(code) => self.state.offsets.system = usize::from(code - 540) / 10,
             None => {}
         }
         self.state.offsets.update();
-        Ok(())
     }
 
     fn warn_of_tool(&mut self) {

@@ -1,0 +1,291 @@
+"""Reads a drawing (DXF) into a Program, with the package ezdxf: `pip install feedplan[dxf]`.
+
+| entity | moves |
+|---|---|
+| LINE | a line |
+| LWPOLYLINE, POLYLINE | lines, and arcs where they bulge |
+| ARC, CIRCLE | an arc, where it is parallel to XY |
+| ELLIPSE | an exact rational curve |
+| SPLINE | its NURBS curve; through its fit points as CAD systems do, where it has no control points |
+
+The model space is followed in drawing order. An open entity whose end touches where the tool is is followed
+backwards; where entities do not touch, a rapid goes from one to the next. Coordinates are the drawing's, with
+its units ($INSUNITS). What else a drawing holds, and what is on layers that are off or frozen, is left out
+with a warning; so are arcs and polylines in a tilted plane. A drawing has no feed: only the machine limits
+it.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.curves.composite import CompositeCurve
+from feedplan.errors import InputError, MissingPackageError, ProgramError
+from feedplan.machine.machine import Machine
+from feedplan.program.moves import NO_FEED, TOUCHING, Moves
+from feedplan.program.program import Program
+
+Point = NDArray[np.float64]
+
+MAX_ENTITIES = 5_000_000
+_FARTHEST = 1e6  # [mm]; beyond is a mistake
+_QUARTER = math.pi / 2.0
+
+
+@dataclass(frozen=True)
+class _Line:
+    start: Point
+    end: Point
+
+    def reversed(self) -> _Line:
+        return _Line(self.end, self.start)
+
+    def add(self, moves: Moves, line: int) -> None:
+        moves.line(self.end, NO_FEED, line)
+
+
+@dataclass(frozen=True)
+class _Arc:
+    """`angle` [rad] from `start`, positive counter-clockwise, in a plane parallel to XY."""
+
+    start: Point
+    end: Point
+    centre: Point
+    angle: float
+
+    def reversed(self) -> _Arc:
+        return _Arc(self.end, self.start, self.centre, -self.angle)
+
+    def add(self, moves: Moves, line: int) -> None:
+        moves.arc(self.end, self.centre, self.angle, NO_FEED, line)
+
+
+@dataclass(frozen=True)
+class _Curve:
+    curve: CompositeCurve
+
+    @property
+    def start(self) -> Point:
+        return np.asarray(self.curve.control_points[0])
+
+    @property
+    def end(self) -> Point:
+        return np.asarray(self.curve.control_points[-1])
+
+    def reversed(self) -> _Curve:
+        return _Curve(self.curve.reversed())
+
+    def add(self, moves: Moves, line: int) -> None:
+        moves.spline(self.curve, NO_FEED, line)
+
+
+_Segment = _Line | _Arc | _Curve
+
+
+class _UnsupportedError(Exception):
+    """Why an entity is left out."""
+
+
+def read_dxf(content: bytes, machine: Machine | None = None, name: str = "drawing.dxf") -> Program:
+    """The moves of a drawing; `line` is the number of the entity in its model space, from 1.
+
+    Feeds are `NO_FEED`: the plan's `feed` sets one. Raises ProgramError in one sentence, MissingPackageError
+    without ezdxf.
+    """
+    try:
+        from ezdxf import recover
+        from ezdxf.enums import InsertUnits
+        from ezdxf.units import conversion_factor
+    except ImportError:
+        raise MissingPackageError(
+            f"{name}: drawings are read with the package ezdxf, which is not installed: "
+            "pip install feedplan[dxf]"
+        ) from None
+    if machine is not None:
+        missing = [letter for letter in "XYZ" if letter not in machine.program_letters]
+        if missing:
+            raise ProgramError(f"{name}: a drawing moves X, Y and Z, and the machine has no {missing[0]}")
+    try:
+        document: Any = recover.read(io.BytesIO(content))[0]
+        units = int(document.header.get("$INSUNITS", 0))
+        # The package has its factors to some digits only: 25.400000000102.
+        factor = conversion_factor(InsertUnits(units), InsertUnits.Millimeters) if units else 1.0
+        scale = float(f"{factor:.9g}")
+        entities = list(document.modelspace())
+    except Exception as error:  # the package raises whatever a broken file leads it to
+        what = " ".join(str(error).split()) or type(error).__name__
+        raise ProgramError(f"{name} cannot be read as DXF ({what}): save the drawing anew") from None
+    if len(entities) > MAX_ENTITIES:
+        raise ProgramError(f"{name} has more than {MAX_ENTITIES} entities: split it")
+    warnings = [] if units else [f"{name} gives no unit ($INSUNITS): millimetres are assumed"]
+    skipped: Counter[str] = Counter()
+    moves = Moves(("X", "Y", "Z"))
+    for number, entity in enumerate(entities, 1):
+        if _hidden(document, entity):
+            skipped["on layers that are off or frozen"] += 1
+            continue
+        try:
+            segments = _segments(entity, scale)
+        except (_UnsupportedError, InputError, ValueError, ArithmeticError) as error:
+            skipped[f"{entity.dxftype()} ({error})" if str(error) else str(entity.dxftype())] += 1
+            continue
+        _check_reach(segments, name, number)
+        _add(moves, segments, number)
+    if not len(moves):
+        raise ProgramError(f"{name} has no line, arc or curve in its model space: draw some there")
+    for kind, count in sorted(skipped.items()):
+        warnings.append(f"{name}: {count} {'entity' if count == 1 else 'entities'} left out: {kind}")
+    warnings.append("a drawing has no feed: only the machine limits it; give --feed to set one")
+    return moves.program(name, tuple(warnings))
+
+
+def _add(moves: Moves, segments: Sequence[_Segment], number: int) -> None:
+    """Follows an entity, backwards where its end is nearer to the tool and touches it."""
+    if not segments:
+        return
+    ahead, back = moves.gap(segments[0].start), moves.gap(segments[-1].end)
+    if len(moves) and back <= TOUCHING < ahead:
+        segments = [segment.reversed() for segment in reversed(segments)]
+    for segment in segments:
+        moves.go_to(segment.start, number)
+        segment.add(moves, number)
+
+
+def _hidden(document: Any, entity: Any) -> bool:
+    layer = entity.dxf.get("layer", "0")
+    if layer not in document.layers:
+        return False
+    row = document.layers.get(layer)
+    return bool(row.is_off() or row.is_frozen())
+
+
+def _check_reach(segments: Sequence[_Segment], name: str, number: int) -> None:
+    for segment in segments:
+        points = segment.curve.control_points if isinstance(segment, _Curve) else segment.end[None, :]
+        if not (np.abs(points) <= _FARTHEST).all():
+            raise ProgramError(
+                f"{name} entity {number} goes farther than {_FARTHEST:g} mm: check the units of the drawing",
+                number,
+            )
+
+
+def _segments(entity: Any, scale: float) -> list[_Segment]:
+    """The moves of an entity in mm."""
+    kind = entity.dxftype()
+    if kind == "LINE":
+        start, end = _point(entity.dxf.start, scale), _point(entity.dxf.end, scale)
+        return [_Line(start, end)] if (start != end).any() else []
+    if kind in ("ARC", "CIRCLE"):
+        return [_arc(entity, scale)]
+    if kind == "LWPOLYLINE":
+        corners = [((x, y, entity.dxf.elevation), bulge) for x, y, bulge in entity.get_points("xyb")]
+        return _polyline(corners, bool(entity.closed), _side(entity), scale)
+    if kind == "POLYLINE" and (entity.is_2d_polyline or entity.is_3d_polyline):
+        if entity.is_2d_polyline and entity.dxf.flags & 6:
+            raise _UnsupportedError("a polyline with fitted vertices: explode it")
+        corners = [
+            (tuple(vertex.dxf.location), vertex.dxf.get("bulge", 0.0) if entity.is_2d_polyline else 0.0)
+            for vertex in entity.vertices
+        ]
+        side = _side(entity) if entity.is_2d_polyline else 1.0
+        return _polyline(corners, bool(entity.is_closed), side, scale)
+    if kind == "ELLIPSE":
+        return [_ellipse(entity, scale)]
+    if kind == "SPLINE":
+        spline = entity.construction_tool()
+        points = np.array([tuple(point) for point in spline.control_points]) * scale
+        weights = list(spline.weights())
+        return [_Curve(CompositeCurve.from_nurbs(points, spline.knots(), spline.degree, weights or None))]
+    raise _UnsupportedError("")
+
+
+def _point(point: Any, scale: float) -> Point:
+    return np.array([float(value) * scale for value in tuple(point)[:3]])
+
+
+def _side(entity: Any) -> float:
+    """1 where the entity's plane is XY seen from above, −1 from below."""
+    x, y, z = tuple(entity.dxf.get("extrusion", (0.0, 0.0, 1.0)))
+    if abs(x) + abs(y) > 1e-9 * abs(z):
+        raise _UnsupportedError("its plane is not parallel to XY")
+    return math.copysign(1.0, z)
+
+
+def _arc(entity: Any, scale: float) -> _Arc:
+    side = _side(entity)
+    centre = _on_side(tuple(entity.dxf.center), side) * scale
+    radius = float(entity.dxf.radius) * scale
+    if not radius > 0.0:
+        raise _UnsupportedError("its radius is not positive")
+    first, sweep = 0.0, 2.0 * math.pi
+    if entity.dxftype() == "ARC":
+        first, last = math.radians(entity.dxf.start_angle), math.radians(entity.dxf.end_angle)
+        sweep = (last - first) % (2.0 * math.pi) or sweep
+
+    def at(angle: float) -> Point:
+        return centre + radius * np.array([side * math.cos(angle), math.sin(angle), 0.0])
+
+    whole = entity.dxftype() == "CIRCLE"
+    return _Arc(at(first), at(first) if whole else at(first + sweep), centre, side * sweep)
+
+
+def _on_side(point: Sequence[float], side: float) -> Point:
+    """A point of an entity's own coordinates in those of the drawing: from below X and Z count backwards."""
+    x, y, z = (*point, 0.0)[:3]
+    return np.array([side * x, y, side * z], dtype=np.float64)
+
+
+def _polyline(
+    corners: Sequence[tuple[Sequence[float], float]], closed: bool, side: float, scale: float
+) -> list[_Segment]:
+    points = [_on_side(point, side) * scale for point, _ in corners]
+    bulges = [side * float(bulge) for _, bulge in corners]
+    if closed and points:
+        points.append(points[0])
+    segments: list[_Segment] = []
+    for i in range(len(points) - 1):
+        start, end = points[i], points[i + 1]
+        if not (start != end).any():
+            continue
+        segments.append(_Line(start, end) if bulges[i] == 0.0 else _bulge(start, end, bulges[i]))
+    return segments
+
+
+def _bulge(start: Point, end: Point, bulge: float) -> _Arc:
+    """The arc whose bulge is the tangent of a quarter of its sweep, positive counter-clockwise."""
+    x, y = 0.5 * (end - start)[:2]
+    height = (1.0 - bulge * bulge) / (2.0 * bulge)
+    centre = 0.5 * (start + end) + height * np.array([-y, x, 0.0])
+    return _Arc(start, end, centre, 4.0 * math.atan(bulge))
+
+
+def _ellipse(entity: Any, scale: float) -> _Curve:
+    """C + a cos t + b sin t, in parts of at most a quarter turn: Piegl & Tiller 1997, section 7.5."""
+    centre, major = _point(entity.dxf.center, scale), _point(entity.dxf.major_axis, scale)
+    normal = _point(entity.dxf.get("extrusion", (0.0, 0.0, 1.0)), 1.0)
+    minor = np.cross(normal / np.linalg.norm(normal), major) * float(entity.dxf.ratio)
+    first, last = float(entity.dxf.start_param), float(entity.dxf.end_param)
+    sweep = (last - first) % (2.0 * math.pi) or 2.0 * math.pi
+    parts = math.ceil(sweep / _QUARTER - 1e-9)
+    half = 0.5 * sweep / parts
+
+    def at(angle: float, out: float = 1.0) -> Point:
+        return np.asarray(centre + out * (major * math.cos(angle) + minor * math.sin(angle)))
+
+    ends = [at(first + 2.0 * half * i) for i in range(parts + 1)]
+    if sweep == 2.0 * math.pi:
+        ends[-1] = ends[0]
+    control = [
+        (ends[i], at(first + half * (2 * i + 1), 1.0 / math.cos(half)), ends[i + 1]) for i in range(parts)
+    ]
+    weights = np.tile([1.0, math.cos(half), 1.0], parts)
+    offsets = 3 * np.arange(parts + 1)
+    return _Curve(CompositeCurve(np.concatenate(control), weights, offsets, np.full(parts, 2.0 * half)))

@@ -1,0 +1,108 @@
+"""Collects the moves of programs that are drawn, not written: curves, lines and arcs one after the other."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from feedplan.curves.composite import CompositeCurve
+from feedplan.machine.machine import AXIS_LETTERS
+from feedplan.program.program import MoveKind, PathControl, Program
+
+# Ends up to this far apart are one point [mm, deg]: what rounding to four decimals can do.
+TOUCHING = 2e-4
+
+# The feed [mm/s] of moves that have none: finite, as they are no rapids, and beyond every machine.
+NO_FEED = 1e6
+
+
+class Moves:
+    """Moves of a program in `axes`, in the order XYZABCUVW with X, Y and Z; the first `start`s it."""
+
+    def __init__(self, axes: tuple[str, ...]) -> None:
+        self.axes = axes
+        self._start: NDArray[np.float64] | None = None
+        self._position: NDArray[np.float64] = np.zeros(len(axes))
+        self._rows: list[tuple[MoveKind, float, int]] = []
+        self._targets: list[NDArray[np.float64]] = []
+        self._arcs: list[tuple[int, NDArray[np.float64], float]] = []
+        self._splines: list[tuple[int, CompositeCurve]] = []
+
+    def gap(self, point: NDArray[np.float64]) -> float:
+        """How far [mm] a point is from where the last move ends; 0 at the start."""
+        return 0.0 if self._start is None else float(np.abs(point - self._position).max())
+
+    def go_to(self, point: NDArray[np.float64], line: int) -> None:
+        """A rapid to a point (axes,), none where the tool is there; the first one is the start."""
+        if self._start is None:
+            self._start = self._position = point
+        elif self.gap(point) > TOUCHING:
+            self._move(MoveKind.RAPID, point, np.inf, line)
+
+    def line(self, target: NDArray[np.float64], feed: float, line: int) -> None:
+        """A straight move, none where it has no length."""
+        if self.gap(target) > 0.0:
+            self._move(MoveKind.LINE, target, feed, line)
+
+    def arc(
+        self, target: NDArray[np.float64], centre: ArrayLike, angle: float, feed: float, line: int
+    ) -> None:
+        """An arc in XY about `centre` (3,) through `angle` [rad], positive counter-clockwise."""
+        self._arcs.append((len(self._rows), np.asarray(centre, dtype=np.float64), angle))
+        self._move(MoveKind.ARC, target, feed, line)
+
+    def spline(self, curve: CompositeCurve, feed: float, line: int) -> None:
+        """A curve in all axes; it starts where the tool is, to rounding, none where it has no extent."""
+        control = curve.control_points.copy()
+        control[0] = self._position
+        if (control == control[0]).all():
+            return
+        self._splines.append(
+            (len(self._rows), CompositeCurve(control, curve.weights, curve.offsets, curve.width))
+        )
+        self._move(MoveKind.SPLINE, control[-1], feed, line)
+
+    def _move(self, kind: MoveKind, target: NDArray[np.float64], feed: float, line: int) -> None:
+        self._rows.append((kind, feed, line))
+        self._targets.append(target)
+        self._position = target
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def program(self, name: str, warnings: tuple[str, ...]) -> Program:
+        """The program; it ends with a full stop."""
+        count = len(self._rows)
+        kind, feed, line = (np.array(column) for column in zip(*self._rows, strict=True))
+        stop = np.zeros(count, dtype=np.bool_)
+        stop[-1] = True
+        nan = np.full(count, np.nan)
+        curves = [curve for _, curve in self._splines]
+        pieces = np.concatenate([[0], np.cumsum([len(curve) for curve in curves], dtype=np.int64)])
+        return Program(
+            name=name,
+            axes=self.axes,
+            start=np.zeros(len(self.axes)) if self._start is None else self._start,
+            kind=kind.astype(np.uint8),
+            target=np.array(self._targets),
+            feed=feed.astype(np.float64),
+            line=line.astype(np.int32),
+            control=np.full(count, PathControl.TOLERANCE, dtype=np.uint8),
+            blend_tolerance=nan,
+            fit_tolerance=nan.copy(),
+            stop=stop,
+            dwell=np.zeros(count),
+            arc_move=np.array([row for row, _, _ in self._arcs], dtype=np.int64),
+            arc_centre=np.array([centre for _, centre, _ in self._arcs]).reshape(-1, 3),
+            arc_normal=np.full(len(self._arcs), 2, dtype=np.uint8),
+            arc_angle=np.array([angle for _, _, angle in self._arcs], dtype=np.float64),
+            spline_move=np.array([row for row, _ in self._splines], dtype=np.int64),
+            spline_pieces=pieces.astype(np.int64),
+            splines=CompositeCurve.joined(curves, gap=np.inf) if curves else None,
+            warnings=warnings,
+        )
+
+
+def program_axes(letters: tuple[str, ...]) -> tuple[str, ...]:
+    """Letters and X, Y, Z, in the order of a program."""
+    return tuple(letter for letter in AXIS_LETTERS if letter in {*letters, "X", "Y", "Z"})

@@ -1,0 +1,120 @@
+"""What G43.4, G43.5 and G49 do on a machine: the same joint positions in words of another meaning."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from feedplan.errors import MachineError
+from feedplan.machine.machine import AXIS_LETTERS, Machine
+from feedplan.machine.rotary import RotaryChain, ToolVector, shortest_turn
+from feedplan.machine.words import Meaning
+
+# Sine of the angle up to which the tool counts as parallel to a rotary axis.
+_PARALLEL = 1e-9
+
+
+@dataclass(frozen=True)
+class TipControl:
+    """The reader's view of a machine; places are X Y Z A B C U V W [mm, deg], then I J K.
+
+    `tool_length` [mm] is NaN for the machine file's. All raise MachineError in one sentence.
+    """
+
+    machine: Machine
+
+    @property
+    def applies(self) -> bool:
+        """Whether words can have more than one meaning on the machine."""
+        return isinstance(self.machine.inverse, RotaryChain)
+
+    def check(self, meaning: int) -> None:
+        """Whether words can have that meaning."""
+        if meaning != Meaning.JOINTS:
+            chain = self._chain(math.nan)
+            if meaning == Meaning.VECTOR and len(chain.joint_names) != 5:
+                raise MachineError(
+                    f"machine {self.machine.name} has no two rotary axes that point the tool along I, J, K: "
+                    "program rotary words (G43.4), or use a five-axis machine"
+                )
+
+    def joints(
+        self, meaning: int, tool_length: float, entry: Sequence[float], places: Sequence[Sequence[float]]
+    ) -> list[float]:
+        """Joints (9,) at the last of the places (k, 12) of a stretch in one meaning that begins at `entry`.
+
+        Where directions are programmed, each move takes the pose and the turn next to the one before.
+        """
+        joints = list(places[-1][: len(AXIS_LETTERS)])
+        if meaning == Meaning.JOINTS:
+            return joints
+        chain = self._chain(tool_length)
+        angles = chain.joint_names[3:]
+        if meaning == Meaning.VECTOR:
+            turned = self._follow(chain, entry, places)
+            for name, angle in zip(angles, turned, strict=True):
+                joints[AXIS_LETTERS.index(name)] = angle
+        for name, value in zip(chain.joint_names, chain.joints(_words(chain, joints)), strict=True):
+            joints[AXIS_LETTERS.index(name)] = float(value)
+        return joints
+
+    def place(
+        self, meaning: int, tool_length: float, joints: Sequence[float]
+    ) -> tuple[list[float], list[float]]:
+        """Place (9,) and tool direction (3,) in words of a meaning, where the joints (9,) are."""
+        place, direction = list(joints), [0.0, 0.0, 1.0]
+        if meaning == Meaning.JOINTS:
+            return place, direction
+        chain = self._chain(tool_length)
+        words = _words(chain, joints)
+        for name, value in zip(chain.tip_names, chain.tip(words), strict=True):
+            place[AXIS_LETTERS.index(name)] = float(value)
+        if len(chain.joint_names) == 5:
+            direction = [float(v) for v in ToolVector(chain).tip(words)[3:]]
+        return place, direction
+
+    def _chain(self, tool_length: float) -> RotaryChain:
+        chain = self.machine.inverse
+        if not isinstance(chain, RotaryChain):
+            raise MachineError(
+                f"machine {self.machine.name} has no rotary axes to follow the tool's tip with: "
+                "remove G43.4 and G43.5, or use a machine that has them"
+            )
+        return chain if math.isnan(tool_length) else chain.with_tool(tool_length)
+
+    def _follow(
+        self, chain: RotaryChain, entry: Sequence[float], places: Sequence[Sequence[float]]
+    ) -> list[float]:
+        """The rotary joints after a stretch of directions, in the pose that it begins with."""
+        names = chain.joint_names[3:]
+        before = {name: entry[AXIS_LETTERS.index(name)] for name in names}
+        first = ToolVector(chain).from_part[0].name
+        side: float | None = None
+        for place in places:
+            parallel = (
+                min(map(float, ToolVector(chain).singular((*place[:3], *place[9:])).values())) < _PARALLEL
+            )
+            if side is None and not parallel:
+                side = min((1.0, -1.0), key=lambda s: _turning(_angles(chain, s, before, place), before))
+            found = _angles(chain, 1.0 if side is None else side, before, place)
+            # A tool parallel to the first axis from the part leaves that axis where it is.
+            before = {name: before[name] if parallel and name == first else found[name] for name in names}
+        return [before[name] for name in names]
+
+
+def _words(chain: RotaryChain, place: Sequence[float]) -> list[float]:
+    """Of a place what the chain takes: X, Y, Z and its rotary words."""
+    return [place[AXIS_LETTERS.index(name)] for name in chain.joint_names]
+
+
+def _angles(
+    chain: RotaryChain, side: float, before: Mapping[str, float], place: Sequence[float]
+) -> dict[str, float]:
+    """The rotary joints [deg] for a place's direction, in the pose of that side, next to those before."""
+    found = ToolVector(chain, side).angles(place[9:])
+    return {name: shortest_turn(angle, float(found[name])) for name, angle in before.items()}
+
+
+def _turning(angles: Mapping[str, float], before: Mapping[str, float]) -> float:
+    return sum(abs(angles[name] - before[name]) for name in angles)
