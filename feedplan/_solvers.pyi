@@ -28,8 +28,8 @@ __all__ = [
     "curve_reverse",
     "curve_split",
     "fit_points",
+    "plan_bang_bang",
     "plan_curves",
-    "plan_quadratic",
     "read_gcode",
     "spline_insert",
     "spline_pieces",
@@ -40,21 +40,8 @@ __version__: str
 
 class PlanError(Exception): ...
 
-def plan_curves(
-    control_points: NDArray[np.float64],
-    weights: NDArray[np.float64],
-    offsets: NDArray[np.int64],
-    width: NDArray[np.float64],
-    runs: NDArray[np.int64],
-    feed: NDArray[np.float64],
-    junction_speed: NDArray[np.float64],
-    max_velocity: NDArray[np.float64],
-    max_acceleration: NDArray[np.float64],
-    chord_tolerance: float,
-    period: float,
-    start_speed: float,
-    end_speed: float,
-) -> tuple[
+# Columns of `feedplan.profile.SpeedProfile`.
+_Profile = tuple[
     NDArray[np.uint32],
     NDArray[np.uint8],
     NDArray[np.uint8],
@@ -65,31 +52,10 @@ def plan_curves(
     NDArray[np.float64],
     NDArray[np.float64],
     NDArray[np.int64],
-]: ...
-def plan_quadratic(
-    control_points: NDArray[np.float64],
-    width: NDArray[np.float64],
-    runs: NDArray[np.int64],
-    feed: NDArray[np.float64],
-    junction_speed: NDArray[np.float64],
-    max_velocity: NDArray[np.float64],
-    max_acceleration: NDArray[np.float64],
-    chord_tolerance: float,
-    period: float,
-    start_speed: float,
-    end_speed: float,
-) -> tuple[
-    NDArray[np.uint32],
-    NDArray[np.uint8],
-    NDArray[np.uint8],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.int64],
-]: ...
+]
+
+def plan_bang_bang(problem: Problem) -> _Profile: ...
+def plan_curves(problem: Problem) -> _Profile: ...
 
 @final
 class PathLength:

@@ -13,7 +13,6 @@ from typing import Any
 from feedplan.audit import Audit, audit
 from feedplan.bound import lower_bound
 from feedplan.constraints.problem import Problem, build_problem
-from feedplan.errors import MachineError
 from feedplan.geometry.build import build_path
 from feedplan.geometry.length import PathLength
 from feedplan.geometry.path import Path
@@ -140,11 +139,6 @@ def plan(
         machine = Machine.load(machine)
     if period is not None:
         machine = machine.with_period(period)
-    if not machine.words_are_joints:
-        raise MachineError(
-            f"machine {machine.name}: its kinematics '{machine.kinematics}' cannot be planned over yet: "
-            "use a machine whose joints are the program's axes"
-        )
     report = progress or (lambda stage, done: None)
     compute: dict[str, float] = {}
     program: Program | None = None

@@ -11,16 +11,11 @@ from feedplan.errors import InputError
 from feedplan.geometry.path import Path
 
 
-def feed_limit(
-    path: Path, max_velocity: NDArray[np.float64], feed: float | None, override: float
-) -> NDArray[np.float64]:
-    """Greatest speed of each piece (n,) [mm/s], finite.
-
-    A rapid has no feed of its own: it gets twice the speed of all axes at their limits, which never binds.
-    """
+def feed_limit(path: Path, greatest: float, feed: float | None, override: float) -> NDArray[np.float64]:
+    """Greatest speed of each piece (n,) [mm/s], at most `greatest`, which is what a rapid gets."""
     if not (math.isfinite(override) and override > 0):
         raise InputError(f"feed override is {override}: give a positive factor (1 is the programmed feed)")
     if feed is not None and not (math.isfinite(feed) and feed > 0):
         raise InputError(f"feed is {feed} mm/s: give a positive feed")
     commanded = path.feed if feed is None else np.where(np.isfinite(path.feed), feed, path.feed)
-    return np.minimum(commanded * override, 2.0 * float(np.linalg.norm(max_velocity)))
+    return np.minimum(commanded * override, greatest)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +15,20 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
-from feedplan.machine.words import AxisWords
+
+if TYPE_CHECKING:
+    from feedplan.machine.words import AxisWords
+
+# No tool is as fast [mm/s]: what a rapid has where joints set its speed.
+NO_FEED = 1e9
 
 
 @dataclass(frozen=True)
 class TipSpeed:
-    """|C'|² of the tool tip as a polynomial of u on each piece: Bernstein `coefficients` (total,), those of
-    piece i from `offsets[i]` to `offsets[i + 1]`."""
+    """|C'(u)|² ω⁴ of the tool as a polynomial on each piece.
+
+    Bernstein `coefficients` (total,), those of piece i from `offsets[i]` to `offsets[i + 1]`; ω is the weight
+    function of the joints' piece over its first weight, 1 where that is polynomial."""
 
     coefficients: NDArray[np.float64]
     offsets: NDArray[np.int64]
@@ -29,14 +38,15 @@ class TipSpeed:
 class Problem:
     """Minimise the time along `path` under these limits.
 
+    Per joint (`axes` names them): `max_velocity` [mm/s], `max_acceleration` [mm/s²], `max_jerk` [mm/s³] (may
+    be infinite). Per piece: `feed` (n,) greatest speed [mm/s], finite. At piece ends: `junction_speed`
+    (n + 1,) greatest speed [mm/s]: 0 at a stop, infinite where nothing but the other limits holds.
+    `chord_tolerance` [mm] and `period` [s] limit the speed on a curve of radius ρ to (2/T)·√(2ρδ − δ²); an
+    infinite tolerance switches that off. `start_speed` and `end_speed` [mm/s] hold at the ends of the path.
+
     Where the path's axes are not the joints of the machine, `joints` is the motion of the joints [mm, deg],
-    one piece for each of the path and over the same parameter; `tip_speed` the square of the speed that the
-    feed is about, per u̇²; and `words` (one a run) the kinematics from the path to the joints. Per joint,
-    `axes` names them: `max_velocity` [mm/s], `max_acceleration` [mm/s²], `max_jerk` [mm/s³] (may be infinite). Per
-    piece: `feed` (n,) greatest speed [mm/s], finite. At piece ends: `junction_speed` (n + 1,) greatest speed
-    [mm/s]: 0 at a stop, infinite where nothing but the other limits holds. `chord_tolerance` [mm] and
-    `period` [s] limit the speed on a curve of radius ρ to (2/T)·√(2ρδ − δ²); an infinite tolerance switches
-    that off. `start_speed` and `end_speed` [mm/s] hold at the two ends of the path.
+    one polynomial piece for each of the path and over the same parameter; `tip_speed` the square of the speed
+    that feed and junctions are about, per u̇²; and `words` (one a run) the kinematics from path to joints.
     """
 
     path: Path
@@ -54,6 +64,11 @@ class Problem:
     tip_speed: TipSpeed | None = None
     words: tuple[AxisWords, ...] = ()
 
+    def __post_init__(self) -> None:
+        for name in ("max_velocity", "max_acceleration", "max_jerk", "feed", "junction_speed"):
+            column = np.ascontiguousarray(getattr(self, name), dtype=np.float64)
+            object.__setattr__(self, name, column)
+
     @property
     def axes(self) -> tuple[str, ...]:
         """Names of the joints that the limits belong to."""
@@ -63,6 +78,17 @@ class Problem:
     def curve(self) -> CompositeCurve:
         """The motion of the joints."""
         return self.path.curve if self.joints is None else self.joints
+
+    @cached_property
+    def tip_curve(self) -> CompositeCurve | None:
+        """The tool's motion in X, Y, Z where the joints have pieces of their own."""
+        if self.joints is None:
+            return None
+        points = np.zeros((len(self.path.curve.control_points), 3))
+        for column, name in enumerate(self.path.axes):
+            if name in "XYZ":
+                points[:, "XYZ".index(name)] = self.path.curve.control_points[:, column]
+        return replace(self.path.curve, control_points=points)
 
 
 def build_problem(
@@ -83,19 +109,56 @@ def build_problem(
     for name, value in (("start speed", start_speed), ("end speed", end_speed)):
         if not (np.isfinite(value) and value >= 0):
             raise InputError(f"{name} is {value} mm/s: give a finite speed of 0 or more")
+    if not machine.is_plain:
+        # Kinematics are loaded where they are needed.
+        from feedplan.constraints.joints import has_joints_of_its_own
+
+        if has_joints_of_its_own(path, machine):
+            return _joint_problem(path, machine, feed, feed_override, (start_speed, end_speed))
     axes = [machine.axis(name) for name in path.axes]
     max_velocity = np.array([axis.max_velocity for axis in axes])
-    junction_speed = junction_limit(path, np.array([axis.max_velocity_jump for axis in axes]))
-    junction_speed[0], junction_speed[-1] = start_speed, end_speed
+    jump = np.array([axis.max_velocity_jump for axis in axes])
     return Problem(
         path=path,
         max_velocity=max_velocity,
         max_acceleration=np.array([axis.max_acceleration for axis in axes]),
         max_jerk=np.array([axis.max_jerk for axis in axes]),
-        feed=feed_limit(path, max_velocity, feed, feed_override),
-        junction_speed=junction_speed,
+        feed=feed_limit(path, 2.0 * float(np.linalg.norm(max_velocity)), feed, feed_override),
+        junction_speed=_with_ends(junction_limit(path, jump), start_speed, end_speed),
         chord_tolerance=machine.chord_tolerance,
         period=machine.period,
         start_speed=start_speed,
         end_speed=end_speed,
     )
+
+
+def _joint_problem(
+    path: Path, machine: Machine, feed: float | None, override: float, ends: tuple[float, float]
+) -> Problem:
+    """The problem where the joints move in another way than the path's axes; corners are stops."""
+    from feedplan.constraints.joints import joint_motion
+
+    limit = feed_limit(path, NO_FEED, feed, override)
+    motion = joint_motion(path, machine, limit)
+    path = motion.path
+    return Problem(
+        path=path,
+        max_velocity=np.array([axis.max_velocity for axis in machine.axes]),
+        max_acceleration=np.array([axis.max_acceleration for axis in machine.axes]),
+        max_jerk=np.array([axis.max_jerk for axis in machine.axes]),
+        feed=feed_limit(path, NO_FEED, feed, override),
+        junction_speed=_with_ends(junction_limit(path, np.zeros(len(path.axes))), *ends),
+        chord_tolerance=machine.chord_tolerance,
+        period=machine.period,
+        start_speed=ends[0],
+        end_speed=ends[1],
+        joint_axes=machine.axis_names,
+        joints=motion.joints,
+        tip_speed=motion.tip_speed,
+        words=motion.words,
+    )
+
+
+def _with_ends(junction_speed: NDArray[np.float64], start: float, end: float) -> NDArray[np.float64]:
+    junction_speed[0], junction_speed[-1] = start, end
+    return junction_speed

@@ -222,6 +222,19 @@ class CompositeCurve:
     def __len__(self) -> int:
         return len(self.width)
 
+    def __getitem__(self, pieces: slice) -> CompositeCurve:
+        """Consecutive pieces."""
+        first, last, step = pieces.indices(len(self))
+        if step != 1:
+            raise InputError(f"pieces in steps of {step}: take consecutive ones")
+        own = slice(int(self.offsets[first]), int(self.offsets[max(last, first)]))
+        return CompositeCurve(
+            self.control_points[own],
+            None if self.weights is None else self.weights[own],
+            self.offsets[first : max(last, first) + 1] - self.offsets[first],
+            self.width[pieces],
+        )
+
     @property
     def axes(self) -> int:
         """Number of axes."""
@@ -243,6 +256,11 @@ class CompositeCurve:
         degree = int(self.offsets[1] - self.offsets[0]) - 1
         refuse(self.degree != degree, lambda i: f"piece {i} has degree {self.degree[i]}, others {degree}")
         return self.control_points.reshape(len(self), degree + 1, self.axes)
+
+    @property
+    def weights_by_piece(self) -> NDArray[np.float64] | None:
+        """Their weights (n, d + 1), or None where all pieces are polynomial."""
+        return None if self.weights is None else self.weights.reshape(self.by_piece.shape[:2])
 
     @property
     def is_quadratic(self) -> bool:

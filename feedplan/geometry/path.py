@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +64,11 @@ class Path:
     meaning: NDArray[np.uint8] | None = None
     tool_length: NDArray[np.float64] | None = None
 
+    def __post_init__(self) -> None:
+        dtypes = {"feed": float, "move": np.int64, "line": np.int32, "runs": np.int64, "dwell": float}
+        for name, dtype in {**dtypes, "tolerance": float}.items():
+            object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name), dtype=dtype))
+
     def __len__(self) -> int:
         return len(self.curve)
 
@@ -71,6 +76,18 @@ class Path:
     def width(self) -> NDArray[np.float64]:
         """The parameter interval of each piece (n,) [mm: about the length]."""
         return self.curve.width
+
+    def cut(self, curve: CompositeCurve, piece: NDArray[np.int64]) -> Path:
+        """The same path with pieces cut: `curve` are the parts in order, `piece` (m,) what they are of."""
+        return replace(
+            self,
+            curve=curve,
+            feed=self.feed[piece],
+            move=self.move[piece],
+            line=self.line[piece],
+            runs=np.searchsorted(piece, self.runs),
+            tolerance=self.tolerance[piece],
+        )
 
     @property
     def pauses(self) -> float:

@@ -14,6 +14,7 @@ is not in ε: some 1e-14 of the largest |q''| of the part.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +25,7 @@ from feedplan.machine.kinematics import Kinematics
 from feedplan.machine.survey import DEEPEST, STRETCH_DEPTH, STRETCH_PARTS
 
 Array = NDArray[np.float64]
+Tolerance = Callable[[NDArray[np.int64], Array], Array]
 
 
 @dataclass(frozen=True)
@@ -51,17 +53,16 @@ def build_proxies(
     kinematics: Kinematics,
     control_points: Array,
     width: Array,
-    curvature_tolerance: ArrayLike,
+    curvature_tolerance: ArrayLike | Tolerance,
     nodes: int = 9,
     weights: Array | None = None,
 ) -> Proxies:
-    """Stand-ins of degree `nodes` with ε₂ within a tolerance, (joints,) or (pieces, joints).
+    """Stand-ins of degree `nodes` with ε₂ within a tolerance, (joints,) for all.
 
+    Or the tolerance is a function of `piece` (m,) and `part` (m, 2) that gives it for each part, (m, joints).
     To keep accelerations within a share η of a joint's limit A, allow ε₂ = η A / p where p is the greatest u̇²
-    that feed and speed limits allow on the piece.
+    that feed and speed limits allow there. Where it is 0 the part is halved.
     """
-    joints = len(kinematics.joint_names)
-    allowed = np.broadcast_to(np.asarray(curvature_tolerance, dtype=np.float64), (len(width), joints))
     piece = np.arange(len(width))
     part = np.tile([0.0, 1.0], (len(width), 1))
     done: list[tuple[NDArray[np.int64], Array, Array]] = []
@@ -71,7 +72,8 @@ def build_proxies(
         length = width[piece] * (part[:, 1] - part[:, 0])
         with np.errstate(over="ignore", invalid="ignore"):
             bound = 2 * (nodes + 1) * c * (length[:, None] / 4) ** nodes * (1 + 1e-13)
-        good = (bound <= allowed[piece]).all(axis=1)
+        allowed = curvature_tolerance
+        good = (bound <= (allowed(piece, part) if callable(allowed) else np.asarray(allowed))).all(axis=1)
         unbounded = np.isinf(c).any(axis=1)
         stretch = np.bincount(piece[unbounded], minlength=len(width))[piece] > STRETCH_PARTS
         given_up = ~good & ((unbounded & stretch & (depth >= STRETCH_DEPTH)) | (depth == DEEPEST))

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from feedplan._solvers import PlanError, plan_quadratic
+from feedplan._solvers import PlanError, plan_bang_bang
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InfeasibleError, InputError, SolverError
 from feedplan.profile import SpeedProfile
@@ -17,25 +15,8 @@ def plan(problem: Problem) -> SpeedProfile:
 
     Raises InfeasibleError where the start or end speed cannot be had, with the speed that can.
     """
-    path = problem.path
-
-    def floats(values: object) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-        return np.ascontiguousarray(values, dtype=np.float64)
-
     try:
-        columns = plan_quadratic(
-            floats(path.curve.by_piece),
-            floats(path.width),
-            np.ascontiguousarray(path.runs, dtype=np.int64),
-            floats(problem.feed),
-            floats(problem.junction_speed),
-            floats(problem.max_velocity),
-            floats(problem.max_acceleration),
-            float(problem.chord_tolerance),
-            float(problem.period),
-            float(problem.start_speed),
-            float(problem.end_speed),
-        )
+        columns = plan_bang_bang(problem)
     except PlanError as fault:
         raise _error(problem, *fault.args) from None
     return SpeedProfile(*columns)

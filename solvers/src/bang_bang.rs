@@ -20,10 +20,25 @@ mod run;
 mod split;
 mod window;
 
-use crate::bang_bang_quadratic::{Fault, Profile};
+use crate::bang_bang_quadratic::{Fault, Profile, Task as QuadraticTask, Workspace as QuadraticWorkspace};
 use crate::planning::{ChordLimit, Limits};
-use crate::quadratic::norm;
+use crate::quadratic::{norm, Quadratic};
 use split::Axes;
+
+/// Axes that the tool itself moves in.
+pub const TIP_AXES: usize = 3;
+
+/// The tool's path beside that of the joints, piece by piece over the same parameter.
+#[derive(Clone, Copy)]
+pub struct Tip<'a> {
+    /// Bernstein coefficients of its speed squared per du/dτ squared, |C'(u)|², and their offsets.
+    pub speed: &'a [f64],
+    pub speed_offset: &'a [usize],
+    /// Its pieces as those of the joints, for the chord error.
+    pub control: &'a [[f64; TIP_AXES]],
+    pub weight: &'a [f64],
+    pub offset: &'a [usize],
+}
 
 /// A path of pieces of any degree with its limits.
 #[derive(Clone, Copy)]
@@ -35,9 +50,8 @@ pub struct Problem<'a, const M: usize> {
     pub offset: &'a [usize],
     /// Parameter intervals.
     pub width: &'a [f64],
-    /// Where the axes are not those of the tool tip: Bernstein coefficients of the tip's |dC/dt|² over each piece, and
-    /// their offsets.
-    pub tip_speed: Option<(&'a [f64], &'a [usize])>,
+    /// Where the axes are not those of the tool.
+    pub tip: Option<Tip<'a>>,
     /// The rest as of the quadratic planner.
     pub runs: &'a [usize],
     pub feed: &'a [f64],
@@ -57,9 +71,27 @@ struct Task<'a, const M: usize> {
     chord: Option<ChordLimit>,
 }
 
-/// The fastest profile. `C` coefficients suffice for polynomial pieces
-/// of a degree up to (C + 2)/4 and rational ones of a degree up to (C + 6)/8.
-pub fn plan<const M: usize, const C: usize>(problem: &Problem<M>) -> Result<Profile, Fault> {
+/// The fastest profile.
+pub fn plan<const M: usize>(problem: &Problem<M>) -> Result<Profile, Fault> {
+    plan_with(problem, &[])
+}
+
+/// The same; runs of polynomial quadratics alone go to the planner made for them.
+pub fn plan_each<const M: usize>(problem: &Problem<M>) -> Result<Profile, Fault> {
+    if problem.tip.is_some() {
+        return plan(problem);
+    }
+    // Pieces of other kinds have no quadratic: what stands in their places is never looked at.
+    let nothing = Quadratic { control: [[0.0; M]; 3], width: 0.0 };
+    let quadratic = |i: usize| {
+        let control = problem.control.get(*problem.offset.get(i)?..*problem.offset.get(i + 1)?)?;
+        Some(Quadratic { control: control.try_into().ok()?, width: problem.width[i] })
+    };
+    let pieces: Vec<_> = (0..problem.width.len()).map(|i| quadratic(i).unwrap_or(nothing)).collect();
+    plan_with(problem, &pieces)
+}
+
+fn plan_with<const M: usize>(problem: &Problem<M>, quadratics: &[Quadratic<M>]) -> Result<Profile, Fault> {
     let limits = Limits {
         runs: problem.runs,
         feed: problem.feed,
@@ -79,13 +111,26 @@ pub fn plan<const M: usize, const C: usize>(problem: &Problem<M>) -> Result<Prof
             acceleration: problem.max_acceleration,
             velocity_sq: problem.max_velocity.map(|v| v * v),
         },
-        chord: match problem.tip_speed {
-            None => ChordLimit::new(problem.chord_tolerance, problem.period, norm(&problem.max_acceleration)),
-            Some(_) => None,
-        },
+        chord: ChordLimit::new(
+            problem.chord_tolerance,
+            problem.period,
+            // What the joints' limits let the tool have is not known.
+            if problem.tip.is_some() { f64::INFINITY } else { norm(&problem.max_acceleration) },
+        ),
     };
-    limits.over_runs(|pieces, speeds_sq, space: &mut run::Workspace, profile| {
-        run::plan_run::<M, C>(&task, pieces, speeds_sq, space, profile)
+    let quadratic_task = QuadraticTask::new(quadratics, &limits);
+    let is_quadratic = |i: usize| {
+        let range = problem.offset[i]..problem.offset[i + 1];
+        let weights = problem.weight.get(range.clone()).unwrap_or(&[]);
+        range.len() == 3 && weights.windows(2).all(|pair| pair[0] == pair[1])
+    };
+    type Spaces = (run::Workspace, QuadraticWorkspace);
+    limits.over_runs(|pieces, speeds_sq, space: &mut Spaces, profile| {
+        if !quadratics.is_empty() && (pieces.0..pieces.1).all(is_quadratic) {
+            quadratic_task.plan_run(pieces, speeds_sq, &mut space.1, profile)
+        } else {
+            run::plan_run(&task, pieces, speeds_sq, &mut space.0, profile)
+        }
     })
 }
 
@@ -119,6 +164,21 @@ fn check_pieces<const M: usize>(problem: &Problem<M>) -> Result<(), Fault> {
         if !weights.iter().all(|weight| *weight > 0.0 && weight.is_finite()) {
             return wrong("a weight is not a positive number");
         }
+    }
+    let Some(tip) = &problem.tip else { return Ok(()) };
+    let rising = |offset: &[usize], total: usize, least: usize| {
+        offset.len() == count + 1
+            && offset[0] == 0
+            && offset[count] == total
+            && offset.windows(2).all(|pair| pair[1] >= pair[0] + least)
+    };
+    if !rising(tip.offset, tip.control.len(), 2)
+        || !rising(tip.speed_offset, tip.speed.len(), 1)
+        || !(tip.weight.is_empty() || tip.weight.len() == tip.control.len())
+        || !tip.control.iter().flatten().chain(tip.speed).chain(tip.weight).all(|value| value.is_finite())
+    {
+        let what = format!("the tool's path does not fit the {count} pieces of the joints");
+        return Err(Fault::Input { piece: None, what });
     }
     Ok(())
 }

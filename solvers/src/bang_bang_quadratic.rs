@@ -36,7 +36,7 @@ pub use profile::{ArcKind, Profile, NO_AXIS};
 
 use crate::planning::{ChordLimit, Limits};
 use crate::quadratic::{norm, Quadratic};
-use run::Workspace;
+pub(crate) use run::Workspace;
 use subpiece::Axes;
 
 /// A path with its limits.
@@ -115,21 +115,40 @@ pub fn plan<const M: usize>(problem: &Problem<M>) -> Result<Profile, Fault> {
     };
     limits.check(problem.pieces.len())?;
     check_pieces(problem.pieces)?;
-    let task = Task {
-        pieces: problem.pieces,
-        feed: problem.feed,
-        junction_speed: problem.junction_speed,
-        axes: Axes {
-            acceleration: problem.max_acceleration,
-            inverse: problem.max_acceleration.map(|a| 1.0 / a),
-            least: problem.max_acceleration.iter().fold(f64::INFINITY, |least, &a| least.min(a)),
-            velocity_sq: problem.max_velocity.map(|v| v * v),
-        },
-        chord: ChordLimit::new(problem.chord_tolerance, problem.period, norm(&problem.max_acceleration)),
-    };
+    let task = Task::new(problem.pieces, &limits);
     limits.over_runs(|pieces, speeds_sq, space: &mut Workspace, profile| {
-        run::plan_run(&task, pieces, speeds_sq, space, profile)
+        task.plan_run(pieces, speeds_sq, space, profile)
     })
+}
+
+impl<'a, const M: usize> Task<'a, M> {
+    /// For pieces and limits that have been checked.
+    pub(crate) fn new(pieces: &'a [Quadratic<M>], limits: &Limits<'a, M>) -> Self {
+        let acceleration = limits.max_acceleration;
+        Self {
+            pieces,
+            feed: limits.feed,
+            junction_speed: limits.junction_speed,
+            axes: Axes {
+                acceleration,
+                inverse: acceleration.map(|a| 1.0 / a),
+                least: acceleration.iter().fold(f64::INFINITY, |least, &a| least.min(a)),
+                velocity_sq: limits.max_velocity.map(|v| v * v),
+            },
+            chord: ChordLimit::new(limits.chord_tolerance, limits.period, norm(&acceleration)),
+        }
+    }
+
+    /// Plans the pieces from the first up to the last from one speed squared to another; appends the arcs.
+    pub(crate) fn plan_run(
+        &self,
+        pieces: (usize, usize),
+        speeds_sq: (f64, f64),
+        space: &mut Workspace,
+        out: &mut Profile,
+    ) -> Result<(), Fault> {
+        run::plan_run(self, pieces, speeds_sq, space, out)
+    }
 }
 
 /// Every piece: finite, of some length and width.

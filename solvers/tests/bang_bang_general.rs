@@ -8,7 +8,7 @@ use feedplan_solvers::bang_bang_quadratic::{Fault, Profile};
 use support::{milder_case, Case};
 
 /// The case planned as pieces of degree 2, or elevated.
-fn general<const M: usize, const C: usize>(case: &Case<M>, elevate: usize) -> Result<Profile, Fault> {
+fn general<const M: usize>(case: &Case<M>, elevate: usize) -> Result<Profile, Fault> {
     let mut control: Vec<[f64; M]> = vec![];
     let mut offset = vec![0];
     for piece in &case.pieces {
@@ -27,12 +27,12 @@ fn general<const M: usize, const C: usize>(case: &Case<M>, elevate: usize) -> Re
         offset.push(control.len());
     }
     let width: Vec<f64> = case.pieces.iter().map(|piece| piece.width).collect();
-    plan::<M, C>(&Problem {
+    plan(&Problem {
         control: &control,
         weight: &[],
         offset: &offset,
         width: &width,
-        tip_speed: None,
+        tip: None,
         runs: &[0, case.pieces.len()],
         feed: &case.feed,
         junction_speed: &case.junction,
@@ -55,7 +55,7 @@ fn quadratics_take_the_time_of_the_quadratic_planner() {
             case.chord_tolerance = f64::INFINITY;
             let exact = case.time();
             for elevate in [0, 1] {
-                match general::<M, 10>(&case, elevate) {
+                match general(&case, elevate) {
                     Err(fault) => failures.push(format!("seed {seed} elevated by {elevate}: {fault}")),
                     Ok(profile) => {
                         let change = (profile.time() / exact - 1.0).abs();
@@ -81,7 +81,7 @@ fn with_a_chord_error_limit_the_times_agree_to_the_margin() {
     for seed in 0..600 {
         let case = milder_case::<3>(seed);
         if case.chord_tolerance.is_finite() {
-            let profile = general::<3, 10>(&case, 0).expect("a profile");
+            let profile = general(&case, 0).expect("a profile");
             let change = profile.time() / case.time() - 1.0;
             // The quadratic planner gives away δ/(4 ρ) where ρ doubles, this one 4e-4 of v² at most.
             assert!(change > -0.05 && change < 1e-3, "seed {seed}: {change:.1e}");

@@ -7,6 +7,7 @@ polynomial proxies of the curves, to 1e-12 s; the circle's switching place also 
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -14,12 +15,40 @@ import pytest
 from numpy.typing import NDArray
 
 from feedplan._solvers import PlanError, plan_curves
+from feedplan.constraints.problem import Problem
 from feedplan.curves.arc import circle
 from feedplan.curves.composite import CompositeCurve, insert_knot
-from feedplan.profile import ArcKind
+from feedplan.geometry.path import Path
+from feedplan.profile import SpeedProfile
+from tests.planners.excess import worst_excess
 
 Array = NDArray[np.float64]
 BUTTERFLY = FilePath(__file__).parents[2] / "benchmarks" / "curves" / "butterfly.json"
+
+
+def problem_of(curve: CompositeCurve, velocity: Array, acceleration: Array, feed: float) -> Problem:
+    """One run from rest to rest, nothing but the axes' limits and the feed."""
+    count = len(curve)
+    path = Path(
+        axes=tuple("XYZABC"[: curve.axes]),
+        curve=curve,
+        feed=np.full(count, feed),
+        move=np.zeros((count, 2)),
+        line=np.zeros(count),
+        runs=np.array([0, count]),
+        dwell=np.zeros(1),
+        tolerance=np.zeros(count),
+    )
+    return Problem(
+        path=path,
+        max_velocity=velocity,
+        max_acceleration=acceleration,
+        max_jerk=np.full(curve.axes, np.inf),
+        feed=path.feed,
+        junction_speed=np.full(count + 1, np.inf),
+        chord_tolerance=np.inf,
+        period=0.001,
+    )
 
 
 class Planned:
@@ -28,72 +57,13 @@ class Planned:
     def __init__(
         self, curve: CompositeCurve, velocity: float | Array, acceleration: float | Array, feed: float = 1e9
     ) -> None:
-        count, axes = len(curve), curve.axes
+        axes = curve.axes
         self.curve, self.feed = curve, feed
         self.velocity = np.broadcast_to(np.asarray(velocity, float), axes).copy()
         self.acceleration = np.broadcast_to(np.asarray(acceleration, float), axes).copy()
-        columns = plan_curves(
-            curve.control_points,
-            np.zeros(0) if curve.weights is None else curve.weights,
-            curve.offsets.astype(np.int64),
-            curve.width,
-            np.array([0, count]),
-            np.full(count, feed),
-            np.full(count + 1, np.inf),
-            self.velocity,
-            self.acceleration,
-            np.inf,
-            0.001,
-            0.0,
-            0.0,
-        )
-        self.piece, self.kind, self.axis, self.value, self.u0, self.u1, self.p0, self.p1, duration, _ = (
-            columns
-        )
-        self.time = float(duration.sum())
-
-    def worst_excess(self, samples: int = 10) -> tuple[float, float]:
-        """Greatest relative excess of any limit and least use of the most used one, inside the arcs."""
-        # u is rounded: where an arc is as short as that, its places cannot be told apart.
-        long = (self.u1 - self.u0) > 1e-6 * self.curve.width[self.piece]
-        piece, kind, value = self.piece[long], self.kind[long, None], self.value[long, None]
-        axis = np.where(self.axis[long] == 255, 0, self.axis[long])
-        u0, u1, p0, p1 = (column[long] for column in (self.u0, self.u1, self.p0, self.p1))
-        rows = np.arange(len(piece))
-
-        def derivatives(u: Array) -> tuple[Array, Array]:
-            """C' and C'' at places (rows, …)."""
-            flat = self.curve.evaluate(np.repeat(piece, u[0].size), u.ravel(), 2)
-            return flat[1].reshape(*u.shape, -1), flat[2].reshape(*u.shape, -1)
-
-        u = u0[:, None] + (u1 - u0)[:, None] * (np.arange(samples) + 0.5) / samples
-        q1, q2 = derivatives(u)
-        g, c = q1[rows, :, axis], q2[rows, :, axis]
-        # v_j² of an arc from its slower end, the way of its axis by Gauss's rule.
-        ends = derivatives(np.stack([u0, u1], axis=1))[0][rows, :, axis]
-        v_sq = np.stack([p0, p1], axis=1) * ends**2
-        slow = np.argmin(np.where(np.isfinite(v_sq), v_sq, np.inf), axis=1)
-        anchor = np.stack([u0, u1], axis=1)[rows, slow]
-        nodes, weights = np.polynomial.legendre.leggauss(12)
-        between = anchor[:, None, None] + (u - anchor[:, None])[..., None] * (nodes + 1) / 2
-        way = (u - anchor[:, None]) / 2 * (derivatives(between)[0][rows, :, :, axis] @ weights)
-        speed_sq = (q1**2).sum(axis=2)
-        kinds = [kind == ArcKind.AXIS_ACCELERATION, kind == ArcKind.FEED, kind == ArcKind.AXIS_VELOCITY]
-        p = np.select(
-            kinds,
-            [(v_sq[rows, slow][:, None] + 2 * value * way) / g**2, value / speed_sq, value / g**2],
-            p0[:, None],
-        )
-        s = np.select(kinds, [(value - c * p) / g, -p * (q1 * q2).sum(axis=2) / speed_sq, -p * c / g], 0.0)
-        used = np.concatenate(
-            [
-                np.abs(q1 * s[..., None] + q2 * p[..., None]) / self.acceleration,
-                np.abs(q1) * np.sqrt(p)[..., None] / self.velocity,
-                (np.sqrt(speed_sq * p) / self.feed)[..., None],
-            ],
-            axis=2,
-        ).max(axis=2)
-        return float(used.max()) - 1, float(used.min())
+        self.problem = problem_of(curve, self.velocity, self.acceleration, feed)
+        self.profile = SpeedProfile(*plan_curves(self.problem))
+        self.time = self.profile.time
 
 
 def butterfly() -> tuple[Array, Array, int, Array]:
@@ -124,7 +94,7 @@ def random_curve(seed: int, weights: bool = True) -> CompositeCurve:
 def test_the_butterfly_takes_its_published_time(feed: float, time: float) -> None:
     planned = Planned(CompositeCurve.from_nurbs(*butterfly()), 250.0, 3000.0, feed)
     assert planned.time == pytest.approx(time, rel=1e-11)
-    excess, use = planned.worst_excess()
+    excess, use = worst_excess(planned.problem, planned.profile)
     assert excess <= 1e-8
     assert use >= 1 - 1e-6
 
@@ -160,7 +130,7 @@ def test_random_curves_keep_every_limit_and_use_one_everywhere(weights: bool) ->
             np.exp(rng.uniform(0.0, 5.0, curve.axes)),
             float(np.exp(rng.uniform(0.0, 3.0))),
         )
-        excess, use = planned.worst_excess()
+        excess, use = worst_excess(planned.problem, planned.profile)
         assert excess <= 1e-8, seed
         assert use >= 1 - 1e-6, seed
 
@@ -190,20 +160,9 @@ def test_limits_that_are_no_limits_are_refused(
     ],
 )
 def test_a_path_that_is_none_is_refused(runs: list[int], weight: float, words: str) -> None:
+    curve = CompositeCurve.from_bezier([[0.0], [1.0], [2.0]])
+    object.__setattr__(curve, "weights", np.array([1.0, weight, 1.0]))
+    problem = problem_of(curve, np.ones(1), np.ones(1), 1.0)
     with pytest.raises(PlanError) as caught:
-        plan_curves(
-            np.array([[0.0], [1.0], [2.0]]),
-            np.array([1.0, weight, 1.0]),
-            np.array([0, 3]),
-            np.ones(1),
-            np.array(runs),
-            np.ones(1),
-            np.full(2, np.inf),
-            np.ones(1),
-            np.ones(1),
-            np.inf,
-            0.001,
-            0.0,
-            0.0,
-        )
+        plan_curves(replace(problem, path=replace(problem.path, runs=np.array(runs))))
     assert words in caught.value.args[3]

@@ -42,6 +42,11 @@ class Kinematics(ABC):
         return tuple(name in "ABC" for name in self.joint_names)
 
     @property
+    def affine(self) -> bool:
+        """Whether every joint is a weighted sum of tip coordinates and a constant."""
+        return False
+
+    @property
     def turning(self) -> tuple[bool, ...]:
         """Which joints are known up to whole turns only; none unless a subclass says otherwise."""
         return (False,) * len(self.joint_names)

@@ -75,7 +75,7 @@ pub struct Stuck;
 /// The state where a pass enters or leaves a sub-piece.
 #[derive(Clone, Copy, Debug)]
 pub struct State {
-    /// v², in mm²/s²
+    /// The sum of the axes' velocities squared; v² where the axes are those of the tool.
     pub speed_sq: f64,
 }
 
@@ -103,7 +103,7 @@ pub fn run<const M: usize, const C: usize, const BACK: bool>(
 ) -> Result<State, Stuck> {
     let (order, direction) = cusp(sub, false);
     let straight = sub.straight;
-    let pi = if order == 0 { state.speed_sq / sub.speed.first() } else { f64::INFINITY };
+    let pi = if order == 0 { state.speed_sq / sub.rate_sq(false) } else { f64::INFINITY };
     let first = out.len();
     let mut pass = Pass::<M, C, BACK> {
         sub,
@@ -137,7 +137,7 @@ pub fn run<const M: usize, const C: usize, const BACK: bool>(
     }
     let (end_order, end_direction) = cusp(sub, true);
     let speed_sq = if end_order == 0 {
-        pi * sub.speed.last()
+        pi * sub.rate_sq(true)
     } else if straight {
         let last = out[first..].last();
         last.map_or(0.0, |arc| end_speed_sq(sub, axes, arc, &end_direction))
@@ -147,7 +147,7 @@ pub fn run<const M: usize, const C: usize, const BACK: bool>(
     Ok(State { speed_sq: speed_sq.max(0.0) })
 }
 
-/// v² at the end of the last arc, where the sub-piece has no tangent.
+/// The speed squared of the axes at the end of the last arc, where the sub-piece has no tangent.
 fn end_speed_sq<const M: usize, const C: usize>(
     sub: &SubPiece<M, C>,
     axes: &Axes<M>,
@@ -161,7 +161,7 @@ fn end_speed_sq<const M: usize, const C: usize>(
         }
         Kind::Braking(k) => arc.slow_sq / direction[k].powi(2),
         Kind::Cap => match sub.cap {
-            super::split::Cap::Speed([_, f1]) => f1,
+            super::split::Cap::Speed([_, f1]) => f1 / sub.tip_share(true),
             super::split::Cap::Axis(k, v_sq) => v_sq / direction[k].powi(2),
         },
         Kind::LimitCurve | Kind::Hold => 0.0,
@@ -290,7 +290,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         }
         let near = |value: f64, limit: f64| self.straight && value >= limit * (1.0 - ON_BOUND);
         match &self.window.bound {
-            Bound::Speed(f) => near(self.cusp_sq.iter().sum(), f.first()),
+            Bound::Speed(f) => near(self.cusp_sq.iter().sum(), f.first() / self.sub.tip_share(false)),
             Bound::Axis(k, v_sq) => near(self.cusp_sq[*k], *v_sq),
             Bound::Arc(k, w) => near(self.cusp_sq[*k], w.first() / self.window.weight.first()),
             // At rest p is free.

@@ -29,8 +29,8 @@ const NO_TANGENT: f64 = 1e-13;
 
 impl<const M: usize, const C: usize> Piece<M, C> {
     /// The piece with these control points, their weights (none: polynomial) and, where the path is one of joints,
-    /// the Bernstein coefficients of the tool's speed squared |dC/dt|².
-    pub fn new(control: &[[f64; M]], weights: &[f64], speed_sq: Option<&[f64]>) -> Self {
+    /// the Bernstein coefficients of the tool's |C'|² with a factor.
+    pub fn new(control: &[[f64; M]], weights: &[f64], speed_sq: Option<(&[f64], f64)>) -> Self {
         let degree = control.len() - 1;
         let rational = weights.iter().any(|&weight| weight != weights[0]);
         let (g, weight) = if rational {
@@ -56,7 +56,7 @@ impl<const M: usize, const C: usize> Piece<M, C> {
         let along = straight_line(&g);
         let g = along.unwrap_or(g);
         let speed = match speed_sq {
-            Some(values) => Polynomial::from_bernstein(values.iter().copied()),
+            Some((values, factor)) => Polynomial::from_bernstein(values.iter().map(|value| factor * value)),
             None => sum_of_squares(&g),
         };
         Self { g, weight, speed, degree, straight: along.is_some(), own_speed: speed_sq.is_none() }

@@ -3,9 +3,9 @@
 use super::pass::{self, cusp, distance, Arc, Kind, State};
 use super::piece::Piece;
 use super::split::{split, Axes, Cap, Part, SubPiece};
-use super::Task;
+use super::{Task, TIP_AXES};
 use crate::bang_bang_quadratic::{ArcKind, Fault, Profile, Row, NO_AXIS};
-use crate::polynomial::Polynomial;
+use crate::polynomial::{Polynomial, MOST};
 
 /// Two directions that differ by more than this at a cusp form a corner.
 const SMOOTH_TURN: f64 = 1e-9;
@@ -35,8 +35,8 @@ struct Failed {
     part: usize,
 }
 
-/// Plans the pieces `first..last` of the task from one speed squared to another; appends the arcs.
-pub fn plan_run<const M: usize, const C: usize>(
+/// Plans the pieces `first..last` of the task from one speed squared of the tool to another; appends the arcs.
+pub fn plan_run<const M: usize>(
     task: &Task<M>,
     (first, last): (usize, usize),
     (start_sq, end_sq): (f64, f64),
@@ -46,11 +46,11 @@ pub fn plan_run<const M: usize, const C: usize>(
     space.held.clear();
     let rows = out.len();
     loop {
-        let reachable = backward::<M, C>(task, (first, last), end_sq, space);
+        let reachable = backward(task, (first, last), end_sq, space);
         if start_sq > reachable * (1.0 + REACHED) {
             return Err(Fault::Start { piece: first, reachable: reachable.sqrt() });
         }
-        match forward::<M, C>(task, (first, last), start_sq.min(reachable), space, out) {
+        match forward(task, (first, last), start_sq.min(reachable), space, out) {
             Ok(reached) if reached < end_sq * (1.0 - REACHED) => {
                 return Err(Fault::End { piece: last - 1, reachable: reached.sqrt() });
             }
@@ -71,14 +71,58 @@ pub fn plan_run<const M: usize, const C: usize>(
     Ok(())
 }
 
+/// Calls a function with the capacity of polynomials that a piece needs.
+macro_rules! with_capacity {
+    ($task:expr, $i:expr, $function:ident($($argument:expr),*)) => {
+        match $task.coefficients($i) {
+            ..=10 => $function::<M, 10>($($argument),*),
+            ..=20 => $function::<M, 20>($($argument),*),
+            ..=36 => $function::<M, 36>($($argument),*),
+            _ => $function::<M, MOST>($($argument),*),
+        }
+    };
+}
+
 impl<const M: usize> Task<'_, M> {
     fn piece<const C: usize>(&self, i: usize) -> Piece<M, C> {
         let problem = self.problem;
-        let range = problem.offset[i]..problem.offset[i + 1];
-        let weights = if problem.weight.is_empty() { &[][..] } else { &problem.weight[range.clone()] };
-        let tip = problem.tip_speed.map(|(values, offsets)| &values[offsets[i]..offsets[i + 1]]);
-        Piece::new(&problem.control[range], weights, tip)
+        let speed_sq = problem
+            .tip
+            .map(|tip| (&tip.speed[tip.speed_offset[i]..tip.speed_offset[i + 1]], problem.width[i].powi(2)));
+        Piece::new(
+            &problem.control[problem.offset[i]..problem.offset[i + 1]],
+            weights_of(problem.weight, problem.offset, i),
+            speed_sq,
+        )
     }
+
+    /// The tool's own piece where it is another one and its chord error is limited.
+    fn tip_piece<const C: usize>(&self, i: usize) -> Option<Piece<TIP_AXES, C>> {
+        let tip = self.problem.tip.filter(|_| self.chord.is_some())?;
+        let control = &tip.control[tip.offset[i]..tip.offset[i + 1]];
+        // Where the tool stands still it has no chord.
+        let moves = control.iter().any(|point| *point != control[0]);
+        moves.then(|| Piece::new(control, weights_of(tip.weight, tip.offset, i), None))
+    }
+
+    /// How many coefficients the polynomials of a piece have at most.
+    fn coefficients(&self, i: usize) -> usize {
+        let problem = self.problem;
+        let of = |offset: &[usize], weight: &[f64]| {
+            let degree = offset[i + 1] - offset[i] - 1;
+            let rational = weights_of(weight, offset, i).iter().any(|&w| w != weight[offset[i]]);
+            (degree, if rational { 8 * degree - 6 } else { 4 * degree - 2 })
+        };
+        let (degree, own) = of(problem.offset, problem.weight);
+        let Some(tip) = problem.tip else { return own };
+        let speed = tip.speed_offset[i + 1] - tip.speed_offset[i];
+        let chord = if self.chord.is_some() { of(tip.offset, tip.weight).1 } else { 0 };
+        own.max(2 * speed).max(2 * degree + speed).max(chord)
+    }
+}
+
+fn weights_of<'a>(weight: &'a [f64], offset: &[usize], i: usize) -> &'a [f64] {
+    weight.get(offset[i]..offset[i + 1]).unwrap_or(&[])
 }
 
 /// The signed limit direction at one end of a part, and whether the tangent itself is zero there.
@@ -102,8 +146,27 @@ fn at_cusp<const M: usize>(before: &(bool, [f64; M]), after: &(bool, [f64; M]), 
     }
 }
 
-/// The greatest v² at the start of the run from which `end_sq` can be met; leaves the arcs in the workspace.
-fn backward<const M: usize, const C: usize>(
+/// Where a pass stands between two pieces.
+struct Between<const M: usize> {
+    state: State,
+    /// The direction on the side that the pass has left, and whether there is a cusp.
+    end: Option<(bool, [f64; M])>,
+    /// The tool's speed squared there.
+    tip_sq: f64,
+}
+
+/// The axes' speed squared at the tool's.
+fn of_axes(tip_sq: f64, tip_share: f64) -> f64 {
+    if tip_sq == 0.0 {
+        0.0
+    } else {
+        tip_sq / tip_share
+    }
+}
+
+/// The tool's greatest speed squared at the start of the run from which `end_sq` can be met; leaves the arcs in the
+/// workspace.
+fn backward<const M: usize>(
     task: &Task<M>,
     (first, last): (usize, usize),
     end_sq: f64,
@@ -113,42 +176,57 @@ fn backward<const M: usize, const C: usize>(
     space.pieces.clear();
     space.bounds.clear();
     space.offsets.clear();
-    let mut state = State { speed_sq: end_sq };
-    let mut after: Option<(bool, [f64; M])> = None;
+    let mut at = Between { state: State { speed_sq: f64::INFINITY }, end: None, tip_sq: end_sq };
     for i in (first..last).rev() {
-        let piece = task.piece::<C>(i);
-        let feed = task.problem.feed[i];
-        let start = space.parts.len();
-        split(&piece, &task.axes, feed * feed, task.chord.as_ref(), &mut space.parts);
-        space.pieces.push(start..space.parts.len());
         if i + 1 < last {
-            let limit = task.problem.junction_speed[i + 1];
-            state.speed_sq = state.speed_sq.min(limit * limit);
+            at.tip_sq = task.problem.junction_speed[i + 1].powi(2);
         }
-        for number in (start..space.parts.len()).rev() {
-            let part = space.parts[number];
-            let sub = part.sub_piece(&piece);
-            let end = end_direction(&sub, part.negative, true);
-            if let Some(after) = &after {
-                state.speed_sq = at_cusp(&end, after, state.speed_sq);
-            }
-            after = Some(end_direction(&sub, part.negative, false));
-            space.offsets.push(space.bounds.len());
-            let reversed = sub.reversed();
-            let held = space.held.contains(&(i, number));
-            let arcs = space.bounds.len();
-            let tried = if held {
-                Err(pass::Stuck)
-            } else {
-                pass::run::<M, C, true>(&reversed, &task.axes, state, &[], &mut space.bounds)
-            };
-            state = tried.unwrap_or_else(|_| {
-                space.bounds.truncate(arcs);
-                hold(&reversed, &task.axes, state, &mut space.bounds)
-            });
-        }
+        with_capacity!(task, i, backward_over(task, i, &mut at, space));
     }
-    state.speed_sq
+    at.tip_sq
+}
+
+/// Backward over piece `i`; `at.tip_sq` is a limit before, and what was reached after it.
+fn backward_over<const M: usize, const C: usize>(
+    task: &Task<M>,
+    i: usize,
+    at: &mut Between<M>,
+    space: &mut Workspace,
+) {
+    let piece = task.piece::<C>(i);
+    let feed = task.problem.feed[i];
+    let start = space.parts.len();
+    let tip = task.tip_piece::<C>(i);
+    let chord = task.chord.as_ref();
+    split(&piece, tip.as_ref(), &task.axes, feed * feed, chord, &mut space.parts);
+    space.pieces.push(start..space.parts.len());
+    let mut limited = false;
+    for number in (start..space.parts.len()).rev() {
+        let part = space.parts[number];
+        let sub = part.sub_piece(&piece);
+        let end = end_direction(&sub, part.negative, true);
+        if !std::mem::replace(&mut limited, true) {
+            at.state.speed_sq = at.state.speed_sq.min(of_axes(at.tip_sq, sub.tip_share(true)));
+        }
+        if let Some(after) = &at.end {
+            at.state.speed_sq = at_cusp(&end, after, at.state.speed_sq);
+        }
+        at.end = Some(end_direction(&sub, part.negative, false));
+        space.offsets.push(space.bounds.len());
+        let reversed = sub.reversed();
+        let held = space.held.contains(&(i, number));
+        let arcs = space.bounds.len();
+        let tried = if held {
+            Err(pass::Stuck)
+        } else {
+            pass::run::<M, C, true>(&reversed, &task.axes, at.state, &[], &mut space.bounds)
+        };
+        at.state = tried.unwrap_or_else(|_| {
+            space.bounds.truncate(arcs);
+            hold(&reversed, &task.axes, at.state, &mut space.bounds)
+        });
+        at.tip_sq = at.state.speed_sq * sub.tip_share(false);
+    }
 }
 
 /// Holds p over a sub-piece, as high as the limits and the state allow.
@@ -160,56 +238,74 @@ fn hold<const M: usize, const C: usize>(
 ) -> State {
     let (first, last) = (sub.weight.first().powi(4), sub.weight.last().powi(4));
     let mut p = pass::hold(sub, axes);
-    if sub.speed.first() > 0.0 {
-        p = p.min(state.speed_sq / sub.speed.first() * first);
+    if sub.rate_sq(false) > 0.0 {
+        p = p.min(state.speed_sq / sub.rate_sq(false) * first);
     }
     out.push(Arc { x0: 0.0, x1: 1.0, kind: Kind::Hold, pi: [p / first, p / last], slow_sq: p });
-    State { speed_sq: p / last * sub.speed.last() }
+    State { speed_sq: p / last * sub.rate_sq(true) }
 }
 
-/// From `start_sq` under the arcs of the backward pass; appends the rows and returns v² at the end.
-fn forward<const M: usize, const C: usize>(
+/// From `start_sq` of the tool under the arcs of the backward pass; appends the rows and returns the tool's speed
+/// squared at the end.
+fn forward<const M: usize>(
     task: &Task<M>,
     (first, last): (usize, usize),
     start_sq: f64,
     space: &mut Workspace,
     out: &mut Profile,
 ) -> Result<f64, Failed> {
-    let mut state = State { speed_sq: start_sq };
-    let mut before: Option<(bool, [f64; M])> = None;
+    let mut at = Between { state: State { speed_sq: f64::INFINITY }, end: None, tip_sq: start_sq };
     let mut index = space.offsets.len();
     for i in first..last {
-        let piece = task.piece::<C>(i);
         if i > first {
-            let limit = task.problem.junction_speed[i];
-            state.speed_sq = state.speed_sq.min(limit * limit);
+            at.tip_sq = task.problem.junction_speed[i].powi(2);
         }
-        for number in space.pieces[last - 1 - i].clone() {
-            let part = space.parts[number];
-            let sub = part.sub_piece(&piece);
-            let start = end_direction(&sub, part.negative, false);
-            if let Some(before) = &before {
-                state.speed_sq = at_cusp(before, &start, state.speed_sq);
-            }
-            before = Some(end_direction(&sub, part.negative, true));
-            index -= 1;
-            let end = space.offsets.get(index + 1).copied().unwrap_or(space.bounds.len());
-            let bounds = &space.bounds[space.offsets[index]..end];
-            space.arcs.clear();
-            let failed = |_| Failed { piece: i, part: number };
-            state = match pass::run::<M, C, false>(&sub, &task.axes, state, bounds, &mut space.arcs) {
-                Ok(next) if keeps_limits(&sub, &task.axes, &space.arcs) => next,
-                // Below the held p of the backward pass p can be held too.
-                _ if bounds.iter().all(|arc| arc.kind == Kind::Hold) => {
-                    space.arcs.clear();
-                    hold(&sub, &task.axes, state, &mut space.arcs)
-                }
-                _ => return Err(failed(pass::Stuck)),
-            };
-            push(task, i, &part, &sub, &space.arcs, out);
-        }
+        let parts = space.pieces[last - 1 - i].clone();
+        with_capacity!(task, i, forward_over(task, i, parts, &mut index, &mut at, space, out))?;
     }
-    Ok(state.speed_sq)
+    Ok(at.tip_sq)
+}
+
+/// Forward over piece `i`; `index` counts down the arcs of the backward pass, `at.tip_sq` as there.
+fn forward_over<const M: usize, const C: usize>(
+    task: &Task<M>,
+    i: usize,
+    parts: std::ops::Range<usize>,
+    index: &mut usize,
+    at: &mut Between<M>,
+    space: &mut Workspace,
+    out: &mut Profile,
+) -> Result<(), Failed> {
+    let piece = task.piece::<C>(i);
+    let mut limited = false;
+    for number in parts {
+        let part = space.parts[number];
+        let sub = part.sub_piece(&piece);
+        let start = end_direction(&sub, part.negative, false);
+        if !std::mem::replace(&mut limited, true) {
+            at.state.speed_sq = at.state.speed_sq.min(of_axes(at.tip_sq, sub.tip_share(false)));
+        }
+        if let Some(before) = &at.end {
+            at.state.speed_sq = at_cusp(before, &start, at.state.speed_sq);
+        }
+        at.end = Some(end_direction(&sub, part.negative, true));
+        *index -= 1;
+        let end = space.offsets.get(*index + 1).copied().unwrap_or(space.bounds.len());
+        let bounds = &space.bounds[space.offsets[*index]..end];
+        space.arcs.clear();
+        at.state = match pass::run::<M, C, false>(&sub, &task.axes, at.state, bounds, &mut space.arcs) {
+            Ok(next) if keeps_limits(&sub, &task.axes, &space.arcs) => next,
+            // Below the held p of the backward pass p can be held too.
+            _ if bounds.iter().all(|arc| arc.kind == Kind::Hold) => {
+                space.arcs.clear();
+                hold(&sub, &task.axes, at.state, &mut space.arcs)
+            }
+            _ => return Err(Failed { piece: i, part: number }),
+        };
+        at.tip_sq = at.state.speed_sq * sub.tip_share(true);
+        push(task, i, &part, &sub, &space.arcs, out);
+    }
+    Ok(())
 }
 
 /// Whether every axis keeps its limits at some places of the arcs: a guard against rounding.

@@ -1,7 +1,9 @@
 //! Cuts a piece where an axis turns round and where the lowest velocity cap changes.
 
 use super::chord::SpeedLine;
+use super::pass::cusp;
 use super::piece::Piece;
+use super::TIP_AXES;
 use crate::planning::ChordLimit;
 use crate::polynomial::Polynomial;
 
@@ -62,9 +64,10 @@ pub struct SubPiece<const M: usize, const C: usize> {
     pub own_speed: bool,
 }
 
-/// Appends the parts of the piece from left to right.
+/// Appends the parts of the piece from left to right; `tip` is the tool's own piece where it is another one.
 pub fn split<const M: usize, const C: usize>(
     piece: &Piece<M, C>,
+    tip: Option<&Piece<TIP_AXES, C>>,
     axes: &Axes<M>,
     feed_sq: f64,
     chord: Option<&ChordLimit>,
@@ -95,9 +98,10 @@ pub fn split<const M: usize, const C: usize>(
         piece.g[greatest].sign_changes(&mut |t| cuts.push((t, moving)));
     }
     let mut lines = vec![];
-    match chord {
-        Some(chord) => chord.lines(piece, feed_sq, &mut lines),
-        None => lines.push(SpeedLine { from: 0.0, to: 1.0, speed_sq: [feed_sq; 2] }),
+    match (chord, tip) {
+        (Some(chord), Some(tip)) => chord.lines(tip, feed_sq, &mut lines),
+        (Some(chord), None) if piece.own_speed => chord.lines(piece, feed_sq, &mut lines),
+        _ => lines.push(SpeedLine { from: 0.0, to: 1.0, speed_sq: [feed_sq; 2] }),
     }
     let squares: [Polynomial<C>; M] = std::array::from_fn(|k| piece.g[k].multiply(&piece.g[k]));
     let mut fast = 0u8;
@@ -233,6 +237,30 @@ impl Part {
 }
 
 impl<const M: usize, const C: usize> SubPiece<M, C> {
+    /// The speed squared of the axes over π at an end.
+    pub fn rate_sq(&self, at_end: bool) -> f64 {
+        let end = |p: &Polynomial<C>| if at_end { p.last() } else { p.first() };
+        if self.own_speed {
+            end(&self.speed)
+        } else {
+            self.g.iter().map(|g| end(g) * end(g)).sum()
+        }
+    }
+
+    /// The tool's speed squared over that of the axes at an end, also in the limit where both are at rest.
+    pub fn tip_share(&self, at_end: bool) -> f64 {
+        if self.own_speed {
+            return 1.0;
+        }
+        let lead = |p: &Polynomial<C>, r: usize| {
+            let c = p.coefficients();
+            c.get(if at_end { c.len().wrapping_sub(1 + r) } else { r }).copied().unwrap_or(0.0)
+        };
+        let (order, _) = cusp(self, at_end);
+        let axes: f64 = self.g.iter().map(|g| lead(g, order).powi(2)).sum();
+        (lead(&self.speed, 2 * order) / axes).max(0.0)
+    }
+
     /// The same as the backward pass travels it.
     pub fn reversed(&self) -> Self {
         let cap = match self.cap {

@@ -1,14 +1,12 @@
-//! `plan_quadratic` and `plan_curves`: the exact planner on quadratic pieces, and on pieces of any degree.
+//! The exact planner: the package's own problem in, the columns of a profile out.
 
-use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
-use pyo3::exceptions::PyValueError;
+use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use super::arrays::{quadratics, row, rows};
+use super::arrays::{row, rows};
 use super::with_padded_axes;
-use crate::bang_bang;
-use crate::bang_bang_quadratic::{plan, Fault, Problem, Profile};
-use crate::polynomial::MOST;
+use crate::bang_bang::{self, plan_each, Problem, Tip, TIP_AXES};
+use crate::bang_bang_quadratic::{Fault, Profile};
 
 pyo3::create_exception!(
     _solvers,
@@ -31,56 +29,44 @@ type Columns<'py> = (
     Bound<'py, PyArray1<i64>>,
 );
 
-/// The fastest profile along quadratic pieces: piece, kind, axis, value, u0, u1, p0, p1, duration, runs.
-#[pyfunction]
-#[pyo3(signature = (control_points, width, runs, feed, junction_speed, max_velocity, max_acceleration, chord_tolerance, period, start_speed, end_speed))]
-#[allow(clippy::too_many_arguments)]
-fn plan_quadratic<'py>(
-    py: Python<'py>,
-    control_points: PyReadonlyArray3<'py, f64>,
-    width: PyReadonlyArray1<'py, f64>,
-    runs: PyReadonlyArray1<'py, i64>,
-    feed: PyReadonlyArray1<'py, f64>,
-    junction_speed: PyReadonlyArray1<'py, f64>,
-    max_velocity: PyReadonlyArray1<'py, f64>,
-    max_acceleration: PyReadonlyArray1<'py, f64>,
-    chord_tolerance: f64,
-    period: f64,
-    start_speed: f64,
-    end_speed: f64,
-) -> PyResult<Columns<'py>> {
-    let runs: Vec<usize> =
-        runs.as_array().iter().map(|&run| usize::try_from(run).unwrap_or(usize::MAX)).collect();
-    with_padded_axes!(control_points.shape()[2], M, {
-        let pieces = quadratics::<M>(&control_points, &width)?;
-        let problem = Problem {
-            pieces: &pieces,
-            runs: &runs,
-            feed: feed.as_slice()?,
-            junction_speed: junction_speed.as_slice()?,
-            max_velocity: row(&max_velocity, 1.0)?,
-            max_acceleration: row(&max_acceleration, 1.0)?,
-            chord_tolerance,
-            period,
-            start_speed,
-            end_speed,
-        };
-        let profile = py.detach(|| plan(&problem)).map_err(|fault| to_exception(&fault))?;
-        Ok(to_columns(py, profile))
-    })
-}
-
-/// The fastest profile along pieces of any degree, polynomial and rational: the same columns.
-#[pyfunction]
-#[pyo3(signature = (control_points, weights, offsets, width, runs, feed, junction_speed, max_velocity, max_acceleration, chord_tolerance, period, start_speed, end_speed))]
-#[allow(clippy::too_many_arguments)]
-fn plan_curves<'py>(
-    py: Python<'py>,
+/// `feedplan.curves.composite.CompositeCurve`.
+#[derive(FromPyObject)]
+struct CurveArrays<'py> {
     control_points: PyReadonlyArray2<'py, f64>,
-    weights: PyReadonlyArray1<'py, f64>,
+    weights: Option<PyReadonlyArray1<'py, f64>>,
     offsets: PyReadonlyArray1<'py, i64>,
     width: PyReadonlyArray1<'py, f64>,
+}
+
+impl CurveArrays<'_> {
+    fn weights(&self) -> PyResult<&[f64]> {
+        Ok(match &self.weights {
+            Some(weights) => weights.as_slice()?,
+            None => &[],
+        })
+    }
+}
+
+/// `feedplan.constraints.problem.TipSpeed`.
+#[derive(FromPyObject)]
+struct TipSpeedArrays<'py> {
+    coefficients: PyReadonlyArray1<'py, f64>,
+    offsets: PyReadonlyArray1<'py, i64>,
+}
+
+/// `feedplan.geometry.path.Path`.
+#[derive(FromPyObject)]
+struct PathArrays<'py> {
     runs: PyReadonlyArray1<'py, i64>,
+}
+
+/// `feedplan.constraints.problem.Problem`.
+#[derive(FromPyObject)]
+struct ProblemArrays<'py> {
+    path: PathArrays<'py>,
+    curve: CurveArrays<'py>,
+    tip_speed: Option<TipSpeedArrays<'py>>,
+    tip_curve: Option<CurveArrays<'py>>,
     feed: PyReadonlyArray1<'py, f64>,
     junction_speed: PyReadonlyArray1<'py, f64>,
     max_velocity: PyReadonlyArray1<'py, f64>,
@@ -89,49 +75,73 @@ fn plan_curves<'py>(
     period: f64,
     start_speed: f64,
     end_speed: f64,
-) -> PyResult<Columns<'py>> {
-    let index = |array: &PyReadonlyArray1<i64>| -> Vec<usize> {
-        array.as_array().iter().map(|&value| usize::try_from(value).unwrap_or(usize::MAX)).collect()
+}
+
+fn indices(array: &PyReadonlyArray1<i64>) -> Vec<usize> {
+    array.as_array().iter().map(|&value| usize::try_from(value).unwrap_or(usize::MAX)).collect()
+}
+
+/// Which planner takes the runs of polynomial quadratics.
+#[derive(Clone, Copy)]
+enum Quadratics {
+    Their,
+    General,
+}
+
+/// The fastest profile: piece, kind, axis, value, u0, u1, p0, p1, duration, runs.
+#[pyfunction]
+fn plan_bang_bang<'py>(py: Python<'py>, problem: ProblemArrays<'py>) -> PyResult<Columns<'py>> {
+    plan(py, &problem, Quadratics::Their)
+}
+
+/// The same by the planner for pieces of any degree alone.
+#[pyfunction]
+fn plan_curves<'py>(py: Python<'py>, problem: ProblemArrays<'py>) -> PyResult<Columns<'py>> {
+    plan(py, &problem, Quadratics::General)
+}
+
+fn plan<'py>(py: Python<'py>, arrays: &ProblemArrays<'py>, by: Quadratics) -> PyResult<Columns<'py>> {
+    let curve = &arrays.curve;
+    let (runs, offsets) = (indices(&arrays.path.runs), indices(&curve.offsets));
+    let tip = match (&arrays.tip_speed, &arrays.tip_curve) {
+        (Some(speed), Some(tip)) => Some((
+            rows::<TIP_AXES>(&tip.control_points)?,
+            tip.weights()?,
+            indices(&tip.offsets),
+            speed.coefficients.as_slice()?,
+            indices(&speed.offsets),
+        )),
+        _ => None,
     };
-    let (runs, offsets) = (index(&runs), index(&offsets));
-    let count = control_points.shape()[0];
-    if offsets.first() != Some(&0)
-        || offsets.last() != Some(&count)
-        || offsets.windows(2).any(|pair| pair[1] < pair[0] + 2 || pair[1] > pair[0] + 10)
-    {
-        return Err(PyValueError::new_err(
-            "the offsets do not divide the control points into pieces of degree 1 to 9",
-        ));
-    }
-    let small = weights.as_slice()?.is_empty() && offsets.windows(2).all(|pair| pair[1] - pair[0] <= 4);
-    with_padded_axes!(control_points.shape()[1], M, {
-        let control = rows::<M>(&control_points)?;
-        let problem = bang_bang::Problem {
+    with_padded_axes!(curve.control_points.shape()[1], M, {
+        let control = rows::<M>(&curve.control_points)?;
+        let problem = Problem {
             control: &control,
-            weight: weights.as_slice()?,
+            weight: curve.weights()?,
             offset: &offsets,
-            width: width.as_slice()?,
-            tip_speed: None,
+            width: curve.width.as_slice()?,
+            tip: tip.as_ref().map(|(control, weight, offset, speed, speed_offset)| Tip {
+                speed,
+                speed_offset,
+                control,
+                weight,
+                offset,
+            }),
             runs: &runs,
-            feed: feed.as_slice()?,
-            junction_speed: junction_speed.as_slice()?,
-            max_velocity: row(&max_velocity, 1.0)?,
-            max_acceleration: row(&max_acceleration, 1.0)?,
-            chord_tolerance,
-            period,
-            start_speed,
-            end_speed,
+            feed: arrays.feed.as_slice()?,
+            junction_speed: arrays.junction_speed.as_slice()?,
+            max_velocity: row(&arrays.max_velocity, 1.0)?,
+            max_acceleration: row(&arrays.max_acceleration, 1.0)?,
+            chord_tolerance: arrays.chord_tolerance,
+            period: arrays.period,
+            start_speed: arrays.start_speed,
+            end_speed: arrays.end_speed,
         };
-        // Polynomials of small degree stay short.
-        let profile = py
-            .detach(|| {
-                if small {
-                    bang_bang::plan::<M, 10>(&problem)
-                } else {
-                    bang_bang::plan::<M, MOST>(&problem)
-                }
-            })
-            .map_err(|fault| to_exception(&fault))?;
+        let plan = match by {
+            Quadratics::Their => plan_each::<M>,
+            Quadratics::General => bang_bang::plan::<M>,
+        };
+        let profile = py.detach(|| plan(&problem)).map_err(|fault| to_exception(&fault))?;
         Ok(to_columns(py, profile))
     })
 }
@@ -167,5 +177,5 @@ fn to_exception(fault: &Fault) -> PyErr {
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("PlanError", module.py().get_type::<PlanError>())?;
     module.add_function(wrap_pyfunction!(plan_curves, module)?)?;
-    module.add_function(wrap_pyfunction!(plan_quadratic, module)?)
+    module.add_function(wrap_pyfunction!(plan_bang_bang, module)?)
 }

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from feedplan import Axis, Machine, MachineError, plan
+from feedplan import Axis, Machine, MachineError
 from feedplan.machine import kinematics as registry
 from feedplan.machine.kinematics import Kinematics
 from feedplan.machine.machine import bundled_machines
@@ -137,14 +137,6 @@ def test_limits_of_rotary_axes_are_in_degrees(tmp_path: Path) -> None:
     file.write_text('[[axes]]\nname = "A"\nkind = "turning"\nmax_velocity = 1\nmax_acceleration = 1\n')
     with pytest.raises(MachineError, match='kind is \'turning\': give "linear" or "rotary"'):
         Machine.load(file)
-
-
-def test_a_machine_whose_words_are_the_tip_is_not_planned_as_if_they_were_joints(tmp_path: Path) -> None:
-    program = tmp_path / "one.ngc"
-    program.write_text("G1 X10 Y10 Z1 F600\nM2\n")
-    with pytest.raises(MachineError, match="kinematics 'corexy' cannot be planned over yet"):
-        plan(program, "corexy")
-    assert plan(program, "trunnion-ac").time > 0
 
 
 def test_importing_feedplan_loads_no_kinematics() -> None:

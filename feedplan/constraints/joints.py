@@ -1,0 +1,263 @@
+"""Joint motion along a path: one polynomial piece of the joints for each piece of the tool's path.
+
+Where K is affine the joints' control points are K of the tool's. Elsewhere q'' is interpolated with a proven
+distance (`feedplan.machine.proxies`) and the tool's pieces are cut to match. The stand-ins are so close that
+an axis's acceleration is met within `SHARE` of its limit at every speed that the other limits allow.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.constraints.problem import TipSpeed
+from feedplan.curves.composite import CompositeCurve
+from feedplan.curves.hodograph import chebyshev, from_chebyshev, interpolation, speed_squares
+from feedplan.errors import InputError
+from feedplan.geometry.path import Path
+from feedplan.machine.along import derivatives, positions
+from feedplan.machine.machine import Machine
+from feedplan.machine.proxies import Proxies, build_proxies
+from feedplan.machine.survey import JointPath, survey
+from feedplan.machine.words import AxisWords, Meaning, axis_words
+
+Array = NDArray[np.float64]
+# Part of an acceleration limit by which the stand-ins may be off.
+SHARE = 1e-9
+# Chebyshev points of q'': the joints' pieces then have the greatest degree that a curve may have.
+NODES = 8
+# Chebyshev points of |C'|² of rational pieces, and how far it may be off, as a part of itself.
+SPEED_NODES, SPEED_SHARE = 12, 1e-9
+# Places of a part at which the greatest possible u̇² is estimated, and how many times more it may be.
+PLACES, MARGIN = 3, 4.0
+
+
+@dataclass(frozen=True)
+class JointMotion:
+    """What a problem has beside a path: the path cut to match, the joints' pieces, the tool's speed, and the
+    kinematics of each run."""
+
+    path: Path
+    joints: CompositeCurve
+    tip_speed: TipSpeed
+    words: tuple[AxisWords, ...]
+
+
+def has_joints_of_its_own(path: Path, machine: Machine) -> bool:
+    """Whether the joints move in another way than the path's axes."""
+    if machine.is_plain:
+        return False
+    if machine.inverse.always:
+        return True
+    return path.meaning is not None and bool((path.meaning != Meaning.JOINTS).any())
+
+
+def joint_motion(path: Path, machine: Machine, feed: Array) -> JointMotion:
+    """The motion of the machine's joints along the path; `feed` (n,) [mm/s] is the greatest speed of a piece.
+
+    Raises InputError where the tool passes a singular position or a joint leaves its travel, with the line.
+    """
+    words = tuple(_words(path, machine, run) for run in range(len(path.runs) - 1))
+    stretches: list[_Stretch] = []
+    first, start = 0, None
+    for run in range(1, len(words) + 1):
+        if run < len(words) and words[run] == words[first]:
+            continue
+        pieces = slice(int(path.runs[first]), int(path.runs[run]))
+        make = _affine if words[first].kinematics.affine else _curved
+        stretches.append(make(path, machine, words[first], pieces, feed, start))
+        first, start = run, stretches[-1].joints.control_points[-1]
+    piece = np.concatenate([stretch.piece for stretch in stretches])
+    joints = CompositeCurve.joined([stretch.joints for stretch in stretches], math.inf)
+    speeds = [stretch.speed for stretch in stretches]
+    counts = np.concatenate([np.diff(speed.offsets) for speed in speeds])
+    tip_speed = TipSpeed(
+        np.concatenate([speed.coefficients for speed in speeds]),
+        np.concatenate([[0], np.cumsum(counts)]),
+    )
+    tool = CompositeCurve.joined([stretch.tool for stretch in stretches], math.inf)
+    return JointMotion(path.cut(tool, piece), joints, tip_speed, words)
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    """Joint motion of neighbouring runs under one kinematics: `piece` of the path, its parts as `tool`."""
+
+    piece: NDArray[np.int64]
+    tool: CompositeCurve
+    joints: CompositeCurve
+    speed: TipSpeed
+
+
+def _words(path: Path, machine: Machine, run: int) -> AxisWords:
+    length = math.nan if path.tool_length is None else float(path.tool_length[run])
+    return axis_words(
+        machine,
+        path.axes,
+        None if path.meaning is None else Meaning(int(path.meaning[run])),
+        tool_length=None if math.isnan(length) else length,
+    )
+
+
+def _affine(
+    path: Path, machine: Machine, words: AxisWords, pieces: slice, feed: Array, start: Array | None
+) -> _Stretch:
+    """Joints that are sums of the path's axes: their control points are, too."""
+    tool = path.curve[pieces]
+    tips = replace(tool, control_points=words.tip(tool.control_points))
+    joints = replace(tool, control_points=positions(words.kinematics, tips.control_points))
+    travel = np.array([axis.travel for axis in machine.axes])
+    if ((joints.control_points < travel[:, 0]) | (joints.control_points > travel[:, 1])).any():
+        _survey(path, machine, words, pieces, tips, start)
+    linear = tool if words.meaning is Meaning.JOINTS else _linear(path, tool)
+    speed = _either(TipSpeed(*speed_squares(linear)), TipSpeed(*speed_squares(tool)), _moving(linear))
+    return _Stretch(np.arange(pieces.start, pieces.stop), tool, joints, speed)
+
+
+def _survey(
+    path: Path,
+    machine: Machine,
+    words: AxisWords,
+    pieces: slice,
+    tips: CompositeCurve,
+    start: Array | None,
+) -> JointPath:
+    """The joints along pieces of one degree; InputError names the first place that they cannot pass."""
+    tips = tips.elevated(int(tips.degree.max()))
+    travel = [axis.travel for axis in machine.axes]
+    route = survey(words.kinematics, tips.by_piece, tips.width, travel, tips.weights_by_piece, start)
+    if route.places:
+        place = route.places[0]
+        raise InputError(place.sentence(words.kinematics, int(path.line[pieces.start + place.piece])))
+    return route
+
+
+def _curved(
+    path: Path, machine: Machine, words: AxisWords, pieces: slice, feed: Array, start: Array | None
+) -> _Stretch:
+    """Joints by polynomials that stand in for K of the tool's pieces."""
+    kinematics, curve = words.kinematics, path.curve[pieces]
+    tips = replace(curve, control_points=words.tip(curve.control_points))
+    tips = tips.elevated(int(tips.degree.max()))
+    control, width, weights = tips.by_piece, tips.width, tips.weights_by_piece
+    route = _survey(path, machine, words, pieces, tips, start)
+    linear = _linear(path, curve)
+    moves = _moving(linear)
+    allowed = _Allowed(machine, words, tips, linear, moves, feed[pieces])
+    proxies = build_proxies(kinematics, control, width, allowed, NODES, weights)
+    near = np.isinf(proxies.curvature_error).any(axis=1)
+    if near.any():
+        line = int(path.line[pieces.start + proxies.piece[near.argmax()]])
+        raise InputError(
+            f"line {line}: the tool passes so near a singular position of machine {machine.name} that its "
+            "joints cannot be followed: keep the path farther off it"
+        )
+    tool = curve.split(proxies.piece, proxies.part[:, 0] * width[proxies.piece]).with_width(proxies.width)
+    joints = _joint_pieces(proxies, route)
+    turning = replace(joints, control_points=joints.control_points[:, np.array(kinematics.rotary)])
+    speed = _either(_tool_speed(_linear(path, tool)), TipSpeed(*speed_squares(turning)), moves[proxies.piece])
+    return _Stretch(proxies.piece + pieces.start, tool, joints, speed)
+
+
+def _linear(path: Path, curve: CompositeCurve) -> CompositeCurve:
+    """The motion in X, Y and Z alone; at rest in X where the path has none of them."""
+    columns = [column for column, name in enumerate(path.axes) if name in "XYZ"]
+    points = curve.control_points[:, columns] if columns else np.zeros((len(curve.control_points), 1))
+    return replace(curve, control_points=points)
+
+
+def _moving(curve: CompositeCurve) -> NDArray[np.bool_]:
+    """Which pieces have a length (n,)."""
+    moving = np.ones(len(curve), dtype=bool)
+    moving[curve.zero_length] = False
+    return moving
+
+
+@dataclass(frozen=True)
+class _Allowed:
+    """How far q'' may be off on parts of pieces; nothing where |C'|² would not be met."""
+
+    machine: Machine
+    words: AxisWords
+    tips: CompositeCurve
+    linear: CompositeCurve
+    moves: NDArray[np.bool_]
+    feed: Array
+
+    def __call__(self, piece: NDArray[np.int64], part: Array) -> Array:
+        acceleration = np.array([axis.max_acceleration for axis in self.machine.axes])
+        allowed: Array = SHARE * acceleration / self._rate_sq(piece, part)[:, None]
+        allowed[~self._speed_is_met(piece, part)] = 0.0
+        return allowed
+
+    def _rate_sq(self, piece: NDArray[np.int64], part: Array) -> Array:
+        """About the greatest u̇² (m,) that feed and joint velocities allow."""
+        weights = self.tips.weights_by_piece
+        own = None if weights is None else weights[piece]
+        control, width = self.tips.by_piece[piece], self.tips.width[piece]
+        limit = np.array([axis.max_velocity for axis in self.machine.axes])
+        greatest = np.zeros(len(piece))
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+            for t in np.linspace(0.0, 1.0, PLACES):
+                fraction = part[:, 0] + t * (part[:, 1] - part[:, 0])
+                slope = derivatives(self.words.kinematics, control, width, fraction, 1, own)[1]
+                tangent = self.linear.evaluate(piece, fraction * width, 1)[1]
+                along = self.feed[piece] ** 2 / (tangent**2).sum(axis=1)
+                at_velocity = (limit / np.abs(slope)).min(axis=1) ** 2
+                here = np.minimum(at_velocity, np.where(self.moves[piece], along, np.inf))
+                greatest = np.fmax(greatest, np.where(np.isfinite(here), here, 0.0))
+        rate_sq: Array = MARGIN * np.where(greatest > 0, greatest, 1.0)
+        return rate_sq
+
+    def _speed_is_met(self, piece: NDArray[np.int64], part: Array) -> NDArray[np.bool_]:
+        """Whether interpolation meets |C'|² halfway between its nodes, where it is off the most."""
+        if self.tips.weights is None:
+            return np.ones(len(piece), dtype=bool)
+        between = 0.5 - 0.5 * np.cos(np.pi * np.arange(SPEED_NODES + 1) / SPEED_NODES)
+        found, true = (self._speed_sq(piece, part, at) for at in (chebyshev(SPEED_NODES), between))
+        miss = np.abs(found @ interpolation(SPEED_NODES, between).T - true)
+        met: NDArray[np.bool_] = (miss <= SPEED_SHARE * true).all(axis=1) | ~self.moves[piece]
+        return met
+
+    def _speed_sq(self, piece: NDArray[np.int64], part: Array, at: Array) -> Array:
+        fraction = part[:, :1] + at * (part[:, 1:] - part[:, :1])
+        u = fraction * self.linear.width[piece][:, None]
+        tangent = self.linear.evaluate(np.repeat(piece, len(at)), u.ravel(), 1)[1]
+        square: Array = (tangent**2).sum(axis=1).reshape(u.shape)
+        return square
+
+
+def _joint_pieces(proxies: Proxies, route: JointPath) -> CompositeCurve:
+    """The integrals of the slopes, each from the joints' true position at its start to that of the next."""
+    slope, count = proxies.slope, len(proxies)
+    degree = slope.shape[1]
+    start = route.positions(proxies.piece, proxies.part[:, 0])
+    steps = np.cumsum(slope, axis=1) * (proxies.width / degree)[:, None, None]
+    points = np.concatenate([start[:, None], start[:, None] + steps], axis=1)
+    points[:-1, -1] = points[1:, 0]
+    return CompositeCurve.from_pieces(points.reshape(count, degree + 1, -1), proxies.width)
+
+
+def _tool_speed(linear: CompositeCurve) -> TipSpeed:
+    """|C'|²: exact for polynomials; for rational pieces interpolated, and above the true one."""
+    if linear.weights is None:
+        return TipSpeed(*speed_squares(linear))
+    piece = np.repeat(np.arange(len(linear)), SPEED_NODES)
+    u = (linear.width[:, None] * chebyshev(SPEED_NODES)).ravel()
+    square = (linear.evaluate(piece, u, 1)[1] ** 2).sum(axis=1).reshape(-1, SPEED_NODES)
+    coefficients = from_chebyshev(square) * (1 + SPEED_SHARE)
+    return TipSpeed(coefficients.ravel(), np.arange(len(linear) + 1) * SPEED_NODES)
+
+
+def _either(first: TipSpeed, second: TipSpeed, chosen: NDArray[np.bool_]) -> TipSpeed:
+    """The first where it is chosen, piece by piece, and else the second."""
+    if chosen.all():
+        return first
+    rows = [
+        speed.coefficients[speed.offsets[i] : speed.offsets[i + 1]]
+        for i, speed in enumerate(first if own else second for own in chosen)
+    ]
+    return TipSpeed(np.concatenate(rows), np.concatenate([[0], np.cumsum([len(row) for row in rows])]))

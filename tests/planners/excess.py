@@ -1,0 +1,81 @@
+"""How far a profile is beyond its limits, from derivatives of the true motion at places inside its arcs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.constraints.problem import Problem
+from feedplan.machine.along import derivatives
+from feedplan.profile import ArcKind, SpeedProfile
+
+Array = NDArray[np.float64]
+# Derivatives (order + 1, m, axes) at places: piece (m,), u (m,), order.
+Motion = Callable[[NDArray[np.uint32], Array, int], Array]
+
+
+def joints_by_kinematics(problem: Problem) -> Motion:
+    """The joints' derivatives by K of the tool's path, never by the planner's stand-ins."""
+    words = problem.words[0]
+    assert all(other == words for other in problem.words)
+    curve = problem.path.curve.elevated(int(problem.path.curve.degree.max()))
+    control, weights = words.tip(curve.by_piece), curve.weights_by_piece
+
+    def motion(piece: NDArray[np.uint32], u: Array, order: int) -> Array:
+        own = None if weights is None else weights[piece]
+        width = curve.width[piece]
+        return derivatives(words.kinematics, control[piece], width, u / width, order, own)
+
+    return motion
+
+
+def worst_excess(problem: Problem, profile: SpeedProfile, samples: int = 10) -> tuple[float, float]:
+    """Greatest relative excess of any limit, and least use of the most used one, inside the arcs."""
+    joints = joints_by_kinematics(problem) if problem.words else problem.path.curve.evaluate
+    tool = problem.path.curve.evaluate if problem.tip_curve is None else problem.tip_curve.evaluate
+    # u is rounded: where an arc is as short as that, its places cannot be told apart.
+    long = (profile.u1 - profile.u0) > 1e-6 * problem.path.width[profile.piece]
+    piece, kind, value = profile.piece[long], profile.kind[long, None], profile.value[long, None]
+    axis = np.where(profile.axis[long] == 255, 0, profile.axis[long])
+    u0, u1, p0, p1 = (column[long] for column in (profile.u0, profile.u1, profile.p0, profile.p1))
+    rows = np.arange(len(piece))
+
+    def at(motion: Motion, u: Array) -> tuple[Array, Array]:
+        """C' and C'' at places (rows, …)."""
+        flat = motion(np.repeat(piece, u[0].size), u.ravel(), 2)
+        return flat[1].reshape(*u.shape, -1), flat[2].reshape(*u.shape, -1)
+
+    u = u0[:, None] + (u1 - u0)[:, None] * (np.arange(samples) + 0.5) / samples
+    q1, q2 = at(joints, u)
+    t1, t2 = at(tool, u)
+    g, c = q1[rows, :, axis], q2[rows, :, axis]
+    # v_j² of an arc from its slower end, the way of its axis by Gauss's rule.
+    ends = at(joints, np.stack([u0, u1], axis=1))[0][rows, :, axis]
+    with np.errstate(invalid="ignore"):
+        v_sq = np.stack([p0, p1], axis=1) * ends**2
+    slow = np.argmin(np.where(np.isfinite(v_sq), v_sq, np.inf), axis=1)
+    anchor = np.stack([u0, u1], axis=1)[rows, slow]
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    between = anchor[:, None, None] + (u - anchor[:, None])[..., None] * (nodes + 1) / 2
+    way = (u - anchor[:, None]) / 2 * (at(joints, between)[0][rows, :, :, axis] @ weights)
+    speed_sq = (t1**2).sum(axis=2)
+    limits = problem.feed[piece]
+    kinds = [kind == ArcKind.AXIS_ACCELERATION, kind == ArcKind.FEED, kind == ArcKind.AXIS_VELOCITY]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        p = np.select(
+            kinds,
+            [(v_sq[rows, slow][:, None] + 2 * value * way) / g**2, value / speed_sq, value / g**2],
+            p0[:, None],
+        )
+        s = np.select(kinds, [(value - c * p) / g, -p * (t1 * t2).sum(axis=2) / speed_sq, -p * c / g], 0.0)
+    used = np.concatenate(
+        [
+            np.abs(q1 * s[..., None] + q2 * p[..., None]) / problem.max_acceleration,
+            np.abs(q1) * np.sqrt(p)[..., None] / problem.max_velocity,
+            (np.sqrt(speed_sq * p) / limits[:, None])[..., None],
+        ],
+        axis=2,
+    ).max(axis=2)
+    return float(used.max()) - 1, float(used.min())
