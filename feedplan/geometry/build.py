@@ -1,4 +1,4 @@
-"""A program on a machine becomes a path: lines, circles, splines, fitted chains of G1 moves, corners, runs."""
+"""A program on a machine becomes a path: lines, circles, splines, fitted chains, corners and runs."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ class FitSettings:
 
     `default_tolerance` [mm] holds in G64 stretches without a P, and where a program says nothing: a hundredth
     is what machining tolerances leave to a controller.
-    `exact_tolerance` [mm] is what "exactly" means for arcs; lines and splines are exact in G61 and G61.1, and so
-    are arcs but for what rounding did to their ends: they become the circle through both. Half of it bounds how
-    far that circle is from the programmed arc, whose radius may change with the angle (beyond it is a spiral
-    and becomes quadratics within as much), and how far a helix is off its axis while on its cylinder; the other
-    half smooths joints. It bounds the arcs of G64 as well.
+    `exact_tolerance` [mm] is what "exactly" means for arcs in every mode; lines and splines are exact. An arc
+    becomes the circle through both its ends, which rounding took off the programmed one. Half of the tolerance
+    bounds how far it is from the programmed arc, whose radius goes with the angle: beyond it is a spiral and
+    becomes quadratics within as much. It also bounds how far a helix is off along its axis while on its
+    cylinder. The other half smooths joints.
     `fit_share` is the part of the tolerance that the fit may use: where the program gives no Q, and at most.
     Corners are rounded by what the fit leaves.
     `max_chord` [mm]: longer G1 chords stay lines. A long chord among short ones was meant as a line.
@@ -69,23 +69,24 @@ def build_path(
     G61.1 stops after every move. G61 follows lines, splines and arcs exactly (arcs with rounded ends and
     helices within `settings.exact_tolerance`), and stops where the direction breaks; only where rounded
     coordinates leave an arc and its neighbour a turn of less than a degree is that smoothed, within the same
-    tolerance. G64 stays within its tolerance, both ways: chains of G1 moves are fitted and corners are rounded.
-    The tolerance [mm] is `tolerance`, else the program's P, else `settings.default_tolerance`; 0 means exact
-    lines with stops. Q bounds the fit alone. Where G64 meets G61 the joint belongs to the stricter of them.
-    Rapids are lines of their own. Arcs become true circles; splines go into the path as they are, their widths
-    scaled to about the length, pieces without a length left out. Corners at splines are not rounded.
+    tolerance. G64 stays within its tolerance, both ways: chains of G1 moves are fitted and corners are
+    rounded. The tolerance [mm] is `tolerance`, else the program's P, else `settings.default_tolerance`; 0
+    means exact lines with stops. Q bounds the fit alone. Where G64 meets G61 the joint belongs to the
+    stricter of them. Rapids are lines of their own. Arcs become true circles; splines go into the path as
+    they are, their widths scaled to about the length, pieces without a length left out. Corners at splines
+    are not rounded.
 
-    Corners that cannot be rounded are stops, unless every axis that moves has a `max_velocity_jump`. The tool
-    stops also where the meaning of words or the tool length changes. Axes that the program moves must be there;
-    axes that it names and never moves are left out. Where words are joints, the path has them in the machine's
-    order and within their travel; where they are the tool tip (and its direction), in the order of the machine's
-    kinematics, and travel is a matter of the joints that follow.
-    A fitted chain is followed across changes of feed; its pieces are cut there, so that none is faster than
-    a block it covers. Where rotary axes move along with X, Y and Z, a feed counts along X, Y and Z; where words
-    are joints it is handed on as the speed in all axes that gives it (on splines as it is, which is not faster).
+    Corners that cannot be rounded are stops, unless every axis that moves has a `max_velocity_jump`. The
+    tool stops also where the meaning of words or the tool length changes. Axes that the program moves must
+    be there; axes that it names and never moves are left out. Where words are joints, the path has them in
+    the machine's order and within their travel; where they are the tool tip (and its direction), in the
+    order of the machine's kinematics, and travel is a matter of the joints that follow. A fitted chain is
+    followed across changes of feed; its pieces are cut there, so that none is faster than a block it covers.
+    Where rotary axes move along with X, Y and Z, a feed counts along X, Y and Z; where words are joints it
+    is handed on as the speed in all axes that gives it (on splines as it is, which is not faster).
 
-    Raises MachineError (an axis is missing), ProgramError (a move has no length, an arc no radius, a spline does
-    not fit its move), InputError (a position outside the travel, a negative tolerance).
+    Raises MachineError (an axis is missing), ProgramError (a move has no length, an arc no radius, a spline
+    does not fit its move), InputError (a position outside the travel, a negative tolerance).
     """
     settings = settings or FitSettings()
     if tolerance is not None and not 0 <= tolerance < math.inf:
@@ -160,12 +161,12 @@ def build_path(
 def _splines(
     program: Program, columns: list[int]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.int64], NDArray[np.float64]] | None:
-    """The program's splines in the axes of the path, each from exactly where its move starts to its target."""
+    """The program's splines in the axes of the path, from exactly where their moves start to their targets."""
     if program.splines is None or len(program.spline_move) == 0:
         return None
     curve, move, pieces = program.splines, program.spline_move, program.spline_pieces
     control = curve.control_points[:, columns].copy()
-    # The first control point of every piece is the last one of the piece before, of the first piece the move's.
+    # Every piece starts with the last control point of the one before, the first one where its move does.
     first, last = curve.offsets[:-1], curve.offsets[1:] - 1
     given = control[first].copy()
     control[first[1:]] = control[last[:-1]]

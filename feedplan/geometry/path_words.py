@@ -19,11 +19,11 @@ LINEAR_AXES = "XYZ"
 class PathWords:
     """The axes of a path: `names`, and `columns`, where they stand in the program.
 
-    `joints` (n,) tells of each move whether its words are joint positions, `changes` (n − 1,) whether the words
-    of the next move mean something else. `max_velocity`, `max_acceleration` (axes,) are for rounding corners:
-    those of the joint where all words are joints; otherwise the least of all linear joints, or of the rotary
-    axis itself. `travel` (axes, 2) counts where words are joints. `may_jump`: all axes that move allow a velocity
-    jump at corners.
+    `joints` (n,) tells of each move whether its words are joint positions, `changes` (n − 1,) whether the
+    words of the next move mean something else. `max_velocity`, `max_acceleration` (axes,) are for rounding
+    corners: those of the joint where all words are joints; otherwise the least of all linear joints, or of
+    the rotary axis itself. `travel` (axes, 2) counts where words are joints. `may_jump`: all words are
+    joints, and those that move allow a velocity jump at corners.
     """
 
     names: tuple[str, ...]
@@ -76,9 +76,10 @@ def path_words(program: Program, machine: Machine) -> PathWords:
         before, after = program.tool_length[:-1], program.tool_length[1:]
         changes |= (before != after) & ~(np.isnan(before) & np.isnan(after))
     joints = meaning == Meaning.JOINTS
-    jumping = machine.axes
-    if joints.all():
-        jumping = tuple(machine.axis(name) for name in names if used[program.axes.index(name)])
+    # Where the joints move in another way than the tip, a corner is a stop.
+    may_jump = bool(joints.all()) and all(
+        machine.axis(name).max_velocity_jump > 0 for name in names if used[program.axes.index(name)]
+    )
     return PathWords(
         names=names,
         columns=[program.axes.index(name) for name in names],
@@ -89,7 +90,7 @@ def path_words(program: Program, machine: Machine) -> PathWords:
         travel=np.array(
             [machine.axis(name).travel if name in machine.axis_names else (-np.inf, np.inf) for name in names]
         ),
-        may_jump=all(axis.max_velocity_jump > 0 for axis in jumping),
+        may_jump=may_jump,
     )
 
 

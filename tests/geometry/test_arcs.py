@@ -30,7 +30,7 @@ def arc_program(make_program: Any, radius: float, angle: float, normal: int, ris
 
 
 def assert_on_cylinder(path: Path, normal: int, radius: float) -> None:
-    """All pieces are conics on the cylinder about (1, 2, 3), passed at parameter speed 1 through their ends."""
+    """All pieces are conics on the cylinder about (1, 2, 3), and |C'| is 1 at their ends."""
     share = np.linspace(0, 1, 21)
     piece = np.repeat(np.arange(len(path)), len(share))
     u = np.tile(share, len(path)) * path.width[piece]

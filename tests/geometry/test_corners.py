@@ -77,7 +77,7 @@ def test_a_corner_reaches_over_short_pieces(make_program: Any, check: Any) -> No
     end = [10 * math.sin(1), 10 - 10 * math.cos(1)]
     arc = 10 * np.stack([np.sin(turn), 1 - np.cos(turn)], axis=1)
     points = [*arc, [end[0] - 10 * math.sin(1), end[1] + 10 * math.cos(1)]]
-    arcs = {i: ((0.0, 10.0, 0.0), 2, 0.005) for i in range(200)}
+    arcs = dict.fromkeys(range(200), ((0.0, 10.0, 0.0), 2, 0.005))
     program = make_program(points, arcs=arcs, blend_tolerance=0.1)
     path = build_path(program, MILL)
     _, off = check(program, path)

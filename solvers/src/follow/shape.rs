@@ -5,6 +5,9 @@ use crate::conic::Conic;
 use crate::quadratic::{norm, sub};
 use crate::spline::CompositeCurve;
 
+/// Edges of a control polygon that are shorter than this part of it are none, as next to a cusp.
+const VANISHING: f64 = 1e-12;
+
 #[derive(Clone, Copy, Debug)]
 pub enum Shape<const M: usize> {
     Conic(Conic<M>),
@@ -27,7 +30,8 @@ impl<const M: usize> Spline<M> {
     pub fn new(curve: &CompositeCurve<M>, index: usize, scale: f64) -> Option<Self> {
         let piece = curve.piece(index);
         let edges = || piece.control.windows(2).map(|pair| sub(&pair[1], &pair[0]));
-        let long = |edge: &[f64; M]| norm(edge) > 0.0;
+        let (extent, _) = piece.extent();
+        let long = |edge: &[f64; M]| norm(edge) > VANISHING * extent;
         Some(Self {
             index: index as u32,
             width: piece.width * scale,
