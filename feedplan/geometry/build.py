@@ -29,7 +29,7 @@ class FitSettings:
     `default_tolerance` [mm] holds in G64 stretches without a P, and where a program says nothing: a hundredth
     is what machining tolerances leave to a controller.
     `exact_tolerance` [mm] is what "exactly" means for arcs in every mode; lines and splines are exact. An arc
-    becomes the circle through both its ends, which rounding took off the programmed one. Half of the tolerance
+    becomes the circle through both its ends, which rounding took off the programmed one. Half of that
     bounds how far it is from the programmed arc, whose radius goes with the angle: beyond it is a spiral and
     becomes quadratics within as much. It also bounds how far a helix is off along its axis while on its
     cylinder. The other half smooths joints.
@@ -161,7 +161,7 @@ def build_path(
 def _splines(
     program: Program, columns: list[int]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.int64], NDArray[np.float64]] | None:
-    """The program's splines in the axes of the path, from exactly where their moves start to their targets."""
+    """The program's splines in the axes of the path, from exactly where moves start to their targets."""
     if program.splines is None or len(program.spline_move) == 0:
         return None
     curve, move, pieces = program.splines, program.spline_move, program.spline_pieces

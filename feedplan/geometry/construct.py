@@ -52,8 +52,9 @@ def path_of_points(
         raise InputError(
             f"the tolerance is {tolerance}: give 0 (exact lines with stops) or a positive number [mm]"
         )
-    refuse(~np.isfinite(array).all(axis=1), lambda i: f"point {i} is not finite: correct its coordinates")
-    same: NDArray[np.bool_] = np.logical_and.reduce(array[1:] == array[:-1], axis=1)
+    finite: NDArray[np.bool_] = np.logical_and.reduce(np.isfinite(array), axis=1)
+    refuse(~finite, lambda i: f"point {i} is not finite: correct its coordinates")
+    same: NDArray[np.bool_] = (array[1:] == array[:-1]).all(axis=1)
     refuse(same, lambda i: f"points {i} and {i + 1} coincide: remove one of them")
     count, width = len(array) - 1, array.shape[1]
     (curve, _, move, allowed, runs), summary, _ = native_build_path(

@@ -106,11 +106,13 @@ def _sample(
     rate = np.linalg.norm(tangent if tip is None else tip.evaluate(piece, u, 1)[1], axis=1)
     before = np.concatenate((u[:1], u[:-1]))
     before[::count] = u[::count]
-    length = start + np.cumsum(_integral(problem, piece, before, u))
+    within = np.cumsum(_integral(problem, piece, before, u).reshape(-1, count), axis=1)
+    # Arc by arc, so that rounding does not add up over the samples.
+    length = (start + np.cumsum(within[:, -1]) - within[:, -1])[:, None] + within
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         p = _profile_at(problem.curve, profile, arc, u, place, tangent, rate)
         return LimitSamples(
-            length=length,
+            length=length.ravel(),
             speed=rate * np.sqrt(np.maximum(p, 0.0)),
             acceleration=rate * np.sqrt(limit_curve(tangent, second, problem.max_acceleration)),
             feed=problem.feed[piece],
