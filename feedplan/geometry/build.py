@@ -103,13 +103,16 @@ def build_path(
     exact = settings.exact_tolerance if not tolerance else min(tolerance, settings.exact_tolerance)
     halt = program.stop | (program.dwell > 0) | (program.control == PathControl.EXACT_STOP)
     halt[:-1] |= words.changes
+    feed = _feed_in_all_axes(program, start, target, names)
+    if not words.joints.all():
+        feed = np.where(words.joints, feed, program.feed)
 
     (curve, feed, move, allowed, runs), summary, outside = native_build_path(
         program.name,
         start,
         program.kind,
         target,
-        np.where(words.joints, _feed_in_all_axes(program, start, target, names), program.feed),
+        feed,
         program.line,
         limit,
         fit_limit,

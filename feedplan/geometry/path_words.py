@@ -47,7 +47,7 @@ def path_words(program: Program, machine: Machine) -> PathWords:
     known: dict[str, None] = {}
     moving = _moving_letters(program)
     used: NDArray[np.bool_] = np.logical_or.reduce(moving, axis=0)
-    for value in np.unique(meaning) if len(meaning) else [default]:
+    for value in [default] if given is None or len(given) == 0 else np.unique(given):
         letters = _letters(machine, Meaning(value))
         known.update(dict.fromkeys(letters))
         for column, name in enumerate(program.axes):
@@ -105,7 +105,9 @@ def _letters(machine: Machine, meaning: Meaning) -> tuple[str, ...]:
 
 def _moving_letters(program: Program) -> NDArray[np.bool_]:
     """(n, axes) which moves move which letters."""
-    moves = np.diff(program.target, axis=0, prepend=program.start[None]) != 0
+    moves = np.empty(program.target.shape, dtype=np.bool_)
+    moves[:1] = program.target[:1] != program.start
+    np.not_equal(program.target[1:], program.target[:-1], out=moves[1:])
     for column, name in enumerate(LINEAR_AXES):
         moves[program.arc_move[program.arc_normal != column], program.axes.index(name)] = True
     if program.splines is not None and len(program.spline_move):
@@ -116,7 +118,7 @@ def _moving_letters(program: Program) -> NDArray[np.bool_]:
         greatest = np.maximum.reduceat(curve.control_points[:ends], points)
         least = np.minimum.reduceat(curve.control_points[:ends], points)
         moves[program.spline_move] |= greatest > least
-    return np.asarray(moves)
+    return moves
 
 
 def _limits(machine: Machine, names: tuple[str, ...], joints: bool, limit: str) -> NDArray[np.float64]:
