@@ -144,6 +144,11 @@ def build_path(
     arc_plane: NDArray[np.int64],
     arc_centre: NDArray[np.float64],
     arc_sweep: NDArray[np.float64],
+    spline_move: NDArray[np.int64],
+    spline_pieces: NDArray[np.int64],
+    splines: tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.int64], NDArray[np.float64]]
+    | None,
+    joints: NDArray[np.bool_],
     max_velocity: NDArray[np.float64],
     max_acceleration: NDArray[np.float64],
     travel: NDArray[np.float64],
@@ -155,8 +160,7 @@ def build_path(
     corner_angle: float,
 ) -> tuple[
     tuple[
-        NDArray[np.float64],
-        NDArray[np.float64],
+        tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.int64], NDArray[np.float64]],
         NDArray[np.float64],
         NDArray[np.int64],
         NDArray[np.float64],

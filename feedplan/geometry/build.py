@@ -1,4 +1,4 @@
-"""A program on a machine becomes a path: lines, arcs, fitted chains of G1 moves, corners and runs."""
+"""A program on a machine becomes a path: lines, circles, splines, fitted chains, corners and runs."""
 
 from __future__ import annotations
 
@@ -10,13 +10,16 @@ from numpy.typing import NDArray
 
 from feedplan._solvers import build_path as native_build_path
 from feedplan.curves.composite import CompositeCurve
-from feedplan.errors import InputError, MachineError
+from feedplan.errors import InputError, ProgramError
 from feedplan.geometry.path import FitSummary, Path
+from feedplan.geometry.path_words import LINEAR_AXES, path_words
 from feedplan.machine.machine import Machine
 from feedplan.program.program import MoveKind, PathControl, Program
 
-LINEAR_AXES = "XYZ"
 PARALLEL_AXES = "UVW"
+
+# Splines and their moves come from sums of the same offsets; more than this between them [mm] is no rounding.
+_SPLINE_GAP = 1e-6
 
 
 @dataclass(frozen=True)
@@ -25,8 +28,11 @@ class FitSettings:
 
     `default_tolerance` [mm] holds in G64 stretches without a P, and where a program says nothing: a hundredth
     is what machining tolerances leave to a controller.
-    `exact_tolerance` [mm] is what "exactly" means for arcs, which become quadratics; lines are exact in G61
-    and G61.1. It bounds the arcs of G64 as well: halving it costs one sixth more pieces.
+    `exact_tolerance` [mm] is what "exactly" means for arcs in every mode; lines and splines are exact. An arc
+    becomes the circle through both its ends, which rounding took off the programmed one. Half of that
+    bounds how far it is from the programmed arc, whose radius goes with the angle: beyond it is a spiral and
+    becomes quadratics within as much. It also bounds how far a helix is off along its axis while on its
+    cylinder. The other half smooths joints.
     `fit_share` is the part of the tolerance that the fit may use: where the program gives no Q, and at most.
     Corners are rounded by what the fit leaves.
     `max_chord` [mm]: longer G1 chords stay lines. A long chord among short ones was meant as a line.
@@ -60,47 +66,53 @@ def build_path(
 ) -> Path:
     """The path that the machine follows.
 
-    G61.1 stops after every move. G61 follows lines exactly and arcs within `settings.exact_tolerance`, and
-    stops where the direction breaks; only where rounded coordinates leave an arc and its neighbour a turn of
-    less than a degree is that smoothed, within the same tolerance. G64 stays within its tolerance, both ways:
-    chains of G1 moves are fitted and corners are rounded. The tolerance [mm] is `tolerance`, else the
-    program's P, else `settings.default_tolerance`; 0 means exact lines with stops. Q bounds the fit alone.
-    Where G64 meets G61 the joint belongs to the stricter of them. Rapids are lines of their own.
+    G61.1 stops after every move. G61 follows lines, splines and arcs exactly (arcs with rounded ends and
+    helices within `settings.exact_tolerance`), and stops where the direction breaks; only where rounded
+    coordinates leave an arc and its neighbour a turn of less than a degree is that smoothed, within the same
+    tolerance. G64 stays within its tolerance, both ways: chains of G1 moves are fitted and corners are
+    rounded. The tolerance [mm] is `tolerance`, else the program's P, else `settings.default_tolerance`; 0
+    means exact lines with stops. Q bounds the fit alone. Where G64 meets G61 the joint belongs to the
+    stricter of them. Rapids are lines of their own. Arcs become true circles; splines go into the path as
+    they are, their widths scaled to about the length, pieces without a length left out. Corners at splines
+    are not rounded.
 
-    Corners that cannot be rounded are stops, unless every axis that moves has a `max_velocity_jump`. Axes
-    that the program moves must be there; axes that it names and never moves are left out.
-    A fitted chain is followed across changes of feed; its pieces are cut there, so that none is faster than
-    a block it covers. Where rotary axes move along with X, Y and Z, a feed counts along X, Y and Z and is
-    handed on as the speed in all axes that gives it.
+    Corners that cannot be rounded are stops, unless every axis that moves has a `max_velocity_jump`. The
+    tool stops also where the meaning of words or the tool length changes. Axes that the program moves must
+    be there; axes that it names and never moves are left out. Where words are joints, the path has them in
+    the machine's order and within their travel; where they are the tool tip (and its direction), in the
+    order of the machine's kinematics, and travel is a matter of the joints that follow. A fitted chain is
+    followed across changes of feed; its pieces are cut there, so that none is faster than a block it covers.
+    Where rotary axes move along with X, Y and Z, a feed counts along X, Y and Z; where words are joints it
+    is handed on as the speed in all axes that gives it (on splines as it is, which is not faster).
 
-    Raises MachineError (an axis is missing), ProgramError (a move has no length, an arc no radius),
-    InputError (a position outside the travel, a negative tolerance).
+    Raises MachineError (an axis is missing), ProgramError (a move has no length, an arc no radius, a spline
+    does not fit its move), InputError (a position outside the travel, a negative tolerance).
     """
     settings = settings or FitSettings()
     if tolerance is not None and not 0 <= tolerance < math.inf:
         raise InputError(
             f"the tolerance is {tolerance}: give 0 (exact lines with stops) or a positive number [mm]"
         )
-    columns = _path_columns(program, machine)
-    names = tuple(program.axes[column] for column in columns)
-    axes = [machine.axis(name) for name in names]
+    words = path_words(program, machine)
+    columns, names = words.columns, words.names
     start = np.ascontiguousarray(program.start[columns])
     target = np.ascontiguousarray(program.target[:, columns])
-    moving = (np.diff(target, axis=0, prepend=start[None]) != 0).any(axis=0)
     arc_plane = _arc_planes(program, names)
-    moving[np.unique(arc_plane)] = True
+    splines = _splines(program, columns)
     limit, fit_limit = _tolerances(program, tolerance, settings)
-    max_velocity = np.array([axis.max_velocity for axis in axes])
-    max_acceleration = np.array([axis.max_acceleration for axis in axes])
     exact = settings.exact_tolerance if not tolerance else min(tolerance, settings.exact_tolerance)
     halt = program.stop | (program.dwell > 0) | (program.control == PathControl.EXACT_STOP)
+    halt[:-1] |= words.changes
+    feed = _feed_in_all_axes(program, start, target, names)
+    if not words.joints.all():
+        feed = np.where(words.joints, feed, program.feed)
 
-    (control, width, feed, move, allowed, runs), summary, outside = native_build_path(
+    (curve, feed, move, allowed, runs), summary, outside = native_build_path(
         program.name,
         start,
         program.kind,
         target,
-        _feed_in_all_axes(program, start, target, names),
+        feed,
         program.line,
         limit,
         fit_limit,
@@ -109,57 +121,76 @@ def build_path(
         arc_plane,
         np.ascontiguousarray(np.take_along_axis(program.arc_centre, _plane_letters(program), axis=1)),
         program.arc_angle,
-        max_velocity,
-        max_acceleration,
-        np.array([axis.travel for axis in axes]),
-        all(axis.max_velocity_jump > 0 for axis, moves in zip(axes, moving, strict=True) if moves),
+        np.ascontiguousarray(program.spline_move, dtype=np.int64),
+        np.ascontiguousarray(program.spline_pieces, dtype=np.int64),
+        splines,
+        words.joints,
+        words.max_velocity,
+        words.max_acceleration,
+        words.travel,
+        words.may_jump,
         exact,
         settings.max_chord,
-        settings.alpha * float(np.linalg.norm(max_acceleration)),
-        float(np.linalg.norm(max_velocity)),
+        settings.alpha * float(np.linalg.norm(words.max_acceleration)),
+        float(np.linalg.norm(words.max_velocity)),
         math.radians(settings.corner_angle),
     )
     if outside is not None:
         index, axis, position = outside
-        least, greatest = axes[axis].travel
+        least, greatest = words.travel[axis]
         end, bound = ("begins", least) if position < least else ("ends", greatest)
         raise InputError(
             f"{program.name}, line {program.line[index]}: {names[axis]} reaches {position:.6g} mm, "
             f"its travel {end} at {bound:.6g} mm: move the work, or correct the travel of the machine"
         )
-    points, splines, polynomials, deviation = summary
+    points, fitted, polynomials, deviation = summary
+    first = move[runs[:-1], 0]
     return Path(
         axes=names,
-        curve=CompositeCurve.from_pieces(control, width),
+        curve=CompositeCurve(*curve),
         feed=feed,
         move=move,
         line=program.line[move[:, 0]],
         runs=runs,
         dwell=program.dwell[move[runs[1:] - 1, 1]],
         tolerance=allowed,
-        fit=FitSummary(points, splines, polynomials, deviation),
+        fit=FitSummary(points, fitted, polynomials, deviation),
         start_dwell=program.start_dwell,
+        meaning=None if program.meaning is None else program.meaning[first],
+        tool_length=None if program.tool_length is None else program.tool_length[first],
     )
 
 
-def _path_columns(program: Program, machine: Machine) -> list[int]:
-    """Columns of the program's axes that the machine has, in the machine's order."""
-    for column, name in enumerate(program.axes):
-        if name in machine.axis_names:
-            continue
-        moves = np.diff(program.target[:, column], prepend=program.start[column]) != 0
-        if name in LINEAR_AXES:
-            moves[program.arc_move[program.arc_normal != LINEAR_AXES.index(name)]] = True
-        if moves.any():
-            line = program.line[int(moves.argmax())]
-            raise MachineError(
-                f"{program.name}, line {line}: axis {name} moves and machine {machine.name} has none: "
-                f"choose a machine with {name}, or add it to the machine file"
+def _splines(
+    program: Program, columns: list[int]
+) -> tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.int64], NDArray[np.float64]] | None:
+    """The program's splines in the axes of the path, from exactly where moves start to their targets."""
+    if program.splines is None or len(program.spline_move) == 0:
+        return None
+    curve, move, pieces = program.splines, program.spline_move, program.spline_pieces
+    control = curve.control_points[:, columns].copy()
+    # Every piece starts with the last control point of the one before, the first one where its move does.
+    first, last = curve.offsets[:-1], curve.offsets[1:] - 1
+    given = control[first].copy()
+    control[first[1:]] = control[last[:-1]]
+    places = np.vstack([program.start, program.target])[:, columns]
+    control[first[pieces[:-1]]] = places[move]
+    end_missed = np.abs(control[last[pieces[1:] - 1]] - places[move + 1]).max(axis=1, initial=0.0)
+    control[last[pieces[1:] - 1]] = places[move + 1]
+    start_missed = np.abs(control[first] - given).max(axis=1, initial=0.0)
+    for missed, owner in (
+        (start_missed, np.searchsorted(pieces, np.arange(len(first)), side="right") - 1),
+        (end_missed, np.arange(len(move))),
+    ):
+        apart = missed > _SPLINE_GAP
+        if apart.any():
+            line = int(program.line[move[owner[int(apart.argmax())]]])
+            raise ProgramError(
+                f"{program.name}, line {line}: the spline leaves a gap of {missed[apart][0]:.3g} mm: "
+                f"at most {_SPLINE_GAP:g} mm is allowed; correct its points",
+                line,
             )
-    columns = [program.axes.index(name) for name in machine.axis_names if name in program.axes]
-    if not columns:
-        raise MachineError(f"{program.name} moves no axis of machine {machine.name}: choose another machine")
-    return columns
+    return control, curve.weights, curve.offsets, curve.width
 
 
 def _plane_letters(program: Program) -> NDArray[np.int64]:
@@ -216,4 +247,5 @@ def _feed_in_all_axes(
         counted = np.where(counted > 0, counted, length_sq[:, group].sum(axis=1))
     with np.errstate(divide="ignore", invalid="ignore"):
         speed: NDArray[np.float64] = program.feed * np.sqrt(length_sq.sum(axis=1) / counted)
-    return np.where((program.kind == MoveKind.RAPID) | (counted == 0), program.feed, speed)
+    as_it_is = (program.kind == MoveKind.RAPID) | (program.kind == MoveKind.SPLINE) | (counted == 0)
+    return np.where(as_it_is, program.feed, speed)

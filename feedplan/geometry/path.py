@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from feedplan.curves.composite import CompositeCurve
+
+if TYPE_CHECKING:
+    from feedplan.geometry.build import FitSettings
 
 
 @dataclass(frozen=True)
@@ -68,6 +73,103 @@ class Path:
         dtypes = {"feed": float, "move": np.int64, "line": np.int32, "runs": np.int64, "dwell": float}
         for name, dtype in {**dtypes, "tolerance": float}.items():
             object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name), dtype=dtype))
+
+    @classmethod
+    def from_curve(
+        cls, curve: CompositeCurve, *, axes: Sequence[str] | None = None, feed: float = math.inf
+    ) -> Path:
+        """The path along a curve [mm, deg], its pieces and widths as they are.
+
+        `axes` names them, by default the first of XYZABC. `feed` [mm/s] is the greatest speed in all axes
+        together; by default there is none, and the axes' limits alone hold. Pieces without length are left
+        out, pieces are cut in cusps, and gaps up to 1e-6 mm are closed. Runs end at corners, which are stops,
+        and in cusps from which the motion goes on in another direction. The source line of all pieces is 0,
+        and piece i counts as move i. Raises InputError for gaps, and for axes or a feed that cannot be used.
+        """
+        # The constructors build paths, so they stand above this module.
+        from feedplan.geometry.construct import path_of_curve
+
+        return path_of_curve(curve, axes, feed)
+
+    @classmethod
+    def from_bezier(
+        cls,
+        control_points: ArrayLike,
+        weights: ArrayLike | None = None,
+        *,
+        axes: Sequence[str] | None = None,
+        feed: float = math.inf,
+    ) -> Path:
+        """The path along a Bézier curve; see `CompositeCurve.from_bezier` and `from_curve`.
+
+        Its width is the length of its control polygon."""
+        return cls._scaled(CompositeCurve.from_bezier(control_points, weights), axes, feed)
+
+    @classmethod
+    def from_bspline(
+        cls,
+        control_points: Any,
+        knots: ArrayLike | None = None,
+        degree: int | None = None,
+        *,
+        periodic: bool = False,
+        axes: Sequence[str] | None = None,
+        feed: float = math.inf,
+    ) -> Path:
+        """The path along a B-spline; see `CompositeCurve.from_bspline` and `from_curve`.
+
+        Its widths are as the knots', in all the length of its control polygon."""
+        curve = CompositeCurve.from_bspline(control_points, knots, degree, periodic=periodic)
+        return cls._scaled(curve, axes, feed)
+
+    @classmethod
+    def from_nurbs(
+        cls,
+        control_points: ArrayLike,
+        knots: ArrayLike,
+        degree: int,
+        weights: ArrayLike | None = None,
+        *,
+        periodic: bool = False,
+        axes: Sequence[str] | None = None,
+        feed: float = math.inf,
+    ) -> Path:
+        """The path along a NURBS curve; see `CompositeCurve.from_nurbs` and `from_curve`.
+
+        Its widths are as the knots', in all the length of its control polygon."""
+        curve = CompositeCurve.from_nurbs(control_points, knots, degree, weights, periodic=periodic)
+        return cls._scaled(curve, axes, feed)
+
+    @classmethod
+    def from_points(
+        cls,
+        points: ArrayLike,
+        tolerance: float,
+        *,
+        axes: Sequence[str] | None = None,
+        feed: float = math.inf,
+        settings: FitSettings | None = None,
+    ) -> Path:
+        """The path through `points` (n, axes) [mm, deg], as that of a program of G1 moves in G64.
+
+        It stays within `tolerance` [mm] of the polygon, both ways: chains are fitted by B-splines, corners
+        rounded as far as the tolerance allows; 0 means exact lines with stops. `move` counts the chords.
+        Raises InputError for points that are too few, repeated or not finite.
+        """
+        from feedplan.geometry.construct import path_of_points
+
+        return path_of_points(points, tolerance, axes, feed, settings)
+
+    @classmethod
+    def _scaled(cls, curve: CompositeCurve, axes: Sequence[str] | None, feed: float) -> Path:
+        """The path along a curve whose parameter becomes about the length, by one factor for all pieces."""
+        edges = np.linalg.norm(np.diff(curve.control_points, axis=0), axis=1)
+        edges[curve.offsets[1:-1] - 1] = 0.0
+        length = float(edges.sum())
+        factor = length / float(curve.width.sum())
+        return cls.from_curve(
+            curve.with_width(curve.width * factor) if length > 0 else curve, axes=axes, feed=feed
+        )
 
     def __len__(self) -> int:
         return len(self.curve)

@@ -48,7 +48,7 @@ class SetpointFigures:
         columns = 1 + 3 * len(self._axes)
         self._curves = Envelope(count, min(_TIME_POINTS_PER_CURVE, _TIME_POINTS // columns))
         self._linear = [self._axes.index(name) for name in "XYZ" if name in self._axes]
-        low = problem.path.curve.by_piece[..., self._linear].reshape(-1, len(self._linear))
+        low = problem.path.curve.control_points[:, self._linear]
         extent = float(np.linalg.norm(np.ptp(low, axis=0))) if low.size else 0.0
         tolerance = _PATH_TOLERANCE * extent if extent > 0 else 1.0
         cut = problem.feed[np.isfinite(problem.path.feed)]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
-from feedplan.geometry.path import Path
+from feedplan.curves.composite import CompositeCurve
 from feedplan.profile import ArcKind, SpeedProfile
 
 Floats = NDArray[np.float64]
@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 _SAMPLES = 400_000
 _SAMPLES_AT_ONCE = 100_000
 _SAMPLES_PER_ARC = 33
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
 @dataclass(frozen=True)
@@ -60,10 +60,10 @@ def limit_samples(problem: Problem, profile: SpeedProfile) -> Iterator[LimitSamp
         yield block
 
 
-def arc_lengths(path: Path, profile: SpeedProfile) -> Floats:
+def arc_lengths(problem: Problem, profile: SpeedProfile) -> Floats:
     """The length of each arc [mm], shape (arcs,)."""
     parts = [
-        _lengths(path, profile, np.arange(first, min(first + _SAMPLES_AT_ONCE, len(profile))))
+        _lengths(problem, profile, np.arange(first, min(first + _SAMPLES_AT_ONCE, len(profile))))
         for first in range(0, len(profile), _SAMPLES_AT_ONCE)
     ]
     return np.concatenate(parts) if parts else np.empty(0)
@@ -71,57 +71,48 @@ def arc_lengths(path: Path, profile: SpeedProfile) -> Floats:
 
 def least_times(problem: Problem, profile: SpeedProfile) -> Floats:
     """The time of each arc if only its feed and the axis velocities held [s], shape (arcs,)."""
-    path = problem.path
     piece = profile.piece.astype(np.int64)
-    first, second = _tangents(path, piece)
-    u0, u1 = profile.u0[:, None], profile.u1[:, None]
-    step = np.abs((u1 - u0) * (first + 0.5 * (u0 + u1) * second))
-    at_velocity = (step / problem.max_velocity).max(axis=1, initial=0.0)
-    return np.asarray(np.maximum(arc_lengths(path, profile) / problem.feed[piece], at_velocity))
+    (start,), (end,) = (problem.curve.evaluate(piece, u) for u in (profile.u0, profile.u1))
+    at_velocity = (np.abs(end - start) / problem.max_velocity).max(axis=1, initial=0.0)
+    return np.asarray(np.maximum(arc_lengths(problem, profile) / problem.feed[piece], at_velocity))
 
 
-def _lengths(path: Path, profile: SpeedProfile, arcs: NDArray[np.int64]) -> Floats:
-    u0, u1 = profile.u0[arcs], profile.u1[arcs]
-    return _integral(path, profile.piece[arcs].astype(np.int64), u0, u1)
+def _lengths(problem: Problem, profile: SpeedProfile, arcs: NDArray[np.int64]) -> Floats:
+    return _integral(problem, profile.piece[arcs].astype(np.int64), profile.u0[arcs], profile.u1[arcs])
 
 
-def _tangents(path: Path, piece: NDArray[np.int64]) -> tuple[Floats, Floats]:
-    """C' at the start of each piece and C'', shapes (n, axes)."""
-    control, width = path.curve.by_piece[piece], path.width[piece][:, None]
-    first = 2.0 * (control[:, 1] - control[:, 0]) / width
-    last = 2.0 * (control[:, 2] - control[:, 1]) / width
-    return first, (last - first) / width
-
-
-def _integral(path: Path, piece: NDArray[np.int64], u0: Floats, u1: Floats) -> Floats:
-    """Length between two parameters of a piece by Gauss–Legendre with four nodes."""
-    first, second = _tangents(path, piece)
+def _integral(problem: Problem, piece: NDArray[np.int64], u0: Floats, u1: Floats) -> Floats:
+    """Length between two parameters of a piece by Gauss–Legendre with eight nodes."""
+    curve = problem.tip_curve or problem.curve
     total = np.zeros(len(piece))
     for node, weight in zip(_NODES, _WEIGHTS, strict=True):
-        u = 0.5 * (u0 + u1) + 0.5 * node * (u1 - u0)
-        total += weight * np.linalg.norm(first + u[:, None] * second, axis=1)
+        u = np.minimum(u0 + 0.5 * (1.0 + node) * (u1 - u0), u1)
+        total += weight * np.linalg.norm(curve.evaluate(piece, u, 1)[1], axis=1)
     return np.asarray(0.5 * (u1 - u0) * total)
 
 
 def _sample(
     problem: Problem, profile: SpeedProfile, arcs: NDArray[np.int64], fraction: Floats, start: float
 ) -> LimitSamples:
-    path, count = problem.path, len(fraction)
+    count = len(fraction)
     u0, u1 = profile.u0[arcs], profile.u1[arcs]
     # The last sample is the end itself: u0 + 1·(u1 − u0) may miss it by a rounding.
-    u = (u0[:, None] * (1.0 - fraction) + u1[:, None] * fraction).ravel()
+    u = u0[:, None] * (1.0 - fraction) + u1[:, None] * fraction
+    u = np.clip(u, u0[:, None], u1[:, None]).ravel()
     arc = np.repeat(arcs, count)
     piece = profile.piece[arc].astype(np.int64)
-    first, second = _tangents(path, piece)
-    tangent = first + u[:, None] * second
-    rate = np.linalg.norm(tangent, axis=1)
+    place, tangent, second = problem.curve.evaluate(piece, u, 2)
+    tip = problem.tip_curve
+    rate = np.linalg.norm(tangent if tip is None else tip.evaluate(piece, u, 1)[1], axis=1)
     before = np.concatenate((u[:1], u[:-1]))
     before[::count] = u[::count]
-    length = start + np.cumsum(_integral(path, piece, before, u))
+    within = np.cumsum(_integral(problem, piece, before, u).reshape(-1, count), axis=1)
+    # Arc by arc, so that rounding does not add up over the samples.
+    length = (start + np.cumsum(within[:, -1]) - within[:, -1])[:, None] + within
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        p = _profile_at(profile, arc, u, tangent, first, second, rate)
+        p = _profile_at(problem.curve, profile, arc, u, place, tangent, rate)
         return LimitSamples(
-            length=length,
+            length=length.ravel(),
             speed=rate * np.sqrt(np.maximum(p, 0.0)),
             acceleration=rate * np.sqrt(limit_curve(tangent, second, problem.max_acceleration)),
             feed=problem.feed[piece],
@@ -132,12 +123,12 @@ def _sample(
 
 
 def _profile_at(
+    curve: CompositeCurve,
     profile: SpeedProfile,
     arc: NDArray[np.int64],
     u: Floats,
+    place: Floats,
     tangent: Floats,
-    first: Floats,
-    second: Floats,
     rate: Floats,
 ) -> Floats:
     """p at a parameter of an arc, from what is constant on it."""
@@ -145,12 +136,13 @@ def _profile_at(
     p0, p1, u0, u1 = profile.p0[arc], profile.p1[arc], profile.u0[arc], profile.u1[arc]
     row = np.arange(len(u))
     column = np.where(axis < tangent.shape[1], axis, 0)
-    q, bend = tangent[row, column], second[row, column]
-    # Both closed forms of an acceleration arc, from its start and from its end: the nearer end rounds less.
+    q = tangent[row, column]
+    # q'² p grows by 2·value·Δq from the start and from the end of the arc: the nearer end rounds less.
     near_start = u - u0 <= u1 - u
     at, known = np.where(near_start, u0, u1), np.where(near_start, p0, p1)
-    q_known = first[row, column] + at * bend
-    arc_p = known + (u - at) * (q + q_known) * (value - bend * known) / (q * q)
+    place_known, tangent_known = curve.evaluate(profile.piece[arc], at, 1)[:, row, column]
+    change = (q - tangent_known) * (q + tangent_known)
+    arc_p = known + (2.0 * value * (place[row, column] - place_known) - known * change) / (q * q)
     p = np.select(
         [kind == ArcKind.FLAT, kind == ArcKind.FEED, kind == ArcKind.AXIS_VELOCITY, kind == ArcKind.CHORD],
         [p0, value / (rate * rate), value / (q * q), value * rate],

@@ -78,7 +78,7 @@ def slowest_lines(problem: Problem, profile: SpeedProfile, count: int = 20) -> l
     path = problem.path
     piece = profile.piece.astype(np.int64)
     lines, row = np.unique(path.line[piece], return_inverse=True)
-    length = arc_lengths(path, profile)
+    length = arc_lengths(problem, profile)
     least = least_times(problem, profile)
     time = np.bincount(row, weights=profile.duration)
     wanted = np.bincount(row, weights=least)

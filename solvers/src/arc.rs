@@ -1,26 +1,17 @@
-//! Circular arcs, helices and spirals as tangent-continuous quadratic pieces within a tolerance.
+//! Arcs of a program as conic pieces: true circles, and spirals within a tolerance.
 //!
-//! The pieces are one uniform quadratic B-spline: with n pieces of half angle α, control point i stands at
-//! radius r/cos α in the middle of its piece, and pieces join half way between control points. On a circle
-//! those joints lie on it and the control polygon touches it there. Everything that is linear in the angle
-//! (the axis of a helix, further axes) stays exactly linear in the parameter.
-//!
-//! With b = sin²α/(2 cos α) and s from −1 to 1 along a piece, a unit circle becomes a curve of
-//! - radius √(1 + b²(1 − s²)²), never inside the circle and at most α⁴/8 outside, and
-//! - polar angle αs − (α³/6)(s − s³) + …, which matters on a helix: the axis runs ahead of the angle.
-//!
-//! Splitting the error to both sides of the circle would save a sixth of the pieces and cost the exact end
-//! points, so it is not done.
+//! | file | idea |
+//! |---|---|
+//! | `true_circle` | the circle through both ends; helices on its cylinder |
+//! | `spiral` | what is no circle: an arc whose radius changes with the angle |
 
-use crate::quadratic::{norm, sub, Quadratic};
+mod spiral;
+mod true_circle;
+
+use crate::conic::Conic;
+use crate::quadratic::{norm, sub};
 use std::f64::consts::{PI, TAU};
 
-/// Greatest half angle of a piece. The curvature of a piece runs from cos²α/r to 1/(r cos α), so even where
-/// the tolerance would allow a quarter circle a piece slows the tool by no more than 8 %.
-const MAX_HALF_ANGLE: f64 = PI / 8.0;
-/// The polar angle of a piece differs from the linear one by at most this times α³ (the supremum is 0.0704
-/// at MAX_HALF_ANGLE and 1/(9√3) in the limit).
-const ANGLE_ERROR: f64 = 0.0715;
 /// A programmed sweep is corrected to the end point that the program gives; more than this is no rounding.
 const SWEEP_SLACK: f64 = 0.1;
 
@@ -67,6 +58,14 @@ struct Polar {
     sweep: f64,
 }
 
+/// The sweep from one spoke to another. The ends decide, the programmed sweep only says how many turns there are.
+fn sweep_to(from: &[f64; 2], to: &[f64; 2], programmed: f64) -> Option<f64> {
+    let turn = (from[0] * to[1] - from[1] * to[0]).atan2(from[0] * to[0] + from[1] * to[1]);
+    let correction = (turn - programmed + PI).rem_euclid(TAU) - PI;
+    let sweep = programmed + correction;
+    (correction.abs() <= SWEEP_SLACK && sweep * programmed > 0.0).then_some(sweep)
+}
+
 impl Polar {
     fn new<const M: usize>(arc: &Arc<M>) -> Result<Self, ArcError> {
         let [x, y] = arc.plane;
@@ -77,13 +76,7 @@ impl Polar {
         if !(finite && radius > 0.0 && end_radius > 0.0 && end_radius.is_finite() && radius.is_finite()) {
             return Err(ArcError::Radius);
         }
-        // The end point decides, the programmed sweep only says how many turns there are.
-        let turn = (from[0] * to[1] - from[1] * to[0]).atan2(from[0] * to[0] + from[1] * to[1]);
-        let correction = (turn - arc.sweep + PI).rem_euclid(TAU) - PI;
-        let sweep = arc.sweep + correction;
-        if !(correction.abs() <= SWEEP_SLACK && sweep * arc.sweep > 0.0) {
-            return Err(ArcError::Sweep);
-        }
+        let sweep = sweep_to(&from, &to, arc.sweep).ok_or(ArcError::Sweep)?;
         let mut other = sub(&arc.end, &arc.start);
         other[x] = 0.0;
         other[y] = 0.0;
@@ -94,87 +87,18 @@ impl Polar {
         }
         Ok(Self { direction: [from[0] / radius, from[1] / radius], radius, growth, pitch, sweep })
     }
-
-    /// An upper bound of the distance between arc and pieces of half angle α, both ways: radial error and,
-    /// on a helix, the smaller of the ways to make up for the angle (at equal angle, or at equal height).
-    fn deviation(&self, alpha: f64) -> f64 {
-        let large = self.radius.max(self.radius + self.growth * self.sweep.abs());
-        let small = self.radius.min(self.radius + self.growth * self.sweep.abs());
-        let (sin, cos) = alpha.sin_cos();
-        let b = sin * sin / (2.0 * cos);
-        let circle = large * b * b / (1.0 + (1.0 + b * b).sqrt());
-        // A changing radius shears the piece: by less than 0.4 α³ of the growth across the arc, and by less
-        // than 1.5 α² of it along the arc, where the radius is then another.
-        let growth = self.growth.abs();
-        let along = 1.5 * growth * alpha * alpha / small;
-        let radial = circle + growth * (0.4 * alpha.powi(3) + along);
-        let angle = ANGLE_ERROR * alpha.powi(3) + along;
-        radial.hypot(angle * self.pitch.min(large))
-    }
-
-    /// The least number of pieces within `tolerance`.
-    fn count(&self, tolerance: f64) -> Result<usize, ArcError> {
-        let half = 0.5 * self.sweep.abs();
-        let fits = |count: f64| self.deviation(half / count) <= tolerance;
-        let mut enough = (half / MAX_HALF_ANGLE * (1.0 - 1e-12)).ceil().max(1.0);
-        let mut short = enough - 1.0;
-        while enough <= MAX_PIECES && !fits(enough) {
-            short = enough;
-            enough *= 2.0;
-        }
-        while enough - short > 1.0 && short < MAX_PIECES {
-            let middle = (0.5 * (short + enough)).floor();
-            if fits(middle) {
-                enough = middle;
-            } else {
-                short = middle;
-            }
-        }
-        if enough <= MAX_PIECES {
-            Ok(enough as usize)
-        } else {
-            Err(ArcError::Turns)
-        }
-    }
 }
 
-/// The arc as quadratic pieces of equal width, and an upper bound of its distance from them, both ways.
+/// The arc as pieces in standard form, and an upper bound of its distance from them, both ways.
 ///
-/// Start and end are met exactly. The bound is at most `tolerance` > 0.
-pub fn arc_pieces<const M: usize>(
-    arc: &Arc<M>,
-    tolerance: f64,
-) -> Result<(Vec<Quadratic<M>>, f64), ArcError> {
+/// Start and end are met exactly. The pieces lie on the circle through both ends whose centre is nearest the
+/// programmed one where that is within `tolerance` > 0, and are a spiral otherwise; the bound is at most `tolerance`.
+pub fn arc_pieces<const M: usize>(arc: &Arc<M>, tolerance: f64) -> Result<(Vec<Conic<M>>, f64), ArcError> {
     let polar = Polar::new(arc)?;
-    let n = polar.count(tolerance)?;
-    let alpha = polar.sweep.abs() / (2.0 * n as f64);
-    let Polar { radius, growth, sweep, direction: [e0, e1], .. } = polar;
-    let [x, y] = arc.plane;
-    let control = |i: usize| {
-        let share = (i as f64 + 0.5) / n as f64;
-        let (sin, cos) = (share * sweep).sin_cos();
-        let r = (radius + growth * share * sweep.abs()) / alpha.cos();
-        let mut point = std::array::from_fn(|k| arc.start[k] + share * (arc.end[k] - arc.start[k]));
-        point[x] = arc.centre[0] + r * (cos * e0 - sin * e1);
-        point[y] = arc.centre[1] + r * (sin * e0 + cos * e1);
-        point
-    };
-    let mean_radius = radius + 0.5 * growth * sweep.abs();
-    let width = 2.0 * alpha * mean_radius.hypot(polar.pitch);
-
-    let mut pieces = Vec::with_capacity(n);
-    let (mut joint, mut middle) = (arc.start, control(0));
-    for i in 1..=n {
-        let (next, end) = if i < n {
-            let next = control(i);
-            (next, std::array::from_fn(|k| 0.5 * (middle[k] + next[k])))
-        } else {
-            (middle, arc.end)
-        };
-        pieces.push(Quadratic { control: [joint, middle, end], width });
-        (joint, middle) = (end, next);
+    match true_circle::pieces(arc, &polar, tolerance) {
+        Some(circle) => Ok(circle),
+        None => spiral::pieces(arc, &polar, tolerance),
     }
-    Ok((pieces, polar.deviation(alpha)))
 }
 
 /// Least and greatest value of axis `k` of the plane (0 or 1) on the arc itself (where the radius changes,
@@ -207,6 +131,16 @@ pub fn arc_extent<const M: usize>(arc: &Arc<M>, k: usize) -> Result<(f64, f64), 
 mod tests {
     use super::*;
     use crate::quadratic::dot;
+    use crate::spline::bezier::derivatives;
+    use crate::spline::Piece;
+
+    /// C and C' at a share of the width.
+    fn at<const M: usize>(conic: &Conic<M>, share: f64) -> [[f64; M]; 2] {
+        let weights = [1.0, conic.weight, 1.0];
+        let piece = Piece { control: &conic.control, weights: &weights, width: conic.width };
+        let [point, tangent, ..] = derivatives(&piece, share * conic.width);
+        [point, tangent]
+    }
 
     fn planar(radius: f64, sweep: f64) -> Arc<3> {
         let (sin, cos) = sweep.sin_cos();
@@ -233,16 +167,16 @@ mod tests {
     }
 
     /// Greatest distance between arc and pieces found on a dense grid, both ways.
-    fn sampled_deviation<const M: usize>(arc: &Arc<M>, pieces: &[Quadratic<M>]) -> f64 {
+    fn sampled_deviation<const M: usize>(arc: &Arc<M>, pieces: &[Conic<M>]) -> f64 {
         let curve = |x: f64| {
             let x = x * pieces.len() as f64;
             let i = (x as usize).min(pieces.len() - 1);
-            pieces[i].point((x - i as f64) * pieces[i].width)
+            at(&pieces[i], x - i as f64)[0]
         };
         let nearest = |point: &[f64; M], other: &dyn Fn(f64) -> [f64; M], near: f64, reach: f64| {
             let distance = |x: f64| norm(&sub(&other(x), point));
             let (mut low, mut high) = ((near - reach).max(0.0), (near + reach).min(1.0));
-            for _ in 0..60 {
+            for _ in 0..80 {
                 let (a, b) = (low + (high - low) * 0.382, low + (high - low) * 0.618);
                 if distance(a) < distance(b) {
                     high = b;
@@ -263,37 +197,101 @@ mod tests {
             .fold(0.0, f64::max)
     }
 
-    fn assert_smooth<const M: usize>(pieces: &[Quadratic<M>], slack: f64) {
+    fn assert_smooth<const M: usize>(pieces: &[Conic<M>], slack: f64) {
         for pair in pieces.windows(2) {
             assert_eq!(pair[0].control[2], pair[1].control[0]);
-            let (out, into) = (pair[0].end_tangents().1, pair[1].end_tangents().0);
+            let (out, into) = (at(&pair[0], 1.0)[1], at(&pair[1], 0.0)[1]);
             assert!(norm(&sub(&out, &into)) < slack, "{out:?} {into:?}");
         }
     }
 
     #[test]
-    fn a_quarter_circle_has_the_tangent_intersections_as_control_points() {
-        let (pieces, deviation) = arc_pieces(&planar(1.0, 0.5 * PI), 1.0).unwrap();
-        assert_eq!(pieces.len(), 2);
-        let t = (PI / 8.0).tan();
-        assert!(norm(&sub(&pieces[0].control[1], &[1.0, t, 0.0])) < 1e-15);
-        assert!(norm(&sub(&pieces[1].control[1], &[t, 1.0, 0.0])) < 1e-15);
-        let apex = norm(&pieces[0].point(0.5 * pieces[0].width)) - 1.0;
-        assert!((apex - deviation).abs() < 1e-15, "the bound is met half way: {apex} {deviation}");
+    fn a_quarter_circle_is_one_piece_with_the_corner_of_its_square() {
+        let (pieces, deviation) = arc_pieces(&planar(2.0, 0.5 * PI), 1e-9).unwrap();
+        assert_eq!((pieces.len(), deviation), (1, 0.0));
+        assert!(norm(&sub(&pieces[0].control[1], &[2.0, 2.0, 0.0])) < 1e-15);
+        assert!((pieces[0].weight - 0.5f64.sqrt()).abs() < 1e-15);
+        assert!((pieces[0].width - 8f64.sqrt()).abs() < 1e-15);
     }
 
     #[test]
-    fn the_bound_is_the_quartic_and_holds_for_every_tolerance() {
-        let arc = planar(25.0, 1.9 * PI);
-        for exponent in 0..10 {
-            let tolerance = 10.0 * 0.1f64.powi(exponent);
-            let (pieces, deviation) = arc_pieces(&arc, tolerance).unwrap();
-            let found = sampled_deviation(&arc, &pieces);
-            assert!(found <= deviation + 1e-13 && deviation <= tolerance, "{found} {deviation} {tolerance}");
-            assert!(found >= 0.99 * deviation - 1e-13, "{found} of {deviation}");
-            let alpha = 1.9 * PI / (2.0 * pieces.len() as f64);
-            assert!((deviation / (25.0 * alpha.powi(4) / 8.0) - 1.0).abs() < alpha * alpha);
+    fn circles_are_true_whatever_the_tolerance_and_run_at_speed_1_through_their_joints() {
+        for (radius, sweep) in [(25.0, 1.9 * PI), (1e-3, -TAU), (1e4, 0.01), (3.0, 5.0 * TAU), (1.0, 1e-5)] {
+            let (pieces, deviation) = arc_pieces(&planar(radius, sweep), 1e-6).unwrap();
+            assert_eq!(pieces.len() as f64, (sweep.abs() / (0.5 * PI) * (1.0 - 1e-12)).ceil());
+            assert!(deviation <= 1e-15 * radius);
+            for piece in &pieces {
+                for i in 0..=16 {
+                    let [point, _] = at(piece, i as f64 / 16.0);
+                    assert!((point[0].hypot(point[1]) / radius - 1.0).abs() < 1e-14);
+                }
+                for share in [0.0, 1.0] {
+                    assert!((norm(&at(piece, share)[1]) - 1.0).abs() < 1e-12);
+                }
+            }
+            assert_smooth(&pieces, 1e-12);
         }
+    }
+
+    /// The arc with an end that is off by rounding to a grid, and a sweep as a reader finds it.
+    fn rounded(radius: f64, from: f64, sweep: f64, grid: f64) -> Arc<3> {
+        let round = |value: f64| (value / grid).round() * grid;
+        let at = |angle: f64| [round(radius * angle.cos()), round(radius * angle.sin()), 0.0];
+        let (start, end) = (at(from), at(from + sweep));
+        let between = end[1].atan2(end[0]) - start[1].atan2(start[0]);
+        let sweep = between + TAU * ((sweep - between) / TAU).round();
+        Arc { start, end, centre: [0.0, 0.0], plane: [0, 1], sweep }
+    }
+
+    #[test]
+    fn rounded_ends_give_a_circle_through_both_and_its_bound_is_met() {
+        let mut state = 11u64;
+        let mut random = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 40) as f64 / (1u64 << 24) as f64
+        };
+        let mut greatest = 0.0f64;
+        for _ in 0..300 {
+            let sign = if random() < 0.5 { -1.0 } else { 1.0 };
+            let sweep = sign * (0.2 + 5.0 * random());
+            let arc = rounded(2.0 + 30.0 * random(), TAU * random(), sweep, 1e-3);
+            let (pieces, deviation) = arc_pieces(&arc, 0.05).unwrap();
+            let found = sampled_deviation(&arc, &pieces);
+            assert!(found <= deviation + 1e-12, "{found} {deviation} {arc:?}");
+            assert!(deviation < 1e-6 || found >= 0.9 * deviation, "{found} of {deviation} {arc:?}");
+            greatest = greatest.max(deviation);
+            assert_eq!(pieces[pieces.len() - 1].control[2], arc.end);
+            assert_smooth(&pieces, 1e-10);
+            // The centre by Pythagoras from three points: the pieces share one circle.
+            let middle = at(&pieces[0], 0.5)[0];
+            let (a, b) = (sub(&middle, &arc.start), sub(&pieces[0].control[2], &arc.start));
+            let twice = 2.0 * (a[0] * b[1] - a[1] * b[0]);
+            let centre = [
+                arc.start[0] + (b[1] * dot(&a, &a) - a[1] * dot(&b, &b)) / twice,
+                arc.start[1] + (a[0] * dot(&b, &b) - b[0] * dot(&a, &a)) / twice,
+            ];
+            let radius = (arc.start[0] - centre[0]).hypot(arc.start[1] - centre[1]);
+            for piece in &pieces {
+                let [point, _] = at(piece, 0.3);
+                let off = (point[0] - centre[0]).hypot(point[1] - centre[1]) - radius;
+                assert!(off.abs() < 1e-11 * radius, "{off}");
+            }
+        }
+        assert!(greatest > 2e-4, "{greatest}");
+    }
+
+    #[test]
+    fn a_spiral_is_no_circle() {
+        let mut arc = planar(10.0, 0.5 * PI);
+        arc.end[1] += 0.5;
+        let (pieces, deviation) = arc_pieces(&arc, 1e-3).unwrap();
+        assert!(pieces.iter().all(|piece| piece.weight == 1.0) && deviation <= 1e-3);
+        assert!(sampled_deviation(&arc, &pieces) <= deviation);
+        assert_smooth(&pieces, 1e-12);
+        // A full turn whose end is a rounding beside its start stays a circle.
+        let mut turn = planar(10.0, TAU);
+        turn.end = [10.0 + 2e-15, 1e-15, 0.0];
+        assert_eq!(arc_pieces(&turn, 1e-3).unwrap().0.len(), 4);
     }
 
     #[test]
@@ -320,7 +318,7 @@ mod tests {
                         assert_eq!(pieces[0].control[0], arc.start);
                         assert_eq!(pieces[pieces.len() - 1].control[2], arc.end);
                         let found = sampled_deviation(&arc, &pieces);
-                        let rounding = 1e-15 * radius.max(1.0);
+                        let rounding = 1e-15 * radius.max(1.0) * sweep.abs().max(1.0);
                         assert!(found <= deviation + 8.0 * rounding, "{found} {deviation} {arc:?}");
                         assert!(deviation <= tolerance);
                         let edge = norm(&sub(&pieces[0].control[1], &pieces[0].control[0]));
@@ -340,20 +338,24 @@ mod tests {
             plane: [0, 1],
             sweep: 6.5 * PI,
         };
-        let (pieces, _) = arc_pieces(&arc, 1e-3).unwrap();
-        let speed = 1.0 / (pieces.len() as f64 * pieces[0].width);
-        for piece in &pieces {
-            for tangent in [piece.end_tangents().0, piece.end_tangents().1] {
-                assert!(
-                    (tangent[2] + 3.25 * speed).abs() < 1e-12 && (tangent[3] - 130.0 * speed).abs() < 1e-10
-                );
+        let (pieces, deviation) = arc_pieces(&arc, 1e-3).unwrap();
+        assert!(deviation <= 1e-3);
+        for (i, piece) in pieces.iter().enumerate() {
+            for j in 0..=8 {
+                let [point, tangent] = at(piece, j as f64 / 8.0);
+                assert!((point[0].hypot(point[1]) - 2.0).abs() < 1e-14);
+                assert!(tangent[2] < 0.0 && tangent[3] > 0.0);
+                // Both other axes go together, and with the angle but for the bound.
+                let share = (point[3] - 10.0) / 130.0;
+                assert!((point[2] + 3.25 * share).abs() < 1e-14);
+                let angle = 6.5 * PI * share;
+                let off = (angle.sin() * point[0] - angle.cos() * point[1]).hypot(0.0);
+                assert!(off <= deviation + 1e-13, "{i} {off} {deviation}");
+            }
+            for share in [0.0, 1.0] {
+                assert!((norm(&at(piece, share)[1]) - 1.0).abs() < 1e-12);
             }
         }
-        let length: f64 = pieces.iter().map(|piece| piece.width).sum();
-        let exact = (2.0 * 6.5 * PI).hypot((3.25f64 * 3.25 + 130.0 * 130.0).sqrt());
-        assert!((length / exact - 1.0).abs() < 1e-12);
-        let (first, _) = pieces[0].end_tangents();
-        assert!((dot(&first, &first) - 1.0).abs() < 1e-2);
     }
 
     #[test]

@@ -1,21 +1,28 @@
-//! The moves of a program as pieces, corners still sharp: lines, arcs and fitted chains of lines.
+//! The moves of a program as pieces, corners still sharp: lines, arcs, splines and fitted chains of lines.
 //!
 //! A chain is a maximal sequence of feed moves along lines that may be fitted together: one tolerance, no
 //! halt in between. A change of feed inside a chain leaves the curve whole; `feed_cuts` cuts its pieces.
 
 mod feed_cuts;
+mod shape;
+
+use std::ops::Range;
 
 use rayon::prelude::*;
 
 use crate::arc::{arc_extent, arc_pieces, Arc, ArcError};
+use crate::conic::Conic;
 use crate::fit::{fit_points, FitOptions};
-use crate::quadratic::{norm, sub, Quadratic};
+use crate::quadratic::{norm, sub};
+use crate::spline::CompositeCurve;
 use feed_cuts::cut_at_feeds;
+pub use shape::{Shape, Spline};
 
 /// What a move is, in the numbers of the Python `MoveKind`.
 pub const RAPID: u8 = 0;
 pub const LINE: u8 = 1;
 pub const ARC: u8 = 2;
+pub const SPLINE: u8 = 3;
 
 /// Moves in plain sequence that one task takes at most.
 const TASK: usize = 4096;
@@ -34,6 +41,11 @@ pub struct Moves<'a, const M: usize> {
     pub halt: &'a [bool],
     /// Arcs with the index of their move, ascending; start and end are taken from the moves.
     pub arcs: &'a [(usize, ArcShape)],
+    /// Spline moves, ascending, with the pieces of `splines` that they take, from the start to the target.
+    pub spline_moves: &'a [(usize, Range<usize>)],
+    pub splines: &'a CompositeCurve<M>,
+    /// The coordinates are positions of joints, which have a travel.
+    pub joints: &'a [bool],
 }
 
 /// The arc of an arc move: plane, centre and sweep as in `arc::Arc`.
@@ -47,7 +59,7 @@ pub struct ArcShape {
 /// How moves become pieces.
 #[derive(Clone, Copy, Debug)]
 pub struct FollowOptions {
-    /// Distance from arcs that are to be followed exactly, in mm.
+    /// Distance from arcs that no circle meets and from helices, in mm.
     pub exact_tolerance: f64,
     /// Chords longer than this stay lines, in mm.
     pub max_chord: f64,
@@ -62,7 +74,7 @@ pub struct FollowOptions {
 /// A piece and the moves it follows.
 #[derive(Clone, Copy, Debug)]
 pub struct Followed<const M: usize> {
-    pub piece: Quadratic<M>,
+    pub piece: Shape<M>,
     /// First and last move.
     pub first: u32,
     pub last: u32,
@@ -92,6 +104,8 @@ pub enum Fault {
     /// The feed is not positive.
     Feed,
     Arc(ArcError),
+    /// There is no spline for the move.
+    Spline,
 }
 
 /// The pieces of a program and what was fitted.
@@ -158,7 +172,8 @@ impl<const M: usize> Moves<'_, M> {
 
     fn check(&self, i: usize) -> Result<(), FollowError> {
         let length = norm(&sub(&self.target[i], &self.origin(i)));
-        if self.kind[i] != ARC && !(length > 0.0 && length.is_finite()) {
+        let open = self.kind[i] != ARC && self.kind[i] != SPLINE;
+        if open && !(length > 0.0 && length.is_finite()) {
             return Err(FollowError { index: i, fault: Fault::Length });
         }
         // A NaN must not pass, so the comparison asks for what is right.
@@ -183,6 +198,27 @@ impl<const M: usize> Moves<'_, M> {
             }),
             _ => Err(FollowError { index: i, fault: Fault::Arc(ArcError::Sweep) }),
         }
+    }
+
+    /// The pieces of spline move `i` that have a length, with widths that together are about the length.
+    fn spline(&self, i: usize) -> Result<impl Iterator<Item = Spline<M>> + '_, FollowError> {
+        let row = self.spline_moves.partition_point(|(index, _)| *index < i);
+        let range = match self.spline_moves.get(row) {
+            Some((index, range)) if *index == i => range.clone(),
+            _ => return Err(FollowError { index: i, fault: Fault::Spline }),
+        };
+        let sum = |length: f64, width: f64, piece: usize| {
+            let piece = self.splines.piece(piece);
+            let polygon = piece.control.windows(2).map(|pair| norm(&sub(&pair[1], &pair[0]))).sum::<f64>();
+            (length + polygon, width + piece.width)
+        };
+        let (length, width) = range.clone().fold((0.0, 0.0), |(a, b), piece| sum(a, b, piece));
+        if !(length > 0.0 && length.is_finite()) {
+            return Err(FollowError { index: i, fault: Fault::Length });
+        }
+        // One factor for all keeps the derivatives continuous.
+        let scale = length / width;
+        Ok(range.filter_map(move |piece| Spline::new(self.splines, piece, scale)))
     }
 
     /// Least and greatest value of axis `k` on the arc of move `i`.
@@ -230,10 +266,14 @@ fn plain<const M: usize>(
         let exact = moves.tolerance[i] <= 0.0;
         let tolerance = if exact { options.exact_tolerance } else { moves.tolerance[i] };
         let feed = if moves.kind[i] == RAPID { f64::INFINITY } else { moves.feed[i] };
-        let piece = Quadratic::line(moves.origin(i), moves.target[i]);
+        let piece = Shape::Conic(Conic::line(moves.origin(i), moves.target[i]));
         let index = i as u32;
         let line =
             Followed { piece, first: index, last: index, feed, deviation: 0.0, tolerance, exact, arc: false };
+        if moves.kind[i] == SPLINE {
+            pieces.extend(moves.spline(i)?.map(|spline| Followed { piece: Shape::Spline(spline), ..line }));
+            continue;
+        }
         if moves.kind[i] != ARC {
             pieces.push(line);
             continue;
@@ -242,7 +282,12 @@ fn plain<const M: usize>(
         let budget = 0.5 * tolerance.min(options.exact_tolerance);
         let (arc, deviation) = arc_pieces(&moves.arc(i)?, budget)
             .map_err(|error| FollowError { index: i, fault: Fault::Arc(error) })?;
-        pieces.extend(arc.into_iter().map(|piece| Followed { piece, deviation, arc: true, ..line }));
+        pieces.extend(arc.into_iter().map(|piece| Followed {
+            piece: Shape::Conic(piece),
+            deviation,
+            arc: true,
+            ..line
+        }));
     }
     Ok(FollowedProgram { pieces, points: 0, splines: 0, polynomials: 0 })
 }
@@ -274,7 +319,7 @@ fn chain<const M: usize>(
     for fit in &fitted {
         cut_at_feeds(fit, &points, &moves.feed[first..end], |piece, chords, feed| {
             pieces.push(Followed {
-                piece,
+                piece: Shape::Conic(piece.into()),
                 first: (first + chords.0) as u32,
                 last: (first + chords.1) as u32,
                 feed,
@@ -327,6 +372,9 @@ mod tests {
             fit_tolerance,
             halt,
             arcs: &[],
+            spline_moves: &[],
+            splines: &CompositeCurve::default(),
+            joints: &vec![true; target.len()],
         };
         follow(&moves, &OPTIONS).unwrap()
     }
@@ -343,11 +391,12 @@ mod tests {
         let fast = cut.iter().position(|piece| piece.feed == 20.0).unwrap();
         assert!(cut[..fast].iter().all(|piece| piece.feed == 10.0 && piece.last <= 37));
         assert!(cut[fast..].iter().all(|piece| piece.feed == 20.0 && piece.first >= 37));
-        assert!(norm(&sub(&cut[fast].piece.control[0], &target[36])) < 0.005);
+        assert!(norm(&sub(cut[fast].piece.start(), &target[36])) < 0.005);
         // Both halves lie on the one curve, with one tangent.
-        let (out, into) = (cut[fast - 1].piece.end_tangents().1, cut[fast].piece.end_tangents().0);
+        let unit = |edge: [f64; 2]| edge.map(|value| value / norm(&edge));
+        let (out, into) = (unit(cut[fast - 1].piece.end_edge()), unit(cut[fast].piece.start_edge()));
         assert!(norm(&sub(&out, &into)) < 1e-12);
-        assert_eq!(cut[fast - 1].piece.control[2], cut[fast].piece.control[0]);
+        assert_eq!(cut[fast - 1].piece.conic().unwrap().control[2], *cut[fast].piece.start());
     }
 
     #[test]
@@ -393,6 +442,9 @@ mod tests {
             fit_tolerance: &[0.0; 5],
             halt: &[false; 5],
             arcs: &[],
+            spline_moves: &[],
+            splines: &CompositeCurve::default(),
+            joints: &[true; 5],
         };
         let error = |moves: &Moves<2>| follow(moves, &OPTIONS).err().unwrap();
         assert_eq!(error(&moves), FollowError { index: 3, fault: Fault::Length });

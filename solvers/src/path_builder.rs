@@ -1,5 +1,7 @@
 //! A program becomes a path: pieces from `follow`, corners from `corner`, runs between full stops.
 //!
+//! Splines are followed as they are: a joint of theirs that is not smooth is never rounded.
+//!
 //! Joints at which the pieces do not meet smoothly divide the path into stretches. A joint is a stop where the
 //! program halts, a rounded corner where the tolerance allows one, and otherwise a corner that is passed with a
 //! velocity jump (if the machine allows one) or at rest. Rounding starts in the stretches on both sides and
@@ -78,9 +80,11 @@ pub fn build_path<const M: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::conic::Conic;
     use crate::corner::Jump;
-    use crate::follow::LINE;
+    use crate::follow::{LINE, SPLINE};
     use crate::quadratic::{norm, sub};
+    use crate::spline::CompositeCurve;
     use proptest::prelude::*;
 
     const OPTIONS: FollowOptions = FollowOptions {
@@ -118,9 +122,16 @@ mod tests {
             fit_tolerance: &fit,
             halt: &vec![false; count],
             arcs: &[],
+            spline_moves: &[],
+            splines: &CompositeCurve::default(),
+            joints: &vec![true; count],
         };
         let path = build_path(&moves, &OPTIONS, &axes(jump)).unwrap();
         (path.parts.concat(), path.runs)
+    }
+
+    fn conic<const M: usize>(followed: &Followed<M>) -> &Conic<M> {
+        followed.piece.conic().unwrap()
     }
 
     #[test]
@@ -129,8 +140,8 @@ mod tests {
         let (pieces, runs) = polyline(&square, &[0.01; 4], false, false);
         let edge = 10.0 - 0.02 * 2f64.sqrt();
         assert_eq!((pieces.len(), &runs[..]), (7, &[0, 7][..]));
-        assert!(norm(&sub(&pieces[0].piece.control[2], &[edge, 0.0])) < 1e-12);
-        assert_eq!(pieces[1].piece.control[1], [10.0, 0.0]);
+        assert!(norm(&sub(&conic(&pieces[0]).control[2], &[edge, 0.0])) < 1e-12);
+        assert_eq!(conic(&pieces[1]).control[1], [10.0, 0.0]);
         assert_eq!((pieces[1].first, pieces[1].last), (0, 1));
         let (exact, stops) = polyline(&square, &[0.0; 4], false, false);
         assert_eq!((exact.len(), &stops[..]), (4, &[0, 1, 2, 3, 4][..]));
@@ -146,7 +157,7 @@ mod tests {
         // 39 corners; of the first and the last edge half is left.
         assert_eq!((pieces.len(), runs.len()), (41, 2));
         for pair in pieces.windows(2) {
-            assert_eq!(pair[0].piece.control[2], pair[1].piece.control[0]);
+            assert_eq!(conic(&pair[0]).control[2], conic(&pair[1]).control[0]);
             assert!(Jump::new(&pair[0].piece, &pair[1].piece).unwrap().size < 1e-9);
         }
     }
@@ -159,6 +170,46 @@ mod tests {
             assert_eq!((pieces.len(), &runs[..]), (3, &[0, 3][..]), "{turn} {tolerance}");
             assert!(pieces[1].deviation <= tolerance * (1.0 + 1e-9));
         }
+    }
+
+    #[test]
+    fn a_spline_passes_smoothly_between_lines_and_stops_in_its_corners() {
+        // A tangent cubic, a piece of no length, and a line of degree 1 at a right angle; then a corner to a line.
+        let mut splines = CompositeCurve::default();
+        splines.push(&[[10.0, 0.0], [11.0, 0.0], [12.0, 0.0], [12.0, 2.0]], &[1.0, 2.0, 1.0, 1.0], 1.0);
+        splines.push(&[[12.0, 2.0], [12.0, 2.0]], &[], 1.0);
+        splines.push(&[[12.0, 2.0], [14.0, 2.0]], &[], 1.0);
+        let moves = Moves {
+            start: [0.0, 0.0],
+            kind: &[LINE, SPLINE, LINE],
+            target: &[[10.0, 0.0], [14.0, 2.0], [14.0, 10.0]],
+            feed: &[10.0; 3],
+            tolerance: &[0.1; 3],
+            fit_tolerance: &[0.0; 3],
+            halt: &[false; 3],
+            arcs: &[],
+            spline_moves: &[(1, 0..3)],
+            splines: &splines,
+            joints: &[true; 3],
+        };
+        let mut limits = axes(false);
+        let path = build_path(&moves, &OPTIONS, &limits).unwrap();
+        let pieces = path.parts.concat();
+        assert_eq!((pieces.len(), &path.runs[..]), (4, &[0, 2, 3, 4][..]));
+        let widths: Vec<f64> = pieces.iter().map(|piece| piece.piece.width()).collect();
+        assert_eq!(widths[0], 10.0);
+        assert!(widths[1] == widths[2] && pieces[1].piece.conic().is_none());
+        assert!(path.outside.is_none() && path.deviation == 0.0);
+        // The polygon reaches 12, the curve less than that before its end.
+        limits.travel[0] = [f64::NEG_INFINITY, 13.0];
+        let outside = build_path(&moves, &OPTIONS, &limits).unwrap().outside.unwrap();
+        assert_eq!((outside.index, outside.axis, outside.position), (1, 0, 14.0));
+        let elsewhere = Moves { joints: &[true, false, false], ..moves };
+        assert!(build_path(&elsewhere, &OPTIONS, &limits).unwrap().outside.is_none());
+        let none = Moves { spline_moves: &[], ..elsewhere };
+        assert!(build_path(&none, &OPTIONS, &limits).is_err());
+        let limits = axes(true);
+        assert_eq!(build_path(&elsewhere, &OPTIONS, &limits).unwrap().runs, [0, 4]);
     }
 
     proptest! {
@@ -178,11 +229,11 @@ mod tests {
             let count = points.len() - 1;
             let limits: Vec<f64> = (0..count).map(|i| if i < exact_from { tolerance } else { 0.0 }).collect();
             let (pieces, runs) = polyline(&points, &limits, fit, false);
-            prop_assert_eq!(pieces[0].piece.control[0], points[0]);
-            prop_assert_eq!(pieces[pieces.len() - 1].piece.control[2], points[count]);
+            prop_assert_eq!(conic(&pieces[0]).control[0], points[0]);
+            prop_assert_eq!(conic(&pieces[pieces.len() - 1]).control[2], points[count]);
             prop_assert!(pieces[0].first == 0 && pieces[pieces.len() - 1].last as usize == count - 1);
             for (i, pair) in pieces.windows(2).enumerate() {
-                prop_assert_eq!(pair[0].piece.control[2], pair[1].piece.control[0]);
+                prop_assert_eq!(conic(&pair[0]).control[2], conic(&pair[1]).control[0]);
                 prop_assert!(pair[1].first >= pair[0].first && pair[1].first <= pair[0].last + 1);
                 prop_assert!(pair[1].last >= pair[0].last);
                 if runs.binary_search(&(i + 1)).is_err() {
@@ -193,7 +244,7 @@ mod tests {
             for piece in &pieces {
                 prop_assert!(piece.deviation <= piece.tolerance * (1.0 + 1e-9));
                 prop_assert!(!piece.exact || piece.deviation == 0.0);
-                prop_assert!(piece.piece.width > 0.0);
+                prop_assert!(piece.piece.width() > 0.0);
             }
         }
     }

@@ -61,10 +61,21 @@ def _make_program(
     )
 
 
-def _curve(control: Array, t: Array) -> Array:
-    """Points (n, axes) of quadratics (n, 3, axes), one t each."""
-    s = t[:, None]
-    return (1 - s) ** 2 * control[:, 0] + 2 * s * (1 - s) * control[:, 1] + s**2 * control[:, 2]
+def _curve(control: Array, weight: Array, t: Array) -> Array:
+    """Points (n, axes) of quadratics (n, 3, axes) with middle weights (n,), one t each."""
+    s, w = t[:, None], weight[:, None]
+    b0, b1, b2 = (1 - s) ** 2, 2 * w * s * (1 - s), s**2
+    found: Array = (b0 * control[:, 0] + b1 * control[:, 1] + b2 * control[:, 2]) / (b0 + b1 + b2)
+    return found
+
+
+def _weights(path: Path) -> Array:
+    """(n,) middle weights of the path's conics, which are in standard form."""
+    if path.curve.weights is None:
+        return np.ones(len(path))
+    weights = path.curve.weights.reshape(-1, 3)
+    np.testing.assert_array_equal(weights[:, [0, 2]], 1.0)
+    return weights[:, 1]
 
 
 class _Moves:
@@ -139,7 +150,8 @@ def _deviations(program: Program, path: Path) -> tuple[Array, Array]:
         own_piece, own_move = piece[rows], move[rows]
         for turns in np.unique(moves.turns[move]):
             chosen = moves.turns[own_move] == turns
-            on_piece = partial(_curve, path.curve.by_piece[own_piece[chosen]])
+            of_chosen = own_piece[chosen]
+            on_piece = partial(_curve, path.curve.by_piece[of_chosen], _weights(path)[of_chosen])
             on_move = partial(moves.points, own_move[chosen])
             if owner is piece:
                 nearest[chosen] = _nearest(on_piece(share[chosen]), on_move, 2 + int(100 * turns))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feedplan.geometry.build import FitSettings, build_path
+from feedplan.geometry.build import build_path
 from feedplan.machine.machine import Machine
 from feedplan.program.program import PathControl
 
@@ -72,17 +72,23 @@ def test_a_neighbour_that_needs_little_leaves_the_rest(make_program: Any, check:
 
 
 def test_a_corner_reaches_over_short_pieces(make_program: Any, check: Any) -> None:
-    # An arc in many pieces runs into a line at a right angle.
+    # Arcs of 0.005 rad, one smooth curve, run into a line at a right angle.
+    turn = np.linspace(0, 1, 201)
     end = [10 * math.sin(1), 10 - 10 * math.cos(1)]
-    points = [[0, 0], end, [end[0] - 10 * math.sin(1), end[1] + 10 * math.cos(1)]]
-    program = make_program(points, arcs={0: ((0.0, 10.0, 0.0), 2, 1.0)}, blend_tolerance=0.1)
-    path = build_path(program, MILL, settings=FitSettings(exact_tolerance=1e-8))
+    arc = 10 * np.stack([np.sin(turn), 1 - np.cos(turn)], axis=1)
+    points = [*arc, [end[0] - 10 * math.sin(1), end[1] + 10 * math.cos(1)]]
+    arcs = dict.fromkeys(range(200), ((0.0, 10.0, 0.0), 2, 0.005))
+    program = make_program(points, arcs=arcs, blend_tolerance=0.1)
+    path = build_path(program, MILL)
     _, off = check(program, path)
     assert off == pytest.approx(0.1, rel=1e-3)
     np.testing.assert_array_equal(path.runs, [0, len(path)])
-    start = 10 * np.stack([np.sin(np.linspace(0, 1, 100)), 1 - np.cos(np.linspace(0, 1, 100))], axis=1)
-    distance = [np.linalg.norm(start - joint[:2], axis=1).min() for joint in path.curve.by_piece[:-1, 2]]
-    assert (np.array(distance) > 0.02).sum() >= 3
+    # Bent circles stay conics, off their circle by more and more.
+    (joints,) = path.curve.evaluate(np.arange(200), path.width[:200])
+    distance = np.abs(np.linalg.norm(joints[:, :2] - [0, 10], axis=1) - 10)
+    assert (distance > 0.02).sum() >= 2
+    assert (distance < 1e-13).sum() >= 150
+    assert path.curve.weights is not None
 
 
 def test_reversals_are_stops(make_program: Any, check: Any) -> None:

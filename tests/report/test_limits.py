@@ -60,7 +60,7 @@ def test_the_square_rises_to_its_feed_and_stops_at_its_corners(square: Any) -> N
 
 
 def test_arcs_are_as_long_as_they_are(square: Any) -> None:
-    assert arc_lengths(square.path, square.profile) == pytest.approx([2.5, 15.0, 2.5] * 4)
+    assert arc_lengths(square.problem, square.profile) == pytest.approx([2.5, 15.0, 2.5] * 4)
 
 
 def bend(

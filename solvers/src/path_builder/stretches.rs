@@ -4,8 +4,8 @@
 use rayon::prelude::*;
 
 use super::Axes;
-use crate::corner::{cut, Jump, Sides};
-use crate::follow::Followed;
+use crate::corner::{Jump, Sides};
+use crate::follow::{Followed, Shape};
 
 /// Exact paths are smoothed only where an arc meets its neighbour with a turn below this (rad): that is what
 /// rounded coordinates leave of a tangent joint.
@@ -65,7 +65,7 @@ impl<'a, const M: usize> Stretches<'a, M> {
             let mut sum = 0.0;
             for followed in &pieces[pair[0].at..pair[1].at] {
                 station.push(sum);
-                sum += followed.piece.width;
+                sum += followed.piece.width();
             }
             length.push(sum);
         }
@@ -147,11 +147,20 @@ impl<'a, const M: usize> Stretches<'a, M> {
             if start >= to {
                 break;
             }
-            let piece = &self.pieces[i].piece;
+            let conic = match &self.pieces[i].piece {
+                Shape::Conic(conic) => conic,
+                // No corner cuts a spline: only rounding can bring a cut beside its end.
+                Shape::Spline(_) => {
+                    if 0.5 * (start + end) > from && 0.5 * (start + end) < to {
+                        pieces.push(self.pieces[i]);
+                    }
+                    continue;
+                }
+            };
             let low = if from <= start { 0.0 } else { from - start };
-            let high = if to >= end { piece.width } else { to - start };
+            let high = if to >= end { conic.width } else { to - start };
             if from < end && low < high {
-                pieces.push(Followed { piece: cut(piece, low, high), ..self.pieces[i] });
+                pieces.push(Followed { piece: Shape::Conic(conic.part(low, high)), ..self.pieces[i] });
             }
         }
     }
@@ -251,12 +260,12 @@ fn reach<'a, const M: usize>(
 ) -> f64 {
     let (mut length, mut station) = (wanted, 0.0);
     for followed in side {
-        if followed.exact && !exact {
+        if followed.exact && !exact || followed.piece.conic().is_none() {
             break;
         }
         let room = jump.length_within(followed.tolerance - followed.deviation);
         length = length.min(room.max(station));
-        station += followed.piece.width;
+        station += followed.piece.width();
         if station >= length {
             return length;
         }
@@ -267,14 +276,14 @@ fn reach<'a, const M: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::quadratic::Quadratic;
+    use crate::conic::Conic;
 
     #[test]
     fn cuts_next_to_the_end_of_a_piece_leave_no_sliver() {
         // A line of 10 mm in two pieces.
         let points = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]];
         let line = |a, b| Followed {
-            piece: Quadratic::line(a, b),
+            piece: Shape::Conic(Conic::line(a, b)),
             first: 0,
             last: 0,
             feed: 10.0,
@@ -284,8 +293,9 @@ mod tests {
             arc: false,
         };
         let lines = [line(points[0], points[1]), line(points[1], points[2])];
-        let side = [cut(&lines[0].piece, 0.0, 4.0), cut(&lines[0].piece, 4.0, 10.0), lines[1].piece]
-            .map(|piece| Followed { piece, ..lines[0] });
+        let whole = Conic::line(points[0], points[1]);
+        let side = [whole.part(0.0, 4.0), whole.part(4.0, 10.0), Conic::line(points[1], points[2])]
+            .map(|piece| Followed { piece: Shape::Conic(piece), ..lines[0] });
         let stretches = Stretches::new(&side, &[false; 2]);
         assert_eq!(stretches.length, [10.0, 10.0]);
         for (station, moved) in [(4.0 + 1e-9, 4.0), (4.0 - 1e-9, 4.0), (4.1, 4.1), (1e-9, 1e-9)] {
@@ -293,7 +303,8 @@ mod tests {
             let (mut before, mut after) = (Vec::new(), Vec::new());
             stretches.region(0, 0.0, moved, &mut before);
             stretches.region(0, moved, f64::INFINITY, &mut after);
-            assert_eq!(before.last().unwrap().piece.control[2], after[0].piece.control[0]);
+            let end = before.last().unwrap().piece.conic().unwrap().control[2];
+            assert_eq!(end, *after[0].piece.start());
             assert_eq!(before.len() + after.len(), if moved == 4.0 { 2 } else { 3 });
         }
     }

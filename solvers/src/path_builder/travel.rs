@@ -2,8 +2,11 @@
 
 use rayon::prelude::*;
 
-use crate::follow::{Followed, Moves};
-use crate::quadratic::Quadratic;
+use crate::follow::{Followed, Moves, Shape};
+use crate::spline::{bezier, CompositeCurve, Piece};
+
+/// Halvings of a piece of a spline; the hull comes nearer to the curve by a factor of four each time.
+const DEPTH: u32 = 26;
 
 /// A position that an axis cannot reach.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,31 +39,83 @@ pub fn outside<const M: usize>(
             None
         }
     };
+    // Only joints have a travel.
+    let judged = |index: usize| moves.joints[index];
     let targets = moves.target.par_iter().enumerate().find_map_first(|(index, target)| {
+        if !judged(index) {
+            return None;
+        }
         (0..M).find_map(|axis| beyond(index, axis, (target[axis], target[axis]), 0.0))
     });
     let arcs = moves.arcs.par_iter().find_map_first(|&(index, shape)| {
+        if !judged(index) {
+            return None;
+        }
         shape.plane.iter().find_map(|&axis| beyond(index, axis, moves.arc_extent(index, axis)?, 0.0))
     });
     let curves = parts.par_iter().find_map_first(|part| {
         part.iter().find_map(|followed| {
             let bulge = if followed.arc { followed.deviation } else { 0.0 };
             let index = followed.first as usize;
-            (0..M).find_map(|axis| beyond(index, axis, extent(&followed.piece, axis), bulge))
+            if !judged(index) {
+                return None;
+            }
+            (0..M).find_map(|axis| match &followed.piece {
+                Shape::Conic(conic) => beyond(index, axis, conic.extent(axis), bulge),
+                Shape::Spline(spline) => {
+                    let [low, high] = travel[axis];
+                    let piece = moves.splines.piece(spline.index as usize);
+                    let position = beyond_hull(&piece, axis, low - SLACK, high + SLACK, DEPTH)?;
+                    Some(Outside { index, axis, position })
+                }
+            })
         })
     });
     [targets, arcs, curves].into_iter().flatten().min_by_key(|place| place.index)
 }
 
-/// Least and greatest value of an axis on a piece.
-fn extent<const M: usize>(piece: &Quadratic<M>, axis: usize) -> (f64, f64) {
-    let [a, b, c] = piece.control.map(|point| point[axis]);
-    let (mut least, mut greatest) = (a.min(c), a.max(c));
-    if b < least || b > greatest {
-        let t = (a - b) / (a - 2.0 * b + c);
-        let turn = a + t * (b - a);
-        least = least.min(turn);
-        greatest = greatest.max(turn);
+/// A value of an axis on a piece below `low` or above `high`. The control points enclose the piece; where they are
+/// beyond and its ends are not, its halves are looked at.
+fn beyond_hull<const M: usize>(
+    piece: &Piece<M>,
+    axis: usize,
+    low: f64,
+    high: f64,
+    depth: u32,
+) -> Option<f64> {
+    let outside = |value: f64| value < low || value > high;
+    if !piece.control.iter().any(|point| outside(point[axis])) {
+        return None;
     }
-    (least, greatest)
+    let ends = [piece.control[0][axis], piece.control[piece.degree()][axis]];
+    if let Some(end) = ends.into_iter().find(|&end| outside(end)) {
+        return Some(end);
+    }
+    if depth == 0 {
+        return None;
+    }
+    let mut halves = CompositeCurve::default();
+    bezier::split(piece, &[0.5 * piece.width], &mut halves);
+    (0..2).find_map(|i| beyond_hull(&halves.piece(i), axis, low, high, depth - 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hull_beyond_the_limit_is_halved_until_the_curve_says() {
+        // The polygons reach 2, the parabola 1 of it and the conic w/(1 + w) of it.
+        let mut curve = CompositeCurve::<1>::default();
+        curve.push(&[[0.0], [2.0], [0.0]], &[], 1.0);
+        let parabola = curve.clone();
+        bezier::elevate(&parabola.piece(0), 1, &mut curve);
+        curve.push(&[[0.0], [2.0], [0.0]], &[1.0, 3.0, 1.0], 1.0);
+        for (piece, apex) in curve.pieces().zip([1.0, 1.0, 1.5]) {
+            assert_eq!(beyond_hull(&piece, 0, -0.1, apex + 1e-9, DEPTH), None);
+            let found = beyond_hull(&piece, 0, -0.1, apex - 1e-9, DEPTH).unwrap();
+            assert!(found > apex - 1e-9 && found <= apex);
+            assert_eq!(beyond_hull(&piece, 0, 0.1, 2.0, DEPTH), Some(0.0));
+        }
+    }
 }

@@ -1,17 +1,19 @@
 //! `build_path`: the columns of a program to the columns of its path.
 
-use numpy::{
-    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
-};
+use std::ops::Range;
+
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
 use super::arrays::{row, rows};
+use super::spline::curve;
 use super::with_padded_axes;
 use crate::arc::ArcError;
-use crate::follow::{ArcShape, Fault, FollowOptions, Followed, Moves};
+use crate::follow::{ArcShape, Fault, FollowOptions, Followed, Moves, Shape};
 use crate::path_builder::{build_path as build, Axes, BuiltPath};
+use crate::spline::{CompositeCurve, Piece};
 
 pyo3::import_exception!(feedplan.errors, ProgramError);
 
@@ -22,10 +24,15 @@ pub fn register(module: &Bound<PyModule>) -> PyResult<()> {
 /// The travel of an axis that is not there.
 const ANYWHERE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
-/// Control points, widths, feeds, first and last moves, tolerances and runs of the path.
+/// Control points, weights (if any piece is rational), offsets and widths of the curve; feeds, first and last moves,
+/// tolerances and runs of the path.
 type Columns<'py> = (
-    Bound<'py, PyArray3<f64>>,
-    Bound<'py, PyArray1<f64>>,
+    (
+        Bound<'py, PyArray2<f64>>,
+        Option<Bound<'py, PyArray1<f64>>>,
+        Bound<'py, PyArray1<i64>>,
+        Bound<'py, PyArray1<f64>>,
+    ),
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray2<i64>>,
     Bound<'py, PyArray1<f64>>,
@@ -35,12 +42,19 @@ type Columns<'py> = (
 type Summary = (usize, usize, usize, f64);
 /// Move, axis and position of the first place outside the travel.
 type Place = (usize, usize, f64);
+/// Control points, weights, offsets and widths of the splines of a program.
+type Splines<'py> = (
+    PyReadonlyArray2<'py, f64>,
+    Option<PyReadonlyArray1<'py, f64>>,
+    PyReadonlyArray1<'py, i64>,
+    PyReadonlyArray1<'py, f64>,
+);
 
 /// The path of a program. `line` and `name` are for messages.
 #[pyfunction]
 #[pyo3(signature = (
     name, start, kind, target, feed, line, tolerance, fit_tolerance, halt, arc_move, arc_plane, arc_centre,
-    arc_sweep, max_velocity, max_acceleration, travel, jump, exact_tolerance, max_chord, corner_acceleration,
+    arc_sweep, spline_move, spline_pieces, splines, joints, max_velocity, max_acceleration, travel, jump, exact_tolerance, max_chord, corner_acceleration,
     max_speed, corner_angle
 ))]
 #[allow(clippy::too_many_arguments)]
@@ -59,6 +73,10 @@ fn build_path<'py>(
     arc_plane: PyReadonlyArray2<'py, i64>,
     arc_centre: PyReadonlyArray2<'py, f64>,
     arc_sweep: PyReadonlyArray1<'py, f64>,
+    spline_move: PyReadonlyArray1<'py, i64>,
+    spline_pieces: PyReadonlyArray1<'py, i64>,
+    splines: Option<Splines<'py>>,
+    joints: PyReadonlyArray1<'py, bool>,
     max_velocity: PyReadonlyArray1<'py, f64>,
     max_acceleration: PyReadonlyArray1<'py, f64>,
     travel: PyReadonlyArray2<'py, f64>,
@@ -71,7 +89,7 @@ fn build_path<'py>(
 ) -> PyResult<(Columns<'py>, Summary, Option<Place>)> {
     let axes = start.len();
     let count = kind.len();
-    let same = [feed.len(), line.len(), tolerance.len(), fit_tolerance.len(), halt.len()];
+    let same = [feed.len(), line.len(), tolerance.len(), fit_tolerance.len(), halt.len(), joints.len()];
     let arcs = arc_move.len();
     if target.shape() != [count, axes]
         || same.iter().any(|&len| len != count)
@@ -79,6 +97,8 @@ fn build_path<'py>(
         || arc_centre.shape() != [arcs, 2]
         || arc_sweep.len() != arcs
         || travel.shape() != [axes, 2]
+        || spline_pieces.len() != spline_move.len() + 1
+        || splines.as_ref().is_some_and(|splines| splines.0.shape()[1] != axes)
     {
         return Err(PyValueError::new_err("the columns of the program differ in length"));
     }
@@ -94,9 +114,32 @@ fn build_path<'py>(
             Ok((index, ArcShape { plane, centre, sweep: arc_sweep.as_slice()?[i] }))
         })
         .collect::<PyResult<_>>()?;
+    let ends = spline_pieces.as_slice()?;
+    let pieces = splines.as_ref().map_or(0, |splines| splines.3.len());
+    let spline_moves: Vec<(usize, Range<usize>)> = spline_move
+        .as_slice()?
+        .iter()
+        .zip(ends.windows(2))
+        .map(|(&index, ends)| -> PyResult<_> {
+            let (index, range) =
+                (usize::try_from(index)?, usize::try_from(ends[0])?..usize::try_from(ends[1])?);
+            if range.start > range.end || range.end > pieces || index >= count {
+                return Err(PyValueError::new_err(
+                    "a spline refers to a move or a piece that does not exist",
+                ));
+            }
+            Ok((index, range))
+        })
+        .collect::<PyResult<_>>()?;
     let options = FollowOptions { exact_tolerance, max_chord, corner_acceleration, max_speed, corner_angle };
     with_padded_axes!(axes, M, {
         let target = rows::<M>(&target)?;
+        let splines = match &splines {
+            Some((control, weights, offsets, width)) => {
+                curve::<M>(control, weights.as_ref(), offsets, width)?
+            }
+            None => CompositeCurve::default(),
+        };
         let moves = Moves {
             start: row::<M>(&start, 0.0)?,
             kind: kind.as_slice()?,
@@ -106,6 +149,9 @@ fn build_path<'py>(
             fit_tolerance: fit_tolerance.as_slice()?,
             halt: halt.as_slice()?,
             arcs: &shapes,
+            spline_moves: &spline_moves,
+            splines: &splines,
+            joints: joints.as_slice()?,
         };
         let travel = rows::<2>(&travel)?;
         let limits = Axes {
@@ -118,7 +164,7 @@ fn build_path<'py>(
             let line = line.as_slice().map_or(0, |lines| lines[error.index]);
             ProgramError::new_err((format!("{name}, line {line}: {}", sentence(error.fault)), line))
         })?;
-        Ok(columns(py, &path, axes))
+        Ok(columns(py, &path, &splines, axes))
     })
 }
 
@@ -132,6 +178,7 @@ fn sentence(fault: Fault) -> &'static str {
         Fault::Arc(ArcError::Sweep) => {
             "the arc does not lead to its end point: correct its centre or its end"
         }
+        Fault::Spline => "the move has no spline: give its pieces",
         Fault::Arc(ArcError::Turns) => "the arc has too many turns to be followed: give fewer",
     }
 }
@@ -139,28 +186,70 @@ fn sentence(fault: Fault) -> &'static str {
 fn columns<'py, const M: usize>(
     py: Python<'py>,
     path: &BuiltPath<M>,
+    splines: &CompositeCurve<M>,
     axes: usize,
 ) -> (Columns<'py>, Summary, Option<Place>) {
     let parts = &path.parts;
-    let count = parts.iter().map(Vec::len).sum();
-    let (control, width, feed, moves, tolerance) = py.detach(|| {
+    let points = |followed: &Followed<M>| match &followed.piece {
+        Shape::Conic(_) => 3,
+        Shape::Spline(spline) => splines.piece(spline.index as usize).control.len(),
+    };
+    let one = |_: &Followed<M>| 1;
+    let (control, weights, offsets, width, feed, moves, tolerance) = py.detach(|| {
+        let is_rational = |followed: &Followed<M>| match &followed.piece {
+            Shape::Conic(conic) => conic.weight != 1.0,
+            Shape::Spline(spline) => splines.piece(spline.index as usize).is_rational(),
+        };
+        let rational = parts.par_iter().any(|part| part.iter().any(is_rational));
+        let counts = gather(parts, one, |followed, out| out[0] = points(followed) as i64);
+        let mut offsets = vec![0; counts.len() + 1];
+        for (i, count) in counts.iter().enumerate() {
+            offsets[i + 1] = offsets[i] + count;
+        }
         (
-            gather(parts, 3 * axes, |followed, out: &mut [f64]| {
-                for (row, point) in out.chunks_exact_mut(axes).zip(&followed.piece.control) {
-                    row.copy_from_slice(&point[..axes]);
-                }
+            gather(
+                parts,
+                |followed| axes * points(followed),
+                |followed, out: &mut [f64]| {
+                    let control = match &followed.piece {
+                        Shape::Conic(conic) => &conic.control[..],
+                        Shape::Spline(spline) => splines.piece(spline.index as usize).control,
+                    };
+                    for (row, point) in out.chunks_exact_mut(axes).zip(control) {
+                        row.copy_from_slice(&point[..axes]);
+                    }
+                },
+            ),
+            rational.then(|| {
+                gather(parts, points, |followed, out: &mut [f64]| match &followed.piece {
+                    Shape::Conic(conic) => out.copy_from_slice(&[1.0, conic.weight, 1.0]),
+                    Shape::Spline(spline) => match splines.piece(spline.index as usize) {
+                        Piece { weights: [], .. } => out.fill(1.0),
+                        Piece { weights, .. } => out.copy_from_slice(weights),
+                    },
+                })
             }),
-            gather(parts, 1, |followed, out| out[0] = followed.piece.width),
-            gather(parts, 1, |followed, out| out[0] = followed.feed),
-            gather(parts, 2, |followed, out: &mut [i64]| {
-                out.copy_from_slice(&[i64::from(followed.first), i64::from(followed.last)]);
-            }),
-            gather(parts, 1, |followed, out| out[0] = followed.tolerance),
+            offsets,
+            gather(parts, one, |followed, out| out[0] = followed.piece.width()),
+            gather(parts, one, |followed, out| out[0] = followed.feed),
+            gather(
+                parts,
+                |_| 2,
+                |followed, out: &mut [i64]| {
+                    out.copy_from_slice(&[i64::from(followed.first), i64::from(followed.last)]);
+                },
+            ),
+            gather(parts, one, |followed, out| out[0] = followed.tolerance),
         )
     });
+    let (rows, count) = (control.len() / axes, width.len());
     let columns = (
-        PyArray1::from_vec(py, control).reshape([count, 3, axes]).expect("n × 3 × axes values"),
-        PyArray1::from_vec(py, width),
+        (
+            PyArray1::from_vec(py, control).reshape([rows, axes]).expect("rows of axes values"),
+            weights.map(|weights| PyArray1::from_vec(py, weights)),
+            PyArray1::from_vec(py, offsets),
+            PyArray1::from_vec(py, width),
+        ),
         PyArray1::from_vec(py, feed),
         PyArray1::from_vec(py, moves).reshape([count, 2]).expect("n × 2 values"),
         PyArray1::from_vec(py, tolerance),
@@ -173,20 +262,23 @@ fn columns<'py, const M: usize>(
 /// One column, `stride` values a piece, written by all parts at once.
 fn gather<const M: usize, T: Default + Clone + Send>(
     parts: &[Vec<Followed<M>>],
-    stride: usize,
+    stride: impl Fn(&Followed<M>) -> usize + Sync,
     write: impl Fn(&Followed<M>, &mut [T]) + Sync,
 ) -> Vec<T> {
-    let mut column = vec![T::default(); stride * parts.iter().map(Vec::len).sum::<usize>()];
+    let lengths: Vec<usize> = parts.par_iter().map(|part| part.iter().map(&stride).sum()).collect();
+    let mut column = vec![T::default(); lengths.iter().sum()];
     let mut rest = &mut column[..];
     let mut slices = Vec::with_capacity(parts.len());
-    for part in parts {
-        let (slice, tail) = rest.split_at_mut(stride * part.len());
+    for length in lengths {
+        let (slice, tail) = rest.split_at_mut(length);
         slices.push(slice);
         rest = tail;
     }
-    parts.par_iter().zip(slices).for_each(|(part, slice)| {
-        for (followed, out) in part.iter().zip(slice.chunks_exact_mut(stride)) {
+    parts.par_iter().zip(slices).for_each(|(part, mut slice)| {
+        for followed in part {
+            let (out, tail) = slice.split_at_mut(stride(followed));
             write(followed, out);
+            slice = tail;
         }
     });
     column

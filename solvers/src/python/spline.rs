@@ -69,7 +69,7 @@ fn weights_to<'py>(py: Python<'py>, weights: Vec<f64>) -> Option<Bound<'py, PyAr
 }
 
 /// Columns to a curve in M axes, those beyond the given ones at rest.
-fn curve<const M: usize>(
+pub(super) fn curve<const M: usize>(
     control: &Array2,
     weights: Option<&Array1>,
     offsets: &PyReadonlyArray1<i64>,

@@ -8,7 +8,7 @@
 //!
 //! Z interpolates f = (1 + τ²) atan τ at τ = −T cos(jπ/d), T = tan(θ/4). Where d is odd it does so at 0 too, both
 //! being odd. With n points in all |Z − f| ≤ max|f⁽ⁿ⁾|/n! · Tⁿ/2ᵈ⁻¹, and f''' = 4/(1 + τ²)², whose poles ±i are
-//! not nearer than 1 to any real τ, gives |f⁽ⁿ⁾|/n! ≤ 2/(n(n − 2)), n ≥ 4.
+//! not nearer than 1 to any real τ, gives |f⁽ⁿ⁾|/n! ≤ 2/(n(n − 2)), n ≥ 3. At d = 2 the axis is (Z₀ + Z₂)/2 in the middle.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -33,7 +33,12 @@ pub struct Turn<const M: usize> {
 impl<const M: usize> Turn<M> {
     /// The turn in equal quadratic pieces of at most 90°, the width of each its length.
     pub fn arc(&self) -> CompositeCurve<M> {
-        self.pieces((self.sweep.abs() / FRAC_PI_2 * (1.0 - SAME_ANGLE)).ceil().max(1.0))
+        self.pieces(self.quarters())
+    }
+
+    /// The least number of equal pieces of at most 90°.
+    pub(crate) fn quarters(&self) -> f64 {
+        (self.sweep.abs() / FRAC_PI_2 * (1.0 - SAME_ANGLE)).ceil().max(1.0)
     }
 
     /// The turn while every other axis goes by `travel`, in proportion to the angle: pieces of degree `degree`
@@ -48,7 +53,7 @@ impl<const M: usize> Turn<M> {
             return Err(SplineError::Degree { degree });
         }
         let rise = travel.iter().map(|value| value * value).sum::<f64>().sqrt();
-        let mut count = (self.sweep.abs() / FRAC_PI_2 * (1.0 - SAME_ANGLE)).ceil().max(1.0);
+        let mut count = self.quarters();
         let mut bound = self.axial_error(rise, degree, count);
         while bound > tolerance {
             count = (count * 0.99 * (bound / tolerance).powf(1.0 / (degree + 1 + degree % 2) as f64))
@@ -83,14 +88,16 @@ impl<const M: usize> Turn<M> {
         Ok((curve, bound))
     }
 
-    fn axial_error(&self, rise: f64, degree: usize, count: f64) -> f64 {
+    /// The bound of the distance along the axis from a helix that rises by `rise`, in `count` pieces.
+    pub(crate) fn axial_error(&self, rise: f64, degree: usize, count: f64) -> f64 {
         let theta = self.sweep.abs() / count;
         let (t, n) = ((0.25 * theta).tan(), (degree + 1 + degree % 2) as f64);
         let derivative = 2.0 / (n * (n - 2.0));
         rise / count * (2.0 / theta) * derivative * t.powf(n) / (degree as f64 - 1.0).exp2()
     }
 
-    fn pieces(&self, count: f64) -> CompositeCurve<M> {
+    /// The turn in `count` equal quadratic pieces.
+    pub(crate) fn pieces(&self, count: f64) -> CompositeCurve<M> {
         let [x, y] = self.plane;
         let mut curve = CompositeCurve::default();
         let theta = self.sweep / count;

@@ -1,0 +1,162 @@
+"""Paths without a program: of Bézier curves, B-splines, NURBS, any curve, and points."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from feedplan._solvers import build_path as native_build_path
+from feedplan.curves._arrays import MAX_AXES, points, refuse
+from feedplan.curves.composite import CompositeCurve
+from feedplan.errors import InputError
+from feedplan.geometry.build import FitSettings
+from feedplan.geometry.joints import tangent_jumps
+from feedplan.geometry.path import FitSummary, Path
+from feedplan.machine.machine import AXIS_LETTERS
+from feedplan.program.program import MoveKind
+
+DEFAULT_AXES = "XYZABC"
+
+# The ends of neighbouring pieces may be this far apart [mm]: it is what rounding makes of one point.
+MAX_GAP = 1e-6
+
+# A speed [mm/s] and an acceleration [mm/s²] for which no corner is too long: the tolerance alone decides.
+_ANY_SPEED, _ANY_ACCELERATION = 1e6, 1.0
+
+
+def path_of_curve(curve: CompositeCurve, axes: Sequence[str] | None, feed: float) -> Path:
+    """See `Path.from_curve`."""
+    names, speed = _names(axes, curve.axes), _feed(feed)
+    curve = _without(curve, curve.zero_length)
+    if len(curve) == 0:
+        raise InputError("the curve has no length: give control points that differ")
+    cusps = curve.cusps()
+    curve = curve.split(cusps.piece, cusps.u)
+    curve = _closed_gaps(_without(curve, curve.zero_length))
+    corners = np.flatnonzero((tangent_jumps(curve) > 0).any(axis=1)) + 1
+    return _path(names, curve, speed, np.concatenate([[0], corners, [len(curve)]]))
+
+
+def path_of_points(
+    given: ArrayLike, tolerance: float, axes: Sequence[str] | None, feed: float, settings: FitSettings | None
+) -> Path:
+    """See `Path.from_points`."""
+    array, _ = points(given, None)
+    names, speed, settings = _names(axes, array.shape[1]), _feed(feed), settings or FitSettings()
+    if len(array) < 2:
+        raise InputError(f"a path of {len(array)} points: give two or more")
+    if not 0 <= tolerance < math.inf:
+        raise InputError(
+            f"the tolerance is {tolerance}: give 0 (exact lines with stops) or a positive number [mm]"
+        )
+    finite: NDArray[np.bool_] = np.logical_and.reduce(np.isfinite(array), axis=1)
+    refuse(~finite, lambda i: f"point {i} is not finite: correct its coordinates")
+    same: NDArray[np.bool_] = (array[1:] == array[:-1]).all(axis=1)
+    refuse(same, lambda i: f"points {i} and {i + 1} coincide: remove one of them")
+    count, width = len(array) - 1, array.shape[1]
+    (curve, _, move, allowed, runs), summary, _ = native_build_path(
+        "points",
+        array[0].copy(),
+        np.full(count, MoveKind.LINE, dtype=np.uint8),
+        array[1:].copy(),
+        np.full(count, speed),
+        np.zeros(count, dtype=np.int32),
+        np.full(count, tolerance),
+        np.full(count, settings.fit_share * tolerance),
+        np.zeros(count, dtype=np.bool_),
+        np.empty(0, dtype=np.int64),
+        np.empty((0, 2), dtype=np.int64),
+        np.empty((0, 2)),
+        np.empty(0),
+        np.empty(0, dtype=np.int64),
+        np.zeros(1, dtype=np.int64),
+        None,
+        np.ones(count, dtype=np.bool_),
+        np.full(width, _ANY_SPEED),
+        np.full(width, _ANY_ACCELERATION),
+        np.tile([-np.inf, np.inf], (width, 1)),
+        False,
+        settings.exact_tolerance,
+        settings.max_chord,
+        math.inf,
+        _ANY_SPEED,
+        math.radians(settings.corner_angle),
+    )
+    return _path(names, CompositeCurve(*curve), speed, runs, move, allowed, FitSummary(*summary))
+
+
+def _path(
+    axes: tuple[str, ...],
+    curve: CompositeCurve,
+    feed: float,
+    runs: NDArray[np.int64],
+    move: NDArray[np.int64] | None = None,
+    tolerance: NDArray[np.float64] | None = None,
+    fit: FitSummary | None = None,
+) -> Path:
+    count = len(curve)
+    number = np.arange(count)
+    return Path(
+        axes=axes,
+        curve=curve,
+        feed=np.full(count, feed),
+        move=np.stack([number, number], axis=1) if move is None else move,
+        line=np.zeros(count, dtype=np.int32),
+        runs=runs,
+        dwell=np.zeros(len(runs) - 1),
+        tolerance=np.zeros(count) if tolerance is None else tolerance,
+        fit=fit or FitSummary(),
+    )
+
+
+def _without(curve: CompositeCurve, pieces: NDArray[np.int64]) -> CompositeCurve:
+    """The curve without some pieces."""
+    if len(pieces) == 0:
+        return curve
+    keep = np.ones(len(curve), dtype=bool)
+    keep[pieces] = False
+    points = np.repeat(keep, curve.degree + 1)
+    return CompositeCurve(
+        curve.control_points[points],
+        None if curve.weights is None else curve.weights[points],
+        np.concatenate([[0], np.cumsum((curve.degree + 1)[keep])]),
+        curve.width[keep],
+    )
+
+
+def _closed_gaps(curve: CompositeCurve) -> CompositeCurve:
+    """The curve with each piece starting exactly where the one before ends."""
+    control = curve.control_points.copy()
+    start, end = curve.offsets[1:-1], curve.offsets[1:-1] - 1
+    gap = np.linalg.norm(control[start] - control[end], axis=1)
+    refuse(
+        gap > MAX_GAP,
+        lambda i: (
+            f"piece {i + 1} starts {gap[i]:g} mm from the end of piece {i}: at most {MAX_GAP:g} mm is "
+            "allowed; add a line between them, or give them as two paths"
+        ),
+    )
+    control[start] = control[end]
+    return CompositeCurve(control, curve.weights, curve.offsets, curve.width)
+
+
+def _names(axes: Sequence[str] | None, count: int) -> tuple[str, ...]:
+    if axes is None and count <= MAX_AXES:
+        return tuple(DEFAULT_AXES[:count])
+    names = tuple(axes or ())
+    known = set(AXIS_LETTERS) | set("IJK")
+    if len(names) != count or len(set(names)) != count or not set(names) <= known:
+        raise InputError(
+            f"the axes are {' '.join(names)} for points of {count} coordinates: name each once, "
+            f"with the letters {AXIS_LETTERS} (or I, J, K of a direction)"
+        )
+    return names
+
+
+def _feed(feed: float) -> float:
+    if not feed > 0:
+        raise InputError(f"feed is {feed} mm/s: give a positive feed, or none for the axes' limits alone")
+    return float(feed)

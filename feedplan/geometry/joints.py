@@ -1,0 +1,57 @@
+"""How the direction of motion turns where the pieces of a curve meet."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.curves.composite import CompositeCurve
+
+Array = NDArray[np.float64]
+
+# A unit tangent computed from control points of size |C| with an edge of length e carries a rounding error
+# of a few eps·|C|/e; a smaller turn than this many times that is no corner.
+ROUNDING_MARGIN = 32.0
+SMOOTH_TURN = 1e-9
+
+# Edges of a control polygon that are shorter than this part of it are none, as next to a cusp.
+VANISHING_EDGE = 1e-12
+
+
+def tangent_jumps(curve: CompositeCurve) -> Array:
+    """|T₊ − T₋| by axis at the joints between pieces (n − 1, axes), T being the unit tangents.
+
+    0 where no corner can be told from rounding, NaN next to a piece without length. In a cusp T is the
+    direction in which the motion ends or begins.
+    """
+    edge_in, edge_out = end_edges(curve)
+    edge_out, edge_in = edge_out[:-1], edge_in[1:]
+    points = curve.control_points[curve.offsets[1:-1]]
+    length_out, length_in = np.linalg.norm(edge_out, axis=1), np.linalg.norm(edge_in, axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        jump: Array = np.abs(edge_in / length_in[:, None] - edge_out / length_out[:, None])
+        size = np.abs(points).max(axis=1, initial=0.0)
+        noise = ROUNDING_MARGIN * np.finfo(float).eps * size / np.minimum(length_in, length_out)
+        jump[jump <= (SMOOTH_TURN + noise)[:, None]] = 0.0
+    return jump
+
+
+def end_edges(curve: CompositeCurve) -> tuple[Array, Array]:
+    """The edges of the control polygons along the tangents at both ends of each piece, each (n, axes).
+
+    The first and the last edge that have a length; 0 on a piece without any.
+    """
+    control, degree = curve.control_points, curve.degree
+    first, last = curve.offsets[:-1], curve.offsets[1:] - 1
+    start, end = control[first + 1] - control[first], control[last] - control[last - 1]
+    if len(curve) == 0:
+        return start, end
+    greatest, least = (f.reduceat(control, first) for f in (np.maximum, np.minimum))
+    shortest = VANISHING_EDGE * (greatest - least).max(axis=1)
+    for edge, near, sign in ((start, first, 1), (end, last, -1)):
+        for step in range(1, int(degree.max()) + 1):
+            rows = np.flatnonzero(np.abs(edge).max(axis=1) <= shortest)
+            more = rows[degree[rows] > step]
+            edge[more] = sign * (control[near[more] + sign * (step + 1)] - control[near[more] + sign * step])
+            edge[rows[degree[rows] <= step]] = 0.0
+    return start, end

@@ -1,0 +1,134 @@
+"""The axes of a path: which letters of a program a machine takes, what they mean, and the limits they set."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.errors import MachineError
+from feedplan.machine.machine import MAX_AXES, Machine
+from feedplan.machine.words import Meaning, axis_words
+from feedplan.program.program import Program
+
+LINEAR_AXES = "XYZ"
+
+
+@dataclass(frozen=True)
+class PathWords:
+    """The axes of a path: `names`, and `columns`, where they stand in the program.
+
+    `joints` (n,) tells of each move whether its words are joint positions, `changes` (n − 1,) whether the
+    words of the next move mean something else. `max_velocity`, `max_acceleration` (axes,) are for rounding
+    corners: those of the joint where all words are joints; otherwise the least of all linear joints, or of
+    the rotary axis itself. `travel` (axes, 2) counts where words are joints. `may_jump`: all words are
+    joints, and those that move allow a velocity jump at corners.
+    """
+
+    names: tuple[str, ...]
+    columns: list[int]
+    joints: NDArray[np.bool_]
+    changes: NDArray[np.bool_]
+    max_velocity: NDArray[np.float64]
+    max_acceleration: NDArray[np.float64]
+    travel: NDArray[np.float64]
+    may_jump: bool
+
+
+def path_words(program: Program, machine: Machine) -> PathWords:
+    """The axes of the program's path on a machine.
+
+    Raises MachineError where the program moves a letter that the machine does not take, or too many of them.
+    """
+    default = Meaning.JOINTS if machine.words_are_joints else Meaning.TIP
+    given = program.meaning
+    meaning = np.full(len(program), default, dtype=np.uint8) if given is None else given
+    known: dict[str, None] = {}
+    moving = _moving_letters(program)
+    used: NDArray[np.bool_] = np.logical_or.reduce(moving, axis=0)
+    for value in [default] if given is None or len(given) == 0 else np.unique(given):
+        letters = _letters(machine, Meaning(value))
+        known.update(dict.fromkeys(letters))
+        for column, name in enumerate(program.axes):
+            if name in letters:
+                continue
+            moves: NDArray[np.bool_] = moving[:, column] & (meaning == value)
+            if moves.any():
+                line = program.line[int(moves.argmax())]
+                what = "none" if Meaning(value) is Meaning.JOINTS else f"{', '.join(letters)} there"
+                raise MachineError(
+                    f"{program.name}, line {line}: axis {name} moves and machine {machine.name} has {what}: "
+                    f"choose a machine with {name}, or add it to the machine file"
+                )
+    names = tuple(name for name in known if name in program.axes)
+    if len(names) > MAX_AXES:
+        names = tuple(name for name in names if used[program.axes.index(name)])
+    if not names:
+        raise MachineError(f"{program.name} moves no axis of machine {machine.name}: choose another machine")
+    if len(names) > MAX_AXES:
+        raise MachineError(
+            f"{program.name} moves {', '.join(names)}: a path has at most {MAX_AXES} axes; "
+            "give stretches of I, J, K and of rotary words programs of their own"
+        )
+    changes = meaning[1:] != meaning[:-1]
+    if program.tool_length is not None:
+        before, after = program.tool_length[:-1], program.tool_length[1:]
+        changes |= (before != after) & ~(np.isnan(before) & np.isnan(after))
+    joints = meaning == Meaning.JOINTS
+    # Where the joints move in another way than the tip, a corner is a stop.
+    may_jump = bool(joints.all()) and all(
+        machine.axis(name).max_velocity_jump > 0 for name in names if used[program.axes.index(name)]
+    )
+    return PathWords(
+        names=names,
+        columns=[program.axes.index(name) for name in names],
+        joints=joints,
+        changes=changes,
+        max_velocity=_limits(machine, names, bool(joints.all()), "max_velocity"),
+        max_acceleration=_limits(machine, names, bool(joints.all()), "max_acceleration"),
+        travel=np.array(
+            [machine.axis(name).travel if name in machine.axis_names else (-np.inf, np.inf) for name in names]
+        ),
+        may_jump=may_jump,
+    )
+
+
+def _letters(machine: Machine, meaning: Meaning) -> tuple[str, ...]:
+    """The program letters that a machine takes under a meaning, in its order."""
+    if meaning is Meaning.JOINTS:
+        return machine.axis_names
+    if meaning is Meaning.TIP:
+        return machine.inverse.tip_names
+    return axis_words(machine, ("I", "J", "K"), meaning).kinematics.tip_names
+
+
+def _moving_letters(program: Program) -> NDArray[np.bool_]:
+    """(n, axes) which moves move which letters."""
+    moves = np.empty(program.target.shape, dtype=np.bool_)
+    moves[:1] = program.target[:1] != program.start
+    np.not_equal(program.target[1:], program.target[:-1], out=moves[1:])
+    for column, name in enumerate(LINEAR_AXES):
+        moves[program.arc_move[program.arc_normal != column], program.axes.index(name)] = True
+    if program.splines is not None and len(program.spline_move):
+        curve = program.splines
+        # The points of a move reach from the offset of its first piece to that of the next move's.
+        points = curve.offsets[program.spline_pieces[:-1]]
+        ends = int(curve.offsets[program.spline_pieces[-1]])
+        greatest = np.maximum.reduceat(curve.control_points[:ends], points)
+        least = np.minimum.reduceat(curve.control_points[:ends], points)
+        moves[program.spline_move] |= greatest > least
+    return moves
+
+
+def _limits(machine: Machine, names: tuple[str, ...], joints: bool, limit: str) -> NDArray[np.float64]:
+    linear = [getattr(axis, limit) for axis in machine.axes if axis.kind == "linear"]
+    least = min(linear or [getattr(axis, limit) for axis in machine.axes])
+    return np.array(
+        [
+            getattr(machine.axis(name), limit)
+            if name in machine.axis_names and (joints or machine.axis(name).kind == "rotary")
+            else least
+            for name in names
+        ]
+    )

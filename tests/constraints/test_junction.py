@@ -1,0 +1,76 @@
+"""Speeds where pieces meet, and the bound of the time, on pieces of any degree."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from feedplan.bound import lower_bound
+from feedplan.constraints.junction import junction_limit
+from feedplan.constraints.problem import build_problem
+from feedplan.curves.arc import arc
+from feedplan.curves.composite import CompositeCurve
+from feedplan.geometry.joints import end_edges, tangent_jumps
+from feedplan.geometry.path import Path
+from feedplan.machine.machine import Axis, Machine
+
+
+def one_run(curve: CompositeCurve, feed: float = 50.0) -> Path:
+    count = len(curve)
+    return Path(
+        axes=tuple("XYZ"[: curve.axes]),
+        curve=curve,
+        feed=np.full(count, feed),
+        move=np.zeros((count, 2)),
+        line=np.zeros(count),
+        runs=np.array([0, count]),
+        dwell=np.zeros(1),
+        tolerance=np.zeros(count),
+    )
+
+
+def bezier(*points: list[float]) -> CompositeCurve:
+    return CompositeCurve.from_bezier(list(points))
+
+
+def test_end_edges_are_the_first_and_the_last_that_have_a_length() -> None:
+    curve = CompositeCurve.joined(
+        [
+            bezier([0, 0], [1, 0]),
+            bezier([1, 0], [1, 0], [1, 0], [3, 4]),
+            bezier([3, 4], [4, 4], [5, 5], [5 + 1e-14, 5], [5, 5]),
+            bezier([5, 5], [5, 5], [5, 5]),
+        ]
+    )
+    start, end = end_edges(curve)
+    np.testing.assert_allclose(start, [[1, 0], [2, 4], [1, 0], [0, 0]])
+    np.testing.assert_allclose(end, [[1, 0], [2, 4], [1, 1], [0, 0]])
+    empty = CompositeCurve(np.empty((0, 2)), None, np.zeros(1), np.empty(0))
+    assert len(tangent_jumps(empty)) == 0
+
+
+def test_a_jump_of_velocity_limits_the_speed_at_corners_of_any_degree() -> None:
+    # Along X, a cubic from X into Y, then a corner of 90 degrees into −X at a cusp of both sides.
+    curve = CompositeCurve.joined(
+        [
+            bezier([0, 0], [2, 0]),
+            bezier([2, 0], [3, 0], [4, 1], [4, 2], [4, 2]),
+            bezier([4, 2], [4, 2], [0, 2]),
+            arc([0, 2], (0, 0), math.pi / 2),
+        ]
+    )
+    limit = junction_limit(one_run(curve), np.array([6.0, 10.0]))
+    np.testing.assert_array_equal(limit, [0.0, np.inf, 6.0, np.inf, 0.0])
+
+
+def test_the_bound_takes_chords_of_pieces_of_any_degree() -> None:
+    axes = (Axis("X", 100.0, 1000.0), Axis("Y", 20.0, 1000.0))
+    machine = Machine("two", axes)
+    curve = CompositeCurve.joined([bezier([0, 0], [9, 9], [-7, 1], [3, 4]), arc([3, 4], (0, 0), math.pi / 2)])
+    problem = build_problem(one_run(curve, 10.0), machine)
+    # Chords of 5 and 5√2 mm at 10 mm/s, slower than the axes.
+    assert lower_bound(problem) == pytest.approx(0.5 + 0.5 * math.sqrt(2))
+    fast = build_problem(one_run(curve, 1e3), machine)
+    assert lower_bound(fast) == pytest.approx(4 / 20 + 7 / 100)

@@ -1,0 +1,151 @@
+"""Spline moves of programs go into the path as they are, between lines, arcs and each other."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from feedplan.curves.composite import CompositeCurve
+from feedplan.errors import InputError, ProgramError
+from feedplan.geometry.build import build_path
+from feedplan.geometry.path import Path
+from feedplan.machine.machine import Axis, Machine
+from feedplan.program.program import MoveKind, PathControl, Program
+
+MILL = Machine.load("mill")
+# From (10, 0) to (14, 4): along X at its start, along Y at its end.
+CUBIC = [[10, 0, 0], [12, 0, 0], [14, 2, 0], [14, 4, 0]]
+
+
+def with_splines(program: Program, splines: dict[int, CompositeCurve], **changes: Any) -> Program:
+    """The program with moves replaced by splines."""
+    kind = program.kind.copy()
+    kind[list(splines)] = MoveKind.SPLINE
+    return dataclasses.replace(
+        program,
+        kind=kind,
+        spline_move=np.array(sorted(splines)),
+        spline_pieces=np.cumsum([0, *(len(splines[move]) for move in sorted(splines))]),
+        splines=CompositeCurve.joined([splines[move] for move in sorted(splines)], gap=math.inf),
+        **changes,
+    )
+
+
+def piece(path: Path, i: int) -> tuple[Any, Any]:
+    """Control points and weights of a piece."""
+    own = slice(path.curve.offsets[i], path.curve.offsets[i + 1])
+    return path.curve.control_points[own], None if path.curve.weights is None else path.curve.weights[own]
+
+
+def test_pieces_of_any_degree_are_kept_to_the_last_bit(make_program: Any) -> None:
+    random = np.random.default_rng(5)
+    curves, points = {}, [np.zeros(3)]
+    for move, degree in enumerate(range(1, 10)):
+        control = random.normal(size=(degree + 1, 3))
+        control[0] = points[-1]
+        points.append(control[-1])
+        weights = random.uniform(0.5, 2, degree + 1) if degree % 2 else None
+        curves[move] = CompositeCurve.from_bezier(control, weights)
+    for control_mode in (PathControl.EXACT_PATH, PathControl.TOLERANCE):
+        path = build_path(with_splines(make_program(points, control=control_mode), curves), MILL)
+        assert path.curve.degree.tolist() == list(range(1, 10))
+        for i in range(9):
+            control, weights = piece(path, i)
+            np.testing.assert_array_equal(control, curves[i].control_points)
+            given = curves[i].weights
+            np.testing.assert_array_equal(weights, 1.0 if given is None else given)
+        # Every joint is a corner, and every corner at a spline a stop.
+        np.testing.assert_array_equal(path.runs, np.arange(10))
+        np.testing.assert_array_equal(path.line, 10 + np.arange(9))
+        assert path.fit.deviation == 0.0
+
+
+def test_tangent_joints_pass_between_lines_arcs_and_splines(make_program: Any) -> None:
+    points = [[0, 0], [10, 0], [14, 4], [12, 6], [0, 6]]
+    spline = CompositeCurve.from_bezier(CUBIC)
+    program = make_program(points, arcs={2: ((12, 4, 0), 2, math.pi / 2)}, feed=[10, 20, 30, 40])
+    path = build_path(with_splines(program, {1: spline}), MILL)
+    np.testing.assert_array_equal(path.runs, [0, 4])
+    assert path.curve.degree.tolist() == [2, 3, 2, 2]
+    np.testing.assert_array_equal(path.feed, [10, 20, 30, 40])
+    np.testing.assert_array_equal(piece(path, 1)[0], CUBIC)
+    assert path.curve.joints().kind.min() >= 2
+    # About its length, by its control polygon.
+    assert path.width[1] == 2 + 2 * math.sqrt(2) + 2
+
+
+def test_a_corner_beside_a_spline_is_a_stop_and_the_next_one_is_rounded(make_program: Any) -> None:
+    points = [[10, 0], [14, 4], [20, 4], [20, 10]]
+    spline = CompositeCurve.from_bezier(CUBIC)
+    program = with_splines(make_program(points, blend_tolerance=0.05), {0: spline})
+    path = build_path(program, MILL)
+    np.testing.assert_array_equal(path.runs, [0, 1, 4])
+    np.testing.assert_array_equal(piece(path, 0)[0], CUBIC)
+    jump = tuple(dataclasses.replace(axis, max_velocity_jump=1.0) for axis in MILL.axes)
+    np.testing.assert_array_equal(build_path(program, dataclasses.replace(MILL, axes=jump)).runs, [0, 4])
+
+
+def test_pieces_of_a_spline_keep_their_continuity_and_lose_those_without_length(make_program: Any) -> None:
+    knots = [0, 0, 0, 0, 1, 3, 3, 3, 3]
+    control = np.array([[0, 0, 0], [1, 2, 0], [3, 2, 0], [4, 0, 1], [6, 0, 0]], dtype=float)
+    smooth = CompositeCurve.from_bspline(control, knots, 3)
+    still = CompositeCurve.from_bezier(np.repeat(control[:1], 3, axis=0))
+    curve = CompositeCurve.joined([still, smooth])
+    path = build_path(with_splines(make_program(control[[0, -1]]), {0: curve}), MILL)
+    np.testing.assert_array_equal(path.runs, [0, 2])
+    # C2 stays C2: one factor for all widths.
+    assert path.curve.joints().kind.tolist() == [4]
+    assert path.width[1] / path.width[0] == pytest.approx(2.0)
+    with pytest.raises(ProgramError, match="line 10: the move has no length"):
+        build_path(with_splines(make_program(control[[0, 0]]), {0: still}), MILL)
+
+
+def test_a_closed_spline_returns_to_its_start(make_program: Any) -> None:
+    circle = [[10, 0, 0], [10, 40, 0], [-50, 0, 0], [10, -40, 0], [10, 0, 0]]
+    path = build_path(
+        with_splines(make_program([[10, 0], [10, 0]]), {0: CompositeCurve.from_bezier(circle)}), MILL
+    )
+    assert len(path) == 1
+
+
+def test_splines_start_exactly_where_their_move_does(make_program: Any) -> None:
+    control = np.array(CUBIC, dtype=float)
+    control[0, 1] += 3e-7
+    points = [[0, 0], [10, 0], [14, 4]]
+    path = build_path(with_splines(make_program(points), {1: CompositeCurve.from_bezier(control)}), MILL)
+    np.testing.assert_array_equal(piece(path, 1)[0][0], [10, 0, 0])
+    control[-1, 2] += 1e-3
+    with pytest.raises(ProgramError, match=r"line 11: the spline leaves a gap of 0\.001 mm"):
+        build_path(with_splines(make_program(points), {1: CompositeCurve.from_bezier(control)}), MILL)
+    with pytest.raises(ProgramError, match="line 11: the move has no spline"):
+        build_path(make_program(points, kind=[MoveKind.LINE, MoveKind.SPLINE]), MILL)
+
+
+def test_travel_is_that_of_the_curve_and_not_of_its_polygon(make_program: Any) -> None:
+    # The apex of this cubic is at 3/4 of its polygon's height.
+    arch = CompositeCurve.from_bezier([[0, 0, 0], [1, 4, 0], [2, 4, 0], [3, 0, 0]])
+    program = with_splines(make_program([[0, 0], [3, 0]]), {0: arch})
+
+    def limited(height: float) -> Machine:
+        axes = (MILL.axes[0], dataclasses.replace(MILL.axes[1], travel=(-1.0, height)), MILL.axes[2])
+        return dataclasses.replace(MILL, axes=axes)
+
+    build_path(program, limited(3.0))
+    with pytest.raises(InputError, match=r"line 10: Y reaches 3 mm, its travel ends at 2\.999 mm"):
+        build_path(program, limited(2.999))
+
+
+def test_an_axis_that_only_a_spline_moves_is_in_the_path(make_program: Any) -> None:
+    rotary = dataclasses.replace(MILL, axes=(*MILL.axes, Axis("A", 100.0, 1000.0)))
+    curve = CompositeCurve.from_bezier([[0, 0, 0, 0], [1, 0, 0, 90], [2, 0, 0, 0]])
+    program = with_splines(make_program([[0, 0, 0, 0], [2, 0, 0, 0]], axes="XYZA", feed=5.0), {0: curve})
+    path = build_path(program, rotary)
+    assert path.axes == ("X", "Y", "Z", "A")
+    # The feed as it is: never faster along X, Y and Z.
+    np.testing.assert_array_equal(path.feed, 5.0)
+    with pytest.raises(Exception, match="axis A moves"):
+        build_path(program, MILL)
