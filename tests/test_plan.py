@@ -60,20 +60,3 @@ def test_the_audit_expects_the_pause_before_the_first_move(planned: dict[str, Pl
     slow = late.setpoints(period=0.0037)
     assert audit(late.problem, late.profile, MILL.with_period(0.0037), late.program, slow).ok
     assert np.isclose(slow.duration, late.time, atol=3 * 0.0037)
-
-
-@pytest.mark.parametrize(
-    ("block", "machine", "words"),
-    [
-        ("G5 I1 J1 P1 Q1 X5", "mill", "line 2: splines are read and cannot be planned yet"),
-        ("G43.4 H1\nG1 X5 A5", "trunnion-ac", "line 3: words of the tool's tip"),
-        ("G43.5 H1\nG1 X5 I1 K5", "trunnion-ac", "line 3: words of the tool's tip"),
-    ],
-)
-def test_what_cannot_be_followed_yet_is_refused(
-    block: str, machine: str, words: str, tmp_path: FilePath
-) -> None:
-    file = tmp_path / "part.ngc"
-    file.write_text(f"G21 F600\n{block}\nM2\n")
-    with pytest.raises(ProgramError, match=words):
-        plan(file, machine)
