@@ -375,7 +375,7 @@ _PROFILE = {
 _PROGRAM = {
     **_dtypes(np.float64, "start", "target", "arc_centre", "arc_angle"),
     **_dtypes(np.int32, "line"),
-    **_dtypes(np.int64, "arc_move"),
+    **_dtypes(np.int64, "arc_move", "spline_move", "spline_pieces"),
     **_dtypes(np.uint8, "arc_normal"),
 }
 
