@@ -1,12 +1,13 @@
 //! The audit of plans and setpoints: the package's own types in, findings out.
 
-use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use super::arrays::to_array2;
 use super::with_padded_axes;
 use crate::audit::arcs::Arcs;
-use crate::audit::curve::{Followed, Pieces};
+use crate::audit::curve::{Curve, Followed, Pieces};
 use crate::audit::deviation::{audit_deviation, audit_path};
 use crate::audit::follow::Plan;
 use crate::audit::moves::Programmed;
@@ -284,6 +285,39 @@ fn audit_plan(
     })
 }
 
+/// C and C' (n, axes) at places of a curve, for what Python measures itself.
+#[pyfunction]
+#[pyo3(signature = (curve, piece, u))]
+fn audit_places<'py>(
+    py: Python<'py>,
+    curve: CurveArrays<'py>,
+    piece: PyReadonlyArray1<'py, i64>,
+    u: PyReadonlyArray1<'py, f64>,
+) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
+    let pieces = curve.pieces("path")?;
+    let (piece, u) = (piece.as_slice()?, u.as_slice()?);
+    let inside = piece.iter().all(|&piece| usize::try_from(piece).is_ok_and(|piece| piece < pieces.len()));
+    require(piece.len() == u.len() && inside, "places")?;
+    let axes = pieces.axes;
+    with_padded_axes!(axes, M, {
+        let (points, slopes) = py.detach(|| {
+            let (mut points, mut slopes) = (Vec::new(), Vec::new());
+            let mut last: Option<(i64, Curve<M>)> = None;
+            for (&number, &u) in piece.iter().zip(u) {
+                let curve = match last.take() {
+                    Some((known, curve)) if known == number => curve,
+                    _ => pieces.curve::<M>(number as usize),
+                };
+                points.push(curve.at(u));
+                slopes.push(curve.derivative(u));
+                last = Some((number, curve));
+            }
+            (points, slopes)
+        });
+        Ok((to_array2(py, points, axes), to_array2(py, slopes, axes)))
+    })
+}
+
 /// A stream whatever its number of axes.
 trait AnyStream: Send + Sync {
     fn push(&mut self, plan: Option<&Plan>, chunk: &Chunk);
@@ -442,5 +476,6 @@ fn finished() -> PyErr {
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(audit_plan, module)?)?;
+    module.add_function(wrap_pyfunction!(audit_places, module)?)?;
     module.add_class::<SetpointAudit>()
 }

@@ -11,6 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import SetpointAudit, audit_plan
+from feedplan.audit.joint_profile import audit_joint_profile
+from feedplan.audit.joint_setpoints import JointSetpoints
+from feedplan.audit.worst import Findings
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InputError
 from feedplan.machine.machine import Axis, Machine
@@ -188,11 +191,11 @@ def audit(
     only if the method claims it (`jerk`). `progress` is called with the share done, 0 to 1.
     Raises InputError where path, machine, program and setpoints do not belong together.
     """
-    path = problem.path
-    axes = path.axes
-    if program is not None and program.axes != axes:
+    axes = problem.axes
+    if program is not None and program.axes != problem.path.axes:
         raise InputError(
-            f"the program has the axes {' '.join(program.axes)}, its path {' '.join(axes)}: audit a path "
+            f"the program has the axes {' '.join(program.axes)}, its path "
+            f"{' '.join(problem.path.axes)}: audit a path "
             "with the program that it was built from"
         )
     machine_axes = _machine_axes(machine, axes)
@@ -206,30 +209,93 @@ def audit(
         period=float(problem.period),
         end_speeds=(float(problem.start_speed), float(problem.end_speed)),
     )
+    report = progress or (lambda done: None)
+    if isinstance(setpoints, Setpoints):
+        limits = replace(limits, period=setpoints.period)
+        setpoints = _reported(setpoints, report)
     try:
         problem, profile, program = _native(problem, profile, program)
-        report = progress or (lambda done: None)
         report(0.0)
-        results = [audit_plan(problem, limits, profile, program)]
-        if setpoints is not None:
-            report(PLAN_SHARE)
-            if isinstance(setpoints, Setpoints):
-                limits = replace(limits, period=setpoints.period)
-                setpoints = _reported(setpoints, report)
-            stream = SetpointAudit(limits, 0.0, problem, profile, program)
-            for chunk in setpoints:
-                stream.push(
-                    _array(chunk.t, np.float64),
-                    _array(chunk.position, np.float64),
-                    _array(chunk.velocity, np.float64),
-                    _array(chunk.acceleration, np.float64),
-                    _array(chunk.line, np.int32),
-                )
-            results.append(stream.finish())
+        work = _audit_axes if problem.joints is None else _audit_joints
+        results = work(problem, profile, limits, program, setpoints, report)
         report(1.0)
     except ValueError as error:
         raise InputError(f"this plan cannot be audited: {error}") from None
     return _join(results, axes, jerk)
+
+
+Results = list[Findings]
+
+
+def _audit_axes(
+    problem: Problem,
+    profile: SpeedProfile | None,
+    limits: _Limits,
+    program: Program | None,
+    setpoints: Iterable[SetpointChunk] | None,
+    report: Callable[[float], None],
+) -> Results:
+    """Where the path's axes are the joints."""
+    plan_limits = replace(limits, period=float(problem.period))
+    results = [audit_plan(problem, plan_limits, profile, program)]
+    if setpoints is not None:
+        report(PLAN_SHARE)
+        stream = SetpointAudit(limits, 0.0, problem, profile, program)
+        for chunk in setpoints:
+            _push(stream, chunk)
+        results.append(stream.finish())
+    return results
+
+
+def _audit_joints(
+    problem: Problem,
+    profile: SpeedProfile | None,
+    limits: _Limits,
+    program: Program | None,
+    setpoints: Iterable[SetpointChunk] | None,
+    report: Callable[[float], None],
+) -> Results:
+    """Where the path is the tool tip's: what is the tip's natively, what is the joints' by the kinematics."""
+    axes = len(problem.path.axes)
+    free = replace(
+        limits,
+        max_velocity=[math.inf] * axes,
+        max_acceleration=[math.inf] * axes,
+        max_jerk=[math.inf] * axes,
+        max_velocity_jump=[0.0] * axes,
+        travel=[(-math.inf, math.inf)] * axes,
+    )
+    findings, samples = audit_plan(problem, free, None, program)
+    results: Results = [([found for found in findings if found[1] < 0], samples)]
+    jump = np.array(limits.max_velocity_jump)
+    if profile is not None:
+        share = PLAN_SHARE if setpoints is not None else 1.0
+        worst = audit_joint_profile(
+            problem, profile, jump, np.array(limits.travel), lambda done: report(share * done)
+        )
+        results.append(worst.findings())
+    if setpoints is not None:
+        report(PLAN_SHARE)
+        stream = SetpointAudit(limits, 0.0)
+        places = None if profile is None else JointSetpoints(problem, profile, jump, limits.period)
+        for chunk in setpoints:
+            _push(stream, chunk)
+            if places is not None:
+                places.push(chunk)
+        results.append(stream.finish())
+        if places is not None:
+            results.append(places.finish().findings())
+    return results
+
+
+def _push(stream: SetpointAudit, chunk: SetpointChunk) -> None:
+    stream.push(
+        _array(chunk.t, np.float64),
+        _array(chunk.position, np.float64),
+        _array(chunk.velocity, np.float64),
+        _array(chunk.acceleration, np.float64),
+        _array(chunk.line, np.int32),
+    )
 
 
 def audit_setpoints(
@@ -322,7 +388,7 @@ def _period(times: NDArray[np.float64], default: float) -> float:
 
 
 def _join(
-    results: Iterable[tuple[list[tuple[str, int, float, float, float, float, int]], int]],
+    results: Iterable[Findings],
     axes: tuple[str, ...],
     jerk: bool,
 ) -> Audit:
