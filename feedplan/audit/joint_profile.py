@@ -213,7 +213,7 @@ class _Auditor:
             directions = [side / np.linalg.norm(side, axis=1)[:, None] for side in (sides[0], sides[2])]
             turn = np.linalg.norm(directions[1] - directions[0], axis=1)
             way = 2.0 * step * np.linalg.norm(sides[1], axis=1)
-            return np.nan_to_num(np.maximum(turn - ROUNDINGS * EPS, 0.0) / way, posinf=0.0)
+            return np.asarray(np.nan_to_num(np.maximum(turn - ROUNDINGS * EPS, 0.0) / way, posinf=0.0))
 
     def _durations(self, state: Motion, line: NDArray[np.int32]) -> None:
         with np.errstate(all="ignore"):
@@ -309,7 +309,7 @@ class _Auditor:
 
     def finish(self) -> None:
         """The travel, angles on the turn that suits them best: the path cannot say on which one it starts."""
-        turning = self.path.turning.all(axis=0) if len(self.path.turning) else np.zeros(self.names, bool)
+        turning = np.all(self.path.turning, axis=0).tolist()
         for k in range(self.names):
             lower, upper = (float(bound) for bound in self.travel[k])
             least, most = (float(q) for q in self.reach[:, k])

@@ -1,8 +1,8 @@
 """The places of joint setpoints on the path of the tool tip, and when the profile is there.
 
 A setpoint is compared with K(C(u)): u on the arc that the profile is on at its time, moved along it until no
-nearer place is found. How far the setpoint stays off is one error, how far the profile gets between the time of
-the setpoint and being at that place the other. The clock starts every run anew: setpoints may wait at a stop
+nearer place is found. How far the setpoint stays off is one error, how far the profile gets between the time
+of the setpoint and being at that place the other. The clock starts every run anew: setpoints may wait at a stop
 for their next period.
 """
 
@@ -27,8 +27,8 @@ UNEVEN = 1e-6
 # A recorded velocity may differ from the profile's by this share of what one period of acceleration changes.
 VELOCITY_SHARE = 1e-3
 
-# Setpoints looked at together, steps towards the nearest place, and how far apart the places are, as a share of
-# the arc, that a step is told from.
+# Setpoints looked at together, steps towards the nearest place, and how far apart the places that a step is
+# told from are, as a share of the arc.
 BLOCK, MOST_STEPS, NEARBY = 8192, 12, 1e-6
 
 # Time, position, piece, u and tip of a setpoint.

@@ -12,8 +12,10 @@ from feedplan._solvers import plan_curves
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Path
+from feedplan.machine.along import derivatives
 from feedplan.machine.machine import Axis, Machine
-from feedplan.profile import SpeedProfile
+from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.setpoints import SetpointChunk
 
 Array = NDArray[np.float64]
 
@@ -77,3 +79,67 @@ def planned(problem: Problem) -> SpeedProfile:
             problem.end_speed,
         )
     )
+
+
+def places_at(problem: Problem, profile: SpeedProfile, t: Array) -> tuple[NDArray[np.int64], Array, Array]:
+    """Arc, u and √p at times in motion (n,): by halving, from closed forms; not along a feed limit."""
+    ends = np.cumsum(profile.duration)
+    arc = np.minimum(np.searchsorted(ends, t, side="right"), len(profile) - 1)
+    since = np.clip(t - (ends[arc] - profile.duration[arc]), 0.0, profile.duration[arc])
+    piece, rows = profile.piece[arc].astype(np.int64), np.arange(len(t))
+    axis = np.where(profile.axis[arc] == 255, 0, profile.axis[arc]).astype(np.int64)
+    kind, value = profile.kind[arc], profile.value[arc]
+
+    def motion(u: Array) -> tuple[Array, Array]:
+        q, slope = problem.curve.evaluate(piece, u, 1)
+        return q[rows, axis], slope[rows, axis]
+
+    (q0, g0), (q1, g1) = motion(profile.u0[arc]), motion(profile.u1[arc])
+    v0, v1 = g0 * np.sqrt(profile.p0[arc]), g1 * np.sqrt(profile.p1[arc])
+    # From the slower end, where nothing cancels.
+    rest = profile.duration[arc] - since
+    ahead = q0 + since * (v0 + 0.5 * value * since)
+    target = np.where(np.abs(v0) <= np.abs(v1), ahead, q1 - rest * (v1 - 0.5 * value * rest))
+    target = np.where(
+        kind == ArcKind.AXIS_VELOCITY, q0 + np.sign(q1 - q0) * np.sqrt(np.abs(value)) * since, target
+    )
+    low, high = profile.u0[arc].copy(), profile.u1[arc].copy()
+    for _ in range(70):
+        middle = 0.5 * (low + high)
+        below = (motion(middle)[0] < target) == (q1 > q0)
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    u = np.where(kind == ArcKind.FLAT, profile.u0[arc] + np.sqrt(profile.p0[arc]) * since, 0.5 * (low + high))
+    q, slope = motion(u)
+    speed = np.sqrt(
+        np.maximum(
+            np.where(np.abs(v0) <= np.abs(v1), v0**2 + 2 * value * (q - q0), v1**2 - 2 * value * (q1 - q)),
+            0.0,
+        )
+    )
+    speed = np.where(kind == ArcKind.AXIS_VELOCITY, np.sqrt(np.abs(value)), speed)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root_p = np.where(kind == ArcKind.FLAT, np.sqrt(profile.p0[arc]), speed / np.abs(slope))
+    return arc, u, root_p
+
+
+def sampled(problem: Problem, profile: SpeedProfile) -> SetpointChunk:
+    """Setpoints of one run: its start, one a period, and the stop at the next whole period."""
+    count = math.ceil(profile.time / problem.period - 1e-9)
+    t = np.arange(count + 1) * problem.period
+    arc, u, root_p = places_at(problem, profile, np.minimum(t, profile.time))
+    piece = profile.piece[arc].astype(np.int64)
+    curve = problem.path.curve
+    if problem.words:
+        (words,) = problem.words
+        control = np.stack([curve.control_points[slice(*curve.offsets[i : i + 2])] for i in piece])
+        width = curve.width[piece]
+        share = np.minimum(u / width, 1.0)
+        q = derivatives(words.kinematics, words.tip(control), width, share, 1)
+        turning = np.array(words.kinematics.turning)
+        q[0] = np.where(turning, np.unwrap(q[0], period=360.0, axis=0), q[0])
+    else:
+        q = curve.evaluate(piece, u, 1)
+    velocity = np.nan_to_num(q[1] * root_p[:, None])
+    velocity[[0, -1]] *= [[problem.start_speed > 0], [problem.end_speed > 0]]
+    zero = np.zeros_like(velocity)
+    return SetpointChunk(t, q[0], velocity, zero, zero, problem.path.line[piece], problem.axes)

@@ -120,7 +120,11 @@ impl Arcs<'_> {
             Curve::General(polygon, whole) => {
                 let part = polygon.part(self.u0[i] / whole, width / whole);
                 let part = Box::new(if anchored_at_end { part.reversed() } else { part });
-                Shape::General { part, tangent, size: curve.derivative_size() }
+                let mut ends = [self.u0[i] / whole, self.u1[i] / whole];
+                if anchored_at_end {
+                    ends.reverse();
+                }
+                Shape::General { whole: polygon.clone(), ends, part, tangent, size: curve.derivative_size() }
             }
         };
         Motion::new(law, shape, width, [p_anchor, p_far], anchored_at_end)

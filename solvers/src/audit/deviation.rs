@@ -21,6 +21,9 @@ const PLACES: usize = 8;
 /// 1.6 % of its greatest distance from a line.
 const NEAR: f64 = 0.95;
 
+/// Where no more pieces follow a move they are all measured; of more, those whose boxes come near enough.
+const FEW: usize = 8;
+
 /// Pieces or moves a thread takes at a time.
 const BLOCK: usize = 2048;
 
@@ -226,7 +229,8 @@ fn move_to_pieces<const M: usize>(
         let enough = settled(tally);
         for piece in outwards(expected, least, most) {
             let tolerance = path.tolerance[piece].max(GAP_TOLERANCE);
-            if path.distance_at_least(piece, &q) - rounding > nearest.0 * tolerance {
+            let beyond = nearest.0 * tolerance + rounding;
+            if most - least > FEW && beyond.is_finite() && path.distance_at_least(piece, &q) > beyond {
                 continue;
             }
             let away = distance_to_piece(&path.curve::<M>(piece), &q) - rounding;
@@ -245,12 +249,20 @@ fn move_to_pieces<const M: usize>(
 
 /// `from`, then its neighbours on both sides by turns, within `least` to `most`.
 pub fn outwards(from: usize, least: usize, most: usize) -> impl Iterator<Item = usize> {
-    let reach = (from - least).max(most - from);
-    (0..=reach).flat_map(move |step| {
-        let after = Some(from + step).filter(|&place| place <= most);
-        let before = from.checked_sub(step).filter(|&place| step > 0 && place >= least);
-        after.into_iter().chain(before)
-    })
+    let (mut after, mut before, mut turn) = (from + 1, from, false);
+    let others = std::iter::from_fn(move || {
+        turn = if after > most { false } else { before <= least || !turn };
+        if turn {
+            after += 1;
+            Some(after - 1)
+        } else {
+            (before > least).then(|| {
+                before -= 1;
+                before
+            })
+        }
+    });
+    std::iter::once(from).chain(others)
 }
 
 /// When the tool enters each piece, and when it leaves the last one, in s.

@@ -42,8 +42,15 @@ pub enum Law {
 pub enum Shape<const M: usize> {
     /// Degree 2: C' at the anchor, and C''.
     Quadratic { tangent: [f64; M], bend: [f64; M] },
-    /// Any other: the part of it from the anchor to the other end, and what the rounding of C' is relative to.
-    General { part: Box<Polygon<M>>, tangent: [f64; M], size: [f64; M] },
+    /// Any other: itself, with t at the anchor and at the other end; the part of it between them, from the anchor; and
+    /// what the rounding of C' is relative to.
+    General {
+        whole: Box<Polygon<M>>,
+        ends: [f64; 2],
+        part: Box<Polygon<M>>,
+        tangent: [f64; M],
+        size: [f64; M],
+    },
 }
 
 impl Law {
@@ -98,6 +105,8 @@ pub struct Motion<const M: usize> {
 
 #[derive(Clone, Debug)]
 struct General<const M: usize> {
+    whole: Box<Polygon<M>>,
+    ends: [f64; 2],
     part: Box<Polygon<M>>,
     size: [f64; M],
 }
@@ -133,7 +142,9 @@ impl<const M: usize> Motion<M> {
         let direction = if anchored_at_end { -1.0 } else { 1.0 };
         let (tangent, bend, general) = match shape {
             Shape::Quadratic { tangent, bend } => (tangent, bend, None),
-            Shape::General { part, tangent, size } => (tangent, [0.0; M], Some(General { part, size })),
+            Shape::General { whole, ends, part, tangent, size } => {
+                (tangent, [0.0; M], Some(General { whole, ends, part, size }))
+            }
         };
         let [root_anchor, root_far] = p.map(f64::sqrt);
         let [near, far] = substitution([root_anchor, root_far]);
@@ -343,7 +354,11 @@ impl<const M: usize> Motion<M> {
     pub fn curvature(&self, state: &State<M>) -> f64 {
         match &self.general {
             None => curvature(&state.tangent, &self.bend),
-            Some(general) => general.part.curvature((self.distance(state.y) / self.width).abs().min(1.0)),
+            // Of the whole piece: on a short part nothing is left of the turn from step to step.
+            Some(General { whole, ends, .. }) => {
+                let share = (self.distance(state.y) / self.width).abs().min(1.0);
+                whole.curvature((ends[0] + share * (ends[1] - ends[0])).clamp(0.0, 1.0))
+            }
         }
     }
 

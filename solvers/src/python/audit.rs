@@ -285,6 +285,9 @@ fn audit_plan(
     })
 }
 
+/// Two (n, axes) arrays.
+type Tables<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
+
 /// C and C' (n, axes) at places of a curve, for what Python measures itself.
 #[pyfunction]
 #[pyo3(signature = (curve, piece, u))]
@@ -293,7 +296,7 @@ fn audit_places<'py>(
     curve: CurveArrays<'py>,
     piece: PyReadonlyArray1<'py, i64>,
     u: PyReadonlyArray1<'py, f64>,
-) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
+) -> PyResult<Tables<'py>> {
     let pieces = curve.pieces("path")?;
     let (piece, u) = (piece.as_slice()?, u.as_slice()?);
     let inside = piece.iter().all(|&piece| usize::try_from(piece).is_ok_and(|piece| piece < pieces.len()));
