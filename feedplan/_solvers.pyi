@@ -210,10 +210,10 @@ def audit_plan(
     profile: SpeedProfile | None = None,
     program: Program | None = None,
 ) -> _Findings: ...
-
 def audit_places(
     curve: CompositeCurve, piece: NDArray[np.int64], u: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+
 @final
 class SetpointAudit:
     def __new__(

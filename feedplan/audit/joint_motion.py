@@ -70,8 +70,8 @@ def motion(path: JointPath, profile: SpeedProfile, arcs: Numbers, u: Array | Non
     piece = profile.piece[arcs].astype(np.int64)
     kind, value = profile.kind[arcs], profile.value[arcs][:, None]
     many = np.repeat(piece, width)
-    slope, error, unknown = (x.reshape(count, width, -1) for x in path.slopes(many, u.ravel()))
-    position = path.at(many, u.ravel()).reshape(count, width, -1)
+    slope, error, unknown = (x.reshape(count, width, x.shape[1]) for x in path.slopes(many, u.ravel()))
+    position = path.at(many, u.ravel()).reshape(count, width, slope.shape[2])
     steps = path.between(piece, position[:, :-1], position[:, 1:])
     way = np.concatenate([np.zeros((count, 1, steps.shape[2])), np.cumsum(steps, axis=1)], axis=1)
     tip_speed = path.feed_slope(many, u.ravel()).reshape(count, width)

@@ -111,7 +111,7 @@ class JointPath:
         """From one position to another (n, …, joints), turning joints the short way round."""
         way = after - before
         turning = self.turning[self.run[piece]]
-        turning = turning.reshape(len(piece), *([1] * (way.ndim - 2)), -1)
+        turning = turning.reshape(len(piece), *([1] * (way.ndim - 2)), way.shape[-1])
         with np.errstate(invalid="ignore"):
             return np.where(turning, way - TURN * np.round(way / TURN), way)
 
@@ -151,12 +151,12 @@ class JointPath:
         places = centre[:, None] + step[:, None] * NODES
         many = np.repeat(piece, len(NODES))
         tip, slope = self.tip(many, places.ravel())
-        q = self.joints(many, tip).reshape(len(piece), len(NODES), -1)
+        q = self.joints(many, tip).reshape(len(piece), len(NODES), len(self.problem.axes))
         way = self.between(piece, q[:, 3:4], q)
         difference = np.einsum("nj,njk->nk", weights, way) / step[:, None]
         # A joint feels the rounding of the tip as much as it moves with it.
-        size = np.abs(tip).max(axis=1).reshape(len(piece), -1).max(axis=1)
-        speed = np.linalg.norm(slope, axis=1).reshape(len(piece), -1).max(axis=1)
+        size = np.abs(tip).max(axis=1).reshape(len(piece), len(NODES)).max(axis=1)
+        speed = np.linalg.norm(slope, axis=1).reshape(len(piece), len(NODES)).max(axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):
             felt = np.nan_to_num(np.abs(difference) * (size / speed)[:, None], posinf=0.0)
         rounding = ROUNDINGS * EPS * (np.abs(q).max(axis=(1, 2))[:, None] + felt)

@@ -42,14 +42,16 @@ def audit_joint_profile(
     `jump` (joints,) is what velocities may jump by at corners, `travel` (joints, 2).
     """
     worst = Worst()
-    good = _order(problem, profile, worst)
-    starts = arc_starts(problem, profile)
-    auditor = _Auditor(JointPath(problem), profile, jump, travel, starts, worst)
-    for first in range(0, len(profile), CHUNK):
-        arcs = np.arange(first, min(first + CHUNK, len(profile)))
-        progress(first / len(profile))
-        auditor.arcs(arcs[good[arcs]])
-    auditor.finish()
+    # What is not a number, or too great for one, is found as such.
+    with np.errstate(all="ignore"):
+        good = _order(problem, profile, worst)
+        starts = arc_starts(problem, profile)
+        auditor = _Auditor(JointPath(problem), profile, jump, travel, starts, worst)
+        for first in range(0, len(profile), CHUNK):
+            arcs = np.arange(first, min(first + CHUNK, len(profile)))
+            progress(first / len(profile))
+            auditor.arcs(arcs[good[arcs]])
+        auditor.finish()
     return worst
 
 

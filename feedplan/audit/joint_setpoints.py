@@ -2,8 +2,8 @@
 
 A setpoint is compared with K(C(u)): u on the arc that the profile is on at its time, moved along it until no
 nearer place is found. How far the setpoint stays off is one error, how far the profile gets between the time
-of the setpoint and being at that place the other. The clock starts every run anew: setpoints may wait at a stop
-for their next period.
+of the setpoint and being at that place the other. The clock starts every run anew: setpoints may wait at a
+stop for their next period.
 """
 
 from __future__ import annotations
@@ -64,13 +64,15 @@ class JointSetpoints:
         if not self.usable or not len(chunk.t):
             return
         rows = chunk if self.held is None else _joined(self.held, chunk)
-        self._take(rows, len(rows.t) - 1)
+        with np.errstate(all="ignore"):
+            self._take(rows, len(rows.t) - 1)
         self.held = _part(rows, len(rows.t) - 1, len(rows.t))
 
     def finish(self) -> Worst:
         """The last setpoint must be the end of the path."""
         if self.usable and self.held is not None:
-            self._take(self.held, len(self.held.t), last=True)
+            with np.errstate(all="ignore"):
+                self._take(self.held, len(self.held.t), last=True)
             piece = np.array([len(self.problem.path) - 1])
             end = self.path.at(piece, self.problem.path.width[piece])
             away = self._off(piece, self.held.position[-1:], end)

@@ -141,5 +141,15 @@ def sampled(problem: Problem, profile: SpeedProfile) -> SetpointChunk:
         q = curve.evaluate(piece, u, 1)
     velocity = np.nan_to_num(q[1] * root_p[:, None])
     velocity[[0, -1]] *= [[problem.start_speed > 0], [problem.end_speed > 0]]
+    acceleration = np.zeros_like(velocity)
+    if not problem.words:
+        # Differences so close that only a switch at the setpoint itself comes between.
+        around = [places_at(problem, profile, np.clip(t + step, 0.0, profile.time)) for step in (-1e-7, 1e-7)]
+        rates = [
+            curve.evaluate(profile.piece[arc].astype(np.int64), u, 1)[1] * root_p[:, None]
+            for arc, u, root_p in around
+        ]
+        acceleration = (rates[1] - rates[0]) / 2e-7
+        acceleration[[0, -1]] = 0.0
     zero = np.zeros_like(velocity)
-    return SetpointChunk(t, q[0], velocity, zero, zero, problem.path.line[piece], problem.axes)
+    return SetpointChunk(t, q[0], velocity, acceleration, zero, problem.path.line[piece], problem.axes)
