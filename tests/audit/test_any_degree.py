@@ -362,3 +362,44 @@ def test_a_circle_is_followed_by_exact_pieces() -> None:
     bulged = replace(path, curve=replace(curve, weights=weights))
     result = audit(replace(problem, path=bulged), None, machine_of(problem), program)
     assert broken(result) == {("deviation", None)}
+
+
+def along_a_line(*pieces: tuple[float, ...]) -> CompositeCurve:
+    """Bézier pieces on a line that rises 4 on 3, by how far along it their control points are."""
+    direction = np.array([0.6, 0.8])
+    return CompositeCurve.joined(
+        [CompositeCurve.from_bezier(np.outer(x, direction), width=10.0) for x in pieces]
+    )
+
+
+@pytest.mark.parametrize("feed", [1e9, 50.0])
+@pytest.mark.parametrize(
+    "curve",
+    [
+        along_a_line((0, 10), (10, 10, 13, 20), (20, 30)),
+        along_a_line((0, 10), (10, 13, 20, 20), (20, 20, 22, 30)),
+    ],
+)
+def test_a_place_where_the_parameter_stands_is_passed_at_a_speed(curve: CompositeCurve, feed: float) -> None:
+    problem = problem_along(path_along(curve), [500.0, 400.0], 1000.0, feed)
+    profile, machine = planned(problem), machine_of(problem)
+    assert np.isinf(profile.p0).any() or np.isinf(profile.p1).any()
+    assert audit(problem, profile, machine).failures == ()
+    value = profile.value.copy()
+    arc = int(np.flatnonzero(np.isinf(profile.p0))[0]) if np.isinf(profile.p0).any() else len(value) - 2
+    value[arc] *= 1.001
+    assert not audit(problem, replace(profile, value=value), machine).ok
+    # Nowhere else.
+    for name in ("p0", "p1"):
+        column = getattr(profile, name).copy()
+        column[0] = math.inf
+        assert ("numbers", None) in broken(audit(problem, replace(profile, **{name: column}), machine))
+
+
+def test_a_speed_is_kept_from_one_such_place_to_the_next() -> None:
+    problem = problem_along(
+        path_along(along_a_line((0, 10), (10, 10, 20, 20), (20, 30))), 500.0, 1000.0, 50.0
+    )
+    profile, machine = planned(problem), machine_of(problem)
+    assert (np.isinf(profile.p0) & np.isinf(profile.p1)).any()
+    assert audit(problem, profile, machine).failures == ()

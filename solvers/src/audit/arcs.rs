@@ -85,7 +85,7 @@ impl Arcs<'_> {
         };
         by_speed
             && matches!(curve, Curve::General(..))
-            && !(self.p0[i].is_infinite() && self.p1[i].is_infinite())
+            && !(self.kind[i] == AXIS_ACCELERATION && self.p0[i].is_infinite() && self.p1[i].is_infinite())
             && still(self.u0[i], self.p0[i])
             && still(self.u1[i], self.p1[i])
     }
