@@ -58,8 +58,8 @@ def audit(
 
     The `profile` on its path; with a `program` the distance between followed and programmed path; with
     `setpoints`, which are read chunk by chunk, their differences and their places on the path. Where the
-    joints are not the path's axes, their limits are measured by the kinematics' positions alone. Jerk is judged
-    only if the method claims it (`jerk`). `progress` is called with the share done, 0 to 1.
+    joints are not the path's axes, their limits are measured by the kinematics' positions alone. Jerk is
+    judged only if the method claims it (`jerk`). `progress` is called with the share done, 0 to 1.
     Raises InputError where path, machine, program and setpoints do not belong together.
     """
     axes = problem.axes
