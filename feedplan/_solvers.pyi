@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from feedplan.audit import _Limits
 from feedplan.constraints.problem import Problem
+from feedplan.curves.composite import CompositeCurve
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 
@@ -17,6 +18,7 @@ __all__ = [
     "Sampler",
     "SetpointAudit",
     "__version__",
+    "audit_places",
     "audit_plan",
     "build_path",
     "check_control_points",
@@ -179,6 +181,9 @@ def audit_plan(
     profile: SpeedProfile | None = None,
     program: Program | None = None,
 ) -> _Findings: ...
+def audit_places(
+    curve: CompositeCurve, piece: NDArray[np.int64], u: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
 
 @final
 class SetpointAudit:

@@ -14,6 +14,7 @@ pub mod integral;
 pub mod motion;
 pub mod moves;
 pub mod place;
+pub mod polygon;
 pub mod profile;
 pub mod setpoints;
 pub mod timed;

@@ -1,7 +1,7 @@
 //! The arcs of a speed profile: their arrays, when they begin, and what is wrong with their numbers alone.
 
-use super::curve::{Curve, Followed};
-use super::motion::{Law, Motion};
+use super::curve::{inner, length, Curve, Followed};
+use super::motion::{Law, Motion, Shape};
 
 /// The profile's arrays, one entry an arc; see `feedplan.profile.SpeedProfile`.
 #[derive(Clone, Copy)]
@@ -26,6 +26,10 @@ const FLAT: u8 = 1;
 const FEED: u8 = 2;
 const AXIS_VELOCITY: u8 = 3;
 const CHORD: u8 = 4;
+const SPEED_LINE: u8 = 5;
+
+/// Where p is infinite C' is at most this share of its size: the tool passes a cusp there.
+const CUSP: f64 = 1e-6;
 
 impl Arcs<'_> {
     /// Number of arcs.
@@ -57,26 +61,45 @@ impl Arcs<'_> {
     /// What is wrong with the numbers of arc `i` taken alone, if anything.
     pub fn has_bad_numbers(&self, i: usize, path: &Followed) -> bool {
         let piece = self.piece[i] as usize;
-        if piece >= path.len() || self.kind[i] > CHORD {
+        if piece >= path.len() || self.kind[i] > SPEED_LINE {
             return true;
         }
         let needs_axis = matches!(self.kind[i], AXIS_ACCELERATION | AXIS_VELOCITY);
-        let numbers = [self.value[i], self.u0[i], self.u1[i], self.p0[i], self.p1[i], self.duration[i]];
+        let numbers = [self.value[i], self.u0[i], self.u1[i], self.duration[i]];
         (needs_axis && self.axis[i] as usize >= path.axes)
             || numbers.iter().any(|number| !number.is_finite())
+            || self.p0[i].is_nan()
+            || self.p1[i].is_nan()
             || self.p0[i] < 0.0
             || self.p1[i] < 0.0
             || self.duration[i] < 0.0
+            || ((self.p0[i].is_infinite() || self.p1[i].is_infinite()) && !self.passes_cusp(i, path))
+    }
+
+    /// Whether an arc with an infinite p begins or ends at a cusp, where that is right.
+    fn passes_cusp(&self, i: usize, path: &Followed) -> bool {
+        let by_speed = matches!(self.kind[i], AXIS_ACCELERATION | FEED | AXIS_VELOCITY);
+        let curve = path.curve::<6>(self.piece[i] as usize);
+        let still = |u: f64, p: f64| {
+            !p.is_infinite() || length(&curve.derivative(u)) <= CUSP * length(&curve.derivative_size())
+        };
+        by_speed
+            && matches!(curve, Curve::General(..))
+            && !(self.kind[i] == AXIS_ACCELERATION && self.p0[i].is_infinite() && self.p1[i].is_infinite())
+            && still(self.u0[i], self.p0[i])
+            && still(self.u1[i], self.p1[i])
     }
 
     /// Arc `i` ready to be evaluated; its numbers must be good.
     pub fn motion<const M: usize>(&self, i: usize, curve: &Curve<M>) -> Motion<M> {
-        let (p0, p1) = (self.p0[i], self.p1[i]);
+        let p = [self.p0[i], self.p1[i]];
         let ends = [curve.derivative(self.u0[i]), curve.derivative(self.u1[i])];
         let axis = self.axis[i] as usize;
-        let anchored_at_end =
-            self.kind[i] == AXIS_ACCELERATION && (ends[1][axis].powi(2) * p1 < ends[0][axis].powi(2) * p0);
-        let (tangent, p_anchor, p_far) = if anchored_at_end { (ends[1], p1, p0) } else { (ends[0], p0, p1) };
+        let anchored_at_end = self.kind[i] == AXIS_ACCELERATION
+            && (p[0].is_infinite() || ends[1][axis].powi(2) * p[1] < ends[0][axis].powi(2) * p[0]);
+        let (tangent, p_anchor, p_far) =
+            if anchored_at_end { (ends[1], p[1], p[0]) } else { (ends[0], p[0], p[1]) };
+        let width = self.u1[i] - self.u0[i];
         let law = match self.kind[i] {
             AXIS_ACCELERATION => Law::AxisAcceleration {
                 axis,
@@ -86,9 +109,24 @@ impl Arcs<'_> {
             FLAT => Law::Flat { root_p: p_anchor.sqrt() },
             FEED => Law::Feed { speed: self.value[i].sqrt() },
             AXIS_VELOCITY => Law::AxisVelocity { axis, speed: self.value[i].sqrt() },
-            _ => Law::Chord { value: self.value[i] },
+            CHORD => Law::Chord { value: self.value[i] },
+            _ => {
+                let [start_sq, end_sq] = [0, 1].map(|end| inner(&ends[end], &ends[end]) * p[end]);
+                Law::SpeedLine { start_sq, change_sq: end_sq - start_sq }
+            }
         };
-        let width = self.u1[i] - self.u0[i];
-        Motion::new(law, tangent, curve.second_derivative(), width, [p_anchor, p_far], anchored_at_end)
+        let shape = match curve {
+            Curve::Quadratic(quadratic) => Shape::Quadratic { tangent, bend: quadratic.second_derivative() },
+            Curve::General(polygon, whole) => {
+                let part = polygon.part(self.u0[i] / whole, width / whole);
+                let part = Box::new(if anchored_at_end { part.reversed() } else { part });
+                let mut ends = [self.u0[i] / whole, self.u1[i] / whole];
+                if anchored_at_end {
+                    ends.reverse();
+                }
+                Shape::General { whole: polygon.clone(), ends, part, tangent, size: curve.derivative_size() }
+            }
+        };
+        Motion::new(law, shape, width, [p_anchor, p_far], anchored_at_end)
     }
 }

@@ -23,7 +23,7 @@ pub struct Comparison<'a, const M: usize> {
     limits: &'a Limits<M>,
     profile: Option<Reader<'a, M>>,
     /// The programmed moves near `piece`.
-    near: Neighbours<M>,
+    near: Neighbours<'a, M>,
     piece: Option<usize>,
 }
 
@@ -41,11 +41,11 @@ impl<'a, const M: usize> Comparison<'a, M> {
         let (path, piece) = (&self.plan.path, spot.place.piece);
         if let Some(program) = &self.plan.program {
             if self.piece != Some(piece) {
-                self.near.replace(window(path, piece, program.len()).map(|m| program.get(m)));
+                self.near.replace(program, window(path, piece, program.len()));
                 self.piece = Some(piece);
             }
             let limit = path.tolerance[piece] + PLACE_TOLERANCE;
-            let away = self.near.distance(&row.q, settled(tally) * limit);
+            let away = self.near.distance(&row.q, settled(tally) * limit + rounding);
             tally.offer(Check::Deviation, 0, away - rounding, limit, time, line);
         }
         if spot.is_good() {
@@ -95,7 +95,7 @@ impl<'a, const M: usize> Comparison<'a, M> {
         for piece in from.piece..=to.piece {
             let curve = path.curve::<M>(piece);
             let start = if piece == from.piece { from.u } else { 0.0 };
-            let end = if piece == to.piece { to.u } else { curve.width };
+            let end = if piece == to.piece { to.u } else { curve.width() };
             let next = if piece == to.piece { row.q } else { curve.at(end) };
             let part = distance(&last, &next);
             way += part;
@@ -133,7 +133,7 @@ impl<'a, const M: usize> Comparison<'a, M> {
         for piece in from.piece..=to.piece {
             let curve = path.curve::<M>(piece);
             let start = if piece == from.piece { from.u } else { 0.0 };
-            let end = if piece == to.piece { to.u } else { curve.width };
+            let end = if piece == to.piece { to.u } else { curve.width() };
             for share in [0.0, 0.25, 0.5, 0.75, 1.0] {
                 let tangent = curve.derivative(start + share * (end - start));
                 let size = length(&tangent);
@@ -161,7 +161,7 @@ impl<'a, const M: usize> Comparison<'a, M> {
         for piece in first..=last {
             let before = path.curve::<M>(piece - 1);
             let after = path.curve::<M>(piece);
-            let (into, out) = (before.derivative(before.width), after.derivative(0.0));
+            let (into, out) = (before.derivative(before.width()), after.derivative(0.0));
             let (a, b) = (length(&into), length(&out));
             if distance(&into.map(|x| x / a), &out.map(|x| x / b)) > SMOOTH {
                 corners += 1.0;

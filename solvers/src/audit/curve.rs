@@ -1,16 +1,29 @@
-//! The followed geometry as the audit sees it: a start point and two differences per piece.
+//! The followed geometry as the audit sees it: pieces of degree 2 by a start point and two differences, all others
+//! by their polygon.
 //!
 //! The kernels take `M` axes; where there are fewer, the last ones rest at 0 and have nothing to break.
+
+use super::polygon::Polygon;
+
+/// Pieces joined end to end; see `feedplan.curves.composite.CompositeCurve`.
+#[derive(Clone, Copy)]
+pub struct Pieces<'a> {
+    /// At most as many as the kernels take.
+    pub axes: usize,
+    /// Control points, one row of axes each, in mm.
+    pub control: &'a [f64],
+    /// Of every control point; empty where all pieces are polynomial.
+    pub weights: &'a [f64],
+    /// Of the pieces in the control points, one more than pieces; they grow by 2 to 10.
+    pub offsets: &'a [i64],
+    /// Parameter intervals, in mm.
+    pub width: &'a [f64],
+}
 
 /// The path's arrays, one entry a piece; see `feedplan.Path`.
 #[derive(Clone, Copy)]
 pub struct Followed<'a> {
-    /// At most as many as the kernels take.
-    pub axes: usize,
-    /// Control points, 3 × axes numbers a piece, in mm.
-    pub control: &'a [f64],
-    /// Parameter interval, in mm.
-    pub width: &'a [f64],
+    pub pieces: Pieces<'a>,
     /// Greatest speed, in mm/s: the problem's feed.
     pub feed: &'a [f64],
     /// Source line.
@@ -27,7 +40,15 @@ pub struct Followed<'a> {
     pub dwell: &'a [f64],
 }
 
-impl Followed<'_> {
+impl<'a> std::ops::Deref for Followed<'a> {
+    type Target = Pieces<'a>;
+
+    fn deref(&self) -> &Pieces<'a> {
+        &self.pieces
+    }
+}
+
+impl Pieces<'_> {
     /// Number of pieces.
     pub fn len(&self) -> usize {
         self.width.len()
@@ -38,22 +59,145 @@ impl Followed<'_> {
         self.width.is_empty()
     }
 
-    /// The control points of piece `i`.
+    /// Where the control points of piece `i` are in the table.
     #[inline]
-    pub fn points<const M: usize>(&self, i: usize) -> [[f64; M]; 3] {
-        std::array::from_fn(|j| vector(self.control, self.axes, 3 * i + j))
+    pub fn rows(&self, i: usize) -> std::ops::Range<usize> {
+        self.offsets[i] as usize..self.offsets[i + 1] as usize
     }
 
-    /// Piece `i` by its differences.
+    /// The first control point of piece `i`.
+    pub fn start<const M: usize>(&self, i: usize) -> [f64; M] {
+        vector(self.control, self.axes, self.rows(i).start)
+    }
+
+    /// The last control point of piece `i`.
+    pub fn end<const M: usize>(&self, i: usize) -> [f64; M] {
+        vector(self.control, self.axes, self.rows(i).end - 1)
+    }
+
+    /// Piece `i`, ready to be evaluated.
     #[inline]
     pub fn curve<const M: usize>(&self, i: usize) -> Curve<M> {
-        Curve::new(&self.points(i), self.width[i])
+        let rows = self.rows(i);
+        if rows.len() == 3 && self.weights.is_empty() {
+            let points = std::array::from_fn(|j| vector(self.control, self.axes, rows.start + j));
+            Curve::Quadratic(Quadratic::new(&points, self.width[i]))
+        } else {
+            self.general(i)
+        }
+    }
+
+    #[inline(never)]
+    fn general<const M: usize>(&self, i: usize) -> Curve<M> {
+        let rows = self.rows(i);
+        let weights = if self.weights.is_empty() { &[][..] } else { &self.weights[rows.clone()] };
+        let points = rows.map(|row| vector(self.control, self.axes, row));
+        Curve::General(Box::new(Polygon::new(points, weights)), self.width[i])
+    }
+
+    /// At least how far `q` is from piece `i`: from the box around its control points.
+    pub fn distance_at_least<const M: usize>(&self, i: usize, q: &[f64; M]) -> f64 {
+        let (mut least, mut most) = ([f64::INFINITY; M], [f64::NEG_INFINITY; M]);
+        for row in self.rows(i) {
+            let point = vector::<M>(self.control, self.axes, row);
+            for k in 0..M {
+                (least[k], most[k]) = (least[k].min(point[k]), most[k].max(point[k]));
+            }
+        }
+        length::<M>(&std::array::from_fn(|k| (least[k] - q[k]).max(q[k] - most[k]).max(0.0)))
+    }
+}
+
+/// A piece, over u in [0, width].
+#[derive(Clone, Debug)]
+pub enum Curve<const M: usize> {
+    Quadratic(Quadratic<M>),
+    General(Box<Polygon<M>>, f64),
+}
+
+impl<const M: usize> Curve<M> {
+    /// Length of the parameter interval, in mm.
+    #[inline]
+    pub fn width(&self) -> f64 {
+        match self {
+            Curve::Quadratic(curve) => curve.width,
+            Curve::General(_, width) => *width,
+        }
+    }
+
+    /// C(u).
+    #[inline]
+    pub fn at(&self, u: f64) -> [f64; M] {
+        match self {
+            Curve::Quadratic(curve) => curve.at(u),
+            Curve::General(polygon, width) => polygon.at(u / width),
+        }
+    }
+
+    /// C'(u).
+    #[inline]
+    pub fn derivative(&self, u: f64) -> [f64; M] {
+        match self {
+            Curve::Quadratic(curve) => curve.derivative(u),
+            Curve::General(polygon, width) => polygon.local(u / width).slope.map(|slope| slope / width),
+        }
+    }
+
+    /// For each axis what the rounding of C' is relative to.
+    pub fn derivative_size(&self) -> [f64; M] {
+        match self {
+            Curve::Quadratic(curve) => {
+                std::array::from_fn(|k| 2.0 / curve.width * (curve.first[k].abs() + curve.second[k].abs()))
+            }
+            Curve::General(polygon, width) => polygon.slope_size().map(|size| size / width),
+        }
+    }
+
+    /// How much the rounding of the control points turns C' against that of a neighbour, per 1 mm/mm.
+    pub fn derivative_scale(&self) -> f64 {
+        match self {
+            Curve::Quadratic(curve) => 2.0 / curve.width,
+            Curve::General(polygon, width) => polygon.slope_scale() / width,
+        }
+    }
+
+    /// Whether the piece goes nowhere.
+    pub fn is_motionless(&self) -> bool {
+        match self {
+            Curve::Quadratic(curve) => curve.is_motionless(),
+            Curve::General(polygon, _) => polygon.is_motionless(),
+        }
+    }
+
+    /// Greatest coordinate: what rounding is relative to.
+    #[inline]
+    pub fn magnitude(&self) -> f64 {
+        match self {
+            Curve::Quadratic(curve) => curve.magnitude(),
+            Curve::General(polygon, _) => polygon.magnitude(),
+        }
+    }
+
+    /// How much more shape the piece can have than one of degree 2.
+    pub fn turns(&self) -> usize {
+        match self {
+            Curve::Quadratic(_) => 1,
+            Curve::General(polygon, _) => polygon.degree(),
+        }
+    }
+
+    /// Least and greatest position of an axis between the ends.
+    pub fn extremes(&self, axis: usize) -> [f64; 2] {
+        match self {
+            Curve::Quadratic(curve) => [curve.turn(axis); 2],
+            Curve::General(polygon, _) => polygon.extremes(axis),
+        }
     }
 }
 
 /// C(t) = start + t (2 first + t (second − first)) with t = u / width.
 #[derive(Clone, Copy, Debug)]
-pub struct Curve<const M: usize> {
+pub struct Quadratic<const M: usize> {
     pub start: [f64; M],
     /// From the first control point to the second, and from the second to the third.
     pub first: [f64; M],
@@ -61,7 +205,7 @@ pub struct Curve<const M: usize> {
     pub width: f64,
 }
 
-impl<const M: usize> Curve<M> {
+impl<const M: usize> Quadratic<M> {
     pub fn new(points: &[[f64; M]; 3], width: f64) -> Self {
         Self {
             start: points[0],
@@ -113,6 +257,12 @@ impl<const M: usize> Curve<M> {
             most = most.max(self.start[k].abs()).max((self.start[k] + self.first[k] + self.second[k]).abs());
         }
         most
+    }
+
+    /// Where an axis turns; its start where it does not.
+    fn turn(&self, k: usize) -> f64 {
+        let turn = self.first[k] / (self.first[k] - self.second[k]);
+        self.start[k] + if turn > 0.0 && turn < 1.0 { turn * self.first[k] } else { 0.0 }
     }
 }
 
@@ -193,8 +343,8 @@ impl<const M: usize> Segment<M> {
 mod tests {
     use super::*;
 
-    fn parabola() -> Curve<2> {
-        Curve::new(&[[0.0, 0.0], [1.0, 2.0], [3.0, 0.0]], 4.0)
+    fn parabola() -> Quadratic<2> {
+        Quadratic::new(&[[0.0, 0.0], [1.0, 2.0], [3.0, 0.0]], 4.0)
     }
 
     #[test]

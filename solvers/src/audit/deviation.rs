@@ -13,12 +13,16 @@ use super::moves::{Move, Neighbours, Programmed};
 use super::place::distance_to_piece;
 use super::{Check, Limits, Tally, Worst, EPS, GAP_TOLERANCE, ROUNDINGS};
 
-/// Even places of a piece, and as many again between two of them where it comes near its tolerance.
+/// Even places of a piece of degree 2, and as many again between two of them where it comes near its tolerance.
+/// Others have more: each degree is another turn.
 const PLACES: usize = 8;
 
 /// Share of the tolerance from which a piece is looked at more closely: eight places of a parabola miss at most
 /// 1.6 % of its greatest distance from a line.
 const NEAR: f64 = 0.95;
+
+/// Where no more pieces follow a move they are all measured; of more, those whose boxes come near enough.
+const FEW: usize = 8;
 
 /// Pieces or moves a thread takes at a time.
 const BLOCK: usize = 2048;
@@ -28,30 +32,52 @@ pub fn audit_path<const M: usize>(path: &Followed, arcs: Option<&Arcs>, limits: 
     let times = entry_times(path, arcs);
     blocks(path.len(), |i, tally| {
         let (time, line) = (times[i], path.line[i]);
-        let points = path.points::<M>(i);
-        let width = path.width[i];
-        let finite = points.iter().flatten().all(|q| q.is_finite()) && width.is_finite();
+        let (rows, width) = (path.rows(i), path.width[i]);
+        let control = &path.control[rows.start * path.axes..rows.end * path.axes];
+        let weights = if path.weights.is_empty() { &[][..] } else { &path.weights[rows] };
+        let finite = control.iter().all(|q| q.is_finite())
+            && weights.iter().all(|w| w.is_finite() && *w > 0.0)
+            && width.is_finite();
         if !finite || width < 0.0 || (width == 0.0 && !path.curve::<M>(i).is_motionless()) {
             tally.offer(Check::Numbers, 0, f64::INFINITY, 0.0, time, line);
             return;
         }
         tally.offer(Check::Numbers, 0, 0.0, 0.0, time, line);
         if i > 0 {
-            let end = path.points::<M>(i - 1)[2];
-            let rounding = ROUNDINGS * EPS * magnitude(&points[0]);
-            let gap = distance(&end, &points[0]) - rounding;
+            let start = path.start::<M>(i);
+            let rounding = ROUNDINGS * EPS * magnitude(&start);
+            let gap = distance(&path.end(i - 1), &start) - rounding;
             tally.offer(Check::Gap, 0, gap, GAP_TOLERANCE, time, line);
         }
-        for k in 0..M {
-            let [start, middle, end] = points.map(|q| q[k]);
-            let turn = (start - middle) / (start - 2.0 * middle + end);
-            let reached = if turn > 0.0 && turn < 1.0 { start + turn * (middle - start) } else { start };
-            for q in [start, reached, end] {
+        let curve = path.curve::<M>(i);
+        for k in 0..path.axes {
+            for q in [path.start::<M>(i)[k], path.end::<M>(i)[k]] {
                 offer_travel(tally, limits, k, q, time, line);
+            }
+            // The control points enclose the piece: where they are fine it is.
+            let reach = control.iter().skip(k).step_by(path.axes);
+            let worst = tally.get(Check::Travel, k).ratio;
+            if reach.copied().any(|q| travel_share(limits, k, q) > worst) {
+                for q in curve.extremes(k) {
+                    offer_travel(tally, limits, k, q, time, line);
+                }
             }
         }
         tally.samples += 1;
     })
+}
+
+/// The share of half the travel that a position is away from the middle.
+fn travel_share<const M: usize>(limits: &Limits<M>, axis: usize, q: f64) -> f64 {
+    let [least, most] = limits.travel[axis];
+    let (middle, half) = (0.5 * (least + most), 0.5 * (most - least));
+    if half.is_finite() {
+        ((q - middle).abs() - ROUNDINGS * EPS * q.abs()) / half
+    } else if q >= least && q <= most {
+        0.0
+    } else {
+        f64::INFINITY
+    }
 }
 
 /// One position of an axis against its travel; the ratio is its share of half the travel, from the middle.
@@ -64,15 +90,8 @@ pub fn offer_travel<const M: usize>(
     line: i32,
 ) {
     let [least, most] = limits.travel[axis];
-    let (middle, half) = (0.5 * (least + most), 0.5 * (most - least));
-    let bound = if q < middle { least } else { most };
-    let ratio = if half.is_finite() {
-        ((q - middle).abs() - ROUNDINGS * EPS * q.abs()) / half
-    } else if q >= least && q <= most {
-        0.0
-    } else {
-        f64::INFINITY
-    };
+    let bound = if q < 0.5 * (least + most) { least } else { most };
+    let ratio = travel_share(limits, axis, q);
     tally.offer_ratio(Check::Travel, axis, Worst { value: q, limit: bound, ratio, time, line });
 }
 
@@ -83,21 +102,17 @@ pub fn audit_deviation<const M: usize>(
     arcs: Option<&Arcs>,
 ) -> Tally<M> {
     let times = entry_times(path, arcs);
-    let from_path = blocks(path.len(), |i, tally| piece_to_moves(path, program, i, times[i], tally));
     let followers = followers(path, program.len());
+    let from_path =
+        blocks(path.len(), |i, tally| piece_to_moves(path, program, &followers, i, times[i], tally));
     let from_program =
         blocks(program.len(), |m, tally| move_to_pieces(path, program, m, followers[m], &times, tally));
     let mut ends = Tally::default();
     if !path.is_empty() && !program.is_empty() {
         let last = path.len() - 1;
         let meetings = [
-            (path.points::<M>(0)[0], program.end(None), times[0], path.line[0]),
-            (
-                path.points::<M>(last)[2],
-                program.end(Some(program.len() - 1)),
-                times[last + 1],
-                path.line[last],
-            ),
+            (path.start::<M>(0), program.end(None), times[0], path.line[0]),
+            (path.end::<M>(last), program.end(Some(program.len() - 1)), times[last + 1], path.line[last]),
         ];
         for (followed, programmed, time, line) in meetings {
             let gap = distance(&followed, &programmed) - ROUNDINGS * EPS * magnitude(&programmed);
@@ -124,28 +139,32 @@ pub fn settled<const M: usize>(tally: &Tally<M>) -> f64 {
 fn piece_to_moves<const M: usize>(
     path: &Followed,
     program: &Programmed,
+    followers: &[Followers],
     piece: usize,
     time: f64,
     tally: &mut Tally<M>,
 ) {
     let curve = path.curve::<M>(piece);
+    let width = curve.width();
     let (line, tolerance) = (path.line[piece], path.tolerance[piece].max(GAP_TOLERANCE));
     let rounding = ROUNDINGS * EPS * curve.magnitude();
     let mut near = Neighbours::default();
-    near.replace(window(path, piece, program.len()).map(|m| program.get(m)));
-    let mut off = |t: f64, enough: f64| near.distance(&curve.at(t * curve.width), enough) - rounding;
+    near.replace(program, window(path, piece, program.len()));
+    near.start_at(followers, piece);
+    let mut off = |t: f64, enough: f64| near.distance(&curve.at(t * width), enough + rounding) - rounding;
     let (mut worst, mut worst_t) = (0.0_f64, 0.0);
-    for i in 0..=PLACES {
-        let t = i as f64 / PLACES as f64;
+    let places = PLACES * curve.turns();
+    for i in 0..=places {
+        let t = i as f64 / places as f64;
         let value = off(t, settled(tally) * tolerance);
         tally.offer(Check::Deviation, 0, value, tolerance, time, line);
         if value > worst {
             (worst, worst_t) = (value, t);
         }
     }
-    tally.samples += PLACES as u64 + 1;
+    tally.samples += places as u64 + 1;
     if worst >= NEAR * tolerance {
-        let step = 1.0 / (PLACES * PLACES) as f64;
+        let step = 1.0 / (places * PLACES) as f64;
         for i in 0..=2 * PLACES {
             let t = (worst_t + (i as f64 - PLACES as f64) * step).clamp(0.0, 1.0);
             tally.offer(Check::Deviation, 0, off(t, 0.0), tolerance, time, line);
@@ -154,7 +173,7 @@ fn piece_to_moves<const M: usize>(
 }
 
 /// First and last piece that follow a move.
-type Followers = (usize, usize);
+pub type Followers = (usize, usize);
 
 /// The pieces near every move. A move that no piece names lies between those of the moves around it.
 fn followers(path: &Followed, moves: usize) -> Vec<Followers> {
@@ -199,19 +218,25 @@ fn move_to_pieces<const M: usize>(
         return;
     }
     let (first, last) = (first.min(path.len() - 1), last.min(path.len() - 1));
-    let wider = [first.saturating_sub(1), (last + 1).min(path.len() - 1)].into_iter();
+    let (least, most) = (first.saturating_sub(1), (last + 1).min(path.len() - 1));
     let places = programmed.places();
     let rounding = ROUNDINGS * EPS * magnitude(&programmed.to);
+    let mut expected = first;
     for i in 0..=places {
         let q = programmed.at(i as f64 / places as f64);
         // The nearest piece counts, measured by its own tolerance.
         let mut nearest = (f64::INFINITY, f64::INFINITY, GAP_TOLERANCE);
         let enough = settled(tally);
-        for piece in (first..=last).chain(wider.clone()) {
+        for piece in outwards(expected, least, most) {
             let tolerance = path.tolerance[piece].max(GAP_TOLERANCE);
+            let beyond = nearest.0 * tolerance + rounding;
+            if most - least > FEW && beyond.is_finite() && path.distance_at_least(piece, &q) > beyond {
+                continue;
+            }
             let away = distance_to_piece(&path.curve::<M>(piece), &q) - rounding;
             if away / tolerance < nearest.0 {
                 nearest = (away / tolerance, away, tolerance);
+                expected = piece;
             }
             if nearest.0 <= enough {
                 break;
@@ -220,6 +245,24 @@ fn move_to_pieces<const M: usize>(
         tally.offer(Check::Deviation, 0, nearest.1, nearest.2, times[first], line);
     }
     tally.samples += places as u64 + 1;
+}
+
+/// `from`, then its neighbours on both sides by turns, within `least` to `most`.
+pub fn outwards(from: usize, least: usize, most: usize) -> impl Iterator<Item = usize> {
+    let (mut after, mut before, mut turn) = (from + 1, from, false);
+    let others = std::iter::from_fn(move || {
+        turn = if after > most { false } else { before <= least || !turn };
+        if turn {
+            after += 1;
+            Some(after - 1)
+        } else {
+            (before > least).then(|| {
+                before -= 1;
+                before
+            })
+        }
+    });
+    std::iter::once(from).chain(others)
 }
 
 /// When the tool enters each piece, and when it leaves the last one, in s.
@@ -259,13 +302,18 @@ fn magnitude<const M: usize>(q: &[f64; M]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::audit::curve::Pieces;
+
+    #[test]
+    fn places_are_looked_at_from_near_to_far() {
+        assert_eq!(outwards(2, 1, 5).collect::<Vec<_>>(), [2, 3, 1, 4, 5]);
+        assert_eq!(outwards(5, 5, 5).collect::<Vec<_>>(), [5]);
+    }
 
     #[test]
     fn a_move_without_a_piece_lies_between_its_neighbours() {
         let path = Followed {
-            axes: 2,
-            control: &[],
-            width: &[1.0; 3],
+            pieces: Pieces { axes: 2, control: &[], weights: &[], offsets: &[], width: &[1.0; 3] },
             feed: &[],
             line: &[],
             moves: &[0, 1, 1, 1, 4, 5],

@@ -60,12 +60,12 @@ impl Default for Spot {
 impl Plan<'_> {
     /// The first point of the path.
     pub fn start<const M: usize>(&self) -> [f64; M] {
-        self.path.points(0)[0]
+        self.path.start(0)
     }
 
     /// The last point of the path.
     pub fn end<const M: usize>(&self) -> [f64; M] {
-        self.path.points(self.path.len() - 1)[2]
+        self.path.end(self.path.len() - 1)
     }
 
     /// The same plan with the clock of the setpoints.
@@ -83,7 +83,7 @@ impl Plan<'_> {
                 Some(run) => {
                     let piece = (self.path.runs[run + 1] as usize).max(1) - 1;
                     let due = clock[run] + profile.motion_time(run) + self.path.dwell[run];
-                    (due, self.path.points::<M>(piece)[2])
+                    (due, self.path.end::<M>(piece))
                 }
             };
             let slack = PASS_EXCESS * limits.period + ROUNDINGS * EPS * due;

@@ -5,6 +5,7 @@
 //! slower: from there v_k² = v_k(anchor)² + 2 a (q_k − q_k(anchor)) adds two terms of one sign and loses nothing.
 
 use super::curve::{inner, length};
+use super::polygon::Polygon;
 use super::EPS;
 
 /// What an arc holds constant.
@@ -29,6 +30,27 @@ pub enum Law {
     Chord {
         value: f64,
     },
+    /// The square of the speed at the start of the arc, and its change to the end.
+    SpeedLine {
+        start_sq: f64,
+        change_sq: f64,
+    },
+}
+
+/// The piece under an arc.
+#[derive(Clone, Debug)]
+pub enum Shape<const M: usize> {
+    /// Degree 2: C' at the anchor, and C''.
+    Quadratic { tangent: [f64; M], bend: [f64; M] },
+    /// Any other: itself, with t at the anchor and at the other end; the part of it between them, from the anchor; and
+    /// what the rounding of C' is relative to.
+    General {
+        whole: Box<Polygon<M>>,
+        ends: [f64; 2],
+        part: Box<Polygon<M>>,
+        tangent: [f64; M],
+        size: [f64; M],
+    },
 }
 
 impl Law {
@@ -40,7 +62,9 @@ impl Law {
                 beside: 0.0,
                 strength: (1.0 - bend[axis] * p_anchor / value).abs(),
             }),
-            Law::Feed { .. } | Law::Chord { .. } if bend.iter().any(|&c| c != 0.0) => {
+            Law::Feed { .. } | Law::Chord { .. } | Law::SpeedLine { .. }
+                if bend.iter().any(|&c| c != 0.0) =>
+            {
                 let square = inner(bend, bend);
                 let at = -inner(tangent, bend) / square;
                 let nearest: [f64; M] = std::array::from_fn(|k| tangent[k] + at * bend[k]);
@@ -52,11 +76,13 @@ impl Law {
 }
 
 /// One arc, ready to be evaluated at any distance from its anchor.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Motion<const M: usize> {
-    /// C' at the anchor, and C''.
+    /// C' at the anchor, and C'' where it is the same everywhere.
     pub(super) tangent: [f64; M],
     pub(super) bend: [f64; M],
+    /// Of a piece that is not of degree 2.
+    general: Option<General<M>>,
     pub(super) law: Law,
     /// +1 where u grows from the anchor, −1 where it falls.
     pub(super) direction: f64,
@@ -65,6 +91,9 @@ pub struct Motion<const M: usize> {
     /// Recorded √p at the anchor and at the other end.
     pub root_anchor: f64,
     pub root_far: f64,
+    /// The same where they are finite: what the integration variable is made for.
+    near: f64,
+    far: f64,
     /// The distance at y is y (first_order + second_order y), and dt/dy the integrand times `time_scale`.
     first_order: f64,
     second_order: f64,
@@ -72,6 +101,14 @@ pub struct Motion<const M: usize> {
     /// Whether the anchor is the end of the arc.
     pub anchored_at_end: bool,
     pub(super) pole: Option<Pole>,
+}
+
+#[derive(Clone, Debug)]
+struct General<const M: usize> {
+    whole: Box<Polygon<M>>,
+    ends: [f64; 2],
+    part: Box<Polygon<M>>,
+    size: [f64; M],
 }
 
 /// Where p would grow without bound, or turn sharply: the zero of what it is divided by.
@@ -100,29 +137,32 @@ pub struct State<const M: usize> {
 }
 
 impl<const M: usize> Motion<M> {
-    /// `tangent` is C' at the anchor, `p` are the recorded values at the anchor and at the other end.
-    pub fn new(
-        law: Law,
-        tangent: [f64; M],
-        bend: [f64; M],
-        width: f64,
-        p: [f64; 2],
-        anchored_at_end: bool,
-    ) -> Self {
+    /// `p` are the recorded values at the anchor and at the other end.
+    pub fn new(law: Law, shape: Shape<M>, width: f64, p: [f64; 2], anchored_at_end: bool) -> Self {
         let direction = if anchored_at_end { -1.0 } else { 1.0 };
+        let (tangent, bend, general) = match shape {
+            Shape::Quadratic { tangent, bend } => (tangent, bend, None),
+            Shape::General { whole, ends, part, tangent, size } => {
+                (tangent, [0.0; M], Some(General { whole, ends, part, size }))
+            }
+        };
         let [root_anchor, root_far] = p.map(f64::sqrt);
-        let share = width / (root_anchor + root_far);
+        let [near, far] = substitution([root_anchor, root_far]);
+        let share = width / (near + far);
         Self {
             tangent,
             bend,
             law,
-            pole: law.pole(&tangent, &bend, p[0]),
+            pole: if general.is_some() { None } else { law.pole(&tangent, &bend, p[0]) },
+            general,
             direction,
             width,
             root_anchor,
             root_far,
-            first_order: direction * share * 2.0 * root_anchor,
-            second_order: direction * share * (root_far - root_anchor),
+            near,
+            far,
+            first_order: direction * share * 2.0 * near,
+            second_order: direction * share * (far - near),
             time_scale: 2.0 * share,
             anchored_at_end,
         }
@@ -139,12 +179,24 @@ impl<const M: usize> Motion<M> {
         if from_anchor <= 0.0 {
             return 0.0;
         }
-        let change = self.root_far - self.root_anchor;
-        let c = (self.root_anchor + self.root_far) * (from_anchor / self.width).min(1.0);
-        (c / (self.root_anchor + (self.root_anchor * self.root_anchor + change * c).max(0.0).sqrt())).min(1.0)
+        let change = self.far - self.near;
+        let c = (self.near + self.far) * (from_anchor / self.width).min(1.0);
+        (c / (self.near + (self.near * self.near + change * c).max(0.0).sqrt())).min(1.0)
     }
 
-    /// √p at the signed distance `d` from the anchor, where C' is `tangent`.
+    /// √p at `y` if p were linear.
+    #[inline(always)]
+    pub(super) fn linear(&self, y: f64) -> f64 {
+        self.near + (self.far - self.near) * y
+    }
+
+    /// Whether the piece is not of degree 2.
+    #[inline(always)]
+    pub(super) fn is_general(&self) -> bool {
+        self.general.is_some()
+    }
+
+    /// √p at the signed distance `d` from the anchor, where C' is `tangent`, on a piece of degree 2.
     #[inline(always)]
     pub(super) fn root_p(&self, d: f64, tangent: &[f64; M]) -> f64 {
         match self.law {
@@ -153,20 +205,81 @@ impl<const M: usize> Motion<M> {
                 let speed_sq = start_sq + value * d * (self.tangent[axis] + tangent[axis]);
                 speed_sq.sqrt() / tangent[axis].abs()
             }
+            _ => self.root_p_by_speed(d, tangent),
+        }
+    }
+
+    /// The same of the laws that need no way.
+    #[inline(always)]
+    fn root_p_by_speed(&self, d: f64, tangent: &[f64; M]) -> f64 {
+        match self.law {
+            Law::AxisAcceleration { .. } => f64::NAN,
             Law::Flat { root_p } => root_p,
             Law::Feed { speed } => speed / length(tangent),
             Law::AxisVelocity { axis, speed } => speed / tangent[axis].abs(),
             Law::Chord { value } => (value * length(tangent)).sqrt(),
+            Law::SpeedLine { start_sq, change_sq } => {
+                (start_sq + change_sq * (d / self.width)).sqrt() / length(tangent)
+            }
         }
+    }
+
+    /// C' and √p at the signed distance `d` on a piece of any degree.
+    #[inline(never)]
+    fn on_general(&self, general: &General<M>, d: f64) -> ([f64; M], f64) {
+        let local = general.part.local((d / self.width).abs().min(1.0));
+        let scale = self.direction / self.width;
+        let tangent = local.slope.map(|slope| scale * slope);
+        let root_p = match self.law {
+            Law::AxisAcceleration { axis, value, start_sq } => {
+                (start_sq + 2.0 * value * local.way[axis]).sqrt() / tangent[axis].abs()
+            }
+            _ => self.root_p_by_speed(d, &tangent),
+        };
+        (tangent, root_p)
+    }
+
+    /// C' and √p at the signed distance `d` from the anchor.
+    #[inline(always)]
+    fn at(&self, d: f64) -> ([f64; M], f64) {
+        match &self.general {
+            None => {
+                let tangent = std::array::from_fn(|k| self.tangent[k] + d * self.bend[k]);
+                (tangent, self.root_p(d, &tangent))
+            }
+            Some(general) => self.on_general(general, d),
+        }
+    }
+
+    /// √p at the signed distance `d` from the anchor.
+    #[inline(always)]
+    pub(super) fn root_p_at(&self, d: f64) -> f64 {
+        self.at(d).1
+    }
+
+    /// Axis velocities where C' is 0 and p infinite: along the direction of the piece there, at the law's speed.
+    fn velocity_at_cusp(&self, general: &General<M>, y: f64) -> [f64; M] {
+        let along = if y < 0.5 { 1.0 } else { -1.0 };
+        let direction = if y < 0.5 { general.part.direction() } else { general.part.reversed().direction() };
+        let direction = direction.map(|e| along * self.direction * e);
+        let speed = match self.law {
+            Law::AxisAcceleration { axis, value, start_sq } => {
+                let way = general.part.local(y.round()).way[axis];
+                (start_sq + 2.0 * value * way).sqrt() / direction[axis].abs()
+            }
+            Law::Feed { speed } => speed,
+            Law::AxisVelocity { axis, speed } => speed / direction[axis].abs(),
+            _ => f64::NAN,
+        };
+        direction.map(|e| e * speed)
     }
 
     /// Distance from the anchor, C' and √p at `y`.
     #[inline(always)]
     fn place(&self, y: f64) -> (f64, [f64; M], f64) {
         let d = self.distance(y);
-        let tangent = std::array::from_fn(|k| self.tangent[k] + d * self.bend[k]);
-        let root_p = if self.keeps_recorded(y) { self.root_anchor } else { self.root_p(d, &tangent) };
-        (d, tangent, root_p)
+        let (tangent, root_p) = self.at(d);
+        (d, tangent, if self.keeps_recorded(y) { self.root_anchor } else { root_p })
     }
 
     /// At the anchor of an accelerating arc the recorded p stands for itself, also where C'_k is 0.
@@ -179,15 +292,34 @@ impl<const M: usize> Motion<M> {
     #[inline]
     pub fn velocity(&self, y: f64) -> [f64; M] {
         let (_, tangent, root_p) = self.place(y);
-        tangent.map(|g| g * root_p)
+        self.velocity_of(y, &tangent, root_p)
+    }
+
+    #[inline(always)]
+    fn velocity_of(&self, y: f64, tangent: &[f64; M], root_p: f64) -> [f64; M] {
+        match &self.general {
+            Some(general) if self.is_cusp(y) => self.velocity_at_cusp(general, y),
+            _ => tangent.map(|g| g * root_p),
+        }
+    }
+
+    /// Whether `y` is an end where the recorded p is infinite.
+    fn is_cusp(&self, y: f64) -> bool {
+        (y == 0.0 && self.root_anchor.is_infinite()) || (y == 1.0 && self.root_far.is_infinite())
     }
 
     /// The motion at `y`.
     #[inline]
     pub fn state(&self, y: f64) -> State<M> {
         let (d, tangent, root_p) = self.place(y);
-        let terms: [f64; M] = std::array::from_fn(|k| self.tangent[k].abs() + (d * self.bend[k]).abs());
-        let velocity = tangent.map(|g| g * root_p);
+        let velocity = self.velocity_of(y, &tangent, root_p);
+        let terms: [f64; M] = match &self.general {
+            None => std::array::from_fn(|k| self.tangent[k].abs() + (d * self.bend[k]).abs()),
+            Some(_) if self.is_cusp(y) => {
+                return State { y, tangent, root_p, velocity, magnitude: velocity.map(f64::abs) }
+            }
+            Some(general) => general.size,
+        };
         // How much the rounding of C' is enlarged in p.
         let enlarged = match self.law {
             Law::AxisAcceleration { axis, .. } | Law::AxisVelocity { axis, .. }
@@ -195,7 +327,7 @@ impl<const M: usize> Motion<M> {
             {
                 terms[axis] / tangent[axis].abs()
             }
-            Law::Feed { .. } | Law::Chord { .. } => length(&terms) / length(&tangent),
+            Law::Feed { .. } | Law::Chord { .. } | Law::SpeedLine { .. } => length(&terms) / length(&tangent),
             _ => 1.0,
         };
         let magnitude = std::array::from_fn(|k| {
@@ -217,15 +349,33 @@ impl<const M: usize> Motion<M> {
         !matches!(self.law, Law::AxisAcceleration { .. } | Law::Flat { .. })
     }
 
-    /// Curvature of the path in 1/mm where C' is `tangent`; 0 where the path has no direction.
+    /// Curvature of the path in 1/mm at a state; 0 where the path has no direction.
     #[inline]
-    pub fn curvature(&self, tangent: &[f64; M]) -> f64 {
-        curvature(tangent, &self.bend)
+    pub fn curvature(&self, state: &State<M>) -> f64 {
+        match &self.general {
+            None => curvature(&state.tangent, &self.bend),
+            // Of the whole piece: on a short part nothing is left of the turn from step to step.
+            Some(General { whole, ends, .. }) => {
+                let share = (self.distance(state.y) / self.width).abs().min(1.0);
+                whole.curvature((ends[0] + share * (ends[1] - ends[0])).clamp(0.0, 1.0))
+            }
+        }
     }
 
     /// What one rounding of the parameter does to the recorded p: the relative error of the arc's width.
     pub fn width_rounding(&self, piece_width: f64) -> f64 {
         EPS * piece_width / self.width
+    }
+}
+
+/// What √p at both ends the integration variable is made for: where one is infinite the speed, not p, is smooth.
+fn substitution(roots: [f64; 2]) -> [f64; 2] {
+    let [near, far] = roots;
+    match (near.is_infinite(), far.is_infinite()) {
+        (false, false) => [near, far],
+        (true, false) => [if far > 0.0 { far } else { 1.0 }, far],
+        (false, true) => [near, if near > 0.0 { near } else { 1.0 }],
+        (true, true) => [1.0, 1.0],
     }
 }
 
@@ -244,12 +394,12 @@ pub fn curvature<const M: usize>(tangent: &[f64; M], bend: &[f64; M]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::audit::curve::Curve;
+    use crate::audit::curve::Quadratic;
 
     #[test]
     fn a_parabola_is_most_curved_at_its_tip() {
         // y = x²/2 has curvature 1 at x = 0 and 1/√8 at x = 1.
-        let curve = Curve::new(&[[-1.0, 0.5], [0.0, -0.5], [1.0, 0.5]], 2.0);
+        let curve = Quadratic::new(&[[-1.0, 0.5], [0.0, -0.5], [1.0, 0.5]], 2.0);
         let bend = curve.second_derivative();
         assert!((curvature(&curve.derivative(1.0), &bend) - 1.0).abs() < 1e-15);
         assert!((curvature(&curve.derivative(2.0), &bend) - 8.0_f64.sqrt().recip()).abs() < 1e-15);

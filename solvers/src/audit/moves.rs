@@ -1,8 +1,10 @@
-//! The programmed path as the audit sees it: straight moves, true arcs and helices, and distances from them.
+//! The programmed path as the audit sees it: straight moves, true arcs and helices, splines, and distances from them.
 
 use std::f64::consts::TAU;
 
-use super::curve::{distance, from_to, inner, vector, Segment};
+use super::curve::{distance, from_to, inner, vector, Pieces, Segment};
+use super::deviation::{outwards, Followers};
+use super::place::distance_to_piece;
 
 /// The program's arrays, one entry a move; see `feedplan.Program`.
 #[derive(Clone, Copy)]
@@ -20,16 +22,32 @@ pub struct Programmed<'a> {
     pub arc_centre: &'a [f64],
     pub arc_normal: &'a [u8],
     pub arc_angle: &'a [f64],
+    /// Splines, in the order of their moves: the move, and which of the pieces it takes, one more entry than moves.
+    pub spline_move: &'a [i64],
+    pub spline_pieces: &'a [i64],
+    pub splines: Pieces<'a>,
     /// Where X, Y, Z are among the axes.
     pub xyz: [Option<usize>; 3],
 }
 
 /// One move.
-#[derive(Clone, Copy, Debug)]
-pub struct Move<const M: usize> {
+#[derive(Clone, Copy)]
+pub struct Move<'a, const M: usize> {
     pub from: [f64; M],
     pub to: [f64; M],
-    arc: Option<Arc>,
+    shape: Shape<'a>,
+}
+
+#[derive(Clone, Copy)]
+enum Shape<'a> {
+    Line,
+    Arc(Arc),
+    /// The pieces from `first` to `last`.
+    Spline {
+        pieces: Pieces<'a>,
+        first: usize,
+        last: usize,
+    },
 }
 
 /// What makes a move an arc: it turns in the plane of the axes `a` and `b`, all others move evenly.
@@ -45,7 +63,7 @@ struct Arc {
     widening: f64,
 }
 
-impl Programmed<'_> {
+impl<'a> Programmed<'a> {
     /// Number of moves.
     pub fn len(&self) -> usize {
         self.line.len()
@@ -65,10 +83,20 @@ impl Programmed<'_> {
     }
 
     /// Move `i`.
-    pub fn get<const M: usize>(&self, i: usize) -> Move<M> {
+    pub fn get<const M: usize>(&self, i: usize) -> Move<'a, M> {
         let (from, to) = (self.end(i.checked_sub(1)), self.end(Some(i)));
         let arc = self.arc_move.binary_search(&(i as i64)).ok().and_then(|row| self.arc(row, &from, &to));
-        Move { from, to, arc }
+        let shape = match arc {
+            Some(arc) => Shape::Arc(arc),
+            None => self.spline(i).unwrap_or(Shape::Line),
+        };
+        Move { from, to, shape }
+    }
+
+    fn spline(&self, i: usize) -> Option<Shape<'a>> {
+        let row = self.spline_move.binary_search(&(i as i64)).ok()?;
+        let [first, end] = [row, row + 1].map(|row| self.spline_pieces[row] as usize);
+        (end > first).then(|| Shape::Spline { pieces: self.splines, first, last: end - 1 })
     }
 
     fn arc<const M: usize>(&self, row: usize, from: &[f64; M], to: &[f64; M]) -> Option<Arc> {
@@ -91,38 +119,73 @@ impl Programmed<'_> {
     }
 }
 
-impl<const M: usize> Move<M> {
+impl<const M: usize> Move<'_, M> {
     /// The place at the share `t` of the move.
     pub fn at(&self, t: f64) -> [f64; M] {
-        let mut point = std::array::from_fn(|k| self.from[k] + t * (self.to[k] - self.from[k]));
-        if let Some(arc) = &self.arc {
-            let (sin, cos) = (arc.start_angle + t * arc.sweep).sin_cos();
-            let radius = arc.radius + t * arc.widening;
-            point[arc.a] = arc.centre[0] + radius * cos;
-            point[arc.b] = arc.centre[1] + radius * sin;
+        match &self.shape {
+            Shape::Line => self.straight(t),
+            Shape::Arc(arc) => self.on_arc(arc, t),
+            Shape::Spline { pieces, first, last } => {
+                let along = t * (last + 1 - first) as f64;
+                let piece = (first + along as usize).min(*last);
+                pieces.curve::<M>(piece).at((along - (piece - first) as f64) * pieces.width[piece])
+            }
         }
+    }
+
+    fn straight(&self, t: f64) -> [f64; M] {
+        std::array::from_fn(|k| self.from[k] + t * (self.to[k] - self.from[k]))
+    }
+
+    fn on_arc(&self, arc: &Arc, t: f64) -> [f64; M] {
+        let mut point = self.straight(t);
+        let (sin, cos) = (arc.start_angle + t * arc.sweep).sin_cos();
+        let radius = arc.radius + t * arc.widening;
+        point[arc.a] = arc.centre[0] + radius * cos;
+        point[arc.b] = arc.centre[1] + radius * sin;
         point
     }
 
     /// Whether the move goes anywhere.
     pub fn is_motion(&self) -> bool {
-        self.from != self.to || self.arc.is_some()
+        self.from != self.to || !matches!(self.shape, Shape::Line)
     }
 
-    /// How many even places show the shape of the move: more on arcs.
+    /// How many even places show the shape of the move: more on arcs and splines.
     pub fn places(&self) -> usize {
-        match &self.arc {
+        match &self.shape {
             // Every 7.5 degrees: between such places a circle is 0.2 % of the radius from its chord.
-            Some(arc) => 4 + (arc.sweep.abs() / (TAU / 48.0)) as usize,
-            None => 4,
+            Shape::Arc(arc) => 4 + (arc.sweep.abs() / (TAU / 48.0)) as usize,
+            Shape::Spline { pieces, first, last } => {
+                let most = (*first..=*last).map(|piece| pieces.rows(piece).len() - 1).max().unwrap_or(1);
+                4 * most * (last + 1 - first)
+            }
+            Shape::Line => 4,
         }
     }
 
-    /// Distance of `q` from the nearest place of the move, in mm.
-    pub fn distance(&self, q: &[f64; M]) -> f64 {
-        match &self.arc {
-            None => Segment::new(&self.from, &self.to).distance_sq(q).sqrt(),
-            Some(arc) => self.distance_to_arc(arc, q),
+    /// Distance of `q` from the nearest place of the move, in mm. Of a spline the search starts at the piece
+    /// `expected`, which becomes the nearest one, and ends where a piece is within `enough`.
+    fn distance(&self, q: &[f64; M], expected: &mut usize, enough: f64) -> f64 {
+        match &self.shape {
+            Shape::Line => Segment::new(&self.from, &self.to).distance_sq(q).sqrt(),
+            Shape::Arc(arc) => self.distance_to_arc(arc, q),
+            Shape::Spline { pieces, first, last } => {
+                let mut least = f64::INFINITY;
+                for piece in outwards((*expected).clamp(*first, *last), *first, *last) {
+                    if pieces.distance_at_least(piece, q) > least {
+                        continue;
+                    }
+                    let away = distance_to_piece(&pieces.curve::<M>(piece), q);
+                    if away < least {
+                        (least, *expected) = (away, piece);
+                    }
+                    if least <= enough {
+                        break;
+                    }
+                }
+                least
+            }
         }
     }
 
@@ -137,25 +200,25 @@ impl<const M: usize> Move<M> {
         for turn in -1..=turns {
             let t = (ahead + turn as f64 * TAU) / sweep;
             if (-0.5..=1.5).contains(&t) {
-                nearest = nearest.min(self.descend(q, t.clamp(0.0, 1.0)));
+                nearest = nearest.min(self.descend(arc, q, t.clamp(0.0, 1.0)));
             }
         }
         nearest
     }
 
     /// Distance at the local minimum near `t`, by Newton steps on numerical slopes kept while they improve.
-    fn descend(&self, q: &[f64; M], mut t: f64) -> f64 {
-        let mut best = distance(q, &self.at(t));
+    fn descend(&self, arc: &Arc, q: &[f64; M], mut t: f64) -> f64 {
+        let mut best = distance(q, &self.on_arc(arc, t));
         for _ in 0..8 {
             let h = 1e-4;
-            let [before, here, after] = [t - h, t, t + h].map(|t| self.at(t));
+            let [before, here, after] = [t - h, t, t + h].map(|t| self.on_arc(arc, t));
             let slope: [f64; M] = std::array::from_fn(|k| (after[k] - before[k]) / (2.0 * h));
             let bend: [f64; M] = std::array::from_fn(|k| (after[k] - 2.0 * here[k] + before[k]) / (h * h));
             let off = from_to(q, &here);
             let curvature = inner(&slope, &slope) + inner(&off, &bend);
             let steepest = if curvature > 0.0 { curvature } else { inner(&slope, &slope) };
             let next = (t - inner(&off, &slope) / steepest).clamp(0.0, 1.0);
-            let there = distance(q, &self.at(next));
+            let there = distance(q, &self.on_arc(arc, next));
             if there.is_nan() || there >= best {
                 break;
             }
@@ -166,19 +229,36 @@ impl<const M: usize> Move<M> {
 }
 
 /// Some moves that places along a path are measured against, one after the other.
-#[derive(Clone, Debug, Default)]
-pub struct Neighbours<const M: usize> {
-    moves: Vec<Move<M>>,
+#[derive(Clone, Default)]
+pub struct Neighbours<'a, const M: usize> {
+    moves: Vec<(usize, Move<'a, M>)>,
     /// The one nearest to the place before: mostly nearest to the next one too.
     nearest: usize,
+    /// Of each move the piece that was nearest last.
+    expected: Vec<usize>,
 }
 
-impl<const M: usize> Neighbours<M> {
+impl<'a, const M: usize> Neighbours<'a, M> {
     /// Takes other moves.
-    pub fn replace(&mut self, moves: impl Iterator<Item = Move<M>>) {
+    pub fn replace(&mut self, program: &Programmed<'a>, numbers: impl Iterator<Item = usize>) {
+        let known = self.moves.first().zip(self.expected.first()).map(|(first, piece)| (first.0, *piece));
         self.moves.clear();
-        self.moves.extend(moves);
+        self.moves.extend(numbers.map(|number| (number, program.get(number))));
         self.nearest = 0;
+        self.expected.clear();
+        let expected = |number: usize| known.filter(|known| known.0 == number).map_or(0, |known| known.1);
+        self.expected.extend(self.moves.iter().map(|(number, _)| expected(*number)));
+    }
+
+    /// Expects the nearest place of a spline to be as far along it as `piece` is along the pieces that follow it.
+    pub fn start_at(&mut self, followers: &[Followers], piece: usize) {
+        for ((number, programmed), expected) in self.moves.iter().zip(&mut self.expected) {
+            if let Shape::Spline { first, last, .. } = programmed.shape {
+                let (from, to) = followers[*number];
+                let share = piece.saturating_sub(from) as f64 / (to + 1).saturating_sub(from).max(1) as f64;
+                *expected = (first + (share * (last + 1 - first) as f64) as usize).min(last);
+            }
+        }
     }
 
     /// Distance of `q` from the nearest move, or from the first that is within `enough`; a NaN if there is one.
@@ -186,7 +266,7 @@ impl<const M: usize> Neighbours<M> {
         let mut least = f64::INFINITY;
         let first = self.nearest;
         for m in (first..self.moves.len()).chain(0..first) {
-            let away = self.moves[m].distance(q);
+            let away = self.moves[m].1.distance(q, &mut self.expected[m], enough);
             if away.is_nan() {
                 return away;
             }
@@ -206,8 +286,50 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    const NONE: Pieces = Pieces { axes: 3, control: &[], weights: &[], offsets: &[0], width: &[] };
+
+    /// The distance from the nearest place.
+    fn off<const M: usize>(programmed: &Move<M>, q: &[f64; M]) -> f64 {
+        programmed.distance(q, &mut 0, 0.0)
+    }
+
+    #[test]
+    fn a_spline_is_as_far_as_its_nearest_piece() {
+        // A line to (4, 0), then a parabola y = (x − 4)²/4 to (8, 4).
+        let splines = Pieces {
+            axes: 2,
+            control: &[0.0, 0.0, 4.0, 0.0, 4.0, 0.0, 6.0, 0.0, 8.0, 4.0],
+            weights: &[],
+            offsets: &[0, 2, 5],
+            width: &[4.0, 4.0],
+        };
+        let program = Programmed {
+            axes: 2,
+            start: &[0.0, 0.0],
+            target: &[8.0, 4.0],
+            line: &[1],
+            arc_move: &[],
+            arc_centre: &[],
+            arc_normal: &[],
+            arc_angle: &[],
+            spline_move: &[0],
+            spline_pieces: &[0, 2],
+            splines,
+            xyz: [Some(0), Some(1), None],
+        };
+        let spline = program.get::<2>(0);
+        assert!(spline.is_motion());
+        assert_eq!(spline.places(), 16);
+        assert!(distance(&spline.at(0.75), &[6.0, 1.0]) < 1e-15);
+        assert!((off(&spline, &[1.0, -2.0]) - 2.0).abs() < 1e-15);
+        // Across the parabola at x = 6, where it rises at 45 degrees.
+        for expected in [0, 1, 7] {
+            assert!((spline.distance(&[7.0, 0.0], &mut { expected }, 0.0) - 2.0_f64.sqrt()).abs() < 1e-12);
+        }
+    }
+
     /// A helix about Z: radius 10, two turns and a quarter, 9 mm up.
-    fn helix() -> Move<3> {
+    fn helix() -> Move<'static, 3> {
         Programmed {
             axes: 3,
             start: &[10.0, 0.0, 0.0],
@@ -217,6 +339,9 @@ mod tests {
             arc_centre: &[0.0, 0.0, 0.0],
             arc_normal: &[2],
             arc_angle: &[2.25 * TAU],
+            spline_move: &[],
+            spline_pieces: &[0],
+            splines: NONE,
             xyz: [Some(0), Some(1), Some(2)],
         }
         .get(0)
@@ -233,20 +358,24 @@ mod tests {
             arc_centre: &[0.0, 0.0, 0.0],
             arc_normal: &[2],
             arc_angle: &[TAU / 4.0],
+            spline_move: &[],
+            spline_pieces: &[0],
+            splines: NONE,
             xyz: [Some(0), Some(1), None],
         }
         .get::<2>(0);
-        assert!((quarter.distance(&[6.0, 9.0]) - (117.0_f64.sqrt() - 10.0)).abs() < 1e-14);
-        assert!((quarter.distance(&[3.0, 4.0]) - 5.0).abs() < 1e-14);
+        assert!((off(&quarter, &[6.0, 9.0]) - (117.0_f64.sqrt() - 10.0)).abs() < 1e-14);
+        assert!((off(&quarter, &[3.0, 4.0]) - 5.0).abs() < 1e-14);
         // Beyond the ends the ends are nearest.
-        assert_eq!(quarter.distance(&[10.0, -2.0]), 2.0);
-        assert_eq!(quarter.distance(&[-3.0, 14.0]), 5.0);
+        assert_eq!(off(&quarter, &[10.0, -2.0]), 2.0);
+        assert_eq!(off(&quarter, &[-3.0, 14.0]), 5.0);
     }
 
     #[test]
     fn arcs_in_the_other_planes_turn_about_their_normal() {
         // G18 and G19: counter-clockwise seen from the tip of Y, of X.
         for (normal, target) in [(1_u8, [0.0, 0.0, -1.0]), (2, [0.0, 1.0, 0.0])] {
+            let normals = [normal];
             let quarter = Programmed {
                 axes: 3,
                 start: &[1.0, 0.0, 0.0],
@@ -254,8 +383,11 @@ mod tests {
                 line: &[1],
                 arc_move: &[0],
                 arc_centre: &[0.0, 0.0, 0.0],
-                arc_normal: &[normal],
+                arc_normal: &normals,
                 arc_angle: &[TAU / 4.0],
+                spline_move: &[],
+                spline_pieces: &[0],
+                splines: NONE,
                 xyz: [Some(0), Some(1), Some(2)],
             }
             .get::<3>(0);
@@ -268,7 +400,7 @@ mod tests {
         let helix = helix();
         for i in 0..=200 {
             let t = f64::from(i) / 200.0;
-            assert!(helix.distance(&helix.at(t)) < 1e-12, "t = {t}");
+            assert!(off(&helix, &helix.at(t)) < 1e-12, "t = {t}");
         }
     }
 
@@ -279,7 +411,7 @@ mod tests {
             let q = [x, y, z];
             let places: Vec<_> = (0..=20_000).map(|i| helix.at(f64::from(i) / 20_000.0)).collect();
             let dense = places.iter().map(|place| distance(&q, place)).fold(f64::INFINITY, f64::min);
-            let found = helix.distance(&q);
+            let found = off(&helix, &q);
             prop_assert!(found <= dense + 1e-12);
             // The nearest place is at most half a step from one of these, at right angles to the way to it; the
             // curve bends away from `q` by less than its radius does.

@@ -1,6 +1,6 @@
 //! Finds the place of a point on the path: the nearest place of a piece, and the next place along the path.
 
-use super::curve::{distance, Curve, Followed};
+use super::curve::{distance, Curve, Followed, Quadratic};
 
 /// A place on the path.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,7 +19,7 @@ struct Slope([f64; 4]);
 
 impl Slope {
     #[inline]
-    fn new<const M: usize>(curve: &Curve<M>, q: &[f64; M]) -> Self {
+    fn new<const M: usize>(curve: &Quadratic<M>, q: &[f64; M]) -> Self {
         let mut cubic = [0.0; 4];
         for k in 0..M {
             let (first, bend, off) =
@@ -86,42 +86,60 @@ impl Slope {
 /// distance still falls at the end of the piece.
 #[inline]
 pub fn first_minimum<const M: usize>(curve: &Curve<M>, q: &[f64; M], from: f64) -> (f64, f64, bool) {
-    let t0 = (from / curve.width).clamp(0.0, 1.0);
+    let width = curve.width();
+    let t0 = (from / width).clamp(0.0, 1.0);
     let (mut u, mut falls) = (from, false);
-    let slope = Slope::new(curve, q);
-    if slope.at(t0) < 0.0 {
-        (u, falls) = (curve.width, true);
-        let ends = slope.monotone_parts(t0);
-        for i in 0..3 {
-            if slope.at(ends[i + 1]) >= 0.0 {
-                (u, falls) = (slope.root(ends[i], ends[i + 1]) * curve.width, false);
-                break;
+    match curve {
+        Curve::Quadratic(quadratic) => {
+            let slope = Slope::new(quadratic, q);
+            if slope.at(t0) < 0.0 {
+                (u, falls) = (width, true);
+                let ends = slope.monotone_parts(t0);
+                for i in 0..3 {
+                    if slope.at(ends[i + 1]) >= 0.0 {
+                        (u, falls) = (slope.root(ends[i], ends[i + 1]) * width, false);
+                        break;
+                    }
+                }
+            }
+        }
+        Curve::General(polygon, _) => {
+            let (t, falls_on) = polygon.first_minimum(q, t0);
+            if t > t0 {
+                (u, falls) = (t * width, falls_on);
             }
         }
     }
     (u, distance(q, &curve.at(u)), falls)
 }
 
-/// Calls `found` with the local minima of the distance at or after `from`, at most four with the ends: parameter
-/// and distance.
+/// Calls `found` with the local minima of the distance at or after `from` and with both ends: parameter and distance.
 pub fn all_minima<const M: usize>(
     curve: &Curve<M>,
     q: &[f64; M],
     from: f64,
     mut found: impl FnMut(f64, f64),
 ) {
-    let t0 = (from / curve.width).clamp(0.0, 1.0);
-    let slope = Slope::new(curve, q);
-    let ends = slope.monotone_parts(t0);
-    let falls = ends.map(|t| slope.at(t) < 0.0);
-    found(from, distance(q, &curve.at(from)));
-    for i in 0..3 {
-        if falls[i] && !falls[i + 1] {
-            let u = slope.root(ends[i], ends[i + 1]) * curve.width;
-            found(u, distance(q, &curve.at(u)));
+    let width = curve.width();
+    let t0 = (from / width).clamp(0.0, 1.0);
+    let mut found = |u: f64| found(u, distance(q, &curve.at(u)));
+    match curve {
+        Curve::Quadratic(quadratic) => {
+            let slope = Slope::new(quadratic, q);
+            let ends = slope.monotone_parts(t0);
+            let falls = ends.map(|t| slope.at(t) < 0.0);
+            found(from);
+            for i in 0..3 {
+                if falls[i] && !falls[i + 1] {
+                    found(slope.root(ends[i], ends[i + 1]) * width);
+                }
+            }
+            found(width);
+        }
+        Curve::General(polygon, _) => {
+            polygon.all_minima(q, t0, &mut |t| found(if t > t0 { t * width } else { from }));
         }
     }
-    found(curve.width, distance(q, &curve.at(curve.width)));
 }
 
 /// Distance of `q` from the nearest place of the piece.
@@ -197,18 +215,12 @@ impl<F: FnMut(Place) -> f64> Search<'_, F> {
             let curve = self.path.curve::<M>(piece);
             let mut falls_on = false;
             if thorough {
-                let mut minima = [(0.0, f64::INFINITY); 4];
-                let mut count = 0;
                 all_minima(&curve, q, start, |u, distance| {
-                    minima[count] = (u, distance);
-                    count += 1;
-                });
-                for &(u, distance) in &minima[..count] {
                     let found = self.candidate(piece, u, distance);
                     if self.badness(&found) <= self.badness(&best) {
                         best = found;
                     }
-                }
+                });
             } else {
                 let (u, distance, falls) = first_minimum(&curve, q, start);
                 let found = self.candidate(piece, u, distance);
@@ -223,7 +235,7 @@ impl<F: FnMut(Place) -> f64> Search<'_, F> {
             }
             // The first piece does not count: the search may start well before the place looked for.
             if piece > from.piece {
-                travelled += distance(&curve.at(start), &curve.at(curve.width));
+                travelled += distance(&curve.at(start), &curve.at(curve.width()));
             }
             if travelled > self.reach {
                 break;
@@ -237,13 +249,18 @@ impl<F: FnMut(Place) -> f64> Search<'_, F> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::audit::curve::Pieces;
     use proptest::prelude::*;
 
     /// Two pieces: along X to 10 and back again.
     const THERE_AND_BACK: Followed = Followed {
-        axes: 2,
-        control: &[0.0, 0.0, 5.0, 0.0, 10.0, 0.0, 10.0, 0.0, 5.0, 0.0, 0.0, 0.0],
-        width: &[10.0, 10.0],
+        pieces: Pieces {
+            axes: 2,
+            control: &[0.0, 0.0, 5.0, 0.0, 10.0, 0.0, 10.0, 0.0, 5.0, 0.0, 0.0, 0.0],
+            weights: &[],
+            offsets: &[0, 3, 6],
+            width: &[10.0, 10.0],
+        },
         feed: &[1.0, 1.0],
         line: &[1, 2],
         moves: &[0, 0, 1, 1],
@@ -285,7 +302,8 @@ mod tests {
         fn no_place_of_a_piece_is_nearer_than_its_distance(
             c in prop::array::uniform6(-2.0..2.0_f64), x in -3.0..3.0_f64, y in -3.0..3.0_f64,
         ) {
-            let curve = Curve::new(&[[c[0], c[1]], [c[2], c[3]], [c[4], c[5]]], 3.0);
+            let points = [[c[0], c[1]], [c[2], c[3]], [c[4], c[5]]];
+            let curve = Curve::Quadratic(Quadratic::new(&points, 3.0));
             let dense = (0..=5000)
                 .map(|i| distance(&[x, y], &curve.at(3.0 * f64::from(i) / 5000.0)))
                 .fold(f64::INFINITY, f64::min);

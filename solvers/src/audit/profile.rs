@@ -25,6 +25,9 @@ const NEAR: f64 = 0.9;
 /// The end intervals are as short as lets rounding hide this share of the acceleration limit.
 const HIDDEN: f64 = 1e-7;
 
+/// The direction of a piece at a cusp is known to this share.
+const CUSP_ROUNDING: f64 = 1e-12;
+
 /// Arcs a thread takes at a time.
 const BLOCK: usize = 4096;
 
@@ -101,6 +104,9 @@ impl<const M: usize> Auditor<'_, M> {
     fn recorded_ends(&self, i: usize, motion: &Motion<M>, width: f64, line: i32, tally: &mut Tally<M>) {
         let spread = (motion.root_anchor - motion.root_far).abs() * motion.width_rounding(width);
         for (y, recorded) in [(0.0, motion.root_anchor), (1.0, motion.root_far)] {
+            if recorded.is_infinite() {
+                continue; // the next arc's velocity is compared with that of the law
+            }
             let state = motion.state(y);
             let at_end = (y == 1.0) != motion.anchored_at_end;
             let time = self.starts[i] + if at_end { self.arcs.duration[i] } else { 0.0 };
@@ -181,13 +187,24 @@ impl<const M: usize> Auditor<'_, M> {
         let mut rounding = [0.0; M];
         for (side, (piece, u, p)) in ends.into_iter().enumerate() {
             let curve = self.path.curve::<M>(piece);
+            if p.is_infinite() {
+                let motion = arcs.motion([i, j][side], &curve);
+                let state = motion.state(if (side == 0) != motion.anchored_at_end { 1.0 } else { 0.0 });
+                velocity[side] = state.velocity;
+                for k in 0..M {
+                    rounding[k] += ROUNDINGS * CUSP_ROUNDING * state.magnitude[k];
+                }
+                continue;
+            }
             let (tangent, root_p) = (curve.derivative(u), p.sqrt());
-            let scale = ROUNDINGS * EPS * 2.0 / curve.width * root_p;
+            let scale = ROUNDINGS * EPS * root_p;
+            let size = curve.derivative_size();
             // Between two pieces the control points' own rounding turns the tangent.
-            let turned = if before == after { 0.0 } else { 2.0 * curve.magnitude() };
+            let turned =
+                if before == after { 0.0 } else { 2.0 * curve.magnitude() * curve.derivative_scale() };
             for k in 0..M {
                 velocity[side][k] = tangent[k] * root_p;
-                rounding[k] += scale * (curve.first[k].abs() + curve.second[k].abs() + turned);
+                rounding[k] += scale * (size[k] + turned);
             }
         }
         let (time, line) = (self.starts[j], self.line(after));
@@ -215,7 +232,8 @@ impl<const M: usize> Auditor<'_, M> {
     /// The speed at the start or the end of a run.
     fn run_end(&self, i: usize, u: f64, p: f64, wanted: f64, time: f64, tally: &mut Tally<M>) {
         let piece = self.arcs.piece[i] as usize;
-        let speed = length(&self.path.curve::<M>(piece).derivative(u)) * p.sqrt();
+        let root_p = if p.is_infinite() { 0.0 } else { p.sqrt() };
+        let speed = length(&self.path.curve::<M>(piece).derivative(u)) * root_p;
         let rounding = ROUNDINGS * EPS * (speed + wanted);
         let limit = self.negligible_speed();
         tally.offer(Check::Junction, 0, (speed - wanted).abs() - rounding, limit, time, self.line(piece));
@@ -342,8 +360,7 @@ impl<'a, const M: usize> Probe<'a, M> {
         let rounding = ROUNDINGS * EPS * length(&state.magnitude);
         self.tally.offer(Check::Feed, 0, speed - rounding, self.feed, time, self.line);
         if self.limits.chord_tolerance.is_finite() {
-            let error =
-                chord_error((speed - rounding) * self.limits.period, self.motion.curvature(&state.tangent));
+            let error = chord_error((speed - rounding) * self.limits.period, self.motion.curvature(state));
             self.tally.offer(Check::Chord, 0, error, self.limits.chord_tolerance, time, self.line);
         }
     }

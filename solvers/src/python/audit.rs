@@ -1,15 +1,17 @@
 //! The audit of plans and setpoints: the package's own types in, findings out.
 
-use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use super::arrays::to_array2;
 use super::with_padded_axes;
 use crate::audit::arcs::Arcs;
-use crate::audit::curve::Followed;
+use crate::audit::curve::{Curve, Followed, Pieces};
 use crate::audit::deviation::{audit_deviation, audit_path};
 use crate::audit::follow::Plan;
 use crate::audit::moves::Programmed;
+use crate::audit::polygon::MOST;
 use crate::audit::profile::audit_profile;
 use crate::audit::setpoints::{Chunk, Stream};
 use crate::audit::timed::Timed;
@@ -48,7 +50,34 @@ fn require(good: bool, what: &str) -> PyResult<()> {
 #[derive(FromPyObject)]
 struct CurveArrays<'py> {
     control_points: PyReadonlyArray2<'py, f64>,
+    weights: Option<PyReadonlyArray1<'py, f64>>,
+    offsets: PyReadonlyArray1<'py, i64>,
     width: PyReadonlyArray1<'py, f64>,
+}
+
+impl CurveArrays<'_> {
+    fn axes(&self) -> usize {
+        self.control_points.shape()[1]
+    }
+
+    fn pieces(&self, whose: &str) -> PyResult<Pieces<'_>> {
+        let pieces = Pieces {
+            axes: self.axes(),
+            control: self.control_points.as_slice()?,
+            weights: self.weights.as_ref().map_or(Ok(&[][..]), |weights| weights.as_slice())?,
+            offsets: self.offsets.as_slice()?,
+            width: self.width.as_slice()?,
+        };
+        let points = self.control_points.shape()[0];
+        let offsets = pieces.offsets;
+        let good = offsets.len() == pieces.len() + 1
+            && offsets.first() == Some(&0)
+            && offsets.last() == Some(&(points as i64))
+            && offsets.windows(2).all(|pair| (2..=MOST as i64 + 1).contains(&(pair[1] - pair[0])))
+            && (pieces.weights.is_empty() || pieces.weights.len() == points);
+        require(good, whose)?;
+        Ok(pieces)
+    }
 }
 
 /// `feedplan.Path`.
@@ -74,15 +103,13 @@ struct ProblemArrays<'py> {
 
 impl ProblemArrays<'_> {
     fn axes(&self) -> usize {
-        self.path.curve.control_points.shape()[1]
+        self.path.curve.axes()
     }
 
     fn followed(&self) -> PyResult<Followed<'_>> {
         let path = &self.path;
         let followed = Followed {
-            axes: self.axes(),
-            control: path.curve.control_points.as_slice()?,
-            width: path.curve.width.as_slice()?,
+            pieces: path.curve.pieces("path")?,
             feed: self.feed.as_slice()?,
             line: path.line.as_slice()?,
             moves: path.moves.as_slice()?,
@@ -95,8 +122,7 @@ impl ProblemArrays<'_> {
         let runs = followed.runs;
         let ordered = runs.windows(2).all(|pair| pair[0] <= pair[1]);
         let spanned = runs.first() == Some(&0) && runs.last() == Some(&(pieces as i64));
-        let good = followed.control.len() == 3 * self.axes() * pieces
-            && [followed.feed.len(), followed.line.len(), followed.tolerance.len()] == [pieces; 3]
+        let good = [followed.feed.len(), followed.line.len(), followed.tolerance.len()] == [pieces; 3]
             && followed.moves.len() == 2 * pieces
             && followed.dwell.len() + 1 == runs.len()
             && self.junction_speed.as_slice()?.len() == pieces + 1
@@ -155,10 +181,14 @@ struct ProgramArrays<'py> {
     arc_centre: PyReadonlyArray2<'py, f64>,
     arc_normal: PyReadonlyArray1<'py, u8>,
     arc_angle: PyReadonlyArray1<'py, f64>,
+    spline_move: PyReadonlyArray1<'py, i64>,
+    spline_pieces: PyReadonlyArray1<'py, i64>,
+    splines: Option<CurveArrays<'py>>,
 }
 
 impl ProgramArrays<'_> {
     fn programmed(&self, axes: usize) -> PyResult<Programmed<'_>> {
+        let none = Pieces { axes, control: &[], weights: &[], offsets: &[0], width: &[] };
         let program = Programmed {
             axes,
             start: self.start.as_slice()?,
@@ -168,6 +198,9 @@ impl ProgramArrays<'_> {
             arc_centre: self.arc_centre.as_slice()?,
             arc_normal: self.arc_normal.as_slice()?,
             arc_angle: self.arc_angle.as_slice()?,
+            spline_move: self.spline_move.as_slice()?,
+            spline_pieces: self.spline_pieces.as_slice()?,
+            splines: self.splines.as_ref().map_or(Ok(none), |splines| splines.pieces("program"))?,
             xyz: ["X", "Y", "Z"].map(|letter| self.axes.iter().position(|axis| axis == letter)),
         };
         let arcs = program.arc_move.len();
@@ -176,7 +209,11 @@ impl ProgramArrays<'_> {
             && program.target.len() == axes * program.len()
             && program.arc_centre.len() == 3 * arcs
             && [program.arc_normal.len(), program.arc_angle.len()] == [arcs; 2]
-            && program.arc_normal.iter().all(|&normal| normal < 3);
+            && program.arc_normal.iter().all(|&normal| normal < 3)
+            && program.splines.axes == axes
+            && program.spline_pieces.len() == program.spline_move.len() + 1
+            && program.spline_pieces.windows(2).all(|pair| 0 <= pair[0] && pair[0] <= pair[1])
+            && program.spline_pieces.last().is_some_and(|&last| last <= program.splines.len() as i64);
         require(good, "program")?;
         Ok(program)
     }
@@ -245,6 +282,42 @@ fn audit_plan(
             }
             findings(&tally, path.axes)
         }))
+    })
+}
+
+/// Two (n, axes) arrays.
+type Tables<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
+
+/// C and C' (n, axes) at places of a curve, for what Python measures itself.
+#[pyfunction]
+#[pyo3(signature = (curve, piece, u))]
+fn audit_places<'py>(
+    py: Python<'py>,
+    curve: CurveArrays<'py>,
+    piece: PyReadonlyArray1<'py, i64>,
+    u: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Tables<'py>> {
+    let pieces = curve.pieces("path")?;
+    let (piece, u) = (piece.as_slice()?, u.as_slice()?);
+    let inside = piece.iter().all(|&piece| usize::try_from(piece).is_ok_and(|piece| piece < pieces.len()));
+    require(piece.len() == u.len() && inside, "places")?;
+    let axes = pieces.axes;
+    with_padded_axes!(axes, M, {
+        let (points, slopes) = py.detach(|| {
+            let (mut points, mut slopes) = (Vec::new(), Vec::new());
+            let mut last: Option<(i64, Curve<M>)> = None;
+            for (&number, &u) in piece.iter().zip(u) {
+                let curve = match last.take() {
+                    Some((known, curve)) if known == number => curve,
+                    _ => pieces.curve::<M>(number as usize),
+                };
+                points.push(curve.at(u));
+                slopes.push(curve.derivative(u));
+                last = Some((number, curve));
+            }
+            (points, slopes)
+        });
+        Ok((to_array2(py, points, axes), to_array2(py, slopes, axes)))
     })
 }
 
@@ -406,5 +479,6 @@ fn finished() -> PyErr {
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(audit_plan, module)?)?;
+    module.add_function(wrap_pyfunction!(audit_places, module)?)?;
     module.add_class::<SetpointAudit>()
 }

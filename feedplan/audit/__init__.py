@@ -11,6 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import SetpointAudit, audit_plan
+from feedplan.audit.joint_profile import audit_joint_profile
+from feedplan.audit.joint_setpoints import JointSetpoints
+from feedplan.audit.verdict import PASS_MARK, Audit, LimitCheck, join
+from feedplan.audit.worst import Findings
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InputError
 from feedplan.machine.machine import Axis, Machine
@@ -18,144 +22,13 @@ from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 from feedplan.setpoints import SetpointChunk, Setpoints
 
-# A ratio of measured value to limit passes up to here: a millionth covers the planner's own rounding over
-# long paths (some 1e-10) and means nothing to a machine.
-PASS_MARK = 1.0 + 1e-6
+__all__ = ["PASS_MARK", "Audit", "LimitCheck", "audit", "audit_setpoints"]
 
 # Share of the audit's time that path and profile take where setpoints follow, for the progress shown.
 PLAN_SHARE = 0.25
 
 # Chunk of setpoints that goes through the audit at once when they are all at hand.
 CHUNK = 100_000
-
-
-@dataclass(frozen=True)
-class _Kind:
-    """How a check is called in a sentence, and its unit."""
-
-    quantity: str
-    unit: str
-
-
-_KINDS = {
-    "feed": _Kind("speed", "mm/s"),
-    "velocity": _Kind("velocity", "mm/s"),
-    "acceleration": _Kind("acceleration", "mm/s²"),
-    "jerk": _Kind("jerk", "mm/s³"),
-    "chord": _Kind("chord error", "mm"),
-    "deviation": _Kind("distance between followed and programmed path", "mm"),
-    "travel": _Kind("position", "mm"),
-    "jump": _Kind("jump of velocity", "mm/s"),
-    "continuity": _Kind("jump of speed where pieces meet", "mm/s"),
-    "junction": _Kind("speed beyond what is allowed where pieces meet or runs end,", "mm/s"),
-    "duration": _Kind("relative error of a recorded duration", ""),
-    "order": _Kind("gap between the arcs of the profile", "mm"),
-    "gap": _Kind("gap in the path", "mm"),
-    "place": _Kind("distance of a setpoint from its place on the path", "mm"),
-    "grid": _Kind("irregularity of the time steps", "s"),
-    "recorded_velocity": _Kind("error of the recorded velocity", "mm/s"),
-    "recorded_acceleration": _Kind("error of the recorded acceleration", "mm/s²"),
-    "numbers": _Kind("number that is not finite or out of its range", ""),
-}
-
-
-@dataclass(frozen=True)
-class LimitCheck:
-    """The worst place of one limit.
-
-    `worst` is the value measured there, less what rounding may have added, `limit` what is allowed, `ratio`
-    their quotient; `time` [s] and source `line` say where (line 0: not known). `axis` is None where the check
-    belongs to no axis. What is not `judged` is reported only. In `travel` the ratio is the share of half the
-    travel. The unit is in `unit`.
-    """
-
-    name: str
-    axis: str | None
-    worst: float
-    limit: float
-    ratio: float
-    time: float
-    line: int
-    judged: bool
-
-    @property
-    def ok(self) -> bool:
-        """Whether the limit holds, or is not judged. What is not a number never holds."""
-        return not self.judged or self.ratio <= PASS_MARK
-
-    @property
-    def unit(self) -> str:
-        """Unit of `worst` and `limit`."""
-        return _KINDS[self.name].unit
-
-    def sentence(self) -> str:
-        """Place, value and limit in words."""
-        place = f"line {self.line}, {self.time:.6f} s" if self.line else f"{self.time:.6f} s"
-        kind = _KINDS[self.name]
-        what = f"{self.axis} {kind.quantity}" if self.axis else kind.quantity
-        if self.name == "numbers":
-            return f"{place}: {what}"
-        unit = f" {kind.unit}" if kind.unit else ""
-        times = f" ({self.ratio:.7g} times)" if math.isfinite(self.ratio) else ""
-        return f"{place}: {what} {self.worst:.7g}{unit}, the limit is {self.limit:.7g}{unit}{times}"
-
-    def to_json(self) -> dict[str, Any]:
-        """The numbers by name; what is not finite is None."""
-        return {
-            "ok": self.ok,
-            "worst": _finite(self.worst),
-            "limit": _finite(self.limit),
-            "ratio": _finite(self.ratio),
-            "time": _finite(self.time),
-            "line": self.line,
-            "judged": self.judged,
-        }
-
-
-@dataclass(frozen=True)
-class Audit:
-    """The verdict: the worst place of every limit, from `checked_samples` samples."""
-
-    checks: tuple[LimitCheck, ...]
-    checked_samples: int
-
-    @property
-    def broken(self) -> tuple[LimitCheck, ...]:
-        """The checks that fail."""
-        return tuple(check for check in self.checks if not check.ok)
-
-    @property
-    def failures(self) -> tuple[str, ...]:
-        """A sentence for every check that fails: place, value, limit."""
-        if not self.checks:
-            return ("there is nothing that could be measured",)
-        return tuple(check.sentence() for check in self.broken)
-
-    @property
-    def ok(self) -> bool:
-        """Whether everything was measured and every limit holds."""
-        return bool(self.checks) and not self.broken
-
-    def check(self, name: str, axis: str | None = None) -> LimitCheck:
-        """One check by its name and axis. Raises KeyError where it was not made."""
-        for check in self.checks:
-            if (check.name, check.axis) == (name, axis):
-                return check
-        raise KeyError((name, axis))
-
-    def to_json(self) -> dict[str, Any]:
-        """`ok`, `checked_samples`, `failures`, and the checks by name, those of an axis by name and axis."""
-        result: dict[str, Any] = {
-            "ok": self.ok,
-            "checked_samples": self.checked_samples,
-            "failures": list(self.failures),
-        }
-        for check in self.checks:
-            if check.axis is None:
-                result[check.name] = check.to_json()
-            else:
-                result.setdefault(check.name, {})[check.axis] = check.to_json()
-        return result
 
 
 @dataclass(frozen=True)
@@ -184,15 +57,16 @@ def audit(
     """Measures a plan against every limit of its problem and machine.
 
     The `profile` on its path; with a `program` the distance between followed and programmed path; with
-    `setpoints`, which are read chunk by chunk, their differences and their places on the path. Jerk is judged
-    only if the method claims it (`jerk`). `progress` is called with the share done, 0 to 1.
+    `setpoints`, which are read chunk by chunk, their differences and their places on the path. Where the
+    joints are not the path's axes, their limits are measured by the kinematics' positions alone. Jerk is
+    judged only if the method claims it (`jerk`). `progress` is called with the share done, 0 to 1.
     Raises InputError where path, machine, program and setpoints do not belong together.
     """
-    path = problem.path
-    axes = path.axes
-    if program is not None and program.axes != axes:
+    axes = problem.axes
+    if program is not None and program.axes != problem.path.axes:
         raise InputError(
-            f"the program has the axes {' '.join(program.axes)}, its path {' '.join(axes)}: audit a path "
+            f"the program has the axes {' '.join(program.axes)}, its path "
+            f"{' '.join(problem.path.axes)}: audit a path "
             "with the program that it was built from"
         )
     machine_axes = _machine_axes(machine, axes)
@@ -206,30 +80,93 @@ def audit(
         period=float(problem.period),
         end_speeds=(float(problem.start_speed), float(problem.end_speed)),
     )
+    report = progress or (lambda done: None)
+    if isinstance(setpoints, Setpoints):
+        limits = replace(limits, period=setpoints.period)
+        setpoints = _reported(setpoints, report)
     try:
         problem, profile, program = _native(problem, profile, program)
-        report = progress or (lambda done: None)
         report(0.0)
-        results = [audit_plan(problem, limits, profile, program)]
-        if setpoints is not None:
-            report(PLAN_SHARE)
-            if isinstance(setpoints, Setpoints):
-                limits = replace(limits, period=setpoints.period)
-                setpoints = _reported(setpoints, report)
-            stream = SetpointAudit(limits, 0.0, problem, profile, program)
-            for chunk in setpoints:
-                stream.push(
-                    _array(chunk.t, np.float64),
-                    _array(chunk.position, np.float64),
-                    _array(chunk.velocity, np.float64),
-                    _array(chunk.acceleration, np.float64),
-                    _array(chunk.line, np.int32),
-                )
-            results.append(stream.finish())
+        work = _audit_axes if problem.joints is None else _audit_joints
+        results = work(problem, profile, limits, program, setpoints, report)
         report(1.0)
     except ValueError as error:
         raise InputError(f"this plan cannot be audited: {error}") from None
-    return _join(results, axes, jerk)
+    return join(results, axes, jerk)
+
+
+Results = list[Findings]
+
+
+def _audit_axes(
+    problem: Problem,
+    profile: SpeedProfile | None,
+    limits: _Limits,
+    program: Program | None,
+    setpoints: Iterable[SetpointChunk] | None,
+    report: Callable[[float], None],
+) -> Results:
+    """Where the path's axes are the joints."""
+    plan_limits = replace(limits, period=float(problem.period))
+    results = [audit_plan(problem, plan_limits, profile, program)]
+    if setpoints is not None:
+        report(PLAN_SHARE)
+        stream = SetpointAudit(limits, 0.0, problem, profile, program)
+        for chunk in setpoints:
+            _push(stream, chunk)
+        results.append(stream.finish())
+    return results
+
+
+def _audit_joints(
+    problem: Problem,
+    profile: SpeedProfile | None,
+    limits: _Limits,
+    program: Program | None,
+    setpoints: Iterable[SetpointChunk] | None,
+    report: Callable[[float], None],
+) -> Results:
+    """Where the path is the tool tip's: what is the tip's natively, what is the joints' by the kinematics."""
+    axes = len(problem.path.axes)
+    free = replace(
+        limits,
+        max_velocity=[math.inf] * axes,
+        max_acceleration=[math.inf] * axes,
+        max_jerk=[math.inf] * axes,
+        max_velocity_jump=[0.0] * axes,
+        travel=[(-math.inf, math.inf)] * axes,
+    )
+    findings, samples = audit_plan(problem, free, None, program)
+    results: Results = [([found for found in findings if found[1] < 0], samples)]
+    jump = np.array(limits.max_velocity_jump)
+    if profile is not None:
+        share = PLAN_SHARE if setpoints is not None else 1.0
+        worst = audit_joint_profile(
+            problem, profile, jump, np.array(limits.travel), lambda done: report(share * done)
+        )
+        results.append(worst.findings())
+    if setpoints is not None:
+        report(PLAN_SHARE)
+        stream = SetpointAudit(limits, 0.0)
+        places = None if profile is None else JointSetpoints(problem, profile, jump, limits.period)
+        for chunk in setpoints:
+            _push(stream, chunk)
+            if places is not None:
+                places.push(chunk)
+        results.append(stream.finish())
+        if places is not None:
+            results.append(places.finish().findings())
+    return results
+
+
+def _push(stream: SetpointAudit, chunk: SetpointChunk) -> None:
+    stream.push(
+        _array(chunk.t, np.float64),
+        _array(chunk.position, np.float64),
+        _array(chunk.velocity, np.float64),
+        _array(chunk.acceleration, np.float64),
+        _array(chunk.line, np.int32),
+    )
 
 
 def audit_setpoints(
@@ -293,7 +230,7 @@ def audit_setpoints(
             None if accelerations is None else accelerations[part],
             None if lines is None else lines[part],
         )
-    return _join([stream.finish()], names, jerk)
+    return join([stream.finish()], names, jerk)
 
 
 def _reported(setpoints: Setpoints, report: Callable[[float], None]) -> Iterator[SetpointChunk]:
@@ -321,35 +258,6 @@ def _period(times: NDArray[np.float64], default: float) -> float:
     return step if math.isfinite(step) and step > 0 else default
 
 
-def _join(
-    results: Iterable[tuple[list[tuple[str, int, float, float, float, float, int]], int]],
-    axes: tuple[str, ...],
-    jerk: bool,
-) -> Audit:
-    """The worst of all results for every check, in the order of `_KINDS`."""
-    worst: dict[tuple[str, int], LimitCheck] = {}
-    samples = 0
-    for findings, count in results:
-        samples += count
-        for name, axis, value, limit, ratio, time, line in findings:
-            check = LimitCheck(
-                name=name,
-                axis=axes[axis] if axis >= 0 else None,
-                worst=value,
-                limit=limit,
-                ratio=ratio,
-                time=time,
-                line=line,
-                judged=jerk or name != "jerk",
-            )
-            known = worst.get((name, axis))
-            if known is None or not check.ratio <= known.ratio:
-                worst[name, axis] = check
-    order = list(_KINDS)
-    keys = sorted(worst, key=lambda key: (order.index(key[0]), key[1]))
-    return Audit(tuple(worst[key] for key in keys), samples)
-
-
 Record = TypeVar("Record")
 Scalar = TypeVar("Scalar", bound=np.generic)
 
@@ -375,7 +283,7 @@ _PROFILE = {
 _PROGRAM = {
     **_dtypes(np.float64, "start", "target", "arc_centre", "arc_angle"),
     **_dtypes(np.int32, "line"),
-    **_dtypes(np.int64, "arc_move"),
+    **_dtypes(np.int64, "arc_move", "spline_move", "spline_pieces"),
     **_dtypes(np.uint8, "arc_normal"),
 }
 
@@ -408,7 +316,3 @@ def _array(values: ArrayLike, dtype: type[Scalar]) -> NDArray[Scalar]:
 
 def _numbers(values: NDArray[np.float64]) -> list[float]:
     return [float(value) for value in values]
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -1,0 +1,176 @@
+"""What an audit says: the worst place of every limit, in numbers and in sentences."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from feedplan.audit.worst import Findings
+
+# A ratio of measured value to limit passes up to here: a millionth covers the planner's own rounding over
+# long paths (some 1e-10) and means nothing to a machine.
+PASS_MARK = 1.0 + 1e-6
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """How a check is called in a sentence, and its unit."""
+
+    quantity: str
+    unit: str
+
+
+_KINDS = {
+    "feed": _Kind("speed", "mm/s"),
+    "velocity": _Kind("velocity", "mm/s"),
+    "acceleration": _Kind("acceleration", "mm/s²"),
+    "jerk": _Kind("jerk", "mm/s³"),
+    "chord": _Kind("chord error", "mm"),
+    "deviation": _Kind("distance between followed and programmed path", "mm"),
+    "travel": _Kind("position", "mm"),
+    "jump": _Kind("jump of velocity", "mm/s"),
+    "continuity": _Kind("jump of speed where pieces meet", "mm/s"),
+    "junction": _Kind("speed beyond what is allowed where pieces meet or runs end,", "mm/s"),
+    "duration": _Kind("relative error of a recorded duration", ""),
+    "order": _Kind("gap between the arcs of the profile", "mm"),
+    "gap": _Kind("gap in the path", "mm"),
+    "place": _Kind("distance of a setpoint from its place on the path", "mm"),
+    "grid": _Kind("irregularity of the time steps", "s"),
+    "recorded_velocity": _Kind("error of the recorded velocity", "mm/s"),
+    "recorded_acceleration": _Kind("error of the recorded acceleration", "mm/s²"),
+    "numbers": _Kind("number that is not finite or out of its range", ""),
+}
+
+
+@dataclass(frozen=True)
+class LimitCheck:
+    """The worst place of one limit.
+
+    `worst` is the value measured there, less what rounding may have added, `limit` what is allowed, `ratio`
+    their quotient; `time` [s] and source `line` say where (line 0: not known). `axis` is None where the check
+    belongs to no axis. What is not `judged` is reported only. In `travel` the ratio is the share of half the
+    travel. The unit is in `unit`.
+    """
+
+    name: str
+    axis: str | None
+    worst: float
+    limit: float
+    ratio: float
+    time: float
+    line: int
+    judged: bool
+
+    @property
+    def ok(self) -> bool:
+        """Whether the limit holds, or is not judged. What is not a number never holds."""
+        return not self.judged or self.ratio <= PASS_MARK
+
+    @property
+    def unit(self) -> str:
+        """Unit of `worst` and `limit`."""
+        return _KINDS[self.name].unit
+
+    def sentence(self) -> str:
+        """Place, value and limit in words."""
+        place = f"line {self.line}, {self.time:.6f} s" if self.line else f"{self.time:.6f} s"
+        kind = _KINDS[self.name]
+        what = f"{self.axis} {kind.quantity}" if self.axis else kind.quantity
+        if self.name == "numbers":
+            return f"{place}: {what}"
+        unit = f" {kind.unit}" if kind.unit else ""
+        times = f" ({self.ratio:.7g} times)" if math.isfinite(self.ratio) else ""
+        return f"{place}: {what} {self.worst:.7g}{unit}, the limit is {self.limit:.7g}{unit}{times}"
+
+    def to_json(self) -> dict[str, Any]:
+        """The numbers by name; what is not finite is None."""
+        return {
+            "ok": self.ok,
+            "worst": _finite(self.worst),
+            "limit": _finite(self.limit),
+            "ratio": _finite(self.ratio),
+            "time": _finite(self.time),
+            "line": self.line,
+            "judged": self.judged,
+        }
+
+
+@dataclass(frozen=True)
+class Audit:
+    """The verdict: the worst place of every limit, from `checked_samples` samples."""
+
+    checks: tuple[LimitCheck, ...]
+    checked_samples: int
+
+    @property
+    def broken(self) -> tuple[LimitCheck, ...]:
+        """The checks that fail."""
+        return tuple(check for check in self.checks if not check.ok)
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """A sentence for every check that fails: place, value, limit."""
+        if not self.checks:
+            return ("there is nothing that could be measured",)
+        return tuple(check.sentence() for check in self.broken)
+
+    @property
+    def ok(self) -> bool:
+        """Whether everything was measured and every limit holds."""
+        return bool(self.checks) and not self.broken
+
+    def check(self, name: str, axis: str | None = None) -> LimitCheck:
+        """One check by its name and axis. Raises KeyError where it was not made."""
+        for check in self.checks:
+            if (check.name, check.axis) == (name, axis):
+                return check
+        raise KeyError((name, axis))
+
+    def to_json(self) -> dict[str, Any]:
+        """`ok`, `checked_samples`, `failures`, and the checks by name, those of an axis by name and axis."""
+        result: dict[str, Any] = {
+            "ok": self.ok,
+            "checked_samples": self.checked_samples,
+            "failures": list(self.failures),
+        }
+        for check in self.checks:
+            if check.axis is None:
+                result[check.name] = check.to_json()
+            else:
+                result.setdefault(check.name, {})[check.axis] = check.to_json()
+        return result
+
+
+def join(
+    results: Iterable[Findings],
+    axes: tuple[str, ...],
+    jerk: bool,
+) -> Audit:
+    """The worst of all results for every check, in the order of `_KINDS`."""
+    worst: dict[tuple[str, int], LimitCheck] = {}
+    samples = 0
+    for findings, count in results:
+        samples += count
+        for name, axis, value, limit, ratio, time, line in findings:
+            check = LimitCheck(
+                name=name,
+                axis=axes[axis] if axis >= 0 else None,
+                worst=value,
+                limit=limit,
+                ratio=ratio,
+                time=time,
+                line=line,
+                judged=jerk or name != "jerk",
+            )
+            known = worst.get((name, axis))
+            if known is None or not check.ratio <= known.ratio:
+                worst[name, axis] = check
+    order = list(_KINDS)
+    keys = sorted(worst, key=lambda key: (order.index(key[0]), key[1]))
+    return Audit(tuple(worst[key] for key in keys), samples)
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

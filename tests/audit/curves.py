@@ -1,0 +1,155 @@
+"""Plans on curves of any degree, for the tests of the audit."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan._solvers import plan_curves
+from feedplan.constraints.problem import Problem
+from feedplan.curves.composite import CompositeCurve
+from feedplan.geometry.path import Path
+from feedplan.machine.along import derivatives
+from feedplan.machine.machine import Axis, Machine
+from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.setpoints import SetpointChunk
+
+Array = NDArray[np.float64]
+
+
+def machine_of(problem: Problem, jump: float = 0.0) -> Machine:
+    """Axes with the limits of the problem."""
+    limits = zip(problem.axes, problem.max_velocity, problem.max_acceleration, strict=True)
+    return Machine("own", tuple(Axis(name, v, a, max_velocity_jump=jump) for name, v, a in limits))
+
+
+def path_along(curve: CompositeCurve, names: str = "XYZABC", **changes: Any) -> Path:
+    """One run over the curve, each piece on a line and a move of its own."""
+    number = np.arange(len(curve))
+    columns: dict[str, Any] = {
+        "axes": tuple(names[: curve.axes]),
+        "curve": curve,
+        "feed": np.full(len(curve), 100.0),
+        "move": np.stack([number, number], axis=1),
+        "line": np.asarray(10 * (number + 1), dtype=np.int32),
+        "runs": np.array([0, len(curve)]),
+        "dwell": np.zeros(1),
+        "tolerance": np.zeros(len(curve)),
+    }
+    return Path(**{**columns, **changes})
+
+
+def problem_along(
+    path: Path, velocity: Any, acceleration: Any, feed: float = 1e9, chord_tolerance: float = math.inf
+) -> Problem:
+    """From rest to rest."""
+    axes = len(path.axes)
+    return Problem(
+        path=path,
+        max_velocity=np.broadcast_to(np.asarray(velocity, float), axes).copy(),
+        max_acceleration=np.broadcast_to(np.asarray(acceleration, float), axes).copy(),
+        max_jerk=np.full(axes, np.inf),
+        feed=np.full(len(path), feed),
+        junction_speed=np.concatenate([[0.0], np.full(len(path) - 1, np.inf), [0.0]]),
+        chord_tolerance=chord_tolerance,
+        period=0.001,
+    )
+
+
+def planned(problem: Problem) -> SpeedProfile:
+    """The exact profile on pieces of any degree."""
+    curve = problem.path.curve
+    return SpeedProfile(
+        *plan_curves(
+            curve.control_points,
+            np.zeros(0) if curve.weights is None else curve.weights,
+            curve.offsets,
+            curve.width,
+            np.asarray(problem.path.runs, np.int64),
+            problem.feed,
+            problem.junction_speed,
+            problem.max_velocity,
+            problem.max_acceleration,
+            problem.chord_tolerance,
+            problem.period,
+            problem.start_speed,
+            problem.end_speed,
+        )
+    )
+
+
+def places_at(problem: Problem, profile: SpeedProfile, t: Array) -> tuple[NDArray[np.int64], Array, Array]:
+    """Arc, u and √p at times in motion (n,): by halving, from closed forms; not along a feed limit."""
+    ends = np.cumsum(profile.duration)
+    arc = np.minimum(np.searchsorted(ends, t, side="right"), len(profile) - 1)
+    since = np.clip(t - (ends[arc] - profile.duration[arc]), 0.0, profile.duration[arc])
+    piece, rows = profile.piece[arc].astype(np.int64), np.arange(len(t))
+    axis = np.where(profile.axis[arc] == 255, 0, profile.axis[arc]).astype(np.int64)
+    kind, value = profile.kind[arc], profile.value[arc]
+
+    def motion(u: Array) -> tuple[Array, Array]:
+        q, slope = problem.curve.evaluate(piece, u, 1)
+        return q[rows, axis], slope[rows, axis]
+
+    (q0, g0), (q1, g1) = motion(profile.u0[arc]), motion(profile.u1[arc])
+    v0, v1 = g0 * np.sqrt(profile.p0[arc]), g1 * np.sqrt(profile.p1[arc])
+    # From the slower end, where nothing cancels.
+    rest = profile.duration[arc] - since
+    ahead = q0 + since * (v0 + 0.5 * value * since)
+    target = np.where(np.abs(v0) <= np.abs(v1), ahead, q1 - rest * (v1 - 0.5 * value * rest))
+    target = np.where(
+        kind == ArcKind.AXIS_VELOCITY, q0 + np.sign(q1 - q0) * np.sqrt(np.abs(value)) * since, target
+    )
+    low, high = profile.u0[arc].copy(), profile.u1[arc].copy()
+    for _ in range(70):
+        middle = 0.5 * (low + high)
+        below = (motion(middle)[0] < target) == (q1 > q0)
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    u = np.where(kind == ArcKind.FLAT, profile.u0[arc] + np.sqrt(profile.p0[arc]) * since, 0.5 * (low + high))
+    q, slope = motion(u)
+    speed = np.sqrt(
+        np.maximum(
+            np.where(np.abs(v0) <= np.abs(v1), v0**2 + 2 * value * (q - q0), v1**2 - 2 * value * (q1 - q)),
+            0.0,
+        )
+    )
+    speed = np.where(kind == ArcKind.AXIS_VELOCITY, np.sqrt(np.abs(value)), speed)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root_p = np.where(kind == ArcKind.FLAT, np.sqrt(profile.p0[arc]), speed / np.abs(slope))
+    return arc, u, root_p
+
+
+def sampled(problem: Problem, profile: SpeedProfile) -> SetpointChunk:
+    """Setpoints of one run: its start, one a period, and the stop at the next whole period."""
+    count = math.ceil(profile.time / problem.period - 1e-9)
+    t = np.arange(count + 1) * problem.period
+    arc, u, root_p = places_at(problem, profile, np.minimum(t, profile.time))
+    piece = profile.piece[arc].astype(np.int64)
+    curve = problem.path.curve
+    if problem.words:
+        (words,) = problem.words
+        control = np.stack([curve.control_points[slice(*curve.offsets[i : i + 2])] for i in piece])
+        width = curve.width[piece]
+        share = np.minimum(u / width, 1.0)
+        q = derivatives(words.kinematics, words.tip(control), width, share, 1)
+        turning = np.array(words.kinematics.turning)
+        q[0] = np.where(turning, np.unwrap(q[0], period=360.0, axis=0), q[0])
+    else:
+        q = curve.evaluate(piece, u, 1)
+    velocity = np.nan_to_num(q[1] * root_p[:, None])
+    velocity[[0, -1]] *= [[problem.start_speed > 0], [problem.end_speed > 0]]
+    acceleration = np.zeros_like(velocity)
+    if not problem.words:
+        # Differences so close that only a switch at the setpoint itself comes between.
+        around = [places_at(problem, profile, np.clip(t + step, 0.0, profile.time)) for step in (-1e-7, 1e-7)]
+        rates = [
+            curve.evaluate(profile.piece[arc].astype(np.int64), u, 1)[1] * root_p[:, None]
+            for arc, u, root_p in around
+        ]
+        acceleration = (rates[1] - rates[0]) / 2e-7
+        acceleration[[0, -1]] = 0.0
+    zero = np.zeros_like(velocity)
+    return SetpointChunk(t, q[0], velocity, acceleration, zero, problem.path.line[piece], problem.axes)
