@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from benchmarks.results import Cell, Result
 from feedplan.curves.composite import CompositeCurve
-from feedplan.geometry.length import PathLength
+from feedplan.curves.length import CurveLength
 from feedplan.geometry.path import Path
 from feedplan.profile import ArcKind, SpeedProfile
 from feedplan.setpoints import INTERPOLATORS, setpoints
@@ -76,7 +76,7 @@ def exact_lengths(path: Path, piece: NDArray[np.uint32], u: NDArray[np.float64])
 
 def inversion_rows(name: str, path: Path, steps: tuple[float, ...]) -> list[dict[str, Cell]]:
     """Places at equal steps."""
-    length = PathLength(path)
+    length = CurveLength(path.curve)
     starts = length.length(np.arange(len(path)), np.zeros(len(path)))
     rows: list[dict[str, Cell]] = []
     for step in steps:
@@ -104,7 +104,7 @@ def inversion_rows(name: str, path: Path, steps: tuple[float, ...]) -> list[dict
 
 def constant_feed(path: Path) -> SpeedProfile:
     """One arc a piece at `FEED`: the stream starts and ends in motion."""
-    count, length = len(path), PathLength(path)
+    count, length = len(path), CurveLength(path.curve)
     joints = np.append(length.length(np.arange(count), np.zeros(count)), length.total)
     edges = np.diff(path.curve.by_piece, axis=1)
     p = (FEED * path.width[:, None] / 2 / np.linalg.norm(edges, axis=2)) ** 2

@@ -25,7 +25,7 @@ from feedplan._solvers import (
 from feedplan.curves._arrays import floats, places, points, refuse
 from feedplan.errors import InputError
 
-MAX_DEGREE = 9
+MAX_DEGREE = 10
 
 Columns = tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.int64], NDArray[np.float64]]
 
@@ -72,7 +72,7 @@ class Cusps:
 
 @dataclass(frozen=True)
 class CompositeCurve:
-    """Bézier pieces C_i(u), u in [0, width_i], each of its own degree 1 to 9, polynomial or rational.
+    """Bézier pieces C_i(u), u in [0, width_i], each of its own degree 1 to 10, polynomial or rational.
 
     `control_points` (total, axes) [mm, or degrees on rotary axes], the degree_i + 1 points of piece i from
     `offsets[i]` to `offsets[i + 1]`; `weights` (total,), ones where a piece is polynomial, or None where all

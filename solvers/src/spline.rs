@@ -1,9 +1,9 @@
-//! Curves of any degree: Bézier pieces of degree 1 to 9, polynomial or rational, in M axes, joined end to end.
+//! Curves of any degree: Bézier pieces of degree 1 to 10, polynomial or rational, in M axes, joined end to end.
 //!
 //! A piece is C(u) on u in [0, width]. It is given by its Bernstein control points in mm and, where it is
 //! rational, one positive weight each. `knots` and `extract` make pieces of B-splines and NURBS, `circle` of
 //! arcs and helices; `bezier` and `rational` evaluate and transform them; `joints` and `cusps` say where they
-//! are not smooth; `length` measures them.
+//! are not smooth; `speed` and `length` measure them.
 
 pub mod bezier;
 pub mod circle;
@@ -14,9 +14,10 @@ pub mod joints;
 pub mod knots;
 pub mod length;
 pub mod rational;
+pub mod speed;
 
 /// The greatest degree of a piece.
-pub const MAX_DEGREE: usize = 9;
+pub const MAX_DEGREE: usize = 10;
 /// Coefficients of the greatest hodograph: that of a rational piece has degree 2d − 2.
 pub const MAX_HODOGRAPH: usize = 2 * MAX_DEGREE - 1;
 /// Coefficients of its square.

@@ -67,7 +67,7 @@ def test_the_published_butterfly_agrees_with_integration() -> None:
     assert np.abs(length.length(places.piece, places.u) - starts[1:]).max() <= 1e-12
 
 
-@given(st.integers(0, 2**32 - 1), st.integers(1, 9), st.booleans())
+@given(st.integers(0, 2**32 - 1), st.integers(1, 10), st.booleans())
 def test_every_place_is_found_again_by_its_length(seed: int, degree: int, rational: bool) -> None:
     rng = np.random.default_rng(seed)
     points = degree + 4

@@ -9,6 +9,7 @@ use super::with_padded_axes;
 use crate::bang_bang;
 use crate::bang_bang_quadratic::{plan, Fault, Problem, Profile};
 use crate::polynomial::MOST;
+use crate::spline::MAX_DEGREE;
 
 pyo3::create_exception!(
     _solvers,
@@ -97,11 +98,11 @@ fn plan_curves<'py>(
     let count = control_points.shape()[0];
     if offsets.first() != Some(&0)
         || offsets.last() != Some(&count)
-        || offsets.windows(2).any(|pair| pair[1] < pair[0] + 2 || pair[1] > pair[0] + 10)
+        || offsets.windows(2).any(|pair| pair[1] < pair[0] + 2 || pair[1] > pair[0] + MAX_DEGREE + 1)
     {
-        return Err(PyValueError::new_err(
-            "the offsets do not divide the control points into pieces of degree 1 to 9",
-        ));
+        return Err(PyValueError::new_err(format!(
+            "the offsets do not divide the control points into pieces of degree 1 to {MAX_DEGREE}"
+        )));
     }
     let small = weights.as_slice()?.is_empty() && offsets.windows(2).all(|pair| pair[1] - pair[0] <= 4);
     with_padded_axes!(control_points.shape()[1], M, {
