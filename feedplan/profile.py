@@ -33,8 +33,8 @@ class SpeedProfile:
     where q'' p is large. On FLAT, `axis` is the one whose acceleration limit holds p.
     An arc may begin or end with C' = 0 (as a straight piece with two equal control points does). Where such a
     place is passed at a speed, p is infinite there; the axis velocity follows from the other end of the arc:
-    q'_k0² p0 = q'_k1² p1 − 2·value·Δq_k, and from the duration where both ends are of that kind. Where it is a
-    stop, p is its limit.
+    q'_k0² p0 = q'_k1² p1 − 2·value·Δq_k, and from the duration where both ends are of that kind. Where it is
+    a stop, p is its limit.
     """
 
     piece: NDArray[np.uint32]

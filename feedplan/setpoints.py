@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import Sampler
 from feedplan.constraints.problem import Problem
-from feedplan.curves.length import INTERPOLATORS
+from feedplan.curves.length import INTERPOLATORS as INTERPOLATORS
 from feedplan.errors import InputError
 from feedplan.profile import SpeedProfile
 
@@ -137,13 +137,13 @@ def setpoints(
 ) -> Setpoints:
     """Setpoints every `period` [s] of the joints along a problem's path, by the profile planned for it.
 
-    `sarfraz`: where an axis moves at constant acceleration or speed its way tells the place, in closed form on
-    quadratic pieces; table of length or time with Sarfraz predictor-corrector elsewhere. `newton`: steps of
-    speed times period, to third order, and Newton–Raphson. Pieces may have any degree, polynomial or rational;
-    arcs of kind CHORD are for quadratic ones.
+    `sarfraz`: where an axis moves at constant acceleration or speed its way tells the place, in closed form
+    on quadratic pieces; table of length or time with Sarfraz predictor-corrector elsewhere. `newton`: steps
+    of speed times period, to third order, and Newton–Raphson. Pieces may have any degree, polynomial or
+    rational; arcs of kind CHORD are for quadratic ones.
     Raises InputError for a period or an interpolator that cannot be used, or a profile of another path.
     """
-    return Setpoints(path, profile, period, interpolator)
+    return Setpoints(problem, profile, period, interpolator)
 
 
 def _array(values: ArrayLike, dtype: type[Scalar]) -> NDArray[Scalar]:

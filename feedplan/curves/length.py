@@ -56,9 +56,7 @@ class CurveLength:
         """Length from the start of the curve to places (m,) [mm]."""
         return self._table.lengths(*places(piece, u))
 
-    def locate(
-        self, lengths: ArrayLike, tolerance: float = 1e-12, interpolator: str = "sarfraz"
-    ) -> Places:
+    def locate(self, lengths: ArrayLike, tolerance: float = 1e-12, interpolator: str = "sarfraz") -> Places:
         """The places at lengths (m,) [mm], within `tolerance` [mm]; a length beyond an end gives that end.
 
         `sarfraz` finds each by itself, in parallel; `newton` finds each from the one before.

@@ -33,6 +33,9 @@ const SLACK: f64 = 1e-9;
 /// p leaves the square root of one.
 const STANDSTILL: f64 = 1e-6;
 
+/// A speed is none beside one so many times greater that a step gains.
+const REST: f64 = 1e-9;
+
 /// A Newton–Raphson step is repeated so often before halving; two or three times are usual.
 const MAX_REPEATS: u32 = 20;
 
@@ -331,7 +334,9 @@ impl<const M: usize> Sampler<M> {
                 high = high.min(*u);
             }
             let middle = 0.5 * (low + high);
-            if step.abs() <= STEP_ERROR * whole + 2.0 * rounding || !(low < middle && middle < high) {
+            // The derivatives of the speed may be rounding where an axis turns round: the speed alone must agree.
+            let off = step.abs().max(0.5 * left.abs() * norm(&rates.velocity));
+            if off <= STEP_ERROR * whole + 2.0 * rounding || !(low < middle && middle < high) {
                 let error = if whole > 0.0 { (step.abs() + motion.length_error()) / whole } else { 0.0 };
                 return (rounds, error);
             }
@@ -400,7 +405,8 @@ impl<const M: usize> Sampler<M> {
 fn step_length<const M: usize>(rates: &Rates<M>, time: f64) -> f64 {
     let Rates { velocity, acceleration, jerk } = rates;
     let v = norm(velocity);
-    if v == 0.0 {
+    // The direction of a speed that is rounding beside what the acceleration adds says nothing.
+    if v <= REST * norm(acceleration) * time.abs() {
         // Away from the standstill, forward or back in time.
         return 0.5 * norm(acceleration) * time * time.abs();
     }

@@ -161,6 +161,7 @@ impl AxisLaw {
                 0.0
             }
         };
+        let given = [0, 1].map(|i| if turns[i] && !passed[i] { 0.0 } else { given[i] });
         let v = match (speed, passed) {
             (Some(speed), _) => [speed; 2],
             (None, [false, false]) => given,

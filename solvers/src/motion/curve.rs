@@ -6,25 +6,27 @@
 //! s = (a − q''_k p)/q'_k and s' = −(q'''_k p + 3 q''_k s)/q'_k.
 //!
 //! These quotients are 0/0 where axis k turns round and at cusps, always at an end of the arc. Nearer to it than
-//! rounding allows, the derivatives are taken at a place a little farther off.
+//! rounding allows they are taken at a place a little farther off, and continued from there where p is finite.
 
 use super::axis::{AxisLaw, End};
 use super::rate::{Line, Rate, Source, Tip, TipSpeed, MAX_TIP};
 use super::{fill, invert, parts, ArcKind, ProfileArc, Rates, State};
 use crate::arc_length::{Node, Table};
 use crate::polynomial::Polynomial;
-use crate::quadratic::dot;
-use crate::spline::bezier::{derivatives, point};
+use crate::quadratic::{dot, norm};
+use crate::spline::bezier::derivatives;
 use crate::spline::speed::{Coefficients, Speed};
 use crate::spline::Piece;
 
-/// How far from the end, in parts of the arc, where an axis turns round at a finite p: s and s' there differ by
-/// this part, and lose as many digits as it has.
-const OFF_TURN: f64 = 1e-5;
+/// How far from the end, in parts of the arc, where an axis turns round at a finite p. Continued from there s is
+/// off by the square of this part; s and s' lose as many digits as it and its square have.
+const OFF_TURN: f64 = 3e-5;
 /// The same at a cusp that is passed, where p is infinite; the way grows with its square at least.
 const OFF_CUSP: f64 = 1e-3;
 /// An end is a cusp where D is below this part of that in the middle of the arc.
 const SLOW: f64 = 1e-8;
+/// A tangent is off a straight line by no more than this part of the longest one, which is rounding.
+const OFF_LINE: f64 = 1e-14;
 /// v² at a cusp is within this factor of v² at the other end, and is bisected so often, geometrically.
 const LINE_RANGE: f64 = 1e12;
 const LINE_ROUNDS: u32 = 60;
@@ -48,6 +50,8 @@ pub struct CurveMotion<'a, const M: usize> {
     law: Law,
     /// Derivatives are taken between these places.
     safe: [f64; 2],
+    /// The direction of travel, where the arc is straight and begins or ends where the quotients are 0/0.
+    straight: Option<[f64; M]>,
     lengths: Vec<Node>,
     times: Vec<Node>,
     pub(super) length_error: f64,
@@ -64,6 +68,7 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
             arc: *arc,
             law: Law::Flat { p: arc.p0 },
             safe: [arc.u0, arc.u1],
+            straight: None,
             lengths: vec![],
             times: vec![],
             length_error: 0.0,
@@ -120,6 +125,23 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
             End::Cusp => OFF_CUSP * (arc.u1 - arc.u0),
         });
         self.safe = [arc.u0 + off[0], arc.u1 - off[1]];
+        if off != [0.0; 2] && (self.tip.is_none() || matches!(self.law, Law::Axis(_))) {
+            self.straight = self.direction();
+        }
+    }
+
+    /// The direction of all tangents on the arc, if they have one but for rounding.
+    fn direction(&self) -> Option<[f64; M]> {
+        let [from, to] = [self.arc.u0, self.arc.u1].map(|u| derivatives(&self.piece, u)[0]);
+        let way: [f64; M] = std::array::from_fn(|k| to[k] - from[k]);
+        let direction = way.map(|x| x / norm(&way));
+        let rows = self.own.hodograph();
+        let longest = rows.iter().map(norm).fold(0.0, f64::max);
+        let straight = rows.iter().all(|row| {
+            let along = dot(row, &direction);
+            (0..M).all(|k| (row[k] - along * direction[k]).abs() <= OFF_LINE * longest)
+        });
+        straight.then_some(direction)
     }
 
     /// v² at both ends. Where p is infinite the duration tells it.
@@ -242,15 +264,39 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
 
     /// Position, and velocity, acceleration and jerk at a place.
     pub fn sample(&self, state: &State) -> ([f64; M], Rates<M>) {
+        let q = derivatives(&self.piece, state.u);
+        if let Some(direction) = &self.straight {
+            return (q[0], self.on_line(direction, state));
+        }
         let at = state.u.clamp(self.safe[0], self.safe[1]);
-        let q = derivatives(&self.piece, at);
-        let place = if at == state.u { q[0] } else { point(&self.piece, state.u) };
+        let there = if at == state.u { q } else { derivatives(&self.piece, at) };
         let rates = match &self.law {
             Law::Flat { p } => rates(&q, p.sqrt(), 0.0, 0.0),
-            Law::Speed(line) => self.at_speed(line, at, &q),
-            Law::Axis(law) => self.by_axis(law, state, at, &q),
+            Law::Speed(line) => self.at_speed(line, at, &there),
+            Law::Axis(law) => self.by_axis(law, state, &q, at, &there),
         };
-        (place, rates)
+        (q[0], rates)
+    }
+
+    /// Along a straight line all axes move in proportion.
+    fn on_line(&self, direction: &[f64; M], state: &State) -> Rates<M> {
+        let [v, a, j] = match &self.law {
+            Law::Axis(law) => {
+                let scale = 1.0 / direction[law.k];
+                [scale * law.sign * state.v, scale * law.acceleration, 0.0]
+            }
+            Law::Speed(line) => {
+                // v dv/ds with ds = √D du, and its change with time.
+                let u = state.u.clamp(self.safe[0], self.safe[1]);
+                let q = derivatives(&self.piece, u);
+                let (square, slope) = (dot(&q[1], &q[1]), 2.0 * dot(&q[1], &q[2]));
+                let a = 0.5 * line.slope / square.sqrt();
+                [line.at(state.u).sqrt(), a, -0.5 * a * slope / square * (line.at(u) / square).sqrt()]
+            }
+            Law::Flat { .. } => [0.0; 3],
+        };
+        let along = |size: f64| direction.map(|x| x * size);
+        Rates { velocity: along(v), acceleration: along(a), jerk: along(j) }
     }
 
     fn at_speed(&self, line: &Line, u: f64, q: &[[f64; M]; 4]) -> Rates<M> {
@@ -266,20 +312,30 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
         rates(q, p.sqrt(), s, -(4.0 * s * slope + p * bend) / (2.0 * square))
     }
 
-    fn by_axis(&self, law: &AxisLaw, state: &State, at: f64, q: &[[f64; M]; 4]) -> Rates<M> {
+    /// From the derivatives q at the place itself and those `there`, at a place where all quotients have digits.
+    fn by_axis(
+        &self,
+        law: &AxisLaw,
+        state: &State,
+        q: &[[f64; M]; 4],
+        at: f64,
+        there: &[[f64; M]; 4],
+    ) -> Rates<M> {
         let k = law.k;
         let near = if at == state.u { *state } else { law.at(&self.arc, at) };
         let (root, g) = (near.v / near.g, law.sign * near.g);
         let p = root * root;
-        let s = (law.acceleration - q[2][k] * p) / g;
-        let mut rates = rates(q, root, s, -(q[3][k] * p + 3.0 * q[2][k] * s) / g);
-        if at != state.u {
-            rates.velocity = match law.ends[usize::from(at < state.u)] {
-                // All axes move in proportion at a cusp.
-                End::Cusp => q[1].map(|q| q / near.g * state.v),
-                _ => derivatives(&self.piece, state.u)[1].map(|q| q * root),
-            };
-        }
+        let s = (law.acceleration - there[2][k] * p) / g;
+        let ds = -(there[3][k] * p + 3.0 * there[2][k] * s) / g;
+        let mut rates = if at == state.u {
+            rates(q, root, s, ds)
+        } else if law.ends[usize::from(at < state.u)] == End::Cusp {
+            // All axes move in proportion there.
+            Rates { velocity: there[1].map(|q| q / near.g * state.v), ..rates(there, root, s, ds) }
+        } else {
+            let off = state.u - at;
+            rates(q, (p + off * (2.0 * s + off * ds)).max(0.0).sqrt(), s + off * ds, ds)
+        };
         rates.velocity[k] = law.sign * state.v;
         rates.acceleration[k] = law.acceleration;
         rates.jerk[k] = 0.0;

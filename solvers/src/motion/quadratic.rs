@@ -9,6 +9,9 @@ use super::{fill, invert, parts, ArcKind, ProfileArc, Rates, State};
 use crate::arc_length::{ChordTime, Hodograph, Length, Node, Table};
 use crate::quadratic::{dot, Quadratic};
 
+/// q'_k and the speed of the axis vanish at an end where they are this part of those at the other one.
+const TURN: f64 = 1e-10;
+
 enum Law {
     Flat { p: f64 },
     Axis(AxisLaw),
@@ -104,6 +107,12 @@ impl<const M: usize> QuadraticMotion<M> {
             (!(arc.p0.is_finite() && arc.p1.is_finite()), if g0 <= g1 { arc.p0 } else { arc.p1 });
         if g0 + g1 <= 0.0 || v0 + v1 <= 0.0 {
             // As short as a rounding error: the axis shows no motion. Its duration still tells the pace.
+            let pace = (arc.u1 - arc.u0) / arc.duration;
+            return Law::Flat { p: pace * pace };
+        }
+        let (near, far) = if g0 <= g1 { ((g0, v0), (g1, v1)) } else { ((g1, v1), (g0, v0)) };
+        if near.0 <= TURN * far.0 && near.1 <= TURN * far.1 {
+            // The axis turns round at an end: v_k² = 2 a Δq_k and q'_k² = 2 c_k Δq_k, and p is the same everywhere.
             let pace = (arc.u1 - arc.u0) / arc.duration;
             return Law::Flat { p: pace * pace };
         }
