@@ -34,9 +34,9 @@ class Problem:
     feed is about, per u̇²; and `words` (one a run) the kinematics from the path to the joints. Per joint,
     `axes` names them: `max_velocity` [mm/s], `max_acceleration` [mm/s²], `max_jerk` [mm/s³] (may be
     infinite). Per piece: `feed` (n,) greatest speed [mm/s], finite. At piece ends: `junction_speed` (n + 1,)
-    greatest speed [mm/s]: 0 at a stop, infinite where nothing but the other limits holds. `chord_tolerance` [mm] and
-    `period` [s] limit the speed on a curve of radius ρ to (2/T)·√(2ρδ − δ²); an infinite tolerance switches
-    that off. `start_speed` and `end_speed` [mm/s] hold at the two ends of the path.
+    greatest speed [mm/s]: 0 at a stop, infinite where nothing but the other limits holds. `chord_tolerance`
+    [mm] and `period` [s] limit the speed on a curve of radius ρ to (2/T)·√(2ρδ − δ²); an infinite tolerance
+    switches that off. `start_speed` and `end_speed` [mm/s] hold at the two ends of the path.
     """
 
     path: Path

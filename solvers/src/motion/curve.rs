@@ -50,6 +50,8 @@ pub struct CurveMotion<'a, const M: usize> {
     law: Law,
     /// Derivatives are taken between these places.
     safe: [f64; 2],
+    /// The end of the arc where C' vanishes, for tables; not a number where it does not.
+    foot: f64,
     /// The direction of travel, where the arc is straight and begins or ends where the quotients are 0/0.
     straight: Option<[f64; M]>,
     lengths: Vec<Node>,
@@ -68,12 +70,14 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
             arc: *arc,
             law: Law::Flat { p: arc.p0 },
             safe: [arc.u0, arc.u1],
+            foot: f64::NAN,
             straight: None,
             lengths: vec![],
             times: vec![],
             length_error: 0.0,
             time_error: 0.0,
         };
+        motion.foot = motion.cusp();
         let axis = |acceleration: f64, speed: Option<f64>| {
             // Its duration tells the pace where the axis shows no motion.
             let pace = (arc.u1 - arc.u0) / arc.duration;
@@ -188,23 +192,31 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
         }
     }
 
-    /// The cusp at an end of the arc; not a number where there is none.
-    fn foot(&self) -> f64 {
-        match (self.arc.p0.is_finite(), self.arc.p1.is_finite()) {
-            (false, _) => self.arc.u0,
-            (true, false) => self.arc.u1,
-            (true, true) => f64::NAN,
+    fn cusp(&self) -> f64 {
+        let own = |u: f64| {
+            let q = derivatives(&self.piece, u)[1];
+            dot(&q, &q)
+        };
+        let arc = &self.arc;
+        let middle = own(0.5 * (arc.u0 + arc.u1));
+        let at = |u: f64, p: f64| p == f64::INFINITY || own(u) <= SLOW * middle;
+        if at(arc.u0, arc.p0) {
+            arc.u0
+        } else if at(arc.u1, arc.p1) {
+            arc.u1
+        } else {
+            f64::NAN
         }
     }
 
     fn own(&self) -> Source<'_, M> {
-        let foot = self.foot();
+        let foot = self.foot;
         let speed = Speed::new(self.own.hodograph(), self.own.denominator(), self.piece.width);
         Source::Own(if foot.is_nan() { speed.without_foot() } else { speed.with_foot(foot) })
     }
 
     fn length_rate(&self) -> Rate<'_, M> {
-        Rate { source: self.own(), line: Line::ONE, foot: self.foot() }
+        Rate { source: self.own(), line: Line::ONE, foot: self.foot }
     }
 
     fn time_rate(&self, line: Line) -> Rate<'_, M> {
@@ -212,7 +224,7 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
             Some([square, ..]) => Source::Tip(Tip { square, width: self.piece.width }),
             None => self.own(),
         };
-        Rate { source, line, foot: self.foot() }
+        Rate { source, line, foot: self.foot }
     }
 
     /// The table of the arc's length; `with_lengths` must have been asked for.
