@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.results import Cell, Result
+from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
-from feedplan.geometry.length import PathLength
+from feedplan.curves.length import CurveLength
 from feedplan.geometry.path import Path
 from feedplan.profile import ArcKind, SpeedProfile
 from feedplan.setpoints import INTERPOLATORS, setpoints
@@ -76,7 +77,7 @@ def exact_lengths(path: Path, piece: NDArray[np.uint32], u: NDArray[np.float64])
 
 def inversion_rows(name: str, path: Path, steps: tuple[float, ...]) -> list[dict[str, Cell]]:
     """Places at equal steps."""
-    length = PathLength(path)
+    length = CurveLength(path.curve)
     starts = length.length(np.arange(len(path)), np.zeros(len(path)))
     rows: list[dict[str, Cell]] = []
     for step in steps:
@@ -104,7 +105,7 @@ def inversion_rows(name: str, path: Path, steps: tuple[float, ...]) -> list[dict
 
 def constant_feed(path: Path) -> SpeedProfile:
     """One arc a piece at `FEED`: the stream starts and ends in motion."""
-    count, length = len(path), PathLength(path)
+    count, length = len(path), CurveLength(path.curve)
     joints = np.append(length.length(np.arange(count), np.zeros(count)), length.total)
     edges = np.diff(path.curve.by_piece, axis=1)
     p = (FEED * path.width[:, None] / 2 / np.linalg.norm(edges, axis=2)) ** 2
@@ -122,13 +123,28 @@ def constant_feed(path: Path) -> SpeedProfile:
     )
 
 
+def unlimited(path: Path) -> Problem:
+    """The path without limits: the stream looks at none."""
+    count, axes = len(path), len(path.axes)
+    return Problem(
+        path=path,
+        max_velocity=np.full(axes, np.inf),
+        max_acceleration=np.full(axes, np.inf),
+        max_jerk=np.full(axes, np.inf),
+        feed=path.feed,
+        junction_speed=np.full(count + 1, np.inf),
+        chord_tolerance=np.inf,
+        period=0.001,
+    )
+
+
 def stream_rows(name: str, path: Path, steps: tuple[float, ...]) -> list[dict[str, Cell]]:
     """The setpoint stream."""
-    profile = constant_feed(path)
+    profile, problem = constant_feed(path), unlimited(path)
     rows: list[dict[str, Cell]] = []
     for step in steps:
         for interpolator in INTERPOLATORS:
-            stream = setpoints(path, profile, step / FEED, interpolator)
+            stream = setpoints(problem, profile, step / FEED, interpolator)
             begin = time.perf_counter()
             count = sum(len(chunk) for chunk in stream.chunks())
             seconds = time.perf_counter() - begin

@@ -13,7 +13,6 @@ from feedplan.program.program import Program
 
 __all__ = [
     "CurveLength",
-    "PathLength",
     "PlanError",
     "Sampler",
     "SetpointAudit",
@@ -60,23 +59,14 @@ def plan_bang_bang(problem: Problem) -> _Profile: ...
 def plan_curves(problem: Problem) -> _Profile: ...
 
 @final
-class PathLength:
-    def __new__(cls, control_points: NDArray[np.float64], width: NDArray[np.float64]) -> PathLength: ...
-    @property
-    def total(self) -> float: ...
-    @property
-    def error(self) -> float: ...
-    def lengths(self, piece: NDArray[np.uint32], u: NDArray[np.float64]) -> NDArray[np.float64]: ...
-    def locate(
-        self, lengths: NDArray[np.float64], tolerance: float, newton: bool
-    ) -> tuple[NDArray[np.uint32], NDArray[np.float64], NDArray[np.uint32], NDArray[np.float64]]: ...
-
-@final
 class Sampler:
     def __new__(
         cls,
         control_points: NDArray[np.float64],
+        weights: NDArray[np.float64] | None,
+        offsets: NDArray[np.int64],
         width: NDArray[np.float64],
+        tip_speed: tuple[NDArray[np.float64], NDArray[np.int64]] | None,
         line: NDArray[np.int32],
         runs: NDArray[np.int64],
         start_dwell: float,
@@ -301,5 +291,5 @@ class CurveLength:
     def error(self) -> float: ...
     def lengths(self, piece: NDArray[np.uint32], u: NDArray[np.float64]) -> NDArray[np.float64]: ...
     def locate(
-        self, lengths: NDArray[np.float64], tolerance: float
+        self, lengths: NDArray[np.float64], tolerance: float, newton: bool
     ) -> tuple[NDArray[np.uint32], NDArray[np.float64], NDArray[np.uint32], NDArray[np.float64]]: ...

@@ -13,8 +13,8 @@ from typing import Any
 from feedplan.audit import Audit, audit
 from feedplan.bound import lower_bound
 from feedplan.constraints.problem import Problem, build_problem
+from feedplan.curves.length import CurveLength
 from feedplan.geometry.build import build_path
-from feedplan.geometry.length import PathLength
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
 from feedplan.planners import planner
@@ -63,7 +63,7 @@ class Plan:
     def setpoints(self, period: float | None = None, interpolator: str | None = None) -> Setpoints:
         """Setpoints at the servo period [s] (the machine's unless given), computed as they are read."""
         return setpoints(
-            self.path, self.profile, period or self.machine.period, interpolator or self.interpolator
+            self.problem, self.profile, period or self.machine.period, interpolator or self.interpolator
         )
 
     def audit(self, progress: Progress | None = None) -> Audit:
@@ -95,7 +95,7 @@ class Plan:
             "method": self.method,
             "machine": self.machine.name,
             "program": self.program.name if self.program else None,
-            "length": PathLength(self.path).total,
+            "length": CurveLength(self.path.curve).total,
             "pieces": len(self.path),
             "runs": len(self.path.runs) - 1,
             "stops": len(self.path.runs) - 2,

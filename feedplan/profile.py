@@ -16,7 +16,8 @@ class ArcKind(IntEnum):
     FLAT = 1  # p itself; value is 0
     FEED = 2  # the speed: |C'|² p = value [mm²/s²]
     AXIS_VELOCITY = 3  # one axis's speed: q'_k² p = value [mm²/s²]
-    CHORD = 4  # the chord-error limit: p = value · |C'|
+    CHORD = 4  # the chord-error limit on a quadratic piece: p = value · |C'|
+    SPEED_LINE = 5  # |C'|² p is linear in u from end to end [mm²/s²]; value is 0
 
 
 @dataclass(frozen=True)
@@ -26,12 +27,14 @@ class SpeedProfile:
     Per arc: `piece` (index into the path), `kind` (ArcKind), `axis` (the axis that the arc's constant
     belongs to, 255 for none), `value` (see ArcKind), `u0`, `u1` (local parameter, u0 < u1), `p0`, `p1` (p at
     both ends [mm²/s²]), `duration` [s]. `runs` (r + 1,) arc offsets of the path's runs.
+    Where the problem has a `tip_speed`, |C'|² of FEED and SPEED_LINE is that; q are the joints.
     Between the ends p follows exactly from the kind: it is never interpolated. On AXIS_ACCELERATION of axis k
     axis l accelerates with (q'_l·value − W_kl p)/q'_k, W_kl = q''_k q'_l − q''_l q'_k, which keeps its digits
     where q'' p is large. On FLAT, `axis` is the one whose acceleration limit holds p.
-    A piece may begin or end with C' = 0 (a straight one with two equal control points). Where such a place
-    is passed at a speed, p is infinite there; the axis velocity follows from the other end of the arc:
-    q'_k0² p0 = q'_k1² p1 − 2·value·Δq_k. Where it is a stop, p is its finite limit.
+    An arc may begin or end with C' = 0 (as a straight piece with two equal control points does). Where such a
+    place is passed at a speed, p is infinite there; the axis velocity follows from the other end of the arc:
+    q'_k0² p0 = q'_k1² p1 − 2·value·Δq_k, and from the duration where both ends are of that kind. Where it is
+    a stop, p is its limit.
     """
 
     piece: NDArray[np.uint32]

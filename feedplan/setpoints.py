@@ -1,4 +1,4 @@
-"""Setpoints at the servo period, from a path and the speed profile planned on it."""
+"""Setpoints at the servo period, from a problem and the speed profile that solves it."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import Sampler
+from feedplan.constraints.problem import Problem
+from feedplan.curves.length import INTERPOLATORS as INTERPOLATORS
 from feedplan.errors import InputError
-from feedplan.geometry.path import Path
 from feedplan.profile import SpeedProfile
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
-INTERPOLATORS = ("sarfraz", "newton")
 # Six axes of it take 5 GB; a stream of any length goes through in smaller chunks.
 MAX_CHUNK = 20_000_000
 
@@ -63,14 +63,15 @@ class Setpoints:
     a setpoint has the values of the arc that begins there.
     """
 
-    def __init__(self, path: Path, profile: SpeedProfile, period: float, interpolator: str) -> None:
+    def __init__(self, problem: Problem, profile: SpeedProfile, period: float, interpolator: str) -> None:
         if interpolator not in INTERPOLATORS:
             raise InputError(
                 f"there is no interpolator '{interpolator}': use one of {', '.join(INTERPOLATORS)}"
             )
+        path, tip = problem.path, problem.tip_speed
         self._sampler = Sampler(
-            _array(path.curve.by_piece, np.float64),
-            _array(path.width, np.float64),
+            *problem.curve.columns(),
+            None if tip is None else (_array(tip.coefficients, np.float64), _array(tip.offsets, np.int64)),
             _array(path.line, np.int32),
             _array(path.runs, np.int64),
             float(path.start_dwell),
@@ -89,7 +90,7 @@ class Setpoints:
             interpolator == "newton",
         )
         self.period = float(period)
-        self.axes = path.axes
+        self.axes = problem.axes
         self.interpolator = interpolator
         self.stats = SamplingStats()
 
@@ -131,15 +132,18 @@ class Setpoints:
         return SetpointChunk(t, position, velocity, acceleration, jerk, line, self.axes, piece, u)
 
 
-def setpoints(path: Path, profile: SpeedProfile, period: float, interpolator: str = "sarfraz") -> Setpoints:
-    """Setpoints every `period` [s] of a profile on its path.
+def setpoints(
+    problem: Problem, profile: SpeedProfile, period: float, interpolator: str = "sarfraz"
+) -> Setpoints:
+    """Setpoints every `period` [s] of the joints along a problem's path, by the profile planned for it.
 
-    `sarfraz`: closed forms where an axis moves at constant acceleration or speed, and length table with
-    Sarfraz predictor-corrector elsewhere. `newton`: steps of speed times period, to second order, and
-    Newton–Raphson.
+    `sarfraz`: where an axis moves at constant acceleration or speed its way tells the place, in closed form
+    on quadratic pieces; table of length or time with Sarfraz predictor-corrector elsewhere. `newton`: steps
+    of speed times period, to third order, and Newton–Raphson. Pieces may have any degree, polynomial or
+    rational; arcs of kind CHORD are for quadratic ones.
     Raises InputError for a period or an interpolator that cannot be used, or a profile of another path.
     """
-    return Setpoints(path, profile, period, interpolator)
+    return Setpoints(problem, profile, period, interpolator)
 
 
 def _array(values: ArrayLike, dtype: type[Scalar]) -> NDArray[Scalar]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
+from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
@@ -22,6 +23,25 @@ from feedplan.setpoints import INTERPOLATORS, Setpoints, setpoints
 
 INTERPOLATOR = pytest.mark.parametrize("interpolator", INTERPOLATORS)
 ARC = tuple[int, ArcKind, int, float, float, float, float, float, float]
+
+
+def problem_of(path: Path) -> Problem:
+    """The path with limits that setpoints do not look at."""
+    count, axes = len(path), len(path.axes)
+    return Problem(
+        path=path,
+        max_velocity=np.full(axes, np.inf),
+        max_acceleration=np.full(axes, np.inf),
+        max_jerk=np.full(axes, np.inf),
+        feed=np.full(count, 1e9),
+        junction_speed=np.full(count + 1, np.inf),
+        chord_tolerance=np.inf,
+        period=0.001,
+    )
+
+
+def sampled(path: Path, profile: SpeedProfile, period: float, interpolator: str = "sarfraz") -> Setpoints:
+    return setpoints(problem_of(path), profile, period, interpolator)
 
 
 def path_of(
@@ -124,7 +144,7 @@ def trapezoid(t: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.f
 @INTERPOLATOR
 def test_a_trapezoid_on_a_line_is_the_school_formula(interpolator: str) -> None:
     path, profile = line_case()
-    chunk = setpoints(path, profile, 0.001, interpolator).all()
+    chunk = sampled(path, profile, 0.001, interpolator).all()
     place, speed = trapezoid(chunk.t)
     assert len(chunk) == 251
     np.testing.assert_allclose(chunk.position[:, 0], place, atol=1e-11)
@@ -140,7 +160,7 @@ def test_a_trapezoid_on_a_line_is_the_school_formula(interpolator: str) -> None:
 @INTERPOLATOR
 def test_a_triangle_peaks_half_way(interpolator: str) -> None:
     path, profile = line_case(speed=1e9)
-    chunk = setpoints(path, profile, 0.01, interpolator).all()
+    chunk = sampled(path, profile, 0.01, interpolator).all()
     assert len(chunk) == 21
     assert chunk.position[10, 0] == pytest.approx(5.0, abs=1e-12)
     assert chunk.velocity[10, 0] == pytest.approx(100.0, abs=1e-9)
@@ -149,7 +169,7 @@ def test_a_triangle_peaks_half_way(interpolator: str) -> None:
 @INTERPOLATOR
 def test_constant_feed_on_a_parabola_keeps_a_millionth_of_a_step(interpolator: str) -> None:
     path, profile = parabola_case()
-    stream = setpoints(path, profile, 0.003, interpolator)
+    stream = sampled(path, profile, 0.003, interpolator)
     chunk = stream.all()
     step = 20.0 * 0.003
     for t, (x, _) in zip(chunk.t[1:-1:7], chunk.position[1:-1:7], strict=True):
@@ -163,7 +183,7 @@ def test_constant_feed_on_a_parabola_keeps_a_millionth_of_a_step(interpolator: s
 def test_the_curvature_of_a_parabola_gives_acceleration_and_jerk() -> None:
     # At the vertex of y = x²/2 with speed v: normal acceleration v², along X the jerk −v³.
     path, profile = parabola_case()
-    chunk = setpoints(path, profile, 0.003).all()
+    chunk = sampled(path, profile, 0.003).all()
     np.testing.assert_allclose(chunk.velocity[0], [20, 0], atol=1e-12)
     np.testing.assert_allclose(chunk.acceleration[0], [0, 400], atol=1e-11)
     np.testing.assert_allclose(chunk.jerk[0], [-8000, 0], atol=1e-9)
@@ -172,7 +192,7 @@ def test_the_curvature_of_a_parabola_gives_acceleration_and_jerk() -> None:
 @INTERPOLATOR
 def test_a_path_that_ends_in_motion_ends_at_its_true_time(interpolator: str) -> None:
     path, profile = parabola_case()
-    stream = setpoints(path, profile, 0.003, interpolator)
+    stream = sampled(path, profile, 0.003, interpolator)
     chunk = stream.all()
     assert chunk.position[-1].tolist() == [4.0, 8.0]
     assert stream.duration == chunk.t[-1] == profile.time
@@ -185,7 +205,7 @@ def test_a_path_that_ends_in_motion_ends_at_its_true_time(interpolator: str) -> 
 def test_every_run_starts_on_the_grid_and_waits_less_than_a_period(interpolator: str) -> None:
     path, profile = two_runs(dwell=0.1)
     period = 0.004
-    stream = setpoints(path, profile, period, interpolator)
+    stream = sampled(path, profile, period, interpolator)
     chunk = stream.all()
     first, second = (math.ceil(time / period - 1e-9) for time in (0.25 + 0.1, profile.run_times[1]))
     assert stream.count == 1 + first + second
@@ -211,8 +231,8 @@ def test_a_pause_before_the_first_run_delays_the_stream_by_whole_periods(
 ) -> None:
     path, profile = two_runs(dwell=0.1)
     period = 0.004
-    stream = setpoints(replace(path, start_dwell=pause), profile, period, interpolator)
-    whole, prompt = stream.all(), setpoints(path, profile, period, interpolator).all()
+    stream = sampled(replace(path, start_dwell=pause), profile, period, interpolator)
+    whole, prompt = stream.all(), sampled(path, profile, period, interpolator).all()
     assert len(whole) == len(prompt) + waiting
     np.testing.assert_array_equal(whole.t, period * np.arange(len(whole)))
     for name in ("position", "velocity", "acceleration", "jerk", "line", "piece", "u"):
@@ -227,7 +247,7 @@ def test_a_pause_before_the_first_run_delays_the_stream_by_whole_periods(
 @INTERPOLATOR
 def test_a_period_longer_than_the_run_hits_its_end(interpolator: str) -> None:
     path, profile = two_runs(dwell=0.0)
-    stream = setpoints(path, profile, 5.0, interpolator)
+    stream = sampled(path, profile, 5.0, interpolator)
     assert stream.all().position[:, 0].tolist() == [0.0, 10.0, 14.0]
     assert stream.duration == 10.0
 
@@ -241,7 +261,7 @@ def test_a_thousand_runs_shorter_than_a_period_take_one_each(interpolator: str) 
     arcs = [line_arcs(i, float(h), 1000.0, 100.0) for i, h in enumerate(width)]
     runs = np.concatenate(([0], np.cumsum([len(run) for run in arcs])))
     profile = profile_of([arc for run in arcs for arc in run], list(runs))
-    chunk = setpoints(path, profile, 0.001, interpolator).all()
+    chunk = sampled(path, profile, 0.001, interpolator).all()
     np.testing.assert_array_equal(chunk.position[:, 0], x)
     assert (chunk.velocity == 0).all()
 
@@ -249,7 +269,7 @@ def test_a_thousand_runs_shorter_than_a_period_take_one_each(interpolator: str) 
 @INTERPOLATOR
 @pytest.mark.parametrize("case", [line_case(), parabola_case(), two_runs(0.1), zigzag(1)])
 def test_chunks_of_any_size_make_the_same_stream(interpolator: str, case: tuple[Path, SpeedProfile]) -> None:
-    stream = setpoints(*case, 0.0031, interpolator)
+    stream = sampled(*case, 0.0031, interpolator)
     whole = stream.all()
     for size in (1, 7, 1000):
         parts = list(stream.chunks(size))
@@ -263,8 +283,8 @@ def test_chunks_of_any_size_make_the_same_stream(interpolator: str, case: tuple[
 @given(seed=st.integers(0, 2**32 - 1), ratio=st.integers(2, 9))
 def test_the_place_at_a_time_does_not_depend_on_the_period(interpolator: str, seed: int, ratio: int) -> None:
     path, profile = zigzag(seed)
-    coarse = setpoints(path, profile, 0.01 * ratio, interpolator).all()
-    fine = setpoints(path, profile, 0.01, interpolator).all()
+    coarse = sampled(path, profile, 0.01 * ratio, interpolator).all()
+    fine = sampled(path, profile, 0.01, interpolator).all()
     shared = min(len(coarse) - 1, (len(fine) - 1) // ratio)
     np.testing.assert_allclose(
         coarse.position[:shared], fine.position[: shared * ratio : ratio], atol=1e-8, rtol=0
@@ -276,7 +296,7 @@ def test_the_place_at_a_time_does_not_depend_on_the_period(interpolator: str, se
 def test_positions_velocities_and_accelerations_belong_together(interpolator: str, seed: int) -> None:
     path, profile = zigzag(seed)
     period = 0.002
-    chunk = setpoints(path, profile, period, interpolator).all()
+    chunk = sampled(path, profile, period, interpolator).all()
     # On one arc the trapezium rule is off by T³ × jerk / 12 at most, by T² × jump where the arc changes.
     same = (np.diff(chunk.piece) == 0) & (np.sign(chunk.acceleration[1:, 0] * chunk.acceleration[:-1, 0]) > 0)
     step = np.diff(chunk.position, axis=0)
@@ -291,7 +311,7 @@ def test_positions_velocities_and_accelerations_belong_together(interpolator: st
 @given(seed=st.integers(0, 2**32 - 1), period=st.floats(1e-3, 0.1))
 def test_second_differences_stay_within_the_acceleration(interpolator: str, seed: int, period: float) -> None:
     path, profile = zigzag(seed)
-    chunk = setpoints(path, profile, period, interpolator).all()
+    chunk = sampled(path, profile, period, interpolator).all()
     x = np.diff(chunk.position[:, 0], 2) / period**2
     assert np.abs(x).max(initial=0.0) <= 100 * (1 + 1e-6)
     assert (np.diff(chunk.position[:, 0]) >= 0).all()
@@ -310,7 +330,7 @@ def test_axis_velocity_flat_and_chord_arcs_follow_their_law() -> None:
     ]
     profile = profile_of(arcs, [0, 4])
     for interpolator in INTERPOLATORS:
-        chunk = setpoints(path, profile, 0.01, interpolator).all()
+        chunk = sampled(path, profile, 0.01, interpolator).all()
         u, ends = chunk.u, np.cumsum(profile.duration)
         on = [(chunk.t > start) & (chunk.t < end) for start, end in zip([0, *ends], ends, strict=False)]
         np.testing.assert_allclose(np.diff(chunk.position[on[1], 1]), 0.06, atol=1e-9)
@@ -325,49 +345,49 @@ def test_axis_velocity_flat_and_chord_arcs_follow_their_law() -> None:
 
 def test_both_interpolators_agree_and_report_their_work() -> None:
     path, profile = parabola_case()
-    streams: dict[str, Setpoints] = {name: setpoints(path, profile, 0.001, name) for name in INTERPOLATORS}
+    streams: dict[str, Setpoints] = {name: sampled(path, profile, 0.001, name) for name in INTERPOLATORS}
     chunks = {name: stream.all() for name, stream in streams.items()}
     np.testing.assert_allclose(chunks["sarfraz"].position, chunks["newton"].position, atol=1e-10)
     for stream in streams.values():
         assert 1 <= stream.stats.iterations <= 12
         assert 0 < stream.stats.length_error < 1e-6
-    assert setpoints(*line_case(speed=1e9), 0.001).stats.iterations == 0
+    assert sampled(*line_case(speed=1e9), 0.001).stats.iterations == 0
 
 
 @pytest.mark.parametrize("period", [0.0, -0.001, math.nan, math.inf, 1e-12])
 def test_a_period_that_cannot_be_used_is_refused(period: float) -> None:
     with pytest.raises(InputError, match="period"):
-        setpoints(*line_case(), period)
+        sampled(*line_case(), period)
 
 
 def test_what_does_not_fit_is_refused_with_a_sentence() -> None:
     path, profile = two_runs(0.0)
     with pytest.raises(InputError, match="use one of sarfraz, newton"):
-        setpoints(path, profile, 0.001, "euler")
+        sampled(path, profile, 0.001, "euler")
     with pytest.raises(InputError, match="give a size from 1"):
-        setpoints(path, profile, 0.001).chunks(0)
+        sampled(path, profile, 0.001).chunks(0)
     with pytest.raises(InputError, match="by chunks"):
-        setpoints(path, profile, 1e-9).all()
+        sampled(path, profile, 1e-9).all()
     with pytest.raises(InputError, match="does not belong to this path"):
-        setpoints(path, line_case()[1], 0.001)
+        sampled(path, line_case()[1], 0.001)
     first = profile_of(line_arcs(0, 10.0, 1000.0, 50.0), [0, 3, 3])
     with pytest.raises(InputError, match="line 20: the profile has no arcs in run 2"):
-        setpoints(path, first, 0.001)
+        sampled(path, first, 0.001)
     with pytest.raises(InputError, match="arc 3 of the profile is on no piece of its run"):
-        setpoints(path, replace(profile, runs=np.array([0, 5, 5])), 0.001)
+        sampled(path, replace(profile, runs=np.array([0, 5, 5])), 0.001)
     with pytest.raises(InputError, match="arc 0 of the profile is governed by axis 1"):
-        setpoints(path, replace(profile, axis=np.ones_like(profile.axis)), 0.001)
+        sampled(path, replace(profile, axis=np.ones_like(profile.axis)), 0.001)
     moving, constant = parabola_case()
     with pytest.raises(InputError, match="plan with end speed 0"):
-        setpoints(replace(moving, dwell=np.array([1.0])), constant, 0.001)
+        sampled(replace(moving, dwell=np.array([1.0])), constant, 0.001)
     with pytest.raises(InputError, match=r"line 10: .* pauses 1 s there: plan with start speed 0"):
-        setpoints(replace(moving, start_dwell=1.0), constant, 0.001)
+        sampled(replace(moving, start_dwell=1.0), constant, 0.001)
     for pause in (-1.0, math.nan, math.inf):
         with pytest.raises(InputError, match="a pause that is negative or not finite"):
-            setpoints(replace(path, start_dwell=pause), profile, 0.001)
+            sampled(replace(path, start_dwell=pause), profile, 0.001)
     nothing = replace(path, curve=CompositeCurve.from_pieces(np.empty((0, 3, 1)), []), runs=np.array([0]))
     with pytest.raises(InputError, match="the path is empty"):
-        setpoints(replace(nothing, dwell=np.empty(0)), profile, 0.001)
+        sampled(replace(nothing, dwell=np.empty(0)), profile, 0.001)
 
 
 def test_a_run_that_ends_in_motion_before_the_last_is_refused() -> None:
@@ -375,7 +395,7 @@ def test_a_run_that_ends_in_motion_before_the_last_is_refused() -> None:
     p1 = profile.p1.copy()
     p1[2] = 100.0
     with pytest.raises(InputError, match=r"line 10: the profile ends run 1 at 10\.0"):
-        setpoints(path, replace(profile, p1=p1), 0.001)
+        sampled(path, replace(profile, p1=p1), 0.001)
 
 
 def test_numbers_do_not_depend_on_the_unit() -> None:
@@ -385,6 +405,6 @@ def test_numbers_do_not_depend_on_the_unit() -> None:
     micro = replace(path, curve=CompositeCurve.from_pieces(path.curve.by_piece * scale, path.width))
     # C' grows with the scale; u and p stay.
     faster = replace(profile, value=profile.value * scale)
-    first, second = setpoints(path, profile, 0.003).all(), setpoints(micro, faster, 0.003).all()
+    first, second = sampled(path, profile, 0.003).all(), sampled(micro, faster, 0.003).all()
     np.testing.assert_allclose(second.position, first.position * scale, rtol=1e-12, atol=1e-9)
     np.testing.assert_allclose(second.acceleration, first.acceleration * scale, rtol=1e-9, atol=1e-5)

@@ -12,10 +12,12 @@ from feedplan.curves._arrays import floats, places
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
 
+INTERPOLATORS = ("sarfraz", "newton")
+
 
 @dataclass(frozen=True)
 class Places:
-    """Places on a path (n,): `piece` and local `u`; `iterations` that the search took (0 at an end) and the
+    """Places on a curve (n,): `piece` and local `u`; `iterations` that the search took (0 at an end) and the
     remaining `miss` of the length [mm]."""
 
     piece: NDArray[np.uint32]
@@ -28,10 +30,14 @@ class CurveLength:
     """The length of a curve as a function of the place on it, tabulated to a proven error.
 
     `accuracy` is the error allowed to each piece, a part of its length; rounding is added to it. Source:
-    Cheatham 2007, chapter 3, for curves of any degree, halved towards cusps.
+    Cheatham 2007, chapter 3, corrected, for curves of any degree and halved towards cusps; Zhang et al. 2010,
+    section 4.2, for `newton`.
+    Raises InputError for an empty curve and an accuracy that cannot be had.
     """
 
     def __init__(self, curve: CompositeCurve, accuracy: float = 1e-13) -> None:
+        if len(curve) == 0:
+            raise InputError("the curve is empty: it has no length table")
         if not 1e-16 <= accuracy < 1:
             raise InputError(f"the accuracy of lengths is {accuracy:g}: give a part from 1e-16 to 1")
         self._table = NativeCurveLength(*curve.columns(), accuracy)
@@ -50,6 +56,14 @@ class CurveLength:
         """Length from the start of the curve to places (m,) [mm]."""
         return self._table.lengths(*places(piece, u))
 
-    def locate(self, lengths: ArrayLike, tolerance: float = 1e-12) -> Places:
-        """The places at lengths (m,) [mm], within `tolerance` [mm]; a length beyond an end gives that end."""
-        return Places(*self._table.locate(floats(lengths, "lengths", 1), tolerance))
+    def locate(self, lengths: ArrayLike, tolerance: float = 1e-12, interpolator: str = "sarfraz") -> Places:
+        """The places at lengths (m,) [mm], within `tolerance` [mm]; a length beyond an end gives that end.
+
+        `sarfraz` finds each by itself, in parallel; `newton` finds each from the one before.
+        """
+        if interpolator not in INTERPOLATORS:
+            raise InputError(
+                f"there is no interpolator '{interpolator}': use one of {', '.join(INTERPOLATORS)}"
+            )
+        wanted = floats(lengths, "lengths", 1)
+        return Places(*self._table.locate(wanted, tolerance, interpolator == "newton"))

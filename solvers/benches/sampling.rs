@@ -1,35 +1,52 @@
 //! Time per setpoint with all derivatives, by the law of the arcs, and per inversion of a length table.
 //!
-//! The path is one C1 quadratic spline of 1000 pieces in three axes, about 1.2 mm each; its profile is synthetic
-//! (no planner takes part): constant feed, or X speeding up and slowing down piece by piece.
+//! The path is one C1 quadratic spline of 1000 pieces in three axes, about 1.2 mm each, the same with its degree
+//! raised, and with weights that change the parameter; its profile is synthetic (no planner takes part): constant
+//! feed, or X speeding up and slowing down piece by piece.
 
 use criterion::{criterion_group, criterion_main, BenchmarkId, Criterion, Throughput};
-use feedplan_solvers::arc_length::PathLength;
 use feedplan_solvers::motion::{ArcKind, ProfileArc};
-use feedplan_solvers::newton;
-use feedplan_solvers::quadratic::Quadratic;
 use feedplan_solvers::sampling::{Interpolator, PathData, Sampler};
+use feedplan_solvers::spline::bezier::elevate;
+use feedplan_solvers::spline::length::CurveLength;
+use feedplan_solvers::spline::CompositeCurve;
 
 const PIECES: usize = 1000;
 const SETPOINTS: usize = 100_000;
 
 /// x = u; y and z have slopes that waver between the joints.
-fn spline() -> Vec<Quadratic<3>> {
+fn spline() -> CompositeCurve<3> {
     let slope = |i: usize| [1.0, (1.7 * i as f64).sin(), 0.5 * (2.3 * i as f64).cos()];
-    let mut pieces = Vec::with_capacity(PIECES);
+    let mut curve = CompositeCurve::default();
     let mut from = [0.0; 3];
     for i in 0..PIECES {
         let (a, b) = (slope(i), slope(i + 1));
         let middle = std::array::from_fn(|k| from[k] + 0.5 * a[k]);
         let to = std::array::from_fn(|k| middle[k] + 0.5 * b[k]);
-        pieces.push(Quadratic { control: [from, middle, to], width: 1.0 });
+        curve.push(&[from, middle, to], &[], 1.0);
         from = to;
     }
-    pieces
+    curve
 }
 
-fn profile(kind: ArcKind, pieces: &[Quadratic<3>]) -> Vec<ProfileArc> {
-    let lengths = PathLength::new(pieces);
+/// The same points with the degree raised, and with the weights 1, r, r²: X is no longer linear in u.
+fn changed(curve: &CompositeCurve<3>, by: usize, r: f64) -> CompositeCurve<3> {
+    let mut raised = CompositeCurve::default();
+    for piece in curve.pieces() {
+        elevate(&piece, by, &mut raised);
+    }
+    if r != 1.0 {
+        let powers =
+            |i: usize| (0..raised.piece(i).control.len()).map(|j| r.powi(j as i32)).collect::<Vec<_>>();
+        raised.weights = (0..raised.len()).flat_map(powers).collect();
+    }
+    raised
+}
+
+fn profile(kind: ArcKind, curve: &CompositeCurve<3>, r: f64) -> Vec<ProfileArc> {
+    let lengths = CurveLength::new(curve, 1e-13);
+    // x' of the weights 1, r, …, r^d on a piece with x' = 1 without them: r at its start, 1/r at its end.
+    let at_ends = |p0: f64, p1: f64| (p0 / (r * r), p1 * r * r);
     (0..PIECES)
         .map(|i| {
             let arc = ProfileArc {
@@ -44,11 +61,15 @@ fn profile(kind: ArcKind, pieces: &[Quadratic<3>]) -> Vec<ProfileArc> {
                 duration: 0.01,
             };
             match kind {
-                ArcKind::Feed => ProfileArc { duration: lengths.table(i).total() / 100.0, ..arc },
+                ArcKind::Feed => {
+                    ProfileArc { duration: (lengths.length(i, 1.0) - lengths.length(i, 0.0)) / 100.0, ..arc }
+                }
                 // Between 50 and 100 mm/s on 1 mm.
                 ArcKind::AxisAcceleration => {
                     let (p0, p1) = if i % 2 == 0 { (2500.0, 1e4) } else { (1e4, 2500.0) };
-                    ProfileArc { value: 0.5 * (p1 - p0), p0, p1, duration: 1.0 / 75.0, ..arc }
+                    let value = 0.5 * (p1 - p0);
+                    let (p0, p1) = at_ends(p0, p1);
+                    ProfileArc { value, p0, p1, duration: 1.0 / 75.0, ..arc }
                 }
                 _ => arc,
             }
@@ -60,19 +81,29 @@ fn setpoints(c: &mut Criterion) {
     let mut group = c.benchmark_group("setpoints");
     group.throughput(Throughput::Elements(SETPOINTS as u64)).sample_size(20);
     let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
-    for kind in [ArcKind::AxisAcceleration, ArcKind::Feed] {
-        for interpolator in [Interpolator::Sarfraz, Interpolator::Newton] {
-            let pieces = spline();
-            let arcs = profile(kind, &pieces);
-            let time: f64 = arcs.iter().map(|arc| arc.duration).sum();
-            let lines = vec![1; PIECES];
-            let path = PathData { pieces, lines, runs: vec![0, PIECES], start_dwell: 0.0, dwell: vec![0.0] };
-            let period = time / (SETPOINTS - 1) as f64;
-            let sampler = Sampler::new(path, arcs, &[0, PIECES], period, interpolator).expect("a profile");
-            let name = BenchmarkId::new(format!("{interpolator:?}"), format!("{kind:?}"));
-            group.bench_function(name, |b| {
-                b.iter(|| one_thread.install(|| sampler.chunk(0..SETPOINTS, &mut None)))
-            });
+    let shapes = [("quadratic", 0, 1.0), ("cubic", 1, 1.0), ("quintic", 3, 1.0), ("rational cubic", 1, 1.5)];
+    for (shape, by, r) in shapes {
+        for kind in [ArcKind::AxisAcceleration, ArcKind::Feed] {
+            for interpolator in [Interpolator::Sarfraz, Interpolator::Newton] {
+                let curve = changed(&spline(), by, r);
+                let arcs = profile(kind, &curve, r);
+                let time: f64 = arcs.iter().map(|arc| arc.duration).sum();
+                let path = PathData {
+                    curve,
+                    tip_speed: None,
+                    lines: vec![1; PIECES],
+                    runs: vec![0, PIECES],
+                    start_dwell: 0.0,
+                    dwell: vec![0.0],
+                };
+                let period = time / (SETPOINTS - 1) as f64;
+                let sampler =
+                    Sampler::new(path, arcs, &[0, PIECES], period, interpolator).expect("a profile");
+                let name = BenchmarkId::new(format!("{interpolator:?}, {shape}"), format!("{kind:?}"));
+                group.bench_function(name, |b| {
+                    b.iter(|| one_thread.install(|| sampler.chunk(0..SETPOINTS, &mut None)))
+                });
+            }
         }
     }
     group.finish();
@@ -80,10 +111,10 @@ fn setpoints(c: &mut Criterion) {
 
 fn lengths(c: &mut Criterion) {
     let mut group = c.benchmark_group("lengths");
-    let pieces = spline();
+    let curve = spline();
     group.throughput(Throughput::Elements(PIECES as u64));
-    group.bench_function("table per piece", |b| b.iter(|| PathLength::new(&pieces)));
-    let table = PathLength::new(&pieces);
+    group.bench_function("table per piece", |b| b.iter(|| CurveLength::new(&curve, 1e-13)));
+    let table = CurveLength::new(&curve, 1e-13);
     for count in [500, 50_000] {
         let wanted: Vec<f64> = (0..count).map(|i| table.total() * i as f64 / count as f64).collect();
         let tolerance = 1e-6 * table.total() / count as f64;
@@ -92,7 +123,7 @@ fn lengths(c: &mut Criterion) {
             b.iter(|| wanted.iter().map(|&s| table.locate(s, tolerance).located.u).sum::<f64>())
         });
         group.bench_function(BenchmarkId::new("Newton", count), |b| {
-            b.iter(|| newton::follow(&table, &wanted, tolerance))
+            b.iter(|| table.follow(&wanted, tolerance))
         });
     }
     group.finish();

@@ -12,10 +12,7 @@
 //! of the singularities of f. Where one of them is near, a uniform table would be long: panels are halved
 //! towards it instead, and every panel keeps its own bound.
 
-use rayon::prelude::*;
-
 use crate::quadratic::{dot, Quadratic};
-use crate::sarfraz::{self, Located};
 
 /// Nodes of the quadrature.
 const N: usize = 8;
@@ -289,94 +286,6 @@ impl<F: Integrand> Builder<'_, F> {
     }
 }
 
-/// The lengths of a whole path, piece after piece.
-pub struct PathLength {
-    integrands: Vec<Length>,
-    nodes: Vec<Node>,
-    /// First node of each piece, and the end.
-    offsets: Vec<usize>,
-    /// Length up to the start of each piece, and the whole; in mm.
-    starts: Vec<f64>,
-    /// The greatest proven error of a piece's length in mm.
-    error: f64,
-}
-
-/// A place on a path: piece and local parameter, and how it was found.
-#[derive(Clone, Copy, Debug)]
-pub struct Place {
-    pub piece: usize,
-    pub located: Located,
-}
-
-impl PathLength {
-    /// Tabulates every piece to the relative error `TABLE_ERROR`.
-    pub fn new<const M: usize>(pieces: &[Quadratic<M>]) -> Self {
-        let mut lengths = Self {
-            integrands: Vec::with_capacity(pieces.len()),
-            nodes: Vec::with_capacity(2 * pieces.len()),
-            offsets: vec![0],
-            starts: vec![0.0],
-            error: 0.0,
-        };
-        let mut total = 0.0;
-        for piece in pieces {
-            let f = Length(Hodograph::new(piece));
-            let estimate = quadrature(&f, 0.0, piece.width);
-            let error = tabulate(f, 0.0, piece.width, TABLE_ERROR * estimate, &mut lengths.nodes);
-            total += lengths.nodes[lengths.nodes.len() - 1].sum;
-            lengths.error = lengths.error.max(error);
-            lengths.integrands.push(f);
-            lengths.offsets.push(lengths.nodes.len());
-            lengths.starts.push(total);
-        }
-        lengths
-    }
-
-    /// Number of pieces.
-    pub fn pieces(&self) -> usize {
-        self.integrands.len()
-    }
-
-    /// The length of the path in mm.
-    pub fn total(&self) -> f64 {
-        self.starts[self.starts.len() - 1]
-    }
-
-    /// The greatest proven error of one piece's length in mm.
-    pub fn error(&self) -> f64 {
-        self.error
-    }
-
-    /// The table of one piece.
-    pub fn table(&self, piece: usize) -> Table<'_, Length> {
-        let nodes = &self.nodes[self.offsets[piece]..self.offsets[piece + 1]];
-        Table { f: self.integrands[piece], nodes }
-    }
-
-    /// Length from the start of the path to parameter u of a piece.
-    pub fn length(&self, piece: usize, u: f64) -> f64 {
-        self.starts[piece] + self.table(piece).integral(u)
-    }
-
-    /// The piece in which a length lies, and the length left within it.
-    pub fn split(&self, length: f64) -> (usize, f64) {
-        let last = self.integrands.len() - 1;
-        let piece = self.starts[1..=last].partition_point(|&start| start <= length);
-        (piece, length - self.starts[piece])
-    }
-
-    /// The place at a length, within `tolerance` mm; a length beyond either end gives that end.
-    pub fn locate(&self, length: f64, tolerance: f64) -> Place {
-        let (piece, rest) = self.split(length);
-        Place { piece, located: sarfraz::locate(&self.table(piece), rest, tolerance) }
-    }
-
-    /// The places at many lengths, in parallel.
-    pub fn locate_all(&self, lengths: &[f64], tolerance: f64) -> Vec<Place> {
-        lengths.par_iter().with_min_len(1024).map(|&length| self.locate(length, tolerance)).collect()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
@@ -461,18 +370,6 @@ mod tests {
         let (nodes, bound) = table_of(f, 0.0, 1.0, 1e-13);
         let fine: f64 = (0..64).map(|i| quadrature(&f, i as f64 / 64.0, (i + 1) as f64 / 64.0)).sum();
         assert!(bound <= 1e-13 && (nodes[nodes.len() - 1].sum - fine).abs() < 1e-14);
-    }
-
-    #[test]
-    fn lengths_of_a_path_run_through_its_pieces() {
-        let pieces = [Quadratic::line([0.0, 0.0], [2.0, 0.0]), Quadratic::line([2.0, 0.0], [2.0, 3.0])];
-        let lengths = PathLength::new(&pieces);
-        assert!((lengths.total() - 5.0).abs() < 1e-15 && (lengths.length(1, 1.0) - 3.0).abs() < 1e-15);
-        let place = lengths.locate(4.5, 1e-12);
-        assert_eq!(place.piece, 1);
-        assert!((place.located.u - 2.5).abs() < 1e-12);
-        assert_eq!((lengths.locate(-1.0, 1e-12).piece, lengths.locate(-1.0, 1e-12).located.u), (0, 0.0));
-        assert_eq!((lengths.locate(9.0, 1e-12).piece, lengths.locate(9.0, 1e-12).located.u), (1, 3.0));
     }
 
     prop_compose! {

@@ -4,7 +4,7 @@
 //! stays between the start of the step and the end of the curve, and bisection takes over where Newton–Raphson
 //! leaves that bracket (a first-order start does so next to a cusp) or does not settle. A step may go back.
 
-use crate::arc_length::{Integrand, PathLength, Place, Table};
+use crate::arc_length::{Integrand, Table};
 use crate::sarfraz::Located;
 
 /// Rounds of Newton–Raphson before bisection takes over.
@@ -51,24 +51,6 @@ pub fn advance<F: Integrand>(
     unreachable!("the last round returns")
 }
 
-/// The places at lengths along a whole path, each found from the one before; lengths should not decrease.
-pub fn follow(path: &PathLength, lengths: &[f64], tolerance: f64) -> Vec<Place> {
-    let mut places = Vec::with_capacity(lengths.len());
-    let (mut at, mut from) = (usize::MAX, (0.0, 0.0));
-    for &length in lengths {
-        let (piece, rest) = path.split(length);
-        let table = path.table(piece);
-        if piece != at || rest < from.1 {
-            from = (table.nodes[0].u, 0.0);
-            at = piece;
-        }
-        let (located, sum) = advance(&table, from, rest - from.1, tolerance);
-        from = (located.u, sum);
-        places.push(Place { piece, located });
-    }
-    places
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
@@ -77,18 +59,24 @@ mod tests {
     use crate::arc_length::{quadrature, tabulate, Hodograph, Length};
     use crate::quadratic::Quadratic;
 
+    /// One step along a line of 5 mm, from 1 mm.
+    fn on_a_line(step: f64) -> (Located, f64) {
+        let f = Length(Hodograph::new(&Quadratic::line([0.0, 0.0], [3.0, 4.0])));
+        let mut nodes = Vec::new();
+        tabulate(f, 0.0, 5.0, 1e-12, &mut nodes);
+        advance(&Table { f, nodes: &nodes }, (1.0, 1.0), step, 1e-12)
+    }
+
     #[test]
     fn a_step_on_a_line_needs_no_correction() {
-        let path = PathLength::new(&[Quadratic::line([0.0, 0.0], [3.0, 4.0])]);
-        let (located, sum) = advance(&path.table(0), (1.0, 1.0), 2.5, 1e-12);
+        let (located, sum) = on_a_line(2.5);
         assert_eq!((located.u, sum, located.iterations), (3.5, 3.5, 1));
     }
 
     #[test]
     fn a_step_past_the_end_stops_there() {
-        let path = PathLength::new(&[Quadratic::line([0.0, 0.0], [3.0, 4.0])]);
-        assert_eq!(advance(&path.table(0), (1.0, 1.0), 9.0, 1e-12).0.u, 5.0);
-        assert_eq!(advance(&path.table(0), (1.0, 1.0), 0.0, 1e-12).0.u, 1.0);
+        assert_eq!(on_a_line(9.0).0.u, 5.0);
+        assert_eq!(on_a_line(0.0).0.u, 1.0);
     }
 
     proptest! {

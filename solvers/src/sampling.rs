@@ -19,9 +19,9 @@ use rayon::prelude::*;
 use self::check::check;
 use self::chunk::Slices;
 pub use self::chunk::{Chunk, Effort};
-use crate::motion::{Motion, ProfileArc, Rates, State, STEP_ERROR};
-use crate::newton;
-use crate::quadratic::{dot, norm, Quadratic};
+use crate::motion::{Motion, ProfileArc, Rates, State, TipSpeed, STEP_ERROR};
+use crate::quadratic::{dot, norm};
+use crate::spline::CompositeCurve;
 
 /// More setpoints than this are refused: their indices and arrays would serve nobody.
 pub const MAX_COUNT: f64 = 2e9;
@@ -32,6 +32,9 @@ const SLACK: f64 = 1e-9;
 /// An end is at rest when its speed is this part of the speed at the other end of its arc: a rounding error of
 /// p leaves the square root of one.
 const STANDSTILL: f64 = 1e-6;
+
+/// A speed is none beside one so many times greater that a step gains.
+const REST: f64 = 1e-9;
 
 /// A Newton–Raphson step is repeated so often before halving; two or three times are usual.
 const MAX_REPEATS: u32 = 20;
@@ -68,10 +71,12 @@ pub struct Resume {
     u: f64,
 }
 
-/// What a path gives: pieces, their source lines, runs as piece offsets, and the pauses before the first run and
-/// after each.
+/// What a path gives: the curve that the axes follow; where the feed is about another one, the Bernstein
+/// coefficients of the square of its speed per parameter and their offsets; the source lines of the pieces, runs
+/// as piece offsets, and the pauses before the first run and after each.
 pub struct PathData<const M: usize> {
-    pub pieces: Vec<Quadratic<M>>,
+    pub curve: CompositeCurve<M>,
+    pub tip_speed: Option<(Vec<f64>, Vec<usize>)>,
     pub lines: Vec<i32>,
     pub runs: Vec<usize>,
     pub start_dwell: f64,
@@ -90,6 +95,18 @@ pub struct Sampler<const M: usize> {
     count: usize,
     /// The path ends at a speed: the last setpoint has its true time.
     ends_moving: bool,
+}
+
+impl<const M: usize> PathData<M> {
+    /// The motion along an arc.
+    fn motion(&self, arc: &ProfileArc, with_lengths: bool) -> Motion<'_, M> {
+        let i = arc.piece as usize;
+        let tip = self.tip_speed.as_ref().map(|(coefficients, offsets)| TipSpeed {
+            coefficients: &coefficients[offsets[i]..offsets[i + 1]],
+            width: self.curve.width[i],
+        });
+        Motion::new(self.curve.piece(i), tip, arc, with_lengths)
+    }
 }
 
 impl<const M: usize> Sampler<M> {
@@ -117,7 +134,7 @@ impl<const M: usize> Sampler<M> {
             }
             let last = r + 1 == path.dwell.len();
             if let Some(arc) = arcs[arc_range.clone()].last() {
-                let motion = Motion::new(&path.pieces[arc.piece as usize], arc, false);
+                let motion = path.motion(arc, false);
                 let speed = |u| norm(&motion.rates(&motion.at(u)).velocity);
                 if speed(arc.u1) > STANDSTILL * speed(arc.u0) {
                     let line = path.lines[arc.piece as usize];
@@ -299,8 +316,8 @@ impl<const M: usize> Sampler<M> {
 
     /// Moves u to `time` on the arc; returns the rounds of Newton–Raphson and the length error left, in steps.
     fn step(&self, motion: &Motion<M>, time: f64, u: &mut f64) -> (u32, f64) {
-        let table = motion.lengths();
-        let (mut low, mut high) = (table.nodes[0].u, table.nodes[table.nodes.len() - 1].u);
+        let (mut low, mut high) = motion.span();
+        let rounding = motion.length_rounding();
         let (mut rounds, mut whole) = (0, 0.0);
         for repeat in 0.. {
             let state = motion.at(*u);
@@ -317,12 +334,14 @@ impl<const M: usize> Sampler<M> {
                 high = high.min(*u);
             }
             let middle = 0.5 * (low + high);
-            if step.abs() <= STEP_ERROR * whole + 2.0 * table.rounding() || !(low < middle && middle < high) {
+            // The derivatives of the speed may be rounding where an axis turns round: the speed alone must agree.
+            let off = step.abs().max(0.5 * left.abs() * norm(&rates.velocity));
+            if off <= STEP_ERROR * whole + 2.0 * rounding || !(low < middle && middle < high) {
                 let error = if whole > 0.0 { (step.abs() + motion.length_error()) / whole } else { 0.0 };
                 return (rounds, error);
             }
-            let tolerance = 0.1 * STEP_ERROR * whole + table.rounding();
-            let (located, _) = newton::advance(&table, (*u, table.integral(*u)), step, tolerance);
+            let tolerance = 0.1 * STEP_ERROR * whole + rounding;
+            let located = motion.advance(*u, step, tolerance);
             rounds += located.iterations;
             // A large period can be too much for the series.
             let usable = low < located.u && located.u < high && repeat < MAX_REPEATS;
@@ -332,10 +351,10 @@ impl<const M: usize> Sampler<M> {
     }
 
     fn set(&self, part: &mut Slices<M>, i: usize, arc: usize, motion: &Motion<M>, state: &State) {
-        let Rates { velocity, acceleration, jerk } = motion.rates(state);
+        let (position, Rates { velocity, acceleration, jerk }) = motion.sample(state);
         let piece = self.arcs[arc].piece;
         part.t[i] = self.time(part.start + i);
-        part.position[i] = motion.point(state);
+        part.position[i] = position;
         part.velocity[i] = velocity;
         part.acceleration[i] = acceleration;
         part.jerk[i] = jerk;
@@ -345,10 +364,10 @@ impl<const M: usize> Sampler<M> {
     }
 
     /// Speed, first arc and its motion where the path begins; a speed of 0 is exact.
-    fn start(&self) -> Option<(f64, usize, Motion<M>)> {
+    fn start(&self) -> Option<(f64, usize, Motion<'_, M>)> {
         let first = self.runs[0].arcs.clone().next()?;
         let arc = &self.arcs[first];
-        let motion = Motion::new(&self.path.pieces[arc.piece as usize], arc, false);
+        let motion = self.path.motion(arc, false);
         let [begin, end] = [arc.u0, arc.u1].map(|u| norm(&motion.rates(&motion.at(u)).velocity));
         Some((if begin <= STANDSTILL * end { 0.0 } else { begin }, first, motion))
     }
@@ -360,24 +379,24 @@ impl<const M: usize> Sampler<M> {
             }
         }
         part.t[i] = self.time(part.start + i);
-        part.position[i] = self.path.pieces[0].control[0];
+        part.position[i] = self.path.curve.control[0];
         part.line[i] = self.path.lines[0];
         part.piece[i] = 0;
         part.u[i] = 0.0;
     }
 
     fn set_end(&self, run: &Run, part: &mut Slices<M>, i: usize) {
-        let piece = &self.path.pieces[run.last_piece];
+        let curve = &self.path.curve;
         let last = self.ends_moving && part.start + i == self.count - 1;
         if let (true, Some(arc)) = (last, self.arcs[run.arcs.clone()].last()) {
-            let motion = Motion::new(&self.path.pieces[arc.piece as usize], arc, false);
+            let motion = self.path.motion(arc, false);
             self.set(part, i, run.arcs.end - 1, &motion, &motion.at(arc.u1));
         }
         part.t[i] = self.time(part.start + i);
-        part.position[i] = piece.control[2];
+        part.position[i] = curve.control[curve.offsets[run.last_piece + 1] - 1];
         part.line[i] = self.path.lines[run.last_piece];
         part.piece[i] = run.last_piece as u32;
-        part.u[i] = piece.width;
+        part.u[i] = curve.width[run.last_piece];
     }
 }
 
@@ -386,7 +405,8 @@ impl<const M: usize> Sampler<M> {
 fn step_length<const M: usize>(rates: &Rates<M>, time: f64) -> f64 {
     let Rates { velocity, acceleration, jerk } = rates;
     let v = norm(velocity);
-    if v == 0.0 {
+    // The direction of a speed that is rounding beside what the acceleration adds says nothing.
+    if v <= REST * norm(acceleration) * time.abs() {
         // Away from the standstill, forward or back in time.
         return 0.5 * norm(acceleration) * time * time.abs();
     }
@@ -410,7 +430,7 @@ fn periods_of(time: f64, period: f64) -> f64 {
 struct Cursor<'a, const M: usize> {
     sampler: &'a Sampler<M>,
     arc: usize,
-    motion: Option<(usize, Motion<M>)>,
+    motion: Option<(usize, Motion<'a, M>)>,
     with_lengths: bool,
 }
 
@@ -434,13 +454,12 @@ impl<'a, const M: usize> Cursor<'a, M> {
         }
         if self.motion.as_ref().is_none_or(|(arc, _)| *arc != self.arc) {
             let arc = &self.sampler.arcs[self.arc];
-            let piece = &self.sampler.path.pieces[arc.piece as usize];
-            self.motion = Some((self.arc, Motion::new(piece, arc, self.with_lengths)));
+            self.motion = Some((self.arc, self.sampler.path.motion(arc, self.with_lengths)));
         }
         self.arc
     }
 
-    fn motion(&self) -> &Motion<M> {
+    fn motion(&self) -> &Motion<'a, M> {
         &self.motion.as_ref().expect("seek comes first").1
     }
 }

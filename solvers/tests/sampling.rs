@@ -3,7 +3,20 @@
 use feedplan_solvers::motion::{ArcKind, Motion, ProfileArc, State};
 use feedplan_solvers::quadratic::{norm, sub, Quadratic};
 use feedplan_solvers::sampling::{Interpolator, PathData, Sampler};
+use feedplan_solvers::spline::bezier::elevate;
+use feedplan_solvers::spline::{CompositeCurve, Piece};
 use proptest::prelude::*;
+
+/// A curve of one piece, its degree raised: the same motion by the closed forms and by the general ones.
+fn raised<const M: usize>(piece: &Quadratic<M>, by: usize) -> CompositeCurve<M> {
+    let mut curve = CompositeCurve::default();
+    elevate(&Piece { control: &piece.control, weights: &[], width: piece.width }, by, &mut curve);
+    curve
+}
+
+fn motion<'a, const M: usize>(curve: &'a CompositeCurve<M>, arc: &ProfileArc) -> Motion<'a, M> {
+    Motion::new(curve.piece(0), None, arc, true)
+}
 
 fn arc(kind: ArcKind, value: f64, u: (f64, f64), p: (f64, f64), duration: f64) -> ProfileArc {
     ProfileArc { piece: 0, kind, axis: 0, value, u0: u.0, u1: u.1, p0: p.0, p1: p.1, duration }
@@ -17,27 +30,40 @@ fn triangle() -> (Quadratic<2>, [ProfileArc; 2]) {
     (line, [up, down])
 }
 
+fn path_of(piece: &Quadratic<2>) -> PathData<2> {
+    PathData {
+        curve: raised(piece, 0),
+        tip_speed: None,
+        lines: vec![7],
+        runs: vec![0, 1],
+        start_dwell: 0.0,
+        dwell: vec![0.0],
+    }
+}
+
 fn sampler(period: f64, interpolator: Interpolator) -> Sampler<2> {
     let (line, arcs) = triangle();
-    let path =
-        PathData { pieces: vec![line], lines: vec![7], runs: vec![0, 1], start_dwell: 0.0, dwell: vec![0.0] };
+    let path = path_of(&line);
     Sampler::new(path, arcs.to_vec(), &[0, 2], period, interpolator).unwrap()
 }
 
 #[test]
 fn a_triangle_is_half_a_t_squared() {
-    let (line, [up, down]) = triangle();
-    let (up, down) = (Motion::new(&line, &up, false), Motion::new(&line, &down, false));
-    for t in [0.0, 0.01, 0.05, 0.1] {
-        let way = 500.0 * t * t;
-        let state = up.at_time(t, 0.001);
-        assert!((state.u - way).abs() < 1e-14, "{t}");
-        assert!((up.rates(&state).velocity[0] - 1000.0 * t).abs() < 1e-12);
-        assert_eq!((up.rates(&state).acceleration[0], up.rates(&state).jerk[0]), (1000.0, 0.0));
-        assert!((down.at_time(0.1 - t, 0.001).u - (10.0 - way)).abs() < 1e-14);
+    for by in [0, 1, 7] {
+        let (line, [up, down]) = triangle();
+        let curve = raised(&line, by);
+        let (up, down) = (motion(&curve, &up), motion(&curve, &down));
+        for t in [0.0, 0.01, 0.05, 0.1] {
+            let way = 500.0 * t * t;
+            let state = up.at_time(t, 0.001);
+            assert!((state.u - way).abs() < 1e-14, "{t}");
+            assert!((up.rates(&state).velocity[0] - 1000.0 * t).abs() < 1e-12);
+            assert_eq!((up.rates(&state).acceleration[0], up.rates(&state).jerk[0]), (1000.0, 0.0));
+            assert!((down.at_time(0.1 - t, 0.001).u - (10.0 - way)).abs() < 1e-14);
+        }
+        assert_eq!(up.rates(&up.at(0.0)).velocity, [0.0; 2]);
+        assert_eq!(down.rates(&down.at(10.0)).velocity, [0.0; 2]);
     }
-    assert_eq!(up.rates(&up.at(0.0)).velocity, [0.0; 2]);
-    assert_eq!(down.rates(&down.at(10.0)).velocity, [0.0; 2]);
 }
 
 #[test]
@@ -82,12 +108,15 @@ fn the_speed_next_to_a_standstill_keeps_its_digits() {
     // x' grows from 1 to 4 on [0, 3]: 7.5 mm from 15 mm/s down to rest in 1 s at 15 mm/s².
     let piece = Quadratic { control: [[0.0], [1.5], [7.5]], width: 3.0 };
     let down = arc(ArcKind::AxisAcceleration, -15.0, (0.0, 3.0), (225.0, 0.0), 1.0);
-    let motion = Motion::new(&piece, &down, false);
-    for i in 0..50 {
-        let u = 3.0 - 1e-12 * f64::from(i) * 1.7;
-        let expected = (2.0 * 15.0 * 4.0 * (3.0 - u)).sqrt();
-        let [speed] = motion.rates(&motion.at(u)).velocity;
-        assert!((speed - expected).abs() <= 1e-9 * expected, "{speed} {expected}");
+    for by in [0, 1, 7] {
+        let curve = raised(&piece, by);
+        let motion = motion(&curve, &down);
+        for i in 0..50 {
+            let u = 3.0 - 1e-12 * f64::from(i) * 1.7;
+            let expected = (2.0 * 15.0 * 4.0 * (3.0 - u)).sqrt();
+            let [speed] = motion.rates(&motion.at(u)).velocity;
+            assert!((speed - expected).abs() <= 1e-9 * expected, "{speed} {expected}");
+        }
     }
 }
 
@@ -99,15 +128,20 @@ fn speed_through_a_full_cusp_stays_finite() {
     let feed = arc(ArcKind::Feed, speed * speed, (0.0, 2.0), (f64::INFINITY, 100.0), 0.1);
     // X gains speed from 3 to 9 mm/s on its 1.2 mm: 0.2 s at 30 mm/s².
     let axis = arc(ArcKind::AxisAcceleration, 30.0, (0.0, 2.0), (f64::INFINITY, 81.0 / 1.44), 0.2);
-    let (feed, axis) = (Motion::new(&piece, &feed, true), Motion::new(&piece, &axis, false));
-    for t in [0.0, 1e-9, 0.01, 0.1] {
-        let state = feed.at_time(t, 0.001);
-        assert!((state.u * state.u / 2.0 - speed * t).abs() < 1e-14);
-        assert!(norm(&sub(&feed.rates(&state).velocity, &[12.0, 16.0])) < 1e-13);
-        let state = axis.at_time(t, 0.001);
-        assert!((axis.point(&state)[0] - (3.0 * t + 15.0 * t * t)).abs() < 1e-14);
-        assert!(norm(&sub(&axis.rates(&state).acceleration, &[30.0, 40.0])) < 1e-12);
-        assert!((axis.time(&state) - t).abs() < 1e-15);
+    for by in [0, 1, 7] {
+        let curve = raised(&piece, by);
+        let (feed, axis) = (motion(&curve, &feed), motion(&curve, &axis));
+        for t in [0.0, 1e-9, 0.01, 0.1] {
+            let state = feed.at_time(t, 0.001);
+            assert!((state.u * state.u / 2.0 - speed * t).abs() < 1e-12 * speed * 0.1);
+            assert!(norm(&sub(&feed.rates(&state).velocity, &[12.0, 16.0])) < 1e-13);
+            assert!(norm(&feed.rates(&state).acceleration) < 1e-6);
+            let state = axis.at_time(t, 0.001);
+            assert!((axis.point(&state)[0] - (3.0 * t + 15.0 * t * t)).abs() < 1e-14);
+            assert!(norm(&sub(&axis.rates(&state).velocity, &[3.0 + 30.0 * t, 4.0 + 40.0 * t])) < 1e-12);
+            assert!(norm(&sub(&axis.rates(&state).acceleration, &[30.0, 40.0])) < 1e-7);
+            assert!((axis.time(&state) - t).abs() < 1e-15);
+        }
     }
 }
 
@@ -116,12 +150,14 @@ fn a_start_at_rest_in_a_cusp_keeps_p_and_speeds_up() {
     // C' = u, p = 9: u = 3t, x = u²/2 at the constant acceleration 9.
     let piece = Quadratic { control: [[0.0], [0.0], [2.0]], width: 2.0 };
     let arc = arc(ArcKind::AxisAcceleration, 9.0, (0.0, 2.0), (9.0, 9.0), 2.0 / 3.0);
-    let motion = Motion::new(&piece, &arc, false);
-    for t in [0.0, 1e-8, 0.1, 0.5] {
-        let state = motion.at_time(t, 0.001);
-        assert!(
-            (state.u - 3.0 * t).abs() <= 1e-15 && (motion.rates(&state).velocity[0] - 9.0 * t).abs() < 1e-14
-        );
+    for by in [0, 1, 7] {
+        let curve = raised(&piece, by);
+        let motion = motion(&curve, &arc);
+        for t in [0.0, 1e-8, 0.1, 0.5] {
+            let state = motion.at_time(t, 0.001);
+            assert!((state.u - 3.0 * t).abs() <= 1e-15);
+            assert!((motion.rates(&state).velocity[0] - 9.0 * t).abs() < 1e-14);
+        }
     }
 }
 
@@ -130,13 +166,7 @@ fn nonsense_is_refused_with_a_sentence() {
     let build = |change: &dyn Fn(&mut ProfileArc), period: f64| {
         let (line, mut arcs) = triangle();
         change(&mut arcs[1]);
-        let path = PathData {
-            pieces: vec![line],
-            lines: vec![7],
-            runs: vec![0, 1],
-            start_dwell: 0.0,
-            dwell: vec![0.0],
-        };
+        let path = path_of(&line);
         Sampler::new(path, arcs.to_vec(), &[0, 2], period, Interpolator::Sarfraz).err()
     };
     assert!(build(&|_| (), 0.001).is_none());
@@ -163,7 +193,7 @@ prop_compose! {
     fn any_arc()(
         control in prop::array::uniform3(prop::array::uniform2(-5.0..5.0)),
         slopes in prop::array::uniform2(prop_oneof![1 => Just(0.0), 4 => 0.0..5.0]),
-        width in 0.1..5.0f64, cut in prop::array::uniform2(0.0..1.0f64), kind in 0u8..5,
+        width in 0.1..5.0f64, cut in prop::array::uniform2(0.0..1.0f64), kind in 0u8..6,
         speeds in prop::array::uniform2(prop_oneof![1 => Just(0.0), 4 => 0.01..100.0]),
         flip in any::<bool>(),
     ) -> (Quadratic<2>, ProfileArc) {
@@ -202,6 +232,13 @@ prop_compose! {
                 arc.duration = simpson(time, u0, u1);
             }
             ArcKind::Flat => (),
+            ArcKind::SpeedLine => {
+                let line = speeds.map(|speed| (10.0 * speed.max(10.0)).powi(2));
+                let square = |u: f64| norm(&tangent(u)).powi(2);
+                (arc.p0, arc.p1) = (line[0] / square(u0), line[1] / square(u1));
+                let at = |u: f64| line[0] + (line[1] - line[0]) * (u - u0) / (u1 - u0);
+                arc.duration = simpson(|u| (square(u) / at(u)).sqrt(), u0, u1);
+            }
         }
         (piece, arc)
     }
@@ -241,8 +278,9 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(1000))]
 
     #[test]
-    fn place_and_time_undo_each_other((piece, arc) in any_arc(), at in 0.0..1.0f64) {
-        let motion = Motion::new(&piece, &arc, false);
+    fn place_and_time_undo_each_other((piece, arc) in any_arc(), at in 0.0..1.0f64, by in 0..4usize) {
+        let curve = raised(&piece, if arc.kind == ArcKind::Chord { 0 } else { by });
+        let motion = motion(&curve, &arc);
         let t = at * arc.duration;
         let state = motion.at_time(t, 1e-3 * arc.duration);
         prop_assert!((arc.u0..=arc.u1).contains(&state.u));
@@ -258,11 +296,14 @@ proptest! {
     }
 
     #[test]
-    fn the_way_of_the_governing_axis_is_its_speed_in_time((piece, arc) in any_arc(), at in 0.0..1.0f64) {
+    fn the_way_of_the_governing_axis_is_its_speed_in_time(
+        (piece, arc) in any_arc(), at in 0.0..1.0f64, by in 0..4usize
+    ) {
         if !matches!(arc.kind, ArcKind::AxisAcceleration | ArcKind::AxisVelocity) {
             return Ok(());
         }
-        let motion = Motion::new(&piece, &arc, false);
+        let curve = raised(&piece, by);
+        let motion = motion(&curve, &arc);
         let t = at * arc.duration;
         let [v0, v1] = [arc.u0, arc.u1].map(|u| motion.rates(&motion.at(u)).velocity[0]);
         if arc.kind == ArcKind::AxisAcceleration {
@@ -276,11 +317,14 @@ proptest! {
     }
 
     #[test]
-    fn every_rate_is_the_derivative_of_the_one_before((piece, arc) in any_arc(), at in 0.1..0.9f64) {
+    fn every_rate_is_the_derivative_of_the_one_before(
+        (piece, arc) in any_arc(), at in 0.1..0.9f64, by in 0..4usize
+    ) {
         if !tame(&piece, &arc) {
             return Ok(());
         }
-        let motion = Motion::new(&piece, &arc, false);
+        let curve = raised(&piece, if arc.kind == ArcKind::Chord { 0 } else { by });
+        let motion = motion(&curve, &arc);
         let (t, h) = (at * arc.duration, 1e-4 * arc.duration);
         let [before, here, after]: [State; 3] = [t - h, t, t + h].map(|t| motion.at_time(t, h));
         let rates = [&before, &here, &after].map(|state| motion.rates(state));

@@ -81,7 +81,7 @@ class Case:
 
 def planned(problem: Problem, machine: Machine, program: Program | None = None) -> Case:
     profile = planner("bang-bang")(problem)
-    return Case(problem, profile, machine, program, setpoints(problem.path, profile, problem.period).all())
+    return Case(problem, profile, machine, program, setpoints(problem, profile, problem.period).all())
 
 
 @pytest.fixture

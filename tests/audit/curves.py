@@ -61,24 +61,7 @@ def problem_along(
 
 def planned(problem: Problem) -> SpeedProfile:
     """The exact profile on pieces of any degree."""
-    curve = problem.path.curve
-    return SpeedProfile(
-        *plan_curves(
-            curve.control_points,
-            np.zeros(0) if curve.weights is None else curve.weights,
-            curve.offsets,
-            curve.width,
-            np.asarray(problem.path.runs, np.int64),
-            problem.feed,
-            problem.junction_speed,
-            problem.max_velocity,
-            problem.max_acceleration,
-            problem.chord_tolerance,
-            problem.period,
-            problem.start_speed,
-            problem.end_speed,
-        )
-    )
+    return SpeedProfile(*plan_curves(problem))
 
 
 def places_at(problem: Problem, profile: SpeedProfile, t: Array) -> tuple[NDArray[np.int64], Array, Array]:

@@ -52,25 +52,7 @@ def joint_problem(machine: Machine, names: str, curve: CompositeCurve, **changes
 
 def planned_joints(problem: Problem) -> SpeedProfile:
     """The exact profile of the joints' limits alone."""
-    assert problem.joints is not None
-    joints = problem.joints
-    return SpeedProfile(
-        *plan_curves(
-            joints.control_points,
-            np.zeros(0),
-            joints.offsets,
-            joints.width,
-            np.asarray(problem.path.runs, np.int64),
-            problem.feed,
-            problem.junction_speed,
-            problem.max_velocity,
-            problem.max_acceleration,
-            math.inf,
-            problem.period,
-            problem.start_speed,
-            problem.end_speed,
-        )
-    )
+    return SpeedProfile(*plan_curves(problem))
 
 
 def steady(problem: Problem, p: float) -> SpeedProfile:

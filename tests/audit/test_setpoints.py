@@ -57,12 +57,12 @@ def test_without_a_profile_the_places_are_found_along_the_path(part: Any) -> Non
 
 
 def test_both_interpolators_pass(part: Any) -> None:
-    stream = setpoints(part.path, part.profile, part.problem.period, "newton")
+    stream = setpoints(part.problem, part.profile, part.problem.period, "newton")
     assert audit(part.problem, part.profile, part.machine, part.program, stream).failures == ()
 
 
 def test_another_period_than_the_machines_passes(part: Any) -> None:
-    stream = setpoints(part.path, part.profile, 0.0037)
+    stream = setpoints(part.problem, part.profile, 0.0037)
     result = audit(replace(part.problem, chord_tolerance=math.inf), part.profile, part.machine, None, stream)
     assert result.failures == ()
 
@@ -201,7 +201,7 @@ def test_setpoints_off_the_program_are_found_where_the_path_is_not(part: Any, ch
 
 def test_the_progress_grows_from_nothing_to_all(part: Any) -> None:
     shares: list[float] = []
-    stream = setpoints(part.path, part.profile, part.problem.period)
+    stream = setpoints(part.problem, part.profile, part.problem.period)
     audit(part.problem, part.profile, part.machine, part.program, stream, progress=shares.append)
     assert shares == sorted(shares)
     assert (shares[0], shares[-1]) == (0.0, 1.0)
@@ -253,7 +253,7 @@ def test_a_corner_cut_by_a_step_is_a_chord_error() -> None:
     )
     problem = build_problem(path, machine)
     profile = planner("bang-bang")(problem)
-    points = setpoints(path, profile, 0.001).all()
+    points = setpoints(problem, profile, 0.001).all()
     row = int(np.flatnonzero(points.position[:, 1] > 0)[0])
     before, after = half - points.position[row - 1, 0], points.position[row, 1]
     cut = before * after / math.hypot(before, after)

@@ -1,17 +1,16 @@
-//! Setpoints and lengths of a path for Python.
+//! Setpoints for Python.
 
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
-use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 
-use super::arrays::{quadratics, to_array2};
+use super::arrays::to_array2;
+use super::spline::curve;
 use super::with_padded_axes;
-use crate::arc_length::{PathLength, Place};
 use crate::motion::{ArcKind, ProfileArc};
-use crate::newton;
 use crate::sampling::{Interpolator, PathData, Resume, Sampler};
 
 pyo3::import_exception!(feedplan.errors, InputError);
@@ -94,8 +93,11 @@ impl PySampler {
     #[allow(clippy::too_many_arguments)]
     fn new(
         py: Python<'_>,
-        control_points: PyReadonlyArray3<'_, f64>,
+        control_points: PyReadonlyArray2<'_, f64>,
+        weights: Option<PyReadonlyArray1<'_, f64>>,
+        offsets: PyReadonlyArray1<'_, i64>,
         width: PyReadonlyArray1<'_, f64>,
+        tip_speed: Option<(PyReadonlyArray1<'_, f64>, PyReadonlyArray1<'_, i64>)>,
         line: PyReadonlyArray1<'_, i32>,
         runs: PyReadonlyArray1<'_, i64>,
         start_dwell: f64,
@@ -140,9 +142,9 @@ impl PySampler {
                 })
             })
             .collect::<PyResult<Vec<_>>>()?;
-        let arc_runs = offsets(&arc_runs)?;
+        let arc_runs = indices(&arc_runs)?;
         let interpolator = if newton { Interpolator::Newton } else { Interpolator::Sarfraz };
-        let axes = control_points.shape()[2];
+        let axes = control_points.shape()[1];
         let of_axis = |kind| matches!(kind, ArcKind::AxisAcceleration | ArcKind::AxisVelocity);
         if let Some(i) = arcs.iter().position(|arc| of_axis(arc.kind) && arc.axis as usize >= axes) {
             return Err(InputError::new_err(format!(
@@ -152,9 +154,13 @@ impl PySampler {
         }
         let stream = with_padded_axes!(axes, M, {
             let path = PathData::<M> {
-                pieces: quadratics(&control_points, &width)?,
+                curve: curve(&control_points, weights.as_ref(), &offsets, &width)?,
+                tip_speed: match &tip_speed {
+                    None => None,
+                    Some((coefficients, offsets)) => Some((slice(coefficients)?.to_vec(), indices(offsets)?)),
+                },
                 lines: slice(&line)?.to_vec(),
-                runs: offsets(&runs)?,
+                runs: indices(&runs)?,
                 start_dwell,
                 dwell: slice(&dwell)?.to_vec(),
             };
@@ -188,88 +194,11 @@ impl PySampler {
     }
 }
 
-/// Lengths along a path of quadratic pieces.
-#[pyclass(name = "PathLength", module = "feedplan._solvers", frozen)]
-struct PyPathLength(PathLength);
-
-#[pymethods]
-impl PyPathLength {
-    #[new]
-    fn new(
-        py: Python<'_>,
-        control_points: PyReadonlyArray3<'_, f64>,
-        width: PyReadonlyArray1<'_, f64>,
-    ) -> PyResult<Self> {
-        if control_points.shape()[0] == 0 {
-            return Err(PyValueError::new_err("the path is empty"));
-        }
-        with_padded_axes!(control_points.shape()[2], M, {
-            let pieces = quadratics::<M>(&control_points, &width)?;
-            Ok(Self(py.detach(|| PathLength::new(&pieces))))
-        })
-    }
-
-    /// Length of the path in mm.
-    #[getter]
-    fn total(&self) -> f64 {
-        self.0.total()
-    }
-
-    /// The greatest proven error of one piece's length in mm.
-    #[getter]
-    fn error(&self) -> f64 {
-        self.0.error()
-    }
-
-    /// Length from the start of the path to the places (piece, u).
-    fn lengths<'py>(
-        &self,
-        py: Python<'py>,
-        piece: PyReadonlyArray1<'py, u32>,
-        u: PyReadonlyArray1<'py, f64>,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let (piece, u) = (slice(&piece)?, slice(&u)?);
-        if piece.len() != u.len() || piece.iter().any(|&piece| piece as usize >= self.0.pieces()) {
-            return Err(PyIndexError::new_err("pieces and parameters do not suit the path"));
-        }
-        let lengths =
-            py.detach(|| piece.iter().zip(u).map(|(&piece, &u)| self.0.length(piece as usize, u)).collect());
-        Ok(PyArray1::from_vec(py, lengths))
-    }
-
-    /// The places at lengths within `tolerance` mm: piece, u, rounds, remaining miss.
-    #[allow(clippy::type_complexity)]
-    fn locate<'py>(
-        &self,
-        py: Python<'py>,
-        lengths: PyReadonlyArray1<'py, f64>,
-        tolerance: f64,
-        newton: bool,
-    ) -> PyResult<(
-        Bound<'py, PyArray1<u32>>,
-        Bound<'py, PyArray1<f64>>,
-        Bound<'py, PyArray1<u32>>,
-        Bound<'py, PyArray1<f64>>,
-    )> {
-        let lengths = slice(&lengths)?;
-        let places: Vec<Place> = py.detach(|| match newton {
-            true => newton::follow(&self.0, lengths, tolerance),
-            false => self.0.locate_all(lengths, tolerance),
-        });
-        Ok((
-            PyArray1::from_iter(py, places.iter().map(|place| place.piece as u32)),
-            PyArray1::from_iter(py, places.iter().map(|place| place.located.u)),
-            PyArray1::from_iter(py, places.iter().map(|place| place.located.iterations)),
-            PyArray1::from_iter(py, places.iter().map(|place| place.located.miss)),
-        ))
-    }
-}
-
 fn slice<'a, T: numpy::Element>(array: &'a PyReadonlyArray1<'_, T>) -> PyResult<&'a [T]> {
     array.as_slice().map_err(|_| PyValueError::new_err("arrays must be C-contiguous"))
 }
 
-fn offsets(array: &PyReadonlyArray1<'_, i64>) -> PyResult<Vec<usize>> {
+fn indices(array: &PyReadonlyArray1<'_, i64>) -> PyResult<Vec<usize>> {
     slice(array)?
         .iter()
         .map(|&offset| usize::try_from(offset).map_err(|_| PyValueError::new_err("an offset is negative")))
@@ -277,6 +206,5 @@ fn offsets(array: &PyReadonlyArray1<'_, i64>) -> PyResult<Vec<usize>> {
 }
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<PySampler>()?;
-    module.add_class::<PyPathLength>()
+    module.add_class::<PySampler>()
 }

@@ -415,11 +415,13 @@ impl CurveLength {
         Ok(Self { lengths, width: width.as_slice()?.to_vec() })
     }
 
+    /// Length of the curve in mm.
     #[getter]
     fn total(&self) -> f64 {
         with_lengths!(&self.lengths, kernel, kernel.total())
     }
 
+    /// Bound of the error of every length on the curve in mm.
     #[getter]
     fn error(&self) -> f64 {
         with_lengths!(&self.lengths, kernel, kernel.error())
@@ -445,6 +447,7 @@ impl CurveLength {
         py: Python<'py>,
         lengths: Array1<'py>,
         tolerance: f64,
+        newton: bool,
     ) -> PyResult<(
         Bound<'py, PyArray1<u32>>,
         Bound<'py, PyArray1<f64>>,
@@ -452,7 +455,13 @@ impl CurveLength {
         Bound<'py, PyArray1<f64>>,
     )> {
         let wanted = lengths.as_slice()?;
-        let found = py.detach(|| with_lengths!(&self.lengths, kernel, kernel.locate_all(wanted, tolerance)));
+        let found = py.detach(|| {
+            with_lengths!(
+                &self.lengths,
+                kernel,
+                if newton { kernel.follow(wanted, tolerance) } else { kernel.locate_all(wanted, tolerance) }
+            )
+        });
         Ok((
             PyArray1::from_iter(py, found.iter().map(|place| place.piece as u32)),
             PyArray1::from_iter(py, found.iter().map(|place| place.located.u)),

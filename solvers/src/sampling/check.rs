@@ -1,7 +1,7 @@
 //! Whether the arrays of a path and a profile fit together, before anything is computed from them.
 
 use super::PathData;
-use crate::motion::{ArcKind, ProfileArc};
+use crate::motion::{ArcKind, ProfileArc, MAX_TIP};
 
 /// The error is a sentence for the user.
 pub(super) fn check<const M: usize>(
@@ -16,14 +16,20 @@ pub(super) fn check<const M: usize>(
             && offsets[runs] == end
             && offsets.windows(2).all(|pair| pair[0] <= pair[1])
     };
-    if path.pieces.is_empty() || runs == 0 {
+    let pieces = path.curve.len();
+    if pieces == 0 || runs == 0 {
         return Err("the path is empty: nothing moves".into());
     }
-    if path.lines.len() != path.pieces.len()
-        || !offsets(&path.runs, path.pieces.len())
+    if path.lines.len() != pieces
+        || !offsets(&path.runs, pieces)
         || path.runs.windows(2).any(|pair| pair[0] == pair[1])
     {
         return Err("the arrays of the path do not fit together".into());
+    }
+    if path.tip_speed.as_ref().is_some_and(|(values, offsets)| !fits_pieces(values, offsets, pieces)) {
+        return Err(format!(
+            "the tip speed does not fit the {pieces} pieces: give 1 to {MAX_TIP} finite coefficients for each"
+        ));
     }
     if path.dwell.iter().chain([&path.start_dwell]).any(|dwell| !(dwell.is_finite() && *dwell >= 0.0)) {
         return Err("the path has a pause that is negative or not finite".into());
@@ -32,9 +38,9 @@ pub(super) fn check<const M: usize>(
         return Err("the profile does not belong to this path: their runs differ".into());
     }
     for r in 0..runs {
-        let pieces = &path.pieces[path.runs[r]..path.runs[r + 1]];
-        let still =
-            || pieces.iter().all(|piece| piece.control.iter().all(|point| *point == pieces[0].control[0]));
+        let of_run = path.curve.offsets[path.runs[r]]..path.curve.offsets[path.runs[r + 1]];
+        let points = &path.curve.control[of_run];
+        let still = || points.iter().all(|point| *point == points[0]);
         if arc_runs[r] == arc_runs[r + 1] && !still() {
             let line = path.lines[path.runs[r]];
             return Err(format!(
@@ -51,11 +57,20 @@ pub(super) fn check<const M: usize>(
     Ok(())
 }
 
+/// Whether coefficients and their offsets are those of so many pieces.
+fn fits_pieces(values: &[f64], offsets: &[usize], pieces: usize) -> bool {
+    offsets.len() == pieces + 1
+        && offsets[0] == 0
+        && offsets[pieces] == values.len()
+        && offsets.windows(2).all(|pair| pair[0] < pair[1] && pair[1] <= pair[0] + MAX_TIP)
+        && values.iter().all(|value| value.is_finite())
+}
+
 fn check_arc<const M: usize>(path: &PathData<M>, run: usize, arc: &ProfileArc) -> Result<(), &'static str> {
     if !(path.runs[run]..path.runs[run + 1]).contains(&(arc.piece as usize)) {
         return Err("is on no piece of its run");
     }
-    let width = path.pieces[arc.piece as usize].width;
+    let (piece, width) = (path.curve.piece(arc.piece as usize), path.curve.width[arc.piece as usize]);
     if !(0.0 <= arc.u0 && arc.u0 < arc.u1 && arc.u1 <= width) {
         return Err("leaves its piece");
     }
@@ -66,12 +81,19 @@ fn check_arc<const M: usize>(path: &PathData<M>, run: usize, arc: &ProfileArc) -
     if of_axis && arc.axis as usize >= M {
         return Err("is governed by an axis that the path lacks");
     }
-    let infinite = (arc.p0 == f64::INFINITY, arc.p1 == f64::INFINITY);
-    let through_cusp = of_axis || arc.kind == ArcKind::Feed;
+    if arc.kind == ArcKind::Chord && (path.tip_speed.is_some() || piece.is_rational() || piece.degree() > 2) {
+        return Err("keeps to the chord-error limit in a way that only quadratic pieces have");
+    }
+    let infinite = [arc.p0, arc.p1].iter().filter(|p| **p == f64::INFINITY).count();
+    let most = match arc.kind {
+        // Nothing else would tell the speed.
+        ArcKind::SpeedLine => 1,
+        ArcKind::Flat | ArcKind::Chord => 0,
+        _ => 2,
+    };
     let signed = arc.kind == ArcKind::AxisAcceleration;
     if !(arc.p0 >= 0.0 && arc.p1 >= 0.0 && arc.value.is_finite() && (signed || arc.value >= 0.0))
-        || infinite == (true, true)
-        || (infinite != (false, false) && !through_cusp)
+        || infinite > most
     {
         return Err("has a speed that is negative or not finite");
     }

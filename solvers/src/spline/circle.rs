@@ -42,7 +42,7 @@ impl<const M: usize> Turn<M> {
     }
 
     /// The turn while every other axis goes by `travel`, in proportion to the angle: pieces of degree `degree`
-    /// (3 to 9), and the bound of their distance from the true helix in mm, at most `tolerance`.
+    /// (3 to 10), and the bound of their distance from the true helix in mm, at most `tolerance`.
     pub fn helix(
         &self,
         travel: &[f64; M],

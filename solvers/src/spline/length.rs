@@ -1,226 +1,39 @@
 //! The length of a curve of any degree and the place at a given length, by the tables of `arc_length`.
 //!
-//! The integrand is |C'| = |h|/ω², h the hodograph numerator. The bound of its derivatives that the table needs
-//! is Cauchy's on a disc about the middle m of a panel: with S = h·h = s₀ + s₁z + … about m and
-//! Σ_{k>0} |s_k| ρᵏ ≤ s₀, S has no zero in |z| < ρ, so that √S is analytic there and below √(2 s₀); in the same
-//! way ω stays above half of ω(m). Panels are halved where the disc is small: towards cusps and near-cusps.
+//! Panels are halved towards cusps and near-cusps. Quadratic pieces have the closed bound of `arc_length`, the
+//! others that of `speed`.
 
 use rayon::prelude::*;
 
 use super::cusps::{piece_cusps, CUSP};
-use super::rational::Hodograph;
-use super::{binomial, CompositeCurve, Piece, MAX_DEGREE, MAX_HODOGRAPH, MAX_SQUARE};
-use crate::arc_length::{quadrature, tabulate, Disc, Integrand, Node, Place, Table};
-use crate::quadratic::dot;
-use crate::sarfraz;
+use super::speed::{Coefficients, Speed};
+use super::{CompositeCurve, Piece};
+use crate::arc_length::{quadrature, tabulate, Hodograph, Length, Node, Table};
+use crate::newton;
+use crate::quadratic::Quadratic;
+use crate::sarfraz::{self, Located};
 
-/// No disc need be greater than so many half panels: one panel then has no error left.
-const MAX_RATIO: f64 = 64.0;
-/// Steps in which the radius of a disc is bisected, geometrically: to 4 %.
-const BISECTIONS: u32 = 7;
-
-/// |C'(u)| of one piece.
+/// A place on a curve: piece and local parameter, and how it was found.
 #[derive(Clone, Copy, Debug)]
-pub struct Speed<'a, const M: usize> {
-    /// Bernstein coefficients of h by t = u / width, times binomials.
-    h: &'a [[f64; M]],
-    /// Those of ω; empty for polynomial pieces.
-    omega: &'a [f64],
-    width: f64,
-    /// The cusp in this part of the piece; not a number without one.
-    foot: f64,
-    /// |C'| at most `at_foot + slope |u − foot|`.
-    at_foot: f64,
-    slope: f64,
+pub struct Place {
+    pub piece: usize,
+    pub located: Located,
 }
 
-impl<'a, const M: usize> Speed<'a, M> {
-    fn new(h: &'a [[f64; M]], omega: &'a [f64], width: f64) -> Self {
-        let mut speed = Self { h, omega, width, foot: f64::NAN, at_foot: 0.0, slope: 0.0 };
-        speed.at_foot = speed.greatest(|i| speed.plain(i)) * speed.inverse_square();
-        speed
-    }
-
-    /// The same with a cusp at u.
-    fn with_foot(mut self, u: f64) -> Self {
-        let n = self.h.len() - 1;
-        let growth = self.greatest(|i| {
-            let (low, high) = (self.plain(i), self.plain((i + 1).min(n)));
-            std::array::from_fn(|k| n as f64 * (high[k] - low[k]))
-        });
-        let value = self.numerator(u / self.width).0;
-        self.foot = u;
-        self.at_foot = dot(&value, &value).sqrt() * self.inverse_square();
-        self.slope = growth * self.inverse_square() / self.width;
-        self
-    }
-
-    fn plain(&self, i: usize) -> [f64; M] {
-        self.h[i].map(|value| value / binomial(self.h.len() - 1, i))
-    }
-
-    fn greatest(&self, vector: impl Fn(usize) -> [f64; M]) -> f64 {
-        (0..self.h.len()).fold(0.0, |most: f64, i| most.max(dot(&vector(i), &vector(i)))).sqrt()
-    }
-
-    /// 1/(ω² width) at most.
-    fn inverse_square(&self) -> f64 {
-        let degree = self.omega.len().saturating_sub(1);
-        let least = (0..self.omega.len())
-            .fold(f64::INFINITY, |least, i| least.min(self.omega[i] / binomial(degree, i)));
-        if self.omega.is_empty() {
-            1.0 / self.width
-        } else {
-            1.0 / (least * least * self.width)
-        }
-    }
-
-    /// h(t), and ω(t), by Horner's scheme from the nearer end.
-    #[inline(always)]
-    fn numerator(&self, t: f64) -> ([f64; M], f64) {
-        let s = 1.0 - t;
-        let n = self.h.len() - 1;
-        let (mut h, mut omega);
-        if t <= 0.5 {
-            let ratio = t / s;
-            h = self.h[n];
-            for row in self.h[..n].iter().rev() {
-                for k in 0..M {
-                    h[k] = h[k] * ratio + row[k];
-                }
-            }
-            omega = 0.0;
-            for value in self.omega.iter().rev() {
-                omega = omega * ratio + value;
-            }
-        } else {
-            let ratio = s / t;
-            h = self.h[0];
-            for row in &self.h[1..] {
-                for k in 0..M {
-                    h[k] = h[k] * ratio + row[k];
-                }
-            }
-            omega = 0.0;
-            for value in self.omega {
-                omega = omega * ratio + value;
-            }
-        }
-        let base = t.max(s);
-        if self.omega.is_empty() {
-            omega = 1.0;
-        } else {
-            omega *= base.powi(self.omega.len() as i32 - 1);
-        }
-        let scale = base.powi(n as i32);
-        (h.map(|value| value * scale), omega)
-    }
-}
-
-impl<const M: usize> Integrand for Speed<'_, M> {
-    #[inline(always)]
-    fn at(&self, u: f64) -> f64 {
-        let (h, omega) = self.numerator(u / self.width);
-        dot(&h, &h).sqrt() / (omega * omega * self.width)
-    }
-
-    fn disc(&self, a: f64, b: f64) -> Disc {
-        let (middle, half) = (0.5 * (a + b) / self.width, 0.5 * (b - a) / self.width);
-        let n = self.h.len() - 1;
-        let mut taylor = [[0.0; M]; MAX_HODOGRAPH];
-        for i in 0..=n {
-            taylor[i] = self.plain(i);
-        }
-        to_taylor(&mut taylor[..=n], middle, half);
-        let mut square = [0.0; MAX_SQUARE];
-        for i in 0..=n {
-            for j in 0..=n {
-                square[i + j] += dot(&taylor[i], &taylor[j]);
-            }
-        }
-        let square = &square[..2 * n + 1];
-
-        let mut omega = [[0.0]; MAX_DEGREE + 1];
-        let degree = self.omega.len().saturating_sub(1);
-        for i in 0..self.omega.len() {
-            omega[i] = [self.omega[i] / binomial(degree, i)];
-        }
-        if !self.omega.is_empty() {
-            to_taylor(&mut omega[..=degree], middle, half);
-        }
-        let clear = |rho: f64| {
-            let tail = square[1..].iter().rev().fold(0.0, |sum, s| (sum + s.abs()) * rho);
-            let omega_tail = omega[1..].iter().rev().fold(0.0, |sum, w| (sum + w[0].abs()) * rho);
-            tail <= square[0] && omega_tail <= 0.5 * omega[0][0]
-        };
-        let (mut low, mut high) = (1.0, MAX_RATIO);
-        if clear(high) {
-            low = high;
-        } else if clear(low) {
-            for _ in 0..BISECTIONS {
-                let rho = (low * high).sqrt();
-                if clear(rho) {
-                    low = rho;
-                } else {
-                    high = rho;
-                }
-            }
-        }
-        let denominator = if self.omega.is_empty() { 1.0 } else { 0.25 * omega[0][0] * omega[0][0] };
-        Disc {
-            radius: (low - 1.0) * half * self.width,
-            bound: (2.0 * square[0]).sqrt() / (denominator * self.width),
-        }
-    }
-
-    fn foot(&self) -> f64 {
-        self.foot
-    }
-
-    // The length of such a panel and its quadrature are both positive and below its width times the bound.
-    fn foot_error(&self, width: f64) -> f64 {
-        width * (self.at_foot + self.slope * width)
-    }
-}
-
-/// Bernstein coefficients on [0, 1] to those of powers of z = (t − middle)/half, up to the sign of z: the part
-/// from the middle to the farther end, and its forward differences.
-fn to_taylor<const M: usize>(b: &mut [[f64; M]], middle: f64, half: f64) {
-    let n = b.len() - 1;
-    let t = if middle > 0.5 {
-        b.reverse();
-        1.0 - middle
-    } else {
-        middle
-    };
-    for row in 1..=n {
-        for i in 0..=n - row {
-            for k in 0..M {
-                b[i][k] += t * (b[i + 1][k] - b[i][k]);
-            }
-        }
-    }
-    for row in 1..=n {
-        for i in (row..=n).rev() {
-            for k in 0..M {
-                b[i][k] -= b[i - 1][k];
-            }
-        }
-    }
-    let (ratio, mut power) = (half / (1.0 - t), 1.0);
-    for k in 0..=n {
-        b[k] = b[k].map(|value| value * (binomial(n, k) * power));
-        power *= ratio;
-    }
+/// What the table of a piece integrates.
+#[derive(Clone, Copy, Debug)]
+enum Shape {
+    Quadratic(Length),
+    /// The coefficients of the piece from here on, of its hodograph and of its denominator.
+    Curve([usize; 2], [usize; 2]),
 }
 
 /// The lengths along a curve, piece after piece.
 #[derive(Clone, Debug)]
 pub struct CurveLength<const M: usize> {
+    shapes: Vec<Shape>,
     h: Vec<[f64; M]>,
     omega: Vec<f64>,
-    /// First coefficient of each piece in `h` and `omega`, and the ends.
-    offsets: Vec<[usize; 2]>,
     width: Vec<f64>,
     nodes: Vec<Node>,
     /// First node of each piece, and the end.
@@ -230,14 +43,32 @@ pub struct CurveLength<const M: usize> {
     error: f64,
 }
 
+/// Calls a generic function on the table of a piece.
+macro_rules! on_table {
+    ($lengths:expr, $piece:expr, $table:ident, $call:expr) => {{
+        let nodes = &$lengths.nodes[$lengths.tables[$piece]..$lengths.tables[$piece + 1]];
+        match $lengths.shapes[$piece] {
+            Shape::Quadratic(f) => {
+                let $table = Table { f, nodes };
+                $call
+            }
+            Shape::Curve(h, omega) => {
+                let f = $lengths.speed(h, omega, $piece);
+                let $table = Table { f, nodes };
+                $call
+            }
+        }
+    }};
+}
+
 impl<const M: usize> CurveLength<M> {
     /// Tabulates every piece to the error `accuracy`, a part of its length; the curve has at least one piece.
     pub fn new(curve: &CompositeCurve<M>, accuracy: f64) -> Self {
         let count = curve.len();
         let mut lengths = Self {
-            h: Vec::with_capacity(curve.control.len()),
+            shapes: Vec::with_capacity(count),
+            h: vec![],
             omega: vec![],
-            offsets: vec![[0, 0]],
             width: curve.width.clone(),
             nodes: Vec::with_capacity(3 * count),
             tables: vec![0],
@@ -245,20 +76,29 @@ impl<const M: usize> CurveLength<M> {
             error: 0.0,
         };
         for piece in curve.pieces() {
-            let hodograph = Hodograph::new(&piece);
-            let n = hodograph.coefficients().len() - 1;
-            for (i, row) in hodograph.coefficients().iter().enumerate() {
-                lengths.h.push(row.map(|value| value * binomial(n, i)));
-            }
-            for (i, weight) in piece.weights.iter().enumerate() {
-                lengths.omega.push(weight * binomial(piece.degree(), i));
-            }
-            lengths.offsets.push([lengths.h.len(), lengths.omega.len()]);
+            lengths.shapes.push(match Quadratic::from_piece(&piece) {
+                Some(quadratic) => Shape::Quadratic(Length(Hodograph::new(&quadratic))),
+                None => {
+                    let coefficients = Coefficients::new(&piece);
+                    let (h, omega) = (lengths.h.len(), lengths.omega.len());
+                    lengths.h.extend_from_slice(coefficients.hodograph());
+                    lengths.omega.extend_from_slice(coefficients.denominator());
+                    Shape::Curve([h, lengths.h.len()], [omega, lengths.omega.len()])
+                }
+            });
         }
         let tables: Vec<(Vec<Node>, f64)> = (0..count)
             .into_par_iter()
             .with_min_len(64)
-            .map(|i| table(lengths.speed(i), &curve.piece(i), accuracy))
+            .map(|i| match lengths.shapes[i] {
+                Shape::Quadratic(f) => {
+                    let mut nodes = vec![];
+                    let allowed = accuracy * quadrature(&f, 0.0, curve.width[i]);
+                    let bound = tabulate(f, 0.0, curve.width[i], allowed, &mut nodes);
+                    (nodes, bound)
+                }
+                Shape::Curve(h, omega) => table(lengths.speed(h, omega, i), &curve.piece(i), accuracy),
+            })
             .collect();
         // Neumaier's sum: the starts of a long path are as good as its pieces.
         let (mut sum, mut lost) = (0.0_f64, 0.0_f64);
@@ -275,14 +115,8 @@ impl<const M: usize> CurveLength<M> {
         lengths
     }
 
-    fn speed(&self, i: usize) -> Speed<'_, M> {
-        let ([h0, w0], [h1, w1]) = (self.offsets[i], self.offsets[i + 1]);
-        let (h, omega) = (&self.h[h0..h1], &self.omega[w0..w1]);
-        Speed { h, omega, width: self.width[i], foot: f64::NAN, at_foot: 0.0, slope: 0.0 }
-    }
-
-    fn table(&self, i: usize) -> Table<'_, Speed<'_, M>> {
-        Table { f: self.speed(i), nodes: &self.nodes[self.tables[i]..self.tables[i + 1]] }
+    fn speed(&self, h: [usize; 2], omega: [usize; 2], piece: usize) -> Speed<'_, M> {
+        Speed::new(&self.h[h[0]..h[1]], &self.omega[omega[0]..omega[1]], self.width[piece])
     }
 
     /// Number of pieces.
@@ -308,14 +142,20 @@ impl<const M: usize> CurveLength<M> {
 
     /// Length from the start of the curve to parameter u of a piece in mm.
     pub fn length(&self, piece: usize, u: f64) -> f64 {
-        self.starts[piece] + self.table(piece).integral(u)
+        self.starts[piece] + on_table!(self, piece, table, table.integral(u))
+    }
+
+    /// The piece in which a length lies, and the length left within it.
+    fn split(&self, length: f64) -> (usize, f64) {
+        let last = self.pieces() - 1;
+        let piece = self.starts[1..=last].partition_point(|&start| start <= length);
+        (piece, length - self.starts[piece])
     }
 
     /// The place at a length, within `tolerance` mm; a length beyond either end gives that end.
     pub fn locate(&self, length: f64, tolerance: f64) -> Place {
-        let last = self.pieces() - 1;
-        let piece = self.starts[1..=last].partition_point(|&start| start <= length);
-        Place { piece, located: sarfraz::locate(&self.table(piece), length - self.starts[piece], tolerance) }
+        let (piece, rest) = self.split(length);
+        Place { piece, located: on_table!(self, piece, table, sarfraz::locate(&table, rest, tolerance)) }
     }
 
     /// Lengths up to many places, in parallel.
@@ -332,15 +172,33 @@ impl<const M: usize> CurveLength<M> {
     pub fn locate_all(&self, lengths: &[f64], tolerance: f64) -> Vec<Place> {
         lengths.par_iter().with_min_len(1024).map(|&length| self.locate(length, tolerance)).collect()
     }
+
+    /// The places at many lengths by Newton–Raphson, each found from the one before; they should not decrease.
+    pub fn follow(&self, lengths: &[f64], tolerance: f64) -> Vec<Place> {
+        let mut places = Vec::with_capacity(lengths.len());
+        let (mut at, mut from) = (usize::MAX, (0.0, 0.0));
+        for &length in lengths {
+            let (piece, rest) = self.split(length);
+            if piece != at || rest < from.1 {
+                from = (0.0, 0.0);
+                at = piece;
+            }
+            let (located, sum) =
+                on_table!(self, piece, table, newton::advance(&table, from, rest - from.1, tolerance));
+            from = (located.u, sum);
+            places.push(Place { piece, located });
+        }
+        places
+    }
 }
 
 /// The table of one piece and the bound of its error. A piece with several cusps is tabulated in parts that hold
 /// one each.
 fn table<const M: usize>(speed: Speed<M>, piece: &Piece<M>, accuracy: f64) -> (Vec<Node>, f64) {
     let mut nodes: Vec<Node> = vec![];
-    let (speed, width) = (Speed::new(speed.h, speed.omega, speed.width), piece.width);
+    let width = piece.width;
     let estimate = quadrature(&speed, 0.0, width);
-    if estimate == 0.0 && speed.at_foot == 0.0 {
+    if speed.is_zero() {
         return (vec![Node { u: 0.0, sum: 0.0, rate: 0.0 }, Node { u: width, sum: 0.0, rate: 0.0 }], 0.0);
     }
     let feet = piece_cusps(piece, CUSP);
@@ -348,7 +206,7 @@ fn table<const M: usize>(speed: Speed<M>, piece: &Piece<M>, accuracy: f64) -> (V
     for (i, foot) in feet.iter().map(|t| t * width).chain(feet.is_empty().then_some(f64::NAN)).enumerate() {
         let start = nodes.last().map_or(0.0, |node| node.u);
         let end = feet.get(i + 1).map_or(width, |next| 0.5 * (foot + next * width));
-        let part = if foot.is_nan() { speed } else { speed.with_foot(foot) };
+        let part = if foot.is_nan() { speed.without_foot() } else { speed.with_foot(foot) };
         let (before, done) = (nodes.pop().map_or(0.0, |node| node.sum), nodes.len());
         bound += tabulate(part, start, end, accuracy * estimate / feet.len().max(1) as f64, &mut nodes);
         for node in &mut nodes[done..] {
@@ -364,6 +222,7 @@ mod tests {
 
     use super::*;
     use crate::spline::bezier::{derivatives, elevate, split};
+    use crate::spline::MAX_DEGREE;
     use proptest::prelude::*;
 
     fn curve_of<const M: usize>(control: &[[f64; M]], weights: &[f64], width: f64) -> CompositeCurve<M> {
@@ -478,7 +337,7 @@ mod tests {
     }
 
     fn pieces() -> impl Strategy<Value = (Vec<[f64; 3]>, Vec<f64>)> {
-        (1..=9usize, any::<bool>()).prop_flat_map(|(degree, rational)| {
+        (1..=MAX_DEGREE, any::<bool>()).prop_flat_map(|(degree, rational)| {
             let weights = if rational { degree + 1 } else { 0 };
             (
                 prop::collection::vec(prop::array::uniform3(-10.0..10.0f64), degree + 1),

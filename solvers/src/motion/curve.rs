@@ -1,0 +1,367 @@
+//! Motion along an arc on a piece of any degree, polynomial or rational; the speed may be that of a tool tip
+//! whose joints the piece moves.
+//!
+//! With D = |C'|² of the path or of the tip, v² = D p is constant (`Feed`) or linear in u (`SpeedLine`), so that
+//! s = ((v²)' − p D')/(2D) and s' = −(4 s D' + p D'')/(2D). Where axis k governs, with acceleration a,
+//! s = (a − q''_k p)/q'_k and s' = −(q'''_k p + 3 q''_k s)/q'_k.
+//!
+//! These quotients are 0/0 where axis k turns round and at cusps, always at an end of the arc. Nearer to it than
+//! rounding allows they are taken at a place a little farther off, and continued from there where p is finite.
+
+use super::axis::{AxisLaw, End};
+use super::rate::{Line, Rate, Source, Tip, TipSpeed, MAX_TIP};
+use super::{fill, invert, parts, ArcKind, ProfileArc, Rates, State};
+use crate::arc_length::{Node, Table};
+use crate::polynomial::Polynomial;
+use crate::quadratic::{dot, norm};
+use crate::spline::bezier::derivatives;
+use crate::spline::speed::{Coefficients, Speed};
+use crate::spline::Piece;
+
+/// How far from the end, in parts of the arc, where an axis turns round at a finite p. Continued from there s is
+/// off by the square of this part; s and s' lose as many digits as it and its square have.
+const OFF_TURN: f64 = 3e-5;
+/// The same at a cusp that is passed, where p is infinite; the way grows with its square at least.
+const OFF_CUSP: f64 = 1e-3;
+/// An end is a cusp where D is below this part of that in the middle of the arc.
+const SLOW: f64 = 1e-8;
+/// A tangent is off a straight line by no more than this part of the longest one, which is rounding.
+const OFF_LINE: f64 = 1e-14;
+/// v² at a cusp is within this factor of v² at the other end, and is bisected so often, geometrically.
+const LINE_RANGE: f64 = 1e12;
+const LINE_ROUNDS: u32 = 60;
+
+enum Law {
+    Flat {
+        p: f64,
+    },
+    Axis(Box<AxisLaw>),
+    /// v² of the path or the tip.
+    Speed(Line),
+}
+
+/// An arc with everything that its evaluation needs.
+pub struct CurveMotion<'a, const M: usize> {
+    piece: Piece<'a, M>,
+    own: Coefficients<M>,
+    /// D of the tip and its two derivatives.
+    tip: Option<[Polynomial<MAX_TIP>; 3]>,
+    pub(super) arc: ProfileArc,
+    law: Law,
+    /// Derivatives are taken between these places.
+    safe: [f64; 2],
+    /// The end of the arc where C' vanishes, for tables; not a number where it does not.
+    foot: f64,
+    /// The direction of travel, where the arc is straight and begins or ends where the quotients are 0/0.
+    straight: Option<[f64; M]>,
+    lengths: Vec<Node>,
+    times: Vec<Node>,
+    pub(super) length_error: f64,
+    time_error: f64,
+}
+
+impl<'a, const M: usize> CurveMotion<'a, M> {
+    /// Prepares an arc; `with_lengths` tabulates its length whatever its kind.
+    pub fn new(piece: Piece<'a, M>, tip: Option<TipSpeed>, arc: &ProfileArc, with_lengths: bool) -> Self {
+        let mut motion = Self {
+            piece,
+            own: Coefficients::new(&piece),
+            tip: tip.map(|tip| tip.derivatives()),
+            arc: *arc,
+            law: Law::Flat { p: arc.p0 },
+            safe: [arc.u0, arc.u1],
+            foot: f64::NAN,
+            straight: None,
+            lengths: vec![],
+            times: vec![],
+            length_error: 0.0,
+            time_error: 0.0,
+        };
+        motion.foot = motion.cusp();
+        let axis = |acceleration: f64, speed: Option<f64>| {
+            // Its duration tells the pace where the axis shows no motion.
+            let pace = (arc.u1 - arc.u0) / arc.duration;
+            AxisLaw::new(&piece, arc, arc.axis as usize, acceleration, speed)
+                .map_or(Law::Flat { p: pace * pace }, |law| Law::Axis(Box::new(law)))
+        };
+        motion.law = match arc.kind {
+            ArcKind::AxisAcceleration => axis(arc.value, None),
+            ArcKind::AxisVelocity => axis(0.0, Some(arc.value.sqrt())),
+            ArcKind::Feed => Law::Speed(Line { start: arc.value, ..Line::ONE }),
+            ArcKind::SpeedLine => Law::Speed(motion.speed_line()),
+            // `check` has refused chord limits here.
+            ArcKind::Flat | ArcKind::Chord => Law::Flat { p: arc.p0 },
+        };
+        motion.keep_off();
+        if with_lengths {
+            let mut nodes = vec![];
+            motion.length_error = fill(motion.length_rate(), arc, &mut nodes);
+            motion.lengths = nodes;
+        }
+        if let Law::Speed(line) = motion.law {
+            let mut nodes = vec![];
+            motion.time_error = fill(motion.time_rate(line), arc, &mut nodes);
+            motion.times = nodes;
+        }
+        motion
+    }
+
+    /// Where the derivatives cannot be taken at the ends.
+    fn keep_off(&mut self) {
+        let arc = self.arc;
+        let ends = match &self.law {
+            Law::Axis(law) => law.ends,
+            Law::Speed(_) => {
+                let middle = self.square(0.5 * (arc.u0 + arc.u1));
+                [(arc.u0, arc.p0), (arc.u1, arc.p1)].map(|(u, p)| {
+                    if p == f64::INFINITY || self.square(u) <= SLOW * middle {
+                        End::Cusp
+                    } else {
+                        End::Regular
+                    }
+                })
+            }
+            Law::Flat { .. } => [End::Regular; 2],
+        };
+        let off = ends.map(|end| match end {
+            End::Regular => 0.0,
+            End::Turn => OFF_TURN * (arc.u1 - arc.u0),
+            End::Cusp => OFF_CUSP * (arc.u1 - arc.u0),
+        });
+        self.safe = [arc.u0 + off[0], arc.u1 - off[1]];
+        if off != [0.0; 2] && (self.tip.is_none() || matches!(self.law, Law::Axis(_))) {
+            self.straight = self.direction();
+        }
+    }
+
+    /// The direction of all tangents on the arc, if they have one but for rounding.
+    fn direction(&self) -> Option<[f64; M]> {
+        let [from, to] = [self.arc.u0, self.arc.u1].map(|u| derivatives(&self.piece, u)[0]);
+        let way: [f64; M] = std::array::from_fn(|k| to[k] - from[k]);
+        let direction = way.map(|x| x / norm(&way));
+        let rows = self.own.hodograph();
+        let longest = rows.iter().map(norm).fold(0.0, f64::max);
+        let straight = rows.iter().all(|row| {
+            let along = dot(row, &direction);
+            (0..M).all(|k| (row[k] - along * direction[k]).abs() <= OFF_LINE * longest)
+        });
+        straight.then_some(direction)
+    }
+
+    /// v² at both ends. Where p is infinite the duration tells it.
+    fn speed_line(&self) -> Line {
+        let arc = &self.arc;
+        let line =
+            |from: f64, to: f64| Line { start: from, slope: (to - from) / (arc.u1 - arc.u0), u0: arc.u0 };
+        let speed_sq = |u: f64, p: f64| self.square(u) * p;
+        let solve = |known: f64, with: &dyn Fn(f64) -> Line| {
+            let (mut low, mut high) = (known / LINE_RANGE, known * LINE_RANGE);
+            for _ in 0..LINE_ROUNDS {
+                let middle = (low * high).sqrt();
+                let mut nodes = vec![];
+                fill(self.time_rate(with(middle)), arc, &mut nodes);
+                if nodes[nodes.len() - 1].sum > arc.duration {
+                    low = middle;
+                } else {
+                    high = middle;
+                }
+            }
+            with((low * high).sqrt())
+        };
+        match (arc.p0.is_finite(), arc.p1.is_finite()) {
+            (false, _) => {
+                let to = speed_sq(arc.u1, arc.p1);
+                solve(to, &|from| line(from, to))
+            }
+            (true, false) => {
+                let from = speed_sq(arc.u0, arc.p0);
+                solve(from, &|to| line(from, to))
+            }
+            (true, true) => line(speed_sq(arc.u0, arc.p0), speed_sq(arc.u1, arc.p1)),
+        }
+    }
+
+    /// D at u.
+    fn square(&self, u: f64) -> f64 {
+        match &self.tip {
+            Some([square, ..]) => square.value(u / self.piece.width),
+            None => {
+                let q = derivatives(&self.piece, u)[1];
+                dot(&q, &q)
+            }
+        }
+    }
+
+    fn cusp(&self) -> f64 {
+        let own = |u: f64| {
+            let q = derivatives(&self.piece, u)[1];
+            dot(&q, &q)
+        };
+        let arc = &self.arc;
+        let middle = own(0.5 * (arc.u0 + arc.u1));
+        let at = |u: f64, p: f64| p == f64::INFINITY || own(u) <= SLOW * middle;
+        if at(arc.u0, arc.p0) {
+            arc.u0
+        } else if at(arc.u1, arc.p1) {
+            arc.u1
+        } else {
+            f64::NAN
+        }
+    }
+
+    fn own(&self) -> Source<'_, M> {
+        let foot = self.foot;
+        let speed = Speed::new(self.own.hodograph(), self.own.denominator(), self.piece.width);
+        Source::Own(if foot.is_nan() { speed.without_foot() } else { speed.with_foot(foot) })
+    }
+
+    fn length_rate(&self) -> Rate<'_, M> {
+        Rate { source: self.own(), line: Line::ONE, foot: self.foot }
+    }
+
+    fn time_rate(&self, line: Line) -> Rate<'_, M> {
+        let source = match &self.tip {
+            Some([square, ..]) => Source::Tip(Tip { square, width: self.piece.width }),
+            None => self.own(),
+        };
+        Rate { source, line, foot: self.foot }
+    }
+
+    /// The table of the arc's length; `with_lengths` must have been asked for.
+    pub fn lengths(&self) -> Table<'_, Rate<'_, M>> {
+        Table { f: self.length_rate(), nodes: &self.lengths }
+    }
+
+    fn times(&self, line: Line) -> Table<'_, Rate<'_, M>> {
+        Table { f: self.time_rate(line), nodes: &self.times }
+    }
+
+    /// The place `t` seconds after the start of the arc. `period` is the step whose length is to be met.
+    pub fn at_time(&self, t: f64, period: f64) -> State {
+        let ProfileArc { u0, u1, .. } = self.arc;
+        let (done, left) = match parts(&self.arc, t) {
+            Ok(parts) => parts,
+            Err(end) => return self.at(end),
+        };
+        match &self.law {
+            Law::Flat { .. } => {
+                self.at(if done <= 0.5 { u0 + (u1 - u0) * done } else { u1 - (u1 - u0) * left })
+            }
+            Law::Axis(law) => law.at_time(&self.arc, done, left),
+            Law::Speed(line) => invert(&self.times(*line), self.time_error, &self.arc, done, period),
+        }
+    }
+
+    /// The place with parameter u.
+    pub fn at(&self, u: f64) -> State {
+        match &self.law {
+            Law::Axis(law) => law.at(&self.arc, u),
+            _ => State { u, ..State::default() },
+        }
+    }
+
+    /// Seconds from the start of the arc to a place.
+    pub fn time(&self, state: &State) -> f64 {
+        let ProfileArc { u0, u1, duration, .. } = self.arc;
+        let done = match &self.law {
+            Law::Flat { .. } => (state.u - u0) / (u1 - u0),
+            Law::Axis(law) => law.done(&self.arc, state),
+            Law::Speed(line) => {
+                let times = self.times(*line);
+                times.integral(state.u) / times.total()
+            }
+        };
+        duration * done
+    }
+
+    /// Position, and velocity, acceleration and jerk at a place.
+    pub fn sample(&self, state: &State) -> ([f64; M], Rates<M>) {
+        let q = derivatives(&self.piece, state.u);
+        if let Some(direction) = &self.straight {
+            return (q[0], self.on_line(direction, state));
+        }
+        let at = state.u.clamp(self.safe[0], self.safe[1]);
+        let there = if at == state.u { q } else { derivatives(&self.piece, at) };
+        let rates = match &self.law {
+            Law::Flat { p } => rates(&q, p.sqrt(), 0.0, 0.0),
+            Law::Speed(line) => self.at_speed(line, at, &there),
+            Law::Axis(law) => self.by_axis(law, state, &q, at, &there),
+        };
+        (q[0], rates)
+    }
+
+    /// Along a straight line all axes move in proportion.
+    fn on_line(&self, direction: &[f64; M], state: &State) -> Rates<M> {
+        let [v, a, j] = match &self.law {
+            Law::Axis(law) => {
+                let scale = 1.0 / direction[law.k];
+                [scale * law.sign * state.v, scale * law.acceleration, 0.0]
+            }
+            Law::Speed(line) => {
+                // v dv/ds with ds = √D du, and its change with time.
+                let u = state.u.clamp(self.safe[0], self.safe[1]);
+                let q = derivatives(&self.piece, u);
+                let (square, slope) = (dot(&q[1], &q[1]), 2.0 * dot(&q[1], &q[2]));
+                let a = 0.5 * line.slope / square.sqrt();
+                [line.at(state.u).sqrt(), a, -0.5 * a * slope / square * (line.at(u) / square).sqrt()]
+            }
+            Law::Flat { .. } => [0.0; 3],
+        };
+        let along = |size: f64| direction.map(|x| x * size);
+        Rates { velocity: along(v), acceleration: along(a), jerk: along(j) }
+    }
+
+    fn at_speed(&self, line: &Line, u: f64, q: &[[f64; M]; 4]) -> Rates<M> {
+        let [square, slope, bend] = match &self.tip {
+            Some(tip) => [0, 1, 2].map(|order| tip[order].value(u / self.piece.width)),
+            None => {
+                let bend = 2.0 * (dot(&q[2], &q[2]) + dot(&q[1], &q[3]));
+                [dot(&q[1], &q[1]), 2.0 * dot(&q[1], &q[2]), bend]
+            }
+        };
+        let p = line.at(u) / square;
+        let s = (line.slope - p * slope) / (2.0 * square);
+        rates(q, p.sqrt(), s, -(4.0 * s * slope + p * bend) / (2.0 * square))
+    }
+
+    /// From the derivatives q at the place itself and those `there`, at a place where all quotients have digits.
+    fn by_axis(
+        &self,
+        law: &AxisLaw,
+        state: &State,
+        q: &[[f64; M]; 4],
+        at: f64,
+        there: &[[f64; M]; 4],
+    ) -> Rates<M> {
+        let k = law.k;
+        let near = if at == state.u { *state } else { law.at(&self.arc, at) };
+        let (root, g) = (near.v / near.g, law.sign * near.g);
+        let p = root * root;
+        let s = (law.acceleration - there[2][k] * p) / g;
+        let ds = -(there[3][k] * p + 3.0 * there[2][k] * s) / g;
+        let mut rates = if at == state.u {
+            rates(q, root, s, ds)
+        } else if law.ends[usize::from(at < state.u)] == End::Cusp {
+            // All axes move in proportion there.
+            Rates { velocity: there[1].map(|q| q / near.g * state.v), ..rates(there, root, s, ds) }
+        } else {
+            let off = state.u - at;
+            rates(q, (p + off * (2.0 * s + off * ds)).max(0.0).sqrt(), s + off * ds, ds)
+        };
+        rates.velocity[k] = law.sign * state.v;
+        rates.acceleration[k] = law.acceleration;
+        rates.jerk[k] = 0.0;
+        rates
+    }
+}
+
+/// Velocity, acceleration and jerk from q and its derivatives by u, and √p, s and s'.
+#[inline(always)]
+fn rates<const M: usize>(q: &[[f64; M]; 4], root: f64, s: f64, ds: f64) -> Rates<M> {
+    let p = root * root;
+    Rates {
+        velocity: q[1].map(|q| q * root),
+        acceleration: std::array::from_fn(|l| q[1][l] * s + q[2][l] * p),
+        jerk: std::array::from_fn(|l| root * (q[1][l] * ds + 3.0 * q[2][l] * s + q[3][l] * p)),
+    }
+}
