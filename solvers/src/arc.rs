@@ -258,7 +258,8 @@ mod tests {
             let (pieces, deviation) = arc_pieces(&arc, 0.05).unwrap();
             let found = sampled_deviation(&arc, &pieces);
             assert!(found <= deviation + 1e-12, "{found} {deviation} {arc:?}");
-            assert!(deviation < 1e-6 || found >= 0.9 * deviation, "{found} of {deviation} {arc:?}");
+            // What the bound has beside g is d²/2r, at most 3e-6 here.
+            assert!(found >= 0.9 * deviation - 4e-6, "{found} of {deviation} {arc:?}");
             greatest = greatest.max(deviation);
             assert_eq!(pieces[pieces.len() - 1].control[2], arc.end);
             assert_smooth(&pieces, 1e-10);
