@@ -140,6 +140,8 @@ def build_path(
     spline_pieces: NDArray[np.int64],
     splines: tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.int64], NDArray[np.float64]]
     | None,
+    change_move: NDArray[np.int64],
+    change_start: NDArray[np.float64],
     joints: NDArray[np.bool_],
     max_velocity: NDArray[np.float64],
     max_acceleration: NDArray[np.float64],

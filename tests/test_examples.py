@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from feedplan.machine.along import positions
 from feedplan.machine.machine import Machine
-from feedplan.machine.words import Meaning, axis_words
+from feedplan.machine.meaning import Meaning
+from feedplan.machine.words import axis_words
 from feedplan.program.gcode import read_gcode
 from feedplan.program.program import Program
 

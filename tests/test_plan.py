@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from feedplan.audit import audit
-from feedplan.errors import ProgramError
 from feedplan.machine.machine import Machine
 from feedplan.plan import Plan, plan
 

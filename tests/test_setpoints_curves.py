@@ -227,7 +227,7 @@ def test_a_higher_degree_changes_no_setpoint(interpolator: str, seed: int) -> No
     profile = planned(problem)
     period = profile.time / 397.3
     plain = setpoints(problem, profile, period, interpolator).all()
-    for degree in range(3, 11):
+    for degree in range(3, 10):
         raised = replace(problem, path=replace(problem.path, curve=problem.curve.elevated(degree)))
         chunk = setpoints(raised, profile, period, interpolator).all()
         np.testing.assert_array_equal(chunk.piece, plain.piece)
@@ -281,7 +281,7 @@ def test_planned_curves_are_sampled_within_their_limits(interpolator: str, seed:
 
 
 @INTERPOLATOR
-@pytest.mark.parametrize("degree", [3, 6, 10])
+@pytest.mark.parametrize("degree", [3, 6, 9])
 def test_a_curved_cusp_is_reached_and_left_at_rest(interpolator: str, degree: int) -> None:
     # (s², s³) on s = u − 1 with x slowing down to rest at s = 0 and speeding up again: x = a τ²/2 from there.
     curve = CompositeCurve.from_bezier([[1.0, -1], [-1 / 3, 1], [-1 / 3, -1], [1, 1]], width=2.0)

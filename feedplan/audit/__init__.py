@@ -281,9 +281,9 @@ _PROFILE = {
     **_dtypes(np.int64, "runs"),
 }
 _PROGRAM = {
-    **_dtypes(np.float64, "start", "target", "arc_centre", "arc_angle"),
+    **_dtypes(np.float64, "start", "target", "arc_centre", "arc_angle", "change_start"),
     **_dtypes(np.int32, "line"),
-    **_dtypes(np.int64, "arc_move", "spline_move", "spline_pieces"),
+    **_dtypes(np.int64, "arc_move", "spline_move", "spline_pieces", "change_move"),
     **_dtypes(np.uint8, "arc_normal"),
 }
 

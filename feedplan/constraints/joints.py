@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import groupby, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +21,10 @@ from feedplan.errors import InputError
 from feedplan.geometry.path import Path
 from feedplan.machine.along import derivatives, positions
 from feedplan.machine.machine import Machine
+from feedplan.machine.meaning import Meaning
 from feedplan.machine.proxies import Proxies, build_proxies
 from feedplan.machine.survey import JointPath, survey
-from feedplan.machine.words import AxisWords, Meaning, axis_words
+from feedplan.machine.words import AxisWords, axis_words
 
 Array = NDArray[np.float64]
 # Part of an acceleration limit by which the stand-ins may be off.
@@ -60,16 +62,18 @@ def joint_motion(path: Path, machine: Machine, feed: Array) -> JointMotion:
 
     Raises InputError where the tool passes a singular position or a joint leaves its travel, with the line.
     """
-    words = tuple(_words(path, machine, run) for run in range(len(path.runs) - 1))
+    runs = [_words(path, machine, run) for run in range(len(path.runs) - 1)]
     stretches: list[_Stretch] = []
-    first, start = 0, None
-    for run in range(1, len(words) + 1):
-        if run < len(words) and words[run] == words[first]:
-            continue
-        pieces = slice(int(path.runs[first]), int(path.runs[run]))
-        make = _affine if words[first].kinematics.affine else _curved
-        stretches.append(make(path, machine, words[first], pieces, feed, start))
-        first, start = run, stretches[-1].joints.control_points[-1]
+    words: list[AxisWords] = []
+    start = None
+    for own, group in groupby(runs):
+        first = len(words)
+        words += group
+        pieces = np.arange(path.runs[first], path.runs[len(words)])
+        stretch = _posed(_Task(path, machine, own, pieces, feed, start))
+        words[first:] = [stretch.words] * (len(words) - first)
+        stretches.append(stretch)
+        start = stretch.joints.control_points[-1]
     piece = np.concatenate([stretch.piece for stretch in stretches])
     joints = CompositeCurve.joined([stretch.joints for stretch in stretches], math.inf)
     speeds = [stretch.speed for stretch in stretches]
@@ -79,13 +83,36 @@ def joint_motion(path: Path, machine: Machine, feed: Array) -> JointMotion:
         np.concatenate([[0], np.cumsum(counts)]),
     )
     tool = CompositeCurve.joined([stretch.tool for stretch in stretches], math.inf)
-    return JointMotion(path.cut(tool, piece), joints, tip_speed, words)
+    return JointMotion(path.cut(tool, piece), joints, tip_speed, tuple(words))
+
+
+@dataclass(frozen=True)
+class _Task:
+    """Pieces of neighbouring runs under one kinematics; the joints are at `start` before them."""
+
+    path: Path
+    machine: Machine
+    words: AxisWords
+    pieces: NDArray[np.int64]
+    feed: Array
+    start: Array | None
+
+    def line(self, piece: int) -> int:
+        """Source line of one of the pieces."""
+        return int(self.path.line[self.pieces[piece]])
+
+    def linear(self, curve: CompositeCurve) -> CompositeCurve:
+        """The motion in X, Y and Z alone; at rest in X where the path has none of them."""
+        columns = [column for column, name in enumerate(self.path.axes) if name in "XYZ"]
+        points = curve.control_points[:, columns] if columns else np.zeros((len(curve.control_points), 1))
+        return replace(curve, control_points=points)
 
 
 @dataclass(frozen=True)
 class _Stretch:
     """Joint motion of neighbouring runs under one kinematics: `piece` of the path, its parts as `tool`."""
 
+    words: AxisWords
     piece: NDArray[np.int64]
     tool: CompositeCurve
     joints: CompositeCurve
@@ -102,71 +129,107 @@ def _words(path: Path, machine: Machine, run: int) -> AxisWords:
     )
 
 
-def _affine(
-    path: Path, machine: Machine, words: AxisWords, pieces: slice, feed: Array, start: Array | None
-) -> _Stretch:
-    """Joints that are sums of the path's axes: their control points are, too."""
-    tool = path.curve[pieces]
+def _posed(task: _Task) -> _Stretch:
+    """The stretch; a tool direction takes the pose nearest the joints before, at first one that can go on."""
+    make = _affine if task.words.kinematics.affine else _curved
+    words, start = task.words, task.start
+    if words.meaning is not Meaning.VECTOR:
+        return make(task)
+    poses = [words, words.other_pose]
+    if start is not None:
+        curve = task.path.curve
+        tip = words.tip(curve.control_points[curve.offsets[task.pieces[0]]][None])
+        rotary = np.array(words.kinematics.rotary)
+        turns = [(positions(pose.kinematics, tip)[0] - start)[rotary] for pose in poses]
+        away = [float(np.abs((turn + 180.0) % 360.0 - 180.0).sum()) for turn in turns]
+        return make(replace(task, words=poses[int(np.argmin(away))]))
+    try:
+        return make(task)
+    except InputError as fault:
+        try:
+            return make(replace(task, words=poses[1]))
+        except InputError:
+            raise fault from None
+
+
+def _affine(task: _Task) -> _Stretch:
+    """Joints that are sums of the path's axes: their control points are, too.
+
+    Rational pieces get polynomials all the same, so that |C'|² and the joints belong to one parameter.
+    """
+    tool, words, machine = task.path.curve.take(task.pieces), task.words, task.machine
+    rational = tool.rational
+    if rational.any():
+        curved = _curved(replace(task, pieces=task.pieces[rational]))
+        if rational.all():
+            return curved
+        return _in_order([_affine(replace(task, pieces=task.pieces[~rational])), curved])
+    tool = replace(tool, weights=None)
     tips = replace(tool, control_points=words.tip(tool.control_points))
     joints = replace(tool, control_points=positions(words.kinematics, tips.control_points))
     travel = np.array([axis.travel for axis in machine.axes])
     if ((joints.control_points < travel[:, 0]) | (joints.control_points > travel[:, 1])).any():
-        _survey(path, machine, words, pieces, tips, start)
-    linear = tool if words.meaning is Meaning.JOINTS else _linear(path, tool)
+        _survey(task, tips)
+    linear = tool if words.meaning is Meaning.JOINTS else task.linear(tool)
     speed = _either(TipSpeed(*speed_squares(linear)), TipSpeed(*speed_squares(tool)), _moving(linear))
-    return _Stretch(np.arange(pieces.start, pieces.stop), tool, joints, speed)
+    return _Stretch(words, task.pieces, tool, joints, speed)
 
 
-def _survey(
-    path: Path,
-    machine: Machine,
-    words: AxisWords,
-    pieces: slice,
-    tips: CompositeCurve,
-    start: Array | None,
-) -> JointPath:
+def _in_order(stretches: list[_Stretch]) -> _Stretch:
+    """Stretches whose pieces lie between one another as one."""
+    piece = np.concatenate([stretch.piece for stretch in stretches])
+    order = np.argsort(piece, kind="stable")
+    tool, joints = (
+        CompositeCurve.joined([getattr(stretch, name) for stretch in stretches], math.inf).take(order)
+        for name in ("tool", "joints")
+    )
+    rows = [
+        stretch.speed.coefficients[first:last]
+        for stretch in stretches
+        for first, last in pairwise(stretch.speed.offsets.tolist())
+    ]
+    speed = _joined_speed([rows[i] for i in order.tolist()])
+    return _Stretch(stretches[0].words, piece[order], tool, joints, speed)
+
+
+def _survey(task: _Task, tips: CompositeCurve) -> JointPath:
     """The joints along pieces of one degree; InputError names the first place that they cannot pass."""
     tips = tips.elevated(int(tips.degree.max()))
-    travel = [axis.travel for axis in machine.axes]
-    route = survey(words.kinematics, tips.by_piece, tips.width, travel, tips.weights_by_piece, start)
+    kinematics, travel = task.words.kinematics, [axis.travel for axis in task.machine.axes]
+    route = survey(kinematics, tips.by_piece, tips.width, travel, tips.weights_by_piece, task.start)
     if route.places:
         place = route.places[0]
-        raise InputError(place.sentence(words.kinematics, int(path.line[pieces.start + place.piece])))
+        raise InputError(place.sentence(kinematics, task.line(place.piece)))
     return route
 
 
-def _curved(
-    path: Path, machine: Machine, words: AxisWords, pieces: slice, feed: Array, start: Array | None
-) -> _Stretch:
+def _curved(task: _Task) -> _Stretch:
     """Joints by polynomials that stand in for K of the tool's pieces."""
-    kinematics, curve = words.kinematics, path.curve[pieces]
-    tips = replace(curve, control_points=words.tip(curve.control_points))
+    kinematics, curve = task.words.kinematics, task.path.curve.take(task.pieces)
+    tips = replace(curve, control_points=task.words.tip(curve.control_points))
     tips = tips.elevated(int(tips.degree.max()))
     control, width, weights = tips.by_piece, tips.width, tips.weights_by_piece
-    route = _survey(path, machine, words, pieces, tips, start)
-    linear = _linear(path, curve)
+    route = _survey(task, tips)
+    linear = task.linear(curve)
     moves = _moving(linear)
-    allowed = _Allowed(machine, words, tips, linear, moves, feed[pieces])
+    allowed = _Allowed(task, tips, linear, moves)
     proxies = build_proxies(kinematics, control, width, allowed, NODES, weights)
     near = np.isinf(proxies.curvature_error).any(axis=1)
     if near.any():
-        line = int(path.line[pieces.start + proxies.piece[near.argmax()]])
+        line = task.line(int(proxies.piece[near.argmax()]))
         raise InputError(
-            f"line {line}: the tool passes so near a singular position of machine {machine.name} that its "
-            "joints cannot be followed: keep the path farther off it"
+            f"line {line}: the tool passes so near a singular position of machine {task.machine.name} that "
+            "its joints cannot be followed: keep the path farther off it"
         )
     tool = curve.split(proxies.piece, proxies.part[:, 0] * width[proxies.piece]).with_width(proxies.width)
-    joints = _joint_pieces(proxies, route)
-    turning = replace(joints, control_points=joints.control_points[:, np.array(kinematics.rotary)])
-    speed = _either(_tool_speed(_linear(path, tool)), TipSpeed(*speed_squares(turning)), moves[proxies.piece])
-    return _Stretch(proxies.piece + pieces.start, tool, joints, speed)
-
-
-def _linear(path: Path, curve: CompositeCurve) -> CompositeCurve:
-    """The motion in X, Y and Z alone; at rest in X where the path has none of them."""
-    columns = [column for column, name in enumerate(path.axes) if name in "XYZ"]
-    points = curve.control_points[:, columns] if columns else np.zeros((len(curve.control_points), 1))
-    return replace(curve, control_points=points)
+    joints = _joint_pieces(proxies, task.pieces[proxies.piece], route)
+    speed = _tool_speed(task.linear(tool))
+    if not moves.all():
+        rotary = np.array(kinematics.rotary)
+        columns = rotary if rotary.any() else ~rotary
+        turning = replace(joints, control_points=joints.control_points[:, columns])
+        speed = _either(speed, TipSpeed(*speed_squares(turning)), moves[proxies.piece])
+    return _Stretch(task.words, task.pieces[proxies.piece], tool, joints, speed)
 
 
 def _moving(curve: CompositeCurve) -> NDArray[np.bool_]:
@@ -180,15 +243,13 @@ def _moving(curve: CompositeCurve) -> NDArray[np.bool_]:
 class _Allowed:
     """How far q'' may be off on parts of pieces; nothing where |C'|² would not be met."""
 
-    machine: Machine
-    words: AxisWords
+    task: _Task
     tips: CompositeCurve
     linear: CompositeCurve
     moves: NDArray[np.bool_]
-    feed: Array
 
     def __call__(self, piece: NDArray[np.int64], part: Array) -> Array:
-        acceleration = np.array([axis.max_acceleration for axis in self.machine.axes])
+        acceleration = np.array([axis.max_acceleration for axis in self.task.machine.axes])
         allowed: Array = SHARE * acceleration / self._rate_sq(piece, part)[:, None]
         allowed[~self._speed_is_met(piece, part)] = 0.0
         return allowed
@@ -198,14 +259,14 @@ class _Allowed:
         weights = self.tips.weights_by_piece
         own = None if weights is None else weights[piece]
         control, width = self.tips.by_piece[piece], self.tips.width[piece]
-        limit = np.array([axis.max_velocity for axis in self.machine.axes])
+        limit = np.array([axis.max_velocity for axis in self.task.machine.axes])
         greatest = np.zeros(len(piece))
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             for t in np.linspace(0.0, 1.0, PLACES):
                 fraction = part[:, 0] + t * (part[:, 1] - part[:, 0])
-                slope = derivatives(self.words.kinematics, control, width, fraction, 1, own)[1]
+                slope = derivatives(self.task.words.kinematics, control, width, fraction, 1, own)[1]
                 tangent = self.linear.evaluate(piece, fraction * width, 1)[1]
-                along = self.feed[piece] ** 2 / (tangent**2).sum(axis=1)
+                along = self.task.feed[self.task.pieces[piece]] ** 2 / (tangent**2).sum(axis=1)
                 at_velocity = (limit / np.abs(slope)).min(axis=1) ** 2
                 here = np.minimum(at_velocity, np.where(self.moves[piece], along, np.inf))
                 greatest = np.fmax(greatest, np.where(np.isfinite(here), here, 0.0))
@@ -230,14 +291,15 @@ class _Allowed:
         return square
 
 
-def _joint_pieces(proxies: Proxies, route: JointPath) -> CompositeCurve:
+def _joint_pieces(proxies: Proxies, piece: NDArray[np.int64], route: JointPath) -> CompositeCurve:
     """The integrals of the slopes, each from the joints' true position at its start to that of the next."""
     slope, count = proxies.slope, len(proxies)
     degree = slope.shape[1]
     start = route.positions(proxies.piece, proxies.part[:, 0])
     steps = np.cumsum(slope, axis=1) * (proxies.width / degree)[:, None, None]
     points = np.concatenate([start[:, None], start[:, None] + steps], axis=1)
-    points[:-1, -1] = points[1:, 0]
+    on = np.flatnonzero(np.diff(piece) <= 1)
+    points[on, -1] = points[on + 1, 0]
     return CompositeCurve.from_pieces(points.reshape(count, degree + 1, -1), proxies.width)
 
 
@@ -260,4 +322,8 @@ def _either(first: TipSpeed, second: TipSpeed, chosen: NDArray[np.bool_]) -> Tip
         speed.coefficients[speed.offsets[i] : speed.offsets[i + 1]]
         for i, speed in enumerate(first if own else second for own in chosen)
     ]
+    return _joined_speed(rows)
+
+
+def _joined_speed(rows: list[Array]) -> TipSpeed:
     return TipSpeed(np.concatenate(rows), np.concatenate([[0], np.cumsum([len(row) for row in rows])]))

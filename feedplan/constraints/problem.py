@@ -25,10 +25,8 @@ NO_FEED = 1e9
 
 @dataclass(frozen=True)
 class TipSpeed:
-    """|C'(u)|² ω⁴ of the tool as a polynomial on each piece.
-
-    Bernstein `coefficients` (total,), those of piece i from `offsets[i]` to `offsets[i + 1]`; ω is the weight
-    function of the joints' piece over its first weight, 1 where that is polynomial."""
+    """|C'(u)|² of the tool as a polynomial on each piece: Bernstein `coefficients` (total,), those of piece i
+    from `offsets[i]` to `offsets[i + 1]`."""
 
     coefficients: NDArray[np.float64]
     offsets: NDArray[np.int64]

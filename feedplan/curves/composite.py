@@ -235,6 +235,22 @@ class CompositeCurve:
             self.width[pieces],
         )
 
+    def take(self, pieces: NDArray[np.integer]) -> CompositeCurve:
+        """These pieces (m,) in this order, whether or not they meet."""
+        counts = np.diff(self.offsets)[pieces]
+        offsets = np.concatenate([[0], np.cumsum(counts)])
+        own = np.repeat(self.offsets[pieces] - offsets[:-1], counts) + np.arange(offsets[-1])
+        weights = None if self.weights is None else self.weights[own]
+        return CompositeCurve(self.control_points[own], weights, offsets, self.width[pieces])
+
+    @property
+    def rational(self) -> NDArray[np.bool_]:
+        """Which pieces are rational with weights that differ (n,)."""
+        if self.weights is None:
+            return np.zeros(len(self), dtype=bool)
+        first = np.repeat(self.weights[self.offsets[:-1]], np.diff(self.offsets))
+        return np.logical_or.reduceat(self.weights != first, self.offsets[:-1])
+
     @property
     def axes(self) -> int:
         """Number of axes."""

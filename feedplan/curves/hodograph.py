@@ -13,32 +13,20 @@ Array = NDArray[np.float64]
 
 
 def speed_squares(curve: CompositeCurve) -> tuple[Array, NDArray[np.int64]]:
-    """Bernstein coefficients (total,) of |C'(u)|² ω⁴ on each piece and their offsets (n + 1,).
-
-    ω is the weight function divided by the piece's first weight; 1 where a piece is polynomial.
-    """
-    degree = curve.degree
-    weights = np.ones(len(curve.control_points)) if curve.weights is None else curve.weights
-    first = curve.offsets[:-1]
-    even = np.logical_and.reduceat(weights == np.repeat(weights[first], degree + 1), first)
-    offsets = np.concatenate([[0], np.cumsum(np.where(even, 2 * degree - 1, 4 * degree - 3))])
+    """Bernstein coefficients (total,) of |C'(u)|² on polynomial pieces, and their offsets (n + 1,)."""
+    degree, first = curve.degree, curve.offsets[:-1]
+    offsets = np.concatenate([[0], np.cumsum(2 * degree - 1)])
     result = np.zeros(int(offsets[-1]))
     for d in np.unique(degree).tolist():
-        for polynomial in (True, False):
-            rows = np.flatnonzero((degree == d) & (even == polynomial))
-            if not len(rows):
-                continue
-            own = first[rows][:, None] + np.arange(d + 1)
-            # About the first point, for the digits.
-            points = curve.control_points[own] - curve.control_points[first[rows]][:, None]
-            if polynomial:
-                slope = _scaled(d * np.diff(points, axis=1))
-            else:
-                weight = weights[own][..., None] / weights[first[rows]][:, None, None]
-                slope = _wronskian(_scaled(points * weight), _scaled(weight))
-            square = _product(slope, slope).sum(axis=2)
-            square /= _binomials(square.shape[1] - 1) * curve.width[rows][:, None] ** 2
-            result[offsets[rows][:, None] + np.arange(square.shape[1])] = square
+        rows = np.flatnonzero(degree == d)
+        points = curve.control_points[first[rows][:, None] + np.arange(d + 1)]
+        slope = d * np.diff(points, axis=1) / curve.width[rows][:, None, None]
+        # Scaled by binomials a product is a convolution.
+        scaled = slope * _binomials(d - 1)[:, None]
+        square = np.zeros((len(rows), 2 * d - 1))
+        for i in range(d):
+            square[:, i : i + d] += (scaled[:, i : i + 1] * scaled).sum(axis=2)
+        result[offsets[rows][:, None] + np.arange(2 * d - 1)] = square / _binomials(2 * d - 2)
     return result, offsets
 
 
@@ -71,26 +59,3 @@ def chebyshev(count: int) -> Array:
 
 def _binomials(degree: int) -> Array:
     return np.array([math.comb(degree, i) for i in range(degree + 1)], dtype=np.float64)
-
-
-def _scaled(bernstein: Array) -> Array:
-    """Bernstein coefficients (n, d + 1, axes) times binomials: products are then convolutions."""
-    scaled: Array = bernstein * _binomials(bernstein.shape[1] - 1)[:, None]
-    return scaled
-
-
-def _product(a: Array, b: Array) -> Array:
-    result = np.zeros((len(a), a.shape[1] + b.shape[1] - 1, a.shape[2]))
-    for i in range(a.shape[1]):
-        result[:, i : i + b.shape[1]] += a[:, i : i + 1] * b
-    return result
-
-
-def _wronskian(p: Array, q: Array) -> Array:
-    """p' q − p q' of scaled coefficients of one degree n, itself of degree 2 n − 2."""
-    n = p.shape[1] - 1
-    result = np.zeros((len(p), 2 * n - 1, p.shape[2]))
-    for a in range(n + 1):
-        for b in range(a + 1, n + 1):
-            result[:, a + b - 1] += (b - a) * (p[:, b] * q[:, a] - p[:, a] * q[:, b])
-    return result

@@ -95,15 +95,17 @@ def build_path(
         )
     words = path_words(program, machine)
     columns, names = words.columns, words.names
+    starts = program.starts()
     start = np.ascontiguousarray(program.start[columns])
     target = np.ascontiguousarray(program.target[:, columns])
+    changed = program.change_start.reshape(-1, len(program.axes))[:, columns]
     arc_plane = _arc_planes(program, names)
-    splines = _splines(program, columns)
+    splines = _splines(program, columns, starts)
     limit, fit_limit = _tolerances(program, tolerance, settings)
     exact = settings.exact_tolerance if not tolerance else min(tolerance, settings.exact_tolerance)
     halt = program.stop | (program.dwell > 0) | (program.control == PathControl.EXACT_STOP)
     halt[:-1] |= words.changes
-    feed = _feed_in_all_axes(program, start, target, names)
+    feed = _feed_in_all_axes(program, starts, columns, names)
     if not words.joints.all():
         feed = np.where(words.joints, feed, program.feed)
 
@@ -124,6 +126,8 @@ def build_path(
         np.ascontiguousarray(program.spline_move, dtype=np.int64),
         np.ascontiguousarray(program.spline_pieces, dtype=np.int64),
         splines,
+        np.ascontiguousarray(program.change_move, dtype=np.int64),
+        np.ascontiguousarray(changed),
         words.joints,
         words.max_velocity,
         words.max_acceleration,
@@ -162,7 +166,7 @@ def build_path(
 
 
 def _splines(
-    program: Program, columns: list[int]
+    program: Program, columns: list[int], starts: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.int64], NDArray[np.float64]] | None:
     """The program's splines in the axes of the path, from exactly where moves start to their targets."""
     if program.splines is None or len(program.spline_move) == 0:
@@ -173,10 +177,10 @@ def _splines(
     first, last = curve.offsets[:-1], curve.offsets[1:] - 1
     given = control[first].copy()
     control[first[1:]] = control[last[:-1]]
-    places = np.vstack([program.start, program.target])[:, columns]
-    control[first[pieces[:-1]]] = places[move]
-    end_missed = np.abs(control[last[pieces[1:] - 1]] - places[move + 1]).max(axis=1, initial=0.0)
-    control[last[pieces[1:] - 1]] = places[move + 1]
+    control[first[pieces[:-1]]] = starts[move][:, columns]
+    ends = program.target[move][:, columns]
+    end_missed = np.abs(control[last[pieces[1:] - 1]] - ends).max(axis=1, initial=0.0)
+    control[last[pieces[1:] - 1]] = ends
     start_missed = np.abs(control[first] - given).max(axis=1, initial=0.0)
     for missed, owner in (
         (start_missed, np.searchsorted(pieces, np.arange(len(first)), side="right") - 1),
@@ -222,7 +226,7 @@ def _tolerances(
 
 
 def _feed_in_all_axes(
-    program: Program, start: NDArray[np.float64], target: NDArray[np.float64], names: tuple[str, ...]
+    program: Program, starts: NDArray[np.float64], columns: list[int], names: tuple[str, ...]
 ) -> NDArray[np.float64]:
     """Feeds as speeds in all axes together: the speed at which the axes that a feed counts along have it."""
     groups = [
@@ -231,12 +235,12 @@ def _feed_in_all_axes(
     ]
     if len(groups[0]) == len(names):
         return program.feed
-    step = np.diff(target, axis=0, prepend=start[None])
+    step = (program.target - starts)[:, columns]
     length_sq = step**2
     # Along an arc the plane axes move by more than the chord says.
     arc = program.arc_move
     linear = [program.axes.index(letter) for letter in LINEAR_AXES]
-    arc_start = np.vstack([program.start, program.target])[arc][:, linear]
+    arc_start = starts[arc][:, linear]
     spoke = np.take_along_axis(arc_start - program.arc_centre, _plane_letters(program), axis=1)
     radius = np.linalg.norm(spoke, axis=1)
     planes = _arc_planes(program, names)

@@ -74,6 +74,8 @@ def path_of_points(
         np.empty(0, dtype=np.int64),
         np.zeros(1, dtype=np.int64),
         None,
+        np.empty(0, dtype=np.int64),
+        np.empty((0, width)),
         np.ones(count, dtype=np.bool_),
         np.full(width, _ANY_SPEED),
         np.full(width, _ANY_ACCELERATION),

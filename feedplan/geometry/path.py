@@ -51,7 +51,7 @@ class Path:
     follows; `line` (n,) source line of the first; `runs` (r + 1,) piece offsets: the tool stands still at the
     start and the end of each run; `dwell` (r,) pause after each run [s]; `tolerance` (n,) allowed distance
     from the programmed path [mm]; `start_dwell` pause before the first run [s].
-    `meaning` (r,) what the axes are on the machine in each run (`feedplan.machine.words.Meaning`) and
+    `meaning` (r,) what the axes are on the machine in each run (`feedplan.machine.meaning.Meaning`) and
     `tool_length` (r,) [mm], NaN for the machine file's; None where the machine knows one meaning only.
     Within a run the tangent is continuous, unless corners are passed with a velocity jump.
     """
@@ -178,6 +178,17 @@ class Path:
     def width(self) -> NDArray[np.float64]:
         """The parameter interval of each piece (n,) [mm: about the length]."""
         return self.curve.width
+
+    @property
+    def new_words(self) -> NDArray[np.bool_]:
+        """(r,) whether the axes of a run mean something else than those of the run before."""
+        new = np.zeros(len(self.runs) - 1, dtype=bool)
+        if self.meaning is not None:
+            new[1:] |= np.diff(self.meaning) != 0
+        if self.tool_length is not None:
+            length = np.nan_to_num(self.tool_length, nan=-1.0)
+            new[1:] |= np.diff(length) != 0
+        return new
 
     def cut(self, curve: CompositeCurve, piece: NDArray[np.int64]) -> Path:
         """The same path with pieces cut: `curve` are the parts in order, `piece` (m,) what they are of."""

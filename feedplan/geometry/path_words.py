@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from feedplan.errors import MachineError
 from feedplan.machine.machine import MAX_AXES, Machine
-from feedplan.machine.words import Meaning, axis_words
+from feedplan.machine.meaning import Meaning
 from feedplan.program.program import Program
 
 LINEAR_AXES = "XYZ"
@@ -100,14 +100,15 @@ def _letters(machine: Machine, meaning: Meaning) -> tuple[str, ...]:
         return machine.axis_names
     if meaning is Meaning.TIP:
         return machine.inverse.tip_names
+    # Kinematics are loaded where they are needed.
+    from feedplan.machine.words import axis_words
+
     return axis_words(machine, ("I", "J", "K"), meaning).kinematics.tip_names
 
 
 def _moving_letters(program: Program) -> NDArray[np.bool_]:
     """(n, axes) which moves move which letters."""
-    moves = np.empty(program.target.shape, dtype=np.bool_)
-    moves[:1] = program.target[:1] != program.start
-    np.not_equal(program.target[1:], program.target[:-1], out=moves[1:])
+    moves: NDArray[np.bool_] = program.target != program.starts()
     for column, name in enumerate(LINEAR_AXES):
         moves[program.arc_move[program.arc_normal != column], program.axes.index(name)] = True
     if program.splines is not None and len(program.spline_move):

@@ -8,8 +8,7 @@ leaves the tool length offset out of them, and adds work offsets, also of rotary
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from enum import IntEnum
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,20 +16,10 @@ from numpy.typing import NDArray
 from feedplan.errors import MachineError
 from feedplan.machine.kinematics import Kinematics
 from feedplan.machine.machine import Machine
+from feedplan.machine.meaning import Meaning
 from feedplan.machine.rotary import RotaryChain, ToolVector
 
 DIRECTION = ("I", "J", "K")
-
-
-class Meaning(IntEnum):
-    """Of axis words."""
-
-    # Every word is the position of the joint of its letter.
-    JOINTS = 0
-    # X, Y, Z are the tip on the part, rotary words the angles of the rotary joints (G43.4).
-    TIP = 1
-    # X, Y, Z are the tip on the part, I, J, K the tool's direction (G43.5).
-    VECTOR = 2
 
 
 @dataclass(frozen=True)
@@ -44,6 +33,12 @@ class AxisWords:
     kinematics: Kinematics
     column: tuple[int, ...]
     held: tuple[float, ...]
+
+    @property
+    def other_pose(self) -> AxisWords:
+        """The same by the other pose that points the tool along a direction."""
+        assert isinstance(self.kinematics, ToolVector)
+        return replace(self, kinematics=replace(self.kinematics, side=-self.kinematics.side))
 
     def tip(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """What `kinematics` takes (…, tip axes), from points or Bézier points (…, program axes)."""

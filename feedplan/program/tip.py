@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from feedplan.errors import MachineError
 from feedplan.machine.machine import AXIS_LETTERS, Machine
+from feedplan.machine.meaning import Meaning
 from feedplan.machine.rotary import RotaryChain, ToolVector, shortest_turn
-from feedplan.machine.words import Meaning
 
 # Sine of the angle up to which the tool counts as parallel to a rotary axis.
 _PARALLEL = 1e-9

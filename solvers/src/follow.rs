@@ -43,6 +43,8 @@ pub struct Moves<'a, const M: usize> {
     pub arcs: &'a [(usize, ArcShape)],
     /// Spline moves, ascending, with the pieces of `splines` that they take, from the start to the target.
     pub spline_moves: &'a [(usize, Range<usize>)],
+    /// Moves that begin elsewhere than the one before ends, ascending, and where: there the axes mean something else.
+    pub changes: &'a [(usize, [f64; M])],
     pub splines: &'a CompositeCurve<M>,
     /// The coordinates are positions of joints, which have a travel.
     pub joints: &'a [bool],
@@ -126,7 +128,9 @@ enum Span {
 impl<const M: usize> Moves<'_, M> {
     /// Where move `i` begins.
     fn origin(&self, i: usize) -> [f64; M] {
-        if i == 0 {
+        if let Ok(row) = self.changes.binary_search_by_key(&i, |change| change.0) {
+            self.changes[row].1
+        } else if i == 0 {
             self.start
         } else {
             self.target[i - 1]
@@ -373,6 +377,7 @@ mod tests {
             halt,
             arcs: &[],
             spline_moves: &[],
+            changes: &[],
             splines: &CompositeCurve::default(),
             joints: &vec![true; target.len()],
         };
@@ -443,6 +448,7 @@ mod tests {
             halt: &[false; 5],
             arcs: &[],
             spline_moves: &[],
+            changes: &[],
             splines: &CompositeCurve::default(),
             joints: &[true; 5],
         };

@@ -123,6 +123,7 @@ mod tests {
             halt: &vec![false; count],
             arcs: &[],
             spline_moves: &[],
+            changes: &[],
             splines: &CompositeCurve::default(),
             joints: &vec![true; count],
         };
@@ -189,6 +190,7 @@ mod tests {
             halt: &[false; 3],
             arcs: &[],
             spline_moves: &[(1, 0..3)],
+            changes: &[],
             splines: &splines,
             joints: &[true; 3],
         };

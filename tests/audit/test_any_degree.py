@@ -35,8 +35,8 @@ def rational(curve: CompositeCurve) -> CompositeCurve:
     """The same pieces over the same parameter, numerator and denominator times 1 + t."""
     points = curve.by_piece
     count, degree = points.shape[0], points.shape[1] - 1
-    one = np.ones((count, degree + 1, 1))
-    homogeneous = np.concatenate([points, one], axis=2)
+    one = np.ones((count, degree + 1)) if curve.weights is None else curve.weights_by_piece
+    homogeneous = np.concatenate([points * one[..., None], one[..., None]], axis=2)
     raised = np.zeros((count, degree + 2, points.shape[2] + 1))
     for i in range(degree + 2):
         if i <= degree:

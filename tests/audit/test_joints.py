@@ -18,7 +18,7 @@ from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.machine.along import derivatives
 from feedplan.machine.machine import Machine
-from feedplan.machine.words import Meaning
+from feedplan.machine.meaning import Meaning
 from feedplan.profile import ArcKind, SpeedProfile
 from feedplan.setpoints import SetpointChunk
 from tests.audit.curves import places_at, sampled

@@ -13,7 +13,7 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import Axis, Machine, bundled_machines
-from feedplan.machine.words import Meaning
+from feedplan.machine.meaning import Meaning
 from feedplan.planners import planner
 from tests.planners.excess import worst_excess
 

@@ -89,7 +89,7 @@ def test_two_axes_may_travel_with_a_helix() -> None:
         (lambda: helix([1.0, 0, 0], (0, 0), 1.0, [1.0, 0, 1]), "0 for those of the plane"),
         (
             lambda: helix([1.0, 0, 0], (0, 0), 1.0, [0, 0, 1.0], degree=2),
-            "the degree of the helix is 2: give 3 to 10",
+            "the degree of the helix is 2: give 3 to 9",
         ),
         (lambda: helix([1.0, 0, 0], (0, 0), 1e3, [0, 0, 1e3], degree=3, tolerance=1e-30), "would take"),
     ],

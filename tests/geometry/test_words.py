@@ -11,7 +11,7 @@ import pytest
 from feedplan.errors import InputError, MachineError
 from feedplan.geometry.build import build_path
 from feedplan.machine.machine import Machine, bundled_machines
-from feedplan.machine.words import Meaning
+from feedplan.machine.meaning import Meaning
 from feedplan.program.program import PathControl
 
 SQUARE = [[20, 0], [30, 0], [30, 10], [20, 10], [20, 0]]

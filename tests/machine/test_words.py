@@ -5,7 +5,8 @@ import pytest
 
 from feedplan import Machine, MachineError
 from feedplan.machine.along import derivatives, positions
-from feedplan.machine.words import Meaning, axis_words
+from feedplan.machine.meaning import Meaning
+from feedplan.machine.words import axis_words
 
 
 def test_words_of_a_five_axis_machine_are_joints_until_said_otherwise() -> None:

@@ -108,10 +108,10 @@ def test_both_schemes_close_in_on_the_exact_time(seed: int) -> None:
 def test_both_schemes_close_in_on_the_exact_time_of_joints(name: str) -> None:
     problem = random_problem(name, 1)
     exact = plan(problem).time
-    # The pieces are cut already.
-    few, many = (math.ceil(cells / len(problem.path)) for cells in (1000, 4000))
-    below = [abs(1 - solve(problem, cells).time / exact) for cells in (few, many)]
-    above = [abs(one_sided_time(problem, cells) / exact - 1) for cells in (few, many)]
-    for coarse, fine in (below, above):
-        assert fine < 0.6 * coarse + 1e-7
-        assert fine < 0.01
+    # The pieces are cut already. One error may pass through zero on its way, both together do not.
+    meshes = [math.ceil(cells / len(problem.path)) for cells in (1000, 4000)]
+    coarse, fine = (
+        max(abs(solve(problem, cells).time / exact - 1), abs(one_sided_time(problem, cells) / exact - 1))
+        for cells in meshes
+    )
+    assert fine < 0.6 * coarse < 0.01

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from feedplan.errors import MachineError, ProgramError
 from feedplan.machine.along import positions
 from feedplan.machine.machine import Machine
+from feedplan.machine.meaning import Meaning
 from feedplan.machine.rotary import RotaryChain
-from feedplan.machine.words import Meaning, axis_words
+from feedplan.machine.words import axis_words
 from feedplan.program.gcode import read_gcode
 from feedplan.program.program import Program
 

@@ -34,6 +34,8 @@ pub struct Followed<'a> {
     pub tolerance: &'a [f64],
     /// Piece offsets of the runs.
     pub runs: &'a [i64],
+    /// Of each run: whether its axes mean something else than those of the run before, so that it begins elsewhere.
+    pub new_words: &'a [bool],
     /// Pause before the first run, in s.
     pub start_dwell: f64,
     /// Pause after each run, in s.
@@ -45,6 +47,13 @@ impl<'a> std::ops::Deref for Followed<'a> {
 
     fn deref(&self) -> &Pieces<'a> {
         &self.pieces
+    }
+}
+
+impl Followed<'_> {
+    /// Whether piece `i` begins a run whose axes mean something else than before.
+    pub fn begins_elsewhere(&self, i: usize) -> bool {
+        self.runs.binary_search(&(i as i64)).is_ok_and(|run| self.new_words.get(run) == Some(&true))
     }
 }
 

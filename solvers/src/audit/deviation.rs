@@ -47,7 +47,9 @@ pub fn audit_path<const M: usize>(path: &Followed, arcs: Option<&Arcs>, limits: 
             let start = path.start::<M>(i);
             let rounding = ROUNDINGS * EPS * magnitude(&start);
             let gap = distance(&path.end(i - 1), &start) - rounding;
-            tally.offer(Check::Gap, 0, gap, GAP_TOLERANCE, time, line);
+            if gap <= 0.0 || !path.begins_elsewhere(i) {
+                tally.offer(Check::Gap, 0, gap, GAP_TOLERANCE, time, line);
+            }
         }
         let curve = path.curve::<M>(i);
         for k in 0..path.axes {
@@ -319,6 +321,7 @@ mod tests {
             moves: &[0, 1, 1, 1, 4, 5],
             tolerance: &[],
             runs: &[],
+            new_words: &[],
             start_dwell: 0.0,
             dwell: &[],
         };

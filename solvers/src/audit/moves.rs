@@ -26,6 +26,9 @@ pub struct Programmed<'a> {
     pub spline_move: &'a [i64],
     pub spline_pieces: &'a [i64],
     pub splines: Pieces<'a>,
+    /// Moves that begin elsewhere than the one before ends, in order, and where, axes numbers each.
+    pub change_move: &'a [i64],
+    pub change_start: &'a [f64],
     /// Where X, Y, Z are among the axes.
     pub xyz: [Option<usize>; 3],
 }
@@ -84,7 +87,11 @@ impl<'a> Programmed<'a> {
 
     /// Move `i`.
     pub fn get<const M: usize>(&self, i: usize) -> Move<'a, M> {
-        let (from, to) = (self.end(i.checked_sub(1)), self.end(Some(i)));
+        let from = match self.change_move.binary_search(&(i as i64)) {
+            Ok(row) => vector(self.change_start, self.axes, row),
+            Err(_) => self.end(i.checked_sub(1)),
+        };
+        let to = self.end(Some(i));
         let arc = self.arc_move.binary_search(&(i as i64)).ok().and_then(|row| self.arc(row, &from, &to));
         let shape = match arc {
             Some(arc) => Shape::Arc(arc),
@@ -342,6 +349,8 @@ mod tests {
             spline_move: &[],
             spline_pieces: &[0],
             splines: NONE,
+            change_move: &[],
+            change_start: &[],
             xyz: [Some(0), Some(1), Some(2)],
         }
         .get(0)
@@ -361,6 +370,8 @@ mod tests {
             spline_move: &[],
             spline_pieces: &[0],
             splines: NONE,
+            change_move: &[],
+            change_start: &[],
             xyz: [Some(0), Some(1), None],
         }
         .get::<2>(0);
@@ -388,6 +399,8 @@ mod tests {
                 spline_move: &[],
                 spline_pieces: &[0],
                 splines: NONE,
+                change_move: &[],
+                change_start: &[],
                 xyz: [Some(0), Some(1), Some(2)],
             }
             .get::<3>(0);

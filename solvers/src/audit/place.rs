@@ -266,6 +266,7 @@ mod tests {
         moves: &[0, 0, 1, 1],
         tolerance: &[0.0, 0.0],
         runs: &[0, 2],
+        new_words: &[],
         start_dwell: 0.0,
         dwell: &[0.0],
     };

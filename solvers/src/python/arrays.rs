@@ -1,8 +1,7 @@
 //! numpy arrays to and from the types of the kernels, each length checked once here.
 
 use numpy::{
-    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
-    PyUntypedArrayMethods,
+    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -27,27 +26,6 @@ pub fn row<const M: usize>(array: &PyReadonlyArray1<f64>, rest: f64) -> PyResult
 
 fn padded<const M: usize>(values: &[f64], rest: f64) -> [f64; M] {
     std::array::from_fn(|k| values.get(k).copied().unwrap_or(rest))
-}
-
-/// (n, 3, m) control points and (n,) widths to pieces in M ≥ m axes; the axes beyond m rest at 0.
-pub fn quadratics<const M: usize>(
-    control: &PyReadonlyArray3<f64>,
-    width: &PyReadonlyArray1<f64>,
-) -> PyResult<Vec<Quadratic<M>>> {
-    let flat = control.as_slice().map_err(|_| contiguous())?;
-    let width = width.as_slice().map_err(|_| contiguous())?;
-    let axes = control.shape()[2];
-    if control.shape() != [width.len(), 3, axes] {
-        return Err(PyValueError::new_err("control points and widths differ in number"));
-    }
-    Ok(flat
-        .chunks_exact(3 * axes)
-        .zip(width)
-        .map(|(c, &width)| Quadratic {
-            control: std::array::from_fn(|i| padded(&c[i * axes..(i + 1) * axes], 0.0)),
-            width,
-        })
-        .collect())
 }
 
 /// The first `axes` columns of rows to an (n, axes) array.

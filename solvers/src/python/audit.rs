@@ -89,6 +89,7 @@ struct PathArrays<'py> {
     moves: PyReadonlyArray2<'py, i64>,
     tolerance: PyReadonlyArray1<'py, f64>,
     runs: PyReadonlyArray1<'py, i64>,
+    new_words: PyReadonlyArray1<'py, bool>,
     start_dwell: f64,
     dwell: PyReadonlyArray1<'py, f64>,
 }
@@ -115,6 +116,7 @@ impl ProblemArrays<'_> {
             moves: path.moves.as_slice()?,
             tolerance: path.tolerance.as_slice()?,
             runs: path.runs.as_slice()?,
+            new_words: path.new_words.as_slice()?,
             start_dwell: path.start_dwell,
             dwell: path.dwell.as_slice()?,
         };
@@ -184,6 +186,8 @@ struct ProgramArrays<'py> {
     spline_move: PyReadonlyArray1<'py, i64>,
     spline_pieces: PyReadonlyArray1<'py, i64>,
     splines: Option<CurveArrays<'py>>,
+    change_move: PyReadonlyArray1<'py, i64>,
+    change_start: PyReadonlyArray2<'py, f64>,
 }
 
 impl ProgramArrays<'_> {
@@ -201,6 +205,8 @@ impl ProgramArrays<'_> {
             spline_move: self.spline_move.as_slice()?,
             spline_pieces: self.spline_pieces.as_slice()?,
             splines: self.splines.as_ref().map_or(Ok(none), |splines| splines.pieces("program"))?,
+            change_move: self.change_move.as_slice()?,
+            change_start: self.change_start.as_slice()?,
             xyz: ["X", "Y", "Z"].map(|letter| self.axes.iter().position(|axis| axis == letter)),
         };
         let arcs = program.arc_move.len();
@@ -211,6 +217,7 @@ impl ProgramArrays<'_> {
             && [program.arc_normal.len(), program.arc_angle.len()] == [arcs; 2]
             && program.arc_normal.iter().all(|&normal| normal < 3)
             && program.splines.axes == axes
+            && program.change_start.len() == axes * program.change_move.len()
             && program.spline_pieces.len() == program.spline_move.len() + 1
             && program.spline_pieces.windows(2).all(|pair| 0 <= pair[0] && pair[0] <= pair[1])
             && program.spline_pieces.last().is_some_and(|&last| last <= program.splines.len() as i64);

@@ -54,7 +54,7 @@ type Splines<'py> = (
 #[pyfunction]
 #[pyo3(signature = (
     name, start, kind, target, feed, line, tolerance, fit_tolerance, halt, arc_move, arc_plane, arc_centre,
-    arc_sweep, spline_move, spline_pieces, splines, joints, max_velocity, max_acceleration, travel, jump, exact_tolerance, max_chord, corner_acceleration,
+    arc_sweep, spline_move, spline_pieces, splines, change_move, change_start, joints, max_velocity, max_acceleration, travel, jump, exact_tolerance, max_chord, corner_acceleration,
     max_speed, corner_angle
 ))]
 #[allow(clippy::too_many_arguments)]
@@ -76,6 +76,8 @@ fn build_path<'py>(
     spline_move: PyReadonlyArray1<'py, i64>,
     spline_pieces: PyReadonlyArray1<'py, i64>,
     splines: Option<Splines<'py>>,
+    change_move: PyReadonlyArray1<'py, i64>,
+    change_start: PyReadonlyArray2<'py, f64>,
     joints: PyReadonlyArray1<'py, bool>,
     max_velocity: PyReadonlyArray1<'py, f64>,
     max_acceleration: PyReadonlyArray1<'py, f64>,
@@ -98,6 +100,7 @@ fn build_path<'py>(
         || arc_sweep.len() != arcs
         || travel.shape() != [axes, 2]
         || spline_pieces.len() != spline_move.len() + 1
+        || (change_move.len() > 0 && change_start.shape() != [change_move.len(), axes])
         || splines.as_ref().is_some_and(|splines| splines.0.shape()[1] != axes)
     {
         return Err(PyValueError::new_err("the columns of the program differ in length"));
@@ -140,6 +143,13 @@ fn build_path<'py>(
             }
             None => CompositeCurve::default(),
         };
+        let starts = if change_move.len() > 0 { rows::<M>(&change_start)? } else { vec![] };
+        let changes: Vec<(usize, [f64; M])> = change_move
+            .as_slice()?
+            .iter()
+            .zip(starts)
+            .map(|(&index, start)| Ok((usize::try_from(index)?, start)))
+            .collect::<PyResult<_>>()?;
         let moves = Moves {
             start: row::<M>(&start, 0.0)?,
             kind: kind.as_slice()?,
@@ -150,6 +160,7 @@ fn build_path<'py>(
             halt: halt.as_slice()?,
             arcs: &shapes,
             spline_moves: &spline_moves,
+            changes: &changes,
             splines: &splines,
             joints: joints.as_slice()?,
         };
