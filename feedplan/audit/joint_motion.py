@@ -21,6 +21,9 @@ SPEED_LINE = 5
 # accelerations have their extremes.
 PLACES = np.concatenate([[0.0, 1.0 / 64.0], np.arange(1.0, 8.0) / 8.0, [63.0 / 64.0, 1.0]])
 
+# So much of a speed may be uncertain before it is taken from the recorded ends of the arc.
+HIDDEN = 1e-3
+
 GAUSS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
@@ -119,6 +122,12 @@ def motion(path: JointPath, profile: SpeedProfile, arcs: Numbers, u: Array | Non
         relative = np.where(
             (laws[0] & ~at_start) | laws[3], speed_error / speed + g_error / g, ROUNDINGS * EPS
         )
+        # Where rounding hides how the arc's own joint moves, its recorded ends tell: p changes little there.
+        share = (u - u[:, :1]) / (u[:, -1:] - u[:, :1])
+        known = 0.5 * np.abs(p[:, 1] - p[:, 0])[:, None] / p.max(axis=1)[:, None] + ROUNDINGS * EPS
+        hidden = ~(relative <= HIDDEN) & (known < HIDDEN)
+        between = np.sqrt(p[:, :1] + (p[:, 1:] - p[:, :1]) * share)
+        root_p, relative = np.where(hidden, between, root_p), np.where(hidden, known, relative)
         velocity = slope * root_p[..., None]
         velocity_error = (
             error * root_p[..., None]
@@ -170,6 +179,11 @@ def _times(
     better = accelerates & (change_error < joint_error)
     time = np.where(better, by_change, by_joint)
     error = np.where(better, change_error, joint_error)
+    # On arcs so short that no joint's way can be told from rounding: by the parameter.
+    sides = root_p[:, :-1] + root_p[:, 1:]
+    by_place, place_error = 2.0 * step / sides, rounding + np.abs(np.diff(root_p, axis=1)) / sides
+    better = ~(error <= place_error)
+    time, error = np.where(better, by_place, time), np.where(better, place_error, error)
     flat = kind[:, None] == ArcKind.FLAT
     time, error = np.where(flat, step / np.sqrt(p[:, :1]), time), np.where(flat, rounding, error)
     integrated = ~np.isin(kind, (ArcKind.AXIS_ACCELERATION, ArcKind.FLAT, ArcKind.AXIS_VELOCITY))

@@ -172,6 +172,9 @@ class _Auditor:
             mean = np.abs(np.diff(state.way, axis=1)) / state.time[..., None]
             unknown = 2.0 * ROUNDINGS * EPS * np.abs(state.position).max(axis=(1, 2))[:, None, None]
             mean -= unknown / state.time[..., None] + mean * state.time_error[..., None]
+        # Places that rounding has put together have nothing between them.
+        together = np.diff(state.u, axis=1) == 0.0
+        acceleration[together] = mean[together] = 0.0
         for k in range(self.names):
             limit = problem.max_velocity[k]
             worst.offer("velocity", np.abs(velocity[:, :, k]) - error[:, :, k], limit, clock, line, k)
@@ -258,13 +261,15 @@ class _Auditor:
         joined = (arc_before == arcs - 1) & ~np.isin(arcs, profile.runs)
         before = profile.piece[np.maximum(arcs - 1, 0)].astype(np.int64)
         corner = (piece != before) & joined
+        # Where the feed is about other axes the speed is another quantity.
+        alike = (self.path.feed_axes[piece] == self.path.feed_axes[before]).all(axis=1)
         jump = np.where(joined[:, None], np.abs(recorded[0] - velocity) - doubt[0] - unknown, 0.0)
         limit = corner[:, None] * self.jump + self.negligible(duration)
         for k in range(self.names):
             worst.offer("jump", jump[:, k], limit[:, k], self.starts[arcs], line, k)
         rounding = ROUNDINGS * EPS * (speed + speeds[0])
         slack = self.slow(duration, tip[0], state.slope[:, 0])
-        steps = np.where(corner, np.abs(speeds[0] - speed) - rounding, 0.0)
+        steps = np.where(corner & alike, np.abs(speeds[0] - speed) - rounding, 0.0)
         worst.offer("continuity", steps, slack, self.starts[arcs], line)
         over = np.where(corner, np.maximum(speeds[0], speed) - rounding, 0.0)
         worst.offer("junction", over, problem.junction_speed[piece] + slack, self.starts[arcs], line)

@@ -29,6 +29,8 @@ from feedplan.machine.words import AxisWords, axis_words
 Array = NDArray[np.float64]
 # Part of an acceleration limit by which the stand-ins may be off.
 SHARE = 1e-9
+# How far positions may be off [mm, deg]: far below what any scale reads.
+POSITION = 1e-8
 # Chebyshev points of q'': the joints' pieces then have the greatest degree that a curve may have.
 NODES = 8
 # Chebyshev points of |C'|² of rational pieces, and how far it may be off, as a part of itself.
@@ -250,7 +252,9 @@ class _Allowed:
 
     def __call__(self, piece: NDArray[np.int64], part: Array) -> Array:
         acceleration = np.array([axis.max_acceleration for axis in self.task.machine.axes])
+        length = self.tips.width[piece] * (part[:, 1] - part[:, 0])
         allowed: Array = SHARE * acceleration / self._rate_sq(piece, part)[:, None]
+        allowed = np.minimum(allowed, (POSITION / length**2)[:, None])
         allowed[~self._speed_is_met(piece, part)] = 0.0
         return allowed
 
