@@ -182,7 +182,7 @@ def _times(
     # On arcs so short that no joint's way can be told from rounding: by the parameter.
     sides = root_p[:, :-1] + root_p[:, 1:]
     by_place, place_error = 2.0 * step / sides, rounding + np.abs(np.diff(root_p, axis=1)) / sides
-    better = ~(error <= place_error)
+    better = ~(error <= HIDDEN) & ~(place_error >= error)
     time, error = np.where(better, by_place, time), np.where(better, place_error, error)
     flat = kind[:, None] == ArcKind.FLAT
     time, error = np.where(flat, step / np.sqrt(p[:, :1]), time), np.where(flat, rounding, error)

@@ -46,8 +46,8 @@ class Program:
     Splines, one row each: `spline_move` (index of the move), `spline_pieces` (k + 1,) which pieces of
     `splines` it takes, a curve in all `axes` [mm, deg] from the move's start to its target.
     What the words mean: `meaning` (n,) (`feedplan.machine.meaning.Meaning`), `tool_length` (n,) [mm] under
-    TIP and VECTOR, NaN for the machine file's; None where the machine knows one meaning only. Under VECTOR the
-    last columns are I, J, K, the unit vector from the tip to the spindle, and F on a move of these alone is
+    TIP and VECTOR, NaN for the machine file's; None where the machine knows one meaning only. Under VECTOR
+    the last columns are I, J, K, the unit vector from the tip to the spindle; F on a move of these alone is
     in deg/s of the tool's turning; columns that a meaning does not use stay as they are. A change of meaning
     is a full stop and moves no joint: `change_move` (c,) are the first moves in a new meaning, and
     `change_start` (c, axes) where they start in the new words, `starts` takes both into account.
