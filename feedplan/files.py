@@ -49,7 +49,7 @@ def write_plan(
     with staged(folder, last=SUMMARY_FILE) as stage:
         with ExitStack() as stack:
             sinks = [
-                stack.enter_context(output.writer(stage / output.FILE, plan.path.axes, setpoints.count))
+                stack.enter_context(output.writer(stage / output.FILE, setpoints.axes, setpoints.count))
                 for output in outputs
             ]
             for chunk in _timed(setpoints.chunks(_ROWS_AT_ONCE), plan.compute):

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from feedplan.errors import InputError
 
-MAX_AXES = 6
+MAX_AXES = 9
 
 
 def points(

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.curves._arrays import MAX_AXES
 from feedplan.errors import MachineError
-from feedplan.machine.machine import MAX_AXES, Machine
+from feedplan.machine.machine import Machine
 from feedplan.machine.meaning import Meaning
 from feedplan.program.program import Program
 

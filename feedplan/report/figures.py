@@ -44,11 +44,13 @@ class SetpointFigures:
     """
 
     def __init__(self, problem: Problem, count: int, marks: Sequence[float] = ()) -> None:
-        self._axes = problem.path.axes
+        self._axes = problem.axes
+        self._problem = problem
         columns = 1 + 3 * len(self._axes)
         self._curves = Envelope(count, min(_TIME_POINTS_PER_CURVE, _TIME_POINTS // columns))
         self._linear = [self._axes.index(name) for name in "XYZ" if name in self._axes]
-        low = problem.path.curve.control_points[:, self._linear]
+        columns_of_tool = [column for column, name in enumerate(problem.path.axes) if name in "XYZ"]
+        low = problem.path.curve.control_points[:, columns_of_tool]
         extent = float(np.linalg.norm(np.ptp(low, axis=0))) if low.size else 0.0
         tolerance = _PATH_TOLERANCE * extent if extent > 0 else 1.0
         cut = problem.feed[np.isfinite(problem.path.feed)]
@@ -64,11 +66,10 @@ class SetpointFigures:
         """The next setpoints."""
         if len(chunk.t) == 0:
             return
-        speed = np.linalg.norm(chunk.velocity, axis=1)
+        places, speed = self._tool(chunk)
         curves = np.column_stack((speed, chunk.velocity, chunk.acceleration, chunk.jerk))
         line = chunk.line.astype(np.int64)
         self._curves.add(chunk.t, curves, line)
-        places = self._xyz(chunk.position)
         self._path.add(np.column_stack((places, self._speed_weight * speed)), line)
         near = np.searchsorted(chunk.t, self._marks)
         inside = (self._marks <= chunk.t[-1]) & np.isnan(self._mark_places[:, 0])
@@ -96,11 +97,18 @@ class SetpointFigures:
             "tolerance": self._path.tolerance,
         }
 
-    def _xyz(self, position: NDArray[np.float64]) -> NDArray[np.float64]:
-        places = np.zeros((len(position), 3))
+    def _tool(self, chunk: SetpointChunk) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Where the tool is in X, Y, Z, and how fast."""
+        tool, joints = self._problem.tip_curve, self._problem.joints
+        if tool is not None and joints is not None:
+            place, tangent = tool.evaluate(chunk.piece, chunk.u, 1)
+            slope = np.linalg.norm(joints.evaluate(chunk.piece, chunk.u, 1)[1], axis=1)
+            rate = np.linalg.norm(chunk.velocity, axis=1) / np.where(slope > 0, slope, np.inf)
+            return place, np.linalg.norm(tangent, axis=1) * rate
+        places = np.zeros((len(chunk), 3))
         for column in self._linear:
-            places[:, "XYZ".index(self._axes[column])] = position[:, column]
-        return places
+            places[:, "XYZ".index(self._axes[column])] = chunk.position[:, column]
+        return places, np.linalg.norm(chunk.velocity, axis=1)
 
 
 def _curve(curves: Envelope, column: int, with_line: bool = False) -> dict[str, Any]:
@@ -156,7 +164,7 @@ def chart_data(
     }
     judged = {check.name for check in audit.checks if check.judged}
     return {
-        "axes": list(problem.path.axes),
+        "axes": list(problem.axes),
         "limits": limits,
         "judged": sorted(judged),
         "feed": float(problem.feed.max()) if len(problem.feed) else None,

@@ -51,7 +51,7 @@ def limit_names(problem: Problem, profile: SpeedProfile) -> tuple[NDArray[np.int
 
 
 def _name(problem: Problem, kind: int, axis: int) -> str:
-    letter = f"{problem.path.axes[axis]} " if axis < len(problem.path.axes) else ""
+    letter = f"{problem.axes[axis]} " if axis < len(problem.axes) else ""
     # A flat arc is held by an axis too: at its acceleration limit while the path turns under it.
     if kind in (ArcKind.AXIS_ACCELERATION, ArcKind.FLAT):
         return f"{letter}acceleration"

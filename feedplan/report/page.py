@@ -81,7 +81,7 @@ def _about(summary: Mapping[str, Any], problem: Problem) -> str:
         f"machine <b>{escape(str(summary.get('machine')))}</b>",
         f"method <b>{escape(str(summary.get('method')))}</b>",
         f"servo period <b>{problem.period * 1e3:g} ms</b>",
-        f"axes <b>{' '.join(problem.path.axes)}</b>",
+        f"axes <b>{' '.join(problem.axes)}</b>",
     ]
     return " · ".join(parts)
 

@@ -33,6 +33,23 @@ macro_rules! with_padded_axes {
 }
 pub(crate) use with_padded_axes;
 
+/// The same for paths and curves, of at most 9 axes: joints beside a tool direction.
+macro_rules! with_path_axes {
+    ($count:expr, $m:ident, $call:expr) => {
+        match $count {
+            7..=9 => {
+                const $m: usize = 9;
+                $call
+            }
+            0 | 10.. => {
+                Err(pyo3::exceptions::PyValueError::new_err(format!("{} axes: 1 to 9 are supported", $count)))
+            }
+            count => with_padded_axes!(count, $m, $call),
+        }
+    };
+}
+pub(crate) use with_path_axes;
+
 /// The native module of feedplan.
 #[pymodule]
 fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -5,7 +5,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::arrays::to_array2;
-use super::with_padded_axes;
+use super::{with_padded_axes, with_path_axes};
 use crate::audit::arcs::Arcs;
 use crate::audit::curve::{Curve, Followed, Pieces};
 use crate::audit::deviation::{audit_deviation, audit_path};
@@ -277,7 +277,7 @@ fn audit_plan(
     let junction_speed = problem.junction_speed.as_slice()?;
     let arcs = profile.as_ref().map(ProfileArrays::arcs).transpose()?;
     let program = program.as_ref().map(|program| program.programmed(problem.axes())).transpose()?;
-    with_padded_axes!(problem.axes(), M, {
+    with_path_axes!(problem.axes(), M, {
         let limits = limits.limits::<M>(path.axes)?;
         Ok(py.detach(|| {
             let mut tally = audit_path(&path, arcs.as_ref(), &limits);
@@ -309,7 +309,7 @@ fn audit_places<'py>(
     let inside = piece.iter().all(|&piece| usize::try_from(piece).is_ok_and(|piece| piece < pieces.len()));
     require(piece.len() == u.len() && inside, "places")?;
     let axes = pieces.axes;
-    with_padded_axes!(axes, M, {
+    with_path_axes!(axes, M, {
         let (points, slopes) = py.detach(|| {
             let (mut points, mut slopes) = (Vec::new(), Vec::new());
             let mut last: Option<(i64, Curve<M>)> = None;

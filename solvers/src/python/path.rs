@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::arrays::{row, rows};
 use super::spline::curve;
-use super::with_padded_axes;
+use super::{with_padded_axes, with_path_axes};
 use crate::arc::ArcError;
 use crate::follow::{ArcShape, Fault, FollowOptions, Followed, Moves, Shape};
 use crate::path_builder::{build_path as build, Axes, BuiltPath};
@@ -135,7 +135,7 @@ fn build_path<'py>(
         })
         .collect::<PyResult<_>>()?;
     let options = FollowOptions { exact_tolerance, max_chord, corner_acceleration, max_speed, corner_angle };
-    with_padded_axes!(axes, M, {
+    with_path_axes!(axes, M, {
         let target = rows::<M>(&target)?;
         let splines = match &splines {
             Some((control, weights, offsets, width)) => {

@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 
 use super::arrays::{row, rows, to_array2};
-use super::with_padded_axes;
+use super::{with_padded_axes, with_path_axes};
 use crate::spline::bezier::{derivatives, elevate, reverse, split};
 use crate::spline::circle::Turn;
 use crate::spline::cusps::cusps;
@@ -122,7 +122,7 @@ fn spline_pieces<'py>(
     periodic: bool,
 ) -> PyResult<Columns<'py>> {
     let axes = control_points.shape()[1];
-    with_padded_axes!(axes, M, {
+    with_path_axes!(axes, M, {
         let spline = spline::<M>(&control_points, weights.as_ref(), &knots, degree, periodic)?;
         let pieces = py.detach(|| extract(&spline)).map_err(input_error)?;
         Ok(columns(py, pieces, axes))
@@ -142,7 +142,7 @@ fn spline_insert<'py>(
     times: usize,
 ) -> PyResult<(Bound<'py, PyArray2<f64>>, Option<Bound<'py, PyArray1<f64>>>, Bound<'py, PyArray1<f64>>)> {
     let axes = control_points.shape()[1];
-    with_padded_axes!(axes, M, {
+    with_path_axes!(axes, M, {
         let mut spline = spline::<M>(&control_points, weights.as_ref(), &knots, degree, false)?;
         spline.insert(value, times).map_err(input_error)?;
         Ok((
@@ -170,7 +170,7 @@ fn turn_pieces<'py>(
     if plane.iter().any(|&axis| axis >= axes) {
         return Err(PyValueError::new_err("the plane is not one of these axes"));
     }
-    with_padded_axes!(axes, M, {
+    with_path_axes!(axes, M, {
         let turn = Turn { start: row::<M>(&start, 0.0)?, plane, centre, sweep };
         let (pieces, bound) = match travel {
             None => (turn.arc(), 0.0),
@@ -187,7 +187,7 @@ fn check_control_points(
     weights: Option<Array1<'_>>,
     degree: usize,
 ) -> PyResult<()> {
-    with_padded_axes!(control_points.shape()[1], M, {
+    with_path_axes!(control_points.shape()[1], M, {
         check_points(degree, &rows::<M>(&control_points)?, &weights_of(weights.as_ref())?)
             .map_err(input_error)
     })
@@ -207,7 +207,7 @@ fn curve_evaluate<'py>(
     order: usize,
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
     let axes = control_points.shape()[1];
-    with_padded_axes!(axes, M, {
+    with_path_axes!(axes, M, {
         let curve = curve::<M>(&control_points, weights.as_ref(), &offsets, &width)?;
         let (piece, u) = (piece.as_slice()?, u.as_slice()?);
         check_places(&curve.width, piece, u)?;
@@ -266,7 +266,7 @@ fn curve_elevate<'py>(
     degree: usize,
 ) -> PyResult<Columns<'py>> {
     let axes = control_points.shape()[1];
-    with_padded_axes!(axes, M, {
+    with_path_axes!(axes, M, {
         let curve = curve::<M>(&control_points, weights.as_ref(), &offsets, &width)?;
         let mut raised = CompositeCurve::default();
         for piece in curve.pieces() {
@@ -288,7 +288,7 @@ fn curve_split<'py>(
     u: Array1<'py>,
 ) -> PyResult<Columns<'py>> {
     let axes = control_points.shape()[1];
-    with_padded_axes!(axes, M, {
+    with_path_axes!(axes, M, {
         let curve = curve::<M>(&control_points, weights.as_ref(), &offsets, &width)?;
         let (piece, u) = (piece.as_slice()?, u.as_slice()?);
         check_places(&curve.width, piece, u)?;
@@ -315,7 +315,7 @@ fn curve_reverse<'py>(
     width: Array1<'py>,
 ) -> PyResult<Columns<'py>> {
     let axes = control_points.shape()[1];
-    with_padded_axes!(axes, M, {
+    with_path_axes!(axes, M, {
         let curve = curve::<M>(&control_points, weights.as_ref(), &offsets, &width)?;
         let mut reversed = CompositeCurve::default();
         for i in (0..curve.len()).rev() {
@@ -339,7 +339,7 @@ fn curve_joints<'py>(
     angle: f64,
     derivative: f64,
 ) -> PyResult<JointColumns<'py>> {
-    with_padded_axes!(control_points.shape()[1], M, {
+    with_path_axes!(control_points.shape()[1], M, {
         let curve = curve::<M>(&control_points, weights.as_ref(), &offsets, &width)?;
         let found = py.detach(|| joints(&curve, closed, &JointTolerance { gap, angle, derivative }));
         Ok((
@@ -363,7 +363,7 @@ fn curve_cusps<'py>(
     width: Array1<'py>,
     tolerance: f64,
 ) -> PyResult<(Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f64>>)> {
-    with_padded_axes!(control_points.shape()[1], M, {
+    with_path_axes!(control_points.shape()[1], M, {
         let curve = curve::<M>(&control_points, weights.as_ref(), &offsets, &width)?;
         let found = py.detach(|| cusps(&curve, tolerance));
         Ok((
