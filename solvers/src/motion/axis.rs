@@ -7,6 +7,8 @@
 
 use super::{ProfileArc, State};
 use crate::polynomial::Polynomial;
+use crate::quadratic::norm;
+use crate::spline::bezier::derivatives;
 use crate::spline::{Piece, MAX_HODOGRAPH};
 
 /// Coefficients of a hodograph, and one more for its integral.
@@ -147,12 +149,14 @@ impl AxisLaw {
         let mean = way / arc.duration;
         let width = arc.u1 - arc.u0;
         let p = [arc.p0, arc.p1];
-        let turns = slopes.map(|slope| slope <= TURN * way);
         let given = [0, 1].map(|i| slopes[i] / width * p[i].sqrt());
+        let fast = [0, 1].map(|i| given[i] > PASSED * given[1 - i].min(mean));
+        let stands = standstills(piece, arc);
+        // An axis that hardly moves while others do, and yet more than rounding says, does not turn round.
+        let turns = [0, 1].map(|i| slopes[i] <= TURN * way && (stands[i] || !fast[i]));
         // At a cusp p is infinite, or so great that q'_k√p is a rounding error times a great number: the duration
         // tells the speed.
-        let passed =
-            [0, 1].map(|i| turns[i] && (p[i] == f64::INFINITY || given[i] > PASSED * given[1 - i].min(mean)));
+        let passed = [0, 1].map(|i| turns[i] && (p[i] == f64::INFINITY || fast[i]));
         let from_other = |v: f64| {
             let speed = 2.0 * mean - v;
             if speed > STANDSTILL * v {
@@ -229,6 +233,13 @@ impl AxisLaw {
             1.0 - passed
         }
     }
+}
+
+/// Whether no axis moves at the ends of an arc, beside what they do in its middle.
+fn standstills<const M: usize>(piece: &Piece<M>, arc: &ProfileArc) -> [bool; 2] {
+    let speed = |u: f64| norm(&derivatives(piece, u)[1]);
+    let middle = speed(0.5 * (arc.u0 + arc.u1));
+    [arc.u0, arc.u1].map(|u| speed(u) <= TURN * middle)
 }
 
 /// q'_k ω² width and ω over the whole piece.
