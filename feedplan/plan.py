@@ -95,7 +95,7 @@ class Plan:
             "method": self.method,
             "machine": self.machine.name,
             "program": self.program.name if self.program else None,
-            "length": CurveLength(self.path.curve).total,
+            "length": CurveLength(self.problem.tip_curve or self.path.curve).total,
             "pieces": len(self.path),
             "runs": len(self.path.runs) - 1,
             "stops": len(self.path.runs) - 2,

@@ -30,9 +30,9 @@
 Everything else is an error that names the line and the word: cutter radius compensation (G41 G42), threading,
 probing, subprograms and flow control (O words, M97 to M99), words that no code of their block uses. Within a
 block the order is LinuxCNC's, with differences that posts count on: F is in the units of its own block, G80
-gives way to another motion code beside it, and G0 beside G28 only stays in force. All axes start at machine
-zero; a change of offsets moves nothing. A stop or dwell belongs to the move before it, and a dwell before the
-first move is kept as `start_dwell`.
+gives way to another motion code beside it, and G0 beside G28 only stays in force. All axes start at the
+machine's home; a change of offsets moves nothing. A stop or dwell belongs to the move before it, and a dwell
+before the first move is kept as `start_dwell`.
 
 A spline of several blocks is one move, in the line and at the feed of its first block; nothing else may stand
 inside it. Its knots and control points are LinuxCNC's and Fanuc's: with G91 those of G5.2 count from its

@@ -322,6 +322,8 @@ mod tests {
             spline_move: &[0],
             spline_pieces: &[0, 2],
             splines,
+            change_move: &[],
+            change_start: &[],
             xyz: [Some(0), Some(1), None],
         };
         let spline = program.get::<2>(0);

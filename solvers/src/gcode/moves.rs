@@ -87,6 +87,8 @@ pub struct Moves {
     /// Places in a `Point` of the columns of `target`.
     axes: Vec<usize>,
     limit: usize,
+    /// Where the first move begins.
+    home: Point,
     /// Where the last move ends.
     pub position: Point,
     /// The tool's direction there, where I, J, K are programmed.
@@ -146,12 +148,13 @@ pub struct Columns {
 
 impl Moves {
     /// Room for `expected` rows, and an error past `limit`.
-    pub fn new(expected: usize, limit: usize) -> Self {
+    pub fn new(expected: usize, limit: usize, home: Point) -> Self {
         let expected = expected.min(limit);
         Self {
             axes: vec![0, 1, 2],
             limit,
-            position: [0.0; 9],
+            home,
+            position: home,
             direction: UPRIGHT,
             kind: Vec::with_capacity(expected),
             target: Vec::with_capacity(3 * expected),
@@ -178,7 +181,7 @@ impl Moves {
         self.kind.is_empty()
     }
 
-    /// Gives an axis a column; so far it stood at zero.
+    /// Gives an axis a column; so far it stood at home.
     #[cold]
     pub fn add_axis(&mut self, axis: usize) {
         let Err(place) = self.axes.binary_search(&axis) else { return };
@@ -186,7 +189,7 @@ impl Moves {
         let mut wider = Vec::with_capacity((self.target.capacity() / width) * (width + 1));
         for row in self.target.chunks_exact(width) {
             wider.extend_from_slice(&row[..place]);
-            wider.push(0.0);
+            wider.push(self.home[axis]);
             wider.extend_from_slice(&row[place..]);
         }
         self.target = wider;
@@ -384,7 +387,7 @@ impl Moves {
         self.line.shrink_to_fit();
         Columns {
             axes: self.letters(),
-            start: self.place(&[0.0; 9], &UPRIGHT),
+            start: self.place(&self.home, &UPRIGHT),
             change_move: self.changes.iter().map(|change| change.row as i64).collect(),
             change_start: self
                 .changes
@@ -499,7 +502,7 @@ mod tests {
 
     #[test]
     fn a_new_axis_gets_its_column_in_order() {
-        let mut moves = Moves::new(4, 10);
+        let mut moves = Moves::new(4, 10, [0.0; 9]);
         let control = Control::new(Mode::Tolerance);
         moves.straight(Kind::Rapid, &point(1.0, 2.0), f64::INFINITY, &control, 1).unwrap();
         moves.add_axis(8);
@@ -516,7 +519,7 @@ mod tests {
 
     #[test]
     fn stops_and_dwells_stay_where_nothing_moves() {
-        let mut moves = Moves::new(4, 10);
+        let mut moves = Moves::new(4, 10, [0.0; 9]);
         let control = Control::new(Mode::ExactPath);
         moves.stop();
         moves.dwell(0.5);
