@@ -8,11 +8,19 @@ from pathlib import Path
 
 from rich.console import Console
 
-from benchmarks import against_toppra, end_to_end, interpolators, kinematics_cost, planner_cost, results
+from benchmarks import (
+    against_toppra,
+    curve_cost,
+    end_to_end,
+    interpolators,
+    kinematics_cost,
+    planner_cost,
+    results,
+)
 
 BENCHMARKS = {
     module.NAME: module.run
-    for module in (planner_cost, against_toppra, end_to_end, interpolators, kinematics_cost)
+    for module in (planner_cost, curve_cost, against_toppra, end_to_end, interpolators, kinematics_cost)
 }
 
 

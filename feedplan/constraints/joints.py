@@ -2,13 +2,14 @@
 
 Where K is affine the joints' control points are K of the tool's. Elsewhere q'' is interpolated with a proven
 distance (`feedplan.machine.proxies`) and the tool's pieces are cut to match. The stand-ins are so close that
-an axis's acceleration is met within `SHARE` of its limit at every speed that the other limits allow.
+an axis's acceleration is met within 1e-8 of its limit at every speed that the other limits allow.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import groupby, pairwise
 
 import numpy as np
@@ -27,14 +28,18 @@ from feedplan.machine.survey import JointPath, survey
 from feedplan.machine.words import AxisWords, axis_words
 
 Array = NDArray[np.float64]
-# Part of an acceleration limit by which the stand-ins may be off.
-SHARE = 1e-9
+# Part of an acceleration limit by which the stand-ins may be off; making pieces meet can cost 36 times that.
+SHARE = 1e-10
 # How far positions may be off [mm, deg]: far below what any scale reads.
 POSITION = 1e-8
+# What rounding leaves of q'', as a part of itself.
+ROUNDING = 1e-13
 # Chebyshev points of q'': the joints' pieces then have the greatest degree that a curve may have.
 NODES = 8
 # Chebyshev points of |C'|² of rational pieces, and how far it may be off, as a part of itself.
 SPEED_NODES, SPEED_SHARE = 12, 1e-9
+# Of the greatest |C'|² of a piece: what rounding leaves of it elsewhere.
+SPEED_NOISE = 1e-12
 # Places of a part at which the greatest possible u̇² is estimated, and how many times more it may be.
 PLACES, MARGIN = 3, 4.0
 
@@ -253,29 +258,32 @@ class _Allowed:
     def __call__(self, piece: NDArray[np.int64], part: Array) -> Array:
         acceleration = np.array([axis.max_acceleration for axis in self.task.machine.axes])
         length = self.tips.width[piece] * (part[:, 1] - part[:, 0])
-        allowed: Array = SHARE * acceleration / self._rate_sq(piece, part)[:, None]
-        allowed = np.minimum(allowed, (POSITION / length**2)[:, None])
+        rate_sq, bend = self._rates(piece, part)
+        allowed: Array = np.minimum(SHARE * acceleration / rate_sq[:, None], (POSITION / length**2)[:, None])
+        # Near a cusp u̇² has no bound that would help; no stand-in is nearer than rounding.
+        allowed = np.maximum(allowed, ROUNDING * bend)
         allowed[~self._speed_is_met(piece, part)] = 0.0
         return allowed
 
-    def _rate_sq(self, piece: NDArray[np.int64], part: Array) -> Array:
-        """About the greatest u̇² (m,) that feed and joint velocities allow."""
+    def _rates(self, piece: NDArray[np.int64], part: Array) -> tuple[Array, Array]:
+        """About the greatest u̇² (m,) that feed and joint velocities allow, and |q''| (m, joints)."""
         weights = self.tips.weights_by_piece
         own = None if weights is None else weights[piece]
         control, width = self.tips.by_piece[piece], self.tips.width[piece]
         limit = np.array([axis.max_velocity for axis in self.task.machine.axes])
-        greatest = np.zeros(len(piece))
+        greatest, bend = np.zeros(len(piece)), np.zeros((len(piece), len(limit)))
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             for t in np.linspace(0.0, 1.0, PLACES):
                 fraction = part[:, 0] + t * (part[:, 1] - part[:, 0])
-                slope = derivatives(self.task.words.kinematics, control, width, fraction, 1, own)[1]
+                _, slope, second = derivatives(self.task.words.kinematics, control, width, fraction, 2, own)
+                bend = np.fmax(bend, np.abs(second))
                 tangent = self.linear.evaluate(piece, fraction * width, 1)[1]
                 along = self.task.feed[self.task.pieces[piece]] ** 2 / (tangent**2).sum(axis=1)
                 at_velocity = (limit / np.abs(slope)).min(axis=1) ** 2
                 here = np.minimum(at_velocity, np.where(self.moves[piece], along, np.inf))
                 greatest = np.fmax(greatest, np.where(np.isfinite(here), here, 0.0))
         rate_sq: Array = MARGIN * np.where(greatest > 0, greatest, 1.0)
-        return rate_sq
+        return rate_sq, bend
 
     def _speed_is_met(self, piece: NDArray[np.int64], part: Array) -> NDArray[np.bool_]:
         """Whether interpolation meets |C'|² halfway between its nodes, where it is off the most."""
@@ -284,8 +292,20 @@ class _Allowed:
         between = 0.5 - 0.5 * np.cos(np.pi * np.arange(SPEED_NODES + 1) / SPEED_NODES)
         found, true = (self._speed_sq(piece, part, at) for at in (chebyshev(SPEED_NODES), between))
         miss = np.abs(found @ interpolation(SPEED_NODES, between).T - true)
-        met: NDArray[np.bool_] = (miss <= SPEED_SHARE * true).all(axis=1) | ~self.moves[piece]
+        # In a near cusp the speed is rounding, and no limit of the feed.
+        floor = SPEED_NOISE * self._fastest[piece][:, None]
+        met: NDArray[np.bool_] = (miss <= SPEED_SHARE * true + floor).all(axis=1) | ~self.moves[piece]
         return met
+
+    @cached_property
+    def _fastest(self) -> Array:
+        """About the greatest |C'|² of each piece (n,), from its polygon."""
+        steps = np.linalg.norm(np.diff(self.linear.control_points, axis=0), axis=1)
+        inside = np.ones(len(steps), dtype=bool)
+        inside[self.linear.offsets[1:-1] - 1] = False
+        longest = np.maximum.reduceat(np.append(np.where(inside, steps, 0.0), 0.0), self.linear.offsets[:-1])
+        fastest: Array = (longest * self.linear.degree / self.linear.width) ** 2
+        return fastest
 
     def _speed_sq(self, piece: NDArray[np.int64], part: Array, at: Array) -> Array:
         fraction = part[:, :1] + at * (part[:, 1:] - part[:, :1])

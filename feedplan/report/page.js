@@ -282,7 +282,9 @@
   }
 
   /* Axes over time ------------------------------------------------------------------------------- */
-  const ROWS = [["speed", "mm/s"], ["velocity", "mm/s"], ["acceleration", "mm/s²"], ["jerk", "mm/s³"]];
+  const turns = data.axes.some((name) => "ABC".includes(name));
+  const ROWS = [["speed", "mm/s"], ...[["velocity", "s"], ["acceleration", "s²"], ["jerk", "s³"]]
+    .map(([name, per]) => [name, turns ? `mm/${per}, deg/${per}` : `mm/${per}`])];
   const tops = Object.fromEntries(ROWS.slice(1).map(([name]) => [name, data.time[name].map((c) => greatest(c.y))]));
   /* What is no limit may have lone spikes; they run out of the chart rather than flatten it. */
   const usual = Object.fromEntries(ROWS.slice(1).map(([name]) => [name, data.time[name].map((c, k) => {

@@ -3,7 +3,9 @@
 //! De Casteljau's algorithm on the steps d_i = P_(i+1) − P_i instead of the points: with w the weights,
 //! w_i ← (1 − t) w_i + t w_(i+1), τ_i = t w_(i+1) / (the new w_i), every level is
 //!
-//!     d_i ← (1 − τ_i) d_i + τ_(i+1) d_(i+1)
+//! ```text
+//! d_i ← (1 − τ_i) d_i + τ_(i+1) d_(i+1)
+//! ```
 //!
 //! Points far from the origin and short parts of a piece so lose no digit. The steps of the part up to t are the
 //! τ_0 d_0 of all levels, and C'(t) = n w_0 w_1 d_0 / w² of the last one (Floater 1992).

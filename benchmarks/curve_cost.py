@@ -1,0 +1,79 @@
+"""Cost of the exact planner on curves of higher degree, rational ones and joint paths."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from benchmarks.problems import MACHINE, random_problem
+from benchmarks.results import Cell, Result
+from benchmarks.timing import best_of
+from feedplan._solvers import plan_bang_bang, plan_curves
+from feedplan.constraints.problem import Problem, build_problem
+from feedplan.curves.composite import CompositeCurve
+from feedplan.geometry.path import Path
+from feedplan.machine.machine import Machine
+
+NAME = "curve-cost"
+SEED = 1
+FEEDS = (100.0, 1e5)
+
+
+def run(quick: bool = False) -> Result:
+    """One random path of each kind, the best of five, one run from rest to rest."""
+    count = 300 if quick else 3000
+    quadratics = random_problem(count)
+    rows = [
+        _row("quadratics, their own planner", quadratics, partial(plan_bang_bang, quadratics)),
+        _row("quadratics, the planner of curves", quadratics, partial(plan_curves, quadratics)),
+    ]
+    for kind, curve in _curves(count).items():
+        for feed in FEEDS:
+            problem = build_problem(Path.from_curve(curve, feed=feed), MACHINE)
+            name = f"{kind}, {feed:g} mm/s"
+            rows.append(_row(name, problem, partial(plan_bang_bang, problem)))
+    machine = Machine.load("cylindrical")
+    axes = tuple(replace(axis, travel=(-np.inf, np.inf)) for axis in machine.axes)
+    near = _curves(count // 10)["cubics"]
+    away = replace(near, control_points=near.control_points + np.array([300.0, 0.0, 0.0]))
+    tip = Path.from_curve(away, feed=FEEDS[0])
+    joints = build_problem(tip, replace(machine, axes=axes))
+    rows.append(_row("joints of cubics, cylindrical", joints, partial(plan_bang_bang, joints)))
+    return Result(
+        NAME,
+        "Exact planner on curves, one thread",
+        tuple(rows),
+        ("The whole native call, profile included. Joint pieces have degree 9.",),
+    )
+
+
+def _curves(count: int) -> dict[str, CompositeCurve]:
+    """Splines through one random walk of points that turns slowly."""
+    rng = np.random.default_rng(SEED)
+    heading = np.cumsum(rng.normal(0, 0.25, (count + 1, 3)), axis=0) + np.array([3.0, 0.0, 0.0])
+    steps = heading / np.linalg.norm(heading, axis=1)[:, None] * rng.uniform(0.5, 2.0, (count + 1, 1))
+    points = np.cumsum(steps, axis=0)
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    cubic, quintic = (make_interp_spline(length, points, k=degree) for degree in (3, 5))
+    weights = np.exp(rng.uniform(-1.0, 1.0, len(cubic.c)))
+    return {
+        "cubics": CompositeCurve.from_bspline(cubic),
+        "quintics": CompositeCurve.from_bspline(quintic),
+        "rational cubics": CompositeCurve.from_nurbs(cubic.c, cubic.t, 3, weights),
+    }
+
+
+def _row(name: str, problem: Problem, plan: Callable[[], object]) -> dict[str, Cell]:
+    best = best_of(plan, 5)
+    arcs = len(plan_bang_bang(problem)[0])
+    pieces = len(problem.path)
+    return {
+        "path": name,
+        "pieces": pieces,
+        "arcs a piece": arcs / pieces,
+        "CPU per piece [µs]": 1e6 * best.processor / pieces,
+    }
