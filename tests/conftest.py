@@ -70,6 +70,7 @@ class SquarePlan:
 class _Stream:
     def __init__(self, chunk: SetpointChunk) -> None:
         self._chunk = chunk
+        self.axes = chunk.axes
         self.count = len(chunk.t)
 
     def chunks(self, size: int) -> Iterator[SetpointChunk]:

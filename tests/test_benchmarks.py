@@ -33,6 +33,7 @@ def test_every_benchmark_runs_and_stores_its_table(tmp_path: Path) -> None:
     tables = {path.stem: json.loads(path.read_text(encoding="utf-8")) for path in tmp_path.glob("*.json")}
     assert set(tables) == {
         "planner-cost",
+        "curve-cost",
         "against-toppra",
         "end-to-end",
         "interpolators",

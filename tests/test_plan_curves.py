@@ -115,7 +115,8 @@ class Skewed(Kinematics):
         return x - y * math.tan(math.radians(30.0)), y / math.cos(math.radians(30.0)), z + 0.001 * z * z
 
 
-def test_a_kinematics_of_ones_own_is_planned_and_audited(tmp_path: FilePath) -> None:
+def test_a_kinematics_of_ones_own_is_planned_and_audited(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kinematics, "_registered", {})
     kinematics.register("skewed", lambda axes, parameters: Skewed(tuple(axis.name for axis in axes)))
     axes = tuple(feedplan.Axis(letter, 200.0, 2000.0) for letter in "XYZ")
     machine = feedplan.Machine("skewed", axes, kinematics="skewed")

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from feedplan.curves._arrays import MAX_AXES
 from feedplan.errors import MachineError
 from feedplan.machine.machine import Machine
 from feedplan.machine.meaning import Meaning
@@ -63,15 +62,8 @@ def path_words(program: Program, machine: Machine) -> PathWords:
                     f"choose a machine with {name}, or add it to the machine file"
                 )
     names = tuple(name for name in known if name in program.axes)
-    if len(names) > MAX_AXES:
-        names = tuple(name for name in names if used[program.axes.index(name)])
     if not names:
         raise MachineError(f"{program.name} moves no axis of machine {machine.name}: choose another machine")
-    if len(names) > MAX_AXES:
-        raise MachineError(
-            f"{program.name} moves {', '.join(names)}: a path has at most {MAX_AXES} axes; "
-            "give stretches of I, J, K and of rotary words programs of their own"
-        )
     changes = meaning[1:] != meaning[:-1]
     if program.tool_length is not None:
         before, after = program.tool_length[:-1], program.tool_length[1:]

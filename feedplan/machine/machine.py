@@ -58,10 +58,10 @@ class Machine:
     """A machine tool.
 
     `period` is the servo period [s], `chord_tolerance` the allowed distance [mm] between the path and the
-    straight line from one setpoint to the next (infinite: not limited), `home` the position [mm] where
-    programs begin and that G28 and G30 go to, `offsets` the work offsets by name (`"G54"`) [mm]; both have
-    one number for each of `program_letters`. `kinematics` is the type that turns the tool tip into joint
-    positions, `parameters` its keys in the machine file.
+    straight line from one setpoint to the next (infinite: not limited), `home` the position [mm] that G28
+    and G30 go to (and where programs begin if their words always are the tool's tip), `offsets` the work
+    offsets by name (`"G54"`) [mm]; both have one number for each of `program_letters`. `kinematics` is the
+    type that turns the tool tip into joint positions, `parameters` its keys in the machine file.
     """
 
     name: str

@@ -30,9 +30,9 @@
 Everything else is an error that names the line and the word: cutter radius compensation (G41 G42), threading,
 probing, subprograms and flow control (O words, M97 to M99), words that no code of their block uses. Within a
 block the order is LinuxCNC's, with differences that posts count on: F is in the units of its own block, G80
-gives way to another motion code beside it, and G0 beside G28 only stays in force. All axes start at the
-machine's home; a change of offsets moves nothing. A stop or dwell belongs to the move before it, and a dwell
-before the first move is kept as `start_dwell`.
+gives way to another motion code beside it, and G0 beside G28 only stays in force. All axes start at
+zero, or at home where words always are the tip; a change of offsets moves nothing. A stop or dwell belongs
+to the move before it, and a dwell before the first move is kept as `start_dwell`.
 
 A spline of several blocks is one move, in the line and at the feed of its first block; nothing else may stand
 inside it. Its knots and control points are LinuxCNC's and Fanuc's: with G91 those of G5.2 count from its
@@ -137,8 +137,8 @@ def _check_size(size: int, place: str, max_bytes: int) -> None:
 
 
 def _places(machine: Machine | None) -> NDArray[np.float64]:
-    """Work offsets and home as rows (10, 9) over XYZABCUVW."""
-    places = np.zeros((len(WORK_OFFSETS) + 1, len(AXIS_LETTERS)))
+    """Work offsets, home and the start of the program as rows (11, 9) over XYZABCUVW."""
+    places = np.zeros((len(WORK_OFFSETS) + 2, len(AXIS_LETTERS)))
     if machine is None:
         return places
     columns = [AXIS_LETTERS.index(letter) for letter in machine.program_letters]
@@ -147,5 +147,8 @@ def _places(machine: Machine | None) -> NDArray[np.float64]:
             raise MachineError(f"machine {machine.name}: offsets has {key!r}: use {', '.join(WORK_OFFSETS)}")
         places[WORK_OFFSETS.index(key), columns] = row
     if machine.home:
-        places[-1, columns] = machine.home
+        places[-2, columns] = machine.home
+        if not machine.words_are_joints:
+            # Zero may be a place that the tip cannot reach, as the axis of a turning column.
+            places[-1] = places[-2]
     return places

@@ -40,6 +40,8 @@ pub struct Options {
     pub offsets: [Point; 9],
     /// Where G28 and G30 go, in mm and degrees.
     pub home: Point,
+    /// Where the program begins, in mm and degrees.
+    pub start: Point,
     /// Letters of the machine's axes; empty where no machine is given.
     pub machine_axes: Vec<u8>,
     /// What the machine makes of G43.4 and G43.5; None where there is no machine.
@@ -55,6 +57,7 @@ impl Default for Options {
         Self {
             offsets: [[0.0; 9]; 9],
             home: [0.0; 9],
+            start: [0.0; 9],
             machine_axes: Vec::new(),
             tip_control: None,
             block_delete: true,

@@ -283,7 +283,7 @@ def test_cusps_corners_and_pieces_of_no_length_are_found() -> None:
         (([[0.0]] * 3, [0, 1, 2, 2, 2, 3], 2), "knots 2 and 3, where the curve starts and ends, are both 2"),
         (([[0.0]] * 20, range(32), 11), "the degree is 11: degrees 1 to 9"),
         (([[0.0]] * 3, range(6), 2.5), r"the degree is 2\.5"),
-        (([[0.0] * 7] * 3, range(6), 2), r"shape \(3, 7\): give \(points, axes\) with 1 to 6 axes"),
+        (([[0.0] * 10] * 3, range(6), 2), r"shape \(3, 10\): give \(points, axes\) with 1 to 9 axes"),
         (([[0.0], [1j]], [0, 0, 1, 1], 1), "control points are not all real numbers"),
         (([["a"], ["b"]], [0, 0, 1, 1], 1), "control points are not all real numbers"),
         (([[0.0], [1], [5], [6]], [0, 0, 1, 1, 2, 2], 1), "a gap of 4 mm at the knot 1"),

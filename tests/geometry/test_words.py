@@ -89,12 +89,10 @@ def test_a_direction_has_columns_of_its_own(make_program: Any) -> None:
         build_path(program, Machine.load("mill"))
 
 
-def test_more_axes_than_a_path_has_are_refused(make_program: Any) -> None:
+def test_rotary_words_and_directions_stand_side_by_side(make_program: Any) -> None:
     machine = Machine.load("trunnion-ac")
     points = [[0] * 8, [1, 1, 1, 5, 5, 0, 0, 0], [2, 2, 2, 5, 5, 0.1, 0.1, 1]]
     meaning = np.array([Meaning.JOINTS, Meaning.VECTOR], dtype=np.uint8)
-    with pytest.raises(MachineError, match="a path has at most 6 axes"):
-        build_path(make_program(points, axes="XYZACIJK", meaning=meaning), machine)
-    # Letters that are named and never move do not count.
-    still = [[*point[:3], 0, 0, *point[5:]] for point in points]
-    assert len(build_path(make_program(still, axes="XYZACIJK", meaning=meaning), machine).axes) == 6
+    path = build_path(make_program(points, axes="XYZACIJK", meaning=meaning), machine)
+    assert path.axes == tuple("XYZACIJK")
+    np.testing.assert_array_equal(path.new_words, [False, True])

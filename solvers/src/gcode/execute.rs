@@ -51,7 +51,7 @@ impl<'a> Interpreter<'a> {
     pub fn new(options: &'a Options, expected: usize) -> Self {
         Self {
             state: State::new(options.offsets),
-            moves: Moves::new(expected, options.max_moves, options.home),
+            moves: Moves::new(expected, options.max_moves, options.start),
             line: 0,
             options,
             known: 0,

@@ -88,7 +88,7 @@ pub struct Moves {
     axes: Vec<usize>,
     limit: usize,
     /// Where the first move begins.
-    home: Point,
+    start: Point,
     /// Where the last move ends.
     pub position: Point,
     /// The tool's direction there, where I, J, K are programmed.
@@ -148,13 +148,13 @@ pub struct Columns {
 
 impl Moves {
     /// Room for `expected` rows, and an error past `limit`.
-    pub fn new(expected: usize, limit: usize, home: Point) -> Self {
+    pub fn new(expected: usize, limit: usize, start: Point) -> Self {
         let expected = expected.min(limit);
         Self {
             axes: vec![0, 1, 2],
             limit,
-            home,
-            position: home,
+            start,
+            position: start,
             direction: UPRIGHT,
             kind: Vec::with_capacity(expected),
             target: Vec::with_capacity(3 * expected),
@@ -181,7 +181,7 @@ impl Moves {
         self.kind.is_empty()
     }
 
-    /// Gives an axis a column; so far it stood at home.
+    /// Gives an axis a column; so far it stood at the start.
     #[cold]
     pub fn add_axis(&mut self, axis: usize) {
         let Err(place) = self.axes.binary_search(&axis) else { return };
@@ -189,7 +189,7 @@ impl Moves {
         let mut wider = Vec::with_capacity((self.target.capacity() / width) * (width + 1));
         for row in self.target.chunks_exact(width) {
             wider.extend_from_slice(&row[..place]);
-            wider.push(self.home[axis]);
+            wider.push(self.start[axis]);
             wider.extend_from_slice(&row[place..]);
         }
         self.target = wider;
@@ -387,7 +387,7 @@ impl Moves {
         self.line.shrink_to_fit();
         Columns {
             axes: self.letters(),
-            start: self.place(&self.home, &UPRIGHT),
+            start: self.place(&self.start, &UPRIGHT),
             change_move: self.changes.iter().map(|change| change.row as i64).collect(),
             change_start: self
                 .changes

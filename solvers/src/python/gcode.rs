@@ -55,8 +55,8 @@ impl TipControl for PyTipControl {
 
 /// Reads a G-code program; see `feedplan.program.gcode`.
 ///
-/// `places` (10, 9): the work offsets G54 to G59.3, then the home position, in X Y Z A B C U V W; `machine_axes`
-/// empty where there is no machine; `tip_control` None likewise. Returns the fields of `Program` but its name, and
+/// `places` (11, 9): the work offsets G54 to G59.3, the home position, where the program begins, in X Y Z A B C U V W;
+/// `machine_axes` empty where there is no machine; `tip_control` None likewise. Returns the fields of `Program` but its name, and
 /// `spline_columns` in place of `splines`.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
@@ -72,12 +72,15 @@ fn read_gcode<'py>(
     max_moves: usize,
 ) -> PyResult<Bound<'py, PyDict>> {
     let places = arrays::rows::<9>(&places)?;
-    let Ok(places) = <[[f64; 9]; 10]>::try_from(places) else {
-        return Err(pyo3::exceptions::PyValueError::new_err("nine work offsets and the home are ten rows"));
+    let Ok(places) = <[[f64; 9]; 11]>::try_from(places) else {
+        return Err(pyo3::exceptions::PyValueError::new_err(
+            "nine work offsets, home and start are eleven rows",
+        ));
     };
     let options = Options {
         offsets: std::array::from_fn(|system| places[system]),
         home: places[9],
+        start: places[10],
         machine_axes: machine_axes.as_bytes().to_vec(),
         tip_control: tip_control.map(|control| Box::new(PyTipControl(control)) as _),
         block_delete,
