@@ -93,6 +93,7 @@ class Setpoints:
         self.axes = problem.axes
         self.interpolator = interpolator
         self.stats = SamplingStats()
+        self._origin = problem.joint_origin
 
     @property
     def count(self) -> int:
@@ -129,6 +130,8 @@ class Setpoints:
         self.stats = SamplingStats(
             max(self.stats.iterations, iterations), max(self.stats.length_error, error)
         )
+        if self._origin is not None:
+            position += self._origin[piece]
         return SetpointChunk(t, position, velocity, acceleration, jerk, line, self.axes, piece, u)
 
 

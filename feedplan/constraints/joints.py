@@ -28,10 +28,10 @@ from feedplan.machine.survey import JointPath, survey
 from feedplan.machine.words import AxisWords, axis_words
 
 Array = NDArray[np.float64]
-# Part of an acceleration limit by which the stand-ins may be off; making pieces meet can cost 36 times that.
-SHARE = 1e-10
+# Part of an acceleration limit by which the stand-ins may be off.
+SHARE = 1e-9
 # How far positions may be off [mm, deg]: far below what any scale reads.
-POSITION = 1e-8
+POSITION = 1e-9
 # What rounding leaves of q'', as a part of itself.
 ROUNDING = 1e-13
 # Chebyshev points of q'': the joints' pieces then have the greatest degree that a curve may have.
@@ -46,11 +46,12 @@ PLACES, MARGIN = 3, 4.0
 
 @dataclass(frozen=True)
 class JointMotion:
-    """What a problem has beside a path: the path cut to match, the joints' pieces, the tool's speed, and the
-    kinematics of each run."""
+    """What a problem has beside a path: the path cut to match, the joints' pieces, each from its `origin`,
+    the tool's speed, and the kinematics of each run."""
 
     path: Path
     joints: CompositeCurve
+    origin: Array
     tip_speed: TipSpeed
     words: tuple[AxisWords, ...]
 
@@ -80,7 +81,7 @@ def joint_motion(path: Path, machine: Machine, feed: Array) -> JointMotion:
         stretch = _posed(_Task(path, machine, own, pieces, feed, start))
         words[first:] = [stretch.words] * (len(words) - first)
         stretches.append(stretch)
-        start = stretch.joints.control_points[-1]
+        start = stretch.origin[-1] + stretch.joints.control_points[-1]
     piece = np.concatenate([stretch.piece for stretch in stretches])
     joints = CompositeCurve.joined([stretch.joints for stretch in stretches], math.inf)
     speeds = [stretch.speed for stretch in stretches]
@@ -90,7 +91,8 @@ def joint_motion(path: Path, machine: Machine, feed: Array) -> JointMotion:
         np.concatenate([[0], np.cumsum(counts)]),
     )
     tool = CompositeCurve.joined([stretch.tool for stretch in stretches], math.inf)
-    return JointMotion(path.cut(tool, piece), joints, tip_speed, tuple(words))
+    origin = np.concatenate([stretch.origin for stretch in stretches])
+    return JointMotion(path.cut(tool, piece), joints, origin, tip_speed, tuple(words))
 
 
 @dataclass(frozen=True)
@@ -123,6 +125,7 @@ class _Stretch:
     piece: NDArray[np.int64]
     tool: CompositeCurve
     joints: CompositeCurve
+    origin: Array
     speed: TipSpeed
 
 
@@ -179,7 +182,9 @@ def _affine(task: _Task) -> _Stretch:
         _survey(task, tips)
     linear = tool if words.meaning is Meaning.JOINTS else task.linear(tool)
     speed = _either(TipSpeed(*speed_squares(linear)), TipSpeed(*speed_squares(tool)), _moving(linear))
-    return _Stretch(words, task.pieces, tool, joints, speed)
+    origin = joints.control_points[joints.offsets[:-1]]
+    local = joints.control_points - np.repeat(origin, np.diff(joints.offsets), axis=0)
+    return _Stretch(words, task.pieces, tool, replace(joints, control_points=local), origin, speed)
 
 
 def _in_order(stretches: list[_Stretch]) -> _Stretch:
@@ -196,7 +201,8 @@ def _in_order(stretches: list[_Stretch]) -> _Stretch:
         for first, last in pairwise(stretch.speed.offsets.tolist())
     ]
     speed = _joined_speed([rows[i] for i in order.tolist()])
-    return _Stretch(stretches[0].words, piece[order], tool, joints, speed)
+    origin = np.concatenate([stretch.origin for stretch in stretches])[order]
+    return _Stretch(stretches[0].words, piece[order], tool, joints, origin, speed)
 
 
 def _survey(task: _Task, tips: CompositeCurve) -> JointPath:
@@ -229,14 +235,15 @@ def _curved(task: _Task) -> _Stretch:
             "its joints cannot be followed: keep the path farther off it"
         )
     tool = curve.split(proxies.piece, proxies.part[:, 0] * width[proxies.piece]).with_width(proxies.width)
-    joints = _joint_pieces(proxies, task.pieces[proxies.piece], route)
+    joints = _joint_pieces(proxies)
+    origin = route.positions(proxies.piece, proxies.part[:, 0])
     speed = _tool_speed(task.linear(tool))
     if not moves.all():
         rotary = np.array(kinematics.rotary)
         columns = rotary if rotary.any() else ~rotary
         turning = replace(joints, control_points=joints.control_points[:, columns])
         speed = _either(speed, TipSpeed(*speed_squares(turning)), moves[proxies.piece])
-    return _Stretch(task.words, task.pieces[proxies.piece], tool, joints, speed)
+    return _Stretch(task.words, task.pieces[proxies.piece], tool, joints, origin, speed)
 
 
 def _moving(curve: CompositeCurve) -> NDArray[np.bool_]:
@@ -315,15 +322,12 @@ class _Allowed:
         return square
 
 
-def _joint_pieces(proxies: Proxies, piece: NDArray[np.int64], route: JointPath) -> CompositeCurve:
-    """The integrals of the slopes, each from the joints' true position at its start to that of the next."""
+def _joint_pieces(proxies: Proxies) -> CompositeCurve:
+    """The integrals of the slopes, each from 0: small numbers keep what second differences need."""
     slope, count = proxies.slope, len(proxies)
     degree = slope.shape[1]
-    start = route.positions(proxies.piece, proxies.part[:, 0])
     steps = np.cumsum(slope, axis=1) * (proxies.width / degree)[:, None, None]
-    points = np.concatenate([start[:, None], start[:, None] + steps], axis=1)
-    on = np.flatnonzero(np.diff(piece) <= 1)
-    points[on, -1] = points[on + 1, 0]
+    points = np.concatenate([np.zeros_like(steps[:, :1]), steps], axis=1)
     return CompositeCurve.from_pieces(points.reshape(count, degree + 1, -1), proxies.width)
 
 

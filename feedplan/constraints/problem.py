@@ -43,8 +43,9 @@ class Problem:
     infinite tolerance switches that off. `start_speed` and `end_speed` [mm/s] hold at the ends of the path.
 
     Where the path's axes are not the joints of the machine, `joints` is the motion of the joints [mm, deg],
-    one polynomial piece for each of the path and over the same parameter; `tip_speed` the square of the speed
-    that feed and junctions are about, per u̇²; and `words` (one a run) the kinematics from path to joints.
+    one polynomial piece for each of the path and over the same parameter, counted from `joint_origin`
+    (n, joints), 0 without one; `tip_speed` the square of the speed that feed and junctions are about, per
+    u̇²; and `words` (one a run) the kinematics from path to joints.
     """
 
     path: Path
@@ -59,6 +60,7 @@ class Problem:
     end_speed: float = 0.0
     joint_axes: tuple[str, ...] = ()
     joints: CompositeCurve | None = None
+    joint_origin: NDArray[np.float64] | None = None
     tip_speed: TipSpeed | None = None
     words: tuple[AxisWords, ...] = ()
 
@@ -185,6 +187,7 @@ def _joint_problem(
         end_speed=ends[1],
         joint_axes=machine.axis_names,
         joints=motion.joints,
+        joint_origin=motion.origin,
         tip_speed=motion.tip_speed,
         words=motion.words,
     )
