@@ -29,9 +29,10 @@ bench: $(VENV)/built
 	cargo bench --manifest-path solvers/Cargo.toml
 	$(BIN)/python -m benchmarks
 
-# Random paths by the million; the figures it prints stand in benchmarks/README.md.
-campaign:
+# Random paths by the million, and on every machine by the thousand; the figures stand in benchmarks/README.md.
+campaign: $(VENV)/built
 	FEEDPLAN_SEEDS=1000000 cargo test --release --manifest-path solvers/Cargo.toml --test bang_bang_random -- --nocapture
+	FEEDPLAN_SEEDS=1250 $(BIN)/pytest tests/constraints/test_joints.py -k random
 
 clean:
 	rm -rf $(VENV) out solvers/target

@@ -3,10 +3,10 @@
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use super::arrays::{row, rows};
+use super::arrays::{quadratics, row, rows};
 use super::with_padded_axes;
 use crate::bang_bang::{self, plan_each, Problem, Tip, TIP_AXES};
-use crate::bang_bang_quadratic::{Fault, Profile};
+use crate::bang_bang_quadratic::{self, Fault, Profile};
 
 pyo3::create_exception!(
     _solvers,
@@ -39,6 +39,14 @@ struct CurveArrays<'py> {
 }
 
 impl CurveArrays<'_> {
+    /// Whether all pieces are polynomials of degree 2.
+    fn is_quadratic(&self) -> bool {
+        let rises = |pair: (&i64, usize)| *pair.0 == 3 * pair.1 as i64;
+        self.weights.is_none()
+            && self.control_points.shape()[0] == 3 * self.width.len()
+            && self.offsets.as_array().iter().zip(0..).all(rises)
+    }
+
     fn weights(&self) -> PyResult<&[f64]> {
         Ok(match &self.weights {
             Some(weights) => weights.as_slice()?,
@@ -102,6 +110,9 @@ fn plan_curves<'py>(py: Python<'py>, problem: ProblemArrays<'py>) -> PyResult<Co
 
 fn plan<'py>(py: Python<'py>, arrays: &ProblemArrays<'py>, by: Quadratics) -> PyResult<Columns<'py>> {
     let curve = &arrays.curve;
+    if matches!(by, Quadratics::Their) && arrays.tip_speed.is_none() && curve.is_quadratic() {
+        return plan_quadratics(py, arrays);
+    }
     let (runs, offsets) = (indices(&arrays.path.runs), indices(&curve.offsets));
     let tip = match (&arrays.tip_speed, &arrays.tip_curve) {
         (Some(speed), Some(tip)) => Some((
@@ -142,6 +153,30 @@ fn plan<'py>(py: Python<'py>, arrays: &ProblemArrays<'py>, by: Quadratics) -> Py
             Quadratics::General => bang_bang::plan::<M>,
         };
         let profile = py.detach(|| plan(&problem)).map_err(|fault| to_exception(&fault))?;
+        Ok(to_columns(py, profile))
+    })
+}
+
+/// A path of polynomial quadratics alone, without a detour.
+fn plan_quadratics<'py>(py: Python<'py>, arrays: &ProblemArrays<'py>) -> PyResult<Columns<'py>> {
+    let curve = &arrays.curve;
+    let runs = indices(&arrays.path.runs);
+    with_padded_axes!(curve.control_points.shape()[1], M, {
+        let pieces = quadratics::<M>(&curve.control_points, &curve.width)?;
+        let problem = bang_bang_quadratic::Problem {
+            pieces: &pieces,
+            runs: &runs,
+            feed: arrays.feed.as_slice()?,
+            junction_speed: arrays.junction_speed.as_slice()?,
+            max_velocity: row(&arrays.max_velocity, 1.0)?,
+            max_acceleration: row(&arrays.max_acceleration, 1.0)?,
+            chord_tolerance: arrays.chord_tolerance,
+            period: arrays.period,
+            start_speed: arrays.start_speed,
+            end_speed: arrays.end_speed,
+        };
+        let profile =
+            py.detach(|| bang_bang_quadratic::plan(&problem)).map_err(|fault| to_exception(&fault))?;
         Ok(to_columns(py, profile))
     })
 }
