@@ -31,9 +31,10 @@ def speed_squares(curve: CompositeCurve) -> tuple[Array, NDArray[np.int64]]:
 
 
 def from_chebyshev(values: Array) -> Array:
-    """Bernstein coefficients (n, m) of the polynomials with these values (n, m) at `chebyshev(m)`."""
+    """Bernstein coefficients (n, m, …) of the polynomials with these values (n, m, …) at `chebyshev(m)`."""
     count = values.shape[1]
-    coefficients: Array = values @ np.linalg.inv(_bernstein(count - 1, chebyshev(count))).T
+    inverse = np.linalg.inv(_bernstein(count - 1, chebyshev(count)))
+    coefficients: Array = np.einsum("ij,nj...->ni...", inverse, values)
     return coefficients
 
 

@@ -13,13 +13,13 @@ is not in ε: some 1e-14 of the largest |q''| of the part.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from feedplan.curves.hodograph import chebyshev, from_chebyshev
 from feedplan.machine.along import derivatives, proxy_constants
 from feedplan.machine.kinematics import Kinematics
 from feedplan.machine.survey import DEEPEST, STRETCH_DEPTH, STRETCH_PARTS
@@ -104,17 +104,12 @@ def _slopes(
     weights: Array | None,
 ) -> Array:
     """Bernstein coefficients of q': q'' through its values at the Chebyshev points, integrated."""
-    at = 0.5 - 0.5 * np.cos(np.pi * (np.arange(nodes) + 0.5) / nodes)
-    curvature = np.stack(
-        [_derivative(kinematics, control_points, width, piece, part, t, 2, weights) for t in at]
-    )
+    curvature = [
+        _derivative(kinematics, control_points, width, piece, part, t, 2, weights) for t in chebyshev(nodes)
+    ]
     start = _derivative(kinematics, control_points, width, piece, part, 0.0, 1, weights)
-    degree = nodes - 1
-    bernstein = np.array(
-        [[math.comb(degree, i) * t**i * (1 - t) ** (degree - i) for i in range(nodes)] for t in at]
-    )
     with np.errstate(invalid="ignore"):
-        coefficients = np.einsum("ij,jmk->mik", np.linalg.inv(bernstein), curvature)
+        coefficients = from_chebyshev(np.stack(curvature, axis=1))
         steps = coefficients * (length / nodes)[:, None, None]
         return np.concatenate([start[:, None], start[:, None] + np.cumsum(steps, axis=1)], axis=1)
 

@@ -8,6 +8,29 @@ use pyo3::prelude::*;
 
 use crate::quadratic::Quadratic;
 
+/// `feedplan.curves.composite.CompositeCurve`.
+#[derive(FromPyObject)]
+pub struct CurveArrays<'py> {
+    pub control_points: PyReadonlyArray2<'py, f64>,
+    pub weights: Option<PyReadonlyArray1<'py, f64>>,
+    pub offsets: PyReadonlyArray1<'py, i64>,
+    pub width: PyReadonlyArray1<'py, f64>,
+}
+
+impl CurveArrays<'_> {
+    pub fn axes(&self) -> usize {
+        self.control_points.shape()[1]
+    }
+
+    /// Empty where all pieces are polynomial.
+    pub fn weights(&self) -> PyResult<&[f64]> {
+        Ok(match &self.weights {
+            Some(weights) => weights.as_slice()?,
+            None => &[],
+        })
+    }
+}
+
 /// (n, m) array to rows of M ≥ m axes; the axes beyond m rest at 0.
 pub fn rows<const M: usize>(array: &PyReadonlyArray2<f64>) -> PyResult<Vec<[f64; M]>> {
     let flat = array.as_slice().map_err(|_| contiguous())?;

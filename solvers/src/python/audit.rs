@@ -4,7 +4,7 @@ use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods}
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::arrays::to_array2;
+use super::arrays::{to_array2, CurveArrays};
 use super::{with_padded_axes, with_path_axes};
 use crate::audit::arcs::Arcs;
 use crate::audit::curve::{Curve, Followed, Pieces};
@@ -46,25 +46,12 @@ fn require(good: bool, what: &str) -> PyResult<()> {
     }
 }
 
-/// `feedplan.curves.composite.CompositeCurve`.
-#[derive(FromPyObject)]
-struct CurveArrays<'py> {
-    control_points: PyReadonlyArray2<'py, f64>,
-    weights: Option<PyReadonlyArray1<'py, f64>>,
-    offsets: PyReadonlyArray1<'py, i64>,
-    width: PyReadonlyArray1<'py, f64>,
-}
-
 impl CurveArrays<'_> {
-    fn axes(&self) -> usize {
-        self.control_points.shape()[1]
-    }
-
     fn pieces(&self, whose: &str) -> PyResult<Pieces<'_>> {
         let pieces = Pieces {
             axes: self.axes(),
             control: self.control_points.as_slice()?,
-            weights: self.weights.as_ref().map_or(Ok(&[][..]), |weights| weights.as_slice())?,
+            weights: self.weights()?,
             offsets: self.offsets.as_slice()?,
             width: self.width.as_slice()?,
         };

@@ -1,9 +1,9 @@
 //! The exact planner: the package's own problem in, the columns of a profile out.
 
-use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyReadonlyArray1, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use super::arrays::{quadratics, row, rows};
+use super::arrays::{quadratics, row, rows, CurveArrays};
 use super::with_padded_axes;
 use crate::bang_bang::{self, plan_each, Problem, Tip, TIP_AXES};
 use crate::bang_bang_quadratic::{self, Fault, Profile};
@@ -29,15 +29,6 @@ type Columns<'py> = (
     Bound<'py, PyArray1<i64>>,
 );
 
-/// `feedplan.curves.composite.CompositeCurve`.
-#[derive(FromPyObject)]
-struct CurveArrays<'py> {
-    control_points: PyReadonlyArray2<'py, f64>,
-    weights: Option<PyReadonlyArray1<'py, f64>>,
-    offsets: PyReadonlyArray1<'py, i64>,
-    width: PyReadonlyArray1<'py, f64>,
-}
-
 impl CurveArrays<'_> {
     /// Whether all pieces are polynomials of degree 2.
     fn is_quadratic(&self) -> bool {
@@ -45,13 +36,6 @@ impl CurveArrays<'_> {
         self.weights.is_none()
             && self.control_points.shape()[0] == 3 * self.width.len()
             && self.offsets.as_array().iter().zip(0..).all(rises)
-    }
-
-    fn weights(&self) -> PyResult<&[f64]> {
-        Ok(match &self.weights {
-            Some(weights) => weights.as_slice()?,
-            None => &[],
-        })
     }
 }
 
@@ -124,7 +108,7 @@ fn plan<'py>(py: Python<'py>, arrays: &ProblemArrays<'py>, by: Quadratics) -> Py
         )),
         _ => None,
     };
-    with_padded_axes!(curve.control_points.shape()[1], M, {
+    with_padded_axes!(curve.axes(), M, {
         let control = rows::<M>(&curve.control_points)?;
         let problem = Problem {
             control: &control,
@@ -161,7 +145,7 @@ fn plan<'py>(py: Python<'py>, arrays: &ProblemArrays<'py>, by: Quadratics) -> Py
 fn plan_quadratics<'py>(py: Python<'py>, arrays: &ProblemArrays<'py>) -> PyResult<Columns<'py>> {
     let curve = &arrays.curve;
     let runs = indices(&arrays.path.runs);
-    with_padded_axes!(curve.control_points.shape()[1], M, {
+    with_padded_axes!(curve.axes(), M, {
         let pieces = quadratics::<M>(&curve.control_points, &curve.width)?;
         let problem = bang_bang_quadratic::Problem {
             pieces: &pieces,
