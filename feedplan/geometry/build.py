@@ -28,11 +28,11 @@ class FitSettings:
 
     `default_tolerance` [mm] holds in G64 stretches without a P, and where a program says nothing: a hundredth
     is what machining tolerances leave to a controller.
-    `exact_tolerance` [mm] is what "exactly" means for arcs in every mode; lines and splines are exact. An arc
-    becomes the circle through both its ends, which rounding took off the programmed one. Half of that
-    bounds how far it is from the programmed arc, whose radius goes with the angle: beyond it is a spiral and
-    becomes quadratics within as much. It also bounds how far a helix is off along its axis while on its
-    cylinder. The other half smooths joints.
+    `exact_tolerance` [mm] is what "exactly" means for arcs in every mode; lines are exact, and splines but
+    for smoothed joints. An arc becomes the circle through both its ends, which rounding took off the
+    programmed one. Half of that bounds how far it is from the programmed arc, whose radius goes with the
+    angle: beyond it is a spiral and becomes quadratics within as much. It also bounds how far a helix is off
+    along its axis while on its cylinder. The other half smooths joints.
     `fit_share` is the part of the tolerance that the fit may use: where the program gives no Q, and at most.
     Corners are rounded by what the fit leaves.
     `max_chord` [mm]: longer G1 chords stay lines. A long chord among short ones was meant as a line.
@@ -68,13 +68,13 @@ def build_path(
 
     G61.1 stops after every move. G61 follows lines, splines and arcs exactly (arcs with rounded ends and
     helices within `settings.exact_tolerance`), and stops where the direction breaks; only where rounded
-    coordinates leave an arc and its neighbour a turn of less than a degree is that smoothed, within the same
-    tolerance. G64 stays within its tolerance, both ways: chains of G1 moves are fitted and corners are
-    rounded. The tolerance [mm] is `tolerance`, else the program's P, else `settings.default_tolerance`; 0
-    means exact lines with stops. Q bounds the fit alone. Where G64 meets G61 the joint belongs to the
-    stricter of them. Rapids are lines of their own. Arcs become true circles; splines go into the path as
-    they are, their widths scaled to about the length, pieces without a length left out. Corners at splines
-    are not rounded.
+    coordinates leave an arc or a spline and its neighbour a turn of less than a degree is that smoothed,
+    within the same tolerance. G64 stays within its tolerance, both ways: chains of G1 moves are fitted and
+    corners are rounded. The tolerance [mm] is `tolerance`, else the program's P, else
+    `settings.default_tolerance`; 0 means exact lines with stops. Q bounds the fit alone. Where G64 meets G61
+    the joint belongs to the stricter of them. Rapids are lines of their own. Arcs become true circles;
+    splines go into the path as they are, their widths scaled to about the length, pieces without a length
+    left out; only at corners are their ends cut and bent as those of lines and arcs are.
 
     Corners that cannot be rounded are stops, unless every axis that moves has a `max_velocity_jump`. The
     tool stops also where the meaning of words or the tool length changes. Axes that the program moves must

@@ -1,4 +1,4 @@
-//! Corners rounded by quadratic pieces: how long a corner may be, and the smooth pieces that replace it.
+//! Rounded corners: how long a corner may be, and the smooth pieces that replace it.
 //!
 //! Two smooth sides meet in V with unit tangents t₋ before and t₊ after. On both sides, up to the length l
 //! from V, the displacement D (q/l)² is added to the curve, where q is the distance from the far end of the
@@ -8,12 +8,15 @@
 //! D = (t₊ − t₋)/(2/l₋ + 2/l₊)          |D| = l |t₊ − t₋|/4 at equal lengths
 //! ```
 //!
-//! the tangents agree in V + D. The pieces stay quadratics, their number stays what it was, and points of equal
+//! the tangents agree in V + D. The pieces keep their degree, their number stays what it was, and points of equal
 //! parameter are never farther apart than |D|: that bounds the deviation both ways, in any number of axes and
-//! over any number of pieces. A conic of middle weight w stays one: its control points get shares of D, so that
-//! every point gets a mean of them. The shares make the slope of what is added grow with q here too; it ends as
-//! 2/(lA), A being the sum over the pieces of the change of (q/l)² over w. It is met in V, whose distance from the curve between two equally long lines is
+//! over any number of pieces. The bound is met in V, whose distance from the curve between two equally long lines is
 //! exactly |D|. There the curve is the one parabola with the control points V − l t₋, V, V + l t₊.
+//!
+//! A piece of degree d with weights stays one: its control points get shares of D, so that every point gets a mean of
+//! them. The slope of what is added grows with q here too and ends as 2/(lA): the shares' first and last steps on a
+//! piece from q₀ to q₁ are q₀ w₀/w₁ and q₁ w_d/w_{d−1}, those between go evenly from one to the other, all times
+//! 2 (q₁ − q₀)/(d l² A), where A makes their sum over the side 1. On polynomials A = 1 and this is (q/l)².
 //!
 //! # Why this shape
 //! Two quadratics with the polygon A, A + x t₋, B − x t₊, B and the apex at the tolerance leave the ratio
@@ -31,7 +34,8 @@
 
 use crate::conic::Conic;
 use crate::follow::{Followed, Shape};
-use crate::quadratic::norm;
+use crate::quadratic::{norm, sub};
+use crate::spline::CompositeCurve;
 
 /// Corners that turn back are passed at rest anyway: no rounding where cos(turn/2) is below this (177.7°).
 const LEAST_COSINE: f64 = 0.02;
@@ -150,6 +154,8 @@ pub fn share_lengths(need: &[f64], stretch: &[f64]) -> Vec<f64> {
 pub struct Sides<const M: usize> {
     pub before: Vec<Followed<M>>,
     pub after: Vec<Followed<M>>,
+    /// The pieces of splines among them.
+    pub made: CompositeCurve<M>,
 }
 
 impl<const M: usize> Sides<M> {
@@ -175,48 +181,107 @@ impl<const M: usize> Sides<M> {
     }
 
     /// Bends both sides so that they meet smoothly. Returns by what factor this exceeds what is left of the
-    /// tolerance of some piece, None where a side is empty or not all of conics.
+    /// tolerance of some piece, None where a side is empty or stands still within.
     pub fn bend(&mut self, jump: &Jump<M>) -> Option<f64> {
-        if self.before.is_empty() || self.after.is_empty() {
+        let Self { before, after, made } = self;
+        if before.is_empty() || after.is_empty() {
             return None;
         }
-        let length_before = rescale(self.before.iter_mut().rev(), true)?;
-        let length_after = rescale(self.after.iter_mut(), false)?;
-        let spread_before = spread(self.before.iter(), length_before);
-        let spread_after = spread(self.after.iter().rev(), length_after);
+        let length_before = rescale(before.iter_mut().rev(), true, made)?;
+        let length_after = rescale(after.iter_mut(), false, made)?;
+        let spread_before = spread(before.iter(), length_before, made, true);
+        let spread_after = spread(after.iter().rev(), length_after, made, false);
         let displacement = jump.displacement(length_before * spread_before, length_after * spread_after);
         // From the far ends to the corner, so that q starts as an exact 0 and ends as an exact length.
-        let before = bend(self.before.iter_mut(), true, &displacement, length_before, spread_before);
-        let after = bend(self.after.iter_mut().rev(), false, &displacement, length_after, spread_after);
+        let before = bend(before.iter_mut(), true, &displacement, length_before, spread_before, made)?;
+        let after = bend(after.iter_mut().rev(), false, &displacement, length_after, spread_after, made)?;
         Some(before.max(after))
     }
 }
 
+/// What bending has to know of a piece: its degree, w₀/w₁ and w_d/w_{d−1}.
+struct Ends {
+    degree: usize,
+    ratio: [f64; 2],
+}
+
+impl Ends {
+    fn new<const M: usize>(shape: &Shape<M>, made: &CompositeCurve<M>) -> Self {
+        match shape {
+            Shape::Conic(conic) => Self { degree: 2, ratio: [1.0 / conic.weight; 2] },
+            Shape::Spline(spline) => {
+                let piece = made.piece(spline.index as usize);
+                let (degree, w) = (piece.degree(), piece.weights);
+                let ratio =
+                    if piece.is_rational() { [w[0] / w[1], w[degree] / w[degree - 1]] } else { [1.0; 2] };
+                Self { degree, ratio }
+            }
+        }
+    }
+
+    /// C'·width at both ends as lengths.
+    fn speeds<const M: usize>(&self, shape: &Shape<M>, made: &CompositeCurve<M>) -> [f64; 2] {
+        let control = match shape {
+            Shape::Conic(conic) => &conic.control[..],
+            Shape::Spline(spline) => made.piece(spline.index as usize).control,
+        };
+        let (last, degree) = (self.degree, self.degree as f64);
+        let edges = [sub(&control[1], &control[0]), sub(&control[last], &control[last - 1])];
+        [degree / self.ratio[0] * norm(&edges[0]), degree / self.ratio[1] * norm(&edges[1])]
+    }
+
+    /// The steps of the shares on the piece where q/l goes from `far` to `near`, seen from the far end.
+    fn steps(&self, far: f64, near: f64, corner_at_end: bool) -> impl Iterator<Item = f64> {
+        let [mut first, mut last] = self.ratio;
+        if !corner_at_end {
+            (first, last) = (last, first);
+        }
+        let (first, last) = (first * far, last * near);
+        let (degree, factor) = (self.degree, 2.0 * (near - far) / self.degree as f64);
+        (0..degree).map(move |i| {
+            let t = i as f64 / (degree - 1) as f64;
+            factor * (first + t * (last - first))
+        })
+    }
+}
+
 /// Makes the pieces of a side, taken from the corner outwards, C1 with speed 1 in the corner, and returns the
-/// length of the side in that parameter, None where a piece is no conic.
+/// length of the side in that parameter, None where a piece begins or ends with no speed.
 fn rescale<'a, const M: usize>(
     side: impl Iterator<Item = &'a mut Followed<M>>,
     corner_at_end: bool,
+    made: &CompositeCurve<M>,
 ) -> Option<f64> {
     let (mut speed, mut length) = (1.0, 0.0);
-    for followed in side {
-        let Shape::Conic(piece) = &mut followed.piece else { return None };
-        let (start, end) = piece.end_speeds();
+    for Followed { piece, .. } in side {
+        let [start, end] = Ends::new(piece, made).speeds(piece, made);
         let (near, far) = if corner_at_end { (end, start) } else { (start, end) };
-        piece.width = near / speed;
-        speed = far / piece.width;
-        length += piece.width;
+        let width = near / speed;
+        match piece {
+            Shape::Conic(conic) => conic.width = width,
+            Shape::Spline(spline) => spline.width = width,
+        }
+        speed = far / width;
+        length += width;
+        if !(width > 0.0 && speed > 0.0 && width.is_finite() && speed.is_finite()) {
+            return None;
+        }
     }
     Some(length)
 }
 
 /// The sum A of a side, taken from the far end to the corner.
-fn spread<'a, const M: usize>(side: impl Iterator<Item = &'a Followed<M>>, length: f64) -> f64 {
+fn spread<'a, const M: usize>(
+    side: impl Iterator<Item = &'a Followed<M>>,
+    length: f64,
+    made: &CompositeCurve<M>,
+    corner_at_end: bool,
+) -> f64 {
     let (mut far, mut sum) = (0.0, 0.0);
-    for conic in side.filter_map(|followed| followed.piece.conic()) {
-        let step = conic.width / length;
-        sum += (far + far + step) * step / conic.weight;
-        far += step;
+    for followed in side {
+        let near = far + followed.piece.width() / length;
+        sum += Ends::new(&followed.piece, made).steps(far, near, corner_at_end).sum::<f64>();
+        far = near;
     }
     sum
 }
@@ -229,30 +294,41 @@ fn bend<'a, const M: usize>(
     displacement: &[f64; M],
     length: f64,
     spread: f64,
-) -> f64 {
+    made: &mut CompositeCurve<M>,
+) -> Option<f64> {
     let distance = norm(displacement);
     let (mut far, mut reached, mut excess, count) = (0.0, 0.0, 0.0f64, side.len());
     for (i, followed) in side.enumerate() {
-        let Shape::Conic(piece) = &mut followed.piece else { continue };
-        let near = if i + 1 == count { 1.0 } else { far + piece.width / length };
-        let slope = (near - far) / (piece.weight * spread);
-        let middle = reached + far * slope;
-        let end = if i + 1 == count { 1.0 } else { middle + near * slope };
-        let mut shares = [reached, middle, end];
-        if !corner_at_end {
-            shares.reverse();
-        }
-        for (point, share) in piece.control.iter_mut().zip(shares) {
+        let near = if i + 1 == count { 1.0 } else { far + followed.piece.width() / length };
+        let ends = Ends::new(&followed.piece, made);
+        let control = match &mut followed.piece {
+            Shape::Conic(conic) => &mut conic.control[..],
+            Shape::Spline(spline) => made.control_mut(spline.index as usize),
+        };
+        let mut share = reached;
+        let give = |point: &mut [f64; M], share: f64| {
             for k in 0..M {
                 point[k] += share * displacement[k];
             }
+        };
+        let at = |i: usize| if corner_at_end { i } else { ends.degree - i };
+        give(&mut control[at(0)], share);
+        for (i, step) in (1..).zip(ends.steps(far, near, corner_at_end)) {
+            share += step / spread;
+            // Two pieces meet in one point, and the last of a side in the corner.
+            let exact = i == ends.degree && near == 1.0;
+            share = if exact { 1.0 } else { share };
+            give(&mut control[at(i)], share);
         }
-        let deviation = end * distance;
+        if let Shape::Spline(spline) = &mut followed.piece {
+            *spline = spline.bent(made)?;
+        }
+        let deviation = share * distance;
         excess = excess.max(deviation / (followed.tolerance - followed.deviation));
         followed.deviation += deviation;
-        (far, reached) = (near, end);
+        (far, reached) = (near, share);
     }
-    excess
+    Some(excess)
 }
 
 #[cfg(test)]
@@ -302,6 +378,7 @@ mod tests {
         let sides = Sides {
             before: vec![followed(before.part(10.0 - length, 10.0))],
             after: vec![followed(after.part(0.0, length))],
+            made: CompositeCurve::default(),
         };
         let corner = sides.parabola(&jump).unwrap();
         let parabola = *conic(&corner);
@@ -356,7 +433,11 @@ mod tests {
 
     fn assert_bends_smoothly<const M: usize>(before: [Conic<M>; 2], after: [Conic<M>; 2]) {
         let jump = jump_between(before[1], after[0]);
-        let mut sides = Sides { before: before.map(followed).to_vec(), after: after.map(followed).to_vec() };
+        let mut sides = Sides {
+            before: before.map(followed).to_vec(),
+            after: after.map(followed).to_vec(),
+            made: CompositeCurve::default(),
+        };
         let excess = sides.bend(&jump).unwrap();
         let all: Vec<_> = sides.before.iter().chain(&sides.after).collect();
         let pieces: Vec<Conic<M>> = all.iter().map(|followed| *conic(followed)).collect();

@@ -1,7 +1,5 @@
 //! A program becomes a path: pieces from `follow`, corners from `corner`, runs between full stops.
 //!
-//! Splines are followed as they are: a joint of theirs that is not smooth is never rounded.
-//!
 //! Joints at which the pieces do not meet smoothly divide the path into stretches. A joint is a stop where the
 //! program halts, a rounded corner where the tolerance allows one, and otherwise a corner that is passed with a
 //! velocity jump (if the machine allows one) or at rest. Rounding starts in the stretches on both sides and
@@ -14,7 +12,8 @@ mod travel;
 use rayon::prelude::*;
 
 use crate::corner::{share_lengths, Sides};
-use crate::follow::{follow, FollowError, FollowOptions, Followed, FollowedProgram, Moves};
+use crate::follow::{follow, FollowError, FollowOptions, FollowedProgram, Moves};
+pub use stretches::Part;
 use stretches::{Cuts, Stretches, TASK};
 use travel::{outside, Outside};
 
@@ -32,7 +31,7 @@ pub struct Axes<const M: usize> {
 /// The path of a program.
 pub struct BuiltPath<const M: usize> {
     /// The pieces in order, in the parts that were made in parallel.
-    pub parts: Vec<Vec<Followed<M>>>,
+    pub parts: Vec<Part<M>>,
     /// Index of the first piece of each run, and the number of pieces.
     pub runs: Vec<usize>,
     /// Upper bound of the distance between path and program, both ways.
@@ -54,7 +53,7 @@ pub fn build_path<const M: usize>(
     let FollowedProgram { pieces, points, splines, polynomials } = follow(moves, options)?;
     let (mut parts, mut runs) = (Vec::new(), vec![0]);
     if !pieces.is_empty() {
-        let stretches = Stretches::new(&pieces, moves.halt);
+        let stretches = Stretches::new(&pieces, moves.splines, moves.halt);
         let joints = 0..stretches.joint_count();
         let need: Vec<f64> = joints.clone().into_par_iter().map(|k| stretches.need(k, axes)).collect();
         let length = share_lengths(&need, &stretches.length);
@@ -65,7 +64,7 @@ pub fn build_path<const M: usize>(
             .collect();
         (parts, runs) = stretches.assemble(&corners, axes.jump);
     }
-    let deviation = |part: &Vec<Followed<M>>| part.iter().map(|piece| piece.deviation).fold(0.0, f64::max);
+    let deviation = |part: &Part<M>| part.pieces.iter().map(|piece| piece.deviation).fold(0.0, f64::max);
     Ok(BuiltPath {
         deviation: parts.iter().map(deviation).fold(0.0, f64::max),
         outside: outside(&parts, moves, &axes.travel),
@@ -82,7 +81,7 @@ mod tests {
     use super::*;
     use crate::conic::Conic;
     use crate::corner::Jump;
-    use crate::follow::{LINE, SPLINE};
+    use crate::follow::{Followed, Shape, LINE, SPLINE};
     use crate::quadratic::{norm, sub};
     use crate::spline::CompositeCurve;
     use proptest::prelude::*;
@@ -102,6 +101,10 @@ mod tests {
             travel: [[f64::NEG_INFINITY, f64::INFINITY]; M],
             jump,
         }
+    }
+
+    fn all<const M: usize>(path: &BuiltPath<M>) -> Vec<Followed<M>> {
+        path.parts.iter().flat_map(|part| &part.pieces).copied().collect()
     }
 
     fn polyline(
@@ -128,7 +131,7 @@ mod tests {
             joints: &vec![true; count],
         };
         let path = build_path(&moves, &OPTIONS, &axes(jump)).unwrap();
-        (path.parts.concat(), path.runs)
+        (all(&path), path.runs)
     }
 
     fn conic<const M: usize>(followed: &Followed<M>) -> &Conic<M> {
@@ -173,9 +176,14 @@ mod tests {
         }
     }
 
-    #[test]
-    fn a_spline_passes_smoothly_between_lines_and_stops_in_its_corners() {
-        // A tangent cubic, a piece of no length, and a line of degree 1 at a right angle; then a corner to a line.
+    /// Two splines between lines: a tangent cubic with weights, a piece of no length, a line of degree 1 at a right
+    /// angle; then a corner to a line.
+    fn between_lines(
+        tolerance: f64,
+        joints: &[bool; 3],
+        axes: &Axes<2>,
+        missing: bool,
+    ) -> Option<BuiltPath<2>> {
         let mut splines = CompositeCurve::default();
         splines.push(&[[10.0, 0.0], [11.0, 0.0], [12.0, 0.0], [12.0, 2.0]], &[1.0, 2.0, 1.0, 1.0], 1.0);
         splines.push(&[[12.0, 2.0], [12.0, 2.0]], &[], 1.0);
@@ -185,18 +193,23 @@ mod tests {
             kind: &[LINE, SPLINE, LINE],
             target: &[[10.0, 0.0], [14.0, 2.0], [14.0, 10.0]],
             feed: &[10.0; 3],
-            tolerance: &[0.1; 3],
+            tolerance: &[tolerance; 3],
             fit_tolerance: &[0.0; 3],
             halt: &[false; 3],
             arcs: &[],
-            spline_moves: &[(1, 0..3)],
+            spline_moves: if missing { &[] } else { &[(1, 0..3)] },
             changes: &[],
             splines: &splines,
-            joints: &[true; 3],
+            joints,
         };
+        build_path(&moves, &OPTIONS, axes).ok()
+    }
+
+    #[test]
+    fn an_exact_spline_passes_smoothly_between_lines_and_stops_in_its_corners() {
         let mut limits = axes(false);
-        let path = build_path(&moves, &OPTIONS, &limits).unwrap();
-        let pieces = path.parts.concat();
+        let path = between_lines(0.0, &[true; 3], &limits, false).unwrap();
+        let pieces = all(&path);
         assert_eq!((pieces.len(), &path.runs[..]), (4, &[0, 2, 3, 4][..]));
         let widths: Vec<f64> = pieces.iter().map(|piece| piece.piece.width()).collect();
         assert_eq!(widths[0], 10.0);
@@ -204,14 +217,45 @@ mod tests {
         assert!(path.outside.is_none() && path.deviation == 0.0);
         // The polygon reaches 12, the curve less than that before its end.
         limits.travel[0] = [f64::NEG_INFINITY, 13.0];
-        let outside = build_path(&moves, &OPTIONS, &limits).unwrap().outside.unwrap();
+        let outside = between_lines(0.0, &[true; 3], &limits, false).unwrap().outside.unwrap();
         assert_eq!((outside.index, outside.axis, outside.position), (1, 0, 14.0));
-        let elsewhere = Moves { joints: &[true, false, false], ..moves };
-        assert!(build_path(&elsewhere, &OPTIONS, &limits).unwrap().outside.is_none());
-        let none = Moves { spline_moves: &[], ..elsewhere };
-        assert!(build_path(&none, &OPTIONS, &limits).is_err());
-        let limits = axes(true);
-        assert_eq!(build_path(&elsewhere, &OPTIONS, &limits).unwrap().runs, [0, 4]);
+        let elsewhere = [true, false, false];
+        assert!(between_lines(0.0, &elsewhere, &limits, false).unwrap().outside.is_none());
+        assert!(between_lines(0.0, &elsewhere, &limits, true).is_none());
+        assert_eq!(between_lines(0.0, &elsewhere, &axes(true), false).unwrap().runs, [0, 4]);
+    }
+
+    #[test]
+    fn corners_at_splines_are_rounded_and_what_is_not_bent_stays_as_it_is() {
+        let path = between_lines(0.1, &[true; 3], &axes(false), false).unwrap();
+        let pieces = all(&path);
+        assert_eq!(path.runs, [0, pieces.len()]);
+        assert!(path.deviation > 0.05 && path.deviation <= 0.1 * (1.0 + 1e-9), "{}", path.deviation);
+        assert_joined_smoothly(&pieces, &path.runs);
+        let no_splines = CompositeCurve::default();
+        let [part] = &path.parts[..] else { panic!("one task") };
+        let curves = pieces.iter().filter_map(|followed| match &followed.piece {
+            Shape::Spline(spline) if spline.made => {
+                Some((followed.deviation, part.spline(spline, &no_splines)))
+            }
+            _ => None,
+        });
+        // What is left of the cubic, its end, and the line in three parts, of which the middle one is a line still.
+        let made: Vec<_> =
+            curves.map(|(deviation, piece)| (deviation, piece.degree(), piece.is_rational())).collect();
+        assert_eq!(made.iter().map(|piece| piece.1).collect::<Vec<_>>(), [3, 3, 2, 2, 2]);
+        assert!(
+            made[0].0 == 0.0 && made[0].2 && made[1].0 == made[2].0 && made[2].0 > 0.0 && made[3].0 == 0.0
+        );
+    }
+
+    fn assert_joined_smoothly<const M: usize>(pieces: &[Followed<M>], runs: &[usize]) {
+        for (i, pair) in pieces.windows(2).enumerate() {
+            if runs.binary_search(&(i + 1)).is_err() {
+                let jump = Jump::new(&pair[0].piece, &pair[1].piece).unwrap();
+                assert!(jump.is_smooth(&pair[0].piece, &pair[1].piece), "{i}: {}", jump.size);
+            }
+        }
     }
 
     proptest! {

@@ -117,6 +117,11 @@ impl<const M: usize> CompositeCurve<M> {
         Piece { control: &self.control[range], weights, width: self.width[i] }
     }
 
+    /// The control points of piece i.
+    pub fn control_mut(&mut self, i: usize) -> &mut [[f64; M]] {
+        &mut self.control[self.offsets[i]..self.offsets[i + 1]]
+    }
+
     pub fn pieces(&self) -> impl Iterator<Item = Piece<'_, M>> {
         (0..self.len()).map(|i| self.piece(i))
     }
@@ -134,6 +139,14 @@ impl<const M: usize> CompositeCurve<M> {
         }
         self.offsets.push(self.control.len());
         self.width.push(width);
+    }
+
+    /// Removes all pieces, and keeps the memory.
+    pub fn clear(&mut self) {
+        self.control.clear();
+        self.weights.clear();
+        self.offsets.truncate(1);
+        self.width.clear();
     }
 }
 

@@ -9,9 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from feedplan.audit import audit
+from feedplan.constraints.problem import build_problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError, ProgramError
 from feedplan.geometry.build import build_path
+from feedplan.geometry.joints import tangent_jumps
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import Axis, Machine
 from feedplan.program.program import MoveKind, PathControl, Program
@@ -50,18 +53,17 @@ def test_pieces_of_any_degree_are_kept_to_the_last_bit(make_program: Any) -> Non
         points.append(control[-1])
         weights = random.uniform(0.5, 2, degree + 1) if degree % 2 else None
         curves[move] = CompositeCurve.from_bezier(control, weights)
-    for control_mode in (PathControl.EXACT_PATH, PathControl.TOLERANCE):
-        path = build_path(with_splines(make_program(points, control=control_mode), curves), MILL)
-        assert path.curve.degree.tolist() == list(range(1, 10))
-        for i in range(9):
-            control, weights = piece(path, i)
-            np.testing.assert_array_equal(control, curves[i].control_points)
-            given = curves[i].weights
-            np.testing.assert_array_equal(weights, 1.0 if given is None else given)
-        # Every joint is a corner, and every corner at a spline a stop.
-        np.testing.assert_array_equal(path.runs, np.arange(10))
-        np.testing.assert_array_equal(path.line, 10 + np.arange(9))
-        assert path.fit.deviation == 0.0
+    path = build_path(with_splines(make_program(points, control=PathControl.EXACT_PATH), curves), MILL)
+    assert path.curve.degree.tolist() == list(range(1, 10))
+    for i in range(9):
+        control, weights = piece(path, i)
+        np.testing.assert_array_equal(control, curves[i].control_points)
+        given = curves[i].weights
+        np.testing.assert_array_equal(weights, 1.0 if given is None else given)
+    # Every joint is a corner, and a stop.
+    np.testing.assert_array_equal(path.runs, np.arange(10))
+    np.testing.assert_array_equal(path.line, 10 + np.arange(9))
+    assert path.fit.deviation == 0.0
 
 
 def test_tangent_joints_pass_between_lines_arcs_and_splines(make_program: Any) -> None:
@@ -78,15 +80,62 @@ def test_tangent_joints_pass_between_lines_arcs_and_splines(make_program: Any) -
     assert path.width[1] == 2 + 2 * math.sqrt(2) + 2
 
 
-def test_a_corner_beside_a_spline_is_a_stop_and_the_next_one_is_rounded(make_program: Any) -> None:
+def test_a_corner_beside_a_spline_is_rounded_within_the_tolerance(make_program: Any) -> None:
     points = [[10, 0], [14, 4], [20, 4], [20, 10]]
-    spline = CompositeCurve.from_bezier(CUBIC)
-    program = with_splines(make_program(points, blend_tolerance=0.05), {0: spline})
+    program = with_splines(make_program(points, blend_tolerance=0.05), {0: CompositeCurve.from_bezier(CUBIC)})
     path = build_path(program, MILL)
-    np.testing.assert_array_equal(path.runs, [0, 1, 4])
-    np.testing.assert_array_equal(piece(path, 0)[0], CUBIC)
-    jump = tuple(dataclasses.replace(axis, max_velocity_jump=1.0) for axis in MILL.axes)
-    np.testing.assert_array_equal(build_path(program, dataclasses.replace(MILL, axes=jump)).runs, [0, 4])
+    np.testing.assert_array_equal(path.runs, [0, len(path)])
+    # What is left of the spline, its end, the line's start in two pieces, then a parabola for two lines.
+    assert path.curve.degree.tolist() == [3, 3, 2, 2, 2, 2]
+    assert path.curve.joints().kind.min() >= 2
+    assert 0.045 < path.fit.deviation <= 0.05 * (1 + 1e-9)
+    # The corner at (14, 4) moves to where both bent sides meet, as far as they say.
+    meeting = piece(path, 1)[0][-1]
+    assert np.linalg.norm(meeting - [14, 4, 0]) == pytest.approx(0.05, rel=0.1)
+    assert meeting[0] > 14
+    assert meeting[1] < 4
+    assert audit(build_problem(path, MILL), None, MILL, program).ok
+
+
+def test_rounded_coordinates_of_an_exact_spline_make_no_stop_and_a_corner_does(make_program: Any) -> None:
+    def exact(turn: float) -> Path:
+        end = [14 + math.cos(math.pi / 2 - turn), 4 + math.sin(math.pi / 2 - turn)]
+        program = make_program([[10, 0], [14, 4], end], control=PathControl.EXACT_PATH)
+        return build_path(with_splines(program, {0: CompositeCurve.from_bezier(CUBIC)}), MILL)
+
+    smoothed = exact(1e-4)
+    assert len(smoothed.runs) == 2
+    assert 0 < smoothed.fit.deviation <= 1e-3
+    assert exact(0.1).runs.tolist() == [0, 1, 2]
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_random_chains_of_splines_arcs_and_lines_are_smooth_and_within_the_tolerance(
+    seed: int, make_program: Any
+) -> None:
+    random = np.random.default_rng(seed)
+    count, tolerance = 8, 10.0 ** random.uniform(-4, 0)
+    points, curves = [np.zeros(3)], {}
+    for move in range(count):
+        if random.random() < 0.3:
+            points.append(points[-1] + random.normal(size=3))
+            continue
+        degree = int(random.integers(1, 6))
+        control = points[-1] + np.cumsum(random.normal(size=(degree + 1, 3)), axis=0)
+        control[0] = points[-1]
+        weights = 10.0 ** random.uniform(-1, 1, degree + 1) if random.random() < 0.4 else None
+        curves[move] = CompositeCurve.from_bezier(control, weights)
+        points.append(control[-1])
+    program = with_splines(make_program(points, blend_tolerance=tolerance), curves)
+    path = build_path(program, MILL)
+    joints = path.curve.joints()
+    within = np.setdiff1d(np.arange(1, len(path)), path.runs)
+    assert joints.kind[within - 1].min() >= 1
+    assert tangent_jumps(path.curve)[within - 1].max() < 1e-9
+    assert len(path.runs) - 2 <= 1
+    assert path.fit.deviation <= tolerance * (1 + 1e-9)
+    verdict = audit(build_problem(path, MILL), None, MILL, program)
+    assert verdict.ok, verdict
 
 
 def test_pieces_of_a_spline_keep_their_continuity_and_lose_those_without_length(make_program: Any) -> None:

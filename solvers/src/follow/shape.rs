@@ -1,9 +1,8 @@
-//! What a piece of a path is: a conic, which corners may cut and bend, or a piece of a programmed spline, which stays
-//! as it is.
+//! What a piece of a path is: a conic, or a piece of a spline, as programmed or as corners cut and bent it.
 
 use crate::conic::Conic;
 use crate::quadratic::{norm, sub};
-use crate::spline::CompositeCurve;
+use crate::spline::{bezier, CompositeCurve, Piece};
 
 /// Edges of a control polygon that are shorter than this part of it are none, as next to a cusp.
 const VANISHING: f64 = 1e-12;
@@ -14,10 +13,12 @@ pub enum Shape<const M: usize> {
     Spline(Spline<M>),
 }
 
-/// A piece of a program's splines, known by its number, and what its neighbours have to know of it.
+/// A piece of a spline, known by its number, and what its neighbours have to know of it.
 #[derive(Clone, Copy, Debug)]
 pub struct Spline<const M: usize> {
+    /// Which piece: of the program's splines, or where `made`, of those that its corners made.
     pub index: u32,
+    pub made: bool,
     pub width: f64,
     start: [f64; M],
     /// The edges of the control polygon at both ends that have a length.
@@ -26,19 +27,45 @@ pub struct Spline<const M: usize> {
 }
 
 impl<const M: usize> Spline<M> {
-    /// Piece `index` of a curve, its width scaled; None where it has no length.
-    pub fn new(curve: &CompositeCurve<M>, index: usize, scale: f64) -> Option<Self> {
-        let piece = curve.piece(index);
+    /// Piece `index` of a program's splines, its width scaled; None where it has no length.
+    pub fn new(splines: &CompositeCurve<M>, index: usize, scale: f64) -> Option<Self> {
+        let piece = splines.piece(index);
+        Self::of(&piece, index, false, piece.width * scale)
+    }
+
+    fn of(piece: &Piece<M>, index: usize, made: bool, width: f64) -> Option<Self> {
         let edges = || piece.control.windows(2).map(|pair| sub(&pair[1], &pair[0]));
         let (extent, _) = piece.extent();
         let long = |edge: &[f64; M]| norm(edge) > VANISHING * extent;
-        Some(Self {
-            index: index as u32,
-            width: piece.width * scale,
-            start: piece.control[0],
-            start_edge: edges().find(long)?,
-            end_edge: edges().rev().find(long)?,
-        })
+        let (start_edge, end_edge) = (edges().find(long)?, edges().rev().find(long)?);
+        Some(Self { index: index as u32, made, width, start: piece.control[0], start_edge, end_edge })
+    }
+
+    /// The part between two places in [0, width] as a made piece that can be bent, so of degree 2 or more;
+    /// `splines` are the program's.
+    pub fn part(
+        &self,
+        splines: &CompositeCurve<M>,
+        low: f64,
+        high: f64,
+        made: &mut CompositeCurve<M>,
+    ) -> Option<Self> {
+        let whole = splines.piece(self.index as usize);
+        let scale = whole.width / self.width;
+        let cuts = [low, high].map(|u| u * scale);
+        let inner = usize::from(low <= 0.0)..1 + usize::from(high < self.width);
+        let mut parts = CompositeCurve::default();
+        bezier::split(&whole, &cuts[inner], &mut parts);
+        let part = parts.piece(usize::from(low > 0.0));
+        bezier::elevate(&part, usize::from(part.degree() == 1), made);
+        let index = made.len() - 1;
+        Self::of(&made.piece(index), index, true, high - low)
+    }
+
+    /// The same piece after its control points have changed.
+    pub fn bent(&self, made: &CompositeCurve<M>) -> Option<Self> {
+        let index = self.index as usize;
+        Self::of(&made.piece(index), index, true, self.width)
     }
 }
 

@@ -5,11 +5,12 @@ use rayon::prelude::*;
 
 use super::Axes;
 use crate::corner::{Jump, Sides};
-use crate::follow::{Followed, Shape};
+use crate::follow::{Followed, Shape, Spline};
+use crate::spline::{CompositeCurve, Piece};
 
-/// Exact paths are smoothed only where an arc meets its neighbour with a turn below this (rad): that is what
-/// rounded coordinates leave of a tangent joint.
-const ARC_JOINT: f64 = 0.0175;
+/// Exact paths are smoothed only where an arc or a spline meets its neighbour with a turn below this (rad): that is
+/// what rounded coordinates leave of a tangent joint.
+const CURVE_JOINT: f64 = 0.0175;
 /// No corner is shorter than this times the tolerance because it needs no more: pieces of no size help nobody.
 const LEAST_LENGTH: f64 = 0.01;
 /// What is left between two corners is dropped below this share of the stretch.
@@ -28,6 +29,8 @@ struct Joint<const M: usize> {
 /// The pieces in stretches, with the stations that cuts refer to.
 pub struct Stretches<'a, const M: usize> {
     pieces: &'a [Followed<M>],
+    /// The program's.
+    splines: &'a CompositeCurve<M>,
     joints: Vec<Joint<M>>,
     /// For each piece, the sum of the widths before it in its stretch.
     station: Vec<f64>,
@@ -42,7 +45,7 @@ pub struct Cuts {
 }
 
 impl<'a, const M: usize> Stretches<'a, M> {
-    pub fn new(pieces: &'a [Followed<M>], halt: &[bool]) -> Self {
+    pub fn new(pieces: &'a [Followed<M>], splines: &'a CompositeCurve<M>, halt: &[bool]) -> Self {
         let end = |at| Joint { at, jump: None };
         let inner = (1..pieces.len()).into_par_iter().filter_map(|at| {
             let (before, after) = (&pieces[at - 1], &pieces[at]);
@@ -69,7 +72,7 @@ impl<'a, const M: usize> Stretches<'a, M> {
             }
             length.push(sum);
         }
-        Self { pieces, joints, station, length }
+        Self { pieces, splines, joints, station, length }
     }
 
     /// Number of joints, both ends of the path included.
@@ -92,8 +95,8 @@ impl<'a, const M: usize> Stretches<'a, M> {
         let at = self.joints[k].at;
         let (before, after) = (&self.pieces[at - 1], &self.pieces[at]);
         let exact = before.exact || after.exact;
-        let meets_arc = before.arc || after.arc;
-        if jump.reverses() || exact && !(meets_arc && jump.size <= ARC_JOINT) {
+        let curved = |side: &Followed<M>| side.arc || matches!(side.piece, Shape::Spline(_));
+        if jump.reverses() || exact && !((curved(before) || curved(after)) && jump.size <= CURVE_JOINT) {
             return 0.0;
         }
         let wanted = jump
@@ -140,37 +143,44 @@ impl<'a, const M: usize> Stretches<'a, M> {
         }
     }
 
-    /// Stretch `k` between two stations.
-    fn region(&self, k: usize, from: f64, to: f64, pieces: &mut Vec<Followed<M>>) {
+    /// Stretch `k` between two stations. Pieces of splines that are cut, or all of them where they are to be
+    /// `bent`, are added to `made`.
+    fn region(
+        &self,
+        k: usize,
+        [from, to]: [f64; 2],
+        bent: bool,
+        pieces: &mut Vec<Followed<M>>,
+        made: &mut CompositeCurve<M>,
+    ) {
         for i in self.piece_at(k, from)..self.joints[k + 1].at {
             let (start, end) = (self.station[i], self.end_station(k, i));
             if start >= to {
                 break;
             }
-            let conic = match &self.pieces[i].piece {
-                Shape::Conic(conic) => conic,
-                // No corner cuts a spline: only rounding can bring a cut beside its end.
-                Shape::Spline(_) => {
-                    if 0.5 * (start + end) > from && 0.5 * (start + end) < to {
-                        pieces.push(self.pieces[i]);
-                    }
-                    continue;
-                }
-            };
+            let whole = &self.pieces[i].piece;
             let low = if from <= start { 0.0 } else { from - start };
-            let high = if to >= end { conic.width } else { to - start };
-            if from < end && low < high {
-                pieces.push(Followed { piece: Shape::Conic(conic.part(low, high)), ..self.pieces[i] });
+            let high = if to >= end { whole.width() } else { to - start };
+            if from >= end || low >= high {
+                continue;
             }
+            let piece = match whole {
+                Shape::Conic(conic) => Some(Shape::Conic(conic.part(low, high))),
+                Shape::Spline(spline) if low == 0.0 && high == spline.width && !bent => Some(*whole),
+                Shape::Spline(spline) => spline.part(self.splines, low, high, made).map(Shape::Spline),
+            };
+            pieces.extend(piece.map(|piece| Followed { piece, ..self.pieces[i] }));
         }
     }
 
     /// The sides of corner `k` between its cuts.
     fn cut_sides(&self, k: usize, cuts: Cuts, sides: &mut Sides<M>) {
-        sides.before.clear();
-        sides.after.clear();
-        self.region(k - 1, cuts.before, f64::INFINITY, &mut sides.before);
-        self.region(k, 0.0, cuts.after, &mut sides.after);
+        let Sides { before, after, made } = sides;
+        before.clear();
+        after.clear();
+        made.clear();
+        self.region(k - 1, [cuts.before, f64::INFINITY], true, before, made);
+        self.region(k, [0.0, cuts.after], true, after, made);
     }
 
     /// Where corner `k` begins and ends, None where the tolerance leaves no room for it.
@@ -205,49 +215,84 @@ impl<'a, const M: usize> Stretches<'a, M> {
     }
 
     /// Corners and what they leave of the stretches, in order and in parts, and the runs.
-    pub fn assemble(&self, corners: &[Option<Cuts>], jump: bool) -> (Vec<Vec<Followed<M>>>, Vec<usize>) {
+    pub fn assemble(&self, corners: &[Option<Cuts>], jump: bool) -> (Vec<Part<M>>, Vec<usize>) {
         let count = self.length.len();
-        let tasks: Vec<(Vec<Followed<M>>, Vec<usize>)> = (0..count.div_ceil(TASK))
+        let tasks: Vec<(Part<M>, Vec<usize>)> = (0..count.div_ceil(TASK))
             .into_par_iter()
             .map(|task| {
                 let stretches = task * TASK..count.min((task + 1) * TASK);
                 let inside = self.joints[stretches.end].at - self.joints[stretches.start].at;
-                let mut pieces = Vec::with_capacity(inside + 2 * stretches.len());
+                let mut part = Part::default();
+                part.pieces.reserve(inside + 2 * stretches.len());
                 let (mut runs, mut sides) = (Vec::new(), Sides::default());
                 for k in stretches {
                     let start = match (corners[k], &self.joints[k].jump) {
                         (Some(cuts), Some(turn)) => {
                             self.cut_sides(k, cuts, &mut sides);
                             if let Some(corner) = sides.parabola(turn) {
-                                pieces.push(corner);
+                                part.pieces.push(corner);
                             } else {
                                 sides.bend(turn);
-                                pieces.extend_from_slice(&sides.before);
-                                pieces.extend_from_slice(&sides.after);
+                                part.append(&sides);
                             }
                             cuts.after
                         }
                         (_, turn) => {
                             if !(jump && turn.is_some()) {
-                                runs.push(pieces.len());
+                                runs.push(part.pieces.len());
                             }
                             0.0
                         }
                     };
                     let end = corners[k + 1].map_or(f64::INFINITY, |cuts| cuts.before);
-                    self.region(k, start, end, &mut pieces);
+                    self.region(k, [start, end], false, &mut part.pieces, &mut part.made);
                 }
-                (pieces, runs)
+                (part, runs)
             })
             .collect();
         let (mut parts, mut runs, mut total) = (Vec::with_capacity(tasks.len()), Vec::new(), 0);
         for (part, starts) in tasks {
             runs.extend(starts.iter().map(|start| start + total));
-            total += part.len();
+            total += part.pieces.len();
             parts.push(part);
         }
         runs.push(total);
         (parts, runs)
+    }
+}
+
+/// Consecutive pieces of a path that one task makes, and the pieces of splines that corners made for it.
+#[derive(Clone, Debug)]
+pub struct Part<const M: usize> {
+    pub pieces: Vec<Followed<M>>,
+    made: CompositeCurve<M>,
+}
+
+impl<const M: usize> Default for Part<M> {
+    fn default() -> Self {
+        Self { pieces: vec![], made: CompositeCurve::default() }
+    }
+}
+
+impl<const M: usize> Part<M> {
+    /// The piece of a spline of this part, `splines` being the program's; its width is that of the spline.
+    pub fn spline<'a>(&'a self, spline: &Spline<M>, splines: &'a CompositeCurve<M>) -> Piece<'a, M> {
+        let source = if spline.made { &self.made } else { splines };
+        source.piece(spline.index as usize)
+    }
+
+    fn append(&mut self, sides: &Sides<M>) {
+        let before = self.made.len() as u32;
+        for piece in sides.made.pieces() {
+            self.made.push(piece.control, piece.weights, piece.width);
+        }
+        for &followed in sides.before.iter().chain(&sides.after) {
+            let mut own = followed;
+            if let Shape::Spline(spline) = &mut own.piece {
+                spline.index += before;
+            }
+            self.pieces.push(own);
+        }
     }
 }
 
@@ -260,7 +305,7 @@ fn reach<'a, const M: usize>(
 ) -> f64 {
     let (mut length, mut station) = (wanted, 0.0);
     for followed in side {
-        if followed.exact && !exact || followed.piece.conic().is_none() {
+        if followed.exact && !exact {
             break;
         }
         let room = jump.length_within(followed.tolerance - followed.deviation);
@@ -296,13 +341,14 @@ mod tests {
         let whole = Conic::line(points[0], points[1]);
         let side = [whole.part(0.0, 4.0), whole.part(4.0, 10.0), Conic::line(points[1], points[2])]
             .map(|piece| Followed { piece: Shape::Conic(piece), ..lines[0] });
-        let stretches = Stretches::new(&side, &[false; 2]);
+        let splines = CompositeCurve::default();
+        let stretches = Stretches::new(&side, &splines, &[false; 2]);
         assert_eq!(stretches.length, [10.0, 10.0]);
         for (station, moved) in [(4.0 + 1e-9, 4.0), (4.0 - 1e-9, 4.0), (4.1, 4.1), (1e-9, 1e-9)] {
             assert_eq!(stretches.snapped(0, station), moved);
-            let (mut before, mut after) = (Vec::new(), Vec::new());
-            stretches.region(0, 0.0, moved, &mut before);
-            stretches.region(0, moved, f64::INFINITY, &mut after);
+            let (mut before, mut after, mut made) = (Vec::new(), Vec::new(), CompositeCurve::default());
+            stretches.region(0, [0.0, moved], false, &mut before, &mut made);
+            stretches.region(0, [moved, f64::INFINITY], false, &mut after, &mut made);
             let end = before.last().unwrap().piece.conic().unwrap().control[2];
             assert_eq!(end, *after[0].piece.start());
             assert_eq!(before.len() + after.len(), if moved == 4.0 { 2 } else { 3 });

@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use crate::follow::{Followed, Moves, Shape};
+use super::Part;
+use crate::follow::{Moves, Shape};
 use crate::spline::{bezier, CompositeCurve, Piece};
 
 /// Halvings of a piece of a spline; the hull comes nearer to the curve by a factor of four each time.
@@ -19,7 +20,7 @@ pub struct Outside {
 /// The first position outside the travel: of the moves as programmed, and of the path, whose arcs may be as far
 /// beyond as they deviate.
 pub fn outside<const M: usize>(
-    parts: &[Vec<Followed<M>>],
+    parts: &[Part<M>],
     moves: &Moves<M>,
     travel: &[[f64; 2]; M],
 ) -> Option<Outside> {
@@ -54,7 +55,7 @@ pub fn outside<const M: usize>(
         shape.plane.iter().find_map(|&axis| beyond(index, axis, moves.arc_extent(index, axis)?, 0.0))
     });
     let curves = parts.par_iter().find_map_first(|part| {
-        part.iter().find_map(|followed| {
+        part.pieces.iter().find_map(|followed| {
             let bulge = if followed.arc { followed.deviation } else { 0.0 };
             let index = followed.first as usize;
             if !judged(index) {
@@ -64,7 +65,7 @@ pub fn outside<const M: usize>(
                 Shape::Conic(conic) => beyond(index, axis, conic.extent(axis), bulge),
                 Shape::Spline(spline) => {
                     let [low, high] = travel[axis];
-                    let piece = moves.splines.piece(spline.index as usize);
+                    let piece = part.spline(spline, moves.splines);
                     let position = beyond_hull(&piece, axis, low - SLACK, high + SLACK, DEPTH)?;
                     Some(Outside { index, axis, position })
                 }

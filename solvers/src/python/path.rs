@@ -12,7 +12,7 @@ use super::spline::curve;
 use super::{with_padded_axes, with_path_axes};
 use crate::arc::ArcError;
 use crate::follow::{ArcShape, Fault, FollowOptions, Followed, Moves, Shape};
-use crate::path_builder::{build_path as build, Axes, BuiltPath};
+use crate::path_builder::{build_path as build, Axes, BuiltPath, Part};
 use crate::spline::{CompositeCurve, Piece};
 
 pyo3::import_exception!(feedplan.errors, ProgramError);
@@ -201,18 +201,19 @@ fn columns<'py, const M: usize>(
     axes: usize,
 ) -> (Columns<'py>, Summary, Option<Place>) {
     let parts = &path.parts;
-    let points = |followed: &Followed<M>| match &followed.piece {
+    let points = |part: &Part<M>, followed: &Followed<M>| match &followed.piece {
         Shape::Conic(_) => 3,
-        Shape::Spline(spline) => splines.piece(spline.index as usize).control.len(),
+        Shape::Spline(spline) => part.spline(spline, splines).control.len(),
     };
-    let one = |_: &Followed<M>| 1;
+    let one = |_: &Part<M>, _: &Followed<M>| 1;
     let (control, weights, offsets, width, feed, moves, tolerance) = py.detach(|| {
-        let is_rational = |followed: &Followed<M>| match &followed.piece {
+        let is_rational = |part: &Part<M>, followed: &Followed<M>| match &followed.piece {
             Shape::Conic(conic) => conic.weight != 1.0,
-            Shape::Spline(spline) => splines.piece(spline.index as usize).is_rational(),
+            Shape::Spline(spline) => part.spline(spline, splines).is_rational(),
         };
-        let rational = parts.par_iter().any(|part| part.iter().any(is_rational));
-        let counts = gather(parts, one, |followed, out| out[0] = points(followed) as i64);
+        let rational =
+            parts.par_iter().any(|part| part.pieces.iter().any(|followed| is_rational(part, followed)));
+        let counts = gather(parts, one, |part, followed, out| out[0] = points(part, followed) as i64);
         let mut offsets = vec![0; counts.len() + 1];
         for (i, count) in counts.iter().enumerate() {
             offsets[i + 1] = offsets[i] + count;
@@ -220,11 +221,11 @@ fn columns<'py, const M: usize>(
         (
             gather(
                 parts,
-                |followed| axes * points(followed),
-                |followed, out: &mut [f64]| {
+                |part, followed| axes * points(part, followed),
+                |part, followed, out: &mut [f64]| {
                     let control = match &followed.piece {
                         Shape::Conic(conic) => &conic.control[..],
-                        Shape::Spline(spline) => splines.piece(spline.index as usize).control,
+                        Shape::Spline(spline) => part.spline(spline, splines).control,
                     };
                     for (row, point) in out.chunks_exact_mut(axes).zip(control) {
                         row.copy_from_slice(&point[..axes]);
@@ -232,25 +233,25 @@ fn columns<'py, const M: usize>(
                 },
             ),
             rational.then(|| {
-                gather(parts, points, |followed, out: &mut [f64]| match &followed.piece {
+                gather(parts, points, |part, followed, out: &mut [f64]| match &followed.piece {
                     Shape::Conic(conic) => out.copy_from_slice(&[1.0, conic.weight, 1.0]),
-                    Shape::Spline(spline) => match splines.piece(spline.index as usize) {
+                    Shape::Spline(spline) => match part.spline(spline, splines) {
                         Piece { weights: [], .. } => out.fill(1.0),
                         Piece { weights, .. } => out.copy_from_slice(weights),
                     },
                 })
             }),
             offsets,
-            gather(parts, one, |followed, out| out[0] = followed.piece.width()),
-            gather(parts, one, |followed, out| out[0] = followed.feed),
+            gather(parts, one, |_, followed, out| out[0] = followed.piece.width()),
+            gather(parts, one, |_, followed, out| out[0] = followed.feed),
             gather(
                 parts,
-                |_| 2,
-                |followed, out: &mut [i64]| {
+                |_, _| 2,
+                |_, followed, out: &mut [i64]| {
                     out.copy_from_slice(&[i64::from(followed.first), i64::from(followed.last)]);
                 },
             ),
-            gather(parts, one, |followed, out| out[0] = followed.tolerance),
+            gather(parts, one, |_, followed, out| out[0] = followed.tolerance),
         )
     });
     let (rows, count) = (control.len() / axes, width.len());
@@ -272,11 +273,12 @@ fn columns<'py, const M: usize>(
 
 /// One column, `stride` values a piece, written by all parts at once.
 fn gather<const M: usize, T: Default + Clone + Send>(
-    parts: &[Vec<Followed<M>>],
-    stride: impl Fn(&Followed<M>) -> usize + Sync,
-    write: impl Fn(&Followed<M>, &mut [T]) + Sync,
+    parts: &[Part<M>],
+    stride: impl Fn(&Part<M>, &Followed<M>) -> usize + Sync,
+    write: impl Fn(&Part<M>, &Followed<M>, &mut [T]) + Sync,
 ) -> Vec<T> {
-    let lengths: Vec<usize> = parts.par_iter().map(|part| part.iter().map(&stride).sum()).collect();
+    let length = |part: &Part<M>| part.pieces.iter().map(|followed| stride(part, followed)).sum();
+    let lengths: Vec<usize> = parts.par_iter().map(length).collect();
     let mut column = vec![T::default(); lengths.iter().sum()];
     let mut rest = &mut column[..];
     let mut slices = Vec::with_capacity(parts.len());
@@ -286,9 +288,9 @@ fn gather<const M: usize, T: Default + Clone + Send>(
         rest = tail;
     }
     parts.par_iter().zip(slices).for_each(|(part, mut slice)| {
-        for followed in part {
-            let (out, tail) = slice.split_at_mut(stride(followed));
-            write(followed, out);
+        for followed in &part.pieces {
+            let (out, tail) = slice.split_at_mut(stride(part, followed));
+            write(part, followed, out);
             slice = tail;
         }
     });
