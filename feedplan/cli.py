@@ -211,6 +211,62 @@ def plan(
 @cli.command()
 @click.argument("program")
 @_MACHINE
+@click.option("--methods", metavar="A,B,…", help="Methods to compare.  [default: all]")
+@_TOLERANCE
+@click.option("--feed", type=_Number(), metavar="MM/S", help="Feed in place of the programmed one.")
+@click.option("--period", type=_Number(), metavar="S", help="Servo period in place of the machine's.")
+@click.option("--output", "-o", metavar="DIR", help="Write comparison.json and comparison.html there.")
+@_JSON
+@_QUIET
+def compare(
+    program: str,
+    machine: str,
+    methods: str | None,
+    tolerance: float | None,
+    feed: float | None,
+    period: float | None,
+    output: str | None,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Plan PROGRAM by several methods: time, proven gap, computing time, and what the audit says of each.
+
+    Exit code 0 if any method has a plan, whether or not its limits hold: that is what the table tells.
+    """
+    from feedplan.compare import LIMITS
+    from feedplan.compare import compare as make_comparison
+    from feedplan.files import summary_text, write_comparison
+    from feedplan.outputs._staging import require_folder
+
+    if output:
+        require_folder(FilePath(output))
+    names = planners.methods() if methods is None else [name.strip() for name in methods.split(",")]
+    with console.progress_bar(quiet) as progress:
+        rows = make_comparison(
+            program, machine, names, progress=progress, tolerance=tolerance, feed=feed, period=period
+        )
+        summary = {
+            "program": program,
+            "machine": Machine.load(machine).name,
+            "methods": [row.to_json() for row in rows],
+        }
+        files = write_comparison(rows, output, summary, progress) if output else ()
+    for row in rows:
+        if row.error and not quiet:
+            print(f"{row.method}: {row.error}", file=sys.stderr)
+    if not quiet:
+        if as_json:
+            sys.stdout.write(summary_text(summary))
+        else:
+            console.print_table(*console.comparison_table(rows, LIMITS))
+            for file in files:
+                print(file)
+    return DONE if any(row.plan for row in rows) else BROKEN
+
+
+@cli.command()
+@click.argument("program")
+@_MACHINE
 @_TOLERANCE
 @_JSON
 def fit(program: str, machine: str, tolerance: float | None, as_json: bool) -> None:

@@ -13,6 +13,7 @@ from feedplan.units import duration_text, mm_per_min
 
 if TYPE_CHECKING:
     from feedplan.audit import Audit, LimitCheck
+    from feedplan.compare import Row
 
 _LIMITS = {"feed", "velocity", "acceleration", "jerk", "chord", "deviation", "travel"}
 Rows = Sequence[tuple[str, str]]
@@ -172,6 +173,45 @@ def audit_rows(audit: Audit) -> list[tuple[str, ...]]:
         for check in audit.checks
         if not check.ok or math.isfinite(check.limit)
     ]
+
+
+def comparison_table(
+    rows: Sequence[Row], limits: Sequence[str]
+) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Header and rows of a comparison: one row a method that has a plan, one column a limit that there is."""
+    planned = [row for row in rows if row.plan is not None]
+    limits = [name for name in limits if any(_is_limited(row.worst(name)) for row in planned)]
+    header = ("method", "time s", "bound s", "gap", "computing", *limits, "audit")
+    fastest = min((row.time for row in planned if row.time is not None), default=0.0)
+    digits = 6 if fastest < 1e3 else 3
+    body = [
+        (
+            row.method,
+            f"{row.time:.{digits}f}",
+            f"{row.lower_bound:.{digits}f}",
+            f"{100 * (row.gap or 0.0):.3g} %",
+            duration_text(row.plan.compute["plan"]) if row.plan else "",
+            *(_use_text(row.worst(name)) for name in limits),
+            "passed" if row.audit and row.audit.ok else "FAILED",
+        )
+        for row in planned
+    ]
+    return header, body
+
+
+def _is_limited(check: LimitCheck | None) -> bool:
+    return check is not None and math.isfinite(check.limit)
+
+
+def _use_text(check: LimitCheck | None) -> str:
+    """`99.99 %`; where the limit is broken with the axis and the line."""
+    if check is None or not math.isfinite(check.ratio):
+        return "-"
+    use = f"{100 * check.ratio:.4g} %"
+    if check.ok:
+        return use if check.judged else f"({use})"
+    line = f"line {check.line}" if check.line else ""
+    return f"{use} {' '.join(part for part in (check.axis, line) if part)}".rstrip()
 
 
 def check_name(check: LimitCheck) -> str:

@@ -1,4 +1,4 @@
-"""The folder of a plan: plan.json, the setpoints and the report, which appear whole or not at all."""
+"""The files of a plan (plan.json, setpoints, report) and of a comparison: they appear whole or not at all."""
 
 from __future__ import annotations
 
@@ -15,10 +15,12 @@ from feedplan.outputs import format_named
 from feedplan.outputs._staging import require_folder, staged
 
 if TYPE_CHECKING:
+    from feedplan.compare import Row
     from feedplan.plan import Plan
     from feedplan.setpoints import SetpointChunk
 
 SUMMARY_FILE = "plan.json"
+COMPARISON_FILE = "comparison.json"
 _ROWS_AT_ONCE = 100_000
 
 
@@ -71,6 +73,55 @@ def write_plan(
         names = sorted(file.name for file in stage.iterdir())
     if progress:
         progress("write", 1.0)
+    return tuple(folder / name for name in names)
+
+
+def write_comparison(
+    rows: Sequence[Row],
+    folder: str | FilePath,
+    summary: dict[str, Any],
+    progress: Callable[[str, float], None] | None = None,
+) -> tuple[FilePath, ...]:
+    """Writes a comparison's numbers (`summary`) and its page; returns the files.
+
+    Both appear whole or not at all. Raises InputError where the folder or the file system refuses.
+    """
+    from feedplan.compare import LIMITS
+    from feedplan.report.comparison import FILE as PAGE_FILE
+    from feedplan.report.comparison import write_comparison as write_page
+    from feedplan.report.tool_path import ToolPath
+
+    folder = FilePath(folder)
+    require_folder(folder)
+    paths, shown = [], []
+    for number, row in enumerate(rows):
+        entry: dict[str, Any] = {"method": row.method, "time": row.time, "error": row.error}
+        if row.plan is not None:
+            tool = ToolPath(row.plan.problem)
+            for chunk in row.plan.setpoints().chunks(_ROWS_AT_ONCE):
+                tool.add(chunk)
+            paths.append({"method": row.method, **tool.data()})
+            entry |= {
+                "gap": row.gap,
+                "computing": row.plan.compute["plan"],
+                "audit": row.plan.audit().ok,
+                "worst": {limit: row.worst(limit) for limit in LIMITS},
+            }
+        shown.append(entry)
+        if progress:
+            progress("write", (number + 1) / len(rows))
+    about = {name: str(summary[name]) for name in ("machine", "program") if summary.get(name)}
+    with staged(folder, last=COMPARISON_FILE) as stage:
+        write_page(
+            stage / PAGE_FILE,
+            title=FilePath(str(summary.get("program") or "path")).name,
+            about=about,
+            rows=shown,
+            limits=LIMITS,
+            paths=paths,
+        )
+        (stage / COMPARISON_FILE).write_text(summary_text(summary), encoding="utf-8")
+        names = sorted(file.name for file in stage.iterdir())
     return tuple(folder / name for name in names)
 
 

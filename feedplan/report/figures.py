@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedplan.audit import Audit
 from feedplan.constraints.problem import Problem
 from feedplan.profile import SpeedProfile
 from feedplan.report.limits import limit_samples, samples_per_arc
-from feedplan.report.reduce import Envelope, Polyline
+from feedplan.report.reduce import Envelope, packed
+from feedplan.report.tool_path import ToolPath
 from feedplan.setpoints import SetpointChunk
 
 # Points kept. The page draws at most a few thousand of them at once and takes the finer ones on zooming in.
@@ -21,20 +20,6 @@ _TIME_POINTS = 240_000  # of all curves over time together
 _TIME_POINTS_PER_CURVE = 24_000
 _LENGTH_POINTS = 12_000  # of each curve over length
 _MEAN_POINTS = 1_000  # of the mean of each curve, drawn where it oscillates too fast for a line
-_PATH_POINTS = 60_000
-
-# The tool path may be drawn this far beside itself, as a part of its extent: a tenth of a pixel at first.
-_PATH_TOLERANCE = 1e-4
-# A difference in speed weighs like one of length: this part of the top speed like `_PATH_TOLERANCE`.
-_SPEED_TOLERANCE = 0.01
-
-
-def packed(array: NDArray[Any]) -> dict[str, str]:
-    """An array as the page reads it: base64 of 32-bit numbers, little-endian."""
-    if array.dtype.kind == "f":
-        with np.errstate(over="ignore"):
-            return {"f4": base64.b64encode(array.astype("<f4").tobytes()).decode()}
-    return {"i4": base64.b64encode(array.astype("<i4").tobytes()).decode()}
 
 
 class SetpointFigures:
@@ -45,20 +30,9 @@ class SetpointFigures:
 
     def __init__(self, problem: Problem, count: int, marks: Sequence[float] = ()) -> None:
         self._axes = problem.axes
-        self._problem = problem
         columns = 1 + 3 * len(self._axes)
         self._curves = Envelope(count, min(_TIME_POINTS_PER_CURVE, _TIME_POINTS // columns))
-        self._linear = [self._axes.index(name) for name in "XYZ" if name in self._axes]
-        columns_of_tool = [column for column, name in enumerate(problem.path.axes) if name in "XYZ"]
-        low = problem.path.curve.control_points[:, columns_of_tool]
-        extent = float(np.linalg.norm(np.ptp(low, axis=0))) if low.size else 0.0
-        tolerance = _PATH_TOLERANCE * extent if extent > 0 else 1.0
-        cut = problem.feed[np.isfinite(problem.path.feed)]
-        top = float((cut if len(cut) else problem.feed).max(initial=0.0)) or 1.0
-        self._speed_weight = tolerance / (_SPEED_TOLERANCE * top)
-        self._path = Polyline(_PATH_POINTS, tolerance)
-        self._marks = np.asarray(marks, dtype=np.float64)
-        self._mark_places = np.full((len(self._marks), 3), np.nan)
+        self._path = ToolPath(problem, marks)
         self.count = 0
         self.duration = 0.0
 
@@ -66,14 +40,9 @@ class SetpointFigures:
         """The next setpoints."""
         if len(chunk.t) == 0:
             return
-        places, speed = self._tool(chunk)
+        speed = self._path.add(chunk)
         curves = np.column_stack((speed, chunk.velocity, chunk.acceleration, chunk.jerk))
-        line = chunk.line.astype(np.int64)
-        self._curves.add(chunk.t, curves, line)
-        self._path.add(np.column_stack((places, self._speed_weight * speed)), line)
-        near = np.searchsorted(chunk.t, self._marks)
-        inside = (self._marks <= chunk.t[-1]) & np.isnan(self._mark_places[:, 0])
-        self._mark_places[inside] = places[np.minimum(near[inside], len(places) - 1)]
+        self._curves.add(chunk.t, curves, chunk.line.astype(np.int64))
         self.count += len(chunk.t)
         self.duration = float(chunk.t[-1])
 
@@ -86,29 +55,8 @@ class SetpointFigures:
         return result
 
     def tool_path(self) -> dict[str, Any]:
-        """Points in X, Y, Z with speed and source line; the marks; how far off the drawn line may be [mm]."""
-        points, line = self._path.result()
-        points = points if points.size else np.empty((0, 4))
-        return {
-            **{name: packed(points[:, k]) for k, name in enumerate("xyz")},
-            "speed": packed(points[:, 3] / self._speed_weight),
-            "line": packed(line),
-            "marks": np.nan_to_num(self._mark_places).tolist(),
-            "tolerance": self._path.tolerance,
-        }
-
-    def _tool(self, chunk: SetpointChunk) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Where the tool is in X, Y, Z, and how fast."""
-        tool, joints = self._problem.tip_curve, self._problem.joints
-        if tool is not None and joints is not None:
-            place, tangent = tool.evaluate(chunk.piece, chunk.u, 1)
-            slope = np.linalg.norm(joints.evaluate(chunk.piece, chunk.u, 1)[1], axis=1)
-            rate = np.linalg.norm(chunk.velocity, axis=1) / np.where(slope > 0, slope, np.inf)
-            return place, np.linalg.norm(tangent, axis=1) * rate
-        places = np.zeros((len(chunk), 3))
-        for column in self._linear:
-            places[:, "XYZ".index(self._axes[column])] = chunk.position[:, column]
-        return places, np.linalg.norm(chunk.velocity, axis=1)
+        """The tool path with speed, source line and time."""
+        return self._path.data()
 
 
 def _curve(curves: Envelope, column: int, with_line: bool = False) -> dict[str, Any]:

@@ -31,15 +31,13 @@ def write_report(
     source: FilePath | None = None,
 ) -> None:
     """Writes the page. `summary` is the content of plan.json, `source` the text of the part program."""
-    from plotly.offline import get_plotlyjs
-
     slow = slowest_lines(problem, profile)
     texts = _lines(source, {row.line for row in slow}) if source else {}
     data = chart_data(problem, profile, figures, audit)
     name = FilePath(str(summary.get("program") or "path")).name
-    page = Template(_asset("page.html")).substitute(
+    page = Template(asset("page.html")).substitute(
         title=escape(name),
-        style=_asset("page.css"),
+        style=asset("page.css"),
         about=_about(summary, problem),
         verdict=verdict(audit),
         numbers=numbers(summary, figures.count),
@@ -49,10 +47,9 @@ def write_report(
         fit=fit_table(summary),
         slowest=slowest_table(slow, texts),
         audit=audit_table(audit),
-        # A script ends at the first "</", whatever stands around it.
-        data=json.dumps(data, allow_nan=False, separators=(",", ":")).replace("</", "<\\/"),
-        plotly=get_plotlyjs().replace("</script", "<\\/script"),
-        script=_asset("page.js"),
+        data=script_data(data),
+        plotly=plotly_script(),
+        script="".join(asset(name) for name in ("charts.js", "path.js", "page.js")),
     )
     file.write_text(page, encoding="utf-8")
 
@@ -72,8 +69,21 @@ def _lines(source: FilePath, wanted: set[int]) -> dict[int, str]:
     return texts
 
 
-def _asset(name: str) -> str:
+def asset(name: str) -> str:
+    """A file of this package as text."""
     return resources.files(__package__).joinpath(name).read_text("utf-8")
+
+
+def script_data(data: Mapping[str, Any]) -> str:
+    """Data as JSON within a script, which ends at the first "</", whatever stands around it."""
+    return json.dumps(data, allow_nan=False, separators=(",", ":")).replace("</", "<\\/")
+
+
+def plotly_script() -> str:
+    """The library that draws the charts."""
+    from plotly.offline import get_plotlyjs
+
+    return str(get_plotlyjs()).replace("</script", "<\\/script")
 
 
 def _about(summary: Mapping[str, Any], problem: Problem) -> str:

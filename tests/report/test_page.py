@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feedplan.report.figures import SetpointFigures, packed
+from feedplan.report.figures import SetpointFigures
 from feedplan.report.page import write_report
+from feedplan.report.reduce import packed
 
 
 def page(plan: Any, file: Path, source: Path | None = None) -> str:

@@ -1,0 +1,124 @@
+"""Several methods on one program: time, proven gap, computing time and the worst use of every limit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from feedplan.audit import Audit, LimitCheck
+from feedplan.errors import InfeasibleError, InputError, MissingPackageError, SolverError
+from feedplan.geometry.path import Path
+from feedplan.machine.machine import Machine
+from feedplan.plan import Plan, Progress, plan
+from feedplan.planners import planner
+from feedplan.program.program import Program
+from feedplan.program.read import read_program
+
+# What the limits of machine and program are called in an audit.
+LIMITS = ("feed", "velocity", "acceleration", "jerk", "chord", "deviation")
+
+
+@dataclass(frozen=True)
+class Row:
+    """One method: its plan with the audit, or in a sentence why it has none.
+
+    `lower_bound` [s] is the greatest proven by any method on this method's path.
+    """
+
+    method: str
+    plan: Plan | None
+    lower_bound: float
+    error: str | None = None
+
+    @property
+    def time(self) -> float | None:
+        """Time of the program [s], None without a plan."""
+        return None if self.plan is None else self.plan.time
+
+    @property
+    def gap(self) -> float | None:
+        """How much of the time may be lost at most: (time − lower_bound) / time."""
+        if self.plan is None:
+            return None
+        return (self.plan.time - self.lower_bound) / self.plan.time if self.plan.time > 0 else 0.0
+
+    @property
+    def audit(self) -> Audit | None:
+        """The verdict on the plan."""
+        return None if self.plan is None else self.plan.audit()
+
+    def worst(self, limit: str) -> LimitCheck | None:
+        """The worst use of a limit, over all axes; None where nothing was measured."""
+        checks = [check for check in self.audit.checks if check.name == limit] if self.audit else []
+        return max(checks, key=lambda check: check.ratio, default=None)
+
+    def to_json(self) -> dict[str, Any]:
+        """The numbers by name."""
+        return {
+            "method": self.method,
+            "time": self.time,
+            "lower_bound": self.lower_bound if self.plan else None,
+            "gap": self.gap,
+            "compute": dict(self.plan.compute) if self.plan else None,
+            "audit": self.audit.to_json() if self.audit else None,
+            "error": self.error,
+        }
+
+
+def compare(
+    source: str | FilePath | Program | Path,
+    machine: Machine | str,
+    methods: Sequence[str],
+    *,
+    progress: Progress | None = None,
+    **options: Any,
+) -> tuple[Row, ...]:
+    """Plans one program by each of the methods and audits every plan.
+
+    `options` are those of `feedplan.plan`. A method that finds no plan, or whose package is missing, says why
+    in its row. `progress(method, done)` is called as it goes on.
+    Raises what `feedplan.plan` raises about the program, the machine and the options.
+    """
+    if not methods:
+        raise InputError("there is no method to compare: name one or more")
+    for method in methods:
+        planner(method)
+    if not isinstance(machine, Machine):
+        machine = Machine.load(machine)
+    if not isinstance(source, (Program, Path)):
+        source = read_program(source, machine)
+    report = progress or (lambda stage, done: None)
+    plans: list[tuple[str, Plan | None, str | None]] = []
+    for method in dict.fromkeys(methods):
+        report(method, 0.0)
+        try:
+            made = plan(source, machine, method, **options)
+            made.audit(lambda _, done, method=method: report(method, done))  # type: ignore[misc]
+            plans.append((method, made, None))
+        except (InfeasibleError, MissingPackageError, SolverError) as error:
+            plans.append((method, None, str(error)))
+        report(method, 1.0)
+    bounds = [
+        max((other.lower_bound for _, other, _ in plans if other and _same_way(made, other)), default=0.0)
+        if made
+        else 0.0
+        for _, made, _ in plans
+    ]
+    return tuple(
+        Row(method, made, bound, error) for (method, made, error), bound in zip(plans, bounds, strict=True)
+    )
+
+
+def _same_way(one: Plan, other: Plan) -> bool:
+    """Both follow the same path: a bound of one holds for the other."""
+    return all(
+        np.array_equal(a, b)
+        for a, b in (
+            (one.path.curve.control_points, other.path.curve.control_points),
+            (one.problem.junction_speed, other.problem.junction_speed),
+        )
+    )
