@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 import shutil
@@ -11,12 +10,11 @@ import sys
 import tempfile
 import time
 from pathlib import Path
-from types import ModuleType
 
+from benchmarks.named import example
 from benchmarks.results import Cell, Result
 
 NAME = "end-to-end"
-EXAMPLES = Path(__file__).parent.parent / "examples"
 # The example, the machine that it is made for, how many blocks. A tenth for the lettering: its letters are so
 # much longer than the finishing parts' blocks that it takes hours of machining, and millions of setpoints.
 PARTS = (("vase", "vase", 500_000), ("head", "mill", 500_000), ("lettering", "router", 50_000))
@@ -29,7 +27,7 @@ def run(quick: bool = False) -> Result:
     with tempfile.TemporaryDirectory() as directory:
         for part, machine, blocks in PARTS:
             program = Path(directory, f"{part}.ngc")
-            program.write_text(_example(part).program(blocks // (QUICK if quick else 1)), encoding="ascii")
+            program.write_text(example(part).program(blocks // (QUICK if quick else 1)), encoding="ascii")
             rows.append(_plan(program, machine, Path(directory, part)))
             shutil.rmtree(Path(directory, part))
     return Result(
@@ -66,12 +64,3 @@ def _plan(program: Path, machine: str, output: Path) -> dict[str, Cell]:
         "peak [MB]": usage.ru_maxrss / 1024.0,
         "audit": "ok" if plan["audit"]["ok"] else "broken",
     }
-
-
-def _example(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module

@@ -6,15 +6,13 @@ polynomial proxies of the curves, to 1e-12 s; the circle's switching place also 
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
-from math import comb
-from pathlib import Path as FilePath
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from benchmarks.named import butterfly, butterfly_nurbs, lemniscate, trefoil
 from feedplan._solvers import PlanError, plan_bang_bang, plan_curves
 from feedplan.constraints.problem import Problem
 from feedplan.curves.arc import circle
@@ -24,7 +22,6 @@ from feedplan.profile import SpeedProfile
 from tests.planners.excess import worst_excess
 
 Array = NDArray[np.float64]
-BUTTERFLY = FilePath(__file__).parents[2] / "benchmarks" / "curves" / "butterfly.json"
 
 
 def problem_of(curve: CompositeCurve, velocity: Array, acceleration: Array, feed: float) -> Problem:
@@ -67,17 +64,6 @@ class Planned:
         self.time = self.profile.time
 
 
-def butterfly() -> tuple[Array, Array, int, Array]:
-    data = json.loads(BUTTERFLY.read_text(encoding="utf-8"))
-    return (
-        np.array(data["control_points"]),
-        # The figures belong to the knots as they are mostly printed.
-        np.round(np.array(data["knots"], dtype=float), 4),
-        data["degree"],
-        np.array(data["weights"], dtype=float),
-    )
-
-
 def random_curve(seed: int, weights: bool = True) -> CompositeCurve:
     rng = np.random.default_rng(seed)
     degree, axes, count = int(rng.integers(2, 6)), int(rng.integers(2, 5)), int(rng.integers(1, 12))
@@ -93,7 +79,7 @@ def random_curve(seed: int, weights: bool = True) -> CompositeCurve:
 
 @pytest.mark.parametrize(("feed", "time"), [(1e9, 2.573254566377), (250.0, 2.622026012553)])
 def test_the_butterfly_takes_its_published_time(feed: float, time: float) -> None:
-    planned = Planned(CompositeCurve.from_nurbs(*butterfly()), 250.0, 3000.0, feed)
+    planned = Planned(butterfly(), 250.0, 3000.0, feed)
     assert planned.time == pytest.approx(time, rel=1e-11)
     excess, use = worst_excess(planned.problem, planned.profile)
     assert excess <= 1e-8
@@ -101,8 +87,8 @@ def test_the_butterfly_takes_its_published_time(feed: float, time: float) -> Non
 
 
 def test_what_leaves_the_curve_alone_leaves_its_time() -> None:
-    points, knots, degree, weights = butterfly()
-    curve = CompositeCurve.from_nurbs(points, knots, degree, weights)
+    points, knots, degree, weights = butterfly_nurbs()
+    curve = butterfly()
     time = Planned(curve, 250.0, 3000.0).time
     middle = 0.5 * (knots[10] + knots[11])
     finer_points, finer_knots, finer_weights = insert_knot(points, knots, degree, middle, weights)
@@ -189,50 +175,10 @@ def test_quadratics_among_other_pieces_are_planned_by_their_own_planner(seed: in
     assert use >= 1 - 1e-6
 
 
-def harmonic(cosines: list[Array], sines: list[Array], start: float) -> CompositeCurve:
-    """Σ cosines[k] cos kθ + sines[k] sin kθ once round from `start`, as rational pieces of quarter turns.
-
-    With x = tan(φ/2), cos φ = (1 − x²)/(1 + x²) and sin φ = 2x/(1 + x²): degree 2m for m harmonics.
-    """
-    m = len(cosines)
-    square = np.polynomial.Polynomial([1.0, 0.0, 1.0])
-    unit = np.polynomial.Polynomial([1.0, 2.0j, -1.0])
-    degree = 2 * m
-    pieces = []
-    for quarter in range(4):
-        turn = start + quarter * np.pi / 2
-        rows = []
-        for axis in range(len(cosines[0])):
-            total = np.zeros(degree + 1, dtype=complex)
-            for k in range(1, m + 1):
-                wave = (unit**k * square ** (m - k)).coef * np.exp(1j * k * turn)
-                total[: len(wave)] += (cosines[k - 1][axis] - 1j * sines[k - 1][axis]) * wave
-            rows.append(total.real)
-        rows.append((square**m).coef)
-        # From powers of x to Bernstein form on [0, 1].
-        to_bernstein = np.array(
-            [[comb(i, j) / comb(degree, j) for j in range(degree + 1)] for i in range(degree + 1)]
-        )
-        homogeneous = to_bernstein @ np.array(rows).T
-        weights = homogeneous[:, -1]
-        pieces.append(CompositeCurve.from_bezier(homogeneous[:, :-1] / weights[:, None], weights))
-    return CompositeCurve.joined(pieces, 1e-9)
-
-
-def test_the_lemniscate_takes_its_known_time() -> None:
-    a = 50.0
-    curve = harmonic([np.array([a, 0.0]), np.zeros(2)], [np.zeros(2), np.array([0.0, a / 2])], np.pi / 2)
+@pytest.mark.parametrize(("curve", "time"), [(lemniscate(), 1.239149290199), (trefoil(), 1.955242894798)])
+def test_the_lemniscate_and_the_trefoil_take_their_known_times(curve: CompositeCurve, time: float) -> None:
     planned = Planned(curve, 250.0, 3000.0)
-    assert planned.time == pytest.approx(1.239149290199, rel=1e-11)
-    assert worst_excess(planned.problem, planned.profile)[0] <= 1e-9
-
-
-def test_the_trefoil_takes_its_known_time() -> None:
-    b = 20.0
-    cosines = [np.array([0.0, b, 0.0]), np.array([0.0, -2 * b, 0.0]), np.zeros(3)]
-    sines = [np.array([b, 0.0, 0.0]), np.array([2 * b, 0.0, 0.0]), np.array([0.0, 0.0, -b])]
-    planned = Planned(harmonic(cosines, sines, 0.3), 250.0, 3000.0)
-    assert planned.time == pytest.approx(1.955242894798, rel=1e-11)
+    assert planned.time == pytest.approx(time, rel=1e-11)
     assert worst_excess(planned.problem, planned.profile)[0] <= 1e-9
 
 
