@@ -1,4 +1,4 @@
-"""Run benchmarks by name: a table on the terminal, a JSON file each."""
+"""Run benchmarks by name: a table on the terminal, a JSON file and where it helps a chart each."""
 
 from __future__ import annotations
 
@@ -14,13 +14,22 @@ from benchmarks import (
     end_to_end,
     interpolators,
     kinematics_cost,
+    methods,
     planner_cost,
     results,
 )
 
 BENCHMARKS = {
     module.NAME: module.run
-    for module in (planner_cost, curve_cost, against_toppra, end_to_end, interpolators, kinematics_cost)
+    for module in (
+        methods,
+        planner_cost,
+        curve_cost,
+        against_toppra,
+        end_to_end,
+        interpolators,
+        kinematics_cost,
+    )
 }
 
 
@@ -42,6 +51,7 @@ def main() -> None:
         result = BENCHMARKS[name](arguments.quick)
         results.show(result, console)
         results.store(result, arguments.output)
+        results.draw(result, arguments.output)
 
 
 if __name__ == "__main__":

@@ -18,6 +18,17 @@ Cell = float | int | str
 
 
 @dataclass(frozen=True)
+class Chart:
+    """Columns of a table to draw against each other on logarithmic scales: `x`, `y`, one colour for each
+    value of `series`, and the `label` of a point."""
+
+    x: str
+    y: str
+    series: str
+    label: str
+
+
+@dataclass(frozen=True)
 class Result:
     """One table: `rows` map column names to numbers or words; `notes` are sentences below it."""
 
@@ -25,6 +36,7 @@ class Result:
     title: str
     rows: tuple[dict[str, Cell], ...]
     notes: tuple[str, ...] = ()
+    chart: Chart | None = None
 
 
 def show(result: Result, console: Console) -> None:
@@ -59,6 +71,34 @@ def store(result: Result, directory: Path) -> Path:
     partial = path.with_suffix(".partial")
     partial.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     partial.replace(path)
+    return path
+
+
+def draw(result: Result, directory: Path) -> Path | None:
+    """Write the chart as a page; its path, None where the table has none."""
+    if result.chart is None:
+        return None
+    from plotly.graph_objects import Figure, Scatter
+
+    chart, figure = result.chart, Figure()
+    for series in dict.fromkeys(row[chart.series] for row in result.rows):
+        rows = [row for row in result.rows if row[chart.series] == series and float(row[chart.y]) > 0]
+        figure.add_trace(
+            Scatter(
+                x=[row[chart.x] for row in rows],
+                y=[row[chart.y] for row in rows],
+                text=[row[chart.label] for row in rows],
+                name=str(series),
+                mode="markers",
+                marker={"size": 10},
+                hovertemplate="%{text}: %{x:.3g}, %{y:.3g}",
+            )
+        )
+    figure.update_layout(title=result.title, template="plotly_white", hovermode="closest")
+    figure.update_xaxes(title=chart.x, type="log")
+    figure.update_yaxes(title=chart.y, type="log")
+    path = directory / f"{result.name}.html"
+    figure.write_html(path, include_plotlyjs="directory")
     return path
 
 

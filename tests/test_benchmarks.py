@@ -32,6 +32,7 @@ def test_every_benchmark_runs_and_stores_its_table(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     tables = {path.stem: json.loads(path.read_text(encoding="utf-8")) for path in tmp_path.glob("*.json")}
     assert set(tables) == {
+        "methods",
         "planner-cost",
         "curve-cost",
         "against-toppra",
