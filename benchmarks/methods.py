@@ -53,7 +53,7 @@ def run(quick: bool = False) -> Result:
         "Every method on every problem",
         tuple(rows),
         (
-            "over optimum: against the exact plan of the fitted path; gap: against what is proven on the method's path.",
+            "over optimum: against the exact plan of the fitted path; gap: to the bound of the method's own.",
             "worst use: the limit that the profile uses most, by the audit; above 1 it is broken.",
             "computing: wall time of the planner alone; ratio: over that of the exact planner.",
         ),
