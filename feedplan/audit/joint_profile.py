@@ -142,8 +142,10 @@ class _Auditor:
         self.path, self.problem, self.profile = path, path.problem, profile
         self.jump, self.travel, self.starts, self.worst = jump, travel, starts, worst
         self.names = len(self.problem.axes)
-        # Least and greatest position of the joints so far, angles continuous; the position last seen.
+        # Least and greatest position of the joints so far, angles continuous, with time and source line; the
+        # position last seen.
         self.reach = np.full((2, self.names), np.nan)
+        self.reached = np.zeros((2, self.names), [("time", float), ("line", int)])
         self.last: tuple[int, Array, Array] | None = None
         # The arc before the chunk: velocities of its end with their errors, speed, piece.
         self.before: tuple[int, Array, Array, float] | None = None
@@ -184,7 +186,7 @@ class _Auditor:
         self._tip(state, piece, clock, line)
         self._durations(state, line[:, 0])
         self._ends(state, piece, line[:, 0])
-        self._reach(state, piece)
+        self._reach(state, piece, clock, line)
 
     def _tip(self, state: Motion, piece: Numbers, clock: Array, line: NDArray[np.int32]) -> None:
         """Feed and chord error of the tip."""
@@ -297,7 +299,7 @@ class _Auditor:
             time = self.starts[arcs] + side * profile.duration[arcs]
             self.worst.offer("junction", off, slack, time, line)
 
-    def _reach(self, state: Motion, piece: Numbers) -> None:
+    def _reach(self, state: Motion, piece: Numbers, clock: Array, line: NDArray[np.int32]) -> None:
         """Positions so far, angles continuous from arc to arc."""
         first = state.position[:, 0]
         if self.last is None:
@@ -309,9 +311,16 @@ class _Auditor:
         ways = state.way[:-1, -1] + steps
         begin = offset + np.concatenate([np.zeros((1, self.names)), np.cumsum(ways, axis=0)])
         positions = begin[:, None] + state.way
-        with np.errstate(invalid="ignore"):
-            least, most = positions.min(axis=(0, 1)), positions.max(axis=(0, 1))
-        self.reach = np.stack([np.fmin(self.reach[0], least), np.fmax(self.reach[1], most)])
+        flat, times = positions.reshape(-1, self.names), clock.ravel()
+        lines = np.broadcast_to(line, clock.shape).ravel()
+        for end, sign in enumerate((-1.0, 1.0)):
+            at = np.where(np.isnan(flat), -np.inf, sign * flat).argmax(axis=0)
+            value = flat[at, np.arange(self.names)]
+            with np.errstate(invalid="ignore"):
+                farther = ~(sign * value <= sign * self.reach[end])
+            self.reach[end, farther] = value[farther]
+            self.reached["time"][end, farther] = times[at[farther]]
+            self.reached["line"][end, farther] = lines[at[farther]]
         self.last = int(piece[-1]), state.position[-1, -1], positions[-1, -1]
 
     def finish(self) -> None:
@@ -326,6 +335,8 @@ class _Auditor:
             if turning[k]:
                 turns = TURN * np.round((middle - 0.5 * (least + most)) / TURN)
                 least, most = least + turns, most + turns
-            value, bound = (most, upper) if most - middle > middle - least else (least, lower)
+            end = int(most - middle > middle - least)
+            value, bound = (most, upper) if end else (least, lower)
             ratio = (abs(value - middle) - 2.0 * ROUNDINGS * EPS * abs(value)) / half
-            self.worst.offer_ratio("travel", value, bound, ratio, 0.0, 0, k)
+            time, line = self.reached[end, k].item()
+            self.worst.offer_ratio("travel", value, bound, ratio, time, line, k)
