@@ -63,8 +63,10 @@ const FEW_CELLS: usize = 20_000;
 /// depends on it.
 #[derive(Clone, Copy)]
 pub struct Hint<'a> {
-    /// Of each arc: its piece, its end on it, its duration in s.
+    /// Of each arc: its piece, the axis that governs, its end on the piece, its duration in s.
     pub piece: &'a [u32],
+    /// That governs, any other number for none.
+    pub axis: &'a [u8],
     pub u1: &'a [f64],
     pub duration: &'a [f64],
 }
@@ -85,8 +87,12 @@ pub fn lower_bound<const M: usize>(problem: &Problem<M>, hint: &Hint) -> Result<
     limits.check(problem.width.len())?;
     check_pieces(problem)?;
     let arcs = hint.piece.len();
-    if hint.u1.len() != arcs || hint.duration.len() != arcs || arcs >= u32::MAX as usize {
-        let what = format!("{} ends and {} durations for {arcs} arcs", hint.u1.len(), hint.duration.len());
+    if hint.axis.len() != arcs
+        || hint.u1.len() != arcs
+        || hint.duration.len() != arcs
+        || arcs >= u32::MAX as usize
+    {
+        let what = format!("the columns of the profile differ in length from its {arcs} pieces");
         return Err(Fault::Input { piece: None, what });
     }
     let share = if problem.tip.is_some() { 1.0 + STAND_IN } else { 1.0 };
@@ -127,7 +133,12 @@ fn over_run<const M: usize>(
     hint: &Hint,
     (cells, other): &mut (Cells, Cells),
 ) -> f64 {
-    cells.from_arcs(hint, pieces, task.problem.width);
+    let turn = |i: usize, axis: usize, part: (f64, f64)| sweep::turn(task, i, axis, part);
+    cells.from_arcs(hint, pieces, task.problem.width, turn);
+    // Where an axis turns, else half way.
+    let middle = |i: usize, (from, to): (f64, f64)| {
+        (0..M).find_map(|k| turn(pieces.0 + i, k, (from, to))).unwrap_or(0.5 * (from + to))
+    };
     let arcs = hint.piece.partition_point(|&piece| (piece as usize) < pieces.0)
         ..hint.piece.partition_point(|&piece| (piece as usize) < pieces.1);
     let duration: f64 = hint.duration.get(arcs).unwrap_or(&[]).iter().sum();
@@ -143,7 +154,11 @@ fn over_run<const M: usize>(
         let gained = bound - best > LEAST_GAIN * (duration - best);
         best = bound.max(best);
         let near = best >= (1.0 - NEAR) * duration;
-        if near || (round > 2 && !gained) || cells.halve(hint, POOR, other) == 0 || cells.end.len() > most {
+        if near
+            || (round > 2 && !gained)
+            || cells.halve(hint, POOR, middle, other) == 0
+            || cells.end.len() > most
+        {
             break;
         }
     }

@@ -3,7 +3,7 @@
 
 mod support;
 
-use feedplan_solvers::bang_bang::{plan_each, Problem};
+use feedplan_solvers::bang_bang::Problem;
 use feedplan_solvers::bang_bang_quadratic::Profile;
 use feedplan_solvers::bound::{lower_bound, Hint};
 use feedplan_solvers::quadratic::Quadratic;
@@ -51,7 +51,7 @@ impl<const M: usize> Path<M> {
 }
 
 fn hint(profile: &Profile) -> Hint<'_> {
-    Hint { piece: &profile.piece, u1: &profile.u1, duration: &profile.duration }
+    Hint { piece: &profile.piece, axis: &profile.axis, u1: &profile.u1, duration: &profile.duration }
 }
 
 fn bound<const M: usize>(case: &Case<M>, profile: &Profile) -> f64 {
@@ -88,9 +88,21 @@ fn the_bound_is_never_above_the_time_and_near_it() {
     }
     gaps.sort_by(|a, b| a.0.total_cmp(&b.0));
     let share = |part: f64| gaps[((gaps.len() - 1) as f64 * part) as usize];
-    println!("least {worst:.1e}, of {} gaps {:?}", gaps.len(), [0.5, 0.9, 0.95, 0.98, 0.99, 0.999, 1.0].map(share));
+    println!(
+        "least {worst:.1e}, of {} gaps {:?}",
+        gaps.len(),
+        [0.5, 0.9, 0.95, 0.98, 0.99, 0.999, 1.0].map(share)
+    );
     let smooth: Vec<_> = gaps.iter().filter(|gap| !gap.2).collect();
     println!("{:?}", &smooth[smooth.len().saturating_sub(40)..]);
-    println!("without chord {:?}", [0.5, 0.9, 0.95, 0.98, 0.99, 0.999, 1.0].map(|p| smooth[((smooth.len() - 1) as f64 * p) as usize]));
-    assert!(failures.is_empty(), "{} failures\n{}", failures.len(), failures[..failures.len().min(40)].join("\n"));
+    println!(
+        "without chord {:?}",
+        [0.5, 0.9, 0.95, 0.98, 0.99, 0.999, 1.0].map(|p| smooth[((smooth.len() - 1) as f64 * p) as usize])
+    );
+    assert!(
+        failures.is_empty(),
+        "{} failures\n{}",
+        failures.len(),
+        failures[..failures.len().min(40)].join("\n")
+    );
 }

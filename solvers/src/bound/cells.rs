@@ -28,8 +28,16 @@ impl Cells {
         self.piece[piece]..self.piece[piece + 1]
     }
 
-    /// The arcs of the profile as cells. What is no profile gives cells all the same.
-    pub fn from_arcs(&mut self, hint: &Hint, (first, last): (usize, usize), width: &[f64]) {
+    /// The arcs of the profile as cells, in two where the arc's axis turns. What is no profile gives cells all the same.
+    ///
+    /// `turn` gives the place where an axis turns on a part of a piece.
+    pub fn from_arcs(
+        &mut self,
+        hint: &Hint,
+        (first, last): (usize, usize),
+        width: &[f64],
+        turn: impl Fn(usize, usize, (f64, f64)) -> Option<f64>,
+    ) {
         self.piece.clear();
         self.end.clear();
         self.arc.clear();
@@ -37,13 +45,22 @@ impl Cells {
         for i in first..last {
             self.piece.push(self.end.len());
             let (mut from, mut own) = (0.0, NO_ARC);
-            while hint.piece.get(arc).is_some_and(|&piece| piece as usize == i) {
-                let t = hint.u1[arc] / width[i];
-                own = arc as u32;
+            let mut cut = |t: f64, own: u32| {
                 if t > from + SAME_END && t < 1.0 - SAME_END {
-                    self.push(t, own);
+                    self.end.push(t);
+                    self.arc.push(own);
                     from = t;
                 }
+                from
+            };
+            let mut start = 0.0;
+            while hint.piece.get(arc).is_some_and(|&piece| piece as usize == i) {
+                own = arc as u32;
+                let end = (hint.u1[arc] / width[i]).min(1.0);
+                if let Some(t) = turn(i, hint.axis[arc] as usize, (start, end)) {
+                    cut(t, own);
+                }
+                start = cut(end, own);
                 arc += 1;
             }
             self.push(1.0, own);
@@ -62,9 +79,16 @@ impl Cells {
         self.time.resize(self.end.len(), 0.0);
     }
 
-    /// Halves the cells of arcs whose bound misses more than this part of their duration; `other` is space for it.
+    /// Divides the cells of arcs whose bound misses more than this part of their duration at their `middle`, a function
+    /// of the piece, counted from the start of the run, and the cell's ends; `other` is space for it.
     /// Returns how many there are.
-    pub fn halve(&mut self, hint: &Hint, part: f64, other: &mut Self) -> usize {
+    pub fn halve(
+        &mut self,
+        hint: &Hint,
+        part: f64,
+        middle: impl Fn(usize, (f64, f64)) -> f64,
+        other: &mut Self,
+    ) -> usize {
         other.piece.clear();
         other.end.clear();
         other.arc.clear();
@@ -84,10 +108,12 @@ impl Cells {
                     let bound: f64 = self.time[cell..known].iter().sum();
                     poor = arc == NO_ARC || bound < (1.0 - part) * hint.duration[arc as usize];
                 }
-                let middle = 0.5 * (from + self.end[cell]);
-                if poor && middle > from && middle < self.end[cell] {
-                    other.push(middle, arc);
-                    halved += 1;
+                if poor {
+                    let middle = middle(i, (from, self.end[cell]));
+                    if middle > from && middle < self.end[cell] {
+                        other.push(middle, arc);
+                        halved += 1;
+                    }
                 }
                 other.push(self.end[cell], arc);
                 from = self.end[cell];

@@ -86,8 +86,7 @@ impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
         (self.degree, self.count) = (2 * d - 2, d + 1);
         for i in 0..=d {
             self.weight[i] = weights[i] / weights[0];
-            self.point[i] =
-                std::array::from_fn(|k| (control[i][k] - control[0][k]) * self.weight[i]);
+            self.point[i] = std::array::from_fn(|k| (control[i][k] - control[0][k]) * self.weight[i]);
         }
         let own = &self.weight[..=d];
         let least = own.iter().fold(f64::INFINITY, |least: f64, &w| least.min(w));
@@ -169,6 +168,25 @@ impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
     #[inline(always)]
     pub fn turns(&self, k: usize, a: &Node<M>, b: &Node<M>) -> bool {
         a.g[k] * b.g[k] < 0.0 && a.g[k].abs() > self.noise[k] && b.g[k].abs() > self.noise[k]
+    }
+
+    /// A place inside [from, to] next to which axis k turns: Newton's method by secants, in a bracket.
+    pub fn turn(&self, k: usize, (from, to): (f64, f64)) -> Option<f64> {
+        let (mut a, mut b) = (self.node(from), self.node(to));
+        if k >= M || !self.turns(k, &a, &b) {
+            return None;
+        }
+        for step in 0..80 {
+            let (ga, gb) = (a.g[k], b.g[k]);
+            let secant = a.t + (b.t - a.t) * (ga / (ga - gb));
+            let t = if step % 3 == 2 { 0.5 * (a.t + b.t) } else { secant };
+            let node = self.node(t);
+            if node.g[k].abs() <= self.noise[k] || t <= a.t || t >= b.t {
+                return Some(t);
+            }
+            *(if node.g[k] * ga > 0.0 { &mut a } else { &mut b }) = node;
+        }
+        Some(a.t)
     }
 
     /// The ways between two nodes, `a` before `b`.

@@ -37,8 +37,6 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
     #[inline(always)]
     pub fn new(task: &'a Task<'a, M>, i: usize) -> Self {
         let problem = task.problem;
-        let range = problem.offset[i]..problem.offset[i + 1];
-        let weights = problem.weight.get(range.clone()).unwrap_or(&[]);
         let tip_speed = problem.tip.map(|tip| {
             let coefficients = &tip.speed[tip.speed_offset[i]..tip.speed_offset[i + 1]];
             let factor = problem.width[i].powi(2);
@@ -52,7 +50,7 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
         });
         Self {
             task,
-            curve: Hodograph::new(&problem.control[range], weights),
+            curve: task.hodograph(i),
             tip_speed,
             tip_curve,
             feed_sq: problem.feed[i].powi(2) * task.speed_share,
@@ -177,10 +175,9 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
 
     /// Not above the tool's way from `a` to `b`.
     fn length(&self, a: &Node<M>, b: &Node<M>, ways: &Ways<M>) -> f64 {
-        let h = b.t - a.t;
         if let Some(tip) = &self.tip_speed {
-            let d = |x: f64| tip.at(a.t + h * x, 0).0;
-            return h * root_integral(d, tip.coefficients.len() - 1, tip.noise) * DOWN;
+            let d = |t: f64| tip.at(t, 0).0;
+            return root_integral(&d, tip.coefficients.len() - 1, tip.noise, (a.t, b.t)) * DOWN;
         }
         let chord = ways.least.iter().map(|way| way * way).sum::<f64>().sqrt() * DOWN;
         if self.curve.degree == 0 {
@@ -194,11 +191,9 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
         }
         let noise: f64 = self.curve.noise.iter().sum();
         let greatest: f64 = self.curve.size.iter().sum();
-        let d = |x: f64| {
-            let g = self.curve.node(a.t + h * x).g;
-            g.iter().map(|value| value * value).sum()
-        };
-        chord.max(h * root_integral(d, 2 * self.curve.degree, 2.0 * greatest * noise) * DOWN)
+        let d = |t: f64| self.curve.node(t).g.iter().map(|value| value * value).sum();
+        let bound = root_integral(&d, 2 * self.curve.degree, 2.0 * greatest * noise, (a.t, b.t));
+        chord.max(bound * DOWN)
     }
 }
 

@@ -1,7 +1,7 @@
 //! The two sweeps over a run: from its end the greatest speed at every node, then from its start as well, with times.
 
 use super::cells::Cells;
-use super::hodograph::Node;
+use super::hodograph::{Hodograph, Node};
 use super::piece::Piece;
 use super::{Task, DOWN, UP};
 
@@ -60,14 +60,43 @@ impl<const M: usize> Task<'_, M> {
         (weights.iter().any(|&weight| weight != weights[0]), degree)
     }
 
+    /// The hodograph of piece `i`.
+    #[inline(always)]
+    pub fn hodograph<const C: usize, const R: usize>(&self, i: usize) -> Hodograph<M, C, R> {
+        let range = self.problem.offset[i]..self.problem.offset[i + 1];
+        Hodograph::new(&self.problem.control[range.clone()], self.problem.weight.get(range).unwrap_or(&[]))
+    }
+
     /// The greatest speed squared where pieces `i − 1` and `i` meet.
     fn junction_sq(&self, i: usize) -> f64 {
         self.problem.junction_speed[i].powi(2) * self.speed_share
     }
 }
 
+/// A place inside [from, to] of piece `i` next to which the axis turns.
+pub fn turn<const M: usize>(task: &Task<M>, i: usize, axis: usize, part: (f64, f64)) -> Option<f64> {
+    if axis >= M {
+        return None;
+    }
+    with_capacity!(task, i, turn_on(task, i, axis, part))
+}
+
+fn turn_on<const M: usize, const C: usize, const R: usize>(
+    task: &Task<M>,
+    i: usize,
+    axis: usize,
+    part: (f64, f64),
+) -> Option<f64> {
+    task.hodograph::<C, R>(i).turn(axis, part)
+}
+
 /// Fills the greatest x at the end of each cell, with what lies behind it.
-pub fn backward<const M: usize>(task: &Task<M>, (first, last): (usize, usize), end_sq: f64, cells: &mut Cells) {
+pub fn backward<const M: usize>(
+    task: &Task<M>,
+    (first, last): (usize, usize),
+    end_sq: f64,
+    cells: &mut Cells,
+) {
     let mut at = Between { speed_sq: end_sq * task.speed_share, end: None };
     for i in (first..last).rev() {
         if i + 1 < last {
