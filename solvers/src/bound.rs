@@ -24,10 +24,12 @@
 //! | `hodograph` | tangents, slopes and ways of a piece with their errors |
 //! | `piece` | the greatest x at a node, its rise over a cell, the least time of a cell |
 //! | `time`, `length` | of an axis between two speeds; of the tool's path |
+//! | `chord` | the chord-error limit at a node and over a cell |
 //! | `cells` | division of a run, refined |
 //! | `sweep` | both sweeps over a run |
 
 mod cells;
+mod chord;
 mod hodograph;
 mod length;
 mod piece;

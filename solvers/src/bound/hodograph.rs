@@ -263,6 +263,22 @@ impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
         (length * (1.0 - (parts + M + 8) as f64 * f64::EPSILON) - 2.0 * parts as f64 * noise).max(0.0)
     }
 
+    /// Not above |g_j' g_k − g_k' g_j| at a node.
+    #[inline(always)]
+    pub fn twist(&self, node: &Node<M>, j: usize, k: usize) -> f64 {
+        let (gj, gk, cj, ck) = (node.g[j], node.g[k], node.c[j], node.c[k]);
+        let (nj, nk, n) = (self.noise[j], self.noise[k], self.degree as f64);
+        let error = (cj.abs() + n * nj) * nk
+            + (ck.abs() + n * nk) * nj
+            + n * (gk.abs() * nj + gj.abs() * nk)
+            + 2.0 * f64::EPSILON * ((cj * gk).abs() + (ck * gj).abs());
+        ((cj * gk - ck * gj).abs() - error * super::UP).max(0.0)
+    }
+
+    pub fn least_weight(&self) -> f64 {
+        self.weights[0]
+    }
+
     /// How far ω can be from its value at a node after a step of `d`.
     pub fn weight_change(&self, d: f64) -> f64 {
         self.count as f64 * (self.weights[1] - self.weights[0]) * d

@@ -12,6 +12,9 @@ const NEAR_TURN: f64 = 1e-7;
 const CHORD_TURN: f64 = 0.05;
 const MOST_CHORDS: f64 = 64.0;
 
+/// The chord-error limit counts on a cell where at an end v² is this near it.
+const NEAR_CHORD: f64 = 0.5;
+
 /// The tool's own piece, of any kind.
 type TipCurve = Hodograph<TIP_AXES, 17, 10>;
 
@@ -83,42 +86,53 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
             most = most.min(task.velocity_sq[k] / (least * least));
         }
         if node.order == 0 {
-            let slope_noise = self.curve.degree as f64;
             for j in 0..M {
                 for k in j + 1..M {
                     // |g_j s + g_j' π| ≤ A_j/ω², the same of k, without s.
-                    let (gj, gk, cj, ck) = (node.g[j], node.g[k], node.c[j], node.c[k]);
-                    let (nj, nk) = (noise[j], noise[k]);
-                    let twist = (cj * gk - ck * gj).abs();
-                    let error = (cj.abs() + slope_noise * nj) * nk
-                        + (ck.abs() + slope_noise * nk) * nj
-                        + slope_noise * (gk.abs() * nj + gj.abs() * nk)
-                        + 2.0 * f64::EPSILON * ((cj * gk).abs() + (ck * gj).abs());
-                    let least = twist - error * UP;
-                    if least > 0.0 {
-                        let both =
-                            task.acceleration[j] * (gk.abs() + nk) + task.acceleration[k] * (gj.abs() + nj);
-                        most = most.min(both / (least * node.weight_sq));
+                    let twist = self.curve.twist(node, j, k);
+                    if twist > 0.0 {
+                        let both = task.acceleration[j] * (node.g[k].abs() + noise[k])
+                            + task.acceleration[k] * (node.g[j].abs() + noise[j]);
+                        most = most.min(both / (twist * node.weight_sq));
                     }
                 }
             }
             for k in 0..M {
                 most = most.min(self.at_turn(node, k));
             }
-            if let Some(chord) = &task.chord {
-                let own;
-                let radius = match &self.tip_curve {
-                    Some(tip) => tip.radius(&tip.node(node.t)),
-                    None => {
-                        own = self.curve.radius(node);
-                        own
-                    }
-                };
-                let limit = chord.slow_sq.max(chord.alpha * radius - chord.slow_sq) * task.speed_share;
-                most = most.min(limit * UP / speed);
+            if let Some(limit) = self.chord_speed_sq(node) {
+                most = most.min(limit / speed);
             }
         }
         most * UP
+    }
+
+    /// Not below the greatest v² that the chord error allows at a node.
+    fn chord_speed_sq(&self, node: &Node<M>) -> Option<f64> {
+        let chord = self.task.chord.as_ref()?;
+        let limit = match &self.tip_curve {
+            Some(tip) => tip.chord_speed_sq(chord, &tip.node(node.t)),
+            None => self.curve.chord_speed_sq(chord, node),
+        };
+        Some(limit * self.task.speed_share)
+    }
+
+    /// Not above the time between two nodes under the chord-error limit; 0 where neither speed is near it.
+    fn chord_time(&self, a: &Node<M>, b: &Node<M>, x: [f64; 2]) -> f64 {
+        let Some(chord) = &self.task.chord else { return 0.0 };
+        let is_near = |node: &Node<M>, x: f64| {
+            node.order == 0
+                && self.chord_speed_sq(node).is_some_and(|limit| x * self.speed(node).1 > NEAR_CHORD * limit)
+        };
+        if !(is_near(a, x[0]) || is_near(b, x[1])) {
+            return 0.0;
+        }
+        let feed_sq = self.feed_sq * UP;
+        let time = match &self.tip_curve {
+            Some(tip) => tip.chord_time(chord, feed_sq, &tip.node(a.t), &tip.node(b.t), 0),
+            None => self.curve.chord_time(chord, feed_sq, a, b, 0),
+        };
+        time / self.task.speed_share
     }
 
     /// Not below π at a node next to which axis k turns: its velocity is 0 there, and v_k² at most 2 A_k times the way
@@ -169,6 +183,7 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
         }
         if time < wanted {
             time = time.max(self.length(a, b, ways) / self.feed_sq.sqrt() * DOWN);
+            time = time.max(self.chord_time(a, b, x));
         }
         time
     }
@@ -216,25 +231,5 @@ impl TipSpeed<'_> {
             }
         }
         (self.factor * b[0], self.noise)
-    }
-}
-
-impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
-    /// Not below the radius of curvature |g|³/(|g × g'| ω²) at a node.
-    fn radius(&self, node: &Node<M>) -> f64 {
-        let n = self.degree as f64;
-        let (mut square, mut twist_sq) = (0.0, 0.0);
-        for j in 0..M {
-            square += (node.g[j].abs() + self.noise[j]).powi(2);
-            for k in j + 1..M {
-                let error = (node.c[j].abs() + n * self.noise[j]) * self.noise[k]
-                    + (node.c[k].abs() + n * self.noise[k]) * self.noise[j]
-                    + n * (node.g[k].abs() * self.noise[j] + node.g[j].abs() * self.noise[k])
-                    + 2.0 * f64::EPSILON * ((node.c[j] * node.g[k]).abs() + (node.c[k] * node.g[j]).abs());
-                let twist = (node.c[j] * node.g[k] - node.c[k] * node.g[j]).abs();
-                twist_sq += (twist - error * UP).max(0.0).powi(2);
-            }
-        }
-        square * square.sqrt() / (twist_sq.sqrt() * node.weight_sq) * UP
     }
 }
