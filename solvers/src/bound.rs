@@ -146,8 +146,8 @@ fn over_run<const M: usize>(
     let duration: f64 = hint.duration.get(arcs).unwrap_or(&[]).iter().sum();
     let most = MOST_CELLS * cells.end.len() + FEW_CELLS;
     let wanted = |arc: u32| match hint.duration.get(arc as usize) {
-        Some(duration) => (1.0 - 0.1 * POOR) * duration,
-        None => f64::INFINITY,
+        Some(duration) => (hint.axis[arc as usize] as usize, (1.0 - 0.1 * POOR) * duration),
+        None => (M, f64::INFINITY),
     };
     let mut best = 0.0;
     for round in 0..MOST_ROUNDS {
@@ -157,7 +157,7 @@ fn over_run<const M: usize>(
         best = bound.max(best);
         let near = best >= (1.0 - NEAR) * duration;
         if near
-            || (round > 2 && !gained)
+            || (round > 0 && !gained)
             || cells.halve(hint, POOR, middle, other) == 0
             || cells.end.len() > most
         {

@@ -4,8 +4,6 @@ use super::Hint;
 
 /// No arc belongs to the cell.
 const NO_ARC: u32 = u32::MAX;
-/// Ends of arcs closer than this part of a piece are one.
-const SAME_END: f64 = 1e-13;
 
 /// Cells in the order of the run; a piece has one or more.
 #[derive(Default)]
@@ -44,23 +42,23 @@ impl Cells {
         let mut arc = hint.piece.partition_point(|&piece| (piece as usize) < first);
         for i in first..last {
             self.piece.push(self.end.len());
+            // `own` is the longest arc since the last cut.
             let (mut from, mut own) = (0.0, NO_ARC);
-            let mut cut = |t: f64, own: u32| {
-                if t > from + SAME_END && t < 1.0 - SAME_END {
-                    self.end.push(t);
-                    self.arc.push(own);
-                    from = t;
-                }
-                from
-            };
-            let mut start = 0.0;
             while hint.piece.get(arc).is_some_and(|&piece| piece as usize == i) {
-                own = arc as u32;
-                let end = (hint.u1[arc] / width[i]).min(1.0);
-                if let Some(t) = turn(i, hint.axis[arc] as usize, (start, end)) {
-                    cut(t, own);
+                if own == NO_ARC || hint.duration[arc] > hint.duration[own as usize] {
+                    own = arc as u32;
                 }
-                start = cut(end, own);
+                let end = (hint.u1[arc] / width[i]).min(1.0);
+                if let Some(t) = turn(i, hint.axis[arc] as usize, (from, end)) {
+                    if t > from && t < end {
+                        self.push(t, own);
+                        from = t;
+                    }
+                }
+                if end > from && end < 1.0 {
+                    self.push(end, own);
+                    (from, own) = (end, NO_ARC);
+                }
                 arc += 1;
             }
             self.push(1.0, own);

@@ -9,7 +9,7 @@ use crate::polynomial::Polynomial;
 type Twist = Polynomial<40>;
 
 /// A part of a cell is halved while the limit varies by more than this part on it, so often at most.
-const VARIES: f64 = 2e-3;
+const VARIES: f64 = 3e-3;
 const MOST_HALVINGS: u32 = 9;
 
 impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
@@ -34,8 +34,14 @@ impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
         b: &Node<M>,
         halvings: u32,
     ) -> f64 {
-        let greatest = self.greatest_chord_speed_sq(chord, a, b);
-        let ends = self.chord_speed_sq(chord, a).min(self.chord_speed_sq(chord, b));
+        let ends = [self.chord_speed_sq(chord, a), self.chord_speed_sq(chord, b)];
+        // Where g is linear |g × g'| is constant and |g| greatest at an end.
+        let greatest = if self.degree == 1 && !self.is_rational() {
+            ends[0].max(ends[1])
+        } else {
+            self.greatest_chord_speed_sq(chord, a, b)
+        };
+        let ends = ends[0].min(ends[1]);
         if halvings < MOST_HALVINGS && ends < feed_sq && greatest.min(feed_sq) > (1.0 + VARIES) * ends {
             let middle = self.node(0.5 * (a.t + b.t));
             return self.chord_time(chord, feed_sq, a, &middle, halvings + 1)

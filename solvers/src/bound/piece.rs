@@ -169,21 +169,29 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
         most * UP
     }
 
-    /// Not above the time from `a` to `b` with at most these x; the length is looked at where the axes do not need
-    /// `wanted` already.
+    /// Not above the time from `a` to `b` with at most these x; `axis` is looked at first, then the length, then all
+    /// else, until the time is `wanted`.
     #[inline(always)]
-    pub fn time(&self, a: &Node<M>, b: &Node<M>, x: [f64; 2], ways: &Ways<M>, wanted: f64) -> f64 {
-        let mut time = 0.0_f64;
-        for k in 0..M {
+    pub fn time(
+        &self,
+        (a, b): (&Node<M>, &Node<M>),
+        x: [f64; 2],
+        ways: &Ways<M>,
+        axis: usize,
+        wanted: f64,
+    ) -> f64 {
+        let of_axis = |k: usize| {
             let noise = self.curve.noise[k];
             let (first, last) = (a.rate[k].abs() + noise, b.rate[k].abs() + noise);
             let (first_sq, last_sq) = (first * first * x[0] * UP, last * last * x[1] * UP);
-            let limits = (self.task.acceleration[k], self.task.velocity_sq[k]);
-            time = time.max(least_time(ways.least[k], first_sq, last_sq, limits.0, limits.1));
-        }
+            least_time(ways.least[k], first_sq, last_sq, self.task.acceleration[k], self.task.velocity_sq[k])
+        };
+        let mut time = if axis < M { of_axis(axis) } else { 0.0 };
         if time < wanted {
             time = time.max(self.length(a, b, ways) / self.feed_sq.sqrt() * DOWN);
-            time = time.max(self.chord_time(a, b, x));
+        }
+        if time < wanted {
+            time = (0..M).map(of_axis).fold(time, f64::max).max(self.chord_time(a, b, x));
         }
         time
     }

@@ -138,12 +138,13 @@ fn backward_over<const M: usize, const C: usize, const R: usize>(
     at.end = Some(End::new(&piece, &node));
 }
 
-/// A lower bound of the time of the run, each cell's beside it; keeps the greatest x in `cells`.
+/// A lower bound of the time of the run, each cell's beside it; `wanted` says of an arc which axis governs and what
+/// time would do.
 pub fn forward<const M: usize>(
     task: &Task<M>,
     (first, last): (usize, usize),
     start_sq: f64,
-    wanted: impl Fn(u32) -> f64,
+    wanted: impl Fn(u32) -> (usize, f64),
     cells: &mut Cells,
 ) -> f64 {
     let mut speed_sq = start_sq * task.speed_share;
@@ -163,7 +164,7 @@ fn forward_over<const M: usize, const C: usize, const R: usize>(
     own: usize,
     speed_sq: &mut f64,
     time: &mut f64,
-    wanted: &impl Fn(u32) -> f64,
+    wanted: &impl Fn(u32) -> (usize, f64),
     cells: &mut Cells,
 ) {
     let piece = Piece::<M, C, R>::new(task, i);
@@ -176,7 +177,8 @@ fn forward_over<const M: usize, const C: usize, const R: usize>(
         let end = piece.curve.node(cells.end[cell]);
         let ways = piece.curve.ways(&node, &end);
         let reached = cells.reach[cell].min(piece.rise(&node, x, &end, &ways));
-        cells.time[cell] = piece.time(&node, &end, [x, reached], &ways, wanted(cells.arc[cell]));
+        let (axis, wanted) = wanted(cells.arc[cell]);
+        cells.time[cell] = piece.time((&node, &end), [x, reached], &ways, axis, wanted);
         *time += cells.time[cell];
         (x, node) = (reached, end);
     }
