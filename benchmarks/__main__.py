@@ -10,6 +10,7 @@ from rich.console import Console
 
 from benchmarks import (
     against_toppra,
+    certificate_cost,
     curve_cost,
     end_to_end,
     interpolators,
@@ -20,7 +21,15 @@ from benchmarks import (
 
 BENCHMARKS = {
     module.NAME: module.run
-    for module in (planner_cost, curve_cost, against_toppra, end_to_end, interpolators, kinematics_cost)
+    for module in (
+        planner_cost,
+        curve_cost,
+        certificate_cost,
+        against_toppra,
+        end_to_end,
+        interpolators,
+        kinematics_cost,
+    )
 }
 
 

@@ -29,7 +29,7 @@ def run(quick: bool = False) -> Result:
     with tempfile.TemporaryDirectory() as directory:
         for part, machine, blocks in PARTS:
             program = Path(directory, f"{part}.ngc")
-            program.write_text(_example(part).program(blocks // (QUICK if quick else 1)), encoding="ascii")
+            program.write_text(example(part).program(blocks // (QUICK if quick else 1)), encoding="ascii")
             rows.append(_plan(program, machine, Path(directory, part)))
             shutil.rmtree(Path(directory, part))
     return Result(
@@ -68,7 +68,7 @@ def _plan(program: Path, machine: str, output: Path) -> dict[str, Cell]:
     }
 
 
-def _example(name: str) -> ModuleType:
+def example(name: str) -> ModuleType:
     spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None

@@ -1,4 +1,4 @@
-"""The certificate of a plan: known times, never above the time, near it, whatever the path and the profile."""
+"""The certificate of a plan: known times; never above the time and near it, whatever the path."""
 
 from __future__ import annotations
 
@@ -131,7 +131,8 @@ def test_random_motions_of_joints_are_certified(name: str) -> None:
 )
 def test_the_examples_are_certified(example: str, machine: str, blocks: int, tmp_path: FilePath) -> None:
     spec = importlib.util.spec_from_file_location(example, EXAMPLES / f"{example}.py")
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     file = tmp_path / "part.ngc"
