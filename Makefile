@@ -32,6 +32,7 @@ bench: $(VENV)/built
 # Random paths by the million, and on every machine by the thousand; the figures stand in benchmarks/README.md.
 campaign: $(VENV)/built
 	FEEDPLAN_SEEDS=1000000 cargo test --release --manifest-path solvers/Cargo.toml --test bang_bang_random -- --nocapture
+	FEEDPLAN_SEEDS=1000000 cargo test --release --manifest-path solvers/Cargo.toml --test bound -- --nocapture
 	FEEDPLAN_SEEDS=1250 $(BIN)/pytest tests/constraints/test_joints.py -k random
 
 clean:

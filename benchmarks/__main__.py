@@ -10,6 +10,7 @@ from rich.console import Console
 
 from benchmarks import (
     against_toppra,
+    certificate_cost,
     curve_cost,
     end_to_end,
     interpolators,
@@ -25,6 +26,7 @@ BENCHMARKS = {
         methods,
         planner_cost,
         curve_cost,
+        certificate_cost,
         against_toppra,
         end_to_end,
         interpolators,

@@ -31,17 +31,12 @@ def run(quick: bool = False) -> Result:
         _row("quadratics, their own planner", quadratics, partial(plan_bang_bang, quadratics)),
         _row("quadratics, the planner of curves", quadratics, partial(plan_curves, quadratics)),
     ]
-    for kind, curve in _curves(count).items():
+    for kind, curve in random_curves(count).items():
         for feed in FEEDS:
             problem = build_problem(Path.from_curve(curve, feed=feed), MACHINE)
             name = f"{kind}, {feed:g} mm/s"
             rows.append(_row(name, problem, partial(plan_bang_bang, problem)))
-    machine = Machine.load("cylindrical")
-    axes = tuple(replace(axis, travel=(-np.inf, np.inf)) for axis in machine.axes)
-    near = _curves(count // 10)["cubics"]
-    away = replace(near, control_points=near.control_points + np.array([300.0, 0.0, 0.0]))
-    tip = Path.from_curve(away, feed=FEEDS[0])
-    joints = build_problem(tip, replace(machine, axes=axes))
+    joints = cylindrical(count // 10)
     rows.append(_row("joints of cubics, cylindrical", joints, partial(plan_bang_bang, joints)))
     return Result(
         NAME,
@@ -51,7 +46,16 @@ def run(quick: bool = False) -> Result:
     )
 
 
-def _curves(count: int) -> dict[str, CompositeCurve]:
+def cylindrical(count: int) -> Problem:
+    """Cubics on the cylindrical machine, whose joints have pieces of degree 9."""
+    machine = Machine.load("cylindrical")
+    axes = tuple(replace(axis, travel=(-np.inf, np.inf)) for axis in machine.axes)
+    near = random_curves(count)["cubics"]
+    away = replace(near, control_points=near.control_points + np.array([300.0, 0.0, 0.0]))
+    return build_problem(Path.from_curve(away, feed=FEEDS[0]), replace(machine, axes=axes))
+
+
+def random_curves(count: int) -> dict[str, CompositeCurve]:
     """Splines through one random walk of points that turns slowly."""
     rng = np.random.default_rng(SEED)
     heading = np.cumsum(rng.normal(0, 0.25, (count + 1, 3)), axis=0) + np.array([3.0, 0.0, 0.0])

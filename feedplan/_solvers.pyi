@@ -29,6 +29,7 @@ __all__ = [
     "curve_reverse",
     "curve_split",
     "fit_points",
+    "lower_bound",
     "plan_bang_bang",
     "plan_curves",
     "read_gcode",
@@ -57,6 +58,7 @@ _Profile = tuple[
 
 def plan_bang_bang(problem: Problem) -> _Profile: ...
 def plan_curves(problem: Problem) -> _Profile: ...
+def lower_bound(problem: Problem, profile: SpeedProfile) -> float: ...
 
 @final
 class Sampler:

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from feedplan._solvers import lower_bound as native_bound
 from feedplan.constraints.problem import Problem
-from feedplan.curves.composite import CompositeCurve
+from feedplan.profile import SpeedProfile
+
+# A profile keeps the limits to rounding only: it may be faster by this part than any that keeps them exactly.
+ROUNDING = 1e-9
 
 
-def lower_bound(problem: Problem) -> float:
+def lower_bound(problem: Problem, profile: SpeedProfile) -> float:
     """A proven lower bound [s] on the time in motion along the problem's path, dwells not counted.
 
-    No piece is passed faster than its chord at its feed, nor faster than each joint from its place at the
-    start to that at the end at its greatest velocity.
+    No profile that keeps the limits on velocity, acceleration, feed, chord error and junction speed is
+    faster; a jerk limit is not looked at. The bound comes from the path and the limits alone: `profile`, of
+    any method, says only where to divide the path and which parts to divide further. A bound above its time
+    shows a profile that breaks a limit. See `solvers/src/bound.rs`.
     """
-    at_feed = np.linalg.norm(_steps(problem.tip_curve or problem.curve), axis=1) / problem.feed
-    at_velocity = (_steps(problem.curve) / problem.max_velocity).max(axis=1, initial=0.0)
-    return float(np.maximum(at_feed, at_velocity).sum())
-
-
-def _steps(curve: CompositeCurve) -> NDArray[np.float64]:
-    """|C(w) − C(0)| of each piece, by axis (n, axes)."""
-    points = curve.control_points
-    return np.asarray(np.abs(points[curve.offsets[1:] - 1] - points[curve.offsets[:-1]]))
+    bound: float = native_bound(problem, profile)
+    time = profile.time
+    return min(bound, time) if bound <= time * (1.0 + ROUNDING) else bound

@@ -163,7 +163,7 @@ def plan(
         )
         profile = solve(problem)
     with _timed(compute, "bound"):
-        least = lower_bound(problem) + path.pauses
+        least = lower_bound(problem, profile) + path.pauses
     report("plan", 1.0)
     return Plan(
         program=program,

@@ -107,17 +107,7 @@ fn plan_with<const M: usize>(
     problem: &Problem<M>,
     quadratics: Option<&[Quadratic<M>]>,
 ) -> Result<Profile, Fault> {
-    let limits = Limits {
-        runs: problem.runs,
-        feed: problem.feed,
-        junction_speed: problem.junction_speed,
-        max_velocity: problem.max_velocity,
-        max_acceleration: problem.max_acceleration,
-        chord_tolerance: problem.chord_tolerance,
-        period: problem.period,
-        start_speed: problem.start_speed,
-        end_speed: problem.end_speed,
-    };
+    let limits = Limits::of(problem);
     limits.check(problem.width.len())?;
     check_pieces(problem)?;
     let task = Task {
@@ -144,7 +134,7 @@ fn plan_with<const M: usize>(
 }
 
 /// Every piece: finite, of some length and width, its weights positive.
-fn check_pieces<const M: usize>(problem: &Problem<M>) -> Result<(), Fault> {
+pub(crate) fn check_pieces<const M: usize>(problem: &Problem<M>) -> Result<(), Fault> {
     let (offset, count) = (problem.offset, problem.width.len());
     if offset.len() != count + 1
         || offset[0] != 0

@@ -7,6 +7,7 @@ pub mod audit;
 pub mod bang_bang;
 pub mod bang_bang_quadratic;
 pub mod bernstein;
+pub mod bound;
 pub mod conic;
 pub mod corner;
 pub mod fit;

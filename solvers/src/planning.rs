@@ -1,7 +1,8 @@
-//! What the exact planners share: limits checked once, runs planned in parallel, the chord-error limit.
+//! What the exact planners and the bound share: limits checked once, runs planned in parallel, the chord-error limit.
 
 use rayon::prelude::*;
 
+use crate::bang_bang::Problem;
 use crate::bang_bang_quadratic::{Fault, Profile};
 
 /// Runs are planned in parallel in groups of about this many pieces.
@@ -20,7 +21,22 @@ pub struct Limits<'a, const M: usize> {
     pub end_speed: f64,
 }
 
-impl<const M: usize> Limits<'_, M> {
+impl<'a, const M: usize> Limits<'a, M> {
+    /// Those of a path of any pieces.
+    pub fn of(problem: &Problem<'a, M>) -> Self {
+        Self {
+            runs: problem.runs,
+            feed: problem.feed,
+            junction_speed: problem.junction_speed,
+            max_velocity: problem.max_velocity,
+            max_acceleration: problem.max_acceleration,
+            chord_tolerance: problem.chord_tolerance,
+            period: problem.period,
+            start_speed: problem.start_speed,
+            end_speed: problem.end_speed,
+        }
+    }
+
     /// Every limit once: lengths, ranges, finite numbers.
     pub fn check(&self, count: usize) -> Result<(), Fault> {
         let wrong = |what: String| Err(Fault::Input { piece: None, what });
@@ -93,7 +109,7 @@ impl<const M: usize> Limits<'_, M> {
         plan: impl Fn((usize, usize), (f64, f64), &mut W, &mut Profile) -> Result<(), Fault> + Sync,
     ) -> Result<Profile, Fault> {
         let last_run = self.runs.len() - 2;
-        let plans: Result<Vec<Profile>, Fault> = group(self.runs)
+        let plans: Result<Vec<Profile>, Fault> = groups(self.runs)
             .par_iter()
             .map(|group| {
                 let pieces = self.runs[group.end] - self.runs[group.start];
@@ -114,7 +130,7 @@ impl<const M: usize> Limits<'_, M> {
 }
 
 /// Groups of neighbouring runs with about `GROUP` pieces each.
-fn group(runs: &[usize]) -> Vec<std::ops::Range<usize>> {
+pub fn groups(runs: &[usize]) -> Vec<std::ops::Range<usize>> {
     let mut groups = vec![];
     let mut first = 0;
     for run in 0..runs.len() - 1 {

@@ -2,10 +2,12 @@
 
 mod arrays;
 mod audit;
+mod bound;
 mod fit;
 mod gcode;
 mod path;
 mod plan;
+mod problem;
 mod sampling;
 mod spline;
 mod text;
@@ -61,6 +63,7 @@ fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     sampling::register(module)?;
     spline::register(module)?;
     plan::register(module)?;
+    bound::register(module)?;
     gcode::register(module)?;
     Ok(())
 }

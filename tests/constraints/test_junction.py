@@ -1,20 +1,16 @@
-"""Speeds where pieces meet, and the bound of the time, on pieces of any degree."""
+"""Speeds where pieces meet, on pieces of any degree."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-import pytest
 
-from feedplan.bound import lower_bound
 from feedplan.constraints.junction import junction_limit
-from feedplan.constraints.problem import build_problem
 from feedplan.curves.arc import arc
 from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.joints import end_edges, tangent_jumps
 from feedplan.geometry.path import Path
-from feedplan.machine.machine import Axis, Machine
 
 
 def one_run(curve: CompositeCurve, feed: float = 50.0) -> Path:
@@ -63,14 +59,3 @@ def test_a_jump_of_velocity_limits_the_speed_at_corners_of_any_degree() -> None:
     )
     limit = junction_limit(one_run(curve), np.array([6.0, 10.0]))
     np.testing.assert_array_equal(limit, [0.0, np.inf, 6.0, np.inf, 0.0])
-
-
-def test_the_bound_takes_chords_of_pieces_of_any_degree() -> None:
-    axes = (Axis("X", 100.0, 1000.0), Axis("Y", 20.0, 1000.0))
-    machine = Machine("two", axes)
-    curve = CompositeCurve.joined([bezier([0, 0], [9, 9], [-7, 1], [3, 4]), arc([3, 4], (0, 0), math.pi / 2)])
-    problem = build_problem(one_run(curve, 10.0), machine)
-    # Chords of 5 and 5√2 mm at 10 mm/s, slower than the axes.
-    assert lower_bound(problem) == pytest.approx(0.5 + 0.5 * math.sqrt(2))
-    fast = build_problem(one_run(curve, 1e3), machine)
-    assert lower_bound(fast) == pytest.approx(4 / 20 + 7 / 100)

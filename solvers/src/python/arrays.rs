@@ -31,6 +31,11 @@ impl CurveArrays<'_> {
     }
 }
 
+/// Offsets; a negative one becomes one that fits nowhere.
+pub fn indices(array: &PyReadonlyArray1<i64>) -> Vec<usize> {
+    array.as_array().iter().map(|&value| usize::try_from(value).unwrap_or(usize::MAX)).collect()
+}
+
 /// (n, m) array to rows of M ≥ m axes; the axes beyond m rest at 0.
 pub fn rows<const M: usize>(array: &PyReadonlyArray2<f64>) -> PyResult<Vec<[f64; M]>> {
     let flat = array.as_slice().map_err(|_| contiguous())?;

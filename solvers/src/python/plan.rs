@@ -1,11 +1,12 @@
 //! The exact planner: the package's own problem in, the columns of a profile out.
 
-use numpy::{PyArray1, PyReadonlyArray1, PyUntypedArrayMethods};
+use numpy::PyArray1;
 use pyo3::prelude::*;
 
-use super::arrays::{quadratics, row, rows, CurveArrays};
+use super::arrays::{indices, quadratics, row};
+use super::problem::{ProblemArrays, ProblemRows};
 use super::with_padded_axes;
-use crate::bang_bang::{self, plan_each, Problem, Tip, TIP_AXES};
+use crate::bang_bang::{self, plan_each};
 use crate::bang_bang_quadratic::{self, Fault, Profile};
 
 pyo3::create_exception!(
@@ -28,50 +29,6 @@ type Columns<'py> = (
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<i64>>,
 );
-
-impl CurveArrays<'_> {
-    /// Whether all pieces are polynomials of degree 2.
-    fn is_quadratic(&self) -> bool {
-        let rises = |pair: (&i64, usize)| *pair.0 == 3 * pair.1 as i64;
-        self.weights.is_none()
-            && self.control_points.shape()[0] == 3 * self.width.len()
-            && self.offsets.as_array().iter().zip(0..).all(rises)
-    }
-}
-
-/// `feedplan.constraints.problem.TipSpeed`.
-#[derive(FromPyObject)]
-struct TipSpeedArrays<'py> {
-    coefficients: PyReadonlyArray1<'py, f64>,
-    offsets: PyReadonlyArray1<'py, i64>,
-}
-
-/// `feedplan.geometry.path.Path`.
-#[derive(FromPyObject)]
-struct PathArrays<'py> {
-    runs: PyReadonlyArray1<'py, i64>,
-}
-
-/// `feedplan.constraints.problem.Problem`.
-#[derive(FromPyObject)]
-struct ProblemArrays<'py> {
-    path: PathArrays<'py>,
-    curve: CurveArrays<'py>,
-    tip_speed: Option<TipSpeedArrays<'py>>,
-    tip_curve: Option<CurveArrays<'py>>,
-    feed: PyReadonlyArray1<'py, f64>,
-    junction_speed: PyReadonlyArray1<'py, f64>,
-    max_velocity: PyReadonlyArray1<'py, f64>,
-    max_acceleration: PyReadonlyArray1<'py, f64>,
-    chord_tolerance: f64,
-    period: f64,
-    start_speed: f64,
-    end_speed: f64,
-}
-
-fn indices(array: &PyReadonlyArray1<i64>) -> Vec<usize> {
-    array.as_array().iter().map(|&value| usize::try_from(value).unwrap_or(usize::MAX)).collect()
-}
 
 /// Which planner takes the runs of polynomial quadratics.
 #[derive(Clone, Copy)]
@@ -97,41 +54,9 @@ fn plan<'py>(py: Python<'py>, arrays: &ProblemArrays<'py>, by: Quadratics) -> Py
     if matches!(by, Quadratics::Their) && arrays.tip_speed.is_none() && curve.is_quadratic() {
         return plan_quadratics(py, arrays);
     }
-    let (runs, offsets) = (indices(&arrays.path.runs), indices(&curve.offsets));
-    let tip = match (&arrays.tip_speed, &arrays.tip_curve) {
-        (Some(speed), Some(tip)) => Some((
-            rows::<TIP_AXES>(&tip.control_points)?,
-            tip.weights()?,
-            indices(&tip.offsets),
-            speed.coefficients.as_slice()?,
-            indices(&speed.offsets),
-        )),
-        _ => None,
-    };
     with_padded_axes!(curve.axes(), M, {
-        let control = rows::<M>(&curve.control_points)?;
-        let problem = Problem {
-            control: &control,
-            weight: curve.weights()?,
-            offset: &offsets,
-            width: curve.width.as_slice()?,
-            tip: tip.as_ref().map(|(control, weight, offset, speed, speed_offset)| Tip {
-                speed,
-                speed_offset,
-                control,
-                weight,
-                offset,
-            }),
-            runs: &runs,
-            feed: arrays.feed.as_slice()?,
-            junction_speed: arrays.junction_speed.as_slice()?,
-            max_velocity: row(&arrays.max_velocity, 1.0)?,
-            max_acceleration: row(&arrays.max_acceleration, 1.0)?,
-            chord_tolerance: arrays.chord_tolerance,
-            period: arrays.period,
-            start_speed: arrays.start_speed,
-            end_speed: arrays.end_speed,
-        };
+        let rows = ProblemRows::<M>::new(arrays)?;
+        let problem = rows.problem()?;
         let plan = match by {
             Quadratics::Their => plan_each::<M>,
             Quadratics::General => bang_bang::plan::<M>,
@@ -181,7 +106,7 @@ fn to_columns(py: Python<'_>, profile: Profile) -> Columns<'_> {
     )
 }
 
-fn to_exception(fault: &Fault) -> PyErr {
+pub fn to_exception(fault: &Fault) -> PyErr {
     let text = fault.to_string();
     let (kind, piece, reachable) = match *fault {
         Fault::Start { piece, reachable } => ("start", Some(piece), Some(reachable)),

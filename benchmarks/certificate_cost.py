@@ -1,0 +1,61 @@
+"""Cost of the lower bound beside that of the plan that it certifies, and the gap that it leaves."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from benchmarks.curve_cost import FEEDS, cylindrical, random_curves
+from benchmarks.end_to_end import PARTS, QUICK
+from benchmarks.named import CURVES, butterfly, part, path_of
+from benchmarks.problems import MACHINE, random_problem
+from benchmarks.results import Cell, Result
+from benchmarks.timing import best_of
+from feedplan._solvers import lower_bound, plan_bang_bang
+from feedplan.constraints.problem import Problem, build_problem
+from feedplan.geometry.path import Path as ToolPath
+from feedplan.profile import SpeedProfile
+
+NAME = "certificate-cost"
+
+
+def run(quick: bool = False) -> Result:
+    """The native calls on one path of each kind, the best of five, plan and bound in one process."""
+    count = 300 if quick else 3000
+    rows = [_row(f"quadratics, {pieces}", random_problem(pieces)) for pieces in _sizes(quick)]
+    for kind, curve in random_curves(count).items():
+        for feed in FEEDS:
+            problem = build_problem(ToolPath.from_curve(curve, feed=feed), MACHINE)
+            rows.append(_row(f"{kind}, {feed:g} mm/s", problem))
+    rows.append(_row("joints of cubics, cylindrical", cylindrical(count // 10)))
+    rows.append(
+        _row("butterfly, 250 mm/s", build_problem(ToolPath.from_curve(butterfly(), feed=250.0), CURVES))
+    )
+    for name, _, blocks in PARTS:
+        program, machine = part(name, blocks // (QUICK if quick else 10))
+        rows.append(_row(name, build_problem(path_of(program, machine), machine)))
+    return Result(
+        NAME,
+        "Lower bound beside the exact plan",
+        tuple(rows),
+        ("The whole native calls. gap: how far the bound stays below the plan's time, as a part of it.",),
+    )
+
+
+def _sizes(quick: bool) -> tuple[int, ...]:
+    return (1000, 10_000) if quick else (1000, 10_000, 100_000, 1_000_000)
+
+
+def _row(name: str, problem: Problem) -> dict[str, Cell]:
+    profile = SpeedProfile(*plan_bang_bang(problem))
+    pieces = len(problem.path)
+    times = 3 if pieces > 100_000 else 7
+    plan = best_of(partial(plan_bang_bang, problem), times)
+    bound = best_of(partial(lower_bound, problem, profile), times)
+    return {
+        "path": name,
+        "pieces": pieces,
+        "gap": 1.0 - lower_bound(problem, profile) / profile.time,
+        "plan [µs]": 1e6 * plan.processor / pieces,
+        "bound [µs]": 1e6 * bound.processor / pieces,
+        "bound/plan": bound.processor / plan.processor,
+    }

@@ -1,0 +1,179 @@
+"""The certificate of a plan: known times; never above the time and near it, whatever the path."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import os
+from dataclasses import replace
+from pathlib import Path as FilePath
+
+import numpy as np
+import pytest
+
+from feedplan import _solvers
+from feedplan.bound import lower_bound
+from feedplan.constraints.problem import Problem, build_problem
+from feedplan.curves.arc import circle
+from feedplan.curves.composite import CompositeCurve
+from feedplan.geometry.build import build_path
+from feedplan.geometry.path import Path
+from feedplan.machine.machine import Machine
+from feedplan.planners import planner
+from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.program.read import read_program
+from tests.constraints.test_joints import NOT_PLAIN
+from tests.constraints.test_joints import random_problem as random_joints
+from tests.planners.test_curves import Planned, butterfly, harmonic, problem_of, random_curve
+
+plan = planner("bang-bang")
+EXAMPLES = FilePath(__file__).parents[1] / "examples"
+
+
+def gap(problem: Problem, profile: SpeedProfile) -> float:
+    """Of the native bound, nothing taken off."""
+    return 1.0 - _solvers.lower_bound(problem, profile) / profile.time
+
+
+def bare(problem: Problem, width: float = 1.0) -> SpeedProfile:
+    """What says nothing of a profile: one arc a piece, with too long a duration."""
+    count = len(problem.path)
+    nothing = np.zeros(count)
+    return SpeedProfile(
+        piece=np.arange(count, dtype=np.uint32),
+        kind=np.full(count, ArcKind.FEED, dtype=np.uint8),
+        axis=np.full(count, 255, dtype=np.uint8),
+        value=nothing,
+        u0=nothing,
+        u1=width * problem.curve.width,
+        p0=nothing,
+        p1=nothing,
+        duration=np.full(count, 1e3),
+        runs=problem.path.runs,
+    )
+
+
+def test_a_line_from_rest_to_rest_takes_its_bound() -> None:
+    line = CompositeCurve.from_bezier([[0.0, 0.0], [30.0, 40.0]])
+    for feed, time in ((10.0, 5.0 + 10.0 / 500.0), (1e9, 2.0 * math.sqrt(50.0 / 500.0))):
+        # The Y axis governs: 400 of 500 mm/s² along the line.
+        planned = Planned(line, 1e9, np.array([1e4, 400.0]), feed)
+        bound = lower_bound(planned.problem, planned.profile)
+        assert time * (1 - 1e-12) < bound <= time * (1 + 1e-15)
+
+
+def test_a_circle_takes_its_bound() -> None:
+    r, a = 10.0, 3000.0
+    planned = Planned(circle([0.0, 0.0], r), 1e9, a)
+    assert lower_bound(planned.problem, planned.profile) == pytest.approx(0.412407376368, rel=3e-12)
+    # A flying lap, each eighth of it at one axis's limit: 8 √((2 − √2) r/A).
+    speed = math.sqrt(a * r)
+    flying = replace(planned.problem, start_speed=speed, end_speed=speed)
+    bound = lower_bound(flying, plan(flying))
+    assert bound == pytest.approx(8.0 * math.sqrt((2.0 - math.sqrt(2.0)) * r / a), rel=1e-11)
+    # At the feed: length over feed.
+    slow = Planned(circle([0.0, 0.0], r), 1e9, 1e9, 5.0)
+    assert lower_bound(slow.problem, slow.profile) == pytest.approx(4.0 * math.pi, rel=2e-4)
+
+
+def published() -> dict[str, Planned]:
+    b = 20.0
+    eight = harmonic([np.array([50.0, 0.0]), np.zeros(2)], [np.zeros(2), np.array([0.0, 25.0])], np.pi / 2)
+    cosines = [np.array([0.0, b, 0.0]), np.array([0.0, -2 * b, 0.0]), np.zeros(3)]
+    sines = [np.array([b, 0.0, 0.0]), np.array([2 * b, 0.0, 0.0]), np.array([0.0, 0.0, -b])]
+    curve = CompositeCurve.from_nurbs(*butterfly())
+    return {
+        "butterfly": Planned(curve, 250.0, 3000.0),
+        "butterfly at a feed": Planned(curve, 250.0, 3000.0, 250.0),
+        "lemniscate": Planned(eight, 250.0, 3000.0),
+        "trefoil": Planned(harmonic(cosines, sines, 0.3), 250.0, 3000.0),
+    }
+
+
+def test_the_gap_closes_on_published_curves() -> None:
+    for name, planned in published().items():
+        assert -1e-11 < gap(planned.problem, planned.profile) < 2e-5, name
+
+
+def test_the_bound_is_far_above_zero_without_any_profile() -> None:
+    for name, planned in published().items():
+        bound = _solvers.lower_bound(planned.problem, bare(planned.problem))
+        assert 0.99 * planned.time < bound < planned.time * (1 + 1e-11), name
+
+
+@pytest.mark.parametrize("weights", [False, True])
+def test_random_curves_are_certified(weights: bool) -> None:
+    gaps = []
+    for seed in range(int(os.environ.get("FEEDPLAN_SEEDS", "200"))):
+        rng = np.random.default_rng(seed + 10_000)
+        curve = random_curve(seed, weights)
+        limits = np.exp(rng.uniform(0.0, 3.0, curve.axes)), np.exp(rng.uniform(0.0, 5.0, curve.axes))
+        problem = problem_of(curve, *limits, float(np.exp(rng.uniform(0.0, 3.0))))
+        gaps.append(gap(problem, SpeedProfile(*_solvers.plan_curves(problem))))
+        assert gaps[-1] > -1e-9, seed
+    assert np.median(gaps) < 1e-4
+    assert max(gaps) < 1e-3
+
+
+@pytest.mark.parametrize("name", NOT_PLAIN)
+def test_random_motions_of_joints_are_certified(name: str) -> None:
+    gaps = []
+    for seed in range(int(os.environ.get("FEEDPLAN_SEEDS", "4"))):
+        problem = random_joints(name, seed)
+        gaps.append(gap(problem, plan(problem)))
+        assert gaps[-1] > 0.0, seed
+    assert max(gaps) < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("example", "machine", "blocks"),
+    [("vase", "vase", 1000), ("head", "mill", 1000), ("lettering", "router", 300)],
+)
+def test_the_examples_are_certified(example: str, machine: str, blocks: int, tmp_path: FilePath) -> None:
+    spec = importlib.util.spec_from_file_location(example, EXAMPLES / f"{example}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    file = tmp_path / "part.ngc"
+    file.write_text(module.program(blocks), encoding="ascii")
+    model = Machine.load(machine)
+    problem = build_problem(build_path(read_program(file, model), model), model)
+    assert -1e-12 < gap(problem, plan(problem)) < 1e-3
+
+
+def test_a_wrong_profile_makes_the_bound_loose_at_most() -> None:
+    planned = published()["trefoil"]
+    for wrong in (
+        replace(planned.profile, duration=0.1 * planned.profile.duration),
+        replace(planned.profile, duration=np.full_like(planned.profile.duration, np.nan)),
+        replace(planned.profile, u1=planned.profile.u1[::-1].copy()),
+        replace(planned.profile, piece=planned.profile.piece[::-1].copy()),
+        bare(planned.problem, width=7.0),
+    ):
+        assert 0.0 < _solvers.lower_bound(planned.problem, wrong) < planned.time * (1 + 1e-11)
+
+
+def test_a_profile_that_breaks_a_limit_shows_a_bound_above_its_time() -> None:
+    planned = published()["lemniscate"]
+    hasty = Planned(planned.curve, 250.0, 3030.0)
+    assert lower_bound(planned.problem, hasty.profile) > 1.001 * hasty.time
+
+
+def test_what_the_bound_cannot_use_is_refused_in_a_sentence() -> None:
+    planned = published()["lemniscate"]
+    short = replace(planned.profile, u1=planned.profile.u1[:-1])
+    with pytest.raises(_solvers.PlanError) as caught:
+        lower_bound(planned.problem, short)
+    assert "columns of the profile" in caught.value.args[3]
+
+
+def test_a_path_of_a_tool_on_plain_axes_has_the_same_bound_run_by_run() -> None:
+    line = CompositeCurve.from_bezier([[0.0], [10.0]])
+    curve = CompositeCurve.joined([line, replace(line, control_points=line.control_points + 10.0)])
+    problem = problem_of(curve, np.full(1, 1e9), np.full(1, 100.0), 1e9)
+    path: Path = replace(problem.path, runs=np.array([0, 1, 2]), dwell=np.zeros(2))
+    stops = replace(problem, path=path)
+    # 10 mm from rest to rest twice, and 20 mm once.
+    assert lower_bound(stops, plan(stops)) == pytest.approx(4.0 * math.sqrt(0.1), rel=1e-14)
+    assert lower_bound(problem, plan(problem)) == pytest.approx(2.0 * math.sqrt(0.2), rel=1e-14)
