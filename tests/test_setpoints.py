@@ -323,9 +323,9 @@ def test_axis_velocity_flat_and_chord_arcs_follow_their_law() -> None:
     path = path_of([[[0.0, 0.0], [2.0, 0.0], [4.0, 8.0]]], [4.0], [0, 1], [0.0])
     chord = float(quad(lambda u: 1 / math.sqrt(2 * math.hypot(1, u)), 3, 4)[0])
     arcs: list[ARC] = [
-        (0, ArcKind.FLAT, 255, 0.0, 0.0, 1.0, 36.0, 36.0, 1 / 6),
+        (0, ArcKind.PARAMETER_ACCELERATION, 255, 0.0, 0.0, 1.0, 36.0, 36.0, 1 / 6),
         (0, ArcKind.AXIS_VELOCITY, 1, 36.0, 1.0, 2.0, 36.0, 9.0, 1.5 / 6),
-        (0, ArcKind.FLAT, 255, 0.0, 2.0, 3.0, 4.0, 4.0, 0.5),
+        (0, ArcKind.PARAMETER_ACCELERATION, 255, 0.0, 2.0, 3.0, 4.0, 4.0, 0.5),
         (0, ArcKind.CHORD, 255, 2.0, 3.0, 4.0, 2 * math.sqrt(10), 2 * math.sqrt(17), chord),
     ]
     profile = profile_of(arcs, [0, 4])

@@ -17,7 +17,8 @@ from feedplan.profile import SpeedProfile
 
 def methods() -> tuple[str, ...]:
     """The names of all planning methods."""
-    return tuple(sorted(module.name.replace("_", "-") for module in pkgutil.iter_modules(__path__)))
+    names = (module.name for module in pkgutil.iter_modules(__path__))
+    return tuple(sorted(name.replace("_", "-") for name in names if not name.startswith("_")))
 
 
 def planner(method: str) -> Callable[[Problem], SpeedProfile]:

@@ -266,7 +266,7 @@ def test_another_kind_or_axis_of_an_arc_is_found(part: Any, changed: Change) -> 
     profile = part.profile
     curved = np.flatnonzero((profile.kind == ArcKind.AXIS_ACCELERATION) & (profile.p0 != profile.p1))
     for arc in curved[[1, 8, 15]]:
-        for kind in (ArcKind.FLAT, ArcKind.FEED, ArcKind.AXIS_VELOCITY, ArcKind.CHORD, 77):
+        for kind in (ArcKind.PARAMETER_ACCELERATION, ArcKind.FEED, ArcKind.AXIS_VELOCITY, ArcKind.CHORD, 77):
             assert not part.with_profile(kind=changed(profile.kind, arc, kind)).audit().ok
         for axis in (0, 1, 2, 9):
             if axis != profile.axis[arc]:

@@ -1,0 +1,146 @@
+"""The arcs between the nodes of a mesh: from p in the nodes to a profile, and how far it uses every limit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.constraints.problem import Problem
+from feedplan.planners._mesh import PLACES, Mesh
+from feedplan.profile import ArcKind, SpeedProfile
+
+Array = NDArray[np.float64]
+
+NO_AXIS = 255
+# An arc may be governed by a joint whose q' does not vary by more than this factor.
+_VARIES = 1e3
+
+
+@dataclass(frozen=True)
+class Arcs:
+    """One arc a cell: `kind`, `axis`, `value`, p at both `ends` (2, n), `duration` (n,); and at most how much of
+    each limit it uses: `acceleration` (n, joints), `speed` (n,), the square of the share."""
+
+    kind: NDArray[np.uint8]
+    axis: NDArray[np.uint8]
+    value: Array
+    ends: Array
+    duration: Array
+    acceleration: Array
+    speed: Array
+
+    @property
+    def worst(self) -> Array:
+        """By how much p must fall to keep every limit of a cell (n,)."""
+        return np.asarray(np.maximum(self.acceleration.max(axis=1), self.speed))
+
+    def scaled(self, factor: float) -> Arcs:
+        """The same with p times a factor."""
+        return Arcs(
+            self.kind,
+            self.axis,
+            self.value * factor,
+            self.ends * factor,
+            self.duration / np.sqrt(factor),
+            self.acceleration * factor,
+            self.speed * factor,
+        )
+
+
+def arcs_between(problem: Problem, mesh: Mesh, p: Array, by_axis: bool) -> Arcs:
+    """The arcs through p in the nodes (n + 1,): p linear in u, or one joint's acceleration constant.
+
+    Where `by_axis` allows it, of all such arcs of a cell the one that uses the limits least is taken.
+    """
+    start, end = mesh.gain * p[:-1], p[1:]
+    own = start + (end - start) * PLACES[:, None]
+    s = (end - start) / (2.0 * mesh.width)
+    best = _Candidate.of(problem, mesh, own, np.broadcast_to(s, own.shape))
+    kind = np.full(len(mesh), ArcKind.PARAMETER_ACCELERATION, np.uint8)
+    axis = np.full(len(mesh), NO_AXIS, np.uint8)
+    value, duration = s.copy(), 2.0 * mesh.width / (np.sqrt(start) + np.sqrt(end))
+    for k in range(len(problem.axes)):
+        slope = mesh.slope[:, :, k]
+        size = np.abs(slope)
+        steady = (slope * np.sign(mesh.way[-1, :, k]) > 0.0).all(axis=0)
+        steady &= size.max(axis=0) < _VARIES * size.min(axis=0)
+        steady &= by_axis | mesh.by_length
+        if not steady.any():
+            continue
+        with np.errstate(divide="ignore", invalid="ignore"):
+            change = slope[-1] ** 2 * end - slope[0] ** 2 * start
+            way = mesh.way[-1, :, k]
+            a = change / (2.0 * way)
+            own = (slope[0] ** 2 * start + change * (mesh.way[:, :, k] / way)) / slope**2
+            own[0], own[-1] = start, end
+            candidate = _Candidate.of(problem, mesh, own, (a - mesh.bend[:, :, k] * own) / slope)
+            better = steady & ((candidate.worst < best.worst) | (mesh.by_length & (size[0] > 0.5)))
+            time = 2.0 * np.abs(way) / (size[0] * np.sqrt(start) + size[-1] * np.sqrt(end))
+        best = best.where(better, candidate)
+        kind[better], axis[better] = ArcKind.AXIS_ACCELERATION, k
+        value, duration = np.where(better, a, value), np.where(better, time, duration)
+    ends = np.stack([start, end])
+    if mesh.by_length.any():
+        ends = _by_parameter(problem, mesh, ends, axis, value)
+    return Arcs(kind, axis, value, ends, duration, best.acceleration, best.speed)
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    """The greatest use of the limits on arcs: accelerations (n, joints), speeds squared (n,)."""
+
+    acceleration: Array
+    speed: Array
+
+    @classmethod
+    def of(cls, problem: Problem, mesh: Mesh, p: Array, s: Array) -> _Candidate:
+        used = np.abs(mesh.slope * s[..., None] + mesh.bend * p[..., None])
+        with np.errstate(invalid="ignore"):
+            speed = np.where(p > 0.0, p / mesh.most, 0.0)
+        return cls((used / problem.max_acceleration).max(axis=0), speed.max(axis=0))
+
+    @property
+    def worst(self) -> Array:
+        return np.asarray(np.maximum(self.acceleration.max(axis=1), self.speed))
+
+    def where(self, better: NDArray[np.bool_], other: _Candidate) -> _Candidate:
+        return _Candidate(
+            np.where(better[:, None], other.acceleration, self.acceleration),
+            np.where(better, other.speed, self.speed),
+        )
+
+
+def _by_parameter(problem: Problem, mesh: Mesh, ends: Array, axis: NDArray[np.uint8], value: Array) -> Array:
+    """p at both ends of the cells, of which those meshed over the length hold v²."""
+    ends = ends.copy()
+    cells = np.flatnonzero(mesh.by_length)
+    k = axis[cells].astype(np.int64)
+    for side in (0, 1):
+        values = problem.derivatives(mesh.piece[cells], mesh.ends[side, cells], 2)
+        square, bend = (values[1] ** 2).sum(axis=1), values[2][np.arange(len(cells)), k]
+        size = (mesh.slope[0, cells] ** 2).sum(axis=1) * (problem.path.width[mesh.piece[cells]]) ** 0
+        speed_sq = ends[side, cells]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            # From rest in a cusp a = q'' p; passed at a speed p has no bound.
+            limit = np.where(speed_sq > 0.0, np.inf, np.abs(value[cells] / bend))
+            ends[side, cells] = np.where(square > 0.0, speed_sq * size / square, limit)
+    return ends
+
+
+def profile(problem: Problem, parts: list[tuple[Mesh, Arcs]], runs: list[int]) -> SpeedProfile:
+    """The arcs of all stretches as one profile; `runs` are the arcs' offsets of the runs."""
+    meshes, arcs = [mesh for mesh, _ in parts], [part for _, part in parts]
+    return SpeedProfile(
+        piece=np.concatenate([mesh.piece for mesh in meshes]).astype(np.uint32),
+        kind=np.concatenate([part.kind for part in arcs]),
+        axis=np.concatenate([part.axis for part in arcs]),
+        value=np.concatenate([part.value for part in arcs]),
+        u0=np.concatenate([mesh.ends[0] for mesh in meshes]),
+        u1=np.concatenate([mesh.ends[1] for mesh in meshes]),
+        p0=np.concatenate([part.ends[0] for part in arcs]),
+        p1=np.concatenate([part.ends[1] for part in arcs]),
+        duration=np.concatenate([part.duration for part in arcs]),
+        runs=np.array(runs, dtype=np.int64),
+    )
