@@ -120,12 +120,11 @@ def _by_parameter(problem: Problem, mesh: Mesh, ends: Array, axis: NDArray[np.ui
     for side in (0, 1):
         values = problem.derivatives(mesh.piece[cells], mesh.ends[side, cells], 2)
         square, bend = (values[1] ** 2).sum(axis=1), values[2][np.arange(len(cells)), k]
-        size = (mesh.slope[0, cells] ** 2).sum(axis=1) * (problem.path.width[mesh.piece[cells]]) ** 0
         speed_sq = ends[side, cells]
         with np.errstate(divide="ignore", invalid="ignore"):
             # From rest in a cusp a = q'' p; passed at a speed p has no bound.
             limit = np.where(speed_sq > 0.0, np.inf, np.abs(value[cells] / bend))
-            ends[side, cells] = np.where(square > 0.0, speed_sq * size / square, limit)
+            ends[side, cells] = np.where(square > 0.0, speed_sq / square, limit)
     return ends
 
 

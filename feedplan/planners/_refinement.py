@@ -135,7 +135,7 @@ class _Planner:
         best: Arcs | None = None
         for rounds in range(_ROUNDS if self.method.feasible else 1):
             rows = self.method.rows(cut, acceleration * allowed, at_ends)
-            transcription = transcribe(cut, rows, acceleration, share)
+            transcription = transcribe(cut, rows, acceleration, share, self.method.feasible)
             p = self._solve(transcription) * transcription.scale
             arcs = arcs_between(self.problem, cut, p, self.method.by_axis)
             if not self.method.feasible:

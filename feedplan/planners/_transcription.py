@@ -78,8 +78,13 @@ class Transcription:
         return float((2.0 * self.width / (self.near * root[:-1] + self.far * root[1:])).sum())
 
 
-def transcribe(mesh: Mesh, rows: Rows, acceleration: Array, share: Array) -> Transcription:
-    """The problem on a mesh; `share` (n + 1,) of the greatest p is allowed in the nodes."""
+def transcribe(
+    mesh: Mesh, rows: Rows, acceleration: Array, share: Array, feasible: bool = True
+) -> Transcription:
+    """The problem on a mesh; `share` (n + 1,) of the greatest p is allowed in the nodes.
+
+    A `feasible` profile is nowhere faster in the nodes than some acceleration of the parameter allows on both sides.
+    """
     limit = np.append(_limit_curve(mesh, acceleration, 0)[:1], _limit_curve(mesh, acceleration, -1))
     limit[:-1] = np.minimum(limit[:-1], _limit_curve(mesh, acceleration, 0) / mesh.gain)
     scale = _reachable(mesh, rows, np.minimum(limit, mesh.cap))
@@ -92,7 +97,7 @@ def transcribe(mesh: Mesh, rows: Rows, acceleration: Array, share: Array) -> Tra
     fixed = [None if p is None else p / scale[node] for p, node in zip(mesh.fixed, (0, -1), strict=True)]
     return Transcription(
         scale=scale,
-        most=share * np.minimum(limit, mesh.cap) / scale,
+        most=share * (np.minimum(limit, mesh.cap) if feasible else mesh.cap) / scale,
         fixed=(fixed[0], fixed[1]),
         width=mesh.width,
         near=np.sqrt(near),
