@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
-from feedplan.planners._mesh import PLACES, Mesh
+from feedplan.planners._mesh import INTEGRATION, PLACES, Mesh
 from feedplan.profile import ArcKind, SpeedProfile
 
 Array = NDArray[np.float64]
@@ -21,7 +21,8 @@ _VARIES = 1e3
 @dataclass(frozen=True)
 class Arcs:
     """One arc a cell: `kind`, `axis`, `value`, p at both `ends` (2, n), `duration` (n,); and at most how much of
-    each limit it uses: `acceleration` (n, joints), `speed` (n,), the square of the share."""
+    each limit it uses: `acceleration` (n, joints), `speed` (n,), the square of the share; and the mean of what
+    it uses of the limit that it uses most at each place (n,)."""
 
     kind: NDArray[np.uint8]
     axis: NDArray[np.uint8]
@@ -30,6 +31,7 @@ class Arcs:
     duration: Array
     acceleration: Array
     speed: Array
+    used: Array
 
     @property
     def worst(self) -> Array:
@@ -46,6 +48,7 @@ class Arcs:
             self.duration / np.sqrt(factor),
             self.acceleration * factor,
             self.speed * factor,
+            self.used * factor,
         )
 
 
@@ -84,22 +87,24 @@ def arcs_between(problem: Problem, mesh: Mesh, p: Array, by_axis: bool) -> Arcs:
     ends = np.stack([start, end])
     if mesh.by_length.any():
         ends = _by_parameter(problem, mesh, ends, axis, value)
-    return Arcs(kind, axis, value, ends, duration, best.acceleration, best.speed)
+    return Arcs(kind, axis, value, ends, duration, best.acceleration, best.speed, best.used)
 
 
 @dataclass(frozen=True)
 class _Candidate:
-    """The greatest use of the limits on arcs: accelerations (n, joints), speeds squared (n,)."""
+    """The greatest use of the limits on arcs, and the mean one; see Arcs."""
 
     acceleration: Array
     speed: Array
+    used: Array
 
     @classmethod
     def of(cls, problem: Problem, mesh: Mesh, p: Array, s: Array) -> _Candidate:
-        used = np.abs(mesh.slope * s[..., None] + mesh.bend * p[..., None])
+        share = np.abs(mesh.slope * s[..., None] + mesh.bend * p[..., None]) / problem.max_acceleration
         with np.errstate(invalid="ignore"):
             speed = np.where(p > 0.0, p / mesh.most, 0.0)
-        return cls((used / problem.max_acceleration).max(axis=0), speed.max(axis=0))
+        mean = INTEGRATION[-1] @ np.minimum(np.maximum(share.max(axis=2), speed), 1.0)
+        return cls(share.max(axis=0), speed.max(axis=0), mean)
 
     @property
     def worst(self) -> Array:
@@ -109,6 +114,7 @@ class _Candidate:
         return _Candidate(
             np.where(better[:, None], other.acceleration, self.acceleration),
             np.where(better, other.speed, self.speed),
+            np.where(better, other.used, self.used),
         )
 
 

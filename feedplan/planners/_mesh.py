@@ -87,6 +87,12 @@ class Mesh:
     def __len__(self) -> int:
         return len(self.piece)
 
+    @property
+    def turn(self) -> Array:
+        """By how much q' changes within the cells, in parts of its size (n,)."""
+        change = np.linalg.norm(self.slope[-1] - self.slope[0], axis=1)
+        return np.asarray(change / np.linalg.norm(self.slope, axis=2).max(axis=0))
+
 
 def stretches(problem: Problem) -> Iterator[list[Stretch]]:
     """The stretches of each run."""
@@ -146,24 +152,52 @@ def _straight_to_cusp(problem: Problem) -> NDArray[np.bool_]:
     return result
 
 
-def mesh(problem: Problem, stretch: Stretch, cells: Numbers) -> Mesh:
-    """The stretch with so many `cells` (pieces,) in each of its pieces.
+@dataclass(frozen=True)
+class Cuts:
+    """How a stretch is cut: the `piece` of each cell (n,), and where it begins and ends in parts of that."""
 
-    Next to a stop the cells are graded, their width growing evenly: the time is least smooth there. Raises
-    InfeasibleError where a given end speed is above what holds at that place.
+    piece: Numbers
+    lower: Array
+    upper: Array
+
+    def __len__(self) -> int:
+        return len(self.piece)
+
+    def bisected(self, marked: NDArray[np.bool_]) -> Cuts:
+        """The same with the `marked` cells (n,) cut in two."""
+        count = 1 + marked.astype(np.int64)
+        lower, upper = np.repeat(self.lower, count), np.repeat(self.upper, count)
+        second = (np.cumsum(count) - 1)[marked]
+        lower[second] = upper[second - 1] = 0.5 * (self.lower[marked] + self.upper[marked])
+        return Cuts(np.repeat(self.piece, count), lower, upper)
+
+
+def even_cuts(stretch: Stretch, cells: int) -> Cuts:
+    """So many `cells` in each piece, even ones but next to a stop.
+
+    There their width grows evenly, because the time is least smooth.
     """
     pieces = np.arange(stretch.first, stretch.last)
-    piece = np.repeat(pieces, cells)
-    shares = [np.arange(n + 1) / n for n in cells]
-    if stretch.start is None or stretch.start == 0.0:
-        shares[0] = 1.0 - np.cos(0.5 * np.pi * shares[0])
-    if stretch.end is None or stretch.end == 0.0:
-        end = np.sin(0.5 * np.pi * np.arange(cells[-1] + 1) / cells[-1])
-        shares[-1] = (
-            end if len(pieces) > 1 else 0.5 - 0.5 * np.cos(np.pi * np.arange(cells[0] + 1) / cells[0])
-        )
-    lower = np.concatenate([share[:-1] for share in shares])
-    upper = np.concatenate([share[1:] for share in shares])
+    even = np.arange(cells + 1) / cells
+    shares = np.tile(even, (len(pieces), 1))
+    at_stop = [speed_sq is None or speed_sq == 0.0 for speed_sq in (stretch.start, stretch.end)]
+    if len(pieces) == 1 and all(at_stop):
+        shares[0] = 0.5 - 0.5 * np.cos(np.pi * even)
+    else:
+        if at_stop[0]:
+            shares[0] = 1.0 - np.cos(0.5 * np.pi * even)
+        if at_stop[1]:
+            shares[-1] = np.sin(0.5 * np.pi * even)
+    shares[:, -1] = 1.0
+    return Cuts(np.repeat(pieces, cells), shares[:, :-1].ravel(), shares[:, 1:].ravel())
+
+
+def mesh(problem: Problem, stretch: Stretch, cuts: Cuts) -> Mesh:
+    """The cells of a stretch with the limits in them.
+
+    Raises InfeasibleError where a given end speed is above what holds at that place.
+    """
+    piece, lower, upper = cuts.piece, cuts.lower, cuts.upper
     local = lower + (upper - lower) * PLACES[:, None]
     straight = _straight_to_cusp(problem)[piece]
     whole = problem.path.width[piece]

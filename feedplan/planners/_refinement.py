@@ -1,5 +1,8 @@
 """Planning by a solver on meshes: stretch by stretch, finer until the time is accurate enough.
 
+The fastest profile is at some limit everywhere. Where the arcs of a mesh are not, and where their rows are too
+strict by the order of the mesh, its cells are cut in two.
+
 On each mesh the solution is checked between the nodes. Where an arc goes beyond a limit that its rows kept, the
 limit is lowered there by as much and the solution repeated; what little is left after some rounds is met by
 scaling p, which keeps every limit. So the result is feasible, and its time approaches the least from above.
@@ -18,7 +21,7 @@ from numpy.typing import NDArray
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InputError, SolverError
 from feedplan.planners._arcs import Arcs, arcs_between, profile
-from feedplan.planners._mesh import Mesh, Stretch, end_error, mesh, stretches
+from feedplan.planners._mesh import Cuts, Mesh, Stretch, end_error, even_cuts, mesh, stretches
 from feedplan.planners._transcription import Rows, Transcription, transcribe
 from feedplan.profile import SpeedProfile
 
@@ -33,6 +36,12 @@ _ROUNDS = 6
 _EXCESS = 1e-6
 # A cell that exceeds a limit by more than this though it was lowered is held at both ends.
 _STUBBORN = 1e-4
+# Cells that make so much of the error are cut.
+_SHARE = 0.8
+# By how much the error falls from mesh to mesh, at best and at worst.
+_FALLS = 0.25, 0.7
+# The error is about this part, or less, of the time in which arcs do not use any limit wholly.
+_TRUE = 0.25
 # Seen between the checked places, and rounding.
 _MARGIN = 1e-9
 
@@ -103,20 +112,21 @@ class _Planner:
         pieces = self.stretch.last - self.stretch.first
         if cells is not None:
             self._check(pieces * cells, "a coarser mesh (fewer cells)")
-            return self._on(np.full(pieces, cells))
-        count = np.full(pieces, max(_LEAST, math.ceil(_FIRST / pieces)))
+            return self._on(even_cuts(self.stretch, cells))[:2]
+        cuts = even_cuts(self.stretch, max(_LEAST, math.ceil(_FIRST / pieces)))
         times: list[float] = []
+        reached = ""
         while True:
-            self._check(
-                int(count.sum()),
-                f"an accuracy above {accuracy:g}"
-                + (f" ({_error(times):.1g} is reached)" if len(times) > 1 else ""),
-            )
-            part = self._on(count)
-            times.append(float(part[1].duration.sum()))
-            if len(times) > 1 and _error(times) <= accuracy:
-                return part
-            count = 2 * count
+            self._check(len(cuts), f"an accuracy above {accuracy:g}{reached}")
+            grid, arcs, lost = self._on(cuts)
+            times.append(float(arcs.duration.sum()))
+            unsure = lost + arcs.duration * (1.0 - arcs.used)
+            if len(times) > 2:
+                error = max(_left(times), _TRUE * float(unsure.sum())) / times[-1]
+                if error <= accuracy:
+                    return grid, arcs
+                reached = f" ({error:.1g} is reached)"
+            cuts = cuts.bisected(_greatest(unsure))
 
     def _check(self, cells: int, remedy: str) -> None:
         if cells > MAX_CELLS:
@@ -125,9 +135,9 @@ class _Planner:
                 f"{remedy}, or use bang-bang"
             )
 
-    def _on(self, cells: NDArray[np.int64]) -> tuple[Mesh, Arcs]:
-        """The solution on one mesh."""
-        cut = mesh(self.problem, self.stretch, cells)
+    def _on(self, cuts: Cuts) -> tuple[Mesh, Arcs, Array]:
+        """The solution on one mesh, and the time that it costs to keep the limits between the nodes (n,)."""
+        cut = mesh(self.problem, self.stretch, cuts)
         acceleration = self.problem.max_acceleration
         allowed = np.ones((len(cut), len(acceleration)))
         share = np.ones(len(cut) + 1)
@@ -139,7 +149,7 @@ class _Planner:
             p = self._solve(transcription) * transcription.scale
             arcs = arcs_between(self.problem, cut, p, self.method.by_axis)
             if not self.method.feasible:
-                return cut, arcs
+                return cut, arcs, np.zeros(len(cut))
             worst = float(arcs.worst.max())
             loss = arcs.duration.sum() * math.sqrt(max(worst, 1.0))
             if best is None or loss < best.duration.sum() * math.sqrt(max(float(best.worst.max()), 1.0)):
@@ -154,16 +164,19 @@ class _Planner:
             beyond = np.maximum(arcs.speed, 1.0)
             share /= np.maximum(np.append(beyond, 1.0), np.append(1.0, beyond))
         assert best is not None
+        beyond = np.maximum(best.worst - (1.0 + _EXCESS), 0.0)
+        lost = best.duration.sum() * beyond
+        lost += best.duration * (1.0 - allowed.min(axis=1) + np.where(rows.held, cut.turn, 0.0))
         factor = (1.0 - _MARGIN) / max(float(best.worst.max()), 1.0)
         moving = [p is not None and p > 0.0 for p in cut.fixed]
         if not any(moving):
-            return cut, best.scaled(factor)
+            return cut, best.scaled(factor), lost
         if factor < 1.0 - 2.0 * _EXCESS:
             raise SolverError(
                 f"{self._place}{self.method.name} leaves a limit by {1.0 / factor - 1.0:.1g} of it between the "
                 "nodes, and speeds given at the ends of the path keep it from being slower: ask for a finer mesh"
             )
-        return cut, best
+        return cut, best, lost
 
     def _solve(self, transcription: Transcription) -> Array:
         left = self.deadline - time.monotonic()
@@ -189,12 +202,20 @@ class _Planner:
         return f"line {int(self.problem.path.line[self.stretch.first])}: "
 
 
-def _error(times: list[float]) -> float:
-    """The relative error of the last of the times on meshes each twice as fine as the one before.
+def _greatest(parts: Array) -> NDArray[np.bool_]:
+    """The greatest of the parts (n,), which together are most of the whole."""
+    order = np.argsort(-parts)
+    enough = int(np.searchsorted(np.cumsum(parts[order]), _SHARE * parts.sum())) + 1
+    marked = np.zeros(len(parts), dtype=bool)
+    marked[order[:enough]] = True
+    return marked
 
-    The order is the observed one of the last three, between 1 and 2; 1 of two times.
+
+def _left(times: list[float]) -> float:
+    """By how much the times on finer and finer meshes would still fall.
+
+    From the last two steps, whose ratio tells how fast what is left becomes smaller.
     """
-    last = abs(times[-1] - times[-2])
-    before = abs(times[-2] - times[-3]) if len(times) > 2 else 0.0
-    order = 1.0 if last == 0.0 or before == 0.0 else min(max(math.log2(before / last), 1.0), 2.0)
-    return last / (2.0**order - 1.0) / times[-1]
+    before, last = (abs(times[-i] - times[-i - 1]) for i in (2, 1))
+    ratio = min(max(last / before, _FALLS[0]), _FALLS[1]) if before > 0.0 else _FALLS[1]
+    return last * ratio / (1.0 - ratio)

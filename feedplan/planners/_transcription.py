@@ -11,7 +11,7 @@ only where a joint turns round inside the cell.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -28,11 +28,15 @@ _SLOW = 1e-6
 
 @dataclass(frozen=True)
 class Rows:
-    """Rows (r,) |`near`·p_start + `far`·p_end| ≤ 1 on the p of `cell` at its ends."""
+    """Rows (r,) |`near`·p_start + `far`·p_end| ≤ 1 on the p of `cell` at its ends.
+
+    `held` (n,) are the cells in which some joint is held at both ends, at the cost of an order.
+    """
 
     cell: Numbers
     near: Array
     far: Array
+    held: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -102,7 +106,7 @@ def transcribe(
         width=mesh.width,
         near=np.sqrt(near),
         far=np.sqrt(far),
-        rows=Rows(rows.cell, rows.near * near[rows.cell], rows.far * far[rows.cell]),
+        rows=replace(rows, near=rows.near * near[rows.cell], far=rows.far * far[rows.cell]),
     )
 
 
@@ -146,6 +150,7 @@ def mean_rows(mesh: Mesh, limit: Array, at_ends: NDArray[np.bool_]) -> Rows:
         np.concatenate([cell, rest.cell]),
         np.concatenate([near[cell, joint], rest.near]),
         np.concatenate([far[cell, joint], rest.far]),
+        rest.held,
     )
 
 
@@ -163,7 +168,7 @@ def end_rows(
         bend = mesh.bend[end, cell, joint] * weight
         near.append(-slope + (bend if end == 0 else 0.0))
         far.append(slope + (bend if end == -1 else 0.0))
-    return Rows(np.tile(cell, len(ends)), np.concatenate(near), np.concatenate(far))
+    return Rows(np.tile(cell, len(ends)), np.concatenate(near), np.concatenate(far), chosen.any(axis=1))
 
 
 def _limit_curve(mesh: Mesh, acceleration: Array, place: int) -> Array:
