@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
-from feedplan.planners._mesh import INTEGRATION, PLACES, Mesh
+from feedplan.planners._mesh import BETWEEN, INTEGRATION, PLACES, Mesh
 from feedplan.profile import ArcKind, SpeedProfile
 
 Array = NDArray[np.float64]
@@ -60,62 +60,74 @@ def arcs_between(problem: Problem, mesh: Mesh, p: Array, by_axis: bool) -> Arcs:
     start, end = mesh.gain * p[:-1], p[1:]
     own = start + (end - start) * PLACES[:, None]
     s = (end - start) / (2.0 * mesh.width)
-    best = _Candidate.of(problem, mesh, own, np.broadcast_to(s, own.shape))
+    motion = _Motion(own, np.broadcast_to(s, own.shape))
+    worst = motion.worst(problem, mesh)
     kind = np.full(len(mesh), ArcKind.PARAMETER_ACCELERATION, np.uint8)
     axis = np.full(len(mesh), NO_AXIS, np.uint8)
     value, duration = s.copy(), 2.0 * mesh.width / (np.sqrt(start) + np.sqrt(end))
     for k in range(len(problem.axes)):
-        slope = mesh.slope[:, :, k]
+        slope, way = mesh.slope[:, :, k], mesh.way[:, :, k]
         size = np.abs(slope)
-        steady = (slope * np.sign(mesh.way[-1, :, k]) > 0.0).all(axis=0)
+        steady = (slope * np.sign(way[-1]) > 0.0).all(axis=0) & (by_axis | mesh.by_length)
         steady &= size.max(axis=0) < _VARIES * size.min(axis=0)
-        steady &= by_axis | mesh.by_length
         if not steady.any():
             continue
         with np.errstate(divide="ignore", invalid="ignore"):
             change = slope[-1] ** 2 * end - slope[0] ** 2 * start
-            way = mesh.way[-1, :, k]
-            a = change / (2.0 * way)
-            own = (slope[0] ** 2 * start + change * (mesh.way[:, :, k] / way)) / slope**2
+            a = change / (2.0 * way[-1])
+            own = (slope[0] ** 2 * start + change * (way / way[-1])) / slope**2
             own[0], own[-1] = start, end
-            candidate = _Candidate.of(problem, mesh, own, (a - mesh.bend[:, :, k] * own) / slope)
-            better = steady & ((candidate.worst < best.worst) | (mesh.by_length & (size[0] > 0.5)))
-            time = 2.0 * np.abs(way) / (size[0] * np.sqrt(start) + size[-1] * np.sqrt(end))
-        best = best.where(better, candidate)
+            other = _Motion(own, (a - mesh.bend[:, :, k] * own) / slope)
+            others = other.worst(problem, mesh)
+            better = steady & ((others < worst) | (mesh.by_length & (size[0] > 0.5)))
+            time = 2.0 * np.abs(way[-1]) / (size[0] * np.sqrt(start) + size[-1] * np.sqrt(end))
+        motion, worst = motion.where(better, other), np.where(better, others, worst)
         kind[better], axis[better] = ArcKind.AXIS_ACCELERATION, k
         value, duration = np.where(better, a, value), np.where(better, time, duration)
     ends = np.stack([start, end])
     if mesh.by_length.any():
         ends = _by_parameter(problem, mesh, ends, axis, value)
-    return Arcs(kind, axis, value, ends, duration, best.acceleration, best.speed, best.used)
+    acceleration, speed = motion.acceleration(problem, mesh), motion.speed(mesh)
+    used = np.maximum(np.abs(acceleration).max(axis=2), speed.max(axis=2))
+    return Arcs(
+        kind,
+        axis,
+        value,
+        ends,
+        duration,
+        np.abs(_with_between(acceleration)).max(axis=0),
+        _with_between(speed).max(axis=(0, 2)),
+        INTEGRATION[-1] @ np.minimum(used, 1.0),
+    )
+
+
+def _with_between(values: Array) -> Array:
+    """Values (places, n, …) and what they are between the places."""
+    return np.concatenate([values, np.einsum("ij,jck->ick", BETWEEN, values)])
 
 
 @dataclass(frozen=True)
-class _Candidate:
-    """The greatest use of the limits on arcs, and the mean one; see Arcs."""
+class _Motion:
+    """p and s of arcs at the places of their cells (places, n)."""
 
-    acceleration: Array
-    speed: Array
-    used: Array
+    p: Array
+    s: Array
 
-    @classmethod
-    def of(cls, problem: Problem, mesh: Mesh, p: Array, s: Array) -> _Candidate:
-        share = np.abs(mesh.slope * s[..., None] + mesh.bend * p[..., None]) / problem.max_acceleration
-        with np.errstate(invalid="ignore"):
-            speed = np.where(p > 0.0, p / mesh.most, 0.0)
-        mean = INTEGRATION[-1] @ np.minimum(np.maximum(share.max(axis=2), speed), 1.0)
-        return cls(share.max(axis=0), speed.max(axis=0), mean)
+    def acceleration(self, problem: Problem, mesh: Mesh) -> Array:
+        """The share of its limit that every joint uses, with its sign (places, n, joints)."""
+        return (mesh.slope * self.s[..., None] + mesh.bend * self.p[..., None]) / problem.max_acceleration
 
-    @property
-    def worst(self) -> Array:
-        return np.asarray(np.maximum(self.acceleration.max(axis=1), self.speed))
+    def speed(self, mesh: Mesh) -> Array:
+        """The share of every limit of a speed, squared (places, n, limits)."""
+        return np.asarray(mesh.speed * self.p[..., None])
 
-    def where(self, better: NDArray[np.bool_], other: _Candidate) -> _Candidate:
-        return _Candidate(
-            np.where(better[:, None], other.acceleration, self.acceleration),
-            np.where(better, other.speed, self.speed),
-            np.where(better, other.used, self.used),
-        )
+    def worst(self, problem: Problem, mesh: Mesh) -> Array:
+        """The greatest of all at the places (n,)."""
+        acceleration = np.abs(self.acceleration(problem, mesh)).max(axis=(0, 2))
+        return np.asarray(np.maximum(acceleration, self.speed(mesh).max(axis=(0, 2))))
+
+    def where(self, better: NDArray[np.bool_], other: _Motion) -> _Motion:
+        return _Motion(np.where(better, other.p, self.p), np.where(better, other.s, self.s))
 
 
 def _by_parameter(problem: Problem, mesh: Mesh, ends: Array, axis: NDArray[np.uint8], value: Array) -> Array:

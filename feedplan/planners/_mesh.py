@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 
 # Places of a cell: the ends and the extremes of the Legendre polynomial between them, in [0, 1].
-_DEGREE = 8
+_DEGREE = 10
 PLACES = np.concatenate(
     [[0.0], 0.5 + 0.5 * np.sort(legendre.legroots(legendre.legder([0.0] * _DEGREE + [1.0]))), [1.0]]
 )
@@ -36,7 +36,7 @@ _STRAIGHT = 1e-12
 
 
 def _integration() -> Array:
-    """The matrix from values at `PLACES` to integrals from 0 to each of them, exact to the eighth degree."""
+    """The matrix from values at `PLACES` to integrals from 0 to each of them, exact to the tenth degree."""
     powers = np.arange(_DEGREE + 1)
     values = PLACES[:, None] ** powers
     integrals = PLACES[:, None] ** (powers + 1) / (powers + 1)
@@ -44,6 +44,11 @@ def _integration() -> Array:
 
 
 INTEGRATION = _integration()
+
+# From values at `PLACES` to those at more, where what happens between the places shows.
+BETWEEN = (np.arange(1, 40) / 40)[:, None] ** np.arange(_DEGREE + 1) @ np.linalg.inv(
+    PLACES[:, None] ** np.arange(_DEGREE + 1)
+)
 
 
 @dataclass(frozen=True)
@@ -66,7 +71,8 @@ class Mesh:
 
     Per cell: `piece`; `ends` (2, n) its local parameter at both ends; `width` (n,) of the variable that it is
     meshed over, `by_length` (n,) whether that is the length. At PLACES: `slope` q' and `bend` q''
-    (places, n, joints), `most` (places, n) the greatest p by velocity, feed and chord error, `way`
+    (places, n, joints), `speed` (places, n, joints + 2) the share of the velocities', the feed's and the chord
+    error's limit that is used, squared, per p, `way`
     (places, n, joints) of the joints from the start of the cell. `gain` (n,) is p at the start of the cell over
     p at the end of the cell before, and `cap` (n + 1,) the greatest p in the nodes, at the end of the cell before
     (of the cell after in the first node). `fixed` holds p at both ends of the stretch where it is given.
@@ -78,7 +84,7 @@ class Mesh:
     by_length: NDArray[np.bool_]
     slope: Array
     bend: Array
-    most: Array
+    speed: Array
     way: Array
     gain: Array
     cap: Array
@@ -209,15 +215,16 @@ def mesh(problem: Problem, stretch: Stretch, cuts: Cuts) -> Mesh:
         width = np.where(straight, length * (upper - lower), width)
     slope, bend = _derivatives(problem, piece, u)
     square = _speed_square(problem, piece, u, slope)
-    most = _most(problem, piece, u, slope, square)
+    chord = _chord_speed_square(problem, piece, u)
     if straight.any():
-        chord = _chords(problem)[piece[straight]]
-        slope[:, straight] = chord / np.linalg.norm(chord, axis=1)[:, None]
-        bend[:, straight] = 0.0
-        square[:, straight] = 1.0
-        with np.errstate(divide="ignore"):
-            velocity = (problem.max_velocity / np.abs(slope[0, straight])).min(axis=1)
-        most[:, straight] = np.minimum(velocity, problem.feed[piece[straight]]) ** 2
+        way = _chords(problem)[piece[straight]]
+        slope[:, straight] = way / np.linalg.norm(way, axis=1)[:, None]
+        bend[:, straight], square[:, straight] = 0.0, 1.0
+    limits = [(slope / problem.max_velocity) ** 2]
+    limits += [(square / most)[..., None] for most in (problem.feed[piece] ** 2, chord)]
+    per_p = np.concatenate(limits, axis=2)
+    with np.errstate(divide="ignore"):
+        most = 1.0 / per_p.max(axis=2)
     way = width[:, None] * np.einsum("ij,jck->ick", INTEGRATION, slope)
     first = np.flatnonzero(np.diff(piece, prepend=-1))
     gain = np.ones(len(piece))
@@ -234,7 +241,7 @@ def mesh(problem: Problem, stretch: Stretch, cuts: Cuts) -> Mesh:
         fixed.append(p)
     ends = np.stack([u[0], u[-1]])
     ends[:, :] = np.where(np.stack([lower, upper]) == 1.0, whole, ends)
-    return Mesh(piece, ends, width, straight, slope, bend, most, way, gain, cap, (fixed[0], fixed[1]))
+    return Mesh(piece, ends, width, straight, slope, bend, per_p, way, gain, cap, (fixed[0], fixed[1]))
 
 
 def end_error(
@@ -298,19 +305,10 @@ def _speed_square(problem: Problem, piece: Numbers, u: Array, slope: Array) -> A
     return result
 
 
-def _most(problem: Problem, piece: Numbers, u: Array, slope: Array, square: Array) -> Array:
-    """The greatest p that velocities, feed and chord error allow (places, n)."""
-    with np.errstate(divide="ignore"):
-        velocity = ((problem.max_velocity / np.abs(slope)) ** 2).min(axis=2)
-        feed = problem.feed[piece] ** 2 / square
-        most = np.minimum(velocity, feed)
-        if np.isfinite(problem.chord_tolerance):
-            most = np.minimum(most, _chord_speed_square(problem, piece, u) / square)
-    return np.asarray(most)
-
-
 def _chord_speed_square(problem: Problem, piece: Numbers, u: Array) -> Array:
     """(2/T)²·(2ρδ − δ²) where ρ is the radius of curvature of the tool's path (places, n), at least δ."""
+    if not np.isfinite(problem.chord_tolerance):
+        return np.full(u.shape, np.inf)
     curve = problem.tip_curve or problem.path.curve
     values = curve.evaluate(np.tile(piece, len(u)), u.ravel(), 2)
     tangent, second = values[1], values[2]

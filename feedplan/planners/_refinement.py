@@ -36,6 +36,8 @@ _ROUNDS = 6
 _EXCESS = 1e-6
 # A cell that exceeds a limit by more than this though it was lowered is held at both ends.
 _STUBBORN = 1e-4
+# A limit that holds at both ends of a cell costs time where it is used as far as this.
+_NEAR = 0.9
 # Cells that make so much of the error are cut.
 _SHARE = 0.8
 # By how much the error falls from mesh to mesh, at best and at worst.
@@ -165,8 +167,9 @@ class _Planner:
             share /= np.maximum(np.append(beyond, 1.0), np.append(1.0, beyond))
         assert best is not None
         beyond = np.maximum(best.worst - (1.0 + _EXCESS), 0.0)
+        held = (rows.held & (best.acceleration > _NEAR)).any(axis=1)
         lost = best.duration.sum() * beyond
-        lost += best.duration * (1.0 - allowed.min(axis=1) + np.where(rows.held, cut.turn, 0.0))
+        lost += best.duration * (1.0 - allowed.min(axis=1) + np.where(held, cut.turn, 0.0))
         factor = (1.0 - _MARGIN) / max(float(best.worst.max()), 1.0)
         moving = [p is not None and p > 0.0 for p in cut.fixed]
         if not any(moving):

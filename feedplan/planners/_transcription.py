@@ -30,7 +30,7 @@ _SLOW = 1e-6
 class Rows:
     """Rows (r,) |`near`·p_start + `far`·p_end| ≤ 1 on the p of `cell` at its ends.
 
-    `held` (n,) are the cells in which some joint is held at both ends, at the cost of an order.
+    `held` (n, joints) are the joints whose limit holds at both ends of cells, at the cost of an order.
     """
 
     cell: Numbers
@@ -145,7 +145,8 @@ def mean_rows(mesh: Mesh, limit: Array, at_ends: NDArray[np.bool_]) -> Rows:
         weight = 1.0 / (2.0 * mesh.way[-1] * limit)
         near, far = -(mesh.slope[0] ** 2) * weight, mesh.slope[-1] ** 2 * weight
     cell, joint = np.nonzero(steady)
-    rest = end_rows(mesh, limit, ~steady)
+    moves = (mesh.slope != 0.0).any(axis=0)
+    rest = end_rows(mesh, limit, ~steady & moves)
     return Rows(
         np.concatenate([cell, rest.cell]),
         np.concatenate([near[cell, joint], rest.near]),
@@ -168,7 +169,7 @@ def end_rows(
         bend = mesh.bend[end, cell, joint] * weight
         near.append(-slope + (bend if end == 0 else 0.0))
         far.append(slope + (bend if end == -1 else 0.0))
-    return Rows(np.tile(cell, len(ends)), np.concatenate(near), np.concatenate(far), chosen.any(axis=1))
+    return Rows(np.tile(cell, len(ends)), np.concatenate(near), np.concatenate(far), chosen)
 
 
 def _limit_curve(mesh: Mesh, acceleration: Array, place: int) -> Array:
