@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
-from feedplan.planners._mesh import BETWEEN, INTEGRATION, PLACES, Mesh
+from feedplan.planners._mesh import EVEN, INTEGRATION, PLACES, Mesh
 from feedplan.profile import ArcKind, SpeedProfile
 
 Array = NDArray[np.float64]
@@ -95,15 +95,18 @@ def arcs_between(problem: Problem, mesh: Mesh, p: Array, by_axis: bool) -> Arcs:
         value,
         ends,
         duration,
-        np.abs(_with_between(acceleration)).max(axis=0),
-        _with_between(speed).max(axis=(0, 2)),
+        _peak(acceleration),
+        _peak(speed).max(axis=1),
         INTEGRATION[-1] @ np.minimum(used, 1.0),
     )
 
 
-def _with_between(values: Array) -> Array:
-    """Values (places, n, …) and what they are between the places."""
-    return np.concatenate([values, np.einsum("ij,jck->ick", BETWEEN, values)])
+def _peak(values: Array) -> Array:
+    """The greatest size (n, …) that values (places, n, …) have in the cells: of parabolas through even places."""
+    even = np.einsum("ij,jck->ick", EVEN, values)
+    bent = np.abs(even[2:] - 2.0 * even[1:-1] + even[:-2]) / 8.0
+    inside = (np.abs(even[1:-1]) + bent).max(axis=0)
+    return np.asarray(np.maximum(inside, np.abs(values).max(axis=0)))
 
 
 @dataclass(frozen=True)

@@ -45,8 +45,8 @@ def _integration() -> Array:
 
 INTEGRATION = _integration()
 
-# From values at `PLACES` to those at more, where what happens between the places shows.
-BETWEEN = (np.arange(1, 40) / 40)[:, None] ** np.arange(_DEGREE + 1) @ np.linalg.inv(
+# From values at `PLACES` to those at even places, where what happens in between shows.
+EVEN = (np.arange(33) / 32)[:, None] ** np.arange(_DEGREE + 1) @ np.linalg.inv(
     PLACES[:, None] ** np.arange(_DEGREE + 1)
 )
 

@@ -32,16 +32,18 @@ _LEAST, _FIRST = 4, 32
 # More cells are not tried; the solvers need some 10 kB for each.
 MAX_CELLS = 400_000
 # How often limits are lowered where the arcs go beyond them, and what is left to scaling.
-_ROUNDS = 6
+_ROUNDS = 4
 _EXCESS = 1e-6
 # A cell that exceeds a limit by more than this though it was lowered is held at both ends.
 _STUBBORN = 1e-4
 # A limit that holds at both ends of a cell costs time where it is used as far as this.
 _NEAR = 0.9
 # Cells that make so much of the error are cut.
-_SHARE = 0.8
+_SHARE = 0.9
 # By how much the error falls from mesh to mesh, at best and at worst.
 _FALLS = 0.25, 0.7
+# An estimate of the error may be wrong by a factor of two.
+_SAFETY = 0.5
 # The error is about this part, or less, of the time in which arcs do not use any limit wholly.
 _TRUE = 0.25
 # Seen between the checked places, and rounding.
@@ -125,7 +127,7 @@ class _Planner:
             unsure = lost + arcs.duration * (1.0 - arcs.used)
             if len(times) > 2:
                 error = max(_left(times), _TRUE * float(unsure.sum())) / times[-1]
-                if error <= accuracy:
+                if error <= _SAFETY * accuracy:
                     return grid, arcs
                 reached = f" ({error:.1g} is reached)"
             cuts = cuts.bisected(_greatest(unsure))
