@@ -126,7 +126,7 @@ def cli(context: click.Context) -> int:
 @_MACHINE
 @click.option("--method", type=click.Choice(planners.methods()), default="bang-bang", show_default=True)
 @click.option(
-    "--accuracy", type=_Number(), metavar="PART", help="Relative error of the time, of methods that have a mesh."
+    "--accuracy", type=_Number(), metavar="PART", help="Relative error of the time, of methods with a mesh."
 )
 @click.option("--time-limit", type=_Number(), metavar="S", help="Time that such a method may take.")
 @_TOLERANCE

@@ -1,8 +1,9 @@
 """How the joints move on arcs of a profile, from what each arc holds constant and the kinematics' positions.
 
-On an arc of constant acceleration of joint k: v_k² = v_k(slower end)² + 2 a Δq_k, u̇ = |v_k| / |dq_k/du|, and
-a way Δq_k takes 2 Δq_k over the sum of the speeds at its ends. Where a joint's speed is constant: the way
-over it; where p is linear in u: Δu over the mean √p; along a speed limit: ∫ |C'| du over the speed, by Gauss's rule.
+On an arc of constant acceleration of joint k: v_k² = v_k(slower end)² + 2 a Δq_k, u̇ = |v_k| / |dq_k/du|,
+and a way Δq_k takes 2 Δq_k over the sum of the speeds at its ends. Where a joint's speed is constant: the
+way over it; where p is linear in u: Δu over the mean √p; along a speed limit: ∫ |C'| du over the speed, by
+Gauss's rule.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Planners: a problem in, a speed profile out; one file a method, found by its name.
 
-A planner module has one function `plan(problem: Problem) -> SpeedProfile`, with what options it has as keywords.
-The method `bang-bang` is the module `bang_bang`. Modules whose names begin with an underscore are what several
-planners share.
+A planner module has one function `plan(problem: Problem) -> SpeedProfile`, with what options it has as
+keywords. The method `bang-bang` is the module `bang_bang`. Modules whose names begin with an underscore are
+what several planners share.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,9 +21,9 @@ _VARIES = 1e3
 
 @dataclass(frozen=True)
 class Arcs:
-    """One arc a cell: `kind`, `axis`, `value`, p at both `ends` (2, n), `duration` (n,); and at most how much of
-    each limit it uses: `acceleration` (n, joints), `speed` (n,), the square of the share; and the mean of what
-    it uses of the limit that it uses most at each place (n,)."""
+    """One arc a cell: `kind`, `axis`, `value`, p at both `ends` (2, n), `duration` (n,); and at most how
+    much of each limit it uses: `acceleration` (n, joints), `speed` (n,), the square of the share; and the
+    mean of what it uses of the limit that it uses most at each place (n,)."""
 
     kind: NDArray[np.uint8]
     axis: NDArray[np.uint8]
@@ -37,6 +38,11 @@ class Arcs:
     def worst(self) -> Array:
         """By how much p must fall to keep every limit of a cell (n,)."""
         return np.asarray(np.maximum(self.acceleration.max(axis=1), self.speed))
+
+    @property
+    def feasible_time(self) -> float:
+        """The time if p were scaled so far [s]."""
+        return float(self.duration.sum()) * math.sqrt(max(float(self.worst.max()), 1.0))
 
     def scaled(self, factor: float) -> Arcs:
         """The same with p times a factor."""
@@ -102,7 +108,8 @@ def arcs_between(problem: Problem, mesh: Mesh, p: Array, by_axis: bool) -> Arcs:
 
 
 def _peak(values: Array) -> Array:
-    """The greatest size (n, …) that values (places, n, …) have in the cells: of parabolas through even places."""
+    """The greatest size (n, …) that values (places, n, …) have in the cells: of parabolas through even
+    places."""
     even = np.einsum("ij,jck->ick", EVEN, values)
     bent = np.abs(even[2:] - 2.0 * even[1:-1] + even[:-2]) / 8.0
     inside = (np.abs(even[1:-1]) + bent).max(axis=0)

@@ -1,18 +1,19 @@
 """The mesh of planners that discretise: stretches between stops, cut into cells, with every limit at places.
 
-A stretch is a part of a run that is passed without stopping inside it. Its cells never reach over the end of a
-piece, so that both values of q'' at a knot are kept, each with the cells on its side. Each cell carries q', q''
-and the greatest p at `PLACES`, both ends among them.
+A stretch is a part of a run that is passed without stopping inside it. Its cells never reach over the end
+of a piece, so that both values of q'' at a knot are kept, each with the cells on its side. Each cell
+carries q', q'' and the greatest p at `PLACES`, both ends among them.
 
-A piece is meshed over its own parameter u. Only a straight piece with a cusp (q' = 0) at an end, where p grows
-without bound if it is passed at a speed, is meshed over its length: its cells have q' of constant size. In any
-other cusp p is finite, so the tool stands there, and the stretch ends.
+A piece is meshed over its own parameter u. Only a straight piece with a cusp (q' = 0) at an end, where p
+grows without bound if it is passed at a speed, is meshed over its length: its cells have q' of constant
+size. In any other cusp p is finite, so the tool stands there, and the stretch ends.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -69,13 +70,13 @@ class Stretch:
 class Mesh:
     """The n cells of a stretch.
 
-    Per cell: `piece`; `ends` (2, n) its local parameter at both ends; `width` (n,) of the variable that it is
-    meshed over, `by_length` (n,) whether that is the length. At PLACES: `slope` q' and `bend` q''
-    (places, n, joints), `speed` (places, n, joints + 2) the share of the velocities', the feed's and the chord
-    error's limit that is used, squared, per p, `way`
-    (places, n, joints) of the joints from the start of the cell. `gain` (n,) is p at the start of the cell over
-    p at the end of the cell before, and `cap` (n + 1,) the greatest p in the nodes, at the end of the cell before
-    (of the cell after in the first node). `fixed` holds p at both ends of the stretch where it is given.
+    Per cell: `piece`; `ends` (2, n) its local parameter at both ends; `width` (n,) of the variable that it
+    is meshed over, `by_length` (n,) whether that is the length. At PLACES: `slope` q' and `bend` q''
+    (places, n, joints), `speed` (places, n, joints + 2) the share of the velocities', the feed's and the
+    chord error's limit that is used, squared, per p, `way` (places, n, joints) of the joints from the start
+    of the cell. `gain` (n,) is p at the start of the cell over p at the end of the cell before, and `cap`
+    (n + 1,) the greatest p in the nodes, at the end of the cell before (of the cell after in the first
+    node). `fixed` holds p at both ends of the stretch where it is given.
     """
 
     piece: Numbers
@@ -122,7 +123,7 @@ def stretches(problem: Problem) -> Iterator[list[Stretch]]:
             *(runs[run] + 1 + np.flatnonzero(stop[runs[run] + 1 : runs[run + 1]])),
             runs[run + 1],
         ]
-        for first, last in zip(cuts[:-1], cuts[1:], strict=True):
+        for first, last in pairwise(cuts):
             speeds = [
                 problem.start_speed if first == 0 else 0.0,
                 problem.end_speed if last == count else 0.0,

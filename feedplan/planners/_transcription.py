@@ -87,7 +87,8 @@ def transcribe(
 ) -> Transcription:
     """The problem on a mesh; `share` (n + 1,) of the greatest p is allowed in the nodes.
 
-    A `feasible` profile is nowhere faster in the nodes than some acceleration of the parameter allows on both sides.
+    A `feasible` profile is nowhere faster in the nodes than some acceleration of the parameter allows on
+    both sides.
     """
     limit = np.append(_limit_curve(mesh, acceleration, 0)[:1], _limit_curve(mesh, acceleration, -1))
     limit[:-1] = np.minimum(limit[:-1], _limit_curve(mesh, acceleration, 0) / mesh.gain)
@@ -113,7 +114,8 @@ def transcribe(
 def _reachable(mesh: Mesh, rows: Rows, greatest: Array) -> Array:
     """The greatest p in the nodes that single rows leave, coming from both ends of the stretch (n + 1,).
 
-    A row with coefficients of two signs keeps p from growing faster. This is what a solution is like near a stop.
+    A row with coefficients of two signs keeps p from growing faster. This is what a solution is like near a
+    stop.
     """
     bounds = np.flatnonzero((rows.near * rows.far <= 0.0) & (rows.near != 0.0) & (rows.far != 0.0))
     bounds = bounds[np.argsort(rows.cell[bounds], kind="stable")]
@@ -158,7 +160,8 @@ def mean_rows(mesh: Mesh, limit: Array, at_ends: NDArray[np.bool_]) -> Rows:
 def end_rows(
     mesh: Mesh, limit: Array, chosen: NDArray[np.bool_] | None = None, ends: tuple[int, ...] = (0, -1)
 ) -> Rows:
-    """a_k at `ends` of the cells with p linear in between, at most `limit` (n, joints), of `chosen` joints."""
+    """a_k at `ends` of the cells with p linear in between, at most `limit` (n, joints), of `chosen`
+    joints."""
     if chosen is None:
         chosen = np.ones(limit.shape, dtype=bool)
     cell, joint = np.nonzero(chosen)
@@ -173,7 +176,8 @@ def end_rows(
 
 
 def _limit_curve(mesh: Mesh, acceleration: Array, place: int) -> Array:
-    """The greatest p that some acceleration of the parameter leaves within all limits, at one place of the cells."""
+    """The greatest p that some acceleration of the parameter leaves within all limits, at one place of the
+    cells."""
     slope, bend = np.abs(mesh.slope[place]), mesh.bend[place]
     tangent = mesh.slope[place]
     best = np.full(len(mesh), np.inf)

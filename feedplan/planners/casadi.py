@@ -1,7 +1,7 @@
 """The time-optimal profile by direct transcription: a nonlinear program with p in the nodes, solved by IPOPT.
 
-CasADi derives the Hessian of the time; the rows are linear in p, so the program is convex and what IPOPT finds
-is the optimum of the mesh.
+CasADi derives the Hessian of the time; the rows are linear in p, so the program is convex and what IPOPT
+finds is the optimum of the mesh.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
 from feedplan.errors import MissingPackageError
-from feedplan.planners._refinement import Method, Refused, plan_on_meshes
+from feedplan.planners._refinement import Method, Refusal, plan_on_meshes
 from feedplan.planners._transcription import Transcription, mean_rows
 from feedplan.profile import SpeedProfile
 
@@ -34,15 +34,17 @@ def plan(
     cells: int | None = None,
     time_limit: float | None = None,
 ) -> SpeedProfile:
-    """The fastest profile on a mesh of about the relative `accuracy` of the time, or of `cells` cells a piece.
+    """The fastest profile on a mesh of about the relative `accuracy` of the time, or of `cells` cells a
+    piece.
 
-    `time_limit` [s]. Raises SolverError with IPOPT's status, InfeasibleError where a speed given at an end cannot
-    be had, MissingPackageError.
+    `time_limit` [s]. Raises SolverError with IPOPT's status, InfeasibleError where a speed given at an end
+    cannot be had, MissingPackageError.
     """
     try:
         import casadi  # noqa: F401
     except ImportError:
-        raise MissingPackageError("the method casadi needs the package casadi: `pip install casadi`") from None
+        sentence = "the method casadi needs the package casadi: `pip install casadi`"
+        raise MissingPackageError(sentence) from None
     return plan_on_meshes(problem, Method("casadi", _solve, mean_rows), accuracy, cells, time_limit)
 
 
@@ -79,7 +81,7 @@ def _solve(task: Transcription, seconds: float) -> Array:
     statistics = solver.stats()
     if not statistics["success"]:
         word = str(statistics["return_status"])
-        raise Refused(word, infeasible=word == "Infeasible_Problem_Detected")
+        raise Refusal(word, infeasible=word == "Infeasible_Problem_Detected")
     result = task.known
     result[free] = np.asarray(found["x"]).ravel()
     return result

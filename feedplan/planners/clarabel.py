@@ -1,8 +1,8 @@
 """The time-optimal profile as a second-order cone program, solved by Clarabel.
 
-After Verscheure, Demeulenaere, Swevers, De Schutter and Diehl, "Time-optimal path tracking for robots: a convex
-optimization approach", IEEE Transactions on Automatic Control 54 (2009). With x = p, c ≤ √x in the nodes and
-d ≥ 1/(√p_start + √p_end) in the cells the time Σ 2 h d is linear, and both bounds are cones.
+After Verscheure, Demeulenaere, Swevers, De Schutter and Diehl, "Time-optimal path tracking for robots: a
+convex optimization approach", IEEE Transactions on Automatic Control 54 (2009). With x = p, c ≤ √x in the
+nodes and d ≥ 1/(√p_start + √p_end) in the cells the time Σ 2 h d is linear, and both bounds are cones.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
 from feedplan.errors import MissingPackageError
-from feedplan.planners._refinement import Method, Refused, plan_on_meshes
+from feedplan.planners._refinement import Method, Refusal, plan_on_meshes
 from feedplan.planners._transcription import Transcription, mean_rows
 from feedplan.profile import SpeedProfile
 
@@ -33,7 +33,8 @@ def plan(
     cells: int | None = None,
     time_limit: float | None = None,
 ) -> SpeedProfile:
-    """The fastest profile on a mesh of about the relative `accuracy` of the time, or of `cells` cells a piece.
+    """The fastest profile on a mesh of about the relative `accuracy` of the time, or of `cells` cells a
+    piece.
 
     `time_limit` [s]. Raises SolverError with Clarabel's status, InfeasibleError where a speed given at an end
     cannot be had, MissingPackageError.
@@ -63,7 +64,7 @@ def _solve(task: Transcription, seconds: float) -> Array:
     solution = clarabel.DefaultSolver(none, cost, matrix, bound, cones, settings).solve()
     word = str(solution.status)
     if word != "Solved":
-        raise Refused(word, infeasible="PrimalInfeasible" in word)
+        raise Refusal(word, infeasible="PrimalInfeasible" in word)
     x = task.known
     free = int(task.free.sum())
     x[task.free] = np.maximum(np.array(solution.x)[:free], 0.0)
@@ -100,7 +101,8 @@ def _program(task: Transcription) -> tuple[Any, Array, list[Any], Array]:
     bounded = np.flatnonzero(np.isfinite(task.most) & task.free)
     most = block(len(bounded), [(np.arange(len(bounded)), column[bounded], 1.0)])
     # (x + 1, x − 1, 2 c) and (c_start + c_end + d, c_start + c_end − d, 2), each with s = b − A z.
-    root = block(3 * free, [(3 * nodes, nodes, -1.0), (3 * nodes + 1, nodes, -1.0), (3 * nodes + 2, free + nodes, -2.0)])
+    first = 3 * nodes
+    root = block(3 * free, [(first, nodes, -1.0), (first + 1, nodes, -1.0), (first + 2, free + nodes, -2.0)])
     cell = np.arange(n)
     weights = (task.near / unit, task.far / unit)
     ends = [np.where(column[at] >= 0, free + column[at], -1) for at in (slice(0, n), slice(1, n + 1))]

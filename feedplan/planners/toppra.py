@@ -1,15 +1,17 @@
-"""The profile of TOPP-RA on a mesh aligned with the knots: a backward and a forward pass of small linear programs.
+"""The profile of TOPP-RA on a mesh aligned with the knots: a backward and a forward pass of small linear
+programs.
 
-After Pham and Pham, "A new approach to time-optimal path parameterization based on reachability analysis", IEEE
-Transactions on Robotics 34 (2018), in the package toppra. Its own scheme asks one path acceleration to serve
-both values of q'' at a knot and does not converge on C1 splines; here every cell has rows of its own. They hold
-at both ends of the cell (`one-sided`), so that the result is feasible and its time falls to the least one as the
-cells get smaller; or at its start alone (`collocation`), which breaks limits between the nodes and whose time
-rises to it. Both are of first order.
+After Pham and Pham, "A new approach to time-optimal path parameterization based on reachability analysis",
+IEEE Transactions on Robotics 34 (2018), in the package toppra. Its own scheme asks one path acceleration to
+serve both values of q'' at a knot and does not converge on C1 splines; here every cell has rows of its own.
+They hold at both ends of the cell (`one-sided`), so that the result is feasible and its time falls to the
+least one as the cells get smaller; or at its start alone (`collocation`), which breaks limits between the
+nodes and whose time rises to it. Both are of first order.
 """
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -18,7 +20,7 @@ from numpy.typing import NDArray
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InputError, MissingPackageError
 from feedplan.planners._mesh import Mesh
-from feedplan.planners._refinement import Method, Refused, plan_on_meshes
+from feedplan.planners._refinement import Method, Refusal, plan_on_meshes
 from feedplan.planners._transcription import Rows, Transcription, end_rows
 from feedplan.profile import SpeedProfile
 
@@ -38,7 +40,8 @@ def plan(
     time_limit: float | None = None,
     scheme: str = "one-sided",
 ) -> SpeedProfile:
-    """The fastest profile on a mesh of about the relative `accuracy` of the time, or of `cells` cells a piece.
+    """The fastest profile on a mesh of about the relative `accuracy` of the time, or of `cells` cells a
+    piece.
 
     `time_limit` [s] ends the refinement; toppra itself cannot be interrupted. `scheme` is `one-sided`, or
     `collocation`, whose profile is faster than the limits allow. Raises SolverError where toppra fails,
@@ -47,7 +50,10 @@ def plan(
     if scheme not in SCHEMES:
         raise InputError(f"there is no scheme '{scheme}' of toppra: use one of {', '.join(SCHEMES)}")
     try:
-        import toppra  # noqa: F401
+        with warnings.catch_warnings():
+            # Its docstrings hold escapes that Python warns of.
+            warnings.simplefilter("ignore")
+            import toppra.algorithm  # noqa: F401
     except ImportError:
         raise MissingPackageError(
             "the method toppra needs the package toppra, which there is for Linux on x86-64: "
@@ -72,8 +78,8 @@ def _solve(task: Transcription, seconds: float) -> Array:
 
     from toppra.algorithm import TOPPRA
 
-    # toppra's path has one parameter, whose speed is continuous: that of the pieces, stretched from one to the
-    # next, with cells about 1 wide and squared speeds about 1.
+    # toppra's path has one parameter, whose speed is continuous: that of the pieces, stretched from one to
+    # the next, with cells about 1 wide and squared speeds about 1.
     stretch = np.concatenate([[0.0], np.cumsum(np.log(task.near[1:] / task.far[:-1]))])
     stretch = np.exp(-stretch) / np.median(task.width * np.exp(-stretch))
     unit = np.median((stretch * task.near) ** 2)
@@ -92,7 +98,7 @@ def _solve(task: Transcription, seconds: float) -> Array:
     finally:
         log.setLevel(level)
     if speed is None or not np.isfinite(speed).all():
-        raise Refused(str(solver.problem_data.return_code), infeasible=speed is None)
+        raise Refusal(str(solver.problem_data.return_code), infeasible=speed is None)
     x: Array = speed**2 / nodes
     return x
 
@@ -107,7 +113,8 @@ def _constraint(task: Transcription, start: Array, end: Array, grid: Array, node
     place = np.arange(len(cell)) - np.searchsorted(cell, cell)
     count = int(place.max()) + 1
     near, far = np.zeros((2, n + 1, count))
-    near[cell, place], far[cell, place] = (rows.near * start[rows.cell])[order], (rows.far * end[rows.cell])[order]
+    near[cell, place] = (rows.near * start[rows.cell])[order]
+    far[cell, place] = (rows.far * end[rows.cell])[order]
     step = np.append(np.diff(grid), 0.0)[:, None]
     identity = np.eye(count)
     bound = np.column_stack([np.zeros(n + 1), np.minimum(task.most * nodes, _FASTEST * nodes)])

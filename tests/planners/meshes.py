@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -55,8 +54,8 @@ NAMED = {"butterfly": butterfly, "infinity": infinity, "trefoil": trefoil}
 
 
 def random_path_problem(seed: int) -> Problem:
-    """A random curve in two to four axes: quadratic, cubic or rational, with corners, speeds at the ends, chord
-    error and feeds, each in a part of the seeds."""
+    """A random curve in two to four axes: quadratic, cubic or rational, with corners, speeds at the ends,
+    chord error and feeds, each in a part of the seeds."""
     rng = np.random.default_rng(seed)
     axes = "XYZA"[: int(rng.integers(2, 5))]
     kind = ("quadratic", "cubic", "rational")[seed % 3]
@@ -96,5 +95,4 @@ def random_path_problem(seed: int) -> Problem:
         period=0.004,
     )
     speeds = rng.uniform(0.0, 3.0, 2) * (rng.random(2) < 0.4)
-    problem = build_problem(path, machine, start_speed=float(speeds[0]), end_speed=float(speeds[1]))
-    return replace(problem, junction_speed=np.where(problem.junction_speed == 0.0, 0.0, problem.junction_speed))
+    return build_problem(path, machine, start_speed=float(speeds[0]), end_speed=float(speeds[1]))
