@@ -158,7 +158,7 @@ class _Planner:
             excess = float(arcs.worst.max()) - 1.0
             if self.method.feasible and excess > _EXCESS:
                 raise SolverError(
-                    f"{self._place}{self.method.name} leaves a limit by {excess:.1g} of it between the nodes, "
+                    f"{self._place}{self.method.name} leaves a limit by {excess:.1g} of it between nodes, "
                     "and speeds given at the ends of the path keep it from being slower: give more cells"
                 )
             return grid, arcs

@@ -7,6 +7,7 @@ finds is the optimum of the mesh.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,7 +64,7 @@ def _solve(task: Transcription, seconds: float) -> Array:
     time = casadi.sum1(casadi.DM(2.0 * task.width / mean) / pace)
     near, far = task.rows.cell.tolist(), (task.rows.cell + 1).tolist()
     used = casadi.DM(task.rows.near) * everywhere[near] + casadi.DM(task.rows.far) * everywhere[far]
-    options = {
+    options: dict[str, Any] = {
         "print_time": False,
         "ipopt.print_level": 0,
         "ipopt.sb": "yes",
