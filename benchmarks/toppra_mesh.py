@@ -1,4 +1,4 @@
-"""toppra on the same problem: the coarsest mesh that is close enough to a known time, and its processor time."""
+"""toppra on the same problem: the coarsest mesh close enough to a known time, and its processor time."""
 
 from __future__ import annotations
 

@@ -244,3 +244,37 @@ def test_nothing_is_printed(method: str, capfd: pytest.CaptureFixture[str]) -> N
     planner(method, cells=16)(line_problem())
     captured = capfd.readouterr()
     assert captured.out == captured.err == ""
+
+
+@pytest.mark.parametrize("degree", [2, 3])
+def test_the_audit_measures_arcs_of_constant_parameter_acceleration(degree: int) -> None:
+    # (u, u²/2) from rest with s = 10: y accelerates with 10 u + p = 30 u, up to 60 mm/s² at u = 2.
+    curve = CompositeCurve.from_bezier([[0.0, 0.0], [1.0, 0.0], [2.0, 2.0]], width=2.0).elevated(degree)
+    path = Path.from_curve(curve, feed=100.0)
+    speed = float(np.sqrt(40.0) * np.hypot(1.0, 2.0))
+    problem = build_problem(path, machine_of("XY", 100.0, 60.0), end_speed=speed)
+    profile = one_arc(u=(0.0, 2.0), p=(0.0, 40.0), value=10.0, duration=2.0 * 2.0 / np.sqrt(40.0))
+    verdict = audited(problem, profile)
+    assert verdict.ok
+    y = next(c for c in verdict.checks if (c.name, c.axis) == ("acceleration", "Y"))
+    assert y.worst == pytest.approx(60.0, rel=1e-6)
+    for change in ({"value": 10.1}, {"duration": 0.64}, {"p": (0.1, 40.0)}):
+        wrong = one_arc(
+            **{"u": (0.0, 2.0), "p": (0.0, 40.0), "value": 10.0, "duration": 4.0 / np.sqrt(40.0), **change}
+        )
+        assert not audited(problem, wrong).ok
+
+
+def one_arc(u: tuple[float, float], p: tuple[float, float], value: float, duration: float) -> SpeedProfile:
+    return SpeedProfile(
+        piece=np.zeros(1, np.uint32),
+        kind=np.array([ArcKind.PARAMETER_ACCELERATION], np.uint8),
+        axis=np.array([255], np.uint8),
+        value=np.array([value]),
+        u0=np.array(u[:1]),
+        u1=np.array(u[1:]),
+        p0=np.array(p[:1]),
+        p1=np.array(p[1:]),
+        duration=np.array([duration]),
+        runs=np.array([0, 1]),
+    )

@@ -90,6 +90,8 @@ def bend(
     ("kind", "axis", "value", "ends", "middle"),
     [
         (ArcKind.PARAMETER_ACCELERATION, 0, 0.0, (100.0, 100.0), np.sqrt(200.0)),
+        # p grows from 50 by 2·5·u.
+        (ArcKind.PARAMETER_ACCELERATION, 255, 5.0, (50.0, 150.0), np.sqrt(200.0)),
         (ArcKind.FEED, 255, 1600.0, (400.0, 400.0), 40.0),
         (ArcKind.CHORD, 255, 30.0, (60.0, 60.0), np.sqrt(2.0 * 30.0 * np.sqrt(2.0))),
         # X: p q'² grows by 2·A·Δx from 0; at u = 5 the tool is at x = 7.5 and q'_x = 1.
