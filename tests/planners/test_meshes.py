@@ -82,7 +82,8 @@ def test_the_solvers_agree_with_the_exact_time_as_meshes_get_finer(name: str) ->
     for fine, coarse in (convex[::-1], above[::-1]):
         assert -1e-7 < fine < 0.6 * coarse
     assert convex[1] < above[1]
-    assert below[1] < 0.0
+    # Collocation is optimistic but for the first, coarse meshes.
+    assert below[1] < 0.5 * above[1]
     assert abs(below[1]) < 0.6 * abs(below[0])
 
 
@@ -131,14 +132,22 @@ def test_a_program_is_planned_sampled_and_audited(method: str, tmp_path: FilePat
 
 
 def test_a_cusp_of_a_straight_piece_is_passed_at_speed() -> None:
-    # q' vanishes at both inner ends: as a line of 100 mm nothing stops there.
-    points = [[[0.0, 0.0], [50.0, 0.0], [50.0, 0.0]], [[50.0, 0.0], [50.0, 0.0], [100.0, 0.0]]]
-    curve = CompositeCurve.from_pieces(points, [50.0, 50.0]).elevated(3)
-    path = replace(line_problem().path, curve=curve, feed=np.full(2, 100.0), runs=np.array([0, 2]))
-    path = replace(path, move=np.zeros((2, 2)), line=np.zeros(2), tolerance=np.zeros(2))
-    problem = replace(line_problem(), path=path, feed=path.feed, junction_speed=np.array([0.0, np.inf, 0.0]))
+    # q' vanishes at both inner ends. As on a line of 100 mm nothing stops there: 80 ms up and down, 1250 mm/s².
+    points = [[[0.0, 0.0], [30.0, 40.0], [30.0, 40.0]], [[30.0, 40.0], [30.0, 40.0], [60.0, 80.0]]]
+    path = Path(
+        axes=("X", "Y"),
+        curve=CompositeCurve.from_pieces(points, [50.0, 50.0]).elevated(3),
+        feed=np.full(2, 100.0),
+        move=np.zeros((2, 2)),
+        line=np.zeros(2),
+        runs=np.array([0, 2]),
+        dwell=np.zeros(1),
+        tolerance=np.zeros(2),
+    )
+    free = np.array([0.0, np.inf, 0.0])
+    problem = replace(line_problem(), path=path, feed=path.feed, junction_speed=free)
     profile = clarabel.plan(problem)
-    assert profile.time == pytest.approx(1.1, rel=1e-4)
+    assert profile.time == pytest.approx(1.08, rel=1e-4)
     assert np.isinf(profile.p1).any()
     assert audited(problem, profile).ok
 
