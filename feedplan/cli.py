@@ -125,6 +125,10 @@ def cli(context: click.Context) -> int:
 @click.argument("program")
 @_MACHINE
 @click.option("--method", type=click.Choice(planners.methods()), default="bang-bang", show_default=True)
+@click.option(
+    "--accuracy", type=_Number(), metavar="PART", help="Relative error of the time, of methods with a mesh."
+)
+@click.option("--time-limit", type=_Number(), metavar="S", help="Time that such a method may take.")
 @_TOLERANCE
 @click.option("--feed", type=_Number(), metavar="MM/S", help="Feed in place of the programmed one.")
 @click.option("--feed-override", type=_Number(), default=1.0, metavar="FACTOR", help="Factor on the feed.")
@@ -146,6 +150,8 @@ def plan(
     program: str,
     machine: str,
     method: str,
+    accuracy: float | None,
+    time_limit: float | None,
     tolerance: float | None,
     feed: float | None,
     feed_override: float,
@@ -175,6 +181,8 @@ def plan(
             program,
             Machine.load(machine),
             method=method,
+            accuracy=accuracy,
+            time_limit=time_limit,
             tolerance=tolerance,
             feed=feed,
             feed_override=feed_override,

@@ -116,6 +116,9 @@ def plan(
     machine: Machine | str,
     method: str = "bang-bang",
     *,
+    accuracy: float | None = None,
+    cells: int | None = None,
+    time_limit: float | None = None,
     tolerance: float | None = None,
     feed: float | None = None,
     feed_override: float = 1.0,
@@ -127,14 +130,16 @@ def plan(
 ) -> Plan:
     """The time-optimal plan of a part program on a machine.
 
-    `source`: a file, a Program or a Path. `machine`: a Machine, or the name or file of one. `tolerance` [mm]
-    is the greatest distance from the programmed path where the program lets the tool leave it (default: the
-    program's own, else 0.01). `feed` [mm/s] replaces the programmed feeds, `feed_override` multiplies them.
-    `period` [s] replaces the machine's servo period; `start_speed` and `end_speed` [mm/s] hold at the ends.
-    `progress(stage, done)` is called as the work goes on.
-    Raises ProgramError, MachineError, InputError or InfeasibleError, each a sentence with place and remedy.
+    `source`: a file, a Program or a Path. `machine`: a Machine, or the name or file of one. Methods that
+    solve on a mesh refine it to the relative `accuracy` of the time, or take `cells` a piece, and give up
+    after `time_limit` [s]; exact methods take none of these. `tolerance` [mm] is the greatest distance from
+    the programmed path where the program lets the tool leave it (default: the program's own, else 0.01).
+    `feed` [mm/s] replaces the programmed feeds, `feed_override` multiplies them. `period` [s] replaces the
+    machine's servo period; `start_speed` and `end_speed` [mm/s] hold at the ends. `progress(stage, done)`
+    is called as the work goes on. Raises ProgramError, MachineError, InputError or InfeasibleError, each a
+    sentence with place and remedy.
     """
-    solve = planner(method)
+    solve = planner(method, accuracy=accuracy, cells=cells, time_limit=time_limit)
     if not isinstance(machine, Machine):
         machine = Machine.load(machine)
     if period is not None:

@@ -13,7 +13,7 @@ class ArcKind(IntEnum):
     """What stays constant on an arc of the profile; `value` holds the constant."""
 
     AXIS_ACCELERATION = 0  # q'_k s + q''_k p = value [mm/s²], signed
-    FLAT = 1  # p itself; value is 0
+    PARAMETER_ACCELERATION = 1  # s = p'/2 = value [mm/s²], so that p is linear in u
     FEED = 2  # the speed: |C'|² p = value [mm²/s²]
     AXIS_VELOCITY = 3  # one axis's speed: q'_k² p = value [mm²/s²]
     CHORD = 4  # the chord-error limit on a quadratic piece: p = value · |C'|
@@ -30,7 +30,8 @@ class SpeedProfile:
     Where the problem has a `tip_speed`, |C'|² of FEED and SPEED_LINE is that; q are the joints.
     Between the ends p follows exactly from the kind: it is never interpolated. On AXIS_ACCELERATION of axis k
     axis l accelerates with (q'_l·value − W_kl p)/q'_k, W_kl = q''_k q'_l − q''_l q'_k, which keeps its digits
-    where q'' p is large. On FLAT, `axis` is the one whose acceleration limit holds p.
+    where q'' p is large. On PARAMETER_ACCELERATION, `axis` is the one whose
+    acceleration limit holds p where s is 0, if it is one.
     An arc may begin or end with C' = 0 (as a straight piece with two equal control points does). Where such a
     place is passed at a speed, p is infinite there; the axis velocity follows from the other end of the arc:
     q'_k0² p0 = q'_k1² p1 − 2·value·Δq_k, and from the duration where both ends are of that kind. Where it is

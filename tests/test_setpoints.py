@@ -318,14 +318,39 @@ def test_second_differences_stay_within_the_acceleration(interpolator: str, seed
     assert chunk.position[-1].tolist() == path.curve.by_piece[-1, 2].tolist()
 
 
+@pytest.mark.parametrize("degree", [2, 3])
+def test_the_parameter_moves_at_constant_acceleration(degree: int) -> None:
+    # y = x²/2, C' = (1, u): u = ½·3·t² from rest to 6 in 2 s, then −6 mm/s² to rest at 9 in 1 s.
+    path = path_of([[[0.0, 0.0], [4.5, 0.0], [9.0, 40.5]]], [9.0], [0, 1], [0.0])
+    path = replace(path, curve=path.curve.elevated(degree))
+    kind = ArcKind.PARAMETER_ACCELERATION
+    arcs: list[ARC] = [
+        (0, kind, 255, 3.0, 0.0, 6.0, 0.0, 36.0, 2.0),
+        (0, kind, 255, -6.0, 6.0, 9.0, 36.0, 0.0, 1.0),
+    ]
+    for interpolator in INTERPOLATORS:
+        chunk = sampled(path, profile_of(arcs, [0, 2]), 0.01, interpolator).all()
+        up = chunk.t <= 2.0
+        rest = 3.0 - chunk.t
+        u = np.where(up, 1.5 * chunk.t**2, 9.0 - 3.0 * rest**2)
+        speed, s = np.where(up, 3.0 * chunk.t, 6.0 * rest), np.where(up, 3.0, -6.0)
+        np.testing.assert_allclose(chunk.u, u, atol=1e-9)
+        np.testing.assert_allclose(chunk.velocity[:, 1], u * speed, atol=1e-8)
+        inside = (chunk.t != 2.0) & (chunk.t < 3.0)
+        np.testing.assert_allclose(
+            chunk.acceleration[inside, 1], (u * s + speed**2)[inside], rtol=1e-9, atol=1e-7
+        )
+        np.testing.assert_allclose(chunk.jerk[inside, 1], (3.0 * s * speed)[inside], rtol=1e-7, atol=1e-6)
+
+
 def test_axis_velocity_flat_and_chord_arcs_follow_their_law() -> None:
     # y = x²/2, C' = (1, u): y at a constant 6 mm/s on [1, 2]; p = 4 on [2, 3]; p = 2 |C'| on [3, 4].
     path = path_of([[[0.0, 0.0], [2.0, 0.0], [4.0, 8.0]]], [4.0], [0, 1], [0.0])
     chord = float(quad(lambda u: 1 / math.sqrt(2 * math.hypot(1, u)), 3, 4)[0])
     arcs: list[ARC] = [
-        (0, ArcKind.FLAT, 255, 0.0, 0.0, 1.0, 36.0, 36.0, 1 / 6),
+        (0, ArcKind.PARAMETER_ACCELERATION, 255, 0.0, 0.0, 1.0, 36.0, 36.0, 1 / 6),
         (0, ArcKind.AXIS_VELOCITY, 1, 36.0, 1.0, 2.0, 36.0, 9.0, 1.5 / 6),
-        (0, ArcKind.FLAT, 255, 0.0, 2.0, 3.0, 4.0, 4.0, 0.5),
+        (0, ArcKind.PARAMETER_ACCELERATION, 255, 0.0, 2.0, 3.0, 4.0, 4.0, 0.5),
         (0, ArcKind.CHORD, 255, 2.0, 3.0, 4.0, 2 * math.sqrt(10), 2 * math.sqrt(17), chord),
     ]
     profile = profile_of(arcs, [0, 4])

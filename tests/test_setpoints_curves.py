@@ -344,7 +344,7 @@ def test_time_and_place_agree_with_integration(seed: int) -> None:
 
         def rate(
             u: float,
-            flat: bool = kind == ArcKind.FLAT,
+            flat: bool = kind == ArcKind.PARAMETER_ACCELERATION,
             p0: float = p0,
             ends: Any = ends,
             span: Any = (u0, u1),

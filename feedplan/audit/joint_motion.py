@@ -1,8 +1,9 @@
 """How the joints move on arcs of a profile, from what each arc holds constant and the kinematics' positions.
 
-On an arc of constant acceleration of joint k: v_k² = v_k(slower end)² + 2 a Δq_k, u̇ = |v_k| / |dq_k/du|, and
-a way Δq_k takes 2 Δq_k over the sum of the speeds at its ends. Where a joint's speed is constant: the way
-over it; where p is: Δu/√p; along a speed limit: ∫ |C'| du over the speed, by Gauss's rule.
+On an arc of constant acceleration of joint k: v_k² = v_k(slower end)² + 2 a Δq_k, u̇ = |v_k| / |dq_k/du|,
+and a way Δq_k takes 2 Δq_k over the sum of the speeds at its ends. Where a joint's speed is constant: the
+way over it; where p is linear in u: Δu over the mean √p; along a speed limit: ∫ |C'| du over the speed, by
+Gauss's rule.
 """
 
 from __future__ import annotations
@@ -104,6 +105,7 @@ def motion(path: JointPath, profile: SpeedProfile, arcs: Numbers, u: Array | Non
         speed_error = sq_error / (speed + np.sqrt(sq_error))
         speed_error = np.where(sq_error > 0.0, speed_error, 0.0) + ROUNDINGS * EPS * speed
         line = _speed_line(tip_speed, p, u)
+        p_slow, u_slow = np.where(p[:, :1] <= p[:, 1:], [p[:, :1], u[:, :1]], [p[:, 1:], u[:, -1:]])
         laws = [kind[:, None] == number for number in (0, 1, 2, 3, 4, SPEED_LINE)]
         slow = np.sqrt(np.where(slower == 0, p[:, 0], p[:, 1]))[:, None]
         by_joint = np.where(at_start & laws[0], slow, speed / g)
@@ -111,7 +113,7 @@ def motion(path: JointPath, profile: SpeedProfile, arcs: Numbers, u: Array | Non
             laws,
             [
                 by_joint,
-                np.sqrt(p[:, :1]),
+                np.sqrt(p_slow + 2.0 * value * (u - u_slow)),
                 np.sqrt(value) / tip_speed,
                 speed / g,
                 np.sqrt(value * tip_speed),
@@ -184,9 +186,11 @@ def _times(
     by_place, place_error = 2.0 * step / sides, rounding + np.abs(np.diff(root_p, axis=1)) / sides
     better = ~(error <= HIDDEN) & ~(place_error >= error)
     time, error = np.where(better, by_place, time), np.where(better, place_error, error)
-    flat = kind[:, None] == ArcKind.FLAT
-    time, error = np.where(flat, step / np.sqrt(p[:, :1]), time), np.where(flat, rounding, error)
-    integrated = ~np.isin(kind, (ArcKind.AXIS_ACCELERATION, ArcKind.FLAT, ArcKind.AXIS_VELOCITY))
+    linear = kind[:, None] == ArcKind.PARAMETER_ACCELERATION
+    time, error = np.where(linear, by_place, time), np.where(linear, rounding, error)
+    integrated = ~np.isin(
+        kind, (ArcKind.AXIS_ACCELERATION, ArcKind.PARAMETER_ACCELERATION, ArcKind.AXIS_VELOCITY)
+    )
     if integrated.any():
         some = np.flatnonzero(integrated)
         both_ways = _integrals(path, piece[some], kind[some], value[some], u[some], p[some])

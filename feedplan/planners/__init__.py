@@ -1,14 +1,17 @@
 """Planners: a problem in, a speed profile out; one file a method, found by its name.
 
-A planner module has one function `plan(problem: Problem) -> SpeedProfile`. The method `bang-bang` is the
-module `bang_bang`.
+A planner module has one function `plan(problem: Problem) -> SpeedProfile`, with what options it has as
+keywords. The method `bang-bang` is the module `bang_bang`. Modules whose names begin with an underscore are
+what several planners share.
 """
 
 from __future__ import annotations
 
 import importlib
+import inspect
 import pkgutil
 from collections.abc import Callable
+from functools import partial
 
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InputError
@@ -17,13 +20,20 @@ from feedplan.profile import SpeedProfile
 
 def methods() -> tuple[str, ...]:
     """The names of all planning methods."""
-    return tuple(sorted(module.name.replace("_", "-") for module in pkgutil.iter_modules(__path__)))
+    names = (module.name for module in pkgutil.iter_modules(__path__))
+    return tuple(sorted(name.replace("_", "-") for name in names if not name.startswith("_")))
 
 
-def planner(method: str) -> Callable[[Problem], SpeedProfile]:
-    """The planning function of a method; raises InputError naming the methods there are."""
+def planner(method: str, **options: float | None) -> Callable[[Problem], SpeedProfile]:
+    """The planning function of a method, with those `options` that are not None.
+
+    Raises InputError naming the methods there are, or the option that the method does not have.
+    """
     if method not in methods():
         raise InputError(f"there is no method '{method}': use one of {', '.join(methods())}")
     module = importlib.import_module(f"{__name__}.{method.replace('-', '_')}")
-    plan: Callable[[Problem], SpeedProfile] = module.plan
-    return plan
+    plan: Callable[..., SpeedProfile] = module.plan
+    given = {name: value for name, value in options.items() if value is not None}
+    for name in given.keys() - inspect.signature(plan).parameters.keys():
+        raise InputError(f"the method {method} takes no {name.replace('_', ' ')}: leave it out")
+    return partial(plan, **given)

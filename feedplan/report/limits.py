@@ -144,8 +144,13 @@ def _profile_at(
     change = (q - tangent_known) * (q + tangent_known)
     arc_p = known + (2.0 * value * (place[row, column] - place_known) - known * change) / (q * q)
     p = np.select(
-        [kind == ArcKind.FLAT, kind == ArcKind.FEED, kind == ArcKind.AXIS_VELOCITY, kind == ArcKind.CHORD],
-        [p0, value / (rate * rate), value / (q * q), value * rate],
+        [
+            kind == ArcKind.PARAMETER_ACCELERATION,
+            kind == ArcKind.FEED,
+            kind == ArcKind.AXIS_VELOCITY,
+            kind == ArcKind.CHORD,
+        ],
+        [known + 2.0 * value * (u - at), value / (rate * rate), value / (q * q), value * rate],
         default=arc_p,
     )
     p = np.where(u == u0, p0, np.where(u == u1, p1, p))

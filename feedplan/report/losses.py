@@ -52,8 +52,8 @@ def limit_names(problem: Problem, profile: SpeedProfile) -> tuple[NDArray[np.int
 
 def _name(problem: Problem, kind: int, axis: int) -> str:
     letter = f"{problem.axes[axis]} " if axis < len(problem.axes) else ""
-    # A flat arc is held by an axis too: at its acceleration limit while the path turns under it.
-    if kind in (ArcKind.AXIS_ACCELERATION, ArcKind.FLAT):
+    # An arc with p held is held by an axis too: at its acceleration limit while the path turns under it.
+    if kind in (ArcKind.AXIS_ACCELERATION, ArcKind.PARAMETER_ACCELERATION):
         return f"{letter}acceleration"
     if kind == ArcKind.AXIS_VELOCITY:
         return f"{letter}velocity"

@@ -6,10 +6,12 @@
 //!
 //! `quadratic` has closed forms for pieces whose q'' is constant, `curve` is for pieces of any degree, polynomial
 //! and rational, and for joints that the speed limits of the tool tip hold for; `axis` is the motion of one axis
-//! at constant acceleration on those, `rate` what is integrated there.
+//! at constant acceleration on those, `rate` what is integrated there. `even` is the motion of the parameter at
+//! constant acceleration, on pieces of both.
 
 mod axis;
 mod curve;
+mod even;
 mod quadratic;
 mod rate;
 
@@ -30,7 +32,7 @@ pub const STEP_ERROR: f64 = 1e-10;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ArcKind {
     AxisAcceleration = 0,
-    Flat = 1,
+    ParameterAcceleration = 1,
     Feed = 2,
     AxisVelocity = 3,
     Chord = 4,
@@ -40,9 +42,16 @@ pub enum ArcKind {
 impl ArcKind {
     /// The kind with a number.
     pub fn from_number(number: u8) -> Option<Self> {
-        [Self::AxisAcceleration, Self::Flat, Self::Feed, Self::AxisVelocity, Self::Chord, Self::SpeedLine]
-            .into_iter()
-            .find(|&kind| kind as u8 == number)
+        [
+            Self::AxisAcceleration,
+            Self::ParameterAcceleration,
+            Self::Feed,
+            Self::AxisVelocity,
+            Self::Chord,
+            Self::SpeedLine,
+        ]
+        .into_iter()
+        .find(|&kind| kind as u8 == number)
     }
 }
 

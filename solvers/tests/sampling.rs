@@ -231,7 +231,11 @@ prop_compose! {
                 let time = |u: f64| 1.0 / (v * norm(&tangent(u))).sqrt();
                 arc.duration = simpson(time, u0, u1);
             }
-            ArcKind::Flat => (),
+            ArcKind::ParameterAcceleration => {
+                (arc.p0, arc.p1) = (v * v, speeds[1] * speeds[1]);
+                arc.value = 0.5 * (arc.p1 - arc.p0) / (u1 - u0);
+                arc.duration = 2.0 * (u1 - u0) / (v + speeds[1]);
+            }
             ArcKind::SpeedLine => {
                 let line = speeds.map(|speed| (10.0 * speed.max(10.0)).powi(2));
                 let square = |u: f64| norm(&tangent(u)).powi(2);

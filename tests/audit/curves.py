@@ -91,7 +91,11 @@ def places_at(problem: Problem, profile: SpeedProfile, t: Array) -> tuple[NDArra
         middle = 0.5 * (low + high)
         below = (motion(middle)[0] < target) == (q1 > q0)
         low, high = np.where(below, middle, low), np.where(below, high, middle)
-    u = np.where(kind == ArcKind.FLAT, profile.u0[arc] + np.sqrt(profile.p0[arc]) * since, 0.5 * (low + high))
+    u = np.where(
+        kind == ArcKind.PARAMETER_ACCELERATION,
+        profile.u0[arc] + np.sqrt(profile.p0[arc]) * since,
+        0.5 * (low + high),
+    )
     q, slope = motion(u)
     speed = np.sqrt(
         np.maximum(
@@ -101,7 +105,9 @@ def places_at(problem: Problem, profile: SpeedProfile, t: Array) -> tuple[NDArra
     )
     speed = np.where(kind == ArcKind.AXIS_VELOCITY, np.sqrt(np.abs(value)), speed)
     with np.errstate(divide="ignore", invalid="ignore"):
-        root_p = np.where(kind == ArcKind.FLAT, np.sqrt(profile.p0[arc]), speed / np.abs(slope))
+        root_p = np.where(
+            kind == ArcKind.PARAMETER_ACCELERATION, np.sqrt(profile.p0[arc]), speed / np.abs(slope)
+        )
     return arc, u, root_p
 
 

@@ -60,7 +60,7 @@ def steady(problem: Problem, p: float) -> SpeedProfile:
     count, width = len(problem.path), problem.path.width
     return SpeedProfile(
         piece=np.arange(count, dtype=np.uint32),
-        kind=np.full(count, ArcKind.FLAT, np.uint8),
+        kind=np.full(count, ArcKind.PARAMETER_ACCELERATION, np.uint8),
         axis=np.full(count, 255, np.uint8),
         value=np.zeros(count),
         u0=np.zeros(count),

@@ -94,7 +94,7 @@ def test_every_way_of_breaking_a_profile_is_named(other: Any, changed: Change) -
             other.with_profile(value=changed(profile.value, arc, lambda a: 1.01 * a)).audit()
         )
     }
-    for kind in (ArcKind.FLAT, ArcKind.FEED, ArcKind.AXIS_VELOCITY, ArcKind.CHORD, 77):
+    for kind in (ArcKind.PARAMETER_ACCELERATION, ArcKind.FEED, ArcKind.AXIS_VELOCITY, ArcKind.CHORD, 77):
         assert not other.with_profile(kind=changed(profile.kind, arc, kind)).audit().ok
     assert ("order", None) in broken(
         other.with_profile(u0=changed(profile.u0, arc, lambda u: u + 1e-6)).audit()

@@ -188,7 +188,7 @@ def test_every_way_of_breaking_a_profile_is_named(case: Case) -> None:
         result = case.audit(profile=bad)
         assert ("numbers", None) in broken(result)
         assert result.check("numbers").line == line
-    assert names(kind=changed(profile.kind, arc, ArcKind.FLAT)) >= {"jump"}
+    assert names(kind=changed(profile.kind, arc, ArcKind.PARAMETER_ACCELERATION)) >= {"jump"}
     assert "order" in names(runs=np.array([0, len(profile) - 1]))
     without = {
         name: np.delete(getattr(profile, name), arc)

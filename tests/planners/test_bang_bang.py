@@ -121,7 +121,7 @@ def worst_excess(task: Problem, profile: SpeedProfile, samples: int = 100) -> tu
             q, q0 = tangent[:, axis], left[piece, axis] + u0 * second[axis]
             p = (q0**2 * p0 + value * (u - u0) * (q + q0)) / q**2
             s = (value - second[axis] * p) / q
-        elif kind == ArcKind.FLAT:
+        elif kind == ArcKind.PARAMETER_ACCELERATION:
             p, s = np.full(samples, p0), np.zeros(samples)
         elif kind == ArcKind.FEED:
             p = value / speed_sq

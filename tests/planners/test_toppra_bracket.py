@@ -9,20 +9,16 @@ time as the mesh refines.
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
 
 pytest.importorskip("toppra", reason="toppra has wheels for Linux on x86-64 only")
 
-from toppra.algorithm import TOPPRA
-from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
-
-from benchmarks.toppra_mesh import FeedConstraint, JointPath, solve
 from feedplan import Path
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
+from feedplan.planners import toppra
 from feedplan.planners.bang_bang import plan
 from tests.constraints.test_joints import random_problem
 
@@ -59,47 +55,16 @@ def cam_problem(count: int, seed: int) -> Problem:
     )
 
 
-class OneSided(JointAccelerationConstraint):  # type: ignore[misc]
-    """|q' s + q'' p| ≤ A at both ends of each cell, the far end with the q'' of this cell."""
-
-    def compute_constraint_params(self, path: JointPath, gridpoints: Any) -> tuple[Any, ...]:
-        axes, cells = path.dof, len(gridpoints) - 1
-        near = path.piece(gridpoints)
-        near[:-1] = path.piece(0.5 * (gridpoints[1:] + gridpoints[:-1]))
-        step = np.append(np.diff(gridpoints), 0.0)
-        tangents, bends = ([path.on(near, gridpoints + h, k) for h in (0.0, step)] for k in (1, 2))
-        # The squared speed at the far end is x + 2 step s.
-        far = tangents[1] + 2 * step[:, None] * bends[1]
-        first, second = np.hstack([tangents[0], far]), np.hstack(bends)
-        signs = np.vstack([np.eye(axes), -np.eye(axes)])
-        rows = np.zeros((4 * axes, 2 * axes))
-        rows[: 2 * axes, :axes] = rows[2 * axes :, axes:] = signs
-        limits = np.concatenate([self.alim[:, 1], -self.alim[:, 0]])
-        assert len(first) == cells + 1
-        return first, second, np.zeros_like(first), rows, np.concatenate([limits, limits]), None, None
-
-
-def one_sided_time(problem: Problem, cells: int) -> float:
-    path = JointPath(problem)
-    steps = np.diff(path.knots)[:, None] * (np.arange(cells) / cells)
-    grid = np.append((path.knots[:-1, None] + steps).ravel(), path.knots[-1])
-    acceleration, velocity = problem.max_acceleration, problem.max_velocity
-    constraints = [
-        OneSided(np.column_stack((-acceleration, acceleration))),
-        JointVelocityConstraint(np.column_stack((-velocity, velocity))),
-        FeedConstraint(problem.feed, path.dof),
-    ]
-    instance = TOPPRA(constraints, path, gridpoints=grid, solver_wrapper="seidel")
-    _, speed, _ = instance.compute_parameterization(0.0, 0.0)
-    return float((2.0 * np.diff(grid) / (speed[1:] + speed[:-1])).sum())
+def time_of(problem: Problem, cells: int, scheme: str) -> float:
+    return toppra.plan(problem, cells=cells, scheme=scheme).time
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_both_schemes_close_in_on_the_exact_time(seed: int) -> None:
     problem = cam_problem(30, seed)
     exact = plan(problem).time
-    below = [1 - solve(problem, cells).time / exact for cells in (40, 160)]
-    above = [one_sided_time(problem, cells) / exact - 1 for cells in (40, 160)]
+    below = [1 - time_of(problem, cells, "collocation") / exact for cells in (40, 160)]
+    above = [time_of(problem, cells, "one-sided") / exact - 1 for cells in (40, 160)]
     for coarse, fine in (below, above):
         assert 0 < fine < 0.4 * coarse < 0.01
 
@@ -112,7 +77,10 @@ def test_both_schemes_close_in_on_the_exact_time_of_joints(name: str, seed: int)
     # The pieces are cut already. One error may pass through zero on its way, both together do not.
     meshes = [math.ceil(cells / len(problem.path)) for cells in (1000, 4000)]
     coarse, fine = (
-        max(abs(solve(problem, cells).time / exact - 1), abs(one_sided_time(problem, cells) / exact - 1))
+        max(
+            abs(time_of(problem, cells, "collocation") / exact - 1),
+            abs(time_of(problem, cells, "one-sided") / exact - 1),
+        )
         for cells in meshes
     )
     assert fine < 0.6 * coarse < 0.01

@@ -89,7 +89,9 @@ def bend(
 @pytest.mark.parametrize(
     ("kind", "axis", "value", "ends", "middle"),
     [
-        (ArcKind.FLAT, 0, 0.0, (100.0, 100.0), np.sqrt(200.0)),
+        (ArcKind.PARAMETER_ACCELERATION, 0, 0.0, (100.0, 100.0), np.sqrt(200.0)),
+        # p grows from 50 by 2·5·u.
+        (ArcKind.PARAMETER_ACCELERATION, 255, 5.0, (50.0, 150.0), np.sqrt(200.0)),
         (ArcKind.FEED, 255, 1600.0, (400.0, 400.0), 40.0),
         (ArcKind.CHORD, 255, 30.0, (60.0, 60.0), np.sqrt(2.0 * 30.0 * np.sqrt(2.0))),
         # X: p q'² grows by 2·A·Δx from 0; at u = 5 the tool is at x = 7.5 and q'_x = 1.
@@ -106,13 +108,13 @@ def test_each_kind_of_arc_has_its_speed_in_the_middle(
 
 
 def test_the_chord_error_limits_the_bend(square: Any) -> None:
-    samples = sampled(*bend(square, ArcKind.FLAT, 0, 0.0, (100.0, 100.0)))
+    samples = sampled(*bend(square, ArcKind.PARAMETER_ACCELERATION, 0, 0.0, (100.0, 100.0)))
     # In the middle |C'| = √2 and |C' × C''| = 0.4: the radius is 2√2/0.4 = 5√2 mm.
     radius, tolerance, period = 5.0 * np.sqrt(2.0), 0.02, 0.001
     step = 2.0 * np.sqrt(2.0 * radius * tolerance - tolerance**2)
     assert samples.chord.min() == pytest.approx(step / period, rel=1e-12)
     assert samples.chord.argmin() == len(samples.chord) // 2
 
-    problem, profile = bend(square, ArcKind.FLAT, 0, 0.0, (100.0, 100.0))
+    problem, profile = bend(square, ArcKind.PARAMETER_ACCELERATION, 0, 0.0, (100.0, 100.0))
     coarse = sampled(replace(problem, chord_tolerance=100.0), profile)
     assert coarse.chord.min() == pytest.approx(2.0 * 100.0 / period)

@@ -31,7 +31,7 @@ def test_shares_come_longest_first_and_dwells_count(square: Any) -> None:
 
 def test_a_flat_arc_counts_for_the_axis_that_holds_it(square: Any) -> None:
     kind = square.profile.kind.copy()
-    kind[0] = ArcKind.FLAT
+    kind[0] = ArcKind.PARAMETER_ACCELERATION
     shares = {
         share.limit: share.time
         for share in time_per_limit(square.problem, replace(square.profile, kind=kind))

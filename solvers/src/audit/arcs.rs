@@ -22,7 +22,7 @@ pub struct Arcs<'a> {
 }
 
 const AXIS_ACCELERATION: u8 = 0;
-const FLAT: u8 = 1;
+const PARAMETER_ACCELERATION: u8 = 1;
 const FEED: u8 = 2;
 const AXIS_VELOCITY: u8 = 3;
 const CHORD: u8 = 4;
@@ -95,8 +95,13 @@ impl Arcs<'_> {
         let p = [self.p0[i], self.p1[i]];
         let ends = [curve.derivative(self.u0[i]), curve.derivative(self.u1[i])];
         let axis = self.axis[i] as usize;
-        let anchored_at_end = self.kind[i] == AXIS_ACCELERATION
-            && (p[0].is_infinite() || ends[1][axis].powi(2) * p[1] < ends[0][axis].powi(2) * p[0]);
+        let anchored_at_end = match self.kind[i] {
+            AXIS_ACCELERATION => {
+                p[0].is_infinite() || ends[1][axis].powi(2) * p[1] < ends[0][axis].powi(2) * p[0]
+            }
+            PARAMETER_ACCELERATION => p[1] < p[0],
+            _ => false,
+        };
         let (tangent, p_anchor, p_far) =
             if anchored_at_end { (ends[1], p[1], p[0]) } else { (ends[0], p[0], p[1]) };
         let width = self.u1[i] - self.u0[i];
@@ -106,7 +111,9 @@ impl Arcs<'_> {
                 value: self.value[i],
                 start_sq: tangent[axis].powi(2) * p_anchor,
             },
-            FLAT => Law::Flat { root_p: p_anchor.sqrt() },
+            PARAMETER_ACCELERATION => {
+                Law::ParameterAcceleration { start: p_anchor, slope: 2.0 * self.value[i] }
+            }
             FEED => Law::Feed { speed: self.value[i].sqrt() },
             AXIS_VELOCITY => Law::AxisVelocity { axis, speed: self.value[i].sqrt() },
             CHORD => Law::Chord { value: self.value[i] },

@@ -2,7 +2,8 @@
 //!
 //! p = (du/dt)² on an arc follows from what the arc holds constant (`feedplan.profile.ArcKind`). Distances `d` are
 //! counted from the arc's *anchor*. On an arc of constant axis acceleration that is the end where the axis is
-//! slower: from there v_k² = v_k(anchor)² + 2 a (q_k − q_k(anchor)) adds two terms of one sign and loses nothing.
+//! slower: from there v_k² = v_k(anchor)² + 2 a (q_k − q_k(anchor)) adds two terms of one sign and loses nothing. So it
+//! is where p is smaller on an arc of constant parameter acceleration.
 
 use super::curve::{inner, length};
 use super::polygon::Polygon;
@@ -17,8 +18,10 @@ pub enum Law {
         value: f64,
         start_sq: f64,
     },
-    Flat {
-        root_p: f64,
+    /// p at the anchor and dp/du.
+    ParameterAcceleration {
+        start: f64,
+        slope: f64,
     },
     Feed {
         speed: f64,
@@ -214,7 +217,7 @@ impl<const M: usize> Motion<M> {
     fn root_p_by_speed(&self, d: f64, tangent: &[f64; M]) -> f64 {
         match self.law {
             Law::AxisAcceleration { .. } => f64::NAN,
-            Law::Flat { root_p } => root_p,
+            Law::ParameterAcceleration { start, slope } => (start + slope * d).sqrt(),
             Law::Feed { speed } => speed / length(tangent),
             Law::AxisVelocity { axis, speed } => speed / tangent[axis].abs(),
             Law::Chord { value } => (value * length(tangent)).sqrt(),
@@ -346,7 +349,7 @@ impl<const M: usize> Motion<M> {
 
     /// Whether the accelerations can have a maximum inside the arc: on slides along a velocity limit.
     pub fn is_slide(&self) -> bool {
-        !matches!(self.law, Law::AxisAcceleration { .. } | Law::Flat { .. })
+        !matches!(self.law, Law::AxisAcceleration { .. } | Law::ParameterAcceleration { .. })
     }
 
     /// Curvature of the path in 1/mm at a state; 0 where the path has no direction.

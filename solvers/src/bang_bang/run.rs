@@ -404,7 +404,9 @@ fn push<const M: usize, const C: usize>(
             Kind::Accelerating(k) => (ArcKind::AxisAcceleration, k as u8, signed(k), by_acceleration(k)),
             Kind::Braking(k) => (ArcKind::AxisAcceleration, k as u8, -signed(k), by_acceleration(k)),
             Kind::LimitCurve => continue,
-            Kind::Hold => (ArcKind::Flat, NO_AXIS, 0.0, (arc.x1 - arc.x0) / arc.slow_sq.sqrt()),
+            Kind::Hold => {
+                (ArcKind::ParameterAcceleration, NO_AXIS, 0.0, (arc.x1 - arc.x0) / arc.slow_sq.sqrt())
+            }
             Kind::Cap => match sub.cap {
                 Cap::Axis(k, v_sq) => (ArcKind::AxisVelocity, k as u8, v_sq, way(k) / v_sq.sqrt()),
                 Cap::Speed([f0, f1]) => {

@@ -11,8 +11,8 @@ use super::subpiece::{Axes, Cap};
 pub enum ArcKind {
     /// q'_k s + q''_k p = value in mm/s², signed.
     AxisAcceleration = 0,
-    /// p.
-    Flat = 1,
+    /// s = value in mm/s²: p is linear in u.
+    ParameterAcceleration = 1,
     /// |C'|² p = value in mm²/s².
     Feed = 2,
     /// q'_k² p = value in mm²/s².
@@ -196,9 +196,9 @@ impl Profile {
             let (kind, axis, value, duration) = match arc.kind {
                 Kind::Accelerating(k) => (ArcKind::AxisAcceleration, k, signed(k), by_axis(k)),
                 Kind::Braking(k) => (ArcKind::AxisAcceleration, k, -signed(k), by_axis(k)),
-                Kind::Flat(k) => (ArcKind::Flat, k, 0.0, step / arc.p0.sqrt()),
+                Kind::Flat(k) => (ArcKind::ParameterAcceleration, k, 0.0, step / arc.p0.sqrt()),
                 // Followed only where it is level.
-                Kind::LimitCurve => (ArcKind::Flat, NO_AXIS, 0.0, step / arc.p0.sqrt()),
+                Kind::LimitCurve => (ArcKind::ParameterAcceleration, NO_AXIS, 0.0, step / arc.p0.sqrt()),
                 Kind::Cap => match part.cap {
                     Cap::SpeedSq(speed_sq) => {
                         let time = duration::length(sub, arc.x0, arc.x1) / speed_sq.sqrt();

@@ -136,8 +136,8 @@ impl Stretch<'_> {
         let axis = line.axis as u8;
         let (kind, axis, value) = match motion {
             // From rest at a cusp p is constant.
-            Motion::SpeedUp if from.rate == 0.0 && v0 == 0.0 => (ArcKind::Flat, axis, 0.0),
-            Motion::SlowDown if to.rate == 0.0 && v1 == 0.0 => (ArcKind::Flat, axis, 0.0),
+            Motion::SpeedUp if from.rate == 0.0 && v0 == 0.0 => (ArcKind::ParameterAcceleration, axis, 0.0),
+            Motion::SlowDown if to.rate == 0.0 && v1 == 0.0 => (ArcKind::ParameterAcceleration, axis, 0.0),
             Motion::SpeedUp => (ArcKind::AxisAcceleration, axis, self.signed),
             Motion::SlowDown => (ArcKind::AxisAcceleration, axis, -self.signed),
             Motion::Cruise => match line.speed_axis {

@@ -3,12 +3,14 @@
 //!
 //! With D = |C'|² of the path or of the tip, v² = D p is constant (`Feed`) or linear in u (`SpeedLine`), so that
 //! s = ((v²)' − p D')/(2D) and s' = −(4 s D' + p D'')/(2D). Where axis k governs, with acceleration a,
-//! s = (a − q''_k p)/q'_k and s' = −(q'''_k p + 3 q''_k s)/q'_k.
+//! s = (a − q''_k p)/q'_k and s' = −(q'''_k p + 3 q''_k s)/q'_k. Where the parameter has a constant acceleration
+//! it is s itself (`even`).
 //!
 //! These quotients are 0/0 where axis k turns round and at cusps, always at an end of the arc. Nearer to it than
 //! rounding allows they are taken at a place a little farther off, and continued from there where p is finite.
 
 use super::axis::{AxisLaw, End};
+use super::even::EvenLaw;
 use super::rate::{Line, Rate, Source, Tip, TipSpeed, MAX_TIP};
 use super::{fill, invert, parts, ArcKind, ProfileArc, Rates, State};
 use crate::arc_length::{Node, Table};
@@ -32,9 +34,7 @@ const LINE_RANGE: f64 = 1e12;
 const LINE_ROUNDS: u32 = 60;
 
 enum Law {
-    Flat {
-        p: f64,
-    },
+    Even(EvenLaw),
     Axis(Box<AxisLaw>),
     /// v² of the path or the tip.
     Speed(Line),
@@ -68,7 +68,7 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
             own: Coefficients::new(&piece),
             tip: tip.map(|tip| tip.derivatives()),
             arc: *arc,
-            law: Law::Flat { p: arc.p0 },
+            law: Law::Even(EvenLaw::new(arc)),
             safe: [arc.u0, arc.u1],
             foot: f64::NAN,
             straight: None,
@@ -80,9 +80,8 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
         motion.foot = motion.cusp();
         let axis = |acceleration: f64, speed: Option<f64>| {
             // Its duration tells the pace where the axis shows no motion.
-            let pace = (arc.u1 - arc.u0) / arc.duration;
             AxisLaw::new(&piece, arc, arc.axis as usize, acceleration, speed)
-                .map_or(Law::Flat { p: pace * pace }, |law| Law::Axis(Box::new(law)))
+                .map_or(Law::Even(EvenLaw::pace(arc)), |law| Law::Axis(Box::new(law)))
         };
         motion.law = match arc.kind {
             ArcKind::AxisAcceleration => axis(arc.value, None),
@@ -90,7 +89,7 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
             ArcKind::Feed => Law::Speed(Line { start: arc.value, ..Line::ONE }),
             ArcKind::SpeedLine => Law::Speed(motion.speed_line()),
             // `check` has refused chord limits here.
-            ArcKind::Flat | ArcKind::Chord => Law::Flat { p: arc.p0 },
+            ArcKind::ParameterAcceleration | ArcKind::Chord => Law::Even(EvenLaw::new(arc)),
         };
         motion.keep_off();
         if with_lengths {
@@ -121,7 +120,7 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
                     }
                 })
             }
-            Law::Flat { .. } => [End::Regular; 2],
+            Law::Even(_) => [End::Regular; 2],
         };
         let off = ends.map(|end| match end {
             End::Regular => 0.0,
@@ -238,15 +237,12 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
 
     /// The place `t` seconds after the start of the arc. `period` is the step whose length is to be met.
     pub fn at_time(&self, t: f64, period: f64) -> State {
-        let ProfileArc { u0, u1, .. } = self.arc;
         let (done, left) = match parts(&self.arc, t) {
             Ok(parts) => parts,
             Err(end) => return self.at(end),
         };
         match &self.law {
-            Law::Flat { .. } => {
-                self.at(if done <= 0.5 { u0 + (u1 - u0) * done } else { u1 - (u1 - u0) * left })
-            }
+            Law::Even(law) => self.at(law.place(&self.arc, done, left)),
             Law::Axis(law) => law.at_time(&self.arc, done, left),
             Law::Speed(line) => invert(&self.times(*line), self.time_error, &self.arc, done, period),
         }
@@ -262,16 +258,15 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
 
     /// Seconds from the start of the arc to a place.
     pub fn time(&self, state: &State) -> f64 {
-        let ProfileArc { u0, u1, duration, .. } = self.arc;
         let done = match &self.law {
-            Law::Flat { .. } => (state.u - u0) / (u1 - u0),
+            Law::Even(law) => law.done(&self.arc, state.u),
             Law::Axis(law) => law.done(&self.arc, state),
             Law::Speed(line) => {
                 let times = self.times(*line);
                 times.integral(state.u) / times.total()
             }
         };
-        duration * done
+        self.arc.duration * done
     }
 
     /// Position, and velocity, acceleration and jerk at a place.
@@ -283,7 +278,7 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
         let at = state.u.clamp(self.safe[0], self.safe[1]);
         let there = if at == state.u { q } else { derivatives(&self.piece, at) };
         let rates = match &self.law {
-            Law::Flat { p } => rates(&q, p.sqrt(), 0.0, 0.0),
+            Law::Even(law) => rates(&q, law.root(&self.arc, state.u), law.s, 0.0),
             Law::Speed(line) => self.at_speed(line, at, &there),
             Law::Axis(law) => self.by_axis(law, state, &q, at, &there),
         };
@@ -305,7 +300,8 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
                 let a = 0.5 * line.slope / square.sqrt();
                 [line.at(state.u).sqrt(), a, -0.5 * a * slope / square * (line.at(u) / square).sqrt()]
             }
-            Law::Flat { .. } => [0.0; 3],
+            // Such an arc has no end where the quotients are 0/0.
+            Law::Even(_) => [0.0; 3],
         };
         let along = |size: f64| direction.map(|x| x * size);
         Rates { velocity: along(v), acceleration: along(a), jerk: along(j) }

@@ -5,6 +5,7 @@
 //! Δq_k = (q'_k(u0) + q'_k(u)) Δu / 2 is one quadratic equation for Δu. It is solved from the end of the arc
 //! where |q'_k| is smaller: there every term is positive and no digit is lost, not even where q'_k vanishes.
 
+use super::even::EvenLaw;
 use super::{fill, invert, parts, ArcKind, ProfileArc, Rates, State};
 use crate::arc_length::{ChordTime, Hodograph, Length, Node, Table};
 use crate::quadratic::{dot, Quadratic};
@@ -13,7 +14,7 @@ use crate::quadratic::{dot, Quadratic};
 const TURN: f64 = 1e-10;
 
 enum Law {
-    Flat { p: f64 },
+    Even(EvenLaw),
     Axis(AxisLaw),
     Feed { speed_sq: f64 },
     Chord { value: f64 },
@@ -57,7 +58,7 @@ impl<const M: usize> QuadraticMotion<M> {
             second: std::array::from_fn(|k| (tangents.1[k] - tangents.0[k]) / piece.width),
             hodograph: Hodograph::new(piece),
             arc: *arc,
-            law: Law::Flat { p: arc.p0 },
+            law: Law::Even(EvenLaw::new(arc)),
             lengths: Vec::new(),
             times: Vec::new(),
             length_error: 0.0,
@@ -77,7 +78,7 @@ impl<const M: usize> QuadraticMotion<M> {
             ArcKind::Feed => Law::Feed { speed_sq: arc.value },
             ArcKind::Chord => Law::Chord { value: arc.value },
             // `Motion` takes the general form for a line of speed.
-            ArcKind::Flat | ArcKind::SpeedLine => Law::Flat { p: arc.p0 },
+            ArcKind::ParameterAcceleration | ArcKind::SpeedLine => Law::Even(EvenLaw::new(arc)),
         };
         if with_lengths || matches!(motion.law, Law::Feed { .. }) {
             motion.length_error = fill(Length(motion.hodograph), arc, &mut motion.lengths);
@@ -107,14 +108,12 @@ impl<const M: usize> QuadraticMotion<M> {
             (!(arc.p0.is_finite() && arc.p1.is_finite()), if g0 <= g1 { arc.p0 } else { arc.p1 });
         if g0 + g1 <= 0.0 || v0 + v1 <= 0.0 {
             // As short as a rounding error: the axis shows no motion. Its duration still tells the pace.
-            let pace = (arc.u1 - arc.u0) / arc.duration;
-            return Law::Flat { p: pace * pace };
+            return Law::Even(EvenLaw::pace(arc));
         }
         let (near, far) = if g0 <= g1 { ((g0, v0), (g1, v1)) } else { ((g1, v1), (g0, v0)) };
         if near.0 <= TURN * far.0 && near.1 <= TURN * far.1 {
             // The axis turns round at an end: v_k² = 2 a Δq_k and q'_k² = 2 c_k Δq_k, and p is the same everywhere.
-            let pace = (arc.u1 - arc.u0) / arc.duration;
-            return Law::Flat { p: pace * pace };
+            return Law::Even(EvenLaw::pace(arc));
         }
         Law::Axis(AxisLaw { k, sign, acceleration, v0, v1, g0, g1, cusp, p_end })
     }
@@ -146,15 +145,12 @@ impl<const M: usize> QuadraticMotion<M> {
 
     /// The place `t` seconds after the start of the arc. `period` is the step whose length is to be met.
     pub fn at_time(&self, t: f64, period: f64) -> State {
-        let ProfileArc { u0, u1, .. } = self.arc;
         let (done, left) = match parts(&self.arc, t) {
             Ok(parts) => parts,
             Err(end) => return self.at(end),
         };
         match &self.law {
-            Law::Flat { .. } => {
-                self.at(if done <= 0.5 { u0 + (u1 - u0) * done } else { u1 - (u1 - u0) * left })
-            }
+            Law::Even(law) => self.at(law.place(&self.arc, done, left)),
             Law::Axis(law) => law.at_time(&self.arc, done, left),
             Law::Feed { .. } => invert(&self.lengths(), self.length_error, &self.arc, done, period),
             Law::Chord { .. } => invert(&self.times(), self.time_error, &self.arc, done, period),
@@ -171,14 +167,13 @@ impl<const M: usize> QuadraticMotion<M> {
 
     /// Seconds from the start of the arc to a place.
     pub fn time(&self, state: &State) -> f64 {
-        let ProfileArc { u0, u1, duration, .. } = self.arc;
         let done = match &self.law {
-            Law::Flat { .. } => (state.u - u0) / (u1 - u0),
+            Law::Even(law) => law.done(&self.arc, state.u),
             Law::Axis(law) => law.done(&self.arc, state),
             Law::Feed { .. } => self.lengths().integral(state.u) / self.lengths().total(),
             Law::Chord { .. } => self.times().integral(state.u) / self.times().total(),
         };
-        duration * done
+        self.arc.duration * done
     }
 
     fn rates(&self, state: &State) -> Rates<M> {
@@ -186,7 +181,7 @@ impl<const M: usize> QuadraticMotion<M> {
         let (root, s, ds) = match &self.law {
             Law::Axis(law) if law.cusp => return law.straight(c, state),
             Law::Axis(law) => law.rates(c[law.k], state),
-            Law::Flat { p } => (p.sqrt(), 0.0, 0.0),
+            Law::Even(law) => (law.root(&self.arc, state.u), law.s, 0.0),
             // p = F²/D with D = |q'|²: p' = −2F² B/D², p''/2 = F² (4B²/D³ − E²/D²).
             Law::Feed { speed_sq } => {
                 let (d, b, e_sq) = (dot(&q, &q), dot(&q, c), dot(c, c));

@@ -88,10 +88,10 @@ fn check_arc<const M: usize>(path: &PathData<M>, run: usize, arc: &ProfileArc) -
     let most = match arc.kind {
         // Nothing else would tell the speed.
         ArcKind::SpeedLine => 1,
-        ArcKind::Flat | ArcKind::Chord => 0,
+        ArcKind::ParameterAcceleration | ArcKind::Chord => 0,
         _ => 2,
     };
-    let signed = arc.kind == ArcKind::AxisAcceleration;
+    let signed = matches!(arc.kind, ArcKind::AxisAcceleration | ArcKind::ParameterAcceleration);
     if !(arc.p0 >= 0.0 && arc.p1 >= 0.0 && arc.value.is_finite() && (signed || arc.value >= 0.0))
         || infinite > most
     {

@@ -1,0 +1,173 @@
+"""The arcs between the nodes of a mesh: from p in the nodes to a profile, and how far it uses every limit."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.constraints.problem import Problem
+from feedplan.planners._mesh import EVEN, INTEGRATION, PLACES, Mesh
+from feedplan.profile import ArcKind, SpeedProfile
+
+Array = NDArray[np.float64]
+
+NO_AXIS = 255
+# An arc may be governed by a joint whose q' does not vary by more than this factor.
+_VARIES = 1e3
+
+
+@dataclass(frozen=True)
+class Arcs:
+    """One arc a cell: `kind`, `axis`, `value`, p at both `ends` (2, n), `duration` (n,); and at most how
+    much of each limit it uses: `acceleration` (n, joints), `speed` (n,), the square of the share; and the
+    mean of what it uses of the limit that it uses most at each place (n,)."""
+
+    kind: NDArray[np.uint8]
+    axis: NDArray[np.uint8]
+    value: Array
+    ends: Array
+    duration: Array
+    acceleration: Array
+    speed: Array
+    used: Array
+
+    @property
+    def worst(self) -> Array:
+        """By how much p must fall to keep every limit of a cell (n,)."""
+        return np.asarray(np.maximum(self.acceleration.max(axis=1), self.speed))
+
+    @property
+    def feasible_time(self) -> float:
+        """The time if p were scaled so far [s]."""
+        return float(self.duration.sum()) * math.sqrt(max(float(self.worst.max()), 1.0))
+
+    def scaled(self, factor: float) -> Arcs:
+        """The same with p times a factor."""
+        return Arcs(
+            self.kind,
+            self.axis,
+            self.value * factor,
+            self.ends * factor,
+            self.duration / np.sqrt(factor),
+            self.acceleration * factor,
+            self.speed * factor,
+            self.used * factor,
+        )
+
+
+def arcs_between(problem: Problem, mesh: Mesh, p: Array, by_axis: bool) -> Arcs:
+    """The arcs through p in the nodes (n + 1,): p linear in u, or one joint's acceleration constant.
+
+    Where `by_axis` allows it, of all such arcs of a cell the one that uses the limits least is taken.
+    """
+    start, end = mesh.gain * p[:-1], p[1:]
+    own = start + (end - start) * PLACES[:, None]
+    s = (end - start) / (2.0 * mesh.width)
+    motion = _Motion(own, np.broadcast_to(s, own.shape))
+    worst = motion.worst(problem, mesh)
+    kind = np.full(len(mesh), ArcKind.PARAMETER_ACCELERATION, np.uint8)
+    axis = np.full(len(mesh), NO_AXIS, np.uint8)
+    value, duration = s.copy(), 2.0 * mesh.width / (np.sqrt(start) + np.sqrt(end))
+    for k in range(len(problem.axes)):
+        slope, way = mesh.slope[:, :, k], mesh.way[:, :, k]
+        size = np.abs(slope)
+        steady = (slope * np.sign(way[-1]) > 0.0).all(axis=0) & (by_axis | mesh.by_length)
+        steady &= size.max(axis=0) < _VARIES * size.min(axis=0)
+        if not steady.any():
+            continue
+        with np.errstate(divide="ignore", invalid="ignore"):
+            change = slope[-1] ** 2 * end - slope[0] ** 2 * start
+            a = change / (2.0 * way[-1])
+            own = (slope[0] ** 2 * start + change * (way / way[-1])) / slope**2
+            own[0], own[-1] = start, end
+            other = _Motion(own, (a - mesh.bend[:, :, k] * own) / slope)
+            others = other.worst(problem, mesh)
+            better = steady & ((others < worst) | (mesh.by_length & (size[0] > 0.5)))
+            time = 2.0 * np.abs(way[-1]) / (size[0] * np.sqrt(start) + size[-1] * np.sqrt(end))
+        motion, worst = motion.where(better, other), np.where(better, others, worst)
+        kind[better], axis[better] = ArcKind.AXIS_ACCELERATION, k
+        value, duration = np.where(better, a, value), np.where(better, time, duration)
+    ends = np.stack([start, end])
+    if mesh.by_length.any():
+        ends = _by_parameter(problem, mesh, ends, axis, value)
+    acceleration, speed = motion.acceleration(problem, mesh), motion.speed(mesh)
+    used = np.maximum(np.abs(acceleration).max(axis=2), speed.max(axis=2))
+    return Arcs(
+        kind,
+        axis,
+        value,
+        ends,
+        duration,
+        _peak(acceleration),
+        _peak(speed).max(axis=1),
+        INTEGRATION[-1] @ np.minimum(used, 1.0),
+    )
+
+
+def _peak(values: Array) -> Array:
+    """The greatest size (n, …) that values (places, n, …) have in the cells: of parabolas through even
+    places."""
+    even = np.einsum("ij,jck->ick", EVEN, values)
+    bent = np.abs(even[2:] - 2.0 * even[1:-1] + even[:-2]) / 8.0
+    inside = (np.abs(even[1:-1]) + bent).max(axis=0)
+    return np.asarray(np.maximum(inside, np.abs(values).max(axis=0)))
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """p and s of arcs at the places of their cells (places, n)."""
+
+    p: Array
+    s: Array
+
+    def acceleration(self, problem: Problem, mesh: Mesh) -> Array:
+        """The share of its limit that every joint uses, with its sign (places, n, joints)."""
+        return (mesh.slope * self.s[..., None] + mesh.bend * self.p[..., None]) / problem.max_acceleration
+
+    def speed(self, mesh: Mesh) -> Array:
+        """The share of every limit of a speed, squared (places, n, limits)."""
+        return np.asarray(mesh.speed * self.p[..., None])
+
+    def worst(self, problem: Problem, mesh: Mesh) -> Array:
+        """The greatest of all at the places (n,)."""
+        acceleration = np.abs(self.acceleration(problem, mesh)).max(axis=(0, 2))
+        return np.asarray(np.maximum(acceleration, self.speed(mesh).max(axis=(0, 2))))
+
+    def where(self, better: NDArray[np.bool_], other: _Motion) -> _Motion:
+        return _Motion(np.where(better, other.p, self.p), np.where(better, other.s, self.s))
+
+
+def _by_parameter(problem: Problem, mesh: Mesh, ends: Array, axis: NDArray[np.uint8], value: Array) -> Array:
+    """p at both ends of the cells, of which those meshed over the length hold v²."""
+    ends = ends.copy()
+    cells = np.flatnonzero(mesh.by_length)
+    k = axis[cells].astype(np.int64)
+    for side in (0, 1):
+        values = problem.derivatives(mesh.piece[cells], mesh.ends[side, cells], 2)
+        square, bend = (values[1] ** 2).sum(axis=1), values[2][np.arange(len(cells)), k]
+        speed_sq = ends[side, cells]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            # From rest in a cusp a = q'' p; passed at a speed p has no bound.
+            limit = np.where(speed_sq > 0.0, np.inf, np.abs(value[cells] / bend))
+            ends[side, cells] = np.where(square > 0.0, speed_sq / square, limit)
+    return ends
+
+
+def profile(problem: Problem, parts: list[tuple[Mesh, Arcs]], runs: list[int]) -> SpeedProfile:
+    """The arcs of all stretches as one profile; `runs` are the arcs' offsets of the runs."""
+    meshes, arcs = [mesh for mesh, _ in parts], [part for _, part in parts]
+    return SpeedProfile(
+        piece=np.concatenate([mesh.piece for mesh in meshes]).astype(np.uint32),
+        kind=np.concatenate([part.kind for part in arcs]),
+        axis=np.concatenate([part.axis for part in arcs]),
+        value=np.concatenate([part.value for part in arcs]),
+        u0=np.concatenate([mesh.ends[0] for mesh in meshes]),
+        u1=np.concatenate([mesh.ends[1] for mesh in meshes]),
+        p0=np.concatenate([part.ends[0] for part in arcs]),
+        p1=np.concatenate([part.ends[1] for part in arcs]),
+        duration=np.concatenate([part.duration for part in arcs]),
+        runs=np.array(runs, dtype=np.int64),
+    )

@@ -1,0 +1,324 @@
+"""The mesh of planners that discretise: stretches between stops, cut into cells, with every limit at places.
+
+A stretch is a part of a run that is passed without stopping inside it. Its cells never reach over the end
+of a piece, so that both values of q'' at a knot are kept, each with the cells on its side. Each cell
+carries q', q'' and the greatest p at `PLACES`, both ends among them.
+
+A piece is meshed over its own parameter u. Only a straight piece with a cusp (q' = 0) at an end, where p
+grows without bound if it is passed at a speed, is meshed over its length: its cells have q' of constant
+size. In any other cusp p is finite, so the tool stands there, and the stretch ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+
+from feedplan.constraints.problem import Problem
+from feedplan.errors import InfeasibleError
+
+Array = NDArray[np.float64]
+Numbers = NDArray[np.int64]
+
+# Places of a cell: the ends and the extremes of the Legendre polynomial between them, in [0, 1].
+_DEGREE = 10
+PLACES = np.concatenate(
+    [[0.0], 0.5 + 0.5 * np.sort(legendre.legroots(legendre.legder([0.0] * _DEGREE + [1.0]))), [1.0]]
+)
+
+# q' below this part of its size on the piece is a cusp; a tangent off a line by this part is rounding.
+_CUSP = 1e-9
+_STRAIGHT = 1e-12
+
+
+def _integration() -> Array:
+    """The matrix from values at `PLACES` to integrals from 0 to each of them, exact to the tenth degree."""
+    powers = np.arange(_DEGREE + 1)
+    values = PLACES[:, None] ** powers
+    integrals = PLACES[:, None] ** (powers + 1) / (powers + 1)
+    return np.asarray(np.linalg.solve(values.T, integrals.T).T)
+
+
+INTEGRATION = _integration()
+
+# From values at `PLACES` to those at even places, where what happens in between shows.
+EVEN = (np.arange(33) / 32)[:, None] ** np.arange(_DEGREE + 1) @ np.linalg.inv(
+    PLACES[:, None] ** np.arange(_DEGREE + 1)
+)
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Pieces `first` to `last` (not included) of a problem, passed without a stop inside.
+
+    `start` and `end` are the squares of the speeds at its ends [mm²/s²]; None at a cusp, where the speed is 0
+    whatever p is.
+    """
+
+    first: int
+    last: int
+    start: float | None
+    end: float | None
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """The n cells of a stretch.
+
+    Per cell: `piece`; `ends` (2, n) its local parameter at both ends; `width` (n,) of the variable that it
+    is meshed over, `by_length` (n,) whether that is the length. At PLACES: `slope` q' and `bend` q''
+    (places, n, joints), `speed` (places, n, joints + 2) the share of the velocities', the feed's and the
+    chord error's limit that is used, squared, per p, `way` (places, n, joints) of the joints from the start
+    of the cell. `gain` (n,) is p at the start of the cell over p at the end of the cell before, and `cap`
+    (n + 1,) the greatest p in the nodes, at the end of the cell before (of the cell after in the first
+    node). `fixed` holds p at both ends of the stretch where it is given.
+    """
+
+    piece: Numbers
+    ends: Array
+    width: Array
+    by_length: NDArray[np.bool_]
+    slope: Array
+    bend: Array
+    speed: Array
+    way: Array
+    gain: Array
+    cap: Array
+    fixed: tuple[float | None, float | None]
+
+    def __len__(self) -> int:
+        return len(self.piece)
+
+    @property
+    def turn(self) -> Array:
+        """By how much q' changes within the cells, in parts of its size (n,)."""
+        change = np.linalg.norm(self.slope[-1] - self.slope[0], axis=1)
+        return np.asarray(change / np.linalg.norm(self.slope, axis=2).max(axis=0))
+
+
+def stretches(problem: Problem) -> Iterator[list[Stretch]]:
+    """The stretches of each run."""
+    count = len(problem.path)
+    pieces = np.arange(count)
+    width = problem.path.width
+    start, end = (problem.derivatives(pieces, at, 1)[1] for at in (np.zeros(count), width))
+    middle = problem.derivatives(pieces, 0.5 * width, 1)[1]
+    size = np.maximum(np.linalg.norm(middle, axis=1), np.maximum(*_norms(start, end)))
+    still = [norm <= _CUSP * size for norm in _norms(start, end)]
+    straight = _straight_to_cusp(problem)
+    stop = np.array(problem.junction_speed) == 0.0
+    for piece in range(1, count):
+        cusp = [still[1][piece - 1] and not straight[piece - 1], still[0][piece] and not straight[piece]]
+        stop[piece] |= any(cusp)
+    runs = problem.path.runs
+    for run in range(len(runs) - 1):
+        result = []
+        cuts = [
+            runs[run],
+            *(runs[run] + 1 + np.flatnonzero(stop[runs[run] + 1 : runs[run + 1]])),
+            runs[run + 1],
+        ]
+        for first, last in pairwise(cuts):
+            speeds = [
+                problem.start_speed if first == 0 else 0.0,
+                problem.end_speed if last == count else 0.0,
+            ]
+            at_cusp = [still[0][first] and not straight[first], still[1][last - 1] and not straight[last - 1]]
+            known = [None if cusp else speed**2 for cusp, speed in zip(at_cusp, speeds, strict=True)]
+            result.append(Stretch(int(first), int(last), known[0], known[1]))
+        yield result
+
+
+def _norms(*vectors: Array) -> list[Array]:
+    return [np.linalg.norm(vector, axis=1) for vector in vectors]
+
+
+def _straight_to_cusp(problem: Problem) -> NDArray[np.bool_]:
+    """Which pieces are straight, do not turn back, and have a cusp at an end (n,)."""
+    curve = problem.path.curve
+    result = np.zeros(len(curve), dtype=bool)
+    if problem.words:
+        return result
+    points, offsets = curve.control_points, curve.offsets
+    steps = np.diff(points, axis=0)
+    chord = points[offsets[1:] - 1] - points[offsets[:-1]]
+    length = np.linalg.norm(chord, axis=1)
+    short = np.linalg.norm(steps, axis=1)
+    for i in np.flatnonzero(length > 0.0):
+        own = slice(int(offsets[i]), int(offsets[i + 1]) - 1)
+        if short[own][[0, -1]].min() > _CUSP * length[i]:
+            continue
+        along = steps[own] @ (chord[i] / length[i])
+        beside = np.linalg.norm(steps[own] - along[:, None] * (chord[i] / length[i]), axis=1)
+        result[i] = (along >= 0.0).all() and beside.max() <= _STRAIGHT * length[i]
+    return result
+
+
+@dataclass(frozen=True)
+class Cuts:
+    """How a stretch is cut: the `piece` of each cell (n,), and where it begins and ends in parts of that."""
+
+    piece: Numbers
+    lower: Array
+    upper: Array
+
+    def __len__(self) -> int:
+        return len(self.piece)
+
+    def bisected(self, marked: NDArray[np.bool_]) -> Cuts:
+        """The same with the `marked` cells (n,) cut in two."""
+        count = 1 + marked.astype(np.int64)
+        lower, upper = np.repeat(self.lower, count), np.repeat(self.upper, count)
+        second = (np.cumsum(count) - 1)[marked]
+        lower[second] = upper[second - 1] = 0.5 * (self.lower[marked] + self.upper[marked])
+        return Cuts(np.repeat(self.piece, count), lower, upper)
+
+
+def even_cuts(stretch: Stretch, cells: int) -> Cuts:
+    """So many `cells` in each piece, even ones but next to a stop.
+
+    There their width grows evenly, because the time is least smooth.
+    """
+    pieces = np.arange(stretch.first, stretch.last)
+    even = np.arange(cells + 1) / cells
+    shares = np.tile(even, (len(pieces), 1))
+    at_stop = [speed_sq is None or speed_sq == 0.0 for speed_sq in (stretch.start, stretch.end)]
+    if len(pieces) == 1 and all(at_stop):
+        shares[0] = 0.5 - 0.5 * np.cos(np.pi * even)
+    else:
+        if at_stop[0]:
+            shares[0] = 1.0 - np.cos(0.5 * np.pi * even)
+        if at_stop[1]:
+            shares[-1] = np.sin(0.5 * np.pi * even)
+    shares[:, -1] = 1.0
+    return Cuts(np.repeat(pieces, cells), shares[:, :-1].ravel(), shares[:, 1:].ravel())
+
+
+def mesh(problem: Problem, stretch: Stretch, cuts: Cuts) -> Mesh:
+    """The cells of a stretch with the limits in them.
+
+    Raises InfeasibleError where a given end speed is above what holds at that place.
+    """
+    piece, lower, upper = cuts.piece, cuts.lower, cuts.upper
+    local = lower + (upper - lower) * PLACES[:, None]
+    straight = _straight_to_cusp(problem)[piece]
+    whole = problem.path.width[piece]
+    u = whole * local
+    width = whole * (upper - lower)
+    if straight.any():
+        length = _lengths(problem)[piece]
+        u[:, straight] = _at_length(problem, piece[straight], local[:, straight])
+        width = np.where(straight, length * (upper - lower), width)
+    slope, bend = _derivatives(problem, piece, u)
+    square = _speed_square(problem, piece, u, slope)
+    chord = _chord_speed_square(problem, piece, u)
+    if straight.any():
+        way = _chords(problem)[piece[straight]]
+        slope[:, straight] = way / np.linalg.norm(way, axis=1)[:, None]
+        bend[:, straight], square[:, straight] = 0.0, 1.0
+    limits = [(slope / problem.max_velocity) ** 2]
+    limits += [(square / most)[..., None] for most in (problem.feed[piece] ** 2, chord)]
+    per_p = np.concatenate(limits, axis=2)
+    with np.errstate(divide="ignore"):
+        most = 1.0 / per_p.max(axis=2)
+    way = width[:, None] * np.einsum("ij,jck->ick", INTEGRATION, slope)
+    first = np.flatnonzero(np.diff(piece, prepend=-1))
+    gain = np.ones(len(piece))
+    before, after = slope[-1, first[1:] - 1], slope[0, first[1:]]
+    gain[first[1:]] = (before**2).sum(axis=1) / (after**2).sum(axis=1)
+    cap = np.concatenate([most[0, :1], np.minimum(most[-1], np.append(most[0, 1:] / gain[1:], np.inf))])
+    at_junction = problem.junction_speed[piece[first[1:]]] ** 2 / square[-1, first[1:] - 1]
+    cap[first[1:]] = np.minimum(cap[first[1:]], at_junction)
+    fixed = []
+    for side, (known, node) in enumerate(((stretch.start, 0), (stretch.end, -1))):
+        p = None if known is None else known / float(square[side * -1, node])
+        if p is not None and p > cap[node] * (1.0 + 1e-12):
+            raise end_error(problem, stretch, side, float(np.sqrt(cap[node] * square[side * -1, node])))
+        fixed.append(p)
+    ends = np.stack([u[0], u[-1]])
+    ends[:, :] = np.where(np.stack([lower, upper]) == 1.0, whole, ends)
+    return Mesh(piece, ends, width, straight, slope, bend, per_p, way, gain, cap, (fixed[0], fixed[1]))
+
+
+def end_error(
+    problem: Problem, stretch: Stretch, side: int, reachable: float | None = None
+) -> InfeasibleError:
+    """No profile has the speed that is asked for at the start (`side` 0) or the end."""
+    line = int(problem.path.line[stretch.first if side == 0 else stretch.last - 1])
+    speed = problem.start_speed if side == 0 else problem.end_speed
+    known = "" if reachable is None else f" at most {reachable:.6g} mm/s is allowed there:"
+    which = "starts" if side == 0 else "ends"
+    return InfeasibleError(
+        f"line {line}: no profile {which} at {speed:g} mm/s:{known} give a lower speed", line, reachable
+    )
+
+
+def _chords(problem: Problem) -> Array:
+    curve = problem.path.curve
+    return curve.control_points[curve.offsets[1:] - 1] - curve.control_points[curve.offsets[:-1]]
+
+
+def _lengths(problem: Problem) -> Array:
+    return np.asarray(np.linalg.norm(_chords(problem), axis=1))
+
+
+def _at_length(problem: Problem, piece: Numbers, share: Array) -> Array:
+    """u on straight pieces (m,) where these shares (places, m) of their length are passed."""
+    curve = problem.path.curve
+    many, chord = np.tile(piece, len(share)), np.tile(_chords(problem)[piece], (len(share), 1))
+    begin, square = curve.control_points[curve.offsets[many]], (chord**2).sum(axis=1)
+    low, high = np.zeros(share.size), curve.width[many]
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        passed = ((curve.evaluate(many, middle)[0] - begin) * chord).sum(axis=1) / square
+        below = passed < share.ravel()
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    u = np.where(share.ravel() == 1.0, curve.width[many], np.where(share.ravel() == 0.0, 0.0, high))
+    return np.asarray(u.reshape(share.shape))
+
+
+def _derivatives(problem: Problem, piece: Numbers, u: Array) -> tuple[Array, Array]:
+    """q' and q'' (places, n, joints)."""
+    values = problem.derivatives(np.tile(piece, len(u)), np.ascontiguousarray(u).ravel(), 2)
+    return values[1].reshape(*u.shape, -1), values[2].reshape(*u.shape, -1)
+
+
+def _speed_square(problem: Problem, piece: Numbers, u: Array, slope: Array) -> Array:
+    """The square of the speed that feed and junctions are about, over p (places, n)."""
+    tip = problem.tip_speed
+    if tip is None:
+        return np.asarray((slope**2).sum(axis=2))
+    t = u / problem.path.width[piece]
+    result = np.empty(u.shape)
+    degree = np.diff(tip.offsets)[piece] - 1
+    for d in np.unique(degree).tolist():
+        own = degree == d
+        values = tip.coefficients[tip.offsets[piece[own]][:, None] + np.arange(d + 1)].T[:, None, :]
+        values = np.broadcast_to(values, (d + 1, len(u), int(own.sum())))
+        for _ in range(d):
+            values = values[:-1] + (values[1:] - values[:-1]) * t[:, own]
+        result[:, own] = values[0]
+    return result
+
+
+def _chord_speed_square(problem: Problem, piece: Numbers, u: Array) -> Array:
+    """(2/T)²·(2ρδ − δ²) where ρ is the radius of curvature of the tool's path (places, n), at least δ."""
+    if not np.isfinite(problem.chord_tolerance):
+        return np.full(u.shape, np.inf)
+    curve = problem.tip_curve or problem.path.curve
+    values = curve.evaluate(np.tile(piece, len(u)), u.ravel(), 2)
+    tangent, second = values[1], values[2]
+    square = (tangent**2).sum(axis=1)
+    along = (tangent * second).sum(axis=1) / np.where(square > 0.0, square, 1.0)
+    across = np.linalg.norm(second - along[:, None] * tangent, axis=1)
+    tolerance = problem.chord_tolerance
+    radius = np.where(across > 0.0, square / np.where(across > 0.0, across, 1.0), np.inf)
+    # Where the tool stands still, while other axes turn, it has no chord.
+    radius = np.where(square > 0.0, np.maximum(radius, tolerance), np.inf)
+    speed_sq = (2.0 / problem.period) ** 2 * tolerance * (2.0 * radius - tolerance)
+    return np.asarray(speed_sq.reshape(u.shape))

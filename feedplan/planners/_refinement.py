@@ -1,0 +1,263 @@
+"""Planning by a solver on meshes: stretch by stretch, finer until the time is accurate enough.
+
+The fastest profile is at some limit everywhere. Where the arcs of a mesh are not, and where their rows are
+too strict by the order of the mesh, its cells are cut in two.
+
+On each mesh the solution is checked between the nodes. Where an arc goes beyond a limit that its rows kept,
+the limit is lowered there by as much and the solution repeated; what little is left after some rounds is
+met by scaling p, which keeps every limit. So the result is feasible, and its time approaches the least from
+above.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.constraints.problem import Problem
+from feedplan.errors import InfeasibleError, InputError, SolverError
+from feedplan.planners._arcs import Arcs, arcs_between, profile
+from feedplan.planners._mesh import Cuts, Mesh, Stretch, end_error, even_cuts, mesh, stretches
+from feedplan.planners._transcription import Rows, Transcription, transcribe
+from feedplan.profile import SpeedProfile
+
+Array = NDArray[np.float64]
+
+# The first mesh has as many cells in a piece, and in a stretch.
+_LEAST, _FIRST = 4, 32
+# More cells are not tried; the solvers need some 10 kB for each.
+MAX_CELLS = 400_000
+# How often limits are lowered where the arcs go beyond them, and what is left to scaling; more often where
+# speeds given at the ends cannot be scaled. The audit allows 1e-6.
+_ROUNDS = 3
+_MOVING_ROUNDS = 8
+_EXCESS = 5e-7
+# A cell that exceeds a limit by more than this though it was lowered is held at both ends.
+_STUBBORN = 1e-4
+# A limit that holds at both ends of a cell costs time where it is used as far as this.
+_NEAR = 0.9
+# Cells that make so much of the error are cut.
+_SHARE = 0.9
+# By how much the error falls from mesh to mesh, at best and at worst.
+_FALLS = 0.25, 0.7
+# An estimate of the error may be wrong by a factor of two.
+_SAFETY = 0.5
+# The error is about this part, or less, of the time in which arcs do not use any limit wholly.
+_TRUE = 0.25
+# Seen between the checked places, and rounding.
+_MARGIN = 1e-9
+
+
+class Refusal(Exception):  # noqa: N818 (its handler makes the error of it)
+    """A solver ended without a solution: its own word, and whether it proved that there is none."""
+
+    def __init__(self, word: str, infeasible: bool = False) -> None:
+        super().__init__(word)
+        self.infeasible = infeasible
+
+
+# x in the nodes of a transcription, within so many seconds; raises Refusal.
+Solve = Callable[[Transcription, float], Array]
+
+
+@dataclass(frozen=True)
+class Method:
+    """A solver, its `rows` of a mesh for limits (n, joints) and for cells that are held at both ends (n,),
+    and what its result is.
+
+    `by_axis`: arcs may be of constant joint acceleration. `feasible`: limits are kept between the nodes.
+    """
+
+    name: str
+    solve: Solve
+    rows: Callable[[Mesh, Array, NDArray[np.bool_]], Rows]
+    by_axis: bool = True
+    feasible: bool = True
+
+
+def plan_on_meshes(
+    problem: Problem,
+    method: Method,
+    accuracy: float,
+    cells: int | None,
+    time_limit: float | None,
+) -> SpeedProfile:
+    """The profile of all runs: on `cells` cells a piece, or on meshes refined to the relative `accuracy`."""
+    if not 0.0 < accuracy < 1.0:
+        raise InputError(f"the accuracy is {accuracy}: give a part of the time between 0 and 1, as 1e-4")
+    if cells is not None and cells < 1:
+        raise InputError(f"{cells} cells a piece: give 1 or more")
+    if time_limit is not None and not time_limit > 0.0:
+        raise InputError(f"the time limit is {time_limit} s: give a positive number")
+    deadline = time.monotonic() + (math.inf if time_limit is None else time_limit)
+    parts: list[tuple[Mesh, Arcs]] = []
+    runs, count = [0], 0
+    for run in stretches(problem):
+        for stretch in run:
+            part = _Planner(problem, stretch, method, deadline).plan(accuracy, cells)
+            parts.append(part)
+            count += len(part[0])
+        runs.append(count)
+    return profile(problem, parts, runs)
+
+
+@dataclass(frozen=True)
+class _Strictness:
+    """How much stricter than the limits the rows are: parts of the `acceleration` (n, joints) and of p in the
+    nodes, `speed` (n + 1,); and which cells are held `at_ends` (n,). `repeated` after the first time."""
+
+    acceleration: Array
+    speed: Array
+    at_ends: NDArray[np.bool_]
+    repeated: bool = False
+
+    @classmethod
+    def none(cls, grid: Mesh, problem: Problem) -> _Strictness:
+        cells = len(grid)
+        return cls(np.ones((cells, len(problem.axes))), np.ones(cells + 1), np.zeros(cells, dtype=bool))
+
+    def tightened(self, arcs: Arcs) -> _Strictness:
+        """Lower where the arcs go beyond; a cell that did so before is held at its ends instead."""
+        stubborn = self.repeated & (arcs.acceleration.max(axis=1) > 1.0 + _STUBBORN) & ~self.at_ends
+        acceleration = self.acceleration / _excess(arcs.acceleration)
+        acceleration[stubborn] = 1.0
+        beyond = _excess(arcs.speed)
+        speed = self.speed / np.maximum(np.append(beyond, 1.0), np.append(1.0, beyond))
+        return _Strictness(acceleration, speed, self.at_ends | stubborn, repeated=True)
+
+    @property
+    def share(self) -> Array:
+        """What of the accelerations is not used (n,)."""
+        return np.asarray(1.0 - self.acceleration.min(axis=1))
+
+
+def _excess(used: Array) -> Array:
+    """By how much a limit has to be lowered, 1 where it is kept."""
+    return np.where(used > 1.0, used * (1.0 + _EXCESS), 1.0)
+
+
+@dataclass(frozen=True)
+class _Planner:
+    """Plans one stretch."""
+
+    problem: Problem
+    stretch: Stretch
+    method: Method
+    deadline: float
+
+    def plan(self, accuracy: float, cells: int | None) -> tuple[Mesh, Arcs]:
+        pieces = self.stretch.last - self.stretch.first
+        if cells is not None:
+            self._check(pieces * cells, "a coarser mesh (fewer cells)")
+            grid, arcs, _ = self._on(even_cuts(self.stretch, cells))
+            excess = float(arcs.worst.max()) - 1.0
+            if self.method.feasible and excess > _EXCESS:
+                raise SolverError(
+                    f"{self._place}{self.method.name} leaves a limit by {excess:.1g} of it between nodes, "
+                    "and speeds given at the ends of the path keep it from being slower: give more cells"
+                )
+            return grid, arcs
+        cuts = even_cuts(self.stretch, max(_LEAST, math.ceil(_FIRST / pieces)))
+        times: list[float] = []
+        reached = ""
+        while True:
+            self._check(len(cuts), f"an accuracy above {accuracy:g}{reached}")
+            grid, arcs, lost = self._on(cuts)
+            times.append(float(arcs.duration.sum()))
+            unsure = lost + arcs.duration * (1.0 - arcs.used)
+            if len(times) > 2:
+                error = max(_left(times), _TRUE * float(unsure.sum())) / times[-1]
+                kept = not self.method.feasible or arcs.worst.max() <= 1.0 + _EXCESS
+                if kept and error <= _SAFETY * accuracy:
+                    return grid, arcs
+                reached = f" ({error:.1g} is reached)"
+            cuts = cuts.bisected(_greatest(unsure))
+
+    def _check(self, cells: int, remedy: str) -> None:
+        if cells > MAX_CELLS:
+            raise SolverError(
+                f"{self._place}{self.method.name} would need {cells} cells, {MAX_CELLS} are the most: "
+                f"ask for {remedy}, or use bang-bang"
+            )
+
+    def _on(self, cuts: Cuts) -> tuple[Mesh, Arcs, Array]:
+        """The solution on one mesh, and the time that it costs to keep the limits between the nodes (n,)."""
+        grid = mesh(self.problem, self.stretch, cuts)
+        moving = any(p is not None and p > 0.0 for p in grid.fixed)
+        strict = _Strictness.none(grid, self.problem)
+        arcs, rows = self._under(strict, grid)
+        if not self.method.feasible:
+            return grid, arcs, np.zeros(len(grid))
+        best = arcs, rows, strict
+        for _ in range(_MOVING_ROUNDS if moving else _ROUNDS):
+            if arcs.worst.max() <= 1.0 + _EXCESS:
+                break
+            strict = strict.tightened(arcs)
+            try:
+                arcs, rows = self._under(strict, grid)
+            except InfeasibleError:
+                break  # what is given at the ends needs all that the limits leave
+            if arcs.feasible_time < best[0].feasible_time:
+                best = arcs, rows, strict
+        arcs, rows, strict = best
+        worst = float(arcs.worst.max())
+        held = (rows.held & (arcs.acceleration > _NEAR)).any(axis=1)
+        lost = arcs.duration * (strict.share + np.where(held, grid.turn, 0.0))
+        lost += arcs.duration.sum() * np.maximum(arcs.worst - (1.0 + _EXCESS), 0.0)
+        # Speeds given at the ends are not scaled: there the excess has to vanish on a finer mesh.
+        return grid, arcs if moving else arcs.scaled((1.0 - _MARGIN) / max(worst, 1.0)), lost
+
+    def _under(self, strict: _Strictness, grid: Mesh) -> tuple[Arcs, Rows]:
+        """The arcs of the solution under stricter limits, and its rows."""
+        acceleration = self.problem.max_acceleration
+        rows = self.method.rows(grid, acceleration * strict.acceleration, strict.at_ends)
+        task = transcribe(grid, rows, acceleration, strict.speed, self.method.feasible)
+        p = self._solve(task) * task.scale
+        return arcs_between(self.problem, grid, p, self.method.by_axis), rows
+
+    def _solve(self, transcription: Transcription) -> Array:
+        left = self.deadline - time.monotonic()
+        name = self.method.name
+        try:
+            if left <= 0.0:
+                raise Refusal("time is up")
+            if not transcription.free.any():
+                return transcription.known
+            return self.method.solve(transcription, left)
+        except Refusal as refusal:
+            if refusal.infeasible:
+                sides = [side for side, x in enumerate(transcription.fixed) if x]
+                if sides:
+                    raise end_error(self.problem, self.stretch, sides[0]) from None
+            raise SolverError(
+                f"{self._place}{name} found no profile ({refusal}): allow more time, ask for another "
+                "accuracy, or use bang-bang"
+            ) from None
+
+    @property
+    def _place(self) -> str:
+        return f"line {int(self.problem.path.line[self.stretch.first])}: "
+
+
+def _greatest(parts: Array) -> NDArray[np.bool_]:
+    """The greatest of the parts (n,), which together are most of the whole."""
+    order = np.argsort(-parts)
+    enough = int(np.searchsorted(np.cumsum(parts[order]), _SHARE * parts.sum())) + 1
+    marked = np.zeros(len(parts), dtype=bool)
+    marked[order[:enough]] = True
+    return marked
+
+
+def _left(times: list[float]) -> float:
+    """By how much the times on finer and finer meshes would still fall.
+
+    From the last two steps, whose ratio tells how fast what is left becomes smaller.
+    """
+    before, last = (abs(times[-i] - times[-i - 1]) for i in (2, 1))
+    ratio = min(max(last / before, _FALLS[0]), _FALLS[1]) if before > 0.0 else _FALLS[1]
+    return last * ratio / (1.0 - ratio)

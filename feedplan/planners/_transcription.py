@@ -1,0 +1,191 @@
+"""The planning problem of one stretch as numbers: p in the nodes of a mesh, rows that hold in its cells.
+
+In a cell whose joint k keeps its direction the mean of a_k over the way of joint k is exactly
+
+    (q'_k(end)² p_end − q'_k(start)² p_start) / (2 Δq_k),
+
+linear in p, and a_k itself where the cell is passed with a_k constant. Limiting it gives second order in the
+width of the cells; limiting a_k at both ends of a cell with p linear in between loses an order, and is done
+only where a joint turns round inside the cell.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.planners._mesh import Mesh
+
+Array = NDArray[np.float64]
+Numbers = NDArray[np.int64]
+
+# A joint this much slower than all together is taken at both ends: the way it makes may be rounding.
+_SLOW = 1e-6
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Rows (r,) |`near`·p_start + `far`·p_end| ≤ 1 on the p of `cell` at its ends.
+
+    `held` (n, joints) are the joints whose limit holds at both ends of cells, at the cost of an order.
+    """
+
+    cell: Numbers
+    near: Array
+    far: Array
+    held: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Transcription:
+    """Minimise Σ 2 width/(√p_start + √p_end) over the cells, with p = `scale`·x in the nodes (n + 1,).
+
+    x is about 1 where the limits leave no more. `most` is the greatest x, `fixed` x at both ends of the
+    stretch where it is given. Per cell: `near`, `far` are √p_start and √p_end over √x, `width`.
+    `rows` are of x.
+    """
+
+    scale: Array
+    most: Array
+    fixed: tuple[float | None, float | None]
+    width: Array
+    near: Array
+    far: Array
+    rows: Rows
+
+    @property
+    def cells(self) -> int:
+        """Number of cells n."""
+        return len(self.width)
+
+    @cached_property
+    def free(self) -> NDArray[np.bool_]:
+        """Which nodes are to be found (n + 1,)."""
+        free = np.ones(self.cells + 1, dtype=bool)
+        free[[0, -1]] = [x is None for x in self.fixed]
+        return free
+
+    @cached_property
+    def known(self) -> Array:
+        """x in the nodes where it is given, 0 elsewhere (n + 1,)."""
+        known = np.zeros(self.cells + 1)
+        for node, x in zip((0, -1), self.fixed, strict=True):
+            known[node] = x or 0.0
+        return known
+
+    def time(self, x: Array) -> float:
+        """The time of a solution [s]."""
+        root = np.sqrt(x)
+        return float((2.0 * self.width / (self.near * root[:-1] + self.far * root[1:])).sum())
+
+
+def transcribe(
+    mesh: Mesh, rows: Rows, acceleration: Array, share: Array, feasible: bool = True
+) -> Transcription:
+    """The problem on a mesh; `share` (n + 1,) of the greatest p is allowed in the nodes.
+
+    A `feasible` profile is nowhere faster in the nodes than some acceleration of the parameter allows on
+    both sides.
+    """
+    limit = np.append(_limit_curve(mesh, acceleration, 0)[:1], _limit_curve(mesh, acceleration, -1))
+    limit[:-1] = np.minimum(limit[:-1], _limit_curve(mesh, acceleration, 0) / mesh.gain)
+    scale = _reachable(mesh, rows, np.minimum(limit, mesh.cap))
+    # Where nothing limits p, as where all joints stand, and where it is 0 its neighbours tell the size.
+    endless = ~(np.isfinite(scale) & (scale > 0.0))
+    if endless.any():
+        where = np.flatnonzero(~endless)
+        scale[endless] = np.interp(np.flatnonzero(endless), where, scale[where]) if len(where) else 1.0
+    near, far = mesh.gain * scale[:-1], scale[1:]
+    fixed = [None if p is None else p / scale[node] for p, node in zip(mesh.fixed, (0, -1), strict=True)]
+    return Transcription(
+        scale=scale,
+        most=share * (np.minimum(limit, mesh.cap) if feasible else mesh.cap) / scale,
+        fixed=(fixed[0], fixed[1]),
+        width=mesh.width,
+        near=np.sqrt(near),
+        far=np.sqrt(far),
+        rows=replace(rows, near=rows.near * near[rows.cell], far=rows.far * far[rows.cell]),
+    )
+
+
+def _reachable(mesh: Mesh, rows: Rows, greatest: Array) -> Array:
+    """The greatest p in the nodes that single rows leave, coming from both ends of the stretch (n + 1,).
+
+    A row with coefficients of two signs keeps p from growing faster. This is what a solution is like near a
+    stop.
+    """
+    bounds = np.flatnonzero((rows.near * rows.far <= 0.0) & (rows.near != 0.0) & (rows.far != 0.0))
+    bounds = bounds[np.argsort(rows.cell[bounds], kind="stable")]
+    first = np.searchsorted(rows.cell[bounds], np.arange(len(mesh) + 1)).tolist()
+    near = np.abs(rows.near[bounds] * mesh.gain[rows.cell[bounds]]).tolist()
+    far = np.abs(rows.far[bounds]).tolist()
+    p = greatest.tolist()
+    for end, known in zip((0, -1), mesh.fixed, strict=True):
+        p[end] = p[end] if known is None else known
+    for cell in range(len(mesh)):
+        reach = [(1.0 + near[i] * p[cell]) / far[i] for i in range(first[cell], first[cell + 1])]
+        p[cell + 1] = min([p[cell + 1], *reach])
+    for cell in reversed(range(len(mesh))):
+        reach = [(1.0 + far[i] * p[cell + 1]) / near[i] for i in range(first[cell], first[cell + 1])]
+        p[cell] = min([p[cell], *reach])
+    return np.array(p)
+
+
+def mean_rows(mesh: Mesh, limit: Array, at_ends: NDArray[np.bool_]) -> Rows:
+    """The mean acceleration of every joint over its way, at most `limit` (n, joints) [mm/s²].
+
+    In the cells `at_ends` (n,), and where a joint does not keep its direction, that at both ends.
+    """
+    size = np.linalg.norm(mesh.slope, axis=2).max(axis=0)
+    sign = np.sign(mesh.way[-1])
+    steady = (mesh.slope * sign >= 0.0).all(axis=0) & (np.abs(mesh.slope).max(axis=0) > _SLOW * size[:, None])
+    steady &= ~at_ends[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        weight = 1.0 / (2.0 * mesh.way[-1] * limit)
+        near, far = -(mesh.slope[0] ** 2) * weight, mesh.slope[-1] ** 2 * weight
+    cell, joint = np.nonzero(steady)
+    moves = (mesh.slope != 0.0).any(axis=0)
+    rest = end_rows(mesh, limit, ~steady & moves)
+    return Rows(
+        np.concatenate([cell, rest.cell]),
+        np.concatenate([near[cell, joint], rest.near]),
+        np.concatenate([far[cell, joint], rest.far]),
+        rest.held,
+    )
+
+
+def end_rows(
+    mesh: Mesh, limit: Array, chosen: NDArray[np.bool_] | None = None, ends: tuple[int, ...] = (0, -1)
+) -> Rows:
+    """a_k at `ends` of the cells with p linear in between, at most `limit` (n, joints), of `chosen`
+    joints."""
+    if chosen is None:
+        chosen = np.ones(limit.shape, dtype=bool)
+    cell, joint = np.nonzero(chosen)
+    weight = 1.0 / limit[cell, joint]
+    near, far = [], []
+    for end in ends:
+        slope = mesh.slope[end, cell, joint] * weight / (2.0 * mesh.width[cell])
+        bend = mesh.bend[end, cell, joint] * weight
+        near.append(-slope + (bend if end == 0 else 0.0))
+        far.append(slope + (bend if end == -1 else 0.0))
+    return Rows(np.tile(cell, len(ends)), np.concatenate(near), np.concatenate(far), chosen)
+
+
+def _limit_curve(mesh: Mesh, acceleration: Array, place: int) -> Array:
+    """The greatest p that some acceleration of the parameter leaves within all limits, at one place of the
+    cells."""
+    slope, bend = np.abs(mesh.slope[place]), mesh.bend[place]
+    tangent = mesh.slope[place]
+    best = np.full(len(mesh), np.inf)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for j in range(len(acceleration)):
+            best = np.fmin(best, np.where(slope[:, j] == 0.0, acceleration[j] / np.abs(bend[:, j]), np.inf))
+            for k in range(j):
+                turn = np.abs(bend[:, j] * tangent[:, k] - bend[:, k] * tangent[:, j])
+                room = acceleration[j] * slope[:, k] + acceleration[k] * slope[:, j]
+                best = np.fmin(best, np.where(turn > 0.0, room / turn, np.inf))
+    return best

@@ -1,0 +1,88 @@
+"""The time-optimal profile by direct transcription: a nonlinear program with p in the nodes, solved by IPOPT.
+
+CasADi derives the Hessian of the time; the rows are linear in p, so the program is convex and what IPOPT
+finds is the optimum of the mesh.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.constraints.problem import Problem
+from feedplan.errors import MissingPackageError
+from feedplan.planners._refinement import Method, Refusal, plan_on_meshes
+from feedplan.planners._transcription import Transcription, mean_rows
+from feedplan.profile import SpeedProfile
+
+Array = NDArray[np.float64]
+
+ACCURACY = 1e-4
+# What IPOPT may leave of optimality and rows, both scaled to about 1.
+_LEFT = 1e-8
+# Between the nodes of a stretch p is positive: the time would have no bound.
+_SLOWEST = 1e-9
+_START = 0.5
+
+
+def plan(
+    problem: Problem,
+    *,
+    accuracy: float = ACCURACY,
+    cells: int | None = None,
+    time_limit: float | None = None,
+) -> SpeedProfile:
+    """The fastest profile on a mesh of about the relative `accuracy` of the time, or of `cells` cells a
+    piece.
+
+    `time_limit` [s]. Raises SolverError with IPOPT's status, InfeasibleError where a speed given at an end
+    cannot be had, MissingPackageError.
+    """
+    try:
+        import casadi  # noqa: F401
+    except ImportError:
+        sentence = "the method casadi needs the package casadi: `pip install casadi`"
+        raise MissingPackageError(sentence) from None
+    return plan_on_meshes(problem, Method("casadi", _solve, mean_rows), accuracy, cells, time_limit)
+
+
+def _solve(task: Transcription, seconds: float) -> Array:
+    import casadi
+
+    free = np.flatnonzero(task.free)
+    x = casadi.SX.sym("x", len(free))
+    everywhere = casadi.SX(task.known)
+    everywhere[free.tolist()] = x
+    root = casadi.sqrt(everywhere)
+    n = task.cells
+    pace = casadi.DM(task.near) * root[:n] + casadi.DM(task.far) * root[1:]
+    # About 1 a cell: IPOPT's tolerance is that of a single row's share in the time.
+    mean = (2.0 * task.width / (task.near + task.far)).mean()
+    time = casadi.sum1(casadi.DM(2.0 * task.width / mean) / pace)
+    near, far = task.rows.cell.tolist(), (task.rows.cell + 1).tolist()
+    used = casadi.DM(task.rows.near) * everywhere[near] + casadi.DM(task.rows.far) * everywhere[far]
+    options: dict[str, Any] = {
+        "print_time": False,
+        "ipopt.print_level": 0,
+        "ipopt.sb": "yes",
+        "ipopt.tol": _LEFT,
+        "ipopt.constr_viol_tol": _LEFT,
+        "ipopt.bound_relax_factor": 0.0,
+        "ipopt.jac_c_constant": "yes",
+        "ipopt.jac_d_constant": "yes",
+    }
+    if math.isfinite(seconds):
+        options["ipopt.max_wall_time"] = seconds
+    solver = casadi.nlpsol("time_optimal", "ipopt", {"x": x, "f": time, "g": used}, options)
+    start = np.minimum(_START, _START * task.most[free])
+    found = solver(x0=start, lbx=_SLOWEST, ubx=task.most[free], lbg=-1.0, ubg=1.0)
+    statistics = solver.stats()
+    if not statistics["success"]:
+        word = str(statistics["return_status"])
+        raise Refusal(word, infeasible=word == "Infeasible_Problem_Detected")
+    result = task.known
+    result[free] = np.asarray(found["x"]).ravel()
+    return result

@@ -1,0 +1,147 @@
+"""The profile of TOPP-RA on a mesh aligned with the knots: a backward and a forward pass of small linear
+programs.
+
+After Pham and Pham, "A new approach to time-optimal path parameterization based on reachability analysis",
+IEEE Transactions on Robotics 34 (2018), in the package toppra. Its own scheme asks one path acceleration to
+serve both values of q'' at a knot and does not converge on C1 splines; here every cell has rows of its own.
+They hold at both ends of the cell (`one-sided`), so that the result is feasible and its time falls to the
+least one as the cells get smaller; or at its start alone (`collocation`), which breaks limits between the
+nodes and whose time rises to it. Both are of first order.
+"""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.constraints.problem import Problem
+from feedplan.errors import InputError, MissingPackageError
+from feedplan.planners._mesh import Mesh
+from feedplan.planners._refinement import Method, Refusal, plan_on_meshes
+from feedplan.planners._transcription import Rows, Transcription, end_rows
+from feedplan.profile import SpeedProfile
+
+Array = NDArray[np.float64]
+
+ACCURACY = 1e-3
+# x is bounded, where nothing else does, by so much of what is usual.
+_FASTEST = 1e6
+SCHEMES = ("one-sided", "collocation")
+
+
+def plan(
+    problem: Problem,
+    *,
+    accuracy: float = ACCURACY,
+    cells: int | None = None,
+    time_limit: float | None = None,
+    scheme: str = "one-sided",
+) -> SpeedProfile:
+    """The fastest profile on a mesh of about the relative `accuracy` of the time, or of `cells` cells a
+    piece.
+
+    `time_limit` [s] ends the refinement; toppra itself cannot be interrupted. `scheme` is `one-sided`, or
+    `collocation`, whose profile is faster than the limits allow. Raises SolverError where toppra fails,
+    InfeasibleError where a speed given at an end cannot be had, MissingPackageError.
+    """
+    if scheme not in SCHEMES:
+        raise InputError(f"there is no scheme '{scheme}' of toppra: use one of {', '.join(SCHEMES)}")
+    try:
+        with warnings.catch_warnings():
+            # Its docstrings hold escapes that Python warns of.
+            warnings.simplefilter("ignore")
+            import toppra.algorithm  # noqa: F401
+    except ImportError:
+        raise MissingPackageError(
+            "the method toppra needs the package toppra, which there is for Linux on x86-64: "
+            "`pip install toppra`"
+        ) from None
+    feasible = scheme == "one-sided"
+    rows = _at_both_ends if feasible else _at_start
+    method = Method("toppra", _solve, rows, by_axis=False, feasible=feasible)
+    return plan_on_meshes(problem, method, accuracy, cells, time_limit)
+
+
+def _at_both_ends(mesh: Mesh, limit: Array, at_ends: NDArray[np.bool_]) -> Rows:
+    return end_rows(mesh, limit)
+
+
+def _at_start(mesh: Mesh, limit: Array, at_ends: NDArray[np.bool_]) -> Rows:
+    return end_rows(mesh, limit, ends=(0,))
+
+
+def _solve(task: Transcription, seconds: float) -> Array:
+    import logging
+
+    from toppra.algorithm import TOPPRA
+
+    # toppra's path has one parameter, whose speed is continuous: that of the pieces, stretched from one to
+    # the next, with cells about 1 wide and squared speeds about 1.
+    stretch = np.concatenate([[0.0], np.cumsum(np.log(task.near[1:] / task.far[:-1]))])
+    stretch = np.exp(-stretch) / np.median(task.width * np.exp(-stretch))
+    unit = np.median((stretch * task.near) ** 2)
+    start, end = (stretch * task.near) ** 2 / unit, (stretch * task.far) ** 2 / unit
+    nodes = np.append(start, end[-1])
+    grid = np.concatenate([[0.0], np.cumsum(stretch * task.width)])
+    constraint = _constraint(task, 1.0 / start, 1.0 / end, grid, nodes)
+    log = logging.getLogger("toppra")
+    level = log.level
+    log.setLevel(logging.CRITICAL + 1)
+    try:
+        solver = TOPPRA([constraint], _path(grid), gridpoints=grid, solver_wrapper="seidel")
+        # In a cusp the tool stands whatever p is.
+        ends = [np.sqrt((x or 0.0) * nodes[node]) for node, x in zip((0, -1), task.fixed, strict=True)]
+        _, speed, _ = solver.compute_parameterization(*ends)
+    finally:
+        log.setLevel(level)
+    if speed is None or not np.isfinite(speed).all():
+        raise Refusal(str(solver.problem_data.return_code), infeasible=speed is None)
+    x: Array = speed**2 / nodes
+    return x
+
+
+def _constraint(task: Transcription, start: Array, end: Array, grid: Array, nodes: Array) -> Any:
+    """|(near + far) x + 2 Δ far u| ≤ 1 for the rows of each cell, as toppra has them, and 0 ≤ x ≤ most."""
+    from toppra.constraint import LinearConstraint
+
+    rows, n = task.rows, task.cells
+    order = np.argsort(rows.cell, kind="stable")
+    cell = rows.cell[order]
+    place = np.arange(len(cell)) - np.searchsorted(cell, cell)
+    count = int(place.max()) + 1
+    near, far = np.zeros((2, n + 1, count))
+    near[cell, place] = (rows.near * start[rows.cell])[order]
+    far[cell, place] = (rows.far * end[rows.cell])[order]
+    step = np.append(np.diff(grid), 0.0)[:, None]
+    identity = np.eye(count)
+    bound = np.column_stack([np.zeros(n + 1), np.minimum(task.most * nodes, _FASTEST * nodes)])
+
+    class Cells(LinearConstraint):  # type: ignore[misc]
+        def __init__(self) -> None:
+            super().__init__()
+            self.dof = 1
+            self.identical = True
+
+        def compute_constraint_params(self, path: Any, gridpoints: Any, *args: Any) -> tuple[Any, ...]:
+            sides, ones = np.vstack([identity, -identity]), np.ones(2 * count)
+            return 2.0 * step * far, near + far, np.zeros_like(near), sides, ones, None, bound
+
+    return Cells()
+
+
+def _path(grid: Array) -> Any:
+    """A path of which toppra needs no more than where its parameter begins and ends."""
+    from toppra.interpolator import AbstractGeometricPath
+
+    class Line(AbstractGeometricPath):  # type: ignore[misc]
+        dof = 1
+        path_interval = grid[[0, -1]]
+        waypoints = (grid, grid[:, None])
+
+        def __call__(self, u: Any, order: int = 0) -> Any:
+            return np.asarray(u)[..., None] if order == 0 else np.full((*np.shape(u), 1), float(order == 1))
+
+    return Line()
