@@ -17,6 +17,7 @@ from benchmarks import (
     methods,
     planner_cost,
     results,
+    zhang_comparison,
 )
 
 BENCHMARKS = {
@@ -27,6 +28,7 @@ BENCHMARKS = {
         curve_cost,
         against_toppra,
         end_to_end,
+        zhang_comparison,
         interpolators,
         kinematics_cost,
     )
