@@ -80,10 +80,10 @@ impl<const M: usize> QuadraticMotion<M> {
             ArcKind::Flat | ArcKind::SpeedLine => Law::Flat { p: arc.p0 },
         };
         if with_lengths || matches!(motion.law, Law::Feed { .. }) {
-            motion.length_error = fill(Length(motion.hodograph), arc, &mut motion.lengths);
+            motion.length_error = fill(Length(motion.hodograph), (arc.u0, arc.u1), &mut motion.lengths);
         }
         if matches!(motion.law, Law::Chord { .. }) {
-            motion.time_error = fill(ChordTime(motion.hodograph), arc, &mut motion.times);
+            motion.time_error = fill(ChordTime(motion.hodograph), (arc.u0, arc.u1), &mut motion.times);
         }
         motion
     }
