@@ -129,7 +129,8 @@ def plan(
 
     `source`: a file, a Program or a Path. `machine`: a Machine, or the name or file of one. `tolerance` [mm]
     is the greatest distance from the programmed path where the program lets the tool leave it (default: the
-    program's own, else 0.01); how it is followed within that depends on the method (`planners.corners`). `feed` [mm/s] replaces the programmed feeds, `feed_override` multiplies them.
+    program's own, else 0.01); how the path follows the program within it is the method's choice
+    (`planners.corners`). `feed` [mm/s] replaces the programmed feeds, `feed_override` multiplies them.
     `period` [s] replaces the machine's servo period; `start_speed` and `end_speed` [mm/s] hold at the ends.
     `progress(stage, done)` is called as the work goes on.
     Raises ProgramError, MachineError, InputError or InfeasibleError, each a sentence with place and remedy.
