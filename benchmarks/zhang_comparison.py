@@ -1,0 +1,60 @@
+"""What the optimum on fitted splines gains over transitions at corners: Zhang et al. 2010, section 5."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from benchmarks.named import example
+from benchmarks.results import Cell, Result
+from feedplan import Machine, Program, plan
+from feedplan.program.read import read_program
+
+NAME = "zhang-comparison"
+# The parts of the paper's figure 8 as our examples have them, and their blocks.
+PARTS = {"vase": 20_000, "lettering": 10_000, "head": 20_000}
+QUICK = 20  # times fewer blocks
+MACHINE = "vase"  # the accelerations of section 4.3
+# The paper states neither the feed nor the period. None: as the examples are programmed.
+FEEDS = (None, 200.0)  # [mm/s]
+PERIODS = (0.001, 0.002)  # [s]
+METHODS = {"constant velocity": "constant-velocity-transition", "arcs": "arc-transition"}
+
+
+def run(quick: bool = False) -> Result:
+    """Plan every part by the three methods at each feed and period, and audit what is planned."""
+    rows: list[dict[str, Cell]] = []
+    with tempfile.TemporaryDirectory() as directory:
+        for part, blocks in PARTS.items():
+            file = Path(directory, f"{part}.ngc")
+            file.write_text(example(part).program(blocks // (QUICK if quick else 1)), encoding="ascii")
+            program = read_program(file, Machine.load(MACHINE))
+            rows += [_row(part, program, feed, period) for feed in FEEDS for period in PERIODS]
+    return Result(
+        NAME,
+        "Machining time of transitions at corners over that of the optimum on fitted splines",
+        tuple(rows),
+        (
+            "gain: the method's time over the optimum's, less 1. Zhang et al. 2010 report 65 to 130 % over",
+            "constant-velocity transition and 30 to 110 % over arc transition, without feeds and period.",
+        ),
+    )
+
+
+def _row(part: str, program: Program, feed: float | None, period: float) -> dict[str, Cell]:
+    optimum = plan(program, MACHINE, feed=feed, period=period)
+    row: dict[str, Cell] = {
+        "part": part,
+        "moves": len(program),
+        "feed [mm/s]": "programmed" if feed is None else feed,
+        "T [ms]": 1e3 * period,
+        "optimum [s]": optimum.time,
+    }
+    audits = [optimum.audit().ok]
+    for name, method in METHODS.items():
+        other = plan(program, MACHINE, method, feed=feed, period=period)
+        row[f"{name} [s]"] = other.time
+        row[f"{name} gain [%]"] = 100.0 * (other.time / optimum.time - 1.0)
+        audits.append(other.audit().ok)
+    row["audits"] = "ok" if all(audits) else "broken"
+    return row
