@@ -136,7 +136,7 @@ fn over_run<const M: usize>(
     (cells, other): &mut (Cells, Cells),
 ) -> f64 {
     let turn = |i: usize, axis: usize, part: (f64, f64)| sweep::turn(task, i, axis, part);
-    cells.from_arcs(hint, pieces, task.problem.width, turn);
+    cells.divide(hint, pieces, task.problem.width, turn);
     // Where an axis turns, else half way.
     let middle = |i: usize, (from, to): (f64, f64)| {
         (0..M).find_map(|k| turn(pieces.0 + i, k, (from, to))).unwrap_or(0.5 * (from + to))

@@ -142,7 +142,7 @@ fn gaps(seeds: std::ops::Range<u64>, with_arcs: bool) -> Gaps {
     Gaps {
         least: found[0].0,
         shares: [0.5, 0.9, 1.0].map(share),
-        failures: found.iter().filter(|gap| !(gap.0 >= -1e-9)).map(|gap| gap.1).collect(),
+        failures: found.iter().filter(|gap| gap.0 < -1e-9 || gap.0.is_nan()).map(|gap| gap.1).collect(),
     }
 }
 

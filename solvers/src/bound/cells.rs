@@ -29,7 +29,7 @@ impl Cells {
     /// The arcs of the profile as cells, in two where the arc's axis turns. What is no profile gives cells all the same.
     ///
     /// `turn` gives the place where an axis turns on a part of a piece.
-    pub fn from_arcs(
+    pub fn divide(
         &mut self,
         hint: &Hint,
         (first, last): (usize, usize),

@@ -31,7 +31,8 @@ fn halves(
     let middle = 0.5 * (from + to);
     let (first, last) = (1.0 / ends.0.sqrt(), 1.0 / ends.1.sqrt());
     let half = d(middle);
-    if depth < MOST_HALVINGS && !((0.5 * (first + last) * half.sqrt() - 1.0).abs() <= OFF_LINE) {
+    let off = (0.5 * (first + last) * half.sqrt() - 1.0).abs();
+    if depth < MOST_HALVINGS && (off > OFF_LINE || off.is_nan()) {
         return halves(d, degree, noise, (from, middle), (ends.0, half), depth + 1)
             + halves(d, degree, noise, (middle, to), (half, ends.1), depth + 1);
     }
