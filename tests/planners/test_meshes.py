@@ -132,7 +132,7 @@ def test_a_program_is_planned_sampled_and_audited(method: str, tmp_path: FilePat
 
 
 def test_a_cusp_of_a_straight_piece_is_passed_at_speed() -> None:
-    # q' vanishes at both inner ends. As on a line of 100 mm nothing stops there: 80 ms up and down.
+    # q' vanishes at both inner ends. As on a line of 100 mm nothing stops there: 80 ms up, 80 ms down.
     points = [[[0.0, 0.0], [30.0, 40.0], [30.0, 40.0]], [[30.0, 40.0], [30.0, 40.0], [60.0, 80.0]]]
     path = Path(
         axes=("X", "Y"),
