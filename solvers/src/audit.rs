@@ -220,6 +220,9 @@ pub struct Limits<const M: usize> {
     pub jerk: [f64; M],
     /// Jump of each axis velocity that is allowed at a corner, in mm/s.
     pub jump: [f64; M],
+    /// What of it may show in differences of setpoints as an acceleration above the limit: nothing of a jump that is
+    /// no more than the limit over a period.
+    pub jump_beyond: [f64; M],
     /// Least and greatest position, in mm.
     pub travel: [[f64; 2]; M],
     /// In mm; infinite: not limited.

@@ -48,6 +48,16 @@ const ROUNDING: f64 = 16.0;
 /// Turns below this (rad) are no corners.
 const SMOOTH: f64 = 1e-9;
 
+/// What a corner between two lines becomes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rounding {
+    /// See "Why this shape".
+    Parabola,
+    /// The circle that touches both lines: with the turn θ, radius r and length l = r tan(θ/2) on each of them, the
+    /// corner is d = r (1/cos(θ/2) − 1) = l sin(θ/2)/(1 + cos(θ/2)) away. Controllers round so.
+    Circle,
+}
+
 /// How the tangent jumps where two pieces meet.
 #[derive(Clone, Copy, Debug)]
 pub struct Jump<const M: usize> {
@@ -101,9 +111,17 @@ impl<const M: usize> Jump<M> {
         EASE * 0.5 * share * speed * speed
     }
 
+    /// cos(turn/2).
+    fn half_cosine(&self) -> f64 {
+        (1.0 - 0.25 * self.size * self.size).max(0.0).sqrt()
+    }
+
     /// The length at which the curve is as far from the corner as `deviation`.
-    pub fn length_within(&self, deviation: f64) -> f64 {
-        4.0 * deviation / self.size
+    pub fn length_within(&self, deviation: f64, rounding: Rounding) -> f64 {
+        match rounding {
+            Rounding::Parabola => 4.0 * deviation / self.size,
+            Rounding::Circle => 2.0 * deviation * (1.0 + self.half_cosine()) / self.size,
+        }
     }
 
     /// The length is too short to be told from errors of rounding.
@@ -159,22 +177,32 @@ pub struct Sides<const M: usize> {
 }
 
 impl<const M: usize> Sides<M> {
-    /// The one parabola that rounds a corner between two lines of one feed and one tolerance.
-    pub fn parabola(&self, jump: &Jump<M>) -> Option<Followed<M>> {
+    /// The one piece that rounds a corner between two lines: a parabola if feed and tolerance are one, a circle at
+    /// the lower of both.
+    pub fn between_lines(&self, jump: &Jump<M>, rounding: Rounding) -> Option<Followed<M>> {
         let ([before], [after]) = (&self.before[..], &self.after[..]) else { return None };
         let (Shape::Conic(first), Shape::Conic(second)) = (&before.piece, &after.piece) else { return None };
         let alike = before.feed == after.feed && before.tolerance == after.tolerance;
-        if !(alike && first.is_line() && second.is_line()) {
+        if !(first.is_line() && second.is_line() && (alike || rounding == Rounding::Circle)) {
             return None;
         }
-        let distance = norm(&jump.displacement(first.width, second.width));
+        let weight = match rounding {
+            Rounding::Parabola => 1.0,
+            Rounding::Circle => jump.half_cosine(),
+        };
+        let control = [first.control[0], first.control[2], second.control[2]];
+        let mut corner = Conic { control, weight, width: first.width + second.width };
+        if rounding == Rounding::Circle {
+            corner.width = corner.natural_width();
+        }
+        // The point in the middle is this share of the parabola's distance away, which has weight 1.
+        let share = 2.0 / (1.0 + weight);
+        let distance = share * norm(&jump.displacement(first.width, second.width));
         Some(Followed {
-            piece: Shape::Conic(Conic {
-                control: [first.control[0], first.control[2], second.control[2]],
-                weight: 1.0,
-                width: first.width + second.width,
-            }),
+            piece: Shape::Conic(corner),
             last: after.last,
+            feed: before.feed.min(after.feed),
+            tolerance: before.tolerance.min(after.tolerance),
             deviation: distance + before.deviation.max(after.deviation),
             ..*before
         })
@@ -373,14 +401,14 @@ mod tests {
         let after = Conic::line([10.0, 0.0], [10.0, 10.0]);
         let jump = jump_between(before, after);
         assert_eq!(jump.change, [-1.0, 1.0]);
-        let length = jump.length_within(0.1);
+        let length = jump.length_within(0.1, Rounding::Parabola);
         assert!((length - 0.2 * 2f64.sqrt()).abs() < 1e-15);
         let sides = Sides {
             before: vec![followed(before.part(10.0 - length, 10.0))],
             after: vec![followed(after.part(0.0, length))],
             made: CompositeCurve::default(),
         };
-        let corner = sides.parabola(&jump).unwrap();
+        let corner = sides.between_lines(&jump, Rounding::Parabola).unwrap();
         let parabola = *conic(&corner);
         assert_eq!(parabola.control, [[10.0 - length, 0.0], [10.0, 0.0], [10.0, length]]);
         let [apex, _] = at(&parabola, 0.5);
@@ -394,6 +422,33 @@ mod tests {
         assert!(norm(&sub(&bent.control[2], &apex)) < 2e-15);
         let half = parabola.part(0.0, length);
         assert!(norm(&sub(&at(bent, 0.3)[0], &at(&half, 0.3)[0])) < 2e-15);
+    }
+
+    #[test]
+    fn a_right_angle_becomes_the_circle_whose_middle_is_at_the_tolerance() {
+        // Radius 0.1/(√2 − 1), which is also the length on both sides.
+        let before = Conic::line([0.0, 0.0], [10.0, 0.0]);
+        let after = Conic::line([10.0, 0.0], [10.0, 10.0]);
+        let jump = jump_between(before, after);
+        let radius = jump.length_within(0.1, Rounding::Circle);
+        assert!((radius - 0.1 / (2f64.sqrt() - 1.0)).abs() < 1e-15);
+        let mut sides = Sides {
+            before: vec![followed(before.part(10.0 - radius, 10.0))],
+            after: vec![followed(after.part(0.0, radius))],
+        };
+        sides.after[0].feed = 3.0;
+        let corner = sides.between_lines(&jump, Rounding::Circle).unwrap();
+        assert!((corner.deviation - 0.1).abs() < 1e-15 && corner.feed == 3.0);
+        let arc = *conic(&corner);
+        for i in 0..=8 {
+            let [point, _] = at(&arc, i as f64 / 8.0);
+            let spoke = sub(&point, &[10.0 - radius, radius]);
+            assert!((norm(&spoke) - radius).abs() < 1e-14, "{i}");
+        }
+        let [middle, _] = at(&arc, 0.5);
+        assert!((norm(&sub(&middle, &[10.0, 0.0])) - 0.1).abs() < 1e-14);
+        // The parabola needs one feed.
+        assert!(sides.between_lines(&jump, Rounding::Parabola).is_none());
     }
 
     #[test]

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 
 use crate::arc::{arc_extent, arc_pieces, Arc, ArcError};
 use crate::conic::Conic;
+use crate::corner::Rounding;
 use crate::fit::{fit_points, FitOptions};
 use crate::quadratic::{norm, sub};
 use crate::spline::CompositeCurve;
@@ -71,6 +72,8 @@ pub struct FollowOptions {
     pub max_speed: f64,
     /// Chains are smooth where they turn less than this, in rad.
     pub corner_angle: f64,
+    /// What corners between two lines become.
+    pub rounding: Rounding,
 }
 
 /// A piece and the moves it follows.
@@ -354,6 +357,7 @@ mod tests {
         corner_acceleration: f64::INFINITY,
         max_speed: 1e3,
         corner_angle: 0.5,
+        rounding: Rounding::Parabola,
     };
 
     /// Moves on a circle of radius 10 in chords of 0.02 rad.

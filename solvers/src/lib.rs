@@ -14,6 +14,7 @@ pub mod fit;
 pub mod follow;
 pub mod gcode;
 pub mod limit_curve;
+pub mod look_ahead;
 pub mod motion;
 pub mod newton;
 pub mod path_builder;

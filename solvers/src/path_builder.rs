@@ -53,7 +53,7 @@ pub fn build_path<const M: usize>(
     let FollowedProgram { pieces, points, splines, polynomials } = follow(moves, options)?;
     let (mut parts, mut runs) = (Vec::new(), vec![0]);
     if !pieces.is_empty() {
-        let stretches = Stretches::new(&pieces, moves.splines, moves.halt);
+        let stretches = Stretches::new(&pieces, moves.splines, moves.halt, options.rounding);
         let joints = 0..stretches.joint_count();
         let need: Vec<f64> = joints.clone().into_par_iter().map(|k| stretches.need(k, axes)).collect();
         let length = share_lengths(&need, &stretches.length);
@@ -80,7 +80,7 @@ pub fn build_path<const M: usize>(
 mod tests {
     use super::*;
     use crate::conic::Conic;
-    use crate::corner::Jump;
+    use crate::corner::{Jump, Rounding};
     use crate::follow::{Followed, Shape, LINE, SPLINE};
     use crate::quadratic::{norm, sub};
     use crate::spline::CompositeCurve;
@@ -92,6 +92,7 @@ mod tests {
         corner_acceleration: 4e3,
         max_speed: 1e3,
         corner_angle: 0.48,
+        rounding: Rounding::Parabola,
     };
 
     fn axes<const M: usize>(jump: bool) -> Axes<M> {
@@ -151,6 +152,36 @@ mod tests {
         assert_eq!((exact.len(), &stops[..]), (4, &[0, 1, 2, 3, 4][..]));
         let (passed, none) = polyline(&square, &[0.0; 4], false, true);
         assert_eq!((passed.len(), &none[..]), (4, &[0, 4][..]));
+    }
+
+    #[test]
+    fn a_square_with_circles_has_a_quarter_of_one_at_each_corner() {
+        let square = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0], [0.0, 0.0]];
+        let moves = Moves {
+            start: square[0],
+            kind: &[LINE; 4],
+            target: &square[1..],
+            feed: &[100.0; 4],
+            tolerance: &[0.01; 4],
+            fit_tolerance: &[0.0; 4],
+            halt: &[false; 4],
+            arcs: &[],
+            spline_moves: &[],
+            changes: &[],
+            splines: &CompositeCurve::default(),
+            joints: &[true; 4],
+        };
+        let options = FollowOptions { rounding: Rounding::Circle, ..OPTIONS };
+        let path = build_path(&moves, &options, &axes(false)).unwrap();
+        let pieces = path.parts.concat();
+        let radius = 0.01 / (2f64.sqrt() - 1.0);
+        assert_eq!((pieces.len(), &path.runs[..]), (7, &[0, 7][..]));
+        for corner in pieces.iter().skip(1).step_by(2) {
+            let arc = conic(corner);
+            assert!((arc.weight - 0.5f64.sqrt()).abs() < 1e-15);
+            assert!((norm(&sub(&arc.control[1], &arc.control[0])) - radius).abs() < 1e-12);
+            assert!((corner.deviation - 0.01).abs() < 1e-12);
+        }
     }
 
     #[test]

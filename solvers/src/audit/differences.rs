@@ -104,7 +104,7 @@ impl<const M: usize> Differences<'_, M> {
                 total[k] += excess[k].max(0.0) * self.limits.period;
             }
         }
-        if (0..M).any(|k| total[k] > self.limits.jump[k] * PASS_MARK) {
+        if (0..M).any(|k| total[k] > self.limits.jump_beyond[k] * PASS_MARK) {
             return false;
         }
         // Steps wholly before and wholly after the corner.

@@ -303,14 +303,14 @@ impl<const M: usize> View<'_, M> {
         for k in 0..M {
             let value = acceleration.value[k].abs() - acceleration.rounding[k];
             let mut limit = limits.acceleration[k];
-            if value > limit && limits.jump[k] > 0.0 {
+            if value > limit && limits.jump_beyond[k] > 0.0 {
                 let corners = *corners.get_or_insert_with(|| match comparison {
                     Some(comparison) => comparison.corners([&rows[c - 1], &rows[c], &rows[c + 1]]),
                     None if self.differences.looks_like_a_corner(c) => 1.0,
                     None => 0.0,
                 });
                 let time = 0.5 * (self.differences.step(c) + self.differences.step(c + 1));
-                limit += corners * limits.jump[k] / time;
+                limit += corners * limits.jump_beyond[k] / time;
             }
             tally.offer(Check::Acceleration, k, value, limit, rows[c].t, rows[c].line);
         }

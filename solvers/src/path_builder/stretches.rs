@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 
 use super::Axes;
-use crate::corner::{Jump, Sides};
+use crate::corner::{Jump, Rounding, Sides};
 use crate::follow::{Followed, Shape, Spline};
 use crate::spline::{CompositeCurve, Piece};
 
@@ -35,6 +35,7 @@ pub struct Stretches<'a, const M: usize> {
     /// For each piece, the sum of the widths before it in its stretch.
     station: Vec<f64>,
     pub length: Vec<f64>,
+    rounding: Rounding,
 }
 
 /// The stations where a rounded corner begins in the stretch before it and ends in the stretch after it.
@@ -45,7 +46,12 @@ pub struct Cuts {
 }
 
 impl<'a, const M: usize> Stretches<'a, M> {
-    pub fn new(pieces: &'a [Followed<M>], splines: &'a CompositeCurve<M>, halt: &[bool]) -> Self {
+    pub fn new(
+        pieces: &'a [Followed<M>],
+        splines: &'a CompositeCurve<M>,
+        halt: &[bool],
+        rounding: Rounding,
+    ) -> Self {
         let end = |at| Joint { at, jump: None };
         let inner = (1..pieces.len()).into_par_iter().filter_map(|at| {
             let (before, after) = (&pieces[at - 1], &pieces[at]);
@@ -72,7 +78,7 @@ impl<'a, const M: usize> Stretches<'a, M> {
             }
             length.push(sum);
         }
-        Self { pieces, splines, joints, station, length }
+        Self { pieces, splines, joints, station, length, rounding }
     }
 
     /// Number of joints, both ends of the path included.
@@ -99,7 +105,7 @@ impl<'a, const M: usize> Stretches<'a, M> {
         if jump.reverses() || exact && !((curved(before) || curved(after)) && jump.size <= CURVE_JOINT) {
             return 0.0;
         }
-        let wanted = jump
+        let mut wanted = jump
             .length_for(
                 [&before.piece, &after.piece],
                 before.feed.min(after.feed),
@@ -107,8 +113,15 @@ impl<'a, const M: usize> Stretches<'a, M> {
                 &axes.max_acceleration,
             )
             .max(LEAST_LENGTH * before.tolerance.min(after.tolerance));
+        // A circle touches one line on each side; what is curved is bent.
+        let lines = [before, after].map(|side| side.piece.conic().filter(|conic| conic.is_line()));
+        let mut rounding = Rounding::Parabola;
+        if let (Rounding::Circle, [Some(first), Some(second)]) = (self.rounding, lines) {
+            (wanted, rounding) = (wanted.min(first.width).min(second.width), Rounding::Circle);
+        }
         let (backwards, forwards) = self.sides(k);
-        reach(forwards, jump, exact, reach(backwards, jump, exact, wanted))
+        let length = reach(backwards, jump, exact, rounding, wanted);
+        reach(forwards, jump, exact, rounding, length)
     }
 
     /// Where piece `i` of stretch `k` ends.
@@ -196,7 +209,7 @@ impl<'a, const M: usize> Stretches<'a, M> {
             }
             cuts = Cuts { before: self.snapped(k - 1, cuts.before), after: self.snapped(k, cuts.after) };
             self.cut_sides(k, cuts, sides);
-            let excess = match sides.parabola(jump) {
+            let excess = match sides.between_lines(jump, self.rounding) {
                 Some(corner) => corner.deviation / corner.tolerance,
                 None => sides.bend(jump)?,
             };
@@ -229,7 +242,7 @@ impl<'a, const M: usize> Stretches<'a, M> {
                     let start = match (corners[k], &self.joints[k].jump) {
                         (Some(cuts), Some(turn)) => {
                             self.cut_sides(k, cuts, &mut sides);
-                            if let Some(corner) = sides.parabola(turn) {
+                            if let Some(corner) = sides.between_lines(turn, self.rounding) {
                                 part.pieces.push(corner);
                             } else {
                                 sides.bend(turn);
@@ -301,6 +314,7 @@ fn reach<'a, const M: usize>(
     side: impl Iterator<Item = &'a Followed<M>>,
     jump: &Jump<M>,
     exact: bool,
+    rounding: Rounding,
     wanted: f64,
 ) -> f64 {
     let (mut length, mut station) = (wanted, 0.0);
@@ -308,7 +322,7 @@ fn reach<'a, const M: usize>(
         if followed.exact && !exact {
             break;
         }
-        let room = jump.length_within(followed.tolerance - followed.deviation);
+        let room = jump.length_within(followed.tolerance - followed.deviation, rounding);
         length = length.min(room.max(station));
         station += followed.piece.width();
         if station >= length {
@@ -342,7 +356,7 @@ mod tests {
         let side = [whole.part(0.0, 4.0), whole.part(4.0, 10.0), Conic::line(points[1], points[2])]
             .map(|piece| Followed { piece: Shape::Conic(piece), ..lines[0] });
         let splines = CompositeCurve::default();
-        let stretches = Stretches::new(&side, &splines, &[false; 2]);
+        let stretches = Stretches::new(&side, &splines, &[false; 2], Rounding::Parabola);
         assert_eq!(stretches.length, [10.0, 10.0]);
         for (station, moved) in [(4.0 + 1e-9, 4.0), (4.0 - 1e-9, 4.0), (4.1, 4.1), (1e-9, 1e-9)] {
             assert_eq!(stretches.snapped(0, station), moved);

@@ -220,6 +220,7 @@ struct LimitArrays {
     max_acceleration: Vec<f64>,
     max_jerk: Vec<f64>,
     max_velocity_jump: Vec<f64>,
+    jump_beyond: Vec<f64>,
     travel: Vec<[f64; 2]>,
     chord_tolerance: f64,
     period: f64,
@@ -229,7 +230,8 @@ struct LimitArrays {
 impl LimitArrays {
     /// For `axes` axes, those beyond at rest.
     fn limits<const M: usize>(&self, axes: usize) -> PyResult<Limits<M>> {
-        let lengths = [&self.max_velocity, &self.max_acceleration, &self.max_jerk, &self.max_velocity_jump];
+        let jumps = [&self.max_velocity_jump, &self.jump_beyond];
+        let lengths = [&self.max_velocity, &self.max_acceleration, &self.max_jerk, jumps[0], jumps[1]];
         let good = axes <= M && lengths.iter().all(|row| row.len() == axes) && self.travel.len() == axes;
         require(good, "limits")?;
         fn padded<const M: usize>(values: &[f64]) -> [f64; M] {
@@ -242,6 +244,7 @@ impl LimitArrays {
             acceleration: padded(&self.max_acceleration),
             jerk: padded(&self.max_jerk),
             jump: padded(&self.max_velocity_jump),
+            jump_beyond: padded(&self.jump_beyond),
             travel: std::array::from_fn(|k| self.travel.get(k).copied().unwrap_or(anywhere)),
             chord_tolerance: self.chord_tolerance,
             period: self.period,

@@ -11,6 +11,7 @@ use super::arrays::{row, rows};
 use super::spline::curve;
 use super::{with_padded_axes, with_path_axes};
 use crate::arc::ArcError;
+use crate::corner::Rounding;
 use crate::follow::{ArcShape, Fault, FollowOptions, Followed, Moves, Shape};
 use crate::path_builder::{build_path as build, Axes, BuiltPath, Part};
 use crate::spline::{CompositeCurve, Piece};
@@ -55,7 +56,7 @@ type Splines<'py> = (
 #[pyo3(signature = (
     name, start, kind, target, feed, line, tolerance, fit_tolerance, halt, arc_move, arc_plane, arc_centre,
     arc_sweep, spline_move, spline_pieces, splines, change_move, change_start, joints, max_velocity, max_acceleration, travel, jump, exact_tolerance, max_chord, corner_acceleration,
-    max_speed, corner_angle
+    max_speed, corner_angle, circles
 ))]
 #[allow(clippy::too_many_arguments)]
 fn build_path<'py>(
@@ -88,6 +89,7 @@ fn build_path<'py>(
     corner_acceleration: f64,
     max_speed: f64,
     corner_angle: f64,
+    circles: bool,
 ) -> PyResult<(Columns<'py>, Summary, Option<Place>)> {
     let axes = start.len();
     let count = kind.len();
@@ -134,7 +136,9 @@ fn build_path<'py>(
             Ok((index, range))
         })
         .collect::<PyResult<_>>()?;
-    let options = FollowOptions { exact_tolerance, max_chord, corner_acceleration, max_speed, corner_angle };
+    let rounding = if circles { Rounding::Circle } else { Rounding::Parabola };
+    let options =
+        FollowOptions { exact_tolerance, max_chord, corner_acceleration, max_speed, corner_angle, rounding };
     with_path_axes!(axes, M, {
         let target = rows::<M>(&target)?;
         let splines = match &splines {

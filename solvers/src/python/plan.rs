@@ -1,13 +1,15 @@
 //! The exact planner: the package's own problem in, the columns of a profile out.
 
-use numpy::PyArray1;
+use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::arrays::{indices, quadratics, row};
+use super::arrays::{indices, quadratics, row, rows};
 use super::problem::{ProblemArrays, ProblemRows};
 use super::with_padded_axes;
 use crate::bang_bang::{self, plan_each};
 use crate::bang_bang_quadratic::{self, Fault, Profile};
+use crate::look_ahead::Segments;
 
 pyo3::create_exception!(
     _solvers,
@@ -117,9 +119,26 @@ pub fn to_exception(fault: &Fault) -> PyErr {
     PlanError::new_err((kind, piece, reachable, text))
 }
 
+/// The greatest speeds at the ends of segments, lowered to those that the segments between lead to.
+#[pyfunction]
+fn look_ahead<'py>(
+    py: Python<'py>,
+    speed: PyReadonlyArray1<'py, f64>,
+    gain: PyReadonlyArray1<'py, f64>,
+    hold: PyReadonlyArray2<'py, f64>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let (mut speed, gain, hold) = (speed.as_slice()?.to_vec(), gain.as_slice()?, rows::<2>(&hold)?);
+    if speed.len() != gain.len() + 1 || hold.len() != gain.len() {
+        return Err(PyValueError::new_err("the arrays of the segments differ in length"));
+    }
+    py.detach(|| Segments { gain, hold: &hold }.lower(&mut speed));
+    Ok(PyArray1::from_vec(py, speed))
+}
+
 /// Adds the function and its exception to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("PlanError", module.py().get_type::<PlanError>())?;
     module.add_function(wrap_pyfunction!(plan_curves, module)?)?;
+    module.add_function(wrap_pyfunction!(look_ahead, module)?)?;
     module.add_function(wrap_pyfunction!(plan_bang_bang, module)?)
 }
