@@ -18,6 +18,7 @@ from benchmarks import (
     methods,
     planner_cost,
     results,
+    zhang_comparison,
 )
 
 BENCHMARKS = {
@@ -29,6 +30,7 @@ BENCHMARKS = {
         certificate_cost,
         against_toppra,
         end_to_end,
+        zhang_comparison,
         interpolators,
         kinematics_cost,
     )

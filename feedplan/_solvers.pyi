@@ -29,6 +29,7 @@ __all__ = [
     "curve_reverse",
     "curve_split",
     "fit_points",
+    "look_ahead",
     "lower_bound",
     "plan_bang_bang",
     "plan_curves",
@@ -58,6 +59,9 @@ _Profile = tuple[
 
 def plan_bang_bang(problem: Problem) -> _Profile: ...
 def plan_curves(problem: Problem) -> _Profile: ...
+def look_ahead(
+    speed: NDArray[np.float64], gain: NDArray[np.float64], hold: NDArray[np.float64]
+) -> NDArray[np.float64]: ...
 def lower_bound(problem: Problem, profile: SpeedProfile) -> float: ...
 
 @final
@@ -154,6 +158,7 @@ def build_path(
     corner_acceleration: float,
     max_speed: float,
     corner_angle: float,
+    circles: bool,
 ) -> tuple[
     tuple[
         tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.int64], NDArray[np.float64]],

@@ -17,7 +17,7 @@ from feedplan.curves.length import CurveLength
 from feedplan.geometry.build import build_path
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
-from feedplan.planners import planner
+from feedplan.planners import corners, planner
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 from feedplan.program.read import read_program
@@ -128,12 +128,13 @@ def plan(
     interpolator: str = "sarfraz",
     progress: Progress | None = None,
 ) -> Plan:
-    """The time-optimal plan of a part program on a machine.
+    """The plan of a part program on a machine, time-optimal unless another method is asked for.
 
     `source`: a file, a Program or a Path. `machine`: a Machine, or the name or file of one. Methods that
     solve on a mesh refine it to the relative `accuracy` of the time, or take `cells` a piece, and give up
     after `time_limit` [s]; exact methods take none of these. `tolerance` [mm] is the greatest distance from
-    the programmed path where the program lets the tool leave it (default: the program's own, else 0.01).
+    the programmed path where the program lets the tool leave it (default: the program's own, else 0.01); how the path follows it
+    is the method's choice (`planners.corners`).
     `feed` [mm/s] replaces the programmed feeds, `feed_override` multiplies them. `period` [s] replaces the
     machine's servo period; `start_speed` and `end_speed` [mm/s] hold at the ends. `progress(stage, done)`
     is called as the work goes on. Raises ProgramError, MachineError, InputError or InfeasibleError, each a
@@ -155,7 +156,7 @@ def plan(
             program = source if isinstance(source, Program) else read_program(FilePath(source), machine)
         report("fit", 0.0)
         with _timed(compute, "fit"):
-            path = build_path(program, machine, tolerance)
+            path = build_path(program, machine, tolerance, corners=corners(method))
     report("plan", 0.0)
     with _timed(compute, "plan"):
         problem = build_problem(

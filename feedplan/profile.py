@@ -9,6 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 
+# The `axis` of an arc whose constant belongs to none.
+NO_AXIS = 255
+
+
 class ArcKind(IntEnum):
     """What stays constant on an arc of the profile; `value` holds the constant."""
 

@@ -38,12 +38,14 @@ def test_every_benchmark_runs_and_stores_its_table(tmp_path: Path) -> None:
         "certificate-cost",
         "against-toppra",
         "end-to-end",
+        "zhang-comparison",
         "interpolators",
         "kinematics-cost",
     }
     assert all(row["error [steps]"] <= 1.001e-6 for row in tables["interpolators"]["rows"])
     assert all(-1e-9 < row["gap"] < 1e-3 for row in tables["certificate-cost"]["rows"])
     assert all(row["audit"] == "ok" for row in tables["end-to-end"]["rows"])
+    assert all(row["audits"] == "ok" for row in tables["zhang-comparison"]["rows"])
     assert all(row["toppra's error"] <= row["accuracy"] for row in tables["against-toppra"]["rows"])
     assert all(table["computer"]["cores"] for table in tables.values())
 

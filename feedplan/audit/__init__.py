@@ -39,6 +39,7 @@ class _Limits:
     max_acceleration: list[float]
     max_jerk: list[float]
     max_velocity_jump: list[float]
+    jump_beyond: list[float]
     travel: list[tuple[float, float]]
     chord_tolerance: float
     period: float
@@ -60,6 +61,10 @@ def audit(
     `setpoints`, which are read chunk by chunk, their differences and their places on the path. Where the
     joints are not the path's axes, their limits are measured by the kinematics' positions alone. Jerk is
     judged only if the method claims it (`jerk`). `progress` is called with the share done, 0 to 1.
+
+    At a corner the profile's axis velocities may jump by the problem's `velocity_jump`. In setpoints a jump is an
+    acceleration over one period, judged like any other by second differences: only the jump that the machine
+    file allows may exceed the limit there.
     Raises InputError where path, machine, program and setpoints do not belong together.
     """
     axes = problem.axes
@@ -70,11 +75,13 @@ def audit(
             "with the program that it was built from"
         )
     machine_axes = _machine_axes(machine, axes)
+    jump = [axis.max_velocity_jump for axis in machine_axes]
     limits = _Limits(
         max_velocity=_numbers(problem.max_velocity),
         max_acceleration=_numbers(problem.max_acceleration),
         max_jerk=_numbers(problem.max_jerk),
-        max_velocity_jump=[axis.max_velocity_jump for axis in machine_axes],
+        max_velocity_jump=jump if problem.velocity_jump is None else _numbers(problem.velocity_jump),
+        jump_beyond=jump,
         travel=[axis.travel for axis in machine_axes],
         chord_tolerance=float(problem.chord_tolerance),
         period=float(problem.period),
@@ -134,6 +141,7 @@ def _audit_joints(
         max_acceleration=[math.inf] * axes,
         max_jerk=[math.inf] * axes,
         max_velocity_jump=[0.0] * axes,
+        jump_beyond=[0.0] * axes,
         travel=[(-math.inf, math.inf)] * axes,
     )
     findings, samples = audit_plan(problem, free, None, program)
@@ -207,6 +215,7 @@ def audit_setpoints(
     accelerations = None if acceleration is None else _array(acceleration, np.float64)
     if any(rates is not None and rates.shape != positions.shape for rates in (velocities, accelerations)):
         raise InputError("recorded velocities and accelerations must have the shape of the positions")
+    jump = [axis.max_velocity_jump for axis in machine_axes]
     lines = None if line is None else _array(line, np.int32)
     if lines is not None and lines.shape != times.shape:
         raise InputError("source lines must be as many as the times")
@@ -214,7 +223,8 @@ def audit_setpoints(
         max_velocity=[axis.max_velocity for axis in machine_axes],
         max_acceleration=[axis.max_acceleration for axis in machine_axes],
         max_jerk=[axis.max_jerk for axis in machine_axes],
-        max_velocity_jump=[axis.max_velocity_jump for axis in machine_axes],
+        max_velocity_jump=jump,
+        jump_beyond=jump,
         travel=[axis.travel for axis in machine_axes],
         chord_tolerance=math.inf,
         period=_period(times, machine.period),

@@ -13,6 +13,7 @@ from feedplan.constraints.feed import feed_limit
 from feedplan.constraints.junction import junction_limit
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
+from feedplan.geometry.corners import Corners
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
 
@@ -41,6 +42,7 @@ class Problem:
     (n + 1,) greatest speed [mm/s]: 0 at a stop, infinite where nothing but the other limits holds.
     `chord_tolerance` [mm] and `period` [s] limit the speed on a curve of radius ρ to (2/T)·√(2ρδ − δ²); an
     infinite tolerance switches that off. `start_speed` and `end_speed` [mm/s] hold at the ends of the path.
+    `velocity_jump` [mm/s] is what each axis velocity may jump by at a corner; None for the machine's own.
 
     Where the path's axes are not the joints of the machine, `joints` is the motion of the joints [mm, deg],
     one polynomial piece for each of the path and over the same parameter, counted from `joint_origin`
@@ -58,6 +60,7 @@ class Problem:
     period: float
     start_speed: float = 0.0
     end_speed: float = 0.0
+    velocity_jump: NDArray[np.float64] | None = None
     joint_axes: tuple[str, ...] = ()
     joints: CompositeCurve | None = None
     joint_origin: NDArray[np.float64] | None = None
@@ -136,7 +139,9 @@ def build_problem(
     """The path on the machine.
 
     `feed` [mm/s] replaces the programmed feeds, `feed_override` multiplies them (rapids keep the axes'
-    limits), `start_speed` and `end_speed` [mm/s] hold at the ends of the whole path.
+    limits), `start_speed` and `end_speed` [mm/s] hold at the ends of the whole path. Corners of a path that
+    keeps those of the program are passed with the jump that the machine allows, or that its accelerations
+    give in one servo period if that is more.
     Raises InputError for a value out of range.
     """
     for name, value in (("start speed", start_speed), ("end speed", end_speed)):
@@ -150,11 +155,14 @@ def build_problem(
             return _joint_problem(path, machine, feed, feed_override, (start_speed, end_speed))
     axes = [machine.axis(name) for name in path.axes]
     max_velocity = np.array([axis.max_velocity for axis in axes])
+    max_acceleration = np.array([axis.max_acceleration for axis in axes])
     jump = np.array([axis.max_velocity_jump for axis in axes])
+    if path.corners is Corners.PROGRAMMED:
+        jump = np.maximum(jump, max_acceleration * machine.period)
     return Problem(
         path=path,
         max_velocity=max_velocity,
-        max_acceleration=np.array([axis.max_acceleration for axis in axes]),
+        max_acceleration=max_acceleration,
         max_jerk=np.array([axis.max_jerk for axis in axes]),
         feed=feed_limit(path, 2.0 * float(np.linalg.norm(max_velocity)), feed, feed_override),
         junction_speed=_with_ends(junction_limit(path, jump), start_speed, end_speed),
@@ -162,6 +170,7 @@ def build_problem(
         period=machine.period,
         start_speed=start_speed,
         end_speed=end_speed,
+        velocity_jump=jump,
     )
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from feedplan._solvers import build_path as native_build_path
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError, ProgramError
+from feedplan.geometry.corners import Corners
 from feedplan.geometry.path import FitSummary, Path
 from feedplan.geometry.path_words import LINEAR_AXES, path_words
 from feedplan.machine.machine import Machine
@@ -63,6 +64,7 @@ def build_path(
     machine: Machine,
     tolerance: float | None = None,
     settings: FitSettings | None = None,
+    corners: Corners = Corners.ROUNDED,
 ) -> Path:
     """The path that the machine follows.
 
@@ -75,6 +77,9 @@ def build_path(
     the joint belongs to the stricter of them. Rapids are lines of their own. Arcs become true circles;
     splines go into the path as they are, their widths scaled to about the length, pieces without a length
     left out; only at corners are their ends cut and bent as those of lines and arcs are.
+
+    With `corners` ARCS nothing is fitted, and corners of two lines become true arcs within the tolerance; with
+    PROGRAMMED nothing is rounded either, and corners are passed within a run.
 
     Corners that cannot be rounded are stops, unless every axis that moves has a `max_velocity_jump`. The
     tool stops also where the meaning of words or the tool length changes. Axes that the program moves must
@@ -101,7 +106,7 @@ def build_path(
     changed = program.change_start.reshape(-1, len(program.axes))[:, columns]
     arc_plane = _arc_planes(program, names)
     splines = _splines(program, columns, starts)
-    limit, fit_limit = _tolerances(program, tolerance, settings)
+    limit, fit_limit = _tolerances(program, tolerance, settings, corners)
     exact = settings.exact_tolerance if not tolerance else min(tolerance, settings.exact_tolerance)
     halt = program.stop | (program.dwell > 0) | (program.control == PathControl.EXACT_STOP)
     halt[:-1] |= words.changes
@@ -132,12 +137,13 @@ def build_path(
         words.max_velocity,
         words.max_acceleration,
         words.travel,
-        words.may_jump,
+        words.may_jump or (corners is Corners.PROGRAMMED and bool(words.joints.all())),
         exact,
         settings.max_chord,
         settings.alpha * float(np.linalg.norm(words.max_acceleration)),
         float(np.linalg.norm(words.max_velocity)),
         math.radians(settings.corner_angle),
+        corners is Corners.ARCS,
     )
     if outside is not None:
         index, axis, position = outside
@@ -162,6 +168,7 @@ def build_path(
         start_dwell=program.start_dwell,
         meaning=None if program.meaning is None else program.meaning[first],
         tool_length=None if program.tool_length is None else program.tool_length[first],
+        corners=corners,
     )
 
 
@@ -210,7 +217,7 @@ def _arc_planes(program: Program, names: tuple[str, ...]) -> NDArray[np.int64]:
 
 
 def _tolerances(
-    program: Program, tolerance: float | None, settings: FitSettings
+    program: Program, tolerance: float | None, settings: FitSettings, corners: Corners
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Per move the allowed deviation and the fit's share of it [mm]; 0 where the path is exact."""
     if tolerance is None:
@@ -221,7 +228,10 @@ def _tolerances(
     else:
         limit = np.full(len(program), tolerance)
         fit_limit = np.full(len(program), np.inf)
-    limit = np.where(program.control == PathControl.TOLERANCE, limit, 0.0)
+    may_leave = (program.control == PathControl.TOLERANCE) & (corners is not Corners.PROGRAMMED)
+    limit = np.where(may_leave, limit, 0.0)
+    if corners is not Corners.ROUNDED:
+        return limit, np.zeros(len(program))
     return limit, np.minimum(fit_limit, settings.fit_share * limit)
 
 

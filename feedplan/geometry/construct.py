@@ -86,6 +86,7 @@ def path_of_points(
         math.inf,
         _ANY_SPEED,
         math.radians(settings.corner_angle),
+        False,
     )
     return _path(names, CompositeCurve(*curve), speed, runs, move, allowed, FitSummary(*summary))
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedplan.curves.composite import CompositeCurve
+from feedplan.geometry.corners import Corners
 
 if TYPE_CHECKING:
     from feedplan.geometry.build import FitSettings
@@ -53,6 +54,7 @@ class Path:
     from the programmed path [mm]; `start_dwell` pause before the first run [s].
     `meaning` (r,) what the axes are on the machine in each run (`feedplan.machine.meaning.Meaning`) and
     `tool_length` (r,) [mm], NaN for the machine file's; None where the machine knows one meaning only.
+    `corners` is what became of those of the program.
     Within a run the tangent is continuous, unless corners are passed with a velocity jump.
     """
 
@@ -68,6 +70,7 @@ class Path:
     start_dwell: float = 0.0
     meaning: NDArray[np.uint8] | None = None
     tool_length: NDArray[np.float64] | None = None
+    corners: Corners = Corners.ROUNDED
 
     def __post_init__(self) -> None:
         dtypes = {"feed": float, "move": np.int64, "line": np.int32, "runs": np.int64, "dwell": float}

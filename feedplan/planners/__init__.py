@@ -3,6 +3,8 @@
 A planner module has one function `plan(problem: Problem) -> SpeedProfile`, with what options it has as
 keywords. The method `bang-bang` is the module `bang_bang`. Modules whose names begin with an underscore are
 what several planners share.
+A method that is made for another path than the rounded one says so in `CORNERS`
+(`feedplan.geometry.corners.Corners`).
 """
 
 from __future__ import annotations
@@ -12,9 +14,11 @@ import inspect
 import pkgutil
 from collections.abc import Callable
 from functools import partial
+from types import ModuleType
 
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InputError
+from feedplan.geometry.corners import Corners
 from feedplan.profile import SpeedProfile
 
 
@@ -29,11 +33,20 @@ def planner(method: str, **options: float | None) -> Callable[[Problem], SpeedPr
 
     Raises InputError naming the methods there are, or the option that the method does not have.
     """
-    if method not in methods():
-        raise InputError(f"there is no method '{method}': use one of {', '.join(methods())}")
-    module = importlib.import_module(f"{__name__}.{method.replace('-', '_')}")
-    plan: Callable[..., SpeedProfile] = module.plan
+    plan: Callable[..., SpeedProfile] = _module(method).plan
     given = {name: value for name, value in options.items() if value is not None}
     for name in given.keys() - inspect.signature(plan).parameters.keys():
         raise InputError(f"the method {method} takes no {name.replace('_', ' ')}: leave it out")
     return partial(plan, **given)
+
+
+def corners(method: str) -> Corners:
+    """What becomes of a program's corners in the path that a method is made for; raises as `planner`."""
+    choice: Corners = getattr(_module(method), "CORNERS", Corners.ROUNDED)
+    return choice
+
+
+def _module(method: str) -> ModuleType:
+    if method not in methods():
+        raise InputError(f"there is no method '{method}': use one of {', '.join(methods())}")
+    return importlib.import_module(f"{__name__}.{method.replace('-', '_')}")

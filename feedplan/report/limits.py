@@ -111,6 +111,8 @@ def _sample(
     length = (start + np.cumsum(within[:, -1]) - within[:, -1])[:, None] + within
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         p = _profile_at(problem.curve, profile, arc, u, place, tangent, rate)
+        line = np.flatnonzero(profile.kind[arc] == ArcKind.SPEED_LINE)
+        p[line] = _speed_line(problem, profile, arc[line], u[line]) / rate[line] ** 2
         return LimitSamples(
             length=length.ravel(),
             speed=rate * np.sqrt(np.maximum(p, 0.0)),
@@ -155,6 +157,17 @@ def _profile_at(
     )
     p = np.where(u == u0, p0, np.where(u == u1, p1, p))
     return np.asarray(p)
+
+
+def _speed_line(problem: Problem, profile: SpeedProfile, arc: NDArray[np.int64], u: Floats) -> Floats:
+    """v² at a parameter of arcs on which it is linear."""
+    curve, piece = problem.tip_curve or problem.curve, profile.piece[arc]
+    u0, u1 = profile.u0[arc], profile.u1[arc]
+    start, end = (
+        (curve.evaluate(piece, at, 1)[1] ** 2).sum(axis=1) * p
+        for at, p in ((u0, profile.p0[arc]), (u1, profile.p1[arc]))
+    )
+    return np.asarray(start + (end - start) * (u - u0) / (u1 - u0))
 
 
 def limit_curve(tangent: Floats, second: Floats, max_acceleration: Floats) -> Floats:

@@ -57,7 +57,7 @@ def _name(problem: Problem, kind: int, axis: int) -> str:
         return f"{letter}acceleration"
     if kind == ArcKind.AXIS_VELOCITY:
         return f"{letter}velocity"
-    return {int(ArcKind.FEED): "feed", int(ArcKind.CHORD): "chord error"}.get(kind, f"limit {kind}")
+    return {ArcKind.FEED: "feed", ArcKind.CHORD: "chord error"}.get(ArcKind(kind), "acceleration along the path")
 
 
 def time_per_limit(problem: Problem, profile: SpeedProfile) -> list[Share]:

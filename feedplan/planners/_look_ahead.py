@@ -1,0 +1,171 @@
+"""Trapezoids with look-ahead over whole runs: what the methods of controllers share.
+
+A method says how fast corners are passed and which accelerations it allows; speed rises and falls at one tangential
+acceleration on each segment (`_segments`). On a line that is the greatest of its direction, min over the axes of A_k/|t_k|,
+and the profile is exact. On a part of a curved piece v² is linear in the parameter, with the greatest slope that
+keeps the tangential acceleration all over the part.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan._solvers import look_ahead as native_look_ahead
+from feedplan.constraints.problem import Problem
+from feedplan.errors import InfeasibleError
+from feedplan.planners._segments import Array, Rule, Segments, segments
+from feedplan.profile import NO_AXIS, ArcKind, SpeedProfile
+
+# A shorter part of a segment than this is rounding.
+NO_PART = 1e-14
+
+# Reached speeds may miss those asked for by this share.
+ROUNDING = 1e-12
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(10)
+
+# What happens between two of the six places of a segment.
+_CONSTANT = np.array([True, False, True, False, True])
+_SIGN = np.array([0.0, 1.0, 0.0, -1.0, 0.0])
+
+
+def look_ahead(
+    problem: Problem, corner_speed: Array, rule: Rule, hold: NDArray[np.float64] | None = None
+) -> SpeedProfile:
+    """The fastest trapezoids.
+
+    `corner_speed` (n + 1,) [mm/s] limits the speed at the ends of the pieces; runs end at rest, the path at the
+    problem's speeds. `hold` (n + 1,) [s]: so long before and after the end of a piece the speed stays as it is
+    there; beside a curve the tool stops instead. Raises InfeasibleError where start or end speed cannot be had.
+    """
+    parts = segments(problem, rule)
+    at_end, held = _speed_at_ends(problem, parts, corner_speed, hold)
+    room = np.stack([held[:-1], held[1:]], axis=1)
+    acceleration = 0.5 * parts.slope / parts.rate
+    holds = np.where(room > 0.0, acceleration[:, None] * room, 0.0)
+    speed = native_look_ahead(at_end, parts.slope * (parts.u1 - parts.u0), np.ascontiguousarray(holds))
+    _check_ends(problem, speed)
+    return _profile(problem, parts, speed, room)
+
+
+def _speed_at_ends(
+    problem: Problem, parts: Segments, corner_speed: Array, hold: NDArray[np.float64] | None
+) -> tuple[Array, Array]:
+    """Greatest speeds at the ends of the segments, and how long each is held (m + 1,)."""
+    first = np.searchsorted(parts.piece, np.arange(len(problem.path) + 1))
+    limit = np.concatenate([parts.speed, [np.inf]])
+    limit[1:] = np.minimum(limit[1:], parts.speed)
+    limit[first] = np.minimum(limit[first], corner_speed)
+    limit[first[problem.path.runs]] = 0.0
+    limit[0], limit[-1] = min(parts.speed[0], problem.start_speed), min(parts.speed[-1], problem.end_speed)
+    held = np.zeros(len(limit))
+    if hold is None:
+        return limit, held
+    held[first] = hold
+    held[[0, -1]] = 0.0
+    curved = np.concatenate([[False], np.isnan(parts.rate), [False]])
+    limit[(held > 0.0) & (curved[:-1] | curved[1:])] = 0.0
+    held[limit == 0.0] = 0.0
+    # A segment takes as long as both its ends are held.
+    time = held[:-1] + held[1:]
+    with np.errstate(divide="ignore"):
+        whole = np.where(time > 0.0, parts.rate * (parts.u1 - parts.u0) / time, np.inf)
+    for ends, both in ((slice(None, -1), whole), (slice(1, None), whole)):
+        limit[ends] = np.where(held[ends] > 0.0, np.minimum(limit[ends], both), limit[ends])
+    return limit, held
+
+
+def _check_ends(problem: Problem, speed: Array) -> None:
+    for name, place, wanted, reached in (
+        ("starts", 0, problem.start_speed, float(speed[0])),
+        ("ends", -1, problem.end_speed, float(speed[-1])),
+    ):
+        if reached < wanted * (1.0 - ROUNDING):
+            line = int(problem.path.line[place])
+            shown = math.floor(reached * 1e6) / 1e6
+            raise InfeasibleError(
+                f"line {line}: no profile of this method {name} at {wanted:g} mm/s: at most {shown:g} mm/s is possible",
+                line,
+                reached,
+            )
+
+
+def _profile(problem: Problem, parts: Segments, speed: Array, room: Array) -> SpeedProfile:
+    """The arcs between the speeds at the ends of the segments."""
+    whole = parts.u1 - parts.u0
+    start_sq, end_sq = speed[:-1] ** 2, speed[1:] ** 2
+    still = np.where(room > 0.0, room * np.stack([speed[:-1], speed[1:]], axis=1) / parts.rate[:, None], 0.0)
+    left = np.maximum(whole - still.sum(axis=1), 0.0)
+    least = np.maximum(start_sq, end_sq)
+    meet = 0.5 * (start_sq + end_sq + parts.slope * left)
+    triangle = meet < parts.speed**2
+    peak_sq = np.maximum(np.minimum(meet, parts.speed**2), least)
+
+    # Held, speeding up, cruising, slowing down, held.
+    rise, fall = (peak_sq - start_sq) / parts.slope, (peak_sq - end_sq) / parts.slope
+    top, end = still[:, 0] + rise, whole - still[:, 1]
+    down = np.where(triangle, top, end - fall)
+    place = np.stack([np.zeros(len(parts)), still[:, 0], top, down, end, whole], axis=1)
+    place = np.maximum.accumulate(np.clip(place, 0.0, whole[:, None]), axis=1)
+    none = NO_PART * whole
+    for i in range(1, 5):
+        place[:, i] = np.where(place[:, i] - place[:, i - 1] <= none, place[:, i - 1], place[:, i])
+    for i in range(4, 0, -1):
+        place[:, i] = np.where(whole - place[:, i] <= none, whole, place[:, i])
+    speed_sq = np.stack([start_sq, start_sq, peak_sq, peak_sq, end_sq, end_sq], axis=1)
+
+    segment, phase = np.nonzero(np.diff(place, axis=1) > 0.0)
+    u = np.where(place == whole[:, None], parts.u1[:, None], parts.u0[:, None] + place)
+    u0, u1 = u[segment, phase], u[segment, phase + 1]
+    from_sq, to_sq = speed_sq[segment, phase], speed_sq[segment, phase + 1]
+    piece, line = parts.piece[segment], ~np.isnan(parts.rate[segment])
+    constant = _CONSTANT[phase]
+    ramp_kind = np.where(line, ArcKind.AXIS_ACCELERATION, ArcKind.SPEED_LINE)
+    rate = np.stack([parts.rate[segment]] * 2)
+    length = rate[0] * (u1 - u0)
+    curved = np.flatnonzero(~line)
+    if len(curved):
+        ends = (problem.curve.evaluate(piece[curved], at[curved], 1)[1] for at in (u0, u1))
+        rate[:, curved] = [np.linalg.norm(tangent, axis=1) for tangent in ends]
+        length[curved] = _weighted_length(problem, piece[curved], u0[curved], u1[curved], from_sq[curved], to_sq[curved])
+    return SpeedProfile(
+        piece=piece.astype(np.uint32),
+        kind=np.where(constant, ArcKind.FEED, ramp_kind).astype(np.uint8),
+        axis=np.where(constant, NO_AXIS, parts.axis[segment]).astype(np.uint8),
+        value=np.where(constant, from_sq, _SIGN[phase] * parts.value[segment]),
+        u0=u0,
+        u1=u1,
+        p0=from_sq / rate[0] ** 2,
+        p1=to_sq / rate[1] ** 2,
+        duration=2.0 * length / (np.sqrt(from_sq) + np.sqrt(to_sq)),
+        runs=np.searchsorted(piece, problem.path.runs),
+    )
+
+
+def _weighted_length(
+    problem: Problem, piece: NDArray[np.int64], u0: Array, u1: Array, from_sq: Array, to_sq: Array
+) -> Array:
+    """The mean of |C'| over v, times u1 − u0: v grows evenly with time where |C'| is constant."""
+    start, end = np.sqrt(from_sq), np.sqrt(to_sq)
+    total = np.zeros(len(piece))
+    for node, weight in zip(0.5 * (1.0 + _NODES), 0.5 * _WEIGHTS, strict=True):
+        # v² is linear in u: the share of the parameter at which v is this share of the way from start to end.
+        share = node * ((2.0 - node) * start + node * end) / (start + end)
+        u = np.minimum(u0 + share * (u1 - u0), u1)
+        total += weight * np.linalg.norm(problem.curve.evaluate(piece, u, 1)[1], axis=1)
+    return np.asarray(total * (u1 - u0))
+
+
+def shared_acceleration(tangent: Array, normal: Array, limit: Array) -> tuple[Array, Array]:
+    """Half along the path, √3/2 across it, of what every direction in the plane of both allows.
+
+    No sum of the two exceeds an axis's limit. The split is that of LinuxCNC's blend arcs (`blendmath.h`: a tangential
+    ratio of 0.5, the normal one its complement in the circle); the whole is min over the axes of
+    A_k/√(t_k² + n_k²).
+    """
+    with np.errstate(divide="ignore"):
+        whole = (limit / np.hypot(tangent, normal)).min(axis=1)
+    return 0.5 * whole, 0.5 * math.sqrt(3.0) * whole

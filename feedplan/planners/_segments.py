@@ -1,0 +1,198 @@
+"""Paths in segments as controllers see them: one greatest speed and one greatest tangential acceleration each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.constraints.problem import Problem
+from feedplan.curves.composite import CompositeCurve
+from feedplan.errors import InputError
+from feedplan.profile import NO_AXIS
+
+Array = NDArray[np.float64]
+
+# From unit tangents and unit normals (m, axes; a normal is 0 where the path is straight) and the limits of the axes
+# [mm/s²]: the greatest accelerations along and across the path (m,) [mm/s²].
+Rule = Callable[[Array, Array, Array], tuple[Array, Array]]
+
+# A curved piece is cut into parts on which it turns, and ln |C'| changes, by about this at most.
+STEP = 0.1
+
+# Places of a part at which its limits are taken, as shares of it. On a circle they are exact; elsewhere the limits
+# between two places differ from theirs by the order of STEP²/16 of themselves.
+PLACES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
+
+# Places that tell how much a whole piece turns.
+SURVEY = np.linspace(0.0, 1.0, 17)
+
+# Greatest speeds of the parts of a piece are one if they differ by this share.
+ONE_SPEED = 1e-9
+
+# A tangent shorter than this share of the longest of its piece is a cusp.
+CUSP = 1e-9
+
+# Control points may lie this share of an edge, and this many roundings, off even spacing on a line.
+UNEVEN, ROUNDINGS = 1e-9, 8.0
+
+
+@dataclass(frozen=True)
+class Segments:
+    """Lines, and parts of curved pieces, in the order of the path.
+
+    `piece`, `u0`, `u1` (m,) say which; `rate` (m,) is |C'|, constant on lines, NaN on curves. `speed` (m,) [mm/s]
+    is the greatest; `slope` (m,) the greatest change of v² by u [mm/s²·|C'|]. On lines `axis` is the one whose
+    acceleration limit that is, `value` [mm/s²] its acceleration when the path speeds up; NO_AXIS and 0 on curves.
+    """
+
+    piece: NDArray[np.int64]
+    u0: Array
+    u1: Array
+    rate: Array
+    speed: Array
+    slope: Array
+    axis: NDArray[np.uint8]
+    value: Array
+
+    def __len__(self) -> int:
+        return len(self.piece)
+
+
+def segments(problem: Problem, rule: Rule) -> Segments:
+    """The path of a problem in segments, accelerations by `rule`.
+
+    Speeds are limited by feed, axis velocities and, on curves, chord error and the acceleration across.
+    Raises InputError at cusps, and where the joints move in another way than the path's axes.
+    """
+    if problem.joints is not None:
+        raise InputError(
+            "this method takes the program's axes as the machine's: where joints move in another way, "
+            "plan with bang-bang"
+        )
+    curve = problem.curve
+    straight = is_line(curve)
+    lines, curves = np.flatnonzero(straight), np.flatnonzero(~straight)
+    parts = [_lines(problem, lines)]
+    if len(curves):
+        parts.append(_curves(problem, curves, rule))
+    columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in parts[0].__dict__}
+    order = np.lexsort((columns["u0"], columns["piece"]))
+    return Segments(**{name: column[order] for name, column in columns.items()})
+
+
+def is_line(curve: CompositeCurve) -> NDArray[np.bool_]:
+    """(n,) which pieces are lines at constant |C'|, as the path builder makes them."""
+    control, first = curve.control_points, curve.offsets[:-1]
+    edge = np.diff(control, axis=0)
+    own = np.repeat(np.arange(len(curve)), curve.degree + 1)[:-1]
+    uneven = np.abs(edge - edge[first][own]).max(axis=1, initial=0.0)
+    size = UNEVEN * np.abs(edge[first]).max(axis=1)
+    size += ROUNDINGS * np.finfo(float).eps * np.abs(control[first]).max(axis=1)
+    # The edge from one piece to the next says nothing.
+    uneven[curve.offsets[1:-1] - 1] = 0.0
+    line = np.maximum.reduceat(np.append(uneven, 0.0), first) <= size
+    return np.asarray(line & ~curve.rational)
+
+
+def _lines(problem: Problem, piece: NDArray[np.int64]) -> Segments:
+    curve = problem.curve
+    way = curve.control_points[curve.offsets[piece + 1] - 1] - curve.control_points[curve.offsets[piece]]
+    length = np.linalg.norm(way, axis=1)
+    _refuse(problem, piece[length == 0.0], "the piece has no length: leave it out")
+    tangent = way / length[:, None]
+    by_axis = _over(problem.max_acceleration, np.abs(tangent))
+    axis = by_axis.argmin(axis=1)
+    rows = np.arange(len(piece))
+    rate = length / curve.width[piece]
+    return Segments(
+        piece=piece,
+        u0=np.zeros(len(piece)),
+        u1=curve.width[piece],
+        rate=rate,
+        speed=_speed(problem, piece, tangent),
+        slope=2.0 * by_axis[rows, axis] * rate,
+        axis=axis.astype(np.uint8),
+        value=np.copysign(problem.max_acceleration[axis], tangent[rows, axis]),
+    )
+
+
+def _curves(problem: Problem, pieces: NDArray[np.int64], rule: Rule) -> Segments:
+    count = _part_counts(problem, pieces)
+    piece = np.repeat(pieces, count)
+    number = np.arange(len(piece)) - np.repeat(np.cumsum(count) - count, count)
+    whole, parts = problem.curve.width[piece], np.repeat(count, count)
+    # The end of a part is the start of the next to the last digit, that of the last the width itself.
+    u0, u1 = number / parts * whole, (number + 1) / parts * whole
+    u = np.clip(u0[:, None] + PLACES * (u1 - u0)[:, None], u0[:, None], u1[:, None])
+    rows = np.repeat(piece, len(PLACES))
+    _, first, second = problem.curve.evaluate(rows, u.ravel(), 2)
+    rate = np.linalg.norm(first, axis=1)
+    tangent = first / rate[:, None]
+    bend = second - (second * tangent).sum(axis=1)[:, None] * tangent
+    size = np.linalg.norm(bend, axis=1)
+    curvature = size / rate**2
+    along, across = rule(tangent, _over(bend, size[:, None], 0.0), problem.max_acceleration)
+    with np.errstate(divide="ignore", over="ignore"):
+        radius = 1.0 / curvature
+        speed = np.minimum(_speed(problem, rows, tangent), np.sqrt(across * radius))
+    speed = np.minimum(speed, _chord_speed(problem, radius))
+    shape = (-1, len(PLACES))
+    speed = speed.reshape(shape).min(axis=1)
+    # On a circle the parts differ by rounding alone: one speed for all of them.
+    least = np.repeat(np.minimum.reduceat(speed, np.cumsum(count) - count), count)
+    speed = np.where(speed <= least * (1.0 + ONE_SPEED), least, speed)
+    return Segments(
+        piece=piece,
+        u0=u0,
+        u1=u1,
+        rate=np.full(len(piece), np.nan),
+        speed=speed,
+        slope=(2.0 * along * rate).reshape(shape).min(axis=1),
+        axis=np.full(len(piece), NO_AXIS, dtype=np.uint8),
+        value=np.zeros(len(piece)),
+    )
+
+
+def _part_counts(problem: Problem, piece: NDArray[np.int64]) -> NDArray[np.int64]:
+    """How many parts each curved piece is cut into."""
+    u = problem.curve.width[piece][:, None] * SURVEY
+    first = problem.curve.evaluate(np.repeat(piece, len(SURVEY)), u.ravel(), 1)[1]
+    first = first.reshape(len(piece), len(SURVEY), -1)
+    rate = np.linalg.norm(first, axis=2)
+    cusp = rate.min(axis=1) <= CUSP * rate.max(axis=1)
+    _refuse(problem, piece[cusp], "the path has a cusp, where this method has no speed: plan with bang-bang")
+    tangent = first / rate[:, :, None]
+    turn = np.linalg.norm(np.diff(tangent, axis=1), axis=2).sum(axis=1)
+    change = np.abs(np.diff(np.log(rate), axis=1)).sum(axis=1)
+    return np.maximum(np.ceil(np.maximum(turn, change) / STEP), 1.0).astype(np.int64)
+
+
+def _speed(problem: Problem, piece: NDArray[np.int64], tangent: Array) -> Array:
+    """The least of feed and what the axis velocities allow in a direction."""
+    by_axis = _over(problem.max_velocity, np.abs(tangent))
+    return np.minimum(problem.feed[piece], by_axis.min(axis=1))
+
+
+def _chord_speed(problem: Problem, radius: Array) -> Array:
+    """(2/T)·√(2ρδ − δ²), below ρ = δ as there: no shorter way can leave its chord by δ."""
+    tolerance = problem.chord_tolerance
+    if not np.isfinite(tolerance):
+        return np.full(len(radius), np.inf)
+    radius = np.maximum(radius, tolerance)
+    return np.asarray(2.0 / problem.period * np.sqrt(2.0 * radius * tolerance - tolerance**2))
+
+
+def _over(top: Array, bottom: Array, otherwise: float = np.inf) -> Array:
+    """top / bottom, `otherwise` where bottom is 0."""
+    quotient = np.full(np.broadcast_shapes(top.shape, bottom.shape), otherwise)
+    with np.errstate(over="ignore"):
+        np.divide(top, bottom, out=quotient, where=np.broadcast_to(bottom != 0.0, quotient.shape))
+    return quotient
+
+
+def _refuse(problem: Problem, pieces: NDArray[np.int64], sentence: str) -> None:
+    if len(pieces):
+        raise InputError(f"line {problem.path.line[pieces[0]]}: {sentence}")

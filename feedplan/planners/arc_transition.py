@@ -1,0 +1,24 @@
+"""Arc transition: an arc that touches both lines, within the tolerance, takes the place of each corner.
+
+Source: Lv, Zhang, Yang & Ye, Study on the method of increasing turning velocity during CNC continuous machining,
+Manufacturing Technology & Machine Tool 2008(7), 79–83, as Zhang et al. 2010 compare with it (section 5). With
+the turn θ and the tolerance d the radius is d/(1/cos(θ/2) − 1), less where the lines are too short. On the arc
+the centripetal acceleration v²/r limits the speed; it is limited so that the axes keep their
+limits in every direction and some tangential acceleration remains (`shared_acceleration`).
+
+The arcs belong to the path (`Corners.ARCS`): a path that has other curves is planned by the same rule on them.
+"""
+
+from __future__ import annotations
+
+from feedplan.constraints.problem import Problem
+from feedplan.geometry.corners import Corners
+from feedplan.planners._look_ahead import look_ahead, shared_acceleration
+from feedplan.profile import SpeedProfile
+
+CORNERS = Corners.ARCS
+
+
+def plan(problem: Problem) -> SpeedProfile:
+    """The fastest trapezoids over lines and arcs. Raises InputError, InfeasibleError as sentences."""
+    return look_ahead(problem, problem.junction_speed, shared_acceleration)

@@ -1,0 +1,27 @@
+"""Speed limits as usual and an acceleration limit along the path only: what a curve does to the axes is not asked.
+
+The methods that Zhang et al. 2010 (section 1) argue against: trapezoids, S-curves and the like with a tangential
+acceleration. Here it is the greatest that the direction of motion allows, min over the axes of A_k/|t_k|, so that the
+axes keep their limits on lines and break them on curves, where v²/ρ comes on top of it. The audit says where.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from feedplan.constraints.problem import Problem
+from feedplan.planners._look_ahead import look_ahead
+from feedplan.planners._segments import Array
+from feedplan.profile import SpeedProfile
+
+
+def plan(problem: Problem) -> SpeedProfile:
+    """The fastest trapezoids. Raises InputError, InfeasibleError as sentences."""
+    return look_ahead(problem, problem.junction_speed, along_only)
+
+
+def along_only(tangent: Array, normal: Array, limit: Array) -> tuple[Array, Array]:
+    """No limit across the path."""
+    with np.errstate(divide="ignore"):
+        along = (limit / np.abs(tangent)).min(axis=1)
+    return along, np.full(len(along), np.inf)
