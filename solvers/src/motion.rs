@@ -172,10 +172,10 @@ impl<'a, const M: usize> Motion<'a, M> {
     }
 }
 
-/// Tabulates f over an arc.
-fn fill<F: Integrand>(f: F, arc: &ProfileArc, nodes: &mut Vec<Node>) -> f64 {
-    let estimate = quadrature(&f, arc.u0, arc.u1);
-    tabulate(f, arc.u0, arc.u1, TABLE_ERROR * estimate, nodes)
+/// Tabulates f from one end to another.
+fn fill<F: Integrand>(f: F, ends: (f64, f64), nodes: &mut Vec<Node>) -> f64 {
+    let estimate = quadrature(&f, ends.0, ends.1);
+    tabulate(f, ends.0, ends.1, TABLE_ERROR * estimate, nodes)
 }
 
 /// The place where a part of the whole integral is done, which grows evenly with time.

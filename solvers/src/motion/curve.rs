@@ -11,7 +11,7 @@
 
 use super::axis::{AxisLaw, End};
 use super::even::EvenLaw;
-use super::rate::{Line, Rate, Source, Tip, TipSpeed, MAX_TIP};
+use super::rate::{FromRest, Line, Rate, Source, Tip, TipSpeed, MAX_TIP};
 use super::{fill, invert, parts, ArcKind, ProfileArc, Rates, State};
 use crate::arc_length::{Node, Table};
 use crate::polynomial::Polynomial;
@@ -55,6 +55,7 @@ pub struct CurveMotion<'a, const M: usize> {
     /// The direction of travel, where the arc is straight and begins or ends where the quotients are 0/0.
     straight: Option<[f64; M]>,
     lengths: Vec<Node>,
+    /// By u; from rest, by the root of the way from there.
     times: Vec<Node>,
     pub(super) length_error: f64,
     time_error: f64,
@@ -94,12 +95,16 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
         motion.keep_off();
         if with_lengths {
             let mut nodes = vec![];
-            motion.length_error = fill(motion.length_rate(), arc, &mut nodes);
+            motion.length_error = fill(motion.length_rate(), (arc.u0, arc.u1), &mut nodes);
             motion.lengths = nodes;
         }
         if let Law::Speed(line) = motion.law {
             let mut nodes = vec![];
-            motion.time_error = fill(motion.time_rate(line), arc, &mut nodes);
+            let (u0, u1) = (arc.u0, arc.u1);
+            motion.time_error = match motion.from_rest(&line) {
+                Some(rate) => fill(rate, (0.0, (u1 - u0).sqrt()), &mut nodes),
+                None => fill(motion.time_rate(line), (u0, u1), &mut nodes),
+            };
             motion.times = nodes;
         }
         motion
@@ -158,7 +163,7 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
             for _ in 0..LINE_ROUNDS {
                 let middle = (low * high).sqrt();
                 let mut nodes = vec![];
-                fill(self.time_rate(with(middle)), arc, &mut nodes);
+                fill(self.time_rate(with(middle)), (arc.u0, arc.u1), &mut nodes);
                 if nodes[nodes.len() - 1].sum > arc.duration {
                     low = middle;
                 } else {
@@ -218,12 +223,27 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
         Rate { source: self.own(), line: Line::ONE, foot: self.foot }
     }
 
-    fn time_rate(&self, line: Line) -> Rate<'_, M> {
-        let source = match &self.tip {
+    fn source(&self) -> Source<'_, M> {
+        match &self.tip {
             Some([square, ..]) => Source::Tip(Tip { square, width: self.piece.width }),
             None => self.own(),
+        }
+    }
+
+    fn time_rate(&self, line: Line) -> Rate<'_, M> {
+        Rate { source: self.source(), line, foot: self.foot }
+    }
+
+    /// Where the arc begins or ends at rest on a path with a direction there.
+    fn from_rest(&self, line: &Line) -> Option<FromRest<'_, M>> {
+        let ProfileArc { u0, u1, p0, p1, .. } = self.arc;
+        let (place, sign) = match (p0 == 0.0, p1 == 0.0) {
+            (true, false) => (u0, 1.0),
+            (false, true) => (u1, -1.0),
+            _ => return None,
         };
-        Rate { source, line, foot: self.foot }
+        let moves = line.slope != 0.0 && self.foot.is_nan();
+        moves.then(|| FromRest { source: self.source(), place, sign, slope: line.slope.abs() })
     }
 
     /// The table of the arc's length; `with_lengths` must have been asked for.
@@ -244,7 +264,15 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
         match &self.law {
             Law::Even(law) => self.at(law.place(&self.arc, done, left)),
             Law::Axis(law) => law.at_time(&self.arc, done, left),
-            Law::Speed(line) => invert(&self.times(*line), self.time_error, &self.arc, done, period),
+            Law::Speed(line) => match self.from_rest(line) {
+                Some(f) => {
+                    let table = Table { f, nodes: &self.times };
+                    let done = if f.sign > 0.0 { done } else { left };
+                    let state = invert(&table, self.time_error, &self.arc, done, period);
+                    State { u: f.u(state.u), ..state }
+                }
+                None => invert(&self.times(*line), self.time_error, &self.arc, done, period),
+            },
         }
     }
 
@@ -261,10 +289,21 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
         let done = match &self.law {
             Law::Even(law) => law.done(&self.arc, state.u),
             Law::Axis(law) => law.done(&self.arc, state),
-            Law::Speed(line) => {
-                let times = self.times(*line);
-                times.integral(state.u) / times.total()
-            }
+            Law::Speed(line) => match self.from_rest(line) {
+                Some(f) => {
+                    let table = Table { f, nodes: &self.times };
+                    let done = table.integral((state.u - f.place).abs().sqrt()) / table.total();
+                    if f.sign > 0.0 {
+                        done
+                    } else {
+                        1.0 - done
+                    }
+                }
+                None => {
+                    let times = self.times(*line);
+                    times.integral(state.u) / times.total()
+                }
+            },
         };
         self.arc.duration * done
     }

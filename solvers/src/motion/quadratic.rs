@@ -81,10 +81,10 @@ impl<const M: usize> QuadraticMotion<M> {
             ArcKind::ParameterAcceleration | ArcKind::SpeedLine => Law::Even(EvenLaw::new(arc)),
         };
         if with_lengths || matches!(motion.law, Law::Feed { .. }) {
-            motion.length_error = fill(Length(motion.hodograph), arc, &mut motion.lengths);
+            motion.length_error = fill(Length(motion.hodograph), (arc.u0, arc.u1), &mut motion.lengths);
         }
         if matches!(motion.law, Law::Chord { .. }) {
-            motion.time_error = fill(ChordTime(motion.hodograph), arc, &mut motion.times);
+            motion.time_error = fill(ChordTime(motion.hodograph), (arc.u0, arc.u1), &mut motion.times);
         }
         motion
     }

@@ -70,6 +70,30 @@ pub enum Source<'a, const M: usize> {
     Tip(Tip<'a>),
 }
 
+impl<const M: usize> Source<'_, M> {
+    #[inline(always)]
+    fn at(&self, u: f64) -> f64 {
+        match self {
+            Self::Own(speed) => speed.at(u),
+            Self::Tip(tip) => tip.at(u),
+        }
+    }
+
+    fn disc(&self, a: f64, b: f64) -> Disc {
+        match self {
+            Self::Own(speed) => speed.disc(a, b),
+            Self::Tip(tip) => tip.disc(a, b),
+        }
+    }
+
+    fn foot_error(&self, width: f64) -> f64 {
+        match self {
+            Self::Own(speed) => speed.foot_error(width),
+            Self::Tip(tip) => tip.greatest() * width,
+        }
+    }
+}
+
 /// v² = `start` + `slope` (u − u0).
 #[derive(Clone, Copy, Debug)]
 pub struct Line {
@@ -88,6 +112,49 @@ impl Line {
     }
 }
 
+/// From rest at `place`, v² grows by `slope` with the way of u: by y, the root of that way, the time is the integral of
+/// 2 √D / √slope, which is smooth there.
+#[derive(Clone, Copy, Debug)]
+pub struct FromRest<'a, const M: usize> {
+    pub source: Source<'a, M>,
+    pub place: f64,
+    /// 1 from the start of an arc, −1 back from its end.
+    pub sign: f64,
+    pub slope: f64,
+}
+
+impl<const M: usize> FromRest<'_, M> {
+    /// The parameter of the piece.
+    pub fn u(&self, y: f64) -> f64 {
+        self.place + self.sign * y * y
+    }
+}
+
+impl<const M: usize> Integrand for FromRest<'_, M> {
+    #[inline(always)]
+    fn at(&self, y: f64) -> f64 {
+        2.0 * self.source.at(self.u(y)) / self.slope.sqrt()
+    }
+
+    // About y a disc of this radius goes into one of the other radius about u: r (2 b + r) = R.
+    fn disc(&self, a: f64, b: f64) -> Disc {
+        let (from, to) = (self.u(a), self.u(b));
+        let disc = self.source.disc(from.min(to), from.max(to));
+        Disc {
+            radius: disc.radius / ((b * b + disc.radius).sqrt() + b),
+            bound: 2.0 * disc.bound / self.slope.sqrt(),
+        }
+    }
+
+    fn foot(&self) -> f64 {
+        f64::NAN
+    }
+
+    fn foot_error(&self, width: f64) -> f64 {
+        2.0 * self.source.foot_error(width) / self.slope.sqrt()
+    }
+}
+
 /// √D / √v².
 #[derive(Clone, Copy, Debug)]
 pub struct Rate<'a, const M: usize> {
@@ -100,10 +167,7 @@ pub struct Rate<'a, const M: usize> {
 impl<const M: usize> Integrand for Rate<'_, M> {
     #[inline(always)]
     fn at(&self, u: f64) -> f64 {
-        let speed = match &self.source {
-            Source::Own(speed) => speed.at(u),
-            Source::Tip(tip) => tip.at(u),
-        };
+        let speed = self.source.at(u);
         if self.line.slope == 0.0 {
             speed / self.line.start.sqrt()
         } else {
@@ -113,10 +177,7 @@ impl<const M: usize> Integrand for Rate<'_, M> {
 
     // v² loses at most half of its least value within the disc.
     fn disc(&self, a: f64, b: f64) -> Disc {
-        let disc = match &self.source {
-            Source::Own(speed) => speed.disc(a, b),
-            Source::Tip(tip) => tip.disc(a, b),
-        };
+        let disc = self.source.disc(a, b);
         let least = self.line.at(a).min(self.line.at(b));
         if self.line.slope == 0.0 {
             return Disc { bound: disc.bound / least.sqrt(), ..disc };
@@ -133,10 +194,7 @@ impl<const M: usize> Integrand for Rate<'_, M> {
 
     // The speed's bound over √v²: at worst v² is `slope` times the distance from the foot.
     fn foot_error(&self, width: f64) -> f64 {
-        let speed = match &self.source {
-            Source::Own(speed) => speed.foot_error(width),
-            Source::Tip(tip) => tip.greatest() * width,
-        };
+        let speed = self.source.foot_error(width);
         if self.line.slope == 0.0 {
             speed / self.line.start.sqrt()
         } else {
