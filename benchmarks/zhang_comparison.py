@@ -1,4 +1,4 @@
-"""What time-optimal planning on fitted splines gains over the transitions of controllers: Zhang et al. 2010, section 5."""
+"""What the optimum on fitted splines gains over transitions at corners: Zhang et al. 2010, section 5."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from feedplan import Machine, Plan, Program, plan
 from feedplan.program.read import read_program
 
 NAME = "zhang-comparison"
-# The parts of the paper's figure 8 and their blocks here; the lettering has few points a letter as theirs had many.
+# The parts of the paper's figure 8 as our examples have them, and their blocks.
 PARTS = {"vase": 20_000, "lettering": 10_000, "head": 20_000}
 QUICK = 20  # times fewer blocks
 # The paper states the accelerations (section 4.3), neither the period nor the feed: 1 to 4 ms were usual.

@@ -133,8 +133,8 @@ def plan(
     `source`: a file, a Program or a Path. `machine`: a Machine, or the name or file of one. Methods that
     solve on a mesh refine it to the relative `accuracy` of the time, or take `cells` a piece, and give up
     after `time_limit` [s]; exact methods take none of these. `tolerance` [mm] is the greatest distance from
-    the programmed path where the program lets the tool leave it (default: the program's own, else 0.01); how the path follows it
-    is the method's choice (`planners.corners`).
+    the programmed path where the program lets the tool leave it (default: the program's own, else 0.01); how
+    the path follows the program within it is the method's choice (`planners.corners`).
     `feed` [mm/s] replaces the programmed feeds, `feed_override` multiplies them. `period` [s] replaces the
     machine's servo period; `start_speed` and `end_speed` [mm/s] hold at the ends. `progress(stage, done)`
     is called as the work goes on. Raises ProgramError, MachineError, InputError or InfeasibleError, each a

@@ -8,7 +8,6 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-
 # The `axis` of an arc whose constant belongs to none.
 NO_AXIS = 255
 

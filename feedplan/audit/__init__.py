@@ -62,10 +62,10 @@ def audit(
     joints are not the path's axes, their limits are measured by the kinematics' positions alone. Jerk is
     judged only if the method claims it (`jerk`). `progress` is called with the share done, 0 to 1.
 
-    At a corner the profile's axis velocities may jump by the problem's `velocity_jump`. In setpoints a jump is an
-    acceleration over one period, judged like any other by second differences: only the jump that the machine
-    file allows may exceed the limit there.
-    Raises InputError where path, machine, program and setpoints do not belong together.
+    At a corner the profile's axis velocities may jump by the problem's `velocity_jump`. In setpoints a
+    jump is an acceleration over one period, judged like any other by second differences: only the jump
+    that the machine file allows may exceed the limit there. Raises InputError where path, machine,
+    program and setpoints do not belong together.
     """
     axes = problem.axes
     if program is not None and program.axes != problem.path.axes:

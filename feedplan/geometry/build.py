@@ -78,8 +78,8 @@ def build_path(
     splines go into the path as they are, their widths scaled to about the length, pieces without a length
     left out; only at corners are their ends cut and bent as those of lines and arcs are.
 
-    With `corners` ARCS nothing is fitted, and corners of two lines become true arcs within the tolerance; with
-    PROGRAMMED nothing is rounded either, and corners are passed within a run.
+    With `corners` ARCS nothing is fitted, and corners of two lines become true arcs within the tolerance;
+    with PROGRAMMED nothing is rounded either, and corners lie within runs.
 
     Corners that cannot be rounded are stops, unless every axis that moves has a `max_velocity_jump`. The
     tool stops also where the meaning of words or the tool length changes. Axes that the program moves must

@@ -8,9 +8,10 @@ from enum import Enum
 class Corners(Enum):
     """How a path follows a program.
 
-    `ROUNDED`: chains of G1 moves are fitted by splines, other corners rounded by parabolas. `ARCS`: lines stay lines, and an
-    arc that touches both rounds each corner of two lines. `PROGRAMMED`: the path is the program itself; its
-    corners are passed with a jump of velocity, of what the accelerations give in one servo period at most.
+    `ROUNDED`: chains of G1 moves are fitted by splines, other corners rounded by parabolas. `ARCS`:
+    lines stay lines, and an arc that touches both rounds each corner of two. `PROGRAMMED`: the path is
+    the program itself; its corners may be passed with a jump of velocity, of what the accelerations give
+    in one servo period.
     """
 
     ROUNDED = "rounded"

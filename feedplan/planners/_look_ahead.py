@@ -1,9 +1,9 @@
 """Trapezoids with look-ahead over whole runs: what the methods of controllers share.
 
-A method says how fast corners are passed and which accelerations it allows; speed rises and falls at one tangential
-acceleration on each segment (`_segments`). On a line that is the greatest of its direction, min over the axes of A_k/|t_k|,
-and the profile is exact. On a part of a curved piece v² is linear in the parameter, with the greatest slope that
-keeps the tangential acceleration all over the part.
+A method says how fast corners are passed and which accelerations it allows; speed rises and falls at one
+tangential acceleration on each segment (`_segments`). On a line that is the greatest of its direction,
+min over the axes of A_k/|t_k|, and the profile is exact. On a part of a curved piece v² is linear in the
+parameter, with the greatest slope that keeps the tangential acceleration all over the part.
 """
 
 from __future__ import annotations
@@ -19,13 +19,14 @@ from feedplan.errors import InfeasibleError
 from feedplan.planners._segments import Array, Rule, Segments, segments
 from feedplan.profile import NO_AXIS, ArcKind, SpeedProfile
 
-# A shorter part of a segment than this is rounding.
-NO_PART = 1e-14
+# A shorter part of a segment of length L than this is rounding. What v jumps by where a ramp is left
+# out, 1e-12 √(a L) where it peaks, is less than the audit can see.
+NO_PART = 1e-12
 
 # Reached speeds may miss those asked for by this share.
 ROUNDING = 1e-12
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(10)
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(6)
 
 # What happens between two of the six places of a segment.
 _CONSTANT = np.array([True, False, True, False, True])
@@ -37,9 +38,10 @@ def look_ahead(
 ) -> SpeedProfile:
     """The fastest trapezoids.
 
-    `corner_speed` (n + 1,) [mm/s] limits the speed at the ends of the pieces; runs end at rest, the path at the
-    problem's speeds. `hold` (n + 1,) [s]: so long before and after the end of a piece the speed stays as it is
-    there; beside a curve the tool stops instead. Raises InfeasibleError where start or end speed cannot be had.
+    `corner_speed` (n + 1,) [mm/s] limits the speed at the ends of the pieces; runs end at rest, the path at
+    the problem's speeds. `hold` (n + 1,) [s]: so long before and after the end of a piece the speed stays as
+    it is there; beside a curve the tool stops instead.
+    Raises InputError (see `segments`) and InfeasibleError where start or end speed cannot be had.
     """
     parts = segments(problem, rule)
     at_end, held = _speed_at_ends(problem, parts, corner_speed, hold)
@@ -87,7 +89,8 @@ def _check_ends(problem: Problem, speed: Array) -> None:
             line = int(problem.path.line[place])
             shown = math.floor(reached * 1e6) / 1e6
             raise InfeasibleError(
-                f"line {line}: no profile of this method {name} at {wanted:g} mm/s: at most {shown:g} mm/s is possible",
+                f"line {line}: no profile of this method {name} at {wanted:g} mm/s: "
+                f"at most {shown:.9g} mm/s is possible",
                 line,
                 reached,
             )
@@ -130,7 +133,9 @@ def _profile(problem: Problem, parts: Segments, speed: Array, room: Array) -> Sp
     if len(curved):
         ends = (problem.curve.evaluate(piece[curved], at[curved], 1)[1] for at in (u0, u1))
         rate[:, curved] = [np.linalg.norm(tangent, axis=1) for tangent in ends]
-        length[curved] = _weighted_length(problem, piece[curved], u0[curved], u1[curved], from_sq[curved], to_sq[curved])
+        length[curved] = _weighted_length(
+            problem, piece[curved], u0[curved], u1[curved], from_sq[curved], to_sq[curved]
+        )
     return SpeedProfile(
         piece=piece.astype(np.uint32),
         kind=np.where(constant, ArcKind.FEED, ramp_kind).astype(np.uint8),
@@ -162,8 +167,8 @@ def _weighted_length(
 def shared_acceleration(tangent: Array, normal: Array, limit: Array) -> tuple[Array, Array]:
     """Half along the path, √3/2 across it, of what every direction in the plane of both allows.
 
-    No sum of the two exceeds an axis's limit. The split is that of LinuxCNC's blend arcs (`blendmath.h`: a tangential
-    ratio of 0.5, the normal one its complement in the circle); the whole is min over the axes of
+    No sum of the two exceeds an axis's limit. The split is that of LinuxCNC's blend arcs (`blendmath.h`: a
+    tangential ratio of 0.5, the normal one its complement in the circle); the whole is min over the axes of
     A_k/√(t_k² + n_k²).
     """
     with np.errstate(divide="ignore"):

@@ -1,4 +1,4 @@
-"""Paths in segments as controllers see them: one greatest speed and one greatest tangential acceleration each."""
+"""Paths in segments as controllers see them: one greatest speed and one tangential acceleration each."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from feedplan.profile import NO_AXIS
 
 Array = NDArray[np.float64]
 
-# From unit tangents and unit normals (m, axes; a normal is 0 where the path is straight) and the limits of the axes
-# [mm/s²]: the greatest accelerations along and across the path (m,) [mm/s²].
+# From unit tangents and unit normals (m, axes; a normal is 0 where the path is straight) and the limits
+# of the axes [mm/s²]: the greatest accelerations along and across the path (m,) [mm/s²].
 Rule = Callable[[Array, Array, Array], tuple[Array, Array]]
 
 # A curved piece is cut into parts on which it turns, and ln |C'| changes, by about this at most.
 STEP = 0.1
 
-# Places of a part at which its limits are taken, as shares of it. On a circle they are exact; elsewhere the limits
-# between two places differ from theirs by the order of STEP²/16 of themselves.
+# Places of a part at which its limits are taken, as shares of it. On a circle they are exact; elsewhere the
+# limits between two places differ from theirs by the order of STEP²/16 of themselves.
 PLACES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
 
 # Places that tell how much a whole piece turns.
-SURVEY = np.linspace(0.0, 1.0, 17)
+SURVEY = np.linspace(0.0, 1.0, 9)
 
 # Greatest speeds of the parts of a piece are one if they differ by this share.
 ONE_SPEED = 1e-9
@@ -43,9 +43,10 @@ UNEVEN, ROUNDINGS = 1e-9, 8.0
 class Segments:
     """Lines, and parts of curved pieces, in the order of the path.
 
-    `piece`, `u0`, `u1` (m,) say which; `rate` (m,) is |C'|, constant on lines, NaN on curves. `speed` (m,) [mm/s]
-    is the greatest; `slope` (m,) the greatest change of v² by u [mm/s²·|C'|]. On lines `axis` is the one whose
-    acceleration limit that is, `value` [mm/s²] its acceleration when the path speeds up; NO_AXIS and 0 on curves.
+    `piece`, `u0`, `u1` (m,) say which; `rate` (m,) is |C'|, constant on lines, NaN on curves. `speed`
+    (m,) [mm/s] is the greatest; `slope` (m,) the greatest change of v² by u [mm/s²·|C'|]. On lines
+    `axis` is the one whose acceleration limit that is, `value` [mm/s²] its acceleration when the path
+    speeds up; NO_AXIS and 0 on curves.
     """
 
     piece: NDArray[np.int64]

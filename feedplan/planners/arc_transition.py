@@ -1,12 +1,13 @@
 """Arc transition: an arc that touches both lines, within the tolerance, takes the place of each corner.
 
-Source: Lv, Zhang, Yang & Ye, Study on the method of increasing turning velocity during CNC continuous machining,
-Manufacturing Technology & Machine Tool 2008(7), 79–83, as Zhang et al. 2010 compare with it (section 5). With
-the turn θ and the tolerance d the radius is d/(1/cos(θ/2) − 1), less where the lines are too short. On the arc
-the centripetal acceleration v²/r limits the speed; it is limited so that the axes keep their
-limits in every direction and some tangential acceleration remains (`shared_acceleration`).
+Source: Lv, Zhang, Yang & Ye, Study on the method of increasing turning velocity during CNC continuous
+machining, Manufacturing Technology & Machine Tool 2008(7), 79–83, known here by what Zhang et al. 2010
+say of it (sections 1 and 5). With the turn θ and the tolerance d the radius is d/(1/cos(θ/2) − 1), less
+where the lines are too short. On the arc the centripetal acceleration v²/r limits the speed, so that the
+axes keep their limits in every direction and some tangential acceleration remains
+(`shared_acceleration`).
 
-The arcs belong to the path (`Corners.ARCS`): a path that has other curves is planned by the same rule on them.
+The arcs belong to the path (`Corners.ARCS`): other curves of a path are planned by the same rule.
 """
 
 from __future__ import annotations

@@ -1,12 +1,14 @@
-"""Constant-velocity transition: corners of lines are passed at the speed that the axes can turn in one period.
+"""Constant-velocity transition: corners of lines are passed at a speed that the axes can turn in one period.
 
 Source: Ye & Zhao, Study on control algorithm for micro-line continuous interpolation, China Mechanical
-Engineering 15(15), 1354–1356, as Zhang et al. 2010 compare with it (section 5). From one interpolation
-period T to the next the velocity may change by A_k T, so a corner where the unit tangent jumps by ΔT is
-passed at min over the axes of A_k T/|ΔT_k|. The speed is constant for a period before and after the corner, so
-that no other acceleration falls into the same difference of setpoints; a line between two corners takes two periods at
-least. The second differences of setpoints at the period T then keep every limit: where a corner lies a share θ of
-a period beside a setpoint they hold (1 − θ) of the jump and θ²/2 of the acceleration before it.
+Engineering 15(15), 1354–1356, known here by what Zhang et al. 2010 say of it (sections 1 and 5). From one
+interpolation period T to the next a velocity may change by A_k T, so a corner where the unit tangent jumps by
+ΔT is passed at min over the axes of A_k T/|ΔT_k|.
+
+The speed is constant for a period before and after the corner, so that no other acceleration adds to the
+jump; a line between two corners takes two periods at least. The second differences of setpoints at the
+period T then keep every limit: where a corner lies a share θ of a period beside a setpoint they hold 1 −
+θ of the jump and at most θ²/2 of an acceleration beside it.
 
 The path is the program's own. Beside curves corners are stops; on curves the acceleration is shared as on
 blend arcs.

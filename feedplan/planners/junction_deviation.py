@@ -1,12 +1,13 @@
 """Trapezoids with look-ahead and junction deviation, as grbl plans.
 
-Source: grbl 1.1, `planner.c` (S. K. Jeon). A corner is passed at the speed of a circle that touches both lines and
-comes within δ of the corner, though the tool follows the lines: v² = a δ s/(1 − s), s = cos(turn/2), with the acceleration
-a = min over the axes of A_k/|j_k| in the direction j of the jump. δ is grbl's setting $11, 0.010 mm by default.
-Klipper's `square_corner_velocity` is the same formula with its speed v₉₀ at right angles given: a δ = v₉₀² (√2 − 1).
+Source: grbl 1.1, `planner.c` (S. K. Jeon). A corner is passed at the speed of a circle that touches both
+lines and comes within δ of the corner, though the tool follows the lines: v² = a δ s/(1 − s), s =
+cos(turn/2), with a = min over the axes of A_k/|j_k| in the direction j of the jump. δ is grbl's setting
+$11, 0.010 mm by default. Klipper's `square_corner_velocity` is the same formula by the speed v₉₀ at
+right angles: a δ = v₉₀² (√2 − 1).
 
-The velocity jumps at the corner. No axis limit enters δ, so the jump can be more than the axes do in a period: the
-audit says at which lines. On curves, which these controllers follow by short lines, the speed is √(a/κ) with the
+The velocity jumps at the corner. No period enters, so the jump can be more than the axes do in one: the audit
+says at which lines. On curves, which these controllers follow by short lines, the speed is √(a/κ) with the
 acceleration in the direction of the normal, and the tangential one comes on top of it.
 """
 
@@ -32,11 +33,14 @@ GRBL_DEVIATION = 0.01
 def plan(
     problem: Problem, deviation: float = GRBL_DEVIATION, square_corner_velocity: float | None = None
 ) -> SpeedProfile:
-    """The fastest trapezoids with corners at the speeds of `deviation` [mm], or of `square_corner_velocity` [mm/s].
+    """The fastest trapezoids with corners by `deviation` [mm], or by `square_corner_velocity` [mm/s].
 
     Raises InputError, InfeasibleError as sentences.
     """
-    for name, value in (("junction deviation", deviation), ("square corner velocity", square_corner_velocity)):
+    for name, value in (
+        ("junction deviation", deviation),
+        ("square corner velocity", square_corner_velocity),
+    ):
         if value is not None and not 0.0 < value < math.inf:
             raise InputError(f"the {name} is {value}: give a positive number")
     return look_ahead(problem, corner_speed(problem, deviation, square_corner_velocity), each_direction)

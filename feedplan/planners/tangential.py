@@ -1,8 +1,9 @@
-"""Speed limits as usual and an acceleration limit along the path only: what a curve does to the axes is not asked.
+"""Speed limits as usual, acceleration limited along the path only: no curve is asked what it does to the axes.
 
-The methods that Zhang et al. 2010 (section 1) argue against: trapezoids, S-curves and the like with a tangential
-acceleration. Here it is the greatest that the direction of motion allows, min over the axes of A_k/|t_k|, so that the
-axes keep their limits on lines and break them on curves, where v²/ρ comes on top of it. The audit says where.
+The methods that Zhang et al. 2010 (section 1) argue against: trapezoids, S-curves and the like with a
+tangential acceleration. Here it is the greatest that the direction of motion allows, min over the axes
+of A_k/|t_k|, so that the axes keep their limits on lines and break them on curves, where v²/ρ comes on
+top of it. The audit says where.
 """
 
 from __future__ import annotations

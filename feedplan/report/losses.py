@@ -57,7 +57,9 @@ def _name(problem: Problem, kind: int, axis: int) -> str:
         return f"{letter}acceleration"
     if kind == ArcKind.AXIS_VELOCITY:
         return f"{letter}velocity"
-    return {ArcKind.FEED: "feed", ArcKind.CHORD: "chord error"}.get(ArcKind(kind), "acceleration along the path")
+    return {ArcKind.FEED: "feed", ArcKind.CHORD: "chord error"}.get(
+        ArcKind(kind), "acceleration along the path"
+    )
 
 
 def time_per_limit(problem: Problem, profile: SpeedProfile) -> list[Share]:

@@ -95,11 +95,14 @@ impl Arcs<'_> {
         let p = [self.p0[i], self.p1[i]];
         let ends = [curve.derivative(self.u0[i]), curve.derivative(self.u1[i])];
         let axis = self.axis[i] as usize;
+        // From the slower end, where rounding would leave the square root of a negative number.
+        let speed_sq = |end: usize| inner(&ends[end], &ends[end]) * p[end];
         let anchored_at_end = match self.kind[i] {
             AXIS_ACCELERATION => {
                 p[0].is_infinite() || ends[1][axis].powi(2) * p[1] < ends[0][axis].powi(2) * p[0]
             }
             PARAMETER_ACCELERATION => p[1] < p[0],
+            SPEED_LINE => speed_sq(1) < speed_sq(0),
             _ => false,
         };
         let (tangent, p_anchor, p_far) =
@@ -118,8 +121,9 @@ impl Arcs<'_> {
             AXIS_VELOCITY => Law::AxisVelocity { axis, speed: self.value[i].sqrt() },
             CHORD => Law::Chord { value: self.value[i] },
             _ => {
-                let [start_sq, end_sq] = [0, 1].map(|end| inner(&ends[end], &ends[end]) * p[end]);
-                Law::SpeedLine { start_sq, change_sq: end_sq - start_sq }
+                let anchor = usize::from(anchored_at_end);
+                let start_sq = speed_sq(anchor);
+                Law::SpeedLine { start_sq, change_sq: speed_sq(1 - anchor) - start_sq }
             }
         };
         let shape = match curve {

@@ -222,7 +222,7 @@ impl<const M: usize> Motion<M> {
             Law::AxisVelocity { axis, speed } => speed / tangent[axis].abs(),
             Law::Chord { value } => (value * length(tangent)).sqrt(),
             Law::SpeedLine { start_sq, change_sq } => {
-                (start_sq + change_sq * (d / self.width)).sqrt() / length(tangent)
+                (start_sq + change_sq * (d / self.width).abs()).sqrt() / length(tangent)
             }
         }
     }
