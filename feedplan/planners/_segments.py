@@ -168,13 +168,13 @@ def _part_counts(problem: Problem, piece: NDArray[np.int64]) -> NDArray[np.int64
     tangent = first / rate[:, :, None]
     turn = np.linalg.norm(np.diff(tangent, axis=1), axis=2).sum(axis=1)
     change = np.abs(np.diff(np.log(rate), axis=1)).sum(axis=1)
-    return np.maximum(np.ceil(np.maximum(turn, change) / STEP), 1.0).astype(np.int64)
+    return np.asarray(np.maximum(np.ceil(np.maximum(turn, change) / STEP), 1.0), dtype=np.int64)
 
 
 def _speed(problem: Problem, piece: NDArray[np.int64], tangent: Array) -> Array:
     """The least of feed and what the axis velocities allow in a direction."""
     by_axis = _over(problem.max_velocity, np.abs(tangent))
-    return np.minimum(problem.feed[piece], by_axis.min(axis=1))
+    return np.asarray(np.minimum(problem.feed[piece], by_axis.min(axis=1)))
 
 
 def _chord_speed(problem: Problem, radius: Array) -> Array:

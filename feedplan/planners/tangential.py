@@ -1,4 +1,4 @@
-"""Speed limits as usual, acceleration limited along the path only: no curve is asked what it does to the axes.
+"""Speed limits as usual, acceleration limited along the path only, whatever a curve does to the axes.
 
 The methods that Zhang et al. 2010 (section 1) argue against: trapezoids, S-curves and the like with a
 tangential acceleration. Here it is the greatest that the direction of motion allows, min over the axes

@@ -109,7 +109,7 @@ columns, summary, _ = _solvers.build_path(
     np.zeros(0, np.int64), np.zeros((0, 2), np.int64), np.zeros((0, 2)), np.zeros(0), np.zeros(0, np.int64),
     np.zeros(1, np.int64), None, np.zeros(0, np.int64), np.zeros((0, 2)), np.ones(n, bool),
     np.full(2, 500.0), np.full(2, 3000.0),
-    np.array([[-np.inf, np.inf]] * 2), False, 1e-3, 5.0, 2e4, 1e3, 0.48)
+    np.array([[-np.inf, np.inf]] * 2), False, 1e-3, 5.0, 2e4, 1e3, 0.48, False)
 (control, _, offsets, width), *rest = columns
 columns = [control, offsets, width, *rest]
 print(summary, hashlib.sha256(b"".join(column.tobytes() for column in columns)).hexdigest())
