@@ -39,7 +39,7 @@ class InfeasibleError(FeedplanError):
 
 
 class SolverError(FeedplanError):
-    """A numerical solver gave up; the text carries its own word and the remedy."""
+    """A numerical solver gave up, or a method is not made for the path; the text says why and the remedy."""
 
 
 class MissingPackageError(FeedplanError):

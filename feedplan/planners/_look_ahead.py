@@ -41,7 +41,7 @@ def look_ahead(
     `corner_speed` (n + 1,) [mm/s] limits the speed at the ends of the pieces; runs end at rest, the path at
     the problem's speeds. `hold` (n + 1,) [s]: so long before and after the end of a piece the speed stays as
     it is there; beside a curve the tool stops instead.
-    Raises InputError (see `segments`) and InfeasibleError where start or end speed cannot be had.
+    Raises SolverError (see `segments`) and InfeasibleError where start or end speed cannot be had.
     """
     parts = segments(problem, rule)
     at_end, held = _speed_at_ends(problem, parts, corner_speed, hold)

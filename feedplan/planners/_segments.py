@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
-from feedplan.errors import InputError
+from feedplan.errors import SolverError
 from feedplan.profile import NO_AXIS
 
 Array = NDArray[np.float64]
@@ -66,10 +66,10 @@ def segments(problem: Problem, rule: Rule) -> Segments:
     """The path of a problem in segments, accelerations by `rule`.
 
     Speeds are limited by feed, axis velocities and, on curves, chord error and the acceleration across.
-    Raises InputError at cusps, and where the joints move in another way than the path's axes.
+    Raises SolverError at cusps, and where the joints move in another way than the path's axes.
     """
     if problem.joints is not None:
-        raise InputError(
+        raise SolverError(
             "this method takes the program's axes as the machine's: where joints move in another way, "
             "plan with bang-bang"
         )
@@ -196,4 +196,4 @@ def _over(top: Array, bottom: Array, otherwise: float = np.inf) -> Array:
 
 def _refuse(problem: Problem, pieces: NDArray[np.int64], sentence: str) -> None:
     if len(pieces):
-        raise InputError(f"line {problem.path.line[pieces[0]]}: {sentence}")
+        raise SolverError(f"line {problem.path.line[pieces[0]]}: {sentence}")

@@ -21,5 +21,5 @@ CORNERS = Corners.ARCS
 
 
 def plan(problem: Problem) -> SpeedProfile:
-    """The fastest trapezoids over lines and arcs. Raises InputError, InfeasibleError as sentences."""
+    """The fastest trapezoids over lines and arcs. Raises SolverError, InfeasibleError as sentences."""
     return look_ahead(problem, problem.junction_speed, shared_acceleration)

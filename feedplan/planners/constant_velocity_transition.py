@@ -29,7 +29,7 @@ CORNERS = Corners.PROGRAMMED
 
 
 def plan(problem: Problem) -> SpeedProfile:
-    """The fastest trapezoids that pass corners so. Raises InputError, InfeasibleError as sentences."""
+    """The fastest trapezoids that pass corners so. Raises SolverError, InfeasibleError as sentences."""
     speed = transition_speed(problem)
     hold = np.where(np.isfinite(speed) & (speed > 0.0), problem.period, 0.0)
     return look_ahead(problem, np.minimum(speed, problem.junction_speed), shared_acceleration, hold)

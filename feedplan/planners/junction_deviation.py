@@ -35,7 +35,7 @@ def plan(
 ) -> SpeedProfile:
     """The fastest trapezoids with corners by `deviation` [mm], or by `square_corner_velocity` [mm/s].
 
-    Raises InputError, InfeasibleError as sentences.
+    Raises InputError for those, SolverError and InfeasibleError, all as sentences.
     """
     for name, value in (
         ("junction deviation", deviation),

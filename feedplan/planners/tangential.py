@@ -17,7 +17,7 @@ from feedplan.profile import SpeedProfile
 
 
 def plan(problem: Problem) -> SpeedProfile:
-    """The fastest trapezoids. Raises InputError, InfeasibleError as sentences."""
+    """The fastest trapezoids. Raises SolverError, InfeasibleError as sentences."""
     return look_ahead(problem, problem.junction_speed, along_only)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -11,8 +12,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from feedplan import Axis, InfeasibleError, InputError, Machine, Plan, plan
+from feedplan import Axis, InfeasibleError, InputError, Machine, Plan, SolverError, plan
 from feedplan.audit import audit
+from feedplan.cli import main
 from feedplan.constraints.problem import Problem, build_problem
 from feedplan.curves.arc import arc
 from feedplan.curves.composite import CompositeCurve
@@ -267,6 +269,21 @@ def test_programs_with_arcs_are_planned_and_audited(tmp_path: FilePath) -> None:
     assert made.profile.p1[np.flatnonzero(np.diff(made.profile.piece))].min() == 0.0
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_the_command_plans_audits_and_reports_by_every_method(
+    method: str, write: Write, tmp_path: FilePath, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    code = main(["plan", str(write(SQUARE)), "--machine", "mill", "--method", method, "-o", str(out)])
+    verdict = json.loads((out / "plan.json").read_text())["audit"]
+    assert (out / "report.html").exists()
+    assert len(np.load(out / "setpoints.npz")["t"]) > 400
+    assert code == (0 if verdict["ok"] else 1)
+    assert verdict["ok"] == (method in (CVT, ARCS))
+    error = capsys.readouterr().err
+    assert ("the audit failed: line " in error) == (code == 1)
+
+
 def test_start_and_end_speeds_are_met_or_refused(write: Write) -> None:
     file = write([[0, 0], [1, 0]])
     moving = plan(file, PLANE, JUNCTION, start_speed=50.0, end_speed=80.0)
@@ -281,9 +298,9 @@ def test_start_and_end_speeds_are_met_or_refused(write: Write) -> None:
 
 def test_what_cannot_be_planned_is_refused_in_a_sentence(write: Write, tmp_path: FilePath) -> None:
     cusp = Path.from_curve(CompositeCurve.from_bezier([[0, 0], [0, 0], [3, 0], [4, 4]]))
-    with pytest.raises(InputError, match=r"cusp.*bang-bang"):
+    with pytest.raises(SolverError, match=r"cusp.*bang-bang"):
         planner(TANGENTIAL)(build_problem(cusp, PLANE))
-    with pytest.raises(InputError, match=r"joints move in another way"):
+    with pytest.raises(SolverError, match=r"joints move in another way"):
         plan(write([[10, 10], [20, 10], [20, 30]]), "polar", CVT)
     with pytest.raises(InputError, match="junction deviation is -1"):
         junction_deviation.plan(_problem(write(SQUARE), PLANE, JUNCTION), -1.0)
