@@ -19,9 +19,9 @@ from feedplan.errors import InfeasibleError
 from feedplan.planners._segments import Array, Rule, Segments, segments
 from feedplan.profile import NO_AXIS, ArcKind, SpeedProfile
 
-# A shorter part of a segment of length L than this is rounding. What v jumps by where a ramp is left
-# out, 1e-12 √(a L) where it peaks, is less than the audit can see.
-NO_PART = 1e-12
+# A shorter part of a segment is rounding: this share of it, and so many roundings of its parameter and of v².
+# What v jumps by where a ramp is left out is less than the audit can see.
+NO_PART, ROUNDINGS = 1e-12, 64.0
 
 # Reached speeds may miss those asked for by this share.
 ROUNDING = 1e-12
@@ -113,7 +113,8 @@ def _profile(problem: Problem, parts: Segments, speed: Array, room: Array) -> Sp
     down = np.where(triangle, top, end - fall)
     place = np.stack([np.zeros(len(parts)), still[:, 0], top, down, end, whole], axis=1)
     place = np.maximum.accumulate(np.clip(place, 0.0, whole[:, None]), axis=1)
-    none = NO_PART * whole
+    digits = parts.u1 + (start_sq + end_sq) / parts.slope
+    none = NO_PART * whole + ROUNDINGS * np.finfo(float).eps * digits
     for i in range(1, 5):
         place[:, i] = np.where(place[:, i] - place[:, i - 1] <= none, place[:, i - 1], place[:, i])
     for i in range(4, 0, -1):
