@@ -1,0 +1,20 @@
+//! The planner for pieces of any degree on curves made to break it.
+
+mod support;
+
+use support::curves::{CurveCase, Piece};
+
+/// Rounding decides where the axes turn round: planning still comes to an end.
+#[test]
+fn a_cubic_that_comes_back_on_its_own_way_is_planned() {
+    let there = [-0.0008179203719107516, 4.482764973940271e-05, 0.004785619607813126];
+    let again = [-0.0008179203719107515, 4.482764973940271e-05, 0.004785619607813128];
+    let points = vec![[0.0; 3], there, [0.0; 3], again];
+    let acceleration = [1.87209756, 6.52307862, 43.35589112];
+    let piece = Piece { points, weights: vec![1.0; 4], width: 2.2850075 };
+    let case = CurveCase::new(vec![piece], 9.07536759, [12.37519959, 7.97605913, 1.91222309], acceleration);
+    let profile = case.plan().expect("a profile");
+    // x(t)/x₁ = 3 t − 6 t² + 4 t³ rises all the way, with x' = 0 in the middle; X is the slowest: a line of length x₁.
+    let time = 2.0 * (there[0].abs() / acceleration[0]).sqrt();
+    assert!((profile.time() / time - 1.0).abs() < 1e-9, "{} {time}", profile.time());
+}
