@@ -101,6 +101,11 @@ impl<const C: usize> Polynomial<C> {
         self.c[self.n] = value;
     }
 
+    /// Puts scaled coefficient `i` to 0.
+    pub fn clear(&mut self, i: usize) {
+        self.c[i] = 0.0;
+    }
+
     /// p'(0).
     #[inline(always)]
     pub fn first_slope(&self) -> f64 {

@@ -1,5 +1,4 @@
-//! Random problems on curves of any degree, polynomial and rational, most of them made to break a planner; and what a
-//! profile does to the limits, from the control points and the columns alone.
+//! Random problems on curves of any degree, polynomial and rational, most of them made to break a planner.
 
 use feedplan_solvers::bang_bang::{plan, plan_each, Problem};
 use feedplan_solvers::bang_bang_quadratic::{Fault, Profile};
