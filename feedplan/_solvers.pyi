@@ -55,6 +55,7 @@ _Profile = tuple[
     NDArray[np.float64],
     NDArray[np.float64],
     NDArray[np.int64],
+    NDArray[np.uint32],
 ]
 
 def plan_bang_bang(problem: Problem) -> _Profile: ...

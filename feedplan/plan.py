@@ -180,7 +180,17 @@ def plan(
         lower_bound=least,
         compute=compute,
         interpolator=interpolator,
-        warnings=program.warnings if program else (),
+        warnings=(program.warnings if program else ()) + rounding_stops(problem, profile),
+    )
+
+
+def rounding_stops(problem: Problem, profile: SpeedProfile) -> tuple[str, ...]:
+    """A sentence for each line on which rounding makes the plan stop."""
+    lines = dict.fromkeys(int(line) for line in problem.path.line[profile.slowed])
+    return tuple(
+        f"line {line}: rounding hides how the path goes on next to a cusp: the plan stops there, slower than "
+        "it need be; a corner in place of the cusp is exact"
+        for line in lines
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
@@ -29,7 +29,8 @@ class SpeedProfile:
 
     Per arc: `piece` (index into the path), `kind` (ArcKind), `axis` (the axis that the arc's constant
     belongs to, 255 for none), `value` (see ArcKind), `u0`, `u1` (local parameter, u0 < u1), `p0`, `p1` (p at
-    both ends [mm²/s²]), `duration` [s]. `runs` (r + 1,) arc offsets of the path's runs.
+    both ends [mm²/s²]), `duration` [s]. `runs` (r + 1,) arc offsets of the path's runs. `slowed` (m,) pieces
+    on which the plan stops because rounding hides the way on, slower than it need be; once for each stop.
     Where the problem has a `tip_speed`, |C'|² of FEED and SPEED_LINE is that; q are the joints.
     Between the ends p follows exactly from the kind: it is never interpolated. On AXIS_ACCELERATION of axis k
     axis l accelerates with (q'_l·value − W_kl p)/q'_k, W_kl = q''_k q'_l − q''_l q'_k, which keeps its digits
@@ -51,6 +52,7 @@ class SpeedProfile:
     p1: NDArray[np.float64]
     duration: NDArray[np.float64]
     runs: NDArray[np.int64]
+    slowed: NDArray[np.uint32] = field(default_factory=lambda: np.empty(0, dtype=np.uint32))
 
     def __len__(self) -> int:
         return len(self.piece)

@@ -8,12 +8,14 @@
 //! |---|---|
 //! | `piece` | the hodograph of a piece, weights multiplied out |
 //! | `chord` | the chord-error limit as speeds linear in the parameter |
+//! | `cusp` | where all axes rest at once, as far as rounding can tell |
 //! | `split` | cut where an axis turns round or another velocity cap is the lowest |
 //! | `window` | what is left of a sub-piece ahead of a pass, with the bound on it |
 //! | `pass` | one pass over one sub-piece: arcs (`bang`), along the cap (`slide`), along the `limit_curve` |
 //! | `run` | both passes over a run, into columns, in seconds |
 
 mod chord;
+mod cusp;
 mod pass;
 mod piece;
 mod run;

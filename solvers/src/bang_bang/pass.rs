@@ -34,10 +34,13 @@ const ON_LIMIT_CURVE: f64 = 1e-11;
 const TIE: f64 = 1e-10;
 /// A zero of g_k and π this close to A_k/|g_k'|: the axis holds π.
 const FLAT: f64 = 1e-9;
+/// The same where π grows to that without a step.
+const NEARLY_FLAT: f64 = 1e-4;
 /// An event this close to the end of the window is at the end.
 const AT_END: f64 = 1e-11;
-/// A step shorter than this part of the sub-piece is none.
+/// A step shorter than this part of x, or of the start of the sub-piece, is none.
 const NO_STEP: f64 = 1e-15;
+const START: f64 = 1e-6;
 /// So many events may follow one another without a step.
 const MAX_HOPS: u32 = 10;
 const MAX_EVENTS: u32 = 2000;
@@ -53,8 +56,6 @@ pub enum Kind {
     Cap,
     /// The limit curve; backward only.
     LimitCurve,
-    /// p, in place of a sub-piece that rounding makes too hard.
-    Hold,
 }
 
 /// An arc from x0 to x1 of the sub-piece as the pass travels it.
@@ -66,13 +67,12 @@ pub struct Arc {
     /// π at its ends, of the whole sub-piece; infinite where the tool passes a place without a tangent.
     pub pi: [f64; 2],
     /// The velocity squared of the axis where the arc is slowest: of an accelerating arc at x0, of a braking one at x1.
-    /// Where p is held: (dx/dτ)².
     pub slow_sq: f64,
 }
 
-/// A pass made no headway.
+/// A pass made no headway at x.
 #[derive(Clone, Copy, Debug)]
-pub struct Stuck;
+pub struct Stuck(pub f64);
 
 /// The state where a pass enters or leaves a sub-piece.
 #[derive(Clone, Copy, Debug)]
@@ -134,8 +134,8 @@ pub fn run<const M: usize, const C: usize, const BACK: bool>(
     let pi = pass.pi;
     let sound =
         |arc: &Arc| arc.pi.iter().all(|&pi| pi >= 0.0) && arc.slow_sq >= 0.0 && arc.slow_sq.is_finite();
-    if !out[first..].iter().all(sound) {
-        return Err(Stuck);
+    if let Some(arc) = out[first..].iter().find(|arc| !sound(arc)) {
+        return Err(Stuck(arc.x0));
     }
     let (end_order, end_direction) = cusp(sub, true);
     let speed_sq = if end_order == 0 {
@@ -166,7 +166,7 @@ fn end_speed_sq<const M: usize, const C: usize>(
             super::split::Cap::Speed([_, f1]) => f1 / sub.tip_share(true),
             super::split::Cap::Axis(k, v_sq) => v_sq / direction[k].powi(2),
         },
-        Kind::LimitCurve | Kind::Hold => 0.0,
+        Kind::LimitCurve => 0.0,
     }
 }
 
@@ -219,6 +219,15 @@ struct Pass<'a, const M: usize, const C: usize, const BACK: bool> {
 }
 
 impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
+    /// Whether there is a way from the start of the window to t.
+    fn is_step(&self, t: f64) -> bool {
+        t * self.window.length() >= NO_STEP * self.window.x0.max(START)
+    }
+
+    fn stuck(&self) -> Stuck {
+        Stuck(self.window.x0)
+    }
+
     fn moving(&self) -> impl Iterator<Item = usize> {
         let moving = self.sub.moving;
         (0..M).filter(move |k| moving >> k & 1 == 1)
@@ -246,7 +255,6 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                 }
                 Kind::Cap => window.bound,
                 Kind::LimitCurve => Bound::LimitCurve,
-                Kind::Hold => Bound::Hold(arc.slow_sq / window.length().powi(2)),
             };
             if arc.kind != Kind::LimitCurve {
                 window.known = [Some(arc.pi[1]), Some(arc.pi[0])];
@@ -275,7 +283,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                     continue;
                 }
                 if self.hops > MAX_HOPS {
-                    return Err(Stuck);
+                    return Err(self.stuck());
                 }
                 continue;
             }
@@ -288,7 +296,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             }
             self.accelerate(on_bound)?;
         }
-        Err(Stuck)
+        Err(self.stuck())
     }
 
     /// Whether the state is on the bound; in the cusp of a straight line its velocities say so.
@@ -301,8 +309,6 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             Bound::Speed(f) => near(self.cusp_sq.iter().sum(), f.first() / self.sub.tip_share(false)),
             Bound::Axis(k, v_sq) => near(self.cusp_sq[*k], *v_sq),
             Bound::Arc(k, w) => near(self.cusp_sq[*k], w.first() / self.window.weight.first()),
-            // At rest p is free.
-            Bound::Hold(_) => true,
             Bound::LimitCurve => false,
         }
     }
@@ -389,7 +395,6 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                     let lead = self.window.g[j].coefficients()[1];
                     self.axes.acceleration[j] / (lead * self.window.weight.first().powi(2)) * scale
                 }
-                Kind::Hold => slow_sq / self.window.weight.first().powi(4),
                 _ => f64::INFINITY,
             };
         }
@@ -432,26 +437,4 @@ fn kept_until<const C: usize>(
         inflated.set_first(0.0);
     }
     inflated.first_root()
-}
-
-/// The greatest constant p of the whole sub-piece at which no axis exceeds its acceleration or velocity: p of x, so
-/// (dx/dτ)².
-pub fn hold<const M: usize, const C: usize>(sub: &SubPiece<M, C>, axes: &Axes<M>) -> f64 {
-    let least_weight = sub.weight.range().0;
-    let mut p = f64::INFINITY;
-    for k in 0..M {
-        let g = &sub.g[k];
-        // q'' = (g' ω − 2 g ω')/ω³
-        let bend =
-            g.derivative().multiply(&sub.weight).combine(1.0, &g.multiply(&sub.weight.derivative()), -2.0);
-        let (low, high) = bend.range();
-        let most = low.abs().max(high.abs()) / least_weight.powi(3);
-        p = p.min(axes.acceleration[k] / most);
-        p = p.min(axes.velocity_sq[k] / (g.range().1 / least_weight.powi(2)).powi(2));
-    }
-    let speed_sq = match sub.cap {
-        super::split::Cap::Speed([f0, f1]) => f0.min(f1),
-        super::split::Cap::Axis(..) => f64::INFINITY,
-    };
-    p.min(speed_sq / (sub.speed.range().1 / least_weight.powi(4)))
 }

@@ -13,6 +13,8 @@ pub struct Piece<const M: usize, const C: usize> {
     pub weight: Polynomial<C>,
     /// D: the speed squared is D π.
     pub speed: Polynomial<C>,
+    /// By axis: so much of g is rounding, of the control points or on the way from them.
+    pub noise: [f64; M],
     /// Degree of the curve itself.
     pub degree: usize,
     /// All of g has one direction.
@@ -21,6 +23,11 @@ pub struct Piece<const M: usize, const C: usize> {
     pub own_speed: bool,
 }
 
+/// Tangents are known to this part of the greatest one, and coordinates to this part of their size, which is not held
+/// against a piece as short as rounding.
+const TANGENT_NOISE: f64 = 1e-14;
+const POINT_NOISE: f64 = 1e-15;
+const MOST_NOISE: f64 = 1e-9;
 /// A tangent is off a straight line by no more than this part of the longest one, which is rounding, and of itself,
 /// or it is itself as short as rounding.
 const OFF_LINE: f64 = 2e-15;
@@ -55,11 +62,17 @@ impl<const M: usize, const C: usize> Piece<M, C> {
         };
         let along = straight_line(&g);
         let g = along.unwrap_or(g);
+        let noise = std::array::from_fn(|k| {
+            let (low, high) = g[k].range();
+            let farthest = control.iter().fold(0.0_f64, |most, point| most.max(point[k].abs()));
+            let size = high.max(-low);
+            (POINT_NOISE * degree as f64 * farthest).clamp(TANGENT_NOISE * size, MOST_NOISE * size)
+        });
         let speed = match speed_sq {
             Some((values, factor)) => Polynomial::from_bernstein(values.iter().map(|value| factor * value)),
             None => sum_of_squares(&g),
         };
-        Self { g, weight, speed, degree, straight: along.is_some(), own_speed: speed_sq.is_none() }
+        Self { g, weight, speed, noise, degree, straight: along.is_some(), own_speed: speed_sq.is_none() }
     }
 }
 
@@ -80,6 +93,7 @@ fn straight_line<const M: usize, const C: usize>(g: &[Polynomial<C>; M]) -> Opti
     on_line.then(|| direction.map(|x| rate.scale(x)))
 }
 
-fn sum_of_squares<const M: usize, const C: usize>(g: &[Polynomial<C>; M]) -> Polynomial<C> {
+/// |g|².
+pub fn sum_of_squares<const M: usize, const C: usize>(g: &[Polynomial<C>; M]) -> Polynomial<C> {
     g.iter().fold(Polynomial::constant(0.0), |sum, g| sum.combine(1.0, &g.multiply(g), 1.0))
 }

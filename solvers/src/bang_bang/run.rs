@@ -1,8 +1,8 @@
 //! Both passes over one run, its arcs into the columns of the profile.
 
-use super::pass::{self, cusp, distance, Arc, Kind, State};
+use super::pass::{self, cusp, distance, Arc, Kind, State, Stuck};
 use super::piece::Piece;
-use super::split::{split, Axes, Cap, Part, SubPiece};
+use super::split::{split, Axes, Cap, Part, Remedy, SubPiece};
 use super::{Task, TIP_AXES};
 use crate::bang_bang_quadratic::{ArcKind, Fault, Profile, Row, Workspace as QuadraticWorkspace, NO_AXIS};
 use crate::polynomial::{Polynomial, MOST};
@@ -13,8 +13,8 @@ const SMOOTH_TURN: f64 = 1e-9;
 const REACHED: f64 = 1e-12;
 /// An arc may exceed a limit by this part.
 const EXCESS: f64 = 1e-9;
-/// Sub-pieces on which p is held instead, at most, in a run.
-const MOST_HELD: usize = 100;
+/// A run in which rounding leaves a pass without headway is planned anew so often, with more cuts every time.
+const MOST_ATTEMPTS: usize = 40;
 
 /// Space for the passes, kept from run to run.
 #[derive(Default)]
@@ -25,17 +25,11 @@ pub struct Workspace {
     bounds: Vec<Arc>,
     offsets: Vec<usize>,
     arcs: Vec<Arc>,
-    /// Parts where p is held, because a pass came to no end there.
-    held: Vec<(usize, usize)>,
+    /// Cuts where a pass came to no end, and those that this attempt asks for.
+    remedies: Vec<Remedy>,
+    asked: Vec<Remedy>,
     /// For the pieces that the planner of quadratics takes.
     pub quadratic: QuadraticWorkspace,
-}
-
-/// Why the forward pass fails.
-enum Failed {
-    /// On a part of a piece, where p can be held instead.
-    Part(usize, usize),
-    Quadratic(Fault),
 }
 
 /// Plans the pieces `first..last` of the task from one speed squared of the tool to another; appends the arcs.
@@ -46,33 +40,35 @@ pub fn plan_run<const M: usize>(
     space: &mut Workspace,
     out: &mut Profile,
 ) -> Result<(), Fault> {
-    space.held.clear();
+    space.remedies.clear();
     let rows = out.len();
-    loop {
+    for attempt in 0..MOST_ATTEMPTS {
+        space.asked.clear();
         let reachable = backward(task, (first, last), end_sq, space)?;
-        if start_sq > reachable * (1.0 + REACHED) {
-            return Err(Fault::Start { piece: first, reachable: reachable.sqrt() });
-        }
-        match forward(task, (first, last), start_sq.min(reachable), space, out) {
-            Ok(reached) if reached < end_sq * (1.0 - REACHED) => {
-                return Err(Fault::End { piece: last - 1, reachable: reached.sqrt() });
+        if space.asked.is_empty() {
+            if start_sq > reachable * (1.0 + REACHED) {
+                return Err(Fault::Start { piece: first, reachable: reachable.sqrt() });
             }
-            Ok(_) => break,
-            Err(Failed::Quadratic(fault)) => return Err(fault),
-            Err(Failed::Part(piece, part)) => {
-                if space.held.len() == MOST_HELD || space.held.contains(&(piece, part)) {
-                    return Err(Fault::Stuck {
-                        piece,
-                        u: space.parts[part].from * task.problem.width[piece],
-                    });
+            let reached = forward(task, (first, last), start_sq.min(reachable), space, out)?;
+            if space.asked.is_empty() {
+                if reached < end_sq * (1.0 - REACHED) {
+                    return Err(Fault::End { piece: last - 1, reachable: reached.sqrt() });
                 }
-                space.held.push((piece, part));
-                out.truncate(rows);
+                out.end_run();
+                let stops = space.remedies.iter().filter(|remedy| remedy.stops);
+                out.slowed.extend(stops.map(|remedy| remedy.piece as u32));
+                return Ok(());
             }
+            out.truncate(rows);
         }
+        for remedy in &mut space.asked {
+            // Other numbers may do; a stop simplifies.
+            remedy.stops = attempt > 0;
+        }
+        space.remedies.append(&mut space.asked);
     }
-    out.end_run();
-    Ok(())
+    let Remedy { piece, t, .. } = space.remedies[space.remedies.len() - 1];
+    Err(Fault::Stuck { piece, u: t * task.problem.width[piece] })
 }
 
 /// Calls a function with the capacity of polynomials that a piece needs.
@@ -214,7 +210,8 @@ fn backward_over<const M: usize, const C: usize>(
     let start = space.parts.len();
     let tip = task.tip_piece::<C>(i);
     let chord = task.chord.as_ref();
-    split(&piece, tip.as_ref(), &task.axes, feed * feed, chord, &mut space.parts);
+    let remedies = space.remedies.iter().filter(|remedy| remedy.piece == i).copied();
+    split(&piece, tip.as_ref(), &task.axes, feed * feed, chord, remedies, &mut space.parts);
     space.pieces.push(start..space.parts.len());
     let mut limited = false;
     for number in (start..space.parts.len()).rev() {
@@ -230,35 +227,18 @@ fn backward_over<const M: usize, const C: usize>(
         at.end = Some(end_direction(&sub, part.negative, false));
         space.offsets.push(space.bounds.len());
         let reversed = sub.reversed();
-        let held = space.held.contains(&(i, number));
         let arcs = space.bounds.len();
-        let tried = if held {
-            Err(pass::Stuck)
-        } else {
-            pass::run::<M, C, true>(&reversed, &task.axes, at.state, &[], &mut space.bounds)
+        at.state = match pass::run::<M, C, true>(&reversed, &task.axes, at.state, &[], &mut space.bounds) {
+            Ok(next) if !part.starts_at_rest() => next,
+            Ok(_) => State { speed_sq: 0.0 },
+            Err(Stuck(x)) => {
+                space.bounds.truncate(arcs);
+                space.asked.push(part.remedy(i, 1.0 - x));
+                State { speed_sq: 0.0 }
+            }
         };
-        at.state = tried.unwrap_or_else(|_| {
-            space.bounds.truncate(arcs);
-            hold(&reversed, &task.axes, at.state, &mut space.bounds)
-        });
         at.tip_sq = at.state.speed_sq * sub.tip_share(false);
     }
-}
-
-/// Holds p over a sub-piece, as high as the limits and the state allow.
-fn hold<const M: usize, const C: usize>(
-    sub: &SubPiece<M, C>,
-    axes: &Axes<M>,
-    state: State,
-    out: &mut Vec<Arc>,
-) -> State {
-    let (first, last) = (sub.weight.first().powi(4), sub.weight.last().powi(4));
-    let mut p = pass::hold(sub, axes);
-    if sub.rate_sq(false) > 0.0 {
-        p = p.min(state.speed_sq / sub.rate_sq(false) * first);
-    }
-    out.push(Arc { x0: 0.0, x1: 1.0, kind: Kind::Hold, pi: [p / first, p / last], slow_sq: p });
-    State { speed_sq: p / last * sub.rate_sq(true) }
 }
 
 /// From `start_sq` of the tool under the arcs of the backward pass; appends the rows and returns the tool's speed
@@ -269,7 +249,7 @@ fn forward<const M: usize>(
     start_sq: f64,
     space: &mut Workspace,
     out: &mut Profile,
-) -> Result<f64, Failed> {
+) -> Result<f64, Fault> {
     let mut at = Between { state: State { speed_sq: f64::INFINITY }, end: None, tip_sq: start_sq };
     let mut index = space.offsets.len();
     for i in first..last {
@@ -282,12 +262,11 @@ fn forward<const M: usize>(
             if let Some(before) = &at.end {
                 speed_sq = at_cusp(before, &start, speed_sq);
             }
-            let reached = quadratic.forward_over(i, speed_sq, &mut space.quadratic, out);
-            at.tip_sq = reached.map_err(Failed::Quadratic)?;
+            at.tip_sq = quadratic.forward_over(i, speed_sq, &mut space.quadratic, out)?;
             (at.state, at.end) = (State { speed_sq: at.tip_sq }, Some(end));
         } else {
             let parts = space.pieces[last - 1 - i].clone();
-            with_capacity!(task, i, forward_over(task, i, parts, &mut index, &mut at, space, out))?;
+            with_capacity!(task, i, forward_over(task, i, parts, &mut index, &mut at, space, out));
         }
     }
     Ok(at.tip_sq)
@@ -302,7 +281,7 @@ fn forward_over<const M: usize, const C: usize>(
     at: &mut Between<M>,
     space: &mut Workspace,
     out: &mut Profile,
-) -> Result<(), Failed> {
+) {
     let piece = task.piece::<C>(i);
     let mut limited = false;
     for number in parts {
@@ -315,29 +294,32 @@ fn forward_over<const M: usize, const C: usize>(
         if let Some(before) = &at.end {
             at.state.speed_sq = at_cusp(before, &start, at.state.speed_sq);
         }
+        if part.starts_at_rest() {
+            at.state.speed_sq = 0.0;
+        }
         at.end = Some(end_direction(&sub, part.negative, true));
         *index -= 1;
         let end = space.offsets.get(*index + 1).copied().unwrap_or(space.bounds.len());
         let bounds = &space.bounds[space.offsets[*index]..end];
         space.arcs.clear();
-        at.state = match pass::run::<M, C, false>(&sub, &task.axes, at.state, bounds, &mut space.arcs) {
-            Ok(next) if keeps_limits(&sub, &task.axes, &space.arcs) => next,
-            // Below the held p of the backward pass p can be held too.
-            _ if bounds.iter().all(|arc| arc.kind == Kind::Hold) => {
-                space.arcs.clear();
-                hold(&sub, &task.axes, at.state, &mut space.arcs)
-            }
-            _ => return Err(Failed::Part(i, number)),
-        };
+        let kept = pass::run::<M, C, false>(&sub, &task.axes, at.state, bounds, &mut space.arcs)
+            .and_then(|next| keeps_limits(&sub, &task.axes, &space.arcs).map(|()| next));
+        at.state = kept.unwrap_or_else(|Stuck(x)| {
+            space.asked.push(part.remedy(i, x));
+            State { speed_sq: 0.0 }
+        });
         at.tip_sq = at.state.speed_sq * sub.tip_share(true);
         push(task, i, &part, &sub, &space.arcs, out);
     }
-    Ok(())
 }
 
-/// Whether every axis keeps its limits at some places of the arcs: a guard against rounding.
-fn keeps_limits<const M: usize, const C: usize>(sub: &SubPiece<M, C>, axes: &Axes<M>, arcs: &[Arc]) -> bool {
-    arcs.iter().all(|arc| {
+/// Whether every axis keeps its limits at some places of the arcs, else where it does not: a guard against rounding.
+fn keeps_limits<const M: usize, const C: usize>(
+    sub: &SubPiece<M, C>,
+    axes: &Axes<M>,
+    arcs: &[Arc],
+) -> Result<(), Stuck> {
+    let kept = |arc: &Arc| {
         let (j, slow_at, signed) = match arc.kind {
             Kind::Accelerating(j) => (j, arc.x0, axes.acceleration[j]),
             Kind::Braking(j) => (j, arc.x1, -axes.acceleration[j]),
@@ -364,7 +346,8 @@ fn keeps_limits<const M: usize, const C: usize>(sub: &SubPiece<M, C>, axes: &Axe
                     && other * other * pi <= axes.velocity_sq[l] * (1.0 + EXCESS)
             })
         })
-    })
+    };
+    arcs.iter().find(|arc| !kept(arc)).map_or(Ok(()), |arc| Err(Stuck(0.5 * (arc.x0 + arc.x1))))
 }
 
 /// Appends the arcs of the forward pass over one part.
@@ -398,15 +381,15 @@ fn push<const M: usize, const C: usize>(
             let way = way(k);
             // An arc that begins where its axis turns has another formula for p.
             joins = arc.pi[0].is_finite() && arc.pi[1].is_finite() && sub.g[k].value(arc.x0) > 0.0;
+            if way <= 0.0 {
+                return 0.0;
+            }
             2.0 * way / (arc.slow_sq.sqrt() + (arc.slow_sq + 2.0 * task.axes.acceleration[k] * way).sqrt())
         };
         let (kind, axis, value, duration) = match arc.kind {
             Kind::Accelerating(k) => (ArcKind::AxisAcceleration, k as u8, signed(k), by_acceleration(k)),
             Kind::Braking(k) => (ArcKind::AxisAcceleration, k as u8, -signed(k), by_acceleration(k)),
             Kind::LimitCurve => continue,
-            Kind::Hold => {
-                (ArcKind::ParameterAcceleration, NO_AXIS, 0.0, (arc.x1 - arc.x0) / arc.slow_sq.sqrt())
-            }
             Kind::Cap => match sub.cap {
                 Cap::Axis(k, v_sq) => (ArcKind::AxisVelocity, k as u8, v_sq, way(k) / v_sq.sqrt()),
                 Cap::Speed([f0, f1]) => {
@@ -425,7 +408,7 @@ fn push<const M: usize, const C: usize>(
     }
 }
 
-/// ∫ √D/(ω² √f) dx from x0 to x1: length over speed, by Gauss's rule of order 12, halved until it agrees.
+/// ∫ √D/(ω² √f) dx from x0 to x1: length over speed, by Gauss's rule of order 12, halved where it does not agree.
 fn time_at_speed<const M: usize, const C: usize>(
     sub: &SubPiece<M, C>,
     (f0, f1): (f64, f64),
@@ -436,16 +419,19 @@ fn time_at_speed<const M: usize, const C: usize>(
         let weight = sub.weight.value(x);
         (sub.speed.value(x).max(0.0) / (f0 + x * (f1 - f0))).sqrt() / (weight * weight)
     };
-    gauss(&rate, x0, x1, rule(&rate, x0, x1), 0)
+    let whole = rule(&rate, x0, x1);
+    gauss(&rate, (x0, x1), whole, 1e-14 * whole, 0)
 }
 
-fn gauss(rate: &impl Fn(f64) -> f64, a: f64, b: f64, whole: f64, depth: u32) -> f64 {
+/// To an error that does not shrink with the stretches: rounding cannot keep them from coming to an end.
+fn gauss(rate: &impl Fn(f64) -> f64, (a, b): (f64, f64), whole: f64, error: f64, depth: u32) -> f64 {
     let middle = 0.5 * (a + b);
     let (left, right) = (rule(rate, a, middle), rule(rate, middle, b));
-    if (left + right - whole).abs() <= 1e-14 * whole || depth == 40 {
-        return left + right;
+    if (left + right - whole).abs() > error && depth < 40 {
+        gauss(rate, (a, middle), left, error, depth + 1) + gauss(rate, (middle, b), right, error, depth + 1)
+    } else {
+        left + right
     }
-    gauss(rate, a, middle, left, depth + 1) + gauss(rate, middle, b, right, depth + 1)
 }
 
 /// Gauss's rule of six places.

@@ -1,8 +1,9 @@
 //! Cuts a piece where an axis turns round and where the lowest velocity cap changes.
 
 use super::chord::SpeedLine;
+use super::cusp::cusps;
 use super::pass::cusp;
-use super::piece::Piece;
+use super::piece::{sum_of_squares, Piece};
 use super::TIP_AXES;
 use crate::planning::ChordLimit;
 use crate::polynomial::Polynomial;
@@ -10,12 +11,16 @@ use crate::polynomial::Polynomial;
 /// Cuts closer than this part of the piece are one.
 const SAME_CUT: f64 = 1e-13;
 /// Turns closer than this part of the piece are one.
-const SAME_TURN: f64 = 1e-8;
+const SAME_TURN: f64 = 1e-12;
 /// Closer than this to a turn where |C'|² is below this part of its greatest value, no velocity cap counts.
 const NEAR_CUSP: f64 = 1e-5;
 const SLOW: f64 = 1e-10;
+/// A weight may be so many times greater than those at the ends of a part.
+const UNEVEN: f64 = 100.0;
 /// The value of a polynomial is rounding below this part of its terms.
 const NOISE: f64 = 1e-14;
+/// A place nearer to the end of a part than this is at its end.
+const AT_END: f64 = 1e-6;
 /// A tangent coefficient this small beside the greatest one is zero.
 const ZERO: f64 = 1e-14;
 
@@ -40,11 +45,58 @@ pub struct Part {
     pub from: f64,
     pub to: f64,
     pub cap: Cap,
-    /// Bit k: axis k turns round at the left or right end, moves backward in between, moves at all.
-    zero_left: u8,
-    zero_right: u8,
+    left: End,
+    right: End,
+    /// Bit k: axis k moves backward, moves at all.
     pub negative: u8,
     moving: u8,
+}
+
+/// An end of a part.
+#[derive(Clone, Copy, Debug, Default)]
+struct End {
+    /// Bit k: axis k turns round there.
+    turns: u8,
+    /// All axes have a zero of this order.
+    order: u8,
+    /// As far as this from the end rounding may have moved the zeros.
+    reach: f64,
+    /// The plan stops there.
+    stops: bool,
+}
+
+/// A place that divides two parts.
+#[derive(Clone, Copy, Debug)]
+struct Cut {
+    t: f64,
+    end: End,
+}
+
+impl Cut {
+    fn plain(t: f64) -> Self {
+        Self { t, end: End::default() }
+    }
+
+    fn turn(t: f64, turns: u8) -> Self {
+        Self { t, end: End { turns, reach: SAME_TURN, ..End::default() } }
+    }
+
+    /// Takes over what another cut at the same place is for.
+    fn join(&mut self, other: &Self) {
+        self.end.turns |= other.end.turns;
+        self.end.order = self.end.order.max(other.end.order);
+        self.end.reach = self.end.reach.max(other.end.reach);
+        self.end.stops |= other.end.stops;
+    }
+}
+
+/// A place where a piece is cut once more because a pass came to no end there.
+#[derive(Clone, Copy, Debug)]
+pub struct Remedy {
+    pub piece: usize,
+    pub t: f64,
+    /// The plan stops there.
+    pub stops: bool,
 }
 
 /// A part as a pass travels it, its polynomials over x in [0, 1], every axis moving forward.
@@ -71,31 +123,31 @@ pub fn split<const M: usize, const C: usize>(
     axes: &Axes<M>,
     feed_sq: f64,
     chord: Option<&ChordLimit>,
+    remedies: impl Iterator<Item = Remedy>,
     out: &mut Vec<Part>,
 ) {
     let size = |g: &Polynomial<C>| g.coefficients().iter().fold(0.0, |most: f64, c| most.max(c.abs()));
     let greatest = piece.g.iter().map(size).fold(0.0, f64::max);
     let mut moving = 0u8;
-    // Places, and the axes that turn there.
-    let mut cuts = vec![(0.0, 0u8), (1.0, 0u8)];
+    let mut cuts = vec![Cut::plain(0.0), Cut::plain(1.0)];
     for (k, g) in piece.g.iter().enumerate() {
         if size(g) <= ZERO * greatest {
             continue;
         }
         moving |= 1 << k;
         for (end, t) in [(g.first(), 0.0), (g.last(), 1.0)] {
-            if end.abs() <= ZERO * size(g) {
-                cuts.push((t, 1 << k));
+            if end.abs() <= piece.noise[k] {
+                cuts.push(Cut::turn(t, 1 << k));
             }
         }
         if !piece.straight {
-            g.sign_changes(&mut |t| cuts.push((t, 1 << k)));
+            g.sign_changes(&mut |t| cuts.push(Cut::turn(t, 1 << k)));
         }
     }
     if piece.straight {
         // All axes turn at once, in a cusp.
         let greatest = (0..M).max_by(|&a, &b| size(&piece.g[a]).total_cmp(&size(&piece.g[b]))).unwrap_or(0);
-        piece.g[greatest].sign_changes(&mut |t| cuts.push((t, moving)));
+        piece.g[greatest].sign_changes(&mut |t| cuts.push(Cut::turn(t, moving)));
     }
     let mut lines = vec![];
     match (chord, tip) {
@@ -110,26 +162,41 @@ pub fn split<const M: usize, const C: usize>(
     });
     let mut fast = 0u8;
     for line in &lines {
-        cuts.push((line.from, 0));
+        cuts.push(Cut::plain(line.from));
         if can_cap != 0 {
             fast |= cut_by_cap(piece, axes, line, can_cap, &mut cuts);
         }
     }
     merge_near_cusps(piece, &mut cuts);
-    cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
+    cut_by_weight(&piece.weight, (0.0, 1.0), &mut cuts);
+    cuts.extend(remedies.map(|Remedy { t, stops, .. }| Cut { t, end: End { stops, ..End::default() } }));
+    for cusp in cusps(piece, moving) {
+        // The axes turn here or nowhere near.
+        let mut all = Cut {
+            t: cusp.t,
+            end: End { turns: moving, order: cusp.order, reach: cusp.reach.max(SAME_TURN), stops: false },
+        };
+        let near = |t: f64| (t - cusp.t).abs() <= 4.0 * all.end.reach;
+        let is_end = |t: f64| t == 0.0 || t == 1.0;
+        all.end.stops = cuts.iter().any(|cut| near(cut.t) && cut.end.stops);
+        all.t = [0.0, 1.0].into_iter().find(|&t| near(t)).unwrap_or(cusp.t);
+        cuts.retain(|cut| !near(cut.t) || is_end(cut.t));
+        cuts.push(all);
+    }
+    cuts.sort_by(|a, b| a.t.total_cmp(&b.t));
     cuts.dedup_by(|b, a| {
-        let same = b.0 - a.0 <= SAME_CUT;
+        let same = b.t - a.t <= SAME_CUT;
         if same {
-            a.1 |= b.1;
+            a.join(b);
         }
         same
     });
     if let Some(last) = cuts.last_mut() {
-        last.0 = 1.0;
+        last.t = 1.0;
     }
     let mut lines = lines.iter().peekable();
     for pair in cuts.windows(2) {
-        let ((from, left), (to, right)) = (pair[0], pair[1]);
+        let (from, to) = (pair[0].t, pair[1].t);
         while lines.peek().is_some_and(|line| line.to <= 0.5 * (from + to)) {
             lines.next();
         }
@@ -140,8 +207,8 @@ pub fn split<const M: usize, const C: usize>(
             from,
             to,
             cap: lowest_cap(&g, piece.speed.value(middle), axes, line, (from, to), fast),
-            zero_left: left,
-            zero_right: right,
+            left: pair[0].end,
+            right: pair[1].end,
             negative: (0..M).fold(0, |bits, k| bits | u8::from(g[k] < 0.0) << k),
             moving,
         });
@@ -150,27 +217,37 @@ pub fn split<const M: usize, const C: usize>(
 
 /// Near a cusp the axes turn within what rounding can tell apart: there they turn at once, and no velocity cap counts,
 /// for the tool hardly moves.
-fn merge_near_cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, cuts: &mut Vec<(f64, u8)>) {
+fn merge_near_cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, cuts: &mut Vec<Cut>) {
     let fastest = piece.speed.range().1;
     let is_end = |t: f64| t == 0.0 || t == 1.0;
-    let mut turns: Vec<(f64, u8)> =
-        cuts.iter().copied().filter(|&(t, axes)| axes != 0 || is_end(t)).collect();
-    turns.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut turns: Vec<Cut> =
+        cuts.iter().copied().filter(|cut| cut.end.turns != 0 || is_end(cut.t)).collect();
+    turns.sort_by(|a, b| a.t.total_cmp(&b.t));
     turns.dedup_by(|b, a| {
-        let same = b.0 - a.0 <= SAME_TURN;
+        let same = b.t - a.t <= SAME_TURN;
         if same {
-            a.1 |= b.1;
+            a.join(b);
             // The ends of the piece stay where they are.
-            a.0 = if b.0 == 1.0 { 1.0 } else { a.0 };
+            a.t = if b.t == 1.0 { 1.0 } else { a.t };
         }
         same
     });
     let slow = |t: f64| piece.speed.value(t) <= SLOW * fastest;
-    let near = |t: f64| turns.iter().any(|&(turn, _)| (t - turn).abs() <= NEAR_CUSP && slow(turn));
-    let rest: Vec<(f64, u8)> =
-        cuts.iter().copied().filter(|&(t, axes)| axes == 0 && !is_end(t) && !near(t)).collect();
-    cuts.clear();
-    cuts.extend(turns.iter().copied().chain(rest));
+    let near = |t: f64| turns.iter().any(|turn| (t - turn.t).abs() <= NEAR_CUSP && slow(turn.t));
+    cuts.retain(|cut| cut.end.turns == 0 && !is_end(cut.t) && !near(cut.t));
+    cuts.extend(turns);
+}
+
+/// Halves until no weight is much greater than those at the ends, from which integrals are computed.
+fn cut_by_weight<const C: usize>(weight: &Polynomial<C>, (from, to): (f64, f64), cuts: &mut Vec<Cut>) {
+    if weight.range().1 <= UNEVEN * weight.first().min(weight.last()) {
+        return;
+    }
+    let middle = 0.5 * (from + to);
+    cuts.push(Cut::plain(middle));
+    let (left, right) = weight.split(0.5);
+    cut_by_weight(&left, (from, middle), cuts);
+    cut_by_weight(&right, (middle, to), cuts);
 }
 
 /// Cuts the places where the caps cross on a line; says which axes can be faster than their limits.
@@ -179,10 +256,10 @@ fn cut_by_cap<const M: usize, const C: usize>(
     axes: &Axes<M>,
     line: &SpeedLine,
     can_cap: u8,
-    cuts: &mut Vec<(f64, u8)>,
+    cuts: &mut Vec<Cut>,
 ) -> u8 {
     let mut fast = 0u8;
-    let mut cut = |t: f64| cuts.push((line.from + t * (line.to - line.from), 0));
+    let mut cut = |t: f64| cuts.push(Cut::plain(line.from + t * (line.to - line.from)));
     let whole = line.from == 0.0 && line.to == 1.0;
     let on_line = |p: &Polynomial<C>| if whole { *p } else { p.part(line.from, line.to) };
     let speed = on_line(&piece.speed);
@@ -212,27 +289,59 @@ fn cut_by_cap<const M: usize, const C: usize>(
 }
 
 impl Part {
+    /// Whether the plan stops at its left end.
+    pub fn starts_at_rest(&self) -> bool {
+        self.left.stops
+    }
+
+    /// Another cut of the part at x where a pass found no way: in the middle where it has one near x.
+    pub fn remedy(&self, piece: usize, x: f64) -> Remedy {
+        let inside = AT_END < x && x < 1.0 - AT_END;
+        let t = self.from + (self.to - self.from) * if inside { x } else { 0.5 };
+        Remedy { piece, t, stops: false }
+    }
+
     /// The part as travelled forward.
     pub fn sub_piece<const M: usize, const C: usize>(&self, piece: &Piece<M, C>) -> SubPiece<M, C> {
         let length = self.to - self.from;
-        let g = std::array::from_fn(|k| {
+        let g: [Polynomial<C>; M] = std::array::from_fn(|k| {
             if self.moving >> k & 1 == 0 {
                 return Polynomial::constant(0.0).elevate(piece.g[k].degree());
             }
             let sign = if self.negative >> k & 1 == 1 { -length } else { length };
             let mut g = piece.g[k].part(self.from, self.to).scale(sign);
-            if self.zero_left >> k & 1 == 1 {
-                g.set_first(0.0);
+            let degree = g.degree();
+            let (low, high) = piece.g[k].range();
+            let noise = length * piece.noise[k].max(SAME_TURN * degree as f64 * high.max(-low));
+            let zeros = |end: &End, g: &Polynomial<C>, at: &dyn Fn(usize) -> usize| {
+                let turns = end.turns >> k & 1 == 1;
+                let known = usize::from(end.order).max(usize::from(turns));
+                let reach = (end.reach / length).min(1.0);
+                // An axis that rounding, or a turn taken for another one, sends back stands still.
+                let noisy = |i: usize| {
+                    let back = -g.coefficients()[at(i)] * reach.powi(i as i32);
+                    turns && back > 0.0 && back <= 64.0 * noise
+                };
+                (0..=degree).take_while(|&i| i < known || noisy(i)).count()
+            };
+            for i in 0..zeros(&self.left, &g, &|i| i) {
+                g.clear(i);
             }
-            if self.zero_right >> k & 1 == 1 {
-                g.set_last(0.0);
+            for i in 0..zeros(&self.right, &g, &|i| degree - i) {
+                g.clear(degree - i);
             }
             g
         });
+        // Next to a cusp |C'|² is lost in the rounding of that of the whole piece.
+        let speed = if piece.own_speed {
+            sum_of_squares(&g)
+        } else {
+            piece.speed.part(self.from, self.to).scale(length * length)
+        };
         SubPiece {
             g,
             weight: piece.weight.part(self.from, self.to),
-            speed: piece.speed.part(self.from, self.to).scale(length * length),
+            speed,
             cap: self.cap,
             moving: self.moving,
             degree: piece.degree,

@@ -12,8 +12,6 @@ pub enum Bound<const C: usize> {
     Axis(usize, f64),
     /// Forward: an arc of the backward pass, on which axis k brakes; its velocity squared times ω.
     Arc(usize, Polynomial<C>),
-    /// Forward: the backward pass holds p.
-    Hold(f64),
     /// Forward: the backward pass follows the limit curve, which a forward arc does not reach.
     LimitCurve,
 }
@@ -54,7 +52,6 @@ impl<const M: usize, const C: usize> Window<M, C> {
         let bound = match &self.bound {
             Bound::Speed(f) => Bound::Speed(f.left(t)),
             Bound::Arc(k, w) => Bound::Arc(*k, w.left(t)),
-            Bound::Hold(p) => Bound::Hold(p / (t * t)),
             bound => *bound,
         };
         Self {
@@ -74,7 +71,6 @@ impl<const M: usize, const C: usize> Window<M, C> {
         let bound = match &self.bound {
             Bound::Speed(f) => Bound::Speed(f.right(t)),
             Bound::Arc(k, w) => Bound::Arc(*k, w.right(t)),
-            Bound::Hold(p) => Bound::Hold(p / (rest * rest)),
             bound => *bound,
         };
         Self {
@@ -97,7 +93,6 @@ impl<const M: usize, const C: usize> Window<M, C> {
             Bound::Speed(f) => (f.first(), self.speed.first()),
             Bound::Axis(k, v_sq) => (*v_sq, self.g[*k].first().powi(2)),
             Bound::Arc(k, w) => (w.first(), self.weight.first() * self.g[*k].first().powi(2)),
-            Bound::Hold(p) => (*p, self.weight.first().powi(4)),
             Bound::LimitCurve => return f64::INFINITY,
         };
         if d > 0.0 {
@@ -121,10 +116,6 @@ impl<const M: usize, const C: usize> Window<M, C> {
             Bound::Speed(f) => Some((*f, self.speed)),
             Bound::Axis(k, v_sq) => Some((Polynomial::constant(*v_sq), self.g[*k].multiply(&self.g[*k]))),
             Bound::Arc(k, w) => Some((*w, self.weight.multiply(&self.g[*k].multiply(&self.g[*k])))),
-            Bound::Hold(p) => {
-                let square = self.weight.multiply(&self.weight);
-                Some((Polynomial::constant(*p), square.multiply(&square)))
-            }
             Bound::LimitCurve => None,
         }
     }

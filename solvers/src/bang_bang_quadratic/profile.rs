@@ -40,6 +40,8 @@ pub struct Profile {
     pub duration: Vec<f64>,
     /// Offsets of the runs in the arcs.
     pub runs: Vec<i64>,
+    /// Pieces on which the plan is slower than it could be, for rounding hides the way; each as often as that happens.
+    pub slowed: Vec<u32>,
     left_out: f64,
 }
 
@@ -120,6 +122,7 @@ impl Profile {
         self.p0.append(&mut other.p0);
         self.p1.append(&mut other.p1);
         self.duration.append(&mut other.duration);
+        self.slowed.append(&mut other.slowed);
     }
 
     /// Appends an arc of piece number `piece`; t and p belong to the parameter t = u/width. An arc too short for u

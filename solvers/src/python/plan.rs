@@ -30,6 +30,7 @@ type Columns<'py> = (
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<i64>>,
+    Bound<'py, PyArray1<u32>>,
 );
 
 /// Which planner takes the runs of polynomial quadratics.
@@ -39,7 +40,7 @@ enum Quadratics {
     General,
 }
 
-/// The fastest profile: piece, kind, axis, value, u0, u1, p0, p1, duration, runs.
+/// The fastest profile: piece, kind, axis, value, u0, u1, p0, p1, duration, runs, slowed.
 #[pyfunction]
 fn plan_bang_bang<'py>(py: Python<'py>, problem: ProblemArrays<'py>) -> PyResult<Columns<'py>> {
     plan(py, &problem, Quadratics::Their)
@@ -105,6 +106,7 @@ fn to_columns(py: Python<'_>, profile: Profile) -> Columns<'_> {
         floats(profile.p1),
         floats(profile.duration),
         PyArray1::from_vec(py, profile.runs),
+        PyArray1::from_vec(py, profile.slowed),
     )
 }
 

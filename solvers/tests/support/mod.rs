@@ -3,6 +3,7 @@
 
 mod audit;
 mod cases;
+pub mod curves;
 
 pub use audit::{audit, Audit};
 pub use cases::{milder_case, random_case, Case, Random};

@@ -1,7 +1,7 @@
 //! The arc of greatest acceleration: its control axis, and the event that ends it.
 
 use super::{
-    kept_until, Kind, Pass, Start, Stuck, AT_END, FLAT, MAX_HOPS, NEARLY_ON_BOUND, NOISE, NO_STEP, TIE,
+    kept_until, Kind, Pass, Start, Stuck, AT_END, FLAT, MAX_HOPS, NEARLY_FLAT, NEARLY_ON_BOUND, NOISE, TIE,
 };
 use crate::bang_bang::window::Bound;
 use crate::polynomial::Polynomial;
@@ -73,22 +73,22 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
     fn least_from_cusp(&self) -> Option<(usize, u8)> {
         let lead = |k: usize| self.window.g[k].coefficients()[self.order];
         let ratio = |k: usize| self.axes.acceleration[k] / lead(k);
-        let j = self.moving().filter(|&k| lead(k) > 0.0).min_by(|&a, &b| ratio(a).total_cmp(&ratio(b)))?;
-        let tied = self
-            .moving()
-            .filter(|&k| k != j && lead(k) > 0.0 && ratio(k) <= ratio(j) * (1.0 + TIE))
-            .fold(0u8, |bits, k| bits | 1 << k);
-        Some((j, tied))
+        let least = self.moving().filter(|&k| lead(k) > 0.0).map(ratio).fold(f64::INFINITY, f64::min);
+        let tied = |k: usize| lead(k) > 0.0 && ratio(k) <= least * (1.0 + TIE);
+        let bits = self.moving().filter(|&k| tied(k)).fold(0u8, |bits, k| bits | 1 << k);
+        // Among tied axes an event at once tells which it is.
+        let j = self.control.filter(|&k| tied(k)).or_else(|| self.moving().find(|&k| tied(k)))?;
+        Some((j, bits))
     }
 
     /// Along an arc of greatest acceleration to the event that ends it.
     pub(super) fn accelerate(&mut self, on_bound: bool) -> Result<(), Stuck> {
         let order = self.order;
         let (j, mut tied, turns) = if order > 0 {
-            let (j, tied) = self.least_from_cusp().ok_or(Stuck)?;
+            let (j, tied) = self.least_from_cusp().ok_or(self.stuck())?;
             (j, tied, false)
         } else {
-            let (j, _, tied, turns) = self.least(&self.start()).ok_or(Stuck)?;
+            let (j, _, tied, turns) = self.least(&self.start()).ok_or(self.stuck())?;
             (j, tied, turns)
         };
         tied = (tied | self.tied) & !(1 << j);
@@ -155,7 +155,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             self.arrived();
             return Ok(());
         };
-        if first * self.window.length() < NO_STEP {
+        if !self.is_step(first) {
             return self.hop(event, j, on_bound);
         }
         let kind = match event {
@@ -176,11 +176,21 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
     fn hop(&mut self, event: Event, j: usize, on_bound: bool) -> Result<(), Stuck> {
         self.hops += 1;
         if self.hops > MAX_HOPS {
-            return Err(Stuck);
+            return Err(self.stuck());
         }
         match event {
             // Whether the two are tied shows in their accelerations.
-            Event::Transition(l) => (self.control, self.tied) = (Some(l), 0),
+            Event::Transition(l) => {
+                (self.control, self.tied) = (Some(l), 0);
+                // An axis that turns here cannot show it while π grows to what it allows at once.
+                let g = &self.window.g[l];
+                let weight = self.window.weight.first();
+                let flat = self.axes.acceleration[l] / (g.first_slope() * weight * weight);
+                if self.order == 0 && g.first() == 0.0 && (1.0 - NEARLY_FLAT..1.0).contains(&(self.pi / flat))
+                {
+                    self.pi = flat;
+                }
+            }
             Event::Low(l) => {
                 self.limit_curve = Some((j, l));
                 self.low = None;
@@ -190,14 +200,14 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                     // So near that the arc meets it at once.
                     let bound = self.window.bound_at_start();
                     if self.order > 0 || self.pi < bound * (1.0 - NEARLY_ON_BOUND) {
-                        return Err(Stuck);
+                        return Err(self.stuck());
                     }
                     self.pi = bound;
                 }
                 self.leaving = false;
                 self.control = None;
                 if self.hops > 4 {
-                    return Err(Stuck);
+                    return Err(self.stuck());
                 }
             }
         }
@@ -232,8 +242,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                 if !n.first().is_finite() {
                     return None;
                 }
-                let known = if matches!(window.bound, Bound::Hold(_)) { 0 } else { 2 };
-                (n.multiply(&weight.multiply(square)), w.multiply(&d), known)
+                (n.multiply(&weight.multiply(square)), w.multiply(&d), 2)
             }
         };
         let same = known == 0;

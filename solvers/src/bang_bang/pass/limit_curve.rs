@@ -1,6 +1,6 @@
 //! Along the velocity limit curve, backward: two axes at their limits, one up and one down.
 
-use super::{kept_until, Kind, Pass, AT_END, NOISE, NO_STEP, ON_BOUND};
+use super::{kept_until, Kind, Pass, AT_END, NOISE, ON_BOUND};
 use crate::polynomial::Polynomial;
 
 /// Why the limit curve is left.
@@ -81,7 +81,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         if first > 1.0 - AT_END && first < 1.0 {
             (first, event) = (1.0, None);
         }
-        let moved = first * self.window.length() >= NO_STEP;
+        let moved = self.is_step(first);
         if moved {
             let scale = self.window.length().powi(2);
             let (n1, w1, weight1) = (n.value(first), w.value(first), weight.value(first));

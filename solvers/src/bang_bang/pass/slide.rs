@@ -1,6 +1,6 @@
 //! Along the bound: an arc of the backward pass to its end, the velocity cap while no axis needs more than it has.
 
-use super::{kept_until, Kind, Pass, NOISE, NO_STEP};
+use super::{kept_until, Kind, Pass, NOISE};
 use crate::bang_bang::window::Bound;
 use crate::polynomial::Polynomial;
 
@@ -16,17 +16,11 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                 self.arrived();
                 return true;
             }
-            Bound::Hold(p) => {
-                let p = p * self.window.length().powi(2);
-                self.push(1.0, Kind::Hold, None, p);
-                self.arrived();
-                return true;
-            }
             Bound::LimitCurve => return false,
             Bound::Speed(f) => self.slide_at_speed(f),
             Bound::Axis(k, v_sq) => self.slide_at_axis_speed(*k, *v_sq),
         };
-        let moved = end * self.window.length() >= NO_STEP;
+        let moved = self.is_step(end);
         if moved {
             self.push(end, Kind::Cap, None, 0.0);
             self.hops = 0;

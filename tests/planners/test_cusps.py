@@ -1,0 +1,124 @@
+"""Cusps and places next to one: known times, every limit on random curves made to break the planner."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from math import comb
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from feedplan._solvers import plan_bang_bang
+from feedplan.curves.composite import CompositeCurve
+from feedplan.plan import rounding_stops
+from feedplan.profile import SpeedProfile
+from tests.planners.excess import worst_excess
+from tests.planners.test_curves import problem_of
+
+Array = NDArray[np.float64]
+
+
+def bernstein(powers: Array) -> Array:
+    """Bernstein coefficients on [0, 1] of a polynomial given by its powers, lowest first."""
+    n = len(powers) - 1
+    return np.array([sum(comb(i, j) / comb(n, j) * powers[j] for j in range(i + 1)) for i in range(n + 1)])
+
+
+def with_cusp(
+    order: int, place: float, direction: Array, bend: Array | None = None, power: int = 1
+) -> CompositeCurve:
+    """The curve with C' = (t − place)^order (direction + bend (t − place)^power)."""
+    factor = np.polynomial.Polynomial([-place, 1.0])
+    rates = [factor**order * x for x in direction]
+    if bend is not None:
+        rates = [rate + factor ** (order + 1) * y for rate, y in zip(rates, bend, strict=True)]
+    degree = max(len(rate.coef) for rate in rates)
+    columns = []
+    for rate in rates:
+        powers = np.zeros(degree + 1)
+        powers[1 : len(rate.coef) + 1] = rate.integ().coef[1:]
+        columns.append(bernstein(powers))
+    return CompositeCurve.from_bezier(np.array(columns).T)
+
+
+def time_of(curve: CompositeCurve, acceleration: float | Array = 100.0, feed: float = 1e9) -> float:
+    axes = curve.axes
+    limit = np.broadcast_to(np.asarray(acceleration, float), axes).copy()
+    return SpeedProfile(*plan_bang_bang(problem_of(curve, np.full(axes, 1e9), limit, feed))).time
+
+
+@pytest.mark.parametrize("place", [0.0, 0.3, 0.5, 0.7123456789, 1.0])
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+def test_a_line_with_a_cusp_is_passed_where_it_goes_on_and_turned_where_it_comes_back(
+    order: int, place: float
+) -> None:
+    # The way before and after the cusp; X is the slower axis of the two.
+    before, after = place ** (order + 1) / (order + 1), (1 - place) ** (order + 1) / (order + 1)
+    ways = [before + after] if order % 2 == 0 else [way for way in (before, after) if way > 0]
+    time = sum(2 * np.sqrt(3.0 * way / 100.0) for way in ways)
+    curve = with_cusp(order, place, np.array([3.0, -1.0]))
+    assert time_of(curve) == pytest.approx(time, rel=1e-9)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_a_curve_stops_in_its_cusp(order: int) -> None:
+    # From rest to rest on both halves: X alone is at its limit where Y needs less.
+    curve = with_cusp(order, 0.5, np.array([1.0, 0.0]), np.array([0.0, 0.3]))
+    halves = [2 * np.sqrt(0.5 ** (order + 1) / (order + 1) / 100.0)] * 2
+    assert time_of(curve, np.array([100.0, 1e4])) == pytest.approx(sum(halves), rel=1e-9)
+
+
+def random_curve(seed: int) -> tuple[CompositeCurve, Array, Array, float]:
+    """A piece with a cusp or nearly one, and limits."""
+    rng = np.random.default_rng(seed)
+    axes, degree = int(rng.integers(1, 4)), int(rng.integers(2, 10))
+    off = 0.0 if rng.random() < 0.3 else 10 ** rng.uniform(-17, -1)
+    kind = int(rng.integers(0, 5))
+    if kind <= 1:
+        order = int(rng.integers(1, min(4, degree)))
+        place = 0.5 if rng.random() < 0.3 else rng.uniform()
+        factor = np.polynomial.Polynomial([-place, 1.0]) ** order
+        rest = np.polynomial.Polynomial(rng.uniform(0.2, 2.0, degree - order))
+        powers = np.zeros(degree)
+        product = (factor * rest).coef
+        powers[: len(product)] = product
+        rates = np.outer(bernstein(powers), rng.normal(size=axes))
+    elif kind == 2:
+        rates = rng.normal(size=(degree, axes))
+        rates[rng.integers(0, degree, 2)] = 0.0
+    elif kind == 3:
+        rates = np.outer(rng.normal(size=degree), rng.normal(size=axes))
+    else:
+        rates = rng.normal(size=(degree, axes)) * 10 ** rng.uniform(-12, 0, size=(degree, axes))
+    rates = rates + off * rng.normal(size=rates.shape)
+    if not rates.any():
+        rates[0, 0] = 1.0
+    points = np.concatenate([np.zeros((1, axes)), np.cumsum(rates, axis=0)]) / degree
+    weights = 10 ** rng.uniform(-1, 1, degree + 1) if rng.random() < 0.25 else None
+    curve = CompositeCurve.from_bezier(points, weights, width=10 ** rng.uniform(-1, 1))
+    velocity, acceleration = 10 ** rng.uniform(0, 2, axes), 10 ** rng.uniform(0, 3, axes)
+    return curve, velocity, acceleration, 1e9 if rng.random() < 0.5 else 10 ** rng.uniform(-1, 1)
+
+
+def test_a_stop_for_rounding_is_told_with_its_line() -> None:
+    problem = problem_of(with_cusp(2, 0.5, np.array([3.0, -1.0])), np.ones(2), np.ones(2), 1.0)
+    profile = SpeedProfile(*plan_bang_bang(problem))
+    assert rounding_stops(problem, profile) == ()
+    (sentence,) = rounding_stops(problem, replace(profile, slowed=np.zeros(2, dtype=np.uint32)))
+    assert sentence.startswith(
+        "line 0: rounding hides how the path goes on next to a cusp: the plan stops there"
+    )
+
+
+def test_random_curves_next_to_cusps_keep_every_limit() -> None:
+    slowed = 0
+    seeds = int(os.environ.get("FEEDPLAN_SEEDS", "400"))
+    for seed in range(seeds):
+        problem = problem_of(*random_curve(seed))
+        profile = SpeedProfile(*plan_bang_bang(problem))
+        assert np.isfinite(profile.time), seed
+        assert worst_excess(problem, profile)[0] <= 1e-8, seed
+        slowed += len(profile.slowed) > 0
+    assert slowed <= 2 + seeds / 300
