@@ -102,6 +102,10 @@ _MACHINE = click.option(
 _TOLERANCE = click.option(
     "--tolerance", type=_Number(), metavar="MM", help="Allowed distance from the programmed path."
 )
+_ACCURACY = click.option(
+    "--accuracy", type=_Number(), metavar="PART", help="Relative error of the time, of methods with a mesh."
+)
+_TIME_LIMIT_HELP = "Time that a method with a mesh may take."
 _JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 _QUIET = click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
 _ZERO_OR_MORE = _Number(or_zero=True)
@@ -125,10 +129,8 @@ def cli(context: click.Context) -> int:
 @click.argument("program")
 @_MACHINE
 @click.option("--method", type=click.Choice(planners.methods()), default="bang-bang", show_default=True)
-@click.option(
-    "--accuracy", type=_Number(), metavar="PART", help="Relative error of the time, of methods with a mesh."
-)
-@click.option("--time-limit", type=_Number(), metavar="S", help="Time that such a method may take.")
+@_ACCURACY
+@click.option("--time-limit", type=_Number(), metavar="S", help=_TIME_LIMIT_HELP)
 @_TOLERANCE
 @click.option("--feed", type=_Number(), metavar="MM/S", help="Feed in place of the programmed one.")
 @click.option("--feed-override", type=_Number(), default=1.0, metavar="FACTOR", help="Factor on the feed.")
@@ -220,6 +222,10 @@ def plan(
 @click.argument("program")
 @_MACHINE
 @click.option("--methods", metavar="A,B,…", help="Methods to compare.  [default: all]")
+@_ACCURACY
+@click.option(
+    "--time-limit", type=_Number(), default=60.0, show_default=True, metavar="S", help=_TIME_LIMIT_HELP
+)
 @_TOLERANCE
 @click.option("--feed", type=_Number(), metavar="MM/S", help="Feed in place of the programmed one.")
 @click.option("--period", type=_Number(), metavar="S", help="Servo period in place of the machine's.")
@@ -230,6 +236,8 @@ def compare(
     program: str,
     machine: str,
     methods: str | None,
+    accuracy: float | None,
+    time_limit: float,
     tolerance: float | None,
     feed: float | None,
     period: float | None,
@@ -251,7 +259,15 @@ def compare(
     names = planners.methods() if methods is None else [name.strip() for name in methods.split(",")]
     with console.progress_bar(quiet) as progress:
         rows = make_comparison(
-            program, machine, names, progress=progress, tolerance=tolerance, feed=feed, period=period
+            program,
+            machine,
+            names,
+            progress=progress,
+            accuracy=accuracy,
+            time_limit=time_limit,
+            tolerance=tolerance,
+            feed=feed,
+            period=period,
         )
         summary = {
             "program": program,

@@ -14,12 +14,15 @@ from feedplan.errors import InfeasibleError, InputError, MissingPackageError, So
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
 from feedplan.plan import Plan, Progress, plan
-from feedplan.planners import planner
+from feedplan.planners import options_of
 from feedplan.program.program import Program
 from feedplan.program.read import read_program
 
 # What the limits of machine and program are called in an audit.
 LIMITS = ("feed", "velocity", "acceleration", "jerk", "chord", "deviation")
+
+# Options of `feedplan.plan` that only some methods take.
+OF_SOME_METHODS = frozenset({"accuracy", "cells", "time_limit"})
 
 
 @dataclass(frozen=True)
@@ -41,8 +44,11 @@ class Row:
 
     @property
     def gap(self) -> float | None:
-        """How much of the time may be lost at most: (time − lower_bound) / time."""
-        if self.plan is None:
+        """How much of the time may be lost at most: (time − lower_bound) / time.
+
+        None without a plan, and where limits are broken: what is faster than allowed has no gap.
+        """
+        if self.plan is None or not self.plan.audit().ok:
             return None
         return (self.plan.time - self.lower_bound) / self.plan.time if self.plan.time > 0 else 0.0
 
@@ -79,14 +85,13 @@ def compare(
 ) -> tuple[Row, ...]:
     """Plans one program by each of the methods and audits every plan.
 
-    `options` are those of `feedplan.plan`. A method that finds no plan, or whose package is missing, says why
-    in its row. `progress(method, done)` is called as it goes on.
+    `options` are those of `feedplan.plan`; what only some methods take goes to those. A method that finds no
+    plan, or whose package is missing, says why in its row. `progress(method, done)` is called as it goes on.
     Raises what `feedplan.plan` raises about the program, the machine and the options.
     """
     if not methods:
         raise InputError("there is no method to compare: name one or more")
-    for method in methods:
-        planner(method)
+    has = {method: options_of(method) for method in methods}
     if not isinstance(machine, Machine):
         machine = Machine.load(machine)
     if not isinstance(source, (Program, Path)):
@@ -96,7 +101,10 @@ def compare(
     for method in dict.fromkeys(methods):
         report(method, 0.0)
         try:
-            made = plan(source, machine, method, **options)
+            own = {
+                name: value for name, value in options.items() if name not in OF_SOME_METHODS - has[method]
+            }
+            made = plan(source, machine, method, **own)
             made.audit(lambda _, done, method=method: report(method, done))  # type: ignore[misc]
             plans.append((method, made, None))
         except (InfeasibleError, MissingPackageError, SolverError) as error:

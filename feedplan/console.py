@@ -189,7 +189,7 @@ def comparison_table(
             row.method,
             f"{row.time:.{digits}f}",
             f"{row.lower_bound:.{digits}f}",
-            f"{100 * (row.gap or 0.0):.3g} %",
+            "-" if row.gap is None else f"{100 * row.gap:.3g} %",
             duration_text(row.plan.compute["plan"]) if row.plan else "",
             *(_use_text(row.worst(name)) for name in limits),
             "passed" if row.audit and row.audit.ok else "FAILED",

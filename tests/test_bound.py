@@ -2,32 +2,27 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 import os
 from dataclasses import replace
-from pathlib import Path as FilePath
 
 import numpy as np
 import pytest
 
+from benchmarks.named import butterfly, lemniscate, part, path_of, trefoil
 from feedplan import _solvers
 from feedplan.bound import lower_bound
 from feedplan.constraints.problem import Problem, build_problem
 from feedplan.curves.arc import circle
 from feedplan.curves.composite import CompositeCurve
-from feedplan.geometry.build import build_path
 from feedplan.geometry.path import Path
-from feedplan.machine.machine import Machine
 from feedplan.planners import planner
 from feedplan.profile import ArcKind, SpeedProfile
-from feedplan.program.read import read_program
 from tests.constraints.test_joints import NOT_PLAIN
 from tests.constraints.test_joints import random_problem as random_joints
-from tests.planners.test_curves import Planned, butterfly, harmonic, problem_of, random_curve
+from tests.planners.test_curves import Planned, problem_of, random_curve
 
 plan = planner("bang-bang")
-EXAMPLES = FilePath(__file__).parents[1] / "examples"
 
 
 def gap(problem: Problem, profile: SpeedProfile) -> float:
@@ -77,16 +72,11 @@ def test_a_circle_takes_its_bound() -> None:
 
 
 def published() -> dict[str, Planned]:
-    b = 20.0
-    eight = harmonic([np.array([50.0, 0.0]), np.zeros(2)], [np.zeros(2), np.array([0.0, 25.0])], np.pi / 2)
-    cosines = [np.array([0.0, b, 0.0]), np.array([0.0, -2 * b, 0.0]), np.zeros(3)]
-    sines = [np.array([b, 0.0, 0.0]), np.array([2 * b, 0.0, 0.0]), np.array([0.0, 0.0, -b])]
-    curve = CompositeCurve.from_nurbs(*butterfly())
     return {
-        "butterfly": Planned(curve, 250.0, 3000.0),
-        "butterfly at a feed": Planned(curve, 250.0, 3000.0, 250.0),
-        "lemniscate": Planned(eight, 250.0, 3000.0),
-        "trefoil": Planned(harmonic(cosines, sines, 0.3), 250.0, 3000.0),
+        "butterfly": Planned(butterfly(), 250.0, 3000.0),
+        "butterfly at a feed": Planned(butterfly(), 250.0, 3000.0, 250.0),
+        "lemniscate": Planned(lemniscate(), 250.0, 3000.0),
+        "trefoil": Planned(trefoil(), 250.0, 3000.0),
     }
 
 
@@ -125,20 +115,10 @@ def test_random_motions_of_joints_are_certified(name: str) -> None:
     assert max(gaps) < 1e-3
 
 
-@pytest.mark.parametrize(
-    ("example", "machine", "blocks"),
-    [("vase", "vase", 1000), ("head", "mill", 1000), ("lettering", "router", 300)],
-)
-def test_the_examples_are_certified(example: str, machine: str, blocks: int, tmp_path: FilePath) -> None:
-    spec = importlib.util.spec_from_file_location(example, EXAMPLES / f"{example}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    file = tmp_path / "part.ngc"
-    file.write_text(module.program(blocks), encoding="ascii")
-    model = Machine.load(machine)
-    problem = build_problem(build_path(read_program(file, model), model), model)
+@pytest.mark.parametrize(("name", "blocks"), [("vase", 1000), ("head", 1000), ("lettering", 300)])
+def test_the_examples_are_certified(name: str, blocks: int) -> None:
+    program, machine = part(name, blocks)
+    problem = build_problem(path_of(program, machine), machine)
     assert -1e-12 < gap(problem, plan(problem)) < 1e-3
 
 

@@ -34,9 +34,14 @@ def planner(method: str, **options: float | None) -> Callable[[Problem], SpeedPr
     """
     plan: Callable[..., SpeedProfile] = _module(method).plan
     given = {name: value for name, value in options.items() if value is not None}
-    for name in given.keys() - inspect.signature(plan).parameters.keys():
+    for name in given.keys() - options_of(method):
         raise InputError(f"the method {method} takes no {name.replace('_', ' ')}: leave it out")
     return partial(plan, **given)
+
+
+def options_of(method: str) -> frozenset[str]:
+    """The names of a method's options; raises as `planner`."""
+    return frozenset(inspect.signature(_module(method).plan).parameters) - {"problem"}
 
 
 def corners(method: str) -> Corners:

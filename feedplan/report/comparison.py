@@ -70,7 +70,7 @@ def _row(row: Mapping[str, Any], limits: Sequence[str], longest: float) -> str:
         name,
         f'<td class="n">{duration_text(row["time"])}</td>',
         f'<td class="bar"><i style="width:{part:.1f}%"></i></td>',
-        f'<td class="n">{_percent(row["gap"])}</td>',
+        f'<td class="n">{"–" if row["gap"] is None else _percent(row["gap"])}</td>',
         f'<td class="n">{duration_text(row["computing"])}</td>',
         *(_use(row["worst"].get(limit)) for limit in limits),
         f'<td class="verdict-cell">{"passed" if row["audit"] else "FAILED"}</td>',

@@ -54,9 +54,10 @@ const STAND_IN: f64 = 1e-8;
 const NEAR: f64 = 5e-4;
 /// An arc is refined while its bound misses more than this part of its duration.
 const POOR: f64 = 2e-4;
-/// Refinement stops when a round closes less than this part of the gap, and after this many rounds, or cells per arc
-/// beside a few.
+/// Refinement stops when so many rounds on end close less than this part of the gap each (a sweep may gain nothing
+/// until all cells of a stretch are halved), and after this many rounds, or cells per arc beside a few.
 const LEAST_GAIN: f64 = 0.02;
+const PATIENCE: usize = 2;
 const MOST_ROUNDS: usize = 14;
 const MOST_CELLS: usize = 12;
 const FEW_CELLS: usize = 20_000;
@@ -149,15 +150,16 @@ fn over_run<const M: usize>(
         Some(duration) => (hint.axis[arc as usize] as usize, (1.0 - 0.1 * POOR) * duration),
         None => (M, f64::INFINITY),
     };
-    let mut best = 0.0;
-    for round in 0..MOST_ROUNDS {
+    let (mut best, mut idle) = (0.0, 0);
+    for _ in 0..MOST_ROUNDS {
         sweep::backward(task, pieces, end_sq, cells);
         let bound = sweep::forward(task, pieces, start_sq, wanted, cells);
         let gained = bound - best > LEAST_GAIN * (duration - best);
+        idle = if gained { 0 } else { idle + 1 };
         best = bound.max(best);
         let near = best >= (1.0 - NEAR) * duration;
         if near
-            || (round > 0 && !gained)
+            || idle == PATIENCE
             || cells.halve(hint, POOR, middle, other) == 0
             || cells.end.len() > most
         {

@@ -1,0 +1,100 @@
+"""Several methods side by side: what each row says, and the files and the table of the command."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from feedplan.cli import main
+from feedplan.compare import compare
+from feedplan.errors import InputError, SolverError
+from feedplan.planners import planner, tangential
+
+# A right angle that the tool passes within a tolerance, and half a circle.
+PROGRAM = "G21 G90 G64 P0.05 F3000\nG0 X0 Y0 Z0\nG1 X20\nY10\nG3 X0 Y10 I-10\nM2\n"
+METHODS = ("bang-bang", "tangential", "junction-deviation")
+
+
+@pytest.fixture
+def program(tmp_path: Path) -> Path:
+    file = tmp_path / "angle.ngc"
+    file.write_text(PROGRAM, encoding="ascii")
+    return file
+
+
+def test_the_optimum_has_no_gap_and_a_method_that_breaks_a_limit_has_none_to_show(program: Path) -> None:
+    exact, tangential, corners = compare(program, "mill", METHODS)
+    assert exact.gap is not None
+    assert 0.0 <= exact.gap < 1e-3
+    assert exact.audit is not None
+    assert exact.audit.ok
+    acceleration = exact.worst("acceleration")
+    assert acceleration is not None
+    assert acceleration.ratio == pytest.approx(1.0, abs=1e-6)
+    # Along the path alone the acceleration keeps its limit; across it, on the circle, it need not.
+    broken = tangential.worst("acceleration")
+    assert broken is not None
+    assert broken.ratio > 1.0
+    assert tangential.gap is None
+    assert tangential.time < exact.time
+    # Both follow one path, so what is proven for one holds for the other; corners are another path.
+    assert tangential.lower_bound == exact.lower_bound
+    assert corners.lower_bound != exact.lower_bound
+
+
+def test_a_method_that_fails_says_why_and_the_others_go_on(
+    program: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(problem: Any) -> Any:
+        raise SolverError("the solver gave up")
+
+    monkeypatch.setattr(tangential, "plan", fails)
+    failed, exact = compare(program, "mill", ("tangential", "bang-bang"))
+    assert (failed.plan, failed.time, failed.gap, failed.error) == (None, None, None, "the solver gave up")
+    assert failed.to_json()["audit"] is None
+    assert exact.plan is not None
+
+
+def test_options_go_to_the_methods_that_have_them(program: Path) -> None:
+    exact, coarse = compare(program, "mill", ("bang-bang", "clarabel"), cells=8)
+    assert exact.time < coarse.time < 1.2 * exact.time
+    with pytest.raises(InputError, match="bang-bang takes no cells"):
+        planner("bang-bang", cells=8)
+
+
+def test_what_is_no_comparison_is_refused(program: Path) -> None:
+    with pytest.raises(InputError, match="there is no method to compare"):
+        compare(program, "mill", ())
+    with pytest.raises(InputError, match="there is no method 'fastest': use one of"):
+        compare(program, "mill", ("bang-bang", "fastest"))
+
+
+def test_the_command_prints_one_row_a_method_and_writes_a_page_that_holds_them(
+    program: Path, tmp_path: Path, capsys: Any
+) -> None:
+    folder = tmp_path / "comparison"
+    arguments = ["compare", str(program), "--methods", ",".join(METHODS), "-o", str(folder)]
+    assert main(arguments) == 0
+    rows = capsys.readouterr().out.splitlines()
+    assert [row.split()[0] for row in rows[1:4]] == list(METHODS)
+    assert rows[1].endswith("passed")
+    assert re.search(r"acceleration|[XY] line 5", rows[2])
+    assert rows[2].endswith("FAILED")
+    content = json.loads((folder / "comparison.json").read_text(encoding="utf-8"))
+    assert [row["method"] for row in content["methods"]] == list(METHODS)
+    assert content["methods"][0]["time"] > content["methods"][1]["time"]
+    page = (folder / "comparison.html").read_text(encoding="utf-8")
+    data = json.loads(page.split('id="data">')[1].split("</script>")[0])
+    assert [path["method"] for path in data["methods"]] == list(METHODS)
+    assert "http://" not in page.split("<script>")[0]
+    assert page.count('class="broken-row"') == sum(not row["audit"]["ok"] for row in content["methods"])
+
+
+def test_a_comparison_without_any_plan_exits_1(program: Path, capsys: Any) -> None:
+    code = main(["compare", str(program), "--methods", "clarabel", "--time-limit", "1e-9"])
+    assert code == 1
+    assert "clarabel: " in capsys.readouterr().err
