@@ -82,7 +82,7 @@ def test_the_command_prints_one_row_a_method_and_writes_a_page_that_holds_them(
     rows = capsys.readouterr().out.splitlines()
     assert [row.split()[0] for row in rows[1:4]] == list(METHODS)
     assert rows[1].endswith("passed")
-    assert re.search(r"acceleration|[XY] line 5", rows[2])
+    assert re.search(r"% [XY] line [3-5]", rows[2])
     assert rows[2].endswith("FAILED")
     content = json.loads((folder / "comparison.json").read_text(encoding="utf-8"))
     assert [row["method"] for row in content["methods"]] == list(METHODS)
