@@ -61,7 +61,7 @@ fn stream(segments: &[Segment], look_ahead: usize) -> Vec<Vec<Section>> {
 
 /// Every requirement on a profile; `close` is the relative size of roundings. The first one broken as a sentence.
 fn check(segments: &[Segment], stream: &[Vec<Section>], close: f64) -> Result<(), String> {
-    let (mut time, mut position, mut speed) = (0.0, 0.0, 0.0);
+    let (mut time, mut position, mut speed, mut before) = (0.0, 0.0, 0.0, 0.0_f64);
     if stream.len() != segments.len() {
         return Err(format!("{} of {} segments", stream.len(), segments.len()));
     }
@@ -83,7 +83,7 @@ fn check(segments: &[Segment], stream: &[Vec<Section>], close: f64) -> Result<()
             if (section.position - position).abs() > close * (end + 1e-300) {
                 return fail("a jump in position");
             }
-            if (section.speed - speed).abs() > close * limit {
+            if (section.speed - speed).abs() > close * limit.max(before) {
                 return fail("a jump in speed");
             }
             if (section.acceleration - acceleration).abs() > close * a {
@@ -124,6 +124,7 @@ fn check(segments: &[Segment], stream: &[Vec<Section>], close: f64) -> Result<()
             return fail("faster than its greatest speed".into());
         }
         position = end;
+        before = if sections.is_empty() { before } else { limit };
     }
     if speed.abs() > close * top {
         return Err(format!("ends at {speed} mm/s"));
