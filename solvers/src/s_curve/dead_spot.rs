@@ -9,9 +9,11 @@
 
 use super::transition::{retreat, Limits};
 
-/// Newton's method on the concave D from the feasible side; it ends by itself except beside the longest fall, where both
+/// Newton's method on what is concave, from the feasible side; it ends by itself except beside the longest fall, where both
 /// roots meet and every step halves the rest.
 const STEPS: usize = 48;
+/// A step this small beside the root is rounding.
+const SETTLED: f64 = 4.0 * f64::EPSILON;
 
 /// Speeds that a fall from V reaches.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -113,33 +115,49 @@ impl Fall {
         if self.length == 0.0 {
             return self.start;
         }
-        // D(ΔV) < V T(ΔV): the change that takes ΔS/V is too small, and the tangents of a concave D keep below the root.
-        let longest = self.longest();
-        let change = self.newton(self.limits.change(self.length / self.start).min(longest));
+        let (full, longest) = (self.limits.full_change(), self.longest());
+        let change = if full >= longest || self.length <= self.distance(full) {
+            self.perfect_change()
+        } else {
+            // (2 V − ΔV)(ΔV + A²/J) = 2 A ΔS, the smaller root.
+            let half = self.start - 0.5 * full;
+            let c = 2.0 * (self.limits.acceleration * self.length - self.start * full);
+            c / (half + (half * half - c).max(0.0).sqrt())
+        };
         let speed = self.start - change.min(longest);
         retreat(speed, self.start, self.start, |end| self.limits.joins(self.start, end, self.length))
     }
 
-    /// The highest speed of the lower region; standstill must be within reach.
-    fn end_of_dead_spot(&self) -> f64 {
-        let change = self.newton(self.start);
-        let speed = self.start - change.max(self.longest());
-        retreat(speed.max(0.0), 0.0, self.start, |end| self.limits.joins(self.start, end, self.length))
+    /// The smaller positive root A_1 of 4.15, p (2 V J − p²) = ΔS J², as a change of speed; tangents of what is
+    /// concave in p keep below it.
+    fn perfect_change(&self) -> f64 {
+        let jerk = self.limits.jerk;
+        let (linear, constant) = (2.0 * self.start * jerk, self.length * jerk * jerk);
+        let mut p = constant / linear;
+        for _ in 0..STEPS {
+            let slope = linear - 3.0 * p * p;
+            let step = (constant - p * (linear - p * p)) / slope;
+            if slope <= 0.0 || step <= SETTLED * p {
+                break;
+            }
+            p += step;
+        }
+        p * p / jerk
     }
 
-    fn newton(&self, change: f64) -> f64 {
-        let mut change = change;
+    /// The highest speed of the lower region; standstill must be within reach.
+    fn end_of_dead_spot(&self) -> f64 {
+        // From standstill on, tangents of the concave D keep above the root.
+        let mut change = self.start;
         for _ in 0..STEPS {
-            let step = (self.length - self.distance(change)) / self.slope(change);
-            if !step.is_finite() {
+            let step = (self.distance(change) - self.length) / self.slope(change);
+            if step.is_nan() || step <= SETTLED * change {
                 break;
             }
-            change = (change + step).clamp(0.0, self.start);
-            if step.abs() <= f64::EPSILON * change {
-                break;
-            }
+            change -= step;
         }
-        change
+        let speed = self.start - change.max(self.longest());
+        retreat(speed.max(0.0), 0.0, self.start, |end| self.limits.joins(self.start, end, self.length))
     }
 }
 
