@@ -132,3 +132,44 @@ pub fn plan(segments: &[Segment], look_ahead: usize) -> Result<Vec<Section>, Fau
     while profiler.drain(&mut sections) {}
     Ok(sections)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Short segments with limits that change much, so that the dead spot matters.
+    fn segment() -> impl Strategy<Value = Segment> {
+        (0.0..1.5f64, 0.2..3.0f64, 0.3..3.0f64, 0.3..3.0f64, 0..10u8).prop_map(
+            |(length, allowable, acceleration, jerk, junction)| Segment {
+                length,
+                allowable,
+                desired: 2.5,
+                limits: Limits { acceleration, jerk },
+                junction: f64::from(junction),
+            },
+        )
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(20_000))]
+        #[test]
+        fn the_established_profile_can_always_be_followed_to_standstill(
+            segments in prop::collection::vec(segment(), 1..40),
+            look_ahead in 1..20usize,
+        ) {
+            let mut profiler = Profiler::new(look_ahead);
+            for segment in segments {
+                profiler.push(segment, &mut vec![]).unwrap();
+                let Profiler { buffer, speeds, .. } = &profiler;
+                prop_assert_eq!(speeds.len(), buffer.len() + 1);
+                prop_assert_eq!(speeds[buffer.len()], 0.0);
+                for i in 0..buffer.len() {
+                    prop_assert!(buffer.segment(i).joins(speeds[i], speeds[i + 1]), "{:?} at {}", speeds, i);
+                    prop_assert!(speeds[i] <= buffer.segment(i).speed());
+                    prop_assert!(buffer.limit(i + 1).is_none_or(|limit| speeds[i + 1] <= limit));
+                }
+            }
+        }
+    }
+}

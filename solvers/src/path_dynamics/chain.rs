@@ -62,4 +62,14 @@ mod tests {
         assert_eq!(shared.by_length(&Terms { x: 0.0, n: -16.0, n_rate: 0.0 }), [0.0, -1.0, 0.0]);
         assert_eq!(shared.by_length(&Terms { x: 2.0, n: 0.0, n_rate: -32.0 }), [1.0, 0.0, -1.0]);
     }
+    #[test]
+    fn a_place_where_the_parameter_slows_by_hand() {
+        // The same circle at u = ½, where x = cos 2 atan ½ = 0.6: Q = 6.25, Q' = 10, d = 1.25, d' = 1, and for x
+        // X = −4 u = −2, N = −16 (1 − u⁴) = −15, N' = 64 u³ = 8.
+        let shared = Shared { q: 6.25, q_rate: 10.0, weight: Some([1.25, 1.0]) };
+        let found: [f64; 3] = shared.by_length(&Terms { x: -2.0, n: -15.0, n_rate: 8.0 });
+        for (found, expected) in found.iter().zip([-0.8, -0.6, 0.8]) {
+            assert!((found - expected).abs() < 1e-15);
+        }
+    }
 }

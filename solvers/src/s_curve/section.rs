@@ -82,15 +82,13 @@ pub fn cross(segment: &Segment, from: f64, to: f64, start: Place, out: &mut Vec<
     at.section(SectionKind::LinearRise, rise.hold, 0.0);
     at.section(SectionKind::ConvexRise, rise.bend, -jerk);
 
-    let fall_length = segment.limits.distance(peak, to);
-    let rest = segment.length - segment.limits.distance(from, peak) - fall_length;
+    let rest = segment.length - segment.limits.distance(from, peak) - segment.limits.distance(peak, to);
     at.settle(peak);
     if rest > ROUNDING * segment.length {
         at.section(SectionKind::ConstantSpeed, rest / peak, 0.0);
     }
 
     let fall = ramp(peak - to, acceleration, jerk);
-    at.place.position = end_position - fall_length;
     at.section(SectionKind::ConvexFall, fall.bend, -jerk);
     at.section(SectionKind::LinearFall, fall.hold, 0.0);
     at.section(SectionKind::ConcaveFall, fall.bend, jerk);
