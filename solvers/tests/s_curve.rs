@@ -273,6 +273,31 @@ fn a_stream_that_sees_far_enough_to_stop_gives_the_profile_of_the_whole() {
     assert!(apart > 0, "a look-ahead of one segment sees as much");
 }
 
+#[test]
+fn the_unit_of_length_does_not_matter() {
+    for seed in seeds(2_000) {
+        let segments = random_segments(&mut Random(seed));
+        let whole = time(&plan(&segments, 20).unwrap());
+        for unit in [1.0 / 1024.0, 1024.0] {
+            let scaled: Vec<Segment> = segments
+                .iter()
+                .map(|segment| Segment {
+                    length: unit * segment.length,
+                    allowable: unit * segment.allowable,
+                    desired: unit * segment.desired,
+                    limits: Limits {
+                        acceleration: unit * segment.limits.acceleration,
+                        jerk: unit * segment.limits.jerk,
+                    },
+                    junction: unit * segment.junction,
+                })
+                .collect();
+            let again = time(&plan(&scaled, 20).unwrap());
+            assert!((again - whole).abs() <= 1e-12 * whole, "seed {seed}: {again} s for {whole} s");
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(20_000))]
     #[test]
