@@ -82,7 +82,7 @@ def draw(result: Result, directory: Path) -> Path | None:
 
     chart, figure = result.chart, Figure()
     for series in dict.fromkeys(row[chart.series] for row in result.rows):
-        rows = [row for row in result.rows if row[chart.series] == series and float(row[chart.y]) > 0]
+        rows = [row for row in result.rows if row[chart.series] == series and _is_positive(row[chart.y])]
         figure.add_trace(
             Scatter(
                 x=[row[chart.x] for row in rows],
@@ -100,6 +100,10 @@ def draw(result: Result, directory: Path) -> Path | None:
     path = directory / f"{result.name}.html"
     figure.write_html(path, include_plotlyjs="directory")
     return path
+
+
+def _is_positive(cell: Cell) -> bool:
+    return not isinstance(cell, str) and cell > 0
 
 
 def _written(cell: Cell) -> str:

@@ -58,6 +58,8 @@ const POOR: f64 = 2e-4;
 /// until all cells of a stretch are halved), and after this many rounds, or cells per arc beside a few.
 const LEAST_GAIN: f64 = 0.02;
 const PATIENCE: usize = 2;
+/// A place nearer to an end of a cell than this part of it is that end.
+const AT_END: f64 = 1e-3;
 const MOST_ROUNDS: usize = 14;
 const MOST_CELLS: usize = 12;
 const FEW_CELLS: usize = 20_000;
@@ -104,11 +106,11 @@ pub fn lower_bound<const M: usize>(problem: &Problem<M>, hint: &Hint) -> Result<
         acceleration: problem.max_acceleration.map(|a| a * share),
         velocity_sq: problem.max_velocity.map(|v| (v * share) * (v * share) * UP),
         speed_share: share * share * UP,
-        chord: ChordLimit::new(
-            problem.chord_tolerance,
-            problem.period,
-            if problem.tip.is_some() { f64::INFINITY } else { norm(&problem.max_acceleration) },
-        ),
+        // The chord error is that of the tool's path: where joints move in another way it is left out.
+        chord: match problem.tip {
+            None => ChordLimit::new(problem.chord_tolerance, problem.period, norm(&problem.max_acceleration)),
+            Some(_) => None,
+        },
     };
     let last_run = problem.runs.len() - 2;
     let times: Vec<f64> = groups(problem.runs)
@@ -138,9 +140,11 @@ fn over_run<const M: usize>(
 ) -> f64 {
     let turn = |i: usize, axis: usize, part: (f64, f64)| sweep::turn(task, i, axis, part);
     cells.divide(hint, pieces, task.problem.width, turn);
-    // Where an axis turns, else half way.
+    // Where an axis turns, else half way; the turn at which a cell ends already is none of it.
     let middle = |i: usize, (from, to): (f64, f64)| {
-        (0..M).find_map(|k| turn(pieces.0 + i, k, (from, to))).unwrap_or(0.5 * (from + to))
+        let inside = |t: &f64| (t - from).min(to - t) > AT_END * (to - from);
+        let mut turns = (0..M).filter_map(|k| turn(pieces.0 + i, k, (from, to)));
+        turns.find(inside).unwrap_or(0.5 * (from + to))
     };
     let arcs = hint.piece.partition_point(|&piece| (piece as usize) < pieces.0)
         ..hint.piece.partition_point(|&piece| (piece as usize) < pieces.1);
@@ -158,11 +162,7 @@ fn over_run<const M: usize>(
         idle = if gained { 0 } else { idle + 1 };
         best = bound.max(best);
         let near = best >= (1.0 - NEAR) * duration;
-        if near
-            || idle == PATIENCE
-            || cells.halve(hint, POOR, middle, other) == 0
-            || cells.end.len() > most
-        {
+        if near || idle == PATIENCE || cells.halve(hint, POOR, middle, other) == 0 || cells.end.len() > most {
             break;
         }
     }

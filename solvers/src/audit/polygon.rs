@@ -183,13 +183,16 @@ impl<const M: usize> Polygon<M> {
 
     /// The part of the piece from the share `from` on, as long as the share `share`.
     pub fn part(&self, from: f64, share: f64) -> Self {
-        let rest = if from > 0.0 { self.split(from)[1].clone() } else { self.clone() };
+        let mut rest = if from > 0.0 { self.split(from)[1].clone() } else { self.clone() };
         let length = share / (1.0 - from);
         if length < 1.0 {
-            rest.split(length)[0].clone()
-        } else {
-            rest
+            return rest.split(length)[0].clone();
         }
+        // Of a sliver at the end rounding changes the share: the part is as long as was asked.
+        for step in &mut rest.steps[..self.degree] {
+            *step = step.map(|value| value * length);
+        }
+        rest
     }
 
     /// The same piece from its end to its start.
@@ -428,6 +431,18 @@ mod tests {
                 assert!(distance(&part.at(t), &polygon.at(0.3 + 0.4 * t)) < 1e-12);
                 let back = part.reversed();
                 assert!(distance(&back.at(1.0 - t), &part.at(t)) < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn a_sliver_at_the_end_is_as_long_as_was_asked() {
+        for polygon in [quarter(), cubic()] {
+            let (from, share) = (1.0 - 6e-11, 6.00001e-11);
+            let slope = polygon.part(from, share).local(1.0).slope;
+            let whole = polygon.local(1.0).slope;
+            for k in 0..2 {
+                assert!((slope[k] / share - whole[k]).abs() < 1e-8, "{slope:?} {whole:?}");
             }
         }
     }

@@ -75,7 +75,7 @@ pub fn plan_run<const M: usize>(
 macro_rules! with_capacity {
     ($task:expr, $i:expr, $function:ident($($argument:expr),*)) => {
         match $task.coefficients($i) {
-            ..=10 => $function::<M, 10>($($argument),*),
+            ..=11 => $function::<M, 11>($($argument),*),
             ..=20 => $function::<M, 20>($($argument),*),
             ..=36 => $function::<M, 36>($($argument),*),
             _ => $function::<M, MOST>($($argument),*),
@@ -108,10 +108,12 @@ impl<const M: usize> Task<'_, M> {
     /// How many coefficients the polynomials of a piece have at most.
     fn coefficients(&self, i: usize) -> usize {
         let problem = self.problem;
+        // A bound of the speed that is not constant adds one to what rational pieces need.
+        let sloped = usize::from(self.chord.is_some());
         let of = |offset: &[usize], weight: &[f64]| {
             let degree = offset[i + 1] - offset[i] - 1;
             let rational = weights_of(weight, offset, i).iter().any(|&w| w != weight[offset[i]]);
-            (degree, if rational { 8 * degree - 6 } else { 4 * degree - 2 })
+            (degree, if rational { 8 * degree - 6 + sloped } else { 4 * degree - 2 })
         };
         let (degree, own) = of(problem.offset, problem.weight);
         let Some(tip) = problem.tip else { return own };

@@ -101,7 +101,7 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
         if let Law::Speed(line) = motion.law {
             let mut nodes = vec![];
             let (u0, u1) = (arc.u0, arc.u1);
-            motion.time_error = match motion.from_rest(&line) {
+            motion.time_error = match motion.rest_at_an_end(&line) {
                 Some(rate) => fill(rate, (0.0, (u1 - u0).sqrt()), &mut nodes),
                 None => fill(motion.time_rate(line), (u0, u1), &mut nodes),
             };
@@ -235,7 +235,7 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
     }
 
     /// Where the arc begins or ends at rest on a path with a direction there.
-    fn from_rest(&self, line: &Line) -> Option<FromRest<'_, M>> {
+    fn rest_at_an_end(&self, line: &Line) -> Option<FromRest<'_, M>> {
         let ProfileArc { u0, u1, p0, p1, .. } = self.arc;
         let (place, sign) = match (p0 == 0.0, p1 == 0.0) {
             (true, false) => (u0, 1.0),
@@ -264,7 +264,7 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
         match &self.law {
             Law::Even(law) => self.at(law.place(&self.arc, done, left)),
             Law::Axis(law) => law.at_time(&self.arc, done, left),
-            Law::Speed(line) => match self.from_rest(line) {
+            Law::Speed(line) => match self.rest_at_an_end(line) {
                 Some(f) => {
                     let table = Table { f, nodes: &self.times };
                     let done = if f.sign > 0.0 { done } else { left };
@@ -289,7 +289,7 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
         let done = match &self.law {
             Law::Even(law) => law.done(&self.arc, state.u),
             Law::Axis(law) => law.done(&self.arc, state),
-            Law::Speed(line) => match self.from_rest(line) {
+            Law::Speed(line) => match self.rest_at_an_end(line) {
                 Some(f) => {
                     let table = Table { f, nodes: &self.times };
                     let done = table.integral((state.u - f.place).abs().sqrt()) / table.total();

@@ -52,16 +52,24 @@ pub struct ProblemRows<'a, 'py, const M: usize> {
     control: Vec<[f64; M]>,
     offset: Vec<usize>,
     runs: Vec<usize>,
-    /// Control points, offsets and offsets of the speed.
-    tip: Option<(Vec<[f64; TIP_AXES]>, Vec<usize>, Vec<usize>)>,
+    tip: Option<TipRows>,
+}
+
+/// Control points of the tool's path, their offsets, and those of its speed.
+struct TipRows {
+    control: Vec<[f64; TIP_AXES]>,
+    offset: Vec<usize>,
+    speed_offset: Vec<usize>,
 }
 
 impl<'a, 'py, const M: usize> ProblemRows<'a, 'py, M> {
     pub fn new(arrays: &'a ProblemArrays<'py>) -> PyResult<Self> {
         let tip = match (&arrays.tip_speed, &arrays.tip_curve) {
-            (Some(speed), Some(tip)) => {
-                Some((rows::<TIP_AXES>(&tip.control_points)?, indices(&tip.offsets), indices(&speed.offsets)))
-            }
+            (Some(speed), Some(tip)) => Some(TipRows {
+                control: rows::<TIP_AXES>(&tip.control_points)?,
+                offset: indices(&tip.offsets),
+                speed_offset: indices(&speed.offsets),
+            }),
             _ => None,
         };
         Ok(Self {
@@ -76,12 +84,12 @@ impl<'a, 'py, const M: usize> ProblemRows<'a, 'py, M> {
     pub fn problem(&self) -> PyResult<Problem<'_, M>> {
         let arrays = self.arrays;
         let tip = match (&self.tip, &arrays.tip_speed, &arrays.tip_curve) {
-            (Some((control, offset, speed_offset)), Some(speed), Some(tip)) => Some(Tip {
+            (Some(rows), Some(speed), Some(tip)) => Some(Tip {
                 speed: speed.coefficients.as_slice()?,
-                speed_offset,
-                control,
+                speed_offset: &rows.speed_offset,
+                control: &rows.control,
                 weight: tip.weights()?,
-                offset,
+                offset: &rows.offset,
             }),
             _ => None,
         };
