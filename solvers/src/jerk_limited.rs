@@ -91,7 +91,7 @@ pub struct Problem<'a, G, const M: usize> {
 /// How well, and how long, to plan.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
-    /// Intervals per time in which the speed can change to its like: 40 leave about 1e-4 of the time.
+    /// Intervals per time in which the speed can change to its like: 16 leave less than 1e-4 of the time.
     pub resolution: f64,
     /// The gap of complementarity at which to stop, in parts of the time.
     pub tolerance: f64,
@@ -105,7 +105,7 @@ pub struct Effort {
 
 impl Default for Effort {
     fn default() -> Self {
-        Self { resolution: 40.0, tolerance: 1e-7, max_iterations: 400, deadline: None, window: 2000 }
+        Self { resolution: 16.0, tolerance: 1e-7, max_iterations: 400, deadline: None, window: 2000 }
     }
 }
 

@@ -112,16 +112,6 @@ impl<const M: usize> Between<M> {
         }
         worst
     }
-
-    /// The same for the intervals of `range` alone.
-    pub fn part(&self, range: std::ops::Range<usize>) -> Self {
-        Self { samples: self.samples[range].to_vec() }
-    }
-
-    /// This and the next stretch as one.
-    pub fn extend(&mut self, other: &Self) {
-        self.samples.extend_from_slice(&other.samples);
-    }
 }
 
 /// The greatest |f| of equidistant values and of the parabolas through each three.

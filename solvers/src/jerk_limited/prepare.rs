@@ -24,6 +24,8 @@ pub struct Prepared<'a, G, const M: usize> {
     pub bounds: [Bound; 2],
     /// A valid plan (w_0, w'_0, w_1, …).
     pub x: Vec<f64>,
+    /// The time of a stop from the greatest speed, in s.
+    pub stop_time: f64,
 }
 
 impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
@@ -51,7 +53,7 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         let (stations, slopes) =
             survey(problem.geometry, limits, problem.caps, [span(0), total - span(1)], &bounds);
         let grid = Grid::new(&stations, slopes, problem.caps, &bounds, resolution);
-        let mut prepared = Self { problem, grid, bounds, x: vec![] };
+        let mut prepared = Self { problem, grid, bounds, x: vec![], stop_time: 0.0 };
         prepared.begin(slopes)?;
         Ok(prepared)
     }
@@ -61,6 +63,8 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         let limits = &self.problem.limits;
         let mut caps =
             self.each(|rows, n, _| rows.intervals[n].envelope_cap(limits, slopes.k), f64::INFINITY);
+        let fastest = caps.iter().copied().fold(0.0, f64::max).powf(2.0 / 3.0);
+        self.stop_time = slopes.stop_time(fastest);
         let mut worst = f64::INFINITY;
         for _ in 0..ROUNDS {
             self.x = baseline::smooth(&self.grid.nodes, &caps, slopes, &self.bounds);

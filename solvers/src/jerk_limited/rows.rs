@@ -115,6 +115,13 @@ impl<const M: usize> Interval<M> {
         cap(0).min(cap(1)).min(cap(2)).min(cap(3))
     }
 
+    /// Makes the limits of speed, acceleration and jerk tighter by these factors.
+    pub fn tighten(&mut self, [speed, acceleration, jerk]: [f64; 3]) {
+        self.speed = self.speed * (speed * speed);
+        self.acceleration = self.acceleration * acceleration;
+        self.jerk *= jerk;
+    }
+
     /// w, w', w'' at the collocation points.
     #[inline(always)]
     pub fn motion(&self, u: &[f64; 4]) -> [Lanes; 3] {
@@ -232,10 +239,5 @@ impl<const M: usize> Rows<M> {
             worst[2] = f64::max(worst[2], (j * v).abs().greatest());
         }
         worst
-    }
-
-    /// The same limits for the intervals of `range` alone.
-    pub fn part(&self, range: std::ops::Range<usize>) -> Self {
-        Self { intervals: self.intervals[range].to_vec(), ..*self }
     }
 }

@@ -3,20 +3,26 @@
 
 use super::between::Between;
 use super::hermite::duration;
-use super::interior_point::{Bound, Effort, InteriorPoint, Outcome};
-use super::lanes::Lanes;
+use super::interior_point::{Bound, Effort, InteriorPoint, Outcome, Report};
 use super::rows::Rows;
 use super::Limits;
 
 /// Uses up to this hold the limits: rounding, and what peaks between the checked places are off.
-const HELD: f64 = 1.0 + 2e-7;
-/// Limits are tightened by so much more than the excess, in parts of it and at least. More would make kinks where
+const HELD: f64 = 1.0 + 5e-7;
+/// Limits are tightened by so much more than the excess, in parts of it and at least; more would make kinks where
 /// tightened intervals meet others.
-const MARGIN: (f64, f64) = (0.1, 2e-6);
+const MARGIN: (f64, f64) = (0.1, 1e-6);
+/// From round to round the margin grows by this factor: a peak may follow its neighbours slowly.
+const RISE: f64 = 4.0;
 /// Rounds of tightening.
-const ROUNDS: usize = 8;
-/// Valid plans scaled by these factors are inside their limits; how near the optimum they are taken for.
-const STARTS: [(f64, f64); 3] = [(0.97, 0.1), (0.8, 1.0), (0.5, 1.0)];
+const ROUNDS: i32 = 8;
+/// What plans are multiplied with to start from, and the barrier to start with. The valid plans are star-shaped: a
+/// smaller multiple is further inside, and further from the optimum. From afar …
+const FAR: [(f64, f64); 1] = [(1.0, 1.0)];
+/// … from a plan on its limits …
+const NEAR: [(f64, f64); 4] = [(0.97, 0.1), (0.8, 1.0), (1.0, 1.0), (1.0, 1e-3)];
+/// … and from one that exceeds them a little.
+const AGAIN: [(f64, f64); 3] = [(0.97, 0.1), (0.8, 1.0), (0.5, 1.0)];
 /// Parts of the way from the former plan to the new one where the new one itself is refused.
 const RETREATS: [f64; 7] = [0.999, 0.99, 0.95, 0.85, 0.6, 0.3, 0.1];
 
@@ -36,63 +42,69 @@ pub struct Verdict {
 }
 
 impl<const M: usize> Stretch<M> {
-    /// Improves the valid plan x in place; `near` says that it is nearly optimal and on its limits.
+    /// Improves the valid plan x in place; `near` says that it is nearly optimal and on its limits. `tight` is how
+    /// much tighter the limits of each interval are than the machine's, before and after.
+    #[allow(clippy::too_many_arguments)] // one call
     pub fn improve(
         &mut self,
         limits: &Limits<M>,
         bounds: [Bound; 2],
+        tight: &mut [[f64; 3]],
         x: &mut [f64],
         near: bool,
         effort: &Effort,
         space: &mut InteriorPoint<M>,
     ) -> Verdict {
-        let asked = self.waive(&bounds);
-        let mut verdict = Verdict::default();
-        let mut best = f64::INFINITY;
-        if near {
-            best = self.time(&bounds, x);
+        for (interval, &tight) in self.rows.intervals.iter_mut().zip(tight.iter()) {
+            interval.tighten(tight);
         }
-        let mut y = x.to_vec();
-        let mut attempts = if near { scaled(x, &STARTS, effort) } else { vec![(x.to_vec(), *effort)] };
-        let mut spent = 0;
-        for _ in 0..ROUNDS {
-            let mut found = None;
-            for (start, effort) in &attempts {
-                y.copy_from_slice(start);
-                let effort =
-                    Effort { max_iterations: effort.max_iterations.saturating_sub(spent), ..*effort };
-                let report = space.solve(&self.rows, bounds, &mut y, &effort);
-                spent += report.iterations;
-                if !matches!(report.outcome, Outcome::NotInside | Outcome::Missed) {
-                    found = Some(report);
-                    break;
-                }
-            }
-            let Some(report) = found else { break };
-            verdict.converged = matches!(report.outcome, Outcome::Converged | Outcome::Stalled);
-            if self.tighten(limits, &y) {
+        self.waive(&bounds);
+        let mut verdict = Verdict::default();
+        let mut best = if near { self.time(&bounds, x) } else { f64::INFINITY };
+        let mut attempts = starts(x, if near { &NEAR } else { &FAR }, effort);
+        for round in 0..ROUNDS {
+            let Some((y, report)) = self.attempt(bounds, attempts, space, &mut verdict.iterations) else {
+                break;
+            };
+            if self.tighten(limits, &y, MARGIN.0 * RISE.powi(round), tight) {
                 if report.time < best {
                     x.copy_from_slice(&y);
-                    best = report.time;
                 }
+                verdict.converged = report.outcome != Outcome::Stopped;
                 break;
             }
-            // The first plan with a small excess serves as a target to approach, should nothing better come.
+            // Should nothing better come: as far towards this plan as the limits allow.
             if let Some((z, time)) = self.retreat(limits, &bounds, x, &y) {
                 if time < best {
                     x.copy_from_slice(&z);
                     best = time;
                 }
             }
-            verdict.converged = false;
             if report.outcome == Outcome::Stopped {
                 break;
             }
-            attempts = scaled(&y, &STARTS, effort);
+            attempts = starts(&y, &AGAIN, effort);
         }
-        verdict.iterations = spent;
-        self.ask(asked);
         verdict
+    }
+
+    /// The first of the starts that leads to a plan; its iterations count towards all that are allowed.
+    fn attempt(
+        &self,
+        bounds: [Bound; 2],
+        starts: Vec<(Vec<f64>, Effort)>,
+        space: &mut InteriorPoint<M>,
+        spent: &mut usize,
+    ) -> Option<(Vec<f64>, Report)> {
+        for (mut y, mut effort) in starts {
+            effort.max_iterations = effort.max_iterations.saturating_sub(*spent);
+            let report = space.solve(&self.rows, bounds, &mut y, &effort);
+            *spent += report.iterations;
+            if !matches!(report.outcome, Outcome::NotInside | Outcome::Missed) {
+                return Some((y, report));
+            }
+        }
+        None
     }
 
     /// The spline nearest to y on the way from x that holds all limits, and its time.
@@ -120,45 +132,33 @@ impl<const M: usize> Stretch<M> {
         })
     }
 
-    /// Tightens the limits where x exceeds them between the points; true if it does nowhere.
-    fn tighten(&mut self, limits: &Limits<M>, x: &[f64]) -> bool {
+    /// Tightens the limits where x exceeds them between the points, by a margin in parts of the excess; true if it
+    /// does nowhere.
+    fn tighten(&mut self, limits: &Limits<M>, x: &[f64], margin: f64, tight: &mut [[f64; 3]]) -> bool {
         let mut holds = true;
-        for (n, interval) in self.rows.intervals.iter_mut().enumerate() {
-            let [v, a, j] = self.between.utilisation(limits, x, n, interval.h);
-            if v > HELD {
-                interval.speed = interval.speed * tighter(v).powi(2);
+        for (n, (interval, tight)) in self.rows.intervals.iter_mut().zip(tight).enumerate() {
+            let used = self.between.utilisation(limits, x, n, interval.h);
+            let factors =
+                used.map(|used| if used > HELD { used + (margin * (used - 1.0)).max(MARGIN.1) } else { 1.0 });
+            if factors != [1.0; 3] {
+                holds = false;
+                interval.tighten(factors);
+                for k in 0..3 {
+                    tight[k] *= factors[k];
+                }
             }
-            if a > HELD {
-                interval.acceleration = interval.acceleration * tighter(a);
-            }
-            if j > HELD {
-                interval.jerk *= tighter(j);
-            }
-            holds &= v <= HELD && a <= HELD && j <= HELD;
         }
         holds
     }
 
-    /// Speed and acceleration at given ends are what they are; returns what was asked there.
-    fn waive(&mut self, bounds: &[Bound; 2]) -> [(Lanes, Lanes); 2] {
+    /// Speed and acceleration at given ends are what they are.
+    fn waive(&mut self, bounds: &[Bound; 2]) {
         let last = self.rows.intervals.len() - 1;
-        let asked = [0, last].map(|n| (self.rows.intervals[n].speed, self.rows.intervals[n].acceleration));
         for (bound, (n, lane)) in bounds.iter().zip([(0, 0), (last, 3)]) {
             if let Bound::Fixed { .. } = bound {
                 self.rows.intervals[n].speed.0[lane] = 0.0;
                 self.rows.intervals[n].acceleration.0[lane] = 0.0;
             }
-        }
-        asked
-    }
-
-    /// Undoes `waive`, tightening kept.
-    fn ask(&mut self, asked: [(Lanes, Lanes); 2]) {
-        let last = self.rows.intervals.len() - 1;
-        for (n, lane, (speed, acceleration)) in [(0, 0, asked[0]), (last, 3, asked[1])] {
-            let interval = &mut self.rows.intervals[n];
-            interval.speed.0[lane] = interval.speed.0[lane].max(speed.0[lane]);
-            interval.acceleration.0[lane] = interval.acceleration.0[lane].max(acceleration.0[lane]);
         }
     }
 
@@ -170,11 +170,6 @@ impl<const M: usize> Stretch<M> {
     }
 }
 
-/// The factor on a limit that was used so far.
-fn tighter(used: f64) -> f64 {
-    used + (MARGIN.0 * (used - 1.0)).max(MARGIN.1)
-}
-
 /// Time on the ramps at rest ends.
 pub fn ramps(bounds: &[Bound; 2], x: &[f64]) -> f64 {
     let time = |end: usize, w: f64| match bounds[end] {
@@ -184,9 +179,9 @@ pub fn ramps(bounds: &[Bound; 2], x: &[f64]) -> f64 {
     time(0, x[0]) + time(1, x[x.len() - 2])
 }
 
-/// Starts for a plan that is on its limits.
-fn scaled(x: &[f64], starts: &[(f64, f64)], effort: &Effort) -> Vec<(Vec<f64>, Effort)> {
-    starts
+/// Starts from multiples of a plan, with the barrier to begin with.
+fn starts(x: &[f64], multiples: &[(f64, f64)], effort: &Effort) -> Vec<(Vec<f64>, Effort)> {
+    multiples
         .iter()
         .map(|&(factor, barrier)| (x.iter().map(|x| factor * x).collect(), Effort { barrier, ..*effort }))
         .collect()

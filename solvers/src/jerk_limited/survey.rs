@@ -78,6 +78,16 @@ impl Slopes {
         r + h * self.k.min(self.acceleration / r.cbrt())
     }
 
+    /// The time of a stop from a speed.
+    pub fn stop_time(&self, speed: f64) -> f64 {
+        let (a, j) = (self.acceleration / RISE, (self.k / SLOPE).powi(2));
+        if speed * j > a * a {
+            speed / a + a / j
+        } else {
+            2.0 * (speed / j).sqrt()
+        }
+    }
+
     /// The envelope at stations.
     pub fn envelope(&self, stations: &[Station], bounds: &[Bound; 2]) -> Vec<f64> {
         let s: Vec<f64> = stations.iter().map(|station| station.s).collect();
