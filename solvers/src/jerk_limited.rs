@@ -13,13 +13,17 @@
 mod band;
 mod baseline;
 mod between;
+mod bound;
+mod exact;
 mod grid;
 mod hermite;
 mod interior_point;
 mod lanes;
+mod model;
 mod newton;
 mod prepare;
 mod profile;
+mod relaxed;
 mod rest;
 mod rows;
 mod stretch;
@@ -28,6 +32,7 @@ mod windows;
 
 use std::time::Instant;
 
+pub use bound::{certify, Certificate};
 pub use profile::Profile;
 
 /// Derivatives of the axes along the path at a place, and the greatest speed there.

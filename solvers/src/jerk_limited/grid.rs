@@ -1,9 +1,12 @@
 //! The nodes of the spline: about equal in travel time where the speed changes, finer where the path turns, wide
 //! where neither happens, and on every knot of the path.
 
-use super::interior_point::Bound;
 use super::survey::{Slopes, Station};
-use super::SpeedCap;
+use std::ops::Range;
+
+use super::interior_point::Bound;
+use super::rows::Rows;
+use super::{Geometry, Problem, Profile, SpeedCap};
 
 /// r counts as changing where it uses more than this part of the greatest slope.
 const CHANGING: f64 = 0.02;
@@ -80,6 +83,28 @@ impl Grid {
         }
         self.nodes.push(stations[stations.len() - 1].s);
         self.pieces.resize(self.nodes.len() - 1, stations[0].piece);
+    }
+
+    /// The grid of a profile on a path with these knots and caps.
+    pub fn of(profile: &Profile, knots: &[f64], caps: &[SpeedCap]) -> Self {
+        let nodes = profile.s.clone();
+        let piece =
+            |pair: &[f64]| knots.partition_point(|&knot| knot <= 0.5 * (pair[0] + pair[1])) as u32 - 1;
+        let pieces = nodes.windows(2).map(piece).collect();
+        let node = |s: f64| nodes.binary_search_by(|node| node.total_cmp(&s)).ok();
+        let caps = caps.iter().filter_map(|cap| Some((node(cap.s)?, cap.speed))).collect();
+        Self { nodes, pieces, caps }
+    }
+
+    /// The limits on a range of intervals.
+    pub fn rows<G: Geometry<M>, const M: usize>(
+        &self,
+        problem: &Problem<G, M>,
+        range: Range<usize>,
+    ) -> Rows<M> {
+        let nodes = &self.nodes[range.start..=range.end];
+        let pieces = &self.pieces[range.clone()];
+        Rows::sample(problem.geometry, &problem.limits, nodes, pieces, |node| self.cap(range.start + node))
     }
 
     /// The speed allowed at a node, infinite where no cap is given.

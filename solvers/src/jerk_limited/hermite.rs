@@ -16,6 +16,9 @@ pub const WEIGHTS: Lanes = Lanes([
     0.173_927_422_568_726_93,
 ]);
 
+/// Weights of the 3/8 rule at the collocation points.
+pub const MASS: Lanes = Lanes([0.125, 0.375, 0.375, 0.125]);
+
 pub type Basis = [Lanes; 4];
 
 /// B_k at the collocation points.

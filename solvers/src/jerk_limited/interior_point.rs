@@ -9,10 +9,11 @@
 use std::time::Instant;
 
 use super::band::{Band, Tie};
-use super::hermite::{duration, local};
+use super::hermite::local;
 use super::lanes::Lanes;
+use super::model::Model;
 use super::newton::State;
-use super::rows::{RowSet, Rows};
+use super::rows::{Order, Rows};
 
 /// What is known at an end of a stretch.
 #[derive(Clone, Copy, Debug)]
@@ -67,9 +68,10 @@ const LEAST_STEP: f64 = 1e-6;
 pub(super) const LEAST_DUAL: f64 = 1e-4;
 
 /// Working space, reused from stretch to stretch.
-pub struct InteriorPoint<const M: usize> {
+pub struct InteriorPoint<X, const M: usize> {
+    pub(super) model: X,
     pub(super) band: Band,
-    pub(super) states: Vec<State<M>>,
+    pub(super) state: State,
     pub(super) gradient: Vec<f64>,
     pub(super) rhs: Vec<f64>,
     pub(super) step: Vec<f64>,
@@ -89,11 +91,12 @@ pub(super) struct EndRow {
     pub aim: f64,
 }
 
-impl<const M: usize> Default for InteriorPoint<M> {
+impl<X: Model<M>, const M: usize> Default for InteriorPoint<X, M> {
     fn default() -> Self {
         Self {
+            model: X::default(),
             band: Band::default(),
-            states: vec![],
+            state: State::default(),
             gradient: vec![],
             rhs: vec![],
             step: vec![],
@@ -103,13 +106,14 @@ impl<const M: usize> Default for InteriorPoint<M> {
     }
 }
 
-impl<const M: usize> InteriorPoint<M> {
+impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
     /// Improves the valid plan x = (w_0, w'_0, w_1, …) in place. Ends given as fixed may be missed by the start.
     pub fn solve(&mut self, rows: &Rows<M>, bounds: [Bound; 2], x: &mut [f64], effort: &Effort) -> Report {
         let count = rows.intervals.len();
-        let total = (count * 4 * RowSet::<M>::COUNT + 2) as f64;
+        let total = (count * 4 * Order::<M>::COUNT + 2) as f64;
         self.resize(count);
-        let mut time = self.time(rows, bounds, x);
+        self.model.begin(rows, x);
+        let mut time = self.time(rows, bounds, x, false);
         if !self.enter(rows, bounds, x, effort.barrier * time / total) {
             return Report { outcome: Outcome::NotInside, iterations: 0, time, gap: f64::INFINITY };
         }
@@ -136,6 +140,7 @@ impl<const M: usize> InteriorPoint<M> {
                 *r = -g;
             }
             self.band.solve(&self.rhs, missing, &mut self.step);
+            self.model.solved(rows, &self.step, false);
             let after = self.predict(rows) / total;
             let sigma = (after.max(0.0) / mu).powi(3).clamp(if met { 1e-3 } else { 0.3 }, 0.5);
             let least = floor * time / total;
@@ -144,6 +149,7 @@ impl<const M: usize> InteriorPoint<M> {
             // Corrector: towards the target, with the second order of the predictor where it is of use.
             self.correct(rows, target, if least > sigma * mu { 0.0 } else { 1.0 }, 3.0 * mu);
             self.band.solve(&self.rhs, missing, &mut self.step);
+            self.model.solved(rows, &self.step, true);
             let (primal, dual) = self.direction(rows);
             let (mut part, dual) = ((STEP * primal).min(1.0), (STEP * dual).min(1.0));
             let mut next = self.attempt(rows, bounds, x, part);
@@ -179,14 +185,17 @@ impl<const M: usize> InteriorPoint<M> {
         } else {
             outcome = Outcome::Missed;
         }
-        Report { outcome, iterations, time: self.time(rows, bounds, x), gap }
+        Report { outcome, iterations, time: self.time(rows, bounds, x, false), gap }
     }
 
     fn resize(&mut self, count: usize) {
-        self.states.clear();
-        self.states.resize(count, State::default());
+        let state = &mut self.state;
+        for vector in
+            [&mut state.slack, &mut state.dual, &mut state.inverse, &mut state.aim, &mut state.trial]
+        {
+            vector.resize(count * Order::<M>::COUNT, Lanes::ONE);
+        }
         for vector in [&mut self.gradient, &mut self.rhs, &mut self.step, &mut self.trial] {
-            vector.clear();
             vector.resize(2 * count + 2, 0.0);
         }
     }
@@ -194,19 +203,17 @@ impl<const M: usize> InteriorPoint<M> {
     /// Slacks and multipliers of the start; false if it is not inside.
     fn enter(&mut self, rows: &Rows<M>, bounds: [Bound; 2], x: &[f64], mu: f64) -> bool {
         let count = rows.intervals.len();
-        let mut inside = true;
-        for (n, state) in self.states.iter_mut().enumerate() {
-            let (slack, pace) = rows.slack(n, &local(x, n, rows.intervals[n].h));
-            let mut least = Lanes::all(f64::INFINITY);
-            state.slack = slack;
-            state.pace = pace;
-            state.dual = slack.map(|s| s.inverse() * mu);
-            slack.zip(&slack, |s, _| {
-                least = s.min(least);
-                s
-            });
-            inside &= least.least() > 0.0;
+        let state = &mut self.state;
+        let mut least = Lanes::all(f64::INFINITY);
+        for (n, interval) in rows.intervals.iter().enumerate() {
+            let slack = Order::<M>::of_mut(&mut state.slack, n);
+            self.model.slack(rows, n, &local(x, n, interval.h), false, slack);
+            for (dual, slack) in Order::<M>::of_mut(&mut state.dual, n).iter_mut().zip(slack) {
+                *dual = slack.inverse() * mu;
+                least = slack.min(least);
+            }
         }
+        let mut inside = least.least() > 0.0;
         for (end, bound) in bounds.iter().enumerate() {
             self.ends[end] = match *bound {
                 Bound::Fixed { .. } => None,
@@ -221,12 +228,9 @@ impl<const M: usize> InteriorPoint<M> {
         inside
     }
 
-    /// The time of a spline, infinite where it is not positive.
-    pub(super) fn time(&self, rows: &Rows<M>, bounds: [Bound; 2], x: &[f64]) -> f64 {
-        let mut time = 0.0;
-        for (n, interval) in rows.intervals.iter().enumerate() {
-            time += duration(x, n, interval.h);
-        }
+    /// The time of a spline with its ramps, infinite where it is not positive.
+    pub(super) fn time(&self, rows: &Rows<M>, bounds: [Bound; 2], x: &[f64], trial: bool) -> f64 {
+        let mut time = self.model.time(rows, x, trial);
         for (bound, w) in bounds.iter().zip([x[0], x[x.len() - 2]]) {
             if let Bound::Rest { ramp, .. } = bound {
                 time += if w > 0.0 { 3.0 * ramp / w.sqrt() } else { f64::INFINITY };

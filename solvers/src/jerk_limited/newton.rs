@@ -1,63 +1,48 @@
 //! The passes of one Newton iteration over the intervals of a stretch; see `interior_point`.
 
-use super::hermite::{combine, local, AT_NODES, BEND, SLOPE, VALUE, WEIGHTS};
+use super::hermite::local;
 use super::interior_point::{Bound, InteriorPoint};
 use super::lanes::Lanes;
-use super::rows::{Interval, RowSet, Rows};
+use super::model::{project, Model};
+use super::rows::{Order, Rows};
 
-/// An interval's part of the iterate.
-#[derive(Clone, Copy)]
-pub struct State<const M: usize> {
-    pub slack: RowSet<M>,
-    pub dual: RowSet<M>,
+/// The iterate, row by row of each interval; see `rows::Order`.
+#[derive(Default)]
+pub struct State {
+    pub slack: Vec<Lanes>,
+    pub dual: Vec<Lanes>,
     /// 1/slack.
-    pub inverse: RowSet<M>,
+    pub inverse: Vec<Lanes>,
     /// Of the predictor: the relative change of the slack; of the corrector: the aim; then the step of λ.
-    pub aim: RowSet<M>,
-    pub trial: RowSet<M>,
-    /// w^(−1/2), and at the trial.
-    pub pace: Lanes,
-    pub trial_pace: Lanes,
+    pub aim: Vec<Lanes>,
+    /// Slacks at the trial, and space.
+    pub trial: Vec<Lanes>,
 }
 
-impl<const M: usize> Default for State<M> {
-    fn default() -> Self {
-        let one = RowSet::ONE;
-        Self {
-            slack: one,
-            dual: one,
-            inverse: one,
-            aim: one,
-            trial: one,
-            pace: Lanes::ONE,
-            trial_pace: Lanes::ONE,
-        }
-    }
-}
-
-/// The symmetric form of (w, w', w'') at each collocation point: 00 01 02 11 12 22.
-type Form = [Lanes; 6];
-
-impl<const M: usize> InteriorPoint<M> {
+impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
     /// Matrix and gradient at x; the sum of λ s. Multipliers are held above `least_dual`/s.
+    #[inline(never)]
     pub(super) fn assemble(&mut self, rows: &Rows<M>, x: &[f64], least_dual: f64) -> f64 {
-        let count = rows.intervals.len();
-        self.band.clear(count + 1);
+        self.band.clear(rows.intervals.len() + 1);
         self.gradient.fill(0.0);
+        let state = &mut self.state;
         let mut work = Lanes::ZERO;
         let floor = Lanes::all(least_dual);
-        for (n, (state, interval)) in self.states.iter_mut().zip(&rows.intervals).enumerate() {
-            state.inverse = state.slack.map(Lanes::inverse);
-            state.dual = state.dual.zip(&state.inverse, |dual, inverse| dual.max(floor * inverse));
-            let weight = state.dual.zip3(&state.inverse, &state.slack, |dual, inverse, slack| {
-                work += dual * slack;
-                dual * inverse
-            });
-            let form = curvature(rows, interval, &weight, state.pace);
-            let (matrix, gradient) = project(interval.h, &form, &local(x, n, interval.h));
-            self.band.add(n, interval.h, &matrix);
+        for (n, interval) in rows.intervals.iter().enumerate() {
+            let slack = Order::<M>::of(&state.slack, n);
+            let dual = Order::<M>::of_mut(&mut state.dual, n);
+            let inverse = Order::<M>::of_mut(&mut state.inverse, n);
+            let weight = Order::<M>::of_mut(&mut state.trial, n);
+            for k in 0..Order::<M>::COUNT {
+                inverse[k] = slack[k].inverse();
+                dual[k] = dual[k].max(floor * inverse[k]);
+                work += dual[k] * slack[k];
+                weight[k] = dual[k] * inverse[k];
+            }
+            let local = self.model.local(rows, n, &local(x, n, interval.h), weight, dual);
+            self.band.add(n, interval.h, &local.matrix);
             for (k, scale) in [1.0, interval.h, 1.0, interval.h].into_iter().enumerate() {
-                self.gradient[2 * n + k] += gradient[k] * scale;
+                self.gradient[2 * n + k] += local.gradient[k] * scale;
             }
         }
         let mut work = work.sum();
@@ -74,28 +59,31 @@ impl<const M: usize> InteriorPoint<M> {
     }
 
     /// Relative changes of the slacks along the predictor's step; the sum of λ s at the end of its longest step.
+    #[inline(never)]
     pub(super) fn predict(&mut self, rows: &Rows<M>) -> f64 {
-        let (mut primal, mut dual) = (Lanes::ZERO, Lanes::ZERO);
+        let state = &mut self.state;
+        let (mut least, mut most) = (Lanes::ZERO, Lanes::ZERO);
         // Sums of λ s, λ ds and λ ds²/s: with dλ = −λ (1 + ds/s) they give λ s after any step.
         let mut sums = [Lanes::ZERO; 3];
-        for (n, (state, interval)) in self.states.iter_mut().zip(&rows.intervals).enumerate() {
-            let step = rows.slack_step(n, &local(&self.step, n, interval.h), fall(state.pace));
-            state.aim = step.zip3(&state.inverse, &state.slack, |step, inverse, _| {
-                let change = step * inverse;
-                primal = primal.max(-change);
-                dual = dual.max(Lanes::ONE + change);
-                change
-            });
-            state.aim.zip3(&state.dual, &state.slack, |change, dual, slack| {
-                let work = dual * slack;
+        for (n, interval) in rows.intervals.iter().enumerate() {
+            let change = Order::<M>::of_mut(&mut state.aim, n);
+            self.model.slack_step(rows, n, &local(&self.step, n, interval.h), change);
+            let slack = Order::<M>::of(&state.slack, n);
+            let dual = Order::<M>::of(&state.dual, n);
+            let inverse = Order::<M>::of(&state.inverse, n);
+            for k in 0..Order::<M>::COUNT {
+                change[k] *= inverse[k];
+                least = least.min(change[k]);
+                most = most.max(change[k]);
+                let work = dual[k] * slack[k];
+                let changed = work * change[k];
                 sums[0] += work;
-                sums[1] += work * change;
-                sums[2] += work * change * change;
-                change
-            });
+                sums[1] += changed;
+                sums[2] += changed * change[k];
+            }
         }
         let mut sums = sums.map(Lanes::sum);
-        let (mut primal, mut dual) = (primal.greatest(), dual.greatest());
+        let (mut primal, mut dual) = (-least.least(), 1.0 + most.greatest());
         for row in self.ends.iter_mut().flatten() {
             let change = -self.step[2 * row.node] / row.greatest / row.slack;
             primal = primal.max(-change);
@@ -112,49 +100,62 @@ impl<const M: usize> InteriorPoint<M> {
 
     /// The right-hand side of the corrector: λ s of every row towards `target`, less `second` times the predictor's
     /// product, itself at most `most`.
+    #[inline(never)]
     pub(super) fn correct(&mut self, rows: &Rows<M>, target: f64, second: f64, most: f64) {
         for (r, g) in self.rhs.iter_mut().zip(&self.gradient) {
             *r = -g;
         }
-        let most = Lanes::all(most);
-        let target_lanes = Lanes::all(target);
-        for (n, (state, interval)) in self.states.iter_mut().zip(&rows.intervals).enumerate() {
-            let product = state.aim.zip3(&state.dual, &state.slack, |change, dual, slack| {
-                let product = -(change * slack * dual * (Lanes::ONE + change));
-                (target_lanes - product.max(-most).min(most) * second)
-            });
-            state.aim = product.zip(&state.inverse, |aim, inverse| aim * inverse);
-            let pull = pull(rows, interval, &state.aim, fall(state.pace));
-            let h = interval.h;
-            let at = &mut self.rhs[2 * n..2 * n + 4];
-            for (k, scale) in [1.0, h, 1.0, h].into_iter().enumerate() {
-                at[k] += (pull[0] * VALUE[k] + pull[1] * SLOPE[k] + pull[2] * BEND[k]).sum() * scale;
+        let state = &mut self.state;
+        let (goal, high, low) = (Lanes::all(target), Lanes::all(most), Lanes::all(-most));
+        for (n, interval) in rows.intervals.iter().enumerate() {
+            let slack = Order::<M>::of(&state.slack, n);
+            let dual = Order::<M>::of(&state.dual, n);
+            let inverse = Order::<M>::of(&state.inverse, n);
+            let aim = Order::<M>::of_mut(&mut state.aim, n);
+            for k in 0..Order::<M>::COUNT {
+                let product = aim[k] * slack[k] * dual[k] * (Lanes::ONE + aim[k]);
+                aim[k] = (goal + product.max(low).min(high) * second) * inverse[k];
+            }
+            let pull = project(interval.h, &self.model.pull(rows, n, aim));
+            for (k, scale) in [1.0, interval.h, 1.0, interval.h].into_iter().enumerate() {
+                self.rhs[2 * n + k] += pull[k] * scale;
             }
         }
         for row in self.ends.iter_mut().flatten() {
-            let product = -row.aim * row.slack * row.dual * (1.0 + row.aim);
-            row.aim = (target - second * product.clamp(-most.0[0], most.0[0])) / row.slack;
+            let product = row.aim * row.slack * row.dual * (1.0 + row.aim);
+            row.aim = (target + second * product.clamp(-most, most)) / row.slack;
             self.rhs[2 * row.node] -= row.aim / row.greatest;
         }
     }
 
     /// The steps of the multipliers; the longest steps that keep slacks and multipliers positive.
+    #[inline(never)]
     pub(super) fn direction(&mut self, rows: &Rows<M>) -> (f64, f64) {
-        let (mut primal, mut dual) = (Lanes::all(1e-12), Lanes::all(1e-12));
-        for (n, (state, interval)) in self.states.iter_mut().zip(&rows.intervals).enumerate() {
-            let step = rows.slack_step(n, &local(&self.step, n, interval.h), fall(state.pace));
-            let change = step.zip(&state.inverse, |step, inverse| {
-                let change = step * inverse;
-                primal = primal.max(-change);
-                change
-            });
-            state.aim = change.zip3(&state.aim, &state.dual, |change, aim, now| {
-                let step = aim - now * (Lanes::ONE + change);
-                dual = dual.max(-(step * now.inverse()));
-                step
-            });
+        let state = &mut self.state;
+        let mut least = Lanes::all(-1e-12);
+        let mut dual_most = 1e-12;
+        for (n, interval) in rows.intervals.iter().enumerate() {
+            let change = Order::<M>::of_mut(&mut state.trial, n);
+            self.model.slack_step(rows, n, &local(&self.step, n, interval.h), change);
+            let inverse = Order::<M>::of(&state.inverse, n);
+            let dual = Order::<M>::of(&state.dual, n);
+            let aim = Order::<M>::of_mut(&mut state.aim, n);
+            let known = Lanes::all(dual_most);
+            let mut beyond = Lanes::ZERO;
+            for k in 0..Order::<M>::COUNT {
+                let change = change[k] * inverse[k];
+                least = least.min(change);
+                aim[k] = aim[k] - dual[k] * (Lanes::ONE + change);
+                beyond = beyond.max(-(aim[k] + dual[k] * known));
+            }
+            // Few intervals ask for a shorter step than all before: only these divide.
+            if beyond.greatest() > 0.0 {
+                for k in 0..Order::<M>::COUNT {
+                    dual_most = (-(aim[k] * dual[k].inverse())).greatest().max(dual_most);
+                }
+            }
         }
-        let (mut primal, mut dual) = (primal.greatest(), dual.greatest());
+        let (mut primal, mut dual) = (-least.least(), dual_most);
         for row in self.ends.iter_mut().flatten() {
             let change = -self.step[2 * row.node] / row.greatest / row.slack;
             primal = primal.max(-change);
@@ -169,17 +170,19 @@ impl<const M: usize> InteriorPoint<M> {
         for ((to, from), step) in self.trial.iter_mut().zip(x).zip(&self.step) {
             *to = from + part * step;
         }
+        self.model.attempt(part);
+        let state = &mut self.state;
         let mut gain = 0.0;
-        for (n, (state, interval)) in self.states.iter_mut().zip(&rows.intervals).enumerate() {
-            let (slack, pace) = rows.slack(n, &local(&self.trial, n, interval.h));
+        for (n, interval) in rows.intervals.iter().enumerate() {
+            let slack = Order::<M>::of_mut(&mut state.trial, n);
+            self.model.slack(rows, n, &local(&self.trial, n, interval.h), true, slack);
+            let inverse = Order::<M>::of(&state.inverse, n);
             let (mut least, mut product) = (Lanes::ONE, Lanes::ONE);
-            slack.zip(&state.inverse, |slack, inverse| {
-                let ratio = slack * inverse;
+            for k in 0..Order::<M>::COUNT {
+                let ratio = slack[k] * inverse[k];
                 least = ratio.min(least);
                 product *= ratio;
-                ratio
-            });
-            (state.trial, state.trial_pace) = (slack, pace);
+            }
             if !(least.least() > 0.0) {
                 return (f64::INFINITY, 0.0);
             }
@@ -192,20 +195,19 @@ impl<const M: usize> InteriorPoint<M> {
             }
             gain += (slack / row.slack).ln();
         }
-        (self.time(rows, bounds, &self.trial), gain)
+        (self.time(rows, bounds, &self.trial, true), gain)
     }
 
     /// Takes the trial and a part of the multipliers' step; the sum of λ s there.
     pub(super) fn accept(&mut self, x: &mut [f64], part: f64) -> f64 {
         x.copy_from_slice(&self.trial);
+        let state = &mut self.state;
+        std::mem::swap(&mut state.slack, &mut state.trial);
+        self.model.accept();
         let mut work = Lanes::ZERO;
-        for state in &mut self.states {
-            (state.slack, state.pace) = (state.trial, state.trial_pace);
-            state.dual = state.dual.zip3(&state.aim, &state.slack, |dual, step, slack| {
-                let dual = dual + step * part;
-                work += dual * slack;
-                dual
-            });
+        for ((dual, step), slack) in state.dual.iter_mut().zip(&state.aim).zip(&state.slack) {
+            *dual += *step * part;
+            work += *dual * *slack;
         }
         let mut work = work.sum();
         for row in self.ends.iter_mut().flatten() {
@@ -215,97 +217,4 @@ impl<const M: usize> InteriorPoint<M> {
         }
         work
     }
-}
-
-/// w^(−3/2)/2.
-#[inline(always)]
-fn fall(pace: Lanes) -> Lanes {
-    pace * pace * pace * 0.5
-}
-
-/// Σ weight ∇s ∇sᵀ over the rows of an interval, at its collocation points.
-#[inline(always)]
-fn curvature<const M: usize>(
-    rows: &Rows<M>,
-    interval: &Interval<M>,
-    weight: &RowSet<M>,
-    pace: Lanes,
-) -> Form {
-    let fall = fall(pace);
-    let tight = interval.acceleration * interval.acceleration;
-    let mut m = [Lanes::ZERO; 6];
-    m[0] = weight.positive + weight.speed * interval.speed * interval.speed;
-    for k in 0..M {
-        let [q1, q2, q3] = interval.q[k];
-        let half = q1 * 0.5;
-        let [up, down] = weight.acceleration[k];
-        let both = (up + down) * tight * (rows.per_acceleration[k] * rows.per_acceleration[k]);
-        let (b2, b1) = (both * q2, both * half);
-        m[0] += b2 * q2;
-        m[1] += b2 * half;
-        m[3] += b1 * half;
-        let per_jerk = rows.per_jerk[k] * interval.jerk;
-        let [up, down] = weight.jerk[k];
-        let (both, turn) = (up + down, (up - down) * fall);
-        let (r0, r1, r2) = (q3 * per_jerk, q2 * (1.5 * per_jerk), half * per_jerk);
-        let (b0, b1) = (both * r0 + turn, both * r1);
-        m[0] += b0 * r0 + (turn * r0 + both * fall * fall);
-        m[1] += b0 * r1;
-        m[2] += b0 * r2;
-        m[3] += b1 * r1;
-        m[4] += b1 * r2;
-        m[5] += both * r2 * r2;
-    }
-    m
-}
-
-/// Σ aim ∇s over the rows of an interval, as a linear form of (w, h w', h² w'').
-#[inline(always)]
-fn pull<const M: usize>(rows: &Rows<M>, interval: &Interval<M>, aim: &RowSet<M>, fall: Lanes) -> [Lanes; 3] {
-    let mut g = [aim.positive - aim.speed * interval.speed, Lanes::ZERO, Lanes::ZERO];
-    for k in 0..M {
-        let [q1, q2, q3] = interval.q[k];
-        let [up, down] = aim.acceleration[k];
-        let a = (down - up) * interval.acceleration * rows.per_acceleration[k];
-        let [up, down] = aim.jerk[k];
-        let j = (down - up) * (rows.per_jerk[k] * interval.jerk);
-        g[0] += a * q2 + j * q3 - fall * (up + down);
-        g[1] += a * q1 * 0.5 + j * q2 * 1.5;
-        g[2] += j * q1 * 0.5;
-    }
-    let per_h = 1.0 / interval.h;
-    [g[0], g[1] * per_h, g[2] * (per_h * per_h)]
-}
-
-/// Matrix and gradient in local coefficients: the form and the curvature of the time.
-#[inline(always)]
-fn project(h: f64, form: &Form, u: &[f64; 4]) -> ([[f64; 4]; 4], [f64; 4]) {
-    let per_h = 1.0 / h;
-    let per_h2 = per_h * per_h;
-    let m = [
-        form[0],
-        form[1] * per_h,
-        form[2] * per_h2,
-        form[3] * per_h2,
-        form[4] * (per_h * per_h2),
-        form[5] * (per_h2 * per_h2),
-    ];
-    let pace = combine(&AT_NODES, u).sqrt().inverse();
-    let pace_sq = pace * pace;
-    let slope = WEIGHTS * pace * pace_sq * (-0.5 * h);
-    let bend = slope * pace_sq * -1.5;
-    let mut matrix = [[0.0; 4]; 4];
-    let mut gradient = [0.0; 4];
-    for j in 0..4 {
-        let (v, s, b) = (VALUE[j], SLOPE[j], BEND[j]);
-        let p0 = m[0] * v + m[1] * s + m[2] * b;
-        let p1 = m[1] * v + m[3] * s + m[4] * b;
-        let p2 = m[2] * v + m[4] * s + m[5] * b;
-        let g = bend * AT_NODES[j];
-        for i in 0..=j {
-            matrix[i][j] = (VALUE[i] * p0 + SLOPE[i] * p1 + BEND[i] * p2 + AT_NODES[i] * g).sum();
-        }
-        gradient[j] = (slope * AT_NODES[j]).sum();
-    }
-    (matrix, gradient)
 }

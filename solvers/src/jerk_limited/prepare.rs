@@ -32,20 +32,9 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
     pub fn new(problem: &'a Problem<'a, G, M>, resolution: f64) -> Result<Self, Fault> {
         check(problem)?;
         let knots = problem.geometry.knots();
-        let pieces = knots.len() - 1;
-        let total = knots[pieces];
+        let total = knots[knots.len() - 1];
         let limits = &problem.limits;
-        let bounds: [Bound; 2] = std::array::from_fn(|end| match problem.ends[end] {
-            End::Moving { speed, acceleration } => {
-                Bound::Fixed { w: speed * speed, slope: 2.0 * acceleration }
-            }
-            End::Rest => {
-                let (piece, s) = if end == 0 { (0, 0.0) } else { (pieces - 1, total) };
-                let ramp = rest::length(limits, &problem.geometry.at(piece, s).first, total);
-                let greatest = rest::greatest(problem.geometry, limits, problem.caps, ramp, end);
-                Bound::Rest { ramp, greatest }
-            }
-        });
+        let bounds = bounds(problem);
         let span = |end: usize| match bounds[end] {
             Bound::Rest { ramp, .. } => ramp,
             Bound::Fixed { .. } => 0.0,
@@ -93,7 +82,7 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         let mut out = vec![fill; self.grid.pieces.len()];
         out.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, out)| {
             let first = chunk * CHUNK;
-            let rows = self.rows(first..first + out.len());
+            let rows = self.grid.rows(self.problem, first..first + out.len());
             let x = self.x.get(2 * first..2 * (first + out.len() + 1)).unwrap_or(&[]);
             for (n, out) in out.iter_mut().enumerate() {
                 *out = f(&rows, n, x);
@@ -102,22 +91,30 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         out
     }
 
-    fn rows(&self, range: std::ops::Range<usize>) -> Rows<M> {
-        let nodes = &self.grid.nodes[range.start..=range.end];
-        let pieces = &self.grid.pieces[range.clone()];
-        Rows::sample(self.problem.geometry, &self.problem.limits, nodes, pieces, |node| {
-            self.grid.cap(range.start + node)
-        })
-    }
-
     /// The limits on a range of intervals.
     pub fn stretch(&self, range: std::ops::Range<usize>) -> Stretch<M> {
-        let rows = self.rows(range.clone());
+        let rows = self.grid.rows(self.problem, range.clone());
         let nodes = &self.grid.nodes[range.start..=range.end];
         let pieces = &self.grid.pieces[range];
         let between = Between::sample(self.problem.geometry, &self.problem.limits, nodes, pieces, &rows);
         Stretch { rows, between }
     }
+}
+
+/// What is known at the ends of a path.
+pub fn bounds<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>) -> [Bound; 2] {
+    let knots = problem.geometry.knots();
+    let (pieces, limits) = (knots.len() - 1, &problem.limits);
+    let total = knots[pieces];
+    std::array::from_fn(|end| match problem.ends[end] {
+        End::Moving { speed, acceleration } => Bound::Fixed { w: speed * speed, slope: 2.0 * acceleration },
+        End::Rest => {
+            let (piece, s) = if end == 0 { (0, 0.0) } else { (pieces - 1, total) };
+            let ramp = rest::length(limits, &problem.geometry.at(piece, s).first, total);
+            let greatest = rest::greatest(problem.geometry, limits, problem.caps, ramp, end);
+            Bound::Rest { ramp, greatest }
+        }
+    })
 }
 
 /// The problem's numbers once.

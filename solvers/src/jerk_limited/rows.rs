@@ -9,7 +9,9 @@
 //! The slack of the jerk is convex in w: its tangent at a valid plan is a safe inner constraint.
 
 use super::hermite::{self, combine, local, BEND, SLOPE, VALUE};
+use super::interior_point::Bound;
 use super::lanes::Lanes;
+use super::model::Form;
 use super::{Geometry, Limits, Place};
 
 /// One interval between two nodes.
@@ -36,71 +38,35 @@ pub struct Rows<const M: usize> {
     pub per_jerk: [f64; M],
 }
 
-/// One value for each row of an interval: slacks, multipliers or steps of them.
-#[derive(Clone, Copy, Debug)]
-pub struct RowSet<const M: usize> {
-    /// Towards the upper and towards the lower limit.
-    pub acceleration: [[Lanes; 2]; M],
-    pub jerk: [[Lanes; 2]; M],
-    pub speed: Lanes,
-    pub positive: Lanes,
-}
+/// Where the rows of an interval stand in a set of them: towards the upper and the lower limit of each axis's
+/// acceleration and jerk, then speed, then w ≥ 0.
+pub struct Order<const M: usize>;
 
-impl<const M: usize> RowSet<M> {
-    pub const ONE: Self = Self {
-        acceleration: [[Lanes::ONE; 2]; M],
-        jerk: [[Lanes::ONE; 2]; M],
-        speed: Lanes::ONE,
-        positive: Lanes::ONE,
-    };
-
-    /// Rows of one collocation point of an interval, all axes.
+impl<const M: usize> Order<M> {
+    pub const SPEED: usize = 4 * M;
+    pub const POSITIVE: usize = 4 * M + 1;
+    /// Rows of an interval.
     pub const COUNT: usize = 4 * M + 2;
 
-    /// f of each row.
     #[inline(always)]
-    pub fn map(&self, f: impl Fn(Lanes) -> Lanes) -> Self {
-        let mut out = *self;
-        for k in 0..M {
-            for side in 0..2 {
-                out.acceleration[k][side] = f(self.acceleration[k][side]);
-                out.jerk[k][side] = f(self.jerk[k][side]);
-            }
-        }
-        out.speed = f(self.speed);
-        out.positive = f(self.positive);
-        out
+    pub const fn acceleration(axis: usize) -> usize {
+        4 * axis
     }
 
-    /// f of each row of two sets.
     #[inline(always)]
-    pub fn zip(&self, other: &Self, mut f: impl FnMut(Lanes, Lanes) -> Lanes) -> Self {
-        let mut out = *self;
-        for k in 0..M {
-            for side in 0..2 {
-                out.acceleration[k][side] = f(self.acceleration[k][side], other.acceleration[k][side]);
-                out.jerk[k][side] = f(self.jerk[k][side], other.jerk[k][side]);
-            }
-        }
-        out.speed = f(self.speed, other.speed);
-        out.positive = f(self.positive, other.positive);
-        out
+    pub const fn jerk(axis: usize) -> usize {
+        4 * axis + 2
     }
 
-    /// f of each row of three sets.
+    /// The rows of interval n among those of all.
     #[inline(always)]
-    pub fn zip3(&self, b: &Self, c: &Self, mut f: impl FnMut(Lanes, Lanes, Lanes) -> Lanes) -> Self {
-        let mut out = *self;
-        for k in 0..M {
-            for side in 0..2 {
-                out.acceleration[k][side] =
-                    f(self.acceleration[k][side], b.acceleration[k][side], c.acceleration[k][side]);
-                out.jerk[k][side] = f(self.jerk[k][side], b.jerk[k][side], c.jerk[k][side]);
-            }
-        }
-        out.speed = f(self.speed, b.speed, c.speed);
-        out.positive = f(self.positive, b.positive, c.positive);
-        out
+    pub fn of(all: &[Lanes], n: usize) -> &[Lanes] {
+        &all[n * Self::COUNT..][..Self::COUNT]
+    }
+
+    #[inline(always)]
+    pub fn of_mut(all: &mut [Lanes], n: usize) -> &mut [Lanes] {
+        &mut all[n * Self::COUNT..][..Self::COUNT]
     }
 }
 
@@ -189,43 +155,90 @@ impl<const M: usize> Rows<M> {
         out
     }
 
-    /// The slacks on interval n for local coefficients u, and w^(−1/2).
+    /// The slacks on interval n for local coefficients u: the jerk's below `pace`, the last one `last`.
     #[inline(always)]
-    pub fn slack(&self, n: usize, u: &[f64; 4]) -> (RowSet<M>, Lanes) {
+    pub fn slack(&self, n: usize, u: &[f64; 4], pace: Lanes, last: Lanes, out: &mut [Lanes]) {
         let interval = &self.intervals[n];
         let motion = interval.motion(u);
         let axes = self.axes(interval, motion);
-        let w = motion[0];
-        let pace = w.max(Lanes::all(f64::MIN_POSITIVE)).sqrt().inverse();
-        let mut out = RowSet::ONE;
+        let out = &mut out[..Order::<M>::COUNT];
         for k in 0..M {
             let [a, j] = axes[k];
-            out.acceleration[k] = [Lanes::ONE - a, Lanes::ONE + a];
-            out.jerk[k] = [pace - j, pace + j];
+            let (at, to) = (Order::<M>::acceleration(k), Order::<M>::jerk(k));
+            (out[at], out[at + 1]) = (Lanes::ONE - a, Lanes::ONE + a);
+            (out[to], out[to + 1]) = (pace - j, pace + j);
         }
-        out.speed = Lanes::ONE - w * interval.speed;
-        out.positive = w;
-        (out, pace)
+        out[Order::<M>::SPEED] = Lanes::ONE - motion[0] * interval.speed;
+        out[Order::<M>::POSITIVE] = last;
     }
 
-    /// The change of the slacks for a step with local coefficients d, the jerk's along its tangent; `fall` is
-    /// w^(−3/2)/2.
+    /// Their change for a step with local coefficients d.
     #[inline(always)]
-    pub fn slack_step(&self, n: usize, d: &[f64; 4], fall: Lanes) -> RowSet<M> {
+    pub fn slack_step(&self, n: usize, d: &[f64; 4], pace: Lanes, last: Lanes, out: &mut [Lanes]) {
         let interval = &self.intervals[n];
         let motion = interval.motion(d);
         let axes = self.axes(interval, motion);
-        let w = motion[0];
-        let pace = -(fall * w);
-        let mut out = RowSet::ONE;
+        let out = &mut out[..Order::<M>::COUNT];
         for k in 0..M {
             let [a, j] = axes[k];
-            out.acceleration[k] = [-a, a];
-            out.jerk[k] = [pace - j, pace + j];
+            let (at, to) = (Order::<M>::acceleration(k), Order::<M>::jerk(k));
+            (out[at], out[at + 1]) = (-a, a);
+            (out[to], out[to + 1]) = (pace - j, pace + j);
         }
-        out.speed = -(w * interval.speed);
-        out.positive = w;
-        out
+        out[Order::<M>::SPEED] = -(motion[0] * interval.speed);
+        out[Order::<M>::POSITIVE] = last;
+    }
+
+    /// Σ weight ∇s ∇sᵀ over what is linear in the rows of interval n.
+    #[inline(always)]
+    pub fn curvature(&self, n: usize, weight: &[Lanes]) -> Form {
+        let interval = &self.intervals[n];
+        let weight = &weight[..Order::<M>::COUNT];
+        let tight = interval.acceleration * interval.acceleration;
+        let mut m = [Lanes::ZERO; 6];
+        m[0] = weight[Order::<M>::SPEED] * interval.speed * interval.speed;
+        for k in 0..M {
+            let [q1, q2, q3] = interval.q[k];
+            let (half, more) = (q1 * 0.5, q2 * 1.5);
+            let at = Order::<M>::acceleration(k);
+            let both =
+                (weight[at] + weight[at + 1]) * tight * (self.per_acceleration[k] * self.per_acceleration[k]);
+            let (b2, b1) = (both * q2, both * half);
+            m[0] += b2 * q2;
+            m[1] += b2 * half;
+            m[3] += b1 * half;
+            let at = Order::<M>::jerk(k);
+            let both = (weight[at] + weight[at + 1]) * (self.per_jerk[k] * interval.jerk).powi(2);
+            let (b0, b1) = (both * q3, both * more);
+            m[0] += b0 * q3;
+            m[1] += b0 * more;
+            m[2] += b0 * half;
+            m[3] += b1 * more;
+            m[4] += b1 * half;
+            m[5] += both * half * half;
+        }
+        m
+    }
+
+    /// Σ aim ∇s over what is linear in the rows of interval n, as a form of (w, w', w''); Σ aim of the jerks' rows.
+    #[inline(always)]
+    pub fn pull(&self, n: usize, aim: &[Lanes]) -> ([Lanes; 3], Lanes) {
+        let interval = &self.intervals[n];
+        let aim = &aim[..Order::<M>::COUNT];
+        let mut g = [-(aim[Order::<M>::SPEED] * interval.speed), Lanes::ZERO, Lanes::ZERO];
+        let mut jerk = Lanes::ZERO;
+        for k in 0..M {
+            let [q1, q2, q3] = interval.q[k];
+            let at = Order::<M>::acceleration(k);
+            let a = (aim[at + 1] - aim[at]) * interval.acceleration * self.per_acceleration[k];
+            let at = Order::<M>::jerk(k);
+            let j = (aim[at + 1] - aim[at]) * (self.per_jerk[k] * interval.jerk);
+            g[0] += a * q2 + j * q3;
+            g[1] += a * q1 * 0.5 + j * q2 * 1.5;
+            g[2] += j * q1 * 0.5;
+            jerk += aim[at] + aim[at + 1];
+        }
+        (g, jerk)
     }
 
     /// The greatest uses of the limits on interval n: of speed, acceleration and jerk, 1 at a limit.
@@ -239,5 +252,16 @@ impl<const M: usize> Rows<M> {
             worst[2] = f64::max(worst[2], (j * v).abs().greatest());
         }
         worst
+    }
+
+    /// Speed and acceleration at given ends are what they are.
+    pub fn waive(&mut self, bounds: &[Bound; 2]) {
+        let last = self.intervals.len() - 1;
+        for (bound, (n, lane)) in bounds.iter().zip([(0, 0), (last, 3)]) {
+            if let Bound::Fixed { .. } = bound {
+                self.intervals[n].speed.0[lane] = 0.0;
+                self.intervals[n].acceleration.0[lane] = 0.0;
+            }
+        }
     }
 }

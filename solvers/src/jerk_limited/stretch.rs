@@ -2,6 +2,7 @@
 //! where that shows an excess.
 
 use super::between::Between;
+use super::exact::Exact;
 use super::hermite::duration;
 use super::interior_point::{Bound, Effort, InteriorPoint, Outcome, Report};
 use super::rows::Rows;
@@ -53,12 +54,12 @@ impl<const M: usize> Stretch<M> {
         x: &mut [f64],
         near: bool,
         effort: &Effort,
-        space: &mut InteriorPoint<M>,
+        space: &mut InteriorPoint<Exact, M>,
     ) -> Verdict {
         for (interval, &tight) in self.rows.intervals.iter_mut().zip(tight.iter()) {
             interval.tighten(tight);
         }
-        self.waive(&bounds);
+        self.rows.waive(&bounds);
         let mut verdict = Verdict::default();
         let mut best = if near { self.time(&bounds, x) } else { f64::INFINITY };
         let mut attempts = starts(x, if near { &NEAR } else { &FAR }, effort);
@@ -93,7 +94,7 @@ impl<const M: usize> Stretch<M> {
         &self,
         bounds: [Bound; 2],
         starts: Vec<(Vec<f64>, Effort)>,
-        space: &mut InteriorPoint<M>,
+        space: &mut InteriorPoint<Exact, M>,
         spent: &mut usize,
     ) -> Option<(Vec<f64>, Report)> {
         for (mut y, mut effort) in starts {
@@ -149,17 +150,6 @@ impl<const M: usize> Stretch<M> {
             }
         }
         holds
-    }
-
-    /// Speed and acceleration at given ends are what they are.
-    fn waive(&mut self, bounds: &[Bound; 2]) {
-        let last = self.rows.intervals.len() - 1;
-        for (bound, (n, lane)) in bounds.iter().zip([(0, 0), (last, 3)]) {
-            if let Bound::Fixed { .. } = bound {
-                self.rows.intervals[n].speed.0[lane] = 0.0;
-                self.rows.intervals[n].acceleration.0[lane] = 0.0;
-            }
-        }
     }
 
     /// Time of a spline with its ramps.

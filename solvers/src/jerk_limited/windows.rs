@@ -9,6 +9,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
+use super::exact::Exact;
 use super::hermite::duration;
 use super::interior_point::{self, Bound, InteriorPoint};
 use super::prepare::Prepared;
@@ -174,7 +175,7 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
         };
         let limits = &self.prepared.problem.limits;
         let mut stretch = self.prepared.stretch(part.range.clone());
-        let mut space = InteriorPoint::default();
+        let mut space = InteriorPoint::<Exact, M>::default();
         stretch.improve(limits, bounds, &mut part.tight, y, near, &effort, &mut space)
     }
 
