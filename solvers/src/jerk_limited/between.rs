@@ -1,5 +1,5 @@
-//! The limits between the collocation points: the truth at 12 places of each interval, and the peaks of parabolas
-//! through them.
+//! The limits between the collocation points: the truth at 12 places of each interval, and the peaks of what
+//! interpolates them.
 
 use super::hermite::{self, combine, local, Basis};
 use super::lanes::Lanes;
@@ -114,19 +114,83 @@ impl<const M: usize> Between<M> {
     }
 }
 
-/// The greatest |f| of equidistant values and of the parabolas through each three.
+/// Points of the polynomials that interpolate half-way between the places.
+const STENCIL: usize = 6;
+/// Their weights, and where they begin.
+const HALFWAY: [([f64; STENCIL], usize); PLACES - 1] = halfway();
+
+const fn halfway() -> [([f64; STENCIL], usize); PLACES - 1] {
+    let mut out = [([0.0; STENCIL], 0); PLACES - 1];
+    let mut i = 0;
+    while i < PLACES - 1 {
+        let centred = if i < STENCIL / 2 - 1 { 0 } else { i + 1 - STENCIL / 2 };
+        let first = if centred + STENCIL > PLACES { PLACES - STENCIL } else { centred };
+        let t = i as f64 + 0.5 - first as f64;
+        let mut k = 0;
+        while k < STENCIL {
+            let (mut weight, mut other) = (1.0, 0);
+            while other < STENCIL {
+                if other != k {
+                    weight *= (t - other as f64) / (k as f64 - other as f64);
+                }
+                other += 1;
+            }
+            out[i].0[k] = weight;
+            k += 1;
+        }
+        out[i].1 = first;
+        i += 1;
+    }
+    out
+}
+
+/// The greatest |f| of a smooth function with these values at the places: of them, of those interpolated half-way
+/// between, and of the parabolas through each three.
 fn peak(f: &[f64; PLACES]) -> f64 {
     let greatest = f.iter().fold(0.0f64, |worst, value| worst.max(value.abs()));
     if !(greatest > NEAR) {
         return greatest;
     }
+    let mut fine = [0.0; 2 * PLACES - 1];
+    for i in 0..PLACES {
+        fine[2 * i] = f[i];
+    }
+    for (i, (weights, first)) in HALFWAY.iter().enumerate() {
+        fine[2 * i + 1] = weights.iter().zip(&f[*first..]).map(|(weight, value)| weight * value).sum();
+    }
     let mut worst = greatest;
-    for i in 1..PLACES - 1 {
-        let sign = f[i].signum();
-        let (bend, rise) = (sign * (2.0 * f[i] - f[i - 1] - f[i + 1]), f[i + 1] - f[i - 1]);
+    for i in 1..fine.len() - 1 {
+        let sign = fine[i].signum();
+        let bend = sign * (2.0 * fine[i] - fine[i - 1] - fine[i + 1]);
+        let rise = fine[i + 1] - fine[i - 1];
         if rise.abs() < 2.0 * bend {
-            worst = worst.max(f[i].abs() + rise * rise / (8.0 * bend));
+            worst = worst.max(fine[i].abs() + rise * rise / (8.0 * bend));
         }
     }
     worst
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn values(f: impl Fn(f64) -> f64) -> [f64; PLACES] {
+        std::array::from_fn(|i| f(i as f64 / (PLACES - 1) as f64))
+    }
+
+    #[test]
+    fn peaks_of_polynomials_between_places_are_found() {
+        // 1 − (t − c)²/2 + (t − c)³/10 peaks at c with 1, wherever that lies.
+        for i in 0..100 {
+            let c = 0.01 * i as f64;
+            let found = peak(&values(|t| 1.0 - 0.5 * (t - c).powi(2) + 0.1 * (t - c).powi(3)));
+            assert!((found - 1.0).abs() < 5e-6, "{found} for a peak at {c}");
+            assert_eq!(peak(&values(|t| -(1.0 - 0.5 * (t - c).powi(2) + 0.1 * (t - c).powi(3)))), found);
+        }
+    }
+
+    #[test]
+    fn values_far_from_a_limit_are_taken_as_they_are() {
+        assert_eq!(peak(&values(|t| 0.5 * t)), 0.5);
+    }
 }

@@ -87,6 +87,8 @@ struct Part {
     x: Vec<f64>,
     slope: Vec<f64>,
     boxes: Vec<[f64; 2]>,
+    /// By how much w can change on each interval.
+    rise: Vec<f64>,
     /// Multipliers of the ramps' limits.
     ends: [f64; 2],
 }
@@ -116,6 +118,7 @@ fn part<const M: usize>(
         value: 0.0,
         x: x[2 * core.start..2 * core.end + 2].to_vec(),
         slope: vec![0.0; nodes],
+        rise: vec![],
         boxes: vec![[0.0, f64::INFINITY], [f64::NEG_INFINITY, f64::INFINITY]].repeat(core.len() + 1),
         ends: [0, 1].map(|end| space.ends[end].filter(|_| known).map_or(0.0, |row| row.dual)),
     };
@@ -133,12 +136,18 @@ fn part<const M: usize>(
         for (k, scale) in [1.0, h, 1.0, h].into_iter().enumerate() {
             out.slope[2 * (n - core.start) + k] += slope[k] * scale;
         }
-        for (lane, node) in [(0, n - core.start), (3, n + 1 - core.start)] {
+        let mut rise = 0.0;
+        for lane in 0..4 {
             let [w, w1] = limits_at(rows, n, lane);
-            let [low, high] = [2 * node, 2 * node + 1];
-            out.boxes[low][1] = out.boxes[low][1].min(w);
-            out.boxes[high] = [out.boxes[high][0].max(-w1), out.boxes[high][1].min(w1)];
+            // The 3/8 rule is exact for w', a quadratic.
+            rise += MASS.0[lane] * w1 * h;
+            if lane == 0 || lane == 3 {
+                let at = 2 * (n - core.start + lane / 3);
+                out.boxes[at][1] = out.boxes[at][1].min(w);
+                out.boxes[at + 1] = [out.boxes[at + 1][0].max(-w1), out.boxes[at + 1][1].min(w1)];
+            }
         }
+        out.rise.push(rise);
     }
     out
 }
@@ -219,9 +228,13 @@ fn join(parts: &[Part], cores: &[Range<usize>], bounds: &[Bound; 2], unknowns: u
                 slope[at + 1] = 0.0;
                 boxes[at][1] = boxes[at][1].min(greatest);
             }
-            Bound::Fixed { .. } => (slope[at], slope[at + 1]) = (0.0, 0.0),
+            Bound::Fixed { w, .. } => {
+                (slope[at], slope[at + 1]) = (0.0, 0.0);
+                boxes[at][1] = w;
+            }
         }
     }
+    narrow(parts, &mut boxes);
     for i in 0..unknowns {
         let [low, high] = boxes[i];
         value += if slope[i] > 0.0 {
@@ -233,4 +246,15 @@ fn join(parts: &[Part], cores: &[Range<usize>], bounds: &[Bound; 2], unknowns: u
         };
     }
     value
+}
+
+/// Narrows the boxes of w to what can be reached from one node to the next, forward and backward.
+fn narrow(parts: &[Part], boxes: &mut [[f64; 2]]) {
+    let rise: Vec<f64> = parts.iter().flat_map(|part| part.rise.iter().copied()).collect();
+    for n in 0..rise.len() {
+        boxes[2 * n + 2][1] = boxes[2 * n + 2][1].min(boxes[2 * n][1] + rise[n]);
+    }
+    for n in (0..rise.len()).rev() {
+        boxes[2 * n][1] = boxes[2 * n][1].min(boxes[2 * n + 2][1] + rise[n]);
+    }
 }

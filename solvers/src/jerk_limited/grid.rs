@@ -16,8 +16,8 @@ const TURNING: f64 = 0.02;
 const GROWTH: f64 = 0.5;
 /// The longest interval, in s.
 const LONGEST: f64 = 0.5;
-/// Every path has at least so many intervals.
-const FEWEST: f64 = 16.0;
+/// Every path has at least so many intervals, in parts of the resolution.
+const FEWEST: f64 = 26.0;
 
 /// Nodes, the piece of each interval, and the caps at nodes.
 #[derive(Clone, Debug, Default)]
@@ -44,7 +44,7 @@ impl Grid {
         for i in 1..stations.len() {
             whole += 0.5 * (density[i - 1] + density[i]) * (stations[i].s - stations[i - 1].s);
         }
-        let more = (FEWEST / whole).max(1.0);
+        let more = (FEWEST * resolution / whole).max(1.0);
         let mut first = 0;
         for i in 1..stations.len() {
             let cap = caps.next_if(|cap| cap.s <= stations[i].s);

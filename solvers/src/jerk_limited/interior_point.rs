@@ -54,8 +54,6 @@ pub struct Report {
     pub iterations: usize,
     /// Time of the stretch with its ramps, in s.
     pub time: f64,
-    /// Gap of complementarity in parts of the time.
-    pub gap: f64,
 }
 
 /// Part of the way to the boundary.
@@ -115,11 +113,10 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         self.model.begin(rows, x);
         let mut time = self.time(rows, bounds, x, false);
         if !self.enter(rows, bounds, x, effort.barrier * time / total) {
-            return Report { outcome: Outcome::NotInside, iterations: 0, time, gap: f64::INFINITY };
+            return Report { outcome: Outcome::NotInside, iterations: 0, time };
         }
         let ties = [tie(&bounds[0], 1.0), tie(&bounds[1], -1.0)];
         let (mut floor, mut least_dual) = (0.3 * effort.barrier, 0.0);
-        let mut gap = f64::INFINITY;
         let mut outcome = Outcome::Stopped;
         let mut iterations = 0;
         while iterations < effort.max_iterations && !effort.deadline.is_some_and(|end| Instant::now() >= end)
@@ -127,7 +124,7 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
             iterations += 1;
             let work = self.assemble(rows, x, least_dual);
             let mu = work / total;
-            gap = work / time;
+            let gap = work / time;
             let missing = missing(&bounds, x);
             let met = miss(&bounds, x, &rows.intervals) < MET;
             if !self.band.factor(ties) {
@@ -185,7 +182,7 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         } else {
             outcome = Outcome::Missed;
         }
-        Report { outcome, iterations, time: self.time(rows, bounds, x, false), gap }
+        Report { outcome, iterations, time: self.time(rows, bounds, x, false) }
     }
 
     fn resize(&mut self, count: usize) {

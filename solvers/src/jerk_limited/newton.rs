@@ -21,7 +21,6 @@ pub struct State {
 
 impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
     /// Matrix and gradient at x; the sum of λ s. Multipliers are held above `least_dual`/s.
-    #[inline(never)]
     pub(super) fn assemble(&mut self, rows: &Rows<M>, x: &[f64], least_dual: f64) -> f64 {
         self.band.clear(rows.intervals.len() + 1);
         self.gradient.fill(0.0);
@@ -59,7 +58,6 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
     }
 
     /// Relative changes of the slacks along the predictor's step; the sum of λ s at the end of its longest step.
-    #[inline(never)]
     pub(super) fn predict(&mut self, rows: &Rows<M>) -> f64 {
         let state = &mut self.state;
         let (mut least, mut most) = (Lanes::ZERO, Lanes::ZERO);
@@ -100,7 +98,6 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
 
     /// The right-hand side of the corrector: λ s of every row towards `target`, less `second` times the predictor's
     /// product, itself at most `most`.
-    #[inline(never)]
     pub(super) fn correct(&mut self, rows: &Rows<M>, target: f64, second: f64, most: f64) {
         for (r, g) in self.rhs.iter_mut().zip(&self.gradient) {
             *r = -g;
@@ -129,7 +126,6 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
     }
 
     /// The steps of the multipliers; the longest steps that keep slacks and multipliers positive.
-    #[inline(never)]
     pub(super) fn direction(&mut self, rows: &Rows<M>) -> (f64, f64) {
         let state = &mut self.state;
         let mut least = Lanes::all(-1e-12);

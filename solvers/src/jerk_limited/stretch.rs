@@ -13,10 +13,10 @@ const HELD: f64 = 1.0 + 5e-7;
 /// Limits are tightened by so much more than the excess, in parts of it and at least; more would make kinks where
 /// tightened intervals meet others.
 const MARGIN: (f64, f64) = (0.1, 1e-6);
-/// From round to round the margin grows by this factor: a peak may follow its neighbours slowly.
+/// From time to time that an interval is tightened its margin grows by this factor: a peak may follow slowly.
 const RISE: f64 = 4.0;
 /// Rounds of tightening.
-const ROUNDS: i32 = 8;
+const ROUNDS: usize = 10;
 /// What plans are multiplied with to start from, and the barrier to start with. The valid plans are star-shaped: a
 /// smaller multiple is further inside, and further from the optimum. From afar …
 const FAR: [(f64, f64); 1] = [(1.0, 1.0)];
@@ -63,11 +63,12 @@ impl<const M: usize> Stretch<M> {
         let mut verdict = Verdict::default();
         let mut best = if near { self.time(&bounds, x) } else { f64::INFINITY };
         let mut attempts = starts(x, if near { &NEAR } else { &FAR }, effort);
-        for round in 0..ROUNDS {
+        let mut times = vec![0; tight.len()];
+        for _ in 0..ROUNDS {
             let Some((y, report)) = self.attempt(bounds, attempts, space, &mut verdict.iterations) else {
                 break;
             };
-            if self.tighten(limits, &y, MARGIN.0 * RISE.powi(round), tight) {
+            if self.tighten(limits, &y, tight, &mut times) {
                 if report.time < best {
                     x.copy_from_slice(&y);
                 }
@@ -133,16 +134,17 @@ impl<const M: usize> Stretch<M> {
         })
     }
 
-    /// Tightens the limits where x exceeds them between the points, by a margin in parts of the excess; true if it
-    /// does nowhere.
-    fn tighten(&mut self, limits: &Limits<M>, x: &[f64], margin: f64, tight: &mut [[f64; 3]]) -> bool {
+    /// Tightens the limits where x exceeds them between the points, and counts how often; true if it does nowhere.
+    fn tighten(&mut self, limits: &Limits<M>, x: &[f64], tight: &mut [[f64; 3]], times: &mut [i32]) -> bool {
         let mut holds = true;
         for (n, (interval, tight)) in self.rows.intervals.iter_mut().zip(tight).enumerate() {
+            let margin = MARGIN.0 * RISE.powi(times[n]);
             let used = self.between.utilisation(limits, x, n, interval.h);
             let factors =
                 used.map(|used| if used > HELD { used + (margin * (used - 1.0)).max(MARGIN.1) } else { 1.0 });
             if factors != [1.0; 3] {
                 holds = false;
+                times[n] += 1;
                 interval.tighten(factors);
                 for k in 0..3 {
                     tight[k] *= factors[k];

@@ -15,7 +15,7 @@ const RISE: f64 = 1.5 * 0.6 * 0.79;
 /// Stations of a piece: halved where the caps between them change by more than this in logarithm …
 const CHANGE: f64 = 0.2;
 /// … at least and at most so often.
-const DEPTH: std::ops::Range<u32> = 2..14;
+const DEPTH: std::ops::Range<u32> = 2..30;
 /// Stations are at most this part of r/K apart.
 const SPACING: f64 = 0.25;
 

@@ -21,7 +21,7 @@ const SEAM: (f64, usize) = (4.0, 80);
 /// Windows of the first plan last so many times of a stop, at least: the optimum takes down to a third of it.
 const LONG: f64 = 36.0;
 /// Windows solved between two hand-outs, for each thread.
-const BATCH: usize = 4;
+const BATCH: usize = 2;
 
 /// See `jerk_limited::stream`.
 pub fn solve<G: Geometry<M>, const M: usize>(
