@@ -110,7 +110,7 @@ pub struct Effort {
 
 impl Default for Effort {
     fn default() -> Self {
-        Self { resolution: 16.0, tolerance: 1e-7, max_iterations: 400, deadline: None, window: 2000 }
+        Self { resolution: 16.0, tolerance: 1e-7, max_iterations: 400, deadline: None, window: 4000 }
     }
 }
 

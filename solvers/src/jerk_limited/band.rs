@@ -70,13 +70,13 @@ impl Band {
             let a = a * s0 * s0 + REGULAR - m[0] * m[0] - m[1] * m[1];
             let b = b * s0 * s1 - m[0] * m[2] - m[1] * m[3];
             let c = c * s1 * s1 + REGULAR - m[2] * m[2] - m[3] * m[3];
-            if !(a > 0.0) {
+            if a.is_nan() || a <= 0.0 {
                 return false;
             }
             let l0 = 1.0 / a.sqrt();
             let l1 = b * l0;
             let c = c - l1 * l1;
-            if !(c > 0.0) {
+            if c.is_nan() || c <= 0.0 {
                 return false;
             }
             let l2 = 1.0 / c.sqrt();

@@ -148,7 +148,7 @@ const fn halfway() -> [([f64; STENCIL], usize); PLACES - 1] {
 /// between, and of the parabolas through each three.
 fn peak(f: &[f64; PLACES]) -> f64 {
     let greatest = f.iter().fold(0.0f64, |worst, value| worst.max(value.abs()));
-    if !(greatest > NEAR) {
+    if greatest <= NEAR {
         return greatest;
     }
     let mut fine = [0.0; 2 * PLACES - 1];

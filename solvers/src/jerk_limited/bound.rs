@@ -119,7 +119,7 @@ fn part<const M: usize>(
         x: x[2 * core.start..2 * core.end + 2].to_vec(),
         slope: vec![0.0; nodes],
         rise: vec![],
-        boxes: vec![[0.0, f64::INFINITY], [f64::NEG_INFINITY, f64::INFINITY]].repeat(core.len() + 1),
+        boxes: [[0.0, f64::INFINITY], [f64::NEG_INFINITY, f64::INFINITY]].repeat(core.len() + 1),
         ends: [0, 1].map(|end| space.ends[end].filter(|_| known).map_or(0.0, |row| row.dual)),
     };
     for n in core.clone() {

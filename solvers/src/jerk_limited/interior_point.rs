@@ -62,7 +62,7 @@ const STEP: f64 = 0.995;
 const MET: f64 = 1e-9;
 /// Steps below this part of Newton's are no progress.
 const LEAST_STEP: f64 = 1e-6;
-/// λ keeps at least this part of the mean complementarity.
+/// λ s keeps at least this part of the complementarity aimed at.
 pub(super) const LEAST_DUAL: f64 = 1e-4;
 
 /// Working space, reused from stretch to stretch.
@@ -116,13 +116,14 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
             return Report { outcome: Outcome::NotInside, iterations: 0, time };
         }
         let ties = [tie(&bounds[0], 1.0), tie(&bounds[1], -1.0)];
-        let (mut floor, mut least_dual) = (0.3 * effort.barrier, 0.0);
+        let mut floor = 0.3 * effort.barrier;
+        // The part of the multipliers' step that is still to be taken, and their least complementarity then.
+        let (mut dual, mut least_dual) = (0.0, 0.0);
         let mut outcome = Outcome::Stopped;
         let mut iterations = 0;
-        while iterations < effort.max_iterations && !effort.deadline.is_some_and(|end| Instant::now() >= end)
-        {
+        while iterations < effort.max_iterations && effort.deadline.is_none_or(|end| Instant::now() < end) {
             iterations += 1;
-            let work = self.assemble(rows, x, least_dual);
+            let work = self.assemble(rows, x, dual, least_dual);
             let mu = work / total;
             let gap = work / time;
             let missing = missing(&bounds, x);
@@ -147,8 +148,8 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
             self.correct(rows, target, if least > sigma * mu { 0.0 } else { 1.0 }, 3.0 * mu);
             self.band.solve(&self.rhs, missing, &mut self.step);
             self.model.solved(rows, &self.step, true);
-            let (primal, dual) = self.direction(rows);
-            let (mut part, dual) = ((STEP * primal).min(1.0), (STEP * dual).min(1.0));
+            let longest = self.direction(rows);
+            let mut part = (STEP * longest.0).min(1.0);
             let mut next = self.attempt(rows, bounds, x, part);
             for _ in 0..20 {
                 let valid = next.0.is_finite();
@@ -162,7 +163,8 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
                 outcome = Outcome::Stalled;
                 break;
             }
-            least_dual = LEAST_DUAL * self.accept(x, dual) / total;
+            self.accept(x);
+            (dual, least_dual) = ((STEP * longest.1).min(1.0), LEAST_DUAL * target);
             let gain = time - next.0;
             time = next.0;
             if part > 0.6 && gain < 0.08 * time {
@@ -177,6 +179,7 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
                 break;
             }
         }
+        self.finish(dual);
         if miss(&bounds, x, &rows.intervals) < MET {
             settle(&bounds, x);
         } else {
@@ -192,6 +195,7 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         {
             vector.resize(count * Order::<M>::COUNT, Lanes::ONE);
         }
+        state.scratch.resize(Order::<M>::COUNT, Lanes::ONE);
         for vector in [&mut self.gradient, &mut self.rhs, &mut self.step, &mut self.trial] {
             vector.resize(2 * count + 2, 0.0);
         }

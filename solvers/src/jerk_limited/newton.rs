@@ -15,13 +15,15 @@ pub struct State {
     pub inverse: Vec<Lanes>,
     /// Of the predictor: the relative change of the slack; of the corrector: the aim; then the step of λ.
     pub aim: Vec<Lanes>,
-    /// Slacks at the trial, and space.
+    /// Slacks at the trial.
     pub trial: Vec<Lanes>,
+    /// Rows of one interval at a time: they stay in the nearest cache.
+    pub scratch: Vec<Lanes>,
 }
 
 impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
-    /// Matrix and gradient at x; the sum of λ s. Multipliers are held above `least_dual`/s.
-    pub(super) fn assemble(&mut self, rows: &Rows<M>, x: &[f64], least_dual: f64) -> f64 {
+    /// Matrix and gradient at x; the sum of λ s. Multipliers take a part of their step and stay above `least_dual`/s.
+    pub(super) fn assemble(&mut self, rows: &Rows<M>, x: &[f64], part: f64, least_dual: f64) -> f64 {
         self.band.clear(rows.intervals.len() + 1);
         self.gradient.fill(0.0);
         let state = &mut self.state;
@@ -30,11 +32,12 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         for (n, interval) in rows.intervals.iter().enumerate() {
             let slack = Order::<M>::of(&state.slack, n);
             let dual = Order::<M>::of_mut(&mut state.dual, n);
+            let step = Order::<M>::of(&state.aim, n);
             let inverse = Order::<M>::of_mut(&mut state.inverse, n);
-            let weight = Order::<M>::of_mut(&mut state.trial, n);
+            let weight = Order::<M>::of_mut(&mut state.scratch, 0);
             for k in 0..Order::<M>::COUNT {
                 inverse[k] = slack[k].inverse();
-                dual[k] = dual[k].max(floor * inverse[k]);
+                dual[k] = (dual[k] + step[k] * part).max(floor * inverse[k]);
                 work += dual[k] * slack[k];
                 weight[k] = dual[k] * inverse[k];
             }
@@ -46,7 +49,7 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         }
         let mut work = work.sum();
         for row in self.ends.iter_mut().flatten() {
-            row.dual = row.dual.max(least_dual / row.slack);
+            row.dual = (row.dual + part * row.aim).max(least_dual / row.slack);
             work += row.dual * row.slack;
             let w = x[2 * row.node];
             let fall = row.ramp / (w * w.sqrt());
@@ -131,7 +134,7 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         let mut least = Lanes::all(-1e-12);
         let mut dual_most = 1e-12;
         for (n, interval) in rows.intervals.iter().enumerate() {
-            let change = Order::<M>::of_mut(&mut state.trial, n);
+            let change = Order::<M>::of_mut(&mut state.scratch, 0);
             self.model.slack_step(rows, n, &local(&self.step, n, interval.h), change);
             let inverse = Order::<M>::of(&state.inverse, n);
             let dual = Order::<M>::of(&state.dual, n);
@@ -179,14 +182,14 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
                 least = ratio.min(least);
                 product *= ratio;
             }
-            if !(least.least() > 0.0) {
+            if least.least() <= 0.0 {
                 return (f64::INFINITY, 0.0);
             }
             gain += product.product().ln();
         }
         for row in self.ends.iter().flatten() {
             let slack = 1.0 - self.trial[2 * row.node] / row.greatest;
-            if !(slack > 0.0) {
+            if slack <= 0.0 {
                 return (f64::INFINITY, 0.0);
             }
             gain += (slack / row.slack).ln();
@@ -194,23 +197,24 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         (self.time(rows, bounds, &self.trial, true), gain)
     }
 
-    /// Takes the trial and a part of the multipliers' step; the sum of λ s there.
-    pub(super) fn accept(&mut self, x: &mut [f64], part: f64) -> f64 {
+    /// Takes the trial; the multipliers follow with the next `assemble`.
+    pub(super) fn accept(&mut self, x: &mut [f64]) {
         x.copy_from_slice(&self.trial);
         let state = &mut self.state;
         std::mem::swap(&mut state.slack, &mut state.trial);
         self.model.accept();
-        let mut work = Lanes::ZERO;
-        for ((dual, step), slack) in state.dual.iter_mut().zip(&state.aim).zip(&state.slack) {
-            *dual += *step * part;
-            work += *dual * *slack;
-        }
-        let mut work = work.sum();
         for row in self.ends.iter_mut().flatten() {
             row.slack = 1.0 - x[2 * row.node] / row.greatest;
-            row.dual += part * row.aim;
-            work += row.dual * row.slack;
         }
-        work
+    }
+
+    /// The multipliers take a part of their last step.
+    pub(super) fn finish(&mut self, part: f64) {
+        for (dual, step) in self.state.dual.iter_mut().zip(&self.state.aim) {
+            *dual += *step * part;
+        }
+        for row in self.ends.iter_mut().flatten() {
+            row.dual += part * row.aim;
+        }
     }
 }

@@ -70,7 +70,7 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
             }
         }
         let scale = baseline::USE / worst;
-        if !(scale > 0.0) || self.bounds.iter().any(|bound| matches!(bound, Bound::Fixed { .. })) {
+        if scale == 0.0 || self.bounds.iter().any(|bound| matches!(bound, Bound::Fixed { .. })) {
             return Err(Fault::NoPlan { s: self.grid.nodes[0] });
         }
         self.x.iter_mut().for_each(|x| *x *= scale);
@@ -117,11 +117,16 @@ pub fn bounds<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>) -> [Bound
     })
 }
 
+/// Whether numbers rise, each above the one before.
+fn rising(numbers: impl Iterator<Item = f64> + Clone) -> bool {
+    numbers.clone().zip(numbers.skip(1)).all(|(a, b)| a < b)
+}
+
 /// The problem's numbers once.
 fn check<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>) -> Result<(), Fault> {
     let wrong = |what: String| Err(Fault::Input(what));
     let knots = problem.geometry.knots();
-    if knots.len() < 2 || knots[0] != 0.0 || knots.windows(2).any(|pair| !(pair[1] > pair[0])) {
+    if knots.len() < 2 || knots[0] != 0.0 || !rising(knots.iter().copied()) {
         return wrong("the knots of the path do not rise from 0".into());
     }
     let limits = &problem.limits;
@@ -139,14 +144,14 @@ fn check<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>) -> Result<(), 
         }
     }
     for cap in problem.caps {
-        if !(cap.speed > 0.0) {
+        if cap.speed.is_nan() || cap.speed <= 0.0 {
             return wrong(format!(
                 "the greatest speed at {} mm is {} mm/s: give a positive number, or stop there",
                 cap.s, cap.speed
             ));
         }
     }
-    if problem.caps.windows(2).any(|pair| !(pair[1].s > pair[0].s)) {
+    if !rising(problem.caps.iter().map(|cap| cap.s)) {
         return wrong("the places with a greatest speed do not rise".into());
     }
     for end in problem.ends {

@@ -139,7 +139,7 @@ impl<const M: usize> Model<M> for Relaxed {
         let y = if trial { &self.trial } else { &self.y };
         let mut time = 0.0;
         for (n, interval) in rows.intervals.iter().enumerate() {
-            if !(interval.motion(&local(x, n, interval.h))[0].least() > 0.0) {
+            if interval.motion(&local(x, n, interval.h))[0].least() <= 0.0 {
                 return f64::INFINITY;
             }
             time += (MASS * y[n]).sum() * interval.h;
