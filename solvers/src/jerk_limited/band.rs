@@ -185,3 +185,68 @@ impl Band {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A positive definite band of five nodes, and its product with a step.
+    fn example() -> (Band, impl Fn(&[f64]) -> Vec<f64>) {
+        let diagonal: Vec<[f64; 3]> = (0..5).map(|i| [4.0 + i as f64, 0.5, 3.0]).collect();
+        let coupling: Vec<[f64; 4]> = (0..4).map(|i| [0.7, -0.2 * i as f64, 0.4, -0.3]).collect();
+        let band = Band { diagonal: diagonal.clone(), coupling: coupling.clone(), ..Band::default() };
+        let product = move |d: &[f64]| {
+            let mut out = vec![0.0; d.len()];
+            for (i, [a, b, c]) in diagonal.iter().enumerate() {
+                out[2 * i] += a * d[2 * i] + b * d[2 * i + 1];
+                out[2 * i + 1] += b * d[2 * i] + c * d[2 * i + 1];
+            }
+            for (i, o) in coupling.iter().enumerate() {
+                for (row, column, value) in [(0, 2, o[0]), (0, 3, o[1]), (1, 2, o[2]), (1, 3, o[3])] {
+                    out[2 * i + row] += value * d[2 * i + column];
+                    out[2 * i + column] += value * d[2 * i + row];
+                }
+            }
+            out
+        };
+        (band, product)
+    }
+
+    fn solved(ties: [Tie; 2], ends: [[f64; 2]; 2]) -> (Vec<f64>, Vec<f64>) {
+        let (mut band, product) = example();
+        let (diagonal, coupling) = (band.diagonal.clone(), band.coupling.clone());
+        band.clear(5);
+        (band.diagonal, band.coupling) = (diagonal, coupling);
+        assert!(band.factor(ties));
+        let rhs: Vec<f64> = (0..10).map(|i| (i as f64).sin()).collect();
+        let mut d = vec![0.0; 10];
+        band.solve(&rhs, ends, &mut d);
+        let left = product(&d).iter().zip(&rhs).map(|(a, b)| a - b).collect();
+        (d, left)
+    }
+
+    #[test]
+    fn given_ends_are_taken_and_the_rest_solves_its_equations() {
+        let ends = [[0.3, -0.1], [0.2, 0.5]];
+        let (d, left) = solved([Tie::Given, Tie::Given], ends);
+        assert_eq!((d[0], d[1], d[8], d[9]), (0.3, -0.1, 0.2, 0.5));
+        assert!(left[2..8].iter().all(|left| left.abs() < 1e-11), "{left:?}");
+    }
+
+    #[test]
+    fn tied_ends_move_along_their_slope() {
+        let (d, left) = solved([Tie::Slope(2.0), Tie::Slope(-3.0)], [[0.0; 2]; 2]);
+        assert_eq!((d[1], d[9]), (2.0 * d[0], -3.0 * d[8]));
+        assert!(left[2..8].iter().all(|left| left.abs() < 1e-11), "{left:?}");
+        // An end's two equations add up along its slope.
+        assert!((left[0] + 2.0 * left[1]).abs() < 1e-11 && (left[8] - 3.0 * left[9]).abs() < 1e-11);
+    }
+
+    #[test]
+    fn an_indefinite_matrix_is_refused() {
+        let mut band = Band::default();
+        band.clear(2);
+        band.diagonal = vec![[1.0, 2.0, 1.0]; 2];
+        assert!(!band.factor([Tie::Slope(-1.0), Tie::Slope(-1.0)]));
+    }
+}

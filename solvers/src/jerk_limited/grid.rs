@@ -149,3 +149,38 @@ fn density(stations: &[Station], slopes: Slopes, bounds: &[Bound; 2], resolution
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::survey::survey;
+    use super::super::{Limits, Place};
+    use super::*;
+
+    struct Line;
+
+    impl Geometry<1> for Line {
+        fn knots(&self) -> &[f64] {
+            &[0.0, 3.0, 3.001, 50.0]
+        }
+
+        fn at(&self, _: usize, _: f64) -> Place<1> {
+            Place { first: [1.0], second: [0.0], third: [0.0], speed_cap: 200.0 }
+        }
+    }
+
+    #[test]
+    fn knots_and_capped_places_are_nodes() {
+        let limits = Limits { velocity: [250.0], acceleration: [3000.0], jerk: [50_000.0] };
+        let caps = [SpeedCap { s: 3.0, speed: 20.0 }, SpeedCap { s: 30.0, speed: 5.0 }];
+        let bounds = [Bound::Rest { ramp: 0.01, greatest: 1.0 }; 2];
+        let (stations, slopes) = survey(&Line, &limits, &caps, [0.01, 49.99], &bounds);
+        let grid = Grid::new(&stations, slopes, &caps, &bounds, 16.0);
+        let node = |s: f64| grid.nodes.binary_search_by(|node| node.total_cmp(&s)).expect("a node");
+        assert_eq!((grid.cap(node(3.0)), grid.cap(node(30.0))), (20.0, 5.0));
+        assert_eq!(grid.cap(node(3.001)), f64::INFINITY);
+        assert_eq!(grid.pieces[node(3.0)], 1);
+        assert_eq!(grid.pieces[node(3.001)], 2);
+        assert_eq!((grid.nodes[0], grid.nodes[grid.nodes.len() - 1]), (0.01, 49.99));
+        assert!(grid.nodes.windows(2).all(|pair| pair[0] < pair[1]));
+    }
+}

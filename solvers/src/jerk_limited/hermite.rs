@@ -77,3 +77,27 @@ pub fn duration(x: &[f64], n: usize, h: f64) -> f64 {
         f64::INFINITY
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cubic_is_met_with_its_derivatives() {
+        // w = 2 + t − 3 t² + 4 t³
+        let u = [2.0, 1.0, 4.0, 7.0];
+        for t in [0.0, 0.2, 1.0] {
+            let of = |d: usize| (0..4).map(|k| u[k] * at(t)[d][k]).sum::<f64>();
+            assert!((of(0) - (2.0 + t - 3.0 * t * t + 4.0 * t * t * t)).abs() < 1e-14);
+            assert!((of(1) - (1.0 - 6.0 * t + 12.0 * t * t)).abs() < 1e-14);
+            assert!((of(2) - (24.0 * t - 6.0)).abs() < 1e-13);
+        }
+    }
+
+    #[test]
+    fn a_constant_speed_takes_its_length() {
+        let x = [4.0, 0.0, 4.0, 0.0];
+        assert!((duration(&x, 0, 3.0) - 1.5).abs() < 1e-14);
+        assert_eq!(duration(&[-1.0, 0.0, 4.0, 0.0], 0, 3.0), f64::INFINITY);
+    }
+}

@@ -56,3 +56,27 @@ fn ramp(distance: f64, length: f64, greatest: f64, sign: f64) -> [f64; 3] {
         4.0 / 9.0 * greatest / (length * length) / (root * root),
     ]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ramps_are_of_constant_jerk() {
+        // From rest with J = 6 mm/s³: s = t³, v = 3 t², w = 9 s^(4/3).
+        let profile = Profile {
+            s: vec![1.0, 2.0],
+            speed_sq: vec![9.0, 9.0],
+            slope: vec![12.0, -12.0],
+            ends: [0.0, 3.0],
+        };
+        let [w, w1, w2] = profile.at(0.125);
+        assert!((w - 9.0 / 16.0).abs() < 1e-14 && (w1 - 6.0).abs() < 1e-14);
+        assert!((0.5 * w.sqrt() * w2 - 6.0).abs() < 1e-13, "jerk is v w''/2 on a line");
+        let [w, w1, _] = profile.at(2.875);
+        assert!((w - 9.0 / 16.0).abs() < 1e-14 && (w1 + 6.0).abs() < 1e-14);
+        // 1 s on each ramp.
+        let inside = hermite::duration(&[9.0, 12.0, 9.0, -12.0], 0, 1.0);
+        assert!((profile.time() - 2.0 - inside).abs() < 1e-14);
+    }
+}

@@ -68,3 +68,54 @@ pub fn greatest<const M: usize>(
     }
     c * ramp * ramp.cbrt() * (1.0 - 1e-9)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::jerk_limited::Place;
+
+    struct Arc {
+        curvature: f64,
+    }
+
+    impl Geometry<2> for Arc {
+        fn knots(&self) -> &[f64] {
+            &[0.0, 100.0]
+        }
+
+        fn at(&self, _: usize, s: f64) -> Place<2> {
+            let k = self.curvature;
+            let (y, x) = (k * s).sin_cos();
+            let (first, second) = ([x, y], [-k * y, k * x]);
+            Place { first, second, third: [-k * k * x, -k * k * y], speed_cap: f64::INFINITY }
+        }
+    }
+
+    const LIMITS: Limits<2> = Limits { velocity: [100.0; 2], acceleration: [1000.0; 2], jerk: [50_000.0; 2] };
+
+    #[test]
+    fn on_a_line_jerk_is_used_fully() {
+        // s = J t³/6 and v = J t²/2: v = (9 J s²/2)^(1/3).
+        let w = greatest(&Arc { curvature: 0.0 }, &LIMITS, &[], 0.01, 0);
+        let expected = (4.5 * 50_000.0 * 1e-4f64).powf(2.0 / 3.0);
+        assert!((w / expected - 1.0).abs() < 1e-6, "{w} and {expected}");
+        assert_eq!(w, greatest(&Arc { curvature: 0.0 }, &LIMITS, &[], 0.01, 1));
+    }
+
+    #[test]
+    fn curvature_and_caps_lower_the_ramp() {
+        let line = greatest(&Arc { curvature: 0.0 }, &LIMITS, &[], 0.01, 0);
+        let arc = greatest(&Arc { curvature: 100.0 }, &LIMITS, &[], 0.01, 0);
+        assert!(arc < line, "{arc} and {line}");
+        let cap = [SpeedCap { s: 0.01, speed: 0.5 }];
+        let capped = greatest(&Arc { curvature: 0.0 }, &LIMITS, &cap, 0.01, 0);
+        assert!((capped - 0.25).abs() < 1e-6, "{capped}");
+    }
+
+    #[test]
+    fn ramps_are_short_on_the_scale_of_the_limits_and_of_the_path() {
+        // A³/(6 J²) = 1/15 mm is the shorter way to a limit.
+        assert!((length(&LIMITS, &[1.0, 0.0], 100.0) - 1.0 / 15.0 / 90.0).abs() < 1e-12);
+        assert_eq!(length(&LIMITS, &[1.0, 0.0], 0.1), 0.1 / 400.0);
+    }
+}
