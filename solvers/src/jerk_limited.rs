@@ -79,7 +79,8 @@ pub struct SpeedCap {
 #[derive(Clone, Copy, Debug)]
 pub enum End {
     Rest,
-    /// With a speed in mm/s above 0 and an acceleration along the path in mm/s².
+    /// With a speed in mm/s above 0 and an acceleration along the path in mm/s². A first plan does not meet it: only
+    /// after some iterations there is a plan.
     Moving {
         speed: f64,
         acceleration: f64,
@@ -121,7 +122,8 @@ impl Default for Effort {
 pub enum Fault {
     /// The problem is ill-posed; the sentence says how.
     Input(String),
-    /// No valid plan was found near this place, in mm along the path.
+    /// No valid plan was found near this place, in mm along the path: no speed is possible there, or a moving end is
+    /// not reached from the path.
     NoPlan { s: f64 },
 }
 

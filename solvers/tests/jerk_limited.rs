@@ -356,6 +356,22 @@ fn moving_ends_are_met() {
 }
 
 #[test]
+fn ends_that_cannot_be_reached_are_refused() {
+    let path = Line::new(10.0);
+    let moving = End::Moving { speed: 200.0, acceleration: 0.0 };
+    for (ends, s) in [([End::Rest, moving], 10.0), ([moving, End::Rest], 0.0)] {
+        let problem = Problem { ends, ..problem(&path, FAST) };
+        assert_eq!(plan(&problem, &Effort::default()).expect_err("200 mm/s in 10 mm"), Fault::NoPlan { s });
+    }
+}
+
+#[test]
+fn a_place_without_speed_is_refused() {
+    let path = Line { feed: 0.0, ..Line::new(10.0) };
+    assert!(matches!(plan(&problem(&path, FAST), &Effort::default()), Err(Fault::NoPlan { .. })));
+}
+
+#[test]
 fn the_same_path_backwards_takes_as_long() {
     let path = slalom(8);
     let length = path.knots()[path.knots().len() - 1];

@@ -173,7 +173,7 @@ mod tests {
         let limits = Limits { velocity: [250.0], acceleration: [3000.0], jerk: [50_000.0] };
         let caps = [SpeedCap { s: 3.0, speed: 20.0 }, SpeedCap { s: 30.0, speed: 5.0 }];
         let bounds = [Bound::Rest { ramp: 0.01, greatest: 1.0 }; 2];
-        let (stations, slopes) = survey(&Line, &limits, &caps, [0.01, 49.99], &bounds);
+        let (stations, slopes) = survey(&Line, &limits, &caps, [0.01, 49.99], &bounds).expect("speeds");
         let grid = Grid::new(&stations, slopes, &caps, &bounds, 16.0);
         let node = |s: f64| grid.nodes.binary_search_by(|node| node.total_cmp(&s)).expect("a node");
         assert_eq!((grid.cap(node(3.0)), grid.cap(node(30.0))), (20.0, 5.0));

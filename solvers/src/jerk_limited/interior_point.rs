@@ -24,6 +24,16 @@ pub enum Bound {
     Fixed { w: f64, slope: f64 },
 }
 
+impl Bound {
+    /// Whether a spline with this end is one for it.
+    pub fn is_met(&self, end_w: f64, end_slope: f64) -> bool {
+        match *self {
+            Self::Rest { .. } => true,
+            Self::Fixed { w, slope } => (end_w, end_slope) == (w, slope),
+        }
+    }
+}
+
 /// When to stop.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {

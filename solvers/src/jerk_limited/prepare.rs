@@ -40,7 +40,7 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
             Bound::Fixed { .. } => 0.0,
         };
         let (stations, slopes) =
-            survey(problem.geometry, limits, problem.caps, [span(0), total - span(1)], &bounds);
+            survey(problem.geometry, limits, problem.caps, [span(0), total - span(1)], &bounds)?;
         let grid = Grid::new(&stations, slopes, problem.caps, &bounds, resolution);
         let mut prepared = Self { problem, grid, bounds, x: vec![], stop_time: 0.0 };
         prepared.begin(slopes)?;

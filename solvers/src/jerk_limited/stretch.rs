@@ -117,6 +117,9 @@ impl<const M: usize> Stretch<M> {
         x: &[f64],
         y: &[f64],
     ) -> Option<(Vec<f64>, f64)> {
+        if !bounds.iter().zip([0, x.len() - 2]).all(|(bound, at)| bound.is_met(x[at], x[at + 1])) {
+            return None;
+        }
         for part in RETREATS {
             let z: Vec<f64> = x.iter().zip(y).map(|(x, y)| x + part * (y - x)).collect();
             if self.holds(limits, &z) {

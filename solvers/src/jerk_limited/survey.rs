@@ -2,7 +2,7 @@
 //! linear, at stations dense enough to lay a grid over.
 
 use super::interior_point::Bound;
-use super::{Geometry, Limits, Place, SpeedCap};
+use super::{Fault, Geometry, Limits, Place, SpeedCap};
 
 /// Parts of the limits that the caps of the envelope leave to a plan through them.
 const SPEED: f64 = 0.9;
@@ -119,14 +119,14 @@ impl Slopes {
     }
 }
 
-/// Stations on the pieces from s = `from` to `to`, and the slopes of their envelope.
+/// Stations on the pieces from s = `from` to `to`, and the slopes of their envelope; a fault where no speed is possible.
 pub fn survey<const M: usize>(
     geometry: &impl Geometry<M>,
     limits: &Limits<M>,
     caps: &[SpeedCap],
     [from, to]: [f64; 2],
     bounds: &[Bound; 2],
-) -> (Vec<Station>, Slopes) {
+) -> Result<(Vec<Station>, Slopes), Fault> {
     let knots = geometry.knots();
     let pieces: Vec<(u32, f64, f64)> = (0..knots.len() - 1)
         .map(|piece| (piece as u32, knots[piece].max(from), knots[piece + 1].min(to)))
@@ -164,7 +164,11 @@ pub fn survey<const M: usize>(
             last = there;
         }
     }
-    (densify(&stations, slopes, bounds), slopes)
+    // Also what is not a number is no speed.
+    if let Some(station) = stations.iter().find(|station| station.cap.is_nan() || station.cap <= 0.0) {
+        return Err(Fault::NoPlan { s: station.s });
+    }
+    Ok((densify(&stations, slopes, bounds), slopes))
 }
 
 /// Stations between two others of a piece.

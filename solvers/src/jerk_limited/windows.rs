@@ -58,6 +58,11 @@ pub fn solve<G: Geometry<M>, const M: usize>(
     if done + 1 < run.nodes.len() {
         finished(&run.profile(&x, done..run.nodes.len() - 1));
     }
+    for (bound, node) in prepared.bounds.iter().zip([0, run.nodes.len() - 1]) {
+        if !bound.is_met(x[2 * node], x[2 * node + 1]) {
+            return Err(Fault::NoPlan { s: run.nodes[node] });
+        }
+    }
     let count = run.nodes.len() - 1;
     let time: f64 = (0..count).map(|n| duration(&x, n, run.nodes[n + 1] - run.nodes[n])).sum();
     Ok(Plan {
