@@ -13,6 +13,7 @@ pub mod corner;
 pub mod fit;
 pub mod follow;
 pub mod gcode;
+pub mod jerk_limited;
 pub mod limit_curve;
 pub mod look_ahead;
 pub mod motion;

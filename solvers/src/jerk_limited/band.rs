@@ -1,0 +1,252 @@
+//! Cholesky factor of the Newton matrix: symmetric, two unknowns (w, w') a node, neighbours coupled.
+//!
+//! The matrix is scaled to a unit diagonal. The two unknowns of an end are tied: to each other where the path starts
+//! from rest (w' = k w), or to given steps where its speed and slope are given.
+
+/// How the unknowns at an end may change.
+#[derive(Clone, Copy, Debug)]
+pub enum Tie {
+    /// dw' = k dw.
+    Slope(f64),
+    /// dw and dw' are given with each right-hand side.
+    Given,
+}
+
+/// Added to the unit diagonal: what rounding may take from it.
+const REGULAR: f64 = 1e-13;
+
+/// Blocks of the matrix and, after `factor`, of its factor.
+#[derive(Default)]
+pub struct Band {
+    /// (a, b, c) of the symmetric block [a b; b c] of each node.
+    pub diagonal: Vec<[f64; 3]>,
+    /// Rows of the block that couples node i with node i + 1: [00 01 10 11].
+    pub coupling: Vec<[f64; 4]>,
+    ties: Option<[Tie; 2]>,
+    /// Couplings of given ends with their neighbours.
+    given: [[f64; 4]; 2],
+    scale: Vec<[f64; 2]>,
+    /// (1/l00, l10, 1/l11) and the transposed coupling of each node.
+    factor: Vec<([f64; 3], [f64; 4])>,
+    work: Vec<[f64; 2]>,
+}
+
+impl Band {
+    /// An empty matrix for so many nodes.
+    pub fn clear(&mut self, nodes: usize) {
+        self.diagonal.clear();
+        self.diagonal.resize(nodes, [0.0; 3]);
+        self.coupling.clear();
+        self.coupling.resize(nodes - 1, [0.0; 4]);
+        self.factor.resize(nodes, Default::default());
+        self.scale.resize(nodes, [0.0; 2]);
+        self.work.resize(nodes, [0.0; 2]);
+    }
+
+    /// Adds the matrix of interval n, of length h, in its local coefficients (w, h w') of both nodes.
+    #[inline(always)]
+    pub fn add(&mut self, n: usize, h: f64, m: &[[f64; 4]; 4]) {
+        for (node, k) in [(n, 0), (n + 1, 2)] {
+            let d = &mut self.diagonal[node];
+            d[0] += m[k][k];
+            d[1] += m[k][k + 1] * h;
+            d[2] += m[k + 1][k + 1] * h * h;
+        }
+        self.coupling[n] = [m[0][2], m[0][3] * h, m[1][2] * h, m[1][3] * h * h];
+    }
+
+    /// Factors the matrix with its ends tied; false if it is not positive definite.
+    pub fn factor(&mut self, ties: [Tie; 2]) -> bool {
+        self.ties = Some(ties);
+        self.tie(ties);
+        let last = self.diagonal.len() - 1;
+        for (scale, d) in self.scale.iter_mut().zip(&self.diagonal) {
+            *scale = [1.0 / d[0].sqrt(), 1.0 / d[2].sqrt()];
+        }
+        let mut m = [0.0f64; 4];
+        for i in 0..=last {
+            let [s0, s1] = self.scale[i];
+            let [a, b, c] = self.diagonal[i];
+            let a = a * s0 * s0 + REGULAR - m[0] * m[0] - m[1] * m[1];
+            let b = b * s0 * s1 - m[0] * m[2] - m[1] * m[3];
+            let c = c * s1 * s1 + REGULAR - m[2] * m[2] - m[3] * m[3];
+            if a.is_nan() || a <= 0.0 {
+                return false;
+            }
+            let l0 = 1.0 / a.sqrt();
+            let l1 = b * l0;
+            let c = c - l1 * l1;
+            if c.is_nan() || c <= 0.0 {
+                return false;
+            }
+            let l2 = 1.0 / c.sqrt();
+            if i < last {
+                let [t0, t1] = self.scale[i + 1];
+                let o = self.coupling[i];
+                let (y0, y1) = (o[0] * s0 * t0 * l0, o[1] * s0 * t1 * l0);
+                m = [y0, (o[2] * s1 * t0 - l1 * y0) * l2, y1, (o[3] * s1 * t1 - l1 * y1) * l2];
+            }
+            self.factor[i] = ([l0, l1, l2], m);
+        }
+        true
+    }
+
+    fn tie(&mut self, ties: [Tie; 2]) {
+        let last = self.diagonal.len() - 1;
+        for (end, tie) in ties.into_iter().enumerate() {
+            let (node, link) = if end == 0 { (0, 0) } else { (last, last - 1) };
+            let o = &mut self.coupling[link];
+            match tie {
+                Tie::Slope(k) => {
+                    let [a, b, c] = self.diagonal[node];
+                    self.diagonal[node] = [a + 2.0 * k * b + k * k * c, 0.0, 1.0];
+                    *o = if end == 0 {
+                        [o[0] + k * o[2], o[1] + k * o[3], 0.0, 0.0]
+                    } else {
+                        [o[0] + k * o[1], 0.0, o[2] + k * o[3], 0.0]
+                    };
+                }
+                Tie::Given => {
+                    self.given[end] = *o;
+                    *o = [0.0; 4];
+                    self.diagonal[node] = [1.0, 0.0, 1.0];
+                }
+            }
+        }
+    }
+
+    /// Solves for the step `out` (pairs dw, dw' flat) with right-hand side `rhs`; `ends` holds the given steps.
+    pub fn solve(&mut self, rhs: &[f64], ends: [[f64; 2]; 2], out: &mut [f64]) {
+        let ties = self.ties.expect("the matrix is factored first");
+        let last = self.diagonal.len() - 1;
+        for (z, r) in self.work.iter_mut().zip(rhs.chunks_exact(2)) {
+            *z = [r[0], r[1]];
+        }
+        for (end, tie) in ties.into_iter().enumerate() {
+            let (node, next) = if end == 0 { (0, 1) } else { (last, last - 1) };
+            match tie {
+                Tie::Slope(k) => {
+                    let [a, b] = self.work[node];
+                    self.work[node] = [a + k * b, 0.0];
+                }
+                Tie::Given => {
+                    let (o, d) = (self.given[end], ends[end]);
+                    let pull = if end == 0 {
+                        [o[0] * d[0] + o[2] * d[1], o[1] * d[0] + o[3] * d[1]]
+                    } else {
+                        [o[0] * d[0] + o[1] * d[1], o[2] * d[0] + o[3] * d[1]]
+                    };
+                    self.work[next][0] -= pull[0];
+                    self.work[next][1] -= pull[1];
+                    self.work[node] = d;
+                }
+            }
+        }
+        self.substitute();
+        for (i, z) in self.work.iter().enumerate() {
+            out[2 * i] = z[0] * self.scale[i][0];
+            out[2 * i + 1] = z[1] * self.scale[i][1];
+        }
+        for (end, tie) in ties.into_iter().enumerate() {
+            let node = if end == 0 { 0 } else { last };
+            match tie {
+                Tie::Slope(k) => out[2 * node + 1] = k * out[2 * node],
+                Tie::Given => out[2 * node..2 * node + 2].copy_from_slice(&ends[end]),
+            }
+        }
+    }
+
+    /// Forward and backward substitution in scaled unknowns.
+    fn substitute(&mut self) {
+        let last = self.work.len() - 1;
+        let (mut p, mut q) = (0.0, 0.0);
+        let mut m = [0.0; 4];
+        for i in 0..=last {
+            let [s0, s1] = self.scale[i];
+            let (l, next) = self.factor[i];
+            let [z0, z1] = self.work[i];
+            let a = (z0 * s0 - m[0] * p - m[1] * q) * l[0];
+            let b = (z1 * s1 - m[2] * p - m[3] * q - l[1] * a) * l[2];
+            self.work[i] = [a, b];
+            (p, q, m) = (a, b, next);
+        }
+        (p, q) = (0.0, 0.0);
+        for i in (0..=last).rev() {
+            let (l, m) = self.factor[i];
+            let [mut a, mut b] = self.work[i];
+            if i < last {
+                a -= m[0] * p + m[2] * q;
+                b -= m[1] * p + m[3] * q;
+            }
+            b *= l[2];
+            a = (a - l[1] * b) * l[0];
+            self.work[i] = [a, b];
+            (p, q) = (a, b);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A positive definite band of five nodes, and its product with a step.
+    fn example() -> (Band, impl Fn(&[f64]) -> Vec<f64>) {
+        let diagonal: Vec<[f64; 3]> = (0..5).map(|i| [4.0 + i as f64, 0.5, 3.0]).collect();
+        let coupling: Vec<[f64; 4]> = (0..4).map(|i| [0.7, -0.2 * i as f64, 0.4, -0.3]).collect();
+        let band = Band { diagonal: diagonal.clone(), coupling: coupling.clone(), ..Band::default() };
+        let product = move |d: &[f64]| {
+            let mut out = vec![0.0; d.len()];
+            for (i, [a, b, c]) in diagonal.iter().enumerate() {
+                out[2 * i] += a * d[2 * i] + b * d[2 * i + 1];
+                out[2 * i + 1] += b * d[2 * i] + c * d[2 * i + 1];
+            }
+            for (i, o) in coupling.iter().enumerate() {
+                for (row, column, value) in [(0, 2, o[0]), (0, 3, o[1]), (1, 2, o[2]), (1, 3, o[3])] {
+                    out[2 * i + row] += value * d[2 * i + column];
+                    out[2 * i + column] += value * d[2 * i + row];
+                }
+            }
+            out
+        };
+        (band, product)
+    }
+
+    fn solved(ties: [Tie; 2], ends: [[f64; 2]; 2]) -> (Vec<f64>, Vec<f64>) {
+        let (mut band, product) = example();
+        let (diagonal, coupling) = (band.diagonal.clone(), band.coupling.clone());
+        band.clear(5);
+        (band.diagonal, band.coupling) = (diagonal, coupling);
+        assert!(band.factor(ties));
+        let rhs: Vec<f64> = (0..10).map(|i| (i as f64).sin()).collect();
+        let mut d = vec![0.0; 10];
+        band.solve(&rhs, ends, &mut d);
+        let left = product(&d).iter().zip(&rhs).map(|(a, b)| a - b).collect();
+        (d, left)
+    }
+
+    #[test]
+    fn given_ends_are_taken_and_the_rest_solves_its_equations() {
+        let ends = [[0.3, -0.1], [0.2, 0.5]];
+        let (d, left) = solved([Tie::Given, Tie::Given], ends);
+        assert_eq!((d[0], d[1], d[8], d[9]), (0.3, -0.1, 0.2, 0.5));
+        assert!(left[2..8].iter().all(|left| left.abs() < 1e-11), "{left:?}");
+    }
+
+    #[test]
+    fn tied_ends_move_along_their_slope() {
+        let (d, left) = solved([Tie::Slope(2.0), Tie::Slope(-3.0)], [[0.0; 2]; 2]);
+        assert_eq!((d[1], d[9]), (2.0 * d[0], -3.0 * d[8]));
+        assert!(left[2..8].iter().all(|left| left.abs() < 1e-11), "{left:?}");
+        // An end's two equations add up along its slope.
+        assert!((left[0] + 2.0 * left[1]).abs() < 1e-11 && (left[8] - 3.0 * left[9]).abs() < 1e-11);
+    }
+
+    #[test]
+    fn an_indefinite_matrix_is_refused() {
+        let mut band = Band::default();
+        band.clear(2);
+        band.diagonal = vec![[1.0, 2.0, 1.0]; 2];
+        assert!(!band.factor([Tie::Slope(-1.0), Tie::Slope(-1.0)]));
+    }
+}

@@ -1,0 +1,94 @@
+//! The true problem on a stretch: the time ∫ ds/√w under the rows as they are.
+
+use super::hermite::{combine, duration, AT_NODES, WEIGHTS};
+use super::lanes::Lanes;
+use super::model::{expand, Local, Model};
+use super::rows::{Order, Rows};
+
+/// w^(−1/2) at the collocation points of each interval, and at the trial.
+#[derive(Default)]
+pub struct Exact {
+    pace: Vec<Lanes>,
+    trial: Vec<Lanes>,
+}
+
+impl<const M: usize> Model<M> for Exact {
+    fn begin(&mut self, rows: &Rows<M>, _: &[f64]) {
+        self.pace.resize(rows.intervals.len(), Lanes::ONE);
+        self.trial.resize(rows.intervals.len(), Lanes::ONE);
+    }
+
+    #[inline(always)]
+    fn slack(&mut self, rows: &Rows<M>, n: usize, u: &[f64; 4], trial: bool, out: &mut [Lanes]) {
+        let w = rows.intervals[n].motion(u)[0];
+        let pace = w.max(Lanes::all(f64::MIN_POSITIVE)).sqrt().inverse();
+        rows.slack(n, u, pace, w, out);
+        if trial {
+            self.trial[n] = pace;
+        } else {
+            self.pace[n] = pace;
+        }
+    }
+
+    #[inline(always)]
+    fn slack_step(&self, rows: &Rows<M>, n: usize, d: &[f64; 4], out: &mut [Lanes]) {
+        let w = rows.intervals[n].motion(d)[0];
+        rows.slack_step(n, d, -(fall(self.pace[n]) * w), w, out);
+    }
+
+    #[inline(always)]
+    fn local(&mut self, rows: &Rows<M>, n: usize, u: &[f64; 4], weight: &[Lanes], _: &[Lanes]) -> Local {
+        let mut form = rows.curvature(n, weight);
+        let fall = fall(self.pace[n]);
+        let interval = &rows.intervals[n];
+        form[0] += weight[Order::<M>::POSITIVE];
+        for k in 0..M {
+            // What the slope of w^(−1/2) adds to the two rows of an axis's jerk.
+            let at = Order::<M>::jerk(k);
+            let (both, turn) = (weight[at] + weight[at + 1], (weight[at] - weight[at + 1]) * fall);
+            let [q1, q2, q3] = interval.q[k];
+            let turn = turn * (rows.per_jerk[k] * interval.jerk);
+            form[0] += both * fall * fall + turn * q3 * 2.0;
+            form[1] += turn * q2 * 1.5;
+            form[2] += turn * q1 * 0.5;
+        }
+        let mut local = expand(interval.h, &form, &[Lanes::ZERO; 3]);
+        let pace = combine(&AT_NODES, u).sqrt().inverse();
+        let pace_sq = pace * pace;
+        let slope = WEIGHTS * pace * pace_sq * (-0.5 * interval.h);
+        let bend = slope * pace_sq * -1.5;
+        for j in 0..4 {
+            let g = bend * AT_NODES[j];
+            for i in 0..=j {
+                local.matrix[i][j] += (AT_NODES[i] * g).sum();
+            }
+            local.gradient[j] = (slope * AT_NODES[j]).sum();
+        }
+        local
+    }
+
+    #[inline(always)]
+    fn pull(&mut self, rows: &Rows<M>, n: usize, aim: &[Lanes]) -> [Lanes; 3] {
+        let (mut pull, jerk) = rows.pull(n, aim);
+        pull[0] += aim[Order::<M>::POSITIVE] - fall(self.pace[n]) * jerk;
+        pull
+    }
+
+    fn solved(&mut self, _: &Rows<M>, _: &[f64], _: bool) {}
+
+    fn attempt(&mut self, _: f64) {}
+
+    fn accept(&mut self) {
+        std::mem::swap(&mut self.pace, &mut self.trial);
+    }
+
+    fn time(&self, rows: &Rows<M>, x: &[f64], _: bool) -> f64 {
+        rows.intervals.iter().enumerate().map(|(n, interval)| duration(x, n, interval.h)).sum()
+    }
+}
+
+/// w^(−3/2)/2.
+#[inline(always)]
+fn fall(pace: Lanes) -> Lanes {
+    pace * pace * pace * 0.5
+}

@@ -1,0 +1,82 @@
+//! w = v² along a path: a C¹ cubic spline between ramps of constant jerk.
+
+use super::hermite;
+
+/// w at nodes; between the path's end and the first or last node a ramp from rest, w ∝ s^(4/3), where the path
+/// begins or ends at rest.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Profile {
+    /// Nodes along the path, in mm.
+    pub s: Vec<f64>,
+    /// v² at the nodes, in mm²/s².
+    pub speed_sq: Vec<f64>,
+    /// Its derivative along the path, twice the acceleration, in mm/s².
+    pub slope: Vec<f64>,
+    /// Where the path begins and ends; the nodes begin and end there too where it does not rest.
+    pub ends: [f64; 2],
+}
+
+impl Profile {
+    /// w, w' and w'' at a place; at a node from the right, or from the left at the last.
+    pub fn at(&self, s: f64) -> [f64; 3] {
+        let last = self.s.len() - 1;
+        if s < self.s[0] {
+            return ramp(s - self.ends[0], self.s[0] - self.ends[0], self.speed_sq[0], 1.0);
+        }
+        if s > self.s[last] {
+            return ramp(self.ends[1] - s, self.ends[1] - self.s[last], self.speed_sq[last], -1.0);
+        }
+        let n = self.s.partition_point(|&node| node <= s).clamp(1, last) - 1;
+        let h = self.s[n + 1] - self.s[n];
+        let u = [self.speed_sq[n], self.slope[n] * h, self.speed_sq[n + 1], self.slope[n + 1] * h];
+        let basis = hermite::at((s - self.s[n]) / h);
+        let of = |order: usize| (0..4).map(|k| u[k] * basis[order][k]).sum::<f64>();
+        [of(0), of(1) / h, of(2) / (h * h)]
+    }
+
+    /// The time from end to end, in s.
+    pub fn time(&self) -> f64 {
+        let last = self.s.len() - 1;
+        let x: Vec<f64> = self.speed_sq.iter().zip(&self.slope).flat_map(|(w, slope)| [*w, *slope]).collect();
+        let inside: f64 = (0..last).map(|n| hermite::duration(&x, n, self.s[n + 1] - self.s[n])).sum();
+        let ramp = |length: f64, w: f64| if length > 0.0 { 3.0 * length / w.sqrt() } else { 0.0 };
+        inside
+            + ramp(self.s[0] - self.ends[0], self.speed_sq[0])
+            + ramp(self.ends[1] - self.s[last], self.speed_sq[last])
+    }
+}
+
+/// w, w', w'' a distance from rest, on a ramp with w = `greatest` at its end.
+fn ramp(distance: f64, length: f64, greatest: f64, sign: f64) -> [f64; 3] {
+    let part = distance / length;
+    let root = part.cbrt();
+    [
+        greatest * part * root,
+        sign * 4.0 / 3.0 * greatest / length * root,
+        4.0 / 9.0 * greatest / (length * length) / (root * root),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ramps_are_of_constant_jerk() {
+        // From rest with J = 6 mm/s³: s = t³, v = 3 t², w = 9 s^(4/3).
+        let profile = Profile {
+            s: vec![1.0, 2.0],
+            speed_sq: vec![9.0, 9.0],
+            slope: vec![12.0, -12.0],
+            ends: [0.0, 3.0],
+        };
+        let [w, w1, w2] = profile.at(0.125);
+        assert!((w - 9.0 / 16.0).abs() < 1e-14 && (w1 - 6.0).abs() < 1e-14);
+        assert!((0.5 * w.sqrt() * w2 - 6.0).abs() < 1e-13, "jerk is v w''/2 on a line");
+        let [w, w1, _] = profile.at(2.875);
+        assert!((w - 9.0 / 16.0).abs() < 1e-14 && (w1 + 6.0).abs() < 1e-14);
+        // 1 s on each ramp.
+        let inside = hermite::duration(&[9.0, 12.0, 9.0, -12.0], 0, 1.0);
+        assert!((profile.time() - 2.0 - inside).abs() < 1e-14);
+    }
+}

@@ -1,0 +1,121 @@
+//! The ramp from rest: constant jerk along the path, w = c s^(4/3).
+
+use super::{Geometry, Limits, SpeedCap};
+
+/// Ramps are this part of the length on which constant jerk reaches the acceleration or the speed …
+const RAMP: f64 = 1.0 / 90.0;
+/// … and at most this part of the path.
+const PART: f64 = 1.0 / 400.0;
+/// Samples of a piece of the path under a ramp.
+const SAMPLES: usize = 32;
+
+/// The length of the ramps of a path, in mm, from |q'| of its axes at the end.
+pub fn length<const M: usize>(limits: &Limits<M>, first: &[f64; M], path: f64) -> f64 {
+    let mut least = PART * path;
+    for k in 0..M {
+        let q = first[k].abs().max(f64::MIN_POSITIVE);
+        let (v, a, j) = (limits.velocity[k] / q, limits.acceleration[k] / q, limits.jerk[k] / q);
+        let by_acceleration = a * a * a / (6.0 * j * j);
+        let by_speed = (8.0 * v * v * v / j).sqrt() / 6.0;
+        least = least.min(RAMP * by_acceleration.min(by_speed));
+    }
+    least
+}
+
+/// The greatest w at the end of the ramp of this length; `end` is 0 at the start of the path and 1 at its end.
+pub fn greatest<const M: usize>(
+    geometry: &impl Geometry<M>,
+    limits: &Limits<M>,
+    caps: &[SpeedCap],
+    ramp: f64,
+    end: usize,
+) -> f64 {
+    let knots = geometry.knots();
+    let total = knots[knots.len() - 1];
+    let sign = if end == 0 { 1.0 } else { -1.0 };
+    let mut c = f64::INFINITY;
+    for piece in 0..knots.len() - 1 {
+        let (start, stop) = if end == 0 {
+            (knots[piece], knots[piece + 1].min(ramp))
+        } else {
+            (knots[piece].max(total - ramp), knots[piece + 1])
+        };
+        if start >= stop {
+            continue;
+        }
+        for i in 0..=SAMPLES {
+            let s = start + (stop - start) * i as f64 / SAMPLES as f64;
+            let place = geometry.at(piece, s);
+            let x = if end == 0 { s } else { total - s };
+            let root = x.cbrt();
+            // w, w' and √w w'' over c, c and c^(3/2), and w^(3/2), √w w' alike.
+            let (w, w1) = (x * root, sign * 4.0 / 3.0 * root);
+            let (cubed, crossed, bend) = (x * x, sign * 4.0 / 3.0 * x, 4.0 / 9.0);
+            c = c.min(1.0 / (limits.per_speed_sq(&place) * w));
+            for k in 0..M {
+                let (q1, q2, q3) = (place.first[k], place.second[k], place.third[k]);
+                let a = (q2 * w + 0.5 * q1 * w1).abs();
+                let j = (q3 * cubed + 1.5 * q2 * crossed + 0.5 * q1 * bend).abs();
+                c = c.min(limits.acceleration[k] / a).min((limits.jerk[k] / j).cbrt().powi(2));
+            }
+        }
+    }
+    for cap in caps {
+        let x = if end == 0 { cap.s } else { total - cap.s };
+        if x <= ramp {
+            c = c.min(cap.speed * cap.speed / (x * x.cbrt()));
+        }
+    }
+    c * ramp * ramp.cbrt() * (1.0 - 1e-9)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::jerk_limited::Place;
+
+    struct Arc {
+        curvature: f64,
+    }
+
+    impl Geometry<2> for Arc {
+        fn knots(&self) -> &[f64] {
+            &[0.0, 100.0]
+        }
+
+        fn at(&self, _: usize, s: f64) -> Place<2> {
+            let k = self.curvature;
+            let (y, x) = (k * s).sin_cos();
+            let (first, second) = ([x, y], [-k * y, k * x]);
+            Place { first, second, third: [-k * k * x, -k * k * y], speed_cap: f64::INFINITY }
+        }
+    }
+
+    const LIMITS: Limits<2> = Limits { velocity: [100.0; 2], acceleration: [1000.0; 2], jerk: [50_000.0; 2] };
+
+    #[test]
+    fn on_a_line_jerk_is_used_fully() {
+        // s = J t³/6 and v = J t²/2: v = (9 J s²/2)^(1/3).
+        let w = greatest(&Arc { curvature: 0.0 }, &LIMITS, &[], 0.01, 0);
+        let expected = (4.5 * 50_000.0 * 1e-4f64).powf(2.0 / 3.0);
+        assert!((w / expected - 1.0).abs() < 1e-6, "{w} and {expected}");
+        assert_eq!(w, greatest(&Arc { curvature: 0.0 }, &LIMITS, &[], 0.01, 1));
+    }
+
+    #[test]
+    fn curvature_and_caps_lower_the_ramp() {
+        let line = greatest(&Arc { curvature: 0.0 }, &LIMITS, &[], 0.01, 0);
+        let arc = greatest(&Arc { curvature: 100.0 }, &LIMITS, &[], 0.01, 0);
+        assert!(arc < line, "{arc} and {line}");
+        let cap = [SpeedCap { s: 0.01, speed: 0.5 }];
+        let capped = greatest(&Arc { curvature: 0.0 }, &LIMITS, &cap, 0.01, 0);
+        assert!((capped - 0.25).abs() < 1e-6, "{capped}");
+    }
+
+    #[test]
+    fn ramps_are_short_on_the_scale_of_the_limits_and_of_the_path() {
+        // A³/(6 J²) = 1/15 mm is the shorter way to a limit.
+        assert!((length(&LIMITS, &[1.0, 0.0], 100.0) - 1.0 / 15.0 / 90.0).abs() < 1e-12);
+        assert_eq!(length(&LIMITS, &[1.0, 0.0], 0.1), 0.1 / 400.0);
+    }
+}
