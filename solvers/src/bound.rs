@@ -54,10 +54,13 @@ const STAND_IN: f64 = 1e-8;
 const NEAR: f64 = 5e-4;
 /// An arc is refined while its bound misses more than this part of its duration.
 const POOR: f64 = 2e-4;
-/// Refinement stops when so many rounds on end close less than this part of the gap each (a sweep may gain nothing
-/// until all cells of a stretch are halved), and after this many rounds, or cells per arc beside a few.
+/// Where a round closes less than this part of the gap all arcs are refined: what makes one poor may be how fast its
+/// neighbour lets it be entered. Refinement stops after so many such rounds on end, and after this many rounds, or
+/// cells per arc beside a few.
 const LEAST_GAIN: f64 = 0.02;
-const PATIENCE: usize = 2;
+const PATIENCE: usize = 3;
+/// Every bound misses more.
+const ALL: f64 = f64::NEG_INFINITY;
 /// A place nearer to an end of a cell than this part of it is that end.
 const AT_END: f64 = 1e-3;
 const MOST_ROUNDS: usize = 14;
@@ -162,7 +165,8 @@ fn over_run<const M: usize>(
         idle = if gained { 0 } else { idle + 1 };
         best = bound.max(best);
         let near = best >= (1.0 - NEAR) * duration;
-        if near || idle == PATIENCE || cells.halve(hint, POOR, middle, other) == 0 || cells.end.len() > most {
+        let part = if idle == 0 { POOR } else { ALL };
+        if near || idle == PATIENCE || cells.halve(hint, part, middle, other) == 0 || cells.end.len() > most {
             break;
         }
     }

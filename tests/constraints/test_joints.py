@@ -113,11 +113,13 @@ def random_problem(name: str, seed: int) -> Problem:
 
 @pytest.mark.parametrize("name", NOT_PLAIN)
 def test_random_curves_keep_every_limit_of_the_true_joints(name: str) -> None:
+    faults = []
     for seed in range(int(os.environ.get("FEEDPLAN_SEEDS", "4"))):
         problem = random_problem(name, seed)
         excess, use = worst_excess(problem, plan(problem))
-        assert excess <= 1e-8, seed
-        assert use >= 1 - 1e-6, seed
+        if not (excess <= 1e-8 and use >= 1 - 1e-6):
+            faults.append((seed, excess, use))
+    assert faults == []
 
 
 def test_a_singular_place_and_a_travel_end_are_told_with_their_lines() -> None:
