@@ -55,7 +55,7 @@ def _table(rows: Sequence[Mapping[str, Any]], limits: Sequence[str]) -> str:
     ]
     times = [row["time"] for row in rows if row.get("time") is not None]
     body = "".join(_row(row, shown, max(times, default=0.0)) for row in rows)
-    return f"<table><tr>{''.join(heads)}</tr>{body}</table>"
+    return f'<table class="many"><tr>{"".join(heads)}</tr>{body}</table>'
 
 
 def _row(row: Mapping[str, Any], limits: Sequence[str], longest: float) -> str:
