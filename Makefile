@@ -12,7 +12,7 @@ demo: $(VENV)/built
 	@echo "The report is out/vase/report.html"
 
 test: lint
-	cargo test --release --quiet --manifest-path solvers/Cargo.toml
+	CARGO_PROFILE_RELEASE_LTO=off cargo test --release --quiet --manifest-path solvers/Cargo.toml
 	$(BIN)/python -m mypy.stubtest feedplan._solvers
 	$(BIN)/pytest
 
@@ -31,8 +31,8 @@ bench: $(VENV)/built
 
 # Random paths by the million, and on every machine by the thousand; the figures stand in benchmarks/README.md.
 campaign: $(VENV)/built
-	FEEDPLAN_SEEDS=1000000 cargo test --release --manifest-path solvers/Cargo.toml --test bang_bang_random -- --nocapture
-	FEEDPLAN_SEEDS=1000000 cargo test --release --manifest-path solvers/Cargo.toml --test bound -- --nocapture
+	FEEDPLAN_SEEDS=1000000 cargo test --release --manifest-path solvers/Cargo.toml --test planning random:: -- --nocapture
+	FEEDPLAN_SEEDS=1000000 cargo test --release --manifest-path solvers/Cargo.toml --test planning bound:: -- --nocapture
 	FEEDPLAN_SEEDS=1250 $(BIN)/pytest tests/constraints/test_joints.py -k random
 
 clean:

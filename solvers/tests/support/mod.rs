@@ -40,3 +40,32 @@ macro_rules! for_axes {
         }
     };
 }
+
+/// As many axes as kernels are compiled for here: each number costs the compiler half a minute.
+pub const FEW_AXES: [usize; 4] = [1, 2, 3, 6];
+
+/// The same for one of `FEW_AXES`.
+#[macro_export]
+macro_rules! for_few_axes {
+    ($count:expr, $m:ident, $call:expr) => {
+        match $count {
+            1 => {
+                const $m: usize = 1;
+                $call
+            }
+            2 => {
+                const $m: usize = 2;
+                $call
+            }
+            3 => {
+                const $m: usize = 3;
+                $call
+            }
+            6 => {
+                const $m: usize = 6;
+                $call
+            }
+            _ => unreachable!("of FEW_AXES"),
+        }
+    };
+}

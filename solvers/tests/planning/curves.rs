@@ -1,8 +1,6 @@
 //! The planner for pieces of any degree on curves made to break it: it comes to an end, with times that are times.
 
-mod support;
-
-use support::curves::{random_curves, CurveCase, Piece};
+use crate::support::curves::{random_curves, CurveCase, Piece};
 
 /// Rounding decides where the axes turn round: planning still comes to an end.
 #[test]

@@ -1,15 +1,13 @@
 //! The lower bound: the time itself where that is known by hand, limit by limit; never above the time of a plan, near
 //! it, and both whatever the cells begin with.
 
-mod support;
-
 use rayon::prelude::*;
 
+use crate::support::{random_case, Case, Random, FEW_AXES};
 use feedplan_solvers::bang_bang::Problem;
 use feedplan_solvers::bang_bang_quadratic::Profile;
 use feedplan_solvers::bound::{lower_bound, Hint};
 use feedplan_solvers::quadratic::Quadratic;
-use support::{random_case, Case, Random};
 
 /// As many seeds, or as many as FEEDPLAN_SEEDS says for a long campaign.
 fn seeds(count: u64) -> std::ops::Range<u64> {
@@ -125,8 +123,8 @@ fn gaps(seeds: std::ops::Range<u64>, with_arcs: bool) -> Gaps {
     let mut found: Vec<(f64, u64)> = seeds
         .into_par_iter()
         .filter_map(|seed| {
-            let count = 1 + (seed % 6) as usize;
-            for_axes!(count, M, {
+            let count = FEW_AXES[(seed % 4) as usize];
+            for_few_axes!(count, M, {
                 let case = random_case::<M>(seed);
                 let mut profile = case.plan().ok()?;
                 let time = profile.time();

@@ -1,10 +1,8 @@
 //! Random and adversarial paths: every limit holds, some limit is active everywhere, and what does not matter to
 //! the path does not change its time.
 
-mod support;
-
+use crate::support::{audit, random_case, Audit, Case, Random};
 use feedplan_solvers::quadratic::Quadratic;
-use support::{audit, random_case, Audit, Case, Random};
 
 /// As many seeds, or as many as FEEDPLAN_SEEDS says for a long campaign.
 fn seeds(count: u64) -> std::ops::Range<u64> {
