@@ -123,9 +123,9 @@ def example(name: str) -> ModuleType:
     return module
 
 
-def part(name: str, blocks: int) -> Named:
-    """A program of the examples of about that many blocks, and its machine."""
-    machine = Machine.load(PROGRAMS[name][0])
+def part(name: str, blocks: int, model: str | None = None) -> tuple[Program, Machine]:
+    """A program of the examples of about that many blocks, and its machine, or another one."""
+    machine = Machine.load(model or PROGRAMS[name][0])
     with tempfile.TemporaryDirectory() as directory:
         file = FilePath(directory, f"{name}.ngc")
         file.write_text(example(name).program(blocks), encoding="ascii")

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
-
-from benchmarks.named import example
+from benchmarks.named import part
 from benchmarks.results import Cell, Result
-from feedplan import Machine, Program, plan
-from feedplan.program.read import read_program
+from feedplan import Program, plan
 
 NAME = "zhang-comparison"
 # The parts of the paper's figure 8 as our examples have them, and their blocks.
@@ -24,12 +20,9 @@ METHODS = {"constant velocity": "constant-velocity-transition", "arcs": "arc-tra
 def run(quick: bool = False) -> Result:
     """Plan every part by the three methods at each feed and period, and audit what is planned."""
     rows: list[dict[str, Cell]] = []
-    with tempfile.TemporaryDirectory() as directory:
-        for part, blocks in PARTS.items():
-            file = Path(directory, f"{part}.ngc")
-            file.write_text(example(part).program(blocks // (QUICK if quick else 1)), encoding="ascii")
-            program = read_program(file, Machine.load(MACHINE))
-            rows += [_row(part, program, feed, period) for feed in FEEDS for period in PERIODS]
+    for name, blocks in PARTS.items():
+        program, _ = part(name, blocks // (QUICK if quick else 1), MACHINE)
+        rows += [_row(name, program, feed, period) for feed in FEEDS for period in PERIODS]
     return Result(
         NAME,
         "Machining time of transitions at corners over that of the optimum on fitted splines",

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 import os
 import re
 import subprocess
 import sys
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from benchmarks.named import EXAMPLES, example
 from feedplan.machine.along import positions
 from feedplan.machine.machine import Machine
 from feedplan.machine.meaning import Meaning
@@ -22,17 +21,7 @@ from feedplan.machine.words import axis_words
 from feedplan.program.gcode import read_gcode
 from feedplan.program.program import Program
 
-EXAMPLES = Path(__file__).parent.parent / "examples"
 SCRIPTS = sorted(path.name for path in EXAMPLES.glob("*.py"))
-
-
-def load(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def moves(text: str, words: str) -> NDArray[np.float64]:
@@ -68,14 +57,14 @@ def test_the_script_runs_and_writes_below_out(script: str, tmp_path: Path) -> No
 @pytest.mark.parametrize("name", ["vase", "lettering", "head"])
 @pytest.mark.parametrize("blocks", [500, 5000, 20_000])
 def test_a_program_has_about_as_many_blocks_as_asked(name: str, blocks: int) -> None:
-    text = load(name).program(blocks)
+    text = example(name).program(blocks)
     assert text.count("\n") == pytest.approx(blocks, rel=0.12, abs=60)
 
 
 @pytest.mark.parametrize("name", ["vase", "lettering", "head"])
 def test_a_program_is_the_same_every_time_and_complete(name: str) -> None:
-    text = load(name).program(1000)
-    assert text == load(name).program(1000)
+    text = example(name).program(1000)
+    assert text == example(name).program(1000)
     lines = text.splitlines()
     assert (lines[0], lines[-2], lines[-1]) == ("%", "M30", "%")
     assert lines[1].startswith("(")
@@ -86,7 +75,7 @@ def test_a_program_is_the_same_every_time_and_complete(name: str) -> None:
 
 
 def test_a_vase_pass_has_486_points_in_one_plane() -> None:
-    vase = load("vase")
+    vase = example("vase")
     text = vase.program(3 * 486)
     passes = re.split(r"\(pass \d+\)\n", text)[1:]
     assert len(passes) == 3
@@ -99,7 +88,7 @@ def test_a_vase_pass_has_486_points_in_one_plane() -> None:
 
 
 def test_a_vase_pass_has_creases_and_smooth_stretches_between_them() -> None:
-    points = load("vase").pass_points(0.0)
+    points = example("vase").pass_points(0.0)
     edges = np.diff(points, axis=0)
     turn = np.abs(np.diff(np.arctan2(edges[:, 1], edges[:, 0])))
     curvature = turn / (0.5 * np.linalg.norm(points[2:] - points[:-2], axis=1))
@@ -111,7 +100,7 @@ def test_a_vase_pass_has_creases_and_smooth_stretches_between_them() -> None:
 
 
 def test_the_passes_of_a_vase_never_leave_its_field() -> None:
-    vase = load("vase")
+    vase = example("vase")
     assert np.allclose(vase.planes(3, 0.1), [-0.1, 0.0, 0.1])
     many = vase.planes(100_000, 0.1)
     assert many[0] == pytest.approx(-vase.HALF_WIDTH)
@@ -120,7 +109,7 @@ def test_the_passes_of_a_vase_never_leave_its_field() -> None:
 
 
 def test_arcs_of_the_lettering_end_on_their_circles() -> None:
-    lettering = load("lettering")
+    lettering = example("lettering")
     text = lettering.program(2000, text="".join(lettering.FONT))
     x = y = 0.0
     arcs = 0
@@ -137,7 +126,7 @@ def test_arcs_of_the_lettering_end_on_their_circles() -> None:
 
 
 def test_a_half_circle_and_a_quarter_have_their_centres_by_hand() -> None:
-    lettering = load("lettering")
+    lettering = example("lettering")
     assert lettering.centre((0.0, 0.0), (2.0, 0.0), 1.0) == pytest.approx((1.0, 0.0))
     # Counter-clockwise from (1, 0) to (0, 1): about the origin.
     assert lettering.centre((1.0, 0.0), (0.0, 1.0), math.tan(math.pi / 8)) == pytest.approx((0.0, 0.0))
@@ -146,7 +135,7 @@ def test_a_half_circle_and_a_quarter_have_their_centres_by_hand() -> None:
 
 def test_the_tool_is_up_on_every_rapid_of_the_lettering() -> None:
     z = math.inf
-    for line in load("lettering").program(1000).splitlines():
+    for line in example("lettering").program(1000).splitlines():
         match = re.search(r"Z(-?[\d.]+)", line)
         if line.startswith("G0") and not match:
             assert z > 0.0
@@ -155,11 +144,11 @@ def test_the_tool_is_up_on_every_rapid_of_the_lettering() -> None:
 
 def test_letters_that_the_font_lacks_are_refused() -> None:
     with pytest.raises(ValueError, match="FEED!"):
-        load("lettering").program(100, text="feed!")
+        example("lettering").program(100, text="feed!")
 
 
 def test_blocks_of_the_head_are_as_long_as_their_curvature_allows() -> None:
-    head = load("head")
+    head = example("head")
     points = head.pass_points(0.3, 0.002)
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     assert lengths.min() >= 0.9 * 0.05
@@ -176,14 +165,14 @@ def test_blocks_of_the_head_are_as_long_as_their_curvature_allows() -> None:
 
 
 def test_the_ball_does_not_gouge_the_head() -> None:
-    head = load("head")
+    head = example("head")
     for x in np.linspace(-0.5 * head.WIDTH, 0.5 * head.WIDTH, 30):
         points = head.pass_points(float(x), 0.002)
         assert np.all(np.diff(points[:, 1]) > 0.0), "a gouge would turn the pass back"
 
 
 def test_the_head_moves_all_three_axes() -> None:
-    points = moves(load("head").program(2000), "XYZ")
+    points = moves(example("head").program(2000), "XYZ")
     assert np.all(np.mean(np.abs(np.diff(points, axis=0)) > 0.0, axis=0) > 0.8)
 
 
@@ -201,7 +190,7 @@ def joint_positions(program: Program, machine: Machine) -> NDArray[np.float64]:
 
 @pytest.mark.parametrize("name", ["trunnion-ac", "trunnion-bc", "head-table", "head-head"])
 def test_the_impeller_is_the_same_motion_in_every_form(name: str) -> None:
-    impeller = load("impeller")
+    impeller = example("impeller")
     machine = Machine.load(name)
     programs = [read_gcode(impeller.program(machine, form, 600), machine) for form in impeller.FORMS]
     tip, vector, joints = (joint_positions(program, machine) for program in programs)
@@ -225,7 +214,7 @@ def test_the_impeller_is_the_same_motion_in_every_form(name: str) -> None:
 
 
 def test_the_flank_of_the_tool_stays_beside_the_blade() -> None:
-    impeller = load("impeller")
+    impeller = example("impeller")
     tips, directions = impeller.blade_pass(0, 9.0, 60)
     hub, rulings = impeller.ruling(np.linspace(0, 1, 2001), 0)
     middle = hub + 9.0 * rulings
