@@ -22,8 +22,7 @@ lint: $(VENV)/built
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	cargo fmt --check --manifest-path solvers/Cargo.toml
-	cargo clippy --release --quiet --all-targets --manifest-path solvers/Cargo.toml -- -D warnings
-	cargo clippy --release --quiet --features python --manifest-path solvers/Cargo.toml -- -D warnings
+	cargo clippy --release --quiet --all-targets --features python --manifest-path solvers/Cargo.toml -- -D warnings
 
 bench: $(VENV)/built
 	cargo bench --manifest-path solvers/Cargo.toml

@@ -4,7 +4,9 @@
 //! Symbols: q an axis, S arc length, V, A, J speed, acceleration and jerk along the path. By 5.18–5.20 every axis keeps its
 //! limits anywhere on a segment, whatever the profile does within V, A, J, if
 //!
-//!     |q_S| V ≤ v_max,   |q_SS| V² + |q_S| A ≤ a_max,   |q_SSS| V³ + 3 |q_SS| V A + |q_S| J ≤ j_max
+//! ```text
+//! |q_S| V ≤ v_max,   |q_SS| V² + |q_S| A ≤ a_max,   |q_SSS| V³ + 3 |q_SS| V A + |q_S| J ≤ j_max
+//! ```
 //!
 //! with bounds of the derivatives over the segment. The thesis's 5.21–5.26 solve the same rows for V, A and J one after
 //! the other, which leaves nothing to A where V takes all, and divide by q_S, which may be 0. Here the three are chosen
