@@ -21,6 +21,8 @@ class ArcKind(IntEnum):
     AXIS_VELOCITY = 3  # one axis's speed: q'_k² p = value [mm²/s²]
     CHORD = 4  # the chord-error limit on a quadratic piece: p = value · |C'|
     SPEED_LINE = 5  # |C'|² p is linear in u from end to end [mm²/s²]; value is 0
+    PATH_JERK = 6  # the jerk along the path v̈ = value [mm/s³]: v is a quadratic polynomial of time
+    SPEED_CUBIC = 7  # v² is a cubic polynomial of the length from end to end, slopes 2a; value is 0
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,9 @@ class SpeedProfile:
     place is passed at a speed, p is infinite there; the axis velocity follows from the other end of the arc:
     q'_k0² p0 = q'_k1² p1 − 2·value·Δq_k, and from the duration where both ends are of that kind. Where it is
     a stop, p is its limit.
+    On PATH_JERK and SPEED_CUBIC `a0`, `a1` are the acceleration along the path at both ends, v̇ [mm/s²]; 0 on
+    all other kinds. Speed v = |C'| √p and length are those of the tool where the problem has a `tip_speed`.
+    PATH_JERK: v1 = v0 + a0·T + value·T²/2, a1 = a0 + value·T, T the duration. SPEED_CUBIC: v0, v1 > 0.
     """
 
     piece: NDArray[np.uint32]
@@ -53,6 +58,13 @@ class SpeedProfile:
     duration: NDArray[np.float64]
     runs: NDArray[np.int64]
     slowed: NDArray[np.uint32] = field(default_factory=lambda: np.empty(0, dtype=np.uint32))
+    a0: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    a1: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+
+    def __post_init__(self) -> None:
+        for name in ("a0", "a1"):
+            if len(getattr(self, name)) != len(self.piece):
+                object.__setattr__(self, name, np.zeros(len(self.piece)))
 
     def __len__(self) -> int:
         return len(self.piece)
