@@ -14,7 +14,7 @@ demo: $(VENV)/built
 test: lint
 	CARGO_PROFILE_RELEASE_LTO=off cargo test --release --quiet --manifest-path solvers/Cargo.toml
 	$(BIN)/python -m mypy.stubtest feedplan._solvers
-	$(BIN)/pytest
+	$(BIN)/pytest --numprocesses auto
 
 lint: $(VENV)/built
 	$(BIN)/ruff check .
@@ -32,7 +32,9 @@ bench: $(VENV)/built
 campaign: $(VENV)/built
 	FEEDPLAN_SEEDS=1000000 cargo test --release --manifest-path solvers/Cargo.toml --test planning random:: -- --nocapture
 	FEEDPLAN_SEEDS=1000000 cargo test --release --manifest-path solvers/Cargo.toml --test planning bound:: -- --nocapture
-	FEEDPLAN_SEEDS=1250 $(BIN)/pytest tests/constraints/test_joints.py -k random
+	FEEDPLAN_SEEDS=1250 $(BIN)/pytest --numprocesses auto tests/constraints/test_joints.py -k random
+	FEEDPLAN_SEEDS=200 $(BIN)/pytest --numprocesses auto tests/planners/test_meshes.py -k random
+	FEEDPLAN_EXAMPLES=5000 $(BIN)/pytest --numprocesses auto tests/test_setpoints_curves.py -k planned
 
 clean:
 	rm -rf $(VENV) out solvers/target

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
-from feedplan.planners._mesh import EVEN, INTEGRATION, PLACES, Mesh
+from feedplan.planners._mesh import EVEN, INTEGRATION, PLACES, TAIL, Mesh
 from feedplan.profile import ArcKind, SpeedProfile
 
 Array = NDArray[np.float64]
@@ -109,11 +109,12 @@ def arcs_between(problem: Problem, mesh: Mesh, p: Array, by_axis: bool) -> Arcs:
 
 def _peak(values: Array) -> Array:
     """The greatest size (n, …) that values (places, n, …) have in the cells: of parabolas through even
-    places."""
+    places, and what the places do not resolve."""
     even = np.einsum("ij,jck->ick", EVEN, values)
     bent = np.abs(even[2:] - 2.0 * even[1:-1] + even[:-2]) / 8.0
     inside = (np.abs(even[1:-1]) + bent).max(axis=0)
-    return np.asarray(np.maximum(inside, np.abs(values).max(axis=0)))
+    tail = np.abs(np.einsum("ij,jck->ick", TAIL, values)).sum(axis=0)
+    return np.asarray(np.maximum(inside, np.abs(values).max(axis=0)) + tail)
 
 
 @dataclass(frozen=True)

@@ -46,6 +46,10 @@ def _integration() -> Array:
 
 INTEGRATION = _integration()
 
+# From values at `PLACES` to the last two Legendre coefficients of the polynomial through them: as much as it
+# may be off where it does not resolve what happens in between.
+TAIL = np.linalg.inv(legendre.legvander(2.0 * PLACES - 1.0, _DEGREE))[-2:]
+
 # From values at `PLACES` to those at even places, where what happens in between shows.
 EVEN = (np.arange(33) / 32)[:, None] ** np.arange(_DEGREE + 1) @ np.linalg.inv(
     PLACES[:, None] ** np.arange(_DEGREE + 1)

@@ -11,8 +11,10 @@ above.
 
 from __future__ import annotations
 
+import importlib
 import math
 import time
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -20,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
-from feedplan.errors import InfeasibleError, InputError, SolverError
+from feedplan.errors import InfeasibleError, InputError, MissingPackageError, SolverError
 from feedplan.planners._arcs import Arcs, arcs_between, profile
 from feedplan.planners._mesh import Cuts, Mesh, Stretch, end_error, even_cuts, mesh, stretches
 from feedplan.planners._transcription import Rows, Transcription, transcribe
@@ -48,7 +50,7 @@ _FALLS = 0.25, 0.7
 # An estimate of the error may be wrong by a factor of two.
 _SAFETY = 0.5
 # The error is about this part, or less, of the time in which arcs do not use any limit wholly.
-_TRUE = 0.25
+_TRUE = 0.35
 # Seen between the checked places, and rounding.
 _MARGIN = 1e-9
 
@@ -67,10 +69,11 @@ Solve = Callable[[Transcription, float], Array]
 
 @dataclass(frozen=True)
 class Method:
-    """A solver, its `rows` of a mesh for limits (n, joints) and for cells that are held at both ends (n,),
-    and what its result is.
+    """A solver and its package, its `rows` of a mesh for limits (n, joints) and for cells that are held at
+    both ends (n,), and what its result is.
 
     `by_axis`: arcs may be of constant joint acceleration. `feasible`: limits are kept between the nodes.
+    `platform`: where the package can be had, if not everywhere.
     """
 
     name: str
@@ -78,6 +81,20 @@ class Method:
     rows: Callable[[Mesh, Array, NDArray[np.bool_]], Rows]
     by_axis: bool = True
     feasible: bool = True
+    platform: str = ""
+
+    def require(self) -> None:
+        """Raises MissingPackageError where the package cannot be imported."""
+        try:
+            with warnings.catch_warnings():
+                # The docstrings of toppra hold escapes that Python warns of.
+                warnings.simplefilter("ignore")
+                importlib.import_module(self.name)
+        except ImportError:
+            where = f", which there is for {self.platform}" if self.platform else ""
+            raise MissingPackageError(
+                f"the method {self.name} needs the package {self.name}{where}: `pip install {self.name}`"
+            ) from None
 
 
 def plan_on_meshes(
@@ -94,6 +111,7 @@ def plan_on_meshes(
         raise InputError(f"{cells} cells a piece: give 1 or more")
     if time_limit is not None and not time_limit > 0.0:
         raise InputError(f"the time limit is {time_limit} s: give a positive number")
+    method.require()
     deadline = time.monotonic() + (math.inf if time_limit is None else time_limit)
     parts: list[tuple[Mesh, Arcs]] = []
     runs, count = [0], 0

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
-from feedplan.errors import MissingPackageError
 from feedplan.planners._refinement import Method, Refusal, plan_on_meshes
 from feedplan.planners._transcription import Transcription, mean_rows
 from feedplan.profile import SpeedProfile
@@ -41,11 +40,6 @@ def plan(
     `time_limit` [s]. Raises SolverError with IPOPT's status, InfeasibleError where a speed given at an end
     cannot be had, MissingPackageError.
     """
-    try:
-        import casadi  # noqa: F401
-    except ImportError:
-        sentence = "the method casadi needs the package casadi: `pip install casadi`"
-        raise MissingPackageError(sentence) from None
     return plan_on_meshes(problem, Method("casadi", _solve, mean_rows), accuracy, cells, time_limit)
 
 

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
-from feedplan.errors import MissingPackageError
 from feedplan.planners._refinement import Method, Refusal, plan_on_meshes
 from feedplan.planners._transcription import Transcription, mean_rows
 from feedplan.profile import SpeedProfile
@@ -39,12 +38,6 @@ def plan(
     `time_limit` [s]. Raises SolverError with Clarabel's status, InfeasibleError where a speed given at an end
     cannot be had, MissingPackageError.
     """
-    try:
-        import clarabel  # noqa: F401
-    except ImportError:
-        raise MissingPackageError(
-            "the method clarabel needs the package clarabel: `pip install clarabel`"
-        ) from None
     return plan_on_meshes(problem, Method("clarabel", _solve, mean_rows), accuracy, cells, time_limit)
 
 
@@ -55,6 +48,8 @@ def _solve(task: Transcription, seconds: float) -> Array:
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.max_threads = 1
+    # The program is scaled already, by what p can be; equilibration on top costs digits on graded meshes.
+    settings.equilibrate_enable = False
     settings.tol_gap_rel = settings.tol_gap_abs = GAP
     if math.isfinite(seconds):
         settings.time_limit = seconds

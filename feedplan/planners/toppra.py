@@ -11,14 +11,13 @@ nodes and whose time rises to it. Both are of first order.
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
-from feedplan.errors import InputError, MissingPackageError
+from feedplan.errors import InputError
 from feedplan.planners._mesh import Mesh
 from feedplan.planners._refinement import Method, Refusal, plan_on_meshes
 from feedplan.planners._transcription import Rows, Transcription, end_rows
@@ -49,19 +48,9 @@ def plan(
     """
     if scheme not in SCHEMES:
         raise InputError(f"there is no scheme '{scheme}' of toppra: use one of {', '.join(SCHEMES)}")
-    try:
-        with warnings.catch_warnings():
-            # Its docstrings hold escapes that Python warns of.
-            warnings.simplefilter("ignore")
-            import toppra.algorithm  # noqa: F401
-    except ImportError:
-        raise MissingPackageError(
-            "the method toppra needs the package toppra, which there is for Linux on x86-64: "
-            "`pip install toppra`"
-        ) from None
     feasible = scheme == "one-sided"
     rows = _at_both_ends if feasible else _at_start
-    method = Method("toppra", _solve, rows, by_axis=False, feasible=feasible)
+    method = Method("toppra", _solve, rows, by_axis=False, feasible=feasible, platform="Linux on x86-64")
     return plan_on_meshes(problem, method, accuracy, cells, time_limit)
 
 

@@ -130,8 +130,8 @@ impl<const C: usize> Polynomial<C> {
     #[inline(always)]
     pub fn map(&self, change: impl Fn(f64) -> f64) -> Self {
         let mut c = [0.0; C];
-        for i in 0..=self.n {
-            c[i] = change(self.c[i]);
+        for (new, &old) in c.iter_mut().zip(self.coefficients()) {
+            *new = change(old);
         }
         Self { n: self.n, c }
     }
@@ -150,9 +150,9 @@ impl<const C: usize> Polynomial<C> {
     #[inline(always)]
     pub fn multiply(&self, other: &Self) -> Self {
         let mut c = [0.0; C];
-        for i in 0..=self.n {
-            for j in 0..=other.n {
-                c[i + j] += self.c[i] * other.c[j];
+        for (i, &p) in self.coefficients().iter().enumerate() {
+            for (sum, &q) in c[i..].iter_mut().zip(other.coefficients()) {
+                *sum += p * q;
             }
         }
         Self { n: self.n + other.n, c }
@@ -163,8 +163,9 @@ impl<const C: usize> Polynomial<C> {
     pub fn elevate(&self, n: usize) -> Self {
         let mut c = self.c;
         for degree in self.n + 1..=n {
-            for i in (1..=degree).rev() {
-                c[i] += c[i - 1];
+            let mut before = 0.0;
+            for value in &mut c[..=degree] {
+                (before, *value) = (*value, *value + before);
             }
         }
         Self { n: n.max(self.n), c }
@@ -173,13 +174,15 @@ impl<const C: usize> Polynomial<C> {
     /// a p + b q.
     #[inline(always)]
     pub fn combine(&self, a: f64, other: &Self, b: f64) -> Self {
-        let n = self.n.max(other.n);
-        let (p, q) = (self.elevate(n), other.elevate(n));
-        let mut c = [0.0; C];
-        for i in 0..=n {
-            c[i] = a * p.c[i] + b * q.c[i];
+        if self.n != other.n {
+            let n = self.n.max(other.n);
+            return self.elevate(n).combine(a, &other.elevate(n), b);
         }
-        Self { n, c }
+        let mut c = [0.0; C];
+        for (sum, (p, q)) in c.iter_mut().zip(self.coefficients().iter().zip(other.coefficients())) {
+            *sum = a * p + b * q;
+        }
+        Self { n: self.n, c }
     }
 
     #[inline(always)]
@@ -203,9 +206,12 @@ impl<const C: usize> Polynomial<C> {
             return Self::constant(0.0);
         }
         let mut c = [0.0; C];
-        for a in 0..=n {
-            for b in a + 1..=n {
-                c[a + b - 1] += (b - a) as f64 * (self.c[b] * other.c[a] - self.c[a] * other.c[b]);
+        let (p, q) = (self.coefficients(), other.coefficients());
+        for (a, (&pa, &qa)) in p.iter().zip(q).enumerate() {
+            let mut apart = 0.0;
+            for (sum, (pb, qb)) in c[2 * a..].iter_mut().zip(p[a + 1..].iter().zip(&q[a + 1..])) {
+                apart += 1.0;
+                *sum += apart * (pb * qa - pa * qb);
             }
         }
         Self { n: 2 * n - 2, c }
@@ -272,17 +278,11 @@ impl<const C: usize> Polynomial<C> {
         let n = self.n;
         if x <= 0.5 {
             let ratio = x / (1.0 - x);
-            let mut sum = self.c[n];
-            for i in (0..n).rev() {
-                sum = sum * ratio + self.c[i];
-            }
+            let sum = self.coefficients().iter().rev().fold(0.0, |sum, c| sum * ratio + c);
             sum * (1.0 - x).powi(n as i32)
         } else {
             let ratio = (1.0 - x) / x;
-            let mut sum = self.c[0];
-            for i in 1..=n {
-                sum = sum * ratio + self.c[i];
-            }
+            let sum = self.coefficients().iter().fold(0.0, |sum, c| sum * ratio + c);
             sum * x.powi(n as i32)
         }
     }
@@ -290,64 +290,47 @@ impl<const C: usize> Polynomial<C> {
     /// p on [0, t] and on [t, 1], each on [0, 1] again (de Casteljau).
     #[inline(always)]
     pub fn split(&self, t: f64) -> (Self, Self) {
-        let n = self.n;
-        let row = &BINOMIALS[n];
-        let mut b = [0.0; C];
-        for i in 0..=n {
-            b[i] = self.c[i] / row[i];
-        }
-        let mut left = [0.0; C];
-        left[0] = b[0];
-        for level in 1..=n {
-            for i in 0..=n - level {
-                b[i] = (1.0 - t) * b[i] + t * b[i + 1];
-            }
-            left[level] = b[0] * row[level];
-        }
-        for i in 0..=n {
-            b[i] *= row[i];
-        }
-        (Self { n, c: left }, Self { n, c: b })
+        let mut b = *self;
+        let left = b.casteljau(t);
+        (left, b)
     }
 
     /// p on [0, t], on [0, 1] again.
     #[inline(always)]
     pub fn left(&self, t: f64) -> Self {
-        let n = self.n;
-        let row = &BINOMIALS[n];
-        let mut b = [0.0; C];
-        for i in 0..=n {
-            b[i] = self.c[i] / row[i];
-        }
-        let mut c = [0.0; C];
-        c[0] = b[0];
-        for level in 1..=n {
-            for i in 0..=n - level {
-                b[i] = (1.0 - t) * b[i] + t * b[i + 1];
-            }
-            c[level] = b[0] * row[level];
-        }
-        Self { n, c }
+        let mut b = *self;
+        b.casteljau(t)
     }
 
     /// p on [t, 1], on [0, 1] again.
     #[inline(always)]
     pub fn right(&self, t: f64) -> Self {
+        let mut b = *self;
+        b.casteljau(t);
+        b
+    }
+
+    /// Leaves the polynomial on [t, 1] and returns that on [0, t].
+    #[inline(always)]
+    fn casteljau(&mut self, t: f64) -> Self {
         let n = self.n;
-        let row = &BINOMIALS[n];
-        let mut c = [0.0; C];
-        for i in 0..=n {
-            c[i] = self.c[i] / row[i];
+        let row = &BINOMIALS[n][..=n];
+        let b = &mut self.c[..=n];
+        for (b, binomial) in b.iter_mut().zip(row) {
+            *b /= binomial;
         }
-        for level in 1..=n {
-            for i in 0..=n - level {
-                c[i] = (1.0 - t) * c[i] + t * c[i + 1];
+        let mut left = [0.0; C];
+        for (level, (left, binomial)) in left.iter_mut().zip(row).enumerate() {
+            *left = b[0] * binomial;
+            let rest = &mut b[..=n - level];
+            for i in 1..rest.len() {
+                rest[i - 1] = (1.0 - t) * rest[i - 1] + t * rest[i];
             }
         }
-        for i in 0..=n {
-            c[i] *= row[i];
+        for (b, binomial) in b.iter_mut().zip(row) {
+            *b *= binomial;
         }
-        Self { n, c }
+        Self { n, c: left }
     }
 
     /// p on [a, b], on [0, 1] again.
