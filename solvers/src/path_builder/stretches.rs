@@ -14,7 +14,7 @@ const CURVE_JOINT: f64 = 0.0175;
 /// No corner is shorter than this times the tolerance because it needs no more: pieces of no size help nobody.
 const LEAST_LENGTH: f64 = 0.01;
 /// What is left between two corners is dropped below this share of the stretch.
-const TOUCHING: f64 = 1e-9;
+const TOUCHING: f64 = 1e-6;
 /// Corners and stretches that one task takes at most.
 pub const TASK: usize = 1024;
 
