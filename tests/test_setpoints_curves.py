@@ -280,6 +280,21 @@ def test_planned_curves_are_sampled_within_their_limits(interpolator: str, seed:
             assert np.median(np.abs(off).max(axis=1)[same] / scale[same]) <= 2e-6, low
 
 
+def test_an_axis_that_has_all_but_turned_round_is_not_taken_for_one_at_rest() -> None:
+    # x = r − a (t + t0)²/2 on a circle: what x does in the time t0 from its turn is nothing; not what y does.
+    r, a = 10.0, 500.0
+    curve = CompositeCurve.from_bezier([[r, 0], [r, r], [0, r]], [1, math.sqrt(0.5), 1])
+    time, t0 = math.sqrt(2 * r / a), 2e-8
+    slope = float(curve.evaluate(0, 0.0, 1)[1, 0, 1])
+    pace = math.sqrt(a * r) / slope
+    end = float((a * time / curve.evaluate(0, curve.width, 1)[1, 0, 0]) ** 2)
+    arc = (0, ArcKind.AXIS_ACCELERATION, 0, -a, pace * t0, float(curve.width[0]), pace**2, end, time - t0)
+    chunk = setpoints(problem_of(curve), profile_of(arc), 1e-3, "sarfraz").all()
+    x = r - a * (chunk.t + t0) ** 2 / 2
+    expected = np.sqrt((r - x) * (r + x))
+    np.testing.assert_allclose(chunk.position[1:-1, 1], expected[1:-1], atol=1e-9)
+
+
 @INTERPOLATOR
 @pytest.mark.parametrize("degree", [3, 6, 9])
 def test_a_curved_cusp_is_reached_and_left_at_rest(interpolator: str, degree: int) -> None:

@@ -12,8 +12,10 @@
 //! | `split` | cut where an axis turns round or another velocity cap is the lowest |
 //! | `window` | what is left of a sub-piece ahead of a pass, with the bound on it |
 //! | `pass` | one pass over one sub-piece: arcs (`bang`), along the cap (`slide`), along the `limit_curve` |
+//! | `check` | whether the arcs keep the limits at some places, for all that rounding did |
 //! | `run` | both passes over a run, into columns, in seconds |
 
+mod check;
 mod chord;
 mod cusp;
 mod pass;

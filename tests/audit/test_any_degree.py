@@ -21,6 +21,7 @@ from feedplan.machine.machine import Axis, Machine
 from feedplan.profile import ArcKind, SpeedProfile
 from feedplan.program.program import MoveKind, Program
 from tests.audit.curves import machine_of, path_along, planned, problem_along, sampled
+from tests.planners.test_cusps import with_cusp
 
 Array = NDArray[np.float64]
 Change = Callable[..., NDArray[Any]]
@@ -403,3 +404,12 @@ def test_a_speed_is_kept_from_one_such_place_to_the_next() -> None:
     profile, machine = planned(problem), machine_of(problem)
     assert (np.isinf(profile.p0) & np.isinf(profile.p1)).any()
     assert audit(problem, profile, machine).failures == ()
+
+
+@pytest.mark.parametrize("order", [2, 4])
+def test_an_axis_that_stands_still_where_a_cusp_is_passed_does_not_jump(order: int) -> None:
+    # p is infinite in the cusp, and Y's tangent is 0 everywhere.
+    problem = problem_along(path_along(with_cusp(order, 0.3, np.array([3.0, 0.0]))), 1e9, 100.0)
+    profile = planned(problem)
+    assert np.isinf(profile.p0).any()
+    assert audit(problem, profile, machine_of(problem)).failures == ()

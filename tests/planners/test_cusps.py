@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from feedplan._solvers import plan_bang_bang
 from feedplan.curves.composite import CompositeCurve
 from feedplan.plan import rounding_stops
-from feedplan.profile import SpeedProfile
+from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.setpoints import setpoints
 from tests.planners.excess import worst_excess
 from tests.planners.test_curves import problem_of
 
@@ -38,7 +39,7 @@ def with_cusp(
     columns = []
     for rate in rates:
         powers = np.zeros(degree + 1)
-        powers[1 : len(rate.coef) + 1] = rate.integ().coef[1:]
+        powers[1 : len(rate.coef) + 1] = rate.coef / np.arange(1, len(rate.coef) + 1)
         columns.append(bernstein(powers))
     return CompositeCurve.from_bezier(np.array(columns).T)
 
@@ -110,6 +111,52 @@ def test_a_stop_for_rounding_is_told_with_its_line() -> None:
     assert sentence.startswith(
         "line 0: rounding hides how the path goes on next to a cusp: the plan stops there"
     )
+
+
+def test_a_curve_that_all_but_rests_inside_keeps_its_limits_there() -> None:
+    # Both tangents fall to 1e-12 of their greatest without turning round.
+    problem = problem_of(*random_curve(3705))
+    assert worst_excess(problem, SpeedProfile(*plan_bang_bang(problem)))[0] <= 1e-8
+
+
+@pytest.mark.parametrize("seed", [3452, 4253, 7517, 8833, 11396])
+def test_axes_that_turn_within_rounding_of_each_other_have_a_plan(seed: int) -> None:
+    problem = problem_of(*random_curve(seed))
+    assert worst_excess(problem, SpeedProfile(*plan_bang_bang(problem)))[0] <= 1e-8
+
+
+def test_the_time_at_a_feed_next_to_a_cusp_is_found_in_a_moment() -> None:
+    # A line through a cusp: its speed squared is rounding there, and halving it gains nothing.
+    problem = problem_of(*random_curve(12790))
+    profile = SpeedProfile(*plan_bang_bang(problem))
+    feed = profile.kind == ArcKind.FEED
+    ways = np.abs(
+        [
+            np.diff(problem.path.curve.evaluate(0, u, 0)[0, :, 0])[0]
+            for u in zip(profile.u0, profile.u1, strict=True)
+        ]
+    )
+    np.testing.assert_allclose(profile.duration[feed], ways[feed] / problem.feed[0], rtol=1e-9)
+
+
+@pytest.mark.parametrize("seed", [29, 61, 70, 138, 187, 341])
+def test_setpoints_through_turns_keep_every_limit(seed: int) -> None:
+    problem = problem_of(*random_curve(seed))
+    profile = SpeedProfile(*plan_bang_bang(problem))
+    chunk = setpoints(problem, profile, profile.time / 200, "sarfraz").all()
+    assert (np.abs(chunk.velocity) <= problem.max_velocity * (1 + 1e-9)).all()
+    assert (np.abs(chunk.acceleration) <= problem.max_acceleration * (1 + 1e-6)).all()
+
+
+@pytest.mark.parametrize("seed", [29, 61, 70, 138, 187, 341])
+def test_no_arc_goes_on_where_its_axis_turns_round(seed: int) -> None:
+    problem = problem_of(*random_curve(seed))
+    profile = SpeedProfile(*plan_bang_bang(problem))
+    for kind, axis, u0, u1 in zip(profile.kind, profile.axis, profile.u0, profile.u1, strict=True):
+        if kind == ArcKind.AXIS_ACCELERATION:
+            u = u0 + (u1 - u0) * np.linspace(0.01, 0.99, 99)
+            rate = problem.path.curve.evaluate(np.zeros(99, dtype=int), u, 1)[1, :, axis]
+            assert (rate > 0).all() or (rate < 0).all()
 
 
 def test_random_curves_next_to_cusps_keep_every_limit() -> None:

@@ -102,7 +102,13 @@ impl<const M: usize> Auditor<'_, M> {
 
     /// The recorded p at both ends against what the arc's definition gives there, as a jump of axis velocity.
     fn recorded_ends(&self, i: usize, motion: &Motion<M>, width: f64, line: i32, tally: &mut Tally<M>) {
-        let spread = (motion.root_anchor - motion.root_far).abs() * motion.width_rounding(width);
+        // At a cusp √p is infinite: it falls from there to the other end as a power of the way.
+        let change = match (motion.root_anchor.is_finite(), motion.root_far.is_finite()) {
+            (true, true) => (motion.root_anchor - motion.root_far).abs(),
+            (true, false) => motion.root_anchor,
+            (false, _) => motion.root_far,
+        };
+        let spread = change * motion.width_rounding(width);
         for (y, recorded) in [(0.0, motion.root_anchor), (1.0, motion.root_far)] {
             if recorded.is_infinite() {
                 continue; // the next arc's velocity is compared with that of the law

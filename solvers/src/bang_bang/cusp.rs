@@ -16,6 +16,8 @@ const MAX_STRETCHES: u32 = 4000;
 const FAST: f64 = 1e-10;
 /// So many times half a stretch away from it the tangents have signs.
 const AWAY: f64 = 10.0;
+/// A stretch shorter than this power of a half on which all axes may be at rest is next to a cusp.
+const NEARLY_DEPTH: u32 = 8;
 /// At a cusp of order r the derivatives below r make up less than this part of the tangents nearby.
 const LOWER: f64 = 0.3;
 
@@ -32,15 +34,34 @@ struct Search<'a, const M: usize> {
     moving: u8,
     left: u32,
     found: Vec<(f64, f64)>,
+    /// Short stretches in the end without a place where all axes rest, and how often each was halved.
+    nearly: Vec<(f64, f64, u32)>,
 }
 
-/// The cusps of a piece on which these axes move, in order.
-pub fn cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, moving: u8) -> Vec<Cusp> {
+/// Where all axes rest, and where they nearly do.
+#[derive(Default)]
+pub struct Cusps {
+    pub cusps: Vec<Cusp>,
+    /// Next to these places the tangents are so short that what depends on their small differences is lost in the
+    /// rounding of polynomials over the whole piece.
+    pub nearly: Vec<Nearly>,
+}
+
+/// Within `reach` of `t` all axes are nearly at rest.
+#[derive(Clone, Copy, Debug)]
+pub struct Nearly {
+    pub t: f64,
+    pub reach: f64,
+}
+
+/// The cusps of a piece on which these axes move, and the places that are nearly one, in order.
+pub fn cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, moving: u8) -> Cusps {
     let (least, greatest) = piece.speed.range();
     if piece.own_speed && least > FAST * greatest {
-        return vec![];
+        return Cusps::default();
     }
-    let mut search = Search { noise: &piece.noise, moving, left: MAX_STRETCHES, found: vec![] };
+    let mut search =
+        Search { noise: &piece.noise, moving, left: MAX_STRETCHES, found: vec![], nearly: vec![] };
     search.halve(&piece.g, (0.0, 1.0), 0);
     let mut stretches: Vec<(f64, f64)> = vec![];
     for (from, to) in search.found {
@@ -49,7 +70,24 @@ pub fn cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, moving: u8) ->
             _ => stretches.push((from, to)),
         }
     }
-    stretches.into_iter().filter_map(|stretch| locate(piece, moving, stretch)).collect()
+    let cusps: Vec<Cusp> =
+        stretches.into_iter().filter_map(|stretch| locate(piece, moving, stretch)).collect();
+    // Of neighbours the shortest stretch stays.
+    let mut nearly: Vec<(f64, f64, u32)> = vec![];
+    let mut reached = 0.0;
+    for stretch in search.nearly {
+        match nearly.last_mut() {
+            Some(last) if stretch.0 <= reached => {
+                if stretch.2 > last.2 {
+                    *last = stretch;
+                }
+            }
+            _ => nearly.push(stretch),
+        }
+        reached = stretch.1;
+    }
+    let place = |(from, to, _): (f64, f64, u32)| Nearly { t: 0.5 * (from + to), reach: 0.5 * (to - from) };
+    Cusps { cusps, nearly: nearly.into_iter().map(place).collect() }
 }
 
 impl<const M: usize> Search<'_, M> {
@@ -61,6 +99,9 @@ impl<const M: usize> Search<'_, M> {
         if axes.clone().any(|k| (0..=g[k].degree()).all(|i| g[k].bernstein(i) > self.noise[k]))
             || axes.clone().any(|k| (0..=g[k].degree()).all(|i| g[k].bernstein(i) < -self.noise[k]))
         {
+            if depth >= NEARLY_DEPTH {
+                self.nearly.push((from, to, depth));
+            }
             return;
         }
         let rests = |k: usize| (0..=g[k].degree()).all(|i| g[k].bernstein(i).abs() <= self.noise[k]);

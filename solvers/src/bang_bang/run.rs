@@ -1,18 +1,20 @@
 //! Both passes over one run, its arcs into the columns of the profile.
 
+use super::check::keeps_limits;
 use super::pass::{self, cusp, distance, Arc, Kind, State, Stuck};
 use super::piece::Piece;
-use super::split::{split, Axes, Cap, Part, Remedy, SubPiece};
+use super::split::{split, Cap, Part, Remedy, SubPiece};
 use super::{Task, TIP_AXES};
 use crate::bang_bang_quadratic::{ArcKind, Fault, Profile, Row, Workspace as QuadraticWorkspace, NO_AXIS};
-use crate::polynomial::{Polynomial, MOST};
+use crate::polynomial::MOST;
+use crate::quadratic::norm;
 
 /// Two directions that differ by more than this at a cusp form a corner.
 const SMOOTH_TURN: f64 = 1e-9;
 /// A speed asked for at an end of the path may exceed what can be had by this part, which is rounding.
 const REACHED: f64 = 1e-12;
-/// An arc may exceed a limit by this part.
-const EXCESS: f64 = 1e-9;
+/// Halvings for the time along one arc at a speed; some twenty are usual.
+const MOST_HALVINGS: u32 = 1000;
 /// A run in which rounding leaves a pass without headway is planned anew so often, with more cuts every time.
 const MOST_ATTEMPTS: usize = 40;
 
@@ -315,43 +317,6 @@ fn forward_over<const M: usize, const C: usize>(
     }
 }
 
-/// Whether every axis keeps its limits at some places of the arcs, else where it does not: a guard against rounding.
-fn keeps_limits<const M: usize, const C: usize>(
-    sub: &SubPiece<M, C>,
-    axes: &Axes<M>,
-    arcs: &[Arc],
-) -> Result<(), Stuck> {
-    let kept = |arc: &Arc| {
-        let (j, slow_at, signed) = match arc.kind {
-            Kind::Accelerating(j) => (j, arc.x0, axes.acceleration[j]),
-            Kind::Braking(j) => (j, arc.x1, -axes.acceleration[j]),
-            _ => return true,
-        };
-        let twist: [Polynomial<C>; M] = std::array::from_fn(|l| {
-            if sub.straight || l == j {
-                Polynomial::constant(0.0)
-            } else {
-                sub.g[l].wronskian(&sub.g[j])
-            }
-        });
-        [0.02, 0.35, 0.7, 0.98].iter().all(|&part| {
-            let x = arc.x0 + part * (arc.x1 - arc.x0);
-            let weight = sub.weight.value(x);
-            let way = if x > slow_at { distance(sub, j, slow_at, x) } else { distance(sub, j, x, slow_at) };
-            let g = sub.g[j].value(x);
-            let pi = (arc.slow_sq + 2.0 * axes.acceleration[j] * way) / (g * g);
-            (0..M).all(|l| {
-                let other = sub.g[l].value(x);
-                // ω² (g_l s + g_l' π) with s from axis j, without the difference of large terms.
-                let acceleration = (signed * other + weight * weight * pi * twist[l].value(x)) / g;
-                acceleration.abs() <= axes.acceleration[l] * (1.0 + EXCESS)
-                    && other * other * pi <= axes.velocity_sq[l] * (1.0 + EXCESS)
-            })
-        })
-    };
-    arcs.iter().find(|arc| !kept(arc)).map_or(Ok(()), |arc| Err(Stuck(0.5 * (arc.x0 + arc.x1))))
-}
-
 /// Appends the arcs of the forward pass over one part.
 fn push<const M: usize, const C: usize>(
     task: &Task<M>,
@@ -381,8 +346,8 @@ fn push<const M: usize, const C: usize>(
         let mut by_acceleration = |k: usize| {
             // Way over mean speed, the faster speed from the way.
             let way = way(k);
-            // An arc that begins where its axis turns has another formula for p.
-            joins = arc.pi[0].is_finite() && arc.pi[1].is_finite() && sub.g[k].value(arc.x0) > 0.0;
+            // Not with what comes before its axis turns, not even where arcs too short to be kept lie in between.
+            joins = arc.pi[0].is_finite() && arc.pi[1].is_finite() && sub.g[k].first() > 0.0;
             if way <= 0.0 {
                 return 0.0;
             }
@@ -419,21 +384,28 @@ fn time_at_speed<const M: usize, const C: usize>(
 ) -> f64 {
     let rate = |x: f64| {
         let weight = sub.weight.value(x);
-        (sub.speed.value(x).max(0.0) / (f0 + x * (f1 - f0))).sqrt() / (weight * weight)
+        // Next to a cusp the sum of squares has lost the digits that the tangents still have.
+        let speed = if sub.own_speed {
+            norm(&std::array::from_fn::<f64, M, _>(|k| sub.g[k].value(x)))
+        } else {
+            sub.speed.value(x).max(0.0).sqrt()
+        };
+        speed / ((f0 + x * (f1 - f0)).sqrt() * weight * weight)
     };
     let whole = rule(&rate, x0, x1);
-    gauss(&rate, (x0, x1), whole, 1e-14 * whole, 0)
+    gauss(&rate, (x0, x1), whole, 1e-14 * whole, &mut { MOST_HALVINGS })
 }
 
-/// To an error that does not shrink with the stretches: rounding cannot keep them from coming to an end.
-fn gauss(rate: &impl Fn(f64) -> f64, (a, b): (f64, f64), whole: f64, error: f64, depth: u32) -> f64 {
+/// To an error that does not shrink with the stretches, and in no more than so many halvings: where the rate is rounding
+/// throughout, as it may be next to a cusp, more would gain nothing.
+fn gauss(rate: &impl Fn(f64) -> f64, (a, b): (f64, f64), whole: f64, error: f64, left: &mut u32) -> f64 {
     let middle = 0.5 * (a + b);
-    let (left, right) = (rule(rate, a, middle), rule(rate, middle, b));
-    if (left + right - whole).abs() > error && depth < 40 {
-        gauss(rate, (a, middle), left, error, depth + 1) + gauss(rate, (middle, b), right, error, depth + 1)
-    } else {
-        left + right
+    let halves = (rule(rate, a, middle), rule(rate, middle, b));
+    if (halves.0 + halves.1 - whole).abs() <= error || *left == 0 {
+        return halves.0 + halves.1;
     }
+    *left -= 1;
+    gauss(rate, (a, middle), halves.0, error, left) + gauss(rate, (middle, b), halves.1, error, left)
 }
 
 /// Gauss's rule of six places.

@@ -1,7 +1,7 @@
 //! Cuts a piece where an axis turns round and where the lowest velocity cap changes.
 
 use super::chord::SpeedLine;
-use super::cusp::cusps;
+use super::cusp::{cusps, Cusps, Nearly};
 use super::pass::cusp;
 use super::piece::{sum_of_squares, Piece};
 use super::TIP_AXES;
@@ -17,6 +17,10 @@ const NEAR_CUSP: f64 = 1e-5;
 const SLOW: f64 = 1e-10;
 /// A weight may be so many times greater than those at the ends of a part.
 const UNEVEN: f64 = 100.0;
+/// A place nearly at rest asks for no cut of its own where there is one, or a cusp, within so many times its reach.
+const AROUND: f64 = 4.0;
+/// A part shorter than this part of the piece is not cut once more: its ends become one.
+const NARROW: f64 = 1e-11;
 /// The value of a polynomial is rounding below this part of its terms.
 const NOISE: f64 = 1e-14;
 /// A place nearer to the end of a part than this is at its end.
@@ -95,6 +99,8 @@ impl Cut {
 pub struct Remedy {
     pub piece: usize,
     pub t: f64,
+    /// All cuts closer than this are one.
+    pub reach: f64,
     /// The plan stops there.
     pub stops: bool,
 }
@@ -169,8 +175,21 @@ pub fn split<const M: usize, const C: usize>(
     }
     merge_near_cusps(piece, &mut cuts);
     cut_by_weight(&piece.weight, (0.0, 1.0), &mut cuts);
-    cuts.extend(remedies.map(|Remedy { t, stops, .. }| Cut { t, end: End { stops, ..End::default() } }));
-    for cusp in cusps(piece, moving) {
+    let remedies: Vec<Remedy> = remedies.collect();
+    let remedy_cut = |remedy: &Remedy| Cut {
+        t: remedy.t,
+        end: End { reach: remedy.reach, stops: remedy.stops, ..End::default() },
+    };
+    cuts.extend(remedies.iter().filter(|remedy| remedy.reach == 0.0).map(remedy_cut));
+    let Cusps { cusps, nearly } = cusps(piece, moving);
+    for Nearly { t, reach } in nearly {
+        let reach = AROUND * reach.max(SAME_TURN);
+        let at_cusp = cusps.iter().any(|cusp| (t - cusp.t).abs() <= AROUND * cusp.reach + reach);
+        if !at_cusp && !cuts.iter().any(|cut| (t - cut.t).abs() <= reach) {
+            cuts.push(Cut::plain(t));
+        }
+    }
+    for cusp in cusps {
         // The axes turn here or nowhere near.
         let mut all = Cut {
             t: cusp.t,
@@ -181,6 +200,18 @@ pub fn split<const M: usize, const C: usize>(
         all.end.stops = cuts.iter().any(|cut| near(cut.t) && cut.end.stops);
         all.t = [0.0, 1.0].into_iter().find(|&t| near(t)).unwrap_or(cusp.t);
         cuts.retain(|cut| !near(cut.t) || is_end(cut.t));
+        cuts.push(all);
+    }
+    for remedy in remedies.iter().filter(|remedy| remedy.reach > 0.0) {
+        let mut all = remedy_cut(remedy);
+        cuts.retain(|cut| {
+            let near = (cut.t - remedy.t).abs() <= remedy.reach;
+            if near {
+                all.join(cut);
+                all.t = if cut.t == 0.0 || cut.t == 1.0 { cut.t } else { all.t };
+            }
+            !near
+        });
         cuts.push(all);
     }
     cuts.sort_by(|a, b| a.t.total_cmp(&b.t));
@@ -294,11 +325,14 @@ impl Part {
         self.left.stops
     }
 
-    /// Another cut of the part at x where a pass found no way: in the middle where it has one near x.
+    /// Another cut of the part at x where a pass found no way: in the middle where it has one near x. The ends of a
+    /// part as short as rounding become one.
     pub fn remedy(&self, piece: usize, x: f64) -> Remedy {
-        let inside = AT_END < x && x < 1.0 - AT_END;
-        let t = self.from + (self.to - self.from) * if inside { x } else { 0.5 };
-        Remedy { piece, t, stops: false }
+        let length = self.to - self.from;
+        let narrow = length <= NARROW;
+        let inside = AT_END < x && x < 1.0 - AT_END && !narrow;
+        let t = self.from + length * if inside { x } else { 0.5 };
+        Remedy { piece, t, reach: if narrow { length } else { 0.0 }, stops: false }
     }
 
     /// The part as travelled forward.

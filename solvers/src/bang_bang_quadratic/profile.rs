@@ -185,7 +185,8 @@ impl Profile {
             // The control axis moves at constant acceleration: its way over its mean speed.
             let mut by_axis = |k: u8| {
                 let (ga, gb) = (sub.axis_tangent(k as usize, arc.x0), sub.axis_tangent(k as usize, arc.x1));
-                joins = ga > 0.0;
+                // Not with what comes before its axis turns, not even where arcs too short to be kept lie in between.
+                joins = sub.axis_tangent(k as usize, 0.0) > 0.0;
                 step * (ga + gb) / (ga * arc.p0.sqrt() + gb * arc.p1.sqrt())
             };
             let signed = |k: u8| {

@@ -19,8 +19,9 @@ const LAST_STEP: f64 = 3e-9;
 const MAX_ROUNDS: u32 = 120;
 /// An end is one where the axis turns round when q'_k is below this part of its mean there.
 const TURN: f64 = 1e-4;
-/// The speed of the axis at such an end is rounding below this part of that at the other one.
-const PASSED: f64 = 1e-6;
+/// The speed of the axis at such an end is rounding below this part of that at the other one. A speed that is left out
+/// is a delay of all other axes.
+const PASSED: f64 = 1e-9;
 /// A speed at a cusp below this part of that at the other end is a standstill but for rounding.
 const STANDSTILL: f64 = 1e-12;
 
