@@ -120,6 +120,15 @@ def test_a_corner_of_short_lines_takes_half_of_each(write: Write) -> None:
     np.testing.assert_allclose(meeting, [1.01, 0.01, 0.0], atol=1e-12)
 
 
+def test_nothing_is_left_between_corners_of_nearly_equal_lines(write: Write) -> None:
+    # Halves of lines of 0.28 mm and 2e-8 mm more meet: between them there is no line to have a direction.
+    a, b, c = 0.28, 0.28 + 2e-8, 0.28
+    points = [[0, 0], [a, 0], [a + 0.8 * b, 0.6 * b], [a + 0.8 * b + c, 0.6 * b]]
+    made = plan(write(points, tolerance=0.1), PLANE, ARCS)
+    assert len(made.path) == 4
+    assert made.audit().ok
+
+
 def test_the_speed_of_transition_is_that_of_the_axis_that_turns_least_willingly(write: Write) -> None:
     machine = Machine("three", (Axis("X", 500.0, 4000.0), Axis("Y", 500.0, 2000.0), Axis("Z", 500.0, 900.0)))
     file = write([[0, 0, 0], [10, 0, 0], [10 + 12, 9, 8]])
