@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path as FilePath
@@ -14,6 +16,7 @@ import pytest
 
 import feedplan
 from feedplan.audit import Audit, audit
+from feedplan.bound import lower_bound
 from feedplan.constraints.problem import Problem, build_problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InfeasibleError, InputError, MissingPackageError, SolverError
@@ -96,6 +99,28 @@ def test_random_paths_take_the_exact_time_and_keep_every_limit(seed: int) -> Non
     assert least < profile.time / exact - 1 < 1e-3
     verdict = audited(problem, profile)
     assert verdict.ok, [check for check in verdict.checks if check.judged and not check.ok]
+
+
+@pytest.mark.parametrize("seed", range(int(os.environ.get("FEEDPLAN_SEEDS", "24"))))
+def test_other_solvers_agree_on_random_paths_and_none_is_below_the_bound(seed: int) -> None:
+    problem = random_path_problem(seed)
+    exact = bang_bang.plan(problem)
+    least = lower_bound(problem, exact)
+    slack = CHORD if np.isfinite(problem.chord_tolerance) else 1e-7
+
+    def time_by(plan: Callable[..., SpeedProfile], cells: int) -> float:
+        with suppress(SolverError):
+            return plan(problem, cells=cells).time
+        # On so coarse a mesh nothing slower has the speeds that are given at the ends.
+        assert problem.start_speed > 0 or problem.end_speed > 0
+        return np.nan
+
+    convex, nonlinear = (time_by(solver.plan, 12) for solver in (clarabel, casadi))
+    # Each lowers limits where its own solution goes beyond them.
+    assert np.isnan([convex, nonlinear]).any() or convex == pytest.approx(nonlinear, rel=2e-4)
+    for time in (convex, nonlinear, time_by(toppra.plan, 24)):
+        assert not time < least * (1 - 1e-9)
+        assert not time < exact.time * (1 - slack)
 
 
 @pytest.mark.parametrize("seed", range(1, int(os.environ.get("FEEDPLAN_SEEDS", "4")), 3))
