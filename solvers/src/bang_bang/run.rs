@@ -78,7 +78,6 @@ macro_rules! with_capacity {
     ($task:expr, $i:expr, $function:ident($($argument:expr),*)) => {
         match $task.coefficients($i) {
             ..=11 => $function::<M, 11>($($argument),*),
-            ..=20 => $function::<M, 20>($($argument),*),
             ..=36 => $function::<M, 36>($($argument),*),
             _ => $function::<M, MOST>($($argument),*),
         }
