@@ -4,8 +4,10 @@ use super::pass::{distance, Arc, Kind, Stuck};
 use super::split::{Axes, SubPiece};
 use crate::polynomial::Polynomial;
 
-/// An arc may exceed a limit by this part.
+/// An arc may exceed a limit by this part …
 const EXCESS: f64 = 1e-9;
+/// … and by this next to a slow end, where more digits are lost.
+const EXCESS_NEAR: f64 = 1e-8;
 /// Next to a place where all tangents are shorter than this part of the longest one limits are looked at closely:
 /// in these parts of the arc from there.
 const SLOW: f64 = 1e-4;
@@ -37,7 +39,8 @@ pub fn keeps_limits<const M: usize, const C: usize>(
         let inside = [0.02, 0.35, 0.7, 0.98].into_iter().map(|part| arc.x0 + part * span);
         let from_start = decades(arc.x0).iter().map(|part| arc.x0 + part * span);
         let to_end = decades(arc.x1).iter().map(|part| arc.x1 - part * span);
-        inside.chain(from_start).chain(to_end).all(|x| {
+        let near = from_start.chain(to_end).map(|x| (x, 1.0 + EXCESS_NEAR));
+        inside.map(|x| (x, 1.0 + EXCESS)).chain(near).all(|(x, most)| {
             let weight = sub.weight.value(x);
             let way = if x > slow_at { distance(sub, j, slow_at, x) } else { distance(sub, j, x, slow_at) };
             let g = sub.g[j].value(x);
@@ -46,8 +49,8 @@ pub fn keeps_limits<const M: usize, const C: usize>(
                 let other = sub.g[l].value(x);
                 // ω² (g_l s + g_l' π) with s from axis j, without the difference of large terms.
                 let acceleration = (signed * other + weight * weight * pi * twist[l].value(x)) / g;
-                acceleration.abs() <= axes.acceleration[l] * (1.0 + EXCESS)
-                    && other * other * pi <= axes.velocity_sq[l] * (1.0 + EXCESS)
+                acceleration.abs() <= axes.acceleration[l] * most
+                    && other * other * pi <= axes.velocity_sq[l] * most
             })
         })
     };
