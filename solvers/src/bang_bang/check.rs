@@ -7,7 +7,7 @@ use crate::polynomial::Polynomial;
 /// An arc may exceed a limit by this part …
 const EXCESS: f64 = 1e-9;
 /// … and by this next to a slow end, where more digits are lost.
-const EXCESS_NEAR: f64 = 1e-8;
+const EXCESS_NEAR: f64 = 1e-6;
 /// Next to a place where all tangents are shorter than this part of the longest one limits are looked at closely:
 /// in these parts of the arc from there.
 const SLOW: f64 = 1e-4;
