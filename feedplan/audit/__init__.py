@@ -285,7 +285,7 @@ _PATH = {
 }
 _PROBLEM = _dtypes(np.float64, "feed", "junction_speed")
 _PROFILE = {
-    **_dtypes(np.float64, "value", "u0", "u1", "p0", "p1", "duration"),
+    **_dtypes(np.float64, "value", "u0", "u1", "p0", "p1", "duration", "a0", "a1"),
     **_dtypes(np.uint8, "kind", "axis"),
     **_dtypes(np.uint32, "piece"),
     **_dtypes(np.int64, "runs"),

@@ -17,6 +17,9 @@ pub struct Arcs<'a> {
     pub p1: &'a [f64],
     /// In s.
     pub duration: &'a [f64],
+    /// Acceleration along the path at both ends, in mm/s².
+    pub a0: &'a [f64],
+    pub a1: &'a [f64],
     /// Arc offsets of the runs.
     pub runs: &'a [i64],
 }

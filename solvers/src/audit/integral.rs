@@ -170,6 +170,8 @@ mod tests {
             p0: &[p[0]],
             p1: &[p[1]],
             duration: &[1.0],
+            a0: &[0.0],
+            a1: &[0.0],
             runs: &[0, 1],
         }
         .motion(0, curve)
