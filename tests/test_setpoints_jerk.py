@@ -156,7 +156,7 @@ def test_rates_on_random_curves_are_the_differences_of_the_positions(interpolato
         stream = setpoints(problem_of(curve), profile, period, interpolator)
         chunk = stream.all()
         differences_agree(chunk, profile, period)
-        # Newton's error is in parts of each step: from rest the first is shorter than a ten millionth of a mm.
+        # Newton's error is in parts of each step: from rest the first is shorter than 1e-7 mm.
         assert stream.stats.length_error < (1e-6 if interpolator == "sarfraz" else 1e-5)
         assert stream.stats.iterations <= 30
         if (profile.kind == ArcKind.PATH_JERK).all():

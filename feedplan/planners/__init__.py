@@ -50,6 +50,12 @@ def corners(method: str) -> Corners:
     return choice
 
 
+def limits_jerk(method: str) -> bool:
+    """Whether a method claims to keep the axes' jerk limits, which are judged then; raises as `planner`."""
+    claim: bool = getattr(_module(method), "LIMITS_JERK", False)
+    return claim
+
+
 def _module(method: str) -> ModuleType:
     if method not in methods():
         raise InputError(f"there is no method '{method}': use one of {', '.join(methods())}")
