@@ -3,7 +3,8 @@
 A planner module has one function `plan(problem: Problem) -> SpeedProfile`, with what options it has as
 keywords. The method `bang-bang` is the module `bang_bang`; modules that begin with an underscore are what
 methods share. A method that is made for another path than the rounded one says so in `CORNERS`
-(`feedplan.geometry.corners.Corners`).
+(`feedplan.geometry.corners.Corners`); one whose profiles keep the jerk limits of the axes says
+`LIMITS_JERK = True`, and the audit judges them.
 """
 
 from __future__ import annotations
