@@ -329,9 +329,8 @@ def check(place: str, machine: str | None, resolution: float, jerk: bool, as_jso
     """
     from feedplan.audit import audit_setpoints
     from feedplan.files import planned_machine, planned_method, summary_text
-    from feedplan.planners import limits_jerk, methods
+    from feedplan.planners import limits_jerk
 
-    method = planned_method(FilePath(place))
     points = outputs.load_setpoints(place)
     audit = audit_setpoints(
         points.t,
@@ -342,7 +341,7 @@ def check(place: str, machine: str | None, resolution: float, jerk: bool, as_jso
         acceleration=points.acceleration,
         line=points.line,
         resolution=resolution,
-        jerk=jerk or (method in methods() and limits_jerk(str(method))),
+        jerk=jerk or limits_jerk(planned_method(FilePath(place))),
     )
     if as_json:
         sys.stdout.write(summary_text(audit.to_json()))

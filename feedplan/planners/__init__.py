@@ -51,10 +51,9 @@ def corners(method: str) -> Corners:
     return choice
 
 
-def limits_jerk(method: str) -> bool:
-    """Whether a method claims to keep the axes' jerk limits, which are judged then; raises as `planner`."""
-    claim: bool = getattr(_module(method), "LIMITS_JERK", False)
-    return claim
+def limits_jerk(method: str | None) -> bool:
+    """Whether a method claims to keep the axes' jerk limits, which are judged then; an unknown one: no."""
+    return method in methods() and getattr(_module(str(method)), "LIMITS_JERK", False)
 
 
 def _module(method: str) -> ModuleType:

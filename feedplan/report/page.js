@@ -144,7 +144,7 @@
       form[row === 0 ? "yaxis" : `yaxis${row + 1}`] = axis({ domain: [bottom, bottom + height - 0.012], range: [-1.12, 1.12], zeroline: true, zerolinecolor: style("--faint"), tickvals: [-1, -0.5, 0, 0.5, 1] });
     });
     Plotly.react("use", traces, layout({
-      ...form, shapes, annotations, margin: { l: 64, r: 20, t: 30, b: 46 }, hovermode: "x unified", hoversubplots: "axis", dragmode: "zoom",
+      ...form, shapes, annotations, margin: { l: 64, r: 20, t: 52, b: 46 }, hovermode: "x unified", hoversubplots: "axis", dragmode: "zoom",
       legend: { orientation: "h", traceorder: "normal", x: 1, xanchor: "right", y: 1, yanchor: "bottom", font: { size: 13 } },
       xaxis: axis({ title: title("time [s]"), anchor: `y${USED.length}`, range: Number.isFinite(from) ? [from, to] : [0, data.duration || 1] }),
     }), { ...config, ...flatTools });
