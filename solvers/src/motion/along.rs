@@ -57,7 +57,7 @@ impl End {
             }
             let next = t - miss / self.speed(t);
             let next = if low <= next && next <= high { next } else { 0.5 * (low + high) };
-            if next == t || !(low < high) {
+            if next == t || low >= high {
                 break;
             }
             t = next;
@@ -96,7 +96,7 @@ impl JerkLaw {
     }
 
     /// A time counted from one of the ends, as part of the way and with the motion there.
-    fn from_end(&self, end: usize, t: f64) -> (f64, Along) {
+    fn counted_from(&self, end: usize, t: f64) -> (f64, Along) {
         let End { a, j, .. } = self.ends[end];
         let (part, v) = (self.ends[end].way(t) / self.total(), self.ends[end].speed(t));
         if end == 0 {
@@ -109,9 +109,9 @@ impl JerkLaw {
     /// The part of the way, and the motion there, when these parts of the duration are done and left.
     pub fn at_time(&self, done: f64, left: f64) -> (f64, Along) {
         if done <= 0.5 {
-            self.from_end(0, done * self.duration)
+            self.counted_from(0, done * self.duration)
         } else {
-            self.from_end(1, left * self.duration)
+            self.counted_from(1, left * self.duration)
         }
     }
 
@@ -119,10 +119,10 @@ impl JerkLaw {
     pub fn at_part(&self, part: f64) -> Along {
         let way = part * self.total();
         if way <= self.ways[0] {
-            self.from_end(0, self.ends[0].time(way, 0.5 * self.duration)).1
+            self.counted_from(0, self.ends[0].time(way, 0.5 * self.duration)).1
         } else {
             let way = (1.0 - part) * self.total();
-            self.from_end(1, self.ends[1].time(way, 0.5 * self.duration)).1
+            self.counted_from(1, self.ends[1].time(way, 0.5 * self.duration)).1
         }
     }
 
