@@ -87,6 +87,8 @@ class Sampler:
         p0: NDArray[np.float64],
         p1: NDArray[np.float64],
         duration: NDArray[np.float64],
+        a0: NDArray[np.float64],
+        a1: NDArray[np.float64],
         arc_runs: NDArray[np.int64],
         period: float,
         newton: bool,

@@ -319,15 +319,17 @@ def fit(program: str, machine: str, tolerance: float | None, as_json: bool) -> N
 @click.option(
     "--resolution", type=_ZERO_OR_MORE, default=0.0, metavar="MM", help="Last digit of rounded positions."
 )
-@click.option("--jerk", is_flag=True, help="Judge jerk as well.")
+@click.option("--jerk", is_flag=True, help="Judge jerk whatever the method.")
 @_JSON
 def check(place: str, machine: str | None, resolution: float, jerk: bool, as_json: bool) -> int:
     """Audit setpoints against the limits of a machine.
 
-    Positions, velocities and accelerations are measured by differences alone. Exit code 1: a limit is broken.
+    Positions, velocities and accelerations are measured by differences alone, and so is the jerk where the
+    plan's method limits it. Exit code 1: a limit is broken.
     """
     from feedplan.audit import audit_setpoints
-    from feedplan.files import planned_machine, summary_text
+    from feedplan.files import planned_machine, planned_method, summary_text
+    from feedplan.planners import limits_jerk
 
     points = outputs.load_setpoints(place)
     audit = audit_setpoints(
@@ -339,7 +341,7 @@ def check(place: str, machine: str | None, resolution: float, jerk: bool, as_jso
         acceleration=points.acceleration,
         line=points.line,
         resolution=resolution,
-        jerk=jerk,
+        jerk=jerk or limits_jerk(planned_method(FilePath(place))),
     )
     if as_json:
         sys.stdout.write(summary_text(audit.to_json()))

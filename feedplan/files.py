@@ -139,12 +139,26 @@ def _timed(chunks: Iterator[SetpointChunk], compute: dict[str, float]) -> Iterat
 
 def planned_machine(place: FilePath) -> str:
     """The machine that these setpoints were planned for. Raises InputError where none is known."""
-    file = (place if place.is_dir() else place.parent) / SUMMARY_FILE
+    name = _planned(place, "machine")
+    if name is None:
+        raise InputError(f"{_summary(place)} names no machine: give the machine with --machine")
+    return name
+
+
+def planned_method(place: FilePath) -> str | None:
+    """The method that planned these setpoints, None where that is not known."""
+    return _planned(place, "method")
+
+
+def _summary(place: FilePath) -> FilePath:
+    return (place if place.is_dir() else place.parent) / SUMMARY_FILE
+
+
+def _planned(place: FilePath, name: str) -> str | None:
     try:
-        name = json.loads(file.read_text(encoding="utf-8"))["machine"]
+        return str(json.loads(_summary(place).read_text(encoding="utf-8"))[name])
     except (OSError, ValueError, KeyError, TypeError):
-        raise InputError(f"{file} names no machine: give the machine with --machine") from None
-    return str(name)
+        return None
 
 
 def summary_text(summary: dict[str, Any]) -> str:

@@ -17,7 +17,7 @@ from feedplan.curves.length import CurveLength
 from feedplan.geometry.build import build_path
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
-from feedplan.planners import corners, planner
+from feedplan.planners import corners, limits_jerk, planner
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 from feedplan.program.read import read_program
@@ -80,6 +80,7 @@ class Plan:
                     self.machine,
                     self.program,
                     self.setpoints(),
+                    jerk=limits_jerk(self.method),
                     progress=share,
                 )
             self._verdict.append(verdict)

@@ -85,6 +85,8 @@ class Setpoints:
             _array(profile.p0, np.float64),
             _array(profile.p1, np.float64),
             _array(profile.duration, np.float64),
+            _array(profile.a0, np.float64),
+            _array(profile.a1, np.float64),
             _array(profile.runs, np.int64),
             float(period),
             interpolator == "newton",
@@ -141,7 +143,8 @@ def setpoints(
     """Setpoints every `period` [s] of the joints along a problem's path, by the profile planned for it.
 
     `sarfraz`: where an axis moves at constant acceleration or speed its way tells the place, in closed form
-    on quadratic pieces; table of length or time with Sarfraz predictor-corrector elsewhere. `newton`: steps
+    on quadratic pieces; table of length or time with Sarfraz predictor-corrector elsewhere, the length at a
+    time in closed form where the jerk along the path is constant. `newton`: steps
     of speed times period, to third order, and Newton–Raphson. Pieces may have any degree, polynomial or
     rational; arcs of kind CHORD are for quadratic ones.
     Raises InputError for a period or an interpolator that cannot be used, or a profile of another path.

@@ -203,6 +203,20 @@ def test_every_format_passes_the_check(program: Path, tmp_path: Path) -> None:
         assert main(["check", str(folder / f"setpoints.{name}")]) == 0
 
 
+def test_jerk_is_judged_where_the_method_of_the_plan_limits_it(
+    program: Path, tmp_path: Path, capsys: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = str(tmp_path / "out")
+    assert main(["plan", str(program), "-m", "router", "-o", out, "-q"]) == 0
+    assert main(["check", out]) == 0
+    # Bang-bang limits none: a method that says so is found out, by its plan and by its setpoints alone.
+    monkeypatch.setattr("feedplan.planners.bang_bang.LIMITS_JERK", True, raising=False)
+    assert main(["check", out]) == 1
+    assert " jerk " in capsys.readouterr().err
+    assert main(["plan", str(program), "-m", "router", "-o", out, "-q"]) == 1
+    assert " jerk " in capsys.readouterr().err
+
+
 def test_a_check_without_a_machine_asks_for_one(program: Path, tmp_path: Path, capsys: Any) -> None:
     main(["plan", str(program), "-o", str(tmp_path / "out"), "-q"])
     (tmp_path / "out" / "plan.json").unlink()

@@ -457,7 +457,7 @@ def test_what_general_pieces_cannot_do_is_refused_with_a_sentence() -> None:
             {"kind": np.array([1], np.uint8), "p0": np.array([np.inf])},
             "a speed that is negative or not finite",
         ),
-        ({"kind": np.array([6], np.uint8)}, "unknown kind 6"),
+        ({"kind": np.array([8], np.uint8)}, "unknown kind 8"),
     ):
         with pytest.raises((InputError, ValueError), match=words):
             setpoints(problem, replace(profile, **change), 0.001)  # type: ignore[arg-type]

@@ -38,6 +38,7 @@ class _Limits:
     max_velocity: list[float]
     max_acceleration: list[float]
     max_jerk: list[float]
+    judges_jerk: bool
     max_velocity_jump: list[float]
     jump_beyond: list[float]
     travel: list[tuple[float, float]]
@@ -60,7 +61,9 @@ def audit(
     The `profile` on its path; with a `program` the distance between followed and programmed path; with
     `setpoints`, which are read chunk by chunk, their differences and their places on the path. Where the
     joints are not the path's axes, their limits are measured by the kinematics' positions alone. Jerk is
-    judged only if the method claims it (`jerk`). `progress` is called with the share done, 0 to 1.
+    judged only if the method claims it (`jerk`): then on the continuous profile as well, and the
+    acceleration may jump only where the curvature of the path does, by what the jerk limit makes in one
+    servo period. `progress` is called with the share done, 0 to 1.
 
     At a corner the profile's axis velocities may jump by the problem's `velocity_jump`. In setpoints a
     jump is an acceleration over one period, judged like any other by second differences: only the jump
@@ -80,6 +83,7 @@ def audit(
         max_velocity=_numbers(problem.max_velocity),
         max_acceleration=_numbers(problem.max_acceleration),
         max_jerk=_numbers(problem.max_jerk),
+        judges_jerk=jerk,
         max_velocity_jump=jump if problem.velocity_jump is None else _numbers(problem.velocity_jump),
         jump_beyond=jump,
         travel=[axis.travel for axis in machine_axes],
@@ -140,6 +144,7 @@ def _audit_joints(
         max_velocity=[math.inf] * axes,
         max_acceleration=[math.inf] * axes,
         max_jerk=[math.inf] * axes,
+        judges_jerk=False,
         max_velocity_jump=[0.0] * axes,
         jump_beyond=[0.0] * axes,
         travel=[(-math.inf, math.inf)] * axes,
@@ -150,7 +155,12 @@ def _audit_joints(
     if profile is not None:
         share = PLAN_SHARE if setpoints is not None else 1.0
         worst = audit_joint_profile(
-            problem, profile, jump, np.array(limits.travel), lambda done: report(share * done)
+            problem,
+            profile,
+            jump,
+            np.array(limits.travel),
+            lambda done: report(share * done),
+            limits.judges_jerk,
         )
         results.append(worst.findings())
     if setpoints is not None:
@@ -196,7 +206,8 @@ def audit_setpoints(
     `resolution` [mm] is the last digit of positions that were written as text: what its rounding adds to a
     difference is allowed. The period is that of the times. Jerk is judged only if `jerk` says so.
     A jump of velocity that the machine allows at corners shows as one or two accelerations above the limit
-    where the direction turns; only there it is allowed for.
+    where the direction turns; only there it is allowed for. So are up to three jerks on end above their limit
+    for a jump of the acceleration by what the jerk limit makes in one period: there the curvature may jump.
     Raises InputError for arrays that do not belong together.
     """
     names = machine.axis_names if axes is None else axes
@@ -223,6 +234,7 @@ def audit_setpoints(
         max_velocity=[axis.max_velocity for axis in machine_axes],
         max_acceleration=[axis.max_acceleration for axis in machine_axes],
         max_jerk=[axis.max_jerk for axis in machine_axes],
+        judges_jerk=jerk,
         max_velocity_jump=jump,
         jump_beyond=jump,
         travel=[axis.travel for axis in machine_axes],
@@ -285,7 +297,7 @@ _PATH = {
 }
 _PROBLEM = _dtypes(np.float64, "feed", "junction_speed")
 _PROFILE = {
-    **_dtypes(np.float64, "value", "u0", "u1", "p0", "p1", "duration"),
+    **_dtypes(np.float64, "value", "u0", "u1", "p0", "p1", "duration", "a0", "a1"),
     **_dtypes(np.uint8, "kind", "axis"),
     **_dtypes(np.uint32, "piece"),
     **_dtypes(np.int64, "runs"),

@@ -3,7 +3,7 @@
 On an arc of constant acceleration of joint k: v_k² = v_k(slower end)² + 2 a Δq_k, u̇ = |v_k| / |dq_k/du|,
 and a way Δq_k takes 2 Δq_k over the sum of the speeds at its ends. Where a joint's speed is constant: the
 way over it; where p is linear in u: Δu over the mean √p; along a speed limit: ∫ |C'| du over the speed, by
-Gauss's rule.
+Gauss's rule; where jerk is limited, speed and time follow from the length of the tip's way.
 """
 
 from __future__ import annotations
@@ -13,10 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.audit.joint_along import Pace, paces, ways
 from feedplan.audit.joint_path import EPS, ROUNDINGS, Array, JointPath, Numbers
 from feedplan.profile import ArcKind, SpeedProfile
 
 SPEED_LINE = 5
+
+# Kinds whose speed follows from the length of the tip's way.
+BY_WAY = (ArcKind.PATH_JERK, ArcKind.SPEED_CUBIC)
 
 # Places of an arc, as shares of the variable in which √p would be linear if p were: close at the ends, where
 # accelerations have their extremes.
@@ -105,8 +109,11 @@ def motion(path: JointPath, profile: SpeedProfile, arcs: Numbers, u: Array | Non
         speed_error = sq_error / (speed + np.sqrt(sq_error))
         speed_error = np.where(sq_error > 0.0, speed_error, 0.0) + ROUNDINGS * EPS * speed
         line = _speed_line(tip_speed, p, u)
+        by_way = np.isin(kind, BY_WAY)
+        pace = _by_way(path, profile, arcs, u, by_way)
         p_slow, u_slow = np.where(p[:, :1] <= p[:, 1:], [p[:, :1], u[:, :1]], [p[:, 1:], u[:, -1:]])
         laws = [kind[:, None] == number for number in (0, 1, 2, 3, 4, SPEED_LINE)]
+        laws.append(by_way[:, None] & np.ones(width, dtype=bool))
         slow = np.sqrt(np.where(slower == 0, p[:, 0], p[:, 1]))[:, None]
         by_joint = np.where(at_start & laws[0], slow, speed / g)
         root_p = np.select(
@@ -118,6 +125,7 @@ def motion(path: JointPath, profile: SpeedProfile, arcs: Numbers, u: Array | Non
                 speed / g,
                 np.sqrt(value * tip_speed),
                 line / tip_speed,
+                pace.v / tip_speed,
             ],
             np.nan,
         )
@@ -144,7 +152,24 @@ def motion(path: JointPath, profile: SpeedProfile, arcs: Numbers, u: Array | Non
         time, time_error = _times(
             path, piece, kind, value, u, g_way, g_unknown, speed, speed_error, root_p, p
         )
+        time = np.where(by_way[:, None], np.diff(pace.time, axis=1), time)
+        # The rounding of a time, not only of a step.
+        late = ROUNDINGS * EPS * (1.0 + np.abs(pace.time[:, 1:]).max(axis=1, keepdims=True) / time)
+        time_error = np.where(by_way[:, None] & (time > 0.0), late, time_error)
     return Motion(arcs, u, position, way, slope, error, root_p, velocity, velocity_error, time, time_error)
+
+
+def _by_way(
+    path: JointPath, profile: SpeedProfile, arcs: Numbers, u: Array, by_way: NDArray[np.bool_]
+) -> Pace:
+    """The motion of the tip (a, places) on arcs on which it follows from the length, 0 on the others."""
+    pace = Pace(*(np.zeros(u.shape) for _ in range(4)))
+    if by_way.any():
+        piece = profile.piece[arcs[by_way]].astype(np.int64)
+        some = paces(path, profile, arcs[by_way], ways(path, piece, u[by_way]))
+        for name in ("v", "a", "j", "time"):
+            getattr(pace, name)[by_way] = getattr(some, name)
+    return pace
 
 
 def _speed_line(tip_speed: Array, p: Array, u: Array) -> Array:
@@ -188,9 +213,8 @@ def _times(
     time, error = np.where(better, by_place, time), np.where(better, place_error, error)
     linear = kind[:, None] == ArcKind.PARAMETER_ACCELERATION
     time, error = np.where(linear, by_place, time), np.where(linear, rounding, error)
-    integrated = ~np.isin(
-        kind, (ArcKind.AXIS_ACCELERATION, ArcKind.PARAMETER_ACCELERATION, ArcKind.AXIS_VELOCITY)
-    )
+    closed = (ArcKind.AXIS_ACCELERATION, ArcKind.PARAMETER_ACCELERATION, ArcKind.AXIS_VELOCITY)
+    integrated = ~np.isin(kind, (*closed, *BY_WAY))
     if integrated.any():
         some = np.flatnonzero(integrated)
         both_ways = _integrals(path, piece[some], kind[some], value[some], u[some], p[some])

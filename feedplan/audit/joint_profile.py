@@ -11,7 +11,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from feedplan.audit.joint_motion import SPEED_LINE, Motion, motion
+from feedplan.audit.joint_jerk import audit_joint_jerk
+from feedplan.audit.joint_motion import BY_WAY, Motion, motion
 from feedplan.audit.joint_path import EPS, ROUNDINGS, TURN, Array, JointPath, Numbers
 from feedplan.audit.worst import Worst
 from feedplan.constraints.problem import Problem
@@ -36,10 +37,12 @@ def audit_joint_profile(
     jump: Array,
     travel: Array,
     progress: Callable[[float], None] = lambda done: None,
+    jerk: bool = False,
 ) -> Worst:
     """Velocity, acceleration and jumps of the joints, feed, chord error, times and order of the arcs.
 
-    `jump` (joints,) is what velocities may jump by at corners, `travel` (joints, 2).
+    `jump` (joints,) is what velocities may jump by at corners, `travel` (joints, 2). With `jerk` that of the
+    joints too, and the jumps of their accelerations.
     """
     worst = Worst()
     # What is not a number, or too great for one, is found as such.
@@ -51,6 +54,8 @@ def audit_joint_profile(
             arcs = np.arange(first, min(first + CHUNK, len(profile)))
             progress(first / len(profile))
             auditor.arcs(arcs[good[arcs]])
+            if jerk:
+                audit_joint_jerk(auditor.path, profile, arcs, good, starts, worst)
         auditor.finish()
     return worst
 
@@ -69,9 +74,11 @@ def arc_starts(problem: Problem, profile: SpeedProfile) -> Array:
 def has_good_numbers(problem: Problem, profile: SpeedProfile) -> NDArray[np.bool_]:
     """Which arcs have numbers that can be measured (arcs,)."""
     path = problem.path
-    good = (profile.piece < len(path)) & (profile.kind <= SPEED_LINE)
-    for column in (profile.value, profile.u0, profile.u1, profile.p0, profile.p1, profile.duration):
+    good = (profile.piece < len(path)) & (profile.kind <= max(ArcKind))
+    ends = (profile.u0, profile.u1, profile.p0, profile.p1, profile.a0, profile.a1)
+    for column in (profile.value, profile.duration, *ends):
         good &= np.isfinite(column)
+    good &= np.isin(profile.kind, BY_WAY) | ((profile.a0 == 0.0) & (profile.a1 == 0.0))
     good &= (profile.p0 >= 0.0) & (profile.p1 >= 0.0) & (profile.duration >= 0.0)
     needs = np.isin(profile.kind, (ArcKind.AXIS_ACCELERATION, ArcKind.AXIS_VELOCITY))
     return np.asarray(good & (~needs | (profile.axis < len(problem.axes))))

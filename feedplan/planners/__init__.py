@@ -3,7 +3,8 @@
 A planner module has one function `plan(problem: Problem) -> SpeedProfile`, with what options it has as
 keywords. The method `bang-bang` is the module `bang_bang`; modules that begin with an underscore are what
 methods share. A method that is made for another path than the rounded one says so in `CORNERS`
-(`feedplan.geometry.corners.Corners`).
+(`feedplan.geometry.corners.Corners`); one whose profiles keep the jerk limits of the axes says
+`LIMITS_JERK = True`, and the audit judges them.
 """
 
 from __future__ import annotations
@@ -48,6 +49,11 @@ def corners(method: str) -> Corners:
     """What becomes of a program's corners in the path that a method is made for; raises as `planner`."""
     choice: Corners = getattr(_module(method), "CORNERS", Corners.ROUNDED)
     return choice
+
+
+def limits_jerk(method: str | None) -> bool:
+    """Whether a method claims to keep the axes' jerk limits, which are judged then; an unknown one: no."""
+    return method in methods() and getattr(_module(str(method)), "LIMITS_JERK", False)
 
 
 def _module(method: str) -> ModuleType:

@@ -12,6 +12,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.audit.joint_along import constant_jerk, cubic
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.profile import ArcKind, SpeedProfile
@@ -113,6 +114,7 @@ def _sample(
         p = _profile_at(problem.curve, profile, arc, u, place, tangent, rate)
         line = np.flatnonzero(profile.kind[arc] == ArcKind.SPEED_LINE)
         p[line] = _speed_line(problem, profile, arc[line], u[line]) / rate[line] ** 2
+        p = _along(profile, arcs, within, rate.reshape(within.shape), p.reshape(within.shape)).ravel()
         return LimitSamples(
             length=length.ravel(),
             speed=rate * np.sqrt(np.maximum(p, 0.0)),
@@ -168,6 +170,22 @@ def _speed_line(problem: Problem, profile: SpeedProfile, arc: NDArray[np.int64],
         for at, p in ((u0, profile.p0[arc]), (u1, profile.p1[arc]))
     )
     return np.asarray(start + (end - start) * (u - u0) / (u1 - u0))
+
+
+def _along(profile: SpeedProfile, arcs: NDArray[np.int64], way: Floats, rate: Floats, p: Floats) -> Floats:
+    """p (arcs, samples), replaced on arcs of limited jerk by what the length from their start makes of it."""
+    p = p.copy()
+    for kind in (ArcKind.PATH_JERK, ArcKind.SPEED_CUBIC):
+        rows = np.flatnonzero(profile.kind[arcs] == kind)
+        some = arcs[rows]
+        v0, v1 = (rate[rows, end] * np.sqrt(x[some]) for end, x in ((0, profile.p0), (-1, profile.p1)))
+        ends = (v0, v1, profile.a0[some], profile.a1[some])
+        if kind == ArcKind.PATH_JERK:
+            pace = constant_jerk(way[rows], *ends, profile.value[some], profile.duration[some])
+        else:
+            pace = cubic(way[rows], *ends)
+        p[rows] = (pace.v / rate[rows]) ** 2
+    return p
 
 
 def limit_curve(tangent: Floats, second: Floats, max_acceleration: Floats) -> Floats:

@@ -57,9 +57,12 @@ def _name(problem: Problem, kind: int, axis: int) -> str:
         return f"{letter}acceleration"
     if kind == ArcKind.AXIS_VELOCITY:
         return f"{letter}velocity"
-    return {ArcKind.FEED: "feed", ArcKind.CHORD: "chord error"}.get(
-        ArcKind(kind), "acceleration along the path"
-    )
+    names = {
+        ArcKind.FEED: "feed",
+        ArcKind.CHORD: "chord error",
+        ArcKind.SPEED_LINE: "acceleration along the path",
+    }
+    return names.get(ArcKind(kind), "motion of limited jerk")
 
 
 def time_per_limit(problem: Problem, profile: SpeedProfile) -> list[Share]:

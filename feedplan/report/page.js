@@ -112,10 +112,49 @@
     }), { ...config, ...flatTools });
   }
 
+  /* Use of the limits, where the method keeps them all --------------------------------------------- */
+  const USED = ["velocity", "acceleration", "jerk"];
+  const usesAll = data.judged.includes("jerk") && data.limits.jerk.some(Boolean);
+  function drawUse(from = -Infinity, to = Infinity) {
+    if (!usesAll) return;
+    element("use-section").hidden = false;
+    const traces = [];
+    const shapes = [];
+    const annotations = [];
+    const form = {};
+    const pixels = element("use").clientWidth;
+    const gap = 0.06;
+    const height = (1 - gap * (USED.length - 1)) / USED.length;
+    USED.forEach((name, row) => {
+      const id = row === 0 ? "y" : `y${row + 1}`;
+      const bottom = 1 - (row + 1) * height - row * gap;
+      data.time[name].forEach((curve, k) => {
+        const limit = data.limits[name][k];
+        if (!limit) return;
+        const more = { name: data.axes[k], legendgroup: data.axes[k], yaxis: id, showlegend: name === "velocity" };
+        traces.push(...curveTraces(curve, from, to, { colour: `--axis-${k % 6}`, scale: 1 / limit, pixels, more, unit: "of its limit" }));
+      });
+      for (const y of [1, -1]) {
+        shapes.push({ type: "line", xref: "paper", x0: 0, x1: 1, yref: id, y0: y, y1: y, line: { color: style("--soft"), width: 1, dash: "dash" } });
+      }
+      annotations.push({
+        xref: "paper", yref: "paper", x: 0, y: bottom + height, xanchor: "left", yanchor: "bottom", showarrow: false,
+        text: `<b>${name}</b> / limit`, font: { size: 13, color: style("--soft") },
+      });
+      form[row === 0 ? "yaxis" : `yaxis${row + 1}`] = axis({ domain: [bottom, bottom + height - 0.012], range: [-1.12, 1.12], zeroline: true, zerolinecolor: style("--faint"), tickvals: [-1, -0.5, 0, 0.5, 1] });
+    });
+    Plotly.react("use", traces, layout({
+      ...form, shapes, annotations, margin: { l: 64, r: 20, t: 52, b: 46 }, hovermode: "x unified", hoversubplots: "axis", dragmode: "zoom",
+      legend: { orientation: "h", traceorder: "normal", x: 1, xanchor: "right", y: 1, yanchor: "bottom", font: { size: 13 } },
+      xaxis: axis({ title: title("time [s]"), anchor: `y${USED.length}`, range: Number.isFinite(from) ? [from, to] : [0, data.duration || 1] }),
+    }), { ...config, ...flatTools });
+  }
+
   function drawAll() {
     toolPath.draw();
     drawLength();
     drawTime();
+    drawUse();
   }
   element("scaling").addEventListener("click", (event) => {
     if (!event.target.dataset.relative) return;
@@ -128,15 +167,17 @@
   drawAll();
   refines("length", drawLength);
   refines("time", drawTime);
+  if (usesAll) refines("use", drawUse);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawAll);
 
   /* Paper is light and narrow, and has no WebGL. */
-  const PAPER = { path: 400, length: 320, time: 860 };
+  const PAPER = { path: 400, length: 320, time: 860, ...(usesAll ? { use: 640 } : {}) };
   addEventListener("beforeprint", () => {
     document.documentElement.classList.add("printing");
     toolPath.draw(true);
     drawLength();
     drawTime();
+    drawUse();
     for (const [id, height] of Object.entries(PAPER)) Plotly.relayout(id, { width: 670, height });
   });
   addEventListener("afterprint", () => {

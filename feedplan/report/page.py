@@ -19,6 +19,15 @@ from feedplan.report.tables import audit_table, fit_table, limits_table, numbers
 
 FILE = "report.html"
 
+# What the chart of speed over length shows, by whether the method limits jerk.
+_SPEED = {
+    False: "The planned speed touches one limit everywhere: it follows the feed, an axis velocity or the "
+    "limit curve of the axis accelerations, or it is on its way between them with one axis at full "
+    "acceleration.",
+    True: "The planned speed below the feed, the axis velocities and the limit curve of the axis "
+    "accelerations; these know no jerk, which holds it further down.",
+}
+
 
 def write_report(
     file: FilePath,
@@ -42,6 +51,7 @@ def write_report(
         verdict=verdict(audit),
         numbers=numbers(summary, figures.count),
         warnings=_warnings(summary.get("warnings") or ()),
+        speed=_SPEED[any(check.name == "jerk" and check.judged for check in audit.checks)],
         fast=f"{data['length']['cutting_speed']:.4g}",
         limits=limits_table(time_per_limit(problem, profile)),
         fit=fit_table(summary),

@@ -12,7 +12,8 @@ from feedplan.report.losses import Share, SlowLine
 from feedplan.units import duration_text, mm_per_min
 
 # Limits of the machine and the program; every other check is one of consistency.
-_LIMITS = {"feed", "velocity", "acceleration", "jerk", "chord", "deviation", "travel", "jump"}
+_OF_AXES = {"velocity", "acceleration", "acceleration_jump", "jerk", "travel", "jump"}
+_LIMITS = _OF_AXES | {"feed", "chord", "deviation"}
 
 _NO_JUMP = 1e-3  # [mm/s]
 
@@ -21,7 +22,9 @@ _NAMES = {
     "chord": "chord error",
     "deviation": "deviation from the program",
     "jump": "velocity jump at corners",
+    "acceleration_jump": "acceleration step where the curvature jumps",
     "continuity": "speed jump between pieces",
+    "acceleration_continuity": "acceleration jump along the path",
     "junction": "speed at corners and stops",
     "duration": "recorded durations",
     "order": "order of the arcs",

@@ -59,6 +59,8 @@ fn profile(kind: ArcKind, curve: &CompositeCurve<3>, r: f64) -> Vec<ProfileArc> 
                 p0: 1e4,
                 p1: 1e4,
                 duration: 0.01,
+                a0: 0.0,
+                a1: 0.0,
             };
             match kind {
                 ArcKind::Feed => {

@@ -4,6 +4,7 @@
 //! are integrated numerically, accelerations are difference quotients. By the mean value theorem a quotient
 //! exceeds a limit only where the motion does, so a broken limit found here is truly broken.
 
+pub mod along;
 pub mod arcs;
 pub mod compare;
 pub mod curve;
@@ -11,6 +12,7 @@ pub mod deviation;
 pub mod differences;
 pub mod follow;
 pub mod integral;
+pub mod jerk;
 pub mod motion;
 pub mod moves;
 pub mod place;
@@ -55,6 +57,8 @@ pub enum Check {
     Junction,
     /// Jump of the speed at a junction, in mm/s.
     Continuity,
+    /// Jump of the acceleration along the path, at rest from 0, in mm/s².
+    AccelerationContinuity,
     /// Recorded duration against the audit's own integral, relative.
     Duration,
     /// Distance between followed and programmed path, in mm.
@@ -73,6 +77,8 @@ pub enum Check {
     Jerk,
     /// Jump of an axis velocity, in mm/s.
     Jump,
+    /// Jump of an axis acceleration where the curvature jumps, in mm/s².
+    AccelerationJump,
     /// Position of an axis against its travel, in mm.
     Travel,
     /// Recorded velocity of an axis against the change of position, in mm/s.
@@ -82,7 +88,7 @@ pub enum Check {
 }
 
 /// Number of checks.
-pub const CHECKS: usize = 18;
+pub const CHECKS: usize = 20;
 
 impl Check {
     /// All checks in the order of their numbers.
@@ -93,6 +99,7 @@ impl Check {
         Check::Chord,
         Check::Junction,
         Check::Continuity,
+        Check::AccelerationContinuity,
         Check::Duration,
         Check::Deviation,
         Check::Gap,
@@ -102,6 +109,7 @@ impl Check {
         Check::Acceleration,
         Check::Jerk,
         Check::Jump,
+        Check::AccelerationJump,
         Check::Travel,
         Check::RecordedVelocity,
         Check::RecordedAcceleration,
@@ -116,6 +124,7 @@ impl Check {
             Check::Chord => "chord",
             Check::Junction => "junction",
             Check::Continuity => "continuity",
+            Check::AccelerationContinuity => "acceleration_continuity",
             Check::Duration => "duration",
             Check::Deviation => "deviation",
             Check::Gap => "gap",
@@ -125,6 +134,7 @@ impl Check {
             Check::Acceleration => "acceleration",
             Check::Jerk => "jerk",
             Check::Jump => "jump",
+            Check::AccelerationJump => "acceleration_jump",
             Check::Travel => "travel",
             Check::RecordedVelocity => "recorded_velocity",
             Check::RecordedAcceleration => "recorded_acceleration",
@@ -218,6 +228,8 @@ pub struct Limits<const M: usize> {
     pub velocity: [f64; M],
     pub acceleration: [f64; M],
     pub jerk: [f64; M],
+    /// Whether jerk is judged; else it is only measured where that costs nothing.
+    pub judges_jerk: bool,
     /// Jump of each axis velocity that is allowed at a corner, in mm/s.
     pub jump: [f64; M],
     /// What of it may show in differences of setpoints as an acceleration above the limit: nothing of a jump that is

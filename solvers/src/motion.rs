@@ -6,9 +6,10 @@
 //!
 //! `quadratic` has closed forms for pieces whose q'' is constant, `curve` is for pieces of any degree, polynomial
 //! and rational, and for joints that the speed limits of the tool tip hold for; `axis` is the motion of one axis
-//! at constant acceleration on those, `rate` what is integrated there. `even` is the motion of the parameter at
+//! at constant acceleration on those, `along` that of laws about the way, `rate` what is integrated there. `even` is the motion of the parameter at
 //! constant acceleration, on pieces of both.
 
+mod along;
 mod axis;
 mod curve;
 mod even;
@@ -20,13 +21,17 @@ use crate::arc_length::{Integrand, Node, Table, TABLE_ERROR};
 use crate::quadratic::Quadratic;
 use crate::sarfraz::{self, Located};
 use crate::spline::Piece;
+use along::Along;
+pub use curve::flaw;
 use curve::CurveMotion;
 use quadratic::QuadraticMotion;
 pub use rate::{TipSpeed, MAX_TIP};
 
 /// A step's length is met this closely, in parts of the step. 1e-6 would do for the length; four digits more
 /// keep the second differences of the positions quiet, which divide by the period squared.
-pub const STEP_ERROR: f64 = 1e-10;
+const STEP_ERROR: f64 = 1e-10;
+/// The same on arcs whose jerk is limited, for the third differences.
+const JERK_STEP_ERROR: f64 = 1e-13;
 
 /// What stays constant on an arc; the numbers are those of the profile's arrays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,6 +42,8 @@ pub enum ArcKind {
     AxisVelocity = 3,
     Chord = 4,
     SpeedLine = 5,
+    PathJerk = 6,
+    SpeedCubic = 7,
 }
 
 impl ArcKind {
@@ -49,13 +56,16 @@ impl ArcKind {
             Self::AxisVelocity,
             Self::Chord,
             Self::SpeedLine,
+            Self::PathJerk,
+            Self::SpeedCubic,
         ]
         .into_iter()
         .find(|&kind| kind as u8 == number)
     }
 }
 
-/// One arc of a profile: `value` is the constant of its kind, u0 < u1 local parameters, p at both ends.
+/// One arc of a profile: `value` is the constant of its kind, u0 < u1 local parameters, p at both ends, and on arcs of
+/// limited jerk the acceleration along the path.
 #[derive(Clone, Copy, Debug)]
 pub struct ProfileArc {
     pub piece: u32,
@@ -67,6 +77,8 @@ pub struct ProfileArc {
     pub p0: f64,
     pub p1: f64,
     pub duration: f64,
+    pub a0: f64,
+    pub a1: f64,
 }
 
 /// Velocity, acceleration and jerk of every axis.
@@ -84,6 +96,8 @@ pub struct State {
     /// Speed and |q'_k| of the governing axis; unused by the other laws.
     v: f64,
     g: f64,
+    /// The motion along the path, of laws about its way.
+    along: Along,
     /// Rounds that an inversion took, 0 for closed forms.
     pub iterations: u32,
     /// Bound of its error in parts of the arc's whole integral.
@@ -110,7 +124,7 @@ impl<'a, const M: usize> Motion<'a, M> {
     /// `with_lengths` tabulates the length of the arc whatever its kind.
     pub fn new(piece: Piece<'a, M>, tip: Option<TipSpeed<'a>>, arc: &ProfileArc, with_lengths: bool) -> Self {
         match Quadratic::from_piece(&piece) {
-            Some(quadratic) if tip.is_none() && arc.kind != ArcKind::SpeedLine => {
+            Some(quadratic) if tip.is_none() && !needs_curve(arc.kind) => {
                 Self::Quadratic(Box::new(QuadraticMotion::new(&quadratic, arc, with_lengths)))
             }
             _ => Self::Curve(Box::new(CurveMotion::new(piece, tip, arc, with_lengths))),
@@ -153,6 +167,14 @@ impl<'a, const M: usize> Motion<'a, M> {
         each!(self, motion, (motion.arc.u0, motion.arc.u1))
     }
 
+    /// How closely a step's length is to be met, in parts of the step.
+    pub fn step_error(&self) -> f64 {
+        match each!(self, motion, motion.arc.kind) {
+            ArcKind::PathJerk | ArcKind::SpeedCubic => JERK_STEP_ERROR,
+            _ => STEP_ERROR,
+        }
+    }
+
     /// No length is found more closely than this; `with_lengths` must have been asked for.
     pub fn length_rounding(&self) -> f64 {
         each!(self, motion, motion.lengths().rounding())
@@ -170,6 +192,11 @@ impl<'a, const M: usize> Motion<'a, M> {
             crate::newton::advance(&table, (u, table.integral(u)), step, tolerance).0
         })
     }
+}
+
+/// Whether the general form follows such an arc on quadratic pieces too.
+fn needs_curve(kind: ArcKind) -> bool {
+    matches!(kind, ArcKind::SpeedLine | ArcKind::PathJerk | ArcKind::SpeedCubic)
 }
 
 /// Tabulates f from one end to another.

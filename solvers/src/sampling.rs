@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use self::check::check;
 use self::chunk::Slices;
 pub use self::chunk::{Chunk, Effort};
-use crate::motion::{Motion, ProfileArc, Rates, State, TipSpeed, STEP_ERROR};
+use crate::motion::{Motion, ProfileArc, Rates, State, TipSpeed};
 use crate::quadratic::{dot, norm};
 use crate::spline::CompositeCurve;
 
@@ -101,11 +101,15 @@ impl<const M: usize> PathData<M> {
     /// The motion along an arc.
     fn motion(&self, arc: &ProfileArc, with_lengths: bool) -> Motion<'_, M> {
         let i = arc.piece as usize;
-        let tip = self.tip_speed.as_ref().map(|(coefficients, offsets)| TipSpeed {
+        Motion::new(self.curve.piece(i), self.tip_of(i), arc, with_lengths)
+    }
+
+    /// The speed that the feed is about on a piece, where it is not that of the path.
+    fn tip_of(&self, i: usize) -> Option<TipSpeed<'_>> {
+        self.tip_speed.as_ref().map(|(coefficients, offsets)| TipSpeed {
             coefficients: &coefficients[offsets[i]..offsets[i + 1]],
             width: self.curve.width[i],
-        });
-        Motion::new(self.curve.piece(i), tip, arc, with_lengths)
+        })
     }
 }
 
@@ -317,7 +321,7 @@ impl<const M: usize> Sampler<M> {
     /// Moves u to `time` on the arc; returns the rounds of Newton–Raphson and the length error left, in steps.
     fn step(&self, motion: &Motion<M>, time: f64, u: &mut f64) -> (u32, f64) {
         let (mut low, mut high) = motion.span();
-        let rounding = motion.length_rounding();
+        let (rounding, allowed) = (motion.length_rounding(), motion.step_error());
         let (mut rounds, mut whole) = (0, 0.0);
         for repeat in 0.. {
             let state = motion.at(*u);
@@ -336,11 +340,11 @@ impl<const M: usize> Sampler<M> {
             let middle = 0.5 * (low + high);
             // The derivatives of the speed may be rounding where an axis turns round: the speed alone must agree.
             let off = step.abs().max(0.5 * left.abs() * norm(&rates.velocity));
-            if off <= STEP_ERROR * whole + 2.0 * rounding || !(low < middle && middle < high) {
+            if off <= allowed * whole + 2.0 * rounding || !(low < middle && middle < high) {
                 let error = if whole > 0.0 { (step.abs() + motion.length_error()) / whole } else { 0.0 };
                 return (rounds, error);
             }
-            let tolerance = 0.1 * STEP_ERROR * whole + rounding;
+            let tolerance = 0.1 * allowed * whole + rounding;
             let located = motion.advance(*u, step, tolerance);
             rounds += located.iterations;
             // A large period can be too much for the series.
@@ -405,15 +409,18 @@ impl<const M: usize> Sampler<M> {
 fn step_length<const M: usize>(rates: &Rates<M>, time: f64) -> f64 {
     let Rates { velocity, acceleration, jerk } = rates;
     let v = norm(velocity);
-    // The direction of a speed that is rounding beside what the acceleration adds says nothing.
-    if v <= REST * norm(acceleration) * time.abs() {
-        // Away from the standstill, forward or back in time.
-        return 0.5 * norm(acceleration) * time * time.abs();
+    let (pull, push) = (norm(acceleration), norm(jerk));
+    // The direction of a speed that is rounding beside what acceleration and jerk add says nothing.
+    if v <= REST * (pull + 0.5 * push * time.abs()) * time.abs() {
+        // Away from the standstill, forward or back in time; so the jerk pushes, where there is nothing else.
+        let push = if pull <= REST * push * time.abs() { push } else { dot(acceleration, jerk) / pull };
+        return time * time.abs() * (0.5 * pull + time.abs() * push / 6.0);
     }
     let a = dot(velocity, acceleration) / v;
     let across: [f64; M] = std::array::from_fn(|k| acceleration[k] - a * velocity[k] / v);
     let j = (dot(velocity, jerk) + dot(&across, &across)) / v;
-    let time = if a < 0.0 { time.min(-v / a) } else { time };
+    // Where v + a t + j t²/2 vanishes, if it does: not a number otherwise, which `min` leaves out.
+    let time = if a < 0.0 { time.min(2.0 * v / ((a * a - 2.0 * v * j).sqrt() - a)) } else { time };
     time * (v + time * (0.5 * a + time * j / 6.0))
 }
 

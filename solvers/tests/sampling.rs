@@ -19,7 +19,8 @@ fn motion<'a, const M: usize>(curve: &'a CompositeCurve<M>, arc: &ProfileArc) ->
 }
 
 fn arc(kind: ArcKind, value: f64, u: (f64, f64), p: (f64, f64), duration: f64) -> ProfileArc {
-    ProfileArc { piece: 0, kind, axis: 0, value, u0: u.0, u1: u.1, p0: p.0, p1: p.1, duration }
+    let ((u0, u1), (p0, p1)) = (u, p);
+    ProfileArc { piece: 0, kind, axis: 0, value, u0, u1, p0, p1, duration, a0: 0.0, a1: 0.0 }
 }
 
 /// A line of 10 mm from rest to rest at 1000 mm/s²: up for 0.1 s to 100 mm/s, and down.
@@ -173,7 +174,7 @@ fn nonsense_is_refused_with_a_sentence() {
     for period in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-12, 5e-324] {
         assert!(build(&|_| (), period).unwrap().contains("period"), "{period}");
     }
-    let changes: [&dyn Fn(&mut ProfileArc); 8] = [
+    let changes: [&dyn Fn(&mut ProfileArc); 10] = [
         &|arc| arc.piece = 1,
         &|arc| arc.u1 = 11.0,
         &|arc| arc.u0 = arc.u1,
@@ -182,6 +183,8 @@ fn nonsense_is_refused_with_a_sentence() {
         &|arc| arc.p1 = f64::NAN,
         &|arc| arc.axis = 2,
         &|arc| arc.value = f64::INFINITY,
+        &|arc| arc.a0 = 1.0,
+        &|arc| arc.a1 = f64::NAN,
     ];
     for (i, change) in changes.iter().enumerate() {
         assert!(build(change, 0.001).unwrap().starts_with("arc 1 of the profile"), "{i}");
@@ -193,9 +196,9 @@ prop_compose! {
     fn any_arc()(
         control in prop::array::uniform3(prop::array::uniform2(-5.0..5.0)),
         slopes in prop::array::uniform2(prop_oneof![1 => Just(0.0), 4 => 0.0..5.0]),
-        width in 0.1..5.0f64, cut in prop::array::uniform2(0.0..1.0f64), kind in 0u8..6,
+        width in 0.1..5.0f64, cut in prop::array::uniform2(0.0..1.0f64), kind in 0u8..8,
         speeds in prop::array::uniform2(prop_oneof![1 => Just(0.0), 4 => 0.01..100.0]),
-        flip in any::<bool>(),
+        inner in prop::array::uniform2(prop_oneof![1 => Just(0.0), 4 => 0.0..2.0]), flip in any::<bool>(),
     ) -> (Quadratic<2>, ProfileArc) {
         let slopes = if slopes[0] + slopes[1] < 0.1 { [1.0, 2.0] } else { slopes };
         let speeds: [f64; 2] = if speeds[0] + speeds[1] == 0.0 { [0.0, 10.0] } else { speeds };
@@ -242,6 +245,25 @@ prop_compose! {
                 (arc.p0, arc.p1) = (line[0] / square(u0), line[1] / square(u1));
                 let at = |u: f64| line[0] + (line[1] - line[0]) * (u - u0) / (u1 - u0);
                 arc.duration = simpson(|u| (square(u) / at(u)).sqrt(), u0, u1);
+            }
+            ArcKind::PathJerk => {
+                // v is a quadratic polynomial of time with these Bernstein coefficients; from rest also without a pull.
+                let b = [speeds[0], 0.5 * inner[0] * (speeds[0] + speeds[1]), speeds[1]];
+                arc.duration = 3.0 * length(&piece, u0, u1) / (b[0] + b[1] + b[2]);
+                (arc.p0, arc.p1) = (p(b[0], norm(&g0)), p(b[2], norm(&g1)));
+                (arc.a0, arc.a1) = (2.0 * (b[1] - b[0]) / arc.duration, 2.0 * (b[2] - b[1]) / arc.duration);
+                arc.value = (arc.a1 - arc.a0) / arc.duration;
+            }
+            ArcKind::SpeedCubic => {
+                let b = [speeds[0], 10.0 * inner[0], 10.0 * inner[1], speeds[1]].map(|v| (1.0 + v).powi(2));
+                let way = length(&piece, u0, u1);
+                (arc.p0, arc.p1) = (p(b[0].sqrt(), norm(&g0)), p(b[3].sqrt(), norm(&g1)));
+                (arc.a0, arc.a1) = (1.5 * (b[1] - b[0]) / way, 1.5 * (b[3] - b[2]) / way);
+                let at = |x: f64| {
+                    let y = 1.0 - x;
+                    y * y * (y * b[0] + 3.0 * x * b[1]) + x * x * (3.0 * y * b[2] + x * b[3])
+                };
+                arc.duration = simpson(|x| way / at(x).sqrt(), 0.0, 1.0);
             }
         }
         (piece, arc)

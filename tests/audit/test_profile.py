@@ -435,7 +435,8 @@ def test_jerk_is_judged_only_where_it_is_claimed(part: Any) -> None:
     arguments = (part.problem, part.profile, part.machine, part.program)
     assert audit(*arguments, part.chunks(500)).ok
     claimed = audit(*arguments, part.chunks(500), jerk=True)
-    assert {name for name, _ in broken(claimed)} == {"jerk"}
+    # Arcs of constant axis acceleration limit no jerk, and those at constant feed jump with the curvature.
+    assert {name for name, _ in broken(claimed)} == {"jerk", "acceleration_jump"}
 
 
 def test_a_sentence_names_place_value_and_limit() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -105,6 +106,24 @@ def test_each_kind_of_arc_has_its_speed_in_the_middle(
     samples = sampled(*bend(square, kind, axis, value, ends))
     assert samples.speed[len(samples.speed) // 2] == pytest.approx(middle, rel=1e-12)
     assert samples.length[-1] == pytest.approx(16.23225240140230, rel=1e-5)
+
+
+def test_arcs_of_limited_jerk_have_the_speed_of_their_length(square: Any) -> None:
+    length = 16.23225240140230
+    # From rest at 600 mm/s³: s = 100 t³ and v = 300 t². Half of the length is done in the middle.
+    time = (length / 100.0) ** (1 / 3)
+    v1 = 300.0 * time**2
+    problem, profile = bend(square, ArcKind.PATH_JERK, 255, 600.0, (0.0, (v1 / 2.0) ** 2))
+    ends = {"a0": np.array([0.0]), "a1": np.array([600.0 * time])}
+    samples = sampled(problem, replace(profile, duration=np.array([time]), **ends))
+    middle = len(samples.speed) // 2
+    assert samples.speed[middle] == pytest.approx(300.0 * (0.5 * length / 100.0) ** (2 / 3), rel=1e-6)
+    assert samples.speed[[0, -1]] == pytest.approx([0.0, v1], rel=1e-6)
+    # v² from 100 to 400 without acceleration at the ends: half-way between them in the middle.
+    problem, profile = bend(square, ArcKind.SPEED_CUBIC, 255, 0.0, (25.0, 100.0))
+    samples = sampled(problem, profile)
+    assert samples.speed[middle] == pytest.approx(math.sqrt(250.0), rel=1e-6)
+    assert samples.speed[[0, -1]] == pytest.approx([10.0, 20.0], rel=1e-9)
 
 
 def test_the_chord_error_limits_the_bend(square: Any) -> None:

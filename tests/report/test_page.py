@@ -165,3 +165,11 @@ def test_axes_that_turn_have_curves_but_no_place_on_the_tool_path(square: Any, t
     assert len(data["time"]["velocity"]) == 3
     assert numbers(data["path"]["x"]).max() == 0.0
     assert numbers(data["path"]["z"]).max() == 20.0
+
+
+def test_the_use_of_all_limits_is_drawn_where_jerk_is_judged(square: Any, tmp_path: Path) -> None:
+    assert "jerk" not in data_of(page(square, tmp_path / "report.html"))["judged"]
+    verdict = replace(square.verdict, checks=(replace(square.verdict.checks[0], name="jerk", axis="X"),))
+    text = page(replace(square, verdict=verdict), tmp_path / "report.html")
+    assert data_of(text)["judged"] == ["jerk"]
+    assert '<section id="use-section" hidden>' in text

@@ -1,7 +1,9 @@
 //! The arcs of a speed profile: their arrays, when they begin, and what is wrong with their numbers alone.
 
+use super::along::{Along, Pace};
 use super::curve::{inner, length, Curve, Followed};
 use super::motion::{Law, Motion, Shape};
+use super::{EPS, ROUNDINGS};
 
 /// The profile's arrays, one entry an arc; see `feedplan.profile.SpeedProfile`.
 #[derive(Clone, Copy)]
@@ -17,6 +19,9 @@ pub struct Arcs<'a> {
     pub p1: &'a [f64],
     /// In s.
     pub duration: &'a [f64],
+    /// Acceleration along the path at both ends, in mm/s².
+    pub a0: &'a [f64],
+    pub a1: &'a [f64],
     /// Arc offsets of the runs.
     pub runs: &'a [i64],
 }
@@ -27,6 +32,8 @@ const FEED: u8 = 2;
 const AXIS_VELOCITY: u8 = 3;
 const CHORD: u8 = 4;
 const SPEED_LINE: u8 = 5;
+const PATH_JERK: u8 = 6;
+const SPEED_CUBIC: u8 = 7;
 
 /// Where p is infinite C' is at most this share of its size: the tool passes a cusp there.
 const CUSP: f64 = 1e-6;
@@ -61,11 +68,12 @@ impl Arcs<'_> {
     /// What is wrong with the numbers of arc `i` taken alone, if anything.
     pub fn has_bad_numbers(&self, i: usize, path: &Followed) -> bool {
         let piece = self.piece[i] as usize;
-        if piece >= path.len() || self.kind[i] > SPEED_LINE {
+        if piece >= path.len() || self.kind[i] > SPEED_CUBIC {
             return true;
         }
         let needs_axis = matches!(self.kind[i], AXIS_ACCELERATION | AXIS_VELOCITY);
-        let numbers = [self.value[i], self.u0[i], self.u1[i], self.duration[i]];
+        let numbers = [self.value[i], self.u0[i], self.u1[i], self.duration[i], self.a0[i], self.a1[i]];
+        let accelerates = matches!(self.kind[i], PATH_JERK | SPEED_CUBIC);
         (needs_axis && self.axis[i] as usize >= path.axes)
             || numbers.iter().any(|number| !number.is_finite())
             || self.p0[i].is_nan()
@@ -73,19 +81,21 @@ impl Arcs<'_> {
             || self.p0[i] < 0.0
             || self.p1[i] < 0.0
             || self.duration[i] < 0.0
+            || (!accelerates && (self.a0[i] != 0.0 || self.a1[i] != 0.0))
             || ((self.p0[i].is_infinite() || self.p1[i].is_infinite()) && !self.passes_cusp(i, path))
     }
 
     /// Whether an arc with an infinite p begins or ends at a cusp, where that is right.
     fn passes_cusp(&self, i: usize, path: &Followed) -> bool {
-        let by_speed = matches!(self.kind[i], AXIS_ACCELERATION | FEED | AXIS_VELOCITY);
+        let by_speed = matches!(self.kind[i], AXIS_ACCELERATION | FEED | AXIS_VELOCITY | PATH_JERK);
+        let needs_an_end = matches!(self.kind[i], AXIS_ACCELERATION | PATH_JERK);
         let curve = path.curve::<6>(self.piece[i] as usize);
         let still = |u: f64, p: f64| {
             !p.is_infinite() || length(&curve.derivative(u)) <= CUSP * length(&curve.derivative_size())
         };
         by_speed
             && matches!(curve, Curve::General(..))
-            && !(self.kind[i] == AXIS_ACCELERATION && self.p0[i].is_infinite() && self.p1[i].is_infinite())
+            && !(needs_an_end && self.p0[i].is_infinite() && self.p1[i].is_infinite())
             && still(self.u0[i], self.p0[i])
             && still(self.u1[i], self.p1[i])
     }
@@ -103,6 +113,7 @@ impl Arcs<'_> {
             }
             PARAMETER_ACCELERATION => p[1] < p[0],
             SPEED_LINE => speed_sq(1) < speed_sq(0),
+            PATH_JERK | SPEED_CUBIC => p[0].is_infinite() || speed_sq(1) < speed_sq(0),
             _ => false,
         };
         let (tangent, p_anchor, p_far) =
@@ -120,6 +131,7 @@ impl Arcs<'_> {
             FEED => Law::Feed { speed: self.value[i].sqrt() },
             AXIS_VELOCITY => Law::AxisVelocity { axis, speed: self.value[i].sqrt() },
             CHORD => Law::Chord { value: self.value[i] },
+            PATH_JERK | SPEED_CUBIC => Law::Along,
             _ => {
                 let anchor = usize::from(anchored_at_end);
                 let start_sq = speed_sq(anchor);
@@ -138,6 +150,40 @@ impl Arcs<'_> {
                 Shape::General { whole: polygon.clone(), ends, part, tangent, size: curve.derivative_size() }
             }
         };
-        Motion::new(law, shape, width, [p_anchor, p_far], anchored_at_end)
+        let motion = Motion::new(law, shape, width, [p_anchor, p_far], anchored_at_end);
+        if !matches!(law, Law::Along) {
+            return motion;
+        }
+        // Counted from the anchor; from the end time runs back.
+        let (mut squares, mut a) = ([speed_sq(0), speed_sq(1)], [self.a0[i], self.a1[i]]);
+        if anchored_at_end {
+            squares.reverse();
+            a = [-a[1], -a[0]];
+        }
+        motion.with_along(|length| match self.kind[i] {
+            PATH_JERK => Along::Jerk {
+                start: Pace { v: squares[0].sqrt(), a: a[0], j: self.value[i] },
+                duration: self.duration[i],
+            },
+            _ => Along::cubic(squares, a, length),
+        })
+    }
+
+    /// The recorded acceleration along the path at an end of arc `i`, where its kind tells one.
+    pub fn end_acceleration(&self, i: usize, at_end: bool) -> Option<f64> {
+        match self.kind[i] {
+            FEED => Some(0.0),
+            PATH_JERK | SPEED_CUBIC => Some(if at_end { self.a1[i] } else { self.a0[i] }),
+            _ => None,
+        }
+    }
+
+    /// How far the accelerations recorded at both ends of arc `i` are from its constant jerk, in mm/s².
+    pub fn acceleration_error(&self, i: usize) -> f64 {
+        if self.kind[i] != PATH_JERK {
+            return 0.0;
+        }
+        let (from, to, change) = (self.a0[i], self.a1[i], self.value[i] * self.duration[i]);
+        (to - from - change).abs() - ROUNDINGS * EPS * (to.abs() + from.abs() + change.abs())
     }
 }

@@ -3,6 +3,7 @@
 use super::curve::{distance, from_to, inner, length, Segment};
 use super::deviation::{settled, window};
 use super::follow::{is_step, Plan};
+use super::jerk::Jerks;
 use super::moves::Neighbours;
 use super::setpoints::Row;
 use super::timed::Reader;
@@ -152,13 +153,8 @@ impl<'a, const M: usize> Comparison<'a, M> {
         if rows.windows(2).any(|pair| !is_step(pair[0].t, pair[1].t, period)) {
             return 0.0;
         }
-        let (from, to) = (&rows[0].spot, &rows[2].spot);
-        let at_start = from.place.u <= PLACE_TOLERANCE;
-        let at_end = path.width[to.place.piece] - to.place.u <= PLACE_TOLERANCE;
-        let first = if at_start { from.place.piece.max(1) } else { from.place.piece + 1 };
-        let last = (to.place.piece + usize::from(at_end)).min(path.len() - 1);
         let mut corners = 0.0;
-        for piece in first..=last {
+        for piece in self.begun([rows[0], rows[2]]) {
             let before = path.curve::<M>(piece - 1);
             let after = path.curve::<M>(piece);
             let (into, out) = (before.derivative(before.width()), after.derivative(0.0));
@@ -168,5 +164,34 @@ impl<'a, const M: usize> Comparison<'a, M> {
             }
         }
         corners
+    }
+
+    /// Jumps of each acceleration where the curvature of the path jumps, all those between two rows together; without a
+    /// profile as great as they may be.
+    pub fn acceleration_steps(&self, rows: [&Row<M>; 2]) -> [f64; M] {
+        let (path, limits) = (&self.plan.path, self.limits);
+        let mut steps = [0.0; M];
+        for piece in self.begun(rows) {
+            let step = match &self.plan.profile {
+                Some(timed) => {
+                    Jerks { path, arcs: &timed.arcs, limits, starts: timed.starts }.step_into(piece)
+                }
+                None => Some(limits.jerk.map(|jerk| jerk * limits.period)),
+            };
+            for (sum, step) in steps.iter_mut().zip(step.iter().flatten()) {
+                *sum += step.max(0.0);
+            }
+        }
+        steps
+    }
+
+    /// The pieces that begin between two rows, those included that the places there cannot be told from.
+    fn begun(&self, [first, last]: [&Row<M>; 2]) -> std::ops::RangeInclusive<usize> {
+        let path = &self.plan.path;
+        let (from, to) = (first.spot.place, last.spot.place);
+        let at_start = from.u <= PLACE_TOLERANCE;
+        let at_end = path.width[to.piece] - to.u <= PLACE_TOLERANCE;
+        let begin = if at_start { from.piece.max(1) } else { from.piece + 1 };
+        begin..=(to.piece + usize::from(at_end)).min(path.len() - 1)
     }
 }

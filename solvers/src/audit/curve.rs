@@ -152,6 +152,25 @@ impl<const M: usize> Curve<M> {
         }
     }
 
+    /// The first three derivatives at u, and what the rounding of each is relative to.
+    pub fn derivatives(&self, u: f64) -> [([f64; M], [f64; M]); 3] {
+        match self {
+            Curve::Quadratic(curve) => {
+                let size = self.derivative_size();
+                let bend = curve.second_derivative();
+                let none = ([0.0; M], [0.0; M]);
+                [(curve.derivative(u), size), (bend, size.map(|size| size / curve.width)), none]
+            }
+            Curve::General(polygon, width) => {
+                let mut scale = 1.0;
+                polygon.derivatives(u / width).map(|(value, size)| {
+                    scale /= width;
+                    (value.map(|x| scale * x), size.map(|x| scale * x))
+                })
+            }
+        }
+    }
+
     /// For each axis what the rounding of C' is relative to.
     pub fn derivative_size(&self) -> [f64; M] {
         match self {

@@ -16,13 +16,30 @@ const INNER_WEIGHTS: [f64; 2] = [5.0 / 9.0, 8.0 / 9.0];
 const RULES_AGREE: f64 = 3e-6;
 
 /// The same on pieces of other degrees, where it is not known how far away p has a pole.
-const RULES_AGREE_CLOSELY: f64 = 3e-8;
+pub(super) const RULES_AGREE_CLOSELY: f64 = 3e-8;
 
 /// A boundary layer that takes less than this share of an interval's time is left out.
 const THIN: f64 = 1e-12;
 
 /// Halvings of an interval before it counts as one that cannot be integrated; right arcs need some forty.
-const MOST_HALVINGS: u32 = 400;
+pub(super) const MOST_HALVINGS: u32 = 400;
+
+/// The integral of f from a to b by both rules, the better one first.
+#[inline(always)]
+pub(super) fn kronrod(f: impl Fn(f64) -> f64, a: f64, b: f64) -> [f64; 2] {
+    let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
+    let centre = f(middle);
+    let mut fine = WEIGHTS[3] * centre;
+    let mut coarse = INNER_WEIGHTS[1] * centre;
+    for (i, node) in NODES.iter().enumerate() {
+        let both = f(middle - half * node) + f(middle + half * node);
+        fine += WEIGHTS[i] * both;
+        if i == 1 {
+            coarse += INNER_WEIGHTS[0] * both;
+        }
+    }
+    [half * fine, half * coarse]
+}
 
 impl<const M: usize> Motion<M> {
     /// dt/dy at `y` inside the arc, up to `time_scale`.
@@ -54,20 +71,9 @@ impl<const M: usize> Motion<M> {
     #[inline]
     fn rule(&self, y0: f64, y1: f64) -> (f64, bool) {
         let smooth = self.is_smooth(self.distance(y0), self.distance(y1));
-        let (middle, half) = (0.5 * (y0 + y1), 0.5 * (y1 - y0));
-        let centre = self.integrand(middle);
-        let mut fine = WEIGHTS[3] * centre;
-        let mut coarse = INNER_WEIGHTS[1] * centre;
-        for (i, node) in NODES.iter().enumerate() {
-            let both = self.integrand(middle - half * node) + self.integrand(middle + half * node);
-            fine += WEIGHTS[i] * both;
-            if i == 1 {
-                coarse += INNER_WEIGHTS[0] * both;
-            }
-        }
-        let scale = self.time_scale * half;
+        let [fine, coarse] = kronrod(|y| self.integrand(y), y0, y1).map(|sum| self.time_scale * sum);
         let agree = if self.is_general() { RULES_AGREE_CLOSELY } else { RULES_AGREE };
-        (fine * scale, smooth && (fine - coarse).abs() <= agree * fine)
+        (fine, smooth && (fine - coarse).abs() <= agree * fine)
     }
 
     /// Walks from `from` to `to` and calls `step` for every interval whose time is known well enough; for what
@@ -112,6 +118,9 @@ impl<const M: usize> Motion<M> {
     /// The time between two places, or the place between them at which the interval has to be halved.
     #[inline]
     fn integrate(&self, y0: f64, y1: f64, halvings: &mut u32) -> Result<f64, f64> {
+        if let Some(time) = self.time_by_way(y0, y1) {
+            return Ok(time);
+        }
         let (time, trusted) = self.rule(y0, y1);
         let middle = 0.5 * (y0 + y1);
         if trusted || middle <= y0 || middle >= y1 {
@@ -127,6 +136,9 @@ impl<const M: usize> Motion<M> {
     /// Time of an interval so short that the 3-point rule is enough, in s.
     #[inline]
     fn short_time(&self, y0: f64, y1: f64) -> f64 {
+        if let Some(time) = self.time_by_way(y0, y1) {
+            return time;
+        }
         let (middle, half) = (0.5 * (y0 + y1), 0.5 * (y1 - y0));
         let both = self.integrand(middle - half * NODES[1]) + self.integrand(middle + half * NODES[1]);
         let sum = INNER_WEIGHTS[1] * self.integrand(middle) + INNER_WEIGHTS[0] * both;
@@ -170,6 +182,8 @@ mod tests {
             p0: &[p[0]],
             p1: &[p[1]],
             duration: &[1.0],
+            a0: &[0.0],
+            a1: &[0.0],
             runs: &[0, 1],
         }
         .motion(0, curve)

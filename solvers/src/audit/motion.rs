@@ -5,7 +5,9 @@
 //! slower: from there v_k² = v_k(anchor)² + 2 a (q_k − q_k(anchor)) adds two terms of one sign and loses nothing. So it
 //! is where p is smaller on an arc of constant parameter acceleration.
 
+use super::along::{Along, Pace};
 use super::curve::{inner, length};
+use super::integral::{kronrod, MOST_HALVINGS, RULES_AGREE_CLOSELY};
 use super::polygon::Polygon;
 use super::EPS;
 
@@ -38,6 +40,8 @@ pub enum Law {
         start_sq: f64,
         change_sq: f64,
     },
+    /// The speed follows from the length of the path: see `Motion::with_along`.
+    Along,
 }
 
 /// The piece under an arc.
@@ -104,6 +108,15 @@ pub struct Motion<const M: usize> {
     /// Whether the anchor is the end of the arc.
     pub anchored_at_end: bool,
     pub(super) pole: Option<Pole>,
+    /// The speed by the length of the path from the anchor.
+    along: Option<Box<Measured>>,
+}
+
+#[derive(Clone, Debug)]
+struct Measured {
+    along: Along,
+    /// Distances from the anchor, and lengths up to there, between which the rule is good.
+    lengths: Vec<[f64; 2]>,
 }
 
 #[derive(Clone, Debug)]
@@ -168,7 +181,71 @@ impl<const M: usize> Motion<M> {
             second_order: direction * share * (far - near),
             time_scale: 2.0 * share,
             anchored_at_end,
+            along: None,
         }
+    }
+
+    /// The same with the speed that `along` makes of the whole length.
+    pub fn with_along(mut self, along: impl FnOnce(f64) -> Along) -> Self {
+        let mut lengths = vec![[0.0; 2]];
+        self.measure(0.0, self.width, &mut { MOST_HALVINGS }, &mut lengths);
+        self.along = Some(Box::new(Measured { along: along(lengths[lengths.len() - 1][1]), lengths }));
+        self
+    }
+
+    /// Adds the lengths of parts between two distances from the anchor.
+    fn measure(&self, from: f64, to: f64, halvings: &mut u32, lengths: &mut Vec<[f64; 2]>) {
+        let [fine, coarse] = self.length_between(from, to);
+        let middle = 0.5 * (from + to);
+        let good = (fine - coarse).abs() <= RULES_AGREE_CLOSELY * fine;
+        if good || *halvings == 0 || !(from < middle && middle < to) {
+            lengths.push([to, lengths[lengths.len() - 1][1] + fine]);
+            return;
+        }
+        *halvings -= 1;
+        self.measure(from, middle, halvings, lengths);
+        self.measure(middle, to, halvings, lengths);
+    }
+
+    fn length_between(&self, from: f64, to: f64) -> [f64; 2] {
+        kronrod(|d| length(&self.tangent_at(self.direction * d)), from, to)
+    }
+
+    /// C' at the signed distance `d` from the anchor.
+    fn tangent_at(&self, d: f64) -> [f64; M] {
+        match &self.general {
+            None => std::array::from_fn(|k| self.tangent[k] + d * self.bend[k]),
+            Some(general) => {
+                let scale = self.direction / self.width;
+                general.part.local((d / self.width).abs().min(1.0)).slope.map(|slope| scale * slope)
+            }
+        }
+    }
+
+    /// The speed by the length, and the length from the anchor to the signed distance `d`.
+    fn along_at(&self, d: f64) -> Option<(&Along, f64)> {
+        let measured = self.along.as_ref()?;
+        let (d, lengths) = (d.abs(), &measured.lengths);
+        let [from, way] = lengths[lengths.partition_point(|row| row[0] <= d).max(1) - 1];
+        let rest = if d > from { self.length_between(from, d)[0] } else { 0.0 };
+        Some((&measured.along, way + rest))
+    }
+
+    /// Time from `y0` to `y1` where the speed follows from the length, in s.
+    pub(super) fn time_by_way(&self, y0: f64, y1: f64) -> Option<f64> {
+        let (along, from) = self.along_at(self.distance(y0))?;
+        let (_, to) = self.along_at(self.distance(y1))?;
+        Some(along.time_between(from, to))
+    }
+
+    /// The motion along the path at `y`, in the order of time, where the arc's kind says something of its jerk.
+    pub fn pace(&self, y: f64) -> Option<Pace> {
+        if let Law::Feed { speed } = self.law {
+            return Some(Pace { v: speed, a: 0.0, j: 0.0 });
+        }
+        let (along, way) = self.along_at(self.distance(y))?;
+        let pace = along.pace(way);
+        Some(Pace { a: self.direction * pace.a, ..pace })
     }
 
     /// Distance from the anchor, with its sign, at `y`.
@@ -224,7 +301,13 @@ impl<const M: usize> Motion<M> {
             Law::SpeedLine { start_sq, change_sq } => {
                 (start_sq + change_sq * (d / self.width).abs()).sqrt() / length(tangent)
             }
+            Law::Along => self.speed_by_way(d) / length(tangent),
         }
+    }
+
+    #[inline(never)]
+    fn speed_by_way(&self, d: f64) -> f64 {
+        self.along_at(d).map_or(f64::NAN, |(along, way)| along.pace(way).v)
     }
 
     /// C' and √p at the signed distance `d` on a piece of any degree.
@@ -272,6 +355,7 @@ impl<const M: usize> Motion<M> {
             }
             Law::Feed { speed } => speed,
             Law::AxisVelocity { axis, speed } => speed / direction[axis].abs(),
+            Law::Along => self.speed_by_way(self.distance(y)),
             _ => f64::NAN,
         };
         direction.map(|e| e * speed)
@@ -331,12 +415,31 @@ impl<const M: usize> Motion<M> {
                 terms[axis] / tangent[axis].abs()
             }
             Law::Feed { .. } | Law::Chord { .. } | Law::SpeedLine { .. } => length(&terms) / length(&tangent),
+            Law::Along => length(&terms) / length(&tangent) + self.felt(d),
             _ => 1.0,
         };
         let magnitude = std::array::from_fn(|k| {
             terms[k] * root_p + if velocity[k] == 0.0 { 0.0 } else { velocity[k].abs() * enlarged }
         });
         State { y, tangent, root_p, velocity, magnitude }
+    }
+
+    /// The local parameter of the piece at `y` on an arc from `u0` to `u1`.
+    pub fn parameter(&self, y: f64, [u0, u1]: [f64; 2]) -> f64 {
+        let d = self.distance(y);
+        (if self.anchored_at_end { u1 + d } else { u0 + d }).clamp(u0, u1)
+    }
+
+    /// How much the rounding of the length is enlarged in the speed that follows from it.
+    fn felt(&self, d: f64) -> f64 {
+        self.along_at(d).map_or(0.0, |(along, way)| {
+            let Pace { v, a, .. } = along.pace(way);
+            if way > 0.0 {
+                a.abs() / v * (way / v)
+            } else {
+                0.0
+            }
+        })
     }
 
     /// Whether the arc's own axis is the one that its definition holds at constant acceleration.

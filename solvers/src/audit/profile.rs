@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use super::arcs::Arcs;
 use super::curve::{length, Followed};
+use super::jerk::Jerks;
 use super::motion::{Motion, State};
 use super::{Check, Limits, Tally, EPS, GAP_TOLERANCE, PASS_EXCESS, ROUNDINGS};
 
@@ -93,11 +94,19 @@ impl<const M: usize> Auditor<'_, M> {
             probe.run_evenly(SLIDE_INTERVALS);
         }
         self.recorded_ends(i, &motion, width, line, tally);
+        if self.limits.judges_jerk {
+            self.jerks().arc(i, &motion, &curve, line, tally);
+        }
 
         // A rounding of u0 or u1 changes the width, and with it the time, by this share.
         let rounding = ROUNDINGS * motion.width_rounding(width);
         let error = (arcs.duration[i] - elapsed).abs() / elapsed - rounding;
         tally.offer(Check::Duration, 0, error, PASS_EXCESS, time, line);
+    }
+
+    fn jerks(&self) -> Jerks<'_, M> {
+        let Self { path, arcs, limits, starts, .. } = *self;
+        Jerks { path, arcs, limits, starts }
     }
 
     /// The recorded p at both ends against what the arc's definition gives there, as a jump of axis velocity.
@@ -214,6 +223,9 @@ impl<const M: usize> Auditor<'_, M> {
             }
         }
         let (time, line) = (self.starts[j], self.line(after));
+        if self.limits.judges_jerk {
+            self.jerks().joint(i, j, line, tally);
+        }
         let at_corner = if before == after { 0.0 } else { 1.0 };
         for k in 0..M {
             let jump = (velocity[1][k] - velocity[0][k]).abs() - rounding[k];
@@ -243,6 +255,9 @@ impl<const M: usize> Auditor<'_, M> {
         let rounding = ROUNDINGS * EPS * (speed + wanted);
         let limit = self.negligible_speed();
         tally.offer(Check::Junction, 0, (speed - wanted).abs() - rounding, limit, time, self.line(piece));
+        if self.limits.judges_jerk && wanted == 0.0 {
+            self.jerks().rest(i, u > self.arcs.u0[i], self.line(piece), tally);
+        }
     }
 
     /// A jump of the speed that means nothing to any axis.

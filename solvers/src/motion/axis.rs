@@ -202,7 +202,7 @@ impl AxisLaw {
         let width = arc.u1 - arc.u0;
         let u = if side == 0 { arc.u0 + width * x } else { arc.u1 - width * x };
         let g = (self.ways[side].slope(x) / width).max(0.0);
-        State { u: u.clamp(arc.u0, arc.u1), v, g, iterations, error: f64::EPSILON }
+        State { u: u.clamp(arc.u0, arc.u1), v, g, iterations, error: f64::EPSILON, ..State::default() }
     }
 
     /// The nearer end, how far away it is, and the part of the way from there.

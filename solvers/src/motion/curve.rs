@@ -4,18 +4,21 @@
 //! With D = |C'|² of the path or of the tip, v² = D p is constant (`Feed`) or linear in u (`SpeedLine`), so that
 //! s = ((v²)' − p D')/(2D) and s' = −(4 s D' + p D'')/(2D). Where axis k governs, with acceleration a,
 //! s = (a − q''_k p)/q'_k and s' = −(q'''_k p + 3 q''_k s)/q'_k. Where the parameter has a constant acceleration
-//! it is s itself (`even`).
+//! it is s itself (`even`). Where v, its change a and that one's change j are known along the path (`along`),
+//! √D du/dt = v and its derivatives give those of u.
 //!
 //! These quotients are 0/0 where axis k turns round and at cusps, always at an end of the arc. Nearer to it than
 //! rounding allows they are taken at a place a little farther off, and continued from there where p is finite.
 
+use super::along::{Along, CubicLaw, JerkLaw};
 use super::axis::{AxisLaw, End};
 use super::even::EvenLaw;
 use super::rate::{FromRest, Line, Rate, Source, Tip, TipSpeed, MAX_TIP};
-use super::{fill, invert, parts, ArcKind, ProfileArc, Rates, State};
-use crate::arc_length::{Node, Table};
+use super::{fill, invert, parts, ArcKind, ProfileArc, Rates, State, JERK_STEP_ERROR};
+use crate::arc_length::{quadrature, Node, Table};
 use crate::polynomial::Polynomial;
 use crate::quadratic::{dot, norm};
+use crate::sarfraz;
 use crate::spline::bezier::derivatives;
 use crate::spline::speed::{Coefficients, Speed};
 use crate::spline::Piece;
@@ -38,6 +41,8 @@ enum Law {
     Axis(Box<AxisLaw>),
     /// v² of the path or the tip.
     Speed(Line),
+    Jerk(JerkLaw),
+    Cubic(Box<CubicLaw>),
 }
 
 /// An arc with everything that its evaluation needs.
@@ -57,13 +62,34 @@ pub struct CurveMotion<'a, const M: usize> {
     lengths: Vec<Node>,
     /// By u; from rest, by the root of the way from there.
     times: Vec<Node>,
+    /// The way of the path or the tip, for laws about it.
+    ways: Vec<Node>,
     pub(super) length_error: f64,
     time_error: f64,
+    way_error: f64,
+}
+
+/// Why nothing can follow an arc, whose numbers are finite, if its law is about the way along the path.
+pub fn flaw<const M: usize>(
+    piece: Piece<M>,
+    tip: Option<TipSpeed>,
+    arc: &ProfileArc,
+) -> Option<&'static str> {
+    if !matches!(arc.kind, ArcKind::PathJerk | ArcKind::SpeedCubic) {
+        return None;
+    }
+    let motion = CurveMotion::bare(piece, tip, arc);
+    let length = quadrature(&motion.time_rate(Line::ONE), arc.u0, arc.u1);
+    if arc.kind == ArcKind::PathJerk {
+        JerkLaw::new(arc, motion.end_speeds(), length).flaw()
+    } else {
+        CubicLaw::flaw(arc, motion.end_speeds(), length)
+    }
 }
 
 impl<'a, const M: usize> CurveMotion<'a, M> {
-    /// Prepares an arc; `with_lengths` tabulates its length whatever its kind.
-    pub fn new(piece: Piece<'a, M>, tip: Option<TipSpeed>, arc: &ProfileArc, with_lengths: bool) -> Self {
+    /// Without a law and its tables.
+    fn bare(piece: Piece<'a, M>, tip: Option<TipSpeed>, arc: &ProfileArc) -> Self {
         let mut motion = Self {
             piece,
             own: Coefficients::new(&piece),
@@ -75,10 +101,23 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
             straight: None,
             lengths: vec![],
             times: vec![],
+            ways: vec![],
             length_error: 0.0,
             time_error: 0.0,
+            way_error: 0.0,
         };
         motion.foot = motion.cusp();
+        motion
+    }
+
+    /// Prepares an arc; `with_lengths` tabulates its length whatever its kind.
+    pub fn new(piece: Piece<'a, M>, tip: Option<TipSpeed>, arc: &ProfileArc, with_lengths: bool) -> Self {
+        let mut motion = Self::bare(piece, tip, arc);
+        if matches!(arc.kind, ArcKind::PathJerk | ArcKind::SpeedCubic) {
+            let mut nodes = vec![];
+            motion.way_error = fill(motion.time_rate(Line::ONE), (arc.u0, arc.u1), &mut nodes);
+            motion.ways = nodes;
+        }
         let axis = |acceleration: f64, speed: Option<f64>| {
             // Its duration tells the pace where the axis shows no motion.
             AxisLaw::new(&piece, arc, arc.axis as usize, acceleration, speed)
@@ -89,6 +128,10 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
             ArcKind::AxisVelocity => axis(0.0, Some(arc.value.sqrt())),
             ArcKind::Feed => Law::Speed(Line { start: arc.value, ..Line::ONE }),
             ArcKind::SpeedLine => Law::Speed(motion.speed_line()),
+            ArcKind::PathJerk => Law::Jerk(JerkLaw::new(arc, motion.end_speeds(), motion.ways().total())),
+            ArcKind::SpeedCubic => {
+                Law::Cubic(Box::new(CubicLaw::new(arc, motion.end_speeds(), motion.ways().total())))
+            }
             // `check` has refused chord limits here.
             ArcKind::ParameterAcceleration | ArcKind::Chord => Law::Even(EvenLaw::new(arc)),
         };
@@ -115,7 +158,7 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
         let arc = self.arc;
         let ends = match &self.law {
             Law::Axis(law) => law.ends,
-            Law::Speed(_) => {
+            Law::Speed(_) | Law::Jerk(_) | Law::Cubic(_) => {
                 let middle = self.square(0.5 * (arc.u0 + arc.u1));
                 [(arc.u0, arc.p0), (arc.u1, arc.p1)].map(|(u, p)| {
                     if p == f64::INFINITY || self.square(u) <= SLOW * middle {
@@ -196,6 +239,12 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
         }
     }
 
+    /// v at both ends; not finite or not a number where p is infinite.
+    fn end_speeds(&self) -> [f64; 2] {
+        let arc = &self.arc;
+        [(arc.u0, arc.p0), (arc.u1, arc.p1)].map(|(u, p)| (self.square(u) * p).sqrt())
+    }
+
     fn cusp(&self) -> f64 {
         let own = |u: f64| {
             let q = derivatives(&self.piece, u)[1];
@@ -255,6 +304,21 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
         Table { f: self.time_rate(line), nodes: &self.times }
     }
 
+    /// The way that a law is about.
+    fn ways(&self) -> Table<'_, Rate<'_, M>> {
+        Table { f: self.time_rate(Line::ONE), nodes: &self.ways }
+    }
+
+    /// Where a part of the way is done.
+    fn at_part(&self, part: f64, along: Along, period: f64) -> State {
+        let ways = self.ways();
+        let total = ways.total();
+        let tolerance = (JERK_STEP_ERROR * total * period / self.arc.duration).max(ways.rounding());
+        let located = sarfraz::locate(&ways, part * total, tolerance);
+        let error = (located.miss + self.way_error) / total;
+        State { u: located.u, iterations: located.iterations, error, along, ..State::default() }
+    }
+
     /// The place `t` seconds after the start of the arc. `period` is the step whose length is to be met.
     pub fn at_time(&self, t: f64, period: f64) -> State {
         let (done, left) = match parts(&self.arc, t) {
@@ -273,13 +337,29 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
                 }
                 None => invert(&self.times(*line), self.time_error, &self.arc, done, period),
             },
+            Law::Jerk(law) => {
+                let (part, along) = law.at_time(done, left);
+                self.at_part(part, along, period)
+            }
+            Law::Cubic(law) => {
+                let (found, along) = law.at_time(done, period);
+                let state = self.at_part(found.u, along, period);
+                let iterations = state.iterations.max(found.iterations);
+                State { iterations, error: state.error + found.miss, ..state }
+            }
         }
     }
 
     /// The place with parameter u.
     pub fn at(&self, u: f64) -> State {
+        let part = || {
+            let ways = self.ways();
+            ways.integral(u) / ways.total()
+        };
         match &self.law {
             Law::Axis(law) => law.at(&self.arc, u),
+            Law::Jerk(law) => State { u, along: law.at_part(part()), ..State::default() },
+            Law::Cubic(law) => State { u, along: law.at_part(part()), ..State::default() },
             _ => State { u, ..State::default() },
         }
     }
@@ -287,6 +367,7 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
     /// Seconds from the start of the arc to a place.
     pub fn time(&self, state: &State) -> f64 {
         let done = match &self.law {
+            Law::Jerk(_) | Law::Cubic(_) => return state.along.t,
             Law::Even(law) => law.done(&self.arc, state.u),
             Law::Axis(law) => law.done(&self.arc, state),
             Law::Speed(line) => match self.rest_at_an_end(line) {
@@ -320,6 +401,7 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
             Law::Even(law) => rates(&q, law.root(&self.arc, state.u), law.s, 0.0),
             Law::Speed(line) => self.at_speed(line, at, &there),
             Law::Axis(law) => self.by_axis(law, state, &q, at, &there),
+            Law::Jerk(_) | Law::Cubic(_) => self.by_way(&state.along, at, &there),
         };
         (q[0], rates)
     }
@@ -339,6 +421,7 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
                 let a = 0.5 * line.slope / square.sqrt();
                 [line.at(state.u).sqrt(), a, -0.5 * a * slope / square * (line.at(u) / square).sqrt()]
             }
+            Law::Jerk(_) | Law::Cubic(_) => [state.along.v, state.along.a, state.along.j],
             // Such an arc has no end where the quotients are 0/0.
             Law::Even(_) => [0.0; 3],
         };
@@ -346,14 +429,37 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
         Rates { velocity: along(v), acceleration: along(a), jerk: along(j) }
     }
 
-    fn at_speed(&self, line: &Line, u: f64, q: &[[f64; M]; 4]) -> Rates<M> {
-        let [square, slope, bend] = match &self.tip {
+    /// D and its derivatives at u.
+    fn squares(&self, u: f64, q: &[[f64; M]; 4]) -> [f64; 3] {
+        match &self.tip {
             Some(tip) => [0, 1, 2].map(|order| tip[order].value(u / self.piece.width)),
             None => {
                 let bend = 2.0 * (dot(&q[2], &q[2]) + dot(&q[1], &q[3]));
                 [dot(&q[1], &q[1]), 2.0 * dot(&q[1], &q[2]), bend]
             }
-        };
+        }
+    }
+
+    /// With g = √D: g u̇ = v, g ü + g' u̇² = a, g u⃛ + 3 g' u̇ ü + g'' u̇³ = j, all finite at a standstill.
+    fn by_way(&self, along: &Along, u: f64, q: &[[f64; M]; 4]) -> Rates<M> {
+        let [square, slope, bend] = self.squares(u, q);
+        let g = square.sqrt();
+        let dg = 0.5 * slope / g;
+        let ddg = (0.5 * bend - dg * dg) / g;
+        let first = along.v / g;
+        let second = (along.a - dg * first * first) / g;
+        let third = (along.j - first * (3.0 * dg * second + ddg * first * first)) / g;
+        Rates {
+            velocity: q[1].map(|q| q * first),
+            acceleration: std::array::from_fn(|l| q[1][l] * second + q[2][l] * first * first),
+            jerk: std::array::from_fn(|l| {
+                q[1][l] * third + first * (3.0 * q[2][l] * second + q[3][l] * first * first)
+            }),
+        }
+    }
+
+    fn at_speed(&self, line: &Line, u: f64, q: &[[f64; M]; 4]) -> Rates<M> {
+        let [square, slope, bend] = self.squares(u, q);
         let p = line.at(u) / square;
         let s = (line.slope - p * slope) / (2.0 * square);
         rates(q, p.sqrt(), s, -(4.0 * s * slope + p * bend) / (2.0 * square))

@@ -77,8 +77,10 @@ impl<const M: usize> QuadraticMotion<M> {
             }
             ArcKind::Feed => Law::Feed { speed_sq: arc.value },
             ArcKind::Chord => Law::Chord { value: arc.value },
-            // `Motion` takes the general form for a line of speed.
-            ArcKind::ParameterAcceleration | ArcKind::SpeedLine => Law::Even(EvenLaw::new(arc)),
+            // `Motion` takes the general form for the last three.
+            ArcKind::ParameterAcceleration | ArcKind::SpeedLine | ArcKind::PathJerk | ArcKind::SpeedCubic => {
+                Law::Even(EvenLaw::new(arc))
+            }
         };
         if with_lengths || matches!(motion.law, Law::Feed { .. }) {
             motion.length_error = fill(Length(motion.hodograph), (arc.u0, arc.u1), &mut motion.lengths);

@@ -134,6 +134,8 @@ struct ProfileArrays<'py> {
     p0: PyReadonlyArray1<'py, f64>,
     p1: PyReadonlyArray1<'py, f64>,
     duration: PyReadonlyArray1<'py, f64>,
+    a0: PyReadonlyArray1<'py, f64>,
+    a1: PyReadonlyArray1<'py, f64>,
     runs: PyReadonlyArray1<'py, i64>,
 }
 
@@ -149,10 +151,13 @@ impl ProfileArrays<'_> {
             p0: self.p0.as_slice()?,
             p1: self.p1.as_slice()?,
             duration: self.duration.as_slice()?,
+            a0: self.a0.as_slice()?,
+            a1: self.a1.as_slice()?,
             runs: self.runs.as_slice()?,
         };
-        let ends = [arcs.u0, arcs.u1, arcs.p0, arcs.p1, arcs.value, arcs.duration];
-        let good = ends.iter().all(|array| array.len() == arcs.len())
+        let [a0, a1] = [arcs.a0, arcs.a1];
+        let numbers = [arcs.u0, arcs.u1, arcs.p0, arcs.p1, arcs.value, arcs.duration, a0, a1];
+        let good = numbers.iter().all(|array| array.len() == arcs.len())
             && [arcs.kind.len(), arcs.axis.len()] == [arcs.len(); 2];
         require(good, "profile")?;
         Ok(arcs)
@@ -219,6 +224,7 @@ struct LimitArrays {
     max_velocity: Vec<f64>,
     max_acceleration: Vec<f64>,
     max_jerk: Vec<f64>,
+    judges_jerk: bool,
     max_velocity_jump: Vec<f64>,
     jump_beyond: Vec<f64>,
     travel: Vec<[f64; 2]>,
@@ -243,6 +249,7 @@ impl LimitArrays {
             velocity: padded(&self.max_velocity),
             acceleration: padded(&self.max_acceleration),
             jerk: padded(&self.max_jerk),
+            judges_jerk: self.judges_jerk,
             jump: padded(&self.max_velocity_jump),
             jump_beyond: padded(&self.jump_beyond),
             travel: std::array::from_fn(|k| self.travel.get(k).copied().unwrap_or(anywhere)),

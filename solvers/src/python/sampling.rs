@@ -111,6 +111,8 @@ impl PySampler {
         p0: PyReadonlyArray1<'_, f64>,
         p1: PyReadonlyArray1<'_, f64>,
         duration: PyReadonlyArray1<'_, f64>,
+        a0: PyReadonlyArray1<'_, f64>,
+        a1: PyReadonlyArray1<'_, f64>,
         arc_runs: PyReadonlyArray1<'_, i64>,
         period: f64,
         newton: bool,
@@ -118,9 +120,10 @@ impl PySampler {
         let (piece, kind, axis) = (slice(&piece)?, slice(&kind)?, slice(&axis)?);
         let (value, duration) = (slice(&value)?, slice(&duration)?);
         let (u0, u1, p0, p1) = (slice(&u0)?, slice(&u1)?, slice(&p0)?, slice(&p1)?);
+        let (a0, a1) = (slice(&a0)?, slice(&a1)?);
         let count = piece.len();
         if [kind.len(), axis.len()].iter().any(|&length| length != count)
-            || [value, u0, u1, p0, p1, duration].iter().any(|array| array.len() != count)
+            || [value, u0, u1, p0, p1, duration, a0, a1].iter().any(|array| array.len() != count)
         {
             return Err(PyValueError::new_err("the arrays of the profile differ in length"));
         }
@@ -139,6 +142,8 @@ impl PySampler {
                     p0: p0[i],
                     p1: p1[i],
                     duration: duration[i],
+                    a0: a0[i],
+                    a1: a1[i],
                 })
             })
             .collect::<PyResult<Vec<_>>>()?;

@@ -1,7 +1,7 @@
 //! Whether the arrays of a path and a profile fit together, before anything is computed from them.
 
 use super::PathData;
-use crate::motion::{ArcKind, ProfileArc, MAX_TIP};
+use crate::motion::{flaw, ArcKind, ProfileArc, MAX_TIP};
 
 /// The error is a sentence for the user.
 pub(super) fn check<const M: usize>(
@@ -88,14 +88,20 @@ fn check_arc<const M: usize>(path: &PathData<M>, run: usize, arc: &ProfileArc) -
     let most = match arc.kind {
         // Nothing else would tell the speed.
         ArcKind::SpeedLine => 1,
-        ArcKind::ParameterAcceleration | ArcKind::Chord => 0,
+        ArcKind::ParameterAcceleration | ArcKind::Chord | ArcKind::SpeedCubic => 0,
         _ => 2,
     };
-    let signed = matches!(arc.kind, ArcKind::AxisAcceleration | ArcKind::ParameterAcceleration);
+    let signed =
+        matches!(arc.kind, ArcKind::AxisAcceleration | ArcKind::ParameterAcceleration | ArcKind::PathJerk);
     if !(arc.p0 >= 0.0 && arc.p1 >= 0.0 && arc.value.is_finite() && (signed || arc.value >= 0.0))
         || infinite > most
     {
         return Err("has a speed that is negative or not finite");
     }
-    Ok(())
+    let of_way = matches!(arc.kind, ArcKind::PathJerk | ArcKind::SpeedCubic);
+    let right = |a: f64| if of_way { a.is_finite() } else { a == 0.0 };
+    if !(right(arc.a0) && right(arc.a1)) {
+        return Err("has an acceleration along the path that is not finite, or not of its kind");
+    }
+    flaw(piece, path.tip_of(arc.piece as usize), arc).map_or(Ok(()), Err)
 }

@@ -1,0 +1,151 @@
+//! The speed of an arc of limited jerk as a function of the length of the path from its anchor.
+//!
+//! At constant jerk the time of a length is found by halving; where v² is a cubic polynomial of the length it is
+//! integrated.
+
+use super::integral::{kronrod, MOST_HALVINGS, RULES_AGREE_CLOSELY};
+
+/// Halvings of a bracket of the time until it is as narrow as its numbers.
+const MOST_STEPS: u32 = 1100;
+
+/// v, its change a and that one's change j, in s.
+#[derive(Clone, Copy, Debug)]
+pub struct Pace {
+    pub v: f64,
+    pub a: f64,
+    pub j: f64,
+}
+
+/// The speed along an arc, counted from its anchor: where that is the end, time runs back.
+#[derive(Clone, Copy, Debug)]
+pub enum Along {
+    /// The state at the anchor.
+    Jerk { start: Pace, duration: f64 },
+    /// v² by powers of the share of the length.
+    Cubic { c: [f64; 4], length: f64 },
+}
+
+impl Along {
+    /// From v² and a at the anchor and at the other end.
+    pub fn cubic(speed_sq: [f64; 2], a: [f64; 2], length: f64) -> Self {
+        let [from, to] = speed_sq;
+        let [slope, end_slope] = a.map(|a| 2.0 * a * length);
+        let c =
+            [from, slope, 3.0 * (to - from) - 2.0 * slope - end_slope, slope + end_slope - 2.0 * (to - from)];
+        Self::Cubic { c, length }
+    }
+
+    /// The motion after a length.
+    pub fn pace(&self, way: f64) -> Pace {
+        match self {
+            Self::Jerk { start, .. } => start.after(self.time(way)),
+            Self::Cubic { c, length } => {
+                let x = way / length;
+                let slope = c[1] + x * (2.0 * c[2] + x * 3.0 * c[3]);
+                let bend = 2.0 * c[2] + 6.0 * c[3] * x;
+                let v = square(c, x).sqrt();
+                Pace { v, a: 0.5 * slope / length, j: 0.5 * v * bend / (length * length) }
+            }
+        }
+    }
+
+    /// Time of the stretch between two lengths, in s; not a number where it cannot be integrated.
+    pub fn time_between(&self, from: f64, to: f64) -> f64 {
+        match self {
+            Self::Jerk { .. } => self.time(to) - self.time(from),
+            Self::Cubic { c, length } => {
+                let pace = |x: f64| length / square(c, x).sqrt();
+                integral(&pace, from / length, to / length, &mut { MOST_HALVINGS })
+            }
+        }
+    }
+
+    /// Time at constant jerk from the anchor to a length; beyond the arc's own at its mean speed.
+    fn time(&self, way: f64) -> f64 {
+        let Self::Jerk { start, duration } = *self else { return f64::NAN };
+        let whole = start.way(duration);
+        if way <= 0.0 {
+            return 0.0;
+        }
+        if way >= whole {
+            return duration * (way / whole);
+        }
+        let (mut low, mut high) = (0.0, duration);
+        // From rest the time is as the cube root of the length.
+        let mut t = duration * (way / whole).cbrt();
+        for _ in 0..MOST_STEPS {
+            let miss = start.way(t) - way;
+            if miss > 0.0 {
+                high = t;
+            } else {
+                low = t;
+            }
+            let newton = t - miss / start.after(t).v;
+            let next = if low < newton && newton < high { newton } else { 0.5 * (low + high) };
+            if next == t || next <= low || next >= high {
+                break;
+            }
+            t = next;
+        }
+        t
+    }
+}
+
+impl Pace {
+    fn after(&self, t: f64) -> Self {
+        Self { v: self.v + t * (self.a + 0.5 * t * self.j), a: self.a + t * self.j, j: self.j }
+    }
+
+    fn way(&self, t: f64) -> f64 {
+        t * (self.v + t * (0.5 * self.a + t * self.j / 6.0))
+    }
+}
+
+fn square(c: &[f64; 4], x: f64) -> f64 {
+    c[0] + x * (c[1] + x * (c[2] + x * c[3]))
+}
+
+/// The integral from a to b, halved where the rules differ; not a number where that takes too long.
+pub fn integral(f: &impl Fn(f64) -> f64, a: f64, b: f64, halvings: &mut u32) -> f64 {
+    let [fine, coarse] = kronrod(f, a, b);
+    let middle = 0.5 * (a + b);
+    if (fine - coarse).abs() <= RULES_AGREE_CLOSELY * fine.abs() || !(a < middle && middle < b) {
+        return fine;
+    }
+    if *halvings == 0 || !fine.is_finite() {
+        return f64::NAN;
+    }
+    *halvings -= 1;
+    integral(f, a, middle, halvings) + integral(f, middle, b, halvings)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn from_rest_at_constant_jerk_the_length_grows_with_the_cube_of_the_time() {
+        let start = Pace { v: 0.0, a: 0.0, j: 6.0 };
+        let along = Along::Jerk { start, duration: 2.0 };
+        for t in [1e-9, 1e-3, 0.5, 1.9, 2.0] {
+            let t: f64 = t;
+            assert!((along.time_between(0.0, t.powi(3)) / t - 1.0).abs() < 1e-15, "{t}");
+            let pace = along.pace(t.powi(3));
+            assert!((pace.v / (3.0 * t * t) - 1.0).abs() < 1e-14 && (pace.a / (6.0 * t) - 1.0).abs() < 1e-14);
+        }
+        // 1 % beyond the end takes 1 % more.
+        assert!((along.time_between(0.0, 8.08) - 2.02).abs() < 1e-14);
+    }
+
+    #[test]
+    fn a_square_linear_in_the_length_is_constant_acceleration() {
+        // v² = 25 + 60 s over 5 mm: v = 5 + 30 t.
+        let along = Along::cubic([25.0, 325.0], [30.0, 30.0], 5.0);
+        for t in [0.01, 0.2, 0.4] {
+            let way = 5.0 * t + 15.0 * t * t;
+            assert!((along.time_between(0.0, way) - t).abs() < 1e-12);
+            let Pace { v, a, j } = along.pace(way);
+            assert!((v - 5.0 - 30.0 * t).abs() < 1e-13 && (a - 30.0).abs() < 1e-13 && j.abs() < 1e-12);
+        }
+    }
+}

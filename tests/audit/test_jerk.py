@@ -1,0 +1,330 @@
+"""The audit of profiles of limited jerk: closed forms, what is planted is found, and nothing else is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from feedplan.audit import Audit, audit
+from feedplan.audit.joint_jerk import slopes
+from feedplan.audit.joint_path import JointPath
+from feedplan.constraints.problem import Problem, build_problem
+from feedplan.curves.arc import arc
+from feedplan.curves.composite import CompositeCurve
+from feedplan.curves.length import CurveLength
+from feedplan.machine.machine import Machine
+from feedplan.machine.meaning import Meaning
+from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.setpoints import setpoints
+from tests.audit.curves import machine_of, path_along, problem_along
+from tests.audit.test_joints import past_the_column, wavy, wide
+from tests.jerk_arcs import constant_jerk, cubic_speed, rest_to_rest
+from tests.test_setpoints_jerk import profiles, random_curve
+
+Array = NDArray[np.float64]
+FREE = 1e6
+
+
+def judged(problem: Problem, profile: SpeedProfile, with_setpoints: bool = True, **changes: Any) -> Audit:
+    """The verdict of a method that claims to limit jerk."""
+    problem = replace(problem, **changes)
+    stream = setpoints(problem, profile, problem.period) if with_setpoints else None
+    return audit(problem, profile, machine_of(problem), None, stream, jerk=True)
+
+
+def broken(result: Audit) -> set[str]:
+    return {check.name for check in result.broken}
+
+
+def problem_on(curve: CompositeCurve, jerk: Any = FREE**2) -> Problem:
+    """A curve with jerk limits and hardly any others."""
+    problem = problem_along(path_along(curve), FREE, FREE)
+    return replace(problem, max_jerk=np.broadcast_to(np.asarray(jerk, float), curve.axes).copy())
+
+
+def line() -> tuple[Problem, SpeedProfile]:
+    """100 mm along (3, 4) from rest to rest at 3200 mm/s³, so at 1920 and 2560 mm/s³ of the axes."""
+    curve = CompositeCurve.from_bezier(np.linspace(0.0, 100.0, 4)[:, None] * [0.6, 0.8], width=100.0)
+    return problem_on(curve, [1920.0, 2560.0]), constant_jerk(curve, rest_to_rest(100.0, 3200.0))
+
+
+def test_a_line_at_its_jerk_limit_passes_and_measures_the_limit() -> None:
+    result = judged(*line())
+    assert result.failures == ()
+    for axis, limit in (("X", 1920.0), ("Y", 2560.0)):
+        assert result.check("jerk", axis).worst == pytest.approx(limit, rel=1e-9)
+        assert result.check("jerk", axis).judged
+    assert result.check("velocity", "X").worst == pytest.approx(0.6 * 200.0, rel=1e-9)
+    assert result.check("acceleration", "Y").worst == pytest.approx(0.8 * 800.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("with_setpoints", [False, True])
+def test_a_jerk_two_millionths_above_its_limit_is_found(with_setpoints: bool) -> None:
+    problem, profile = line()
+    for excess, found in ((0.5e-6, set()), (2e-6, {"jerk"})):
+        limits = problem.max_jerk / [1.0 + excess, 0.5]
+        result = judged(problem, profile, with_setpoints, max_jerk=limits)
+        assert broken(result) == found
+        assert {check.axis for check in result.broken} <= {"X"}
+
+
+def test_setpoints_alone_show_the_excess_too() -> None:
+    problem, profile = line()
+    stream = setpoints(problem, profile, 0.001).all()
+    # Rounding hides some 2e-6 of the limit in third differences over 1 ms.
+    for excess, ok in ((0.5e-6, True), (1e-5, False)):
+        tight = replace(problem, max_jerk=problem.max_jerk / (1.0 + excess))
+        # The profile is not audited: only the positions speak.
+        result = audit(tight, None, machine_of(tight), None, [stream], jerk=True)
+        assert result.ok == ok, result.failures
+        assert broken(result) <= {"jerk"}
+
+
+def circle_case(radius: float = 10.0) -> tuple[Problem, SpeedProfile, list[tuple[float, float]]]:
+    curve = arc([radius, 0.0], [0.0, 0.0], 1.9 * math.pi)
+    sections = rest_to_rest(CurveLength(curve).total, 2000.0, 0.8)
+    return problem_on(curve), constant_jerk(curve, sections), sections
+
+
+def test_on_a_circle_jerk_is_what_the_closed_form_says() -> None:
+    problem, profile, sections = circle_case()
+    result = judged(problem, profile)
+    assert result.failures == ()
+    worst = np.zeros(2)
+    s, v, a, radius = 0.0, 0.0, 0.0, 10.0
+    for duration, jerk in sections:
+        t = np.linspace(0.0, duration, 20_001)
+        way, speed = s + t * (v + t * (a / 2 + t * jerk / 6)), v + t * (a + t * jerk / 2)
+        pull, angle = a + t * jerk, way / radius
+        along, across = jerk - speed**3 / radius**2, 3 * speed * pull / radius
+        x = -np.sin(angle) * along - np.cos(angle) * across
+        y = np.cos(angle) * along - np.sin(angle) * across
+        worst = np.maximum(worst, [np.abs(x).max(), np.abs(y).max()])
+        s, v, a = way[-1], speed[-1], pull[-1]
+    for axis, value in zip("XY", worst, strict=True):
+        assert result.check("jerk", axis).worst == pytest.approx(value, rel=1e-4)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_random_curves_pass_at_their_own_jerk_and_fail_below_it(seed: int) -> None:
+    curve = random_curve(seed)
+    for profile in profiles(curve, seed):
+        problem = problem_on(curve)
+        places = np.array([0, len(curve) - 1]), np.array([0.0, curve.width[-1]])
+        ends = np.linalg.norm(curve.evaluate(*places, 1)[1], axis=1)
+        ends *= np.sqrt([profile.p0[0], profile.p1[-1]])
+        problem = replace(problem, start_speed=float(ends[0]), end_speed=float(ends[1]))
+        dense = setpoints(problem, profile, 2e-5).all()
+        most = np.abs(dense.jerk[1:-1]).max(axis=0)
+        free = judged(problem, profile)
+        assert free.failures == ()
+        worst = np.array([free.check("jerk", axis).worst for axis in problem.axes])
+        np.testing.assert_allclose(worst, most, rtol=2e-3)
+        assert judged(problem, profile, max_jerk=worst).failures == ()
+        alone = judged(problem, profile, with_setpoints=False)
+        worst = np.array([alone.check("jerk", axis).worst for axis in problem.axes])
+        k = seed % len(worst)
+        tight = worst.copy()
+        tight[k] /= 1.0 + 2e-6
+        result = judged(problem, profile, False, max_jerk=tight)
+        assert {(check.name, check.axis) for check in result.broken} == {("jerk", problem.axes[k])}
+
+
+def changed(profile: SpeedProfile, place: int, **changes: float) -> SpeedProfile:
+    columns = {name: getattr(profile, name).copy() for name in changes}
+    for name, value in changes.items():
+        columns[name][place] += value
+    return replace(profile, **columns)
+
+
+def names(problem: Problem, profile: SpeedProfile) -> set[str]:
+    return broken(judged(problem, profile, with_setpoints=False))
+
+
+def test_every_way_of_breaking_an_arc_is_named() -> None:
+    problem, profile, _ = circle_case()
+    problem = replace(problem, max_jerk=np.full(2, 1e5))
+    assert names(problem, profile) == set()
+    assert names(problem, changed(profile, 1, duration=1e-5 * profile.duration[1])) >= {"duration"}
+    assert names(problem, changed(profile, 1, value=1.0)) >= {"duration", "acceleration_continuity"}
+    assert names(problem, changed(profile, 1, a0=1.0)) >= {"duration", "acceleration_continuity"}
+    assert names(problem, changed(profile, 1, a1=1.0)) == {"acceleration_continuity"}
+    assert names(problem, changed(profile, 1, p1=1e-3 * profile.p1[1])) >= {"jump"}
+    assert names(problem, changed(profile, 0, p0=1.0)) >= {"junction"}
+    assert names(problem, changed(profile, 0, a0=math.nan)) == {"numbers"}
+    assert names(problem, changed(profile, 0, kind=2)) >= {"numbers"}
+
+
+def test_every_way_of_breaking_a_cubic_is_named() -> None:
+    curve = random_curve(1)
+    profile = cubic_speed(curve, lambda s: 900.0 + 4.0 * s, lambda s: 4.0, 3)
+    problem = replace(problem_on(curve), start_speed=30.0, max_jerk=np.full(curve.axes, 1e7))
+    last = math.sqrt(900.0 + 4.0 * CurveLength(curve).total)
+    problem = replace(problem, end_speed=last)
+    assert names(problem, profile) == set()
+    assert names(problem, changed(profile, 4, duration=1e-5 * profile.duration[4])) == {"duration"}
+    assert names(problem, changed(profile, 4, a0=0.2)) == {"duration", "acceleration_continuity"}
+    assert names(problem, changed(profile, 4, p1=1e-3 * profile.p1[4])) >= {"jump", "duration"}
+    # A dent down to standstill.
+    assert "duration" in names(problem, changed(profile, 4, a0=-1e4))
+
+
+def test_acceleration_that_steps_is_no_limited_jerk() -> None:
+    # A trapezoid: constant acceleration is jerk 0, and still it steps.
+    curve = CompositeCurve.from_bezier([[0.0, 0.0], [50.0, 0.0], [100.0, 0.0]], width=100.0)
+    problem = problem_on(curve, 1e6)
+    up = constant_jerk(curve, [(0.5, 0.0), (0.5, 0.0)])
+    half = {"value": np.zeros(2), "u0": np.array([0.0, 50.0]), "u1": np.array([50.0, 100.0])}
+    top = 2 * 400.0 * 50.0
+    profile = replace(
+        up,
+        **half,
+        p0=np.array([0.0, top]),
+        p1=np.array([top, 0.0]),
+        duration=np.full(2, 0.5),
+        a0=np.array([400.0, -400.0]),
+        a1=np.array([400.0, -400.0]),
+    )
+    result = judged(problem, profile, with_setpoints=False)
+    assert broken(result) == {"acceleration_continuity"}
+    check = result.check("acceleration_continuity")
+    assert check.worst == pytest.approx(800.0)
+    assert check.time == pytest.approx(0.5)
+    # Its setpoints alone tell as much.
+    assert "jerk" in broken(judged(problem, profile, max_jerk=np.full(2, 1e4)))
+
+
+def test_arcs_of_other_kinds_claim_what_nothing_limits() -> None:
+    problem, profile = line()
+    arcs = replace(profile, kind=np.full(len(profile), ArcKind.AXIS_ACCELERATION, np.uint8))
+    arcs = replace(arcs, axis=np.zeros(len(profile), np.uint8), a0=0 * profile.a0, a1=0 * profile.a1)
+    result = judged(problem, arcs, with_setpoints=False)
+    assert result.check("jerk", "X").ratio == math.inf
+
+
+def straight_into_a_bend(speed: float, radius: float = 20.0) -> tuple[Problem, SpeedProfile]:
+    """20 mm along X, then a quarter turn: the curvature jumps by 1/radius, at one speed."""
+    straight = CompositeCurve.from_bezier([[-20.0, 0.0], [-10.0, 0.0], [0.0, 0.0]], width=20.0)
+    turn = arc([0.0, 0.0], [0.0, radius], 0.5 * math.pi)
+    curve = CompositeCurve.joined([straight, turn])
+    profile = constant_jerk(curve, [(CurveLength(curve).total / speed, 0.0)], start=(speed, 0.0))
+    problem = replace(problem_on(curve, 1e5), start_speed=speed, end_speed=speed)
+    return problem, profile
+
+
+def test_where_the_curvature_jumps_the_acceleration_may_step_by_a_period_of_jerk() -> None:
+    # v²/R = 45 mm/s² steps; the limit of 50 000 mm/s³ over 1 ms is 50, of 44 000 44.
+    problem, profile = straight_into_a_bend(30.0)
+    for jerk, ok in ((50_000.0, True), (45_000.0 / (1 + 0.5e-6), True), (44_000.0, False)):
+        result = judged(problem, profile, max_jerk=np.full(2, jerk))
+        check = result.check("acceleration_jump", "Y")
+        assert (check.worst, check.limit) == pytest.approx((45.0, jerk * 1e-3), rel=1e-9)
+        assert broken(result) == (set() if ok else {"acceleration_jump"})
+        # Where no path is known the setpoints alone show it, and are allowed it as well.
+        alone = audit(
+            replace(problem, max_jerk=np.full(2, jerk)),
+            None,
+            machine_of(problem),
+            None,
+            [setpoints(problem, profile, 0.001).all()],
+            jerk=True,
+        )
+        assert alone.check("jerk", "Y").worst > 0.3 * jerk
+        assert alone.ok
+
+
+def test_what_is_not_claimed_is_not_measured() -> None:
+    problem, profile = line()
+    stream = setpoints(problem, profile, 0.001)
+    tight = replace(problem, max_jerk=problem.max_jerk / 2)
+    result = audit(tight, profile, machine_of(tight), None, stream)
+    assert result.ok
+    assert not result.check("jerk", "X").judged
+    assert not {"acceleration_jump", "acceleration_continuity"} & {check.name for check in result.checks}
+
+
+def test_velocity_feed_acceleration_and_chord_are_measured_on_these_arcs() -> None:
+    problem, profile, _ = circle_case()
+    free = judged(problem, profile, with_setpoints=False)
+    speed = free.check("feed").worst
+    for change, name in (
+        ({"max_velocity": np.full(2, 0.99 * free.check("velocity", "X").worst)}, "velocity"),
+        ({"max_acceleration": np.full(2, 0.99 * free.check("acceleration", "X").worst)}, "acceleration"),
+        ({"feed": np.full(len(problem.path), 0.99 * speed)}, "feed"),
+        ({"chord_tolerance": 0.98 * (speed * 0.001) ** 2 / 80.0}, "chord"),
+    ):
+        assert broken(judged(problem, profile, with_setpoints=False, **change)) == {name}
+
+
+JOINTS = {
+    "cylindrical": ("cylindrical", "XYZ", past_the_column, None),
+    "trunnion": ("trunnion-ac", "XYZAC", wavy, Meaning.TIP),
+}
+
+
+@pytest.fixture(scope="module", params=list(JOINTS))
+def joints(request: pytest.FixtureRequest) -> tuple[Problem, SpeedProfile, Machine]:
+    name, letters, curve, meaning = JOINTS[request.param]
+    machine = wide(name)
+    free = tuple(
+        replace(axis, max_velocity=FREE, max_acceleration=FREE, max_jerk=FREE**2) for axis in machine.axes
+    )
+    machine = replace(machine, axes=free, chord_tolerance=math.inf)
+    means = None if meaning is None else np.array([meaning], np.uint8)
+    problem = build_problem(path_along(curve(), letters, meaning=means), machine, feed=FREE)
+    tip = problem.tip_curve
+    assert tip is not None
+    profile = constant_jerk(tip, rest_to_rest(CurveLength(tip).total, 2000.0, 0.8))
+    return problem, profile, machine
+
+
+def test_differences_of_the_kinematics_are_its_derivatives(joints: Any) -> None:
+    problem, _, _ = joints
+    rng = np.random.default_rng(3)
+    piece = rng.integers(0, len(problem.path), 60)
+    u = rng.uniform(0.0, 1.0, 60) * problem.path.width[piece]
+    u[:10], u[10:20] = 0.0, problem.path.width[piece[10:20]]
+    at, exact = slopes(JointPath(problem), piece, u), problem.derivatives(piece, u, 3)
+    for order in (1, 2, 3):
+        away = np.abs(at.joints[order - 1] - exact[order])
+        assert (away <= at.joints_error[order - 1]).all()
+        size = np.abs(exact[order]).max()
+        assert np.median(at.joints_error[order - 1]) <= 1e-5 * size, order
+
+
+def test_the_jerk_of_joints_is_that_of_their_setpoints(joints: Any) -> None:
+    problem, profile, machine = joints
+    stream = setpoints(problem, profile, machine.period)
+    dense = setpoints(problem, profile, 1e-4).all()
+    most = np.abs(dense.jerk[1:-1]).max(axis=0)
+    result = audit(problem, profile, machine, None, stream, jerk=True)
+    assert result.failures == ()
+    for k, name in enumerate(problem.axes):
+        assert result.check("jerk", name).worst == pytest.approx(most[k], rel=5e-3, abs=1e-3)
+    assert audit(replace(problem, max_jerk=most + 1.0), profile, machine, None, None, jerk=True).ok
+    k = int(np.argmax(most))
+    tight = most + 1.0
+    tight[k] *= 0.98
+    result = audit(replace(problem, max_jerk=tight), profile, machine, None, None, jerk=True)
+    assert {(check.name, check.axis) for check in result.broken} == {("jerk", problem.axes[k])}
+
+
+def test_every_way_of_breaking_an_arc_of_joints_is_named(joints: Any) -> None:
+    problem, profile, machine = joints
+    problem = replace(problem, max_jerk=np.full(len(problem.axes), 1e7))
+
+    def found(other: SpeedProfile) -> set[str]:
+        return broken(audit(problem, other, machine, None, None, jerk=True))
+
+    assert found(profile) == set()
+    assert found(changed(profile, 1, duration=1e-4 * profile.duration[1])) >= {"duration"}
+    assert found(changed(profile, 1, a1=100.0)) >= {"acceleration_continuity"}
+    assert found(changed(profile, 1, p1=1e-2 * profile.p1[1])) >= {"jump"}
+    assert found(changed(profile, 0, a0=math.nan)) == {"numbers"}
+    kinds = replace(profile, kind=np.full(len(profile), 1, np.uint8), a0=0 * profile.a0, a1=0 * profile.a1)
+    assert "jerk" in found(kinds)
