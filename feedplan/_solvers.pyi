@@ -33,6 +33,7 @@ __all__ = [
     "lower_bound",
     "plan_bang_bang",
     "plan_curves",
+    "plan_jerk_limited",
     "read_gcode",
     "spline_insert",
     "spline_pieces",
@@ -58,8 +59,18 @@ _Profile = tuple[
     NDArray[np.uint32],
 ]
 
+# Its accelerations at both ends of the arcs, and `kinked`.
+_Changes = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.uint32]]
+
 def plan_bang_bang(problem: Problem) -> _Profile: ...
 def plan_curves(problem: Problem) -> _Profile: ...
+def plan_jerk_limited(
+    problem: Problem,
+    jerk: NDArray[np.float64],
+    resolution: float,
+    tolerance: float,
+    time_limit: float | None = None,
+) -> tuple[_Profile, _Changes]: ...
 def lower_bound(problem: Problem, profile: SpeedProfile) -> float: ...
 def look_ahead(
     speed: NDArray[np.float64], gain: NDArray[np.float64], hold: NDArray[np.float64]

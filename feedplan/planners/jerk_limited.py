@@ -1,0 +1,36 @@
+"""The time-optimal profile under limits of velocity, acceleration and jerk of every axis, to an accuracy."""
+
+from __future__ import annotations
+
+from feedplan._solvers import PlanError, plan_jerk_limited
+from feedplan.constraints.problem import Problem
+from feedplan.errors import InputError
+from feedplan.planners._faults import error_of
+from feedplan.planners._jerk import jerk_limits
+from feedplan.profile import SpeedProfile
+
+# The profile keeps the limits of jerk.
+LIMITS_JERK = True
+# Accuracies that the grid is made for.
+FINEST, COARSEST = 1e-7, 0.1
+
+
+def plan(problem: Problem, *, accuracy: float = 1e-4, time_limit: float | None = None) -> SpeedProfile:
+    """The fastest profile, its time within about `accuracy` of the least, as a part of it.
+
+    It is planned by the length of the tool's way (`solvers/src/jerk_limited_path.rs`). After `time_limit` [s]
+    the best profile so far is taken: it keeps all limits too. Raises InputError for an axis without a limit
+    of jerk, InfeasibleError where the start or end speed cannot be had, with the speed that can.
+    """
+    if not FINEST <= accuracy <= COARSEST:
+        raise InputError(f"the accuracy is {accuracy:g}: give {FINEST:g} to {COARSEST:g}")
+    if time_limit is not None and not time_limit >= 0:
+        raise InputError(f"the time limit is {time_limit:g} s: give 0 or more")
+    # Errors fall with the square of the resolution, 1e-4 at 16 intervals.
+    resolution = min(max(16.0 * (1e-4 / accuracy) ** 0.5, 6.0), 200.0)
+    limits = jerk_limits(problem)
+    try:
+        columns, changes = plan_jerk_limited(problem, limits, resolution, 1e-3 * accuracy, time_limit)
+    except PlanError as fault:
+        raise error_of(problem, fault) from None
+    return SpeedProfile(*columns, *changes)
