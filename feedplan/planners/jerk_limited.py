@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
 from feedplan._solvers import PlanError, plan_jerk_limited
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InputError
 from feedplan.planners._faults import error_of
-from feedplan.planners._jerk import jerk_limits
+from feedplan.planners._jerk import jerk_limits, lowered_limits
 from feedplan.profile import SpeedProfile
 
 # The profile keeps the limits of jerk.
@@ -29,6 +34,22 @@ def plan(problem: Problem, *, accuracy: float = 1e-4, time_limit: float | None =
     # Errors fall with the square of the resolution, 1e-4 at 16 intervals.
     resolution = min(max(16.0 * (1e-4 / accuracy) ** 0.5, 6.0), 200.0)
     limits = jerk_limits(problem)
+    start = time.perf_counter()
+    profile = _planned(problem, limits, resolution, accuracy, time_limit)
+    lowered = lowered_limits(problem, limits, profile)
+    if lowered is not None:
+        left = None if time_limit is None else max(time_limit - (time.perf_counter() - start), 0.0)
+        profile = _planned(problem, lowered, resolution, accuracy, left)
+    return profile
+
+
+def _planned(
+    problem: Problem,
+    limits: NDArray[np.float64],
+    resolution: float,
+    accuracy: float,
+    time_limit: float | None,
+) -> SpeedProfile:
     try:
         columns, changes = plan_jerk_limited(problem, limits, resolution, 1e-3 * accuracy, time_limit)
     except PlanError as fault:

@@ -14,7 +14,7 @@ LIMITS_JERK = True
 LOOK_AHEAD = 256
 # Parts of a curved piece, the length over which a speed has to pay [mm], and by what part of them the speeds
 # of parts may differ that are one segment.
-CUTTING = (4, 20.0, 0.1)
+CUTTING = (8, 30.0, 0.05)
 
 
 def plan(problem: Problem) -> SpeedProfile:
