@@ -36,7 +36,7 @@ const OFF_LINE: f64 = 1e-12;
 /// Derivatives are asked for at least so far from a place where D vanishes, as a part of the length.
 const INSET: f64 = 1e-9;
 /// The most coefficients of D.
-const MAX_RATE: usize = 40;
+pub const MAX_RATE: usize = 40;
 
 /// Pieces between two parameters each, without a cusp inside.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -303,12 +303,17 @@ impl<'a, const M: usize> ByLength<'a, M> {
         u
     }
 
-    /// The length up to u of a part.
-    pub fn length(&self, part: usize, u: f64) -> f64 {
-        let table = &self.tables[part];
-        let i = table.rows[1..table.rows.len() - 1].partition_point(|row| row.u <= u);
-        let from = &table.rows[i];
-        self.knots[part] + from.s + panel(self.problem, self.parts[part].piece, from.u, u)
+    /// The length between two parameters of a part; short ones to their own digits.
+    pub fn between(&self, part: usize, a: f64, b: f64) -> f64 {
+        let (rows, at) = (&self.tables[part].rows, self.parts[part].piece);
+        let row = |u: f64| rows[1..rows.len() - 1].partition_point(|row| row.u <= u);
+        let (i, j) = (row(a), row(b));
+        if i == j {
+            return panel(self.problem, at, a, b);
+        }
+        let inside: f64 =
+            rows[i + 1..=j].windows(2).map(|pair| panel(self.problem, at, pair[0].u, pair[1].u)).sum();
+        panel(self.problem, at, a, rows[i + 1].u) + inside + panel(self.problem, at, rows[j].u, b)
     }
 
     /// The one direction of all parts and their one feed, if there are such.

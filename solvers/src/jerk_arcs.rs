@@ -3,6 +3,8 @@
 //! Two kinds, of `feedplan.profile.ArcKind`: the jerk along the path is constant, or v² is a cubic of the length. What
 //! goes over several pieces is cut where they meet: both kinds stay what they are.
 
+use std::ops::Range;
+
 use crate::bang_bang::Problem;
 use crate::by_length::{speed_sq, ByLength};
 use crate::jerk_limited::{Geometry, Profile};
@@ -96,15 +98,12 @@ impl Arcs {
         self.kinks.append(&mut other.kinks);
     }
 
-    /// An arc too short for u to show it is left out, its time goes to its neighbour.
-    fn push<const M: usize>(&mut self, problem: &Problem<M>, path: &ByLength<M>, part: usize, arc: &Arc) {
-        let at = path.parts[part];
+    /// Appends an arc between two parameters of a piece. One too short for u to show it is left out, its time goes to
+    /// its neighbour.
+    fn push<const M: usize>(&mut self, problem: &Problem<M>, piece: usize, [u0, u1]: [f64; 2], arc: &Arc) {
         let last = self.len().wrapping_sub(1);
-        let knots = path.knots();
-        let goes_on = last < self.len() && arc.ends[0].s > knots[part];
-        let u0 = if goes_on { self.u1[last] } else { at.u[0] };
-        let u1 = path.locate(part, arc.ends[1].s);
-        let speed = |u: f64, v: f64| if v == 0.0 { 0.0 } else { v * v / speed_sq(problem, at.piece, u) };
+        let goes_on = last < self.len() && self.piece[last] as usize == piece && self.u1[last] == u0;
+        let speed = |u: f64, v: f64| if v == 0.0 { 0.0 } else { v * v / speed_sq(problem, piece, u) };
         if u1 <= u0 {
             if goes_on {
                 self.duration[last] += arc.duration;
@@ -115,7 +114,7 @@ impl Arcs {
             }
             return;
         }
-        self.piece.push(at.piece as u32);
+        self.piece.push(piece as u32);
         self.kind.push(arc.kind);
         self.value.push(arc.value);
         self.u0.push(u0);
@@ -153,12 +152,15 @@ impl Arcs {
                 }
             }
             let end = State { s: knot, ..start.after(high, jerk) };
-            self.push(problem, path, part, &Arc { kind: PATH_JERK, value: jerk, ends: [start, end], duration: high });
+            let arc = Arc { kind: PATH_JERK, value: jerk, ends: [start, end], duration: high };
+            let at = path.parts[part];
+            self.push(problem, at.piece, [path.locate(part, start.s), at.u[1]], &arc);
             (start, left) = (end, left - high);
             part += 1;
         }
         let arc = Arc { kind: PATH_JERK, value: jerk, ends: [start, to], duration: left };
-        self.push(problem, path, part, &arc);
+        let u = [start.s, to.s].map(|s| path.locate(part, s));
+        self.push(problem, path.parts[part].piece, u, &arc);
     }
 
     /// Appends sections of constant jerk from rest to rest along a whole stretch.
@@ -179,40 +181,105 @@ impl Arcs {
     }
 
     /// Appends a profile of the jerk-limited planner along a whole stretch.
-    pub fn push_profile<const M: usize>(&mut self, problem: &Problem<M>, path: &ByLength<M>, profile: &Profile) {
-        let state =
-            |n: usize| State { s: profile.s[n], v: profile.speed_sq[n].sqrt(), a: 0.5 * profile.slope[n] };
-        let last = profile.s.len() - 1;
-        let (first, end) = (state(0), state(last));
-        // On a ramp s = J t³/6 and v = J t²/2, so that t = 3 s/v.
-        let rest = |s: f64| State { s, v: 0.0, a: 0.0 };
-        let ramp = |length: f64, v: f64| {
-            let t = 3.0 * length / v;
-            (2.0 * v / (t * t), t)
-        };
-        if first.s > profile.ends[0] {
-            let (jerk, t) = ramp(first.s - profile.ends[0], first.v);
-            self.push_jerk(problem, path, [rest(profile.ends[0]), first], jerk, t);
-        }
-        let mut part = path.part(first.s);
-        for n in 0..last {
-            let ends = [state(n), state(n + 1)];
-            while path.knots()[part + 1] <= ends[0].s && part + 1 < path.parts.len() {
+    ///
+    /// Near a rest arcs are so short that rounding of u changes their length, and w'' by some hundred times as much. So
+    /// lengths of arcs are measured between the rounded parameters, and each state is moved along its profile to
+    /// where they end. They add up from the nearer end of each part.
+    pub fn push_profile<const M: usize>(
+        &mut self,
+        problem: &Problem<M>,
+        path: &ByLength<M>,
+        profile: &Profile,
+    ) {
+        let (s, knots, ends) = (&profile.s, path.knots(), profile.ends);
+        let last = s.len() - 1;
+        let (mut first, mut part) = (0, path.part(s[0]));
+        while first < last {
+            while knots[part + 1] <= s[first] && part + 1 < path.parts.len() {
                 part += 1;
             }
-            let duration = cubic_time(&ends);
-            self.push(problem, path, part, &Arc { kind: SPEED_CUBIC, value: 0.0, ends, duration });
-        }
-        if end.s < profile.ends[1] {
-            let (jerk, t) = ramp(profile.ends[1] - end.s, end.v);
-            self.push_jerk(problem, path, [end, rest(profile.ends[1])], jerk, t);
+            let at = path.parts[part];
+            let end = first + s[first..].partition_point(|&s| s <= knots[part + 1]) - 1;
+            let mut u = vec![at.u[0]];
+            u.extend(s[first..=end].iter().map(|&s| path.locate(part, s)));
+            u.push(at.u[1]);
+            let lengths: Vec<f64> = u.windows(2).map(|u| path.between(part, u[0], u[1])).collect();
+            let states = settled(profile, first..end + 1, [knots[part], knots[part + 1]], &lengths);
+            let count = states.len();
+            if first == 0 && s[0] > ends[0] {
+                let rest = State { s: ends[0], v: 0.0, a: 0.0 };
+                if part == 0 {
+                    let (jerk, duration) = ramp(lengths[0], states[0].v);
+                    let arc = Arc { kind: PATH_JERK, value: jerk, ends: [rest, states[0]], duration };
+                    self.push(problem, at.piece, [u[0], u[1]], &arc);
+                } else {
+                    let (jerk, duration) = ramp(s[0] - ends[0], states[0].v);
+                    self.push_jerk(problem, path, [rest, State { s: s[0], ..states[0] }], jerk, duration);
+                }
+            }
+            for n in 1..count {
+                let ends = [states[n - 1], states[n]];
+                let duration = cubic_time(lengths[n], &ends);
+                self.push(
+                    problem,
+                    at.piece,
+                    [u[n], u[n + 1]],
+                    &Arc { kind: SPEED_CUBIC, value: 0.0, ends, duration },
+                );
+            }
+            if end == last && s[last] < ends[1] {
+                let rest = State { s: ends[1], v: 0.0, a: 0.0 };
+                let from = states[count - 1];
+                if part + 1 == path.parts.len() {
+                    let (jerk, duration) = ramp(lengths[count], from.v);
+                    let arc = Arc { kind: PATH_JERK, value: jerk, ends: [from, rest], duration };
+                    self.push(problem, at.piece, [u[count], u[count + 1]], &arc);
+                } else {
+                    let (jerk, duration) = ramp(ends[1] - s[last], from.v);
+                    self.push_jerk(problem, path, [State { s: s[last], ..from }, rest], jerk, duration);
+                }
+            }
+            first = end;
         }
     }
 }
 
-/// ∫ ds/√w of the cubic w between two states.
-pub fn cubic_time([from, to]: &[State; 2]) -> f64 {
-    let h = to.s - from.s;
+/// Jerk and duration of a ramp from rest to a speed: s = J t³/6 and v = J t²/2, so that t = 3 s/v.
+fn ramp(length: f64, v: f64) -> (f64, f64) {
+    let t = 3.0 * length / v;
+    (2.0 * v / (t * t), t)
+}
+
+/// The states at some nodes of a part between two knots, moved to where `lengths`, from knot to knot, say they are.
+fn settled(profile: &Profile, nodes: Range<usize>, [from, to]: [f64; 2], lengths: &[f64]) -> Vec<State> {
+    let s = &profile.s[nodes.clone()];
+    let count = s.len();
+    let mut moved = vec![0.0; count];
+    let mut miss = 0.0;
+    for n in 0..count {
+        miss += lengths[n] - (s[n] - if n == 0 { from } else { s[n - 1] });
+        if s[n] < 0.5 * (from + to) && s[n] > from {
+            moved[n] = miss;
+        }
+    }
+    let mut miss = 0.0;
+    for n in (0..count).rev() {
+        miss += if n + 1 == count { to } else { s[n + 1] } - s[n] - lengths[n + 1];
+        if s[n] >= 0.5 * (from + to) && s[n] < to {
+            moved[n] = miss;
+        }
+    }
+    let state = |n: usize| {
+        let (d, at) = (moved[n], nodes.start + n);
+        let bend = profile.at(if d < 0.0 { s[n].next_down() } else { s[n] })[2];
+        let w = profile.speed_sq[at] + d * (profile.slope[at] + 0.5 * d * bend);
+        State { s: s[n], v: w.sqrt(), a: 0.5 * (profile.slope[at] + d * bend) }
+    };
+    (0..count).map(state).collect()
+}
+
+/// ∫ ds/√w of the cubic w between two states so far apart.
+fn cubic_time(h: f64, [from, to]: &[State; 2]) -> f64 {
     let (w0, w1) = (from.v * from.v, to.v * to.v);
     let (d0, d1) = (2.0 * from.a * h, 2.0 * to.a * h);
     let speed = |t: f64| {
@@ -220,9 +287,7 @@ pub fn cubic_time([from, to]: &[State; 2]) -> f64 {
         (r * r * ((1.0 + 2.0 * t) * w0 + t * d0) + t * t * ((1.0 + 2.0 * r) * w1 - r * d1)).sqrt()
     };
     let half = |middle: f64| -> f64 {
-        (0..4)
-            .map(|i| W[i] * (1.0 / speed(middle - 0.25 * X[i]) + 1.0 / speed(middle + 0.25 * X[i])))
-            .sum()
+        (0..4).map(|i| W[i] * (1.0 / speed(middle - 0.25 * X[i]) + 1.0 / speed(middle + 0.25 * X[i]))).sum()
     };
     0.25 * h * (half(0.25) + half(0.75))
 }
@@ -235,6 +300,6 @@ mod tests {
     fn a_cubic_of_constant_acceleration_takes_its_change_of_speed() {
         // 10 to 30 mm/s at 200 mm/s²: 2 mm, 0.1 s.
         let ends = [State { s: 1.0, v: 10.0, a: 200.0 }, State { s: 3.0, v: 30.0, a: 200.0 }];
-        assert!((cubic_time(&ends) - 0.1).abs() < 1e-9, "{}", cubic_time(&ends));
+        assert!((cubic_time(2.0, &ends) - 0.1).abs() < 1e-9, "{}", cubic_time(2.0, &ends));
     }
 }

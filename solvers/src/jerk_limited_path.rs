@@ -70,7 +70,9 @@ impl<const M: usize> Task<'_, M> {
                 Ok(arcs)
             }
             Err(jerk_limited::Fault::Input(what)) => Err(Fault::Input { piece: Some(parts[0].piece), what }),
-            Err(jerk_limited::Fault::NoPlan { .. }) if moving => self.out_of_reach(&path, parts, speeds, &speed_caps),
+            Err(jerk_limited::Fault::NoPlan { .. }) if moving => {
+                self.out_of_reach(&path, parts, speeds, &speed_caps)
+            }
             Err(jerk_limited::Fault::NoPlan { s }) if cuts < CUTS => self.cut(&path, s, cuts),
             Err(jerk_limited::Fault::NoPlan { s }) => {
                 let part = path.part(s);
@@ -87,9 +89,8 @@ impl<const M: usize> Task<'_, M> {
         feed: f64,
         arcs: &mut Arcs,
     ) -> Result<(), Fault> {
-        let most = |limit: &[f64; M]| {
-            (0..M).map(|k| limit[k] / direction[k].abs()).fold(f64::INFINITY, f64::min)
-        };
+        let most =
+            |limit: &[f64; M]| (0..M).map(|k| limit[k] / direction[k].abs()).fold(f64::INFINITY, f64::min);
         let segment = s_curve::Segment {
             length: path.total(),
             allowable: most(&self.limits.velocity),

@@ -11,10 +11,10 @@ use crate::jerk_arcs::Arcs;
 use crate::jerk_limited::{Effort, Geometry, Limits, Place};
 use crate::jerk_limited_path::Task;
 use crate::path_dynamics::{allowable, bounded, AxisLimits, Curve, Shape};
-use crate::s_curve::{self, Segment};
+use crate::s_curve::{self, Section, Segment};
 use crate::spline::bezier::split;
 use crate::spline::CompositeCurve;
-use crate::stretches::over_stretches;
+use crate::stretches::{checked, over_stretches, stretches, Stretch};
 
 /// Bounds of derivatives are greater than these by this part.
 const ACCURACY: f64 = 0.05;
@@ -22,6 +22,9 @@ const ACCURACY: f64 = 0.05;
 const PLACES: usize = 33;
 /// A joint holds the speed where it is passed within this part of its cap.
 const HELD: f64 = 0.998;
+
+/// Lengths this near to one another, as parts of them, are the same.
+const CLOSE: f64 = 1e-9;
 
 /// How to cut a path into segments.
 #[derive(Clone, Copy, Debug)]
@@ -42,28 +45,109 @@ pub fn plan<const M: usize>(
     cutting: &Cutting,
     look_ahead: usize,
 ) -> Result<Arcs, Fault> {
-    let effort = Effort::default();
     over_stretches(problem, jerk, |stretch, limits| {
         let path = ByLength::new(problem, &stretch.parts);
-        let segments = if stretch.ends == [0.0; 2] { segments(problem, &path, limits, cutting) } else { None };
-        let Some(segments) = segments else {
-            return Task { problem, limits: *limits, effort: &effort }.plan(&stretch.parts, stretch.ends, 0);
-        };
-        let mut arcs = Arcs::default();
-        let sections = s_curve::plan(&segments, look_ahead)?;
-        arcs.push_sections(problem, &path, &sections);
-        let mut next = 0;
-        for (cap, jumps) in path.caps(&limits.jerk) {
-            while next + 1 < sections.len() && sections[next + 1].position <= cap.s {
+        let segments =
+            if stretch.ends == [0.0; 2] { segments(problem, &path, limits, cutting) } else { None };
+        match segments {
+            Some(segments) => Ok(along(problem, &path, limits, &s_curve::plan(&segments, look_ahead)?)),
+            None => otherwise(problem, stretch, limits),
+        }
+    })
+}
+
+/// The segments of all stretches, and what the two-pass profiler makes of them.
+#[derive(Clone, Debug, Default)]
+pub struct Planned {
+    /// Offsets of the stretches in the segments; a stretch that has none is not for this planner.
+    pub stretches: Vec<i64>,
+    pub segments: Vec<Segment>,
+    /// The speed at the start of each, in mm/s.
+    pub start_speed: Vec<f64>,
+    /// The place where each begins.
+    pub piece: Vec<u32>,
+    pub u: Vec<f64>,
+}
+
+/// Segments with their first profile.
+pub fn cut<const M: usize>(
+    problem: &Problem<M>,
+    jerk: &[f64; M],
+    cutting: &Cutting,
+    look_ahead: usize,
+) -> Result<Planned, Fault> {
+    let limits = checked(problem, jerk)?;
+    let mut all = Planned { stretches: vec![0], ..Planned::default() };
+    for stretch in stretches(problem) {
+        let path = ByLength::new(problem, &stretch.parts);
+        let own = if stretch.ends == [0.0; 2] { segments(problem, &path, &limits, cutting) } else { None };
+        let own = own.unwrap_or_default();
+        let sections = s_curve::plan(&own, look_ahead)?;
+        let (mut s, mut next) = (0.0, 0);
+        for segment in &own {
+            // The sections of a segment begin where it does, but for rounding.
+            while next + 1 < sections.len() && sections[next + 1].position <= s + 0.5 * CLOSE * segment.length
+            {
                 next += 1;
             }
-            let section = &sections[next];
-            if jumps && cap.s - section.position <= 1e-9 * path.total() && section.speed >= HELD * cap.speed {
-                arcs.kinks.push(path.parts[path.part(cap.s)].piece as u32);
-            }
+            all.start_speed.push(sections[next].speed);
+            let part = path.part(s);
+            all.piece.push(path.parts[part].piece as u32);
+            all.u.push(path.locate(part, s));
+            s += segment.length;
         }
-        Ok(arcs)
+        all.segments.extend(own);
+        all.stretches.push(all.segments.len() as i64);
+    }
+    Ok(all)
+}
+
+/// The profile of given sections: stretch i takes those from `offsets[i]` to `offsets[i + 1]`; where there are none the
+/// jerk-limited planner plans it.
+pub fn follow<const M: usize>(
+    problem: &Problem<M>,
+    jerk: &[f64; M],
+    offsets: &[usize],
+    sections: &[Section],
+) -> Result<Arcs, Fault> {
+    over_stretches(problem, jerk, |stretch, limits| {
+        let own = offsets.get(stretch.number).zip(offsets.get(stretch.number + 1));
+        match own.and_then(|(&from, &to)| sections.get(from..to)).filter(|own| !own.is_empty()) {
+            Some(own) => Ok(along(problem, &ByLength::new(problem, &stretch.parts), limits, own)),
+            None => otherwise(problem, stretch, limits),
+        }
     })
+}
+
+/// A stretch that has no segments.
+fn otherwise<const M: usize>(
+    problem: &Problem<M>,
+    stretch: &Stretch,
+    limits: &Limits<M>,
+) -> Result<Arcs, Fault> {
+    Task { problem, limits: *limits, effort: &Effort::default() }.plan(&stretch.parts, stretch.ends, 0)
+}
+
+/// The arcs of sections from rest to rest, with the joints that hold the speed.
+fn along<const M: usize>(
+    problem: &Problem<M>,
+    path: &ByLength<M>,
+    limits: &Limits<M>,
+    sections: &[Section],
+) -> Arcs {
+    let mut arcs = Arcs::default();
+    arcs.push_sections(problem, path, sections);
+    let mut next = 0;
+    for (cap, jumps) in path.caps(&limits.jerk) {
+        while next + 1 < sections.len() && sections[next + 1].position <= cap.s * (1.0 + CLOSE) {
+            next += 1;
+        }
+        let section = &sections[next];
+        if jumps && cap.s - section.position <= CLOSE * cap.s && section.speed >= HELD * cap.speed {
+            arcs.kinks.push(path.parts[path.part(cap.s)].piece as u32);
+        }
+    }
+    arcs
 }
 
 /// A part of the path on its way to a segment.
@@ -80,8 +164,7 @@ pub fn segments<const M: usize>(
     limits: &Limits<M>,
     cutting: &Cutting,
 ) -> Option<Vec<Segment>> {
-    let axes =
-        AxisLimits { velocity: limits.velocity, acceleration: limits.acceleration, jerk: limits.jerk };
+    let axes = AxisLimits { velocity: limits.velocity, acceleration: limits.acceleration, jerk: limits.jerk };
     let caps = path.caps(&limits.jerk);
     let mut out: Vec<Cut<M>> = vec![];
     let mut caps = caps.iter().map(|(cap, _)| cap).peekable();
@@ -116,7 +199,8 @@ pub fn segments<const M: usize>(
             // One with the segment before, where that costs little.
             let joined = out.last().filter(|last| last.segment.junction == f64::INFINITY).and_then(|last| {
                 let (a, b) = (&last.segment, &cut.segment);
-                let feeds_agree = a.desired == b.desired || (a.desired - b.desired).abs() <= cutting.alike * b.desired;
+                let feeds_agree =
+                    a.desired == b.desired || (a.desired - b.desired).abs() <= cutting.alike * b.desired;
                 let (low, high) = (a.speed().min(b.speed()), a.speed().max(b.speed()));
                 if !feeds_agree || high - low > cutting.alike * high {
                     return None;

@@ -4,22 +4,27 @@ use rayon::prelude::*;
 
 use crate::bang_bang::{check_pieces, Problem};
 use crate::bang_bang_quadratic::Fault;
-use crate::by_length::{piece, straight, tip_piece, Part};
+use crate::by_length::{piece, straight, tip_piece, Part, MAX_RATE};
 use crate::jerk_arcs::Arcs;
 use crate::jerk_limited::Limits;
 use crate::planning;
+use crate::polynomial::Polynomial;
 use crate::quadratic::dot;
 use crate::spline::bezier::derivatives;
 use crate::spline::cusps::{piece_cusps, CUSP};
+use crate::spline::rational::Hodograph;
 
 /// Cusps closer to the end of a piece than this part of it are at the end.
 const AT_END: f64 = 1e-9;
+/// Places are slow where the square of the speed is below this part of the greatest on their piece.
+const SLOW: f64 = 0.25;
 /// How far from a place on a line its direction is looked at, as a part of the piece.
 const BESIDE: f64 = 1e-4;
 
 /// Parts of pieces from one place of rest, or end of the path, to another.
 #[derive(Clone, Debug)]
 pub struct Stretch {
+    pub number: usize,
     run: usize,
     pub parts: Vec<Part>,
     /// Speeds at its ends in mm/s.
@@ -32,16 +37,7 @@ pub fn over_stretches<const M: usize>(
     jerk: &[f64; M],
     plan: impl Fn(&Stretch, &Limits<M>) -> Result<Arcs, Fault> + Sync,
 ) -> Result<Arcs, Fault> {
-    planning::Limits::of(problem).check(problem.width.len())?;
-    check_pieces(problem)?;
-    for (axis, &limit) in jerk.iter().enumerate() {
-        if !(limit > 0.0 && limit.is_finite()) {
-            let what = format!("the jerk limit of axis {axis} is {limit} mm/s³: give a positive number");
-            return Err(Fault::Input { piece: None, what });
-        }
-    }
-    let limits =
-        Limits { velocity: problem.max_velocity, acceleration: problem.max_acceleration, jerk: *jerk };
+    let limits = checked(problem, jerk)?;
     let stretches = stretches(problem);
     let planned: Result<Vec<Arcs>, Fault> =
         stretches.par_iter().map(|stretch| plan(stretch, &limits)).collect();
@@ -58,6 +54,19 @@ pub fn over_stretches<const M: usize>(
     Ok(all)
 }
 
+/// The limits of the axes, every number of the problem checked once.
+pub fn checked<const M: usize>(problem: &Problem<M>, jerk: &[f64; M]) -> Result<Limits<M>, Fault> {
+    planning::Limits::of(problem).check(problem.width.len())?;
+    check_pieces(problem)?;
+    for (axis, &limit) in jerk.iter().enumerate() {
+        if !(limit > 0.0 && limit.is_finite()) {
+            let what = format!("the jerk limit of axis {axis} is {limit} mm/s³: give a positive number");
+            return Err(Fault::Input { piece: None, what });
+        }
+    }
+    Ok(Limits { velocity: problem.max_velocity, acceleration: problem.max_acceleration, jerk: *jerk })
+}
+
 /// The stretches of all runs, in order.
 pub fn stretches<const M: usize>(problem: &Problem<M>) -> Vec<Stretch> {
     let mut out: Vec<Stretch> = vec![];
@@ -65,14 +74,21 @@ pub fn stretches<const M: usize>(problem: &Problem<M>) -> Vec<Stretch> {
         let mut rests = true;
         for i in pair[0]..pair[1] {
             let (cuts, cusped) = cusps(problem, i);
+            let slow = slow_places(problem, i);
             rests |= i > pair[0] && problem.junction_speed[i] == 0.0;
             let mut from = 0.0;
             for (part, to) in cuts.iter().copied().chain([problem.width[i]]).enumerate() {
                 let rest = if part == 0 { rests || cusped[0] } else { true };
                 if rest {
-                    out.push(Stretch { run, parts: vec![], ends: [0.0; 2] });
+                    out.push(Stretch { number: out.len(), run, parts: vec![], ends: [0.0; 2] });
                 }
                 let last = out.len() - 1;
+                for &u in &slow {
+                    if u > from && u < to {
+                        out[last].parts.push(Part { piece: i, u: [from, u] });
+                        from = u;
+                    }
+                }
                 out[last].parts.push(Part { piece: i, u: [from, to] });
                 from = to;
             }
@@ -104,4 +120,31 @@ fn cusps<const M: usize>(problem: &Problem<M>, i: usize) -> (Vec<f64>, [bool; 2]
         [places.first().is_some_and(|&t| t < AT_END), places.last().is_some_and(|&t| t > 1.0 - AT_END)];
     places.retain(|&t| (AT_END..=1.0 - AT_END).contains(&t));
     (places.iter().map(|t| t * own.width).collect(), ends)
+}
+
+/// Parameters inside piece `i` where the tool's speed per parameter is least, and low: its way may turn sharply there.
+fn slow_places<const M: usize>(problem: &Problem<M>, i: usize) -> Vec<f64> {
+    let square: Polynomial<MAX_RATE> = match problem.tip {
+        Some(tip) => {
+            let coefficients = &tip.speed[tip.speed_offset[i]..tip.speed_offset[i + 1]];
+            Polynomial::from_bernstein(coefficients.iter().copied())
+        }
+        None => {
+            let hodograph = Hodograph::new(&piece(problem, i));
+            let axis = |k: usize| -> Polynomial<MAX_RATE> {
+                Polynomial::from_bernstein(hodograph.coefficients().iter().map(|row| row[k]))
+            };
+            (0..M).map(axis).fold(Polynomial::constant(0.0), |sum, g| sum.combine(1.0, &g.multiply(&g), 1.0))
+        }
+    };
+    let rate = square.derivative();
+    let (bend, greatest) = (rate.derivative(), square.range().1);
+    let mut found = vec![];
+    rate.sign_changes(&mut |t| {
+        let deep = square.value(t) < SLOW * greatest;
+        if deep && t > AT_END && t < 1.0 - AT_END && bend.value(t) > 0.0 {
+            found.push(t * problem.width[i]);
+        }
+    });
+    found
 }

@@ -2,10 +2,10 @@
 
 use std::time::{Duration, Instant};
 
-use numpy::{PyArray1, PyReadonlyArray1};
+use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use super::arrays::row;
+use super::arrays::{indices, row, rows};
 use super::plan::{to_exception, Columns};
 use super::problem::{ProblemArrays, ProblemRows};
 use super::with_padded_axes;
@@ -13,10 +13,24 @@ use crate::bang_bang_quadratic::NO_AXIS;
 use crate::jerk_arcs::Arcs;
 use crate::jerk_limited::Effort;
 use crate::jerk_limited_path;
+use crate::s_curve::{Section, SectionKind, Segment};
 use crate::s_curve_path::{self, Cutting};
 
 /// The accelerations at both ends of the arcs, and `kinked`.
 type Changes<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u32>>);
+
+/// Offsets, then columns of segments.
+type Segments<'py> = (
+    Bound<'py, PyArray1<i64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<u32>>,
+    Bound<'py, PyArray1<f64>>,
+);
 
 /// How long a planner may take.
 fn deadline(time_limit: Option<f64>) -> Option<Instant> {
@@ -69,6 +83,74 @@ fn plan_s_curve<'py>(
     })
 }
 
+/// The segments that `plan_s_curve` plans on, and the speeds at their starts by it: offsets of the stretches, then
+/// (n,) length, speed, acceleration, jerk, junction, start speed, piece, u. A stretch without segments is not for it.
+#[pyfunction]
+fn path_segments<'py>(
+    py: Python<'py>,
+    problem: ProblemArrays<'py>,
+    jerk: PyReadonlyArray1<'py, f64>,
+    cutting: (usize, f64, f64),
+    look_ahead: usize,
+) -> PyResult<Segments<'py>> {
+    let (parts, stretch, alike) = cutting;
+    let cutting = Cutting { parts, stretch, alike };
+    with_padded_axes!(problem.curve.axes(), M, {
+        let rows = ProblemRows::<M>::new(&problem)?;
+        let (problem, jerk) = (rows.problem()?, row::<M>(&jerk, 1.0)?);
+        let planned = py
+            .detach(|| s_curve_path::cut(&problem, &jerk, &cutting, look_ahead))
+            .map_err(|fault| to_exception(&fault))?;
+        let column =
+            |of: fn(&Segment) -> f64| PyArray1::from_vec(py, planned.segments.iter().map(of).collect());
+        Ok((
+            PyArray1::from_vec(py, planned.stretches),
+            column(|segment| segment.length),
+            column(Segment::speed),
+            column(|segment| segment.limits.acceleration),
+            column(|segment| segment.limits.jerk),
+            column(|segment| segment.junction),
+            PyArray1::from_vec(py, planned.start_speed),
+            PyArray1::from_vec(py, planned.piece),
+            PyArray1::from_vec(py, planned.u),
+        ))
+    })
+}
+
+/// The columns of a profile from sections of constant jerk, (n, 5) rows of duration, position along the stretch, speed,
+/// acceleration, jerk at their starts; those of stretch i from `offsets[i]` on. A stretch without any is planned by the
+/// jerk-limited planner.
+#[pyfunction]
+fn profile_of_sections<'py>(
+    py: Python<'py>,
+    problem: ProblemArrays<'py>,
+    jerk: PyReadonlyArray1<'py, f64>,
+    offsets: PyReadonlyArray1<'py, i64>,
+    sections: PyReadonlyArray2<'py, f64>,
+) -> PyResult<(Columns<'py>, Changes<'py>)> {
+    let sections: Vec<Section> = rows::<5>(&sections)?
+        .into_iter()
+        .map(|[duration, position, speed, acceleration, jerk]| Section {
+            kind: SectionKind::ConstantSpeed,
+            time: 0.0,
+            duration,
+            position,
+            speed,
+            acceleration,
+            jerk,
+        })
+        .collect();
+    let offsets = indices(&offsets);
+    with_padded_axes!(problem.curve.axes(), M, {
+        let rows = ProblemRows::<M>::new(&problem)?;
+        let (problem, jerk) = (rows.problem()?, row::<M>(&jerk, 1.0)?);
+        let arcs = py
+            .detach(|| s_curve_path::follow(&problem, &jerk, &offsets, &sections))
+            .map_err(|fault| to_exception(&fault))?;
+        Ok(to_columns(py, arcs))
+    })
+}
+
 fn to_columns(py: Python<'_>, arcs: Arcs) -> (Columns<'_>, Changes<'_>) {
     let floats = |column| PyArray1::from_vec(py, column);
     let count = arcs.len();
@@ -91,5 +173,7 @@ fn to_columns(py: Python<'_>, arcs: Arcs) -> (Columns<'_>, Changes<'_>) {
 /// Adds the functions to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(plan_jerk_limited, module)?)?;
-    module.add_function(wrap_pyfunction!(plan_s_curve, module)?)
+    module.add_function(wrap_pyfunction!(plan_s_curve, module)?)?;
+    module.add_function(wrap_pyfunction!(path_segments, module)?)?;
+    module.add_function(wrap_pyfunction!(profile_of_sections, module)?)
 }
