@@ -50,4 +50,4 @@ def lowered_limits(
     missed = INSIDE * np.nanmax(error * rate_sq[:, None] ** 1.5, axis=0)
     if (missed <= HELD * limits).all():
         return None
-    return np.maximum(limits - missed, 0.5 * limits)
+    return np.asarray(np.maximum(limits - missed, 0.5 * limits))

@@ -1,4 +1,4 @@
-"""The two-pass profile of constant-jerk sections, with the acceleration 0 where segments meet (Cheatham 2007)."""
+"""The two-pass profile of constant jerk, no acceleration where segments meet (Cheatham 2007, chapter 4)."""
 
 from __future__ import annotations
 

@@ -330,7 +330,8 @@ impl<'a, const M: usize> ByLength<'a, M> {
     /// The speeds between parts where a corner or a jump of q'' holds them, with whether it is the jump: q'' w is to
     /// jump by no more than the jerk limit allows in one servo period.
     pub fn caps(&self, jerk: &[f64; M]) -> Vec<(SpeedCap, bool)> {
-        let joints = 1..self.parts.len();
+        // Parts of one piece are smooth where they meet.
+        let joints = (1..self.parts.len()).filter(|&i| self.parts[i].piece != self.parts[i - 1].piece);
         let caps = joints.map(|i| {
             let s = self.knots[i];
             let (before, after) = (self.at(i - 1, s), self.at(i, s));

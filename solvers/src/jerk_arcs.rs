@@ -11,7 +11,7 @@ use crate::jerk_limited::{Geometry, Profile};
 use crate::s_curve::Section;
 
 const PATH_JERK: u8 = 6;
-const SPEED_CUBIC: u8 = 7;
+pub const SPEED_CUBIC: u8 = 7;
 /// Gauss–Legendre nodes and weights on [−1, 1] for times.
 const X: [f64; 4] =
     [0.183_434_642_495_649_8, 0.525_532_409_916_329, 0.796_666_477_413_626_7, 0.960_289_856_497_536_3];

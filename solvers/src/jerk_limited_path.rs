@@ -4,13 +4,17 @@
 //! corner is passed at its speed, and a joint where q'' jumps at the speed at which the acceleration of no axis jumps
 //! by more than its jerk limit allows in one servo period. Lines from rest to rest take sections of constant jerk.
 
+use std::ops::Range;
+
+use rayon::prelude::*;
+
 use crate::bang_bang::Problem;
 use crate::bang_bang_quadratic::Fault;
-use crate::by_length::{ByLength, Part};
-use crate::jerk_arcs::Arcs;
-use crate::jerk_limited::{self, Effort, End, Limits};
+use crate::by_length::{speed_sq, ByLength, Part};
+use crate::jerk_arcs::{Arcs, SPEED_CUBIC};
+use crate::jerk_limited::{self, Effort, End, Geometry, Limits, Profile};
 use crate::s_curve;
-use crate::stretches::over_stretches;
+use crate::stretches::{checked, over_stretches, stretches, Stretch};
 
 /// A joint holds the speed where the plan is within this part of its cap.
 const HELD: f64 = 0.998;
@@ -24,6 +28,50 @@ pub fn plan<const M: usize>(problem: &Problem<M>, jerk: &[f64; M], effort: &Effo
     over_stretches(problem, jerk, |stretch, limits| {
         Task { problem, limits: *limits, effort }.plan(&stretch.parts, stretch.ends, 0)
     })
+}
+
+/// Columns of a profile of this planner.
+#[derive(Clone, Copy, Debug)]
+pub struct Columns<'a> {
+    pub piece: &'a [u32],
+    pub kind: &'a [u8],
+    pub u0: &'a [f64],
+    pub u1: &'a [f64],
+    pub p0: &'a [f64],
+    pub p1: &'a [f64],
+    pub a0: &'a [f64],
+    pub a1: &'a [f64],
+    pub duration: &'a [f64],
+}
+
+/// A bound in s of the time on the grids of a profile: see `jerk_limited::certify`. A stretch that this planner did not
+/// plan as one counts for nothing.
+pub fn certified<const M: usize>(
+    problem: &Problem<M>,
+    jerk: &[f64; M],
+    columns: &Columns,
+    effort: &Effort,
+) -> Result<f64, Fault> {
+    let limits = checked(problem, jerk)?;
+    let stretches = stretches(problem);
+    let place = |arc: usize| (columns.piece[arc] as usize, columns.u0[arc]);
+    let count = columns.piece.len();
+    let mut offsets = vec![];
+    let mut arc = 0;
+    for stretch in &stretches {
+        let start = stretch.parts[0];
+        while arc < count && place(arc) < (start.piece, start.u[0]) {
+            arc += 1;
+        }
+        offsets.push(arc);
+    }
+    offsets.push(count);
+    let task = Task { problem, limits, effort };
+    let bounds = stretches
+        .par_iter()
+        .enumerate()
+        .map(|(i, stretch)| task.certified(stretch, columns, offsets[i]..offsets[i + 1]).unwrap_or(0.0));
+    Ok(bounds.sum())
 }
 
 /// The planner of stretches.
@@ -79,6 +127,54 @@ impl<const M: usize> Task<'_, M> {
                 Err(Fault::Stuck { piece: parts[part].piece, u: path.locate(part, s) })
             }
         }
+    }
+
+    /// The bound of a stretch; None where its arcs are no profile of this planner.
+    fn certified(&self, stretch: &Stretch, columns: &Columns, arcs: Range<usize>) -> Option<f64> {
+        let path = ByLength::new(self.problem, &stretch.parts);
+        let is_cubic = |arc: &usize| columns.kind[*arc] == SPEED_CUBIC;
+        let Some(first) = arcs.clone().find(is_cubic) else {
+            let time = columns.duration[arcs].iter().sum();
+            return path.line().filter(|_| stretch.ends == [0.0; 2]).map(|_| time);
+        };
+        let last = arcs.clone().rev().find(is_cubic)?;
+        if !(first..=last).all(|arc| is_cubic(&arc)) {
+            return None;
+        }
+        let knots = path.knots();
+        let mut profile = Profile { ends: [0.0, path.total()], ..Profile::default() };
+        let mut part = 0;
+        for arc in first..=last {
+            let (piece, u) = (columns.piece[arc] as usize, [columns.u0[arc], columns.u1[arc]]);
+            while path.parts[part].piece != piece || path.parts[part].u[1] <= u[0] {
+                part += 1;
+                path.parts.get(part)?;
+            }
+            let speed_sq = |u: f64, p: f64| p * speed_sq(self.problem, piece, u);
+            if arc == first {
+                let before = path.between(part, path.parts[part].u[0], u[0]);
+                profile.s.push(knots[part] + before);
+                profile.speed_sq.push(speed_sq(u[0], columns.p0[arc]));
+                profile.slope.push(2.0 * columns.a0[arc]);
+            }
+            let ends = u[1] >= path.parts[part].u[1];
+            let before = profile.s[profile.s.len() - 1];
+            let s = if ends { knots[part + 1] } else { before + path.between(part, u[0], u[1]) };
+            if s <= before {
+                return None;
+            }
+            profile.s.push(s);
+            profile.speed_sq.push(speed_sq(u[1], columns.p1[arc]));
+            profile.slope.push(2.0 * columns.a1[arc]);
+        }
+        let caps: Vec<_> = path.caps(&self.limits.jerk).iter().map(|(cap, _)| *cap).collect();
+        let problem = jerk_limited::Problem {
+            geometry: &path,
+            limits: self.limits,
+            caps: &caps,
+            ends: stretch.ends.map(end),
+        };
+        Some(jerk_limited::certify(&problem, &profile, self.effort).least_time)
     }
 
     /// A line from rest to rest in one direction with one feed.

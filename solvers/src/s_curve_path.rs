@@ -56,47 +56,36 @@ pub fn plan<const M: usize>(
     })
 }
 
-/// The segments of all stretches, and what the two-pass profiler makes of them.
+/// The segments of all stretches.
 #[derive(Clone, Debug, Default)]
-pub struct Planned {
-    /// Offsets of the stretches in the segments; a stretch that has none is not for this planner.
+pub struct Segmented {
+    /// Offsets of the stretches in the segments; a stretch that has none is not for profilers of segments.
     pub stretches: Vec<i64>,
     pub segments: Vec<Segment>,
-    /// The speed at the start of each, in mm/s.
-    pub start_speed: Vec<f64>,
     /// The place where each begins.
     pub piece: Vec<u32>,
     pub u: Vec<f64>,
 }
 
-/// Segments with their first profile.
+/// Cuts all stretches into segments.
 pub fn cut<const M: usize>(
     problem: &Problem<M>,
     jerk: &[f64; M],
     cutting: &Cutting,
-    look_ahead: usize,
-) -> Result<Planned, Fault> {
+) -> Result<Segmented, Fault> {
     let limits = checked(problem, jerk)?;
-    let mut all = Planned { stretches: vec![0], ..Planned::default() };
+    let mut all = Segmented { stretches: vec![0], ..Segmented::default() };
     for stretch in stretches(problem) {
         let path = ByLength::new(problem, &stretch.parts);
         let own = if stretch.ends == [0.0; 2] { segments(problem, &path, &limits, cutting) } else { None };
-        let own = own.unwrap_or_default();
-        let sections = s_curve::plan(&own, look_ahead)?;
-        let (mut s, mut next) = (0.0, 0);
-        for segment in &own {
-            // The sections of a segment begin where it does, but for rounding.
-            while next + 1 < sections.len() && sections[next + 1].position <= s + 0.5 * CLOSE * segment.length
-            {
-                next += 1;
-            }
-            all.start_speed.push(sections[next].speed);
+        let mut s = 0.0;
+        for segment in own.unwrap_or_default() {
             let part = path.part(s);
             all.piece.push(path.parts[part].piece as u32);
             all.u.push(path.locate(part, s));
             s += segment.length;
+            all.segments.push(segment);
         }
-        all.segments.extend(own);
         all.stretches.push(all.segments.len() as i64);
     }
     Ok(all)

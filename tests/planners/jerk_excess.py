@@ -1,4 +1,4 @@
-"""How far a profile of limited jerk is beyond its limits, from derivatives of the true motion inside its arcs."""
+"""How far a profile of limited jerk is beyond its limits, from derivatives of the true motion on its arcs."""
 
 from __future__ import annotations
 
@@ -17,9 +17,11 @@ NODES, WEIGHTS = leggauss(12)
 
 @dataclass(frozen=True)
 class Excess:
-    """Greatest relative excess of velocity, acceleration and jerk of the axes, of the feed and the chord speed,
-    and how far neighbouring arcs are from one another: in speed, in acceleration, in length and in time, as parts
-    of the greatest speed and acceleration, of the length and of the time."""
+    """Greatest relative excess of velocity, acceleration and jerk of the axes, of the feed and the chord speed.
+
+    `gaps`: how far neighbouring arcs are apart in speed, acceleration and u, and what the columns say from the
+    true length and time, as parts of the greatest speed and acceleration, of all length and all time.
+    """
 
     velocity: float
     acceleration: float

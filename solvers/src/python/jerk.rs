@@ -27,7 +27,6 @@ type Segments<'py> = (
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<u32>>,
     Bound<'py, PyArray1<f64>>,
 );
@@ -61,6 +60,50 @@ fn plan_jerk_limited<'py>(
     })
 }
 
+/// `feedplan.profile.SpeedProfile`.
+#[derive(FromPyObject)]
+struct ProfileArrays<'py> {
+    piece: PyReadonlyArray1<'py, u32>,
+    kind: PyReadonlyArray1<'py, u8>,
+    u0: PyReadonlyArray1<'py, f64>,
+    u1: PyReadonlyArray1<'py, f64>,
+    p0: PyReadonlyArray1<'py, f64>,
+    p1: PyReadonlyArray1<'py, f64>,
+    a0: PyReadonlyArray1<'py, f64>,
+    a1: PyReadonlyArray1<'py, f64>,
+    duration: PyReadonlyArray1<'py, f64>,
+}
+
+/// A lower bound in s of the time on the grid of a profile of `plan_jerk_limited`.
+#[pyfunction]
+#[pyo3(signature = (problem, jerk, profile, time_limit=None))]
+fn bound_jerk_limited(
+    py: Python<'_>,
+    problem: ProblemArrays<'_>,
+    jerk: PyReadonlyArray1<'_, f64>,
+    profile: ProfileArrays<'_>,
+    time_limit: Option<f64>,
+) -> PyResult<f64> {
+    let columns = jerk_limited_path::Columns {
+        piece: profile.piece.as_slice()?,
+        kind: profile.kind.as_slice()?,
+        u0: profile.u0.as_slice()?,
+        u1: profile.u1.as_slice()?,
+        p0: profile.p0.as_slice()?,
+        p1: profile.p1.as_slice()?,
+        a0: profile.a0.as_slice()?,
+        a1: profile.a1.as_slice()?,
+        duration: profile.duration.as_slice()?,
+    };
+    let effort = Effort { deadline: deadline(time_limit), ..Effort::default() };
+    with_padded_axes!(problem.curve.axes(), M, {
+        let rows = ProblemRows::<M>::new(&problem)?;
+        let (problem, jerk) = (rows.problem()?, row::<M>(&jerk, 1.0)?);
+        py.detach(|| jerk_limited_path::certified(&problem, &jerk, &columns, &effort))
+            .map_err(|fault| to_exception(&fault))
+    })
+}
+
 /// The two-pass profile within `jerk` of every axis, of segments cut as `s_curve_path::Cutting` says (parts, stretch,
 /// alike): the same columns.
 #[pyfunction]
@@ -83,36 +126,34 @@ fn plan_s_curve<'py>(
     })
 }
 
-/// The segments that `plan_s_curve` plans on, and the speeds at their starts by it: offsets of the stretches, then
-/// (n,) length, speed, acceleration, jerk, junction, start speed, piece, u. A stretch without segments is not for it.
+/// The segments that `plan_s_curve` plans on: offsets of the stretches, then (n,) length, speed, acceleration, jerk,
+/// junction, piece, u. A stretch without segments is not for it.
 #[pyfunction]
 fn path_segments<'py>(
     py: Python<'py>,
     problem: ProblemArrays<'py>,
     jerk: PyReadonlyArray1<'py, f64>,
     cutting: (usize, f64, f64),
-    look_ahead: usize,
 ) -> PyResult<Segments<'py>> {
     let (parts, stretch, alike) = cutting;
     let cutting = Cutting { parts, stretch, alike };
     with_padded_axes!(problem.curve.axes(), M, {
         let rows = ProblemRows::<M>::new(&problem)?;
         let (problem, jerk) = (rows.problem()?, row::<M>(&jerk, 1.0)?);
-        let planned = py
-            .detach(|| s_curve_path::cut(&problem, &jerk, &cutting, look_ahead))
+        let segmented = py
+            .detach(|| s_curve_path::cut(&problem, &jerk, &cutting))
             .map_err(|fault| to_exception(&fault))?;
         let column =
-            |of: fn(&Segment) -> f64| PyArray1::from_vec(py, planned.segments.iter().map(of).collect());
+            |of: fn(&Segment) -> f64| PyArray1::from_vec(py, segmented.segments.iter().map(of).collect());
         Ok((
-            PyArray1::from_vec(py, planned.stretches),
+            PyArray1::from_vec(py, segmented.stretches),
             column(|segment| segment.length),
             column(Segment::speed),
             column(|segment| segment.limits.acceleration),
             column(|segment| segment.limits.jerk),
             column(|segment| segment.junction),
-            PyArray1::from_vec(py, planned.start_speed),
-            PyArray1::from_vec(py, planned.piece),
-            PyArray1::from_vec(py, planned.u),
+            PyArray1::from_vec(py, segmented.piece),
+            PyArray1::from_vec(py, segmented.u),
         ))
     })
 }
@@ -173,6 +214,7 @@ fn to_columns(py: Python<'_>, arcs: Arcs) -> (Columns<'_>, Changes<'_>) {
 /// Adds the functions to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(plan_jerk_limited, module)?)?;
+    module.add_function(wrap_pyfunction!(bound_jerk_limited, module)?)?;
     module.add_function(wrap_pyfunction!(plan_s_curve, module)?)?;
     module.add_function(wrap_pyfunction!(path_segments, module)?)?;
     module.add_function(wrap_pyfunction!(profile_of_sections, module)?)
