@@ -217,8 +217,8 @@ def curvature_jumps(problem: Problem, profile: SpeedProfile) -> tuple[str, ...]:
     count = len(profile.kinked)
     joints = "1 joint" if count == 1 else f"{count} joints, here the most"
     return (
-        f"line {line}: the tool slows to {math.sqrt(speed_sq[slowest]):.3g} mm/s where the curvature jumps, as "
-        f"it does at {joints}: limits of jerk hold the speed there; a path of continuous curvature is faster",
+        f"line {line}: the tool slows to {math.sqrt(speed_sq[slowest]):.3g} mm/s where the curvature jumps, "
+        f"as it does at {joints}: limits of jerk hold it there; a path of continuous curvature is faster",
     )
 
 

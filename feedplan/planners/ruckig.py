@@ -36,7 +36,7 @@ LIMITS_JERK = True
 # Cuttings that are tried: the S-curve's own and a finer one.
 CUTTINGS = (s_curve.CUTTING, (16, 30.0, 0.02))
 # Times that all joints are improved, at most, and the gain of one round below which steps are halved.
-ROUNDS, GAIN = 40, 1e-4
+ROUNDS, GAIN = 24, 3e-4
 # Steps of speed and acceleration as parts of their limits: the first, and the least.
 STEP, LEAST_STEP = 0.25, 0.002
 # A motion may be out of its limits by rounding, as a part of them.
@@ -107,13 +107,13 @@ class Motions:
 
     def __init__(self) -> None:
         try:
-            from ruckig import InputParameter, Result, Ruckig, Trajectory
+            from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
         except ImportError:
             raise MissingPackageError(
                 "the method ruckig needs the package ruckig: `pip install ruckig`"
             ) from None
         self._generator, self._input, self._trajectory = Ruckig(1), InputParameter(1), Trajectory(1)
-        self._done = Result.Working
+        self._done, self._fault = Result.Working, RuckigError
         self._input.current_position = [0.0]
 
     def duration(self, segment: Segment, start: State, end: State) -> float:
@@ -150,9 +150,12 @@ class Motions:
             [end[0]],
             [end[1]],
         )
-        given.max_velocity, given.min_velocity = [segment.speed], [-ROUNDING * segment.speed]
+        given.max_velocity = [segment.speed]
         given.max_acceleration, given.max_jerk = [segment.acceleration], [segment.jerk]
-        return bool(self._generator.calculate(given, self._trajectory) == self._done)
+        try:
+            return bool(self._generator.calculate(given, self._trajectory) == self._done)
+        except self._fault:
+            return False
 
 
 def plan(problem: Problem, *, time_limit: float | None = None) -> SpeedProfile:

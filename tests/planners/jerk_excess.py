@@ -17,10 +17,10 @@ NODES, WEIGHTS = leggauss(12)
 
 @dataclass(frozen=True)
 class Excess:
-    """Greatest relative excess of velocity, acceleration and jerk of the axes, of the feed and the chord speed.
+    """Greatest relative excess of axis velocity, acceleration and jerk, of the feed and of the chord speed.
 
-    `gaps`: how far neighbouring arcs are apart in speed, acceleration and u, and what the columns say from the
-    true length and time, as parts of the greatest speed and acceleration, of all length and all time.
+    `gaps`: how far neighbouring arcs are apart in speed, acceleration and u, and what the columns say from
+    the true length and time, as parts of the greatest speed and acceleration, of all length and all time.
     """
 
     velocity: float
