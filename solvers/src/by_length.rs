@@ -23,10 +23,13 @@ const X: [f64; 4] =
     [0.183_434_642_495_649_8, 0.525_532_409_916_329, 0.796_666_477_413_626_7, 0.960_289_856_497_536_3];
 const W: [f64; 4] =
     [0.362_683_783_378_362, 0.313_706_645_877_887_3, 0.222_381_034_453_374_5, 0.101_228_536_290_376_3];
-/// What the quadrature of a panel may be off, as a part of the length of its piece …
-const QUADRATURE: f64 = 1e-13;
-/// … and the quintic half-way; in the halves that are kept it is off by a sixty-fourth of that.
-const QUINTIC: f64 = 1e-10;
+/// What the quadrature of a panel may be off, as a part of its length …
+const QUADRATURE: f64 = 1e-12;
+/// … and the quintic half-way; in the halves that are kept it is off by a sixty-fourth of that. Near a sharp turn panels
+/// are as short as the turn, and the third derivatives need digits of that length.
+const QUINTIC: f64 = 1e-9;
+/// Panels this short beside their piece are not halved.
+const SHORTEST: f64 = 1e-14;
 /// Panels are not halved more often.
 const DEPTH: u32 = 48;
 /// Newton steps to a place; the quintic is so near that one or two do.
@@ -215,7 +218,9 @@ impl<const M: usize> Builder<'_, M> {
         if !(from.rate.is_finite() && end.rate.is_finite() && miss.is_finite()) {
             miss = left + right;
         }
-        let met = (left + right - whole).abs() <= QUADRATURE * self.size && miss <= QUINTIC * self.size;
+        let length = left + right;
+        let met = (length - whole).abs() <= QUADRATURE * length && miss <= QUINTIC * length;
+        let met = met || length <= SHORTEST * self.size;
         if met || depth == DEPTH {
             self.rows.extend([half, end]);
         } else {
@@ -373,7 +378,7 @@ impl<'a, const M: usize> ByLength<'a, M> {
 
     /// The place at u of a part.
     #[inline]
-    fn place(&self, part: usize, u: f64) -> Place<M> {
+    pub fn place(&self, part: usize, u: f64) -> Place<M> {
         let i = self.parts[part].piece;
         let c = derivatives(&piece(self.problem, i), u);
         let [d, d1, d2] = rate(self.problem, i, u, &c);

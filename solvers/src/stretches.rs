@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::bang_bang::{check_pieces, Problem};
 use crate::bang_bang_quadratic::Fault;
-use crate::by_length::{piece, straight, tip_piece, Part, MAX_RATE};
+use crate::by_length::{piece, straight, tip_piece, ByLength, Part, MAX_RATE};
 use crate::jerk_arcs::Arcs;
 use crate::jerk_limited::Limits;
 use crate::planning;
@@ -16,6 +16,8 @@ use crate::spline::rational::Hodograph;
 
 /// Cusps closer to the end of a piece than this part of it are at the end.
 const AT_END: f64 = 1e-9;
+/// The tool creeps where the axes turn it only below this part of what they gain in a servo period.
+const CREEP: f64 = 0.02;
 /// Places are slow where the square of the speed is below this part of the greatest on their piece.
 const SLOW: f64 = 0.25;
 /// How far from a place on a line its direction is looked at, as a part of the piece.
@@ -74,23 +76,23 @@ pub fn stretches<const M: usize>(problem: &Problem<M>) -> Vec<Stretch> {
         let mut rests = true;
         for i in pair[0]..pair[1] {
             let (cuts, cusped) = cusps(problem, i);
-            let slow = slow_places(problem, i);
+            let mut cuts: Vec<(f64, bool)> = cuts.into_iter().map(|u| (u, true)).collect();
+            cuts.extend(slow_places(problem, i).into_iter().map(|u| (u, is_sharp(problem, i, u))));
+            cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
+            cuts.dedup_by(|b, a| {
+                let same = b.0 - a.0 <= AT_END * problem.width[i];
+                a.1 |= same && b.1;
+                same
+            });
             rests |= i > pair[0] && problem.junction_speed[i] == 0.0;
-            let mut from = 0.0;
-            for (part, to) in cuts.iter().copied().chain([problem.width[i]]).enumerate() {
-                let rest = if part == 0 { rests || cusped[0] } else { true };
+            let (mut from, mut rest) = (0.0, rests || cusped[0]);
+            for (to, then) in cuts.into_iter().chain([(problem.width[i], false)]) {
                 if rest {
                     out.push(Stretch { number: out.len(), run, parts: vec![], ends: [0.0; 2] });
                 }
                 let last = out.len() - 1;
-                for &u in &slow {
-                    if u > from && u < to {
-                        out[last].parts.push(Part { piece: i, u: [from, u] });
-                        from = u;
-                    }
-                }
                 out[last].parts.push(Part { piece: i, u: [from, to] });
-                from = to;
+                (from, rest) = (to, then);
             }
             rests = cusped[1];
         }
@@ -147,4 +149,15 @@ fn slow_places<const M: usize>(problem: &Problem<M>, i: usize) -> Vec<f64> {
         }
     });
     found
+}
+
+/// Whether the tool would creep through a place on piece `i`: a rest there takes no longer that setpoints could tell.
+fn is_sharp<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> bool {
+    let part = [Part { piece: i, u: [0.0, problem.width[i]] }];
+    let place = ByLength::new(problem, &part).place(0, u);
+    (0..M).any(|k| {
+        let most = problem.max_acceleration[k];
+        let speed = (most / place.second[k].abs()).sqrt();
+        speed < CREEP * most * problem.period
+    })
 }
