@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
-from feedplan.errors import InputError
+from feedplan.errors import SolverError
 from feedplan.profile import SpeedProfile
 
 # Joints' third derivatives are compared at arc ends: inside, they may be off by this much more.
@@ -18,12 +18,12 @@ HELD = 2e-7
 def jerk_limits(problem: Problem) -> NDArray[np.float64]:
     """The jerk limits (axes,) [mm/s³]; 1 for an axis without one that does not move.
 
-    Raises InputError for an axis that moves without one.
+    Raises SolverError for an axis that moves without one.
     """
     limits = problem.max_jerk.copy()
     for column in np.flatnonzero(~np.isfinite(limits)):
         if np.ptp(problem.curve.control_points[:, column]) > 0:
-            raise InputError(
+            raise SolverError(
                 f"axis {problem.axes[column]} has no limit of jerk: give it max_jerk in the machine file, or "
                 "plan with a method that needs none, such as bang-bang"
             )

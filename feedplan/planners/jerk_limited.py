@@ -26,7 +26,7 @@ def plan(problem: Problem, *, accuracy: float = 1e-4, time_limit: float | None =
     """The fastest profile, its time within about `accuracy` of the least, as a part of it.
 
     It is planned by the length of the tool's way (`solvers/src/jerk_limited_path.rs`). After `time_limit` [s]
-    the best profile so far is taken: it keeps all limits too. Raises InputError for an axis without a limit
+    the best profile so far is taken: it keeps all limits too. Raises SolverError for an axis without a limit
     of jerk, InfeasibleError where the start or end speed cannot be had, with the speed that can.
     """
     if not FINEST <= accuracy <= COARSEST:

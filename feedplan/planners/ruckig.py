@@ -161,7 +161,7 @@ class Motions:
 def plan(problem: Problem, *, time_limit: float | None = None) -> SpeedProfile:
     """The profile; after `time_limit` [s] the best so far.
 
-    Raises InputError for an axis without a limit of jerk, MissingPackageError.
+    Raises SolverError for an axis without a limit of jerk, MissingPackageError.
     """
     return _planned(problem, time_limit, None)
 

@@ -20,7 +20,7 @@ CUTTING = (8, 30.0, 0.05)
 def plan(problem: Problem) -> SpeedProfile:
     """The profile of a controller that looks some segments ahead; not the fastest.
 
-    Raises InputError for an axis without a limit of jerk.
+    Raises SolverError for an axis without a limit of jerk.
     """
     try:
         columns, changes = plan_s_curve(problem, jerk_limits(problem), CUTTING, LOOK_AHEAD)
