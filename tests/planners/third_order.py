@@ -1,8 +1,9 @@
-"""The problem of least time with limits of jerk on the grid of a profile, by two solvers that know nothing of ours.
+"""The problem of least time with limits of jerk on the grid of a profile, by two solvers that are not ours.
 
-w = v² is a C¹ cubic in the length between the nodes, ramps w ∝ s^(4/3) lead from and to rest; limits hold at four
-places of each interval. IPOPT takes the problem as it is. Clarabel gets quadratic programs, one after the other:
-the row |L w| ≤ J w^(−1/2) of jerk by the tangent of its right side, which is convex, so that every plan is valid.
+w = v² is a C¹ cubic in the length between the nodes, ramps w ∝ s^(4/3) lead from and to rest; limits hold
+at four places of each interval. IPOPT takes the problem as it is. Clarabel gets quadratic programs, one after
+the other: the row |L w| ≤ J w^(−1/2) of jerk by the tangent of its right side, which is convex, so that every
+plan is valid.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ PROGRAMS, GAIN = 60, 1e-8
 
 @dataclass(frozen=True)
 class Grid:
-    """Intervals of length `h` (n,), derivatives by length `q` (3, 4 n, axes) at their places, limits of each, the
-    ramps' lengths, and a plan `x` (2 n + 2,): w and w' at the nodes."""
+    """Intervals of length `h` (n,), derivatives by length `q` (3, 4 n, axes) at their places, limits, the
+    lengths of the ramps, and a plan `x` (2 n + 2,): w and w' at the nodes."""
 
     h: Array
     q: Array
