@@ -30,8 +30,14 @@ const QUADRATURE: f64 = 1e-12;
 const QUINTIC: f64 = 1e-9;
 /// Panels this short beside their piece are not halved.
 const SHORTEST: f64 = 1e-14;
+/// What rounding leaves of tangents and parameters.
+const ROUNDING: f64 = 4e-15;
+/// No table gets many more rows.
+const MOST_ROWS: usize = 2000;
 /// Panels are not halved more often.
 const DEPTH: u32 = 48;
+/// Parts of a piece between places at which the speed is looked at.
+const PLACES: usize = 8;
 /// Newton steps to a place; the quintic is so near that one or two do.
 const STEPS: usize = 8;
 /// Tangents of a straight piece are off its direction by no more than this part of the longest.
@@ -202,6 +208,7 @@ struct Builder<'a, const M: usize> {
     problem: &'a Problem<'a, M>,
     piece: usize,
     size: f64,
+    fastest: f64,
     rows: Vec<Row>,
 }
 
@@ -219,8 +226,10 @@ impl<const M: usize> Builder<'_, M> {
             miss = left + right;
         }
         let length = left + right;
-        let met = (length - whole).abs() <= QUADRATURE * length && miss <= QUINTIC * length;
-        let met = met || length <= SHORTEST * self.size;
+        // Tangents are known to a part of the longest one, and u to a part of itself.
+        let noise = ROUNDING * ((b - from.u) * self.fastest + b / half.rate);
+        let met = (length - whole).abs() <= QUADRATURE * length + noise && miss <= QUINTIC * length + noise;
+        let met = met || length <= SHORTEST * self.size || self.rows.len() > MOST_ROWS;
         if met || depth == DEPTH {
             self.rows.extend([half, end]);
         } else {
@@ -235,7 +244,9 @@ impl<const M: usize> Table<M> {
         let [a, b] = part.u;
         let whole = panel(problem, part.piece, a, b);
         let first = Row::new(problem, part.piece, a, 0.0);
-        let mut builder = Builder { problem, piece: part.piece, size: whole, rows: vec![first] };
+        let places = (0..=PLACES).map(|i| a + (b - a) * i as f64 / PLACES as f64);
+        let fastest = places.map(|u| speed_sq(problem, part.piece, u)).fold(0.0, f64::max).sqrt();
+        let mut builder = Builder { problem, piece: part.piece, size: whole, fastest, rows: vec![first] };
         builder.halve(b, whole, 0);
         let rows = builder.rows;
         let length = rows[rows.len() - 1].s;
