@@ -14,6 +14,7 @@ from benchmarks import (
     curve_cost,
     end_to_end,
     interpolators,
+    jerk,
     kinematics_cost,
     methods,
     planner_cost,
@@ -33,6 +34,7 @@ BENCHMARKS = {
         zhang_comparison,
         interpolators,
         kinematics_cost,
+        jerk,
     )
 }
 

@@ -14,7 +14,7 @@ from feedplan.planners import methods, options_of
 NAME = "methods"
 EXACT = "bang-bang"
 # Pieces beyond which a solver on a mesh takes minutes: what it does on fewer says the same.
-MOST_PIECES = {"casadi": 100, "clarabel": 1000, "toppra": 100}
+MOST_PIECES = {"casadi": 100, "clarabel": 1000, "toppra": 100, "ruckig": 100}
 QUICK = ("lemniscate", "spline-10")
 # What solvers on a mesh are asked for, and when they give up [s].
 ACCURACY, TIME_LIMIT = 1e-3, 20.0

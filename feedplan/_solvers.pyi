@@ -19,6 +19,7 @@ __all__ = [
     "__version__",
     "audit_places",
     "audit_plan",
+    "bound_jerk_limited",
     "build_path",
     "check_control_points",
     "csv_rows",
@@ -31,8 +32,12 @@ __all__ = [
     "fit_points",
     "look_ahead",
     "lower_bound",
+    "path_segments",
     "plan_bang_bang",
     "plan_curves",
+    "plan_jerk_limited",
+    "plan_s_curve",
+    "profile_of_sections",
     "read_gcode",
     "spline_insert",
     "spline_pieces",
@@ -58,8 +63,42 @@ _Profile = tuple[
     NDArray[np.uint32],
 ]
 
+# Its accelerations at both ends of the arcs, and `kinked`.
+_Changes = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.uint32]]
+
 def plan_bang_bang(problem: Problem) -> _Profile: ...
 def plan_curves(problem: Problem) -> _Profile: ...
+def plan_jerk_limited(
+    problem: Problem,
+    jerk: NDArray[np.float64],
+    resolution: float,
+    tolerance: float,
+    time_limit: float | None = None,
+) -> tuple[_Profile, _Changes]: ...
+def bound_jerk_limited(
+    problem: Problem, jerk: NDArray[np.float64], profile: SpeedProfile, time_limit: float | None = None
+) -> float: ...
+def plan_s_curve(
+    problem: Problem, jerk: NDArray[np.float64], cutting: tuple[int, float, float], look_ahead: int
+) -> tuple[_Profile, _Changes]: ...
+def path_segments(
+    problem: Problem, jerk: NDArray[np.float64], cutting: tuple[int, float, float]
+) -> tuple[
+    NDArray[np.int64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.uint32],
+    NDArray[np.float64],
+]: ...
+def profile_of_sections(
+    problem: Problem,
+    jerk: NDArray[np.float64],
+    offsets: NDArray[np.int64],
+    sections: NDArray[np.float64],
+) -> tuple[_Profile, _Changes]: ...
 def lower_bound(problem: Problem, profile: SpeedProfile) -> float: ...
 def look_ahead(
     speed: NDArray[np.float64], gain: NDArray[np.float64], hold: NDArray[np.float64]

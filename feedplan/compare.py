@@ -14,7 +14,7 @@ from feedplan.errors import InfeasibleError, InputError, MissingPackageError, So
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
 from feedplan.plan import Plan, Progress, plan
-from feedplan.planners import options_of
+from feedplan.planners import limits_jerk, options_of
 from feedplan.program.program import Program
 from feedplan.program.read import read_program
 
@@ -111,7 +111,7 @@ def compare(
             plans.append((method, None, str(error)))
         report(method, 1.0)
     bounds = [
-        max((other.lower_bound for _, other, _ in plans if other and _same_way(made, other)), default=0.0)
+        max((other.lower_bound for _, other, _ in plans if other and _bounds(other, made)), default=0.0)
         if made
         else 0.0
         for _, made, _ in plans
@@ -119,6 +119,11 @@ def compare(
     return tuple(
         Row(method, made, bound, error) for (method, made, error), bound in zip(plans, bounds, strict=True)
     )
+
+
+def _bounds(other: Plan, made: Plan) -> bool:
+    """The bound of one holds for the other: on the same path, and without limits that only it keeps."""
+    return _same_way(made, other) and limits_jerk(made.method) >= limits_jerk(other.method)
 
 
 def _same_way(one: Plan, other: Plan) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections.abc import Callable, Iterator
@@ -10,14 +11,16 @@ from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from typing import Any
 
+import numpy as np
+
 from feedplan.audit import Audit, audit
 from feedplan.bound import lower_bound
-from feedplan.constraints.problem import Problem, build_problem
+from feedplan.constraints.problem import Problem, build_problem, speed_square
 from feedplan.curves.length import CurveLength
 from feedplan.geometry.build import build_path
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
-from feedplan.planners import corners, limits_jerk, planner
+from feedplan.planners import bound_of, corners, limits_jerk, planner
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 from feedplan.program.read import read_program
@@ -141,7 +144,8 @@ def plan(
     on. Raises ProgramError, MachineError, InputError or InfeasibleError, each a sentence with place and
     remedy.
     """
-    solve = planner(method, accuracy=accuracy, cells=cells, time_limit=time_limit)
+    options = {"accuracy": accuracy, "cells": cells, "time_limit": time_limit}
+    solve = planner(method, **options)
     if not isinstance(machine, Machine):
         machine = Machine.load(machine)
     if period is not None:
@@ -170,7 +174,11 @@ def plan(
         )
         profile = solve(problem)
     with _timed(compute, "bound"):
-        least = lower_bound(problem, profile) + path.pauses
+        least = lower_bound(problem, profile)
+        known = bound_of(method, **options)
+        if known is not None:
+            least = max(least, known(problem, profile))
+        least += path.pauses
     report("plan", 1.0)
     return Plan(
         program=program,
@@ -181,7 +189,9 @@ def plan(
         lower_bound=least,
         compute=compute,
         interpolator=interpolator,
-        warnings=(program.warnings if program else ()) + rounding_stops(problem, profile),
+        warnings=(program.warnings if program else ())
+        + rounding_stops(problem, profile)
+        + curvature_jumps(problem, profile),
     )
 
 
@@ -192,6 +202,23 @@ def rounding_stops(problem: Problem, profile: SpeedProfile) -> tuple[str, ...]:
         f"line {line}: rounding hides how the path goes on next to a cusp: the plan stops there, slower than "
         "it need be; a corner in place of the cusp is exact"
         for line in lines
+    )
+
+
+def curvature_jumps(problem: Problem, profile: SpeedProfile) -> tuple[str, ...]:
+    """A sentence where jumps of curvature slow a profile of limited jerk: how many, and the slowest place."""
+    if not len(profile.kinked):
+        return ()
+    # The first arc of each piece: it begins at the jump.
+    arc = np.searchsorted(profile.piece, profile.kinked)
+    speed_sq = profile.p0[arc] * speed_square(problem, profile.kinked, np.zeros(len(arc)))
+    slowest = int(np.argmin(speed_sq))
+    line = int(problem.path.line[profile.kinked[slowest]])
+    count = len(profile.kinked)
+    joints = "1 joint" if count == 1 else f"{count} joints, here the most"
+    return (
+        f"line {line}: the tool slows to {math.sqrt(speed_sq[slowest]):.3g} mm/s where the curvature jumps, "
+        f"as it does at {joints}: limits of jerk hold it there; a path of continuous curvature is faster",
     )
 
 

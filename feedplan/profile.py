@@ -44,6 +44,7 @@ class SpeedProfile:
     a stop, p is its limit.
     On PATH_JERK and SPEED_CUBIC `a0`, `a1` are the acceleration along the path at both ends, v̇ [mm/s²]; 0 on
     all other kinds. Speed v = |C'| √p and length are those of the tool where the problem has a `tip_speed`.
+    `kinked` (m,) pieces at whose start a jump of curvature holds the speed.
     PATH_JERK: v1 = v0 + a0·T + value·T²/2, a1 = a0 + value·T, T the duration. SPEED_CUBIC: v0, v1 > 0.
     """
 
@@ -60,6 +61,7 @@ class SpeedProfile:
     slowed: NDArray[np.uint32] = field(default_factory=lambda: np.empty(0, dtype=np.uint32))
     a0: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     a1: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    kinked: NDArray[np.uint32] = field(default_factory=lambda: np.empty(0, dtype=np.uint32))
 
     def __post_init__(self) -> None:
         for name in ("a0", "a1"):

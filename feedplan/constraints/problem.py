@@ -174,6 +174,23 @@ def build_problem(
     )
 
 
+def speed_square(problem: Problem, piece: NDArray[np.integer], u: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The square of the tool's speed over p at places (n,)."""
+    tip = problem.tip_speed
+    if tip is None:
+        return np.asarray((problem.curve.evaluate(piece, u, 1)[1] ** 2).sum(axis=1))
+    t = u / problem.path.width[piece]
+    counts = np.diff(tip.offsets)[piece]
+    square = np.empty(len(u))
+    for count in np.unique(counts).tolist():
+        own = counts == count
+        values = tip.coefficients[tip.offsets[piece[own]][:, None] + np.arange(count)].T
+        while len(values) > 1:
+            values = values[:-1] + (values[1:] - values[:-1]) * t[own]
+        square[own] = values[0]
+    return square
+
+
 def _joint_problem(
     path: Path, machine: Machine, feed: float | None, override: float, ends: tuple[float, float]
 ) -> Problem:

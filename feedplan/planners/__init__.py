@@ -4,7 +4,8 @@ A planner module has one function `plan(problem: Problem) -> SpeedProfile`, with
 keywords. The method `bang-bang` is the module `bang_bang`; modules that begin with an underscore are what
 methods share. A method that is made for another path than the rounded one says so in `CORNERS`
 (`feedplan.geometry.corners.Corners`); one whose profiles keep the jerk limits of the axes says
-`LIMITS_JERK = True`, and the audit judges them.
+`LIMITS_JERK = True`, and the audit judges them. One that knows a bound of the time beside that of
+`feedplan.bound` has a function `lower_bound(problem, profile)` with the same options.
 """
 
 from __future__ import annotations
@@ -38,6 +39,14 @@ def planner(method: str, **options: float | None) -> Callable[[Problem], SpeedPr
     for name in given.keys() - options_of(method):
         raise InputError(f"the method {method} takes no {name.replace('_', ' ')}: leave it out")
     return partial(plan, **given)
+
+
+def bound_of(method: str, **options: float | None) -> Callable[[Problem, SpeedProfile], float] | None:
+    """What a method itself knows of the least time [s] from one of its profiles, with the same options; None
+    for most; raises as `planner`."""
+    bound: Callable[..., float] | None = getattr(_module(method), "lower_bound", None)
+    given = {name: value for name, value in options.items() if value is not None}
+    return None if bound is None else partial(bound, **given)
 
 
 def options_of(method: str) -> frozenset[str]:

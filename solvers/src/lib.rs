@@ -8,12 +8,15 @@ pub mod bang_bang;
 pub mod bang_bang_quadratic;
 pub mod bernstein;
 pub mod bound;
+pub mod by_length;
 pub mod conic;
 pub mod corner;
 pub mod fit;
 pub mod follow;
 pub mod gcode;
+pub mod jerk_arcs;
 pub mod jerk_limited;
+pub mod jerk_limited_path;
 pub mod limit_curve;
 pub mod look_ahead;
 pub mod motion;
@@ -24,9 +27,11 @@ mod planning;
 pub mod polynomial;
 pub mod quadratic;
 pub mod s_curve;
+pub mod s_curve_path;
 pub mod sampling;
 pub mod sarfraz;
 pub mod spline;
+pub mod stretches;
 pub mod text;
 
 #[cfg(feature = "python")]

@@ -5,6 +5,7 @@ mod audit;
 mod bound;
 mod fit;
 mod gcode;
+mod jerk;
 mod path;
 mod plan;
 mod problem;
@@ -63,6 +64,7 @@ fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     sampling::register(module)?;
     spline::register(module)?;
     plan::register(module)?;
+    jerk::register(module)?;
     bound::register(module)?;
     gcode::register(module)?;
     Ok(())

@@ -8,6 +8,8 @@ const RAMP: f64 = 1.0 / 90.0;
 const PART: f64 = 1.0 / 400.0;
 /// Samples of a piece of the path under a ramp.
 const SAMPLES: usize = 32;
+/// Rounds of sampling, each between the places beside the worst one.
+const ROUNDS: usize = 3;
 
 /// The length of the ramps of a path, in mm, from |q'| of its axes at the end.
 pub fn length<const M: usize>(limits: &Limits<M>, first: &[f64; M], path: f64) -> f64 {
@@ -43,21 +45,35 @@ pub fn greatest<const M: usize>(
         if start >= stop {
             continue;
         }
-        for i in 0..=SAMPLES {
-            let s = start + (stop - start) * i as f64 / SAMPLES as f64;
+        let at = |s: f64| {
             let place = geometry.at(piece, s);
             let x = if end == 0 { s } else { total - s };
             let root = x.cbrt();
             // w, w' and √w w'' over c, c and c^(3/2), and w^(3/2), √w w' alike.
             let (w, w1) = (x * root, sign * 4.0 / 3.0 * root);
             let (cubed, crossed, bend) = (x * x, sign * 4.0 / 3.0 * x, 4.0 / 9.0);
-            c = c.min(1.0 / (limits.per_speed_sq(&place) * w));
+            let mut c = 1.0 / (limits.per_speed_sq(&place) * w);
             for k in 0..M {
                 let (q1, q2, q3) = (place.first[k], place.second[k], place.third[k]);
                 let a = (q2 * w + 0.5 * q1 * w1).abs();
                 let j = (q3 * cubed + 1.5 * q2 * crossed + 0.5 * q1 * bend).abs();
                 c = c.min(limits.acceleration[k] / a).min((limits.jerk[k] / j).cbrt().powi(2));
             }
+            c
+        };
+        let (mut from, mut to) = (start, stop);
+        for _ in 0..ROUNDS {
+            let place = |i: usize| from + (to - from) * i as f64 / SAMPLES as f64;
+            let (mut worst, mut least) = (0, f64::INFINITY);
+            for i in 0..=SAMPLES {
+                let here = at(place(i));
+                if here < least {
+                    (worst, least) = (i, here);
+                }
+            }
+            c = c.min(least);
+            // Between its neighbours it may be less.
+            (from, to) = (place(worst.saturating_sub(1)), place((worst + 1).min(SAMPLES)));
         }
     }
     for cap in caps {

@@ -71,6 +71,12 @@ impl<const M: usize> Shape<M> {
         Self { first: [0.0; M], second: [0.0; M], third: [0.0; M], curvature: 0.0 }
     }
 
+    /// Bounds over both segments.
+    pub fn with(mut self, other: &Self) -> Self {
+        self.include(other);
+        self
+    }
+
     fn include(&mut self, other: &Self) {
         for k in 0..M {
             self.first[k] = self.first[k].max(other.first[k]);

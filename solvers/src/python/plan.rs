@@ -19,7 +19,7 @@ pyo3::create_exception!(
 );
 
 /// Columns of `feedplan.profile.SpeedProfile`.
-type Columns<'py> = (
+pub type Columns<'py> = (
     Bound<'py, PyArray1<u32>>,
     Bound<'py, PyArray1<u8>>,
     Bound<'py, PyArray1<u8>>,

@@ -1,0 +1,90 @@
+"""Methods with limits of jerk on published curves, beside other people's solvers of the same problem."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from benchmarks.named import FREE, butterfly, lemniscate, trefoil
+from benchmarks.results import Cell, Result
+from feedplan import Axis, Machine
+from feedplan import plan as plan_path
+from feedplan.curves.composite import CompositeCurve
+from feedplan.geometry.path import Path
+from tests.planners.jerk_excess import jerk_excess
+from tests.planners.third_order import by_clarabel, by_ipopt, grid_of
+
+NAME = "jerk"
+AXES = tuple(Axis(name, 250.0, 3000.0, max_jerk=50_000.0) for name in "XYZ")
+MACHINE = Machine("jerk", AXES, chord_tolerance=float("inf"))
+METHODS = ("jerk-limited", "ruckig", "s-curve", "bang-bang")
+CURVES: dict[str, Callable[[], CompositeCurve]] = {
+    "lemniscate": lemniscate,
+    "trefoil": trefoil,
+    "butterfly": butterfly,
+}
+# Other solvers get the grid of a plan of this accuracy; the butterfly's is too great for them.
+ACCURACY = 1e-3
+OTHERS = {"IPOPT": by_ipopt, "Clarabel": by_clarabel}
+
+
+def run(quick: bool = False) -> Result:
+    """Every method on every curve, and the other solvers on the grid of a plan."""
+    rows: list[dict[str, Cell]] = []
+    for name, make in CURVES.items():
+        if quick and name != "lemniscate":
+            continue
+        path = Path.from_curve(make(), feed=FREE)
+        best = plan_path(path, MACHINE, "jerk-limited", accuracy=ACCURACY)
+        spent = best.compute["plan"]
+        for method in METHODS:
+            made = plan_path(path, MACHINE, method)
+            excess = jerk_excess(made.problem, made.profile).worst if method != "bang-bang" else float("nan")
+            rows.append(
+                _row(name, method, made.time, best.time, made.gap, excess, made.compute["plan"], spent)
+            )
+        rows.append(
+            _row(
+                name,
+                f"jerk-limited, accuracy {ACCURACY:g}",
+                best.time,
+                best.time,
+                best.gap,
+                jerk_excess(best.problem, best.profile).worst,
+                spent,
+                spent,
+            )
+        )
+        if name == "butterfly":
+            continue
+        grid = grid_of(best.problem, best.profile)
+        for solver, solve in OTHERS.items():
+            start = time.perf_counter()
+            found = solve(grid)
+            cost = time.perf_counter() - start
+            rows.append(_row(name, f"{solver}, the same grid", found, best.time, 0.0, 0.0, cost, spent))
+    return Result(
+        NAME,
+        "Limits of jerk",
+        tuple(rows),
+        (
+            "250 mm/s, 3000 mm/s², 50 000 mm/s³ of each axis, rest to rest; bang-bang limits no jerk.",
+            f"ratio: of times, and of computing times, to those of jerk-limited at accuracy {ACCURACY:g}.",
+            "excess: of any limit, between the places of the grid. Other solvers hold them at those alone.",
+        ),
+    )
+
+
+def _row(
+    curve: str, method: str, found: float, best: float, gap: float, excess: float, cost: float, unit: float
+) -> dict[str, Cell]:
+    return {
+        "curve": curve,
+        "method": method,
+        "time [s]": found,
+        "ratio": found / best,
+        "gap [%]": 100.0 * gap,
+        "excess": excess,
+        "computing [s]": cost,
+        "computing ratio": cost / unit,
+    }

@@ -1,0 +1,39 @@
+"""Faults of the native planners as errors of the package."""
+
+from __future__ import annotations
+
+import math
+
+from feedplan._solvers import PlanError
+from feedplan.constraints.problem import Problem
+from feedplan.errors import InfeasibleError, InputError, SolverError
+
+
+def error_of(problem: Problem, fault: PlanError) -> InfeasibleError | InputError | SolverError:
+    """The planner's fault in our words: with the source line, and a speed that will do."""
+    kind, piece, reachable, sentence = fault.args
+    line = None if piece is None else int(problem.path.line[piece])
+    place = "" if line is None else f"line {line}: "
+    if reachable is not None:
+        shown = _rounded_down(reachable)
+        if kind == "start":
+            sentence = (
+                f"{place}no profile starts at {problem.start_speed:g} mm/s: "
+                f"the limits ahead allow at most {shown} mm/s"
+            )
+        else:
+            sentence = (
+                f"{place}no profile ends at {problem.end_speed:g} mm/s: at most {shown} mm/s can be reached"
+            )
+        return InfeasibleError(sentence, line, reachable)
+    if kind == "stuck":
+        return SolverError(f"{place}{sentence}: this is a fault of the planner; please report the program")
+    return InputError(f"{place}{sentence}")
+
+
+def _rounded_down(speed: float) -> str:
+    """Six digits of a speed, never above it."""
+    if speed <= 0.0:
+        return "0"
+    scale = 10.0 ** (5 - math.floor(math.log10(speed)))
+    return f"{math.floor(speed * scale) / scale:.6g}"

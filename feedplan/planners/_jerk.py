@@ -1,0 +1,53 @@
+"""What planners with a limit of jerk share."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.constraints.problem import Problem
+from feedplan.errors import SolverError
+from feedplan.profile import SpeedProfile
+
+# Joints' third derivatives are compared at arc ends: inside, they may be off by this much more.
+INSIDE = 1.5
+# What the limits may be exceeded by, as a part of them, without another plan.
+HELD = 2e-7
+
+
+def jerk_limits(problem: Problem) -> NDArray[np.float64]:
+    """The jerk limits (axes,) [mm/s³]; 1 for an axis without one that does not move.
+
+    Raises SolverError for an axis that moves without one.
+    """
+    limits = problem.max_jerk.copy()
+    for column in np.flatnonzero(~np.isfinite(limits)):
+        if np.ptp(problem.curve.control_points[:, column]) > 0:
+            raise SolverError(
+                f"axis {problem.axes[column]} has no limit of jerk: give it max_jerk in the machine file, or "
+                "plan with a method that needs none, such as bang-bang"
+            )
+        limits[column] = 1.0
+    return limits
+
+
+def lowered_limits(
+    problem: Problem, limits: NDArray[np.float64], profile: SpeedProfile
+) -> NDArray[np.float64] | None:
+    """`limits` of jerk less what the stand-ins of the joints (`Problem.joints`) miss of it on a profile; None
+    where that is next to nothing.
+
+    The stand-ins meet accelerations; of jerks they are off by the error of the third derivative times the
+    parameter's speed to the third.
+    """
+    if not problem.words:
+        return None
+    piece = np.concatenate([profile.piece, profile.piece])
+    u = np.concatenate([profile.u0, profile.u1])
+    rate_sq = np.concatenate([profile.p0, profile.p1])
+    rate_sq = np.where(np.isfinite(rate_sq), rate_sq, 0.0)
+    error = np.abs(problem.derivatives(piece, u, 3)[3] - problem.curve.evaluate(piece, u, 3)[3])
+    missed = INSIDE * np.nanmax(error * rate_sq[:, None] ** 1.5, axis=0)
+    if (missed <= HELD * limits).all():
+        return None
+    return np.asarray(np.maximum(limits - missed, 0.5 * limits))

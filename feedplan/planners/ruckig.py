@@ -1,0 +1,286 @@
+"""State-to-state profiles along the path: states where segments meet, and the quickest motions between them.
+
+The segments are those of the S-curve, and finer ones, with its limits along the path. At first they meet
+without acceleration, as fast as looking ahead over the whole of a stretch allows. Then speed and acceleration
+are improved joint after joint, forward and backward, each time with the quickest motions to both neighbours,
+which the package ruckig finds: Berscheid and Kröger, "Jerk-limited real-time trajectory generation with
+arbitrary target states" (2021). No step makes the profile slower: it is at least as fast as the S-curve.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan._solvers import PlanError, path_segments, profile_of_sections
+from feedplan.constraints.problem import Problem, speed_square
+from feedplan.errors import InputError, MissingPackageError
+from feedplan.planners import s_curve
+from feedplan.planners._faults import error_of
+from feedplan.planners._jerk import jerk_limits
+from feedplan.profile import SpeedProfile
+
+Array = NDArray[np.float64]
+# Speed [mm/s] and acceleration [mm/s²] along the path.
+State = tuple[float, float]
+# A section of constant jerk: duration; at its start position along the stretch, speed, acceleration; jerk.
+Section = tuple[float, float, float, float, float]
+
+# The profile keeps the limits of jerk.
+LIMITS_JERK = True
+# Cuttings that are tried: the S-curve's own and a finer one.
+CUTTINGS = (s_curve.CUTTING, (16, 30.0, 0.02))
+# Times that all joints are improved, at most, and the gain of one round below which steps are halved.
+ROUNDS, GAIN = 24, 3e-4
+# Steps of speed and acceleration as parts of their limits: the first, and the least.
+STEP, LEAST_STEP = 0.25, 0.002
+# A motion may be out of its limits by rounding, as a part of them.
+ROUNDING = 1e-9
+# Halvings for a speed that can be reached: to the last digit.
+HALVINGS = 60
+# On a segment of a repaired profile the speed is at least this part of what the path allows.
+SLOWEST = 1e-3
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A part of the path: `length` [mm], greatest `speed`, `acceleration` and `jerk` along it."""
+
+    length: float
+    speed: float
+    acceleration: float
+    jerk: float
+
+    def stands(self, speed: float, change: float) -> bool:
+        """Whether an acceleration of `change` can be reached from or left to `speed` within the limits."""
+        beyond = change * abs(change) / (2 * self.jerk)
+        return 0 <= speed + beyond <= self.speed
+
+    def highest(self, speed: float) -> float:
+        """The greatest speed that can be reached on it from another one, without acceleration at both."""
+
+        def way(high: float) -> float:
+            change = high - speed
+            full = self.acceleration**2 / self.jerk
+            if change <= full:
+                duration = 2 * math.sqrt(change / self.jerk)
+            else:
+                duration = change / self.acceleration + self.acceleration / self.jerk
+            return (speed + high) / 2 * duration
+
+        low, high = speed, max(self.speed, speed)
+        if way(high) <= self.length:
+            return high
+        for _ in range(HALVINGS):
+            middle = (low + high) / 2
+            if way(middle) <= self.length:
+                low = middle
+            else:
+                high = middle
+        return low
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Segments from rest to rest, and the greatest speeds (n + 1,) at their ends."""
+
+    segments: list[Segment]
+    speeds: list[float]
+
+    def first_states(self) -> list[State]:
+        """The greatest speeds without acceleration that lead from one to the next."""
+        v = list(self.speeds)
+        for i, segment in enumerate(self.segments):
+            v[i + 1] = min(v[i + 1], segment.highest(v[i]))
+        for i, segment in reversed(list(enumerate(self.segments))):
+            v[i] = min(v[i], segment.highest(v[i + 1]))
+        return [((1 - ROUNDING) * speed, 0.0) for speed in v]
+
+
+class Motions:
+    """The quickest motions on segments between states at their ends."""
+
+    def __init__(self) -> None:
+        try:
+            from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
+        except ImportError:
+            raise MissingPackageError(
+                "the method ruckig needs the package ruckig: `pip install ruckig`"
+            ) from None
+        self._generator, self._input, self._trajectory = Ruckig(1), InputParameter(1), Trajectory(1)
+        self._done, self._fault = Result.Working, RuckigError
+        self._input.current_position = [0.0]
+
+    def duration(self, segment: Segment, start: State, end: State) -> float:
+        """The time [s]; infinite where there is no motion within the limits."""
+        if not (
+            segment.stands(start[0], start[1]) and segment.stands(end[0], -end[1])
+        ) or not self._calculate(segment, start, end):
+            return math.inf
+        profile = self._trajectory.profiles[0][0]
+        v, a, j = profile.v, profile.a, profile.j
+        low, high = -ROUNDING * segment.speed, (1 + ROUNDING) * segment.speed
+        for k in range(7):
+            turns = a[k] * a[k + 1] < 0
+            for speed in (v[k + 1], v[k] - a[k] ** 2 / (2 * j[k]) if turns else v[k]):
+                if not low <= speed <= high:
+                    return math.inf
+        return float(self._trajectory.duration) if profile.brake.duration == 0 else math.inf
+
+    def sections(self, segment: Segment, start: State, end: State, position: float) -> list[Section]:
+        """The sections of a motion that there is, the first at `position`."""
+        self._calculate(segment, start, end)
+        profile = self._trajectory.profiles[0][0]
+        return [
+            (t, position + p, max(v, 0.0), a, j)
+            for t, p, v, a, j in zip(profile.t, profile.p, profile.v, profile.a, profile.j, strict=False)
+            if t > 0
+        ]
+
+    def _calculate(self, segment: Segment, start: State, end: State) -> bool:
+        given = self._input
+        given.current_velocity, given.current_acceleration = [start[0]], [start[1]]
+        given.target_position, given.target_velocity, given.target_acceleration = (
+            [segment.length],
+            [end[0]],
+            [end[1]],
+        )
+        given.max_velocity = [segment.speed]
+        given.max_acceleration, given.max_jerk = [segment.acceleration], [segment.jerk]
+        try:
+            return bool(self._generator.calculate(given, self._trajectory) == self._done)
+        except self._fault:
+            return False
+
+
+def plan(problem: Problem, *, time_limit: float | None = None) -> SpeedProfile:
+    """The profile; after `time_limit` [s] the best so far.
+
+    Raises SolverError for an axis without a limit of jerk, MissingPackageError.
+    """
+    return _planned(problem, time_limit, None)
+
+
+def repaired(problem: Problem, profile: SpeedProfile, *, time_limit: float | None = None) -> SpeedProfile:
+    """A profile without limits of jerk made one that keeps them: where segments meet it is no faster, and
+    between no faster than the faster end, except to leave a stop and come to it."""
+    return _planned(problem, time_limit, profile)
+
+
+def _planned(problem: Problem, time_limit: float | None, guide: SpeedProfile | None) -> SpeedProfile:
+    if time_limit is not None and not time_limit >= 0:
+        raise InputError(f"the time limit is {time_limit:g} s: give 0 or more")
+    motions = Motions()
+    limits = jerk_limits(problem)
+    deadline = math.inf if time_limit is None else time.perf_counter() + time_limit
+    best: list[list[Section]] = []
+    try:
+        for cutting in CUTTINGS:
+            stretches = _stretches(problem, limits, cutting, guide)
+            found = [_improved(stretch, motions, deadline) for stretch in stretches]
+            best = [min(pair, key=_time) for pair in zip(best or found, found, strict=True)]
+            if time.perf_counter() >= deadline:
+                break
+        offsets = np.cumsum([0] + [len(sections) for sections in best])
+        rows = np.array([section for sections in best for section in sections]).reshape(-1, 5)
+        columns, changes = profile_of_sections(problem, limits, offsets, rows)
+    except PlanError as fault:
+        raise error_of(problem, fault) from None
+    return SpeedProfile(*columns, *changes)
+
+
+def _time(sections: list[Section]) -> float:
+    """The time of sections [s]; infinite for none."""
+    return sum(section[0] for section in sections) or math.inf
+
+
+def _stretches(
+    problem: Problem, limits: Array, cutting: tuple[int, float, float], guide: SpeedProfile | None
+) -> list[Stretch]:
+    """The stretches of the path; those for the jerk-limited planner have no segments."""
+    offsets, length, speed, acceleration, jerk, junction, piece, u = path_segments(problem, limits, cutting)
+    stretches = []
+    for first, last in pairwise(offsets.tolist()):
+        own = slice(first, last)
+        v = speed[own]
+        ends = np.zeros(len(v) + 1)
+        ends[1:-1] = np.minimum(np.minimum(v[:-1], v[1:]), junction[own][:-1])
+        if guide is not None:
+            ends[:-1] = np.minimum(ends[:-1], _speeds(problem, guide, piece[own], u[own]))
+            v = np.minimum(v, np.maximum(np.maximum(ends[:-1], ends[1:]), SLOWEST * v))
+        columns = (column.tolist() for column in (length[own], v, acceleration[own], jerk[own]))
+        segments = [Segment(*row) for row in zip(*columns, strict=True)]
+        stretches.append(Stretch(segments, ends.tolist()))
+    return stretches
+
+
+def _speeds(problem: Problem, guide: SpeedProfile, piece: NDArray[np.uint32], u: Array) -> Array:
+    """The speed of a profile (n,) [mm/s] at places, between the ends of its arcs linear in u."""
+    at = guide.piece + guide.u0 / problem.path.width[guide.piece]
+    place = piece + u / problem.path.width[piece]
+    arc = np.clip(np.searchsorted(at, place, side="right") - 1, 0, len(guide) - 1)
+    part = (u - guide.u0[arc]) / (guide.u1 - guide.u0)[arc]
+    rate_sq = (1 - part) * guide.p0[arc] + part * guide.p1[arc]
+    speeds: Array = np.sqrt(np.maximum(rate_sq * speed_square(problem, piece, u), 0.0))
+    return speeds
+
+
+def _improved(stretch: Stretch, motions: Motions, deadline: float) -> list[Section]:
+    """The sections of the quickest profile found; none where the first one is none."""
+    segments, states = stretch.segments, stretch.first_states()
+    durations = [
+        motions.duration(segment, *ends) for segment, ends in zip(segments, pairwise(states), strict=True)
+    ]
+    if not math.isfinite(sum(durations)):
+        return []
+    step, inner = STEP, range(1, len(segments))
+    for count in range(ROUNDS):
+        before = sum(durations)
+        for i in inner if count % 2 == 0 else reversed(inner):
+            if time.perf_counter() >= deadline:
+                break
+            _improve(stretch, motions, states, durations, i, step)
+        if before - sum(durations) < GAIN * before:
+            step /= 2
+        if step < LEAST_STEP or time.perf_counter() >= deadline:
+            break
+    sections: list[Section] = []
+    position = 0.0
+    for segment, ends in zip(segments, pairwise(states), strict=True):
+        sections += motions.sections(segment, *ends, position)
+        position += segment.length
+    return sections
+
+
+def _improve(
+    stretch: Stretch,
+    motions: Motions,
+    states: list[State],
+    durations: list[float],
+    i: int,
+    step: float,
+) -> None:
+    """Takes a step of the state between segments i − 1 and i that makes both quicker together."""
+    before, after = stretch.segments[i - 1], stretch.segments[i]
+    most = stretch.speeds[i]
+    steepest = min(before.acceleration, after.acceleration)
+    v, a = states[i]
+    for dv, da in ((1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1), (-1, 0)):
+        state = (
+            min(max(v + dv * step * most, 0.0), most),
+            min(max(a + da * step * steepest, -steepest), steepest),
+        )
+        if state == (v, a):
+            continue
+        first = motions.duration(before, states[i - 1], state)
+        if first >= durations[i - 1] + durations[i]:
+            continue
+        second = motions.duration(after, state, states[i + 1])
+        if first + second < durations[i - 1] + durations[i]:
+            states[i], durations[i - 1], durations[i] = state, first, second
+            return

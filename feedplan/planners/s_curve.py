@@ -1,0 +1,29 @@
+"""The two-pass profile of constant jerk, no acceleration where segments meet (Cheatham 2007, chapter 4)."""
+
+from __future__ import annotations
+
+from feedplan._solvers import PlanError, plan_s_curve
+from feedplan.constraints.problem import Problem
+from feedplan.planners._faults import error_of
+from feedplan.planners._jerk import jerk_limits
+from feedplan.profile import SpeedProfile
+
+# The profile keeps the limits of jerk.
+LIMITS_JERK = True
+# Segments known beyond the one that the motion enters.
+LOOK_AHEAD = 256
+# Parts of a curved piece, the length over which a speed has to pay [mm], and by what part of them the speeds
+# of parts may differ that are one segment.
+CUTTING = (8, 30.0, 0.05)
+
+
+def plan(problem: Problem) -> SpeedProfile:
+    """The profile of a controller that looks some segments ahead; not the fastest.
+
+    Raises SolverError for an axis without a limit of jerk.
+    """
+    try:
+        columns, changes = plan_s_curve(problem, jerk_limits(problem), CUTTING, LOOK_AHEAD)
+    except PlanError as fault:
+        raise error_of(problem, fault) from None
+    return SpeedProfile(*columns, *changes)

@@ -1,0 +1,446 @@
+//! A stretch of a path by its length: the parameter at a length, derivatives of the axes along it, the greatest speed.
+//!
+//! With D(u) the square of the tool's speed per parameter, s' = √D, so that
+//!
+//!   u' = D^(−1/2),   u'' = −D_u / (2 D²),   u''' = D^(−1/2) (D_u² / D³ − D_uu / (2 D²))
+//!
+//! A piece is tabulated: between two rows u(s) is the quintic with these u, u' and u''. The places that a profile is
+//! handed out at are found to rounding, by Newton's method on the quadrature of √D.
+
+use rayon::prelude::*;
+
+use crate::bang_bang::Problem;
+use crate::jerk_limited::{Geometry, Place, SpeedCap};
+use crate::path_dynamics::chord_speed;
+use crate::quadratic::{dot, norm};
+use crate::spline::bezier::derivatives;
+use crate::spline::cusps::CUSP;
+use crate::spline::rational::Hodograph;
+use crate::spline::Piece;
+
+/// Nodes of Gauss–Legendre quadrature on [−1, 1], and their weights.
+const X: [f64; 4] =
+    [0.183_434_642_495_649_8, 0.525_532_409_916_329, 0.796_666_477_413_626_7, 0.960_289_856_497_536_3];
+const W: [f64; 4] =
+    [0.362_683_783_378_362, 0.313_706_645_877_887_3, 0.222_381_034_453_374_5, 0.101_228_536_290_376_3];
+/// What the quadrature of a panel may be off, as a part of its length …
+const QUADRATURE: f64 = 1e-12;
+/// … and the quintic half-way; in the halves that are kept it is off by a sixty-fourth of that. Near a sharp turn panels
+/// are as short as the turn, and the third derivatives need digits of that length.
+const QUINTIC: f64 = 1e-9;
+/// Panels this short beside their piece are not halved.
+const SHORTEST: f64 = 1e-14;
+/// What rounding leaves of tangents and parameters.
+const ROUNDING: f64 = 4e-15;
+/// No table gets many more rows.
+const MOST_ROWS: usize = 2000;
+/// Panels are not halved more often.
+const DEPTH: u32 = 48;
+/// Parts of a piece between places at which the speed is looked at.
+const PLACES: usize = 8;
+/// Newton steps to a place; the quintic is so near that one or two do.
+const STEPS: usize = 8;
+/// Tangents of a straight piece are off its direction by no more than this part of the longest.
+const OFF_LINE: f64 = 1e-12;
+/// Derivatives are asked for at least so far from a place where D vanishes, as a part of the length.
+const INSET: f64 = 1e-9;
+/// The most coefficients of D.
+pub const MAX_RATE: usize = 40;
+
+/// Pieces between two parameters each, without a cusp inside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Part {
+    pub piece: usize,
+    pub u: [f64; 2],
+}
+
+/// One row of a table: u and its derivatives at a length from the start of the part.
+#[derive(Clone, Copy, Debug)]
+struct Row {
+    s: f64,
+    u: f64,
+    rate: f64,
+    bend: f64,
+}
+
+/// What is known of a part.
+#[derive(Clone, Debug)]
+struct Table<const M: usize> {
+    rows: Vec<Row>,
+    /// The direction of motion where it does not change and the axes are those of the tool.
+    straight: Option<[f64; M]>,
+    /// Derivatives are asked for within these lengths.
+    inside: [f64; 2],
+}
+
+/// Parts one after the other, from one place to another.
+#[derive(Clone)]
+pub struct ByLength<'a, const M: usize> {
+    problem: &'a Problem<'a, M>,
+    pub parts: &'a [Part],
+    tables: Vec<Table<M>>,
+    knots: Vec<f64>,
+}
+
+/// Piece `i` of the path; equal weights make none rational.
+pub fn piece<'a, const M: usize>(problem: &Problem<'a, M>, i: usize) -> Piece<'a, M> {
+    plain(problem.control, problem.weight, problem.offset, problem.width, i)
+}
+
+/// The tool's piece beside it, where the axes are not those of the tool.
+pub fn tip_piece<'a, const M: usize>(problem: &Problem<'a, M>, i: usize) -> Option<Piece<'a, 3>> {
+    problem.tip.map(|tip| plain(tip.control, tip.weight, tip.offset, problem.width, i))
+}
+
+fn plain<'a, const M: usize>(
+    control: &'a [[f64; M]],
+    weight: &'a [f64],
+    offset: &[usize],
+    width: &[f64],
+    i: usize,
+) -> Piece<'a, M> {
+    let range = offset[i]..offset[i + 1];
+    let weights = weight.get(range.clone()).unwrap_or(&[]);
+    let weights = if weights.windows(2).all(|pair| pair[0] == pair[1]) { &[] } else { weights };
+    Piece { control: &control[range], weights, width: width[i] }
+}
+
+/// The one direction of a piece, as it goes at u, if it has one.
+pub fn straight<const M: usize>(piece: &Piece<M>, u: f64) -> Option<[f64; M]> {
+    let hodograph = Hodograph::new(piece);
+    let tangents = hodograph.coefficients();
+    let longest = tangents.iter().max_by(|a, b| norm(a).total_cmp(&norm(b)))?;
+    let length = norm(longest);
+    let mut direction = longest.map(|x| x / length);
+    let on_line = tangents.iter().all(|tangent| {
+        let along = dot(tangent, &direction);
+        let off: [f64; M] = std::array::from_fn(|k| tangent[k] - along * direction[k]);
+        norm(&off) <= OFF_LINE * length
+    });
+    if dot(&derivatives(piece, u)[1], &direction) < 0.0 {
+        direction = direction.map(|x| -x);
+    }
+    on_line.then_some(direction)
+}
+
+/// D, D_u and D_uu at u of piece `i`, whose axes move with these derivatives.
+#[inline]
+fn rate<const M: usize>(problem: &Problem<M>, i: usize, u: f64, [_, c1, c2, c3]: &[[f64; M]; 4]) -> [f64; 3] {
+    let Some(tip) = problem.tip else {
+        return [dot(c1, c1), 2.0 * dot(c1, c2), 2.0 * (dot(c2, c2) + dot(c1, c3))];
+    };
+    let coefficients = &tip.speed[tip.speed_offset[i]..tip.speed_offset[i + 1]];
+    let (width, n) = (problem.width[i], coefficients.len() - 1);
+    let t = u / width;
+    let mut b = [0.0; MAX_RATE];
+    b[..=n].copy_from_slice(coefficients);
+    let mut out = [0.0; 3];
+    // De Casteljau's triangle: its last three rows hold the value and the derivatives.
+    for left in (0..=n).rev() {
+        let degree = n as f64;
+        match left {
+            2 => out[2] = degree * (degree - 1.0) * ((b[2] - b[1]) - (b[1] - b[0])) / (width * width),
+            1 => out[1] = degree * (b[1] - b[0]) / width,
+            0 => out[0] = b[0],
+            _ => {}
+        }
+        for j in 0..left {
+            b[j] = (1.0 - t) * b[j] + t * b[j + 1];
+        }
+    }
+    // A D that touches 0 may be a rounding error below it.
+    out[0] = out[0].max(0.0);
+    out
+}
+
+/// D at u of piece `i`.
+pub fn speed_sq<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> f64 {
+    if problem.tip.is_some() {
+        rate(problem, i, u, &[[0.0; M]; 4])[0]
+    } else {
+        let tangent = derivatives(&piece(problem, i), u)[1];
+        dot(&tangent, &tangent)
+    }
+}
+
+/// The length between two parameters of piece `i`, by one panel.
+fn panel<const M: usize>(problem: &Problem<M>, i: usize, a: f64, b: f64) -> f64 {
+    let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
+    let mut sum = 0.0;
+    for j in 0..4 {
+        for u in [middle - half * X[j], middle + half * X[j]] {
+            sum += W[j] * speed_sq(problem, i, u).sqrt();
+        }
+    }
+    half * sum
+}
+
+impl Row {
+    fn new<const M: usize>(problem: &Problem<M>, i: usize, u: f64, s: f64) -> Self {
+        let [d, d1, _] = rate(problem, i, u, &derivatives(&piece(problem, i), u));
+        Self { s, u, rate: 1.0 / d.sqrt(), bend: -0.5 * d1 / (d * d) }
+    }
+
+    /// u at s between two rows.
+    #[inline]
+    fn between(&self, next: &Self, s: f64) -> f64 {
+        let h = next.s - self.s;
+        let t = if h > 0.0 { (s - self.s) / h } else { 0.0 };
+        let (r, t2) = (1.0 - t, t * t);
+        let r2 = r * r;
+        let left = self.u * (1.0 + 3.0 * t + 6.0 * t2)
+            + self.rate * h * t * (1.0 + 3.0 * t)
+            + 0.5 * self.bend * h * h * t2;
+        let right = next.u * (1.0 + 3.0 * r + 6.0 * r2) - next.rate * h * r * (1.0 + 3.0 * r)
+            + 0.5 * next.bend * h * h * r2;
+        let u = left * r2 * r + right * t2 * t;
+        // Next to a cusp the quintic says nothing.
+        if u >= self.u && u <= next.u {
+            u
+        } else {
+            self.u + t * (next.u - self.u)
+        }
+    }
+}
+
+/// Halves panels of a part until quadrature and quintic hold.
+struct Builder<'a, const M: usize> {
+    problem: &'a Problem<'a, M>,
+    piece: usize,
+    size: f64,
+    fastest: f64,
+    rows: Vec<Row>,
+}
+
+impl<const M: usize> Builder<'_, M> {
+    /// Appends rows for the panel from the last row to b.
+    fn halve(&mut self, b: f64, whole: f64, depth: u32) {
+        let from = self.rows[self.rows.len() - 1];
+        let middle = 0.5 * (from.u + b);
+        let [left, right] =
+            [(from.u, middle), (middle, b)].map(|(a, b)| panel(self.problem, self.piece, a, b));
+        let half = Row::new(self.problem, self.piece, middle, from.s + left);
+        let end = Row::new(self.problem, self.piece, b, from.s + left + right);
+        let mut miss = (from.between(&end, half.s) - middle).abs() / half.rate;
+        if !(from.rate.is_finite() && end.rate.is_finite() && miss.is_finite()) {
+            miss = left + right;
+        }
+        let length = left + right;
+        // Tangents are known to a part of the longest one, and u to a part of itself.
+        let noise = ROUNDING * ((b - from.u) * self.fastest + b / half.rate);
+        let met = (length - whole).abs() <= QUADRATURE * length + noise && miss <= QUINTIC * length + noise;
+        let met = met || length <= SHORTEST * self.size || self.rows.len() > MOST_ROWS;
+        if met || depth == DEPTH {
+            self.rows.extend([half, end]);
+        } else {
+            self.halve(middle, left, depth + 1);
+            self.halve(b, right, depth + 1);
+        }
+    }
+}
+
+impl<const M: usize> Table<M> {
+    fn new(problem: &Problem<M>, part: &Part) -> Self {
+        let [a, b] = part.u;
+        let whole = panel(problem, part.piece, a, b);
+        let first = Row::new(problem, part.piece, a, 0.0);
+        let places = (0..=PLACES).map(|i| a + (b - a) * i as f64 / PLACES as f64);
+        let fastest = places.map(|u| speed_sq(problem, part.piece, u)).fold(0.0, f64::max).sqrt();
+        let mut builder = Builder { problem, piece: part.piece, size: whole, fastest, rows: vec![first] };
+        builder.halve(b, whole, 0);
+        let rows = builder.rows;
+        let length = rows[rows.len() - 1].s;
+        let slowest = (b - a) / length / CUSP;
+        let inset = |row: &Row| if row.rate < slowest { 0.0 } else { INSET * length };
+        let inside = [inset(&rows[0]), length - inset(&rows[rows.len() - 1])];
+        let straight = match problem.tip {
+            Some(_) => None,
+            None => straight(&piece(problem, part.piece), 0.5 * (a + b)),
+        };
+        Self { rows, straight, inside }
+    }
+
+    fn row(&self, s: f64) -> usize {
+        self.rows[1..self.rows.len() - 1].partition_point(|row| row.s <= s)
+    }
+}
+
+impl<'a, const M: usize> ByLength<'a, M> {
+    pub fn new(problem: &'a Problem<'a, M>, parts: &'a [Part]) -> Self {
+        let tables: Vec<Table<M>> =
+            parts.par_iter().with_min_len(16).map(|part| Table::new(problem, part)).collect();
+        let mut knots = vec![0.0];
+        let mut total = 0.0;
+        for table in &tables {
+            total += table.rows[table.rows.len() - 1].s;
+            knots.push(total);
+        }
+        Self { problem, parts, tables, knots }
+    }
+
+    /// The length of all parts, in mm.
+    pub fn total(&self) -> f64 {
+        self.knots[self.knots.len() - 1]
+    }
+
+    /// The part that a length lies in.
+    pub fn part(&self, s: f64) -> usize {
+        self.knots[1..self.knots.len() - 1].partition_point(|&knot| knot <= s)
+    }
+
+    /// The parameter at a length on a part, to rounding.
+    pub fn locate(&self, part: usize, s: f64) -> f64 {
+        let (table, at) = (&self.tables[part], &self.parts[part]);
+        if s <= self.knots[part] {
+            return at.u[0];
+        }
+        if s >= self.knots[part + 1] {
+            return at.u[1];
+        }
+        let x = s - self.knots[part];
+        let i = table.row(x);
+        let (from, to) = (&table.rows[i], &table.rows[i + 1]);
+        let (mut low, mut high) = (from.u, to.u);
+        let mut u = from.between(to, x);
+        for _ in 0..STEPS {
+            let miss = from.s + panel(self.problem, at.piece, from.u, u) - x;
+            if miss > 0.0 {
+                high = u;
+            } else {
+                low = u;
+            }
+            let step = miss / speed_sq(self.problem, at.piece, u).sqrt();
+            let next = u - step;
+            u = if next >= low && next <= high { next } else { 0.5 * (low + high) };
+            if step.abs() <= 1e-15 * at.u[1] {
+                break;
+            }
+        }
+        u
+    }
+
+    /// The length between two parameters of a part; short ones to their own digits.
+    pub fn between(&self, part: usize, a: f64, b: f64) -> f64 {
+        let (rows, at) = (&self.tables[part].rows, self.parts[part].piece);
+        let row = |u: f64| rows[1..rows.len() - 1].partition_point(|row| row.u <= u);
+        let (i, j) = (row(a), row(b));
+        if i == j {
+            return panel(self.problem, at, a, b);
+        }
+        let inside: f64 =
+            rows[i + 1..=j].windows(2).map(|pair| panel(self.problem, at, pair[0].u, pair[1].u)).sum();
+        panel(self.problem, at, a, rows[i + 1].u) + inside + panel(self.problem, at, rows[j].u, b)
+    }
+
+    /// The one direction of all parts and their one feed, if there are such.
+    pub fn line(&self) -> Option<([f64; M], f64)> {
+        let direction = self.tables[0].straight?;
+        let feed = self.problem.feed[self.parts[0].piece];
+        let alike = self.tables.iter().zip(self.parts).all(|(table, part)| {
+            table.straight.is_some_and(|other| (0..M).all(|k| (other[k] - direction[k]).abs() <= OFF_LINE))
+                && self.problem.feed[part.piece] == feed
+        });
+        alike.then_some((direction, feed))
+    }
+
+    /// The speeds between parts where a corner or a jump of q'' holds them, with whether it is the jump: q'' w is to
+    /// jump by no more than the jerk limit allows in one servo period.
+    pub fn caps(&self, jerk: &[f64; M]) -> Vec<(SpeedCap, bool)> {
+        // Parts of one piece are smooth where they meet.
+        let joints = (1..self.parts.len()).filter(|&i| self.parts[i].piece != self.parts[i - 1].piece);
+        let caps = joints.map(|i| {
+            let s = self.knots[i];
+            let (before, after) = (self.at(i - 1, s), self.at(i, s));
+            let mut jump_sq = f64::INFINITY;
+            for k in 0..M {
+                let jump = (after.second[k] - before.second[k]).abs();
+                jump_sq = jump_sq.min(jerk[k] * self.problem.period / jump);
+            }
+            let corner = self.problem.junction_speed[self.parts[i].piece];
+            let jump = jump_sq.sqrt();
+            (SpeedCap { s, speed: corner.min(jump) }, jump < corner)
+        });
+        // What the limits of the axes keep lower needs no cap.
+        let fastest = self.parts.iter().fold(0.0, |most: f64, part| most.max(self.problem.feed[part.piece]));
+        caps.filter(|(cap, _)| cap.speed < fastest).collect()
+    }
+
+    /// The direction of motion on a part where it does not change.
+    pub fn direction(&self, part: usize) -> Option<[f64; M]> {
+        self.tables[part].straight
+    }
+
+    /// Curvature of the tool's way at a length on a part, in 1/mm.
+    pub fn curvature(&self, part: usize, s: f64) -> f64 {
+        match tip_piece(self.problem, self.parts[part].piece) {
+            None => norm(&self.at(part, s).second),
+            Some(tip) => curvature(&tip, self.locate(part, s)),
+        }
+    }
+
+    /// The greatest speed by the chord error on a curvature.
+    pub fn chord_speed(&self, curvature: f64) -> f64 {
+        if self.problem.chord_tolerance.is_finite() {
+            chord_speed(curvature, self.problem.chord_tolerance, self.problem.period)
+        } else {
+            f64::INFINITY
+        }
+    }
+
+    /// The place at u of a part.
+    #[inline]
+    pub fn place(&self, part: usize, u: f64) -> Place<M> {
+        let i = self.parts[part].piece;
+        let c = derivatives(&piece(self.problem, i), u);
+        let [d, d1, d2] = rate(self.problem, i, u, &c);
+        let [_, c1, c2, c3] = c;
+        let (u1, per_d_sq) = (1.0 / d.sqrt(), 1.0 / (d * d));
+        let u2 = -0.5 * d1 * per_d_sq;
+        let u3 = u1 * per_d_sq * (d1 * d1 / d - 0.5 * d2);
+        let of = |f: &dyn Fn(usize) -> f64| std::array::from_fn(f);
+        let mut place = Place {
+            first: of(&|k| c1[k] * u1),
+            second: of(&|k| c2[k] * u1 * u1 + c1[k] * u2),
+            third: of(&|k| c3[k] * u1 * u1 * u1 + 3.0 * c2[k] * u1 * u2 + c1[k] * u3),
+            speed_cap: self.problem.feed[i],
+        };
+        if self.problem.chord_tolerance.is_finite() {
+            let curvature = match tip_piece(self.problem, i) {
+                None => norm(&place.second),
+                Some(tip) => curvature(&tip, u),
+            };
+            place.speed_cap = place.speed_cap.min(self.chord_speed(curvature));
+        }
+        place
+    }
+}
+
+/// Curvature of a piece at u; 0 where it stands.
+fn curvature(piece: &Piece<3>, u: f64) -> f64 {
+    let [_, c1, c2, _] = derivatives(piece, u);
+    let square = dot(&c1, &c1);
+    let along = dot(&c1, &c2) / square;
+    let off: [f64; 3] = std::array::from_fn(|k| c2[k] - along * c1[k]);
+    if square > 0.0 {
+        norm(&off) / square
+    } else {
+        0.0
+    }
+}
+
+impl<const M: usize> Geometry<M> for ByLength<'_, M> {
+    fn knots(&self) -> &[f64] {
+        &self.knots
+    }
+
+    fn at(&self, part: usize, s: f64) -> Place<M> {
+        let table = &self.tables[part];
+        if let Some(direction) = table.straight {
+            let speed_cap = self.problem.feed[self.parts[part].piece];
+            return Place { first: direction, second: [0.0; M], third: [0.0; M], speed_cap };
+        }
+        let x = (s - self.knots[part]).clamp(table.inside[0], table.inside[1]);
+        let i = table.row(x);
+        self.place(part, table.rows[i].between(&table.rows[i + 1], x))
+    }
+}

@@ -1,0 +1,305 @@
+//! Profiles of limited jerk as columns: arcs along the pieces of a path, in the order of the path.
+//!
+//! Two kinds, of `feedplan.profile.ArcKind`: the jerk along the path is constant, or v² is a cubic of the length. What
+//! goes over several pieces is cut where they meet: both kinds stay what they are.
+
+use std::ops::Range;
+
+use crate::bang_bang::Problem;
+use crate::by_length::{speed_sq, ByLength};
+use crate::jerk_limited::{Geometry, Profile};
+use crate::s_curve::Section;
+
+const PATH_JERK: u8 = 6;
+pub const SPEED_CUBIC: u8 = 7;
+/// Gauss–Legendre nodes and weights on [−1, 1] for times.
+const X: [f64; 4] =
+    [0.183_434_642_495_649_8, 0.525_532_409_916_329, 0.796_666_477_413_626_7, 0.960_289_856_497_536_3];
+const W: [f64; 4] =
+    [0.362_683_783_378_362, 0.313_706_645_877_887_3, 0.222_381_034_453_374_5, 0.101_228_536_290_376_3];
+/// Halvings for the time at which a section of constant jerk passes a place.
+const HALVINGS: usize = 200;
+
+/// Columns of arcs; see `feedplan.profile.SpeedProfile`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Arcs {
+    pub piece: Vec<u32>,
+    pub kind: Vec<u8>,
+    pub value: Vec<f64>,
+    pub u0: Vec<f64>,
+    pub u1: Vec<f64>,
+    pub p0: Vec<f64>,
+    pub p1: Vec<f64>,
+    pub duration: Vec<f64>,
+    pub a0: Vec<f64>,
+    pub a1: Vec<f64>,
+    /// Offsets of the runs in the arcs.
+    pub runs: Vec<i64>,
+    /// Pieces at whose start a jump of curvature holds the speed.
+    pub kinks: Vec<u32>,
+    left_out: f64,
+}
+
+/// Length along a stretch, speed and acceleration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct State {
+    pub s: f64,
+    pub v: f64,
+    pub a: f64,
+}
+
+impl State {
+    /// After a time with a jerk.
+    pub fn after(&self, t: f64, jerk: f64) -> Self {
+        let Self { s, v, a } = *self;
+        Self {
+            s: s + t * (v + t * (0.5 * a + t * jerk / 6.0)),
+            v: (v + t * (a + 0.5 * t * jerk)).max(0.0),
+            a: a + t * jerk,
+        }
+    }
+}
+
+/// One arc on a part of a stretch.
+struct Arc {
+    kind: u8,
+    value: f64,
+    ends: [State; 2],
+    duration: f64,
+}
+
+impl Arcs {
+    /// Number of arcs.
+    pub fn len(&self) -> usize {
+        self.piece.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.piece.is_empty()
+    }
+
+    /// The time of all arcs, in seconds.
+    pub fn time(&self) -> f64 {
+        self.duration.iter().sum()
+    }
+
+    /// Appends the arcs of another profile; `runs` stays as it is.
+    pub fn append(&mut self, mut other: Self) {
+        self.piece.append(&mut other.piece);
+        self.kind.append(&mut other.kind);
+        self.value.append(&mut other.value);
+        self.u0.append(&mut other.u0);
+        self.u1.append(&mut other.u1);
+        self.p0.append(&mut other.p0);
+        self.p1.append(&mut other.p1);
+        self.duration.append(&mut other.duration);
+        self.a0.append(&mut other.a0);
+        self.a1.append(&mut other.a1);
+        self.kinks.append(&mut other.kinks);
+    }
+
+    /// Appends an arc between two parameters of a piece. One too short for u to show it is left out, its time goes to
+    /// its neighbour.
+    fn push<const M: usize>(&mut self, problem: &Problem<M>, piece: usize, [u0, u1]: [f64; 2], arc: &Arc) {
+        let last = self.len().wrapping_sub(1);
+        let goes_on = last < self.len() && self.piece[last] as usize == piece && self.u1[last] == u0;
+        let speed = |u: f64, v: f64| if v == 0.0 { 0.0 } else { v * v / speed_sq(problem, piece, u) };
+        if u1 <= u0 {
+            if goes_on {
+                self.duration[last] += arc.duration;
+                self.p1[last] = speed(u0, arc.ends[1].v);
+                self.a1[last] = arc.ends[1].a;
+            } else {
+                self.left_out += arc.duration;
+            }
+            return;
+        }
+        self.piece.push(piece as u32);
+        self.kind.push(arc.kind);
+        self.value.push(arc.value);
+        self.u0.push(u0);
+        self.u1.push(u1);
+        self.p0.push(speed(u0, arc.ends[0].v));
+        self.p1.push(speed(u1, arc.ends[1].v));
+        self.duration.push(arc.duration + std::mem::take(&mut self.left_out));
+        self.a0.push(arc.ends[0].a);
+        self.a1.push(arc.ends[1].a);
+    }
+
+    /// Appends a section of constant jerk that ends as given; `duration` in s.
+    pub fn push_jerk<const M: usize>(
+        &mut self,
+        problem: &Problem<M>,
+        path: &ByLength<M>,
+        [from, to]: [State; 2],
+        jerk: f64,
+        duration: f64,
+    ) {
+        let mut part = path.part(from.s);
+        let (mut start, mut left) = (from, duration);
+        while part + 1 < path.parts.len() && path.knots()[part + 1] < to.s {
+            let knot = path.knots()[part + 1];
+            let (mut low, mut high) = (0.0, left);
+            for _ in 0..HALVINGS {
+                let middle = 0.5 * (low + high);
+                if middle <= low || middle >= high {
+                    break;
+                }
+                if start.after(middle, jerk).s < knot {
+                    low = middle;
+                } else {
+                    high = middle;
+                }
+            }
+            let end = State { s: knot, ..start.after(high, jerk) };
+            let arc = Arc { kind: PATH_JERK, value: jerk, ends: [start, end], duration: high };
+            let at = path.parts[part];
+            self.push(problem, at.piece, [path.locate(part, start.s), at.u[1]], &arc);
+            (start, left) = (end, left - high);
+            part += 1;
+        }
+        let arc = Arc { kind: PATH_JERK, value: jerk, ends: [start, to], duration: left };
+        let u = [start.s, to.s].map(|s| path.locate(part, s));
+        self.push(problem, path.parts[part].piece, u, &arc);
+    }
+
+    /// Appends sections of constant jerk from rest to rest along a whole stretch.
+    pub fn push_sections<const M: usize>(
+        &mut self,
+        problem: &Problem<M>,
+        path: &ByLength<M>,
+        sections: &[Section],
+    ) {
+        for (i, section) in sections.iter().enumerate() {
+            let from = State { s: section.position, v: section.speed, a: section.acceleration };
+            let to = match sections.get(i + 1) {
+                Some(next) => State { s: next.position, v: next.speed, a: next.acceleration },
+                None => State { s: path.total(), v: 0.0, a: 0.0 },
+            };
+            self.push_jerk(problem, path, [from, to], section.jerk, section.duration);
+        }
+    }
+
+    /// Appends a profile of the jerk-limited planner along a whole stretch.
+    ///
+    /// Near a rest arcs are so short that rounding of u changes their length, and w'' by some hundred times as much. So
+    /// lengths of arcs are measured between the rounded parameters, and each state is moved along its profile to
+    /// where they end. They add up from the nearer end of each part.
+    pub fn push_profile<const M: usize>(
+        &mut self,
+        problem: &Problem<M>,
+        path: &ByLength<M>,
+        profile: &Profile,
+    ) {
+        let (s, knots, ends) = (&profile.s, path.knots(), profile.ends);
+        let last = s.len() - 1;
+        let (mut first, mut part) = (0, path.part(s[0]));
+        while first < last {
+            while knots[part + 1] <= s[first] && part + 1 < path.parts.len() {
+                part += 1;
+            }
+            let at = path.parts[part];
+            let end = first + s[first..].partition_point(|&s| s <= knots[part + 1]) - 1;
+            let mut u = vec![at.u[0]];
+            u.extend(s[first..=end].iter().map(|&s| path.locate(part, s)));
+            u.push(at.u[1]);
+            let lengths: Vec<f64> = u.windows(2).map(|u| path.between(part, u[0], u[1])).collect();
+            let states = settled(profile, first..end + 1, [knots[part], knots[part + 1]], &lengths);
+            let count = states.len();
+            if first == 0 && s[0] > ends[0] {
+                let rest = State { s: ends[0], v: 0.0, a: 0.0 };
+                if part == 0 {
+                    let (jerk, duration) = ramp(lengths[0], states[0].v);
+                    let arc = Arc { kind: PATH_JERK, value: jerk, ends: [rest, states[0]], duration };
+                    self.push(problem, at.piece, [u[0], u[1]], &arc);
+                } else {
+                    let (jerk, duration) = ramp(s[0] - ends[0], states[0].v);
+                    self.push_jerk(problem, path, [rest, State { s: s[0], ..states[0] }], jerk, duration);
+                }
+            }
+            for n in 1..count {
+                let ends = [states[n - 1], states[n]];
+                let duration = cubic_time(lengths[n], &ends);
+                self.push(
+                    problem,
+                    at.piece,
+                    [u[n], u[n + 1]],
+                    &Arc { kind: SPEED_CUBIC, value: 0.0, ends, duration },
+                );
+            }
+            if end == last && s[last] < ends[1] {
+                let rest = State { s: ends[1], v: 0.0, a: 0.0 };
+                let from = states[count - 1];
+                if part + 1 == path.parts.len() {
+                    let (jerk, duration) = ramp(lengths[count], from.v);
+                    let arc = Arc { kind: PATH_JERK, value: jerk, ends: [from, rest], duration };
+                    self.push(problem, at.piece, [u[count], u[count + 1]], &arc);
+                } else {
+                    let (jerk, duration) = ramp(ends[1] - s[last], from.v);
+                    self.push_jerk(problem, path, [State { s: s[last], ..from }, rest], jerk, duration);
+                }
+            }
+            first = end;
+        }
+    }
+}
+
+/// Jerk and duration of a ramp from rest to a speed: s = J t³/6 and v = J t²/2, so that t = 3 s/v.
+fn ramp(length: f64, v: f64) -> (f64, f64) {
+    let t = 3.0 * length / v;
+    (2.0 * v / (t * t), t)
+}
+
+/// The states at some nodes of a part between two knots, moved to where `lengths`, from knot to knot, say they are.
+fn settled(profile: &Profile, nodes: Range<usize>, [from, to]: [f64; 2], lengths: &[f64]) -> Vec<State> {
+    let s = &profile.s[nodes.clone()];
+    let count = s.len();
+    let mut moved = vec![0.0; count];
+    let mut miss = 0.0;
+    for n in 0..count {
+        miss += lengths[n] - (s[n] - if n == 0 { from } else { s[n - 1] });
+        if s[n] < 0.5 * (from + to) && s[n] > from {
+            moved[n] = miss;
+        }
+    }
+    let mut miss = 0.0;
+    for n in (0..count).rev() {
+        miss += if n + 1 == count { to } else { s[n + 1] } - s[n] - lengths[n + 1];
+        if s[n] >= 0.5 * (from + to) && s[n] < to {
+            moved[n] = miss;
+        }
+    }
+    let state = |n: usize| {
+        let (d, at) = (moved[n], nodes.start + n);
+        let bend = profile.at(if d < 0.0 { s[n].next_down() } else { s[n] })[2];
+        let w = profile.speed_sq[at] + d * (profile.slope[at] + 0.5 * d * bend);
+        State { s: s[n], v: w.sqrt(), a: 0.5 * (profile.slope[at] + d * bend) }
+    };
+    (0..count).map(state).collect()
+}
+
+/// ∫ ds/√w of the cubic w between two states so far apart.
+fn cubic_time(h: f64, [from, to]: &[State; 2]) -> f64 {
+    let (w0, w1) = (from.v * from.v, to.v * to.v);
+    let (d0, d1) = (2.0 * from.a * h, 2.0 * to.a * h);
+    let speed = |t: f64| {
+        let r = 1.0 - t;
+        (r * r * ((1.0 + 2.0 * t) * w0 + t * d0) + t * t * ((1.0 + 2.0 * r) * w1 - r * d1)).sqrt()
+    };
+    let half = |middle: f64| -> f64 {
+        (0..4).map(|i| W[i] * (1.0 / speed(middle - 0.25 * X[i]) + 1.0 / speed(middle + 0.25 * X[i]))).sum()
+    };
+    0.25 * h * (half(0.25) + half(0.75))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cubic_of_constant_acceleration_takes_its_change_of_speed() {
+        // 10 to 30 mm/s at 200 mm/s²: 2 mm, 0.1 s.
+        let ends = [State { s: 1.0, v: 10.0, a: 200.0 }, State { s: 3.0, v: 30.0, a: 200.0 }];
+        assert!((cubic_time(2.0, &ends) - 0.1).abs() < 1e-9, "{}", cubic_time(2.0, &ends));
+    }
+}

@@ -1,0 +1,248 @@
+//! The two-pass profiler on a path of the package: segments with limits along the path, and what they become.
+//!
+//! Neighbouring straight pieces of one direction are one segment. A curved piece is cut into parts of equal length,
+//! and parts whose limits differ little are one segment again: the acceleration is 0 where segments meet, so that
+//! each more costs time, and each less lets the tightest place of more of the path hold all of it.
+
+use crate::bang_bang::Problem;
+use crate::bang_bang_quadratic::Fault;
+use crate::by_length::{piece, ByLength};
+use crate::jerk_arcs::Arcs;
+use crate::jerk_limited::{Effort, Geometry, Limits, Place};
+use crate::jerk_limited_path::Task;
+use crate::path_dynamics::{allowable, bounded, AxisLimits, Curve, Shape};
+use crate::s_curve::{self, Section, Segment};
+use crate::spline::bezier::split;
+use crate::spline::CompositeCurve;
+use crate::stretches::{checked, over_stretches, stretches, Stretch};
+
+/// Bounds of derivatives are greater than these by this part.
+const ACCURACY: f64 = 0.05;
+/// Places of a segment looked at where no bound is proven.
+const PLACES: usize = 33;
+/// A joint holds the speed where it is passed within this part of its cap.
+const HELD: f64 = 0.998;
+
+/// Lengths this near to one another, as parts of them, are the same.
+const CLOSE: f64 = 1e-9;
+
+/// How to cut a path into segments.
+#[derive(Clone, Copy, Debug)]
+pub struct Cutting {
+    /// Parts of a curved piece.
+    pub parts: usize,
+    /// The length in mm over which a speed has to pay: short ones give more to acceleration.
+    pub stretch: f64,
+    /// Parts are joined whose allowable speeds differ by no more than this part of them.
+    pub alike: f64,
+}
+
+/// The profile of a path, planned with so many segments of look-ahead. Where a segment has no speed, next to a
+/// cusp, and where the path begins or ends in motion, the jerk-limited planner plans the stretch.
+pub fn plan<const M: usize>(
+    problem: &Problem<M>,
+    jerk: &[f64; M],
+    cutting: &Cutting,
+    look_ahead: usize,
+) -> Result<Arcs, Fault> {
+    over_stretches(problem, jerk, |stretch, limits| {
+        let path = ByLength::new(problem, &stretch.parts);
+        let segments =
+            if stretch.ends == [0.0; 2] { segments(problem, &path, limits, cutting) } else { None };
+        match segments {
+            Some(segments) => Ok(along(problem, &path, limits, &s_curve::plan(&segments, look_ahead)?)),
+            None => otherwise(problem, stretch, limits),
+        }
+    })
+}
+
+/// The segments of all stretches.
+#[derive(Clone, Debug, Default)]
+pub struct Segmented {
+    /// Offsets of the stretches in the segments; a stretch that has none is not for profilers of segments.
+    pub stretches: Vec<i64>,
+    pub segments: Vec<Segment>,
+    /// The place where each begins.
+    pub piece: Vec<u32>,
+    pub u: Vec<f64>,
+}
+
+/// Cuts all stretches into segments.
+pub fn cut<const M: usize>(
+    problem: &Problem<M>,
+    jerk: &[f64; M],
+    cutting: &Cutting,
+) -> Result<Segmented, Fault> {
+    let limits = checked(problem, jerk)?;
+    let mut all = Segmented { stretches: vec![0], ..Segmented::default() };
+    for stretch in stretches(problem) {
+        let path = ByLength::new(problem, &stretch.parts);
+        let own = if stretch.ends == [0.0; 2] { segments(problem, &path, &limits, cutting) } else { None };
+        let mut s = 0.0;
+        for segment in own.unwrap_or_default() {
+            let part = path.part(s);
+            all.piece.push(path.parts[part].piece as u32);
+            all.u.push(path.locate(part, s));
+            s += segment.length;
+            all.segments.push(segment);
+        }
+        all.stretches.push(all.segments.len() as i64);
+    }
+    Ok(all)
+}
+
+/// The profile of given sections: stretch i takes those from `offsets[i]` to `offsets[i + 1]`; where there are none the
+/// jerk-limited planner plans it.
+pub fn follow<const M: usize>(
+    problem: &Problem<M>,
+    jerk: &[f64; M],
+    offsets: &[usize],
+    sections: &[Section],
+) -> Result<Arcs, Fault> {
+    over_stretches(problem, jerk, |stretch, limits| {
+        let own = offsets.get(stretch.number).zip(offsets.get(stretch.number + 1));
+        match own.and_then(|(&from, &to)| sections.get(from..to)).filter(|own| !own.is_empty()) {
+            Some(own) => Ok(along(problem, &ByLength::new(problem, &stretch.parts), limits, own)),
+            None => otherwise(problem, stretch, limits),
+        }
+    })
+}
+
+/// A stretch that has no segments.
+fn otherwise<const M: usize>(
+    problem: &Problem<M>,
+    stretch: &Stretch,
+    limits: &Limits<M>,
+) -> Result<Arcs, Fault> {
+    Task { problem, limits: *limits, effort: &Effort::default() }.plan(&stretch.parts, stretch.ends, 0)
+}
+
+/// The arcs of sections from rest to rest, with the joints that hold the speed.
+fn along<const M: usize>(
+    problem: &Problem<M>,
+    path: &ByLength<M>,
+    limits: &Limits<M>,
+    sections: &[Section],
+) -> Arcs {
+    let mut arcs = Arcs::default();
+    arcs.push_sections(problem, path, sections);
+    let mut next = 0;
+    for (cap, jumps) in path.caps(&limits.jerk) {
+        while next + 1 < sections.len() && sections[next + 1].position <= cap.s * (1.0 + CLOSE) {
+            next += 1;
+        }
+        let section = &sections[next];
+        if jumps && cap.s - section.position <= CLOSE * cap.s && section.speed >= HELD * cap.speed {
+            arcs.kinks.push(path.parts[path.part(cap.s)].piece as u32);
+        }
+    }
+    arcs
+}
+
+/// A part of the path on its way to a segment.
+struct Cut<const M: usize> {
+    length: f64,
+    shape: Shape<M>,
+    segment: Segment,
+}
+
+/// The segments of a stretch from rest to rest; None where one has no speed.
+pub fn segments<const M: usize>(
+    problem: &Problem<M>,
+    path: &ByLength<M>,
+    limits: &Limits<M>,
+    cutting: &Cutting,
+) -> Option<Vec<Segment>> {
+    let axes = AxisLimits { velocity: limits.velocity, acceleration: limits.acceleration, jerk: limits.jerk };
+    let caps = path.caps(&limits.jerk);
+    let mut out: Vec<Cut<M>> = vec![];
+    let mut caps = caps.iter().map(|(cap, _)| cap).peekable();
+    for (part, at) in path.parts.iter().enumerate() {
+        let (start, end) = (path.knots()[part], path.knots()[part + 1]);
+        let straight = path.direction(part);
+        let count = if straight.is_some() { 1 } else { cutting.parts };
+        let place = |i: usize| if i == count { end } else { start + (end - start) * i as f64 / count as f64 };
+        for i in 0..count {
+            let (from, to) = (place(i), place(i + 1));
+            let shape = match straight {
+                Some(direction) => Shape {
+                    first: direction.map(f64::abs),
+                    second: [0.0; M],
+                    third: [0.0; M],
+                    curvature: 0.0,
+                },
+                None => shape(problem, path, part, [from, to]),
+            };
+            let feed = problem.feed[at.piece].min(path.chord_speed(shape.curvature));
+            let make = |shape: &Shape<M>, length: f64| -> Option<Segment> {
+                let allowed = allowable(shape, &axes, feed, cutting.stretch).ok()?;
+                Some(Segment {
+                    length,
+                    allowable: allowed.speed,
+                    desired: feed,
+                    limits: allowed.limits,
+                    junction: f64::INFINITY,
+                })
+            };
+            let cut = Cut { length: to - from, segment: make(&shape, to - from)?, shape };
+            // One with the segment before, where that costs little.
+            let joined = out.last().filter(|last| last.segment.junction == f64::INFINITY).and_then(|last| {
+                let (a, b) = (&last.segment, &cut.segment);
+                let feeds_agree =
+                    a.desired == b.desired || (a.desired - b.desired).abs() <= cutting.alike * b.desired;
+                let (low, high) = (a.speed().min(b.speed()), a.speed().max(b.speed()));
+                if !feeds_agree || high - low > cutting.alike * high {
+                    return None;
+                }
+                let shape = last.shape.with(&cut.shape);
+                let length = last.length + cut.length;
+                let mut segment = make(&shape, length)?;
+                segment.desired = a.desired.min(b.desired);
+                Some(Cut { length, shape, segment })
+            });
+            match (joined, out.last_mut()) {
+                (Some(joined), Some(last)) => *last = joined,
+                _ => out.push(cut),
+            }
+        }
+        if let (Some(cap), Some(last)) = (caps.next_if(|cap| cap.s <= end), out.last_mut()) {
+            last.segment.junction = cap.speed;
+        }
+    }
+    Some(out.into_iter().map(|cut| cut.segment).collect())
+}
+
+/// Bounds of the derivatives between two lengths of a part: proven where the axes are those of the tool.
+fn shape<const M: usize>(
+    problem: &Problem<M>,
+    path: &ByLength<M>,
+    part: usize,
+    [from, to]: [f64; 2],
+) -> Shape<M> {
+    if problem.tip.is_none() {
+        let own = piece(problem, path.parts[part].piece);
+        let (a, b) = (path.locate(part, from), path.locate(part, to));
+        let mut pieces = CompositeCurve::default();
+        split(&own, &[a, b], &mut pieces);
+        let middle = pieces.piece(1);
+        return bounded(&Curve { joints: middle.control, tip: None, weight: middle.weights }, ACCURACY);
+    }
+    let lengths: Vec<f64> =
+        (0..PLACES).map(|i| from + (to - from) * i as f64 / (PLACES - 1) as f64).collect();
+    let places: Vec<Place<M>> = lengths.iter().map(|&s| path.at(part, s)).collect();
+    let most = |of: &dyn Fn(&Place<M>) -> f64| {
+        let mut greatest: f64 = places.iter().map(|place| of(place).abs()).fold(0.0, f64::max);
+        // A peak between places is above them by no more than an eighth of the second difference there.
+        for three in places.windows(3) {
+            let bend = (of(&three[0]) - 2.0 * of(&three[1]) + of(&three[2])).abs();
+            greatest = greatest.max(of(&three[1]).abs() + bend);
+        }
+        greatest
+    };
+    Shape {
+        first: std::array::from_fn(|k| most(&|place| place.first[k])),
+        second: std::array::from_fn(|k| most(&|place| place.second[k])),
+        third: std::array::from_fn(|k| most(&|place| place.third[k])),
+        curvature: lengths.iter().map(|&s| path.curvature(part, s)).fold(0.0, f64::max),
+    }
+}

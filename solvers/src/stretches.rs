@@ -1,0 +1,163 @@
+//! Stretches of a path between places of rest: stops, and cusps, whose curvature has no bound.
+
+use rayon::prelude::*;
+
+use crate::bang_bang::{check_pieces, Problem};
+use crate::bang_bang_quadratic::Fault;
+use crate::by_length::{piece, straight, tip_piece, ByLength, Part, MAX_RATE};
+use crate::jerk_arcs::Arcs;
+use crate::jerk_limited::Limits;
+use crate::planning;
+use crate::polynomial::Polynomial;
+use crate::quadratic::dot;
+use crate::spline::bezier::derivatives;
+use crate::spline::cusps::{piece_cusps, CUSP};
+use crate::spline::rational::Hodograph;
+
+/// Cusps closer to the end of a piece than this part of it are at the end.
+const AT_END: f64 = 1e-9;
+/// The tool creeps where the axes turn it only below this part of what they gain in a servo period.
+const CREEP: f64 = 0.02;
+/// Places are slow where the square of the speed is below this part of the greatest on their piece.
+const SLOW: f64 = 0.25;
+/// How far from a place on a line its direction is looked at, as a part of the piece.
+const BESIDE: f64 = 1e-4;
+
+/// Parts of pieces from one place of rest, or end of the path, to another.
+#[derive(Clone, Debug)]
+pub struct Stretch {
+    pub number: usize,
+    run: usize,
+    pub parts: Vec<Part>,
+    /// Speeds at its ends in mm/s.
+    pub ends: [f64; 2],
+}
+
+/// The profile of a path with these jerk limits in mm/s³, each stretch planned alone.
+pub fn over_stretches<const M: usize>(
+    problem: &Problem<M>,
+    jerk: &[f64; M],
+    plan: impl Fn(&Stretch, &Limits<M>) -> Result<Arcs, Fault> + Sync,
+) -> Result<Arcs, Fault> {
+    let limits = checked(problem, jerk)?;
+    let stretches = stretches(problem);
+    let planned: Result<Vec<Arcs>, Fault> =
+        stretches.par_iter().map(|stretch| plan(stretch, &limits)).collect();
+    let mut all = Arcs::default();
+    let mut run = usize::MAX;
+    for (stretch, arcs) in stretches.iter().zip(planned?) {
+        if stretch.run != run {
+            run = stretch.run;
+            all.runs.push(all.len() as i64);
+        }
+        all.append(arcs);
+    }
+    all.runs.push(all.len() as i64);
+    Ok(all)
+}
+
+/// The limits of the axes, every number of the problem checked once.
+pub fn checked<const M: usize>(problem: &Problem<M>, jerk: &[f64; M]) -> Result<Limits<M>, Fault> {
+    planning::Limits::of(problem).check(problem.width.len())?;
+    check_pieces(problem)?;
+    for (axis, &limit) in jerk.iter().enumerate() {
+        if !(limit > 0.0 && limit.is_finite()) {
+            let what = format!("the jerk limit of axis {axis} is {limit} mm/s³: give a positive number");
+            return Err(Fault::Input { piece: None, what });
+        }
+    }
+    Ok(Limits { velocity: problem.max_velocity, acceleration: problem.max_acceleration, jerk: *jerk })
+}
+
+/// The stretches of all runs, in order.
+pub fn stretches<const M: usize>(problem: &Problem<M>) -> Vec<Stretch> {
+    let mut out: Vec<Stretch> = vec![];
+    for (run, pair) in problem.runs.windows(2).enumerate() {
+        let mut rests = true;
+        for i in pair[0]..pair[1] {
+            let (cuts, cusped) = cusps(problem, i);
+            let mut cuts: Vec<(f64, bool)> = cuts.into_iter().map(|u| (u, true)).collect();
+            cuts.extend(slow_places(problem, i).into_iter().map(|u| (u, is_sharp(problem, i, u))));
+            cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
+            cuts.dedup_by(|b, a| {
+                let same = b.0 - a.0 <= AT_END * problem.width[i];
+                a.1 |= same && b.1;
+                same
+            });
+            rests |= i > pair[0] && problem.junction_speed[i] == 0.0;
+            let (mut from, mut rest) = (0.0, rests || cusped[0]);
+            for (to, then) in cuts.into_iter().chain([(problem.width[i], false)]) {
+                if rest {
+                    out.push(Stretch { number: out.len(), run, parts: vec![], ends: [0.0; 2] });
+                }
+                let last = out.len() - 1;
+                out[last].parts.push(Part { piece: i, u: [from, to] });
+                (from, rest) = (to, then);
+            }
+            rests = cusped[1];
+        }
+    }
+    let last = out.len() - 1;
+    out[0].ends[0] = problem.start_speed;
+    out[last].ends[1] = problem.end_speed;
+    out
+}
+
+/// Parameters inside piece `i` at which the tool has to rest, and whether it has to at either end.
+fn cusps<const M: usize>(problem: &Problem<M>, i: usize) -> (Vec<f64>, [bool; 2]) {
+    let own = piece(problem, i);
+    let mut places = match tip_piece(problem, i) {
+        // A tool that does not move has the speed of the joints that turn.
+        Some(tip) if tip.extent().0 > 0.0 => piece_cusps(&tip, CUSP),
+        _ => piece_cusps(&own, CUSP),
+    };
+    let line = problem.tip.is_none() && straight(&own, 0.5 * own.width).is_some();
+    if line {
+        // A line that does not turn back has no curvature where it stands.
+        let tangent = |t: f64| derivatives(&own, t * own.width)[1];
+        let turns = |t: f64| dot(&tangent(t - BESIDE), &tangent(t + BESIDE)) < 0.0;
+        places.retain(|&t| t > 0.0 && t < 1.0 && turns(t));
+    }
+    let ends =
+        [places.first().is_some_and(|&t| t < AT_END), places.last().is_some_and(|&t| t > 1.0 - AT_END)];
+    places.retain(|&t| (AT_END..=1.0 - AT_END).contains(&t));
+    (places.iter().map(|t| t * own.width).collect(), ends)
+}
+
+/// Parameters inside piece `i` where the tool's speed per parameter is least, and low: its way may turn sharply there.
+fn slow_places<const M: usize>(problem: &Problem<M>, i: usize) -> Vec<f64> {
+    let square: Polynomial<MAX_RATE> = match problem.tip {
+        Some(tip) => {
+            let coefficients = &tip.speed[tip.speed_offset[i]..tip.speed_offset[i + 1]];
+            Polynomial::from_bernstein(coefficients.iter().copied())
+        }
+        None => {
+            let hodograph = Hodograph::new(&piece(problem, i));
+            let axis = |k: usize| -> Polynomial<MAX_RATE> {
+                Polynomial::from_bernstein(hodograph.coefficients().iter().map(|row| row[k]))
+            };
+            (0..M).map(axis).fold(Polynomial::constant(0.0), |sum, g| sum.combine(1.0, &g.multiply(&g), 1.0))
+        }
+    };
+    let rate = square.derivative();
+    let (bend, greatest) = (rate.derivative(), square.range().1);
+    let mut found = vec![];
+    rate.sign_changes(&mut |t| {
+        let deep = square.value(t) < SLOW * greatest;
+        if deep && t > AT_END && t < 1.0 - AT_END && bend.value(t) > 0.0 {
+            found.push(t * problem.width[i]);
+        }
+    });
+    found
+}
+
+/// Whether the tool would creep through a place on piece `i`: a rest there takes no longer that setpoints could tell.
+fn is_sharp<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> bool {
+    let part = [Part { piece: i, u: [0.0, problem.width[i]] }];
+    let place = ByLength::new(problem, &part).place(0, u);
+    (0..M).any(|k| {
+        let most = problem.max_acceleration[k];
+        let speed = (most / place.second[k].abs()).sqrt();
+        speed < CREEP * most * problem.period
+    })
+}

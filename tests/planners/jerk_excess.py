@@ -1,0 +1,171 @@
+"""How far a profile of limited jerk is beyond its limits, from derivatives of the true motion on its arcs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial.legendre import leggauss
+from numpy.typing import NDArray
+
+from feedplan.constraints.problem import Problem
+from feedplan.profile import ArcKind, SpeedProfile
+
+Array = NDArray[np.float64]
+NODES, WEIGHTS = leggauss(12)
+
+
+@dataclass(frozen=True)
+class Excess:
+    """Greatest relative excess of axis velocity, acceleration and jerk, of the feed and of the chord speed.
+
+    `gaps`: how far neighbouring arcs are apart in speed, acceleration and u, and what the columns say from
+    the true length and time, as parts of the greatest speed and acceleration, of all length and all time.
+    """
+
+    velocity: float
+    acceleration: float
+    jerk: float
+    feed: float
+    chord: float
+    gaps: float
+
+    @property
+    def worst(self) -> float:
+        return max(self.velocity, self.acceleration, self.jerk, self.feed, self.chord)
+
+
+def jerk_excess(problem: Problem, profile: SpeedProfile, samples: int = 20) -> Excess:
+    """The excess at `samples` places of each arc, both its ends among them."""
+    count = len(profile)
+    t = np.linspace(0.0, 1.0, samples)
+    # u is rounded: what lies next to its ends is looked at there.
+    u = profile.u0[:, None] + (profile.u1 - profile.u0)[:, None] * t
+    piece = np.repeat(profile.piece, samples)
+    s = _lengths(problem, profile.piece, profile.u0, u)
+    width = problem.path.width[profile.piece]
+    inside = np.clip(u, 1e-9 * width[:, None], (1 - 1e-9) * width[:, None])
+    v, a, j = _motion(problem, profile, s)
+    d = _speed_sq(problem, piece, inside.ravel(), 2)
+    q = problem.derivatives(piece, inside.ravel(), 3)
+    u1 = 1 / np.sqrt(d[0])
+    u2 = -d[1] / (2 * d[0] ** 2)
+    u3 = u1 * (d[1] ** 2 / d[0] ** 3 - d[2] / (2 * d[0] ** 2))
+    q1 = q[1] * u1[:, None]
+    q2 = q[2] * u1[:, None] ** 2 + q[1] * u2[:, None]
+    q3 = q[3] * u1[:, None] ** 3 + 3 * q[2] * (u1 * u2)[:, None] + q[1] * u3[:, None]
+    v, a, j = (x.ravel()[:, None] for x in (v, a, j))
+    velocity = np.abs(q1 * v) / problem.max_velocity
+    acceleration = np.abs(q2 * v**2 + q1 * a) / problem.max_acceleration
+    jerk = np.abs(q3 * v**3 + 3 * q2 * v * a + q1 * j) / problem.max_jerk
+    feed = v[:, 0] / problem.feed[piece]
+    chord = np.zeros(1)
+    if np.isfinite(problem.chord_tolerance):
+        tool = (problem.tip_curve or problem.path.curve).evaluate(piece, inside.ravel(), 2)
+        square = np.maximum((tool[1] ** 2).sum(axis=1), 1e-300)
+        off = tool[2] - tool[1] * ((tool[1] * tool[2]).sum(axis=1) / square)[:, None]
+        curvature = np.linalg.norm(off, axis=1) / square
+        delta = problem.chord_tolerance
+        with np.errstate(divide="ignore"):
+            limit = np.where(curvature * delta < 1, 8 * delta / curvature - 4 * delta**2, 4 * delta**2)
+        chord = v[:, 0] * problem.period / np.sqrt(limit)
+    shape = (count, samples)
+    v, a = v.reshape(shape), a.reshape(shape)
+    joined = np.ones(count - 1, dtype=bool)
+    joined[profile.runs[1:-1] - 1] = False
+    gaps = [
+        np.abs(v[1:, 0] - v[:-1, -1])[joined] / v.max(),
+        np.abs(profile.a0[1:] - profile.a1[:-1])[joined] / np.abs(a).max(),
+        _misfits(profile, v, s)[0] / s[:, -1].sum(),
+        _misfits(profile, v, s)[1] / profile.time,
+        np.abs(profile.u0[1:] - np.where(profile.piece[1:] == profile.piece[:-1], profile.u1[:-1], 0.0)),
+    ]
+    return Excess(
+        *(float(used.max()) - 1 for used in (velocity, acceleration, jerk, feed, chord)),
+        max(float(gap.max(initial=0.0)) for gap in gaps),
+    )
+
+
+def _motion(problem: Problem, profile: SpeedProfile, s: Array) -> tuple[Array, Array, Array]:
+    """Speed, acceleration and jerk along the path at lengths (arcs, samples) from the arcs' starts."""
+    d0 = _speed_sq(problem, profile.piece, profile.u0, 0)[0]
+    d1 = _speed_sq(problem, profile.piece, profile.u1, 0)[0]
+    with np.errstate(invalid="ignore"):
+        v0, v1 = (np.nan_to_num(np.sqrt(d * p)) for d, p in ((d0, profile.p0), (d1, profile.p1)))
+    h = s[:, -1:]
+    x = s / h
+    # A cubic of v².
+    w0, w1, s0, s1 = (
+        column[:, None] for column in (v0**2, v1**2, 2 * profile.a0 * h[:, 0], 2 * profile.a1 * h[:, 0])
+    )
+    y = 1 - x
+    w = y**2 * ((1 + 2 * x) * w0 + x * s0) + x**2 * ((1 + 2 * y) * w1 - y * s1)
+    slope = (6 * x * y * (w1 - w0) + y * (1 - 3 * x) * s0 + x * (3 * x - 2) * s1) / h
+    bend = ((6 - 12 * x) * (w1 - w0) + (6 * x - 4) * s0 + (6 * x - 2) * s1) / h**2
+    v = np.sqrt(np.maximum(w, 0.0))
+    a, j = slope / 2, v * bend / 2
+    # Constant jerk: the time at each length, by halving.
+    rows = profile.kind == ArcKind.PATH_JERK
+    low, high = np.zeros_like(s[rows]), np.repeat(profile.duration[rows, None], s.shape[1], axis=1)
+    a0, value, start = (c[rows, None] for c in (profile.a0, profile.value, v0))
+    for _ in range(60):
+        t = (low + high) / 2
+        before = t * (start + t * (a0 / 2 + t * value / 6)) < s[rows]
+        low, high = np.where(before, t, low), np.where(before, high, t)
+    v[rows] = np.maximum(start + t * (a0 + t * value / 2), 0.0)
+    a[rows], j[rows] = a0 + value * t, value + 0 * t
+    return v, a, j
+
+
+def _misfits(profile: SpeedProfile, v: Array, s: Array) -> tuple[Array, Array]:
+    """How far length and time (arcs,) are from what the columns of the arcs say."""
+    t, length = profile.duration, s[:, -1]
+    constant = profile.kind == ArcKind.PATH_JERK
+    way = t * (v[:, 0] + t * (profile.a0 / 2 + t * profile.value / 6))
+    nodes = (NODES + 1) / 2
+    w0, w1, s0, s1 = v[:, 0] ** 2, v[:, -1] ** 2, 2 * profile.a0 * length, 2 * profile.a1 * length
+    x, y = nodes, 1 - nodes
+    w = np.outer(w0, y**2 * (1 + 2 * x)) + np.outer(s0, y**2 * x)
+    w += np.outer(w1, x**2 * (1 + 2 * y)) - np.outer(s1, x**2 * y)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        time = length * ((1 / np.sqrt(w)) @ (WEIGHTS / 2))
+    return np.where(constant, np.abs(way - length), 0.0), np.where(constant, 0.0, np.abs(time - t))
+
+
+def _lengths(problem: Problem, piece: NDArray[np.uint32], start: Array, u: Array) -> Array:
+    """Lengths of the tool's way (arcs, samples) from the arcs' starts, sample by sample."""
+    low = np.concatenate([start[:, None], u[:, :-1]], axis=1)
+    half = (u - low) / 2
+    places = low[..., None] + half[..., None] * (NODES + 1)
+    rows = np.repeat(piece, places[0].size)
+    speed = np.sqrt(_speed_sq(problem, rows, places.ravel(), 0)[0]).reshape(places.shape)
+    return np.cumsum(half * (speed @ WEIGHTS), axis=1)
+
+
+def _speed_sq(problem: Problem, piece: NDArray[np.integer], u: Array, order: int) -> list[Array]:
+    """|C'|² of the tool at places and its derivatives by u."""
+    tip = problem.tip_speed
+    if tip is None:
+        _, c1, c2, c3 = problem.path.curve.evaluate(piece, u, 3)
+        return [
+            (c1**2).sum(axis=1),
+            2 * (c1 * c2).sum(axis=1),
+            2 * (c2**2 + c1 * c3).sum(axis=1),
+        ][: order + 1]
+    out = [np.empty(len(u)) for _ in range(order + 1)]
+    counts = np.diff(tip.offsets)[piece]
+    for count in np.unique(counts):
+        own = np.flatnonzero(counts == count)
+        width = problem.path.width[piece[own]]
+        rows = tip.coefficients[tip.offsets[piece[own]][:, None] + np.arange(count)]
+        for derivative in range(order + 1):
+            out[derivative][own] = _bernstein(rows, u[own] / width)
+            degree = rows.shape[1] - 1
+            rows = degree * np.diff(rows, axis=1) / width[:, None] if degree else np.zeros((len(own), 1))
+    return out
+
+
+def _bernstein(rows: Array, t: Array) -> Array:
+    while rows.shape[1] > 1:
+        rows = (1 - t)[:, None] * rows[:, :-1] + t[:, None] * rows[:, 1:]
+    return rows[:, 0]

@@ -1,0 +1,165 @@
+"""Profiles of limited jerk: known times, limits between the grid's places, other solvers, sentences."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.named import FREE, butterfly, lemniscate, trefoil
+from feedplan import plan as plan_program
+from feedplan.bound import lower_bound
+from feedplan.constraints.problem import Problem, build_problem
+from feedplan.curves.composite import CompositeCurve
+from feedplan.errors import InfeasibleError, InputError, SolverError
+from feedplan.geometry.path import Path
+from feedplan.machine.machine import Axis, Machine
+from feedplan.planners import bound_of, planner
+from feedplan.profile import ArcKind
+from tests.constraints.test_joints import NOT_PLAIN
+from tests.constraints.test_joints import random_problem as random_joints
+from tests.planners.jerk_excess import jerk_excess
+from tests.planners.random_paths import random_problem
+from tests.planners.third_order import by_clarabel, by_ipopt, grid_of
+
+plan = planner("jerk-limited")
+SEEDS = int(os.environ.get("FEEDPLAN_SEEDS", "12"))
+# What limits may be exceeded by, as a part of them.
+EXCESS = 1e-6
+
+
+def curves_machine(velocity: float, acceleration: float, jerk: float) -> Machine:
+    axes = tuple(Axis(name, velocity, acceleration, max_jerk=jerk) for name in "XYZ")
+    return Machine("jerk", axes, chord_tolerance=np.inf)
+
+
+CURVES = curves_machine(250.0, 3000.0, 50_000.0)
+
+
+def assert_held(problem: Problem, method: str = "jerk-limited", **options: float) -> float:
+    profile = planner(method, **options)(problem)
+    excess = jerk_excess(problem, profile)
+    assert excess.worst <= EXCESS, excess
+    assert excess.gaps <= 1e-9, excess
+    return profile.time
+
+
+@pytest.mark.parametrize("method", ["jerk-limited", "s-curve", "ruckig"])
+def test_a_square_with_stops_takes_as_long_as_by_hand(method: str) -> None:
+    # A side: 0.21 s and 10.5 mm to 100 mm/s, 79 mm at it, 0.21 s down: 1.21 s.
+    corners = [[0.0, 0.0], [100.0, 0.0], [100.0, 100.0], [0.0, 100.0], [0.0, 0.0]]
+    problem = build_problem(Path.from_points(corners, 0.0), curves_machine(100.0, 500.0, 50_000.0))
+    profile = planner(method)(problem)
+    assert profile.time == pytest.approx(4.84, rel=1e-8)
+    assert len(profile.runs) == 5
+    assert (profile.kind == ArcKind.PATH_JERK).all()
+
+
+@pytest.mark.parametrize(
+    ("curve", "time"), [(lemniscate, 1.3170), (trefoil, 2.0352), (butterfly, 3.376)], ids=lambda x: str(x)
+)
+def test_published_curves_take_no_longer_than_known(curve: object, time: float) -> None:
+    problem = build_problem(Path.from_curve(curve(), feed=FREE), CURVES)  # type: ignore[operator]
+    assert assert_held(problem) <= time
+
+
+def test_the_relaxation_proves_the_lemniscate_and_more_than_the_second_order_bound() -> None:
+    problem = build_problem(Path.from_curve(lemniscate(), feed=FREE), CURVES)
+    profile = plan(problem)
+    known = bound_of("jerk-limited")
+    assert known is not None
+    assert lower_bound(problem, profile) < known(problem, profile) <= profile.time
+    assert known(problem, profile) >= 0.9995 * profile.time
+
+
+def test_other_solvers_find_the_same_time_on_the_same_grid() -> None:
+    problem = build_problem(Path.from_curve(lemniscate(), feed=FREE), CURVES)
+    profile = planner("jerk-limited", accuracy=1e-2)(problem)
+    grid = grid_of(problem, profile)
+    assert grid.time(grid.x / grid.reference) == pytest.approx(profile.time, rel=1e-6)
+    assert by_ipopt(grid) == pytest.approx(profile.time, rel=3e-4)
+    assert by_clarabel(grid) == pytest.approx(profile.time, rel=3e-4)
+
+
+def test_random_curves_keep_every_limit() -> None:
+    faults = []
+    for seed in range(SEEDS):
+        problem = random_problem(seed)
+        excess = jerk_excess(problem, plan(problem))
+        if not (excess.worst <= EXCESS and excess.gaps <= 1e-9):
+            faults.append((seed, excess))
+    assert faults == []
+
+
+@pytest.mark.parametrize("name", NOT_PLAIN)
+def test_random_curves_keep_every_limit_of_the_true_joints(name: str) -> None:
+    problem = random_joints(name, 6)
+    jerk = np.where(np.isfinite(problem.max_jerk), problem.max_jerk, 30 * problem.max_acceleration)
+    assert_held(replace(problem, max_jerk=jerk))
+
+
+@pytest.mark.parametrize("seconds", [0.0, 0.003, 0.03])
+def test_a_time_limit_at_any_moment_gives_a_plan_that_keeps_the_limits(seconds: float) -> None:
+    problem = random_problem(5)
+    assert assert_held(problem, time_limit=seconds) >= plan(problem).time * (1 - 1e-6)
+
+
+def test_speeds_at_the_ends_are_met_or_refused_with_the_speed_that_can_be_had() -> None:
+    path = Path.from_curve(lemniscate(), feed=FREE)
+    rest = plan(build_problem(path, CURVES)).time
+    problem = build_problem(path, CURVES, start_speed=50.0, end_speed=120.0)
+    profile = plan(problem)
+    excess = jerk_excess(problem, profile)
+    assert excess.worst <= EXCESS
+    assert profile.time < rest
+    assert (profile.a0[0], profile.a1[-1]) == (0.0, 0.0)
+    # 250 mm/s of both axes, at 45 degrees.
+    with pytest.raises(InfeasibleError, match=r"no profile ends at 400 mm/s: at most 353\.") as fault:
+        plan(build_problem(path, CURVES, end_speed=400.0))
+    assert fault.value.reachable == pytest.approx(250 * np.sqrt(2), rel=1e-2)
+
+
+def _round_corner() -> Path:
+    """A line, a quarter turn of radius 10 mm, a line."""
+    piece = CompositeCurve.from_bezier
+    turn = piece([[30.0, 0.0], [40.0, 0.0], [40.0, 10.0]], [1.0, np.sqrt(0.5), 1.0])
+    lines = piece([[0.0, 0.0], [30.0, 0.0]]), piece([[40.0, 10.0], [40.0, 40.0]])
+    return Path.from_curve(CompositeCurve.joined([lines[0], turn, lines[1]]))
+
+
+def test_jumps_of_curvature_hold_the_speed_and_are_told() -> None:
+    made = plan_program(_round_corner(), CURVES, "jerk-limited")
+    # v²/10 mm jumps by no more than 50 000 mm/s³ in a servo period.
+    allowed = np.sqrt(10.0 * 50_000.0 * CURVES.period)
+    problem, profile = made.problem, made.profile
+    assert jerk_excess(problem, profile).worst <= EXCESS
+    assert profile.kinked.tolist() == [1, 2]
+    first = np.searchsorted(profile.piece, profile.kinked)
+    tangent = problem.curve.evaluate(profile.kinked, np.zeros(2), 1)[1]
+    speed = np.linalg.norm(tangent, axis=1) * np.sqrt(profile.p0[first])
+    assert speed == pytest.approx(allowed, rel=2e-3)
+    (sentence,) = made.warnings
+    assert sentence.startswith(
+        "line 0: the tool slows to 22.4 mm/s where the curvature jumps, as it does at 2 "
+    )
+
+
+def test_an_axis_without_a_limit_of_jerk_is_named_unless_it_rests() -> None:
+    free = replace(CURVES.axes[2], max_jerk=np.inf)
+    machine = replace(CURVES, axes=(*CURVES.axes[:2], free))
+    problem = build_problem(Path.from_curve(trefoil(), feed=FREE), machine)
+    for method in ("jerk-limited", "s-curve", "ruckig"):
+        with pytest.raises(SolverError, match="axis Z has no limit of jerk: give it max_jerk in the machine"):
+            planner(method)(problem)
+    flat = CompositeCurve.from_bezier([[0.0, 0.0, 1.0], [10.0, 0.0, 1.0], [10.0, 10.0, 1.0]])
+    assert_held(build_problem(Path.from_curve(flat), machine))
+
+
+def test_options_out_of_range_are_refused() -> None:
+    problem = build_problem(_round_corner(), CURVES)
+    with pytest.raises(InputError, match=r"the accuracy is 1e-09: give 1e-05 to 0\.1"):
+        planner("jerk-limited", accuracy=1e-9)(problem)
+    with pytest.raises(InputError, match="the time limit is -1 s"):
+        planner("jerk-limited", time_limit=-1.0)(problem)

@@ -1,0 +1,214 @@
+"""The problem of least time with limits of jerk on the grid of a profile, by two solvers that are not ours.
+
+w = v² is a C¹ cubic in the length between the nodes, ramps w ∝ s^(4/3) lead from and to rest; limits hold
+at four places of each interval. IPOPT takes the problem as it is. Clarabel gets quadratic programs, one after
+the other: the row |L w| ≤ J w^(−1/2) of jerk by the tangent of its right side, which is convex, so that every
+plan is valid.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.polynomial.legendre import leggauss
+from numpy.typing import NDArray
+
+from feedplan.constraints.problem import Problem
+from feedplan.profile import ArcKind, SpeedProfile
+from tests.planners.jerk_excess import _lengths
+
+Array = NDArray[np.float64]
+PLACES = np.array([0.0, 1 / 3, 2 / 3, 1.0])
+NODES, WEIGHTS = leggauss(4)
+# The first plan is so much of the one given.
+START = 0.5
+# Quadratic programs, at most, and the gain at which they end.
+PROGRAMS, GAIN = 60, 1e-8
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Intervals of length `h` (n,), derivatives by length `q` (3, 4 n, axes) at their places, limits, the
+    lengths of the ramps, and a plan `x` (2 n + 2,): w and w' at the nodes."""
+
+    h: Array
+    q: Array
+    speed_sq: Array
+    acceleration: Array
+    jerk: Array
+    ramps: tuple[float, float]
+    x: Array
+
+    @cached_property
+    def reference(self) -> Array:
+        """What unknowns are measured in (2 n + 2,)."""
+        w = self.x[::2]
+        step = np.maximum(np.append(self.h, 0.0), np.append(0.0, self.h))
+        return np.stack([w, w / step], axis=1).ravel()
+
+    def rows(self, t: Array, order: int) -> sp.csr_matrix:
+        """w, w' or w'' at places t of every interval, from the unknowns over their references."""
+        c = np.stack([t**0, t, t**2, t**3], axis=1)
+        hermite = np.array([[1, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]], dtype=float)
+        if order == 1:
+            c = np.stack([0 * t, t**0, 2 * t, 3 * t**2], axis=1)
+        if order == 2:
+            c = np.stack([0 * t, 0 * t, 2 * t**0, 6 * t], axis=1)
+        basis = c @ hermite.T
+        n, m = len(self.h), len(t)
+        scale = np.stack([1 + 0 * self.h, self.h, 1 + 0 * self.h, self.h], axis=1)
+        values = basis[None] * scale[:, None, :] / self.h[:, None, None] ** order
+        columns = np.broadcast_to((2 * np.arange(n))[:, None, None] + np.arange(4), (n, m, 4))
+        row = np.broadcast_to(np.arange(n * m).reshape(n, m, 1), (n, m, 4))
+        matrix = sp.csr_matrix((values.ravel(), (row.ravel(), columns.ravel())), (n * m, 2 * n + 2))
+        return sp.csr_matrix(matrix @ sp.diags(self.reference))
+
+    @cached_property
+    def motion(self) -> tuple[Any, list[Any], list[Any]]:
+        """w over its limit; accelerations and L w of the axes over their limits."""
+        w, w1, w2 = (self.rows(PLACES, order) for order in range(3))
+        diagonal = sp.diags
+        accelerations, jerks = [], []
+        for axis in range(self.q.shape[2]):
+            q1, q2, q3 = self.q[:, :, axis]
+            a, j = self.acceleration[axis], self.jerk[axis]
+            accelerations.append(diagonal(q2 / a) @ w + diagonal(q1 / (2 * a)) @ w1)
+            jerks.append(diagonal(q3 / j) @ w + diagonal(1.5 * q2 / j) @ w1 + diagonal(0.5 * q1 / j) @ w2)
+        return diagonal(1 / self.speed_sq) @ w, accelerations, jerks
+
+    @cached_property
+    def ends(self) -> Any:
+        """Rows that vanish where the ramps go on smoothly."""
+        last = len(self.x) - 2
+        rows = sp.lil_matrix((2, len(self.x)))
+        rows[0, 0], rows[0, 1] = -4 / (3 * self.ramps[0]), 1
+        rows[1, last], rows[1, last + 1] = 4 / (3 * self.ramps[1]), 1
+        rows = sp.csr_matrix(rows) @ sp.diags(self.reference)
+        return sp.diags(1 / np.asarray(abs(rows).max(axis=1).todense()).ravel()) @ rows
+
+    @cached_property
+    def pace(self) -> tuple[Any, Array]:
+        """Rows of w and weights: the time is Σ weights/√w."""
+        rows = self.rows((NODES + 1) / 2, 0)
+        weights = (self.h[:, None] / 2 * WEIGHTS).ravel()
+        ends = sp.csr_matrix((len(self.x), len(self.x)))
+        ends = sp.diags(self.reference).tocsr()[[0, len(self.x) - 2]]
+        return sp.vstack([rows, ends]).tocsr(), np.append(weights, 3 * np.array(self.ramps))
+
+    def time(self, z: Array) -> float:
+        """The time of unknowns over their references."""
+        rows, weights = self.pace
+        return float(np.sum(weights / np.sqrt(rows @ z)))
+
+
+def grid_of(problem: Problem, profile: SpeedProfile) -> Grid:
+    """The grid of a profile from rest to rest whose ramps are one arc each."""
+    cubic = np.flatnonzero(profile.kind == ArcKind.SPEED_CUBIC)
+    assert len(cubic) == len(profile) - 2
+    piece, u0, u1 = profile.piece, profile.u0, profile.u1
+    u = u0[:, None] + (u1 - u0)[:, None] * PLACES
+    lengths = _lengths(problem, piece, u0, u)[:, -1]
+    places = np.clip(u[cubic].ravel(), 1e-12, None)
+    pieces = np.repeat(piece[cubic], 4)
+    # Each piece's own derivatives at its ends.
+    _, c1, c2, c3 = problem.curve.evaluate(pieces, places, 3)
+    d0 = (c1**2).sum(axis=1)
+    d1, d2 = 2 * (c1 * c2).sum(axis=1), 2 * (c2**2 + c1 * c3).sum(axis=1)
+    r1 = (1 / np.sqrt(d0))[:, None]
+    r2 = (-d1 / (2 * d0**2))[:, None]
+    r3 = r1 * (d1**2 / d0**3 - d2 / (2 * d0**2))[:, None]
+    q = np.stack([c1 * r1, c2 * r1**2 + c1 * r2, c3 * r1**3 + 3 * c2 * r1 * r2 + c1 * r3])
+    with np.errstate(divide="ignore"):
+        speed_sq = np.minimum(((problem.max_velocity / q[0]) ** 2).min(axis=1), problem.feed[pieces] ** 2)
+    speed = d0.reshape(-1, 4)
+    w = np.append(profile.p0[cubic] * speed[:, 0], profile.p1[cubic[-1]] * speed[-1, 3])
+    slope = 2 * np.append(profile.a0[cubic], profile.a1[cubic[-1]])
+    return Grid(
+        lengths[cubic],
+        q,
+        speed_sq,
+        problem.max_acceleration,
+        problem.max_jerk,
+        (float(lengths[0]), float(lengths[-1])),
+        np.stack([w, slope], axis=1).ravel(),
+    )
+
+
+def by_ipopt(grid: Grid) -> float:
+    """The least time [s] on a grid."""
+    import casadi
+
+    def of(matrix: Any) -> Any:
+        m = matrix.tocsc()
+        pattern = casadi.Sparsity(*m.shape, m.indptr.tolist(), m.indices.tolist())
+        return casadi.DM(pattern, m.data)
+
+    z = casadi.MX.sym("z", len(grid.x))
+    speed, accelerations, jerks = grid.motion
+    root = casadi.sqrt(of(grid.rows(PLACES, 0)) @ z)
+    rows = [of(speed) @ z, *(of(row) @ z for row in accelerations), *((of(row) @ z) * root for row in jerks)]
+    rows.append(of(grid.ends) @ z)
+    pace, weights = grid.pace
+    upper = np.ones(sum(row.shape[0] for row in rows))
+    lower = -upper
+    lower[: speed.shape[0]] = 1e-9
+    upper[-2:] = lower[-2:] = 0.0
+    program = {
+        "x": z,
+        "f": casadi.dot(casadi.DM(weights), 1 / casadi.sqrt(of(pace) @ z)),
+        "g": casadi.vertcat(*rows),
+    }
+    options = {"ipopt.print_level": 0, "print_time": 0, "ipopt.tol": 1e-7, "ipopt.sb": "yes"}
+    solver = casadi.nlpsol("third_order", "ipopt", program, options)
+    start = START * grid.x / grid.reference
+    most = np.full(len(start), np.inf)
+    most[[0, -2]] = 1.0
+    least = np.where(np.arange(len(start)) % 2 == 0, 1e-6, -np.inf)
+    result = solver(x0=start, lbg=lower, ubg=upper, lbx=least, ubx=most)
+    assert solver.stats()["success"], solver.stats()["return_status"]
+    return float(result["f"])
+
+
+def by_clarabel(grid: Grid) -> float:
+    """A time [s] on a grid that no tangent program improves."""
+    import clarabel
+
+    speed, accelerations, jerks = grid.motion
+    w = grid.rows(PLACES, 0)
+    pace, weights = grid.pace
+    z = START * grid.x / grid.reference
+    first = sp.identity(len(z), format="csr")[[0, len(z) - 2]]
+    fixed = [speed, *accelerations, *(-row for row in accelerations), first]
+    limits = [np.ones(row.shape[0]) for row in fixed]
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    for _ in range(PROGRAMS):
+        at = w @ z
+        # w^(−1/2) is above its tangent at w.
+        tangent = sp.diags(0.5 * at**-1.5) @ w
+        own = [sign * row + tangent for row in jerks for sign in (1, -1)]
+        bound = [1.5 / np.sqrt(at)] * len(own)
+        positive = [-w]
+        matrix = sp.vstack([grid.ends, *fixed, *own, *positive]).tocsr()
+        right = np.concatenate([np.zeros(2), *limits, *bound, -1e-3 * at])
+        size = np.maximum(np.asarray(abs(matrix).max(axis=1).todense()).ravel(), 1e-12)
+        matrix, right = sp.diags(1 / size) @ matrix, right / size
+        value = pace @ z
+        slope = pace.T @ (-0.5 * weights * value**-1.5)
+        curvature = (pace.T @ sp.diags(0.75 * weights * value**-2.5) @ pace).tocsc()
+        cones = [clarabel.ZeroConeT(2), clarabel.NonnegativeConeT(len(right) - 2)]
+        solver = clarabel.DefaultSolver(
+            sp.triu(curvature).tocsc(), slope - curvature @ z, matrix.tocsc(), right, cones, settings
+        )
+        found = np.array(solver.solve().x)
+        before, step = grid.time(z), 1.0
+        while step > 1e-6 and not grid.time(z + step * (found - z)) <= before:
+            step /= 2
+        z = z + step * (found - z)
+        if before - grid.time(z) < GAIN * before:
+            break
+    return grid.time(z)
