@@ -180,7 +180,7 @@ def plan(
         lower_bound=least,
         compute=compute,
         interpolator=interpolator,
-        warnings=(program.warnings if program else ()) + rounding_stops(problem, profile),
+        warnings=(program.warnings if program else ()) + path.warnings + rounding_stops(problem, profile),
     )
 
 

@@ -3,6 +3,7 @@
 //! A chain is a maximal sequence of feed moves along lines that may be fitted together: one tolerance, no
 //! halt in between. A change of feed inside a chain leaves the curve whole; `feed_cuts` cuts its pieces.
 
+mod chords;
 mod feed_cuts;
 mod shape;
 
@@ -17,6 +18,7 @@ use crate::fit::{fit_points, FitOptions};
 use crate::quadratic::{norm, sub};
 use crate::spline::CompositeCurve;
 use feed_cuts::cut_at_feeds;
+pub use chords::{Chord, Chords};
 pub use shape::{Shape, Spline};
 
 /// What a move is, in the numbers of the Python `MoveKind`.

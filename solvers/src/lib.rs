@@ -26,6 +26,7 @@ pub mod quadratic;
 pub mod s_curve;
 pub mod sampling;
 pub mod sarfraz;
+pub mod smooth_fit;
 pub mod spline;
 pub mod text;
 

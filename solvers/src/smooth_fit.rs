@@ -50,9 +50,11 @@ const SLIVER: f64 = 1e-6;
 
 /// How a run is fitted.
 #[derive(Clone, Copy, Debug)]
-pub struct SmoothOptions {
+pub struct SmoothOptions<const D: usize> {
     /// Chords longer than this are straight in the middle, in mm.
     pub long: f64,
+    /// Least and greatest position of each axis: where no curve stays inside, corners are rounded one by one.
+    pub bounds: [[f64; 2]; D],
 }
 
 /// What a piece of the curve follows.
@@ -106,16 +108,24 @@ impl<const D: usize> Smooth<D> {
 /// The curve along a polyline of one chord or more, cut beside the vertices that `cut` says.
 ///
 /// Vertices that turn back must end a polyline: no curve passes them without standing still.
-pub fn smooth_fit<const D: usize>(line: &Polyline<D>, cut: &[bool], options: &SmoothOptions) -> Smooth<D> {
+pub fn smooth_fit<const D: usize>(line: &Polyline<D>, cut: &[bool], options: &SmoothOptions<D>) -> Smooth<D> {
     let mut out = Smooth::default();
     Run { line, cut, options }.fit(0..line.chords(), PARTINGS, &mut out);
+    out
+}
+
+/// The lines of a polyline, each corner rounded by itself.
+pub fn smooth_corners<const D: usize>(line: &Polyline<D>) -> Smooth<D> {
+    let mut out = Smooth::default();
+    let options = SmoothOptions { long: f64::INFINITY, bounds: [[f64::NEG_INFINITY, f64::INFINITY]; D] };
+    Run { line, cut: &[], options: &options }.leave_corners(0..line.chords(), &mut out);
     out
 }
 
 struct Run<'a, const D: usize> {
     line: &'a Polyline<D>,
     cut: &'a [bool],
-    options: &'a SmoothOptions,
+    options: &'a SmoothOptions<D>,
 }
 
 impl<const D: usize> Run<'_, D> {
@@ -155,7 +165,7 @@ impl<const D: usize> Run<'_, D> {
         let mut refinement = 0;
         loop {
             let pieces = fit.spline.pieces();
-            let certificate = Certificate::new(part, &fit.spline.knots, &pieces);
+            let certificate = Certificate::new(part, &fit.spline.knots, &pieces, &self.options.bounds);
             if refinement == REFINEMENTS || certificate.good.iter().all(|&good| good) {
                 return (fit, pieces, certificate);
             }

@@ -59,6 +59,23 @@ fn distance_within<const D: usize>(
     [left, right].iter().fold(0.0, |most, half| most.max(distance_within(half, line, chord, enough, depth - 1)))
 }
 
+/// The piece is within the bounds of its axes; where its control points are not, its halves say so.
+pub fn is_inside<const D: usize>(control: &Control<D>, bounds: &[[f64; 2]; D]) -> bool {
+    is_inside_within(control, bounds, DEPTH)
+}
+
+fn is_inside_within<const D: usize>(control: &Control<D>, bounds: &[[f64; 2]; D], depth: u32) -> bool {
+    let inside = |point: &[f64; D]| (0..D).all(|k| point[k] >= bounds[k][0] && point[k] <= bounds[k][1]);
+    if control.iter().all(inside) {
+        return true;
+    }
+    if depth == 0 || !inside(&control[0]) || !inside(&control[DEGREE]) {
+        return false;
+    }
+    let (left, right) = split(control, 0.5);
+    is_inside_within(&left, bounds, depth - 1) && is_inside_within(&right, bounds, depth - 1)
+}
+
 /// A lower bound of |C'|, no closer than needed to tell that it is above `enough`: that of the derivative's control
 /// points along the way from end to end.
 pub fn speed_bound<const D: usize>(control: &Control<D>, width: f64, enough: f64) -> f64 {

@@ -7,7 +7,7 @@
 
 use rayon::prelude::*;
 
-use super::bezier::{distance_bound, point_and_slope, speed_bound, split, Control};
+use super::bezier::{distance_bound, is_inside, point_and_slope, speed_bound, split, Control};
 use super::polyline::Polyline;
 use crate::quadratic::{dot, norm, sub};
 
@@ -30,7 +30,13 @@ pub struct Certificate {
 }
 
 impl Certificate {
-    pub fn new<const D: usize>(line: &Polyline<D>, knots: &[f64], pieces: &[Control<D>]) -> Self {
+    /// The curve must stay within `bounds` of the axes too.
+    pub fn new<const D: usize>(
+        line: &Polyline<D>,
+        knots: &[f64],
+        pieces: &[Control<D>],
+        bounds: &[[f64; 2]; D],
+    ) -> Self {
         let last = line.chords();
         let free: Vec<f64> =
             (1..last).into_par_iter().with_min_len(TASK).map(|i| foot_point(line, knots, pieces, i)).collect();
@@ -43,7 +49,10 @@ impl Certificate {
         let checked: Vec<(f64, bool)> = (0..pieces.len())
             .into_par_iter()
             .with_min_len(TASK)
-            .map(|j| interval(line, knots, pieces, &foot, j))
+            .map(|j| {
+                let (deviation, good) = interval(line, knots, pieces, &foot, j);
+                (deviation, good && is_inside(&pieces[j], bounds))
+            })
             .collect();
         let (deviation, good) = checked.into_iter().unzip();
         Self { foot, deviation, good }
@@ -124,6 +133,8 @@ fn interval<const D: usize>(
 mod tests {
     use super::*;
 
+    const ANYWHERE: [[f64; 2]; 2] = [[f64::NEG_INFINITY, f64::INFINITY]; 2];
+
     #[test]
     fn a_straight_curve_beside_an_elbow_is_as_far_as_the_elbow() {
         // Two chords to a height of 0.3 and back; the curve is the line between their ends.
@@ -131,15 +142,15 @@ mod tests {
         let length = line.length();
         let knots = [0.0, 0.5 * length, length];
         let piece = |a: f64, b: f64| std::array::from_fn(|k| [a + (b - a) * k as f64 / 5.0, 0.0]);
-        let certificate = Certificate::new(&line, &knots, &[piece(0.0, 2.0), piece(2.0, 4.0)]);
+        let certificate = Certificate::new(&line, &knots, &[piece(0.0, 2.0), piece(2.0, 4.0)], &ANYWHERE);
         assert!((certificate.foot[1] - 0.5 * length).abs() < 1e-12);
         assert!(certificate.deviation.iter().all(|deviation| (deviation - 0.3).abs() < 1e-12));
         assert!(certificate.good.iter().all(|&good| good));
         let tight = Polyline { tolerance: vec![0.29; 2], ..line };
-        let certificate = Certificate::new(&tight, &knots, &[piece(0.0, 2.0), piece(2.0, 4.0)]);
+        let certificate = Certificate::new(&tight, &knots, &[piece(0.0, 2.0), piece(2.0, 4.0)], &ANYWHERE);
         assert!(certificate.good.iter().any(|&good| !good));
         // A curve that stops on its way.
         let stops = [[0.0, 0.0], [0.4, 0.0], [2.0, 0.0], [0.0, 0.0], [1.6, 0.0], [2.0, 0.0]];
-        assert!(!Certificate::new(&tight, &knots, &[stops, piece(2.0, 4.0)]).good[0]);
+        assert!(!Certificate::new(&tight, &knots, &[stops, piece(2.0, 4.0)], &ANYWHERE).good[0]);
     }
 }

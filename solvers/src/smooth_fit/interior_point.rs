@@ -41,6 +41,8 @@ pub struct Problem<const D: usize> {
 struct Pairs<const D: usize> {
     s: [[f64; D]; 2],
     l: [[f64; D]; 2],
+    /// 1/s, which is divided by often.
+    inverse: [[f64; D]; 2],
 }
 
 const SIGN: [f64; 2] = [1.0, -1.0];
@@ -61,7 +63,8 @@ impl<const D: usize> Problem<D> {
                 let s: [[f64; D]; 2] = std::array::from_fn(|side| {
                     std::array::from_fn(|r| (e[r] - SIGN[side] * off[i][r]).max(0.1 * e[r]))
                 });
-                Pairs { s, l: s.map(|side| side.map(|s| mu / s)) }
+                let inverse = s.map(|side| side.map(|s| 1.0 / s));
+                Pairs { s, l: inverse.map(|side| side.map(|i| mu * i)), inverse }
             })
             .collect();
         let mut steps = state.clone();
@@ -98,9 +101,9 @@ impl<const D: usize> Problem<D> {
             }
 
             for (weight, pairs) in weight.iter_mut().zip(&state) {
-                *weight = std::array::from_fn(|r| {
-                    pairs.l[0][r] / pairs.s[0][r] + pairs.l[1][r] / pairs.s[1][r]
-                });
+                let [lower, upper] = &pairs.inverse;
+                *weight =
+                    std::array::from_fn(|r| pairs.l[0][r] * lower[r] + pairs.l[1][r] * upper[r]);
             }
             self.assemble(&weight, band);
             band.factor();
@@ -135,6 +138,7 @@ impl<const D: usize> Problem<D> {
                     for r in 0..D {
                         pairs.s[side][r] += primal * d.s[side][r];
                         pairs.l[side][r] += dual * d.l[side][r];
+                        pairs.inverse[side][r] = 1.0 / pairs.s[side][r];
                     }
                 }
             }
@@ -282,7 +286,7 @@ impl<const D: usize> Problem<D> {
                     let (s, l) = (pairs.s[side][r], pairs.l[side][r]);
                     let c = aim.map_or(-s * l, |aim| aim - s * l - d.s[side][r] * d.l[side][r]);
                     let lack = SIGN[side] * off[i][r] + s - self.rows[i].half[r];
-                    weight[i][r] += SIGN[side] * (c + l * lack) / s;
+                    weight[i][r] += SIGN[side] * (c + l * lack) * pairs.inverse[side][r];
                     d.l[side][r] = c;
                 }
             }
@@ -301,7 +305,7 @@ impl<const D: usize> Problem<D> {
                     let lack = SIGN[side] * off[i][r] + s - row.half[r];
                     let ds = -lack - SIGN[side] * moved;
                     steps[i].s[side][r] = ds;
-                    steps[i].l[side][r] = (steps[i].l[side][r] - l * ds) / s;
+                    steps[i].l[side][r] = (steps[i].l[side][r] - l * ds) * state[i].inverse[side][r];
                 }
             }
         });
@@ -315,7 +319,7 @@ fn longest<const D: usize>(state: &[Pairs<D>], steps: &[Pairs<D>], part: f64) ->
     for (pairs, d) in state.iter().zip(steps) {
         for side in 0..2 {
             for r in 0..D {
-                most[0] = most[0].max(-d.s[side][r] / pairs.s[side][r]);
+                most[0] = most[0].max(-d.s[side][r] * pairs.inverse[side][r]);
                 most[1] = most[1].max(-d.l[side][r] / pairs.l[side][r]);
             }
         }
