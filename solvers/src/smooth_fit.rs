@@ -41,8 +41,6 @@ use windows::{Fit, FREE};
 const REFINEMENTS: usize = 3;
 /// Times that a run is taken apart where it cannot be fitted, before all of it is left to its corners.
 const PARTINGS: usize = 3;
-/// The greatest interval, in parts of the length from which a chord is long.
-const GREATEST: f64 = 0.8;
 /// A run whose vertices are this close to a line, in tolerances, is one.
 const STRAIGHT: f64 = 1e-3;
 /// Parts of an interval that are shorter than this share of it are not cut off.
@@ -110,7 +108,9 @@ impl<const D: usize> Smooth<D> {
 /// Vertices that turn back must end a polyline: no curve passes them without standing still.
 pub fn smooth_fit<const D: usize>(line: &Polyline<D>, cut: &[bool], options: &SmoothOptions<D>) -> Smooth<D> {
     let mut out = Smooth::default();
-    Run { line, cut, options }.fit(0..line.chords(), PARTINGS, &mut out);
+    // Not a number is no length.
+    let partings = if line.length().is_finite() { PARTINGS } else { 0 };
+    Run { line, cut, options }.fit(0..line.chords(), partings, &mut out);
     out
 }
 
@@ -159,7 +159,7 @@ impl<const D: usize> Run<'_, D> {
     /// The fit of a part, refined until its certificate holds or refining helps no more.
     fn refined<'b>(&self, part: &'b Polyline<D>) -> (Fit<'b, D>, Vec<bezier::Control<D>>, Certificate) {
         let long = self.options.long;
-        let mut fit = Fit::new(part, size::knots(part, GREATEST * long), long);
+        let mut fit = Fit::new(part, size::knots(part, long), long);
         let all = 0..fit.spline.intervals();
         fit.solve(std::slice::from_ref(&all));
         let mut refinement = 0;
@@ -247,43 +247,48 @@ impl<const D: usize> Run<'_, D> {
             let pins = &fit.pin[j..=j + DEGREE];
             (pins[0] != FREE && pins.iter().all(|&pin| pin == pins[0])).then_some(pins[0] as usize)
         };
-        let mut chord = 0;
-        let mut j = 0;
+        // The chord at the end of what is appended, and the first that no piece follows yet: none is left out, though
+        // all of it may be nearest to a single place.
+        let last = chords.len() - 1;
+        let (mut chord, mut next) = (0, 0);
+        let mut push = |control: &[[f64; D]], width: f64, [first, end]: [usize; 2], j: usize| {
+            let end = if j + 1 == pieces.len() && foot[end + 1] >= knots[j + 1] { last } else { end };
+            let first = chords.start + first.min(next);
+            out.push(control, width, Stretch::new(first, chords.start + end, deviation[j]));
+            next = end + 1;
+        };
+        let (mut j, mut polynomials) = (0, 0);
         while j < pieces.len() {
+            polynomials += 1;
             let (first, start) = (j, knots[j]);
             if let Some(pinned) = lies(j) {
                 while j + 1 < pieces.len() && lies(j + 1) == Some(pinned) {
                     j += 1;
                 }
-                let control = [pieces[first][0], pieces[j][DEGREE]];
-                let at = chords.start + pinned;
-                out.push(&control, knots[j + 1] - start, Stretch::new(at, at, deviation[j]));
+                push(&[pieces[first][0], pieces[j][DEGREE]], knots[j + 1] - start, [pinned; 2], j);
                 (chord, j) = (pinned, j + 1);
-                out.polynomials += 1;
                 continue;
             }
             let (end, width) = (knots[j + 1], knots[j + 1] - start);
             let (mut from, mut rest) = (start, pieces[j]);
-            let inner = |chord: usize| chord + 1 < foot.len() - 1;
-            while inner(chord) && foot[chord + 1] <= from {
+            while chord < last && foot[chord + 1] <= from {
                 chord += 1;
             }
             let mut begun = chord;
-            while inner(chord) && foot[chord + 1] < end {
+            while chord < last && foot[chord + 1] < end {
                 let u = foot[chord + 1];
                 let cut = self.cut[chords.start + chord + 1];
                 if cut && u - from > SLIVER * width && end - u > SLIVER * width {
                     let (part, after) = split(&rest, (u - from) / (end - from));
-                    let stretch = Stretch::new(chords.start + begun, chords.start + chord, deviation[j]);
-                    out.push(&part, u - from, stretch);
+                    push(&part, u - from, [begun, chord], j);
                     (from, rest, begun) = (u, after, chord + 1);
                 }
                 chord += 1;
             }
-            out.push(&rest, end - from, Stretch::new(chords.start + begun, chords.start + chord, deviation[j]));
-            out.polynomials += 1;
+            push(&rest, end - from, [begun, chord], j);
             j += 1;
         }
+        out.polynomials += polynomials;
     }
 }
 

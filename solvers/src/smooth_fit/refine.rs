@@ -3,7 +3,10 @@
 use std::ops::Range;
 
 use super::spline::{Spline, DEGREE};
-use super::windows::{Fit, OVERLAP};
+use super::windows::Fit;
+
+/// Intervals around a halved one that are solved again with it.
+const REACH: usize = 8;
 
 /// Halves intervals and their neighbours: the new fit, its other coefficients as they were, and the ranges of its
 /// intervals to solve.
@@ -32,7 +35,7 @@ pub fn halved<'a, const D: usize>(fit: &Fit<'a, D>, halve: &[bool], long: f64) -
 
     let mut ranges: Vec<Range<usize>> = Vec::new();
     for (j, _) in origin.iter().enumerate().filter(|(_, (new, _))| *new) {
-        let range = j.saturating_sub(OVERLAP)..(j + 1 + OVERLAP).min(origin.len());
+        let range = j.saturating_sub(REACH)..(j + 1 + REACH).min(origin.len());
         match ranges.last_mut() {
             Some(last) if range.start <= last.end => last.end = range.end,
             _ => ranges.push(range),
@@ -74,7 +77,7 @@ mod tests {
         let mut halve = vec![false; 100];
         halve[50] = true;
         let (next, ranges) = halved(&fit, &halve, 1e3);
-        assert_eq!((next.spline.intervals(), &ranges[..]), (103, &[29..75][..]));
+        assert_eq!((next.spline.intervals(), &ranges[..]), (103, &[41..63][..]));
         assert_eq!(&next.spline.knots[48..56], [48.0, 49.0, 49.5, 50.0, 50.5, 51.0, 51.5, 52.0]);
         let (old, new) = (&fit.spline.coefficient, &next.spline.coefficient);
         assert_eq!(new[..49], old[..49]);

@@ -17,14 +17,24 @@ const GRADE: f64 = 0.25;
 /// The first w, in tolerances: below it no turn, however sharp, is too much.
 const LEAST: f64 = 0.5;
 const GROWTH: f64 = 1.5;
+/// The greatest interval, in parts of the length from which a chord is long;
+const GREATEST: f64 = 0.8;
+/// and in a long chord, in parts of it: enough of them lie in its middle to make it straight.
+const SHARE: f64 = 0.05;
 /// Intervals of a run, at least.
 const FEWEST: usize = 4;
 
-/// The knots of a run from 0 to its length, no interval longer than `greatest` or so.
-pub fn knots<const D: usize>(line: &Polyline<D>, greatest: f64) -> Vec<f64> {
+/// The knots of a run from 0 to its length; chords longer than `long` have several intervals.
+pub fn knots<const D: usize>(line: &Polyline<D>, long: f64) -> Vec<f64> {
+    let greatest = GREATEST * long;
     let h = sizes(line, greatest);
-    let grades: Vec<Grade> =
-        (0..line.chords()).map(|i| Grade::new(line.chord_length(i), h[i], h[i + 1], greatest)).collect();
+    let grades: Vec<Grade> = (0..line.chords())
+        .map(|i| {
+            let length = line.chord_length(i);
+            let most = if length > long { SHARE * length } else { greatest };
+            Grade::new(length, [h[i], h[i + 1]].map(|h| h.min(most)), most)
+        })
+        .collect();
     let total: f64 = grades.iter().map(Grade::total).sum();
     let count = (total.ceil() as usize).max(FEWEST);
     let mut knots = Vec::with_capacity(count + 1);
@@ -55,9 +65,9 @@ struct Grade {
 }
 
 impl Grade {
-    fn new(length: f64, start: f64, end: f64, greatest: f64) -> Self {
+    fn new(length: f64, [start, end]: [f64; 2], most: f64) -> Self {
         let crossing = 0.5 * (start + end + GRADE * length);
-        let peak = crossing.min(greatest).max(start).max(end);
+        let peak = crossing.min(most).max(start).max(end);
         let flat = (length - (peak - start) / GRADE - (peak - end) / GRADE).max(0.0);
         let parts = [(peak / start).ln() / GRADE, flat / peak, (peak / end).ln() / GRADE];
         Self { length, start, end, peak, parts }
@@ -132,10 +142,10 @@ mod tests {
         // 0.05 · 1.5⁵ = 0.380 ≤ 6 · 0.1 / (π/2) = 0.382
         assert!((h[1] - 0.05 * 1.5f64.powi(5)).abs() < 1e-12);
         assert_eq!((h[0], h[2]), (4.0, 4.0));
-        let knots = knots(&elbow, 4.0);
-        assert!(knots.windows(2).all(|pair| pair[1] > pair[0] && pair[1] - pair[0] < 4.1));
+        let knots = knots(&elbow, 5.0);
+        assert!(knots.windows(2).all(|pair| pair[1] > pair[0] && pair[1] - pair[0] < 1.1));
         assert_eq!((knots[0], knots[knots.len() - 1]), (0.0, 40.0));
-        assert!(knots.len() > 20 && knots.len() < 40, "{}", knots.len());
+        assert!(knots.len() > 40 && knots.len() < 50, "{}", knots.len());
     }
 
     #[test]

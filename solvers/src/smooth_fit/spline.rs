@@ -105,6 +105,9 @@ impl<const D: usize> Spline<D> {
             }
             pieces.push(piece);
         }
+        // Both ends are the coefficients themselves.
+        let last = pieces.len() - 1;
+        (pieces[0][0], pieces[last][DEGREE]) = (self.coefficient[0], self.coefficient[last + DEGREE]);
         pieces
     }
 

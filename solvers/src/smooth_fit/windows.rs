@@ -15,7 +15,7 @@ use std::ops::Range;
 /// Intervals of a window.
 const WINDOW: usize = 300;
 /// Intervals by which a window reaches over its ends, and half the length of a seam.
-pub const OVERLAP: usize = 20;
+const OVERLAP: usize = 20;
 /// Long chords are straight in the middle: from this part of their length at each end, and from so many times the
 /// length from which a chord is long.
 const BENT: f64 = 0.25;
