@@ -17,8 +17,8 @@ use crate::corner::Rounding;
 use crate::fit::{fit_points, FitOptions};
 use crate::quadratic::{norm, sub};
 use crate::spline::CompositeCurve;
-use feed_cuts::cut_at_feeds;
 pub use chords::{Chord, Chords};
+use feed_cuts::cut_at_feeds;
 pub use shape::{Shape, Spline};
 
 /// What a move is, in the numbers of the Python `MoveKind`.

@@ -15,17 +15,17 @@
 //! The parameter u of the curve is the length of the chords, so that blocks and feeds map by their stations; D is the
 //! number of axes that move. Time and memory are linear in the number of vertices.
 
-pub mod band;
-pub mod bezier;
-pub mod certificate;
-pub mod corner;
-pub mod interior_point;
+mod band;
+mod bezier;
+mod certificate;
+mod corner;
+mod interior_point;
 pub mod polyline;
-pub mod refine;
-pub mod rows;
-pub mod size;
-pub mod spline;
-pub mod windows;
+mod refine;
+mod rows;
+mod size;
+mod spline;
+mod windows;
 
 use crate::quadratic::{dot, norm, sub};
 use crate::spline::CompositeCurve;
@@ -212,8 +212,7 @@ impl<const D: usize> Run<'_, D> {
                 continue;
             }
             let along = dot(&sub(&self.line.vertex[i], &start), &way) / (length * length);
-            let to =
-                if i == chords.end { end } else { std::array::from_fn(|k| start[k] + along * way[k]) };
+            let to = if i == chords.end { end } else { std::array::from_fn(|k| start[k] + along * way[k]) };
             let width = norm(&sub(&to, &from));
             if width > 0.0 {
                 out.push(&[from, to], width, Stretch::new(first, i - 1, deviation));

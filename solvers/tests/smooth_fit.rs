@@ -4,12 +4,14 @@
 #[path = "support/by_length.rs"]
 #[allow(dead_code)]
 mod by_length;
+#[path = "support/polylines.rs"]
+mod polylines;
 
 use by_length::{ByLength, Curve};
 use feedplan_solvers::jerk_limited::{plan, Effort, End, Limits, Problem};
 use feedplan_solvers::smooth_fit::polyline::Polyline;
 use feedplan_solvers::smooth_fit::{smooth_corners, smooth_fit, Smooth, SmoothOptions};
-use feedplan_solvers::spline::Piece;
+use polylines::{dense, derivatives, distance, length, random_polyline, to_segment, walk, Random};
 
 const LONG: f64 = 5.0;
 
@@ -25,76 +27,6 @@ fn fit<const D: usize>(line: &Polyline<D>) -> Smooth<D> {
 
 fn square(side: f64) -> Vec<[f64; 2]> {
     vec![[0.0, 0.0], [side, 0.0], [side, side], [0.0, side], [0.0, 0.0]]
-}
-
-/// C and its derivatives to the fourth by u at t in [0, 1].
-fn derivatives<const D: usize>(piece: &Piece<D>, t: f64) -> [[f64; D]; 5] {
-    let mut out = [[0.0; D]; 5];
-    let mut points = piece.control.to_vec();
-    let mut scale = 1.0;
-    for row in &mut out {
-        let mut c = points.clone();
-        while c.len() > 1 {
-            for i in 0..c.len() - 1 {
-                c[i] = std::array::from_fn(|k| c[i][k] + t * (c[i + 1][k] - c[i][k]));
-            }
-            c.pop();
-        }
-        *row = c[0].map(|x| scale * x);
-        scale *= (points.len() - 1) as f64 / piece.width;
-        points = points.windows(2).map(|p| std::array::from_fn(|k| p[1][k] - p[0][k])).collect();
-        if points.is_empty() {
-            break;
-        }
-    }
-    out
-}
-
-fn length<const D: usize>(a: &[f64; D]) -> f64 {
-    a.iter().map(|x| x * x).sum::<f64>().sqrt()
-}
-
-fn distance<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
-    length(&std::array::from_fn::<f64, D, _>(|k| a[k] - b[k]))
-}
-
-fn to_segment<const D: usize>(a: &[f64; D], b: &[f64; D], p: &[f64; D]) -> f64 {
-    let (mut way_sq, mut along) = (0.0, 0.0);
-    for k in 0..D {
-        way_sq += (b[k] - a[k]).powi(2);
-        along += (p[k] - a[k]) * (b[k] - a[k]);
-    }
-    let t = if way_sq > 0.0 { (along / way_sq).clamp(0.0, 1.0) } else { 0.0 };
-    distance(p, &std::array::from_fn(|k| a[k] + t * (b[k] - a[k])))
-}
-
-/// The greatest distance of samples of the curve from the chords they follow, three more on each side, and of samples
-/// of the chords from the curve.
-fn dense<const D: usize>(line: &Polyline<D>, smooth: &Smooth<D>) -> f64 {
-    const NEAR: usize = 3;
-    let (mut worst, mut samples) = (0.0f64, Vec::new());
-    for (piece, stretch) in smooth.curve.pieces().zip(&smooth.stretches) {
-        for i in 0..=12 {
-            let point = derivatives(&piece, i as f64 / 12.0)[0];
-            let chords = stretch.first.saturating_sub(NEAR)..(stretch.last + NEAR + 1).min(line.chords());
-            let away = chords.map(|j| to_segment(&line.vertex[j], &line.vertex[j + 1], &point));
-            worst = worst.max(away.fold(f64::INFINITY, f64::min));
-            samples.push((point, stretch.first, stretch.last));
-        }
-    }
-    let mut from = 0;
-    for j in 0..line.chords() {
-        while from + 1 < samples.len() && samples[from + 1].2 + NEAR < j {
-            from += 1;
-        }
-        for t in [0.0, 0.5, 1.0] {
-            let point = std::array::from_fn(|k| line.vertex[j][k] + t * (line.vertex[j + 1][k] - line.vertex[j][k]));
-            let near = samples[from..].windows(2).take_while(|pair| pair[0].1 <= j + NEAR);
-            let away = near.map(|pair| to_segment(&pair[0].0, &pair[1].0, &point));
-            worst = worst.max(away.fold(f64::INFINITY, f64::min));
-        }
-    }
-    worst
 }
 
 /// Checks what holds for every curve: ends, joints, widths, chords, deviation.
@@ -115,7 +47,7 @@ fn check<const D: usize>(line: &Polyline<D>, smooth: &Smooth<D>, name: &str) {
         assert!(stretch.deviation <= tolerance, "{name}: {stretch:?}");
         for i in 0..=10 {
             let speed = length(&derivatives(&piece, i as f64 / 10.0)[1]);
-            assert!(speed > 0.01 && speed < 3.0, "{name}: {stretch:?} speed {speed}");
+            assert!(speed > 0.02 - 1e-9, "{name}: {stretch:?} speed {speed}");
         }
     }
     let found = dense(line, smooth);
@@ -163,8 +95,11 @@ fn a_right_corner_is_symmetric_about_its_bisector() {
     let line = polyline(vec![[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]], 0.1);
     let smooth = fit(&line);
     check(&line, &smooth, "corner");
-    let points: Vec<[f64; 2]> =
-        smooth.curve.pieces().flat_map(|piece| [0.0, 0.3, 0.6, 1.0].map(|t| derivatives(&piece, t)[0])).collect();
+    let points: Vec<[f64; 2]> = smooth
+        .curve
+        .pieces()
+        .flat_map(|piece| [0.0, 0.3, 0.6, 1.0].map(|t| derivatives(&piece, t)[0]))
+        .collect();
     for p in &points {
         let mirrored = [10.0 - p[1], 10.0 - p[0]];
         let near = points.windows(2).map(|pair| to_segment(&pair[0], &pair[1], &mirrored));
@@ -178,7 +113,9 @@ fn a_right_corner_is_symmetric_about_its_bisector() {
 
 #[test]
 fn the_sides_of_a_square_are_straight_in_the_middle() {
-    for (side, tolerance, straight) in [(100.0, 0.1, 30.0), (100.0, 0.01, 30.0), (20.0, 0.01, 4.0), (5.1, 0.001, 1.0)] {
+    for (side, tolerance, straight) in
+        [(100.0, 0.1, 30.0), (100.0, 0.01, 30.0), (20.0, 0.01, 4.0), (5.1, 0.001, 1.0)]
+    {
         let line = polyline(square(side), tolerance);
         let smooth = fit(&line);
         check(&line, &smooth, "square");
@@ -237,78 +174,6 @@ fn a_curve_that_would_leave_its_bounds_keeps_its_corners() {
     assert!(!smooth.corners.is_empty());
 }
 
-/// Xorshift.
-struct Random(u64);
-
-impl Random {
-    /// In [0, 1).
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        let mut x = self.0;
-        x ^= x >> 33;
-        x = x.wrapping_mul(0xff51_afd7_ed55_8ccd);
-        x ^= x >> 33;
-        (x >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn either_way(&mut self) -> f64 {
-        2.0 * self.next() - 1.0
-    }
-}
-
-/// A walk of random steps and turns below 135°.
-fn walk<const D: usize>(random: &mut Random, chords: usize, step: f64) -> Vec<[f64; D]> {
-    let mut points = vec![[0.0; D]];
-    let mut way = [0.0; D];
-    while points.len() <= chords {
-        let free: [f64; D] = std::array::from_fn(|_| random.either_way());
-        let next = free.map(|x| x / length(&free));
-        if (0..D).map(|k| way[k] * next[k]).sum::<f64>() > -0.7 {
-            let (last, size) = (points[points.len() - 1], step * (0.05 + random.next()));
-            points.push(std::array::from_fn(|k| last[k] + size * next[k]));
-            way = next;
-        }
-    }
-    points
-}
-
-/// A random polyline that nowhere turns back: a walk, a zig-zag, noise on a curve, dense points, or all of them.
-fn random_polyline<const D: usize>(random: &mut Random) -> Vec<[f64; D]> {
-    let chords = 2 + (150.0 * random.next().powi(2)) as usize;
-    let step = 10f64.powf(3.5 * random.next() - 2.5);
-    let kind = (5.0 * random.next()) as usize;
-    let noise = [0.0, 0.003, 0.3][(3.0 * random.next()) as usize] * step;
-    let phase: [f64; D] = std::array::from_fn(|_| random.next());
-    let points: Vec<[f64; D]> = match kind {
-        0 | 1 => walk(random, chords, step),
-        2 => {
-            let slope = 2.0 * random.next();
-            let zig = |i: usize, k: usize| if k == 0 { i as f64 } else { slope * phase[k] * (i % 2) as f64 };
-            (0..=chords).map(|i| std::array::from_fn(|k| step * zig(i, k))).collect()
-        }
-        _ => {
-            let turn = 0.3 * random.next().powi(2);
-            let at = |i: usize, k: usize| {
-                (1.0 + phase[k]) * (turn * i as f64 + 6.0 * phase[k]).sin() / turn + if k == 0 { i as f64 } else { 0.0 }
-            };
-            (0..=chords)
-                .map(|i| std::array::from_fn(|k| step * at(i, k) + noise * random.either_way()))
-                .collect()
-        }
-    };
-    // Where it would turn back, points are left out.
-    let mut kept: Vec<[f64; D]> = Vec::with_capacity(points.len());
-    for point in points {
-        if kept.last().is_none_or(|last| distance(last, &point) > 1e-9) {
-            let count = kept.len();
-            if count < 2 || polyline(vec![kept[count - 2], kept[count - 1], point], 1.0).turn(1) < 2.356 {
-                kept.push(point);
-            }
-        }
-    }
-    kept
-}
-
 fn random_polylines<const D: usize>(seed: u64, count: usize) -> usize {
     let mut random = Random(seed);
     let mut rough = 0;
@@ -328,7 +193,7 @@ fn random_polylines<const D: usize>(seed: u64, count: usize) -> usize {
 
 #[test]
 fn random_polylines_are_followed_within_their_tolerance() {
-    let count = std::env::var("FEEDPLAN_SEEDS").map_or(200, |seeds| seeds.parse().expect("a number"));
+    let count = std::env::var("FEEDPLAN_SEEDS").map_or(100, |seeds| seeds.parse().expect("a number"));
     let rough = [
         random_polylines::<2>(1, count),
         random_polylines::<3>(2, count),
@@ -390,13 +255,13 @@ fn jerk_limited_plans_lose_little_in_corners() {
         let a = 0.1 * i as f64;
         [0.25 * a + 3.0 * a.cos(), 3.0 * a.sin()]
     };
-    // Times of the prototype of this fit, and what was measured since.
+    // The square took 1.475 s in the prototype of this fit, and 1.64 s with a corner piece at each vertex.
     for (name, points, tolerance, most) in [
-        ("square", square(20.0), 0.1, 1.49),
-        ("square", square(20.0), 0.01, 1.7),
-        ("zig-zag", (0..=10).map(zig_zag).collect(), 0.1, 9.9),
-        ("trochoid", (0..=400).map(arcs).collect(), 0.1, 99.9),
-        ("trochoid", (0..=400).map(arcs).collect(), 0.01, 99.9),
+        ("square", square(20.0), 0.1, 1.475),
+        ("square", square(20.0), 0.01, 1.57),
+        ("zig-zag", (0..=10).map(zig_zag).collect(), 0.1, 1.24),
+        ("trochoid", (0..=400).map(arcs).collect(), 0.1, 3.06),
+        ("trochoid", (0..=400).map(arcs).collect(), 0.01, 3.11),
     ] {
         let time = jerk_limited_time(&polyline(points, tolerance));
         println!("{name} at {tolerance} mm: {time:.4} s");

@@ -72,7 +72,12 @@ impl<const M: usize> Moves<'_, M> {
                 }
             } else if self.kind[i] == SPLINE {
                 for piece in self.spline(i)? {
-                    out.append_spline(&self.splines.piece(piece.index as usize), CHORD * allowed, DEPTH, &chord);
+                    out.append_spline(
+                        &self.splines.piece(piece.index as usize),
+                        CHORD * allowed,
+                        DEPTH,
+                        &chord,
+                    );
                 }
             } else {
                 out.push(self.target[i], chord);

@@ -145,7 +145,9 @@ impl<const M: usize> Group<M> {
             return;
         }
         let moving: Vec<usize> = (0..M)
-            .filter(|&k| chords.points[run.start..=run.end].iter().any(|p| p[k] != chords.points[run.start][k]))
+            .filter(|&k| {
+                chords.points[run.start..=run.end].iter().any(|p| p[k] != chords.points[run.start][k])
+            })
             .collect();
         match moving.len() {
             0..=2 => self.append_curve::<2>(chords, run, &moving, exact, travel, long),
@@ -172,9 +174,8 @@ impl<const M: usize> Group<M> {
         let points: Vec<[f64; D]> = chords.points[run.start..=run.end].iter().map(narrow).collect();
         let line = Polyline::new(points, own.iter().map(Chord::left).collect());
         let apart = |a: &Chord, b: &Chord| a.feed != b.feed || a.allowed != b.allowed;
-        let cut: Vec<bool> = (0..=own.len())
-            .map(|i| i > 0 && i < own.len() && apart(&own[i - 1], &own[i]))
-            .collect();
+        let cut: Vec<bool> =
+            (0..=own.len()).map(|i| i > 0 && i < own.len() && apart(&own[i - 1], &own[i])).collect();
         let bounds = |k: usize| match moving.get(k) {
             Some(&axis) => [travel[axis][0] - TRAVEL_SLACK, travel[axis][1] + TRAVEL_SLACK],
             None => [f64::NEG_INFINITY, f64::INFINITY],

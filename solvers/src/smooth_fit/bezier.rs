@@ -56,7 +56,9 @@ fn distance_within<const D: usize>(
         return bound;
     }
     let (left, right) = split(control, 0.5);
-    [left, right].iter().fold(0.0, |most, half| most.max(distance_within(half, line, chord, enough, depth - 1)))
+    [left, right]
+        .iter()
+        .fold(0.0, |most, half| most.max(distance_within(half, line, chord, enough, depth - 1)))
 }
 
 /// The piece is within the bounds of its axes; where its control points are not, its halves say so.

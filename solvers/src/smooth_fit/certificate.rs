@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::bezier::{distance_bound, is_inside, point_and_slope, speed_bound, split, Control};
 use super::polyline::Polyline;
+use super::spline::ORDER;
 use crate::quadratic::{dot, norm, sub};
 
 /// |C'| of a curve that never stops; a vertex that turns by 135° leaves 0.38 of it.
@@ -38,8 +39,11 @@ impl Certificate {
         bounds: &[[f64; 2]; D],
     ) -> Self {
         let last = line.chords();
-        let free: Vec<f64> =
-            (1..last).into_par_iter().with_min_len(TASK).map(|i| foot_point(line, knots, pieces, i)).collect();
+        let free: Vec<f64> = (1..last)
+            .into_par_iter()
+            .with_min_len(TASK)
+            .map(|i| foot_point(line, knots, pieces, i))
+            .collect();
         let mut foot = Vec::with_capacity(last + 1);
         foot.push(0.0);
         for u in free {
@@ -117,7 +121,7 @@ fn interval<const D: usize>(
             rest = after;
             part
         } else {
-            [rest[0]; 6]
+            [rest[0]; ORDER]
         };
         offer(distance_bound(&part, line, chord, line.tolerance[chord]), line.tolerance[chord]);
         offer(norm(&sub(&rest[0], &line.vertex[chord + 1])), line.tolerance_at(chord + 1));

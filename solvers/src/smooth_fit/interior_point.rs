@@ -102,8 +102,7 @@ impl<const D: usize> Problem<D> {
 
             for (weight, pairs) in weight.iter_mut().zip(&state) {
                 let [lower, upper] = &pairs.inverse;
-                *weight =
-                    std::array::from_fn(|r| pairs.l[0][r] * lower[r] + pairs.l[1][r] * upper[r]);
+                *weight = std::array::from_fn(|r| pairs.l[0][r] * lower[r] + pairs.l[1][r] * upper[r]);
             }
             self.assemble(&weight, band);
             band.factor();
@@ -123,7 +122,16 @@ impl<const D: usize> Problem<D> {
             let sigma = (after / work).powi(3).clamp(1e-3, 0.8);
 
             // Corrector: towards σμ, with the second order of the predictor.
-            self.direction(band, &gradient, &off, &state, &mut steps, Some(sigma * mu), &mut weight, &mut step);
+            self.direction(
+                band,
+                &gradient,
+                &off,
+                &state,
+                &mut steps,
+                Some(sigma * mu),
+                &mut weight,
+                &mut step,
+            );
             let [primal, dual] = longest(&state, &steps, STEP);
             if !(primal.is_finite() && dual.is_finite()) {
                 return iteration;
@@ -348,7 +356,8 @@ mod tests {
         let mut fixed = vec![false; 45];
         (fixed[0], fixed[44]) = (true, true);
         let energy = (0..40).map(|j| energy(&around(&knots, j))).collect();
-        let mut problem = Problem { energy, rows, start, x, fixed, unit_energy: 40.0 * 0.25 / 0.5f64.powi(5) };
+        let mut problem =
+            Problem { energy, rows, start, x, fixed, unit_energy: 40.0 * 0.25 / 0.5f64.powi(5) };
         let mut gradient = vec![[0.0; 2]; 45];
         let before = problem.energy_gradient(&mut gradient);
         let iterations = problem.solve(&mut Band::default());
@@ -363,7 +372,9 @@ mod tests {
         // The two sides of the corner are mirror images.
         for i in 0..45 {
             let [x, y] = problem.x[44 - i];
-            assert!((problem.x[i][0] - (10.0 - y)).abs() < 1e-3 && (problem.x[i][1] - (10.0 - x)).abs() < 1e-3);
+            assert!(
+                (problem.x[i][0] - (10.0 - y)).abs() < 1e-3 && (problem.x[i][1] - (10.0 - x)).abs() < 1e-3
+            );
         }
     }
 }

@@ -10,7 +10,11 @@ const REACH: usize = 8;
 
 /// Halves intervals and their neighbours: the new fit, its other coefficients as they were, and the ranges of its
 /// intervals to solve.
-pub fn halved<'a, const D: usize>(fit: &Fit<'a, D>, halve: &[bool], long: f64) -> (Fit<'a, D>, Vec<Range<usize>>) {
+pub fn halved<'a, const D: usize>(
+    fit: &Fit<'a, D>,
+    halve: &[bool],
+    long: f64,
+) -> (Fit<'a, D>, Vec<Range<usize>>) {
     let count = halve.len();
     let chosen = |j: usize| halve[j.saturating_sub(1)..(j + 2).min(count)].contains(&true);
     let mut knots = Vec::with_capacity(2 * count);

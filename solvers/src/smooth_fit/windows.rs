@@ -62,7 +62,8 @@ impl<'a, const D: usize> Fit<'a, D> {
             let cut = |i: usize| range.start + range.len() * i / parts;
             for i in 0..parts {
                 let own = cut(i)..cut(i + 1);
-                let wide = range.start.max(own.start.saturating_sub(OVERLAP))..range.end.min(own.end + OVERLAP);
+                let wide =
+                    range.start.max(own.start.saturating_sub(OVERLAP))..range.end.min(own.end + OVERLAP);
                 // Of the coefficients that a cut lies between, half belong to each side.
                 let first = if i == 0 { wide.start } else { own.start + DEGREE / 2 };
                 let end = if i + 1 == parts { wide.end + DEGREE } else { own.end + DEGREE / 2 };
