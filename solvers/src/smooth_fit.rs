@@ -114,14 +114,6 @@ pub fn smooth_fit<const D: usize>(line: &Polyline<D>, cut: &[bool], options: &Sm
     out
 }
 
-/// The lines of a polyline, each corner rounded by itself.
-pub fn smooth_corners<const D: usize>(line: &Polyline<D>) -> Smooth<D> {
-    let mut out = Smooth::default();
-    let options = SmoothOptions { long: f64::INFINITY, bounds: [[f64::NEG_INFINITY, f64::INFINITY]; D] };
-    Run { line, cut: &[], options: &options }.leave_corners(0..line.chords(), &mut out);
-    out
-}
-
 struct Run<'a, const D: usize> {
     line: &'a Polyline<D>,
     cut: &'a [bool],

@@ -48,8 +48,8 @@ def test_a_square_with_exact_stops_stays_exact(make_program: Any) -> None:
     for control in (PathControl.EXACT_PATH, PathControl.EXACT_STOP):
         path = smooth(make_program(SQUARE, control=control))
         np.testing.assert_array_equal(path.runs, np.arange(5))
-        np.testing.assert_array_equal(path.curve.by_piece[:, 0], SQUARE[:-1])
-        np.testing.assert_array_equal(path.curve.by_piece[:, -1], SQUARE[1:])
+        np.testing.assert_array_equal(path.curve.by_piece[:, 0, :2], SQUARE[:-1])
+        np.testing.assert_array_equal(path.curve.by_piece[:, -1, :2], SQUARE[1:])
         assert path.fit.deviation == 0.0
         assert not path.warnings
 

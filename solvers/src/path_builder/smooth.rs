@@ -14,7 +14,7 @@ use super::{deviation, Axes, BuiltPath, Part};
 use crate::conic::Conic;
 use crate::follow::{Chord, Chords, FollowError, FollowOptions, Followed, Moves, Shape, RAPID};
 use crate::smooth_fit::polyline::{angle, Polyline};
-use crate::smooth_fit::{smooth_corners, smooth_fit, Smooth, SmoothOptions};
+use crate::smooth_fit::{smooth_fit, SmoothOptions};
 
 /// A path that turns by more, in rad, stops: no curve is near both sides of the corner at any speed.
 const TURNS_BACK: f64 = 2.356;
@@ -25,8 +25,6 @@ const ROUNDING: f64 = 16.0;
 
 /// A nanometre beyond the travel is no fault, in mm.
 const TRAVEL_SLACK: f64 = 5e-7;
-/// The greatest number of axes that the fit takes.
-const MOST_AXES: usize = 6;
 
 /// Places of a smooth path where it is not smooth.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -112,7 +110,8 @@ impl<const M: usize> Group<M> {
         for end in 1..=count {
             let stops = end == count || {
                 let turn = chords.turn(end);
-                if turn > TURNS_BACK {
+                // An exact path stops in every corner.
+                if turn > TURNS_BACK && !exact {
                     group.rough.reversals.push(chords.chords[end - 1].last);
                 }
                 turn > TURNS_BACK || exact && !chords.meet(end)
@@ -155,11 +154,11 @@ impl<const M: usize> Group<M> {
             4 => self.append_curve::<4>(chords, run, &moving, exact, travel, long),
             5 => self.append_curve::<5>(chords, run, &moving, exact, travel, long),
             6 => self.append_curve::<6>(chords, run, &moving, exact, travel, long),
-            _ => self.append_curve::<M>(chords, run, &moving, exact, travel, long),
+            _ => self.append_curve::<9>(chords, run, &moving, exact, travel, long),
         }
     }
 
-    /// Appends a run in which at most D axes move.
+    /// Appends a run in which at most D axes move; an axis that rests changes nothing.
     fn append_curve<const D: usize>(
         &mut self,
         chords: &Chords<M>,
@@ -181,8 +180,7 @@ impl<const M: usize> Group<M> {
             None => [f64::NEG_INFINITY, f64::INFINITY],
         };
         let options = SmoothOptions { long, bounds: std::array::from_fn(bounds) };
-        let smooth: Smooth<D> =
-            if D > MOST_AXES { smooth_corners(&line) } else { smooth_fit(&line, &cut, &options) };
+        let smooth = smooth_fit(&line, &cut, &options);
         let rest = chords.points[run.start];
         for (piece, stretch) in smooth.curve.pieces().zip(&smooth.stretches) {
             let control: Vec<[f64; M]> = piece

@@ -69,3 +69,42 @@ fn leg<const D: usize>(line: &Polyline<D>, vertex: usize) -> f64 {
     let chords = line.chord_length(vertex - 1).min(line.chord_length(vertex));
     (FILL * line.tolerance_at(vertex) / (MIDDLE * size)).min(HALF * chords)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::quadratic::sub;
+
+    #[test]
+    fn a_corner_meets_its_lines_with_three_derivatives_and_is_as_far_as_it_may() {
+        let line = Polyline::new(vec![[0.0, 0.0], [10.0, 0.0], [10.0, 4.0]], vec![0.1; 2]);
+        let mut out = Smooth::default();
+        append_corners(&line, 0, 2, &mut out);
+        assert_eq!(out.curve.pieces().map(|piece| piece.degree()).collect::<Vec<_>>(), [1, 7, 1]);
+        assert_eq!(
+            out.stretches.iter().map(|s| (s.first, s.last)).collect::<Vec<_>>(),
+            [(0, 0), (0, 1), (1, 1)]
+        );
+        let corner = out.curve.piece(1);
+        // Even steps at the speed of the lines: neither a second nor a third derivative.
+        for k in 0..3 {
+            for (step, way) in [(k, [1.0, 0.0]), (6 - k, [0.0, 1.0])] {
+                let edge = sub(&corner.control[step + 1], &corner.control[step]);
+                assert!(norm(&sub(&edge.map(|x| 7.0 * x / corner.width), &way)) < 1e-12);
+            }
+        }
+        let mut points = corner.control.to_vec();
+        while points.len() > 1 {
+            points = points.windows(2).map(|p| [0, 1].map(|k| 0.5 * (p[0][k] + p[1][k]))).collect();
+        }
+        assert!((norm(&sub(&points[0], &[10.0, 0.0])) - 0.099).abs() < 1e-12);
+        assert!((out.stretches[1].deviation - 0.099).abs() < 1e-12);
+        // Short chords are shared by halves.
+        let zig_zag = (0..9).map(|i| [0.01 * i as f64, 0.01 * (i % 2) as f64]).collect();
+        let mut out = Smooth::default();
+        append_corners(&Polyline::new(zig_zag, vec![0.1; 8]), 0, 8, &mut out);
+        assert_eq!(out.curve.pieces().filter(|piece| piece.degree() == 7).count(), 7);
+        assert!((1..out.curve.len())
+            .all(|i| out.curve.piece(i - 1).control.last() == Some(&out.curve.piece(i).control[0])));
+    }
+}
