@@ -200,7 +200,7 @@ def build_path(
     corner_acceleration: float,
     max_speed: float,
     corner_angle: float,
-    circles: bool,
+    corners: str,
 ) -> tuple[
     tuple[
         tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.int64], NDArray[np.float64]],
@@ -211,6 +211,7 @@ def build_path(
     ],
     tuple[int, int, int, float],
     tuple[int, int, float] | None,
+    tuple[NDArray[np.int64], NDArray[np.int64]],
 ]: ...
 
 # Per limit: name, axis (-1: none), worst value, limit, ratio, time, source line; and the number of samples.

@@ -292,18 +292,22 @@ def compare(
 @click.argument("program")
 @_MACHINE
 @_TOLERANCE
+@click.option("--smooth", is_flag=True, help="Fit all moves by curves fit for limits of jerk.")
 @_JSON
-def fit(program: str, machine: str, tolerance: float | None, as_json: bool) -> None:
+def fit(program: str, machine: str, tolerance: float | None, smooth: bool, as_json: bool) -> None:
     """Fit PROGRAM's points by splines, without planning."""
     from dataclasses import asdict
 
     from feedplan.files import summary_text
     from feedplan.geometry.build import build_path
+    from feedplan.geometry.corners import Corners
     from feedplan.program.read import read_program
 
     known = Machine.load(machine)
     moves = read_program(program, known)
-    path = build_path(moves, known, tolerance)
+    path = build_path(moves, known, tolerance, corners=Corners.SMOOTH if smooth else Corners.ROUNDED)
+    for warning in path.warnings:
+        print(f"warning: {warning}", file=sys.stderr)
     ratios = {"spline_ratio": path.fit.spline_ratio, "polynomial_ratio": path.fit.polynomial_ratio}
     summary = asdict(path.fit) | ratios | {"pieces": len(path), "runs": len(path.runs) - 1}
     if as_json:

@@ -190,6 +190,7 @@ def plan(
         compute=compute,
         interpolator=interpolator,
         warnings=(program.warnings if program else ())
+        + path.warnings
         + rounding_stops(problem, profile)
         + curvature_jumps(problem, profile),
     )

@@ -79,7 +79,12 @@ def build_path(
     left out; only at corners are their ends cut and bent as those of lines and arcs are.
 
     With `corners` ARCS nothing is fitted, and corners of two lines become true arcs within the tolerance;
-    with PROGRAMMED nothing is rounded either, and corners lie within runs.
+    with PROGRAMMED nothing is rounded either, and corners lie within runs. With SMOOTH all moves between two
+    stops are one curve of continuous fourth derivative within the tolerance (Q does not count), arcs and
+    splines too; where the program asks for the exact path, those are followed within `exact_tolerance` with
+    the lines that they touch. Lines longer than `max_chord` are straight in the middle. It stops where G0
+    and other moves, or the exact path and another, meet, and where the path turns back by more than 135°;
+    where no curve is found, corners are rounded one by one between stops, and `Path.warnings` says so.
 
     Corners that cannot be rounded are stops, unless every axis that moves has a `max_velocity_jump`. The
     tool stops also where the meaning of words or the tool length changes. Axes that the program moves must
@@ -114,7 +119,7 @@ def build_path(
     if not words.joints.all():
         feed = np.where(words.joints, feed, program.feed)
 
-    (curve, feed, move, allowed, runs), summary, outside = native_build_path(
+    (curve, feed, move, allowed, runs), summary, outside, rough = native_build_path(
         program.name,
         start,
         program.kind,
@@ -143,7 +148,7 @@ def build_path(
         settings.alpha * float(np.linalg.norm(words.max_acceleration)),
         float(np.linalg.norm(words.max_velocity)),
         math.radians(settings.corner_angle),
-        corners is Corners.ARCS,
+        corners.value,
     )
     if outside is not None:
         index, axis, position = outside
@@ -169,7 +174,34 @@ def build_path(
         meaning=None if program.meaning is None else program.meaning[first],
         tool_length=None if program.tool_length is None else program.tool_length[first],
         corners=corners,
+        warnings=_rough_places(program, *rough),
     )
+
+
+def _rough_places(
+    program: Program, reversals: NDArray[np.int64], zones: NDArray[np.int64]
+) -> tuple[str, ...]:
+    """Sentences on where a smooth path stops without being told to."""
+    sentences = []
+    if len(reversals):
+        sentences.append(
+            f"{_lines(program, reversals)}: the path turns back by more than 135°, and stops: no curve "
+            "within the tolerance goes around it"
+        )
+    if len(zones):
+        sentences.append(
+            f"{_lines(program, zones[:, 0])}: no smooth curve was found within the tolerance: corners are "
+            "rounded one by one there, between stops; allow more tolerance"
+        )
+    return tuple(sentences)
+
+
+def _lines(program: Program, moves: NDArray[np.int64], most: int = 5) -> str:
+    """The source lines of some moves, the first ones by number."""
+    lines = list(dict.fromkeys(program.line[moves].tolist()))
+    shown = ", ".join(str(line) for line in lines[:most])
+    rest = f" and {len(lines) - most} more" if len(lines) > most else ""
+    return f"line {shown}{rest}"
 
 
 def _splines(
@@ -230,7 +262,7 @@ def _tolerances(
         fit_limit = np.full(len(program), np.inf)
     may_leave = (program.control == PathControl.TOLERANCE) & (corners is not Corners.PROGRAMMED)
     limit = np.where(may_leave, limit, 0.0)
-    if corners is not Corners.ROUNDED:
+    if corners is not Corners.ROUNDED:  # only that fits a part of the program by itself
         return limit, np.zeros(len(program))
     return limit, np.minimum(fit_limit, settings.fit_share * limit)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +14,7 @@ from feedplan.curves._arrays import MAX_AXES, points, refuse
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
 from feedplan.geometry.build import FitSettings
+from feedplan.geometry.corners import Corners
 from feedplan.geometry.joints import tangent_jumps
 from feedplan.geometry.path import FitSummary, Path
 from feedplan.machine.machine import AXIS_LETTERS
@@ -41,7 +43,12 @@ def path_of_curve(curve: CompositeCurve, axes: Sequence[str] | None, feed: float
 
 
 def path_of_points(
-    given: ArrayLike, tolerance: float, axes: Sequence[str] | None, feed: float, settings: FitSettings | None
+    given: ArrayLike,
+    tolerance: float,
+    axes: Sequence[str] | None,
+    feed: float,
+    settings: FitSettings | None,
+    corners: Corners,
 ) -> Path:
     """See `Path.from_points`."""
     array, _ = points(given, None)
@@ -57,7 +64,7 @@ def path_of_points(
     same: NDArray[np.bool_] = (array[1:] == array[:-1]).all(axis=1)
     refuse(same, lambda i: f"points {i} and {i + 1} coincide: remove one of them")
     count, width = len(array) - 1, array.shape[1]
-    (curve, _, move, allowed, runs), summary, _ = native_build_path(
+    (curve, _, move, allowed, runs), summary, _, _ = native_build_path(
         "points",
         array[0].copy(),
         np.full(count, MoveKind.LINE, dtype=np.uint8),
@@ -86,9 +93,10 @@ def path_of_points(
         math.inf,
         _ANY_SPEED,
         math.radians(settings.corner_angle),
-        False,
+        corners.value,
     )
-    return _path(names, CompositeCurve(*curve), speed, runs, move, allowed, FitSummary(*summary))
+    path = _path(names, CompositeCurve(*curve), speed, runs, move, allowed, FitSummary(*summary))
+    return replace(path, corners=corners)
 
 
 def _path(

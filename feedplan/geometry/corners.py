@@ -11,9 +11,12 @@ class Corners(Enum):
     `ROUNDED`: chains of G1 moves are fitted by splines, other corners rounded by parabolas. `ARCS`:
     lines stay lines, and an arc that touches both rounds each corner of two. `PROGRAMMED`: the path is
     the program itself; its corners may be passed with a jump of velocity, of what the accelerations give
-    in one servo period.
+    in one servo period. `SMOOTH`: all moves between two stops, arcs and splines too, are one curve of
+    continuous fourth derivative, in which long lines are straight; its curvature has no jumps, which is what
+    limits of jerk ask for.
     """
 
     ROUNDED = "rounded"
     ARCS = "arcs"
     PROGRAMMED = "programmed"
+    SMOOTH = "smooth"

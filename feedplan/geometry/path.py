@@ -54,7 +54,7 @@ class Path:
     from the programmed path [mm]; `start_dwell` pause before the first run [s].
     `meaning` (r,) what the axes are on the machine in each run (`feedplan.machine.meaning.Meaning`) and
     `tool_length` (r,) [mm], NaN for the machine file's; None where the machine knows one meaning only.
-    `corners` is what became of those of the program.
+    `corners` is what became of those of the program; `warnings` are sentences for the user.
     Within a run the tangent is continuous, unless corners are passed with a velocity jump.
     """
 
@@ -71,6 +71,7 @@ class Path:
     meaning: NDArray[np.uint8] | None = None
     tool_length: NDArray[np.float64] | None = None
     corners: Corners = Corners.ROUNDED
+    warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         dtypes = {"feed": float, "move": np.int64, "line": np.int32, "runs": np.int64, "dwell": float}
@@ -152,16 +153,18 @@ class Path:
         axes: Sequence[str] | None = None,
         feed: float = math.inf,
         settings: FitSettings | None = None,
+        corners: Corners = Corners.ROUNDED,
     ) -> Path:
         """The path through `points` (n, axes) [mm, deg], as that of a program of G1 moves in G64.
 
         It stays within `tolerance` [mm] of the polygon, both ways: chains are fitted by B-splines, corners
-        rounded as far as the tolerance allows; 0 means exact lines with stops. `move` counts the chords.
+        rounded as far as the tolerance allows, or as `corners` says (ROUNDED, ARCS or SMOOTH); 0 means exact
+        lines with stops. `move` counts the chords.
         Raises InputError for points that are too few, repeated or not finite.
         """
         from feedplan.geometry.construct import path_of_points
 
-        return path_of_points(points, tolerance, axes, feed, settings)
+        return path_of_points(points, tolerance, axes, feed, settings, corners)
 
     @classmethod
     def _scaled(cls, curve: CompositeCurve, axes: Sequence[str] | None, feed: float) -> Path:

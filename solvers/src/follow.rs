@@ -3,6 +3,7 @@
 //! A chain is a maximal sequence of feed moves along lines that may be fitted together: one tolerance, no
 //! halt in between. A change of feed inside a chain leaves the curve whole; `feed_cuts` cuts its pieces.
 
+mod chords;
 mod feed_cuts;
 mod shape;
 
@@ -16,6 +17,7 @@ use crate::corner::Rounding;
 use crate::fit::{fit_points, FitOptions};
 use crate::quadratic::{norm, sub};
 use crate::spline::CompositeCurve;
+pub use chords::{Chord, Chords};
 use feed_cuts::cut_at_feeds;
 pub use shape::{Shape, Spline};
 

@@ -30,6 +30,7 @@ pub mod s_curve;
 pub mod s_curve_path;
 pub mod sampling;
 pub mod sarfraz;
+pub mod smooth_fit;
 pub mod spline;
 pub mod stretches;
 pub mod text;

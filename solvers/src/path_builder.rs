@@ -6,6 +6,7 @@
 //! cuts away their ends; what is left of them in the middle stays as it is. All stages run over stretches in
 //! parallel and join their results in order, so the path does not depend on the number of threads.
 
+mod smooth;
 mod stretches;
 mod travel;
 
@@ -13,6 +14,7 @@ use rayon::prelude::*;
 
 use crate::corner::{share_lengths, Sides};
 use crate::follow::{follow, FollowError, FollowOptions, FollowedProgram, Moves};
+pub use smooth::{build_smooth_path, Rough};
 pub use stretches::Part;
 use stretches::{Cuts, Stretches, TASK};
 use travel::{outside, Outside};
@@ -29,6 +31,7 @@ pub struct Axes<const M: usize> {
 }
 
 /// The path of a program.
+#[derive(Default)]
 pub struct BuiltPath<const M: usize> {
     /// The pieces in order, in the parts that were made in parallel.
     pub parts: Vec<Part<M>>,
@@ -42,6 +45,8 @@ pub struct BuiltPath<const M: usize> {
     pub polynomials: usize,
     /// The first place outside the travel of an axis.
     pub outside: Option<Outside>,
+    /// Where a smooth path is not smooth.
+    pub rough: Rough,
 }
 
 /// The path of a program.
@@ -64,16 +69,21 @@ pub fn build_path<const M: usize>(
             .collect();
         (parts, runs) = stretches.assemble(&corners, axes.jump);
     }
-    let deviation = |part: &Part<M>| part.pieces.iter().map(|piece| piece.deviation).fold(0.0, f64::max);
     Ok(BuiltPath {
-        deviation: parts.iter().map(deviation).fold(0.0, f64::max),
+        deviation: deviation(&parts),
         outside: outside(&parts, moves, &axes.travel),
         parts,
         runs,
         points,
         splines,
         polynomials,
+        rough: Rough::default(),
     })
+}
+
+/// The greatest bound of the distance between pieces and moves.
+fn deviation<const M: usize>(parts: &[Part<M>]) -> f64 {
+    parts.iter().flat_map(|part| &part.pieces).map(|piece| piece.deviation).fold(0.0, f64::max)
 }
 
 #[cfg(test)]

@@ -62,6 +62,13 @@ impl<const M: usize> Spline<M> {
         Self::of(&made.piece(index), index, true, high - low)
     }
 
+    /// The last of the made pieces, its width as it is; None where it has no length.
+    pub fn last_made(made: &CompositeCurve<M>) -> Option<Self> {
+        let index = made.len().checked_sub(1)?;
+        let piece = made.piece(index);
+        Self::of(&piece, index, true, piece.width)
+    }
+
     /// The same piece after its control points have changed.
     pub fn bent(&self, made: &CompositeCurve<M>) -> Option<Self> {
         let index = self.index as usize;

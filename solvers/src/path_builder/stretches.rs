@@ -4,13 +4,14 @@
 use rayon::prelude::*;
 
 use super::Axes;
+use crate::conic::Conic;
 use crate::corner::{Jump, Rounding, Sides};
 use crate::follow::{Followed, Shape, Spline};
 use crate::spline::{CompositeCurve, Piece};
 
 /// Exact paths are smoothed only where an arc or a spline meets its neighbour with a turn below this (rad): that is
 /// what rounded coordinates leave of a tangent joint.
-const CURVE_JOINT: f64 = 0.0175;
+pub const CURVE_JOINT: f64 = 0.0175;
 /// No corner is shorter than this times the tolerance because it needs no more: pieces of no size help nobody.
 const LEAST_LENGTH: f64 = 0.01;
 /// What is left between two corners is dropped below this share of the stretch.
@@ -294,6 +295,17 @@ impl<const M: usize> Part<M> {
         source.piece(spline.index as usize)
     }
 
+    /// Appends a polynomial piece; all but its shape is that of `like`.
+    pub fn push(&mut self, control: &[[f64; M]], width: f64, like: Followed<M>) {
+        if let [start, end] = *control {
+            self.pieces.push(Followed { piece: Shape::Conic(Conic::line(start, end)), ..like });
+            return;
+        }
+        self.made.push(control, &[], width);
+        let piece = Spline::last_made(&self.made).map(Shape::Spline);
+        self.pieces.extend(piece.map(|piece| Followed { piece, ..like }));
+    }
+
     fn append(&mut self, sides: &Sides<M>) {
         let before = self.made.len() as u32;
         for piece in sides.made.pieces() {
@@ -335,7 +347,6 @@ fn reach<'a, const M: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::conic::Conic;
 
     #[test]
     fn cuts_next_to_the_end_of_a_piece_leave_no_sliver() {

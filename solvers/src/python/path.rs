@@ -13,7 +13,7 @@ use super::{with_padded_axes, with_path_axes};
 use crate::arc::ArcError;
 use crate::corner::Rounding;
 use crate::follow::{ArcShape, Fault, FollowOptions, Followed, Moves, Shape};
-use crate::path_builder::{build_path as build, Axes, BuiltPath, Part};
+use crate::path_builder::{build_path as build_path_of, build_smooth_path, Axes, BuiltPath, Part};
 use crate::spline::{CompositeCurve, Piece};
 
 pyo3::import_exception!(feedplan.errors, ProgramError);
@@ -43,6 +43,8 @@ type Columns<'py> = (
 type Summary = (usize, usize, usize, f64);
 /// Move, axis and position of the first place outside the travel.
 type Place = (usize, usize, f64);
+/// Moves at whose end a smooth path turns back, first and last moves (k, 2) of the places where it keeps its corners.
+type Rough<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray2<i64>>);
 /// Control points, weights, offsets and widths of the splines of a program.
 type Splines<'py> = (
     PyReadonlyArray2<'py, f64>,
@@ -56,7 +58,7 @@ type Splines<'py> = (
 #[pyo3(signature = (
     name, start, kind, target, feed, line, tolerance, fit_tolerance, halt, arc_move, arc_plane, arc_centre,
     arc_sweep, spline_move, spline_pieces, splines, change_move, change_start, joints, max_velocity, max_acceleration, travel, jump, exact_tolerance, max_chord, corner_acceleration,
-    max_speed, corner_angle, circles
+    max_speed, corner_angle, corners
 ))]
 #[allow(clippy::too_many_arguments)]
 fn build_path<'py>(
@@ -89,8 +91,8 @@ fn build_path<'py>(
     corner_acceleration: f64,
     max_speed: f64,
     corner_angle: f64,
-    circles: bool,
-) -> PyResult<(Columns<'py>, Summary, Option<Place>)> {
+    corners: &str,
+) -> PyResult<(Columns<'py>, Summary, Option<Place>, Rough<'py>)> {
     let axes = start.len();
     let count = kind.len();
     let same = [feed.len(), line.len(), tolerance.len(), fit_tolerance.len(), halt.len(), joints.len()];
@@ -136,7 +138,8 @@ fn build_path<'py>(
             Ok((index, range))
         })
         .collect::<PyResult<_>>()?;
-    let rounding = if circles { Rounding::Circle } else { Rounding::Parabola };
+    let rounding = if corners == "arcs" { Rounding::Circle } else { Rounding::Parabola };
+    let smooth = corners == "smooth";
     let options =
         FollowOptions { exact_tolerance, max_chord, corner_acceleration, max_speed, corner_angle, rounding };
     with_path_axes!(axes, M, {
@@ -175,7 +178,11 @@ fn build_path<'py>(
             travel: std::array::from_fn(|k| travel.get(k).copied().unwrap_or(ANYWHERE)),
             jump,
         };
-        let path = py.detach(|| build(&moves, &options, &limits)).map_err(|error| {
+        let build = || match smooth {
+            true => build_smooth_path(&moves, &options, &limits),
+            false => build_path_of(&moves, &options, &limits),
+        };
+        let path = py.detach(build).map_err(|error| {
             let line = line.as_slice().map_or(0, |lines| lines[error.index]);
             ProgramError::new_err((format!("{name}, line {line}: {}", sentence(error.fault)), line))
         })?;
@@ -203,7 +210,7 @@ fn columns<'py, const M: usize>(
     path: &BuiltPath<M>,
     splines: &CompositeCurve<M>,
     axes: usize,
-) -> (Columns<'py>, Summary, Option<Place>) {
+) -> (Columns<'py>, Summary, Option<Place>, Rough<'py>) {
     let parts = &path.parts;
     let points = |part: &Part<M>, followed: &Followed<M>| match &followed.piece {
         Shape::Conic(_) => 3,
@@ -272,7 +279,12 @@ fn columns<'py, const M: usize>(
         PyArray1::from_vec(py, path.runs.iter().map(|&start| start as i64).collect()),
     );
     let summary = (path.points, path.splines, path.polynomials, path.deviation);
-    (columns, summary, path.outside.map(|place| (place.index, place.axis, place.position)))
+    let zones: Vec<i64> = path.rough.corners.iter().flatten().map(|&i| i64::from(i)).collect();
+    let rough = (
+        PyArray1::from_iter(py, path.rough.reversals.iter().map(|&i| i64::from(i))),
+        PyArray1::from_vec(py, zones).reshape([path.rough.corners.len(), 2]).expect("k × 2 values"),
+    );
+    (columns, summary, path.outside.map(|place| (place.index, place.axis, place.position)), rough)
 }
 
 /// One column, `stride` values a piece, written by all parts at once.
