@@ -22,8 +22,9 @@ from feedplan.profile import SpeedProfile
 Array = NDArray[np.float64]
 
 ACCURACY = 1e-4
-# What the solver may leave of the time: far below the error of any mesh.
-GAP = 1e-6
+# What the solver may leave of the time, far below the error of any mesh, and of the rows, which hold in the
+# end because p is scaled.
+GAP, ROWS = 1e-6, 1e-7
 
 
 def plan(
@@ -56,6 +57,7 @@ def _solve(task: Transcription, seconds: float) -> Array:
         settings.max_threads = 1
         settings.equilibrate_enable = equilibrate
         settings.tol_gap_rel = settings.tol_gap_abs = GAP
+        settings.tol_feas = ROWS
         if math.isfinite(seconds):
             settings.time_limit = max(deadline - time.monotonic(), 1e-3)
         solution = clarabel.DefaultSolver(none, cost, matrix, bound, cones, settings).solve()

@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 from feedplan._solvers import PlanError, bound_jerk_limited, plan_jerk_limited
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InputError
+from feedplan.geometry.corners import Corners
 from feedplan.planners._faults import error_of
 from feedplan.planners._jerk import jerk_limits, lowered_limits
 from feedplan.profile import SpeedProfile
 
-# The profile keeps the limits of jerk.
+# The profile keeps the limits of jerk, best where curvature does not jump.
 LIMITS_JERK = True
+CORNERS = Corners.SMOOTH
 # What finer grids may gain, in accuracies.
 GRID_ERROR = 2.0
 # Accuracies that the grid is made for.

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from feedplan._solvers import PlanError, path_segments, profile_of_sections
 from feedplan.constraints.problem import Problem, speed_square
 from feedplan.errors import InputError, MissingPackageError
+from feedplan.geometry.corners import Corners
 from feedplan.planners import s_curve
 from feedplan.planners._faults import error_of
 from feedplan.planners._jerk import jerk_limits
@@ -31,8 +32,9 @@ State = tuple[float, float]
 # A section of constant jerk: duration; at its start position along the stretch, speed, acceleration; jerk.
 Section = tuple[float, float, float, float, float]
 
-# The profile keeps the limits of jerk.
+# The profile keeps the limits of jerk, best where curvature does not jump.
 LIMITS_JERK = True
+CORNERS = Corners.SMOOTH
 # Cuttings that are tried: the S-curve's own and a finer one.
 CUTTINGS = (s_curve.CUTTING, (16, 30.0, 0.02))
 # Times that all joints are improved, at most, and the gain of one round below which steps are halved.

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from feedplan._solvers import PlanError, plan_s_curve
 from feedplan.constraints.problem import Problem
+from feedplan.geometry.corners import Corners
 from feedplan.planners._faults import error_of
 from feedplan.planners._jerk import jerk_limits
 from feedplan.profile import SpeedProfile
 
-# The profile keeps the limits of jerk.
+# The profile keeps the limits of jerk, best where curvature does not jump.
 LIMITS_JERK = True
+CORNERS = Corners.SMOOTH
 # Segments known beyond the one that the motion enters.
 LOOK_AHEAD = 256
 # Parts of a curved piece, the length over which a speed has to pay [mm], and by what part of them the speeds
