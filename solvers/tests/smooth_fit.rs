@@ -160,10 +160,8 @@ fn a_curve_that_would_leave_its_bounds_keeps_its_corners() {
     let smooth = smooth_fit(&line, &[false; 5], &SmoothOptions { long: LONG, bounds });
     check(&line, &smooth, "bounds");
     assert!(smooth.curve.control.iter().all(|point| point[0] >= -1e-6));
-    // Both corners on the bound, with a stop before and after.
-    assert!(!smooth.corners.is_empty() && smooth.curve.pieces().any(|piece| piece.degree() == 7));
-    let worst = jumps(&smooth);
-    assert!(worst[1..4].iter().all(|&jump| jump < 1e-9), "{worst:?}");
+    // The side on the bound is a line, with a stop where it begins.
+    assert!(!smooth.corners.is_empty() && smooth.stretches.iter().any(|stretch| stretch.stop));
 }
 
 fn random_polylines<const D: usize>(seed: u64, count: usize) -> usize {
