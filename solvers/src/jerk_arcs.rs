@@ -271,7 +271,8 @@ fn settled(profile: &Profile, nodes: Range<usize>, [from, to]: [f64; 2], lengths
     }
     let state = |n: usize| {
         let (d, at) = (moved[n], nodes.start + n);
-        let bend = profile.at(if d < 0.0 { s[n].next_down() } else { s[n] })[2];
+        // w'' on the side that the node moves to.
+        let bend = profile.at(if d < 0.0 { s[n] * (1.0 - f64::EPSILON) } else { s[n] })[2];
         let w = profile.speed_sq[at] + d * (profile.slope[at] + 0.5 * d * bend);
         State { s: s[n], v: w.sqrt(), a: 0.5 * (profile.slope[at] + d * bend) }
     };

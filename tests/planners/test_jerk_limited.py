@@ -58,7 +58,9 @@ def test_a_square_with_stops_takes_as_long_as_by_hand(method: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("curve", "time"), [(lemniscate, 1.3170), (trefoil, 2.0352), (butterfly, 3.376)], ids=lambda x: str(x)
+    ("curve", "time"),
+    [(lemniscate, 1.3170), (trefoil, 2.0352), (butterfly, 3.376)],
+    ids=["lemniscate", "trefoil", "butterfly"],
 )
 def test_published_curves_take_no_longer_than_known(curve: object, time: float) -> None:
     problem = build_problem(Path.from_curve(curve(), feed=FREE), CURVES)  # type: ignore[operator]
