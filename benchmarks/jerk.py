@@ -5,14 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+from benchmarks.jerk_excess import jerk_excess
 from benchmarks.named import FREE, butterfly, lemniscate, trefoil
 from benchmarks.results import Cell, Result
+from benchmarks.third_order import by_clarabel, by_ipopt, grid_of
 from feedplan import Axis, Machine
 from feedplan import plan as plan_path
 from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Path
-from tests.planners.jerk_excess import jerk_excess
-from tests.planners.third_order import by_clarabel, by_ipopt, grid_of
 
 NAME = "jerk"
 AXES = tuple(Axis(name, 250.0, 3000.0, max_jerk=50_000.0) for name in "XYZ")

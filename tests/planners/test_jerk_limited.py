@@ -8,7 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.jerk_excess import jerk_excess
 from benchmarks.named import FREE, butterfly, lemniscate, trefoil
+from benchmarks.third_order import by_clarabel, by_ipopt, grid_of
 from feedplan import plan as plan_program
 from feedplan.bound import lower_bound
 from feedplan.constraints.problem import Problem, build_problem
@@ -20,9 +22,7 @@ from feedplan.planners import bound_of, planner
 from feedplan.profile import ArcKind
 from tests.constraints.test_joints import NOT_PLAIN
 from tests.constraints.test_joints import random_problem as random_joints
-from tests.planners.jerk_excess import jerk_excess
 from tests.planners.random_paths import random_problem
-from tests.planners.third_order import by_clarabel, by_ipopt, grid_of
 
 plan = planner("jerk-limited")
 SEEDS = int(os.environ.get("FEEDPLAN_SEEDS", "12"))

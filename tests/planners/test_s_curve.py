@@ -7,12 +7,12 @@ import os
 import numpy as np
 import pytest
 
+from benchmarks.jerk_excess import jerk_excess
 from benchmarks.named import FREE, lemniscate
 from feedplan.constraints.problem import build_problem
 from feedplan.geometry.path import Path
 from feedplan.planners import planner
 from feedplan.planners.ruckig import repaired
-from tests.planners.jerk_excess import jerk_excess
 from tests.planners.random_paths import random_problem
 from tests.planners.test_jerk_limited import CURVES
 

@@ -17,9 +17,9 @@ import scipy.sparse as sp
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
+from benchmarks.jerk_excess import lengths
 from feedplan.constraints.problem import Problem
 from feedplan.profile import ArcKind, SpeedProfile
-from tests.planners.jerk_excess import _lengths
 
 Array = NDArray[np.float64]
 PLACES = np.array([0.0, 1 / 3, 2 / 3, 1.0])
@@ -111,7 +111,7 @@ def grid_of(problem: Problem, profile: SpeedProfile) -> Grid:
     assert len(cubic) == len(profile) - 2
     piece, u0, u1 = profile.piece, profile.u0, profile.u1
     u = u0[:, None] + (u1 - u0)[:, None] * PLACES
-    lengths = _lengths(problem, piece, u0, u)[:, -1]
+    lengths = lengths(problem, piece, u0, u)[:, -1]
     places = np.clip(u[cubic].ravel(), 1e-12, None)
     pieces = np.repeat(piece[cubic], 4)
     # Each piece's own derivatives at its ends.

@@ -42,7 +42,7 @@ def jerk_excess(problem: Problem, profile: SpeedProfile, samples: int = 20) -> E
     # u is rounded: what lies next to its ends is looked at there.
     u = profile.u0[:, None] + (profile.u1 - profile.u0)[:, None] * t
     piece = np.repeat(profile.piece, samples)
-    s = _lengths(problem, profile.piece, profile.u0, u)
+    s = lengths(problem, profile.piece, profile.u0, u)
     width = problem.path.width[profile.piece]
     inside = np.clip(u, 1e-9 * width[:, None], (1 - 1e-9) * width[:, None])
     v, a, j = _motion(problem, profile, s)
@@ -132,7 +132,7 @@ def _misfits(profile: SpeedProfile, v: Array, s: Array) -> tuple[Array, Array]:
     return np.where(constant, np.abs(way - length), 0.0), np.where(constant, 0.0, np.abs(time - t))
 
 
-def _lengths(problem: Problem, piece: NDArray[np.uint32], start: Array, u: Array) -> Array:
+def lengths(problem: Problem, piece: NDArray[np.uint32], start: Array, u: Array) -> Array:
     """Lengths of the tool's way (arcs, samples) from the arcs' starts, sample by sample."""
     low = np.concatenate([start[:, None], u[:, :-1]], axis=1)
     half = (u - low) / 2
