@@ -111,7 +111,7 @@ def grid_of(problem: Problem, profile: SpeedProfile) -> Grid:
     assert len(cubic) == len(profile) - 2
     piece, u0, u1 = profile.piece, profile.u0, profile.u1
     u = u0[:, None] + (u1 - u0)[:, None] * PLACES
-    lengths = lengths(problem, piece, u0, u)[:, -1]
+    arc = lengths(problem, piece, u0, u)[:, -1]
     places = np.clip(u[cubic].ravel(), 1e-12, None)
     pieces = np.repeat(piece[cubic], 4)
     # Each piece's own derivatives at its ends.
@@ -128,12 +128,12 @@ def grid_of(problem: Problem, profile: SpeedProfile) -> Grid:
     w = np.append(profile.p0[cubic] * speed[:, 0], profile.p1[cubic[-1]] * speed[-1, 3])
     slope = 2 * np.append(profile.a0[cubic], profile.a1[cubic[-1]])
     return Grid(
-        lengths[cubic],
+        arc[cubic],
         q,
         speed_sq,
         problem.max_acceleration,
         problem.max_jerk,
-        (float(lengths[0]), float(lengths[-1])),
+        (float(arc[0]), float(arc[-1])),
         np.stack([w, slope], axis=1).ravel(),
     )
 
