@@ -287,10 +287,10 @@ fn cubic_time(h: f64, [from, to]: &[State; 2]) -> f64 {
         let r = 1.0 - t;
         (r * r * ((1.0 + 2.0 * t) * w0 + t * d0) + t * t * ((1.0 + 2.0 * r) * w1 - r * d1)).sqrt()
     };
-    let half = |middle: f64| -> f64 {
-        (0..4).map(|i| W[i] * (1.0 / speed(middle - 0.25 * X[i]) + 1.0 / speed(middle + 0.25 * X[i]))).sum()
+    let quarter = |middle: f64| -> f64 {
+        (0..4).map(|i| W[i] * (1.0 / speed(middle - 0.125 * X[i]) + 1.0 / speed(middle + 0.125 * X[i]))).sum()
     };
-    0.25 * h * (half(0.25) + half(0.75))
+    0.125 * h * [0.125, 0.375, 0.625, 0.875].into_iter().map(quarter).sum::<f64>()
 }
 
 #[cfg(test)]
