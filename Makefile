@@ -34,6 +34,7 @@ campaign: $(VENV)/built
 	FEEDPLAN_SEEDS=1000000 cargo test --release --manifest-path solvers/Cargo.toml --test planning bound:: -- --nocapture
 	FEEDPLAN_SEEDS=1250 $(BIN)/pytest --numprocesses auto tests/constraints/test_joints.py -k random
 	FEEDPLAN_SEEDS=200 $(BIN)/pytest --numprocesses auto tests/planners/test_meshes.py -k random
+	FEEDPLAN_SEEDS=2000 $(BIN)/pytest --numprocesses auto tests/planners/test_jerk_limited.py -k random
 	FEEDPLAN_EXAMPLES=5000 $(BIN)/pytest --numprocesses auto tests/test_setpoints_curves.py -k planned
 
 clean:
