@@ -34,7 +34,8 @@ class Plan:
     """A planned program.
 
     `profile` is the speed along `problem.path`; `lower_bound` [s] is proven: no feasible profile of this path
-    is faster; `compute` is the computing time of each stage [s].
+    is faster (a method with a bound of its own, as jerk-limited, may prove its on a grid and say so);
+    `compute` is the computing time of each stage [s].
     """
 
     program: Program | None
