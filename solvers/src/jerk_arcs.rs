@@ -17,6 +17,8 @@ const X: [f64; 4] =
     [0.183_434_642_495_649_8, 0.525_532_409_916_329, 0.796_666_477_413_626_7, 0.960_289_856_497_536_3];
 const W: [f64; 4] =
     [0.362_683_783_378_362, 0.313_706_645_877_887_3, 0.222_381_034_453_374_5, 0.101_228_536_290_376_3];
+/// A section that takes no longer is rounding, in s.
+const SHORTEST: f64 = 1e-10;
 /// Halvings for the time at which a section of constant jerk passes a place.
 const HALVINGS: usize = 200;
 
@@ -170,6 +172,9 @@ impl Arcs {
         path: &ByLength<M>,
         sections: &[Section],
     ) {
+        // What rounding leaves between two sections is none: the one before ends where the one after begins.
+        let kept = |(i, section): &(usize, &Section)| *i == 0 || section.duration > SHORTEST;
+        let sections: Vec<&Section> = sections.iter().enumerate().filter(kept).map(|(_, one)| one).collect();
         for (i, section) in sections.iter().enumerate() {
             let from = State { s: section.position, v: section.speed, a: section.acceleration };
             let to = match sections.get(i + 1) {
