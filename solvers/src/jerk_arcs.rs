@@ -40,6 +40,8 @@ pub struct Arcs {
     /// Pieces at whose start a jump of curvature holds the speed.
     pub kinks: Vec<u32>,
     left_out: f64,
+    /// Where the arcs that were left out at the start of a piece begin.
+    left_from: Option<(usize, f64)>,
 }
 
 /// Length along a stretch, speed and acceleration.
@@ -100,19 +102,23 @@ impl Arcs {
         self.kinks.append(&mut other.kinks);
     }
 
-    /// Appends an arc between two parameters of a piece. One too short for u to show it is left out, its time goes to
-    /// its neighbour.
+    /// Appends an arc between two parameters of a piece. One too short for u to show it is left out, its time and its
+    /// way go to its neighbour.
     fn push<const M: usize>(&mut self, problem: &Problem<M>, piece: usize, [u0, u1]: [f64; 2], arc: &Arc) {
+        let u0 = self.left_from.take().filter(|from| from.0 == piece).map_or(u0, |from| from.1);
         let last = self.len().wrapping_sub(1);
         let goes_on = last < self.len() && self.piece[last] as usize == piece && self.u1[last] == u0;
         let speed = |u: f64, v: f64| if v == 0.0 { 0.0 } else { v * v / speed_sq(problem, piece, u) };
-        if u1 <= u0 {
+        if u1 <= u0 || arc.duration <= SHORTEST {
+            let u1 = u1.max(u0);
             if goes_on {
                 self.duration[last] += arc.duration;
-                self.p1[last] = speed(u0, arc.ends[1].v);
+                self.u1[last] = u1;
+                self.p1[last] = speed(u1, arc.ends[1].v);
                 self.a1[last] = arc.ends[1].a;
             } else {
                 self.left_out += arc.duration;
+                self.left_from = Some((piece, u0));
             }
             return;
         }
