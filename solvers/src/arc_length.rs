@@ -16,9 +16,10 @@ use crate::quadratic::{dot, Quadratic};
 
 /// Nodes of the quadrature.
 const N: usize = 8;
-const X: [f64; 4] =
+/// The positive ones of Gauss–Legendre quadrature on [−1, 1], and the weights of each pair.
+pub const X: [f64; 4] =
     [0.183_434_642_495_649_8, 0.525_532_409_916_329, 0.796_666_477_413_626_7, 0.960_289_856_497_536_3];
-const W: [f64; 4] =
+pub const W: [f64; 4] =
     [0.362_683_783_378_362, 0.313_706_645_877_887_3, 0.222_381_034_453_374_5, 0.101_228_536_290_376_3];
 
 /// K_n (2n)!, because `Disc` bounds f^(2n)/(2n)!.

@@ -9,6 +9,7 @@
 
 use rayon::prelude::*;
 
+use crate::arc_length::{W, X};
 use crate::bang_bang::Problem;
 use crate::jerk_limited::{Geometry, Place, SpeedCap};
 use crate::path_dynamics::chord_speed;
@@ -18,11 +19,6 @@ use crate::spline::cusps::CUSP;
 use crate::spline::rational::Hodograph;
 use crate::spline::Piece;
 
-/// Nodes of Gauss–Legendre quadrature on [−1, 1], and their weights.
-const X: [f64; 4] =
-    [0.183_434_642_495_649_8, 0.525_532_409_916_329, 0.796_666_477_413_626_7, 0.960_289_856_497_536_3];
-const W: [f64; 4] =
-    [0.362_683_783_378_362, 0.313_706_645_877_887_3, 0.222_381_034_453_374_5, 0.101_228_536_290_376_3];
 /// What the quadrature of a panel may be off, as a part of its length …
 const QUADRATURE: f64 = 1e-12;
 /// … and the quintic half-way; in the halves that are kept it is off by a sixty-fourth of that. Near a sharp turn panels

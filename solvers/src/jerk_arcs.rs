@@ -5,18 +5,15 @@
 
 use std::ops::Range;
 
+use crate::arc_length::{W, X};
 use crate::bang_bang::Problem;
 use crate::by_length::{speed_sq, ByLength};
 use crate::jerk_limited::{Geometry, Profile};
+use crate::motion::ArcKind;
 use crate::s_curve::Section;
 
-const PATH_JERK: u8 = 6;
-pub const SPEED_CUBIC: u8 = 7;
-/// Gauss–Legendre nodes and weights on [−1, 1] for times.
-const X: [f64; 4] =
-    [0.183_434_642_495_649_8, 0.525_532_409_916_329, 0.796_666_477_413_626_7, 0.960_289_856_497_536_3];
-const W: [f64; 4] =
-    [0.362_683_783_378_362, 0.313_706_645_877_887_3, 0.222_381_034_453_374_5, 0.101_228_536_290_376_3];
+const PATH_JERK: u8 = ArcKind::PathJerk as u8;
+pub const SPEED_CUBIC: u8 = ArcKind::SpeedCubic as u8;
 /// A section that takes no longer is rounding, in s.
 const SHORTEST: f64 = 1e-10;
 /// Halvings for the time at which a section of constant jerk passes a place.
