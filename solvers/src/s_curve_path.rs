@@ -33,7 +33,7 @@ pub struct Cutting {
     pub parts: usize,
     /// The length in mm over which a speed has to pay: short ones give more to acceleration.
     pub stretch: f64,
-    /// Parts are joined whose allowable speeds differ by no more than this part of them.
+    /// Parts are joined where that lowers the speed on none of them by more than this part of it.
     pub alike: f64,
 }
 
@@ -141,9 +141,10 @@ fn along<const M: usize>(
 
 /// A part of the path on its way to a segment.
 struct Cut<const M: usize> {
-    length: f64,
     shape: Shape<M>,
     segment: Segment,
+    /// The greatest speed that one of its parts has alone.
+    highest: f64,
 }
 
 /// The segments of a stretch from rest to rest; None where one has no speed.
@@ -184,21 +185,19 @@ pub fn segments<const M: usize>(
                     junction: f64::INFINITY,
                 })
             };
-            let cut = Cut { length: to - from, segment: make(&shape, to - from)?, shape };
-            // One with the segment before, where that costs little.
+            let segment = make(&shape, to - from)?;
+            let cut = Cut { shape, segment, highest: segment.speed() };
+            // One with the segment before, where that costs no part of it much.
             let joined = out.last().filter(|last| last.segment.junction == f64::INFINITY).and_then(|last| {
-                let (a, b) = (&last.segment, &cut.segment);
-                let feeds_agree =
-                    a.desired == b.desired || (a.desired - b.desired).abs() <= cutting.alike * b.desired;
-                let (low, high) = (a.speed().min(b.speed()), a.speed().max(b.speed()));
-                if !feeds_agree || high - low > cutting.alike * high {
-                    return None;
-                }
                 let shape = last.shape.with(&cut.shape);
-                let length = last.length + cut.length;
-                let mut segment = make(&shape, length)?;
-                segment.desired = a.desired.min(b.desired);
-                Some(Cut { length, shape, segment })
+                let mut segment = make(&shape, last.segment.length + cut.segment.length)?;
+                segment.desired = last.segment.desired.min(cut.segment.desired);
+                let highest = last.highest.max(cut.highest);
+                (segment.speed() >= (1.0 - cutting.alike) * highest).then_some(Cut {
+                    shape,
+                    segment,
+                    highest,
+                })
             });
             match (joined, out.last_mut()) {
                 (Some(joined), Some(last)) => *last = joined,
