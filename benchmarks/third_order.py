@@ -3,11 +3,13 @@
 w = v² is a C¹ cubic in the length between the nodes, ramps w ∝ s^(4/3) lead from and to rest; limits hold
 at four places of each interval. IPOPT takes the problem as it is. Clarabel gets quadratic programs, one after
 the other: the row |L w| ≤ J w^(−1/2) of jerk by the tangent of its right side, which is convex, so that every
-plan is valid.
+plan is valid; and the plan in one stage that controllers and earlier works make ("pseudo-jerk"), which bounds w in
+the row of jerk by the optimum without limits of jerk.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -22,6 +24,8 @@ from feedplan.constraints.problem import Problem
 from feedplan.profile import ArcKind, SpeedProfile
 
 Array = NDArray[np.float64]
+# Matrices of the unknowns and their upper bounds.
+Rows = list[tuple[Any, Array]]
 PLACES = np.array([0.0, 1 / 3, 2 / 3, 1.0])
 NODES, WEIGHTS = leggauss(4)
 # The first plan is so much of the one given.
@@ -175,26 +179,42 @@ def by_ipopt(grid: Grid) -> float:
 
 def by_clarabel(grid: Grid) -> float:
     """A time [s] on a grid that no tangent program improves."""
+    jerks, w = grid.motion[2], grid.rows(PLACES, 0)
+
+    def tangents(z: Array) -> Rows:
+        at = w @ z
+        # w^(−1/2) is above its tangent at w.
+        tangent = sp.diags(0.5 * at**-1.5) @ w
+        return [(sign * row + tangent, 1.5 / np.sqrt(at)) for row in jerks for sign in (1, -1)]
+
+    return grid.time(_descent(grid, tangents))
+
+
+def pseudo_jerk(grid: Grid) -> float:
+    """The time [s] of the plan in one stage, |L w| ≤ J w̄^(−1/2) and w ≤ w̄, w̄ being the optimum without jerk."""
+    jerks, w = grid.motion[2], grid.rows(PLACES, 0)
+    top = w @ _descent(grid, lambda _: [])
+    rows = [(sign * row, top**-0.5) for row in jerks for sign in (1, -1)]
+    return grid.time(_descent(grid, lambda _: [*rows, (w, top)]))
+
+
+def _descent(grid: Grid, jerk_rows: Callable[[Array], Rows]) -> Array:
+    """The unknowns over their references that no quadratic program improves, with the rows at the last ones."""
     import clarabel
 
-    speed, accelerations, jerks = grid.motion
+    speed, accelerations, _ = grid.motion
     w = grid.rows(PLACES, 0)
     pace, weights = grid.pace
     z = START * grid.x / grid.reference
     first = sp.identity(len(z), format="csr")[[0, len(z) - 2]]
     fixed = [speed, *accelerations, *(-row for row in accelerations), first]
-    limits = [np.ones(row.shape[0]) for row in fixed]
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     for _ in range(PROGRAMS):
-        at = w @ z
-        # w^(−1/2) is above its tangent at w.
-        tangent = sp.diags(0.5 * at**-1.5) @ w
-        own = [sign * row + tangent for row in jerks for sign in (1, -1)]
-        bound = [1.5 / np.sqrt(at)] * len(own)
-        positive = [-w]
-        matrix = sp.vstack([grid.ends, *fixed, *own, *positive]).tocsr()
-        right = np.concatenate([np.zeros(2), *limits, *bound, -1e-3 * at])
+        own = jerk_rows(z)
+        matrix = sp.vstack([grid.ends, *fixed, *(row for row, _ in own), -w]).tocsr()
+        limits = [np.ones(row.shape[0]) for row in fixed]
+        right = np.concatenate([np.zeros(2), *limits, *(bound for _, bound in own), -1e-3 * (w @ z)])
         size = np.maximum(np.asarray(abs(matrix).max(axis=1).todense()).ravel(), 1e-12)
         matrix, right = sp.diags(1 / size) @ matrix, right / size
         value = pace @ z
@@ -211,4 +231,4 @@ def by_clarabel(grid: Grid) -> float:
         z = z + step * (found - z)
         if before - grid.time(z) < GAIN * before:
             break
-    return grid.time(z)
+    return z
