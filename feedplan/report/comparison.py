@@ -9,7 +9,7 @@ from pathlib import Path as FilePath
 from string import Template
 from typing import TYPE_CHECKING, Any
 
-from feedplan.report.page import asset, plotly_script, script_data
+from feedplan.report.page import asset, framed
 from feedplan.units import duration_text
 
 if TYPE_CHECKING:
@@ -33,16 +33,10 @@ def write_comparison(
     check of each of `limits`), or `time` None and an `error`. `paths` are `ToolPath.data()` of the rows that
     have a plan, with their `method`.
     """
-    page = Template(asset("comparison.html")).substitute(
-        title=escape(title),
-        style=asset("page.css"),
-        about=" · ".join(f"{escape(name)} <b>{escape(value)}</b>" for name, value in about.items()),
-        table=_table(rows, limits),
-        data=script_data({"methods": list(paths)}),
-        plotly=plotly_script(),
-        script="".join(asset(name) for name in ("charts.js", "path.js", "comparison.js")),
-    )
-    file.write_text(page, encoding="utf-8")
+    told = " · ".join(f"{escape(name)} <b>{escape(value)}</b>" for name, value in about.items())
+    sections = Template(asset("comparison.html")).substitute(table=_table(rows, limits))
+    data = {"methods": list(paths)}
+    file.write_text(framed("comparison", title, told, "", sections, data, "comparison.js"), encoding="utf-8")
 
 
 def _table(rows: Sequence[Mapping[str, Any]], limits: Sequence[str]) -> str:

@@ -44,24 +44,36 @@ def write_report(
     texts = _lines(source, {row.line for row in slow}) if source else {}
     data = chart_data(problem, profile, figures, audit)
     name = FilePath(str(summary.get("program") or "path")).name
-    page = Template(asset("page.html")).substitute(
-        title=escape(name),
-        style=asset("page.css"),
-        about=_about(summary, problem),
-        verdict=verdict(audit),
-        numbers=numbers(summary, figures.count),
-        warnings=_warnings(summary.get("warnings") or ()),
+    judged = verdict(audit), numbers(summary, figures.count), _warnings(summary.get("warnings") or ())
+    sections = Template(asset("page.html")).substitute(
         speed=_SPEED[any(check.name == "jerk" and check.judged for check in audit.checks)],
         fast=f"{data['length']['cutting_speed']:.4g}",
         limits=limits_table(time_per_limit(problem, profile)),
         fit=fit_table(summary),
         slowest=slowest_table(slow, texts),
         audit=audit_table(audit),
-        data=script_data(data),
-        plotly=plotly_script(),
-        script="".join(asset(name) for name in ("charts.js", "path.js", "page.js")),
     )
-    file.write_text(page, encoding="utf-8")
+    about = _about(summary, problem)
+    file.write_text(
+        framed("report", name, about, "\n".join(judged), sections, data, "page.js"), encoding="utf-8"
+    )
+
+
+def framed(
+    kind: str, title: str, about: str, summary: str, sections: str, data: Mapping[str, Any], script: str
+) -> str:
+    """A whole page of HTML around its sections, with the data that its script draws."""
+    return Template(asset("frame.html")).substitute(
+        kind=kind,
+        title=escape(title),
+        style=asset("page.css"),
+        about=about,
+        summary=summary,
+        sections=sections,
+        data=_script_data(data),
+        plotly=_plotly_script(),
+        script="".join(asset(name) for name in ("charts.js", "path.js", script)),
+    )
 
 
 def _lines(source: FilePath, wanted: set[int]) -> dict[int, str]:
@@ -84,12 +96,12 @@ def asset(name: str) -> str:
     return resources.files(__package__).joinpath(name).read_text("utf-8")
 
 
-def script_data(data: Mapping[str, Any]) -> str:
+def _script_data(data: Mapping[str, Any]) -> str:
     """Data as JSON within a script, which ends at the first "</", whatever stands around it."""
     return json.dumps(data, allow_nan=False, separators=(",", ":")).replace("</", "<\\/")
 
 
-def plotly_script() -> str:
+def _plotly_script() -> str:
     """The library that draws the charts."""
     from plotly.offline import get_plotlyjs
 
