@@ -14,6 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from benchmarks.named import EXAMPLES, example
+from feedplan.curves.composite import CompositeCurve
 from feedplan.machine.along import positions
 from feedplan.machine.machine import Machine
 from feedplan.machine.meaning import Meaning
@@ -222,3 +223,39 @@ def test_the_flank_of_the_tool_stays_beside_the_blade() -> None:
     reach = impeller.TOOL_RADIUS + 0.5 * impeller.THICKNESS
     assert away == pytest.approx(np.full(len(tips), reach), abs=0.02)
     assert np.linalg.norm(directions, axis=1) == pytest.approx(np.ones(len(tips)))
+
+
+def test_the_passes_of_the_panel_are_joined_as_asked() -> None:
+    panel = example("panel")
+    for joint in panel.JOINTS:
+        parts = [
+            CompositeCurve.from_bspline(curve["control_points"], curve["knots"], 3)
+            if "knots" in curve
+            else CompositeCurve.from_bezier(curve["control_points"])
+            for curve in panel.panel(3, joint)["curves"]
+        ]
+        curves = CompositeCurve.joined(parts, 1e-9)
+        last = np.cumsum([len(part) for part in parts])[:-1]
+        assert len(last) == 4, "two loops, each with two ends"
+        ends = curves.evaluate(last - 1, curves.width[last - 1], 2), curves.evaluate(last, 0 * last, 2)
+        tangents, bends = [], []
+        for _, first, second in ends:
+            speed = np.linalg.norm(first, axis=1)[:, None]
+            tangents.append(first / speed)
+            across = second - tangents[-1] * (second * tangents[-1]).sum(axis=1)[:, None]
+            bends.append(across / speed**2)
+        assert np.abs(tangents[0] - tangents[1]).max() < 1e-6
+        jump = np.linalg.norm(bends[0] - bends[1], axis=1)
+        assert (jump < 1e-6).all() if joint == "curvature" else (jump > 1e-2).all()
+
+
+def test_the_ball_touches_the_panel_and_nowhere_gouges_it() -> None:
+    panel = example("panel")
+    y = np.linspace(0.0, panel.WIDTH, 200)
+    tips = panel.tool_tip(np.full_like(y, 95.0), y)
+    centres = tips + np.array([0.0, 0.0, panel.TOOL_RADIUS])
+    around = np.linspace(-6.0, 6.0, 61)
+    for centre in centres[::10]:
+        x, z = np.meshgrid(centre[0] + around, centre[1] + around)
+        below = np.stack([x, z, panel.height(x, z)], axis=-1)
+        assert np.linalg.norm(below - centre, axis=-1).min() == pytest.approx(panel.TOOL_RADIUS, abs=0.02)
