@@ -129,8 +129,8 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
         }
         let feed_sq = self.feed_sq * UP;
         let time = match &self.tip_curve {
-            Some(tip) => tip.chord_time(chord, feed_sq, &tip.node(a.t), &tip.node(b.t), 0),
-            None => self.curve.chord_time(chord, feed_sq, a, b, 0),
+            Some(tip) => tip.chord_time(chord, feed_sq, &tip.node(a.t), &tip.node(b.t)),
+            None => self.curve.chord_time(chord, feed_sq, a, b),
         };
         time / self.task.speed_share
     }
