@@ -3,8 +3,7 @@
 
 use rayon::prelude::*;
 
-use crate::support::{random_case, Case, Random, FEW_AXES};
-use feedplan_solvers::bang_bang::Problem;
+use crate::support::{audit, random_case, Case, Elevated, Random, FEW_AXES};
 use feedplan_solvers::bang_bang_quadratic::Profile;
 use feedplan_solvers::bound::{lower_bound, Hint};
 use feedplan_solvers::quadratic::Quadratic;
@@ -14,49 +13,12 @@ fn seeds(count: u64) -> std::ops::Range<u64> {
     0..std::env::var("FEEDPLAN_SEEDS").map_or(count, |text| text.parse().expect("a number of seeds"))
 }
 
-/// The case as a path of any pieces.
-struct Path<const M: usize> {
-    control: Vec<[f64; M]>,
-    offset: Vec<usize>,
-    width: Vec<f64>,
-}
-
-impl<const M: usize> Path<M> {
-    fn of(case: &Case<M>) -> Self {
-        Self {
-            control: case.pieces.iter().flat_map(|piece| piece.control).collect(),
-            offset: (0..=case.pieces.len()).map(|i| 3 * i).collect(),
-            width: case.pieces.iter().map(|piece| piece.width).collect(),
-        }
-    }
-
-    fn problem<'a>(&'a self, case: &'a Case<M>, runs: &'a [usize]) -> Problem<'a, M> {
-        Problem {
-            control: &self.control,
-            weight: &[],
-            offset: &self.offset,
-            width: &self.width,
-            tip: None,
-            runs,
-            feed: &case.feed,
-            junction_speed: &case.junction,
-            max_velocity: case.velocity,
-            max_acceleration: case.acceleration,
-            chord_tolerance: case.chord_tolerance,
-            period: case.period,
-            start_speed: case.start_speed,
-            end_speed: case.end_speed,
-        }
-    }
-}
-
 fn hint(profile: &Profile) -> Hint<'_> {
     Hint { piece: &profile.piece, axis: &profile.axis, u1: &profile.u1, duration: &profile.duration }
 }
 
 fn bound<const M: usize>(case: &Case<M>, profile: &Profile) -> f64 {
-    let path = Path::of(case);
-    lower_bound(&path.problem(case, &[0, case.pieces.len()]), &hint(profile)).expect("a bound")
+    lower_bound(&Elevated::new(case, 0).problem(case), &hint(profile)).expect("a bound")
 }
 
 #[test]
@@ -111,7 +73,7 @@ fn the_chord_error_counts() {
     assert!(bound > 2.0 / (8f64 * 10.2).sqrt() && bound > 3.0 * free, "{bound}, {free}");
 }
 
-/// The least and the greatest gap of some plans, in thousands of their number, and those below −1e-9.
+/// Gaps of some plans, and the seeds of those that are proven to be too fast.
 struct Gaps {
     least: f64,
     shares: [f64; 3],
@@ -120,18 +82,23 @@ struct Gaps {
 
 /// Over random cases with these seeds, each plan's own arcs for cells, or one cell a piece.
 fn gaps(seeds: std::ops::Range<u64>, with_arcs: bool) -> Gaps {
-    let mut found: Vec<(f64, u64)> = seeds
+    let mut found: Vec<(f64, u64, bool)> = seeds
         .into_par_iter()
         .filter_map(|seed| {
-            let count = FEW_AXES[(seed % 4) as usize];
+            let count = FEW_AXES[(seed % 3) as usize];
             for_few_axes!(count, M, {
                 let case = random_case::<M>(seed);
-                let mut profile = case.plan().ok()?;
+                let profile = case.plan().ok()?;
                 let time = profile.time();
-                if !with_arcs {
-                    profile = whole_pieces(&profile, &case);
-                }
-                Some((1.0 - bound(&case, &profile) / time, seed))
+                let bound = if with_arcs {
+                    bound(&case, &profile)
+                } else {
+                    bound(&case, &whole_pieces(&profile, &case))
+                };
+                let gap = 1.0 - bound / time;
+                // Next to a cusp rounding makes the durations of single arcs wrong.
+                let is_sound = gap >= -1e-10 || -gap <= 2.0 * audit(&case, &profile, 1).duration;
+                Some((gap, seed, is_sound))
             })
         })
         .collect();
@@ -140,7 +107,7 @@ fn gaps(seeds: std::ops::Range<u64>, with_arcs: bool) -> Gaps {
     Gaps {
         least: found[0].0,
         shares: [0.5, 0.9, 1.0].map(share),
-        failures: found.iter().filter(|gap| gap.0 < -1e-9 || gap.0.is_nan()).map(|gap| gap.1).collect(),
+        failures: found.iter().filter(|gap| !gap.2).map(|gap| gap.1).collect(),
     }
 }
 
@@ -159,7 +126,7 @@ fn whole_pieces<const M: usize>(profile: &Profile, case: &Case<M>) -> Profile {
 
 #[test]
 fn the_bound_is_never_above_the_time_and_near_it() {
-    let found = gaps(seeds(20_000), true);
+    let found = gaps(seeds(100_000), true);
     println!(
         "gaps from {:.1e}, {:.1e} in the middle, 9 of 10 below {:.1e}, all below {:.1e}",
         found.least, found.shares[0], found.shares[1], found.shares[2]

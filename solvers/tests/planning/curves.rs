@@ -1,6 +1,7 @@
 //! The planner for pieces of any degree on curves made to break it: it comes to an end, with times that are times.
 
 use crate::support::curves::{random_curves, CurveCase, Piece};
+use crate::support::FEW_AXES;
 
 /// Rounding decides where the axes turn round: planning still comes to an end.
 #[test]
@@ -24,7 +25,7 @@ fn curves_made_to_break_the_planner_are_planned_in_finite_time() {
         std::env::var("FEEDPLAN_SEEDS").map_or(6_000, |text| text.parse().expect("a number of seeds"));
     let (mut slowed, mut stuck, mut arcs) = (0, 0, 0);
     for seed in 0..count {
-        for_axes!([1, 2, 3][(seed % 3) as usize], M, {
+        for_few_axes!(FEW_AXES[(seed % 3) as usize], M, {
             let case = random_curves::<M>(seed);
             match case.plan() {
                 Err(_) => stuck += 1,

@@ -4,27 +4,17 @@
 mod audit;
 mod cases;
 pub mod curves;
+mod elevated;
 
 pub use audit::{audit, Audit};
 pub use cases::{milder_case, random_case, Case, Random};
+pub use elevated::Elevated;
 
 /// Runs an expression for a number of axes known at run time: `for_axes!(count, M, expression)`.
 #[macro_export]
 macro_rules! for_axes {
     ($count:expr, $m:ident, $call:expr) => {
         match $count {
-            1 => {
-                const $m: usize = 1;
-                $call
-            }
-            2 => {
-                const $m: usize = 2;
-                $call
-            }
-            3 => {
-                const $m: usize = 3;
-                $call
-            }
             4 => {
                 const $m: usize = 4;
                 $call
@@ -33,16 +23,18 @@ macro_rules! for_axes {
                 const $m: usize = 5;
                 $call
             }
-            _ => {
+            6 => {
                 const $m: usize = 6;
                 $call
             }
+            few => for_few_axes!(few, $m, $call),
         }
     };
 }
 
-/// As many axes as kernels are compiled for here: each number costs the compiler half a minute.
-pub const FEW_AXES: [usize; 4] = [1, 2, 3, 6];
+/// As many axes as the kernels of curves are compiled for here: each number costs the compiler half a minute, and on
+/// joints they run with five.
+pub const FEW_AXES: [usize; 3] = [1, 2, 3];
 
 /// The same for one of `FEW_AXES`.
 #[macro_export]
@@ -57,15 +49,10 @@ macro_rules! for_few_axes {
                 const $m: usize = 2;
                 $call
             }
-            3 => {
+            _ => {
                 const $m: usize = 3;
                 $call
             }
-            6 => {
-                const $m: usize = 6;
-                $call
-            }
-            _ => unreachable!("of FEW_AXES"),
         }
     };
 }
