@@ -67,7 +67,7 @@ def blade_pass(blade: int, level: float, points: int) -> tuple[Array, Array]:
     return tips, np.concatenate([direction, last, direction[::-1]])
 
 
-def passes(blocks: int, levels: int = 3) -> list[tuple[Array, Array]]:
+def passes(blocks: int, levels: int) -> list[tuple[Array, Array]]:
     """All passes, about `blocks` points together, each with its way in and out along the tool."""
     points = max(4, round((blocks / (BLADES * levels) - EDGE_POINTS) / 2.0))
     found = []
@@ -111,14 +111,17 @@ def five_axis(machine: Machine) -> RotaryChain:
     return chain
 
 
-def program(machine: Machine, form: str = "tip", blocks: int = 2000, *, feed: float = 3000.0) -> str:
-    """The part program with about `blocks` blocks in one of the `FORMS`; `feed` in mm/min of the tip.
+def program(
+    machine: Machine, form: str = "tip", blocks: int = 2000, *, levels: int = 3, feed: float = 3000.0
+) -> str:
+    """The part program with about `blocks` blocks in one of the `FORMS`, in so many passes a blade; `feed` in
+    mm/min of the tip.
 
     Joint positions have the feed in each block as inverse time (G93), so that the tip keeps its feed.
     """
     chain = five_axis(machine)
     names = machine.axis_names
-    all_passes = passes(blocks)
+    all_passes = passes(blocks, levels)
     safe = min(machine.axis("Z").travel[1] - 10.0, 480.0)
     lines = [
         "%",
@@ -174,11 +177,18 @@ def main() -> None:
     parser.add_argument("--machine", default="trunnion-ac", help="a five-axis machine (default trunnion-ac)")
     parser.add_argument("--form", choices=FORMS, default="tip", help="(default tip)")
     parser.add_argument("--blocks", type=int, default=2000, help="about how many blocks (default 2000)")
+    parser.add_argument("--levels", type=int, default=3, help="passes a blade (default 3)")
     parser.add_argument("--feed", type=float, default=3000.0, help="of the tip [mm/min] (default 3000)")
     parser.add_argument("--output", type=Path, default=Path("out/impeller.ngc"))
     arguments = parser.parse_args()
 
-    text = program(Machine.load(arguments.machine), arguments.form, arguments.blocks, feed=arguments.feed)
+    text = program(
+        Machine.load(arguments.machine),
+        arguments.form,
+        arguments.blocks,
+        levels=arguments.levels,
+        feed=arguments.feed,
+    )
     arguments.output.parent.mkdir(parents=True, exist_ok=True)
     arguments.output.write_text(text, encoding="ascii")
     print(f"{arguments.output}: {text.count(chr(10))} lines")
