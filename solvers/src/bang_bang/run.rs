@@ -4,6 +4,7 @@ use super::check::keeps_limits;
 use super::pass::{self, cusp, distance, Arc, Kind, State, Stuck};
 use super::piece::Piece;
 use super::split::{split, Cap, Part, Remedy, SubPiece};
+use super::store::Store;
 use super::{Task, TIP_AXES};
 use crate::bang_bang_quadratic::{ArcKind, Fault, Profile, Row, Workspace as QuadraticWorkspace, NO_AXIS};
 use crate::polynomial::MOST;
@@ -13,6 +14,8 @@ use crate::quadratic::norm;
 const SMOOTH_TURN: f64 = 1e-9;
 /// A speed asked for at an end of the path may exceed what can be had by this part, which is rounding.
 const REACHED: f64 = 1e-12;
+/// Places of the rule for the time along an arc at a speed.
+const NODES: usize = 6;
 /// Halvings for the time along one arc at a speed; some twenty are usual.
 const MOST_HALVINGS: u32 = 1000;
 /// A run in which rounding leaves a pass without headway is planned anew so often, with more cuts every time.
@@ -22,8 +25,10 @@ const MOST_ATTEMPTS: usize = 40;
 #[derive(Default)]
 pub struct Workspace {
     parts: Vec<Part>,
-    /// Of each piece: its parts, of each part: its arcs of the backward pass, last piece and last part first.
+    /// Of each piece: its parts, of each part: its sub-piece and its arcs of the backward pass, last piece and last part
+    /// first.
     pieces: Vec<std::ops::Range<usize>>,
+    subs: Store,
     bounds: Vec<Arc>,
     offsets: Vec<usize>,
     arcs: Vec<Arc>,
@@ -178,6 +183,7 @@ fn backward<const M: usize>(
     space.quadratic.clear();
     space.parts.clear();
     space.pieces.clear();
+    space.subs.clear();
     space.bounds.clear();
     space.offsets.clear();
     let mut at = Between { state: State { speed_sq: f64::INFINITY }, end: None, tip_sq: end_sq };
@@ -228,6 +234,7 @@ fn backward_over<const M: usize, const C: usize>(
             at.state.speed_sq = at_cusp(&end, after, at.state.speed_sq);
         }
         at.end = Some(end_direction(&sub, part.negative, false));
+        space.subs.push(&sub);
         space.offsets.push(space.bounds.len());
         let reversed = sub.reversed();
         let arcs = space.bounds.len();
@@ -285,11 +292,11 @@ fn forward_over<const M: usize, const C: usize>(
     space: &mut Workspace,
     out: &mut Profile,
 ) {
-    let piece = task.piece::<C>(i);
     let mut limited = false;
     for number in parts {
+        *index -= 1;
         let part = space.parts[number];
-        let sub = part.sub_piece(&piece);
+        let sub = space.subs.get::<M, C>(*index, &part);
         let start = end_direction(&sub, part.negative, false);
         if !std::mem::replace(&mut limited, true) {
             at.state.speed_sq = at.state.speed_sq.min(of_axes(at.tip_sq, sub.tip_share(false)));
@@ -301,7 +308,6 @@ fn forward_over<const M: usize, const C: usize>(
             at.state.speed_sq = 0.0;
         }
         at.end = Some(end_direction(&sub, part.negative, true));
-        *index -= 1;
         let end = space.offsets.get(*index + 1).copied().unwrap_or(space.bounds.len());
         let bounds = &space.bounds[space.offsets[*index]..end];
         space.arcs.clear();
@@ -381,15 +387,16 @@ fn time_at_speed<const M: usize, const C: usize>(
     x0: f64,
     x1: f64,
 ) -> f64 {
-    let rate = |x: f64| {
-        let weight = sub.weight.value(x);
+    let rate = |x: [f64; NODES]| {
+        let weight = sub.weight.values(x);
         // Next to a cusp the sum of squares has lost the digits that the tangents still have.
         let speed = if sub.own_speed {
-            norm(&std::array::from_fn::<f64, M, _>(|k| sub.g[k].value(x)))
+            let g = sub.g.each_ref().map(|g| g.values(x));
+            std::array::from_fn(|i| norm(&g.map(|g| g[i])))
         } else {
-            sub.speed.value(x).max(0.0).sqrt()
+            sub.speed.values(x).map(|speed| speed.max(0.0).sqrt())
         };
-        speed / ((f0 + x * (f1 - f0)).sqrt() * weight * weight)
+        std::array::from_fn(|i| speed[i] / ((f0 + x[i] * (f1 - f0)).sqrt() * weight[i] * weight[i]))
     };
     let whole = rule(&rate, x0, x1);
     gauss(&rate, (x0, x1), whole, 1e-14 * whole, &mut { MOST_HALVINGS })
@@ -397,7 +404,13 @@ fn time_at_speed<const M: usize, const C: usize>(
 
 /// To an error that does not shrink with the stretches, and in no more than so many halvings: where the rate is rounding
 /// throughout, as it may be next to a cusp, more would gain nothing.
-fn gauss(rate: &impl Fn(f64) -> f64, (a, b): (f64, f64), whole: f64, error: f64, left: &mut u32) -> f64 {
+fn gauss(
+    rate: &impl Fn([f64; NODES]) -> [f64; NODES],
+    (a, b): (f64, f64),
+    whole: f64,
+    error: f64,
+    left: &mut u32,
+) -> f64 {
     let middle = 0.5 * (a + b);
     let halves = (rule(rate, a, middle), rule(rate, middle, b));
     if (halves.0 + halves.1 - whole).abs() <= error || *left == 0 {
@@ -407,13 +420,18 @@ fn gauss(rate: &impl Fn(f64) -> f64, (a, b): (f64, f64), whole: f64, error: f64,
     gauss(rate, (a, middle), halves.0, error, left) + gauss(rate, (middle, b), halves.1, error, left)
 }
 
-/// Gauss's rule of six places.
-fn rule(rate: &impl Fn(f64) -> f64, a: f64, b: f64) -> f64 {
-    const NODES: [(f64, f64); 3] = [
+/// Gauss's rule.
+fn rule(rate: &impl Fn([f64; NODES]) -> [f64; NODES], a: f64, b: f64) -> f64 {
+    const HALF: [(f64, f64); NODES / 2] = [
         (0.238_619_186_083_196_9, 0.467_913_934_572_691_04),
         (0.661_209_386_466_264_5, 0.360_761_573_048_138_6),
         (0.932_469_514_203_152, 0.171_324_492_379_170_35),
     ];
     let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
-    half * NODES.iter().map(|(x, w)| w * (rate(middle - half * x) + rate(middle + half * x))).sum::<f64>()
+    let node = |i: usize| {
+        let (x, weight) = HALF[i / 2];
+        (if i % 2 == 0 { -x } else { x }, weight)
+    };
+    let rates = rate(std::array::from_fn(|i| middle + half * node(i).0));
+    half * rates.iter().enumerate().map(|(i, rate)| node(i).1 * rate).sum::<f64>()
 }
