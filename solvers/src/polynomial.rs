@@ -620,6 +620,16 @@ mod tests {
     }
 
     #[test]
+    fn a_sum_of_squares_its_values_and_what_it_is_above_by_hand() {
+        // x² + (1 − 2 x)² = 1 − 4 x + 5 x², with the Bernstein coefficients 1, −1, 2.
+        let lines = [[0.0, 1.0], [1.0, -1.0]].map(|c| Quintic::from_bernstein(c.into_iter()));
+        let sum = Quintic::sum_of_squares(&lines);
+        assert_eq!(sum.coefficients(), [1.0, -2.0, 2.0]);
+        assert_eq!(sum.values([0.0, 0.5, 1.0]), [1.0, 0.25, 2.0]);
+        assert!(sum.is_above(-1.0) && !sum.is_above(-0.99));
+    }
+
+    #[test]
     fn an_antiderivative_over_a_weight_by_hand() {
         // (m/w)' = p/w² with w = 1 + x and m = 3 x: p = 3 (1 + x) − 3 x = 3, as a form of degree 0.
         let w = Quintic::from_bernstein([1.0, 2.0].into_iter());
