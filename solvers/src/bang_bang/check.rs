@@ -82,6 +82,8 @@ impl<const M: usize, const C: usize> Places<'_, M, C> {
         let Self { sub, axes, arc, j, .. } = *self;
         let span = arc.x1 - arc.x0;
         let x = places.map(|place| if self.braking { arc.x1 - place * span } else { arc.x0 + place * span });
+        // Where rounding has moved x to, lest way and tangent belong to two places.
+        let places = x.map(|x| (if self.braking { arc.x1 - x } else { x - arc.x0 }) / span);
         let (weight, way, g) = (self.weight.values(places), self.way.values(places), sub.g[j].values(x));
         let pi: [f64; K] = std::array::from_fn(|i| {
             (arc.slow_sq + 2.0 * axes.acceleration[j] * way[i] / weight[i]) / (g[i] * g[i])
