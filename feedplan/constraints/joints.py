@@ -15,7 +15,7 @@ from itertools import groupby, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from feedplan.constraints.problem import TipSpeed
+from feedplan.constraints.problem import Cut, TipSpeed
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.hodograph import chebyshev, from_chebyshev, interpolation, speed_squares
 from feedplan.errors import InputError
@@ -46,10 +46,11 @@ PLACES, MARGIN = 3, 4.0
 
 @dataclass(frozen=True)
 class JointMotion:
-    """What a problem has beside a path: the path cut to match, the joints' pieces, each from its `origin`,
-    the tool's speed, and the kinematics of each run."""
+    """What a problem has beside a path: the path cut to match, where from, the joints' pieces, each from its
+    `origin`, the tool's speed, and the kinematics of each run."""
 
     path: Path
+    cut: Cut
     joints: CompositeCurve
     origin: Array
     tip_speed: TipSpeed
@@ -92,7 +93,8 @@ def joint_motion(path: Path, machine: Machine, feed: Array) -> JointMotion:
     )
     tool = CompositeCurve.joined([stretch.tool for stretch in stretches], math.inf)
     origin = np.concatenate([stretch.origin for stretch in stretches])
-    return JointMotion(path.cut(tool, piece), joints, origin, tip_speed, tuple(words))
+    cut = Cut(path.curve, piece, np.concatenate([stretch.part for stretch in stretches]))
+    return JointMotion(path.cut(tool, piece), cut, joints, origin, tip_speed, tuple(words))
 
 
 @dataclass(frozen=True)
@@ -119,10 +121,11 @@ class _Task:
 
 @dataclass(frozen=True)
 class _Stretch:
-    """Joint motion of neighbouring runs under one kinematics: `piece` of the path, its parts as `tool`."""
+    """Joint motion of neighbouring runs under one kinematics: `tool` are parts of pieces of the path."""
 
     words: AxisWords
     piece: NDArray[np.int64]
+    part: Array
     tool: CompositeCurve
     joints: CompositeCurve
     origin: Array
@@ -184,12 +187,14 @@ def _affine(task: _Task) -> _Stretch:
     speed = _either(TipSpeed(*speed_squares(linear)), TipSpeed(*speed_squares(tool)), _moving(linear))
     origin = joints.control_points[joints.offsets[:-1]]
     local = joints.control_points - np.repeat(origin, np.diff(joints.offsets), axis=0)
-    return _Stretch(words, task.pieces, tool, replace(joints, control_points=local), origin, speed)
+    whole = np.tile([0.0, 1.0], (len(tool), 1))
+    return _Stretch(words, task.pieces, whole, tool, replace(joints, control_points=local), origin, speed)
 
 
 def _in_order(stretches: list[_Stretch]) -> _Stretch:
     """Stretches whose pieces lie between one another as one."""
     piece = np.concatenate([stretch.piece for stretch in stretches])
+    part = np.concatenate([stretch.part for stretch in stretches])
     order = np.argsort(piece, kind="stable")
     tool, joints = (
         CompositeCurve.joined([getattr(stretch, name) for stretch in stretches], math.inf).take(order)
@@ -202,7 +207,7 @@ def _in_order(stretches: list[_Stretch]) -> _Stretch:
     ]
     speed = _joined_speed([rows[i] for i in order.tolist()])
     origin = np.concatenate([stretch.origin for stretch in stretches])[order]
-    return _Stretch(stretches[0].words, piece[order], tool, joints, origin, speed)
+    return _Stretch(stretches[0].words, piece[order], part[order], tool, joints, origin, speed)
 
 
 def _survey(task: _Task, tips: CompositeCurve) -> JointPath:
@@ -243,7 +248,7 @@ def _curved(task: _Task) -> _Stretch:
         columns = rotary if rotary.any() else ~rotary
         turning = replace(joints, control_points=joints.control_points[:, columns])
         speed = _either(speed, TipSpeed(*speed_squares(turning)), moves[proxies.piece])
-    return _Stretch(task.words, task.pieces[proxies.piece], tool, joints, origin, speed)
+    return _Stretch(task.words, task.pieces[proxies.piece], proxies.part, tool, joints, origin, speed)
 
 
 def _moving(curve: CompositeCurve) -> NDArray[np.bool_]:

@@ -34,6 +34,23 @@ class TipSpeed:
 
 
 @dataclass(frozen=True)
+class Cut:
+    """What the pieces of a path were cut from: fractions `part` (n, 2) of `piece` (n,) of `curve`.
+
+    Control points of a short part keep the digits of its place, not those of its derivatives.
+    """
+
+    curve: CompositeCurve
+    piece: NDArray[np.int64]
+    part: NDArray[np.float64]
+
+    @cached_property
+    def even(self) -> CompositeCurve:
+        """The curve with all pieces of one degree."""
+        return self.curve.elevated(int(self.curve.degree.max()))
+
+
+@dataclass(frozen=True)
 class Problem:
     """Minimise the time along `path` under these limits.
 
@@ -47,7 +64,8 @@ class Problem:
     Where the path's axes are not the joints of the machine, `joints` is the motion of the joints [mm, deg],
     one polynomial piece for each of the path and over the same parameter, counted from `joint_origin`
     (n, joints), 0 without one; `tip_speed` the square of the speed that feed and junctions are about, per
-    u̇²; and `words` (one a run) the kinematics from path to joints.
+    u̇²; `words` (one a run) the kinematics from path to joints; and `cut` what the path was before it was cut
+    to match the joints' pieces.
     """
 
     path: Path
@@ -66,6 +84,7 @@ class Problem:
     joint_origin: NDArray[np.float64] | None = None
     tip_speed: TipSpeed | None = None
     words: tuple[AxisWords, ...] = ()
+    cut: Cut | None = None
 
     def __post_init__(self) -> None:
         for name in ("max_velocity", "max_acceleration", "max_jerk", "feed", "junction_speed"):
@@ -87,33 +106,30 @@ class Problem:
     ) -> NDArray[np.float64]:
         """The joints' q, q', … by u at places (m,): (order + 1, m, joints), order ≤ 3.
 
-        Exact to rounding: by the kinematics from the path, not by `joints`; angles up to whole turns.
+        Exact to rounding: by the kinematics from the path as it was before it was cut, not by `joints`;
+        angles up to whole turns.
         """
-        if not self.words:
+        if self.cut is None:
             return self.path.curve.evaluate(piece, u, order)
         from feedplan.machine.along import derivatives
 
         run = np.searchsorted(self.path.runs, piece, side="right") - 1
         result = np.empty((order + 1, len(u), len(self.axes)))
+        curve, whole = self.cut.even, self.cut.piece[piece]
+        start, end = self.cut.part[piece].T
+        fraction = start + (end - start) * (u / self.path.width[piece])
+        control, weights = curve.by_piece, curve.weights_by_piece
         for words in dict.fromkeys(self.words):
             own = np.flatnonzero(np.array([other == words for other in self.words])[run])
-            control, weights = self._even_pieces
-            width = self.path.width[piece[own]]
             result[:, own] = derivatives(
                 words.kinematics,
-                words.tip(control[piece[own]]),
-                width,
-                u[own] / width,
+                words.tip(control[whole[own]]),
+                curve.width[whole[own]],
+                fraction[own],
                 order,
-                None if weights is None else weights[piece[own]],
+                None if weights is None else weights[whole[own]],
             )
         return result
-
-    @cached_property
-    def _even_pieces(self) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
-        """Control points and weights of the path's pieces, all of one degree."""
-        even = self.path.curve.elevated(int(self.path.curve.degree.max()))
-        return even.by_piece, even.weights_by_piece
 
     @cached_property
     def tip_curve(self) -> CompositeCurve | None:
@@ -216,6 +232,7 @@ def _joint_problem(
         joint_origin=motion.origin,
         tip_speed=motion.tip_speed,
         words=motion.words,
+        cut=motion.cut,
     )
 
 

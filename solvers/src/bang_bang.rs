@@ -10,6 +10,8 @@
 //! | `chord` | the chord-error limit as speeds linear in the parameter |
 //! | `cusp` | where all axes rest at once, as far as rounding can tell |
 //! | `split` | cut where an axis turns round or another velocity cap is the lowest |
+//! | `store` | sub-pieces from the backward pass to the forward one |
+//! | `time` | the time along the tool's speed cap |
 //! | `window` | what is left of a sub-piece ahead of a pass, with the bound on it |
 //! | `pass` | one pass over one sub-piece: arcs (`bang`), along the cap (`slide`), along the `limit_curve` |
 //! | `check` | whether the arcs keep the limits at some places, for all that rounding did |
@@ -22,6 +24,8 @@ mod pass;
 mod piece;
 mod run;
 mod split;
+mod store;
+mod time;
 mod window;
 
 use crate::bang_bang_quadratic::{Fault, Profile, Task as QuadraticTask};

@@ -6,6 +6,8 @@
 
 /// Most coefficients of any polynomial.
 pub const MOST: usize = 74;
+/// Sums of polynomials with room for no more coefficients than this go through all of it.
+const FEW: usize = 12;
 /// Halving stops here: the interval is then as short as the spacing of numbers near 1.
 const MAX_DEPTH: u32 = 52;
 
@@ -55,6 +57,14 @@ impl<const C: usize> Polynomial<C> {
             c[i] = value * BINOMIALS[n][i];
         }
         Self { n, c }
+    }
+
+    /// The polynomial with these scaled coefficients.
+    #[inline]
+    pub fn from_coefficients(coefficients: &[f64]) -> Self {
+        let mut c = [0.0; C];
+        c[..coefficients.len()].copy_from_slice(coefficients);
+        Self { n: coefficients.len() - 1, c }
     }
 
     #[inline(always)]
@@ -126,12 +136,12 @@ impl<const C: usize> Polynomial<C> {
         2.0 * self.c[2] - 2.0 * (n - 1.0) * self.c[1] + n * (n - 1.0) * self.c[0]
     }
 
-    /// Every coefficient changed.
+    /// Every coefficient changed; 0 stays 0.
     #[inline(always)]
     pub fn map(&self, change: impl Fn(f64) -> f64) -> Self {
-        let mut c = [0.0; C];
-        for (new, &old) in c.iter_mut().zip(self.coefficients()) {
-            *new = change(old);
+        let mut c = self.c;
+        for c in &mut c[..self.width()] {
+            *c = change(*c);
         }
         Self { n: self.n, c }
     }
@@ -149,13 +159,34 @@ impl<const C: usize> Polynomial<C> {
 
     #[inline(always)]
     pub fn multiply(&self, other: &Self) -> Self {
+        let (short, long) = if self.n <= other.n { (self, other) } else { (other, self) };
+        if short.n == 0 {
+            return long.scale(short.c[0]);
+        }
         let mut c = [0.0; C];
-        for (i, &p) in self.coefficients().iter().enumerate() {
-            for (sum, &q) in c[i..].iter_mut().zip(other.coefficients()) {
+        for (i, &p) in short.coefficients().iter().enumerate() {
+            for (sum, &q) in c[i..].iter_mut().zip(long.coefficients()) {
                 *sum += p * q;
             }
         }
         Self { n: self.n + other.n, c }
+    }
+
+    /// The sum of the squares of polynomials of one degree.
+    #[inline]
+    pub fn sum_of_squares(polynomials: &[Self]) -> Self {
+        let n = polynomials.first().map_or(0, Self::degree);
+        let mut c = [0.0; C];
+        for p in polynomials {
+            let p = p.coefficients();
+            for (i, &pi) in p.iter().enumerate() {
+                c[2 * i] += pi * pi;
+                for (sum, &pk) in c[2 * i + 1..].iter_mut().zip(&p[i + 1..]) {
+                    *sum += 2.0 * pi * pk;
+                }
+            }
+        }
+        Self { n: 2 * n, c }
     }
 
     /// The same polynomial as one of degree `n`.
@@ -174,15 +205,33 @@ impl<const C: usize> Polynomial<C> {
     /// a p + b q.
     #[inline(always)]
     pub fn combine(&self, a: f64, other: &Self, b: f64) -> Self {
-        if self.n != other.n {
-            let n = self.n.max(other.n);
-            return self.elevate(n).combine(a, &other.elevate(n), b);
+        if self.n == other.n {
+            self.sum(a, other, b)
+        } else if self.n < other.n {
+            self.elevate(other.n).sum(a, other, b)
+        } else {
+            self.sum(a, &other.elevate(self.n), b)
         }
+    }
+
+    /// a p + b q of one degree.
+    #[inline(always)]
+    fn sum(&self, a: f64, other: &Self, b: f64) -> Self {
         let mut c = [0.0; C];
-        for (sum, (p, q)) in c.iter_mut().zip(self.coefficients().iter().zip(other.coefficients())) {
-            *sum = a * p + b * q;
+        for i in 0..self.width() {
+            c[i] = a * self.c[i] + b * other.c[i];
         }
         Self { n: self.n, c }
+    }
+
+    /// So many coefficients are gone through: all where they are few, for the number is then a constant.
+    #[inline(always)]
+    fn width(&self) -> usize {
+        if C <= FEW {
+            C
+        } else {
+            self.n + 1
+        }
     }
 
     #[inline(always)]
@@ -272,50 +321,32 @@ impl<const C: usize> Polynomial<C> {
         Self { n: self.n, c }
     }
 
-    /// p(x), by Horner's rule from the nearer end.
+    /// p(x).
     #[inline(always)]
     pub fn value(&self, x: f64) -> f64 {
-        let n = self.n;
-        if x <= 0.5 {
-            let ratio = x / (1.0 - x);
-            let sum = self.coefficients().iter().rev().fold(0.0, |sum, c| sum * ratio + c);
-            sum * (1.0 - x).powi(n as i32)
-        } else {
-            let ratio = (1.0 - x) / x;
-            let sum = self.coefficients().iter().fold(0.0, |sum, c| sum * ratio + c);
-            sum * x.powi(n as i32)
-        }
+        self.values([x])[0]
     }
 
-    /// p on [0, t] and on [t, 1], each on [0, 1] again (de Casteljau).
+    /// p at some places, by Horner's rule in x and 1 − x at once: free of divisions and of cancellation.
+    #[inline(always)]
+    pub fn values<const K: usize>(&self, x: [f64; K]) -> [f64; K] {
+        let (mut sum, mut power) = ([self.c[0]; K], [1.0; K]);
+        for &c in &self.coefficients()[1..] {
+            for i in 0..K {
+                power[i] *= x[i];
+                sum[i] = sum[i] * (1.0 - x[i]) + c * power[i];
+            }
+        }
+        sum
+    }
+
+    /// p on [0, t] and on [t, 1], each on [0, 1] again (de Casteljau): both agree at t to the last bit.
     #[inline(always)]
     pub fn split(&self, t: f64) -> (Self, Self) {
-        let mut b = *self;
-        let left = b.casteljau(t);
-        (left, b)
-    }
-
-    /// p on [0, t], on [0, 1] again.
-    #[inline(always)]
-    pub fn left(&self, t: f64) -> Self {
-        let mut b = *self;
-        b.casteljau(t)
-    }
-
-    /// p on [t, 1], on [0, 1] again.
-    #[inline(always)]
-    pub fn right(&self, t: f64) -> Self {
-        let mut b = *self;
-        b.casteljau(t);
-        b
-    }
-
-    /// Leaves the polynomial on [t, 1] and returns that on [0, t].
-    #[inline(always)]
-    fn casteljau(&mut self, t: f64) -> Self {
         let n = self.n;
         let row = &BINOMIALS[n][..=n];
-        let b = &mut self.c[..=n];
+        let mut right = *self;
+        let b = &mut right.c[..=n];
         for (b, binomial) in b.iter_mut().zip(row) {
             *b /= binomial;
         }
@@ -330,7 +361,45 @@ impl<const C: usize> Polynomial<C> {
         for (b, binomial) in b.iter_mut().zip(row) {
             *b *= binomial;
         }
-        Self { n, c: left }
+        (Self { n, c: left }, right)
+    }
+
+    /// p on [0, t], on [0, 1] again.
+    #[inline(always)]
+    pub fn left(&self, t: f64) -> Self {
+        // As a polynomial of z = (1 − x)/x: scaled by t, shifted by 1 − t.
+        let mut c = self.c;
+        let used = &mut c[..=self.n];
+        let (mut power, rest) = (1.0, 1.0 - t);
+        for c in &mut used[1..] {
+            power *= t;
+            *c *= power;
+        }
+        for last in (1..=self.n).rev() {
+            for i in 1..=last {
+                used[i] += rest * used[i - 1];
+            }
+        }
+        Self { n: self.n, c }
+    }
+
+    /// p on [t, 1], on [0, 1] again.
+    #[inline(always)]
+    pub fn right(&self, t: f64) -> Self {
+        // As a polynomial of z = x/(1 − x): scaled by 1 − t, shifted by t.
+        let mut c = self.c;
+        let used = &mut c[..=self.n];
+        let (mut power, rest) = (1.0, 1.0 - t);
+        for c in used[..self.n].iter_mut().rev() {
+            power *= rest;
+            *c *= power;
+        }
+        for first in 0..self.n {
+            for i in (first..self.n).rev() {
+                used[i] += t * used[i + 1];
+            }
+        }
+        Self { n: self.n, c }
     }
 
     /// p on [a, b], on [0, 1] again.
@@ -341,6 +410,12 @@ impl<const C: usize> Polynomial<C> {
         } else {
             right
         }
+    }
+
+    /// Whether no Bernstein coefficient is below this, so that the polynomial is not either.
+    #[inline(always)]
+    pub fn is_above(&self, least: f64) -> bool {
+        self.coefficients().iter().zip(&BINOMIALS[self.n]).all(|(&value, binomial)| value >= least * binomial)
     }
 
     /// Whether no coefficient is negative, so that the polynomial is not either.
@@ -361,7 +436,10 @@ impl<const C: usize> Polynomial<C> {
 
     /// Every x in (0, 1) where the polynomial changes its sign, in order.
     pub fn sign_changes(&self, found: &mut impl FnMut(f64)) {
-        Stretch::whole(self).sign_changes(&mut 0.0, found);
+        let c = self.coefficients();
+        if c.iter().any(|&value| value > 0.0) && c.iter().any(|&value| value < 0.0) {
+            Stretch::whole(self).sign_changes(&mut 0.0, found);
+        }
     }
 
     /// The root of a polynomial with one change of sign, from positive to negative: Newton's method inside a bracket.
@@ -539,6 +617,16 @@ mod tests {
         let raised = p.elevate(2);
         assert!((raised.wronskian(&q).value(x) - (2.0 * x * x - (1.0 + 2.0 * x) * 2.0 * x)).abs() < 1e-15);
         assert_eq!((raised.first_slope(), raised.first_bend(), q.first_bend()), (2.0, 0.0, 2.0));
+    }
+
+    #[test]
+    fn a_sum_of_squares_its_values_and_what_it_is_above_by_hand() {
+        // x² + (1 − 2 x)² = 1 − 4 x + 5 x², with the Bernstein coefficients 1, −1, 2.
+        let lines = [[0.0, 1.0], [1.0, -1.0]].map(|c| Quintic::from_bernstein(c.into_iter()));
+        let sum = Quintic::sum_of_squares(&lines);
+        assert_eq!(sum.coefficients(), [1.0, -2.0, 2.0]);
+        assert_eq!(sum.values([0.0, 0.5, 1.0]), [1.0, 0.25, 2.0]);
+        assert!(sum.is_above(-1.0) && !sum.is_above(-0.99));
     }
 
     #[test]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan._solvers import plan_curves
-from feedplan.constraints.problem import Problem
+from feedplan.constraints.problem import Cut, Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.machine.along import positions
 from feedplan.machine.machine import Machine
@@ -46,6 +46,7 @@ def joint_problem(machine: Machine, names: str, curve: CompositeCurve, **changes
         joint_axes=machine.axis_names,
         joints=CompositeCurve.from_pieces(joints, path.width),
         words=(words,),
+        cut=Cut(curve, proxies.piece, proxies.part),
     )
     return problem if not changes else type(problem)(**{**vars(problem), **changes})
 

@@ -122,6 +122,15 @@ def test_random_curves_keep_every_limit_of_the_true_joints(name: str) -> None:
     assert faults == []
 
 
+@pytest.mark.parametrize(("name", "seed"), [("corexy", 1200), ("cylindrical", 1195)])
+def test_pieces_some_micrometres_long_keep_the_digits_of_their_derivatives(name: str, seed: int) -> None:
+    # From control points 100 mm off these accelerations cannot be told closer than 1e-7 of their limits.
+    problem = random_problem(name, seed)
+    excess, use = worst_excess(problem, plan(problem))
+    assert excess <= 1e-9
+    assert use >= 1 - 1e-6
+
+
 def test_a_singular_place_and_a_travel_end_are_told_with_their_lines() -> None:
     through = CompositeCurve.joined(
         [

@@ -1,6 +1,6 @@
 //! A guard against rounding: whether the arcs of a forward pass keep the limits of all axes at some places.
 
-use super::pass::{distance, Arc, Kind, Stuck};
+use super::pass::{Arc, Kind, Stuck};
 use super::split::{Axes, SubPiece};
 use crate::polynomial::Polynomial;
 
@@ -8,6 +8,8 @@ use crate::polynomial::Polynomial;
 const EXCESS: f64 = 1e-9;
 /// … and by this next to a slow end, where more digits are lost.
 const EXCESS_NEAR: f64 = 1e-6;
+/// Places that are looked at on each arc.
+const PLACES: [f64; 4] = [0.02, 0.35, 0.7, 0.98];
 /// Next to a place where all tangents are shorter than this part of the longest one limits are looked at closely:
 /// in these parts of the arc from there.
 const SLOW: f64 = 1e-4;
@@ -19,15 +21,29 @@ pub fn keeps_limits<const M: usize, const C: usize>(
     axes: &Axes<M>,
     arcs: &[Arc],
 ) -> Result<(), Stuck> {
+    // A test of the coefficients spares most sub-pieces that of places.
     let fastest = sub.g.iter().fold(0.0_f64, |most, g| most.max(g.range().1));
-    let slow = |x: f64| (0..M).all(|k| sub.g[k].value(x) <= SLOW * fastest);
+    let slow_somewhere = sub.g.iter().all(|g| g.range().0 <= SLOW * fastest);
+    let slow = |x: f64| slow_somewhere && sub.g.iter().all(|g| g.value(x) <= SLOW * fastest);
     let kept = |arc: &Arc| {
-        let decades = |x: f64| if slow(x) { &DECADES[..] } else { &[] };
-        let (j, slow_at, signed) = match arc.kind {
-            Kind::Accelerating(j) => (j, arc.x0, axes.acceleration[j]),
-            Kind::Braking(j) => (j, arc.x1, -axes.acceleration[j]),
+        let (j, braking) = match arc.kind {
+            Kind::Accelerating(j) => (j, false),
+            Kind::Braking(j) => (j, true),
             _ => return true,
         };
+        let span = arc.x1 - arc.x0;
+        let signed = if braking { -axes.acceleration[j] } else { axes.acceleration[j] };
+        // Along the arc from where it is slowest; way/ω is what axis j has gone.
+        let along = |p: &Polynomial<C>| {
+            let p = p.part(arc.x0, arc.x1);
+            if braking {
+                p.reverse()
+            } else {
+                p
+            }
+        };
+        let weight = along(&sub.weight);
+        let way = along(&sub.g[j]).scale(span).antiderivative(&weight, sub.degree);
         let twist: [Polynomial<C>; M] = std::array::from_fn(|l| {
             if sub.straight || l == j {
                 Polynomial::constant(0.0)
@@ -35,24 +51,52 @@ pub fn keeps_limits<const M: usize, const C: usize>(
                 sub.g[l].wronskian(&sub.g[j])
             }
         });
-        let span = arc.x1 - arc.x0;
-        let inside = [0.02, 0.35, 0.7, 0.98].into_iter().map(|part| arc.x0 + part * span);
-        let from_start = decades(arc.x0).iter().map(|part| arc.x0 + part * span);
-        let to_end = decades(arc.x1).iter().map(|part| arc.x1 - part * span);
-        let near = from_start.chain(to_end).map(|x| (x, 1.0 + EXCESS_NEAR));
-        inside.map(|x| (x, 1.0 + EXCESS)).chain(near).all(|(x, most)| {
-            let weight = sub.weight.value(x);
-            let way = if x > slow_at { distance(sub, j, slow_at, x) } else { distance(sub, j, x, slow_at) };
-            let g = sub.g[j].value(x);
-            let pi = (arc.slow_sq + 2.0 * axes.acceleration[j] * way) / (g * g);
-            (0..M).all(|l| {
-                let other = sub.g[l].value(x);
-                // ω² (g_l s + g_l' π) with s from axis j, without the difference of large terms.
-                let acceleration = (signed * other + weight * weight * pi * twist[l].value(x)) / g;
-                acceleration.abs() <= axes.acceleration[l] * most
-                    && other * other * pi <= axes.velocity_sq[l] * most
-            })
-        })
+        let at = Places { sub, axes, arc, j, signed, braking, weight, way, twist };
+        let (slowest, other) = if braking { (arc.x1, arc.x0) } else { (arc.x0, arc.x1) };
+        at.keep_limits(PLACES, 1.0 + EXCESS)
+            && (!slow(slowest) || at.keep_limits(DECADES, 1.0 + EXCESS_NEAR))
+            && (!slow(other) || at.keep_limits(DECADES.map(|part| 1.0 - part), 1.0 + EXCESS_NEAR))
     };
     arcs.iter().find(|arc| !kept(arc)).map_or(Ok(()), |arc| Err(Stuck(0.5 * (arc.x0 + arc.x1))))
+}
+
+/// What the places of an arc share; they are counted from where it is slowest.
+struct Places<'a, const M: usize, const C: usize> {
+    sub: &'a SubPiece<M, C>,
+    axes: &'a Axes<M>,
+    arc: &'a Arc,
+    /// The axis at its limit, which the arc has with this sign.
+    j: usize,
+    signed: f64,
+    braking: bool,
+    weight: Polynomial<C>,
+    /// The way of axis j times ω.
+    way: Polynomial<C>,
+    /// g_l' g_j − g_l g_j'
+    twist: [Polynomial<C>; M],
+}
+
+impl<const M: usize, const C: usize> Places<'_, M, C> {
+    /// Whether each axis keeps its limits, but for a factor.
+    fn keep_limits<const K: usize>(&self, places: [f64; K], factor: f64) -> bool {
+        let Self { sub, axes, arc, j, .. } = *self;
+        let span = arc.x1 - arc.x0;
+        let x = places.map(|place| if self.braking { arc.x1 - place * span } else { arc.x0 + place * span });
+        // Where rounding has moved x to, lest way and tangent belong to two places.
+        let places = x.map(|x| (if self.braking { arc.x1 - x } else { x - arc.x0 }) / span);
+        let (weight, way, g) = (self.weight.values(places), self.way.values(places), sub.g[j].values(x));
+        let pi: [f64; K] = std::array::from_fn(|i| {
+            (arc.slow_sq + 2.0 * axes.acceleration[j] * way[i] / weight[i]) / (g[i] * g[i])
+        });
+        (0..M).all(|l| {
+            let (other, twist) = (sub.g[l].values(x), self.twist[l].values(x));
+            (0..K).all(|i| {
+                // ω² (g_l s + g_l' π) with s from axis j, without the difference of large terms.
+                let bend = weight[i] * weight[i] * pi[i] * twist[i];
+                let acceleration = (self.signed * other[i] + bend) / g[i];
+                acceleration.abs() <= axes.acceleration[l] * factor
+                    && other[i] * other[i] * pi[i] <= axes.velocity_sq[l] * factor
+            })
+        })
+    }
 }

@@ -182,11 +182,10 @@ pub fn distance<const M: usize, const C: usize>(sub: &SubPiece<M, C>, k: usize, 
     (x1 - x0) * g.antiderivative(&weight, sub.degree).last() / weight.last()
 }
 
-/// Tangents, their slopes and bends at the start of the window.
+/// Tangents and their slopes at the start of the window.
 struct Start<const M: usize> {
     g: [f64; M],
     c: [f64; M],
-    e: [f64; M],
     /// A_k/ω² and its slope.
     limit: [f64; M],
     limit_slope: [f64; M],
@@ -235,36 +234,52 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
 
     /// Forward: over one window after the other, each under one arc of the backward pass.
     fn under(&mut self, bounds: &[Arc]) -> Result<(), Stuck> {
-        let mut rest = self.window;
+        let whole = self.window;
+        let mut x0 = 0.0;
         for (i, arc) in bounds.iter().rev().enumerate() {
-            let x1 = 1.0 - arc.x0;
-            let mut window = rest;
-            if i + 1 < bounds.len() {
-                let t = (x1 - rest.x0) / rest.length();
-                (window, rest) = (rest.before(t), rest.after(t));
-                // Not rounded: π of the next window starts where this one ends.
-                window.x1 = x1;
-                rest.x0 = x1;
-            }
-            window.bound = match arc.kind {
-                Kind::Accelerating(k) | Kind::Braking(k) => {
-                    let (g, weight) = (window.g[k].reverse(), window.weight.reverse());
-                    let gain = g.antiderivative(&weight, self.sub.degree);
-                    let w = weight.combine(arc.slow_sq, &gain, 2.0 * self.axes.acceleration[k]);
-                    Bound::Arc(k, w.reverse())
+            let x1 = if i + 1 < bounds.len() { 1.0 - arc.x0 } else { 1.0 };
+            let pi = [arc.pi[1], arc.pi[0]];
+            match arc.kind {
+                // Any other motion under an arc of the backward pass meets it again later.
+                Kind::Accelerating(k) if self.joins(pi[0]) => {
+                    self.out.push(Arc { x0, x1, kind: Kind::Braking(k), pi, slow_sq: arc.slow_sq });
+                    self.pi = pi[1];
+                    self.arrived();
                 }
-                Kind::Cap => window.bound,
-                Kind::LimitCurve => Bound::LimitCurve,
-            };
-            if arc.kind != Kind::LimitCurve {
-                window.known = [Some(arc.pi[1]), Some(arc.pi[0])];
+                _ => {
+                    self.window = whole.part(x0, x1);
+                    self.bound_by(arc);
+                    // From π of the sub-piece to that of the window.
+                    self.pi /= self.window.length().powi(2);
+                    self.over_window()?;
+                }
             }
-            // From π of the sub-piece to that of the window.
-            self.pi /= window.length().powi(2);
-            self.window = window;
-            self.over_window()?;
+            x0 = x1;
         }
         Ok(())
+    }
+
+    /// Whether π of the sub-piece is on an arc of the backward pass that begins with this one.
+    fn joins(&self, pi: f64) -> bool {
+        self.order == 0 && !self.leaving && pi.is_finite() && self.pi >= pi * (1.0 - ON_BOUND)
+    }
+
+    /// Puts the window under an arc of the backward pass.
+    fn bound_by(&mut self, arc: &Arc) {
+        let window = &mut self.window;
+        match arc.kind {
+            Kind::Accelerating(k) | Kind::Braking(k) => {
+                let (g, weight) = (window.g[k].reverse(), window.weight.reverse());
+                let gain = g.antiderivative(&weight, self.sub.degree);
+                let w = weight.combine(arc.slow_sq, &gain, 2.0 * self.axes.acceleration[k]);
+                window.bound = Bound::Arc(k, w.reverse());
+            }
+            Kind::Cap => {}
+            Kind::LimitCurve => window.bound = Bound::LimitCurve,
+        }
+        if arc.kind != Kind::LimitCurve {
+            window.known = [Some(arc.pi[1]), Some(arc.pi[0])];
+        }
     }
 
     /// To the end of the window; leaves π there, of the whole sub-piece.
@@ -320,7 +335,6 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         Start {
             g: std::array::from_fn(|k| g[k].first()),
             c: std::array::from_fn(|k| g[k].first_slope()),
-            e: std::array::from_fn(|k| g[k].first_bend()),
             limit: std::array::from_fn(|k| a[k] / (w * w)),
             limit_slope: std::array::from_fn(|k| -2.0 * a[k] * slope / (w * w * w)),
         }
@@ -425,8 +439,7 @@ fn kept_until<const C: usize>(
     known: usize,
     slack: f64,
 ) -> Option<f64> {
-    let deflated = if known > 0 { test.deflate(known) } else { *test };
-    if deflated.is_positive() {
+    if test.coefficients().iter().skip(known.min(test.degree())).all(|&value| value >= 0.0) {
         return None;
     }
     let mut inflated = test.combine(1.0, &size(), 1.0);

@@ -70,7 +70,7 @@ impl<const M: usize, const C: usize> Piece<M, C> {
         });
         let speed = match speed_sq {
             Some((values, factor)) => Polynomial::from_bernstein(values.iter().map(|value| factor * value)),
-            None => sum_of_squares(&g),
+            None => Polynomial::sum_of_squares(&g),
         };
         Self { g, weight, speed, noise, degree, straight: along.is_some(), own_speed: speed_sq.is_none() }
     }
@@ -78,22 +78,23 @@ impl<const M: usize, const C: usize> Piece<M, C> {
 
 /// The same tangents with exactly one direction, if they have one but for rounding.
 fn straight_line<const M: usize, const C: usize>(g: &[Polynomial<C>; M]) -> Option<[Polynomial<C>; M]> {
-    let tangents: Vec<[f64; M]> =
-        (0..=g[0].degree()).map(|i| std::array::from_fn(|k| g[k].bernstein(i))).collect();
-    let longest = tangents.iter().max_by(|a, b| norm(a).total_cmp(&norm(b)))?;
-    let length = norm(longest);
+    let tangent = |i: usize| -> [f64; M] { std::array::from_fn(|k| g[k].bernstein(i)) };
+    let tangents = || (0..g[0].degree() + 1).map(tangent);
+    let longest = tangents().max_by(|a, b| dot(a, a).total_cmp(&dot(b, b)))?;
+    let length = norm(&longest);
     let direction = longest.map(|x| x / length);
-    let on_line = tangents.iter().all(|tangent| {
-        let along = dot(tangent, &direction);
+    let on_line = tangents().all(|tangent| {
+        let along = dot(&tangent, &direction);
         let off = norm(&std::array::from_fn::<f64, M, _>(|k| tangent[k] - along * direction[k]));
-        let own = norm(tangent);
-        off <= OFF_LINE * length && (off <= OFF_ITSELF * own || own <= NO_TANGENT * length)
+        if off > OFF_LINE * length {
+            return false;
+        }
+        let own = norm(&tangent);
+        off <= OFF_ITSELF * own || own <= NO_TANGENT * length
     });
-    let rate = Polynomial::from_bernstein(tangents.iter().map(|tangent| dot(tangent, &direction)));
-    on_line.then(|| direction.map(|x| rate.scale(x)))
-}
-
-/// |g|².
-pub fn sum_of_squares<const M: usize, const C: usize>(g: &[Polynomial<C>; M]) -> Polynomial<C> {
-    g.iter().fold(Polynomial::constant(0.0), |sum, g| sum.combine(1.0, &g.multiply(g), 1.0))
+    if !on_line {
+        return None;
+    }
+    let rate = Polynomial::from_bernstein(tangents().map(|tangent| dot(&tangent, &direction)));
+    Some(direction.map(|x| rate.scale(x)))
 }

@@ -4,17 +4,16 @@ use super::check::keeps_limits;
 use super::pass::{self, cusp, distance, Arc, Kind, State, Stuck};
 use super::piece::Piece;
 use super::split::{split, Cap, Part, Remedy, SubPiece};
+use super::store::Store;
+use super::time::time_at_speed;
 use super::{Task, TIP_AXES};
 use crate::bang_bang_quadratic::{ArcKind, Fault, Profile, Row, Workspace as QuadraticWorkspace, NO_AXIS};
 use crate::polynomial::MOST;
-use crate::quadratic::norm;
 
 /// Two directions that differ by more than this at a cusp form a corner.
 const SMOOTH_TURN: f64 = 1e-9;
 /// A speed asked for at an end of the path may exceed what can be had by this part, which is rounding.
 const REACHED: f64 = 1e-12;
-/// Halvings for the time along one arc at a speed; some twenty are usual.
-const MOST_HALVINGS: u32 = 1000;
 /// A run in which rounding leaves a pass without headway is planned anew so often, with more cuts every time.
 const MOST_ATTEMPTS: usize = 40;
 
@@ -22,8 +21,10 @@ const MOST_ATTEMPTS: usize = 40;
 #[derive(Default)]
 pub struct Workspace {
     parts: Vec<Part>,
-    /// Of each piece: its parts, of each part: its arcs of the backward pass, last piece and last part first.
+    /// Of each piece: its parts, of each part: its sub-piece and its arcs of the backward pass, last piece and last part
+    /// first.
     pieces: Vec<std::ops::Range<usize>>,
+    subs: Store,
     bounds: Vec<Arc>,
     offsets: Vec<usize>,
     arcs: Vec<Arc>,
@@ -178,6 +179,7 @@ fn backward<const M: usize>(
     space.quadratic.clear();
     space.parts.clear();
     space.pieces.clear();
+    space.subs.clear();
     space.bounds.clear();
     space.offsets.clear();
     let mut at = Between { state: State { speed_sq: f64::INFINITY }, end: None, tip_sq: end_sq };
@@ -228,6 +230,7 @@ fn backward_over<const M: usize, const C: usize>(
             at.state.speed_sq = at_cusp(&end, after, at.state.speed_sq);
         }
         at.end = Some(end_direction(&sub, part.negative, false));
+        space.subs.push(&sub);
         space.offsets.push(space.bounds.len());
         let reversed = sub.reversed();
         let arcs = space.bounds.len();
@@ -285,11 +288,11 @@ fn forward_over<const M: usize, const C: usize>(
     space: &mut Workspace,
     out: &mut Profile,
 ) {
-    let piece = task.piece::<C>(i);
     let mut limited = false;
     for number in parts {
+        *index -= 1;
         let part = space.parts[number];
-        let sub = part.sub_piece(&piece);
+        let sub = space.subs.get::<M, C>(*index, &part);
         let start = end_direction(&sub, part.negative, false);
         if !std::mem::replace(&mut limited, true) {
             at.state.speed_sq = at.state.speed_sq.min(of_axes(at.tip_sq, sub.tip_share(false)));
@@ -301,7 +304,6 @@ fn forward_over<const M: usize, const C: usize>(
             at.state.speed_sq = 0.0;
         }
         at.end = Some(end_direction(&sub, part.negative, true));
-        *index -= 1;
         let end = space.offsets.get(*index + 1).copied().unwrap_or(space.bounds.len());
         let bounds = &space.bounds[space.offsets[*index]..end];
         space.arcs.clear();
@@ -372,48 +374,4 @@ fn push<const M: usize, const C: usize>(
         let p = [p(arc.pi[0], arc.x0), p(arc.pi[1], arc.x1)];
         out.push(number as u32, width, Row { kind, axis, value, t, p, duration, joins });
     }
-}
-
-/// ∫ √D/(ω² √f) dx from x0 to x1: length over speed, by Gauss's rule of order 12, halved where it does not agree.
-fn time_at_speed<const M: usize, const C: usize>(
-    sub: &SubPiece<M, C>,
-    (f0, f1): (f64, f64),
-    x0: f64,
-    x1: f64,
-) -> f64 {
-    let rate = |x: f64| {
-        let weight = sub.weight.value(x);
-        // Next to a cusp the sum of squares has lost the digits that the tangents still have.
-        let speed = if sub.own_speed {
-            norm(&std::array::from_fn::<f64, M, _>(|k| sub.g[k].value(x)))
-        } else {
-            sub.speed.value(x).max(0.0).sqrt()
-        };
-        speed / ((f0 + x * (f1 - f0)).sqrt() * weight * weight)
-    };
-    let whole = rule(&rate, x0, x1);
-    gauss(&rate, (x0, x1), whole, 1e-14 * whole, &mut { MOST_HALVINGS })
-}
-
-/// To an error that does not shrink with the stretches, and in no more than so many halvings: where the rate is rounding
-/// throughout, as it may be next to a cusp, more would gain nothing.
-fn gauss(rate: &impl Fn(f64) -> f64, (a, b): (f64, f64), whole: f64, error: f64, left: &mut u32) -> f64 {
-    let middle = 0.5 * (a + b);
-    let halves = (rule(rate, a, middle), rule(rate, middle, b));
-    if (halves.0 + halves.1 - whole).abs() <= error || *left == 0 {
-        return halves.0 + halves.1;
-    }
-    *left -= 1;
-    gauss(rate, (a, middle), halves.0, error, left) + gauss(rate, (middle, b), halves.1, error, left)
-}
-
-/// Gauss's rule of six places.
-fn rule(rate: &impl Fn(f64) -> f64, a: f64, b: f64) -> f64 {
-    const NODES: [(f64, f64); 3] = [
-        (0.238_619_186_083_196_9, 0.467_913_934_572_691_04),
-        (0.661_209_386_466_264_5, 0.360_761_573_048_138_6),
-        (0.932_469_514_203_152, 0.171_324_492_379_170_35),
-    ];
-    let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
-    half * NODES.iter().map(|(x, w)| w * (rate(middle - half * x) + rate(middle + half * x))).sum::<f64>()
 }

@@ -3,7 +3,7 @@
 use super::chord::SpeedLine;
 use super::cusp::{cusps, Cusps, Nearly};
 use super::pass::cusp;
-use super::piece::{sum_of_squares, Piece};
+use super::piece::Piece;
 use super::TIP_AXES;
 use crate::planning::ChordLimit;
 use crate::polynomial::Polynomial;
@@ -53,7 +53,7 @@ pub struct Part {
     right: End,
     /// Bit k: axis k moves backward, moves at all.
     pub negative: u8,
-    moving: u8,
+    pub moving: u8,
 }
 
 /// An end of a part.
@@ -135,7 +135,8 @@ pub fn split<const M: usize, const C: usize>(
     let size = |g: &Polynomial<C>| g.coefficients().iter().fold(0.0, |most: f64, c| most.max(c.abs()));
     let greatest = piece.g.iter().map(size).fold(0.0, f64::max);
     let mut moving = 0u8;
-    let mut cuts = vec![Cut::plain(0.0), Cut::plain(1.0)];
+    let mut cuts = Vec::with_capacity(8);
+    cuts.extend([Cut::plain(0.0), Cut::plain(1.0)]);
     for (k, g) in piece.g.iter().enumerate() {
         if size(g) <= ZERO * greatest {
             continue;
@@ -249,6 +250,9 @@ pub fn split<const M: usize, const C: usize>(
 /// Near a cusp the axes turn within what rounding can tell apart: there they turn at once, and no velocity cap counts,
 /// for the tool hardly moves.
 fn merge_near_cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, cuts: &mut Vec<Cut>) {
+    if cuts.len() == 2 {
+        return;
+    }
     let fastest = piece.speed.range().1;
     let is_end = |t: f64| t == 0.0 || t == 1.0;
     let mut turns: Vec<Cut> =
@@ -295,10 +299,12 @@ fn cut_by_cap<const M: usize, const C: usize>(
     let on_line = |p: &Polynomial<C>| if whole { *p } else { p.part(line.from, line.to) };
     let speed = on_line(&piece.speed);
     let [f0, f1] = line.speed_sq;
+    // The tool is never faster than all of its axes at their limits.
+    let binds = !piece.own_speed || f0.min(f1) < axes.velocity_sq.iter().sum();
     let bound =
         if f0 == f1 { Polynomial::constant(f0) } else { Polynomial::from_bernstein([f0, f1].into_iter()) };
     for k in (0..M).filter(|&k| can_cap >> k & 1 == 1 && axes.velocity_sq[k] < f64::MAX) {
-        if f0.is_finite() && f1.is_finite() {
+        if binds && f0.is_finite() && f1.is_finite() {
             let square = on_line(&piece.g[k].multiply(&piece.g[k]));
             let excess = square.multiply(&bound).combine(1.0, &speed, -axes.velocity_sq[k]);
             if excess.coefficients().iter().all(|&value| value <= 0.0) {
@@ -345,10 +351,13 @@ impl Part {
             let sign = if self.negative >> k & 1 == 1 { -length } else { length };
             let mut g = piece.g[k].part(self.from, self.to).scale(sign);
             let degree = g.degree();
-            let (low, high) = piece.g[k].range();
-            let noise = length * piece.noise[k].max(SAME_TURN * degree as f64 * high.max(-low));
             let zeros = |end: &End, g: &Polynomial<C>, at: &dyn Fn(usize) -> usize| {
                 let turns = end.turns >> k & 1 == 1;
+                if !turns && end.order == 0 {
+                    return 0;
+                }
+                let (low, high) = piece.g[k].range();
+                let noise = length * piece.noise[k].max(SAME_TURN * degree as f64 * high.max(-low));
                 let known = usize::from(end.order).max(usize::from(turns));
                 let reach = (end.reach / length).min(1.0);
                 // An axis that rounding, or a turn taken for another one, sends back stands still.
@@ -368,7 +377,7 @@ impl Part {
         });
         // Next to a cusp |C'|² is lost in the rounding of that of the whole piece.
         let speed = if piece.own_speed {
-            sum_of_squares(&g)
+            Polynomial::sum_of_squares(&g)
         } else {
             piece.speed.part(self.from, self.to).scale(length * length)
         };

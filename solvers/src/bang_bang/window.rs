@@ -47,21 +47,24 @@ impl<const M: usize, const C: usize> Window<M, C> {
         self.x1 - self.x0
     }
 
-    /// What lies before t.
-    pub fn before(&self, t: f64) -> Self {
+    /// What lies between two places, of the window of a whole sub-piece under its cap.
+    pub fn part(&self, x0: f64, x1: f64) -> Self {
+        if x0 == 0.0 && x1 == 1.0 {
+            return *self;
+        }
+        let length = x1 - x0;
         let bound = match &self.bound {
-            Bound::Speed(f) => Bound::Speed(f.left(t)),
-            Bound::Arc(k, w) => Bound::Arc(*k, w.left(t)),
+            Bound::Speed(f) => Bound::Speed(f.part(x0, x1)),
             bound => *bound,
         };
         Self {
-            g: std::array::from_fn(|k| self.g[k].left(t).scale(t)),
-            weight: self.weight.left(t),
-            speed: self.speed.left(t).scale(t * t),
+            g: std::array::from_fn(|k| self.g[k].part(x0, x1).scale(length)),
+            weight: self.weight.part(x0, x1),
+            speed: self.speed.part(x0, x1).scale(length * length),
             bound,
-            known: [self.known[0], None],
-            x0: self.x0,
-            x1: self.x0 + t * self.length(),
+            known: [None; 2],
+            x0,
+            x1,
         }
     }
 
@@ -99,6 +102,17 @@ impl<const M: usize, const C: usize> Window<M, C> {
             n / d
         } else {
             f64::INFINITY
+        }
+    }
+
+    /// No bound is lower than this anywhere on the window of a polynomial piece.
+    pub fn least_bound(&self) -> f64 {
+        let most_sq = |k: usize| self.g[k].range().1.powi(2);
+        match &self.bound {
+            Bound::Speed(f) => f.range().0 / self.speed.range().1,
+            Bound::Axis(k, v_sq) => v_sq / most_sq(*k),
+            Bound::Arc(k, w) => w.range().0 / most_sq(*k),
+            Bound::LimitCurve => f64::INFINITY,
         }
     }
 

@@ -24,7 +24,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             if start.g[k] > 0.0 {
                 s[k] = rest / start.g[k];
             } else if start.c[k] > 0.0 && rest <= FLAT * start.limit[k] {
-                s[k] = (start.limit_slope[k] - start.e[k] * self.pi) / (3.0 * start.c[k]);
+                s[k] = (start.limit_slope[k] - self.window.g[k].first_bend() * self.pi) / (3.0 * start.c[k]);
                 turns |= 1 << k;
             }
         }
@@ -55,7 +55,8 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             let slope = if turning(k) {
                 f64::INFINITY
             } else {
-                (start.limit_slope[k] - 3.0 * start.c[k] * s[k] - start.e[k] * self.pi) / start.g[k]
+                (start.limit_slope[k] - 3.0 * start.c[k] * s[k] - self.window.g[k].first_bend() * self.pi)
+                    / start.g[k]
             };
             if slope < steepest {
                 (steepest, j) = (slope, k);
@@ -120,11 +121,17 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                 (first, event) = (t, Some(what));
             }
         };
+        // On a polynomial piece w grows, and no π on the arc is greater than this.
+        let polynomial = order == 0 && window.weight.degree() == 0;
+        let highest = if polynomial { w.last() / g.range().0.powi(2) } else { f64::INFINITY };
         if !self.straight {
-            let cube = square.multiply(g);
-            let weighted = window.weight.multiply(&w);
             for l in self.moving().filter(|&l| l != j) {
-                let twist = weighted.multiply(&window.g[l].wronskian(g));
+                let twist = window.g[l].wronskian(g);
+                if self.has_to_spare(l, j, &twist, highest) {
+                    continue;
+                }
+                let (cube, weighted) = (square.multiply(g), window.weight.multiply(&w));
+                let twist = weighted.multiply(&twist);
                 let need = window.g[l].multiply(&square).combine(a[j], &twist, 1.0);
                 let size = || {
                     let twist = weighted.magnitude().multiply(&window.g[l].wronskian_magnitude(g));
@@ -146,7 +153,10 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                 }
             }
         }
-        found(self.gap(j, &w, &square, turns, on_bound), Event::Bound);
+        let stays_under = highest < window.least_bound();
+        if on_bound || !stays_under {
+            found(self.gap(j, &w, &square, turns, on_bound), Event::Bound);
+        }
         if first > 1.0 - AT_END && first < 1.0 {
             (first, event) = (1.0, None);
         }
@@ -170,6 +180,21 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             Event::Bound => {}
         }
         Ok(())
+    }
+
+    /// Whether axis l keeps its limits while axis j is at +A and π is no greater than this; `twist` is g_l' g_j − g_l g_j'.
+    ///
+    /// Axis l has the acceleration (A_j g_l + π twist)/g_j; the Bernstein coefficients enclose its terms. Most arcs of
+    /// most axes are told apart by this, without a polynomial of their own.
+    fn has_to_spare(&self, l: usize, j: usize, twist: &Polynomial<C>, highest: f64) -> bool {
+        if !highest.is_finite() {
+            return false;
+        }
+        let (least, greatest) = twist.range();
+        let (up, down) = (highest * greatest.max(0.0), -highest * least.min(0.0));
+        let (a, g) = (&self.axes.acceleration, &self.window.g);
+        g[j].combine(a[l], &g[l], -a[j]).is_above(up)
+            && (!BACK || g[j].combine(a[l], &g[l], a[j]).is_above(down))
     }
 
     /// An event at the very start of an arc.

@@ -57,22 +57,25 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         let (d_slope, d_sq) = (d.derivative(), d.multiply(d));
         let f_slope = f.derivative();
         let weight_sq = window.weight.multiply(&window.weight);
-        self.slide(&|l: usize| {
+        let need = |l: usize| {
             let g = &window.g[l];
-            let along = g.derivative().multiply(d).combine(1.0, &g.multiply(&d_slope), -0.5);
-            let mut need = along.multiply(f);
-            let mut size = g
-                .derivative()
-                .magnitude()
-                .multiply(d)
-                .combine(1.0, &g.multiply(&d_slope.magnitude()), 0.5)
-                .multiply(&f.magnitude());
+            let mut need = g.derivative().multiply(d).combine(1.0, &g.multiply(&d_slope), -0.5).multiply(f);
             if f.degree() > 0 {
                 need = need.combine(1.0, &g.multiply(d).multiply(&f_slope), 0.5);
+            }
+            weight_sq.multiply(&need)
+        };
+        let size = |l: usize| {
+            let g = &window.g[l];
+            let slope = g.derivative().magnitude();
+            let mut size = slope.multiply(d).combine(1.0, &g.multiply(&d_slope.magnitude()), 0.5);
+            size = size.multiply(&f.magnitude());
+            if f.degree() > 0 {
                 size = size.combine(1.0, &g.multiply(d).multiply(&f_slope.magnitude()), 0.5);
             }
-            (d_sq, weight_sq.multiply(&need), weight_sq.multiply(&size))
-        })
+            weight_sq.multiply(&size)
+        };
+        self.slide(&d_sq, &need, &size)
     }
 
     /// Whether v²/ρ = v² |g × g'|/D^1.5 stays below the least acceleration limit.
@@ -96,17 +99,18 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         let g = &window.g[k];
         let cube = g.multiply(g).multiply(g);
         let weight_sq = window.weight.multiply(&window.weight).scale(v_sq);
-        self.slide(&|l: usize| {
-            let (twist, size) = (window.g[l].wronskian(g), window.g[l].wronskian_magnitude(g));
-            (cube, weight_sq.multiply(&twist), weight_sq.multiply(&size))
+        self.slide(&cube, &|l| weight_sq.multiply(&window.g[l].wronskian(g)), &|l| {
+            weight_sq.multiply(&window.g[l].wronskian_magnitude(g))
         })
     }
 
-    /// How far the velocity cap can be followed: `terms` gives x, y and the size of y for each axis, whose
-    /// acceleration is y/x; the axis that saturates, and the axes of the limit curve where that falls below the cap.
+    /// How far the velocity cap can be followed: axis l has the acceleration `need`(l)/x, with terms of the size
+    /// `size`(l); the axis that saturates, and the axes of the limit curve where that falls below the cap.
     fn slide(
         &self,
-        terms: &dyn Fn(usize) -> (Polynomial<C>, Polynomial<C>, Polynomial<C>),
+        x: &Polynomial<C>,
+        need: &dyn Fn(usize) -> Polynomial<C>,
+        size: &dyn Fn(usize) -> Polynomial<C>,
     ) -> (f64, Option<usize>, Option<(usize, usize)>) {
         let mut end = 1.0;
         let mut saturated = None;
@@ -115,10 +119,10 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             return (end, None, None);
         }
         for l in self.moving() {
-            let (x, y, size) = terms(l);
+            let y = need(l);
             let a = self.axes.acceleration[l];
             let inside = x.combine(a, &y, -1.0);
-            if let Some(t) = kept_until(&inside, || x.combine(NOISE * a, &size, NOISE), 0, 0.0) {
+            if let Some(t) = kept_until(&inside, || x.combine(NOISE * a, &size(l), NOISE), 0, 0.0) {
                 if t < end {
                     (end, saturated) = (t, Some(l));
                 }
