@@ -65,7 +65,7 @@ class Problem:
     one polynomial piece for each of the path and over the same parameter, counted from `joint_origin`
     (n, joints), 0 without one; `tip_speed` the square of the speed that feed and junctions are about, per
     u̇²; `words` (one a run) the kinematics from path to joints; and `cut` what the path was before it was cut
-    to match the joints' pieces.
+    to match the joints' pieces, if it was.
     """
 
     path: Path
@@ -109,14 +109,14 @@ class Problem:
         Exact to rounding: by the kinematics from the path as it was before it was cut, not by `joints`;
         angles up to whole turns.
         """
-        if self.cut is None:
+        if not self.words:
             return self.path.curve.evaluate(piece, u, order)
         from feedplan.machine.along import derivatives
 
         run = np.searchsorted(self.path.runs, piece, side="right") - 1
         result = np.empty((order + 1, len(u), len(self.axes)))
-        curve, whole = self.cut.even, self.cut.piece[piece]
-        start, end = self.cut.part[piece].T
+        curve, whole = self._uncut.even, self._uncut.piece[piece]
+        start, end = self._uncut.part[piece].T
         fraction = start + (end - start) * (u / self.path.width[piece])
         control, weights = curve.by_piece, curve.weights_by_piece
         for words in dict.fromkeys(self.words):
@@ -130,6 +130,11 @@ class Problem:
                 None if weights is None else weights[whole[own]],
             )
         return result
+
+    @cached_property
+    def _uncut(self) -> Cut:
+        count = len(self.path)
+        return self.cut or Cut(self.path.curve, np.arange(count), np.tile([0.0, 1.0], (count, 1)))
 
     @cached_property
     def tip_curve(self) -> CompositeCurve | None:

@@ -345,3 +345,27 @@ def _random_polyline(rng: np.random.Generator) -> list[list[float]]:
 def _second_differences(made: Plan) -> Array:
     position = made.setpoints().all().position
     return np.asarray(np.abs(np.diff(position, 2, axis=0)).max(axis=0) / made.machine.period**2)
+
+
+@pytest.mark.parametrize("method", [CVT, JUNCTION, TANGENTIAL])
+def test_the_parameter_of_a_line_does_not_matter(method: str) -> None:
+    lines = [CompositeCurve.from_bezier(SQUARE[i : i + 2]) for i in range(2)]
+    times = []
+    for width in ([1.0, 1.0], [10.0, 10.0], [0.3, 70.0]):
+        curve = CompositeCurve.joined(lines, 1e-9).with_width(np.array(width))
+        path = Path.from_curve(curve, feed=F)
+        # A corner, not a stop.
+        path = replace(path, runs=np.array([0, 2]), dwell=np.zeros(1), corners=corners(method))
+        times.append(planner(method)(build_problem(path, PLANE)).time)
+    assert times == pytest.approx([times[0]] * 3, rel=1e-12)
+    assert times[0] < 2.0 * (10.0 / F + F / A) * (1.0 + 1e-12)
+
+
+def test_a_circle_little_greater_than_the_chord_error_is_passed_by_its_formula() -> None:
+    # (T v/2)² = 2 ρ δ − δ² = 0.0016 mm² with ρ = 0.05 mm, δ = 0.02 mm and T = 0.01 s: 8 mm/s.
+    machine = Machine("chord", tuple(Axis(name, 500.0, 1e6) for name in "XY"), 0.01, 0.02)
+    circle = arc([0.05, 0.0], [0.0, 0.0], 2.0 * math.pi)
+    profile = planner(TANGENTIAL)(build_problem(Path.from_curve(circle, feed=1e3), machine))
+    cruise = profile.kind == ArcKind.FEED
+    assert cruise.any()
+    assert profile.value[cruise] == pytest.approx(64.0, rel=1e-9)
