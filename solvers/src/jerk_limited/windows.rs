@@ -191,7 +191,7 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
             }
         }
         let apart = |n: usize| (y_from(n)[0] / x[2 * n] - 1.0).abs();
-        for parts in BLENDS {
+        for parts in BLENDS.into_iter().filter(|&parts| shared >= parts) {
             // Parts overlap by half of each.
             let size = shared / parts;
             let begins = (0..2 * parts - 1).map(|i| window.start + i * size / 2);
