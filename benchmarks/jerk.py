@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import resource
 import time
 from collections.abc import Callable
+
+import numpy as np
 
 from benchmarks.jerk_excess import jerk_excess
 from benchmarks.named import FREE, butterfly, lemniscate, trefoil
 from benchmarks.results import Cell, Result
 from benchmarks.third_order import by_clarabel, by_ipopt, grid_of
+from benchmarks.timing import taken
 from feedplan import Axis, Machine
 from feedplan import plan as plan_path
+from feedplan.constraints.problem import build_problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Path
+from feedplan.planners import planner
+from feedplan.profile import SpeedProfile
 
 NAME = "jerk"
 AXES = tuple(Axis(name, 250.0, 3000.0, max_jerk=50_000.0) for name in "XYZ")
@@ -26,6 +33,8 @@ CURVES: dict[str, Callable[[], CompositeCurve]] = {
 # Other solvers get the grid of a plan of this accuracy; the butterfly's is too great for them.
 ACCURACY = 1e-3
 OTHERS = {"IPOPT": by_ipopt, "Clarabel": by_clarabel}
+# Lengths of the winding path [mm]; the longest takes about a million intervals.
+WINDING = (1e3, 1e4, 1e5)
 
 
 def run(quick: bool = False) -> Result:
@@ -63,6 +72,7 @@ def run(quick: bool = False) -> Result:
             found = solve(grid)
             cost = time.perf_counter() - start
             rows.append(_row(name, f"{solver}, the same grid", found, best.time, 0.0, 0.0, cost, spent))
+    rows.extend(_cost(length) for length in (WINDING[:1] if quick else WINDING))
     return Result(
         NAME,
         "Limits of jerk",
@@ -71,8 +81,39 @@ def run(quick: bool = False) -> Result:
             "250 mm/s, 3000 mm/s², 50 000 mm/s³ of each axis, rest to rest; bang-bang limits no jerk.",
             f"ratio: of times, and of computing times, to those of jerk-limited at accuracy {ACCURACY:g}.",
             "excess: of any limit, between the places of the grid. Other solvers hold them at those alone.",
+            "winding: a long space curve, in windows; its computing ratio: CPU seconds to the clock's.",
         ),
     )
+
+
+def winding(length: float) -> CompositeCurve:
+    """A C2 cubic spline about so long [mm], through points on a way whose two angles are sums of sines."""
+    from scipy.interpolate import CubicSpline
+
+    s = np.arange(0.0, length + 0.5)
+    yaw = 0.9 * np.sin(s / 3.1) + 0.3 * np.sin(s / 1.7) + 1.5 * np.sin(s / 7.3)
+    pitch = 0.3 * np.sin(s / 1.7) + 0.5 * np.cos(s / 7.3)
+    way = np.stack([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)], axis=1)
+    spline = CubicSpline(s, np.cumsum(way, axis=0))
+    points, slope = spline(s), spline(s, 1)
+    control = np.stack([points[:-1], points[:-1] + slope[:-1] / 3, points[1:] - slope[1:] / 3, points[1:]], 1)
+    return CompositeCurve.from_pieces(control, np.ones(len(control)))
+
+
+def _cost(length: float) -> dict[str, Cell]:
+    """What the planner takes for a long path."""
+    problem = build_problem(Path.from_curve(winding(length), feed=FREE), MACHINE)
+    plan, made = planner("jerk-limited"), list[SpeedProfile]()
+    cost = taken(lambda: made.append(plan(problem)))
+    (profile,) = made
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return {
+        **_row("winding", "jerk-limited", profile.time, profile.time, np.nan, np.nan, cost.wall, cost.wall),
+        "computing ratio": cost.processor / cost.wall,
+        "intervals": len(profile),
+        "µs each": 1e6 * cost.wall / len(profile),
+        "peak memory [MB]": memory,
+    }
 
 
 def _row(
@@ -87,4 +128,7 @@ def _row(
         "excess": excess,
         "computing [s]": cost,
         "computing ratio": cost / unit,
+        "intervals": "",
+        "µs each": "",
+        "peak memory [MB]": "",
     }

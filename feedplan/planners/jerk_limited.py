@@ -20,7 +20,10 @@ LIMITS_JERK = True
 CORNERS = Corners.SMOOTH
 # What finer grids may gain, in accuracies.
 GRID_ERROR = 2.0
-# Accuracies that the grid is made for.
+# The gap of complementarity at which the interior point stops, in accuracies.
+GAP = 0.01
+# Accuracies the grid is made for: on finer ones smooth changes of speed drown in what keeps the matrix
+# of the interior point definite.
 FINEST, COARSEST = 1e-5, 0.1
 
 
@@ -67,7 +70,7 @@ def _planned(
     time_limit: float | None,
 ) -> SpeedProfile:
     try:
-        columns, changes = plan_jerk_limited(problem, limits, resolution, 1e-3 * accuracy, time_limit)
+        columns, changes = plan_jerk_limited(problem, limits, resolution, GAP * accuracy, time_limit)
     except PlanError as fault:
         raise error_of(problem, fault) from None
     return SpeedProfile(*columns, *changes)

@@ -9,23 +9,28 @@ use super::rows::Rows;
 use super::Limits;
 
 /// Uses up to this hold the limits: rounding, and what peaks between the checked places are off.
-const HELD: f64 = 1.0 + 5e-7;
+pub const HELD: f64 = 1.0 + 4e-7;
 /// Limits are tightened by so much more than the excess, in parts of it and at least; more would make kinks where
 /// tightened intervals meet others.
-const MARGIN: (f64, f64) = (0.1, 1e-6);
+const MARGIN: [f64; 2] = [0.1, 1e-6];
 /// From time to time that an interval is tightened its margin grows by this factor: a peak may follow slowly.
 const RISE: f64 = 4.0;
 /// Rounds of tightening.
 const ROUNDS: usize = 10;
+/// The first round ends at this gap of complementarity: where the points then use more than this part of a limit,
+/// the peaks beside them stand out as they will in the end.
+const ROUGH: (f64, f64) = (1e-4, 0.97);
+/// Peaks that stand out by more, in parts of what the points use, move before the end.
+const FIRM: f64 = 1.05;
 /// What plans are multiplied with to start from, and the barrier to start with. The valid plans are star-shaped: a
-/// smaller multiple is further inside, and further from the optimum. From afar …
+/// smaller multiple is further inside, and further from the optimum. From the first plan, well inside …
 const FAR: [(f64, f64); 1] = [(1.0, 1.0)];
-/// … from a plan on its limits …
-const NEAR: [(f64, f64); 4] = [(0.97, 0.1), (0.8, 1.0), (1.0, 1.0), (1.0, 1e-3)];
-/// … and from one that exceeds them a little.
-const AGAIN: [(f64, f64); 3] = [(0.97, 0.1), (0.8, 1.0), (0.5, 1.0)];
-/// Parts of the way from the former plan to the new one where the new one itself is refused.
-const RETREATS: [f64; 7] = [0.999, 0.99, 0.95, 0.85, 0.6, 0.3, 0.1];
+/// … and from one that exceeds tightened limits a little.
+const AGAIN: [(f64, f64); 5] = [(0.999, 1e-3), (0.997, 3e-3), (0.99, 1e-2), (0.9, 0.3), (0.5, 1.0)];
+/// What of the way from the former plan to the new one is left where the new one itself is refused.
+const RETREATS: [f64; 11] = [1e-6, 3e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.05, 0.15, 0.4, 0.7, 0.9];
+/// A retreat that costs no more than this many times the tolerance is as good as the plan.
+const CHEAP: f64 = 10.0;
 
 /// Limits of some intervals, and those between their points.
 #[derive(Clone, Debug)]
@@ -43,50 +48,49 @@ pub struct Verdict {
 }
 
 impl<const M: usize> Stretch<M> {
-    /// Improves the valid plan x in place; `near` says that it is nearly optimal and on its limits. `tight` is how
-    /// much tighter the limits of each interval are than the machine's, before and after.
-    #[allow(clippy::too_many_arguments)] // one call
+    /// Improves the valid plan x in place.
     pub fn improve(
         &mut self,
         limits: &Limits<M>,
         bounds: [Bound; 2],
-        tight: &mut [[f64; 3]],
         x: &mut [f64],
-        near: bool,
         effort: &Effort,
         space: &mut InteriorPoint<Exact, M>,
     ) -> Verdict {
-        for (interval, &tight) in self.rows.intervals.iter_mut().zip(tight.iter()) {
-            interval.tighten(tight);
-        }
         self.rows.waive(&bounds);
         let mut verdict = Verdict::default();
-        let mut best = if near { self.time(&bounds, x) } else { f64::INFINITY };
-        let mut attempts = starts(x, if near { &NEAR } else { &FAR }, effort);
-        let mut times = vec![0; tight.len()];
-        for _ in 0..ROUNDS {
+        let (mut best, mut improved) = (f64::INFINITY, x.to_vec());
+        let rough = Effort { tolerance: effort.tolerance.max(ROUGH.0), ..*effort };
+        let mut attempts = starts(x, &FAR, &rough);
+        let mut times = vec![0; self.rows.intervals.len()];
+        for round in 0..ROUNDS {
             let Some((y, report)) = self.attempt(bounds, attempts, space, &mut verdict.iterations) else {
                 break;
             };
-            if self.tighten(limits, &y, tight, &mut times) {
+            let holds = self.tighten(limits, &y, &mut times, round == 0);
+            let stopped = report.outcome == Outcome::Stopped;
+            if holds && (round > 0 || stopped) {
                 if report.time < best {
-                    x.copy_from_slice(&y);
+                    improved = y;
                 }
-                verdict.converged = report.outcome != Outcome::Stopped;
+                verdict.converged = !stopped;
                 break;
             }
             // Should nothing better come: as far towards this plan as the limits allow.
             if let Some((z, time)) = self.retreat(limits, &bounds, x, &y) {
                 if time < best {
-                    x.copy_from_slice(&z);
                     best = time;
+                    improved.copy_from_slice(&z);
                 }
+                verdict.converged =
+                    !stopped && round > 0 && time <= report.time * (1.0 + CHEAP * effort.tolerance);
             }
-            if report.outcome == Outcome::Stopped {
+            if stopped || verdict.converged {
                 break;
             }
             attempts = starts(&y, &AGAIN, effort);
         }
+        x.copy_from_slice(&improved);
         verdict
     }
 
@@ -121,8 +125,8 @@ impl<const M: usize> Stretch<M> {
             return None;
         }
         for part in RETREATS {
-            let z: Vec<f64> = x.iter().zip(y).map(|(x, y)| x + part * (y - x)).collect();
-            if self.holds(limits, &z) {
+            let z: Vec<f64> = x.iter().zip(y).map(|(x, y)| y + part * (x - y)).collect();
+            if self.holds(limits, &z, HELD) {
                 let time = self.time(bounds, &z);
                 return Some((z, time));
             }
@@ -130,28 +134,37 @@ impl<const M: usize> Stretch<M> {
         None
     }
 
-    fn holds(&self, limits: &Limits<M>, x: &[f64]) -> bool {
+    /// Whether x uses no limit of the machine by more than a part.
+    pub fn holds(&self, limits: &Limits<M>, x: &[f64], most: f64) -> bool {
         (0..self.rows.intervals.len()).all(|n| {
             let worst = self.between.utilisation(limits, x, n, self.rows.intervals[n].h);
-            worst.iter().all(|&part| part <= HELD)
+            worst.iter().all(|&part| part <= most)
         })
     }
 
-    /// Tightens the limits where x exceeds them between the points, and counts how often; true if it does nowhere.
-    fn tighten(&mut self, limits: &Limits<M>, x: &[f64], tight: &mut [[f64; 3]], times: &mut [i32]) -> bool {
+    /// Tightens the limits where x exceeds them between the points, and counts how often; false if it does somewhere.
+    /// A rough x stays inside its limits: there they are tightened by how far peaks stand out over the points.
+    fn tighten(&mut self, limits: &Limits<M>, x: &[f64], times: &mut [i32], rough: bool) -> bool {
         let mut holds = true;
-        for (n, (interval, tight)) in self.rows.intervals.iter_mut().zip(tight).enumerate() {
-            let margin = MARGIN.0 * RISE.powi(times[n]);
-            let used = self.between.utilisation(limits, x, n, interval.h);
-            let factors =
-                used.map(|used| if used > HELD { used + (margin * (used - 1.0)).max(MARGIN.1) } else { 1.0 });
-            if factors != [1.0; 3] {
-                holds = false;
-                times[n] += 1;
-                interval.tighten(factors);
-                for k in 0..3 {
-                    tight[k] *= factors[k];
+        for (n, times) in times.iter_mut().enumerate() {
+            let margin = MARGIN.map(|least| least * RISE.powi(*times));
+            let mut used = self.between.utilisation(limits, x, n, self.rows.intervals[n].h);
+            holds &= used.iter().all(|&used| used <= HELD);
+            if rough {
+                let at = self.rows.utilisation(x, n);
+                for (used, at) in used.iter_mut().zip(at) {
+                    if at > ROUGH.1 && *used < FIRM * at {
+                        *used /= at;
+                    }
                 }
+            }
+            let factors =
+                used.map(
+                    |used| if used > HELD { used + (margin[0] * (used - 1.0)).max(margin[1]) } else { 1.0 },
+                );
+            if factors != [1.0; 3] {
+                *times += 1;
+                self.rows.intervals[n].tighten(factors);
             }
         }
         holds

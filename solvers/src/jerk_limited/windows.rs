@@ -1,8 +1,9 @@
-//! Paths of any length, in windows that are solved in parallel and then again over their seams.
+//! Paths of any length, in windows that overlap and are solved in parallel.
 //!
-//! What a cut costs decays with the travel time from it, by about 1e-5 in two of the times a stop takes. So windows
-//! are solved between places of the first plan, and then each cut anew between places of their optima, four such
-//! times away to both sides. Only w and w' need to match where windows meet. A few windows at a time are in memory.
+//! A window is solved between places of the first plan, well inside all limits. What that changes decays with the
+//! travel time from its ends: two windows agree to 1e-8 two or three times of a stop inside their overlap, and are
+//! blended there. Ends at the optimum of another window would lie on its limits, with next to nothing between those
+//! to start from. A few windows at a time are in memory.
 
 use std::ops::Range;
 use std::time::Instant;
@@ -16,12 +17,17 @@ use super::prepare::Prepared;
 use super::stretch::{ramps, Verdict};
 use super::{Effort, Fault, Geometry, Plan, Problem, Profile};
 
-/// Seams reach so many times of a stop from their cut, and so many intervals.
-const SEAM: (f64, usize) = (4.0, 80);
-/// Windows of the first plan last so many times of a stop, at least: the optimum takes down to a third of it.
+/// Windows reach so many times of a stop of the first plan beyond their cuts, and so many intervals: the optimum takes
+/// down to a third of its time.
+const REACH: (f64, usize) = (14.0, 80);
+/// Windows last so many of them from cut to cut, at least.
 const LONG: f64 = 36.0;
 /// Windows solved between two hand-outs, for each thread.
 const BATCH: usize = 2;
+/// Windows are blended over one of so many parts of their overlap, where they agree best; else over one of fewer.
+const BLENDS: [usize; 4] = [8, 4, 2, 1];
+/// Uses of the limits that a blend may have: a little more than a window.
+const BLENDED: f64 = 1.0 + 5e-7;
 
 /// See `jerk_limited::stream`.
 pub fn solve<G: Geometry<M>, const M: usize>(
@@ -31,27 +37,31 @@ pub fn solve<G: Geometry<M>, const M: usize>(
 ) -> Result<Plan, Fault> {
     let prepared = Prepared::new(problem, effort.resolution)?;
     let mut x = prepared.x.clone();
-    let cuts = cuts(&prepared, effort.window);
     let run = Run { prepared: &prepared, effort, nodes: &prepared.grid.nodes };
+    let windows = run.windows();
     let mut counts = Counts { converged: true, steps: 0.0 };
-    let mut pending: Option<Part> = None;
     let mut done = 0;
-    let windows: Vec<Range<usize>> = cuts.windows(2).map(|pair| pair[0]..pair[1]).collect();
-    for batch in windows.chunks(BATCH * rayon::current_num_threads()) {
+    for first in (0..windows.len()).step_by(BATCH * rayon::current_num_threads()) {
         if effort.deadline.is_some_and(|end| Instant::now() >= end) {
             counts.converged = false;
             break;
         }
-        let loose = |range: &Range<usize>| Part { range: range.clone(), tight: vec![[1.0; 3]; range.len()] };
-        let mut parts: Vec<Part> = batch.iter().map(loose).collect();
-        run.improve(&mut parts, &mut x, false, &mut counts);
-        let parts: Vec<Part> = pending.take().into_iter().chain(parts).collect();
-        let mut seams: Vec<Part> = parts.windows(2).map(|pair| run.seam(&x, &pair[0], &pair[1])).collect();
-        run.improve(&mut seams, &mut x, true, &mut counts);
-        pending = parts.into_iter().next_back();
-        // The last window is final up to where its next seam may begin.
-        let last = &batch[batch.len() - 1];
-        let final_node = if last.end == run.nodes.len() - 1 { last.end } else { (last.start + last.end) / 2 };
+        let batch = first..windows.len().min(first + BATCH * rayon::current_num_threads());
+        let solved: Vec<_> = windows[batch.clone()].par_iter().map(|range| run.solve(range)).collect();
+        for (at, (y, verdict)) in batch.clone().zip(solved) {
+            counts.add(&verdict, windows[at].len());
+            let reached = if at == 0 { 0 } else { windows[at - 1].end };
+            if !run.join(&mut x, reached, &windows[at], &y) {
+                // No blend keeps the limits: this window begins at a place of the first plan, where the last one ends.
+                let rest = reached..windows[at].end;
+                let (y, verdict) = run.solve(&rest);
+                counts.add(&verdict, rest.len());
+                counts.converged = false;
+                x[2 * rest.start..2 * rest.end + 2].copy_from_slice(&y);
+            }
+        }
+        // Final is what the next window does not reach.
+        let final_node = windows.get(batch.end).map_or(run.nodes.len() - 1, |next| next.start);
         finished(&run.profile(&x, done..final_node));
         done = final_node;
     }
@@ -73,40 +83,17 @@ pub fn solve<G: Geometry<M>, const M: usize>(
     })
 }
 
-/// The nodes where windows meet, the ends of the path among them.
-fn cuts<G: Geometry<M>, const M: usize>(prepared: &Prepared<G, M>, window: usize) -> Vec<usize> {
-    let nodes = &prepared.grid.nodes;
-    let count = nodes.len() - 1;
-    let long = LONG * prepared.stop_time;
-    let mut cuts = vec![0];
-    let (mut last, mut time) = (0, 0.0);
-    for n in 0..count {
-        time += duration(&prepared.x, n, nodes[n + 1] - nodes[n]);
-        if n + 1 - last >= window && time >= long {
-            cuts.push(n + 1);
-            (last, time) = (n + 1, 0.0);
-        }
-    }
-    // A short rest belongs to the window before it.
-    if cuts.len() > 1 && last < count {
-        cuts.pop();
-    }
-    if cuts[cuts.len() - 1] < count {
-        cuts.push(count);
-    }
-    cuts
-}
-
 struct Counts {
     converged: bool,
     /// Newton steps times intervals.
     steps: f64,
 }
 
-/// Intervals, and how much tighter than the machine's their limits of speed, acceleration and jerk are.
-struct Part {
-    range: Range<usize>,
-    tight: Vec<[f64; 3]>,
+impl Counts {
+    fn add(&mut self, verdict: &Verdict, intervals: usize) {
+        self.converged &= verdict.converged;
+        self.steps += (verdict.iterations * intervals) as f64;
+    }
 }
 
 struct Run<'a, G, const M: usize> {
@@ -116,60 +103,66 @@ struct Run<'a, G, const M: usize> {
 }
 
 impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
-    /// The intervals round the cut between two windows: far enough, but at most half of each. Towards the cut the
-    /// limits are tightened anew, for another speed.
-    fn seam(&self, x: &[f64], left: &Part, right: &Part) -> Part {
-        let far = |count: usize, time: f64| count >= SEAM.1 && time >= SEAM.0 * self.prepared.stop_time;
-        let lasts = |n: usize| duration(x, n, self.nodes[n + 1] - self.nodes[n]);
-        let cut = right.range.start;
-        let (mut start, mut time) = (cut, 0.0);
-        while start > (left.range.start + cut).div_ceil(2) && !far(cut - start, time) {
-            start -= 1;
-            time += lasts(start);
-        }
-        let (mut end, mut time) = (cut, 0.0);
-        while end < (cut + right.range.end) / 2 && !far(end - cut, time) {
-            time += lasts(end);
-            end += 1;
-        }
-        let tight = (start..end)
-            .map(|n| {
-                if n < (start + cut) / 2 {
-                    left.tight[n - left.range.start]
-                } else if n >= (cut + end) / 2 {
-                    right.tight[n - cut]
-                } else {
-                    [1.0; 3]
-                }
+    /// The windows, each with what it shares with its neighbours.
+    fn windows(&self) -> Vec<Range<usize>> {
+        let cuts = self.cuts();
+        let reach = |from: usize, to: usize| {
+            let step = |n: usize| if to > from { n + 1 } else { n - 1 };
+            let (mut n, mut time) = (from, 0.0);
+            while n != to && (n.abs_diff(from) < REACH.1 || time < REACH.0 * self.prepared.stop_time) {
+                time += self.lasts(n.min(step(n)));
+                n = step(n);
+            }
+            n
+        };
+        let middle = |i: usize| (cuts[i] + cuts[i + 1]) / 2;
+        let last = cuts.len() - 2;
+        (0..=last)
+            .map(|i| {
+                let start = if i == 0 { 0 } else { reach(cuts[i], middle(i - 1)) };
+                let end = if i == last { cuts[i + 1] } else { reach(cuts[i + 1], middle(i + 1)) };
+                start..end
             })
-            .collect();
-        Part { range: start..end, tight }
+            .collect()
     }
 
-    /// Solves parts that lie apart, between the places of x at their ends.
-    fn improve(&self, parts: &mut [Part], x: &mut [f64], near: bool, counts: &mut Counts) {
-        let solved: Vec<_> = parts
-            .par_iter_mut()
-            .map(|part| {
-                let mut y = x[2 * part.range.start..2 * part.range.end + 2].to_vec();
-                let verdict = self.solve(part, &mut y, near);
-                (y, verdict)
-            })
-            .collect();
-        for (Part { range, .. }, (y, verdict)) in parts.iter().zip(solved) {
-            x[2 * range.start..2 * range.end + 2].copy_from_slice(&y);
-            counts.converged &= verdict.converged;
-            counts.steps += (verdict.iterations * range.len()) as f64;
+    /// The nodes between windows, the ends of the path among them.
+    fn cuts(&self) -> Vec<usize> {
+        let count = self.nodes.len() - 1;
+        let long = LONG * self.prepared.stop_time;
+        let mut cuts = vec![0];
+        let (mut last, mut time) = (0, 0.0);
+        for n in 0..count {
+            time += self.lasts(n);
+            if n + 1 - last >= self.effort.window && time >= long {
+                cuts.push(n + 1);
+                (last, time) = (n + 1, 0.0);
+            }
         }
+        // A short rest belongs to the window before it.
+        if cuts.len() > 1 && last < count {
+            cuts.pop();
+        }
+        if cuts[cuts.len() - 1] < count {
+            cuts.push(count);
+        }
+        cuts
     }
 
-    fn solve(&self, part: &mut Part, y: &mut [f64], near: bool) -> Verdict {
+    /// Time of an interval in the first plan.
+    fn lasts(&self, n: usize) -> f64 {
+        duration(&self.prepared.x, n, self.nodes[n + 1] - self.nodes[n])
+    }
+
+    /// A window between places of the first plan.
+    fn solve(&self, range: &Range<usize>) -> (Vec<f64>, Verdict) {
+        let mut y = self.prepared.x[2 * range.start..2 * range.end + 2].to_vec();
         let fixed = |at: usize| Bound::Fixed { w: y[at], slope: y[at + 1] };
         let mut bounds = [fixed(0), fixed(y.len() - 2)];
-        if part.range.start == 0 {
+        if range.start == 0 {
             bounds[0] = self.prepared.bounds[0];
         }
-        if part.range.end + 1 == self.nodes.len() {
+        if range.end + 1 == self.nodes.len() {
             bounds[1] = self.prepared.bounds[1];
         }
         let effort = interior_point::Effort {
@@ -179,9 +172,52 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
             barrier: 1.0,
         };
         let limits = &self.prepared.problem.limits;
-        let mut stretch = self.prepared.stretch(part.range.clone());
+        let mut stretch = self.prepared.stretch(range.clone());
         let mut space = InteriorPoint::<Exact, M>::default();
-        stretch.improve(limits, bounds, &mut part.tight, y, near, &effort, &mut space)
+        let verdict = stretch.improve(limits, bounds, &mut y, &effort, &mut space);
+        (y, verdict)
+    }
+
+    /// Goes on from x, which is planned up to the node `reached`, with the plan y of a window; false, and x as it
+    /// was, if no way keeps the limits.
+    fn join(&self, x: &mut [f64], reached: usize, window: &Range<usize>, y: &[f64]) -> bool {
+        let shared = reached - window.start;
+        let y_from = |node: usize| &y[2 * (node - window.start)..];
+        // A plan that has not been improved is still the first one, where the other ends.
+        for node in [window.start, reached] {
+            if shared == 0 || x[2 * node..2 * node + 2] == y_from(node)[..2] {
+                x[2 * node..2 * window.end + 2].copy_from_slice(y_from(node));
+                return true;
+            }
+        }
+        let apart = |n: usize| (y_from(n)[0] / x[2 * n] - 1.0).abs();
+        for parts in BLENDS.into_iter().filter(|&parts| shared >= parts) {
+            // Parts overlap by half of each.
+            let size = shared / parts;
+            let begins = (0..2 * parts - 1).map(|i| window.start + i * size / 2);
+            let worst = |start: usize| (start..=start + size).map(apart).fold(0.0, f64::max);
+            let Some(start) = begins.min_by(|&a, &b| worst(a).total_cmp(&worst(b))) else {
+                continue;
+            };
+            let nodes = start..start + size;
+            let mut blend = x[2 * nodes.start..2 * nodes.end + 2].to_vec();
+            let (from, length) = (self.nodes[nodes.start], self.nodes[nodes.end] - self.nodes[nodes.start]);
+            for (n, (z, y)) in blend.chunks_exact_mut(2).zip(y_from(nodes.start).chunks_exact(2)).enumerate()
+            {
+                let t = (self.nodes[nodes.start + n] - from) / length;
+                let (weight, rate) = (t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t) / length);
+                let [w, slope] = [y[0] - z[0], y[1] - z[1]];
+                z[0] += weight * w;
+                z[1] += weight * slope + rate * w;
+            }
+            let stretch = self.prepared.stretch(nodes.clone());
+            if stretch.holds(&self.prepared.problem.limits, &blend, BLENDED) {
+                x[2 * nodes.start..2 * nodes.end + 2].copy_from_slice(&blend);
+                x[2 * nodes.end..2 * window.end + 2].copy_from_slice(y_from(nodes.end));
+                return true;
+            }
+        }
+        false
     }
 
     /// The profile between two nodes, with the ramps at the ends of the path.
