@@ -1,6 +1,6 @@
 //! A guard against rounding: whether the arcs of a forward pass keep the limits of all axes at some places.
 
-use super::pass::{Arc, Kind, Stuck};
+use super::pass::{distance, Arc, Kind, Stuck};
 use super::split::{Axes, SubPiece};
 use crate::polynomial::Polynomial;
 
@@ -51,7 +51,7 @@ pub fn keeps_limits<const M: usize, const C: usize>(
                 sub.g[l].wronskian(&sub.g[j])
             }
         });
-        let at = Places { sub, axes, arc, j, signed, braking, weight, way, twist };
+        let at = Places { sub, axes, arc, j, signed, braking, slow_somewhere, weight, way, twist };
         let (slowest, other) = if braking { (arc.x1, arc.x0) } else { (arc.x0, arc.x1) };
         at.keep_limits(PLACES, 1.0 + EXCESS)
             && (!slow(slowest) || at.keep_limits(DECADES, 1.0 + EXCESS_NEAR))
@@ -69,6 +69,7 @@ struct Places<'a, const M: usize, const C: usize> {
     j: usize,
     signed: f64,
     braking: bool,
+    slow_somewhere: bool,
     weight: Polynomial<C>,
     /// The way of axis j times ω.
     way: Polynomial<C>,
@@ -84,10 +85,18 @@ impl<const M: usize, const C: usize> Places<'_, M, C> {
         let x = places.map(|place| if self.braking { arc.x1 - place * span } else { arc.x0 + place * span });
         // Where rounding has moved x to, lest way and tangent belong to two places.
         let places = x.map(|x| (if self.braking { arc.x1 - x } else { x - arc.x0 }) / span);
-        let (weight, way, g) = (self.weight.values(places), self.way.values(places), sub.g[j].values(x));
-        let pi: [f64; K] = std::array::from_fn(|i| {
-            (arc.slow_sq + 2.0 * axes.acceleration[j] * way[i] / weight[i]) / (g[i] * g[i])
-        });
+        let (weight, g) = (self.weight.values(places), sub.g[j].values(x));
+        let way: [f64; K] = if !self.slow_somewhere {
+            let way = self.way.values(places);
+            std::array::from_fn(|i| way[i] / weight[i])
+        } else if self.braking {
+            x.map(|x| distance(sub, j, x, arc.x1))
+        } else {
+            // With all the digits that coefficients of a short part keep.
+            x.map(|x| distance(sub, j, arc.x0, x))
+        };
+        let pi: [f64; K] =
+            std::array::from_fn(|i| (arc.slow_sq + 2.0 * axes.acceleration[j] * way[i]) / (g[i] * g[i]));
         (0..M).all(|l| {
             let (other, twist) = (sub.g[l].values(x), self.twist[l].values(x));
             (0..K).all(|i| {

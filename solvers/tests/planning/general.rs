@@ -40,6 +40,18 @@ fn quadratics_take_the_time_of_the_quadratic_planner() {
     );
 }
 
+/// Next to rest the guard must take an arc's way and tangent at one place.
+#[test]
+fn the_guard_makes_no_alarm_of_its_own_next_to_rest() {
+    for seed in [27_653, 47_526] {
+        let mut case = milder_case::<2>(seed);
+        case.chord_tolerance = f64::INFINITY;
+        let profile = general(&case, 0).expect("a profile");
+        let change = profile.time() / case.time() - 1.0;
+        assert!(profile.slowed.is_empty() && change.abs() < 1e-12, "seed {seed}: {change:.1e}");
+    }
+}
+
 /// The chord-error limit is taken with a margin, by each planner in its own way.
 #[test]
 fn with_a_chord_error_limit_the_times_agree_to_the_margin() {
