@@ -3,8 +3,8 @@
 w = v² is a C¹ cubic in the length between the nodes, ramps w ∝ s^(4/3) lead from and to rest; limits hold
 at four places of each interval. IPOPT takes the problem as it is. Clarabel gets quadratic programs, one after
 the other: the row |L w| ≤ J w^(−1/2) of jerk by the tangent of its right side, which is convex, so that every
-plan is valid; and the plan in one stage that controllers and earlier works make ("pseudo-jerk"), which bounds w in
-the row of jerk by the optimum without limits of jerk.
+plan is valid; and the plan in one stage that controllers and earlier works make ("pseudo-jerk"), which bounds
+w in the row of jerk by the optimum without limits of jerk.
 """
 
 from __future__ import annotations
@@ -191,7 +191,7 @@ def by_clarabel(grid: Grid) -> float:
 
 
 def pseudo_jerk(grid: Grid) -> float:
-    """The time [s] of the plan in one stage, |L w| ≤ J w̄^(−1/2) and w ≤ w̄, w̄ being the optimum without jerk."""
+    """The time [s] of the plan in one stage: |L w| ≤ J w̄^(−1/2) and w ≤ w̄, the optimum without limits of jerk."""
     jerks, w = grid.motion[2], grid.rows(PLACES, 0)
     top = w @ _descent(grid, lambda _: [])
     rows = [(sign * row, top**-0.5) for row in jerks for sign in (1, -1)]
@@ -199,7 +199,7 @@ def pseudo_jerk(grid: Grid) -> float:
 
 
 def _descent(grid: Grid, jerk_rows: Callable[[Array], Rows]) -> Array:
-    """The unknowns over their references that no quadratic program improves, with the rows at the last ones."""
+    """The unknowns over their references that no quadratic program improves, with rows by the last ones."""
     import clarabel
 
     speed, accelerations, _ = grid.motion
