@@ -191,7 +191,7 @@ def by_clarabel(grid: Grid) -> float:
 
 
 def pseudo_jerk(grid: Grid) -> float:
-    """The time [s] of the plan in one stage: |L w| ≤ J w̄^(−1/2), w ≤ w̄, the optimum without limits of jerk."""
+    """The time [s] of the plan in one stage: |L w| √w̄ ≤ J, w ≤ w̄, the optimum without limits of jerk."""
     jerks, w = grid.motion[2], grid.rows(PLACES, 0)
     top = w @ _descent(grid, lambda _: [])
     rows = [(sign * row, top**-0.5) for row in jerks for sign in (1, -1)]
