@@ -320,7 +320,10 @@ fn finished_stretches_make_up_the_plan() {
     let problem = problem(&path, SHORT_STOPS);
     let mut stretches: Vec<Profile> = vec![];
     let effort = Effort { window: 400, ..Effort::default() };
-    let plan = stream(&problem, &effort, |stretch| stretches.push(stretch.clone())).expect("a plan");
+    // A hand-out has some windows for each thread.
+    let two = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");
+    let plan = two.install(|| stream(&problem, &effort, |stretch| stretches.push(stretch.clone())));
+    let plan = plan.expect("a plan");
     assert!(stretches.len() > 3, "{} stretches", stretches.len());
     assert!(stretches.windows(2).all(|pair| pair[0].ends[1] == pair[1].ends[0]));
     let time: f64 = stretches.iter().map(Profile::time).sum();
