@@ -11,13 +11,18 @@ from feedplan.constraints.problem import Problem
 from feedplan.profile import ArcKind, SpeedProfile
 
 Array = NDArray[np.float64]
+# Of a tangent, as a part of the longest one on its arc.
+ROUNDING = 1e-15
 # Derivatives (order + 1, m, axes) at places: piece (m,), u (m,), order.
 Motion = Callable[[NDArray[np.uint32], Array, int], Array]
 
 
 def worst_excess(problem: Problem, profile: SpeedProfile, samples: int = 10) -> tuple[float, float]:
-    """Greatest relative excess of any limit, and least use of the most used one, inside the arcs."""
-    joints: Motion = problem.derivatives
+    """Greatest relative excess of any limit, and least use of the most used one, inside the arcs.
+
+    What the arcs say of p is about `problem.curve`, what the limits are kept for the exact joints.
+    """
+    planned: Motion = problem.curve.evaluate
     tool: Motion = problem.path.curve.evaluate if problem.tip_curve is None else problem.tip_curve.evaluate
     # u is rounded: where an arc is as short as that, its places cannot be told apart.
     long = (profile.u1 - profile.u0) > 1e-6 * problem.path.width[profile.piece]
@@ -32,18 +37,19 @@ def worst_excess(problem: Problem, profile: SpeedProfile, samples: int = 10) -> 
         return flat[1].reshape(*u.shape, -1), flat[2].reshape(*u.shape, -1)
 
     u = u0[:, None] + (u1 - u0)[:, None] * (np.arange(samples) + 0.5) / samples
-    q1, q2 = at(joints, u)
+    q1, q2 = at(problem.derivatives, u)
     t1, t2 = at(tool, u)
-    g, c = q1[rows, :, axis], q2[rows, :, axis]
+    j1, j2 = at(planned, u)
+    g, c = j1[rows, :, axis], j2[rows, :, axis]
     # v_j² of an arc from its slower end, the way of its axis by Gauss's rule.
-    ends = at(joints, np.stack([u0, u1], axis=1))[0][rows, :, axis]
+    ends = at(planned, np.stack([u0, u1], axis=1))[0][rows, :, axis]
     with np.errstate(invalid="ignore"):
         v_sq = np.stack([p0, p1], axis=1) * ends**2
     slow = np.argmin(np.where(np.isfinite(v_sq), v_sq, np.inf), axis=1)
     anchor = np.stack([u0, u1], axis=1)[rows, slow]
     nodes, weights = np.polynomial.legendre.leggauss(12)
     between = anchor[:, None, None] + (u - anchor[:, None])[..., None] * (nodes + 1) / 2
-    way = (u - anchor[:, None]) / 2 * (at(joints, between)[0][rows, :, :, axis] @ weights)
+    way = (u - anchor[:, None]) / 2 * (at(planned, between)[0][rows, :, :, axis] @ weights)
     speed_sq = (t1**2).sum(axis=2)
     limits = problem.feed[piece]
     kinds = [kind == ArcKind.AXIS_ACCELERATION, kind == ArcKind.FEED, kind == ArcKind.AXIS_VELOCITY]
@@ -54,9 +60,14 @@ def worst_excess(problem: Problem, profile: SpeedProfile, samples: int = 10) -> 
             p0[:, None],
         )
         s = np.select(kinds, [(value - c * p) / g, -p * (t1 * t2).sum(axis=2) / speed_sq, -p * c / g], 0.0)
+    # Next to where its axis turns round s is a difference over next to nothing: so much of it is rounding.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        grain = ROUNDING * np.abs(j1).max(axis=(1, 2))[:, None] * np.abs(c * p) / g**2
+    grain = np.where(kinds[0], grain, 0.0)
+    acceleration = np.abs(q1 * s[..., None] + q2 * p[..., None]) - np.abs(q1) * grain[..., None]
     used = np.concatenate(
         [
-            np.abs(q1 * s[..., None] + q2 * p[..., None]) / problem.max_acceleration,
+            acceleration / problem.max_acceleration,
             np.abs(q1) * np.sqrt(p)[..., None] / problem.max_velocity,
             (np.sqrt(speed_sq * p) / limits[:, None])[..., None],
         ],
