@@ -9,7 +9,7 @@ from benchmarks.results import Cell, Chart, Result
 from feedplan import plan
 from feedplan.audit import Audit, audit
 from feedplan.errors import InfeasibleError, SolverError
-from feedplan.planners import methods, options_of
+from feedplan.planners import limits_jerk, methods, options_of
 
 NAME = "methods"
 EXACT = "bang-bang"
@@ -31,6 +31,8 @@ def run(quick: bool = False) -> Result:
         cost = 1e3 * optimum.compute["plan"]
         for method in (EXACT, *(method for method in methods() if method != EXACT)):
             if len(optimum.path) > MOST_PIECES.get(method, math.inf):
+                continue
+            if limits_jerk(method) and not all(math.isfinite(axis.max_jerk) for axis in machine.axes):
                 continue
             mesh = {"accuracy": ACCURACY, "time_limit": TIME_LIMIT} if _has_mesh(method) else {}
             try:

@@ -44,11 +44,13 @@ def show(result: Result, console: Console) -> None:
     table = Table(
         title=result.title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False
     )
-    for column in result.rows[0]:
-        words = isinstance(result.rows[0][column], str)
-        table.add_column(escape(column), justify="left" if words else "right", no_wrap=True)
+    columns = list(dict.fromkeys(column for row in result.rows for column in row))
+    for column in columns:
+        words = isinstance(result.rows[0].get(column), str)
+        # Sentences give way to numbers.
+        table.add_column(escape(column), justify="left" if words else "right", no_wrap=not words)
     for row in result.rows:
-        table.add_row(*(_written(cell) for cell in row.values()))
+        table.add_row(*(_written(row[column]) if column in row else "" for column in columns))
     console.print(table)
     for note in result.notes:
         console.print(f"  {note}", highlight=False)
