@@ -149,9 +149,10 @@ impl<const M: usize> Motion<M> {
     /// fast, in mm/s², and how much of each may be rounding.
     pub fn acceleration_near(&self, y: f64) -> ([f64; M], [f64; M]) {
         let d = self.distance(y);
-        let away = self
-            .pole
-            .map_or(f64::INFINITY, |pole| ((d - pole.at) * (d - pole.at) + pole.beside * pole.beside).sqrt());
+        let away = match self.pole {
+            Some(pole) => ((d - pole.at) * (d - pole.at) + pole.beside * pole.beside).sqrt(),
+            None => self.way_to_turn(y),
+        };
         // Around y, so that the mean is that at y to second order; at an end one-sided and very short.
         let half = f64::min(5e-4, 0.01 * away / self.width).min(y.min(1.0 - y).max(1e-6));
         let (from, to) = (self.state((y - half).max(0.0)), self.state((y + half).min(1.0)));
@@ -169,6 +170,7 @@ mod tests {
     use super::*;
     use crate::audit::arcs::Arcs;
     use crate::audit::curve::{inner, Curve, Quadratic};
+    use crate::audit::polygon::Polygon;
 
     /// One arc on one piece.
     fn one_arc(kind: u8, axis: u8, value: f64, u: [f64; 2], p: [f64; 2], curve: &Curve<2>) -> Motion<2> {
@@ -236,6 +238,20 @@ mod tests {
         let motion = one_arc(0, 0, value, [0.0, 2.0], [p0, p1], &curve);
         let exact = (g1 * p1.sqrt() - g0 * p0.sqrt()) / value;
         assert!((total(&motion) / exact - 1.0).abs() < 1e-10);
+    }
+
+    #[test]
+    fn next_to_a_turn_of_its_axis_on_a_conic_the_acceleration_is_that_of_the_place() {
+        // Y turns 6e-4 mm before the arc begins; the acceleration of X there by exact arithmetic.
+        let points = [[3.33400833, -245.33330009], [4.66993226, -245.33369929], [5.18118385, -246.56792565]];
+        let weights = [1.0, 0.831_556_127_752_042_9, 1.0];
+        let curve = Curve::General(Box::new(Polygon::new(points.into_iter(), &weights)), 2.22179155091747);
+        let p = [1000.311668347934, 1001.67845];
+        let motion = one_arc(0, 1, -500.0, [0.0, 1.47142088], p, &curve);
+        let y = motion.y_at(0.000787988);
+        let (acceleration, rounding) = motion.acceleration_near(y);
+        assert!((acceleration[0] + 40.3678).abs() < 0.05, "{acceleration:?} ± {rounding:?}");
+        assert!((acceleration[1] + 500.0).abs() < 1e-3, "{acceleration:?}");
     }
 
     #[test]

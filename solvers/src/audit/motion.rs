@@ -82,6 +82,9 @@ impl Law {
     }
 }
 
+/// Slopes of tangents are taken over this part of the arc.
+const BESIDE: f64 = 1e-6;
+
 /// One arc, ready to be evaluated at any distance from its anchor.
 #[derive(Clone, Debug)]
 pub struct Motion<const M: usize> {
@@ -388,6 +391,20 @@ impl<const M: usize> Motion<M> {
             Some(general) if self.is_cusp(y) => self.velocity_at_cusp(general, y),
             _ => tangent.map(|g| g * root_p),
         }
+    }
+
+    /// About how far from `y` the arc's axis turns round, where p changes fast, on a piece that has no pole: by its tangent
+    /// and the slope of that.
+    pub(super) fn way_to_turn(&self, y: f64) -> f64 {
+        let (Some(_), Law::AxisAcceleration { axis, .. } | Law::AxisVelocity { axis, .. }) =
+            (&self.general, self.law)
+        else {
+            return f64::INFINITY;
+        };
+        let beside = if y < 0.5 { y + BESIDE } else { y - BESIDE };
+        let [here, there] = [y, beside].map(|y| self.distance(y));
+        let (tangent, next) = (self.at(here).0[axis], self.at(there).0[axis]);
+        (tangent / (next - tangent) * (there - here)).abs()
     }
 
     /// Whether `y` is an end where the recorded p is infinite.
