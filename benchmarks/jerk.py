@@ -129,7 +129,4 @@ def _row(
         "excess": excess,
         "computing [s]": cost,
         "computing ratio": cost / unit,
-        "intervals": "",
-        "µs each": "",
-        "peak memory [MB]": "",
     }
