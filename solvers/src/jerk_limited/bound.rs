@@ -107,6 +107,7 @@ fn part<const M: usize>(
         max_iterations: effort.max_iterations,
         deadline: effort.deadline,
         barrier: 1.0,
+        warm: false,
     };
     let mut waived = rows.clone();
     waived.waive(&bounds);

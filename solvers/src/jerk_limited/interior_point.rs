@@ -43,6 +43,8 @@ pub struct Effort {
     pub deadline: Option<Instant>,
     /// The first μ in parts of the mean time per row: 1 from afar, less from a plan that is nearly optimal.
     pub barrier: f64,
+    /// Multipliers begin with those of the last solution on these intervals, where they are greater than by μ.
+    pub warm: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -122,22 +124,28 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         self.resize(count);
         self.model.begin(rows, x);
         let mut time = self.time(rows, bounds, x, false);
-        if !self.enter(rows, bounds, x, effort.barrier * time / total) {
+        if !self.enter(rows, bounds, x, effort.barrier * time / total, effort.warm) {
             return Report { outcome: Outcome::NotInside, iterations: 0, time };
         }
         let ties = [tie(&bounds[0], 1.0), tie(&bounds[1], -1.0)];
         let mut floor = 0.3 * effort.barrier;
         // The part of the multipliers' step that is still to be taken, and their least complementarity then.
         let (mut dual, mut least_dual) = (0.0, 0.0);
+        let mut gain = f64::INFINITY;
         let mut outcome = Outcome::Stopped;
         let mut iterations = 0;
         while iterations < effort.max_iterations && effort.deadline.is_none_or(|end| Instant::now() < end) {
-            iterations += 1;
             let work = self.assemble(rows, x, dual, least_dual);
+            dual = 0.0;
             let mu = work / total;
             let gap = work / time;
             let missing = missing(&bounds, x);
             let met = miss(&bounds, x, &rows.intervals) < MET;
+            if met && gap < effort.tolerance && gain.abs() < effort.tolerance.max(1e-6) * time {
+                outcome = Outcome::Converged;
+                break;
+            }
+            iterations += 1;
             if !self.band.factor(ties) {
                 outcome = Outcome::Stalled;
                 break;
@@ -175,14 +183,10 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
             }
             self.accept(x);
             (dual, least_dual) = ((STEP * longest.1).min(1.0), LEAST_DUAL * target);
-            let gain = time - next.0;
+            gain = time - next.0;
             time = next.0;
             if part > 0.6 && gain < 0.08 * time {
                 floor *= 0.1;
-            }
-            if met && gap < effort.tolerance && gain.abs() < effort.tolerance.max(1e-6) * time {
-                outcome = Outcome::Converged;
-                break;
             }
             if part < LEAST_STEP {
                 outcome = Outcome::Stalled;
@@ -212,7 +216,7 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
     }
 
     /// Slacks and multipliers of the start; false if it is not inside.
-    fn enter(&mut self, rows: &Rows<M>, bounds: [Bound; 2], x: &[f64], mu: f64) -> bool {
+    fn enter(&mut self, rows: &Rows<M>, bounds: [Bound; 2], x: &[f64], mu: f64, warm: bool) -> bool {
         let count = rows.intervals.len();
         let state = &mut self.state;
         let mut least = Lanes::all(f64::INFINITY);
@@ -220,7 +224,8 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
             let slack = Order::<M>::of_mut(&mut state.slack, n);
             self.model.slack(rows, n, &local(x, n, interval.h), false, slack);
             for (dual, slack) in Order::<M>::of_mut(&mut state.dual, n).iter_mut().zip(slack) {
-                *dual = slack.inverse() * mu;
+                let centred = slack.inverse() * mu;
+                *dual = if warm { dual.max(centred) } else { centred };
                 least = slack.min(least);
             }
         }
@@ -232,7 +237,8 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
                     let node = end * count;
                     let slack = 1.0 - x[2 * node] / greatest;
                     inside &= slack > 0.0;
-                    Some(EndRow { node, ramp, greatest, slack, dual: mu / slack, aim: 0.0 })
+                    let known = self.ends[end].filter(|_| warm).map_or(0.0, |row| row.dual);
+                    Some(EndRow { node, ramp, greatest, slack, dual: (mu / slack).max(known), aim: 0.0 })
                 }
             };
         }

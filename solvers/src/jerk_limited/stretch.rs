@@ -22,11 +22,11 @@ const ROUNDS: usize = 10;
 const ROUGH: (f64, f64) = (1e-4, 0.97);
 /// Peaks that stand out by more, in parts of what the points use, move before the end.
 const FIRM: f64 = 1.05;
-/// What plans are multiplied with to start from, and the barrier to start with. The valid plans are star-shaped: a
-/// smaller multiple is further inside, and further from the optimum. From the first plan, well inside …
-const FAR: [(f64, f64); 1] = [(1.0, 1.0)];
-/// … and from one that exceeds tightened limits a little.
-const AGAIN: [(f64, f64); 5] = [(0.999, 1e-3), (0.997, 3e-3), (0.99, 1e-2), (0.9, 0.3), (0.5, 1.0)];
+/// What of the way back to the first plan is tried to be inside tightened limits; the start is as much further again.
+const BACK: [f64; 7] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 0.3];
+const FURTHER: f64 = 3.0;
+/// The barrier to begin with there, in parts of the way back.
+const BARRIER: f64 = 0.1;
 /// What of the way from the former plan to the new one is left where the new one itself is refused.
 const RETREATS: [f64; 11] = [1e-6, 3e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.05, 0.15, 0.4, 0.7, 0.9];
 /// A retreat that costs no more than this many times the tolerance is as good as the plan.
@@ -61,7 +61,7 @@ impl<const M: usize> Stretch<M> {
         let mut verdict = Verdict::default();
         let (mut best, mut improved) = (f64::INFINITY, x.to_vec());
         let rough = Effort { tolerance: effort.tolerance.max(ROUGH.0), ..*effort };
-        let mut attempts = starts(x, &FAR, &rough);
+        let mut attempts = vec![(x.to_vec(), rough)];
         let mut times = vec![0; self.rows.intervals.len()];
         for round in 0..ROUNDS {
             let Some((y, report)) = self.attempt(bounds, attempts, space, &mut verdict.iterations) else {
@@ -88,7 +88,7 @@ impl<const M: usize> Stretch<M> {
             if stopped || verdict.converged {
                 break;
             }
-            attempts = starts(&y, &AGAIN, effort);
+            attempts = self.starts(x, &y, effort);
         }
         x.copy_from_slice(&improved);
         verdict
@@ -113,6 +113,21 @@ impl<const M: usize> Stretch<M> {
         None
     }
 
+    /// Starts inside the tightened limits, on the way from the first plan x to the last one y, nearest to it first.
+    fn starts(&self, x: &[f64], y: &[f64], effort: &Effort) -> Vec<(Vec<f64>, Effort)> {
+        let inside = |z: &[f64]| {
+            (0..self.rows.intervals.len()).all(|n| self.rows.utilisation(z, n).iter().all(|&used| used < 1.0))
+        };
+        let near = BACK.into_iter().position(|part| inside(&blend(x, y, part))).unwrap_or(BACK.len());
+        BACK[near..]
+            .iter()
+            .map(|part| {
+                let start = Effort { barrier: BARRIER * part, warm: true, ..*effort };
+                (blend(x, y, FURTHER * part), start)
+            })
+            .collect()
+    }
+
     /// The spline nearest to y on the way from x that holds all limits, and its time.
     fn retreat(
         &self,
@@ -125,7 +140,7 @@ impl<const M: usize> Stretch<M> {
             return None;
         }
         for part in RETREATS {
-            let z: Vec<f64> = x.iter().zip(y).map(|(x, y)| y + part * (x - y)).collect();
+            let z = blend(x, y, part);
             if self.holds(limits, &z, HELD) {
                 let time = self.time(bounds, &z);
                 return Some((z, time));
@@ -187,10 +202,7 @@ pub fn ramps(bounds: &[Bound; 2], x: &[f64]) -> f64 {
     time(0, x[0]) + time(1, x[x.len() - 2])
 }
 
-/// Starts from multiples of a plan, with the barrier to begin with.
-fn starts(x: &[f64], multiples: &[(f64, f64)], effort: &Effort) -> Vec<(Vec<f64>, Effort)> {
-    multiples
-        .iter()
-        .map(|&(factor, barrier)| (x.iter().map(|x| factor * x).collect(), Effort { barrier, ..*effort }))
-        .collect()
+/// A part of the way back from y to x.
+fn blend(x: &[f64], y: &[f64], part: f64) -> Vec<f64> {
+    x.iter().zip(y).map(|(x, y)| y + part * (x - y)).collect()
 }

@@ -170,6 +170,7 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
             max_iterations: self.effort.max_iterations,
             deadline: self.effort.deadline,
             barrier: 1.0,
+            warm: false,
         };
         let limits = &self.prepared.problem.limits;
         let mut stretch = self.prepared.stretch(range.clone());
