@@ -22,11 +22,11 @@ const ROUNDS: usize = 10;
 const ROUGH: (f64, f64) = (1e-4, 0.97);
 /// Peaks that stand out by more, in parts of what the points use, move before the end.
 const FIRM: f64 = 1.05;
-/// What of the way back to the first plan is tried to be inside tightened limits; the start is as much further again.
-const BACK: [f64; 7] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 0.3];
-const FURTHER: f64 = 3.0;
+/// What of the way back to the first plan is tried to be inside tightened limits; the start is as far again from them.
+const BACK: [f64; 13] = [3e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3];
+const FURTHER: f64 = 2.0;
 /// The barrier to begin with there, in parts of the way back.
-const BARRIER: f64 = 0.1;
+const BARRIER: f64 = 0.03;
 /// What of the way from the former plan to the new one is left where the new one itself is refused.
 const RETREATS: [f64; 11] = [1e-6, 3e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.05, 0.15, 0.4, 0.7, 0.9];
 /// A retreat that costs no more than this many times the tolerance is as good as the plan.
