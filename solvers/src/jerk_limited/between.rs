@@ -23,7 +23,7 @@ const fn bases() -> [[Basis; 3]; GROUPS] {
         while d < 3 {
             let mut k = 0;
             while k < 4 {
-                out[i / 4][d][k].0[i % 4] = at[d][k];
+                out[i / 4][d][k].values_mut()[i % 4] = at[d][k];
                 k += 1;
             }
             d += 1;
@@ -65,19 +65,19 @@ impl<const M: usize> Between<M> {
                     let from = if i == 0 { 0 } else { 3 };
                     for k in 0..M {
                         for order in 0..3 {
-                            sample.q[k][order].0[lane] = interval.q[k][order].0[from];
+                            sample.q[k][order].values_mut()[lane] = interval.q[k][order].values()[from];
                         }
                     }
-                    sample.speed.0[lane] = interval.speed.0[from];
+                    sample.speed.values_mut()[lane] = interval.speed.values()[from];
                 } else {
                     let s = nodes[n] + interval.h * (i as f64 / (PLACES - 1) as f64);
                     let place = geometry.at(pieces[n] as usize, s);
                     for k in 0..M {
-                        sample.q[k][0].0[lane] = place.first[k];
-                        sample.q[k][1].0[lane] = place.second[k];
-                        sample.q[k][2].0[lane] = place.third[k];
+                        sample.q[k][0].values_mut()[lane] = place.first[k];
+                        sample.q[k][1].values_mut()[lane] = place.second[k];
+                        sample.q[k][2].values_mut()[lane] = place.third[k];
                     }
-                    sample.speed.0[lane] = limits.per_speed_sq(&place);
+                    sample.speed.values_mut()[lane] = limits.per_speed_sq(&place);
                 }
             }
             samples.push(groups);
@@ -96,13 +96,13 @@ impl<const M: usize> Between<M> {
             let (w1, w2) = (combine(&basis[1], &u) * per_h, combine(&basis[2], &u) * (per_h * per_h));
             let v = w.max(Lanes::ZERO).sqrt();
             let at = 4 * group..4 * group + 4;
-            speed[at.clone()].copy_from_slice(&(w * sample.speed).0);
+            speed[at.clone()].copy_from_slice((w * sample.speed).values());
             for k in 0..M {
                 let [q1, q2, q3] = sample.q[k];
                 let a = q2 * w + q1 * w1 * 0.5;
                 let j = (q3 * w + q2 * w1 * 1.5 + q1 * w2 * 0.5) * v;
-                axes[k][0][at.clone()].copy_from_slice(&(a * (1.0 / limits.acceleration[k])).0);
-                axes[k][1][at.clone()].copy_from_slice(&(j * (1.0 / limits.jerk[k])).0);
+                axes[k][0][at.clone()].copy_from_slice((a * (1.0 / limits.acceleration[k])).values());
+                axes[k][1][at.clone()].copy_from_slice((j * (1.0 / limits.jerk[k])).values());
             }
         }
         let mut worst = [peak(&speed).max(0.0).sqrt(), 0.0, 0.0];

@@ -141,7 +141,7 @@ fn part<const M: usize>(
         for lane in 0..4 {
             let [w, w1] = limits_at(rows, n, lane);
             // The 3/8 rule is exact for w', a quadratic.
-            rise += MASS.0[lane] * w1 * h;
+            rise += MASS.values()[lane] * w1 * h;
             if lane == 0 || lane == 3 {
                 let at = 2 * (n - core.start + lane / 3);
                 out.boxes[at][1] = out.boxes[at][1].min(w);
@@ -188,10 +188,10 @@ fn lagrangian<const M: usize>(
 /// The greatest w and |w'| that the limits of speed and acceleration allow at a lane of interval n.
 fn limits_at<const M: usize>(rows: &Rows<M>, n: usize, lane: usize) -> [f64; 2] {
     let interval = &rows.intervals[n];
-    let w = 1.0 / interval.speed.0[lane];
+    let w = 1.0 / interval.speed.values()[lane];
     let mut w1 = f64::INFINITY;
     for k in 0..M {
-        let [q1, q2, _] = interval.q[k].map(|q| q.0[lane].abs());
+        let [q1, q2, _] = interval.q[k].map(|q| q.values()[lane].abs());
         w1 = w1.min(2.0 * (1.0 / rows.per_acceleration[k] + q2 * w) / q1);
     }
     [w, w1]

@@ -5,29 +5,23 @@ use super::lanes::Lanes;
 use super::model::{expand, Local, Model};
 use super::rows::{Order, Rows};
 
-/// w^(−1/2) at the collocation points of each interval, and at the trial.
+/// w^(−1/2) at the collocation points of each interval, where the slacks are.
 #[derive(Default)]
 pub struct Exact {
     pace: Vec<Lanes>,
-    trial: Vec<Lanes>,
 }
 
 impl<const M: usize> Model<M> for Exact {
     fn begin(&mut self, rows: &Rows<M>, _: &[f64]) {
         self.pace.resize(rows.intervals.len(), Lanes::ONE);
-        self.trial.resize(rows.intervals.len(), Lanes::ONE);
     }
 
     #[inline(always)]
-    fn slack(&mut self, rows: &Rows<M>, n: usize, u: &[f64; 4], trial: bool, out: &mut [Lanes]) {
+    fn slack(&mut self, rows: &Rows<M>, n: usize, u: &[f64; 4], _: bool, out: &mut [Lanes]) {
         let w = rows.intervals[n].motion(u)[0];
         let pace = w.max(Lanes::all(f64::MIN_POSITIVE)).sqrt().inverse();
         rows.slack(n, u, pace, w, out);
-        if trial {
-            self.trial[n] = pace;
-        } else {
-            self.pace[n] = pace;
-        }
+        self.pace[n] = pace;
     }
 
     #[inline(always)]
@@ -68,19 +62,17 @@ impl<const M: usize> Model<M> for Exact {
     }
 
     #[inline(always)]
-    fn pull(&mut self, rows: &Rows<M>, n: usize, aim: &[Lanes]) -> [Lanes; 3] {
+    fn pull(&mut self, rows: &Rows<M>, n: usize, aim: &[Lanes], _: usize) -> [Lanes; 3] {
         let (mut pull, jerk) = rows.pull(n, aim);
         pull[0] += aim[Order::<M>::POSITIVE] - fall(self.pace[n]) * jerk;
         pull
     }
 
-    fn solved(&mut self, _: &Rows<M>, _: &[f64], _: bool) {}
+    fn solved(&mut self, _: &Rows<M>, _: &[f64], _: [f64; 2]) {}
 
     fn attempt(&mut self, _: f64) {}
 
-    fn accept(&mut self) {
-        std::mem::swap(&mut self.pace, &mut self.trial);
-    }
+    fn accept(&mut self) {}
 
     fn time(&self, rows: &Rows<M>, x: &[f64], _: bool) -> f64 {
         rows.intervals.iter().enumerate().map(|(n, interval)| duration(x, n, interval.h)).sum()

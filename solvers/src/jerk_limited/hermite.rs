@@ -9,7 +9,7 @@ pub const POINTS: [f64; 4] = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0];
 /// Gauss–Legendre nodes and weights on [0, 1].
 const NODES: [f64; 4] =
     [0.069_431_844_202_973_71, 0.330_009_478_207_571_87, 0.669_990_521_792_428_1, 0.930_568_155_797_026_3];
-pub const WEIGHTS: Lanes = Lanes([
+pub const WEIGHTS: Lanes = Lanes::new([
     0.173_927_422_568_726_93,
     0.326_072_577_431_273_1,
     0.326_072_577_431_273_1,
@@ -17,7 +17,7 @@ pub const WEIGHTS: Lanes = Lanes([
 ]);
 
 /// Weights of the 3/8 rule at the collocation points.
-pub const MASS: Lanes = Lanes([0.125, 0.375, 0.375, 0.125]);
+pub const MASS: Lanes = Lanes::new([0.125, 0.375, 0.375, 0.125]);
 
 pub type Basis = [Lanes; 4];
 
@@ -37,7 +37,7 @@ const fn basis(points: [f64; 4], derivative: usize) -> Basis {
         let row = at(points[i])[derivative];
         let mut k = 0;
         while k < 4 {
-            out[k].0[i] = row[k];
+            out[k].values_mut()[i] = row[k];
             k += 1;
         }
         i += 1;

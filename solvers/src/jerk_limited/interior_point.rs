@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use super::band::{Band, Tie};
 use super::hermite::local;
-use super::lanes::Lanes;
+use super::lanes::{Lanes, LogProduct};
 use super::model::Model;
 use super::newton::State;
 use super::rows::{Order, Rows};
@@ -86,6 +86,10 @@ pub struct InteriorPoint<X, const M: usize> {
     pub(super) rhs: Vec<f64>,
     pub(super) step: Vec<f64>,
     pub(super) trial: Vec<f64>,
+    /// What draws each node's (w, w') to the centre, for a target of 1, and the second order of the predictor.
+    pub(super) pulls: Vec<[[f64; 2]; 2]>,
+    /// Rows of one interval at a time: they stay in the nearest cache.
+    pub(super) scratch: Vec<Lanes>,
     pub(super) ends: [Option<EndRow>; 2],
 }
 
@@ -97,8 +101,8 @@ pub(super) struct EndRow {
     pub greatest: f64,
     pub slack: f64,
     pub dual: f64,
-    /// Of the predictor: the relative change; of the corrector: the aim; then the step of λ.
-    pub aim: f64,
+    /// As in `State`.
+    pub step: f64,
 }
 
 impl<X: Model<M>, const M: usize> Default for InteriorPoint<X, M> {
@@ -111,6 +115,8 @@ impl<X: Model<M>, const M: usize> Default for InteriorPoint<X, M> {
             rhs: vec![],
             step: vec![],
             trial: vec![],
+            pulls: vec![],
+            scratch: vec![],
             ends: [None; 2],
         }
     }
@@ -124,9 +130,10 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         self.resize(count);
         self.model.begin(rows, x);
         let mut time = self.time(rows, bounds, x, false);
-        if !self.enter(rows, bounds, x, effort.barrier * time / total, effort.warm) {
+        let Some(mut logarithm) = self.enter(rows, bounds, x, effort.barrier * time / total, effort.warm)
+        else {
             return Report { outcome: Outcome::NotInside, iterations: 0, time };
-        }
+        };
         let ties = [tie(&bounds[0], 1.0), tie(&bounds[1], -1.0)];
         let mut floor = 0.3 * effort.barrier;
         // The part of the multipliers' step that is still to be taken, and their least complementarity then.
@@ -156,22 +163,23 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
                 *r = -g;
             }
             self.band.solve(&self.rhs, missing, &mut self.step);
-            self.model.solved(rows, &self.step, false);
-            let after = self.predict(rows) / total;
+            self.model.solved(rows, &self.step, [0.0; 2]);
+            let after = self.predict(rows, work, 3.0 * mu) / total;
             let sigma = (after.max(0.0) / mu).powi(3).clamp(if met { 1e-3 } else { 0.3 }, 0.5);
             let least = floor * time / total;
             let target = least.max(sigma * mu);
 
             // Corrector: towards the target, with the second order of the predictor where it is of use.
-            self.correct(rows, target, if least > sigma * mu { 0.0 } else { 1.0 }, 3.0 * mu);
+            let second = if least > sigma * mu { 0.0 } else { 1.0 };
+            self.correct(target, second);
             self.band.solve(&self.rhs, missing, &mut self.step);
-            self.model.solved(rows, &self.step, true);
-            let longest = self.direction(rows);
+            self.model.solved(rows, &self.step, [target, second]);
+            let longest = self.direction(rows, target, second);
             let mut part = (STEP * longest.0).min(1.0);
             let mut next = self.attempt(rows, bounds, x, part);
             for _ in 0..20 {
                 let valid = next.0.is_finite();
-                if valid && (!met || next.0 - target * next.1 <= time * (1.0 + 1e-9)) {
+                if valid && (!met || next.0 - target * (next.1 - logarithm) <= time * (1.0 + 1e-9)) {
                     break;
                 }
                 part *= 0.6;
@@ -181,7 +189,9 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
                 outcome = Outcome::Stalled;
                 break;
             }
-            self.accept(x);
+            x.copy_from_slice(&self.trial);
+            self.model.accept();
+            logarithm = next.1;
             (dual, least_dual) = ((STEP * longest.1).min(1.0), LEAST_DUAL * target);
             gain = time - next.0;
             time = next.0;
@@ -204,45 +214,66 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
 
     fn resize(&mut self, count: usize) {
         let state = &mut self.state;
-        for vector in
-            [&mut state.slack, &mut state.dual, &mut state.inverse, &mut state.aim, &mut state.trial]
-        {
+        for vector in [&mut state.slack, &mut state.dual, &mut state.step] {
             vector.resize(count * Order::<M>::COUNT, Lanes::ONE);
         }
-        state.scratch.resize(Order::<M>::COUNT, Lanes::ONE);
+        self.scratch.resize(Order::<M>::COUNT, Lanes::ONE);
+        self.pulls.resize(count + 1, [[0.0; 2]; 2]);
         for vector in [&mut self.gradient, &mut self.rhs, &mut self.step, &mut self.trial] {
             vector.resize(2 * count + 2, 0.0);
         }
     }
 
-    /// Slacks and multipliers of the start; false if it is not inside.
-    fn enter(&mut self, rows: &Rows<M>, bounds: [Bound; 2], x: &[f64], mu: f64, warm: bool) -> bool {
-        let count = rows.intervals.len();
-        let state = &mut self.state;
-        let mut least = Lanes::all(f64::INFINITY);
-        for (n, interval) in rows.intervals.iter().enumerate() {
-            let slack = Order::<M>::of_mut(&mut state.slack, n);
-            self.model.slack(rows, n, &local(x, n, interval.h), false, slack);
-            for (dual, slack) in Order::<M>::of_mut(&mut state.dual, n).iter_mut().zip(slack) {
-                let centred = slack.inverse() * mu;
-                *dual = if warm { dual.max(centred) } else { centred };
-                least = slack.min(least);
+    /// Slacks and multipliers of the start; Σ ln s, unless it is not inside.
+    fn enter(&mut self, rows: &Rows<M>, bounds: [Bound; 2], x: &[f64], mu: f64, warm: bool) -> Option<f64> {
+        let last = self.ends;
+        self.ends = std::array::from_fn(|end| match bounds[end] {
+            Bound::Fixed { .. } => None,
+            Bound::Rest { ramp, greatest } => {
+                let node = end * rows.intervals.len();
+                Some(EndRow { node, ramp, greatest, slack: 1.0, dual: 0.0, step: 0.0 })
+            }
+        });
+        let logarithm = self.slacks(rows, x, false)?;
+        for (dual, slack) in self.state.dual.iter_mut().zip(&self.state.slack) {
+            let centred = slack.inverse() * mu;
+            *dual = if warm { dual.max(centred) } else { centred };
+        }
+        for (row, last) in self.ends.iter_mut().zip(last) {
+            if let Some(row) = row {
+                let known = last.filter(|_| warm).map_or(0.0, |last| last.dual);
+                row.dual = known.max(mu / row.slack);
             }
         }
-        let mut inside = least.least() > 0.0;
-        for (end, bound) in bounds.iter().enumerate() {
-            self.ends[end] = match *bound {
-                Bound::Fixed { .. } => None,
-                Bound::Rest { ramp, greatest } => {
-                    let node = end * count;
-                    let slack = 1.0 - x[2 * node] / greatest;
-                    inside &= slack > 0.0;
-                    let known = self.ends[end].filter(|_| warm).map_or(0.0, |row| row.dual);
-                    Some(EndRow { node, ramp, greatest, slack, dual: (mu / slack).max(known), aim: 0.0 })
-                }
-            };
+        Some(logarithm)
+    }
+
+    /// Slacks of x, or of the trial; Σ ln s, unless a limit is broken.
+    pub(super) fn slacks(&mut self, rows: &Rows<M>, x: &[f64], trial: bool) -> Option<f64> {
+        let mut product = LogProduct::default();
+        for (n, interval) in rows.intervals.iter().enumerate() {
+            let slack = Order::<M>::of_mut(&mut self.state.slack, n);
+            self.model.slack(rows, n, &local(x, n, interval.h), trial, slack);
+            let (mut least, mut all) = (slack[0], slack[0]);
+            for slack in &slack[1..] {
+                least = slack.min(least);
+                all *= *slack;
+            }
+            // Also a product that is not a number.
+            if least.least() <= 0.0 || all.sum().is_nan() {
+                return None;
+            }
+            product.take(all);
         }
-        inside
+        let mut logarithm = product.ln();
+        for row in self.ends.iter_mut().flatten() {
+            row.slack = 1.0 - x[2 * row.node] / row.greatest;
+            if row.slack <= 0.0 {
+                return None;
+            }
+            logarithm += row.slack.ln();
+        }
+        Some(logarithm)
     }
 
     /// The time of a spline with its ramps, infinite where it is not positive.

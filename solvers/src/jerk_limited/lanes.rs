@@ -1,9 +1,11 @@
 //! Four numbers at a time: one for each collocation point of an interval.
 
+use wide::f64x4;
+
 use std::ops::{Add, AddAssign, Mul, MulAssign, Neg, Sub};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lanes(pub [f64; 4]);
+pub struct Lanes(f64x4);
 
 impl Lanes {
     pub const ZERO: Self = Self::all(0.0);
@@ -11,69 +13,66 @@ impl Lanes {
 
     #[inline(always)]
     pub const fn all(value: f64) -> Self {
-        Self([value; 4])
+        Self(f64x4::new([value; 4]))
     }
 
     #[inline(always)]
-    fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
-        let (a, b) = (self.0, other.0);
-        Self([f(a[0], b[0]), f(a[1], b[1]), f(a[2], b[2]), f(a[3], b[3])])
+    pub const fn new(values: [f64; 4]) -> Self {
+        Self(f64x4::new(values))
     }
 
     #[inline(always)]
-    fn map(self, f: impl Fn(f64) -> f64) -> Self {
-        let a = self.0;
-        Self([f(a[0]), f(a[1]), f(a[2]), f(a[3])])
+    pub const fn values(&self) -> &[f64; 4] {
+        self.0.as_array()
+    }
+
+    #[inline(always)]
+    pub const fn values_mut(&mut self) -> &mut [f64; 4] {
+        self.0.as_mut_array()
     }
 
     /// The greater of each pair; `other` where either is not a number (the rule of the machine's instruction).
     #[inline(always)]
     pub fn max(self, other: Self) -> Self {
-        self.zip(other, |a, b| if a > b { a } else { b })
+        Self(self.0.fast_max(other.0))
     }
 
     /// The smaller of each pair; `other` where either is not a number.
     #[inline(always)]
     pub fn min(self, other: Self) -> Self {
-        self.zip(other, |a, b| if a < b { a } else { b })
+        Self(self.0.fast_min(other.0))
     }
 
     #[inline(always)]
     pub fn abs(self) -> Self {
-        self.map(f64::abs)
+        Self(self.0.abs())
     }
 
     #[inline(always)]
     pub fn sqrt(self) -> Self {
-        self.map(f64::sqrt)
+        Self(self.0.sqrt())
     }
 
     #[inline(always)]
     pub fn inverse(self) -> Self {
-        self.map(|a| 1.0 / a)
+        Self(f64x4::splat(1.0) / self.0)
     }
 
     #[inline(always)]
     pub fn sum(self) -> f64 {
-        let a = self.0;
+        let a = self.values();
         (a[0] + a[2]) + (a[1] + a[3])
     }
 
     #[inline(always)]
-    pub fn product(self) -> f64 {
-        let a = self.0;
-        (a[0] * a[2]) * (a[1] * a[3])
-    }
-
-    #[inline(always)]
     pub fn least(self) -> f64 {
-        let a = self.0;
+        let a = self.values();
         a[0].min(a[1]).min(a[2].min(a[3]))
     }
 
     #[inline(always)]
     pub fn greatest(self) -> f64 {
-        let a = self.0;
+        let a = self.values();
         a[0].max(a[1]).max(a[2].max(a[3]))
     }
 }
@@ -84,7 +83,7 @@ macro_rules! lanewise {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                self.zip(other, |a, b| a $op b)
+                Self(self.0 $op other.0)
             }
         }
     };
@@ -98,7 +97,7 @@ impl Mul<f64> for Lanes {
     type Output = Self;
     #[inline(always)]
     fn mul(self, factor: f64) -> Self {
-        self.map(|a| a * factor)
+        Self(self.0 * f64x4::splat(factor))
     }
 }
 
@@ -106,7 +105,7 @@ impl Neg for Lanes {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        self.map(|a| -a)
+        Self(-self.0)
     }
 }
 
@@ -121,5 +120,53 @@ impl MulAssign for Lanes {
     #[inline(always)]
     fn mul_assign(&mut self, other: Self) {
         *self = *self * other;
+    }
+}
+
+/// The logarithm of a product of positive numbers, however many: only the last step takes a logarithm.
+pub struct LogProduct {
+    /// In [1, 2).
+    mantissa: [f64; 4],
+    exponent: [i64; 4],
+}
+
+impl Default for LogProduct {
+    fn default() -> Self {
+        Self { mantissa: [1.0; 4], exponent: [0; 4] }
+    }
+}
+
+impl LogProduct {
+    #[inline(always)]
+    pub fn take(&mut self, factor: Lanes) {
+        const FRACTION: u64 = (1 << 52) - 1;
+        for lane in 0..4 {
+            let bits = (self.mantissa[lane] * factor.values()[lane]).to_bits();
+            self.exponent[lane] += (bits >> 52) as i64 - 1023;
+            self.mantissa[lane] = f64::from_bits(bits & FRACTION | 1.0f64.to_bits());
+        }
+    }
+
+    pub fn ln(&self) -> f64 {
+        let exponents: i64 = self.exponent.iter().sum();
+        let mantissas: f64 = self.mantissa.iter().product();
+        exponents as f64 * std::f64::consts::LN_2 + mantissas.ln()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_product_beyond_all_numbers_has_its_logarithm() {
+        let mut product = LogProduct::default();
+        let mut sum = 0.0;
+        for i in 0..1000 {
+            let factor = Lanes::new([1e-200, 3.0, 0.5 + i as f64, 1e-30]);
+            product.take(factor);
+            sum += factor.values().iter().map(|factor| factor.ln()).sum::<f64>();
+        }
+        assert!((product.ln() / sum - 1.0).abs() < 1e-13, "{} for {sum}", product.ln());
     }
 }

@@ -18,11 +18,12 @@ pub trait Model<const M: usize>: Default {
     /// Matrix and gradient of interval n for the weights λ/s and the multipliers λ of its rows.
     fn local(&mut self, rows: &Rows<M>, n: usize, u: &[f64; 4], weight: &[Lanes], dual: &[Lanes]) -> Local;
 
-    /// Σ aim ∇s over the rows of interval n, as a linear form of (w, w', w'') at the collocation points.
-    fn pull(&mut self, rows: &Rows<M>, n: usize, aim: &[Lanes]) -> [Lanes; 3];
+    /// Σ aim ∇s over the rows of interval n, as a linear form of (w, w', w'') at the collocation points; aims are of
+    /// the centring (0), or of the predictor's second order (1).
+    fn pull(&mut self, rows: &Rows<M>, n: usize, aim: &[Lanes], which: usize) -> [Lanes; 3];
 
-    /// Its own part of a step whose spline is known: of the predictor, or of the corrector.
-    fn solved(&mut self, rows: &Rows<M>, step: &[f64], corrected: bool);
+    /// Its own part of a step whose spline is known, with so much of each pull in it.
+    fn solved(&mut self, rows: &Rows<M>, step: &[f64], pulls: [f64; 2]);
 
     /// The trial of its own variables is a part of their step away.
     fn attempt(&mut self, part: f64);

@@ -17,12 +17,11 @@ pub struct Relaxed {
     pub y: Vec<Lanes>,
     step: Vec<Lanes>,
     trial: Vec<Lanes>,
-    /// w^(−1/2), and at the trial.
+    /// w^(−1/2), where the slacks are.
     pace: Vec<Lanes>,
-    trial_pace: Vec<Lanes>,
-    /// ∂² of y with itself and with (w, w', w''), and the pull of the rows on y.
+    /// ∂² of y with itself and with (w, w', w''), and the pulls of the rows on y.
     cross: Vec<[Lanes; 4]>,
-    aim: Vec<Lanes>,
+    pulls: Vec<[Lanes; 2]>,
 }
 
 /// y begins at this multiple of the least possible.
@@ -31,16 +30,10 @@ const ABOVE: f64 = 1.1;
 impl<const M: usize> Model<M> for Relaxed {
     fn begin(&mut self, rows: &Rows<M>, x: &[f64]) {
         let count = rows.intervals.len();
-        for lanes in [
-            &mut self.y,
-            &mut self.step,
-            &mut self.trial,
-            &mut self.pace,
-            &mut self.trial_pace,
-            &mut self.aim,
-        ] {
+        for lanes in [&mut self.y, &mut self.step, &mut self.trial, &mut self.pace] {
             lanes.resize(count, Lanes::ONE);
         }
+        self.pulls.resize(count, [Lanes::ZERO; 2]);
         self.cross.resize(count, [Lanes::ONE; 4]);
         for (n, interval) in rows.intervals.iter().enumerate() {
             let motion = interval.motion(&local(x, n, interval.h));
@@ -57,11 +50,7 @@ impl<const M: usize> Model<M> for Relaxed {
         let pace = pace(rows.intervals[n].motion(u)[0]);
         let y = if trial { self.trial[n] } else { self.y[n] };
         rows.slack(n, u, y, y - pace, out);
-        if trial {
-            self.trial_pace[n] = pace;
-        } else {
-            self.pace[n] = pace;
-        }
+        self.pace[n] = pace;
     }
 
     #[inline(always)]
@@ -102,24 +91,24 @@ impl<const M: usize> Model<M> for Relaxed {
     }
 
     #[inline(always)]
-    fn pull(&mut self, rows: &Rows<M>, n: usize, aim: &[Lanes]) -> [Lanes; 3] {
+    fn pull(&mut self, rows: &Rows<M>, n: usize, aim: &[Lanes], which: usize) -> [Lanes; 3] {
         let (mut pull, jerk) = rows.pull(n, aim);
         let last = aim[Order::<M>::POSITIVE];
         pull[0] += last * fall(self.pace[n]);
-        self.aim[n] = jerk + last;
+        self.pulls[n][which] = jerk + last;
         let cross = &self.cross[n];
-        let part = self.aim[n] * cross[0].inverse();
+        let part = (jerk + last) * cross[0].inverse();
         for k in 0..3 {
             pull[k] += -(part * cross[k + 1]);
         }
         pull
     }
 
-    fn solved(&mut self, rows: &Rows<M>, step: &[f64], corrected: bool) {
+    fn solved(&mut self, rows: &Rows<M>, step: &[f64], pulls: [f64; 2]) {
         for (n, interval) in rows.intervals.iter().enumerate() {
             let [w, w1, w2] = interval.motion(&local(step, n, interval.h));
             let [own, c0, c1, c2] = self.cross[n];
-            let aim = if corrected { self.aim[n] } else { Lanes::ZERO };
+            let aim = self.pulls[n][0] * pulls[0] + self.pulls[n][1] * pulls[1];
             self.step[n] = (aim - MASS * interval.h - c0 * w - c1 * w1 - c2 * w2) * own.inverse();
         }
     }
@@ -132,7 +121,6 @@ impl<const M: usize> Model<M> for Relaxed {
 
     fn accept(&mut self) {
         std::mem::swap(&mut self.y, &mut self.trial);
-        std::mem::swap(&mut self.pace, &mut self.trial_pace);
     }
 
     fn time(&self, rows: &Rows<M>, x: &[f64], trial: bool) -> f64 {

@@ -74,8 +74,8 @@ impl<const M: usize> Interval<M> {
     /// The greatest r = w^(3/4) of an envelope that rises by k at most.
     pub fn envelope_cap(&self, limits: &Limits<M>, k: f64) -> f64 {
         let cap = |lane: usize| {
-            let of = |order: usize| std::array::from_fn(|axis| self.q[axis][order].0[lane]);
-            let speed_cap = 1.0 / self.speed.0[lane].sqrt();
+            let of = |order: usize| std::array::from_fn(|axis| self.q[axis][order].values()[lane]);
+            let speed_cap = 1.0 / self.speed.values()[lane].sqrt();
             limits.envelope_cap(&Place { first: of(0), second: of(1), third: of(2), speed_cap }, k)
         };
         cap(0).min(cap(1)).min(cap(2)).min(cap(3))
@@ -118,16 +118,16 @@ impl<const M: usize> Rows<M> {
             };
             let end = geometry.at(piece, nodes[n + 1]);
             let places = [first, at(hermite::POINTS[1]), at(hermite::POINTS[2]), end];
-            let mut speed = Lanes(places.map(|place| limits.per_speed_sq(&place)));
+            let mut speed = Lanes::new(places.map(|place| limits.per_speed_sq(&place)));
             for (lane, node) in [(0, n), (3, n + 1)] {
                 let cap = node_cap(node);
-                speed.0[lane] = speed.0[lane].max(1.0 / (cap * cap));
+                speed.values_mut()[lane] = speed.values()[lane].max(1.0 / (cap * cap));
             }
             let q = std::array::from_fn(|k| {
                 [
-                    Lanes(places.map(|place| place.first[k])),
-                    Lanes(places.map(|place| place.second[k])),
-                    Lanes(places.map(|place| place.third[k])),
+                    Lanes::new(places.map(|place| place.first[k])),
+                    Lanes::new(places.map(|place| place.second[k])),
+                    Lanes::new(places.map(|place| place.third[k])),
                 ]
             });
             intervals.push(Interval { h, q, speed, acceleration: Lanes::ONE, jerk: 1.0 });
@@ -259,8 +259,8 @@ impl<const M: usize> Rows<M> {
         let last = self.intervals.len() - 1;
         for (bound, (n, lane)) in bounds.iter().zip([(0, 0), (last, 3)]) {
             if let Bound::Fixed { .. } = bound {
-                self.intervals[n].speed.0[lane] = 0.0;
-                self.intervals[n].acceleration.0[lane] = 0.0;
+                self.intervals[n].speed.values_mut()[lane] = 0.0;
+                self.intervals[n].acceleration.values_mut()[lane] = 0.0;
             }
         }
     }
