@@ -137,10 +137,10 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
                 let part = change[k] * inverse[k];
                 least = least.min(part);
                 step[k] = (goal + step[k] * second) * inverse[k] - dual[k] * (Lanes::ONE + part);
-                beyond = beyond.max(-(step[k] + dual[k] * known));
+                beyond = beyond.min(step[k] + dual[k] * known);
             }
             // Few intervals ask for a shorter step than all before: only these divide.
-            if beyond.greatest() > 0.0 {
+            if beyond.least() < 0.0 {
                 for k in 0..Order::<M>::COUNT {
                     dual_most = (-(step[k] * dual[k].inverse())).greatest().max(dual_most);
                 }

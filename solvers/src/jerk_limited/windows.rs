@@ -47,14 +47,17 @@ pub fn solve<G: Geometry<M>, const M: usize>(
             break;
         }
         let batch = first..windows.len().min(first + BATCH * rayon::current_num_threads());
-        let solved: Vec<_> = windows[batch.clone()].par_iter().map(|range| run.solve(range)).collect();
+        let solved: Vec<_> = windows[batch.clone()]
+            .par_iter()
+            .map_init(InteriorPoint::default, |space, range| run.solve(range, space))
+            .collect();
         for (at, (y, verdict)) in batch.clone().zip(solved) {
             counts.add(&verdict, windows[at].len());
             let reached = if at == 0 { 0 } else { windows[at - 1].end };
             if !run.join(&mut x, reached, &windows[at], &y) {
                 // No blend keeps the limits: this window begins at a place of the first plan, where the last one ends.
                 let rest = reached..windows[at].end;
-                let (y, verdict) = run.solve(&rest);
+                let (y, verdict) = run.solve(&rest, &mut InteriorPoint::default());
                 counts.add(&verdict, rest.len());
                 counts.converged = false;
                 x[2 * rest.start..2 * rest.end + 2].copy_from_slice(&y);
@@ -155,7 +158,7 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
     }
 
     /// A window between places of the first plan.
-    fn solve(&self, range: &Range<usize>) -> (Vec<f64>, Verdict) {
+    fn solve(&self, range: &Range<usize>, space: &mut InteriorPoint<Exact, M>) -> (Vec<f64>, Verdict) {
         let mut y = self.prepared.x[2 * range.start..2 * range.end + 2].to_vec();
         let fixed = |at: usize| Bound::Fixed { w: y[at], slope: y[at + 1] };
         let mut bounds = [fixed(0), fixed(y.len() - 2)];
@@ -174,8 +177,7 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
         };
         let limits = &self.prepared.problem.limits;
         let mut stretch = self.prepared.stretch(range.clone());
-        let mut space = InteriorPoint::<Exact, M>::default();
-        let verdict = stretch.improve(limits, bounds, &mut y, &effort, &mut space);
+        let verdict = stretch.improve(limits, bounds, &mut y, &effort, space);
         (y, verdict)
     }
 
