@@ -1,4 +1,4 @@
-//! Cholesky factor of the Newton matrix: symmetric, two unknowns (w, w') a node, neighbours coupled.
+//! LDLᵀ factor of the Newton matrix: symmetric, two unknowns (w, w') a node, neighbours coupled.
 //!
 //! The matrix is scaled to a unit diagonal. The two unknowns of an end are tied: to each other where the path starts
 //! from rest (w' = k w), or to given steps where its speed and slope are given.
@@ -26,7 +26,7 @@ pub struct Band {
     /// Couplings of given ends with their neighbours.
     given: [[f64; 4]; 2],
     scale: Vec<[f64; 2]>,
-    /// (1/l00, l10, 1/l11) and the transposed coupling of each node.
+    /// (1/d0, l, 1/d1) of each node, and the rows of L that couple the next one with it: [00 01 10 11].
     factor: Vec<([f64; 3], [f64; 4])>,
     work: Vec<[f64; 2]>,
 }
@@ -63,30 +63,36 @@ impl Band {
         for (scale, d) in self.scale.iter_mut().zip(&self.diagonal) {
             *scale = [1.0 / d[0].sqrt(), 1.0 / d[2].sqrt()];
         }
-        let mut m = [0.0f64; 4];
+        let mut less = [0.0f64; 3];
         for i in 0..=last {
             let [s0, s1] = self.scale[i];
             let [a, b, c] = self.diagonal[i];
-            let a = a * s0 * s0 + REGULAR - m[0] * m[0] - m[1] * m[1];
-            let b = b * s0 * s1 - m[0] * m[2] - m[1] * m[3];
-            let c = c * s1 * s1 + REGULAR - m[2] * m[2] - m[3] * m[3];
-            if a.is_nan() || a <= 0.0 {
+            let d0 = a * s0 * s0 + REGULAR - less[0];
+            let b = b * s0 * s1 - less[1];
+            if d0.is_nan() || d0 <= 0.0 {
                 return false;
             }
-            let l0 = 1.0 / a.sqrt();
-            let l1 = b * l0;
-            let c = c - l1 * l1;
-            if c.is_nan() || c <= 0.0 {
+            let per_d0 = 1.0 / d0;
+            let l = b * per_d0;
+            let d1 = c * s1 * s1 + REGULAR - less[2] - b * l;
+            if d1.is_nan() || d1 <= 0.0 {
                 return false;
             }
-            let l2 = 1.0 / c.sqrt();
+            let per_d1 = 1.0 / d1;
+            let mut rows = [0.0; 4];
             if i < last {
                 let [t0, t1] = self.scale[i + 1];
                 let o = self.coupling[i];
-                let (y0, y1) = (o[0] * s0 * t0 * l0, o[1] * s0 * t1 * l0);
-                m = [y0, (o[2] * s1 * t0 - l1 * y0) * l2, y1, (o[3] * s1 * t1 - l1 * y1) * l2];
+                let (y00, y10) = (o[0] * s0 * t0, o[1] * s0 * t1);
+                let (y01, y11) = (o[2] * s1 * t0 - l * y00, o[3] * s1 * t1 - l * y10);
+                rows = [y00 * per_d0, y01 * per_d1, y10 * per_d0, y11 * per_d1];
+                less = [
+                    y00 * rows[0] + y01 * rows[1],
+                    y00 * rows[2] + y01 * rows[3],
+                    y10 * rows[2] + y11 * rows[3],
+                ];
             }
-            self.factor[i] = ([l0, l1, l2], m);
+            self.factor[i] = ([per_d0, l, per_d1], rows);
         }
         true
     }
@@ -158,29 +164,19 @@ impl Band {
 
     /// Forward and backward substitution in scaled unknowns.
     fn substitute(&mut self) {
-        let last = self.work.len() - 1;
         let (mut p, mut q) = (0.0, 0.0);
         let mut m = [0.0; 4];
-        for i in 0..=last {
-            let [s0, s1] = self.scale[i];
-            let (l, next) = self.factor[i];
-            let [z0, z1] = self.work[i];
-            let a = (z0 * s0 - m[0] * p - m[1] * q) * l[0];
-            let b = (z1 * s1 - m[2] * p - m[3] * q - l[1] * a) * l[2];
-            self.work[i] = [a, b];
-            (p, q, m) = (a, b, next);
+        for ((z, [s0, s1]), ([_, l, _], rows)) in self.work.iter_mut().zip(&self.scale).zip(&self.factor) {
+            let a = z[0] * s0 - m[0] * p - m[1] * q;
+            let b = z[1] * s1 - m[2] * p - m[3] * q - l * a;
+            *z = [a, b];
+            (p, q, m) = (a, b, *rows);
         }
         (p, q) = (0.0, 0.0);
-        for i in (0..=last).rev() {
-            let (l, m) = self.factor[i];
-            let [mut a, mut b] = self.work[i];
-            if i < last {
-                a -= m[0] * p + m[2] * q;
-                b -= m[1] * p + m[3] * q;
-            }
-            b *= l[2];
-            a = (a - l[1] * b) * l[0];
-            self.work[i] = [a, b];
+        for (z, ([per_d0, l, per_d1], m)) in self.work.iter_mut().zip(&self.factor).rev() {
+            let b = z[1] * per_d1 - (m[1] * p + m[3] * q);
+            let a = z[0] * per_d0 - (m[0] * p + m[2] * q) - l * b;
+            *z = [a, b];
             (p, q) = (a, b);
         }
     }
