@@ -46,19 +46,13 @@ impl<const M: usize> Model<M> for Exact {
             form[1] += turn * q2 * 1.5;
             form[2] += turn * q1 * 0.5;
         }
-        let mut local = expand(interval.h, &form, &[Lanes::ZERO; 3]);
         let pace = combine(&AT_NODES, u).sqrt().inverse();
         let pace_sq = pace * pace;
         let slope = WEIGHTS * pace * pace_sq * (-0.5 * interval.h);
-        let bend = slope * pace_sq * -1.5;
-        for j in 0..4 {
-            let g = bend * AT_NODES[j];
-            for i in 0..=j {
-                local.matrix[i][j] += (AT_NODES[i] * g).sum();
-            }
-            local.gradient[j] = (slope * AT_NODES[j]).sum();
+        Local {
+            matrix: expand(interval.h, &form, slope * pace_sq * -1.5),
+            gradient: AT_NODES.map(|basis| (basis * slope).sum()),
         }
-        local
     }
 
     #[inline(always)]

@@ -1,6 +1,6 @@
 //! What the interior point asks of a problem: its slacks, their steps, and its curvature, interval by interval.
 
-use super::hermite::{BEND, SLOPE, VALUE};
+use super::hermite::{AT_NODES, BEND, SLOPE, VALUE};
 use super::lanes::Lanes;
 use super::rows::Rows;
 
@@ -44,9 +44,9 @@ pub struct Local {
     pub gradient: [f64; 4],
 }
 
-/// A form and a linear form of (w, w', w'') in local coefficients.
+/// The upper half of a form of (w, w', w'') in local coefficients, with one of w at the nodes of the quadrature.
 #[inline(always)]
-pub fn expand(h: f64, form: &Form, linear: &[Lanes; 3]) -> Local {
+pub fn expand(h: f64, form: &Form, at_nodes: Lanes) -> [[f64; 4]; 4] {
     let per_h = 1.0 / h;
     let per_h2 = per_h * per_h;
     let m = [
@@ -59,15 +59,15 @@ pub fn expand(h: f64, form: &Form, linear: &[Lanes; 3]) -> Local {
     ];
     let mut matrix = [[0.0; 4]; 4];
     for j in 0..4 {
-        let (v, s, b) = (VALUE[j], SLOPE[j], BEND[j]);
+        let (v, s, b, node) = (VALUE[j], SLOPE[j], BEND[j], AT_NODES[j] * at_nodes);
         let p0 = m[0] * v + m[1] * s + m[2] * b;
         let p1 = m[1] * v + m[3] * s + m[4] * b;
         let p2 = m[2] * v + m[4] * s + m[5] * b;
         for i in 0..=j {
-            matrix[i][j] = (VALUE[i] * p0 + SLOPE[i] * p1 + BEND[i] * p2).sum();
+            matrix[i][j] = (VALUE[i] * p0 + SLOPE[i] * p1 + BEND[i] * p2 + AT_NODES[i] * node).sum();
         }
     }
-    Local { matrix, gradient: project(h, linear) }
+    matrix
 }
 
 /// A linear form of (w, w', w'') in local coefficients.

@@ -8,7 +8,7 @@
 
 use super::hermite::{local, MASS};
 use super::lanes::Lanes;
-use super::model::{expand, Local, Model};
+use super::model::{expand, project, Local, Model};
 use super::rows::{Order, Rows};
 
 /// The variables of the relaxation, one set of lanes for each interval.
@@ -87,7 +87,8 @@ impl<const M: usize> Model<M> for Relaxed {
         form[4] += -(p1 * cross[3]);
         form[5] += -(p2 * cross[3]);
         let cost = MASS * interval.h;
-        expand(interval.h, &form, &[-(p0 * cost), -(p1 * cost), -(p2 * cost)])
+        let linear = [-(p0 * cost), -(p1 * cost), -(p2 * cost)];
+        Local { matrix: expand(interval.h, &form, Lanes::ZERO), gradient: project(interval.h, &linear) }
     }
 
     #[inline(always)]
