@@ -43,7 +43,7 @@ pub struct Effort {
     pub deadline: Option<Instant>,
     /// The first μ in parts of the mean time per row: 1 from afar, less from a plan that is nearly optimal.
     pub barrier: f64,
-    /// Multipliers begin with those of the last solution on these intervals, where they are greater than by μ.
+    /// Multipliers begin as the last solution, of these intervals, left them; with those of μ where they are greater.
     pub warm: bool,
 }
 
@@ -86,7 +86,7 @@ pub struct InteriorPoint<X, const M: usize> {
     pub(super) rhs: Vec<f64>,
     pub(super) step: Vec<f64>,
     pub(super) trial: Vec<f64>,
-    /// What draws each node's (w, w') to the centre, for a target of 1, and the second order of the predictor.
+    /// On (w, w') of each node: the pull of the centre, for λ s of 1, and of the predictor's products.
     pub(super) pulls: Vec<[[f64; 2]; 2]>,
     /// Rows of one interval at a time: they stay in the nearest cache.
     pub(super) scratch: Vec<Lanes>,
@@ -217,6 +217,7 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         for vector in [&mut state.slack, &mut state.dual, &mut state.step] {
             vector.resize(count * Order::<M>::COUNT, Lanes::ONE);
         }
+        state.step.fill(Lanes::ZERO);
         self.scratch.resize(Order::<M>::COUNT, Lanes::ONE);
         self.pulls.resize(count + 1, [[0.0; 2]; 2]);
         for vector in [&mut self.gradient, &mut self.rhs, &mut self.step, &mut self.trial] {

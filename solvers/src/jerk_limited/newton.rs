@@ -12,7 +12,7 @@ pub struct State {
     /// Slacks, from `attempt` to `assemble`; from there on 1/slack.
     pub slack: Vec<Lanes>,
     pub dual: Vec<Lanes>,
-    /// The product of the predictor's steps of slack and λ, negative; after the corrector the step of λ.
+    /// −ds dλ of the predictor, at most so great; after the corrector dλ.
     pub step: Vec<Lanes>,
 }
 
@@ -55,8 +55,8 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         work
     }
 
-    /// The sum of λ s, which is `work` now, at the end of the predictor's longest step; what draws to the centre and,
-    /// each at most `most`, the predictor's products.
+    /// The sum of λ s, which is `work` now, at the end of the predictor's longest step. Keeps the predictor's products
+    /// −ds dλ, each at most `most`, and the pulls of them and of the centre on each node.
     pub(super) fn predict(&mut self, rows: &Rows<M>, work: f64, most: f64) -> f64 {
         self.pulls.fill([[0.0; 2]; 2]);
         let state = &mut self.state;
@@ -107,8 +107,8 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         work + p * sums[0] - d * (work + sums[0]) - p * d * (sums[0] + sums[1])
     }
 
-    /// The right-hand side of the corrector: λ s of every row towards `target`, less `second` times the predictor's
-    /// product.
+    /// The right-hand side of the corrector: λ s of every row towards `target`, with `second` times the predictor's
+    /// products.
     pub(super) fn correct(&mut self, target: f64, second: f64) {
         for ((rhs, gradient), pulls) in
             self.rhs.chunks_exact_mut(2).zip(self.gradient.chunks_exact(2)).zip(&self.pulls)

@@ -22,8 +22,9 @@ const ROUNDS: usize = 10;
 const ROUGH: (f64, f64) = (1e-4, 0.97);
 /// Peaks that stand out by more, in parts of what the points use, move before the end.
 const FIRM: f64 = 1.05;
-/// What of the way back to the first plan is tried to be inside tightened limits; the start is as far again from them.
+/// What of the way back to the first plan is tried to be inside tightened limits …
 const BACK: [f64; 13] = [3e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3];
+/// … and how many times as far the start is, not to begin on a limit.
 const FURTHER: f64 = 2.0;
 /// The barrier to begin with there, in parts of the way back.
 const BARRIER: f64 = 0.03;
