@@ -310,7 +310,7 @@ fn windows_agree_where_the_optimum_lies_on_limits_all_along() {
     let whole = plan(&problem, &Effort { window: usize::MAX, ..Effort::default() }).expect("a plan");
     let windows = plan(&problem, &Effort { window: 1000, ..Effort::default() }).expect("a plan");
     assert!(whole.converged && windows.converged);
-    assert!(whole.iterations < 45.0, "{} iterations", whole.iterations);
+    assert!(whole.iterations < 60.0, "{} iterations", whole.iterations);
     let loss = windows.time / whole.time - 1.0;
     assert!(loss < 1e-6, "{loss:e}");
     assert_held(&problem, &windows.profile);
