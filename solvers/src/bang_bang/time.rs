@@ -58,7 +58,7 @@ fn rule(rate: &impl Fn([f64; NODES]) -> [f64; NODES], a: f64, b: f64) -> f64 {
     let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
     let node = |i: usize| {
         let (x, weight) = HALF[i / 2];
-        (if i % 2 == 0 { -x } else { x }, weight)
+        (if i.is_multiple_of(2) { -x } else { x }, weight)
     };
     let rates = rate(std::array::from_fn(|i| middle + half * node(i).0));
     half * rates.iter().enumerate().map(|(i, rate)| node(i).1 * rate).sum::<f64>()
