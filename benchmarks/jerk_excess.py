@@ -46,14 +46,7 @@ def jerk_excess(problem: Problem, profile: SpeedProfile, samples: int = 20) -> E
     width = problem.path.width[profile.piece]
     inside = np.clip(u, 1e-9 * width[:, None], (1 - 1e-9) * width[:, None])
     v, a, j = _motion(problem, profile, s)
-    d = _speed_sq(problem, piece, inside.ravel(), 2)
-    q = problem.derivatives(piece, inside.ravel(), 3)
-    u1 = 1 / np.sqrt(d[0])
-    u2 = -d[1] / (2 * d[0] ** 2)
-    u3 = u1 * (d[1] ** 2 / d[0] ** 3 - d[2] / (2 * d[0] ** 2))
-    q1 = q[1] * u1[:, None]
-    q2 = q[2] * u1[:, None] ** 2 + q[1] * u2[:, None]
-    q3 = q[3] * u1[:, None] ** 3 + 3 * q[2] * (u1 * u2)[:, None] + q[1] * u3[:, None]
+    q1, q2, q3 = _by_length(problem, piece, inside.ravel())
     v, a, j = (x.ravel()[:, None] for x in (v, a, j))
     velocity = np.abs(q1 * v) / problem.max_velocity
     acceleration = np.abs(q2 * v**2 + q1 * a) / problem.max_acceleration
@@ -84,6 +77,25 @@ def jerk_excess(problem: Problem, profile: SpeedProfile, samples: int = 20) -> E
         *(float(used.max()) - 1 for used in (velocity, acceleration, jerk, feed, chord)),
         max(float(gap.max(initial=0.0)) for gap in gaps),
     )
+
+
+def _by_length(problem: Problem, piece: NDArray[np.integer], u: Array) -> tuple[Array, Array, Array]:
+    """Derivatives of the axes by the length of the tool's way (places, axes) up to the third."""
+    _, c1, c2, c3 = problem.derivatives(piece, u, 3)
+    if problem.tip_speed is None:
+        # With T the direction and P = I - T Tᵀ: nothing across a straight way, whatever the parameter's speed.
+        d = (c1**2).sum(axis=1, keepdims=True)
+        tangent = c1 / np.sqrt(d)
+        along = (tangent * c2).sum(axis=1, keepdims=True)
+        bent = c2 - tangent * along
+        twisted = c3 - tangent * (tangent * c3).sum(axis=1, keepdims=True)
+        curvature = bent / d
+        turning = (curvature**2).sum(axis=1, keepdims=True)
+        return tangent, curvature, (twisted - 3 * bent * along / np.sqrt(d)) / d**1.5 - turning * tangent
+    d, d1, d2 = (rate[:, None] for rate in _speed_sq(problem, piece, u, 2))
+    u1, u2 = 1 / np.sqrt(d), -d1 / (2 * d**2)
+    u3 = u1 * (d1**2 / d**3 - d2 / (2 * d**2))
+    return c1 * u1, c2 * u1**2 + c1 * u2, c3 * u1**3 + 3 * c2 * u1 * u2 + c1 * u3
 
 
 def _motion(problem: Problem, profile: SpeedProfile, s: Array) -> tuple[Array, Array, Array]:

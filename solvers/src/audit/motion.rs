@@ -304,7 +304,11 @@ impl<const M: usize> Motion<M> {
             Law::SpeedLine { start_sq, change_sq } => {
                 (start_sq + change_sq * (d / self.width).abs()).sqrt() / length(tangent)
             }
-            Law::Along => self.speed_by_way(d) / length(tangent),
+            // At rest p is 0 also where C' vanishes: from there the length grows faster than C'.
+            Law::Along => match self.speed_by_way(d) {
+                0.0 => 0.0,
+                speed => speed / length(tangent),
+            },
         }
     }
 
@@ -518,6 +522,25 @@ pub fn curvature<const M: usize>(tangent: &[f64; M], bend: &[f64; M]) -> f64 {
 mod tests {
     use super::*;
     use crate::audit::curve::Quadratic;
+
+    #[test]
+    fn at_rest_where_the_tangent_vanishes_velocities_are_zero() {
+        // x = u³ by s = t³: u̇ = 1, but at u = 0 both v and C' vanish.
+        let piece = Polygon::new([[0.0; 2], [0.0; 2], [0.0; 2], [1.0, 0.0]].into_iter(), &[]);
+        let part = Box::new(piece.part(0.0, 1.0));
+        let shape = Shape::General {
+            whole: Box::new(piece),
+            ends: [0.0, 1.0],
+            part,
+            tangent: [0.0; 2],
+            size: [3.0, 0.0],
+        };
+        let start = Pace { v: 0.0, a: 0.0, j: 6.0 };
+        let motion = Motion::new(Law::Along, shape, 1.0, [0.0, 1.0], false)
+            .with_along(|_| Along::Jerk { start, duration: 1.0 });
+        assert_eq!(motion.velocity(0.0), [0.0; 2]);
+        assert!((motion.velocity(1.0)[0] - 3.0).abs() < 1e-12);
+    }
 
     #[test]
     fn a_parabola_is_most_curved_at_its_tip() {

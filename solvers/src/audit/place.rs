@@ -44,12 +44,18 @@ impl Slope {
         c1 + t * (2.0 * c2 + t * (3.0 * c3))
     }
 
-    /// The root between `a`, where the slope is negative, and `b`, where it is not: Newton, halved when it strays.
+    /// Whether the distance falls at `t`, also where it only begins to, as at a cusp.
+    fn falls(&self, t: f64) -> bool {
+        let slope = self.at(t);
+        slope < 0.0 || (slope == 0.0 && self.derivative(t) < 0.0)
+    }
+
+    /// The root between `a`, where the distance falls, and `b`, where it does not: Newton, halved when it strays.
     fn root(&self, mut a: f64, mut b: f64) -> f64 {
         let mut t = a;
         for _ in 0..100 {
             let f = self.at(t);
-            if f < 0.0 {
+            if f < 0.0 || t == a {
                 a = t;
             } else {
                 b = t;
@@ -92,11 +98,11 @@ pub fn first_minimum<const M: usize>(curve: &Curve<M>, q: &[f64; M], from: f64) 
     match curve {
         Curve::Quadratic(quadratic) => {
             let slope = Slope::new(quadratic, q);
-            if slope.at(t0) < 0.0 {
+            if slope.falls(t0) {
                 (u, falls) = (width, true);
                 let ends = slope.monotone_parts(t0);
                 for i in 0..3 {
-                    if slope.at(ends[i + 1]) >= 0.0 {
+                    if !slope.falls(ends[i + 1]) {
                         (u, falls) = (slope.root(ends[i], ends[i + 1]) * width, false);
                         break;
                     }
@@ -127,7 +133,7 @@ pub fn all_minima<const M: usize>(
         Curve::Quadratic(quadratic) => {
             let slope = Slope::new(quadratic, q);
             let ends = slope.monotone_parts(t0);
-            let falls = ends.map(|t| slope.at(t) < 0.0);
+            let falls = ends.map(|t| slope.falls(t));
             found(from);
             for i in 0..3 {
                 if falls[i] && !falls[i + 1] {
@@ -296,6 +302,17 @@ mod tests {
         let on_the_way_back = |place: Place| if place.piece == 1 { 0.0 } else { 1.0 };
         let found = next(Place { piece: 0, u: 2.0 }, [3.0, 0.0], on_the_way_back);
         assert_eq!((found.place.piece, found.error), (1, 0.0));
+    }
+
+    #[test]
+    fn from_a_start_at_rest_the_next_place_is_ahead() {
+        let curve = Curve::Quadratic(Quadratic::new(&[[0.0, 0.0], [0.0, 0.0], [3.0, 0.0]], 1.0));
+        for x in [1e-9, 0.01, 2.0] {
+            let (u, off, falls) = first_minimum(&curve, &[x, 0.0], 0.0);
+            assert!(!falls && off < 1e-13, "{x}: {u} is {off} off");
+            assert!(distance_to_piece(&curve, &[x, 0.0]) < 1e-13);
+        }
+        assert_eq!(first_minimum(&curve, &[-1.0, 0.0], 0.0), (0.0, 1.0, false));
     }
 
     proptest! {

@@ -363,14 +363,16 @@ impl<const M: usize> Polygon<M> {
         self.steps[..self.degree].iter().all(|step| inner(step, &chord) >= size * length(step))
     }
 
-    /// (C − q)·C' at t, and |C'|².
+    /// (C − q)·C' at t, and |C'|²; at a start where C' vanishes, the direction of the first motion stands for it.
     fn fall(&self, q: &[f64; M], t: f64) -> [f64; 2] {
         let Local { way, slope } = self.local(t);
+        let square = inner(&slope, &slope);
+        let along = if square == 0.0 && t == 0.0 { self.direction() } else { slope };
         let mut fall = 0.0;
         for k in 0..M {
-            fall += (self.start[k] - q[k] + way[k]) * slope[k];
+            fall += (self.start[k] - q[k] + way[k]) * along[k];
         }
-        [fall, inner(&slope, &slope)]
+        [fall, square]
     }
 
     /// The minimum between `a`, where the distance falls, and `b`, where it does not: Newton as if the piece were
@@ -546,6 +548,19 @@ mod tests {
     fn a_piece_that_starts_at_rest_has_the_direction_of_its_first_motion() {
         let polygon = Polygon::new([[1.0, 1.0], [1.0, 1.0], [4.0, 5.0]].into_iter(), &[]);
         assert_eq!(polygon.direction(), [0.6, 0.8]);
+    }
+
+    #[test]
+    fn from_a_start_at_rest_the_next_place_is_ahead() {
+        let piece = Polygon::new([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0], [3.0, 0.0]].into_iter(), &[]);
+        for x in [1e-9, 0.01, 2.0] {
+            let (t, falls_on) = piece.first_minimum(&[x, 0.0], 0.0);
+            assert!(!falls_on && (piece.at(t)[0] - x).abs() < 1e-13, "{x}: {t}");
+            let mut nearest = f64::INFINITY;
+            piece.all_minima(&[x, 0.0], 0.0, &mut |t| nearest = nearest.min((piece.at(t)[0] - x).abs()));
+            assert!(nearest < 1e-13, "{x}: {nearest}");
+        }
+        assert_eq!(piece.first_minimum(&[-1.0, 0.0], 0.0), (0.0, false));
     }
 
     proptest! {

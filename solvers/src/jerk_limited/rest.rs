@@ -1,15 +1,22 @@
 //! The ramp from rest: constant jerk along the path, w = c s^(4/3).
 
+use std::ops::Range;
+
 use super::{Geometry, Limits, SpeedCap};
 
 /// Ramps are this part of the length on which constant jerk reaches the acceleration or the speed …
 const RAMP: f64 = 1.0 / 90.0;
 /// … and at most this part of the path.
 const PART: f64 = 1.0 / 400.0;
-/// Samples of a piece of the path under a ramp.
-const SAMPLES: usize = 32;
-/// Rounds of sampling, each between the places beside the worst one.
-const ROUNDS: usize = 3;
+/// Places of a piece under a ramp, even in time: halved at least and at most so often …
+const DEPTH: Range<u32> = 4..40;
+/// … where the greatest speed between them changes by more than this in logarithm, and they are further apart than this
+/// part of their time.
+const CHANGE: f64 = 0.05;
+const APART: f64 = 1e-5;
+/// Places between those beside the worst one, and how often they are taken anew.
+const PLACES: usize = 16;
+const ROUNDS: usize = 2;
 
 /// The length of the ramps of a path, in mm, from |q'| of its axes at the end.
 pub fn length<const M: usize>(limits: &Limits<M>, first: &[f64; M], path: f64) -> f64 {
@@ -45,12 +52,12 @@ pub fn greatest<const M: usize>(
         if start >= stop {
             continue;
         }
-        let at = |s: f64| {
-            let place = geometry.at(piece, s);
-            let x = if end == 0 { s } else { total - s };
-            let root = x.cbrt();
+        // By t, where t³ is the distance from rest.
+        let at = |t: f64| {
+            let x = t * t * t;
+            let place = geometry.at(piece, if end == 0 { x } else { total - x });
             // w, w' and √w w'' over c, c and c^(3/2), and w^(3/2), √w w' alike.
-            let (w, w1) = (x * root, sign * 4.0 / 3.0 * root);
+            let (w, w1) = (x * t, sign * 4.0 / 3.0 * t);
             let (cubed, crossed, bend) = (x * x, sign * 4.0 / 3.0 * x, 4.0 / 9.0);
             let mut c = 1.0 / (limits.per_speed_sq(&place) * w);
             for k in 0..M {
@@ -59,21 +66,19 @@ pub fn greatest<const M: usize>(
                 let j = (q3 * cubed + 1.5 * q2 * crossed + 0.5 * q1 * bend).abs();
                 c = c.min(limits.acceleration[k] / a).min((limits.jerk[k] / j).cbrt().powi(2));
             }
-            c
+            (t, c)
         };
-        let (mut from, mut to) = (start, stop);
-        for _ in 0..ROUNDS {
-            let place = |i: usize| from + (to - from) * i as f64 / SAMPLES as f64;
-            let (mut worst, mut least) = (0, f64::INFINITY);
-            for i in 0..=SAMPLES {
-                let here = at(place(i));
-                if here < least {
-                    (worst, least) = (i, here);
-                }
-            }
-            c = c.min(least);
+        let distances = if end == 0 { [start, stop] } else { [total - stop, total - start] };
+        let ends = distances.map(|x| at(x.cbrt()));
+        let mut places = vec![ends[0]];
+        halve(&at, ends, 0, &mut places);
+        for _ in 0..=ROUNDS {
+            let worst = (0..places.len()).fold(0, |i, j| if places[j].1 < places[i].1 { j } else { i });
+            c = c.min(places[worst].1);
             // Between its neighbours it may be less.
-            (from, to) = (place(worst.saturating_sub(1)), place((worst + 1).min(SAMPLES)));
+            let beside = [worst.saturating_sub(1), (worst + 1).min(places.len() - 1)].map(|i| places[i].0);
+            let place = |i: usize| beside[0] + (beside[1] - beside[0]) * i as f64 / PLACES as f64;
+            places = (0..=PLACES).map(|i| at(place(i))).collect();
         }
     }
     for cap in caps {
@@ -83,6 +88,18 @@ pub fn greatest<const M: usize>(
         }
     }
     c * ramp * ramp.cbrt() * (1.0 - 1e-9)
+}
+
+/// Appends places, and the greatest c there, from the last of them to the end of a range.
+fn halve(at: &impl Fn(f64) -> (f64, f64), [a, b]: [(f64, f64); 2], depth: u32, places: &mut Vec<(f64, f64)>) {
+    let middle = at(0.5 * (a.0 + b.0));
+    let changes = (middle.1 * middle.1 / (a.1 * b.1)).ln().abs() > CHANGE && b.0 - a.0 > APART * b.0;
+    if depth < DEPTH.start || (changes && depth < DEPTH.end) {
+        halve(at, [a, middle], depth + 1, places);
+        halve(at, [middle, b], depth + 1, places);
+    } else {
+        places.extend([middle, b]);
+    }
 }
 
 #[cfg(test)]
