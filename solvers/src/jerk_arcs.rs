@@ -212,18 +212,27 @@ impl Arcs {
             u.extend(s[first..=end].iter().map(|&s| path.locate(part, s)));
             u.push(at.u[1]);
             let lengths: Vec<f64> = u.windows(2).map(|u| path.between(part, u[0], u[1])).collect();
-            let states = settled(profile, first..end + 1, [knots[part], knots[part + 1]], &lengths);
+            let mut states = settled(profile, first..end + 1, [knots[part], knots[part + 1]], &lengths);
             let count = states.len();
             if first == 0 && s[0] > ends[0] {
                 let rest = State { s: ends[0], v: 0.0, a: 0.0 };
-                if part == 0 {
-                    let (jerk, duration) = ramp(lengths[0], states[0].v);
+                let within = part == 0;
+                let length = if within { lengths[0] } else { s[0] - ends[0] };
+                let (jerk, duration) = ramp(length, states[0].v);
+                states[0].a = jerk * duration;
+                if within {
                     let arc = Arc { kind: PATH_JERK, value: jerk, ends: [rest, states[0]], duration };
                     self.push(problem, at.piece, [u[0], u[1]], &arc);
                 } else {
-                    let (jerk, duration) = ramp(s[0] - ends[0], states[0].v);
-                    self.push_jerk(problem, path, [rest, State { s: s[0], ..states[0] }], jerk, duration);
+                    self.push_jerk(problem, path, [rest, states[0]], jerk, duration);
                 }
+            }
+            let stops = end == last && s[last] < ends[1];
+            let within = part + 1 == path.parts.len();
+            let length = if within { lengths[count] } else { ends[1] - s[last] };
+            let (jerk, duration) = ramp(length, states[count - 1].v);
+            if stops {
+                states[count - 1].a = -jerk * duration;
             }
             for n in 1..count {
                 let ends = [states[n - 1], states[n]];
@@ -235,16 +244,14 @@ impl Arcs {
                     &Arc { kind: SPEED_CUBIC, value: 0.0, ends, duration },
                 );
             }
-            if end == last && s[last] < ends[1] {
+            if stops {
                 let rest = State { s: ends[1], v: 0.0, a: 0.0 };
                 let from = states[count - 1];
-                if part + 1 == path.parts.len() {
-                    let (jerk, duration) = ramp(lengths[count], from.v);
+                if within {
                     let arc = Arc { kind: PATH_JERK, value: jerk, ends: [from, rest], duration };
                     self.push(problem, at.piece, [u[count], u[count + 1]], &arc);
                 } else {
-                    let (jerk, duration) = ramp(ends[1] - s[last], from.v);
-                    self.push_jerk(problem, path, [State { s: s[last], ..from }, rest], jerk, duration);
+                    self.push_jerk(problem, path, [from, rest], jerk, duration);
                 }
             }
             first = end;
@@ -252,7 +259,8 @@ impl Arcs {
     }
 }
 
-/// Jerk and duration of a ramp from rest to a speed: s = J t³/6 and v = J t²/2, so that t = 3 s/v.
+/// Jerk and duration of a ramp from rest to a speed: s = J t³/6 and v = J t²/2, so that t = 3 s/v. The acceleration
+/// there is J t, to rounding: the profile's own is of a length that rounding of u has changed.
 fn ramp(length: f64, v: f64) -> (f64, f64) {
     let t = 3.0 * length / v;
     (2.0 * v / (t * t), t)

@@ -352,9 +352,8 @@ impl<const M: usize> Motion<M> {
 
     /// Axis velocities where C' is 0 and p infinite: along the direction of the piece there, at the law's speed.
     fn velocity_at_cusp(&self, general: &General<M>, y: f64) -> [f64; M] {
-        let along = if y < 0.5 { 1.0 } else { -1.0 };
-        let direction = if y < 0.5 { general.part.direction() } else { general.part.reversed().direction() };
-        let direction = direction.map(|e| along * self.direction * e);
+        let direction = if y < 0.5 { general.part.direction() } else { general.part.end_direction() };
+        let direction = direction.map(|e| self.direction * e);
         let speed = match self.law {
             Law::AxisAcceleration { axis, value, start_sq } => {
                 let way = general.part.local(y.round()).way[axis];
