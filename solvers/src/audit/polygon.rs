@@ -15,8 +15,10 @@ use super::curve::{distance, inner, length};
 /// Greatest degree.
 pub const MOST: usize = 9;
 
-/// Halvings of a piece, at most, until its parts are nearly straight.
-const MOST_HALVINGS: u32 = 6;
+/// Halvings of a piece, at most, until its parts are nearly straight, or shorter than this, in mm: in a sharp turn the
+/// distance from a place that is passed twice falls, rises and falls again.
+const MOST_HALVINGS: u32 = 30;
+const SHORT: f64 = 1e-7;
 
 /// Cosine of the greatest angle between the steps of a nearly straight part and the line between its ends.
 const NEARLY_STRAIGHT: f64 = 0.9;
@@ -364,10 +366,15 @@ impl<const M: usize> Polygon<M> {
             return true;
         }
         let mut chord = [0.0; M];
+        let mut way = 0.0;
         for step in &self.steps[..self.degree] {
+            way += length(step);
             for k in 0..M {
                 chord[k] += step[k];
             }
+        }
+        if way <= SHORT {
+            return true;
         }
         let size = NEARLY_STRAIGHT * length(&chord);
         self.steps[..self.degree].iter().all(|step| inner(step, &chord) >= size * length(step))
@@ -564,6 +571,17 @@ mod tests {
     fn a_piece_that_starts_at_rest_has_the_direction_of_its_first_motion() {
         let polygon = Polygon::new([[1.0, 1.0], [1.0, 1.0], [4.0, 5.0]].into_iter(), &[]);
         assert_eq!(polygon.direction(), [0.6, 0.8]);
+    }
+
+    #[test]
+    fn a_place_before_a_sharp_turn_is_found_before_it() {
+        // x = (t − 1/3)², with a y that keeps it from standing still.
+        let piece = Polygon::new([[1.0 / 9.0, 0.0], [-2.0 / 9.0, 5e-7], [4.0 / 9.0, 1e-6]].into_iter(), &[]);
+        for before in [1e-3, 1e-2, 0.1] {
+            let q = piece.at(1.0 / 3.0 - before);
+            let (t, falls_on) = piece.first_minimum(&q, 0.1);
+            assert!(!falls_on && (t - (1.0 / 3.0 - before)).abs() < 1e-6, "{before}: {t}");
+        }
     }
 
     #[test]
