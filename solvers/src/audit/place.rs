@@ -1,6 +1,6 @@
 //! Finds the place of a point on the path: the nearest place of a piece, and the next place along the path.
 
-use super::curve::{distance, Curve, Followed, Quadratic};
+use super::curve::{distance, length, Curve, Followed, Quadratic};
 
 /// A place on the path.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,57 +13,62 @@ pub struct Place {
 /// A Newton step of this share of the piece is the last one: its error is about the square of that.
 const CLOSE: f64 = 1e-7;
 
-/// Where C' vanishes at the start of a piece, rounding leaves this part of it.
-const BEGINS: f64 = 1e-13;
+/// At an end where C' is this part of what it is elsewhere it is rounding.
+const STILL: f64 = 1e-12;
 
-/// (C(u) − q)·C'(u) as a cubic in t = u / width, up to a factor: where it turns from negative to positive the
-/// distance has a local minimum.
-struct Slope([f64; 4]);
+/// (C(u) − q)·C'(u) in t = u / width, up to a factor, a cubic: where it turns from negative to positive the distance has
+/// a local minimum. It is taken as the product: of its coefficients nothing is left next to a place where C' vanishes.
+struct Slope<const M: usize> {
+    off: [f64; M],
+    first: [f64; M],
+    bend: [f64; M],
+}
 
-impl Slope {
+impl<const M: usize> Slope<M> {
     #[inline]
-    fn new<const M: usize>(curve: &Quadratic<M>, q: &[f64; M]) -> Self {
-        let mut cubic = [0.0; 4];
-        for k in 0..M {
-            let (first, bend, off) =
-                (curve.first[k], curve.second[k] - curve.first[k], curve.start[k] - q[k]);
-            cubic[0] += off * first;
-            cubic[1] += 2.0 * first * first + off * bend;
-            cubic[2] += 3.0 * first * bend;
-            cubic[3] += bend * bend;
+    fn new(curve: &Quadratic<M>, q: &[f64; M]) -> Self {
+        Self {
+            off: std::array::from_fn(|k| curve.start[k] - q[k]),
+            first: curve.first,
+            bend: std::array::from_fn(|k| curve.second[k] - curve.first[k]),
         }
-        Self(cubic)
     }
 
+    /// (C − q)·C' at t, and its derivative.
     #[inline(always)]
-    fn at(&self, t: f64) -> f64 {
-        let [c0, c1, c2, c3] = self.0;
-        c0 + t * (c1 + t * (c2 + t * c3))
+    fn at(&self, t: f64) -> [f64; 2] {
+        let (mut slope, mut derivative) = (0.0, 0.0);
+        for k in 0..M {
+            let away = self.off[k] + t * (2.0 * self.first[k] + t * self.bend[k]);
+            let tangent = self.first[k] + t * self.bend[k];
+            slope += away * tangent;
+            derivative += 2.0 * tangent * tangent + away * self.bend[k];
+        }
+        [slope, derivative]
     }
 
-    #[inline(always)]
-    fn derivative(&self, t: f64) -> f64 {
-        let [_, c1, c2, c3] = self.0;
-        c1 + t * (2.0 * c2 + t * (3.0 * c3))
-    }
-
-    /// Whether the distance falls at `t`, also where it only begins to, as at a cusp.
+    /// Whether the distance falls at `t`. Where C' is rounding, at an end, the motion beside it tells.
     fn falls(&self, t: f64) -> bool {
-        let slope = self.at(t);
-        slope < 0.0 || slope < -BEGINS * self.derivative(t)
+        let tangent: [f64; M] = std::array::from_fn(|k| self.first[k] + t * self.bend[k]);
+        if length(&tangent) > STILL * length(&self.bend) {
+            return self.at(t)[0] < 0.0;
+        }
+        let inwards = if t < 0.5 { 1.0 } else { -1.0 };
+        let away = |k: usize| self.off[k] + t * (2.0 * self.first[k] + t * self.bend[k]);
+        (0..M).map(|k| away(k) * inwards * self.bend[k]).sum::<f64>() < 0.0
     }
 
     /// The root between `a`, where the distance falls, and `b`, where it does not: Newton, halved when it strays.
     fn root(&self, mut a: f64, mut b: f64) -> f64 {
         let mut t = a;
         for _ in 0..100 {
-            let f = self.at(t);
+            let [f, derivative] = self.at(t);
             if f < 0.0 || t == a {
                 a = t;
             } else {
                 b = t;
             }
-            let newton = t - f / self.derivative(t);
+            let newton = t - f / derivative;
             if newton > a && newton < b {
                 if (newton - t).abs() <= CLOSE {
                     return newton;
@@ -81,7 +86,13 @@ impl Slope {
 
     /// The ends of the parts of [t0, 1] on which the slope only rises or only falls.
     fn monotone_parts(&self, t0: f64) -> [f64; 4] {
-        let [_, c1, c2, c3] = self.0;
+        let (mut c1, mut c2, mut c3) = (0.0, 0.0, 0.0);
+        for k in 0..M {
+            let (off, first, bend) = (self.off[k], self.first[k], self.bend[k]);
+            c1 += 2.0 * first * first + off * bend;
+            c2 += 3.0 * first * bend;
+            c3 += bend * bend;
+        }
         let discriminant = c2 * c2 - 3.0 * c3 * c1;
         if c3 == 0.0 || discriminant <= 0.0 {
             return [t0, t0, 1.0, 1.0];
@@ -305,6 +316,16 @@ mod tests {
         let on_the_way_back = |place: Place| if place.piece == 1 { 0.0 } else { 1.0 };
         let found = next(Place { piece: 0, u: 2.0 }, [3.0, 0.0], on_the_way_back);
         assert_eq!((found.place.piece, found.error), (1, 0.0));
+    }
+
+    #[test]
+    fn a_place_next_to_an_end_at_rest_is_before_it() {
+        for step in [0.0, -1e-15] {
+            let points = [[-61.0, 0.0], [-19.0, 0.0], [-19.0 + step, 0.0]];
+            let curve = Curve::Quadratic(Quadratic::new(&points, 1.0));
+            let (u, off, falls) = first_minimum(&curve, &[-19.0 - 42.0 * 1e-12, 0.0], 0.99);
+            assert!(!falls && off < 1e-13 && (1.0 - u - 1e-6).abs() < 1e-8, "{u} is {off} off");
+        }
     }
 
     #[test]
