@@ -34,8 +34,9 @@ const MOST_ROWS: usize = 2000;
 const DEPTH: u32 = 48;
 /// Parts of a piece between places at which the speed is looked at.
 const PLACES: usize = 8;
-/// Newton steps to a place; the quintic is so near that one or two do.
-const STEPS: usize = 8;
+/// Steps to a place: the quintic is so near that one or two of Newton's do, but next to a cusp, where they stray, halving
+/// needs as many as u has bits.
+const STEPS: usize = 64;
 /// Tangents of a straight piece are off its direction by no more than this part of the longest.
 const OFF_LINE: f64 = 1e-12;
 /// Derivatives are asked for at least so far from a place where D vanishes, as a part of the length.
