@@ -12,7 +12,7 @@ from feedplan.constraints.problem import Problem
 from feedplan.profile import ArcKind, SpeedProfile
 
 Array = NDArray[np.float64]
-NODES, WEIGHTS = leggauss(12)
+NODES, WEIGHTS = leggauss(20)
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def _by_length(problem: Problem, piece: NDArray[np.integer], u: Array) -> tuple[
     """Derivatives of the axes by the length of the tool's way (places, axes) up to the third."""
     _, c1, c2, c3 = problem.derivatives(piece, u, 3)
     if problem.tip_speed is None:
-        # With T the direction and P = I - T Tᵀ: nothing across a straight way, whatever the parameter's speed.
+        # With T the direction and P = I - T Tᵀ: nothing across a straight way at any parameter speed.
         d = (c1**2).sum(axis=1, keepdims=True)
         tangent = c1 / np.sqrt(d)
         along = (tangent * c2).sum(axis=1, keepdims=True)

@@ -14,6 +14,11 @@ from feedplan.machine.machine import Axis, Machine
 
 def random_problem(seed: int) -> Problem:
     """A B-spline of degree 2 to 5 in one to three axes, rational or not, smooth or with double knots."""
+    return random_case(seed)[0]
+
+
+def random_case(seed: int) -> tuple[Problem, Machine]:
+    """The same with its machine."""
     rng = np.random.default_rng(seed)
     degree, axes = int(rng.integers(2, 6)), int(rng.integers(1, 4))
     count = degree + 1 + int(rng.integers(0, 20 if rng.random() < 0.5 else 6))
@@ -32,4 +37,6 @@ def random_problem(seed: int) -> Problem:
     curve = CompositeCurve.from_nurbs(points, knots, degree, weights)
     path = Path.from_curve(curve, axes=tuple("XYZ"[:axes]), feed=10 ** rng.uniform(0.5, 3))
     problem = build_problem(path, machine)
-    return problem if rng.random() < 0.5 else replace(problem, chord_tolerance=np.inf)
+    if rng.random() >= 0.5:
+        problem = replace(problem, chord_tolerance=np.inf)
+    return problem, machine
