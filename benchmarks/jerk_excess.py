@@ -13,6 +13,8 @@ from feedplan.profile import ArcKind, SpeedProfile
 
 Array = NDArray[np.float64]
 NODES, WEIGHTS = leggauss(20)
+# How far inside the ends of an arc limits are looked at, as a part of it.
+INSET = 1e-7
 
 
 @dataclass(frozen=True)
@@ -36,17 +38,15 @@ class Excess:
 
 
 def jerk_excess(problem: Problem, profile: SpeedProfile, samples: int = 20) -> Excess:
-    """The excess at `samples` places of each arc, both its ends among them."""
-    count = len(profile)
-    t = np.linspace(0.0, 1.0, samples)
-    # u is rounded: what lies next to its ends is looked at there.
+    """The excess at `samples` places of each arc from end to end."""
+    # Both ends, and the places; those next to the ends a little inside, where every curve has a direction.
+    t = np.concatenate([[0.0], np.linspace(INSET, 1 - INSET, samples), [1.0]])
     u = profile.u0[:, None] + (profile.u1 - profile.u0)[:, None] * t
-    piece = np.repeat(profile.piece, samples)
     s = lengths(problem, profile.piece, profile.u0, u)
-    width = problem.path.width[profile.piece]
-    inside = np.clip(u, 1e-9 * width[:, None], (1 - 1e-9) * width[:, None])
-    v, a, j = _motion(problem, profile, s)
+    pace = _motion(problem, profile, s)
+    piece, inside = np.repeat(profile.piece, samples), u[:, 1:-1]
     q1, q2, q3 = _by_length(problem, piece, inside.ravel())
+    v, a, j = (x[:, 1:-1] for x in pace)
     v, a, j = (x.ravel()[:, None] for x in (v, a, j))
     velocity = np.abs(q1 * v) / problem.max_velocity
     acceleration = np.abs(q2 * v**2 + q1 * a) / problem.max_acceleration
@@ -62,9 +62,8 @@ def jerk_excess(problem: Problem, profile: SpeedProfile, samples: int = 20) -> E
         with np.errstate(divide="ignore"):
             limit = np.where(curvature * delta < 1, 8 * delta / curvature - 4 * delta**2, 4 * delta**2)
         chord = v[:, 0] * problem.period / np.sqrt(limit)
-    shape = (count, samples)
-    v, a = v.reshape(shape), a.reshape(shape)
-    joined = np.ones(count - 1, dtype=bool)
+    v, a, _ = pace
+    joined = np.ones(len(profile) - 1, dtype=bool)
     joined[profile.runs[1:-1] - 1] = False
     gaps = [
         np.abs(v[1:, 0] - v[:-1, -1])[joined] / v.max(),
