@@ -17,7 +17,7 @@ EXACT = "bang-bang"
 MOST_PIECES = {"casadi": 100, "clarabel": 1000, "toppra": 100, "ruckig": 100}
 QUICK = ("lemniscate", "spline-10")
 # What solvers on a mesh are asked for, and when they give up [s].
-ACCURACY, TIME_LIMIT = 1e-3, 20.0
+ACCURACY, TIME_LIMIT = 1e-3, 10.0
 
 
 def run(quick: bool = False) -> Result:

@@ -11,6 +11,8 @@ from feedplan.constraints.problem import Problem
 from feedplan.planners import toppra
 
 VERSION = metadata.version("toppra")
+# The part of the accuracy that the error of a mesh near the coarsest uses.
+USED = 0.8
 
 
 @dataclass(frozen=True)
@@ -30,17 +32,17 @@ def solve(problem: Problem, cells: int) -> Solution:
 
 
 def solve_to(problem: Problem, exact: float, accuracy: float) -> tuple[Solution, float]:
-    """The coarsest mesh, to a tenth, whose time is within `accuracy` (relative) of `exact`, and its error.
+    """The coarsest mesh, to a fourth, whose time is within `accuracy` (relative) of `exact`, and its error.
 
-    The error falls about as 1/cells: each try is sized by the one before, until one is accurate enough; then
-    the mesh is coarsened again between the last that was not and the first that was.
+    The error falls about as 1/cells: each try is sized by the one before, until one is accurate enough; where
+    its error is much less than allowed the mesh is coarsened again between it and the last that was not.
     """
     too_coarse, cells = 0, 8
     solution = solve(problem, cells)
     while (error := abs(solution.time / exact - 1.0)) > accuracy:
         too_coarse, cells = cells, max(cells + 1, math.ceil(1.03 * cells * error / accuracy))
         solution = solve(problem, cells)
-    while solution.cells > 1.1 * too_coarse + 1:
+    while error < USED * accuracy and solution.cells > 1.1 * too_coarse + 1:
         cells = math.isqrt(max(too_coarse, 1) * solution.cells)
         candidate = solve(problem, cells)
         candidate_error = abs(candidate.time / exact - 1.0)
