@@ -15,10 +15,11 @@ use super::curve::{distance, inner, length};
 /// Greatest degree.
 pub const MOST: usize = 9;
 
-/// Halvings of a piece, at most, until its parts are nearly straight, or shorter than this, in mm: in a sharp turn the
-/// distance from a place that is passed twice falls, rises and falls again.
+/// Halvings of a piece, at most, until its parts are nearly straight: in a sharp turn the distance from a place that is
+/// passed twice falls, rises and falls again. Parts shorter than this, in mm or as a part of the whole, are not halved.
 const MOST_HALVINGS: u32 = 30;
 const SHORT: f64 = 1e-7;
+const ROUNDING: f64 = 1e-12;
 
 /// Cosine of the greatest angle between the steps of a nearly straight part and the line between its ends.
 const NEARLY_STRAIGHT: f64 = 0.9;
@@ -342,23 +343,30 @@ impl<const M: usize> Polygon<M> {
             return;
         }
         let rest = if from > 0.0 { &self.split(from)[1] } else { self };
-        rest.straight_halves(from, 1.0, 0, each);
+        rest.straight_halves([from, 1.0], 0, SHORT.max(ROUNDING * rest.way()), each);
     }
 
     fn straight_halves(
         &self,
-        from: f64,
-        to: f64,
+        [from, to]: [f64; 2],
         depth: u32,
+        short: f64,
         each: &mut impl FnMut(f64, f64) -> bool,
     ) -> bool {
-        if depth == MOST_HALVINGS || self.is_nearly_straight() {
+        // What is not a number is not halved.
+        let halves = depth < MOST_HALVINGS && self.way() > short && !self.is_nearly_straight();
+        if !halves {
             return each(from, to);
         }
         let [left, right] = self.split(0.5);
         let middle = 0.5 * (from + to);
-        left.straight_halves(from, middle, depth + 1, each)
-            && right.straight_halves(middle, to, depth + 1, each)
+        left.straight_halves([from, middle], depth + 1, short, each)
+            && right.straight_halves([middle, to], depth + 1, short, each)
+    }
+
+    /// The length of the polygon.
+    fn way(&self) -> f64 {
+        self.steps[..self.degree].iter().map(length).sum()
     }
 
     fn is_nearly_straight(&self) -> bool {
@@ -366,15 +374,10 @@ impl<const M: usize> Polygon<M> {
             return true;
         }
         let mut chord = [0.0; M];
-        let mut way = 0.0;
         for step in &self.steps[..self.degree] {
-            way += length(step);
             for k in 0..M {
                 chord[k] += step[k];
             }
-        }
-        if way <= SHORT {
-            return true;
         }
         let size = NEARLY_STRAIGHT * length(&chord);
         self.steps[..self.degree].iter().all(|step| inner(step, &chord) >= size * length(step))
@@ -581,6 +584,16 @@ mod tests {
             let q = piece.at(1.0 / 3.0 - before);
             let (t, falls_on) = piece.first_minimum(&q, 0.1);
             assert!(!falls_on && (t - (1.0 / 3.0 - before)).abs() < 1e-6, "{before}: {t}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_a_number_ends_the_search() {
+        for bad in [f64::NAN, f64::INFINITY, 1e200] {
+            let piece = Polygon::new([[0.0, 0.0], [bad, 3.0], [4.0, -2.0], [5.0, -bad]].into_iter(), &[]);
+            let mut found = 0;
+            piece.all_minima(&[1.0, 1.0], 0.0, &mut |_| found += 1);
+            assert!(found < 100, "{bad}: {found}");
         }
     }
 
