@@ -78,6 +78,7 @@ pub fn plan_run<const M: usize>(
 macro_rules! with_capacity {
     ($task:expr, $i:expr, $function:ident($($argument:expr),*)) => {
         match $task.coefficients($i) {
+            ..=6 => $function::<M, 6>($($argument),*),
             ..=11 => $function::<M, 11>($($argument),*),
             ..=36 => $function::<M, 36>($($argument),*),
             _ => $function::<M, MOST>($($argument),*),
