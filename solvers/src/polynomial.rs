@@ -91,6 +91,12 @@ impl<const C: usize> Polynomial<C> {
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
     }
 
+    /// The integral over [0, 1].
+    #[inline(always)]
+    pub fn mean(&self) -> f64 {
+        (0..=self.n).map(|i| self.bernstein(i)).sum::<f64>() / (self.n + 1) as f64
+    }
+
     /// p(0).
     #[inline(always)]
     pub fn first(&self) -> f64 {

@@ -174,9 +174,7 @@ fn end_speed_sq<const M: usize, const C: usize>(
 pub fn distance<const M: usize, const C: usize>(sub: &SubPiece<M, C>, k: usize, x0: f64, x1: f64) -> f64 {
     let g = sub.g[k].part(x0, x1);
     if sub.weight.degree() == 0 {
-        // The mean of the Bernstein coefficients.
-        let sum: f64 = (0..=g.degree()).map(|i| g.bernstein(i)).sum();
-        return (x1 - x0) * sum / (g.degree() + 1) as f64;
+        return (x1 - x0) * g.mean();
     }
     let weight = sub.weight.part(x0, x1);
     (x1 - x0) * g.antiderivative(&weight, sub.degree).last() / weight.last()

@@ -105,17 +105,6 @@ impl<const M: usize, const C: usize> Window<M, C> {
         }
     }
 
-    /// No bound is lower than this anywhere on the window of a polynomial piece.
-    pub fn least_bound(&self) -> f64 {
-        let most_sq = |k: usize| self.g[k].range().1.powi(2);
-        match &self.bound {
-            Bound::Speed(f) => f.range().0 / self.speed.range().1,
-            Bound::Axis(k, v_sq) => v_sq / most_sq(*k),
-            Bound::Arc(k, w) => w.range().0 / most_sq(*k),
-            Bound::LimitCurve => f64::INFINITY,
-        }
-    }
-
     /// The greatest π at the end, of the sub-piece.
     pub fn bound_at_end(&self) -> f64 {
         self.known[1].unwrap_or_else(|| match self.quotient() {

@@ -121,15 +121,12 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                 (first, event) = (t, Some(what));
             }
         };
-        // On a polynomial piece w grows, and no π on the arc is greater than this.
-        let polynomial = order == 0 && window.weight.degree() == 0;
-        let highest = if polynomial { w.last() / g.range().0.powi(2) } else { f64::INFINITY };
         if !self.straight {
             for l in self.moving().filter(|&l| l != j) {
-                let twist = window.g[l].wronskian(g);
-                if self.has_to_spare(l, j, &twist, highest) {
+                if self.has_to_spare(l, j, &w) {
                     continue;
                 }
+                let twist = window.g[l].wronskian(g);
                 let (cube, weighted) = (square.multiply(g), window.weight.multiply(&w));
                 let twist = weighted.multiply(&twist);
                 let need = window.g[l].multiply(&square).combine(a[j], &twist, 1.0);
@@ -153,8 +150,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                 }
             }
         }
-        let stays_under = highest < window.least_bound();
-        if on_bound || !stays_under {
+        if on_bound || !self.stays_under(j, &w) {
             found(self.gap(j, &w, &square, turns, on_bound), Event::Bound);
         }
         if first > 1.0 - AT_END && first < 1.0 {
@@ -182,19 +178,56 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         Ok(())
     }
 
-    /// Whether axis l keeps its limits while axis j is at +A and π is no greater than this; `twist` is g_l' g_j − g_l g_j'.
+    /// Whether axis l keeps its limits while axis j is at +A with w = v_j², told without a polynomial of its own.
     ///
-    /// Axis l has the acceleration (A_j g_l + π twist)/g_j; the Bernstein coefficients enclose its terms. Most arcs of
-    /// most axes are told apart by this, without a polynomial of their own.
-    fn has_to_spare(&self, l: usize, j: usize, twist: &Polynomial<C>, highest: f64) -> bool {
-        if !highest.is_finite() {
+    /// Axis l has the acceleration (A_j g_l + π W)/g_j with W = g_l' g_j − g_l g_j', and its slope is
+    /// 3 W (A_j g_j² − w g_j')/g_j⁴ + w W'/g_j³. On a quadratic W and the bracket are constant: the ends tell. On other
+    /// polynomial pieces the Bernstein coefficients enclose the terms, with the greatest π that w allows.
+    fn has_to_spare(&self, l: usize, j: usize, w: &Polynomial<C>) -> bool {
+        let (a, window) = (&self.axes.acceleration, &self.window);
+        let (g, other) = (&window.g[j], &window.g[l]);
+        if window.weight.degree() > 0 {
             return false;
         }
-        let (least, greatest) = twist.range();
+        if g.degree() == 1 {
+            let twist = other.last() * g.first() - other.first() * g.last();
+            let keeps = |g: f64, other: f64, w: f64| {
+                let (most, turn) = (a[l] * g * g * g, w * twist);
+                let need = a[j] * other * g * g + turn;
+                most >= need && (!BACK || most >= -need)
+            };
+            return keeps(g.first(), other.first(), w.first()) && keeps(g.last(), other.last(), w.last());
+        }
+        let highest = w.last() / g.range().0.powi(2);
+        if self.order > 0 || !highest.is_finite() {
+            return false;
+        }
+        let (least, greatest) = other.wronskian(g).range();
         let (up, down) = (highest * greatest.max(0.0), -highest * least.min(0.0));
-        let (a, g) = (&self.axes.acceleration, &self.window.g);
-        g[j].combine(a[l], &g[l], -a[j]).is_above(up)
-            && (!BACK || g[j].combine(a[l], &g[l], a[j]).is_above(down))
+        g.combine(a[l], other, -a[j]).is_above(up) && (!BACK || g.combine(a[l], other, a[j]).is_above(down))
+    }
+
+    /// Whether the arc of axis j with w = ω v_j² stays under the bound for sure, as long as all axes keep their limits.
+    fn stays_under(&self, j: usize, w: &Polynomial<C>) -> bool {
+        let (a, window) = (&self.axes.acceleration, &self.window);
+        // Each axis gains no more speed on its way than its limit allows.
+        let gain = |k: usize| 2.0 * a[k] * window.g[k].mean();
+        let polynomial = self.order == 0 && window.weight.degree() == 0;
+        match &window.bound {
+            Bound::Speed(f) if polynomial && self.sub.own_speed => {
+                let most = self.pi * window.speed.first() + self.moving().map(gain).sum::<f64>();
+                most < f.range().0
+            }
+            Bound::Axis(k, v_sq) if polynomial => {
+                self.pi * window.g[*k].first().powi(2) + gain(*k) < *v_sq
+            }
+            // No motion that keeps the limits leaves this arc downward once it has met it: the ends tell.
+            Bound::Arc(k, bound) => {
+                w.last() * window.g[*k].last().powi(2) < bound.last() * window.g[j].last().powi(2)
+            }
+            Bound::Speed(_) | Bound::Axis(..) => false,
+            Bound::LimitCurve => true,
+        }
     }
 
     /// An event at the very start of an arc.
