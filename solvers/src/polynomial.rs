@@ -59,14 +59,6 @@ impl<const C: usize> Polynomial<C> {
         Self { n, c }
     }
 
-    /// The polynomial with these scaled coefficients.
-    #[inline]
-    pub fn from_coefficients(coefficients: &[f64]) -> Self {
-        let mut c = [0.0; C];
-        c[..coefficients.len()].copy_from_slice(coefficients);
-        Self { n: coefficients.len() - 1, c }
-    }
-
     #[inline(always)]
     pub fn degree(&self) -> usize {
         self.n
@@ -76,6 +68,31 @@ impl<const C: usize> Polynomial<C> {
     #[inline(always)]
     pub fn coefficients(&self) -> &[f64] {
         &self.c[..=self.n]
+    }
+
+    /// Its scaled coefficients, and zeros after them where that makes their number a constant.
+    #[inline(always)]
+    pub fn padded(&self) -> &[f64] {
+        &self.c[..self.width()]
+    }
+
+    /// So many coefficients are kept of a polynomial of degree `n`, or gone through: all where they are few, for the
+    /// number is then a constant.
+    #[inline(always)]
+    pub fn padded_len(n: usize) -> usize {
+        if C <= FEW {
+            C
+        } else {
+            n + 1
+        }
+    }
+
+    /// The polynomial of degree `n` with these scaled coefficients, padded or not.
+    #[inline(always)]
+    pub fn from_padded(n: usize, coefficients: &[f64]) -> Self {
+        let mut c = [0.0; C];
+        c[..Self::padded_len(n)].copy_from_slice(coefficients);
+        Self { n, c }
     }
 
     /// Bernstein coefficient `i`.
@@ -171,7 +188,7 @@ impl<const C: usize> Polynomial<C> {
         }
         let mut c = [0.0; C];
         for (i, &p) in short.coefficients().iter().enumerate() {
-            for (sum, &q) in c[i..].iter_mut().zip(long.coefficients()) {
+            for (sum, &q) in c[i..].iter_mut().zip(long.padded()) {
                 *sum += p * q;
             }
         }
@@ -201,7 +218,7 @@ impl<const C: usize> Polynomial<C> {
         let mut c = self.c;
         for degree in self.n + 1..=n {
             let mut before = 0.0;
-            for value in &mut c[..=degree] {
+            for value in &mut c[..if C <= FEW { C } else { degree + 1 }] {
                 (before, *value) = (*value, *value + before);
             }
         }
@@ -230,14 +247,9 @@ impl<const C: usize> Polynomial<C> {
         Self { n: self.n, c }
     }
 
-    /// So many coefficients are gone through: all where they are few, for the number is then a constant.
     #[inline(always)]
     fn width(&self) -> usize {
-        if C <= FEW {
-            C
-        } else {
-            self.n + 1
-        }
+        Self::padded_len(self.n)
     }
 
     #[inline(always)]
@@ -409,12 +421,14 @@ impl<const C: usize> Polynomial<C> {
     }
 
     /// p on [a, b], on [0, 1] again.
+    #[inline]
     pub fn part(&self, a: f64, b: f64) -> Self {
-        let right = if a > 0.0 { self.right(a) } else { *self };
-        if b < 1.0 {
-            right.left((b - a) / (1.0 - a))
-        } else {
-            right
+        match (a > 0.0, b < 1.0) {
+            _ if self.n == 0 => *self,
+            (false, false) => *self,
+            (false, true) => self.left(b),
+            (true, false) => self.right(a),
+            (true, true) => self.right(a).left((b - a) / (1.0 - a)),
         }
     }
 
@@ -427,16 +441,18 @@ impl<const C: usize> Polynomial<C> {
     /// Whether no coefficient is negative, so that the polynomial is not either.
     #[inline(always)]
     pub fn is_positive(&self) -> bool {
-        self.coefficients().iter().all(|&value| value >= 0.0)
+        self.padded().iter().fold(true, |all, &value| all & (value >= 0.0))
     }
 
     /// First x in [0, 1] after which the polynomial is negative; one that starts negative answers 0.
     #[inline(always)]
     pub fn first_root(&self) -> Option<f64> {
-        if self.is_positive() {
-            None
-        } else {
-            Stretch::whole(self).first_root()
+        let (first, _, changes) = signs(self.coefficients().iter().copied());
+        match changes {
+            _ if first < 0.0 => Some(0.0),
+            0 => None,
+            1 => Some(self.single_root()),
+            _ => Stretch::whole(self).first_root(),
         }
     }
 
@@ -457,11 +473,12 @@ impl<const C: usize> Polynomial<C> {
         let from = c.iter().position(|&value| value != 0.0).unwrap_or(0);
         let to = c.iter().rposition(|&value| value != 0.0).unwrap_or(0);
         let (c, n) = (&c[from..=to], to - from);
-        if self.value(0.5) < 0.0 {
-            let z = root_below_one(|i| c[i], n, true);
+        let middle: f64 = c.iter().sum();
+        if middle < 0.0 {
+            let z = root_below_one(|i| c[i], n, middle);
             z / (1.0 + z)
         } else {
-            let z = root_below_one(|i| c[n - i], n, false);
+            let z = root_below_one(|i| c[n - i], n, middle);
             1.0 / (1.0 + z)
         }
     }
@@ -512,19 +529,9 @@ impl<const C: usize> Stretch<C> {
         }
     }
 
-    /// The first and the last sign, 0 for none, and how often it changes.
     #[inline(always)]
     fn signs(&self) -> (f64, f64, usize) {
-        let (mut first, mut last, mut changes) = (0.0, 0.0, 0);
-        for i in 0..=self.p.n {
-            let value = self.known(i);
-            if value != 0.0 {
-                changes += usize::from(value * last < 0.0);
-                last = value.signum();
-                first = if first == 0.0 { last } else { first };
-            }
-        }
-        (first, last, changes)
+        signs((0..=self.p.n).map(|i| self.known(i)))
     }
 
     /// Where the one change of sign is; `first` is the sign before it.
@@ -569,11 +576,25 @@ impl<const C: usize> Stretch<C> {
     }
 }
 
-/// The root of Σ c_i z^i in [0, 1], where the sum changes its sign once: from positive to negative, or else upward.
+/// The first and the last sign, 0 for none, and how often it changes.
 #[inline(always)]
-fn root_below_one(c: impl Fn(usize) -> f64, n: usize, falls: bool) -> f64 {
+fn signs(coefficients: impl Iterator<Item = f64>) -> (f64, f64, usize) {
+    let (mut first, mut last, mut changes) = (0.0, 0.0, 0);
+    for value in coefficients.filter(|&value| value != 0.0) {
+        changes += usize::from(value * last < 0.0);
+        last = value.signum();
+        first = if first == 0.0 { last } else { first };
+    }
+    (first, last, changes)
+}
+
+/// The root of Σ c_i z^i in [0, 1], where the sum changes its sign once, to that of its value at 1.
+#[inline(always)]
+fn root_below_one(c: impl Fn(usize) -> f64, n: usize, at_one: f64) -> f64 {
+    let falls = at_one < 0.0;
     let (mut low, mut high) = (0.0, 1.0);
-    let mut z = 0.5;
+    // Where a straight line between the ends has its root.
+    let mut z = c(0) / (c(0) - at_one);
     for _ in 0..120 {
         let (mut value, mut slope) = (c(n), 0.0);
         for i in (0..n).rev() {

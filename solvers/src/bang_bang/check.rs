@@ -22,8 +22,9 @@ pub fn keeps_limits<const M: usize, const C: usize>(
     arcs: &[Arc],
 ) -> Result<(), Stuck> {
     // A test of the coefficients spares most sub-pieces that of places.
-    let fastest = sub.g.iter().fold(0.0_f64, |most, g| most.max(g.range().1));
-    let slow_somewhere = sub.g.iter().all(|g| g.range().0 <= SLOW * fastest);
+    let ranges = sub.g.each_ref().map(Polynomial::range);
+    let fastest = ranges.iter().fold(0.0_f64, |most, range| most.max(range.1));
+    let slow_somewhere = ranges.iter().all(|range| range.0 <= SLOW * fastest);
     let slow = |x: f64| slow_somewhere && sub.g.iter().all(|g| g.value(x) <= SLOW * fastest);
     let kept = |arc: &Arc| {
         let (j, braking) = match arc.kind {
@@ -44,14 +45,7 @@ pub fn keeps_limits<const M: usize, const C: usize>(
         };
         let weight = along(&sub.weight);
         let way = along(&sub.g[j]).scale(span).antiderivative(&weight, sub.degree);
-        let twist: [Polynomial<C>; M] = std::array::from_fn(|l| {
-            if sub.straight || l == j {
-                Polynomial::constant(0.0)
-            } else {
-                sub.g[l].wronskian(&sub.g[j])
-            }
-        });
-        let at = Places { sub, axes, arc, j, signed, braking, slow_somewhere, weight, way, twist };
+        let at = Places { sub, axes, arc, j, signed, braking, slow_somewhere, weight, way };
         let (slowest, other) = if braking { (arc.x1, arc.x0) } else { (arc.x0, arc.x1) };
         at.keep_limits(PLACES, 1.0 + EXCESS)
             && (!slow(slowest) || at.keep_limits(DECADES, 1.0 + EXCESS_NEAR))
@@ -73,8 +67,6 @@ struct Places<'a, const M: usize, const C: usize> {
     weight: Polynomial<C>,
     /// The way of axis j times ω.
     way: Polynomial<C>,
-    /// g_l' g_j − g_l g_j'
-    twist: [Polynomial<C>; M],
 }
 
 impl<const M: usize, const C: usize> Places<'_, M, C> {
@@ -97,14 +89,19 @@ impl<const M: usize, const C: usize> Places<'_, M, C> {
         };
         let pi: [f64; K] =
             std::array::from_fn(|i| (arc.slow_sq + 2.0 * axes.acceleration[j] * way[i]) / (g[i] * g[i]));
+        let bend: [f64; K] = std::array::from_fn(|i| weight[i] * weight[i] * pi[i]);
         (0..M).all(|l| {
-            let (other, twist) = (sub.g[l].values(x), self.twist[l].values(x));
-            (0..K).all(|i| {
-                // ω² (g_l s + g_l' π) with s from axis j, without the difference of large terms.
-                let bend = weight[i] * weight[i] * pi[i] * twist[i];
-                let acceleration = (self.signed * other[i] + bend) / g[i];
-                acceleration.abs() <= axes.acceleration[l] * factor
-                    && other[i] * other[i] * pi[i] <= axes.velocity_sq[l] * factor
+            let other = sub.g[l].values(x);
+            // ω² (g_l s + g_l' π) with s from axis j, without the difference of large terms.
+            let twist = if sub.straight || l == j {
+                [0.0; K]
+            } else {
+                sub.g[l].wronskian(&sub.g[j]).values(x)
+            };
+            let (most, most_sq) = (axes.acceleration[l] * factor, axes.velocity_sq[l] * factor);
+            (0..K).fold(true, |kept, i| {
+                kept & ((self.signed * other[i] + bend[i] * twist[i]).abs() <= most * g[i])
+                    & (other[i] * other[i] * pi[i] <= most_sq)
             })
         })
     }

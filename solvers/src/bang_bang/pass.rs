@@ -21,6 +21,7 @@ mod slide;
 use super::split::{Axes, SubPiece};
 use super::window::{Bound, Window};
 use crate::polynomial::Polynomial;
+use crate::quadratic::norm;
 
 /// Tests are taken for kept while they miss by less than this part of their own terms.
 const NOISE: f64 = 1e-13;
@@ -81,17 +82,26 @@ pub struct State {
     pub speed_sq: f64,
 }
 
-/// The order of the zero that every tangent component has at an end, and the limit direction there.
-pub fn cusp<const M: usize, const C: usize>(sub: &SubPiece<M, C>, at_end: bool) -> (usize, [f64; M]) {
-    let degree = sub.g[0].degree();
-    let coefficient = |k: usize, r: usize| sub.g[k].coefficients()[if at_end { degree - r } else { r }];
-    let mut r = 0;
-    while r < degree && (0..M).all(|k| coefficient(k, r) == 0.0) {
-        r += 1;
-    }
-    let lead: [f64; M] = std::array::from_fn(|k| coefficient(k, r));
-    let length = lead.iter().map(|x| x * x).sum::<f64>().sqrt();
-    (r, lead.map(|x| x / length))
+/// The order of the zero that every tangent component has at an end.
+#[inline(always)]
+pub fn cusp_order<const M: usize, const C: usize>(sub: &SubPiece<M, C>, at_end: bool) -> usize {
+    (0..sub.g[0].degree()).find(|&r| leading(sub, at_end, r) != [0.0; M]).unwrap_or(sub.g[0].degree())
+}
+
+/// The tangents' scaled coefficients next to an end: from the order of its cusp they have the limit direction.
+#[inline(always)]
+pub fn leading<const M: usize, const C: usize>(sub: &SubPiece<M, C>, at_end: bool, order: usize) -> [f64; M] {
+    std::array::from_fn(|k| {
+        let g = sub.g[k].coefficients();
+        g[if at_end { g.len() - 1 - order } else { order }]
+    })
+}
+
+/// The limit direction at an end.
+fn direction<const M: usize, const C: usize>(sub: &SubPiece<M, C>, at_end: bool, order: usize) -> [f64; M] {
+    let lead = leading(sub, at_end, order);
+    let length = norm(&lead);
+    lead.map(|x| x / length)
 }
 
 /// Over the sub-piece as travelled, from a state, under its cap (backward) or under the arcs of the backward pass
@@ -103,7 +113,7 @@ pub fn run<const M: usize, const C: usize, const BACK: bool>(
     bounds: &[Arc],
     out: &mut Vec<Arc>,
 ) -> Result<State, Stuck> {
-    let (order, direction) = cusp(sub, false);
+    let order = cusp_order(sub, false);
     let straight = sub.straight;
     let pi = if order == 0 { state.speed_sq / sub.rate_sq(false) } else { f64::INFINITY };
     let first = out.len();
@@ -114,7 +124,11 @@ pub fn run<const M: usize, const C: usize, const BACK: bool>(
         pi,
         order,
         // A curve stops in its cusps, a straight line need not.
-        cusp_sq: if straight { direction.map(|x| x * x * state.speed_sq) } else { [0.0; M] },
+        cusp_sq: if straight && order > 0 {
+            direction(sub, false, order).map(|x| x * x * state.speed_sq)
+        } else {
+            [0.0; M]
+        },
         straight,
         out,
         control: None,
@@ -137,12 +151,12 @@ pub fn run<const M: usize, const C: usize, const BACK: bool>(
     if let Some(arc) = out[first..].iter().find(|arc| !sound(arc)) {
         return Err(Stuck(arc.x0));
     }
-    let (end_order, end_direction) = cusp(sub, true);
+    let end_order = cusp_order(sub, true);
     let speed_sq = if end_order == 0 {
         pi * sub.rate_sq(true)
     } else if straight {
         let last = out[first..].last();
-        last.map_or(0.0, |arc| end_speed_sq(sub, axes, arc, &end_direction))
+        last.map_or(0.0, |arc| end_speed_sq(sub, axes, arc, &direction(sub, true, end_order)))
     } else {
         0.0
     };

@@ -1,7 +1,7 @@
 //! Both passes over one run, its arcs into the columns of the profile.
 
 use super::check::keeps_limits;
-use super::pass::{self, cusp, distance, Arc, Kind, State, Stuck};
+use super::pass::{self, cusp_order, distance, leading, Arc, Kind, State, Stuck};
 use super::piece::Piece;
 use super::split::{split, Cap, Part, Remedy, SubPiece};
 use super::store::Store;
@@ -9,6 +9,7 @@ use super::time::time_at_speed;
 use super::{Task, TIP_AXES};
 use crate::bang_bang_quadratic::{ArcKind, Fault, Profile, Row, Workspace as QuadraticWorkspace, NO_AXIS};
 use crate::polynomial::MOST;
+use crate::quadratic::norm;
 
 /// Two directions that differ by more than this at a cusp form a corner.
 const SMOOTH_TURN: f64 = 1e-9;
@@ -130,21 +131,25 @@ fn weights_of<'a>(weight: &'a [f64], offset: &[usize], i: usize) -> &'a [f64] {
     weight.get(offset[i]..offset[i + 1]).unwrap_or(&[])
 }
 
-/// The signed limit direction at one end of a part, and whether the tangent itself is zero there.
+/// Whether the tangent is zero at one end of a part, and the signed limit of its direction there, of any length.
 fn end_direction<const M: usize, const C: usize>(
     sub: &SubPiece<M, C>,
     negative: u8,
     at_end: bool,
 ) -> (bool, [f64; M]) {
-    let (order, direction) = cusp(sub, at_end);
-    let signed = std::array::from_fn(|k| if negative >> k & 1 == 1 { -direction[k] } else { direction[k] });
-    (order > 0, signed)
+    let order = cusp_order(sub, at_end);
+    let lead = leading(sub, at_end, order);
+    (order > 0, std::array::from_fn(|k| if negative >> k & 1 == 1 { -lead[k] } else { lead[k] }))
 }
 
 /// The greatest v² where two parts meet: none in the corner of a cusp.
 fn at_cusp<const M: usize>(before: &(bool, [f64; M]), after: &(bool, [f64; M]), speed_sq: f64) -> f64 {
-    let turn: f64 = before.1.iter().zip(&after.1).map(|(a, b)| (a - b) * (a - b)).sum();
-    if (before.0 || after.0) && turn > SMOOTH_TURN * SMOOTH_TURN {
+    if !before.0 && !after.0 {
+        return speed_sq;
+    }
+    let (long, other) = (norm(&before.1), norm(&after.1));
+    let turn = norm(&std::array::from_fn::<f64, M, _>(|k| before.1[k] / long - after.1[k] / other));
+    if turn > SMOOTH_TURN {
         0.0
     } else {
         speed_sq

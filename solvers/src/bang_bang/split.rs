@@ -2,7 +2,7 @@
 
 use super::chord::SpeedLine;
 use super::cusp::{cusps, Cusps, Nearly};
-use super::pass::cusp;
+use super::pass::cusp_order;
 use super::piece::Piece;
 use super::TIP_AXES;
 use crate::planning::ChordLimit;
@@ -414,7 +414,7 @@ impl<const M: usize, const C: usize> SubPiece<M, C> {
             let c = p.coefficients();
             c.get(if at_end { c.len().wrapping_sub(1 + r) } else { r }).copied().unwrap_or(0.0)
         };
-        let (order, _) = cusp(self, at_end);
+        let order = cusp_order(self, at_end);
         let axes: f64 = self.g.iter().map(|g| lead(g, order).powi(2)).sum();
         (lead(&self.speed, 2 * order) / axes).max(0.0)
     }

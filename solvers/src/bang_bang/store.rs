@@ -35,7 +35,7 @@ impl Store {
             own_speed: sub.own_speed,
         });
         for p in sub.g.iter().chain([&sub.weight, &sub.speed]) {
-            self.coefficients.extend_from_slice(p.coefficients());
+            self.coefficients.extend_from_slice(p.padded());
         }
     }
 
@@ -45,9 +45,9 @@ impl Store {
         let [tangent, weight, speed, degree] = kept.degrees.map(usize::from);
         let mut rest = &self.coefficients[kept.start..];
         let mut next = |degree: usize| {
-            let (own, after) = rest.split_at(degree + 1);
+            let (own, after) = rest.split_at(Polynomial::<C>::padded_len(degree));
             rest = after;
-            Polynomial::from_coefficients(own)
+            Polynomial::from_padded(degree, own)
         };
         SubPiece {
             g: std::array::from_fn(|_| next(tangent)),
