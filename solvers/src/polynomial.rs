@@ -216,6 +216,13 @@ impl<const C: usize> Polynomial<C> {
     #[inline(always)]
     pub fn elevate(&self, n: usize) -> Self {
         let mut c = self.c;
+        if self.n == 0 {
+            let (value, len) = (c[0], Self::padded_len(n));
+            for (c, binomial) in c[..len].iter_mut().zip(&BINOMIALS[n]) {
+                *c = value * binomial;
+            }
+            return Self { n, c };
+        }
         for degree in self.n + 1..=n {
             let mut before = 0.0;
             for value in &mut c[..if C <= FEW { C } else { degree + 1 }] {
@@ -269,8 +276,10 @@ impl<const C: usize> Polynomial<C> {
     pub fn wronskian(&self, other: &Self) -> Self {
         let n = self.n;
         debug_assert_eq!(n, other.n);
-        if n == 0 {
-            return Self::constant(0.0);
+        match n {
+            0 => return Self::constant(0.0),
+            1 => return Self::constant(self.c[1] * other.c[0] - self.c[0] * other.c[1]),
+            _ => {}
         }
         let mut c = [0.0; C];
         let (p, q) = (self.coefficients(), other.coefficients());
@@ -421,14 +430,22 @@ impl<const C: usize> Polynomial<C> {
     }
 
     /// p on [a, b], on [0, 1] again.
-    #[inline]
+    #[inline(always)]
     pub fn part(&self, a: f64, b: f64) -> Self {
-        match (a > 0.0, b < 1.0) {
-            _ if self.n == 0 => *self,
-            (false, false) => *self,
-            (false, true) => self.left(b),
-            (true, false) => self.right(a),
-            (true, true) => self.right(a).left((b - a) / (1.0 - a)),
+        if self.n == 0 || (a == 0.0 && b == 1.0) {
+            *self
+        } else {
+            self.inner_part(a, b)
+        }
+    }
+
+    #[inline(never)]
+    fn inner_part(&self, a: f64, b: f64) -> Self {
+        let right = if a > 0.0 { self.right(a) } else { *self };
+        if b < 1.0 {
+            right.left((b - a) / (1.0 - a))
+        } else {
+            right
         }
     }
 

@@ -85,7 +85,13 @@ pub struct State {
 /// The order of the zero that every tangent component has at an end.
 #[inline(always)]
 pub fn cusp_order<const M: usize, const C: usize>(sub: &SubPiece<M, C>, at_end: bool) -> usize {
-    (0..sub.g[0].degree()).find(|&r| leading(sub, at_end, r) != [0.0; M]).unwrap_or(sub.g[0].degree())
+    let degree = sub.g[0].degree();
+    let rests = |r: usize| sub.g.iter().all(|g| g.coefficients()[if at_end { degree - r } else { r }] == 0.0);
+    let mut order = 0;
+    while order < degree && rests(order) {
+        order += 1;
+    }
+    order
 }
 
 /// The tangents' scaled coefficients next to an end: from the order of its cusp they have the limit direction.
@@ -147,7 +153,7 @@ pub fn run<const M: usize, const C: usize, const BACK: bool>(
     }
     let pi = pass.pi;
     let sound =
-        |arc: &Arc| arc.pi.iter().all(|&pi| pi >= 0.0) && arc.slow_sq >= 0.0 && arc.slow_sq.is_finite();
+        |arc: &Arc| arc.pi[0] >= 0.0 && arc.pi[1] >= 0.0 && (0.0..f64::INFINITY).contains(&arc.slow_sq);
     if let Some(arc) = out[first..].iter().find(|arc| !sound(arc)) {
         return Err(Stuck(arc.x0));
     }
@@ -321,7 +327,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                     continue;
                 }
             }
-            self.accelerate(on_bound)?;
+            self.accelerate(&start, on_bound)?;
         }
         Err(self.stuck())
     }
@@ -343,12 +349,12 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
     fn start(&self) -> Start<M> {
         let (w, slope) = (self.window.weight.first(), self.window.weight.first_slope());
         let g = &self.window.g;
-        let a = &self.axes.acceleration;
+        let limit = self.axes.acceleration.map(|a| a / (w * w));
         Start {
             g: std::array::from_fn(|k| g[k].first()),
             c: std::array::from_fn(|k| g[k].first_slope()),
-            limit: std::array::from_fn(|k| a[k] / (w * w)),
-            limit_slope: std::array::from_fn(|k| -2.0 * a[k] * slope / (w * w * w)),
+            limit,
+            limit_slope: if slope == 0.0 { [0.0; M] } else { limit.map(|limit| -2.0 * limit * slope / w) },
         }
     }
 
@@ -368,8 +374,8 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         }
         let mut lowest = f64::INFINITY;
         for j in self.moving() {
-            for l in self.moving().filter(|&l| l != j) {
-                let w = start.c[j] * start.g[l] - start.c[l] * start.g[j];
+            for l in self.moving().take_while(|&l| l < j) {
+                let w = (start.c[j] * start.g[l] - start.c[l] * start.g[j]).abs();
                 if start.g[j] > 0.0 && start.g[l] > 0.0 && w > 0.0 {
                     lowest = lowest.min((start.limit[j] * start.g[l] + start.limit[l] * start.g[j]) / w);
                 }
@@ -403,7 +409,8 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         // π at the end, of the sub-piece.
         let pi_end = match (w, kind) {
             (Some(w), Kind::Accelerating(j)) => {
-                let (w, g, weight) = (w.value(t), self.window.g[j].value(t), self.window.weight.value(t));
+                let at = |p: &Polynomial<C>| if t == 1.0 { p.last() } else { p.value(t) };
+                let (w, g, weight) = (at(w), at(&self.window.g[j]), at(&self.window.weight));
                 let pi = if g > 0.0 { w / (weight * g * g) } else { f64::INFINITY };
                 let turn = if g > 0.0 { None } else { self.at_turn(j) };
                 turn.unwrap_or(pi) * scale
@@ -451,7 +458,9 @@ fn kept_until<const C: usize>(
     known: usize,
     slack: f64,
 ) -> Option<f64> {
-    if test.coefficients().iter().skip(known.min(test.degree())).all(|&value| value >= 0.0) {
+    if test.is_positive()
+        || test.coefficients().iter().skip(known.min(test.degree())).all(|&value| value >= 0.0)
+    {
         return None;
     }
     let mut inflated = test.combine(1.0, &size(), 1.0);

@@ -3,7 +3,7 @@
 use super::check::keeps_limits;
 use super::pass::{self, cusp_order, distance, leading, Arc, Kind, State, Stuck};
 use super::piece::Piece;
-use super::split::{split, Cap, Part, Remedy, SubPiece};
+use super::split::{split, Cap, Cut, Limits, Part, Remedy, SubPiece};
 use super::store::Store;
 use super::time::time_at_speed;
 use super::{Task, TIP_AXES};
@@ -21,6 +21,7 @@ const MOST_ATTEMPTS: usize = 40;
 /// Space for the passes, kept from run to run.
 #[derive(Default)]
 pub struct Workspace {
+    cuts: Vec<Cut>,
     parts: Vec<Part>,
     /// Of each piece: its parts, of each part: its sub-piece and its arcs of the backward pass, last piece and last part
     /// first.
@@ -217,12 +218,12 @@ fn backward_over<const M: usize, const C: usize>(
     space: &mut Workspace,
 ) {
     let piece = task.piece::<C>(i);
-    let feed = task.problem.feed[i];
     let start = space.parts.len();
     let tip = task.tip_piece::<C>(i);
-    let chord = task.chord.as_ref();
+    let limits =
+        Limits { axes: &task.axes, feed_sq: task.problem.feed[i].powi(2), chord: task.chord.as_ref() };
     let remedies = space.remedies.iter().filter(|remedy| remedy.piece == i).copied();
-    split(&piece, tip.as_ref(), &task.axes, feed * feed, chord, remedies, &mut space.parts);
+    split(&piece, tip.as_ref(), &limits, remedies, &mut space.cuts, &mut space.parts);
     space.pieces.push(start..space.parts.len());
     let mut limited = false;
     for number in (start..space.parts.len()).rev() {

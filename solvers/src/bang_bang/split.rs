@@ -43,6 +43,13 @@ pub struct Axes<const M: usize> {
     pub velocity_sq: [f64; M],
 }
 
+/// What limits the speed on a piece.
+pub struct Limits<'a, const M: usize> {
+    pub axes: &'a Axes<M>,
+    pub feed_sq: f64,
+    pub chord: Option<&'a ChordLimit>,
+}
+
 /// A part [from, to] of a piece on which no axis turns round and one velocity cap is the lowest.
 #[derive(Clone, Copy, Debug)]
 pub struct Part {
@@ -71,7 +78,7 @@ struct End {
 
 /// A place that divides two parts.
 #[derive(Clone, Copy, Debug)]
-struct Cut {
+pub struct Cut {
     t: f64,
     end: End,
 }
@@ -122,23 +129,24 @@ pub struct SubPiece<const M: usize, const C: usize> {
     pub own_speed: bool,
 }
 
-/// Appends the parts of the piece from left to right; `tip` is the tool's own piece where it is another one.
+/// Appends the parts of the piece from left to right; `tip` is the tool's own piece where it is another one, `cuts`
+/// is space.
 pub fn split<const M: usize, const C: usize>(
     piece: &Piece<M, C>,
     tip: Option<&Piece<TIP_AXES, C>>,
-    axes: &Axes<M>,
-    feed_sq: f64,
-    chord: Option<&ChordLimit>,
+    limits: &Limits<M>,
     remedies: impl Iterator<Item = Remedy>,
+    cuts: &mut Vec<Cut>,
     out: &mut Vec<Part>,
 ) {
-    let size = |g: &Polynomial<C>| g.coefficients().iter().fold(0.0, |most: f64, c| most.max(c.abs()));
-    let greatest = piece.g.iter().map(size).fold(0.0, f64::max);
+    let Limits { axes, feed_sq, chord } = *limits;
+    let size = piece.g.each_ref().map(|g| g.padded().iter().fold(0.0, |most: f64, c| most.max(c.abs())));
+    let greatest = size.iter().copied().fold(0.0, f64::max);
     let mut moving = 0u8;
-    let mut cuts = Vec::with_capacity(8);
+    cuts.clear();
     cuts.extend([Cut::plain(0.0), Cut::plain(1.0)]);
     for (k, g) in piece.g.iter().enumerate() {
-        if size(g) <= ZERO * greatest {
+        if size[k] <= ZERO * greatest {
             continue;
         }
         moving |= 1 << k;
@@ -153,29 +161,30 @@ pub fn split<const M: usize, const C: usize>(
     }
     if piece.straight {
         // All axes turn at once, in a cusp.
-        let greatest = (0..M).max_by(|&a, &b| size(&piece.g[a]).total_cmp(&size(&piece.g[b]))).unwrap_or(0);
+        let greatest = (0..M).max_by(|&a, &b| size[a].total_cmp(&size[b])).unwrap_or(0);
         piece.g[greatest].sign_changes(&mut |t| cuts.push(Cut::turn(t, moving)));
     }
-    let mut lines = vec![];
+    let (whole, mut below_chord) = ([SpeedLine { from: 0.0, to: 1.0, speed_sq: [feed_sq; 2] }], vec![]);
     match (chord, tip) {
-        (Some(chord), Some(tip)) => chord.lines(tip, feed_sq, &mut lines),
-        (Some(chord), None) if piece.own_speed => chord.lines(piece, feed_sq, &mut lines),
-        _ => lines.push(SpeedLine { from: 0.0, to: 1.0, speed_sq: [feed_sq; 2] }),
+        (Some(chord), Some(tip)) => chord.lines(tip, feed_sq, &mut below_chord),
+        (Some(chord), None) if piece.own_speed => chord.lines(piece, feed_sq, &mut below_chord),
+        _ => {}
     }
+    let lines = if below_chord.is_empty() { &whole } else { below_chord.as_slice() };
     // Where the axes are the tool's none is faster than the tool.
     let can_cap = (0..M).fold(0u8, |bits, k| {
         let slow = piece.own_speed && axes.velocity_sq[k] >= feed_sq;
         bits | u8::from(!slow && moving >> k & 1 == 1) << k
     });
     let mut fast = 0u8;
-    for line in &lines {
+    for line in lines {
         cuts.push(Cut::plain(line.from));
         if can_cap != 0 {
-            fast |= cut_by_cap(piece, axes, line, can_cap, &mut cuts);
+            fast |= cut_by_cap(piece, axes, line, can_cap, cuts);
         }
     }
-    merge_near_cusps(piece, &mut cuts);
-    cut_by_weight(&piece.weight, (0.0, 1.0), &mut cuts);
+    merge_near_cusps(piece, cuts);
+    cut_by_weight(&piece.weight, (0.0, 1.0), cuts);
     let remedies: Vec<Remedy> = remedies.collect();
     let remedy_cut = |remedy: &Remedy| Cut {
         t: remedy.t,
@@ -351,27 +360,24 @@ impl Part {
             let sign = if self.negative >> k & 1 == 1 { -length } else { length };
             let mut g = piece.g[k].part(self.from, self.to).scale(sign);
             let degree = g.degree();
-            let zeros = |end: &End, g: &Polynomial<C>, at: &dyn Fn(usize) -> usize| {
+            for (end, at_end) in [(&self.left, false), (&self.right, true)] {
                 let turns = end.turns >> k & 1 == 1;
                 if !turns && end.order == 0 {
-                    return 0;
+                    continue;
                 }
                 let (low, high) = piece.g[k].range();
                 let noise = length * piece.noise[k].max(SAME_TURN * degree as f64 * high.max(-low));
                 let known = usize::from(end.order).max(usize::from(turns));
                 let reach = (end.reach / length).min(1.0);
-                // An axis that rounding, or a turn taken for another one, sends back stands still.
-                let noisy = |i: usize| {
-                    let back = -g.coefficients()[at(i)] * reach.powi(i as i32);
-                    turns && back > 0.0 && back <= 64.0 * noise
-                };
-                (0..=degree).take_while(|&i| i < known || noisy(i)).count()
-            };
-            for i in 0..zeros(&self.left, &g, &|i| i) {
-                g.clear(i);
-            }
-            for i in 0..zeros(&self.right, &g, &|i| degree - i) {
-                g.clear(degree - i);
+                for i in 0..=degree {
+                    let place = if at_end { degree - i } else { i };
+                    // An axis that rounding, or a turn taken for another one, sends back stands still.
+                    let back = -g.coefficients()[place] * reach.powi(i as i32);
+                    if i >= known && !(turns && back > 0.0 && back <= 64.0 * noise) {
+                        break;
+                    }
+                    g.clear(place);
+                }
             }
             g
         });

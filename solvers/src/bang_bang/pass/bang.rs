@@ -83,13 +83,13 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
     }
 
     /// Along an arc of greatest acceleration to the event that ends it.
-    pub(super) fn accelerate(&mut self, on_bound: bool) -> Result<(), Stuck> {
+    pub(super) fn accelerate(&mut self, start: &Start<M>, on_bound: bool) -> Result<(), Stuck> {
         let order = self.order;
         let (j, mut tied, turns) = if order > 0 {
             let (j, tied) = self.least_from_cusp().ok_or(self.stuck())?;
             (j, tied, false)
         } else {
-            let (j, _, tied, turns) = self.least(&self.start()).ok_or(self.stuck())?;
+            let (j, _, tied, turns) = self.least(start).ok_or(self.stuck())?;
             (j, tied, turns)
         };
         tied = (tied | self.tied) & !(1 << j);
@@ -104,16 +104,13 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         let gain = g.antiderivative(&window.weight, self.sub.degree);
         // w = ω v_j²
         let w = window.weight.combine(slow_sq, &gain, 2.0 * a[j]);
-        let (square, known) = (
-            g.multiply(g),
-            if order > 0 {
-                3 * order
-            } else if turns {
-                3
-            } else {
-                0
-            },
-        );
+        let known = if order > 0 {
+            3 * order
+        } else if turns {
+            3
+        } else {
+            0
+        };
         let mut first = 1.0;
         let mut event = None;
         let mut found = |t: Option<f64>, what: Event| {
@@ -127,6 +124,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                     continue;
                 }
                 let twist = window.g[l].wronskian(g);
+                let square = g.multiply(g);
                 let (cube, weighted) = (square.multiply(g), window.weight.multiply(&w));
                 let twist = weighted.multiply(&twist);
                 let need = window.g[l].multiply(&square).combine(a[j], &twist, 1.0);
@@ -151,7 +149,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             }
         }
         if on_bound || !self.stays_under(j, &w) {
-            found(self.gap(j, &w, &square, turns, on_bound), Event::Bound);
+            found(self.gap(j, &w, turns, on_bound), Event::Bound);
         }
         if first > 1.0 - AT_END && first < 1.0 {
             (first, event) = (1.0, None);
@@ -283,24 +281,24 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         &self,
         j: usize,
         w: &Polynomial<C>,
-        square: &Polynomial<C>,
         turns: bool,
         on_bound: bool,
     ) -> Option<f64> {
         let window = &self.window;
+        let square = || window.g[j].multiply(&window.g[j]);
         let weight = &window.weight;
         let (limit, used, mut known) = match &window.bound {
             Bound::Axis(k, v_sq) if *k == j => (weight.scale(*v_sq), *w, 0),
             Bound::Arc(k, bound) if *k == j => (*bound, *w, 0),
             Bound::Arc(k, bound) => {
-                (bound.multiply(square), w.multiply(&window.g[*k].multiply(&window.g[*k])), 2)
+                (bound.multiply(&square()), w.multiply(&window.g[*k].multiply(&window.g[*k])), 2)
             }
             _ => {
                 let (n, d) = window.quotient()?;
                 if !n.first().is_finite() {
                     return None;
                 }
-                (n.multiply(&weight.multiply(square)), w.multiply(&d), 2)
+                (n.multiply(&weight.multiply(&square())), w.multiply(&d), 2)
             }
         };
         let same = known == 0;

@@ -41,7 +41,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         self.control = saturated;
         self.tangent = saturated.is_some() && moved;
         // The state is on the bound still: the arc that leaves it follows at once.
-        moved && self.window.x0 >= self.window.x1
+        moved
     }
 
     fn slide_at_speed(&self, f: &Polynomial<C>) -> (f64, Option<usize>, Option<(usize, usize)>) {
