@@ -434,6 +434,8 @@ impl<const C: usize> Polynomial<C> {
     pub fn part(&self, a: f64, b: f64) -> Self {
         if self.n == 0 || (a == 0.0 && b == 1.0) {
             *self
+        } else if self.n == 1 {
+            Self::from_bernstein([a, b].map(|x| self.value(x)).into_iter())
         } else {
             self.inner_part(a, b)
         }

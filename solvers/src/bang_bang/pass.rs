@@ -97,10 +97,12 @@ pub fn cusp_order<const M: usize, const C: usize>(sub: &SubPiece<M, C>, at_end: 
 /// The tangents' scaled coefficients next to an end: from the order of its cusp they have the limit direction.
 #[inline(always)]
 pub fn leading<const M: usize, const C: usize>(sub: &SubPiece<M, C>, at_end: bool, order: usize) -> [f64; M] {
-    std::array::from_fn(|k| {
-        let g = sub.g[k].coefficients();
-        g[if at_end { g.len() - 1 - order } else { order }]
-    })
+    match (order, at_end) {
+        (0, false) => sub.g.each_ref().map(Polynomial::first),
+        (0, true) => sub.g.each_ref().map(Polynomial::last),
+        (_, false) => sub.g.each_ref().map(|g| g.coefficients()[order]),
+        (_, true) => sub.g.each_ref().map(|g| g.coefficients()[g.degree() - order]),
+    }
 }
 
 /// The limit direction at an end.
@@ -152,8 +154,7 @@ pub fn run<const M: usize, const C: usize, const BACK: bool>(
         pass.under(bounds)?;
     }
     let pi = pass.pi;
-    let sound =
-        |arc: &Arc| arc.pi[0] >= 0.0 && arc.pi[1] >= 0.0 && (0.0..f64::INFINITY).contains(&arc.slow_sq);
+    let sound = |arc: &Arc| (arc.pi[0] >= 0.0) & (arc.pi[1] >= 0.0) & (arc.slow_sq >= 0.0) & arc.slow_sq.is_finite();
     if let Some(arc) = out[first..].iter().find(|arc| !sound(arc)) {
         return Err(Stuck(arc.x0));
     }
@@ -252,7 +253,6 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
 
     /// Forward: over one window after the other, each under one arc of the backward pass.
     fn under(&mut self, bounds: &[Arc]) -> Result<(), Stuck> {
-        let whole = self.window;
         let mut x0 = 0.0;
         for (i, arc) in bounds.iter().rev().enumerate() {
             let x1 = if i + 1 < bounds.len() { 1.0 - arc.x0 } else { 1.0 };
@@ -265,7 +265,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                     self.arrived();
                 }
                 _ => {
-                    self.window = whole.part(x0, x1);
+                    self.window = Window::new(self.sub).part(x0, x1);
                     self.bound_by(arc);
                     // From π of the sub-piece to that of the window.
                     self.pi /= self.window.length().powi(2);

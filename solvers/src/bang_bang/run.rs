@@ -37,6 +37,22 @@ pub struct Workspace {
     pub quadratic: QuadraticWorkspace,
 }
 
+impl Workspace {
+    /// Empty, with room for what most runs of so many pieces need.
+    fn clear(&mut self, pieces: usize) {
+        self.quadratic.clear();
+        self.parts.clear();
+        self.parts.reserve(2 * pieces);
+        self.pieces.clear();
+        self.pieces.reserve(pieces);
+        self.subs.clear();
+        self.bounds.clear();
+        self.bounds.reserve(2 * pieces);
+        self.offsets.clear();
+        self.offsets.reserve(2 * pieces);
+    }
+}
+
 /// Plans the pieces `first..last` of the task from one speed squared of the tool to another; appends the arcs.
 pub fn plan_run<const M: usize>(
     task: &Task<M>,
@@ -183,12 +199,7 @@ fn backward<const M: usize>(
     end_sq: f64,
     space: &mut Workspace,
 ) -> Result<f64, Fault> {
-    space.quadratic.clear();
-    space.parts.clear();
-    space.pieces.clear();
-    space.subs.clear();
-    space.bounds.clear();
-    space.offsets.clear();
+    space.clear(last - first);
     let mut at = Between { state: State { speed_sq: f64::INFINITY }, end: None, tip_sq: end_sq };
     for i in (first..last).rev() {
         if i + 1 < last {

@@ -353,6 +353,7 @@ impl Part {
     /// The part as travelled forward.
     pub fn sub_piece<const M: usize, const C: usize>(&self, piece: &Piece<M, C>) -> SubPiece<M, C> {
         let length = self.to - self.from;
+        let mut whole = length == 1.0;
         let g: [Polynomial<C>; M] = std::array::from_fn(|k| {
             if self.moving >> k & 1 == 0 {
                 return Polynomial::constant(0.0).elevate(piece.g[k].degree());
@@ -377,12 +378,13 @@ impl Part {
                         break;
                     }
                     g.clear(place);
+                    whole = false;
                 }
             }
             g
         });
         // Next to a cusp |C'|² is lost in the rounding of that of the whole piece.
-        let speed = if piece.own_speed {
+        let speed = if piece.own_speed && !whole {
             Polynomial::sum_of_squares(&g)
         } else {
             piece.speed.part(self.from, self.to).scale(length * length)

@@ -120,7 +120,8 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         };
         if !self.straight {
             for l in self.moving().filter(|&l| l != j) {
-                if self.has_to_spare(l, j, &w) {
+                let [below_limit, above_limit] = self.has_to_spare(l, j, &w);
+                if below_limit && above_limit {
                     continue;
                 }
                 let twist = window.g[l].wronskian(g);
@@ -133,9 +134,11 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                     cube.combine(a[l], &window.g[l].multiply(&square), a[j]).combine(NOISE, &twist, NOISE)
                 };
                 let roots = known + usize::from(tied >> l & 1 == 1);
-                let above = cube.combine(a[l], &need, -1.0);
-                found(kept_until(&above, size, roots, 1e-9 * a[l] * cube.first()), Event::Transition(l));
-                if BACK {
+                if !below_limit {
+                    let above = cube.combine(a[l], &need, -1.0);
+                    found(kept_until(&above, size, roots, 1e-9 * a[l] * cube.first()), Event::Transition(l));
+                }
+                if !above_limit {
                     let below = cube.combine(a[l], &need, 1.0);
                     let contact = if self.low != Some(l) {
                         0
@@ -176,33 +179,39 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         Ok(())
     }
 
-    /// Whether axis l keeps its limits while axis j is at +A with w = v_j², told without a polynomial of its own.
+    /// Whether axis l stays below +A and above −A while axis j is at +A with w = v_j², told without a polynomial of its
+    /// own; forward nothing goes below −A.
     ///
     /// Axis l has the acceleration (A_j g_l + π W)/g_j with W = g_l' g_j − g_l g_j', and its slope is
     /// 3 W (A_j g_j² − w g_j')/g_j⁴ + w W'/g_j³. On a quadratic W and the bracket are constant: the ends tell. On other
     /// polynomial pieces the Bernstein coefficients enclose the terms, with the greatest π that w allows.
-    fn has_to_spare(&self, l: usize, j: usize, w: &Polynomial<C>) -> bool {
+    fn has_to_spare(&self, l: usize, j: usize, w: &Polynomial<C>) -> [bool; 2] {
         let (a, window) = (&self.axes.acceleration, &self.window);
         let (g, other) = (&window.g[j], &window.g[l]);
         if window.weight.degree() > 0 {
-            return false;
+            return [false, !BACK];
         }
         if g.degree() == 1 {
             let twist = other.last() * g.first() - other.first() * g.last();
             let keeps = |g: f64, other: f64, w: f64| {
                 let (most, turn) = (a[l] * g * g * g, w * twist);
                 let need = a[j] * other * g * g + turn;
-                most >= need && (!BACK || most >= -need)
+                [most >= need, !BACK || most >= -need]
             };
-            return keeps(g.first(), other.first(), w.first()) && keeps(g.last(), other.last(), w.last());
+            let start = keeps(g.first(), other.first(), w.first());
+            let end = keeps(g.last(), other.last(), w.last());
+            return [start[0] && end[0], start[1] && end[1]];
         }
         let highest = w.last() / g.range().0.powi(2);
         if self.order > 0 || !highest.is_finite() {
-            return false;
+            return [false, !BACK];
         }
         let (least, greatest) = other.wronskian(g).range();
         let (up, down) = (highest * greatest.max(0.0), -highest * least.min(0.0));
-        g.combine(a[l], other, -a[j]).is_above(up) && (!BACK || g.combine(a[l], other, a[j]).is_above(down))
+        [
+            g.combine(a[l], other, -a[j]).is_above(up),
+            !BACK || g.combine(a[l], other, a[j]).is_above(down),
+        ]
     }
 
     /// Whether the arc of axis j with w = ω v_j² stays under the bound for sure, as long as all axes keep their limits.
