@@ -102,7 +102,12 @@ impl<const C: usize> Polynomial<C> {
     }
 
     /// The greatest and the least Bernstein coefficient: the polynomial lies between them.
+    #[inline(always)]
     pub fn range(&self) -> (f64, f64) {
+        if self.n <= 1 {
+            let (first, last) = (self.first(), self.last());
+            return (first.min(last), first.max(last));
+        }
         (0..=self.n)
             .map(|i| self.bernstein(i))
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
@@ -612,8 +617,10 @@ fn signs(coefficients: impl Iterator<Item = f64>) -> (f64, f64, usize) {
 fn root_below_one(c: impl Fn(usize) -> f64, n: usize, at_one: f64) -> f64 {
     let falls = at_one < 0.0;
     let (mut low, mut high) = (0.0, 1.0);
-    // Where a straight line between the ends has its root.
-    let mut z = c(0) / (c(0) - at_one);
+    // The root of the parabola with the same ends, and the same slope at 0.
+    let (half, bend) = (0.5 * c(1), at_one - c(0) - c(1));
+    let q = -(half + (half * half - bend * c(0)).max(0.0).sqrt().copysign(half));
+    let mut z = [c(0) / q, q / bend].into_iter().find(|z| (0.0..1.0).contains(z)).unwrap_or(0.5);
     for _ in 0..120 {
         let (mut value, mut slope) = (c(n), 0.0);
         for i in (0..n).rev() {

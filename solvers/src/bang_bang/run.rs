@@ -148,24 +148,41 @@ fn weights_of<'a>(weight: &'a [f64], offset: &[usize], i: usize) -> &'a [f64] {
     weight.get(offset[i]..offset[i + 1]).unwrap_or(&[])
 }
 
-/// Whether the tangent is zero at one end of a part, and the signed limit of its direction there, of any length.
-fn end_direction<const M: usize, const C: usize>(
-    sub: &SubPiece<M, C>,
+/// Where parts meet.
+#[derive(Clone, Copy)]
+struct PartEnd<const M: usize> {
+    /// The tangent is zero there.
+    is_cusp: bool,
+    /// The limit of its direction, of any length, with bits of the axes that move backward.
+    lead: [f64; M],
     negative: u8,
-    at_end: bool,
-) -> (bool, [f64; M]) {
-    let order = cusp_order(sub, at_end);
-    let lead = leading(sub, at_end, order);
-    (order > 0, std::array::from_fn(|k| if negative >> k & 1 == 1 { -lead[k] } else { lead[k] }))
+}
+
+impl<const M: usize> PartEnd<M> {
+    fn of<const C: usize>(sub: &SubPiece<M, C>, negative: u8, at_end: bool) -> Self {
+        let order = cusp_order(sub, at_end);
+        Self { is_cusp: order > 0, lead: leading(sub, at_end, order), negative }
+    }
+
+    /// Of a piece that the planner of quadratics takes.
+    fn of_quadratic((is_cusp, lead): (bool, [f64; M])) -> Self {
+        Self { is_cusp, lead, negative: 0 }
+    }
+
+    fn direction(&self) -> [f64; M] {
+        let length = norm(&self.lead);
+        let sign = |k: usize| if self.negative >> k & 1 == 1 { -1.0 } else { 1.0 };
+        std::array::from_fn(|k| sign(k) * self.lead[k] / length)
+    }
 }
 
 /// The greatest v² where two parts meet: none in the corner of a cusp.
-fn at_cusp<const M: usize>(before: &(bool, [f64; M]), after: &(bool, [f64; M]), speed_sq: f64) -> f64 {
-    if !before.0 && !after.0 {
+fn at_cusp<const M: usize>(before: &PartEnd<M>, after: &PartEnd<M>, speed_sq: f64) -> f64 {
+    if !before.is_cusp && !after.is_cusp {
         return speed_sq;
     }
-    let (long, other) = (norm(&before.1), norm(&after.1));
-    let turn = norm(&std::array::from_fn::<f64, M, _>(|k| before.1[k] / long - after.1[k] / other));
+    let (before, after) = (before.direction(), after.direction());
+    let turn = norm(&std::array::from_fn::<f64, M, _>(|k| before[k] - after[k]));
     if turn > SMOOTH_TURN {
         0.0
     } else {
@@ -176,8 +193,8 @@ fn at_cusp<const M: usize>(before: &(bool, [f64; M]), after: &(bool, [f64; M]), 
 /// Where a pass stands between two pieces.
 struct Between<const M: usize> {
     state: State,
-    /// The direction on the side that the pass has left, and whether there is a cusp.
-    end: Option<(bool, [f64; M])>,
+    /// The side that the pass has left.
+    end: Option<PartEnd<M>>,
     /// The tool's speed squared there.
     tip_sq: f64,
 }
@@ -206,7 +223,7 @@ fn backward<const M: usize>(
             at.tip_sq = task.problem.junction_speed[i + 1].powi(2);
         }
         if let Some(quadratic) = task.quadratic(i) {
-            let [start, end] = quadratic.ends(i);
+            let [start, end] = quadratic.ends(i).map(PartEnd::of_quadratic);
             let mut speed_sq = at.state.speed_sq.min(at.tip_sq);
             if let Some(after) = &at.end {
                 speed_sq = at_cusp(&end, after, speed_sq);
@@ -240,14 +257,14 @@ fn backward_over<const M: usize, const C: usize>(
     for number in (start..space.parts.len()).rev() {
         let part = space.parts[number];
         let sub = part.sub_piece(&piece);
-        let end = end_direction(&sub, part.negative, true);
+        let end = PartEnd::of(&sub, part.negative, true);
         if !std::mem::replace(&mut limited, true) {
             at.state.speed_sq = at.state.speed_sq.min(of_axes(at.tip_sq, sub.tip_share(true)));
         }
         if let Some(after) = &at.end {
             at.state.speed_sq = at_cusp(&end, after, at.state.speed_sq);
         }
-        at.end = Some(end_direction(&sub, part.negative, false));
+        at.end = Some(PartEnd::of(&sub, part.negative, false));
         space.subs.push(&sub);
         space.offsets.push(space.bounds.len());
         let reversed = sub.reversed();
@@ -281,7 +298,7 @@ fn forward<const M: usize>(
             at.tip_sq = task.problem.junction_speed[i].powi(2);
         }
         if let Some(quadratic) = task.quadratic(i) {
-            let [start, end] = quadratic.ends(i);
+            let [start, end] = quadratic.ends(i).map(PartEnd::of_quadratic);
             let mut speed_sq = at.state.speed_sq.min(at.tip_sq);
             if let Some(before) = &at.end {
                 speed_sq = at_cusp(before, &start, speed_sq);
@@ -311,7 +328,7 @@ fn forward_over<const M: usize, const C: usize>(
         *index -= 1;
         let part = space.parts[number];
         let sub = space.subs.get::<M, C>(*index, &part);
-        let start = end_direction(&sub, part.negative, false);
+        let start = PartEnd::of(&sub, part.negative, false);
         if !std::mem::replace(&mut limited, true) {
             at.state.speed_sq = at.state.speed_sq.min(of_axes(at.tip_sq, sub.tip_share(false)));
         }
@@ -321,7 +338,7 @@ fn forward_over<const M: usize, const C: usize>(
         if part.starts_at_rest() {
             at.state.speed_sq = 0.0;
         }
-        at.end = Some(end_direction(&sub, part.negative, true));
+        at.end = Some(PartEnd::of(&sub, part.negative, true));
         let end = space.offsets.get(*index + 1).copied().unwrap_or(space.bounds.len());
         let bounds = &space.bounds[space.offsets[*index]..end];
         space.arcs.clear();

@@ -76,6 +76,13 @@ struct End {
     stops: bool,
 }
 
+impl End {
+    /// Whether axis k has a zero there.
+    fn is_cut_for(&self, k: usize) -> bool {
+        self.order > 0 || self.turns >> k & 1 == 1
+    }
+}
+
 /// A place that divides two parts.
 #[derive(Clone, Copy, Debug)]
 pub struct Cut {
@@ -361,11 +368,14 @@ impl Part {
             let sign = if self.negative >> k & 1 == 1 { -length } else { length };
             let mut g = piece.g[k].part(self.from, self.to).scale(sign);
             let degree = g.degree();
+            if !self.left.is_cut_for(k) && !self.right.is_cut_for(k) {
+                return g;
+            }
             for (end, at_end) in [(&self.left, false), (&self.right, true)] {
-                let turns = end.turns >> k & 1 == 1;
-                if !turns && end.order == 0 {
+                if !end.is_cut_for(k) {
                     continue;
                 }
+                let turns = end.turns >> k & 1 == 1;
                 let (low, high) = piece.g[k].range();
                 let noise = length * piece.noise[k].max(SAME_TURN * degree as f64 * high.max(-low));
                 let known = usize::from(end.order).max(usize::from(turns));

@@ -17,10 +17,11 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
     /// The control axis of greatest acceleration: the axis, s = π'/2, bits of the axes tied with it, and whether it
     /// turns here.
     pub(super) fn least(&self, start: &Start<M>) -> Option<(usize, f64, u8, bool)> {
-        let mut s = [f64::INFINITY; M];
+        let (mut s, mut rests) = ([f64::INFINITY; M], [0.0; M]);
         let mut turns = 0u8;
         for k in self.moving() {
             let rest = start.limit[k] - start.c[k] * self.pi;
+            rests[k] = rest;
             if start.g[k] > 0.0 {
                 s[k] = rest / start.g[k];
             } else if start.c[k] > 0.0 && rest <= FLAT * start.limit[k] {
@@ -45,7 +46,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             let same = if turning(k) {
                 (s[k] - least).abs() <= 1e-9 * (least.abs() + s[k].abs())
             } else {
-                start.limit[k] - (start.g[k] * least + start.c[k] * self.pi) <= TIE * start.limit[k]
+                rests[k] - start.g[k] * least <= TIE * start.limit[k]
             };
             if !same {
                 continue;
@@ -128,10 +129,11 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                 let square = g.multiply(g);
                 let (cube, weighted) = (square.multiply(g), window.weight.multiply(&w));
                 let twist = weighted.multiply(&twist);
-                let need = window.g[l].multiply(&square).combine(a[j], &twist, 1.0);
+                let along = window.g[l].multiply(&square);
+                let need = along.combine(a[j], &twist, 1.0);
                 let size = || {
                     let twist = weighted.magnitude().multiply(&window.g[l].wronskian_magnitude(g));
-                    cube.combine(a[l], &window.g[l].multiply(&square), a[j]).combine(NOISE, &twist, NOISE)
+                    cube.combine(a[l], &along, a[j]).combine(NOISE, &twist, NOISE)
                 };
                 let roots = known + usize::from(tied >> l & 1 == 1);
                 if !below_limit {
