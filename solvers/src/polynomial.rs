@@ -116,6 +116,9 @@ impl<const C: usize> Polynomial<C> {
     /// The integral over [0, 1].
     #[inline(always)]
     pub fn mean(&self) -> f64 {
+        if self.n <= 1 {
+            return 0.5 * (self.first() + self.last());
+        }
         (0..=self.n).map(|i| self.bernstein(i)).sum::<f64>() / (self.n + 1) as f64
     }
 
@@ -349,7 +352,11 @@ impl<const C: usize> Polynomial<C> {
     #[inline(always)]
     pub fn reverse(&self) -> Self {
         let mut c = self.c;
-        c[..=self.n].reverse();
+        if self.n == 1 {
+            c.swap(0, 1);
+        } else if self.n > 1 {
+            c[..=self.n].reverse();
+        }
         Self { n: self.n, c }
     }
 
@@ -471,12 +478,13 @@ impl<const C: usize> Polynomial<C> {
     /// First x in [0, 1] after which the polynomial is negative; one that starts negative answers 0.
     #[inline(always)]
     pub fn first_root(&self) -> Option<f64> {
-        let (first, _, changes) = signs(self.coefficients().iter().copied());
-        match changes {
-            _ if first < 0.0 => Some(0.0),
-            0 => None,
-            1 => Some(self.single_root()),
-            _ => Stretch::whole(self).first_root(),
+        let (before, after) = self.coefficients().split_at(self.coefficients().iter().position(|&c| c < 0.0)?);
+        if before.iter().all(|&c| c == 0.0) {
+            Some(0.0)
+        } else if after.iter().all(|&c| c <= 0.0) {
+            Some(self.single_root())
+        } else {
+            Stretch::whole(self).first_root()
         }
     }
 
@@ -553,9 +561,19 @@ impl<const C: usize> Stretch<C> {
         }
     }
 
+    /// The first and the last sign, 0 for none, and how often it changes.
     #[inline(always)]
     fn signs(&self) -> (f64, f64, usize) {
-        signs((0..=self.p.n).map(|i| self.known(i)))
+        let (mut first, mut last, mut changes) = (0.0, 0.0, 0);
+        for i in 0..=self.p.n {
+            let value = self.known(i);
+            if value != 0.0 {
+                changes += usize::from(value * last < 0.0);
+                last = value.signum();
+                first = if first == 0.0 { last } else { first };
+            }
+        }
+        (first, last, changes)
     }
 
     /// Where the one change of sign is; `first` is the sign before it.
@@ -598,18 +616,6 @@ impl<const C: usize> Stretch<C> {
         }
         *before = if last == 0.0 { *before } else { last };
     }
-}
-
-/// The first and the last sign, 0 for none, and how often it changes.
-#[inline(always)]
-fn signs(coefficients: impl Iterator<Item = f64>) -> (f64, f64, usize) {
-    let (mut first, mut last, mut changes) = (0.0, 0.0, 0);
-    for value in coefficients.filter(|&value| value != 0.0) {
-        changes += usize::from(value * last < 0.0);
-        last = value.signum();
-        first = if first == 0.0 { last } else { first };
-    }
-    (first, last, changes)
 }
 
 /// The root of Σ c_i z^i in [0, 1], where the sum changes its sign once, to that of its value at 1.

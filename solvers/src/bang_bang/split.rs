@@ -95,6 +95,10 @@ impl Cut {
         Self { t, end: End::default() }
     }
 
+    fn is_turn_or_end(&self) -> bool {
+        self.end.turns != 0 || self.t == 0.0 || self.t == 1.0
+    }
+
     fn turn(t: f64, turns: u8) -> Self {
         Self { t, end: End { turns, reach: SAME_TURN, ..End::default() } }
     }
@@ -233,7 +237,8 @@ pub fn split<const M: usize, const C: usize>(
     }
     cuts.sort_by(|a, b| a.t.total_cmp(&b.t));
     cuts.dedup_by(|b, a| {
-        let same = b.t - a.t <= SAME_CUT;
+        let both_turn = a.is_turn_or_end() && b.is_turn_or_end();
+        let same = b.t - a.t <= if both_turn { SAME_TURN } else { SAME_CUT };
         if same {
             a.join(b);
         }
@@ -266,13 +271,12 @@ pub fn split<const M: usize, const C: usize>(
 /// Near a cusp the axes turn within what rounding can tell apart: there they turn at once, and no velocity cap counts,
 /// for the tool hardly moves.
 fn merge_near_cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, cuts: &mut Vec<Cut>) {
-    if cuts.len() == 2 {
+    let (slowest, fastest) = piece.speed.range();
+    if cuts.len() == 2 || slowest > SLOW * fastest {
         return;
     }
-    let fastest = piece.speed.range().1;
-    let is_end = |t: f64| t == 0.0 || t == 1.0;
     let mut turns: Vec<Cut> =
-        cuts.iter().copied().filter(|cut| cut.end.turns != 0 || is_end(cut.t)).collect();
+        cuts.iter().copied().filter(Cut::is_turn_or_end).collect();
     turns.sort_by(|a, b| a.t.total_cmp(&b.t));
     turns.dedup_by(|b, a| {
         let same = b.t - a.t <= SAME_TURN;
@@ -285,7 +289,7 @@ fn merge_near_cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, cuts: &
     });
     let slow = |t: f64| piece.speed.value(t) <= SLOW * fastest;
     let near = |t: f64| turns.iter().any(|turn| (t - turn.t).abs() <= NEAR_CUSP && slow(turn.t));
-    cuts.retain(|cut| cut.end.turns == 0 && !is_end(cut.t) && !near(cut.t));
+    cuts.retain(|cut| !cut.is_turn_or_end() && !near(cut.t));
     cuts.extend(turns);
 }
 

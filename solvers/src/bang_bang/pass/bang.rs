@@ -216,25 +216,31 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         ]
     }
 
-    /// Whether the arc of axis j with w = ω v_j² stays under the bound for sure, as long as all axes keep their limits.
-    fn stays_under(&self, j: usize, w: &Polynomial<C>) -> bool {
-        let (a, window) = (&self.axes.acceleration, &self.window);
-        // Each axis gains no more speed on its way than its limit allows.
-        let gain = |k: usize| 2.0 * a[k] * window.g[k].mean();
-        let polynomial = self.order == 0 && window.weight.degree() == 0;
+    /// Whether no motion within the limits of the axes can reach the velocity cap: each axis gains no more speed on
+    /// its way than its acceleration limit allows.
+    pub(super) fn cap_is_far(&self) -> bool {
+        let window = &self.window;
+        let gain = |k: usize| 2.0 * self.axes.acceleration[k] * window.g[k].mean();
+        if self.order > 0 || window.weight.degree() > 0 {
+            return false;
+        }
         match &window.bound {
-            Bound::Speed(f) if polynomial && self.sub.own_speed => {
+            Bound::Speed(f) if self.sub.own_speed => {
                 let most = self.pi * window.speed.first() + self.moving().map(gain).sum::<f64>();
                 most < f.range().0
             }
-            Bound::Axis(k, v_sq) if polynomial => {
-                self.pi * window.g[*k].first().powi(2) + gain(*k) < *v_sq
-            }
+            Bound::Axis(k, v_sq) => self.pi * window.g[*k].first().powi(2) + gain(*k) < *v_sq,
+            _ => false,
+        }
+    }
+
+    /// Whether the arc of axis j with w = ω v_j² stays under the bound for sure, as long as all axes keep their limits.
+    fn stays_under(&self, j: usize, w: &Polynomial<C>) -> bool {
+        let g = &self.window.g;
+        match &self.window.bound {
+            Bound::Speed(_) | Bound::Axis(..) => self.cap_is_far(),
             // No motion that keeps the limits leaves this arc downward once it has met it: the ends tell.
-            Bound::Arc(k, bound) => {
-                w.last() * window.g[*k].last().powi(2) < bound.last() * window.g[j].last().powi(2)
-            }
-            Bound::Speed(_) | Bound::Axis(..) => false,
+            Bound::Arc(k, bound) => w.last() * g[*k].last().powi(2) < bound.last() * g[j].last().powi(2),
             Bound::LimitCurve => true,
         }
     }

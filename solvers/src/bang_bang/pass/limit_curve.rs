@@ -64,7 +64,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                 }
             }
         }
-        if let Some((bound, d)) = window.quotient() {
+        if let Some((bound, d)) = window.quotient().filter(|_| !self.cap_is_far()) {
             if bound.first().is_finite() {
                 let used = n.multiply(&d);
                 let limit = bound.multiply(&weight.multiply(weight)).multiply(&w);
