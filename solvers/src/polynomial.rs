@@ -425,8 +425,12 @@ impl<const C: usize> Polynomial<C> {
     /// p on [t, 1], on [0, 1] again.
     #[inline(always)]
     pub fn right(&self, t: f64) -> Self {
-        // As a polynomial of z = x/(1 − x): scaled by 1 − t, shifted by t.
         let mut c = self.c;
+        if self.n == 1 {
+            c[0] = (1.0 - t) * c[0] + t * c[1];
+            return Self { n: 1, c };
+        }
+        // As a polynomial of z = x/(1 − x): scaled by 1 − t, shifted by t.
         let used = &mut c[..=self.n];
         let (mut power, rest) = (1.0, 1.0 - t);
         for c in used[..self.n].iter_mut().rev() {
@@ -478,7 +482,8 @@ impl<const C: usize> Polynomial<C> {
     /// First x in [0, 1] after which the polynomial is negative; one that starts negative answers 0.
     #[inline(always)]
     pub fn first_root(&self) -> Option<f64> {
-        let (before, after) = self.coefficients().split_at(self.coefficients().iter().position(|&c| c < 0.0)?);
+        let (before, after) =
+            self.coefficients().split_at(self.coefficients().iter().position(|&c| c < 0.0)?);
         if before.iter().all(|&c| c == 0.0) {
             Some(0.0)
         } else if after.iter().all(|&c| c <= 0.0) {

@@ -100,11 +100,8 @@ impl<const M: usize, const C: usize> Places<'_, M, C> {
         (0..M).all(|l| {
             let other = sub.g[l].values(x);
             // ω² (g_l s + g_l' π) with s from axis j, without the difference of large terms.
-            let twist = if sub.straight || l == j {
-                [0.0; K]
-            } else {
-                sub.g[l].wronskian(&sub.g[j]).values(x)
-            };
+            let twist =
+                if sub.straight || l == j { [0.0; K] } else { sub.g[l].wronskian(&sub.g[j]).values(x) };
             let (most, most_sq) = (axes.acceleration[l] * factor, axes.velocity_sq[l] * factor);
             (0..K).fold(true, |kept, i| {
                 kept & ((self.signed * other[i] + bend[i] * twist[i]).abs() <= most * g[i])

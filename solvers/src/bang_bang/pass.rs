@@ -154,7 +154,8 @@ pub fn run<const M: usize, const C: usize, const BACK: bool>(
         pass.under(bounds)?;
     }
     let pi = pass.pi;
-    let sound = |arc: &Arc| (arc.pi[0] >= 0.0) & (arc.pi[1] >= 0.0) & (arc.slow_sq >= 0.0) & arc.slow_sq.is_finite();
+    let sound =
+        |arc: &Arc| (arc.pi[0] >= 0.0) & (arc.pi[1] >= 0.0) & (arc.slow_sq >= 0.0) & arc.slow_sq.is_finite();
     if let Some(arc) = out[first..].iter().find(|arc| !sound(arc)) {
         return Err(Stuck(arc.x0));
     }
@@ -364,7 +365,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             return;
         }
         self.pi = self.pi.min(self.window.bound_at_start());
-        for k in self.moving() {
+        for k in 0..M {
             if start.g[k] == 0.0 && start.c[k] != 0.0 {
                 self.pi = self.pi.min(start.limit[k] / start.c[k].abs());
             }
@@ -373,8 +374,8 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             return;
         }
         let mut lowest = f64::INFINITY;
-        for j in self.moving() {
-            for l in self.moving().take_while(|&l| l < j) {
+        for j in 0..M {
+            for l in 0..j {
                 let w = (start.c[j] * start.g[l] - start.c[l] * start.g[j]).abs();
                 if start.g[j] > 0.0 && start.g[l] > 0.0 && w > 0.0 {
                     lowest = lowest.min((start.limit[j] * start.g[l] + start.limit[l] * start.g[j]) / w);

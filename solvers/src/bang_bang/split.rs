@@ -189,7 +189,9 @@ pub fn split<const M: usize, const C: usize>(
     });
     let mut fast = 0u8;
     for line in lines {
-        cuts.push(Cut::plain(line.from));
+        if line.from > 0.0 {
+            cuts.push(Cut::plain(line.from));
+        }
         if can_cap != 0 {
             fast |= cut_by_cap(piece, axes, line, can_cap, cuts);
         }
@@ -235,7 +237,9 @@ pub fn split<const M: usize, const C: usize>(
         });
         cuts.push(all);
     }
-    cuts.sort_by(|a, b| a.t.total_cmp(&b.t));
+    if cuts.len() > 2 {
+        cuts.sort_by(|a, b| a.t.total_cmp(&b.t));
+    }
     cuts.dedup_by(|b, a| {
         let both_turn = a.is_turn_or_end() && b.is_turn_or_end();
         let same = b.t - a.t <= if both_turn { SAME_TURN } else { SAME_CUT };
@@ -275,8 +279,7 @@ fn merge_near_cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, cuts: &
     if cuts.len() == 2 || slowest > SLOW * fastest {
         return;
     }
-    let mut turns: Vec<Cut> =
-        cuts.iter().copied().filter(Cut::is_turn_or_end).collect();
+    let mut turns: Vec<Cut> = cuts.iter().copied().filter(Cut::is_turn_or_end).collect();
     turns.sort_by(|a, b| a.t.total_cmp(&b.t));
     turns.dedup_by(|b, a| {
         let same = b.t - a.t <= SAME_TURN;

@@ -19,7 +19,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
     pub(super) fn least(&self, start: &Start<M>) -> Option<(usize, f64, u8, bool)> {
         let (mut s, mut rests) = ([f64::INFINITY; M], [0.0; M]);
         let mut turns = 0u8;
-        for k in self.moving() {
+        for k in 0..M {
             let rest = start.limit[k] - start.c[k] * self.pi;
             rests[k] = rest;
             if start.g[k] > 0.0 {
@@ -42,7 +42,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         let least = s[j];
         let mut tied = turns;
         let mut steepest = f64::INFINITY;
-        for k in self.moving().filter(|&k| s[k].is_finite()) {
+        for k in (0..M).filter(|&k| s[k].is_finite()) {
             let same = if turning(k) {
                 (s[k] - least).abs() <= 1e-9 * (least.abs() + s[k].abs())
             } else {
@@ -210,10 +210,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         }
         let (least, greatest) = other.wronskian(g).range();
         let (up, down) = (highest * greatest.max(0.0), -highest * least.min(0.0));
-        [
-            g.combine(a[l], other, -a[j]).is_above(up),
-            !BACK || g.combine(a[l], other, a[j]).is_above(down),
-        ]
+        [g.combine(a[l], other, -a[j]).is_above(up), !BACK || g.combine(a[l], other, a[j]).is_above(down)]
     }
 
     /// Whether no motion within the limits of the axes can reach the velocity cap: each axis gains no more speed on
@@ -226,7 +223,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         }
         match &window.bound {
             Bound::Speed(f) if self.sub.own_speed => {
-                let most = self.pi * window.speed.first() + self.moving().map(gain).sum::<f64>();
+                let most = self.pi * window.speed.first() + (0..M).map(gain).sum::<f64>();
                 most < f.range().0
             }
             Bound::Axis(k, v_sq) => self.pi * window.g[*k].first().powi(2) + gain(*k) < *v_sq,
@@ -294,13 +291,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
     }
 
     /// Where the arc of axis j with w = ω v_j² rises above the bound.
-    fn gap(
-        &self,
-        j: usize,
-        w: &Polynomial<C>,
-        turns: bool,
-        on_bound: bool,
-    ) -> Option<f64> {
+    fn gap(&self, j: usize, w: &Polynomial<C>, turns: bool, on_bound: bool) -> Option<f64> {
         let window = &self.window;
         let square = || window.g[j].multiply(&window.g[j]);
         let weight = &window.weight;
