@@ -92,7 +92,8 @@ pub fn plan_run<const M: usize>(
     Err(Fault::Stuck { piece, u: t * task.problem.width[piece] })
 }
 
-/// Calls a function with the capacity of polynomials that a piece needs.
+/// Calls a function with the capacity of polynomials that a piece needs: that of quadratics, of cubics and conics, of
+/// other polynomial pieces, of all.
 macro_rules! with_capacity {
     ($task:expr, $i:expr, $function:ident($($argument:expr),*)) => {
         match $task.coefficients($i) {

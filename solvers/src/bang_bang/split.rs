@@ -237,7 +237,7 @@ pub fn split<const M: usize, const C: usize>(
         });
         cuts.push(all);
     }
-    if cuts.len() > 2 {
+    if !cuts.is_sorted_by(|a, b| a.t <= b.t) {
         cuts.sort_by(|a, b| a.t.total_cmp(&b.t));
     }
     cuts.dedup_by(|b, a| {

@@ -1,5 +1,5 @@
 //! The sub-pieces of a run, kept from the backward pass to the forward one: what they take up is that of their own
-//! degree.
+//! degree, or of the capacity where that is small.
 
 use super::split::{Part, SubPiece};
 use crate::polynomial::Polynomial;
