@@ -8,10 +8,8 @@ use crate::polynomial::Polynomial;
 const EXCESS: f64 = 1e-9;
 /// … and by this next to a slow end, where more digits are lost.
 const EXCESS_NEAR: f64 = 1e-6;
-/// Places that are looked at on each arc …
+/// Places that are looked at on each arc.
 const PLACES: [f64; 4] = [0.02, 0.35, 0.7, 0.98];
-/// … and on one of a quadratic, along which every acceleration only grows or only falls.
-const PLACES_OF_QUADRATIC: [f64; 2] = [0.02, 0.98];
 /// Next to a place where all tangents are shorter than this part of the longest one limits are looked at closely:
 /// in these parts of the arc from there.
 const SLOW: f64 = 1e-4;
@@ -49,12 +47,7 @@ pub fn keeps_limits<const M: usize, const C: usize>(
         let way = along(&sub.g[j]).scale(span).antiderivative(&weight, sub.degree);
         let at = Places { sub, axes, arc, j, signed, braking, slow_somewhere, weight, way };
         let (slowest, other) = if braking { (arc.x1, arc.x0) } else { (arc.x0, arc.x1) };
-        let keeps = if sub.g[j].degree() <= 1 && sub.weight.degree() == 0 {
-            at.keep_limits(PLACES_OF_QUADRATIC, 1.0 + EXCESS)
-        } else {
-            at.keep_limits(PLACES, 1.0 + EXCESS)
-        };
-        keeps
+        at.keep_limits(PLACES, 1.0 + EXCESS)
             && (!slow(slowest) || at.keep_limits(DECADES, 1.0 + EXCESS_NEAR))
             && (!slow(other) || at.keep_limits(DECADES.map(|part| 1.0 - part), 1.0 + EXCESS_NEAR))
     };
