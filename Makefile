@@ -12,7 +12,7 @@ demo: $(VENV)/built
 	@echo "The report is out/vase/report.html"
 
 test: lint
-	CARGO_PROFILE_RELEASE_LTO=off cargo test --release --quiet --manifest-path solvers/Cargo.toml
+	cargo test --release --quiet --manifest-path solvers/Cargo.toml
 	$(BIN)/python -m mypy.stubtest feedplan._solvers
 	$(BIN)/pytest --numprocesses auto
 

@@ -728,7 +728,8 @@ mod tests {
         assert_eq!(quadratic([0.5, -0.25, 0.0]).first_root(), Some(0.5));
         let mut found = vec![];
         from_roots(&[0.25, 0.5, 0.75]).sign_changes(&mut |x| found.push(x));
-        assert_eq!(found, [0.25, 0.5, 0.75]);
+        assert_eq!(found.len(), 3);
+        assert!(found.iter().zip([0.25, 0.5, 0.75]).all(|(x, root)| (x - root).abs() < 1e-15), "{found:?}");
     }
 
     proptest! {
