@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import subprocess
 import sys
 from pathlib import Path
 
@@ -51,6 +52,13 @@ def main() -> None:
     if unknown:
         parser.error(f"there is no benchmark {unknown[0]!r}: use {', '.join(BENCHMARKS)}")
 
+    if len(arguments.names) != 1 and not arguments.quick:
+        # In processes of their own: what one leaves in memory is not the next one's.
+        for name in arguments.names or BENCHMARKS:
+            command = [sys.executable, "-m", "benchmarks", name, "--output", str(arguments.output)]
+            if status := subprocess.run(command, check=False).returncode:
+                sys.exit(status)
+        return
     # Wide enough for every table where there is no terminal.
     console = Console() if sys.stdout.isatty() else Console(width=160)
     for name in arguments.names or BENCHMARKS:

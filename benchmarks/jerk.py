@@ -5,6 +5,7 @@ from __future__ import annotations
 import resource
 import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from benchmarks.jerk_excess import jerk_excess
 from benchmarks.named import FREE, butterfly, lemniscate, trefoil
 from benchmarks.results import Cell, Result
 from benchmarks.third_order import by_clarabel, by_ipopt, grid_of, pseudo_jerk
-from benchmarks.timing import taken
+from benchmarks.timing import best_of, taken
 from feedplan import Axis, Machine
 from feedplan import plan as plan_path
 from feedplan.constraints.problem import build_problem
@@ -45,7 +46,8 @@ def run(quick: bool = False) -> Result:
             continue
         path = Path.from_curve(make(), feed=FREE)
         best = plan_path(path, MACHINE, "jerk-limited", accuracy=ACCURACY)
-        spent = best.compute["plan"]
+        again = partial(planner("jerk-limited", accuracy=ACCURACY), best.problem)
+        spent = best_of(again, 5).wall
         for method in METHODS:
             made = plan_path(path, MACHINE, method)
             excess = jerk_excess(made.problem, made.profile).worst if method != "bang-bang" else float("nan")
@@ -79,7 +81,8 @@ def run(quick: bool = False) -> Result:
         tuple(rows),
         (
             "250 mm/s, 3000 mm/s², 50 000 mm/s³ of each axis, rest to rest; bang-bang limits no jerk.",
-            f"ratio: of times, and of computing times, to those of jerk-limited at accuracy {ACCURACY:g}.",
+            f"ratio: of times, and of computing times, to those of jerk-limited at accuracy {ACCURACY:g},",
+            "whose computing time is the best of five.",
             "excess: of any limit, between the places of the grid. Other solvers hold them at those alone.",
             "one stage: the row of jerk with the speed of the optimum without limits of jerk, by Clarabel.",
             "winding: a long space curve, in windows; its computing ratio: CPU seconds to the clock's.",
