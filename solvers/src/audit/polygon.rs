@@ -283,22 +283,12 @@ impl<const M: usize> Polygon<M> {
 
     /// The unit direction of motion at the start, also where C' is 0 there.
     pub fn direction(&self) -> [f64; M] {
-        self.first_direction(self.steps[..self.degree].iter())
+        first_direction(self.steps[..self.degree].iter())
     }
 
     /// The same at the end.
     pub fn end_direction(&self) -> [f64; M] {
-        self.first_direction(self.steps[..self.degree].iter().rev())
-    }
-
-    /// Of the first step that is more than rounding.
-    fn first_direction<'a>(&'a self, mut steps: impl Iterator<Item = &'a [f64; M]> + Clone) -> [f64; M] {
-        let longest = steps.clone().map(length).fold(0.0, f64::max);
-        let step = steps.find(|step| length(step) > STILL * longest);
-        step.map_or([0.0; M], |step| {
-            let length = length(step);
-            step.map(|d| d / length)
-        })
+        first_direction(self.steps[..self.degree].iter().rev())
     }
 
     pub fn is_motionless(&self) -> bool {
@@ -465,6 +455,16 @@ impl<const M: usize> Polygon<M> {
         });
         found(1.0);
     }
+}
+
+/// The unit direction of the first step that is more than rounding.
+fn first_direction<'a, const M: usize>(mut steps: impl Iterator<Item = &'a [f64; M]> + Clone) -> [f64; M] {
+    let longest = steps.clone().map(length).fold(0.0, f64::max);
+    let step = steps.find(|step| length(step) > STILL * longest);
+    step.map_or([0.0; M], |step| {
+        let length = length(step);
+        step.map(|d| d / length)
+    })
 }
 
 #[cfg(test)]
