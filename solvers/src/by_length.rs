@@ -12,9 +12,10 @@ use rayon::prelude::*;
 use crate::arc_length::{W, X};
 use crate::bang_bang::Problem;
 use crate::jerk_limited::{Geometry, Place, SpeedCap};
+use crate::lanes::Lanes;
 use crate::path_dynamics::chord_speed;
 use crate::quadratic::{dot, norm};
-use crate::spline::bezier::derivatives;
+use crate::spline::bezier::{self, derivatives};
 use crate::spline::cusps::CUSP;
 use crate::spline::rational::Hodograph;
 use crate::spline::Piece;
@@ -160,16 +161,21 @@ pub fn speed_sq<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> f64 {
     }
 }
 
+/// D at four u of piece `i`.
+fn speeds_sq<const M: usize>(problem: &Problem<M>, i: usize, u: Lanes) -> Lanes {
+    if problem.tip.is_some() {
+        Lanes::new(u.values().map(|u| speed_sq(problem, i, u)))
+    } else {
+        bezier::speeds_sq(&piece(problem, i), u)
+    }
+}
+
 /// The length between two parameters of piece `i`, by one panel.
 fn panel<const M: usize>(problem: &Problem<M>, i: usize, a: f64, b: f64) -> f64 {
-    let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
-    let mut sum = 0.0;
-    for j in 0..4 {
-        for u in [middle - half * X[j], middle + half * X[j]] {
-            sum += W[j] * speed_sq(problem, i, u).sqrt();
-        }
-    }
-    half * sum
+    let (middle, half) = (Lanes::all(0.5 * (a + b)), 0.5 * (b - a));
+    let to = Lanes::new(X) * half;
+    let speeds = speeds_sq(problem, i, middle - to).sqrt() + speeds_sq(problem, i, middle + to).sqrt();
+    half * (Lanes::new(W) * speeds).sum()
 }
 
 impl Row {
@@ -377,38 +383,40 @@ impl<'a, const M: usize> ByLength<'a, M> {
 
     /// The greatest speed by the chord error on a curvature.
     pub fn chord_speed(&self, curvature: f64) -> f64 {
-        if self.problem.chord_tolerance.is_finite() {
-            chord_speed(curvature, self.problem.chord_tolerance, self.problem.period)
-        } else {
-            f64::INFINITY
-        }
+        chord_limit(self.problem, curvature)
     }
+}
 
-    /// The place at u of a part.
-    #[inline]
-    pub fn place(&self, part: usize, u: f64) -> Place<M> {
-        let i = self.parts[part].piece;
-        let c = derivatives(&piece(self.problem, i), u);
-        let [d, d1, d2] = rate(self.problem, i, u, &c);
-        let [_, c1, c2, c3] = c;
-        let (u1, per_d_sq) = (1.0 / d.sqrt(), 1.0 / (d * d));
-        let u2 = -0.5 * d1 * per_d_sq;
-        let u3 = u1 * per_d_sq * (d1 * d1 / d - 0.5 * d2);
-        let of = |f: &dyn Fn(usize) -> f64| std::array::from_fn(f);
-        let mut place = Place {
-            first: of(&|k| c1[k] * u1),
-            second: of(&|k| c2[k] * u1 * u1 + c1[k] * u2),
-            third: of(&|k| c3[k] * u1 * u1 * u1 + 3.0 * c2[k] * u1 * u2 + c1[k] * u3),
-            speed_cap: self.problem.feed[i],
+/// The place at u of piece `i`.
+pub fn place<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> Place<M> {
+    let c = derivatives(&piece(problem, i), u);
+    let [d, d1, d2] = rate(problem, i, u, &c);
+    let [_, c1, c2, c3] = c;
+    let (u1, per_d_sq) = (1.0 / d.sqrt(), 1.0 / (d * d));
+    let u2 = -0.5 * d1 * per_d_sq;
+    let u3 = u1 * per_d_sq * (d1 * d1 / d - 0.5 * d2);
+    let (mut first, mut second, mut third) = ([0.0; M], [0.0; M], [0.0; M]);
+    for k in 0..M {
+        first[k] = c1[k] * u1;
+        second[k] = c2[k] * u1 * u1 + c1[k] * u2;
+        third[k] = c3[k] * u1 * u1 * u1 + 3.0 * c2[k] * u1 * u2 + c1[k] * u3;
+    }
+    let mut speed_cap = problem.feed[i];
+    if problem.chord_tolerance.is_finite() {
+        let curvature = match tip_piece(problem, i) {
+            None => norm(&second),
+            Some(tip) => curvature(&tip, u),
         };
-        if self.problem.chord_tolerance.is_finite() {
-            let curvature = match tip_piece(self.problem, i) {
-                None => norm(&place.second),
-                Some(tip) => curvature(&tip, u),
-            };
-            place.speed_cap = place.speed_cap.min(self.chord_speed(curvature));
-        }
-        place
+        speed_cap = speed_cap.min(chord_limit(problem, curvature));
+    }
+    Place { first, second, third, speed_cap }
+}
+
+fn chord_limit<const M: usize>(problem: &Problem<M>, curvature: f64) -> f64 {
+    if problem.chord_tolerance.is_finite() {
+        chord_speed(curvature, problem.chord_tolerance, problem.period)
+    } else {
+        f64::INFINITY
     }
 }
 
@@ -438,6 +446,6 @@ impl<const M: usize> Geometry<M> for ByLength<'_, M> {
         }
         let x = (s - self.knots[part]).clamp(table.inside[0], table.inside[1]);
         let i = table.row(x);
-        self.place(part, table.rows[i].between(&table.rows[i + 1], x))
+        place(self.problem, self.parts[part].piece, table.rows[i].between(&table.rows[i + 1], x))
     }
 }

@@ -20,7 +20,6 @@ mod exact;
 mod grid;
 mod hermite;
 mod interior_point;
-mod lanes;
 mod model;
 mod newton;
 mod prepare;

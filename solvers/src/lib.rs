@@ -17,6 +17,7 @@ pub mod gcode;
 pub mod jerk_arcs;
 pub mod jerk_limited;
 pub mod jerk_limited_path;
+mod lanes;
 pub mod limit_curve;
 pub mod look_ahead;
 pub mod motion;

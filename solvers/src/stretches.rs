@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::bang_bang::{check_pieces, Problem};
 use crate::bang_bang_quadratic::Fault;
-use crate::by_length::{piece, straight, tip_piece, ByLength, Part, MAX_RATE};
+use crate::by_length::{piece, place, straight, tip_piece, Part, MAX_RATE};
 use crate::jerk_arcs::Arcs;
 use crate::jerk_limited::Limits;
 use crate::planning;
@@ -153,8 +153,7 @@ fn slow_places<const M: usize>(problem: &Problem<M>, i: usize) -> Vec<f64> {
 
 /// Whether the tool would creep through a place on piece `i`: a rest there takes no longer that setpoints could tell.
 fn is_sharp<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> bool {
-    let part = [Part { piece: i, u: [0.0, problem.width[i]] }];
-    let place = ByLength::new(problem, &part).place(0, u);
+    let place = place(problem, i, u);
     (0..M).any(|k| {
         let most = problem.max_acceleration[k];
         let speed = (most / place.second[k].abs()).sqrt();

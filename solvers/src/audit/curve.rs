@@ -143,6 +143,16 @@ impl<const M: usize> Curve<M> {
         }
     }
 
+    /// The length between two parameters, or somewhat more: that of the control polygon of this part.
+    pub fn way_at_most(&self, from: f64, to: f64) -> f64 {
+        match self {
+            Curve::Quadratic(curve) => {
+                0.5 * (to - from) * (length(&curve.derivative(from)) + length(&curve.derivative(to)))
+            }
+            Curve::General(polygon, width) => polygon.part(from / width, (to - from) / width).way(),
+        }
+    }
+
     /// C'(u).
     #[inline]
     pub fn derivative(&self, u: f64) -> [f64; M] {

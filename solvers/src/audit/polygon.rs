@@ -355,7 +355,7 @@ impl<const M: usize> Polygon<M> {
     }
 
     /// The length of the polygon.
-    fn way(&self) -> f64 {
+    pub fn way(&self) -> f64 {
         self.steps[..self.degree].iter().map(length).sum()
     }
 

@@ -6,7 +6,7 @@ use super::arcs::Arcs;
 use super::curve::{length, Followed};
 use super::motion::Motion;
 use super::place::Place;
-use super::{Limits, EPS, ROUNDINGS};
+use super::{Limits, EPS, PLACE_TOLERANCE, ROUNDINGS};
 
 /// A switch of the acceleration this share of a period away counts as at the setpoint.
 const SWITCH_SHARE: f64 = 1e-4;
@@ -148,7 +148,56 @@ impl<'a, const M: usize> Reader<'a, M> {
         }
         let speed = length(&self.motion.velocity(here.y));
         let reach = |wait: f64| wait * (speed + 0.5 * wait * length(&limits.acceleration));
-        reach(wait) - reach(rounding)
+        let most = reach(wait) - reach(rounding);
+        // A profile that creeps through a turn gets nowhere near as far.
+        if most > PLACE_TOLERANCE {
+            most.min(self.way_from(place, time).unwrap_or(most))
+        } else {
+            most
+        }
+    }
+
+    /// At most the way along the path between a place and the profile's own place at `time`, in mm, on the piece of the
+    /// place or one beside it.
+    fn way_from(&self, place: Place, time: f64) -> Option<f64> {
+        let there = self.place_at(time)?;
+        let (first, last) =
+            if (there.piece, there.u) < (place.piece, place.u) { (there, place) } else { (place, there) };
+        let curve = self.path.curve::<M>(first.piece);
+        match last.piece - first.piece {
+            0 => Some(curve.way_at_most(first.u, last.u)),
+            1 => {
+                let next = self.path.curve::<M>(last.piece);
+                Some(curve.way_at_most(first.u, curve.width()) + next.way_at_most(0.0, last.u))
+            }
+            _ => None,
+        }
+    }
+
+    /// Where the profile is at `time`, in the reader's run.
+    fn place_at(&self, time: f64) -> Option<Place> {
+        let (timed, run) = (&self.timed, self.timed.arcs_of(self.run));
+        let time = time - timed.shift(self.run);
+        let passed = timed.starts[run.clone()].partition_point(|&start| start <= time);
+        let arc = run.start + passed.checked_sub(1)?;
+        let since = time - timed.starts[arc];
+        let (arcs, duration) = (&timed.arcs, timed.arcs.duration[arc]);
+        if !(since <= duration) {
+            return None;
+        }
+        let piece = arcs.piece[arc] as usize;
+        let motion = arcs.motion::<M>(arc, &self.path.curve(piece));
+        let wanted = if motion.anchored_at_end { duration - since } else { since };
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..f64::MANTISSA_DIGITS {
+            let middle = 0.5 * (low + high);
+            if motion.time_from_anchor(middle) < wanted {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        Some(Place { piece, u: motion.parameter(0.5 * (low + high), [arcs.u0[arc], arcs.u1[arc]]) })
     }
 
     /// Least and greatest acceleration of each axis just before and just after `time`, at a place of the reader's arc.

@@ -2,9 +2,9 @@
 //! interpolates them.
 
 use super::hermite::{self, combine, local, Basis};
-use super::lanes::Lanes;
 use super::rows::Rows;
 use super::{Geometry, Limits};
+use crate::lanes::Lanes;
 
 /// Places of an interval, both ends among them, in groups of four.
 const GROUPS: usize = 3;

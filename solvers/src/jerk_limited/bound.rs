@@ -18,13 +18,13 @@ use rayon::prelude::*;
 use super::grid::Grid;
 use super::hermite::{local, MASS};
 use super::interior_point::{self, Bound, InteriorPoint, Outcome};
-use super::lanes::Lanes;
 use super::model::project;
 use super::prepare;
 use super::relaxed::{fall, pace, Relaxed};
 use super::rows::{Order, Rows};
 use super::stretch::ramps;
 use super::{Effort, Geometry, Problem, Profile};
+use crate::lanes::Lanes;
 
 /// Windows overlap by so many intervals to both sides, at least this part of a window.
 const HALO: usize = 400;

@@ -1,9 +1,9 @@
 //! The true problem on a stretch: the time ∫ ds/√w under the rows as they are.
 
 use super::hermite::{combine, duration, AT_NODES, WEIGHTS};
-use super::lanes::Lanes;
 use super::model::{expand, Local, Model};
 use super::rows::{Order, Rows};
+use crate::lanes::Lanes;
 
 /// w^(−1/2) at the collocation points of each interval, where the slacks are.
 #[derive(Default)]

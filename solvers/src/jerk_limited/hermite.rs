@@ -2,7 +2,7 @@
 //!
 //! On an interval of length h with t in [0, 1], w = Σ u_k B_k(t) with u = (w, h w') at its start and at its end.
 
-use super::lanes::Lanes;
+use crate::lanes::Lanes;
 
 /// Where the limits are enforced inside an interval, as parts of its length.
 pub const POINTS: [f64; 4] = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0];

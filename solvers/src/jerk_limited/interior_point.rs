@@ -10,10 +10,10 @@ use std::time::Instant;
 
 use super::band::{Band, Tie};
 use super::hermite::local;
-use super::lanes::{Lanes, LogProduct};
 use super::model::Model;
 use super::newton::State;
 use super::rows::{Order, Rows};
+use crate::lanes::{Lanes, LogProduct};
 
 /// What is known at an end of a stretch.
 #[derive(Clone, Copy, Debug)]

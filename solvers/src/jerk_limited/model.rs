@@ -1,8 +1,8 @@
 //! What the interior point asks of a problem: its slacks, their steps, and its curvature, interval by interval.
 
 use super::hermite::{AT_NODES, BEND, SLOPE, VALUE};
-use super::lanes::Lanes;
 use super::rows::Rows;
+use crate::lanes::Lanes;
 
 /// A problem over the rows of a stretch; it may have variables of its own at the collocation points.
 pub trait Model<const M: usize>: Default {

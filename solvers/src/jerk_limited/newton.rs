@@ -2,9 +2,9 @@
 
 use super::hermite::local;
 use super::interior_point::{Bound, InteriorPoint};
-use super::lanes::Lanes;
 use super::model::{project, Model};
 use super::rows::{Order, Rows};
+use crate::lanes::Lanes;
 
 /// The iterate, row by row of each interval; see `rows::Order`.
 #[derive(Default)]

@@ -7,9 +7,9 @@
 //! that Newton's matrix keeps its band.
 
 use super::hermite::{local, MASS};
-use super::lanes::Lanes;
 use super::model::{expand, project, Local, Model};
 use super::rows::{Order, Rows};
+use crate::lanes::Lanes;
 
 /// The variables of the relaxation, one set of lanes for each interval.
 #[derive(Default)]

@@ -10,9 +10,9 @@
 
 use super::hermite::{self, combine, local, BEND, SLOPE, VALUE};
 use super::interior_point::Bound;
-use super::lanes::Lanes;
 use super::model::Form;
 use super::{Geometry, Limits, Place};
+use crate::lanes::Lanes;
 
 /// One interval between two nodes.
 #[derive(Clone, Copy, Debug)]

@@ -5,41 +5,52 @@
 
 use super::rational::{cut_corners, quotient};
 use super::{CompositeCurve, Piece, MAX_DEGREE};
-use crate::quadratic::sub;
+use crate::lanes::Lanes;
+
+/// Calls a function for M axes with the number of control points as a constant, for which triangles unroll.
+macro_rules! with_count {
+    ($piece:expr, $function:ident($($argument:expr),*)) => {
+        match $piece.control.len() {
+            2 => $function::<M, 2>($($argument),*),
+            3 => $function::<M, 3>($($argument),*),
+            4 => $function::<M, 4>($($argument),*),
+            5 => $function::<M, 5>($($argument),*),
+            6 => $function::<M, 6>($($argument),*),
+            7 => $function::<M, 7>($($argument),*),
+            8 => $function::<M, 8>($($argument),*),
+            9 => $function::<M, 9>($($argument),*),
+            _ => $function::<M, { MAX_DEGREE + 1 }>($($argument),*),
+        }
+    };
+}
 
 /// C, C', C'' and C''' at u, by u.
 #[inline]
 pub fn derivatives<const M: usize>(piece: &Piece<M>, u: f64) -> [[f64; M]; 4] {
-    // The degrees of most paths as constants: their triangles unroll.
-    match piece.control.len() {
-        2 => with_count::<M, 2>(piece, u),
-        3 => with_count::<M, 3>(piece, u),
-        4 => with_count::<M, 4>(piece, u),
-        6 => with_count::<M, 6>(piece, u),
-        _ => with_count::<M, { MAX_DEGREE + 1 }>(piece, u),
-    }
+    with_count!(piece, derivatives_of(piece, u))
 }
 
-/// The same for at most N control points.
-#[inline(always)]
-fn with_count<const M: usize, const N: usize>(piece: &Piece<M>, u: f64) -> [[f64; M]; 4] {
-    let count = if N > MAX_DEGREE { piece.control.len() } else { N };
+fn derivatives_of<const M: usize, const N: usize>(piece: &Piece<M>, u: f64) -> [[f64; M]; 4] {
     let (t, scale) = (u / piece.width, 1.0 / piece.width);
-    let control = &piece.control[..count];
-    let anchor = if t <= 0.5 { control[0] } else { control[count - 1] };
+    let control = &piece.control[..N];
+    let anchor = if t <= 0.5 { control[0] } else { control[N - 1] };
     let mut local = [[0.0; M]; N];
-    for i in 0..count {
-        local[i] = sub(&control[i], &anchor);
+    for i in 0..N {
+        for k in 0..M {
+            local[i][k] = control[i][k] - anchor[k];
+        }
     }
     let mut c = if piece.is_rational() {
         let mut weights = [[0.0]; N];
-        for i in 0..count {
-            weights[i] = [piece.weights[i]];
-            local[i] = local[i].map(|value| value * piece.weights[i]);
+        for (i, &weight) in piece.weights[..N].iter().enumerate() {
+            weights[i] = [weight];
+            for k in 0..M {
+                local[i][k] *= weight;
+            }
         }
-        quotient(&triangle(&mut local, count, t), &triangle(&mut weights, count, t))
+        quotient(&triangle(local, t), &triangle(weights, t))
     } else {
-        triangle(&mut local, count, t)
+        triangle(local, t)
     };
     let mut power = 1.0;
     for order in 1..4 {
@@ -56,31 +67,92 @@ fn with_count<const M: usize, const N: usize>(piece: &Piece<M>, u: f64) -> [[f64
 
 /// De Casteljau's triangle: its last four rows hold the value and the derivatives by t.
 #[inline(always)]
-fn triangle<const M: usize, const N: usize>(b: &mut [[f64; M]; N], count: usize, t: f64) -> [[f64; M]; 4] {
+fn triangle<const M: usize, const N: usize>(mut b: [[f64; M]; N], t: f64) -> [[f64; M]; 4] {
     // Weights far apart keep their digits in this form of the mean, which takes no differences.
-    let (d, s) = ((count - 1) as f64, 1.0 - t);
-    let mut out = [[0.0; M]; 4];
-    for left in (0..count).rev() {
-        for k in 0..M {
-            match left {
-                3 => {
-                    let (first, middle, last) =
-                        (b[1][k] - b[0][k], b[2][k] - b[1][k], b[3.min(N - 1)][k] - b[2][k]);
-                    out[3][k] = d * (d - 1.0) * (d - 2.0) * ((last - middle) - (middle - first));
-                }
-                2 => out[2][k] = d * (d - 1.0) * ((b[2.min(N - 1)][k] - b[1][k]) - (b[1][k] - b[0][k])),
-                1 => out[1][k] = d * (b[1][k] - b[0][k]),
-                0 => out[0][k] = b[0][k],
-                _ => {}
-            }
-        }
+    let (d, s) = ((N - 1) as f64, 1.0 - t);
+    let cut = |b: &mut [[f64; M]; N], left: usize| {
         for i in 0..left {
             for k in 0..M {
                 b[i][k] = s * b[i][k] + t * b[i + 1][k];
             }
         }
+    };
+    let mut out = [[0.0; M]; 4];
+    for left in (4..N).rev() {
+        cut(&mut b, left);
     }
+    if N > 3 {
+        for k in 0..M {
+            let steps = [b[1][k] - b[0][k], b[2][k] - b[1][k], b[3][k] - b[2][k]];
+            out[3][k] = d * (d - 1.0) * (d - 2.0) * ((steps[2] - steps[1]) - (steps[1] - steps[0]));
+        }
+        cut(&mut b, 3);
+    }
+    if N > 2 {
+        for k in 0..M {
+            out[2][k] = d * (d - 1.0) * ((b[2][k] - b[1][k]) - (b[1][k] - b[0][k]));
+        }
+        cut(&mut b, 2);
+    }
+    for k in 0..M {
+        out[1][k] = d * (b[1][k] - b[0][k]);
+    }
+    cut(&mut b, 1);
+    out[0] = b[0];
     out
+}
+
+/// |C'|² by u, at four places.
+#[inline]
+pub fn speeds_sq<const M: usize>(piece: &Piece<M>, u: Lanes) -> Lanes {
+    with_count!(piece, speeds_sq_of(piece, u))
+}
+
+fn speeds_sq_of<const M: usize, const N: usize>(piece: &Piece<M>, u: Lanes) -> Lanes {
+    let (scale, control) = (1.0 / piece.width, &piece.control[..N]);
+    let t = u * scale;
+    let mut sum = Lanes::ZERO;
+    if piece.is_rational() {
+        let weights: &[f64; N] = piece.weights[..N].try_into().expect("a weight for each point");
+        let [w0, w1] = value_and_slope(weights, t);
+        let inverse = w0.inverse();
+        let turn = w1 * inverse;
+        for k in 0..M {
+            let mut points = [0.0; N];
+            for i in 0..N {
+                points[i] = (control[i][k] - control[0][k]) * weights[i];
+            }
+            let [m0, m1] = value_and_slope(&points, t);
+            let tangent = (m1 - turn * m0) * inverse;
+            sum += tangent * tangent;
+        }
+    } else {
+        for k in 0..M {
+            let mut points = [0.0; N];
+            for i in 0..N {
+                points[i] = control[i][k] - control[0][k];
+            }
+            let [_, tangent] = value_and_slope(&points, t);
+            sum += tangent * tangent;
+        }
+    }
+    sum * (scale * scale)
+}
+
+/// Value and derivative by t of a polynomial in Bernstein form.
+#[inline(always)]
+fn value_and_slope<const N: usize>(coefficients: &[f64; N], t: Lanes) -> [Lanes; 2] {
+    let s = Lanes::ONE - t;
+    let mut b = [Lanes::ZERO; N];
+    for i in 0..N {
+        b[i] = Lanes::all(coefficients[i]);
+    }
+    for left in (2..N).rev() {
+        for i in 0..left {
+            b[i] = s * b[i] + t * b[i + 1];
+        }
+    }
+    [s * b[0] + t * b[1], (b[1] - b[0]) * (N - 1) as f64]
 }
 
 /// C(u).
@@ -171,7 +243,7 @@ pub fn reverse<const M: usize>(piece: &Piece<M>, curve: &mut CompositeCurve<M>) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::quadratic::norm;
+    use crate::quadratic::{dot, norm, sub};
     use proptest::prelude::*;
 
     #[test]
@@ -255,6 +327,19 @@ mod tests {
             elevate(&piece, by, &mut raised);
             prop_assert_eq!(raised.piece(0).degree(), piece.degree() + by);
             prop_assert!(close(&derivatives(&raised.piece(0), u), &derivatives(&piece, u)));
+        }
+
+        #[test]
+        fn speeds_are_those_of_the_derivative(
+            (control, weights) in pieces(),
+            u in prop::array::uniform4(0.0..2.0f64),
+        ) {
+            let piece = Piece { control: &control, weights: &weights, width: 2.0 };
+            let size = control.iter().map(norm).fold(0.0, f64::max);
+            for (u, found) in u.into_iter().zip(speeds_sq(&piece, Lanes::new(u)).values()) {
+                let tangent = derivatives(&piece, u)[1];
+                prop_assert!((found - dot(&tangent, &tangent)).abs() <= 1e-10 * size * size);
+            }
         }
 
         #[test]

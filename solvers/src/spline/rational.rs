@@ -4,8 +4,6 @@
 //! positive parts, and differences of points are taken before anything is multiplied: the result depends on the
 //! size of the piece, not on where it lies.
 
-use std::array::from_fn;
-
 use super::{binomial, Piece, MAX_HODOGRAPH};
 use crate::quadratic::{lerp, sub};
 
@@ -86,11 +84,14 @@ impl<const M: usize> Hodograph<M> {
 pub fn quotient<const M: usize>(m: &[[f64; M]; 4], w: &[[f64; 1]; 4]) -> [[f64; M]; 4] {
     let inverse = 1.0 / w[0][0];
     let [w1, w2, w3] = [w[1][0] * inverse, w[2][0] * inverse, w[3][0] * inverse];
-    let c0: [f64; M] = from_fn(|k| m[0][k] * inverse);
-    let c1: [f64; M] = from_fn(|k| m[1][k] * inverse - w1 * c0[k]);
-    let c2: [f64; M] = from_fn(|k| m[2][k] * inverse - 2.0 * w1 * c1[k] - w2 * c0[k]);
-    let c3: [f64; M] = from_fn(|k| m[3][k] * inverse - 3.0 * (w1 * c2[k] + w2 * c1[k]) - w3 * c0[k]);
-    [c0, c1, c2, c3]
+    let mut c = [[0.0; M]; 4];
+    for k in 0..M {
+        c[0][k] = m[0][k] * inverse;
+        c[1][k] = m[1][k] * inverse - w1 * c[0][k];
+        c[2][k] = m[2][k] * inverse - 2.0 * w1 * c[1][k] - w2 * c[0][k];
+        c[3][k] = m[3][k] * inverse - 3.0 * (w1 * c[2][k] + w2 * c[1][k]) - w3 * c[0][k];
+    }
+    c
 }
 
 #[cfg(test)]

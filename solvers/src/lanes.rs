@@ -1,4 +1,4 @@
-//! Four numbers at a time, in the machine's vectors: one for each collocation point of an interval.
+//! Four numbers at a time, in the machine's vectors: values at four places of an interval or of a piece.
 
 use wide::f64x4;
 
