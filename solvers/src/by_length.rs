@@ -29,8 +29,8 @@ const QUINTIC: f64 = 1e-9;
 const SHORTEST: f64 = 1e-14;
 /// What rounding leaves of tangents and parameters.
 const ROUNDING: f64 = 4e-15;
-/// No table gets many more rows.
-const MOST_ROWS: usize = 2000;
+/// No table gets many more rows; next to a turn a part of 1e-10 as long as its piece some 3000 are used.
+const MOST_ROWS: usize = 20_000;
 /// Panels are not halved more often.
 const DEPTH: u32 = 48;
 /// Parts of a piece between places at which the speed is looked at.

@@ -16,6 +16,8 @@ const PATH_JERK: u8 = ArcKind::PathJerk as u8;
 pub const SPEED_CUBIC: u8 = ArcKind::SpeedCubic as u8;
 /// A section that takes no longer is rounding, in s.
 const SHORTEST: f64 = 1e-10;
+/// What states have been moved by is taken back by this part of each arc: there its length shows nothing of it.
+const TAKEN_BACK: f64 = 1e-10;
 /// Halvings for the time at which a section of constant jerk passes a place.
 const HALVINGS: usize = 200;
 
@@ -192,7 +194,7 @@ impl Arcs {
     ///
     /// Near a rest arcs are so short that rounding of u changes their length, and w'' by some hundred times as much. So
     /// lengths of arcs are measured between the rounded parameters, and each state is moved along its profile to
-    /// where they end. They add up from the nearer end of each part.
+    /// where they end. Moves add up from the nearer end of each part.
     pub fn push_profile<const M: usize>(
         &mut self,
         problem: &Problem<M>,
@@ -271,9 +273,12 @@ fn settled(profile: &Profile, nodes: Range<usize>, [from, to]: [f64; 2], lengths
     let s = &profile.s[nodes.clone()];
     let count = s.len();
     let mut moved = vec![0.0; count];
+    // What the quadratures of long arcs are off must not move states in turns that are shorter than that.
+    let settle = |miss: f64, length: f64| miss - miss.clamp(-TAKEN_BACK * length, TAKEN_BACK * length);
     let mut miss = 0.0;
     for n in 0..count {
         miss += lengths[n] - (s[n] - if n == 0 { from } else { s[n - 1] });
+        miss = settle(miss, lengths[n]);
         if s[n] < 0.5 * (from + to) && s[n] > from {
             moved[n] = miss;
         }
@@ -281,6 +286,7 @@ fn settled(profile: &Profile, nodes: Range<usize>, [from, to]: [f64; 2], lengths
     let mut miss = 0.0;
     for n in (0..count).rev() {
         miss += if n + 1 == count { to } else { s[n + 1] } - s[n] - lengths[n + 1];
+        miss = settle(miss, lengths[n + 1]);
         if s[n] >= 0.5 * (from + to) && s[n] < to {
             moved[n] = miss;
         }

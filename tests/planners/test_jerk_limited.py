@@ -115,7 +115,7 @@ def test_random_curves_keep_every_limit_whenever_they_are_stopped(part: int) -> 
 
 
 # Turns so sharp that the tool rests at them, cusps on lines and on curves of degree 2 and more.
-@pytest.mark.parametrize("seed", [53, 83, 115, 339, 538, 724])
+@pytest.mark.parametrize("seed", [53, 83, 115, 339, 538, 724, 2512])
 def test_curves_that_all_but_stop_keep_every_limit(seed: int) -> None:
     assert faults_of(seed) == []
 
