@@ -7,7 +7,7 @@
 
 use super::along::{Along, Pace};
 use super::curve::{inner, length};
-use super::integral::{kronrod, MOST_HALVINGS, RULES_AGREE_CLOSELY};
+use super::integral::{kronrod, kronrod_lanes, MOST_HALVINGS, RULES_AGREE_CLOSELY};
 use super::polygon::Polygon;
 use super::EPS;
 
@@ -210,17 +210,17 @@ impl<const M: usize> Motion<M> {
         self.measure(middle, to, halvings, lengths);
     }
 
+    /// The length between two distances from the anchor, by both rules.
     fn length_between(&self, from: f64, to: f64) -> [f64; 2] {
-        kronrod(|d| length(&self.tangent_at(self.direction * d)), from, to)
-    }
-
-    /// C' at the signed distance `d` from the anchor.
-    fn tangent_at(&self, d: f64) -> [f64; M] {
         match &self.general {
-            None => std::array::from_fn(|k| self.tangent[k] + d * self.bend[k]),
+            None => {
+                let tangent = |d: f64| -> [f64; M] {
+                    std::array::from_fn(|k| self.tangent[k] + self.direction * d * self.bend[k])
+                };
+                kronrod(|d| length(&tangent(d)), from, to)
+            }
             Some(general) => {
-                let scale = self.direction / self.width;
-                general.part.local((d / self.width).abs().min(1.0)).slope.map(|slope| scale * slope)
+                kronrod_lanes(|t| general.part.speeds(t), from / self.width, (to / self.width).min(1.0))
             }
         }
     }

@@ -11,6 +11,7 @@
 //! τ_0 d_0 of all levels, and C'(t) = n w_0 w_1 d_0 / w² of the last one (Floater 1992).
 
 use super::curve::{distance, inner, length};
+use crate::lanes::Lanes;
 
 /// Greatest degree.
 pub const MOST: usize = 9;
@@ -106,6 +107,54 @@ impl<const M: usize> Polygon<M> {
         }
     }
 
+    /// |dC/dt| at four places, by the same algorithm.
+    pub fn speeds(&self, t: Lanes) -> Lanes {
+        let (degree, s) = (self.degree, Lanes::ONE - t);
+        let mut steps = [[Lanes::ZERO; M]; MOST];
+        for i in 0..degree {
+            for k in 0..M {
+                steps[i][k] = Lanes::all(self.steps[i][k]);
+            }
+        }
+        let mut scale = Lanes::all(degree as f64);
+        if self.rational {
+            let mut weights = [Lanes::ZERO; MOST + 1];
+            for i in 0..=degree {
+                weights[i] = Lanes::all(self.weights[i]);
+            }
+            for count in (2..=degree).rev() {
+                let mut left = [Lanes::ZERO; MOST];
+                let mut right = [Lanes::ZERO; MOST];
+                for i in 0..count {
+                    let (a, b) = (s * weights[i], t * weights[i + 1]);
+                    weights[i] = a + b;
+                    let inverse = weights[i].inverse();
+                    (left[i], right[i]) = (a * inverse, b * inverse);
+                }
+                for i in 0..count - 1 {
+                    for k in 0..M {
+                        steps[i][k] = left[i] * steps[i][k] + right[i + 1] * steps[i + 1][k];
+                    }
+                }
+            }
+            let inverse = (s * weights[0] + t * weights[1]).inverse();
+            scale = scale * weights[0] * weights[1] * inverse * inverse;
+        } else {
+            for count in (1..degree).rev() {
+                for i in 0..count {
+                    for k in 0..M {
+                        steps[i][k] = s * steps[i][k] + t * steps[i + 1][k];
+                    }
+                }
+            }
+        }
+        let mut square = Lanes::ZERO;
+        for k in 0..M {
+            square += steps[0][k] * steps[0][k];
+        }
+        scale * square.sqrt()
+    }
+
     /// The place at t.
     #[inline]
     pub fn local(&self, t: f64) -> Local<M> {
@@ -119,7 +168,9 @@ impl<const M: usize> Polygon<M> {
                 let weight = (1.0 - t) * weights[0] + t * weights[1];
                 let scale =
                     if self.rational { degree * weights[0] * weights[1] / (weight * weight) } else { degree };
-                slope = steps[0].map(|step| scale * step);
+                for k in 0..M {
+                    slope[k] = scale * steps[0][k];
+                }
             }
         });
         Local { way, slope }
@@ -492,6 +543,17 @@ mod tests {
             assert!((quarter.curvature(t) - 0.1).abs() < 1e-14, "t = {t}: {}", quarter.curvature(t));
             let slope = quarter.local(t).slope;
             assert!(((x - 1000.0) * slope[0] + y * slope[1]).abs() < 1e-10);
+        }
+    }
+
+    #[test]
+    fn speeds_are_the_lengths_of_slopes() {
+        let t = [0.0, 0.3, 0.8, 1.0];
+        for piece in [quarter(), cubic(), quarter().part(0.2, 0.5), cubic().part(0.9, 0.1)] {
+            let speeds = piece.speeds(Lanes::new(t));
+            for (t, speed) in t.into_iter().zip(speeds.values()) {
+                assert!((speed / length(&piece.local(t).slope) - 1.0).abs() < 1e-14, "{speed} at {t}");
+            }
         }
     }
 
