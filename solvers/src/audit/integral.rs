@@ -5,7 +5,7 @@
 
 use super::motion::{Law, Motion, State};
 use super::{EPS, ROUNDINGS};
-use crate::lanes::Lanes;
+use wide::f64x4;
 
 /// Nodes and weights of Kronrod's 7-point rule on [−1, 1], the middle one last, and the weights of the 3-point Gauss rule inside it.
 const NODES: [f64; 3] = [0.960_491_268_708_020_3, 0.774_596_669_241_483_4, 0.434_243_749_346_802_55];
@@ -43,15 +43,15 @@ pub(super) fn kronrod(f: impl Fn(f64) -> f64, a: f64, b: f64) -> [f64; 2] {
 }
 
 /// The same of a function of four places at once.
-pub(super) fn kronrod_lanes(f: impl Fn(Lanes) -> Lanes, a: f64, b: f64) -> [f64; 2] {
+pub(super) fn kronrod_lanes(f: impl Fn(f64x4) -> f64x4, a: f64, b: f64) -> [f64; 2] {
     let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
-    let to = Lanes::new([NODES[0], NODES[1], NODES[2], 0.0]) * half;
-    let (below, above) = (f(Lanes::all(middle) - to), f(Lanes::all(middle) + to));
+    let to = f64x4::new([NODES[0], NODES[1], NODES[2], 0.0]) * half;
+    let (below, above) = (f(f64x4::splat(middle) - to), f(f64x4::splat(middle) + to));
     // The middle is there twice.
     let both = below + above;
-    let fine = Lanes::new([WEIGHTS[0], WEIGHTS[1], WEIGHTS[2], 0.5 * WEIGHTS[3]]) * both;
-    let coarse = Lanes::new([0.0, INNER_WEIGHTS[0], 0.0, 0.5 * INNER_WEIGHTS[1]]) * both;
-    [half * fine.sum(), half * coarse.sum()]
+    let fine = f64x4::new([WEIGHTS[0], WEIGHTS[1], WEIGHTS[2], 0.5 * WEIGHTS[3]]) * both;
+    let coarse = f64x4::new([0.0, INNER_WEIGHTS[0], 0.0, 0.5 * INNER_WEIGHTS[1]]) * both;
+    [half * fine.reduce_add(), half * coarse.reduce_add()]
 }
 
 impl<const M: usize> Motion<M> {

@@ -11,7 +11,7 @@
 //! τ_0 d_0 of all levels, and C'(t) = n w_0 w_1 d_0 / w² of the last one (Floater 1992).
 
 use super::curve::{distance, inner, length};
-use crate::lanes::Lanes;
+use wide::f64x4;
 
 /// Greatest degree.
 pub const MOST: usize = 9;
@@ -108,27 +108,27 @@ impl<const M: usize> Polygon<M> {
     }
 
     /// |dC/dt| at four places, by the same algorithm.
-    pub fn speeds(&self, t: Lanes) -> Lanes {
-        let (degree, s) = (self.degree, Lanes::ONE - t);
-        let mut steps = [[Lanes::ZERO; M]; MOST];
+    pub fn speeds(&self, t: f64x4) -> f64x4 {
+        let (degree, s) = (self.degree, f64x4::ONE - t);
+        let mut steps = [[f64x4::ZERO; M]; MOST];
         for i in 0..degree {
             for k in 0..M {
-                steps[i][k] = Lanes::all(self.steps[i][k]);
+                steps[i][k] = f64x4::splat(self.steps[i][k]);
             }
         }
-        let mut scale = Lanes::all(degree as f64);
+        let mut scale = f64x4::splat(degree as f64);
         if self.rational {
-            let mut weights = [Lanes::ZERO; MOST + 1];
+            let mut weights = [f64x4::ZERO; MOST + 1];
             for i in 0..=degree {
-                weights[i] = Lanes::all(self.weights[i]);
+                weights[i] = f64x4::splat(self.weights[i]);
             }
             for count in (2..=degree).rev() {
-                let mut left = [Lanes::ZERO; MOST];
-                let mut right = [Lanes::ZERO; MOST];
+                let mut left = [f64x4::ZERO; MOST];
+                let mut right = [f64x4::ZERO; MOST];
                 for i in 0..count {
                     let (a, b) = (s * weights[i], t * weights[i + 1]);
                     weights[i] = a + b;
-                    let inverse = weights[i].inverse();
+                    let inverse = f64x4::ONE / weights[i];
                     (left[i], right[i]) = (a * inverse, b * inverse);
                 }
                 for i in 0..count - 1 {
@@ -137,7 +137,7 @@ impl<const M: usize> Polygon<M> {
                     }
                 }
             }
-            let inverse = (s * weights[0] + t * weights[1]).inverse();
+            let inverse = f64x4::ONE / (s * weights[0] + t * weights[1]);
             scale = scale * weights[0] * weights[1] * inverse * inverse;
         } else {
             for count in (1..degree).rev() {
@@ -148,7 +148,7 @@ impl<const M: usize> Polygon<M> {
                 }
             }
         }
-        let mut square = Lanes::ZERO;
+        let mut square = f64x4::ZERO;
         for k in 0..M {
             square += steps[0][k] * steps[0][k];
         }
@@ -550,8 +550,8 @@ mod tests {
     fn speeds_are_the_lengths_of_slopes() {
         let t = [0.0, 0.3, 0.8, 1.0];
         for piece in [quarter(), cubic(), quarter().part(0.2, 0.5), cubic().part(0.9, 0.1)] {
-            let speeds = piece.speeds(Lanes::new(t));
-            for (t, speed) in t.into_iter().zip(speeds.values()) {
+            let speeds = piece.speeds(f64x4::new(t));
+            for (t, speed) in t.into_iter().zip(speeds.as_array()) {
                 assert!((speed / length(&piece.local(t).slope) - 1.0).abs() < 1e-14, "{speed} at {t}");
             }
         }

@@ -182,7 +182,8 @@ impl<'a, const M: usize> Reader<'a, M> {
         let arc = run.start + passed.checked_sub(1)?;
         let since = time - timed.starts[arc];
         let (arcs, duration) = (&timed.arcs, timed.arcs.duration[arc]);
-        if !(since <= duration) {
+        // Of a profile of rubbish nothing is known.
+        if !(since <= duration && arcs.u0[arc] < arcs.u1[arc]) {
             return None;
         }
         let piece = arcs.piece[arc] as usize;
