@@ -352,10 +352,11 @@ impl<const C: usize> Polynomial<C> {
     #[inline(always)]
     pub fn reverse(&self) -> Self {
         let mut c = self.c;
-        if self.n == 1 {
-            c.swap(0, 1);
-        } else if self.n > 1 {
-            c[..=self.n].reverse();
+        match self.n {
+            0 => {}
+            1 => c.swap(0, 1),
+            2 => c.swap(0, 2),
+            n => c[..=n].reverse(),
         }
         Self { n: self.n, c }
     }

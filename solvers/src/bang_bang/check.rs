@@ -32,20 +32,8 @@ pub fn keeps_limits<const M: usize, const C: usize>(
             Kind::Braking(j) => (j, true),
             _ => return true,
         };
-        let span = arc.x1 - arc.x0;
         let signed = if braking { -axes.acceleration[j] } else { axes.acceleration[j] };
-        // Along the arc from where it is slowest; way/ω is what axis j has gone.
-        let along = |p: &Polynomial<C>| {
-            let p = p.part(arc.x0, arc.x1);
-            if braking {
-                p.reverse()
-            } else {
-                p
-            }
-        };
-        let weight = along(&sub.weight);
-        let way = along(&sub.g[j]).scale(span).antiderivative(&weight, sub.degree);
-        let at = Places { sub, axes, arc, j, signed, braking, slow_somewhere, weight, way };
+        let at = Places { sub, axes, arc, j, signed, braking, slow_somewhere };
         let (slowest, other) = if braking { (arc.x1, arc.x0) } else { (arc.x0, arc.x1) };
         at.keep_limits(PLACES, 1.0 + EXCESS)
             && (!slow(slowest) || at.keep_limits(DECADES, 1.0 + EXCESS_NEAR))
@@ -64,9 +52,6 @@ struct Places<'a, const M: usize, const C: usize> {
     signed: f64,
     braking: bool,
     slow_somewhere: bool,
-    weight: Polynomial<C>,
-    /// The way of axis j times ω.
-    way: Polynomial<C>,
 }
 
 impl<const M: usize, const C: usize> Places<'_, M, C> {
@@ -75,18 +60,8 @@ impl<const M: usize, const C: usize> Places<'_, M, C> {
         let Self { sub, axes, arc, j, .. } = *self;
         let span = arc.x1 - arc.x0;
         let x = places.map(|place| if self.braking { arc.x1 - place * span } else { arc.x0 + place * span });
-        // Where rounding has moved x to, lest way and tangent belong to two places.
-        let places = x.map(|x| (if self.braking { arc.x1 - x } else { x - arc.x0 }) / span);
-        let (weight, g) = (self.weight.values(places), sub.g[j].values(x));
-        let way: [f64; K] = if !self.slow_somewhere {
-            let way = self.way.values(places);
-            std::array::from_fn(|i| way[i] / weight[i])
-        } else if self.braking {
-            x.map(|x| distance(sub, j, x, arc.x1))
-        } else {
-            // With all the digits that coefficients of a short part keep.
-            x.map(|x| distance(sub, j, arc.x0, x))
-        };
+        let (weight, g) = (sub.weight.values(x), sub.g[j].values(x));
+        let way = self.ways(x, &g);
         let pi: [f64; K] =
             std::array::from_fn(|i| (arc.slow_sq + 2.0 * axes.acceleration[j] * way[i]) / (g[i] * g[i]));
         let bend: [f64; K] = std::array::from_fn(|i| weight[i] * weight[i] * pi[i]);
@@ -101,5 +76,34 @@ impl<const M: usize, const C: usize> Places<'_, M, C> {
                     & (other[i] * other[i] * pi[i] <= most_sq)
             })
         })
+    }
+
+    /// How far axis j goes between the slowest place of the arc and each of these, where its tangents are `g`.
+    fn ways<const K: usize>(&self, x: [f64; K], g: &[f64; K]) -> [f64; K] {
+        let Self { sub, arc, j, .. } = *self;
+        let slowest = if self.braking { arc.x1 } else { arc.x0 };
+        if sub.weight.degree() == 0 && sub.g[j].degree() <= 1 {
+            let start = sub.g[j].value(slowest);
+            return std::array::from_fn(|i| (x[i] - slowest).abs() * 0.5 * (start + g[i]));
+        }
+        if self.slow_somewhere {
+            // With all the digits that coefficients of a short part keep.
+            return x.map(|x| distance(sub, j, x.min(slowest), x.max(slowest)));
+        }
+        let along = |p: &Polynomial<C>| {
+            let p = p.part(arc.x0, arc.x1);
+            if self.braking {
+                p.reverse()
+            } else {
+                p
+            }
+        };
+        let span = arc.x1 - arc.x0;
+        let weight = along(&sub.weight);
+        let way = along(&sub.g[j]).scale(span).antiderivative(&weight, sub.degree);
+        // Where rounding has moved x to, lest way and tangent belong to two places.
+        let places = x.map(|x| (x - slowest).abs() / span);
+        let (way, weight) = (way.values(places), weight.values(places));
+        std::array::from_fn(|i| way[i] / weight[i])
     }
 }

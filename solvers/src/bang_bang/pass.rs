@@ -82,32 +82,20 @@ pub struct State {
     pub speed_sq: f64,
 }
 
-/// The order of the zero that every tangent component has at an end.
-#[inline(always)]
-pub fn cusp_order<const M: usize, const C: usize>(sub: &SubPiece<M, C>, at_end: bool) -> usize {
-    let degree = sub.g[0].degree();
-    let rests = |r: usize| sub.g.iter().all(|g| g.coefficients()[if at_end { degree - r } else { r }] == 0.0);
-    let mut order = 0;
-    while order < degree && rests(order) {
-        order += 1;
-    }
-    order
-}
-
 /// The tangents' scaled coefficients next to an end: from the order of its cusp they have the limit direction.
 #[inline(always)]
-pub fn leading<const M: usize, const C: usize>(sub: &SubPiece<M, C>, at_end: bool, order: usize) -> [f64; M] {
-    match (order, at_end) {
+pub fn leading<const M: usize, const C: usize>(sub: &SubPiece<M, C>, at_end: bool) -> [f64; M] {
+    match (sub.cusp_order(at_end), at_end) {
         (0, false) => sub.g.each_ref().map(Polynomial::first),
         (0, true) => sub.g.each_ref().map(Polynomial::last),
-        (_, false) => sub.g.each_ref().map(|g| g.coefficients()[order]),
-        (_, true) => sub.g.each_ref().map(|g| g.coefficients()[g.degree() - order]),
+        (order, false) => sub.g.each_ref().map(|g| g.coefficients()[order]),
+        (order, true) => sub.g.each_ref().map(|g| g.coefficients()[g.degree() - order]),
     }
 }
 
 /// The limit direction at an end.
-fn direction<const M: usize, const C: usize>(sub: &SubPiece<M, C>, at_end: bool, order: usize) -> [f64; M] {
-    let lead = leading(sub, at_end, order);
+fn direction<const M: usize, const C: usize>(sub: &SubPiece<M, C>, at_end: bool) -> [f64; M] {
+    let lead = leading(sub, at_end);
     let length = norm(&lead);
     lead.map(|x| x / length)
 }
@@ -121,7 +109,7 @@ pub fn run<const M: usize, const C: usize, const BACK: bool>(
     bounds: &[Arc],
     out: &mut Vec<Arc>,
 ) -> Result<State, Stuck> {
-    let order = cusp_order(sub, false);
+    let order = sub.cusp_order(false);
     let straight = sub.straight;
     let pi = if order == 0 { state.speed_sq / sub.rate_sq(false) } else { f64::INFINITY };
     let first = out.len();
@@ -133,7 +121,7 @@ pub fn run<const M: usize, const C: usize, const BACK: bool>(
         order,
         // A curve stops in its cusps, a straight line need not.
         cusp_sq: if straight && order > 0 {
-            direction(sub, false, order).map(|x| x * x * state.speed_sq)
+            direction(sub, false).map(|x| x * x * state.speed_sq)
         } else {
             [0.0; M]
         },
@@ -159,12 +147,11 @@ pub fn run<const M: usize, const C: usize, const BACK: bool>(
     if let Some(arc) = out[first..].iter().find(|arc| !sound(arc)) {
         return Err(Stuck(arc.x0));
     }
-    let end_order = cusp_order(sub, true);
-    let speed_sq = if end_order == 0 {
+    let speed_sq = if sub.cusp_order(true) == 0 {
         pi * sub.rate_sq(true)
     } else if straight {
         let last = out[first..].last();
-        last.map_or(0.0, |arc| end_speed_sq(sub, axes, arc, &direction(sub, true, end_order)))
+        last.map_or(0.0, |arc| end_speed_sq(sub, axes, arc, &direction(sub, true)))
     } else {
         0.0
     };
@@ -266,7 +253,9 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                     self.arrived();
                 }
                 _ => {
-                    self.window = Window::new(self.sub).part(x0, x1);
+                    if bounds.len() > 1 {
+                        self.window = Window::new(self.sub).part(x0, x1);
+                    }
                     self.bound_by(arc);
                     // From π of the sub-piece to that of the window.
                     self.pi /= self.window.length().powi(2);
@@ -405,22 +394,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
     fn push(&mut self, t: f64, kind: Kind, w: Option<&Polynomial<C>>, slow_sq: f64) {
         let length = self.window.length();
         let scale = length * length;
-        let after = (t < 1.0).then(|| self.window.after(t));
-        let x1 = after.as_ref().map_or(self.window.x1, |after| after.x0);
-        // π at the end, of the sub-piece.
-        let pi_end = match (w, kind) {
-            (Some(w), Kind::Accelerating(j)) => {
-                let at = |p: &Polynomial<C>| if t == 1.0 { p.last() } else { p.value(t) };
-                let (w, g, weight) = (at(w), at(&self.window.g[j]), at(&self.window.weight));
-                let pi = if g > 0.0 { w / (weight * g * g) } else { f64::INFINITY };
-                let turn = if g > 0.0 { None } else { self.at_turn(j) };
-                turn.unwrap_or(pi) * scale
-            }
-            _ => match &after {
-                Some(after) => after.bound_at_start() * after.length().powi(2),
-                None => self.window.bound_at_end(),
-            },
-        };
+        let x0 = self.window.x0;
         let mut pi_start = self.pi * scale;
         if self.order > 0 {
             // The limit at a cusp.
@@ -432,15 +406,30 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                 _ => f64::INFINITY,
             };
         }
-        self.out.push(Arc { x0: self.window.x0, x1, kind, pi: [pi_start, pi_end], slow_sq });
-        self.order = 0;
-        if let Some(after) = after {
-            self.pi = pi_end / after.length().powi(2);
-            self.window = after;
+        // π at the end, of the sub-piece.
+        let of_arc = w.and_then(|w| match kind {
+            Kind::Accelerating(j) => {
+                let at = |p: &Polynomial<C>| if t == 1.0 { p.last() } else { p.value(t) };
+                let (w, g, weight) = (at(w), at(&self.window.g[j]), at(&self.window.weight));
+                let pi = if g > 0.0 { w / (weight * g * g) } else { f64::INFINITY };
+                let turn = if g > 0.0 { None } else { self.at_turn(j) };
+                Some(turn.unwrap_or(pi) * scale)
+            }
+            _ => None,
+        });
+        let pi_end;
+        if t < 1.0 {
+            self.window.leave_before(t);
+            let scale = self.window.length().powi(2);
+            pi_end = of_arc.unwrap_or_else(|| self.window.bound_at_start() * scale);
+            self.pi = pi_end / scale;
         } else {
+            pi_end = of_arc.unwrap_or_else(|| self.window.bound_at_end());
             self.window.x0 = self.window.x1;
             self.pi = pi_end;
         }
+        self.out.push(Arc { x0, x1: self.window.x0, kind, pi: [pi_start, pi_end], slow_sq });
+        self.order = 0;
     }
 
     /// π at the end of the window where axis j turns round: all others hold it there.

@@ -1,7 +1,7 @@
 //! Both passes over one run, its arcs into the columns of the profile.
 
 use super::check::keeps_limits;
-use super::pass::{self, cusp_order, distance, leading, Arc, Kind, State, Stuck};
+use super::pass::{self, distance, leading, Arc, Kind, State, Stuck};
 use super::piece::Piece;
 use super::split::{split, Cap, Cut, Limits, Part, Remedy, SubPiece};
 use super::store::Store;
@@ -161,8 +161,7 @@ struct PartEnd<const M: usize> {
 
 impl<const M: usize> PartEnd<M> {
     fn of<const C: usize>(sub: &SubPiece<M, C>, negative: u8, at_end: bool) -> Self {
-        let order = cusp_order(sub, at_end);
-        Self { is_cusp: order > 0, lead: leading(sub, at_end, order), negative }
+        Self { is_cusp: sub.cusp_order(at_end) > 0, lead: leading(sub, at_end), negative }
     }
 
     /// Of a piece that the planner of quadratics takes.

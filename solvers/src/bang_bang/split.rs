@@ -2,7 +2,6 @@
 
 use super::chord::SpeedLine;
 use super::cusp::{cusps, Cusps, Nearly};
-use super::pass::cusp_order;
 use super::piece::Piece;
 use super::TIP_AXES;
 use crate::planning::ChordLimit;
@@ -138,6 +137,8 @@ pub struct SubPiece<const M: usize, const C: usize> {
     pub degree: usize,
     pub straight: bool,
     pub own_speed: bool,
+    /// The order of the zero that every tangent has at the start and at the end.
+    pub cusp_orders: [u8; 2],
 }
 
 /// Appends the parts of the piece from left to right; `tip` is the tool's own piece where it is another one, `cuts`
@@ -407,6 +408,7 @@ impl Part {
             piece.speed.part(self.from, self.to).scale(length * length)
         };
         SubPiece {
+            cusp_orders: [false, true].map(|at_end| cusp_order(&g, at_end)),
             g,
             weight: piece.weight.part(self.from, self.to),
             speed,
@@ -420,6 +422,12 @@ impl Part {
 }
 
 impl<const M: usize, const C: usize> SubPiece<M, C> {
+    /// The order of the zero that every tangent has at an end.
+    #[inline(always)]
+    pub fn cusp_order(&self, at_end: bool) -> usize {
+        usize::from(self.cusp_orders[usize::from(at_end)])
+    }
+
     /// The speed squared of the axes over π at an end.
     pub fn rate_sq(&self, at_end: bool) -> f64 {
         let end = |p: &Polynomial<C>| if at_end { p.last() } else { p.first() };
@@ -439,7 +447,7 @@ impl<const M: usize, const C: usize> SubPiece<M, C> {
             let c = p.coefficients();
             c.get(if at_end { c.len().wrapping_sub(1 + r) } else { r }).copied().unwrap_or(0.0)
         };
-        let order = cusp_order(self, at_end);
+        let order = self.cusp_order(at_end);
         let axes: f64 = self.g.iter().map(|g| lead(g, order).powi(2)).sum();
         (lead(&self.speed, 2 * order) / axes).max(0.0)
     }
@@ -455,9 +463,17 @@ impl<const M: usize, const C: usize> SubPiece<M, C> {
             weight: self.weight.reverse(),
             speed: self.speed.reverse(),
             cap,
+            cusp_orders: [self.cusp_orders[1], self.cusp_orders[0]],
             ..*self
         }
     }
+}
+
+/// The order of the zero that all of these have at an end.
+fn cusp_order<const M: usize, const C: usize>(g: &[Polynomial<C>; M], at_end: bool) -> u8 {
+    let degree = g[0].degree();
+    let rests = |r: usize| g.iter().all(|g| g.coefficients()[if at_end { degree - r } else { r }] == 0.0);
+    (0..degree).take_while(|&r| rests(r)).count() as u8
 }
 
 /// Where a polynomial changes its sign by more than rounding: between two places that rounding alone keeps apart, as

@@ -18,6 +18,7 @@ struct Kept {
     degrees: [u8; 4],
     straight: bool,
     own_speed: bool,
+    cusp_orders: [u8; 2],
 }
 
 impl Store {
@@ -33,6 +34,7 @@ impl Store {
                 .map(|n| n as u8),
             straight: sub.straight,
             own_speed: sub.own_speed,
+            cusp_orders: sub.cusp_orders,
         });
         for p in sub.g.iter().chain([&sub.weight, &sub.speed]) {
             self.coefficients.extend_from_slice(p.padded());
@@ -58,6 +60,7 @@ impl Store {
             degree,
             straight: kept.straight,
             own_speed: kept.own_speed,
+            cusp_orders: kept.cusp_orders,
         }
     }
 }

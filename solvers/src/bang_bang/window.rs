@@ -49,9 +49,6 @@ impl<const M: usize, const C: usize> Window<M, C> {
 
     /// What lies between two places, of the window of a whole sub-piece under its cap.
     pub fn part(&self, x0: f64, x1: f64) -> Self {
-        if x0 == 0.0 && x1 == 1.0 {
-            return *self;
-        }
         let length = x1 - x0;
         let bound = match &self.bound {
             Bound::Speed(f) => Bound::Speed(f.part(x0, x1)),
@@ -68,23 +65,20 @@ impl<const M: usize, const C: usize> Window<M, C> {
         }
     }
 
-    /// What lies after t.
-    pub fn after(&self, t: f64) -> Self {
+    /// Leaves out what lies before t.
+    pub fn leave_before(&mut self, t: f64) {
         let rest = 1.0 - t;
-        let bound = match &self.bound {
-            Bound::Speed(f) => Bound::Speed(f.right(t)),
-            Bound::Arc(k, w) => Bound::Arc(*k, w.right(t)),
-            bound => *bound,
-        };
-        Self {
-            g: std::array::from_fn(|k| self.g[k].right(t).scale(rest)),
-            weight: self.weight.right(t),
-            speed: self.speed.right(t).scale(rest * rest),
-            bound,
-            known: [None, self.known[1]],
-            x0: self.x0 + t * self.length(),
-            x1: self.x1,
+        for g in &mut self.g {
+            *g = g.right(t).scale(rest);
         }
+        self.weight = self.weight.right(t);
+        self.speed = self.speed.right(t).scale(rest * rest);
+        match &mut self.bound {
+            Bound::Speed(p) | Bound::Arc(_, p) => *p = p.right(t),
+            Bound::Axis(..) | Bound::LimitCurve => {}
+        }
+        self.known[0] = None;
+        self.x0 += t * self.length();
     }
 
     /// The greatest π at the start, infinite for no limit.
