@@ -4,6 +4,7 @@ use feedplan_solvers::bang_bang::{plan, plan_each, Problem};
 use feedplan_solvers::bang_bang_quadratic::{Fault, Profile};
 
 use super::cases::Random;
+use super::{padded, PADDED};
 
 /// One piece: its control points and weights, and its parameter width.
 #[derive(Clone, Debug)]
@@ -30,8 +31,9 @@ impl<const M: usize> CurveCase<M> {
         Self { pieces, feed, junction, velocity, acceleration }
     }
 
-    fn planned(&self, by: impl Fn(&Problem<M>) -> Result<Profile, Fault>) -> Result<Profile, Fault> {
-        let control: Vec<[f64; M]> = self.pieces.iter().flat_map(|piece| piece.points.clone()).collect();
+    fn planned(&self, by: impl Fn(&Problem<PADDED>) -> Result<Profile, Fault>) -> Result<Profile, Fault> {
+        let points = self.pieces.iter().flat_map(|piece| &piece.points);
+        let control: Vec<[f64; PADDED]> = points.map(|point| padded(point, 0.0)).collect();
         let weight: Vec<f64> = self.pieces.iter().flat_map(|piece| piece.weights.clone()).collect();
         let width: Vec<f64> = self.pieces.iter().map(|piece| piece.width).collect();
         let mut offset = vec![0];
@@ -47,8 +49,8 @@ impl<const M: usize> CurveCase<M> {
             runs: &[0, self.pieces.len()],
             feed: &vec![self.feed; self.pieces.len()],
             junction_speed: &self.junction,
-            max_velocity: self.velocity,
-            max_acceleration: self.acceleration,
+            max_velocity: padded(&self.velocity, 1.0),
+            max_acceleration: padded(&self.acceleration, 1.0),
             chord_tolerance: f64::INFINITY,
             period: 0.001,
             start_speed: 0.0,

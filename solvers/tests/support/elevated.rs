@@ -3,19 +3,20 @@
 use feedplan_solvers::bang_bang::Problem;
 
 use super::cases::Case;
+use super::{padded, PADDED};
 
 /// The arrays of such a problem.
-pub struct Elevated<const M: usize> {
-    control: Vec<[f64; M]>,
+pub struct Elevated {
+    control: Vec<[f64; PADDED]>,
     offset: Vec<usize>,
     width: Vec<f64>,
     runs: [usize; 2],
 }
 
-impl<const M: usize> Elevated<M> {
+impl Elevated {
     /// The pieces of a case, of degree 2 and so much more.
-    pub fn new(case: &Case<M>, elevate: usize) -> Self {
-        let mut control: Vec<[f64; M]> = vec![];
+    pub fn new<const M: usize>(case: &Case<M>, elevate: usize) -> Self {
+        let mut control = vec![];
         let mut offset = vec![0];
         for piece in &case.pieces {
             let mut points = piece.control.to_vec();
@@ -29,7 +30,7 @@ impl<const M: usize> Elevated<M> {
                 higher.push(points[points.len() - 1]);
                 points = higher;
             }
-            control.extend(points);
+            control.extend(points.iter().map(|point| padded(point, 0.0)));
             offset.push(control.len());
         }
         let width = case.pieces.iter().map(|piece| piece.width).collect();
@@ -37,7 +38,7 @@ impl<const M: usize> Elevated<M> {
     }
 
     /// The problem of the case.
-    pub fn problem<'a>(&'a self, case: &'a Case<M>) -> Problem<'a, M> {
+    pub fn problem<'a, const M: usize>(&'a self, case: &'a Case<M>) -> Problem<'a, PADDED> {
         Problem {
             control: &self.control,
             weight: &[],
@@ -47,8 +48,8 @@ impl<const M: usize> Elevated<M> {
             runs: &self.runs,
             feed: &case.feed,
             junction_speed: &case.junction,
-            max_velocity: case.velocity,
-            max_acceleration: case.acceleration,
+            max_velocity: padded(&case.velocity, 1.0),
+            max_acceleration: padded(&case.acceleration, 1.0),
             chord_tolerance: case.chord_tolerance,
             period: case.period,
             start_speed: case.start_speed,

@@ -32,9 +32,18 @@ macro_rules! for_axes {
     };
 }
 
-/// As many axes as the kernels of curves are compiled for here: each number costs the compiler half a minute, and on
-/// joints they run with five.
+/// As many axes as cases for the kernels of curves have.
 pub const FEW_AXES: [usize; 3] = [1, 2, 3];
+
+/// So many the kernels of curves see, as from Python: each number that they are compiled for costs the compiler a
+/// minute.
+pub const PADDED: usize = 3;
+
+/// The values of all axes, and another one for those that stand still.
+pub fn padded<const M: usize>(values: &[f64; M], still: f64) -> [f64; PADDED] {
+    const { assert!(M <= PADDED) };
+    std::array::from_fn(|k| values.get(k).copied().unwrap_or(still))
+}
 
 /// The same for one of `FEW_AXES`.
 #[macro_export]
