@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from fractions import Fraction
+from itertools import pairwise
+from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,3 +77,60 @@ def worst_excess(problem: Problem, profile: SpeedProfile, samples: int = 10) -> 
         axis=2,
     ).max(axis=2)
     return float(used.max()) - 1, float(used.min())
+
+
+def worst_excess_exactly(problem: Problem, profile: SpeedProfile) -> float:
+    """The same excess of the axes' limits on one polynomial piece, in rational numbers.
+
+    Next to a cusp the piece's derivatives in floats may be rounding alone, and what follows from them.
+    """
+    (width,) = map(Fraction, problem.path.width.tolist())
+    points = [list(map(Fraction, point)) for point in problem.curve.control_points.tolist()]
+    rates = _derivative(points, width)
+    bends = _derivative(rates, width)
+    worst = Fraction(0)
+    for arc in np.flatnonzero(profile.u1 - profile.u0 > 1e-6 * problem.path.width[0]):
+        kind, axis = profile.kind[arc], int(profile.axis[arc])
+        value, u0, u1 = (Fraction(float(column[arc])) for column in (profile.value, profile.u0, profile.u1))
+        for part in (0.001, 0.01, 0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95, 0.99, 0.999):
+            u = u0 + (u1 - u0) * Fraction(part)
+            g, c = _value(rates, u / width), _value(bends, u / width)
+            if kind == ArcKind.FEED:
+                p = value / sum(x * x for x in g)
+                s = -p * sum(x * y for x, y in zip(g, c, strict=True)) / sum(x * x for x in g)
+            elif kind == ArcKind.AXIS_VELOCITY:
+                p = value / g[axis] ** 2
+                s = -p * c[axis] / g[axis]
+            else:
+                # v² of the axis at the slower end; p is infinite in a cusp that is passed.
+                ends = [(float(profile.p0[arc]), u0), (float(profile.p1[arc]), u1)]
+                v_sq, slow = min(
+                    (Fraction(p) * _value(rates, end / width)[axis] ** 2, end)
+                    for p, end in ends
+                    if p < np.inf
+                )
+                way = _value(points, u / width)[axis] - _value(points, slow / width)[axis]
+                p = (v_sq + 2 * value * way) / g[axis] ** 2
+                s = (value - c[axis] * p) / g[axis]
+            limits = zip(g, c, problem.max_acceleration.tolist(), problem.max_velocity.tolist(), strict=True)
+            for x, y, acceleration, velocity in limits:
+                worst = max(
+                    worst, abs(x * s + y * p) / Fraction(acceleration), x * x * p / Fraction(velocity) ** 2
+                )
+    return float(worst - 1)
+
+
+def _value(points: list[list[Fraction]], t: Fraction) -> list[Fraction]:
+    """The Bernstein polynomial with these coefficients, axis by axis."""
+    n = len(points) - 1
+    basis = [comb(n, i) * t**i * (1 - t) ** (n - i) for i in range(n + 1)]
+    return [sum(b * x for b, x in zip(basis, axis, strict=True)) for axis in zip(*points, strict=True)]
+
+
+def _derivative(points: list[list[Fraction]], width: Fraction) -> list[list[Fraction]]:
+    """Its derivative by u = t width."""
+    n = len(points) - 1
+    return [
+        [n * (y - x) / width for x, y in zip(before, after, strict=True)]
+        for before, after in pairwise(points)
+    ]

@@ -15,7 +15,7 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.plan import rounding_stops
 from feedplan.profile import ArcKind, SpeedProfile
 from feedplan.setpoints import setpoints
-from tests.planners.excess import worst_excess
+from tests.planners.excess import worst_excess, worst_excess_exactly
 from tests.planners.test_curves import problem_of
 
 Array = NDArray[np.float64]
@@ -117,6 +117,13 @@ def test_a_curve_that_all_but_rests_inside_keeps_its_limits_there() -> None:
     # Both tangents fall to 1e-12 of their greatest without turning round.
     problem = problem_of(*random_curve(3705))
     assert worst_excess(problem, SpeedProfile(*plan_bang_bang(problem)))[0] <= 1e-8
+
+
+@pytest.mark.parametrize("seed", [3422, 5957, 10814, 11046])
+def test_limits_that_floats_cannot_judge_next_to_a_cusp_are_kept(seed: int) -> None:
+    # All tangents fall to 1e-10 of their greatest or less: in floats most digits of C' and C'' are rounding.
+    problem = problem_of(*random_curve(seed))
+    assert worst_excess_exactly(problem, SpeedProfile(*plan_bang_bang(problem))) <= 1e-8
 
 
 @pytest.mark.parametrize("seed", [3452, 4253, 7517, 8833, 11396])
