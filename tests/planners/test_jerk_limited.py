@@ -135,8 +135,8 @@ def test_a_time_limit_at_any_moment_gives_a_plan_that_keeps_the_limits(seconds: 
     assert faults_of(0, time_limit=seconds) == []
 
 
-def test_setpoints_of_a_plan_that_creeps_round_a_sharp_turn_are_where_it_is() -> None:
-    # A setpoint 1e-8 mm before the turn is as near to the path behind it, where the plan is a millisecond later.
+def test_setpoints_of_a_plan_that_creeps_round_a_turn_are_where_it_is() -> None:
+    # A setpoint 1e-8 mm before the turn is as near to the path behind it, where the plan is 1 ms later.
     assert faults_of(1734, time_limit=0.0) == []
 
 
