@@ -9,7 +9,7 @@ from benchmarks.end_to_end import PARTS, QUICK
 from benchmarks.named import CURVES, butterfly, part, path_of
 from benchmarks.problems import MACHINE, random_problem
 from benchmarks.results import Cell, Result
-from benchmarks.timing import best_of
+from benchmarks.timing import best_of_each
 from feedplan._solvers import lower_bound, plan_bang_bang
 from feedplan.constraints.problem import Problem, build_problem
 from feedplan.geometry.path import Path as ToolPath
@@ -49,8 +49,8 @@ def _row(name: str, problem: Problem) -> dict[str, Cell]:
     profile = SpeedProfile(*plan_bang_bang(problem))
     pieces = len(problem.path)
     times = 3 if pieces > 100_000 else 7
-    plan = best_of(partial(plan_bang_bang, problem), times)
-    bound = best_of(partial(lower_bound, problem, profile), times)
+    calls = [partial(plan_bang_bang, problem), partial(lower_bound, problem, profile)]
+    plan, bound = best_of_each(calls, times)
     return {
         "path": name,
         "pieces": pieces,

@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 NODES, WEIGHTS = leggauss(20)
 # How far inside the ends of an arc limits are looked at, as a part of it.
 INSET = 1e-7
+# Lengths are added up over parts that shrink towards both ends, where the way may turn sharply.
+DECADES = 10.0 ** np.arange(-6, -1)
 
 
 @dataclass(frozen=True)
@@ -41,8 +43,11 @@ def jerk_excess(problem: Problem, profile: SpeedProfile, samples: int = 20) -> E
     """The excess at `samples` places of each arc from end to end."""
     # Both ends, and the places; those next to the ends a little inside, where every curve has a direction.
     t = np.concatenate([[0.0], np.linspace(INSET, 1 - INSET, samples), [1.0]])
-    u = profile.u0[:, None] + (profile.u1 - profile.u0)[:, None] * t
-    s = lengths(problem, profile.piece, profile.u0, u)
+    fine = np.unique(np.concatenate([t, DECADES, 1 - DECADES]))
+    along = profile.u0[:, None] + (profile.u1 - profile.u0)[:, None] * fine
+    looked_at = np.searchsorted(fine, t)
+    u = along[:, looked_at]
+    s = lengths(problem, profile.piece, profile.u0, along)[:, looked_at]
     pace = _motion(problem, profile, s)
     piece, inside = np.repeat(profile.piece, samples), u[:, 1:-1]
     q1, q2, q3 = _by_length(problem, piece, inside.ravel())
@@ -133,13 +138,16 @@ def _misfits(profile: SpeedProfile, v: Array, s: Array) -> tuple[Array, Array]:
     t, length = profile.duration, s[:, -1]
     constant = profile.kind == ArcKind.PATH_JERK
     way = t * (v[:, 0] + t * (profile.a0 / 2 + t * profile.value / 6))
-    nodes = (NODES + 1) / 2
+    # Parts as for the lengths: next to rest 1/v is all but singular.
+    ends = np.concatenate([[0.0], DECADES, [0.5], 1 - DECADES[::-1], [1.0]])
+    half = np.diff(ends)[:, None] / 2
+    nodes, weights = (ends[:-1, None] + half * (NODES + 1)).ravel(), (half * WEIGHTS).ravel()
     w0, w1, s0, s1 = v[:, 0] ** 2, v[:, -1] ** 2, 2 * profile.a0 * length, 2 * profile.a1 * length
     x, y = nodes, 1 - nodes
     w = np.outer(w0, y**2 * (1 + 2 * x)) + np.outer(s0, y**2 * x)
     w += np.outer(w1, x**2 * (1 + 2 * y)) - np.outer(s1, x**2 * y)
     with np.errstate(invalid="ignore", divide="ignore"):
-        time = length * ((1 / np.sqrt(w)) @ (WEIGHTS / 2))
+        time = length * ((1 / np.sqrt(w)) @ weights)
     return np.where(constant, np.abs(way - length), 0.0), np.where(constant, 0.0, np.abs(time - t))
 
 

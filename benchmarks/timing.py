@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 
@@ -27,5 +27,13 @@ def taken(call: Callable[[], object]) -> Taken:
 
 def best_of(call: Callable[[], object], times: int) -> Taken:
     """The least wall time and the least processor time of 3 to 50 calls."""
-    measured = [taken(call) for _ in range(min(max(times, 3), 50))]
-    return Taken(min(t.wall for t in measured), min(t.processor for t in measured))
+    return best_of_each([call], min(max(times, 3), 50))[0]
+
+
+def best_of_each(calls: Sequence[Callable[[], object]], times: int) -> list[Taken]:
+    """The same of several calls in turn: what the computer does meanwhile befalls all of them."""
+    rounds = [[taken(call) for call in calls] for _ in range(times)]
+    return [
+        Taken(min(t.wall for t in measured), min(t.processor for t in measured))
+        for measured in zip(*rounds, strict=True)
+    ]

@@ -29,7 +29,7 @@ const QUINTIC: f64 = 1e-9;
 const SHORTEST: f64 = 1e-14;
 /// What rounding leaves of tangents and parameters.
 const ROUNDING: f64 = 4e-15;
-/// No table gets many more rows; next to a turn a part of 1e-10 as long as its piece some 3000 are used.
+/// No table gets many more rows; next to a turn a part of 1e-10 as long as its piece some 700 are used.
 const MOST_ROWS: usize = 20_000;
 /// Panels are not halved more often.
 const DEPTH: u32 = 48;
@@ -229,8 +229,8 @@ impl<const M: usize> Builder<'_, M> {
             miss = left + right;
         }
         let length = left + right;
-        // Tangents are known to a part of the longest one, and u to a part of itself.
-        let noise = ROUNDING * ((b - from.u) * self.fastest + b / half.rate);
+        // Tangents are known to a part of the longest one, u and s to a part of themselves.
+        let noise = ROUNDING * ((b - from.u) * self.fastest + b / half.rate) + f64::EPSILON * end.s;
         let met = (length - whole).abs() <= QUADRATURE * length + noise && miss <= QUINTIC * length + noise;
         let met = met || length <= SHORTEST * self.size || self.rows.len() > MOST_ROWS;
         if met || depth == DEPTH {

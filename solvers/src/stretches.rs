@@ -112,14 +112,13 @@ fn cusps<const M: usize>(problem: &Problem<M>, i: usize) -> (Vec<f64>, [bool; 2]
         _ => piece_cusps(&own, CUSP),
     };
     let line = problem.tip.is_none() && straight(&own, 0.5 * own.width).is_some();
-    if line {
-        // A line that does not turn back has no curvature where it stands.
-        let tangent = |t: f64| derivatives(&own, t * own.width)[1];
-        let turns = |t: f64| dot(&tangent(t - BESIDE), &tangent(t + BESIDE)) < 0.0;
-        places.retain(|&t| t > 0.0 && t < 1.0 && turns(t));
-    }
     let ends =
         [places.first().is_some_and(|&t| t < AT_END), places.last().is_some_and(|&t| t > 1.0 - AT_END)];
+    if line {
+        // A line that does not turn back has no curvature where it stands; at its ends no finite p tells a speed.
+        let tangent = |t: f64| derivatives(&own, t * own.width)[1];
+        places.retain(|&t| dot(&tangent(t - BESIDE), &tangent(t + BESIDE)) < 0.0);
+    }
     places.retain(|&t| (AT_END..=1.0 - AT_END).contains(&t));
     (places.iter().map(|t| t * own.width).collect(), ends)
 }

@@ -114,8 +114,9 @@ def test_random_curves_keep_every_limit_whenever_they_are_stopped(part: int) -> 
     assert found == []
 
 
-# Turns so sharp that the tool rests at them, cusps on lines and on curves of degree 2 and more.
-@pytest.mark.parametrize("seed", [53, 83, 115, 339, 538, 724, 2512])
+# Turns so sharp that the tool rests at them or nearly, rests beside turns, cusps on lines and on curves of degree 2 and
+# more, ends next to rest, two axes in turn at their greatest speeds.
+@pytest.mark.parametrize("seed", [53, 83, 115, 339, 538, 724, 2512, 3328, 4010, 4213, 4930, 6955])
 def test_curves_that_all_but_stop_keep_every_limit(seed: int) -> None:
     assert faults_of(seed) == []
 
@@ -135,9 +136,11 @@ def test_a_time_limit_at_any_moment_gives_a_plan_that_keeps_the_limits(seconds: 
     assert faults_of(0, time_limit=seconds) == []
 
 
-def test_setpoints_of_a_plan_that_creeps_round_a_turn_are_where_it_is() -> None:
+def test_setpoints_of_a_plan_that_creeps_are_where_it_is() -> None:
     # A setpoint 1e-8 mm before the turn is as near to the path behind it, where the plan is 1 ms later.
     assert faults_of(1734, time_limit=0.0) == []
+    # In its first period the tool moves 1e-10 mm, and does not wait.
+    assert faults_of(3576, time_limit=0.0) == []
 
 
 def test_speeds_at_the_ends_are_met_or_refused_with_the_speed_that_can_be_had() -> None:

@@ -96,7 +96,8 @@ impl Plan<'_> {
                 [] => break,
                 // On the very end of the pause: the next row tells whether the stream goes on or waits.
                 [row] if stands(row) && on_time(row) => break,
-                [row, later, ..] if stands(row) && on_time(row) && stands(later) => clock.push(later.t),
+                // A run may begin at a crawl: one that waits does not move at all.
+                [row, later, ..] if stands(row) && on_time(row) && later.q == row.q => clock.push(later.t),
                 [row, ..] if stands(row) => clock.push(row.t),
                 _ => clock.push(due),
             }

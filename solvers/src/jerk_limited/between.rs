@@ -33,82 +33,75 @@ const fn bases() -> [[Basis; 3]; GROUPS] {
     out
 }
 
-/// q', q'', q''' of each axis, in parts of the limits as they enter, and 1/w_max.
+/// q', q'', q''' of each axis, and one over the square of the greatest speed along the path.
 #[derive(Clone, Copy, Debug)]
 struct Sample<const M: usize> {
     q: [[Lanes; 3]; M],
-    speed: Lanes,
+    cap: Lanes,
 }
 
 /// The limits of a stretch at all places.
 #[derive(Clone, Debug)]
 pub struct Between<const M: usize> {
     samples: Vec<[Sample<M>; GROUPS]>,
+    /// 1/w_max at the nodes on both sides of each interval.
+    at_nodes: Vec<[f64; 2]>,
 }
 
 impl<const M: usize> Between<M> {
-    /// Samples between `nodes`; the places at the nodes are taken from `rows`.
-    pub fn sample(
-        geometry: &impl Geometry<M>,
-        limits: &Limits<M>,
-        nodes: &[f64],
-        pieces: &[u32],
-        rows: &Rows<M>,
-    ) -> Self {
+    /// Samples between `nodes`, where the greatest speeds are those of `rows`.
+    pub fn sample(geometry: &impl Geometry<M>, nodes: &[f64], pieces: &[u32], rows: &Rows<M>) -> Self {
         let mut samples = Vec::with_capacity(pieces.len());
+        let mut at_nodes = Vec::with_capacity(pieces.len());
         for (n, interval) in rows.intervals.iter().enumerate() {
-            let mut groups = [Sample { q: [[Lanes::ZERO; 3]; M], speed: Lanes::ZERO }; GROUPS];
+            let mut groups = [Sample { q: [[Lanes::ZERO; 3]; M], cap: Lanes::ZERO }; GROUPS];
             for i in 0..PLACES {
-                let sample = &mut groups[i / 4];
-                let lane = i % 4;
-                if i == 0 || i + 1 == PLACES {
-                    let from = if i == 0 { 0 } else { 3 };
-                    for k in 0..M {
-                        for order in 0..3 {
-                            sample.q[k][order].values_mut()[lane] = interval.q[k][order].values()[from];
-                        }
-                    }
-                    sample.speed.values_mut()[lane] = interval.speed.values()[from];
-                } else {
-                    let s = nodes[n] + interval.h * (i as f64 / (PLACES - 1) as f64);
-                    let place = geometry.at(pieces[n] as usize, s);
-                    for k in 0..M {
-                        sample.q[k][0].values_mut()[lane] = place.first[k];
-                        sample.q[k][1].values_mut()[lane] = place.second[k];
-                        sample.q[k][2].values_mut()[lane] = place.third[k];
-                    }
-                    sample.speed.values_mut()[lane] = limits.per_speed_sq(&place);
+                let (sample, lane) = (&mut groups[i / 4], i % 4);
+                let s = nodes[n] + interval.h * (i as f64 / (PLACES - 1) as f64);
+                let place = geometry.at(pieces[n] as usize, s);
+                for k in 0..M {
+                    sample.q[k][0].values_mut()[lane] = place.first[k];
+                    sample.q[k][1].values_mut()[lane] = place.second[k];
+                    sample.q[k][2].values_mut()[lane] = place.third[k];
                 }
+                sample.cap.values_mut()[lane] = 1.0 / (place.speed_cap * place.speed_cap);
             }
             samples.push(groups);
+            at_nodes.push([0, 3].map(|lane| interval.speed.values()[lane]));
         }
-        Self { samples }
+        Self { samples, at_nodes }
     }
 
     /// The greatest uses of speed, acceleration and jerk on interval n by the spline x.
+    ///
+    /// Peaks are sought of each axis for itself: of several together they are no peaks of a smooth function.
     pub fn utilisation(&self, limits: &Limits<M>, x: &[f64], n: usize, h: f64) -> [f64; 3] {
         let u = local(x, n, h);
         let per_h = 1.0 / h;
-        let mut speed = [0.0; PLACES];
-        let mut axes = [[[0.0; PLACES]; 2]; M];
+        let mut cap = [0.0; PLACES];
+        let mut axes = [[[0.0; PLACES]; 3]; M];
         for (group, (sample, basis)) in self.samples[n].iter().zip(&BASES).enumerate() {
             let w = combine(&basis[0], &u);
             let (w1, w2) = (combine(&basis[1], &u) * per_h, combine(&basis[2], &u) * (per_h * per_h));
             let v = w.max(Lanes::ZERO).sqrt();
             let at = 4 * group..4 * group + 4;
-            speed[at.clone()].copy_from_slice((w * sample.speed).values());
+            cap[at.clone()].copy_from_slice((w * sample.cap).values());
             for k in 0..M {
                 let [q1, q2, q3] = sample.q[k];
                 let a = q2 * w + q1 * w1 * 0.5;
                 let j = (q3 * w + q2 * w1 * 1.5 + q1 * w2 * 0.5) * v;
-                axes[k][0][at.clone()].copy_from_slice((a * (1.0 / limits.acceleration[k])).values());
-                axes[k][1][at.clone()].copy_from_slice((j * (1.0 / limits.jerk[k])).values());
+                axes[k][0][at.clone()].copy_from_slice((q1 * v * (1.0 / limits.velocity[k])).values());
+                axes[k][1][at.clone()].copy_from_slice((a * (1.0 / limits.acceleration[k])).values());
+                axes[k][2][at.clone()].copy_from_slice((j * (1.0 / limits.jerk[k])).values());
             }
         }
-        let mut worst = [peak(&speed).max(0.0).sqrt(), 0.0, 0.0];
-        for [a, j] in &axes {
-            worst[1] = f64::max(worst[1], peak(a));
-            worst[2] = f64::max(worst[2], peak(j));
+        let [from, to] = self.at_nodes[n];
+        let speed_sq = peak(&cap).max(x[2 * n] * from).max(x[2 * n + 2] * to);
+        let mut worst = [speed_sq.max(0.0).sqrt(), 0.0, 0.0];
+        for uses in &axes {
+            for (worst, values) in worst.iter_mut().zip(uses) {
+                *worst = f64::max(*worst, peak(values));
+            }
         }
         worst
     }

@@ -96,7 +96,7 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         let rows = self.grid.rows(self.problem, range.clone());
         let nodes = &self.grid.nodes[range.start..=range.end];
         let pieces = &self.grid.pieces[range];
-        let between = Between::sample(self.problem.geometry, &self.problem.limits, nodes, pieces, &rows);
+        let between = Between::sample(self.problem.geometry, nodes, pieces, &rows);
         Stretch { rows, between }
     }
 }

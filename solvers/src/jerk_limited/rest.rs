@@ -14,6 +14,8 @@ const DEPTH: Range<u32> = 4..40;
 /// part of their time.
 const CHANGE: f64 = 0.05;
 const APART: f64 = 1e-5;
+/// From rest on, places are taken in so many octaves of time: the way may turn in any length there.
+const OCTAVES: i32 = 12;
 /// Places between those beside the worst one, and how often they are taken anew.
 const PLACES: usize = 16;
 const ROUNDS: usize = 2;
@@ -69,9 +71,13 @@ pub fn greatest<const M: usize>(
             (t, c)
         };
         let distances = if end == 0 { [start, stop] } else { [total - stop, total - start] };
-        let ends = distances.map(|x| at(x.cbrt()));
-        let mut places = vec![ends[0]];
-        halve(&at, ends, 0, &mut places);
+        let [first, last] = distances.map(f64::cbrt);
+        let mut places = vec![at(first)];
+        let octaves = if first == 0.0 { -OCTAVES..=0 } else { 0..=0 };
+        for octave in octaves {
+            let from = places[places.len() - 1];
+            halve(&at, [from, at(last * 2f64.powi(octave))], 0, &mut places);
+        }
         for _ in 0..=ROUNDS {
             let worst = (0..places.len()).fold(0, |i, j| if places[j].1 < places[i].1 { j } else { i });
             c = c.min(places[worst].1);
@@ -133,6 +139,35 @@ mod tests {
         let expected = (4.5 * 50_000.0 * 1e-4f64).powf(2.0 / 3.0);
         assert!((w / expected - 1.0).abs() < 1e-6, "{w} and {expected}");
         assert_eq!(w, greatest(&Arc { curvature: 0.0 }, &LIMITS, &[], 0.01, 1));
+    }
+
+    /// A turn of this length at the start of a line, by the angle arctan(s/length).
+    struct Turn(f64);
+
+    impl Geometry<2> for Turn {
+        fn knots(&self) -> &[f64] {
+            &[0.0, 100.0]
+        }
+
+        fn at(&self, _: usize, s: f64) -> Place<2> {
+            let (x, per) = (s / self.0, 1.0 / self.0);
+            let (sin, cos) = x.atan().sin_cos();
+            let (k, dk) = (per * cos * cos, -2.0 * per * per * x * cos.powi(4));
+            let (first, second) = ([cos, sin], [-k * sin, k * cos]);
+            let third = [-dk * sin - k * k * cos, dk * cos - k * k * sin];
+            Place { first, second, third, speed_cap: f64::INFINITY }
+        }
+    }
+
+    #[test]
+    fn a_turn_of_any_length_beside_the_rest_lowers_the_ramp_as_much() {
+        // Lengths of turn and way scale alike, and the jerk of a ramp depends on their ratio alone.
+        let line = greatest(&Arc { curvature: 0.0 }, &LIMITS, &[], 0.01, 0);
+        for i in 0..80 {
+            let length = 1e-3 * 10f64.powf(-0.1 * i as f64);
+            let ramp = greatest(&Turn(length), &LIMITS, &[], 0.01, 0) / line;
+            assert!((ramp - 0.5).abs() < 0.02, "{ramp} beside a turn of {length} mm");
+        }
     }
 
     #[test]
