@@ -28,6 +28,8 @@ mod store;
 mod time;
 mod window;
 
+use std::cell::RefCell;
+
 use crate::bang_bang_quadratic::{Fault, Profile, Task as QuadraticTask};
 use crate::planning::{ChordLimit, Limits};
 use crate::quadratic::{norm, Quadratic};
@@ -111,6 +113,10 @@ pub fn plan_each<const M: usize>(problem: &Problem<M>) -> Result<Profile, Fault>
     plan_with(problem, Some(&pieces))
 }
 
+thread_local! {
+    static SPACE: RefCell<run::Workspace> = RefCell::default();
+}
+
 fn plan_with<const M: usize>(
     problem: &Problem<M>,
     quadratics: Option<&[Quadratic<M>]>,
@@ -132,7 +138,7 @@ fn plan_with<const M: usize>(
         ),
         quadratic: quadratics.map(|pieces| QuadraticTask::new(pieces, &limits)),
     };
-    limits.over_runs(|pieces, speeds_sq, space: &mut run::Workspace, profile| {
+    limits.over_runs(&SPACE, |pieces, speeds_sq, space, profile| {
         let (first, last) = pieces;
         match task.quadratic.as_ref().filter(|_| (first..last).all(|i| task.quadratic(i).is_some())) {
             Some(quadratic) => quadratic.plan_run(pieces, speeds_sq, &mut space.quadratic, profile),

@@ -34,6 +34,8 @@ mod turns;
 pub(crate) use profile::Row;
 pub use profile::{ArcKind, Profile, NO_AXIS};
 
+use std::cell::RefCell;
+
 use crate::planning::{ChordLimit, Limits};
 use crate::quadratic::{norm, Quadratic};
 use piece::Piece;
@@ -101,6 +103,10 @@ pub(crate) struct Task<'a, const M: usize> {
     chord: Option<ChordLimit>,
 }
 
+thread_local! {
+    static SPACE: RefCell<Workspace> = RefCell::default();
+}
+
 /// The fastest profile.
 pub fn plan<const M: usize>(problem: &Problem<M>) -> Result<Profile, Fault> {
     let limits = Limits {
@@ -117,7 +123,7 @@ pub fn plan<const M: usize>(problem: &Problem<M>) -> Result<Profile, Fault> {
     limits.check(problem.pieces.len())?;
     check_pieces(problem.pieces)?;
     let task = Task::new(problem.pieces, &limits);
-    limits.over_runs(|pieces, speeds_sq, space: &mut Workspace, profile| {
+    limits.over_runs(&SPACE, |pieces, speeds_sq, space, profile| {
         task.plan_run(pieces, speeds_sq, space, profile)
     })
 }

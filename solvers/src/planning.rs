@@ -1,5 +1,8 @@
 //! What the exact planners and the bound share: limits checked once, runs planned in parallel, the chord-error limit.
 
+use std::cell::RefCell;
+use std::thread::LocalKey;
+
 use rayon::prelude::*;
 
 use crate::bang_bang::Problem;
@@ -102,10 +105,11 @@ impl<'a, const M: usize> Limits<'a, M> {
         Ok(())
     }
 
-    /// The profiles of all runs as one. `plan` gets the pieces of a run, the squares of the speeds at its ends, its
-    /// space and the profile to append to.
+    /// The profiles of all runs as one. `plan` gets the pieces of a run, the squares of the speeds at its ends, space
+    /// and the profile to append to.
     pub fn over_runs<W: Default>(
         &self,
+        space: Space<W>,
         plan: impl Fn((usize, usize), (f64, f64), &mut W, &mut Profile) -> Result<(), Fault> + Sync,
     ) -> Result<Profile, Fault> {
         let last_run = self.runs.len() - 2;
@@ -113,14 +117,19 @@ impl<'a, const M: usize> Limits<'a, M> {
             .par_iter()
             .map(|group| {
                 let pieces = self.runs[group.end] - self.runs[group.start];
-                let mut space = W::default();
                 let mut profile = Profile::with_capacity(2 * pieces);
                 for run in group.clone() {
                     let ends = (self.runs[run], self.runs[run + 1]);
                     let start = if run == 0 { self.start_speed } else { 0.0 };
                     let end = if run == last_run { self.end_speed } else { 0.0 };
                     profile.runs.push(profile.len() as i64);
-                    plan(ends, (start * start, end * end), &mut space, &mut profile)?;
+                    space.with_borrow_mut(|space| {
+                        let planned = plan(ends, (start * start, end * end), space, &mut profile);
+                        if ends.1 - ends.0 > MOST_KEPT {
+                            *space = W::default();
+                        }
+                        planned
+                    })?;
                 }
                 Ok(profile)
             })
@@ -128,6 +137,12 @@ impl<'a, const M: usize> Limits<'a, M> {
         Ok(join(plans?))
     }
 }
+
+/// Space for one run, of each thread: kept from call to call, for the system takes its time to give some MB.
+pub type Space<W> = &'static LocalKey<RefCell<W>>;
+
+/// What a run of more pieces took is given back: some MB are kept at most.
+const MOST_KEPT: usize = 4096;
 
 /// Groups of neighbouring runs with about `GROUP` pieces each.
 pub fn groups(runs: &[usize]) -> Vec<std::ops::Range<usize>> {
