@@ -46,7 +46,7 @@ clean:
 # beside the tests of native code, each on one core.
 $(VENV)/built: $(VENV)/maturin $(NATIVE)
 	@command -v cargo >/dev/null || { echo "cargo is missing: install the Rust toolchain"; exit 1; }
-	CARGO_TARGET_DIR=$(CURDIR)/solvers/target/module $(BIN)/pip install --quiet --constraint constraints.txt --no-build-isolation --editable ".[dev]"
+	MAKEFLAGS= CARGO_TARGET_DIR=$(CURDIR)/solvers/target/module $(BIN)/pip install --quiet --constraint constraints.txt --no-build-isolation --editable ".[dev]"
 	@touch $@
 
 $(VENV)/maturin: constraints.txt
