@@ -1,7 +1,7 @@
 # Two commands do everything: `make demo` plans an example, `make test` checks the project.
 VENV := .venv
 BIN := $(VENV)/bin
-NATIVE := $(wildcard solvers/src/*.rs solvers/src/*/*.rs) solvers/Cargo.toml pyproject.toml
+NATIVE := $(wildcard solvers/src/*.rs solvers/src/*/*.rs solvers/src/*/*/*.rs) solvers/Cargo.toml pyproject.toml
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
 .PHONY: demo test native lint bench campaign clean
