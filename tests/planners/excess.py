@@ -71,7 +71,7 @@ def worst_excess(problem: Problem, profile: SpeedProfile, samples: int = 10) -> 
     grain = np.where(kinds[0], grain, 0.0)
     # The control points are rounded: next to a cusp far from the origin little is left of C'.
     far = np.abs(problem.curve.control_points).max() / problem.path.width[piece]
-    felt = 1 + CONTROL * far[:, None] / np.abs(j1).max(axis=2)
+    felt = 1 + CONTROL * far[:, None] / np.where(kinds[0], np.abs(g), np.abs(j1).max(axis=2))
     acceleration = np.abs(q1 * s[..., None] + q2 * p[..., None]) - np.abs(q1) * grain[..., None]
     used = np.concatenate(
         [
