@@ -16,8 +16,6 @@ from feedplan.profile import ArcKind, SpeedProfile
 Array = NDArray[np.float64]
 # Of a tangent, as a part of the longest one on its arc.
 ROUNDING = 1e-15
-# Of C' times the width, as a part of the greatest coordinate, on curves of degree 5 with weights far apart.
-CONTROL = 1e-14
 # Derivatives (order + 1, m, axes) at places: piece (m,), u (m,), order.
 Motion = Callable[[NDArray[np.uint32], Array, int], Array]
 
@@ -69,9 +67,6 @@ def worst_excess(problem: Problem, profile: SpeedProfile, samples: int = 10) -> 
     with np.errstate(divide="ignore", invalid="ignore"):
         grain = ROUNDING * np.abs(j1).max(axis=(1, 2))[:, None] * np.abs(c * p) / g**2
     grain = np.where(kinds[0], grain, 0.0)
-    # The control points are rounded: next to a cusp far from the origin little is left of C'.
-    far = np.abs(problem.curve.control_points).max() / problem.path.width[piece]
-    felt = 1 + CONTROL * far[:, None] / np.where(kinds[0], np.abs(g), np.abs(j1).max(axis=2))
     acceleration = np.abs(q1 * s[..., None] + q2 * p[..., None]) - np.abs(q1) * grain[..., None]
     used = np.concatenate(
         [
@@ -81,7 +76,7 @@ def worst_excess(problem: Problem, profile: SpeedProfile, samples: int = 10) -> 
         ],
         axis=2,
     ).max(axis=2)
-    return float((used / felt).max()) - 1, float((used * felt).min())
+    return float(used.max()) - 1, float(used.min())
 
 
 def worst_excess_exactly(problem: Problem, profile: SpeedProfile) -> float:
