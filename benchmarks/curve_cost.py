@@ -28,14 +28,16 @@ def run(quick: bool = False) -> Result:
     """One random path of each kind, one run from rest to rest; the best of calls in turn."""
     count = 300 if quick else 3000
     quadratics = random_problem(count)
-    cases = [("quadratics, their own planner", quadratics), ("quadratics, the planner of curves", quadratics)]
+    cases = [
+        ("quadratics, their own planner", quadratics, plan_bang_bang),
+        ("quadratics, the planner of curves", quadratics, plan_curves),
+    ]
     for kind, curve in random_curves(count).items():
         for feed in FEEDS:
             problem = build_problem(Path.from_curve(curve, feed=feed), MACHINE)
-            cases.append((f"{kind}, {feed:g} mm/s", problem))
-    cases.append(("joints of cubics, cylindrical", cylindrical(count // 10)))
-    calls = [partial(plan_bang_bang, problem) for _, problem in cases]
-    calls[1] = partial(plan_curves, quadratics)
+            cases.append((f"{kind}, {feed:g} mm/s", problem, plan_bang_bang))
+    cases.append(("joints of cubics, cylindrical", cylindrical(count // 10), plan_bang_bang))
+    calls = [partial(plan, problem) for _, problem, plan in cases]
     costs = [taken.processor for taken in best_of_each(calls, ROUNDS)]
     of_quadratics = costs[0] / len(quadratics.path)
     return Result(
@@ -43,7 +45,7 @@ def run(quick: bool = False) -> Result:
         "Exact planner on curves, one thread",
         tuple(
             _row(name, problem, cost, of_quadratics)
-            for (name, problem), cost in zip(cases, costs, strict=True)
+            for (name, problem, _), cost in zip(cases, costs, strict=True)
         ),
         (
             "The whole native call, profile included. Joint pieces have degree 9.",
