@@ -109,8 +109,13 @@ def _chunks(count: int) -> list[slice]:
 def _point_series(
     control_points: Array, width: Array, fraction: Array, order: int, weights: Array | None
 ) -> list[Series]:
-    """Taylor series of the tip's coordinates at one point of each piece."""
+    """Taylor series of the tip's coordinates at one point of each piece.
+
+    Points are counted from the first, lest derivatives beside a cusp be lost in the digits of the place.
+    """
     points = np.asarray(control_points)
+    origin = points[:, 0]
+    points = points - origin[:, None]
     if weights is not None:
         points = np.concatenate([points * weights[..., None], weights[..., None]], axis=-1)
     degree = points.shape[1] - 1
@@ -123,7 +128,9 @@ def _point_series(
         coefficients[k] = math.comb(degree, k) * level[:, 0] / np.asarray(width)[:, None] ** k
         points = np.diff(points, axis=1)
     series = [Series(coefficients[..., i]) for i in range(coefficients.shape[2])]
-    return series if weights is None else [axis / series[-1] for axis in series[:-1]]
+    if weights is not None:
+        series = [axis / series[-1] for axis in series[:-1]]
+    return [axis + start for axis, start in zip(series, origin.T, strict=True)]
 
 
 def _restricted(

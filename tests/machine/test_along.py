@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from feedplan.machine.along import _same_turn, derivatives, enclosures, positions, proxy_constants
 from feedplan.machine.kinematics import Kinematics
+from feedplan.machine.kinematics.corexy import CoreXY
 from feedplan.machine.kinematics.cylindrical import Cylindrical
 from feedplan.machine.numbers import Interval, Number, Series
 from tests.machine.kinematics.bundled import all_kinematics, random_tips
@@ -194,6 +196,35 @@ def test_a_rational_arc_round_the_axis_turns_at_a_constant_radius() -> None:
     bounds = enclosures(*arc, 6, parts, weights)
     assert bounds.lo[0, 0, 1] <= 50 <= bounds.hi[0, 0, 1]
     assert bounds.width[0, 0, 1] < 0.01
+
+
+def test_beside_a_rational_cusp_derivatives_keep_their_digits_far_from_the_origin() -> None:
+    # Of points 100 mm off and 1e-9 mm apart the differences are what counts; truth is in rational numbers.
+    points = np.array([[101.7, 55.3, 3.1], [101.7 + 1e-9, 55.3 - 2e-9, 3.1 + 1e-9], [102.9, 56.1, 2.2]])
+    weights, width, t = np.array([0.3, 4.7, 1.9]), 0.7, 3e-9
+    x, y = (exact_derivatives(points[:, axis], weights, width, t) for axis in (0, 1))
+    found = derivatives(
+        CoreXY(tuple("XYZ"), tuple("ABZ"), (False,) * 3), points[None], np.array([width]), np.array([t]), 2, weights[None]
+    )[:, 0]
+    for order in (1, 2):
+        assert found[order, 0] == pytest.approx(float(x[order] + y[order]), rel=1e-12, abs=0)
+        assert found[order, 1] == pytest.approx(float(x[order] - y[order]), rel=1e-12, abs=0)
+
+
+def exact_derivatives(points: Array, weights: Array, width: float, t: float) -> list[Fraction]:
+    """q, q' and q'' of one coordinate of a rational quadratic at u = t width, by the quotient rule."""
+    w = [Fraction(x) for x in weights.tolist()]
+    n = [Fraction(x) * y for x, y in zip(points.tolist(), w, strict=True)]
+    at, long = Fraction(t), Fraction(width)
+
+    def of(b: list[Fraction]) -> tuple[Fraction, Fraction, Fraction]:
+        steps = [b[1] - b[0], b[2] - b[1]]
+        value = (1 - at) ** 2 * b[0] + 2 * at * (1 - at) * b[1] + at**2 * b[2]
+        return value, 2 * ((1 - at) * steps[0] + at * steps[1]) / long, 2 * (steps[1] - steps[0]) / long**2
+
+    (n0, n1, n2), (w0, w1, w2) = of(n), of(w)
+    first = (n1 - w1 * n0 / w0) / w0
+    return [n0 / w0, first, (n2 - 2 * w1 * first - w2 * n0 / w0) / w0]
 
 
 @pytest.mark.parametrize("nodes", [5, 9])
