@@ -111,12 +111,14 @@ def _point_series(
 ) -> list[Series]:
     """Taylor series of the tip's coordinates at one point of each piece.
 
-    Points are counted from the first, lest derivatives beside a cusp be lost in the digits of the place.
+    With weights points are counted from the nearer end, lest the derivatives beside a cusp there be lost in the
+    digits of its place.
     """
     points = np.asarray(control_points)
-    origin = points[:, 0]
-    points = points - origin[:, None]
+    origin = np.zeros_like(points[:, 0])
     if weights is not None:
+        origin = np.where(np.asarray(fraction)[:, None] < 0.5, points[:, 0], points[:, -1])
+        points = points - origin[:, None]
         points = np.concatenate([points * weights[..., None], weights[..., None]], axis=-1)
     degree = points.shape[1] - 1
     coefficients = np.zeros((order + 1, points.shape[0], points.shape[2]), dtype=points.dtype)

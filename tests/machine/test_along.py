@@ -198,10 +198,13 @@ def test_a_rational_arc_round_the_axis_turns_at_a_constant_radius() -> None:
     assert bounds.width[0, 0, 1] < 0.01
 
 
-def test_beside_a_rational_cusp_derivatives_keep_their_digits_far_from_the_origin() -> None:
+@pytest.mark.parametrize("t", [3e-9, 1 - 3e-9])
+def test_beside_a_rational_cusp_derivatives_keep_their_digits_far_from_the_origin(t: float) -> None:
     # Of points 100 mm off and 1e-9 mm apart the differences are what counts; truth is in rational numbers.
     points = np.array([[101.7, 55.3, 3.1], [101.7 + 1e-9, 55.3 - 2e-9, 3.1 + 1e-9], [102.9, 56.1, 2.2]])
-    weights, width, t = np.array([0.3, 4.7, 1.9]), 0.7, 3e-9
+    if t > 0.5:
+        points = points[::-1]
+    weights, width = np.array([0.3, 4.7, 1.9]), 0.7
     x, y = (exact_derivatives(points[:, axis], weights, width, t) for axis in (0, 1))
     found = derivatives(
         CoreXY(tuple("XYZ"), tuple("ABZ"), (False,) * 3), points[None], np.array([width]), np.array([t]), 2, weights[None]
