@@ -20,6 +20,7 @@
 mod check;
 mod chord;
 mod cusp;
+mod part;
 mod pass;
 mod piece;
 mod run;

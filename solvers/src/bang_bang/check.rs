@@ -1,7 +1,8 @@
 //! A guard against rounding: whether the arcs of a forward pass keep the limits of all axes at some places.
 
+use super::part::SubPiece;
 use super::pass::{distance, Arc, Kind, Stuck};
-use super::split::{Axes, SubPiece};
+use super::split::Axes;
 use crate::polynomial::Polynomial;
 
 /// An arc may exceed a limit by this part …

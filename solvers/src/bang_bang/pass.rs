@@ -18,7 +18,8 @@ mod bang;
 mod limit_curve;
 mod slide;
 
-use super::split::{Axes, SubPiece};
+use super::part::{Cap, SubPiece};
+use super::split::Axes;
 use super::window::{Bound, Window};
 use crate::polynomial::Polynomial;
 use crate::quadratic::norm;
@@ -172,8 +173,8 @@ fn end_speed_sq<const M: usize, const C: usize>(
         }
         Kind::Braking(k) => arc.slow_sq / direction[k].powi(2),
         Kind::Cap => match sub.cap {
-            super::split::Cap::Speed([_, f1]) => f1 / sub.tip_share(true),
-            super::split::Cap::Axis(k, v_sq) => v_sq / direction[k].powi(2),
+            Cap::Speed([_, f1]) => f1 / sub.tip_share(true),
+            Cap::Axis(k, v_sq) => v_sq / direction[k].powi(2),
         },
         Kind::LimitCurve => 0.0,
     }

@@ -1,9 +1,10 @@
 //! Both passes over one run, its arcs into the columns of the profile.
 
 use super::check::keeps_limits;
+use super::part::{Cap, Part, Remedy, SubPiece};
 use super::pass::{self, distance, leading, Arc, Kind, State, Stuck};
 use super::piece::Piece;
-use super::split::{split, Cap, Cut, Limits, Part, Remedy, SubPiece};
+use super::split::{split, Cut, Limits};
 use super::store::Store;
 use super::time::time_at_speed;
 use super::{Task, TIP_AXES};

@@ -2,6 +2,7 @@
 
 use super::chord::SpeedLine;
 use super::cusp::{cusps, Cusps, Nearly};
+use super::part::{Cap, End, Part, Remedy, SAME_TURN};
 use super::piece::Piece;
 use super::TIP_AXES;
 use crate::planning::ChordLimit;
@@ -9,8 +10,6 @@ use crate::polynomial::Polynomial;
 
 /// Cuts closer than this part of the piece are one.
 const SAME_CUT: f64 = 1e-13;
-/// Turns closer than this part of the piece are one.
-const SAME_TURN: f64 = 1e-12;
 /// Closer than this to a turn where |C'|² is below this part of its greatest value, no velocity cap counts.
 const NEAR_CUSP: f64 = 1e-5;
 const SLOW: f64 = 1e-10;
@@ -18,23 +17,10 @@ const SLOW: f64 = 1e-10;
 const UNEVEN: f64 = 100.0;
 /// A place nearly at rest asks for no cut of its own where there is one, or a cusp, within so many times its reach.
 const AROUND: f64 = 4.0;
-/// A part shorter than this part of the piece is not cut once more: its ends become one.
-const NARROW: f64 = 1e-11;
 /// The value of a polynomial is rounding below this part of its terms.
 const NOISE: f64 = 1e-14;
-/// A place nearer to the end of a part than this is at its end.
-const AT_END: f64 = 1e-6;
 /// A tangent coefficient this small beside the greatest one is zero.
 const ZERO: f64 = 1e-14;
-
-/// The lowest velocity cap of a sub-piece.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Cap {
-    /// The speed squared, linear in t between its two ends: the feed, or a bound below the chord-error limit.
-    Speed([f64; 2]),
-    /// The square of the velocity limit of an axis.
-    Axis(usize, f64),
-}
 
 /// Limits of the axes.
 pub struct Axes<const M: usize> {
@@ -47,39 +33,6 @@ pub struct Limits<'a, const M: usize> {
     pub axes: &'a Axes<M>,
     pub feed_sq: f64,
     pub chord: Option<&'a ChordLimit>,
-}
-
-/// A part [from, to] of a piece on which no axis turns round and one velocity cap is the lowest.
-#[derive(Clone, Copy, Debug)]
-pub struct Part {
-    pub from: f64,
-    pub to: f64,
-    pub cap: Cap,
-    left: End,
-    right: End,
-    /// Bit k: axis k moves backward, moves at all.
-    pub negative: u8,
-    pub moving: u8,
-}
-
-/// An end of a part.
-#[derive(Clone, Copy, Debug, Default)]
-struct End {
-    /// Bit k: axis k turns round there.
-    turns: u8,
-    /// All axes have a zero of this order.
-    order: u8,
-    /// As far as this from the end rounding may have moved the zeros.
-    reach: f64,
-    /// The plan stops there.
-    stops: bool,
-}
-
-impl End {
-    /// Whether axis k has a zero there.
-    fn is_cut_for(&self, k: usize) -> bool {
-        self.order > 0 || self.turns >> k & 1 == 1
-    }
 }
 
 /// A place that divides two parts.
@@ -111,34 +64,10 @@ impl Cut {
     }
 }
 
-/// A place where a piece is cut once more because a pass came to no end there.
-#[derive(Clone, Copy, Debug)]
-pub struct Remedy {
-    pub piece: usize,
-    pub t: f64,
-    /// All cuts closer than this are one.
-    pub reach: f64,
-    /// The plan stops there.
-    pub stops: bool,
-}
-
-/// A part as a pass travels it, its polynomials over x in [0, 1], every axis moving forward.
-///
-/// Here g and π belong to x: π = (dx/dτ)²/ω⁴.
-#[derive(Clone, Copy, Debug)]
-pub struct SubPiece<const M: usize, const C: usize> {
-    pub g: [Polynomial<C>; M],
-    pub weight: Polynomial<C>,
-    pub speed: Polynomial<C>,
-    pub cap: Cap,
-    /// Bit k: axis k moves at all.
-    pub moving: u8,
-    /// Degree of the curve itself.
-    pub degree: usize,
-    pub straight: bool,
-    pub own_speed: bool,
-    /// The order of the zero that every tangent has at the start and at the end.
-    pub cusp_orders: [u8; 2],
+impl From<&Remedy> for Cut {
+    fn from(remedy: &Remedy) -> Self {
+        Self { t: remedy.t, end: End { reach: remedy.reach, stops: remedy.stops, ..End::default() } }
+    }
 }
 
 /// Appends the parts of the piece from left to right; `tip` is the tool's own piece where it is another one, `cuts`
@@ -152,30 +81,9 @@ pub fn split<const M: usize, const C: usize>(
     out: &mut Vec<Part>,
 ) {
     let Limits { axes, feed_sq, chord } = *limits;
-    let size = piece.g.each_ref().map(|g| g.padded().iter().fold(0.0, |most: f64, c| most.max(c.abs())));
-    let greatest = size.iter().copied().fold(0.0, f64::max);
-    let mut moving = 0u8;
     cuts.clear();
     cuts.extend([Cut::plain(0.0), Cut::plain(1.0)]);
-    for (k, g) in piece.g.iter().enumerate() {
-        if size[k] <= ZERO * greatest {
-            continue;
-        }
-        moving |= 1 << k;
-        for (end, t) in [(g.first(), 0.0), (g.last(), 1.0)] {
-            if end.abs() <= piece.noise[k] {
-                cuts.push(Cut::turn(t, 1 << k));
-            }
-        }
-        if !piece.straight {
-            g.sign_changes(&mut |t| cuts.push(Cut::turn(t, 1 << k)));
-        }
-    }
-    if piece.straight {
-        // All axes turn at once, in a cusp.
-        let greatest = (0..M).max_by(|&a, &b| size[a].total_cmp(&size[b])).unwrap_or(0);
-        piece.g[greatest].sign_changes(&mut |t| cuts.push(Cut::turn(t, moving)));
-    }
+    let moving = cut_at_turns(piece, cuts);
     let (whole, mut below_chord) = ([SpeedLine { from: 0.0, to: 1.0, speed_sq: [feed_sq; 2] }], vec![]);
     match (chord, tip) {
         (Some(chord), Some(tip)) => chord.lines(tip, feed_sq, &mut below_chord),
@@ -200,58 +108,12 @@ pub fn split<const M: usize, const C: usize>(
     merge_near_cusps(piece, cuts);
     cut_by_weight(&piece.weight, (0.0, 1.0), cuts);
     let remedies: Vec<Remedy> = remedies.collect();
-    let remedy_cut = |remedy: &Remedy| Cut {
-        t: remedy.t,
-        end: End { reach: remedy.reach, stops: remedy.stops, ..End::default() },
-    };
-    cuts.extend(remedies.iter().filter(|remedy| remedy.reach == 0.0).map(remedy_cut));
-    let Cusps { cusps, nearly } = cusps(piece, moving);
-    for Nearly { t, reach } in nearly {
-        let reach = AROUND * reach.max(SAME_TURN);
-        let at_cusp = cusps.iter().any(|cusp| (t - cusp.t).abs() <= AROUND * cusp.reach + reach);
-        if !at_cusp && !cuts.iter().any(|cut| (t - cut.t).abs() <= reach) {
-            cuts.push(Cut::plain(t));
-        }
-    }
-    for cusp in cusps {
-        // The axes turn here or nowhere near.
-        let mut all = Cut {
-            t: cusp.t,
-            end: End { turns: moving, order: cusp.order, reach: cusp.reach.max(SAME_TURN), stops: false },
-        };
-        let near = |t: f64| (t - cusp.t).abs() <= 4.0 * all.end.reach;
-        let is_end = |t: f64| t == 0.0 || t == 1.0;
-        all.end.stops = cuts.iter().any(|cut| near(cut.t) && cut.end.stops);
-        all.t = [0.0, 1.0].into_iter().find(|&t| near(t)).unwrap_or(cusp.t);
-        cuts.retain(|cut| !near(cut.t) || is_end(cut.t));
-        cuts.push(all);
-    }
+    cuts.extend(remedies.iter().filter(|remedy| remedy.reach == 0.0).map(Cut::from));
+    cut_at_cusps(piece, moving, cuts);
     for remedy in remedies.iter().filter(|remedy| remedy.reach > 0.0) {
-        let mut all = remedy_cut(remedy);
-        cuts.retain(|cut| {
-            let near = (cut.t - remedy.t).abs() <= remedy.reach;
-            if near {
-                all.join(cut);
-                all.t = if cut.t == 0.0 || cut.t == 1.0 { cut.t } else { all.t };
-            }
-            !near
-        });
-        cuts.push(all);
+        join_around(remedy, cuts);
     }
-    if !cuts.is_sorted_by(|a, b| a.t <= b.t) {
-        cuts.sort_by(|a, b| a.t.total_cmp(&b.t));
-    }
-    cuts.dedup_by(|b, a| {
-        let both_turn = a.is_turn_or_end() && b.is_turn_or_end();
-        let same = b.t - a.t <= if both_turn { SAME_TURN } else { SAME_CUT };
-        if same {
-            a.join(b);
-        }
-        same
-    });
-    if let Some(last) = cuts.last_mut() {
-        last.t = 1.0;
-    }
+    put_in_order(cuts);
     let mut lines = lines.iter().peekable();
     for pair in cuts.windows(2) {
         let (from, to) = (pair[0].t, pair[1].t);
@@ -270,6 +132,89 @@ pub fn split<const M: usize, const C: usize>(
             negative: (0..M).fold(0, |bits, k| bits | u8::from(g[k] < 0.0) << k),
             moving,
         });
+    }
+}
+
+/// Cuts where an axis turns round; says which axes move at all.
+fn cut_at_turns<const M: usize, const C: usize>(piece: &Piece<M, C>, cuts: &mut Vec<Cut>) -> u8 {
+    let size = piece.g.each_ref().map(|g| g.padded().iter().fold(0.0, |most: f64, c| most.max(c.abs())));
+    let greatest = size.iter().copied().fold(0.0, f64::max);
+    let mut moving = 0u8;
+    for (k, g) in piece.g.iter().enumerate() {
+        if size[k] <= ZERO * greatest {
+            continue;
+        }
+        moving |= 1 << k;
+        for (end, t) in [(g.first(), 0.0), (g.last(), 1.0)] {
+            if end.abs() <= piece.noise[k] {
+                cuts.push(Cut::turn(t, 1 << k));
+            }
+        }
+        if !piece.straight {
+            g.sign_changes(&mut |t| cuts.push(Cut::turn(t, 1 << k)));
+        }
+    }
+    if piece.straight {
+        // All axes turn at once, in a cusp.
+        let greatest = (0..M).max_by(|&a, &b| size[a].total_cmp(&size[b])).unwrap_or(0);
+        piece.g[greatest].sign_changes(&mut |t| cuts.push(Cut::turn(t, moving)));
+    }
+    moving
+}
+
+/// Cuts where the tool is at rest, or nearly; all axes turn in a cusp, or nowhere near.
+fn cut_at_cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, moving: u8, cuts: &mut Vec<Cut>) {
+    let Cusps { cusps, nearly } = cusps(piece, moving);
+    for Nearly { t, reach } in nearly {
+        let reach = AROUND * reach.max(SAME_TURN);
+        let at_cusp = cusps.iter().any(|cusp| (t - cusp.t).abs() <= AROUND * cusp.reach + reach);
+        if !at_cusp && !cuts.iter().any(|cut| (t - cut.t).abs() <= reach) {
+            cuts.push(Cut::plain(t));
+        }
+    }
+    for cusp in cusps {
+        let mut all = Cut {
+            t: cusp.t,
+            end: End { turns: moving, order: cusp.order, reach: cusp.reach.max(SAME_TURN), stops: false },
+        };
+        let near = |t: f64| (t - cusp.t).abs() <= AROUND * all.end.reach;
+        let is_end = |t: f64| t == 0.0 || t == 1.0;
+        all.end.stops = cuts.iter().any(|cut| near(cut.t) && cut.end.stops);
+        all.t = [0.0, 1.0].into_iter().find(|&t| near(t)).unwrap_or(cusp.t);
+        cuts.retain(|cut| !near(cut.t) || is_end(cut.t));
+        cuts.push(all);
+    }
+}
+
+/// Makes one cut of all within the remedy's reach.
+fn join_around(remedy: &Remedy, cuts: &mut Vec<Cut>) {
+    let mut all = Cut::from(remedy);
+    cuts.retain(|cut| {
+        let near = (cut.t - remedy.t).abs() <= remedy.reach;
+        if near {
+            all.join(cut);
+            all.t = if cut.t == 0.0 || cut.t == 1.0 { cut.t } else { all.t };
+        }
+        !near
+    });
+    cuts.push(all);
+}
+
+/// Sorts the cuts and joins those at one place.
+fn put_in_order(cuts: &mut Vec<Cut>) {
+    if !cuts.is_sorted_by(|a, b| a.t <= b.t) {
+        cuts.sort_by(|a, b| a.t.total_cmp(&b.t));
+    }
+    cuts.dedup_by(|b, a| {
+        let both_turn = a.is_turn_or_end() && b.is_turn_or_end();
+        let same = b.t - a.t <= if both_turn { SAME_TURN } else { SAME_CUT };
+        if same {
+            a.join(b);
+        }
+        same
+    });
+    if let Some(last) = cuts.last_mut() {
+        last.t = 1.0;
     }
 }
 
@@ -347,133 +292,6 @@ fn cut_by_cap<const M: usize, const C: usize>(
         }
     }
     fast
-}
-
-impl Part {
-    /// Whether the plan stops at its left end.
-    pub fn starts_at_rest(&self) -> bool {
-        self.left.stops
-    }
-
-    /// Another cut of the part at x where a pass found no way: in the middle where it has one near x. The ends of a
-    /// part as short as rounding become one.
-    pub fn remedy(&self, piece: usize, x: f64) -> Remedy {
-        let length = self.to - self.from;
-        let narrow = length <= NARROW;
-        let inside = AT_END < x && x < 1.0 - AT_END && !narrow;
-        let t = self.from + length * if inside { x } else { 0.5 };
-        Remedy { piece, t, reach: if narrow { length } else { 0.0 }, stops: false }
-    }
-
-    /// The part as travelled forward.
-    pub fn sub_piece<const M: usize, const C: usize>(&self, piece: &Piece<M, C>) -> SubPiece<M, C> {
-        let length = self.to - self.from;
-        let mut whole = length == 1.0;
-        let g: [Polynomial<C>; M] = std::array::from_fn(|k| {
-            if self.moving >> k & 1 == 0 {
-                return Polynomial::constant(0.0).elevate(piece.g[k].degree());
-            }
-            let sign = if self.negative >> k & 1 == 1 { -length } else { length };
-            let mut g = piece.g[k].part(self.from, self.to).scale(sign);
-            let degree = g.degree();
-            if !self.left.is_cut_for(k) && !self.right.is_cut_for(k) {
-                return g;
-            }
-            for (end, at_end) in [(&self.left, false), (&self.right, true)] {
-                if !end.is_cut_for(k) {
-                    continue;
-                }
-                let turns = end.turns >> k & 1 == 1;
-                let (low, high) = piece.g[k].range();
-                let noise = length * piece.noise[k].max(SAME_TURN * degree as f64 * high.max(-low));
-                let known = usize::from(end.order).max(usize::from(turns));
-                let reach = (end.reach / length).min(1.0);
-                for i in 0..=degree {
-                    let place = if at_end { degree - i } else { i };
-                    // An axis that rounding, or a turn taken for another one, sends back stands still.
-                    let back = -g.coefficients()[place] * reach.powi(i as i32);
-                    if i >= known && !(turns && back > 0.0 && back <= 64.0 * noise) {
-                        break;
-                    }
-                    g.clear(place);
-                    whole = false;
-                }
-            }
-            g
-        });
-        // Next to a cusp |C'|² is lost in the rounding of that of the whole piece.
-        let speed = if piece.own_speed && !whole {
-            Polynomial::sum_of_squares(&g)
-        } else {
-            piece.speed.part(self.from, self.to).scale(length * length)
-        };
-        SubPiece {
-            cusp_orders: [false, true].map(|at_end| cusp_order(&g, at_end)),
-            g,
-            weight: piece.weight.part(self.from, self.to),
-            speed,
-            cap: self.cap,
-            moving: self.moving,
-            degree: piece.degree,
-            straight: piece.straight,
-            own_speed: piece.own_speed,
-        }
-    }
-}
-
-impl<const M: usize, const C: usize> SubPiece<M, C> {
-    /// The order of the zero that every tangent has at an end.
-    #[inline(always)]
-    pub fn cusp_order(&self, at_end: bool) -> usize {
-        usize::from(self.cusp_orders[usize::from(at_end)])
-    }
-
-    /// The speed squared of the axes over π at an end.
-    pub fn rate_sq(&self, at_end: bool) -> f64 {
-        let end = |p: &Polynomial<C>| if at_end { p.last() } else { p.first() };
-        if self.own_speed {
-            end(&self.speed)
-        } else {
-            self.g.iter().map(|g| end(g) * end(g)).sum()
-        }
-    }
-
-    /// The tool's speed squared over that of the axes at an end, also in the limit where both are at rest.
-    pub fn tip_share(&self, at_end: bool) -> f64 {
-        if self.own_speed {
-            return 1.0;
-        }
-        let lead = |p: &Polynomial<C>, r: usize| {
-            let c = p.coefficients();
-            c.get(if at_end { c.len().wrapping_sub(1 + r) } else { r }).copied().unwrap_or(0.0)
-        };
-        let order = self.cusp_order(at_end);
-        let axes: f64 = self.g.iter().map(|g| lead(g, order).powi(2)).sum();
-        (lead(&self.speed, 2 * order) / axes).max(0.0)
-    }
-
-    /// The same as the backward pass travels it.
-    pub fn reversed(&self) -> Self {
-        let cap = match self.cap {
-            Cap::Speed([f0, f1]) => Cap::Speed([f1, f0]),
-            cap => cap,
-        };
-        Self {
-            g: std::array::from_fn(|k| self.g[k].reverse()),
-            weight: self.weight.reverse(),
-            speed: self.speed.reverse(),
-            cap,
-            cusp_orders: [self.cusp_orders[1], self.cusp_orders[0]],
-            ..*self
-        }
-    }
-}
-
-/// The order of the zero that all of these have at an end.
-fn cusp_order<const M: usize, const C: usize>(g: &[Polynomial<C>; M], at_end: bool) -> u8 {
-    let degree = g[0].degree();
-    let rests = |r: usize| g.iter().all(|g| g.coefficients()[if at_end { degree - r } else { r }] == 0.0);
-    (0..degree).take_while(|&r| rests(r)).count() as u8
 }
 
 /// Where a polynomial changes its sign by more than rounding: between two places that rounding alone keeps apart, as

@@ -1,7 +1,7 @@
 //! The sub-pieces of a run, kept from the backward pass to the forward one: what they take up is that of their own
 //! degree, or of the capacity where that is small.
 
-use super::split::{Part, SubPiece};
+use super::part::{Part, SubPiece};
 use crate::polynomial::Polynomial;
 
 /// Sub-pieces of any degree, in the order of the backward pass.

@@ -1,6 +1,6 @@
 //! The time along the tool's speed cap: length over speed, by quadrature.
 
-use super::split::SubPiece;
+use super::part::SubPiece;
 use crate::quadratic::norm;
 
 /// Places of the rule.

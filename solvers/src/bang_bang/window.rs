@@ -1,6 +1,6 @@
 //! What is left of a sub-piece ahead of a pass, with the bound on it: both over x in [0, 1], the state at x = 0.
 
-use super::split::{Cap, SubPiece};
+use super::part::{Cap, SubPiece};
 use crate::polynomial::Polynomial;
 
 /// What π stays under.
