@@ -32,21 +32,16 @@
 //! A parabola is what two axes with constant accelerations draw, so it is where both can be at their limits all
 //! along. Greater ratios also take more of the sides than r = 1/2 does, which short sides do not have.
 
+mod jump;
+mod share;
+
+pub use jump::Jump;
+pub use share::share_lengths;
+
 use crate::conic::Conic;
 use crate::follow::{Followed, Shape};
 use crate::quadratic::{norm, sub};
 use crate::spline::CompositeCurve;
-
-/// Corners that turn back are passed at rest anyway: no rounding where cos(turn/2) is below this (177.7°).
-const LEAST_COSINE: f64 = 0.02;
-/// A corner gets this many times the length that passing it at the feed asks of the axis accelerations, so that
-/// what the sides themselves ask is left to them.
-const EASE: f64 = 8.0;
-/// A unit tangent of an edge e carries an error of some eps·|C|/e, |C| being the size of the coordinates. Turns
-/// below this many times that are no corners, and the rounding of a corner is at least this much longer.
-const ROUNDING: f64 = 16.0;
-/// Turns below this (rad) are no corners.
-const SMOOTH: f64 = 1e-9;
 
 /// What a corner between two lines becomes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,115 +51,6 @@ pub enum Rounding {
     /// The circle that touches both lines: with the turn θ, radius r and length l = r tan(θ/2) on each of them, the
     /// corner is d = r (1/cos(θ/2) − 1) = l sin(θ/2)/(1 + cos(θ/2)) away. Controllers round so.
     Circle,
-}
-
-/// How the tangent jumps where two pieces meet.
-#[derive(Clone, Copy, Debug)]
-pub struct Jump<const M: usize> {
-    /// t₊ − t₋.
-    pub change: [f64; M],
-    /// |t₊ − t₋| = 2 sin(turn/2).
-    pub size: f64,
-    /// Errors of rounding in a length here, in mm.
-    pub rounding: f64,
-}
-
-impl<const M: usize> Jump<M> {
-    /// The jump between two pieces, None where a piece ends without a tangent.
-    pub fn new(before: &Shape<M>, after: &Shape<M>) -> Option<Self> {
-        let (out, into) = (before.end_edge(), after.start_edge());
-        let (edge_out, edge_into) = (norm(&out), norm(&into));
-        if !(edge_out > 0.0 && edge_into > 0.0) {
-            return None;
-        }
-        let change = std::array::from_fn(|k| into[k] / edge_into - out[k] / edge_out);
-        let coordinate = after.start().iter().fold(0.0, |a: f64, b| a.max(b.abs()));
-        Some(Self { change, size: norm(&change), rounding: ROUNDING * f64::EPSILON * coordinate })
-    }
-
-    /// The pieces meet smoothly, as far as their coordinates can tell.
-    pub fn is_smooth(&self, before: &Shape<M>, after: &Shape<M>) -> bool {
-        let (out, into) = (before.end_edge(), after.start_edge());
-        self.size <= SMOOTH + self.rounding / norm(&out).min(norm(&into))
-    }
-
-    /// The path turns back on itself.
-    pub fn reverses(&self) -> bool {
-        self.size * self.size >= 4.0 * (1.0 - LEAST_COSINE * LEAST_COSINE)
-    }
-
-    /// The length beyond which a corner between two pieces, passed at `feed`, has nothing to gain, in mm.
-    pub fn length_for(
-        &self,
-        sides: [&Shape<M>; 2],
-        feed: f64,
-        max_velocity: &[f64; M],
-        max_acceleration: &[f64; M],
-    ) -> f64 {
-        let (out, into) = (sides[0].end_edge(), sides[1].start_edge());
-        let (edge_out, edge_into) = (norm(&out), norm(&into));
-        let (mut speed, mut share) = (feed, 0.0f64);
-        for k in 0..M {
-            speed = speed.min(max_velocity[k] / (out[k].abs() / edge_out).max(into[k].abs() / edge_into));
-            share = share.max(self.change[k].abs() / max_acceleration[k]);
-        }
-        EASE * 0.5 * share * speed * speed
-    }
-
-    /// cos(turn/2).
-    fn half_cosine(&self) -> f64 {
-        (1.0 - 0.25 * self.size * self.size).max(0.0).sqrt()
-    }
-
-    /// The length at which the curve is as far from the corner as `deviation`.
-    pub fn length_within(&self, deviation: f64, rounding: Rounding) -> f64 {
-        match rounding {
-            Rounding::Parabola => 4.0 * deviation / self.size,
-            Rounding::Circle => 2.0 * deviation * (1.0 + self.half_cosine()) / self.size,
-        }
-    }
-
-    /// The length is too short to be told from errors of rounding.
-    pub fn vanishes(&self, length: f64) -> bool {
-        length <= ROUNDING * self.rounding || length <= 0.0
-    }
-
-    /// The displacement of the corner for the lengths of its two sides.
-    pub fn displacement(&self, before: f64, after: f64) -> [f64; M] {
-        self.change.map(|x| x / (2.0 / before + 2.0 / after))
-    }
-}
-
-/// Lengths of corners that share the stretches between them, from what each `need`s; `stretch[k]` lies between
-/// corners k and k + 1, and corners that are not rounded need 0.
-///
-/// Each corner gets half of a stretch, or what the other does not need. What a corner cannot have on its other
-/// side it does not need here either; two more rounds hand that on.
-pub fn share_lengths(need: &[f64], stretch: &[f64]) -> Vec<f64> {
-    const ROUNDS: usize = 3;
-    let grant = |stretch: f64, other: f64| (0.5 * stretch).max(stretch - other);
-    let shared = |limit: &[f64]| -> Vec<f64> {
-        (0..need.len())
-            .map(|k| {
-                let mut length = need[k];
-                if k > 0 {
-                    length = length.min(grant(stretch[k - 1], limit[k - 1]));
-                }
-                if k < stretch.len() {
-                    length = length.min(grant(stretch[k], limit[k + 1]));
-                }
-                length
-            })
-            .collect()
-    };
-    let mut limit = need.to_vec();
-    let mut length = shared(&limit);
-    for _ in 1..ROUNDS {
-        // The others have at least `length`, so no corner can get more than what that leaves.
-        limit = shared(&length);
-        length = shared(&limit);
-    }
-    length
 }
 
 /// The two sides of a corner, each in the order of the path.
@@ -520,50 +406,5 @@ mod tests {
         let moved = sub(&pieces[1].control[2], &before[1].control[2]);
         assert!((norm(&moved) - all[1].deviation).abs() < 1e-14, "{moved:?} {}", all[1].deviation);
         assert!(dot(&moved, &jump.change) > 0.0);
-    }
-
-    #[test]
-    fn corners_share_a_stretch_by_halves_or_take_what_the_other_leaves() {
-        assert_eq!(share_lengths(&[0.0, 9.0, 9.0, 0.0], &[5.0, 4.0, 5.0]), [0.0, 2.0, 2.0, 0.0]);
-        assert_eq!(share_lengths(&[0.0, 9.0, 1.0, 0.0], &[5.0, 4.0, 5.0]), [0.0, 3.0, 1.0, 0.0]);
-        assert_eq!(share_lengths(&[0.0, 9.0, 0.0], &[5.0, 7.0]), [0.0, 5.0, 0.0]);
-        // The first corner is held by its short side, the second gets the rest.
-        let shared = share_lengths(&[0.0, 9.0, 9.0, 0.0], &[0.25, 4.0, 9.0]);
-        assert_eq!(shared, [0.0, 0.25, 3.75, 0.0]);
-    }
-
-    #[test]
-    fn shared_lengths_never_overlap() {
-        let mut state = 7u64;
-        let mut random = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 40) as f64 / (1u64 << 24) as f64
-        };
-        for _ in 0..2000 {
-            let stretch: Vec<f64> = (0..12).map(|_| random().powi(3)).collect();
-            let mut need: Vec<f64> = (0..13).map(|_| 2.0 * random().powi(3)).collect();
-            need[0] = 0.0;
-            need[12] = 0.0;
-            let length = share_lengths(&need, &stretch);
-            for k in 0..12 {
-                assert!(length[k] + length[k + 1] <= stretch[k] * (1.0 + 1e-15) && length[k] <= need[k]);
-                // Nobody has less than its half without being held elsewhere.
-                let left = if k > 0 { 0.5 * stretch[k - 1] } else { f64::INFINITY };
-                assert!(length[k] >= need[k].min(0.5 * stretch[k]).min(left));
-            }
-        }
-    }
-
-    #[test]
-    fn what_rounding_does_is_no_corner_and_a_small_turn_is() {
-        let smooth = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
-            let (before, after) = (Shape::Conic(Conic::line(a, b)), Shape::Conic(Conic::line(b, c)));
-            Jump::new(&before, &after).unwrap().is_smooth(&before, &after)
-        };
-        assert!(smooth([0.1, 0.1], [0.2, 0.2], [0.7, 0.7]));
-        assert!(smooth([1e5, 1e5], [1e5 + 1e-6, 1e5 + 1e-6], [1e5 + 3e-6, 1e5 + 3e-6]));
-        assert!(!smooth([0.0, 0.0], [1.0, 0.0], [2.0, 1e-8]));
-        let back = jump_between(Conic::line([0.0], [1.0]), Conic::line([1.0], [0.0]));
-        assert!(back.reverses());
     }
 }

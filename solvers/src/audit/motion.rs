@@ -5,82 +5,15 @@
 //! slower: from there v_k² = v_k(anchor)² + 2 a (q_k − q_k(anchor)) adds two terms of one sign and loses nothing. So it
 //! is where p is smaller on an arc of constant parameter acceleration.
 
+mod law;
+
+pub use law::{Law, Pole, Shape};
+
 use super::along::{Along, Pace};
 use super::curve::{inner, length};
 use super::integral::{kronrod, kronrod_lanes, MOST_HALVINGS, RULES_AGREE_CLOSELY};
 use super::polygon::Polygon;
 use super::EPS;
-
-/// What an arc holds constant.
-#[derive(Clone, Copy, Debug)]
-pub enum Law {
-    /// `start_sq` is the square of the axis velocity at the anchor.
-    AxisAcceleration {
-        axis: usize,
-        value: f64,
-        start_sq: f64,
-    },
-    /// p at the anchor and dp/du.
-    ParameterAcceleration {
-        start: f64,
-        slope: f64,
-    },
-    Feed {
-        speed: f64,
-    },
-    AxisVelocity {
-        axis: usize,
-        speed: f64,
-    },
-    Chord {
-        value: f64,
-    },
-    /// The square of the speed at the start of the arc, and its change to the end.
-    SpeedLine {
-        start_sq: f64,
-        change_sq: f64,
-    },
-    /// The speed follows from the length of the path: see `Motion::with_along`.
-    Along,
-}
-
-/// The piece under an arc.
-#[derive(Clone, Debug)]
-pub enum Shape<const M: usize> {
-    /// Degree 2: C' at the anchor, and C''.
-    Quadratic { tangent: [f64; M], bend: [f64; M] },
-    /// Any other: itself, with t at the anchor and at the other end; the part of it between them, from the anchor; and
-    /// what the rounding of C' is relative to.
-    General {
-        whole: Box<Polygon<M>>,
-        ends: [f64; 2],
-        part: Box<Polygon<M>>,
-        tangent: [f64; M],
-        size: [f64; M],
-    },
-}
-
-impl Law {
-    fn pole<const M: usize>(&self, tangent: &[f64; M], bend: &[f64; M], p_anchor: f64) -> Option<Pole> {
-        match *self {
-            // p − a/q''_k falls off as (q'_k(anchor) / q'_k)².
-            Law::AxisAcceleration { axis, value, .. } if bend[axis] != 0.0 => Some(Pole {
-                at: -tangent[axis] / bend[axis],
-                beside: 0.0,
-                strength: (1.0 - bend[axis] * p_anchor / value).abs(),
-            }),
-            Law::Feed { .. } | Law::Chord { .. } | Law::SpeedLine { .. }
-                if bend.iter().any(|&c| c != 0.0) =>
-            {
-                let square = inner(bend, bend);
-                let at = -inner(tangent, bend) / square;
-                let nearest: [f64; M] = std::array::from_fn(|k| tangent[k] + at * bend[k]);
-                Some(Pole { at, beside: length(&nearest) / square.sqrt(), strength: 1.0 })
-            }
-            _ => None,
-        }
-    }
-}
 
 /// Slopes of tangents are taken over this part of the arc.
 const BESIDE: f64 = 1e-6;
@@ -128,16 +61,6 @@ struct General<const M: usize> {
     ends: [f64; 2],
     part: Box<Polygon<M>>,
     size: [f64; M],
-}
-
-/// Where p would grow without bound, or turn sharply: the zero of what it is divided by.
-#[derive(Clone, Copy, Debug)]
-pub struct Pole {
-    /// Signed distance from the anchor, and how far the pole lies beside the real line.
-    pub at: f64,
-    pub beside: f64,
-    /// Share of p that changes in its neighbourhood.
-    pub strength: f64,
 }
 
 /// The motion at one place of an arc.
