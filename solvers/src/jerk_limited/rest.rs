@@ -21,6 +21,9 @@ const PLACES: usize = 16;
 const ROUNDS: usize = 2;
 
 /// The length of the ramps of a path, in mm, from |q'| of its axes at the end.
+///
+/// It is as far as a place on the path can be from the path's end: places have the digits of the whole way, and a ramp is
+/// so short that its slope, 4/3 w over its length, shows what its place rounds off.
 pub fn length<const M: usize>(limits: &Limits<M>, first: &[f64; M], path: f64) -> f64 {
     let mut least = PART * path;
     for k in 0..M {
@@ -30,7 +33,7 @@ pub fn length<const M: usize>(limits: &Limits<M>, first: &[f64; M], path: f64) -
         let by_speed = (8.0 * v * v * v / j).sqrt() / 6.0;
         least = least.min(RAMP * by_acceleration.min(by_speed));
     }
-    least
+    path - (path - least)
 }
 
 /// The greatest w at the end of the ramp of this length; `end` is 0 at the start of the path and 1 at its end.
@@ -184,6 +187,16 @@ mod tests {
     fn ramps_are_short_on_the_scale_of_the_limits_and_of_the_path() {
         // A³/(6 J²) = 1/15 mm is the shorter way to a limit.
         assert!((length(&LIMITS, &[1.0, 0.0], 100.0) - 1.0 / 15.0 / 90.0).abs() < 1e-12);
-        assert_eq!(length(&LIMITS, &[1.0, 0.0], 0.1), 0.1 / 400.0);
+        assert!((length(&LIMITS, &[1.0, 0.0], 0.1) - 0.1 / 400.0).abs() < 1e-16);
+    }
+
+    #[test]
+    fn a_ramp_is_as_long_as_its_node_is_from_the_end_of_the_path() {
+        for i in 0..60 {
+            let path = 10f64.powf(0.1 * i as f64);
+            let ramp = length(&LIMITS, &[1.0, 0.0], path);
+            let node = path - ramp;
+            assert_eq!(path - node, ramp, "on {path} mm");
+        }
     }
 }
