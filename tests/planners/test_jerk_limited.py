@@ -122,6 +122,16 @@ def test_curves_that_all_but_stop_keep_every_limit(seed: int) -> None:
     assert faults_of(seed) == []
 
 
+# The acceleration is built up on 5e-9 mm of 559, and on 5e-12 mm of 6.
+@pytest.mark.parametrize(("size", "feed", "acceleration"), [(100.0, 100.0, 3000.0), (1.0, 1.0, 300.0)])
+def test_a_jerk_limit_too_high_to_matter_is_kept_next_to_rest(
+    size: float, feed: float, acceleration: float
+) -> None:
+    points = size * np.array([[0.0, 0.0], [1.0, 0.2], [2.5, -1.0], [4.0, 3.0]])
+    path = Path.from_curve(CompositeCurve.from_bezier(points), feed=feed)
+    assert_held(build_problem(path, curves_machine(250.0, acceleration, 1e9)))
+
+
 @pytest.mark.parametrize("name", NOT_PLAIN)
 def test_random_curves_keep_every_limit_of_the_true_joints(name: str) -> None:
     problem = random_joints(name, 6)

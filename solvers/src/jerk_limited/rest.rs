@@ -6,8 +6,8 @@ use super::{Geometry, Limits, SpeedCap};
 
 /// Ramps are this part of the length on which constant jerk reaches the acceleration or the speed …
 const RAMP: f64 = 1.0 / 90.0;
-/// … and at most this part of the path.
-const PART: f64 = 1.0 / 400.0;
+/// … and at least and at most these parts of the path: the nodes beside a shorter one would have no digits.
+const PARTS: [f64; 2] = [1e-11, 1.0 / 400.0];
 /// Places of a piece under a ramp, even in time: halved at least and at most so often …
 const DEPTH: Range<u32> = 4..40;
 /// … where the greatest speed between them changes by more than this in logarithm, and they are further apart than this
@@ -23,17 +23,18 @@ const ROUNDS: usize = 2;
 /// The length of the ramps of a path, in mm, from |q'| of its axes at the end.
 ///
 /// It is as far as a place on the path can be from the path's end: places have the digits of the whole way, and a ramp is
-/// so short that its slope, 4/3 w over its length, shows what its place rounds off.
+/// so short that the slope at its node, 4/3 w over its length, shows what the node rounds off.
 pub fn length<const M: usize>(limits: &Limits<M>, first: &[f64; M], path: f64) -> f64 {
-    let mut least = PART * path;
+    let [least, most] = PARTS.map(|part| part * path);
+    let mut ramp = most;
     for k in 0..M {
         let q = first[k].abs().max(f64::MIN_POSITIVE);
         let (v, a, j) = (limits.velocity[k] / q, limits.acceleration[k] / q, limits.jerk[k] / q);
         let by_acceleration = a * a * a / (6.0 * j * j);
         let by_speed = (8.0 * v * v * v / j).sqrt() / 6.0;
-        least = least.min(RAMP * by_acceleration.min(by_speed));
+        ramp = ramp.min(RAMP * by_acceleration.min(by_speed));
     }
-    path - (path - least)
+    path - (path - ramp.max(least))
 }
 
 /// The greatest w at the end of the ramp of this length; `end` is 0 at the start of the path and 1 at its end.
@@ -188,6 +189,8 @@ mod tests {
         // A³/(6 J²) = 1/15 mm is the shorter way to a limit.
         assert!((length(&LIMITS, &[1.0, 0.0], 100.0) - 1.0 / 15.0 / 90.0).abs() < 1e-12);
         assert!((length(&LIMITS, &[1.0, 0.0], 0.1) - 0.1 / 400.0).abs() < 1e-16);
+        let jerk = Limits { jerk: [1e12; 2], ..LIMITS };
+        assert!((length(&jerk, &[1.0, 0.0], 0.1) - 1e-12).abs() < 1e-16);
     }
 
     #[test]
