@@ -115,8 +115,8 @@ def test_random_curves_keep_every_limit_whenever_they_are_stopped(part: int) -> 
 
 
 # Turns so sharp that the tool rests at them or nearly, rests beside turns, cusps on lines and on curves of
-# degree 2 and more, ends next to rest, two axes in turn at their greatest speeds, a ramp of 0.3 nm at the end of
-# 721 mm.
+# degree 2 and more, ends next to rest, two axes in turn at their greatest speeds, a ramp of 0.3 nm at the end
+# of 721 mm.
 @pytest.mark.parametrize("seed", [53, 83, 115, 339, 538, 724, 2512, 3328, 4010, 4213, 4930, 6726, 6955])
 def test_curves_that_all_but_stop_keep_every_limit(seed: int) -> None:
     assert faults_of(seed) == []
