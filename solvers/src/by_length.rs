@@ -387,6 +387,14 @@ impl<'a, const M: usize> ByLength<'a, M> {
     }
 }
 
+/// Curvature of the tool's way at u of piece `i`, in 1/mm.
+pub fn tool_curvature<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> f64 {
+    match tip_piece(problem, i) {
+        Some(tip) => curvature(&tip, u),
+        None => curvature(&piece(problem, i), u),
+    }
+}
+
 /// The place at u of piece `i`.
 pub fn place<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> Place<M> {
     let c = derivatives(&piece(problem, i), u);
@@ -421,11 +429,11 @@ fn chord_limit<const M: usize>(problem: &Problem<M>, curvature: f64) -> f64 {
 }
 
 /// Curvature of a piece at u; 0 where it stands.
-fn curvature(piece: &Piece<3>, u: f64) -> f64 {
+fn curvature<const M: usize>(piece: &Piece<M>, u: f64) -> f64 {
     let [_, c1, c2, _] = derivatives(piece, u);
     let square = dot(&c1, &c1);
     let along = dot(&c1, &c2) / square;
-    let off: [f64; 3] = std::array::from_fn(|k| c2[k] - along * c1[k]);
+    let off: [f64; M] = std::array::from_fn(|k| c2[k] - along * c1[k]);
     if square > 0.0 {
         norm(&off) / square
     } else {

@@ -21,6 +21,10 @@ const TAKEN_BACK: f64 = 1e-10;
 /// What halves of an arc may differ from the whole in time, where the speed is not too near to none; and their halvings.
 const QUADRATURE: f64 = 1e-12;
 const DEPTH: u32 = 12;
+/// On arcs shorter than this, in s, the rounding of v² may show in the jerk of a cubic …
+const BRIEF: f64 = 1e-5;
+/// … which is constant where it would by more than this part of its limit.
+const SHOWN: f64 = 1e-7;
 /// Halvings for the time at which a section of constant jerk passes a place.
 const HALVINGS: usize = 200;
 
@@ -202,6 +206,7 @@ impl Arcs {
         &mut self,
         problem: &Problem<M>,
         path: &ByLength<M>,
+        jerk_limits: &[f64; M],
         profile: &Profile,
     ) {
         let (s, knots, ends) = (&profile.s, path.knots(), profile.ends);
@@ -240,14 +245,8 @@ impl Arcs {
                 states[count - 1].a = -jerk * duration;
             }
             for n in 1..count {
-                let ends = [states[n - 1], states[n]];
-                let duration = cubic_time(lengths[n], &ends);
-                self.push(
-                    problem,
-                    at.piece,
-                    [u[n], u[n + 1]],
-                    &Arc { kind: SPEED_CUBIC, value: 0.0, ends, duration },
-                );
+                let arc = between(path, jerk_limits, part, lengths[n], [states[n - 1], states[n]]);
+                self.push(problem, at.piece, [u[n], u[n + 1]], &arc);
             }
             if stops {
                 let rest = State { s: ends[1], v: 0.0, a: 0.0 };
@@ -302,6 +301,29 @@ fn settled(profile: &Profile, nodes: Range<usize>, [from, to]: [f64; 2], lengths
         State { s: s[n], v: w.sqrt(), a: 0.5 * (profile.slope[at] + d * bend) }
     };
     (0..count).map(state).collect()
+}
+
+/// The arc between two states of a profile, so far apart on a part of the path.
+///
+/// v² as a cubic is known by v² at its ends: their rounding is 3 ε v³/h² in its jerk, more than the limit on a piece of
+/// a nanometre. There the accelerations tell the jerk, which has no way to change.
+fn between<const M: usize>(
+    path: &ByLength<M>,
+    jerk_limits: &[f64; M],
+    part: usize,
+    h: f64,
+    ends: [State; 2],
+) -> Arc {
+    let duration = cubic_time(h, &ends);
+    if duration < BRIEF {
+        let first = path.at(part, ends[0].s).first;
+        let limit = (0..M).map(|k| jerk_limits[k] / first[k].abs()).fold(f64::INFINITY, f64::min);
+        if 3.0 * f64::EPSILON * ends[1].v.powi(3) > SHOWN * limit * h * h {
+            let value = (ends[1].a - ends[0].a) / duration;
+            return Arc { kind: PATH_JERK, value, ends, duration };
+        }
+    }
+    Arc { kind: SPEED_CUBIC, value: 0.0, ends, duration }
 }
 
 /// ∫ ds/√w of the cubic w between two states so far apart.

@@ -109,7 +109,7 @@ impl<const M: usize> Task<'_, M> {
         }
         match plan {
             Ok(plan) => {
-                arcs.push_profile(self.problem, &path, &plan.profile);
+                arcs.push_profile(self.problem, &path, &self.limits.jerk, &plan.profile);
                 for (cap, jumps) in &caps {
                     if *jumps && plan.profile.at(cap.s)[0] >= HELD * cap.speed * cap.speed {
                         arcs.kinks.push(parts[path.part(cap.s)].piece as u32);
@@ -138,7 +138,7 @@ impl<const M: usize> Task<'_, M> {
             return path.line().filter(|_| stretch.ends == [0.0; 2]).map(|_| time);
         };
         let last = arcs.clone().rev().find(is_cubic)?;
-        if !(first..=last).all(|arc| is_cubic(&arc)) {
+        if (first..last).any(|arc| columns.p1[arc] == 0.0) {
             return None;
         }
         let knots = path.knots();

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::bang_bang::{check_pieces, Problem};
 use crate::bang_bang_quadratic::Fault;
-use crate::by_length::{piece, place, straight, tip_piece, Part, MAX_RATE};
+use crate::by_length::{piece, place, straight, tip_piece, tool_curvature, Part, MAX_RATE};
 use crate::jerk_arcs::Arcs;
 use crate::jerk_limited::Limits;
 use crate::planning;
@@ -20,6 +20,13 @@ const AT_END: f64 = 1e-9;
 const CREEP: f64 = 0.02;
 /// Places are slow where the square of the speed is below this part of the greatest on their piece.
 const SLOW: f64 = 0.25;
+/// To either side of a slow place the square of the speed rises by more than this part: less may be rounding of a
+/// speed that hardly changes there, and then its least place is anywhere.
+const RISE: f64 = 1e-6;
+/// Parts of a piece between places at which its curvature is looked at, …
+const PLACES: [usize; 2] = [4, 64];
+/// … more of them where at one of the first its radius is less than so many times the chord tolerance.
+const TIGHT: f64 = 10.0;
 /// How far from a place on a line its direction is looked at, as a part of the piece.
 const BESIDE: f64 = 1e-4;
 
@@ -78,6 +85,7 @@ pub fn stretches<const M: usize>(problem: &Problem<M>) -> Vec<Stretch> {
             let (cuts, cusped) = cusps(problem, i);
             let mut cuts: Vec<(f64, bool)> = cuts.into_iter().map(|u| (u, true)).collect();
             cuts.extend(slow_places(problem, i).into_iter().map(|u| (u, is_sharp(problem, i, u))));
+            cuts.extend(chord_kinks(problem, i).into_iter().map(|u| (u, false)));
             cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
             cuts.dedup_by(|b, a| {
                 let same = b.0 - a.0 <= AT_END * problem.width[i];
@@ -138,16 +146,56 @@ fn slow_places<const M: usize>(problem: &Problem<M>, i: usize) -> Vec<f64> {
             (0..M).map(axis).fold(Polynomial::constant(0.0), |sum, g| sum.combine(1.0, &g.multiply(&g), 1.0))
         }
     };
-    let rate = square.derivative();
-    let (bend, greatest) = (rate.derivative(), square.range().1);
-    let mut found = vec![];
-    rate.sign_changes(&mut |t| {
-        let deep = square.value(t) < SLOW * greatest;
-        if deep && t > AT_END && t < 1.0 - AT_END && bend.value(t) > 0.0 {
-            found.push(t * problem.width[i]);
+    let greatest = square.range().1;
+    let mut turns = vec![0.0];
+    square.derivative().sign_changes(&mut |t| turns.push(t));
+    turns.push(1.0);
+    let speeds: Vec<f64> = turns.iter().map(|&t| square.value(t)).collect();
+    let is_low = |n: usize| {
+        let least = speeds[n];
+        least < SLOW * greatest
+            && rises(least, speeds[..n].iter().rev())
+            && rises(least, speeds[n + 1..].iter())
+    };
+    let inside = |t: f64| t > AT_END && t < 1.0 - AT_END;
+    let places = (1..turns.len() - 1).filter(|&n| inside(turns[n]) && is_low(n));
+    places.map(|n| turns[n] * problem.width[i]).collect()
+}
+
+/// Whether the square of the speed rises from a place to one side before it falls below what it is there.
+fn rises<'a>(least: f64, mut beside: impl Iterator<Item = &'a f64>) -> bool {
+    beside.find(|&&speed| speed < least || speed > (1.0 + RISE) * least).is_some_and(|&speed| speed > least)
+}
+
+/// Parameters inside piece `i` where the radius of the tool's way is the chord tolerance: the greatest speed by the chord
+/// error has a kink there, for no chord is farther from a smaller circle.
+fn chord_kinks<const M: usize>(problem: &Problem<M>, i: usize) -> Vec<f64> {
+    let (tolerance, width) = (problem.chord_tolerance, problem.width[i]);
+    if !tolerance.is_finite() {
+        return vec![];
+    }
+    let over = |u: f64| tool_curvature(problem, i, u) * tolerance - 1.0;
+    let places = |count: usize| (0..=count).map(move |n| width * n as f64 / count as f64);
+    if places(PLACES[0]).all(|u| TIGHT * (over(u) + 1.0) < 1.0) {
+        return vec![];
+    }
+    let places: Vec<f64> = places(PLACES[1]).collect();
+    let crossed = places.windows(2).filter(|pair| over(pair[0]) * over(pair[1]) < 0.0);
+    let kinks = crossed.map(|pair| {
+        let (mut low, mut high) = (pair[0], pair[1]);
+        loop {
+            let middle = 0.5 * (low + high);
+            if middle <= low || middle >= high {
+                return middle;
+            }
+            if over(low) * over(middle) > 0.0 {
+                low = middle;
+            } else {
+                high = middle;
+            }
         }
     });
-    found
+    kinks.filter(|&u| u > AT_END * width && u < (1.0 - AT_END) * width).collect()
 }
 
 /// Whether the tool would creep through a place on piece `i`: a rest there takes no longer that setpoints could tell.
