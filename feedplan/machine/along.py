@@ -111,8 +111,8 @@ def _point_series(
 ) -> list[Series]:
     """Taylor series of the tip's coordinates at one point of each piece.
 
-    With weights points are counted from the nearer end, lest the derivatives beside a cusp there be lost in the
-    digits of its place.
+    With weights points are counted from the nearer end, lest the derivatives beside a cusp there be lost in
+    the digits of its place.
     """
     points = np.asarray(control_points)
     origin = np.zeros_like(points[:, 0])

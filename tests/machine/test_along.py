@@ -206,9 +206,8 @@ def test_beside_a_rational_cusp_derivatives_keep_their_digits_far_from_the_origi
         points = points[::-1]
     weights, width = np.array([0.3, 4.7, 1.9]), 0.7
     x, y = (exact_derivatives(points[:, axis], weights, width, t) for axis in (0, 1))
-    found = derivatives(
-        CoreXY(tuple("XYZ"), tuple("ABZ"), (False,) * 3), points[None], np.array([width]), np.array([t]), 2, weights[None]
-    )[:, 0]
+    belts = CoreXY(tuple("XYZ"), tuple("ABZ"), (False,) * 3)
+    found = derivatives(belts, points[None], np.array([width]), np.array([t]), 2, weights[None])[:, 0]
     for order in (1, 2):
         assert found[order, 0] == pytest.approx(float(x[order] + y[order]), rel=1e-12, abs=0)
         assert found[order, 1] == pytest.approx(float(x[order] - y[order]), rel=1e-12, abs=0)

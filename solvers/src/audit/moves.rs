@@ -196,7 +196,8 @@ impl<const M: usize> Move<'_, M> {
         }
     }
 
-    /// The nearest place is an end, or lies near where the arc's angle is that of `q`, once in every turn.
+    /// The nearest place is an end, or lies near where the arc's angle is that of `q`, once in every turn, or on a steep
+    /// helix near where it is as high.
     fn distance_to_arc(&self, arc: &Arc, q: &[f64; M]) -> f64 {
         let mut nearest = distance(q, &self.from).min(distance(q, &self.to));
         let angle = (q[arc.b] - arc.centre[1]).atan2(q[arc.a] - arc.centre[0]);
@@ -209,6 +210,15 @@ impl<const M: usize> Move<'_, M> {
             if (-0.5..=1.5).contains(&t) {
                 nearest = nearest.min(self.descend(arc, q, t.clamp(0.0, 1.0)));
             }
+        }
+        let (mut rise_sq, mut risen) = (0.0, 0.0);
+        for k in (0..M).filter(|&k| k != arc.a && k != arc.b) {
+            let rise = self.to[k] - self.from[k];
+            rise_sq += rise * rise;
+            risen += rise * (q[k] - self.from[k]);
+        }
+        if rise_sq > 0.0 {
+            nearest = nearest.min(self.descend(arc, q, (risen / rise_sq).clamp(0.0, 1.0)));
         }
         nearest
     }
@@ -337,17 +347,24 @@ mod tests {
         }
     }
 
-    /// A helix about Z: radius 10, two turns and a quarter, 9 mm up.
-    fn helix() -> Move<'static, 3> {
+    /// Helices about Z, of radius 10 and a quarter of a turn more than two or none: 9 mm up, and 100 mm.
+    const HELICES: [([f64; 3], [f64; 1]); 4] = [
+        ([0.0, 10.0, 9.0], [2.25 * TAU]),
+        ([0.0, 10.0, 100.0], [2.25 * TAU]),
+        ([0.0, 10.0, 9.0], [0.25 * TAU]),
+        ([0.0, 10.0, 100.0], [0.25 * TAU]),
+    ];
+
+    fn helix<'a>((target, angle): &'a ([f64; 3], [f64; 1])) -> Move<'a, 3> {
         Programmed {
             axes: 3,
             start: &[10.0, 0.0, 0.0],
-            target: &[0.0, 10.0, 9.0],
+            target,
             line: &[1],
             arc_move: &[0],
             arc_centre: &[0.0, 0.0, 0.0],
             arc_normal: &[2],
-            arc_angle: &[2.25 * TAU],
+            arc_angle: angle,
             spline_move: &[],
             spline_pieces: &[0],
             splines: NONE,
@@ -412,18 +429,24 @@ mod tests {
 
     #[test]
     fn a_place_on_a_helix_is_on_it() {
-        let helix = helix();
-        for i in 0..=200 {
-            let t = f64::from(i) / 200.0;
-            assert!(off(&helix, &helix.at(t)) < 1e-12, "t = {t}");
+        for helix in HELICES.each_ref().map(helix) {
+            for i in 0..=200 {
+                let t = f64::from(i) / 200.0;
+                assert!(off(&helix, &helix.at(t)) < 1e-12, "t = {t}");
+            }
         }
     }
 
     proptest! {
         #[test]
-        fn no_place_of_a_helix_is_nearer_than_its_distance(x in -20.0..20.0_f64, y in -20.0..20.0_f64, z in -5.0..15.0_f64) {
-            let helix = helix();
-            let q = [x, y, z];
+        fn no_place_of_a_helix_is_nearer_than_its_distance(
+            which in 0..HELICES.len(),
+            x in -20.0..20.0_f64,
+            y in -20.0..20.0_f64,
+            height in -0.5..1.5_f64,
+        ) {
+            let helix = helix(&HELICES[which]);
+            let q = [x, y, height * HELICES[which].0[2]];
             let places: Vec<_> = (0..=20_000).map(|i| helix.at(f64::from(i) / 20_000.0)).collect();
             let dense = places.iter().map(|place| distance(&q, place)).fold(f64::INFINITY, f64::min);
             let found = off(&helix, &q);
