@@ -107,9 +107,9 @@ fn square(c: &[f64; 4], x: f64) -> f64 {
 
 /// The integral from a to b, halved where the rules differ; not a number where that takes too long.
 pub fn integral(f: &impl Fn(f64) -> f64, a: f64, b: f64, halvings: &mut u32) -> f64 {
-    let [fine, coarse] = kronrod(f, a, b);
+    let [fine, doubt] = kronrod(f, a, b);
     let middle = 0.5 * (a + b);
-    if (fine - coarse).abs() <= RULES_AGREE_CLOSELY * fine.abs() || !(a < middle && middle < b) {
+    if doubt.abs() <= RULES_AGREE_CLOSELY * fine.abs() || !(a < middle && middle < b) {
         return fine;
     }
     if *halvings == 0 || !fine.is_finite() {

@@ -7,13 +7,19 @@ use super::motion::{Law, Motion, State};
 use super::{EPS, ROUNDINGS};
 use wide::f64x4;
 
-/// Nodes and weights of Kronrod's 7-point rule on [−1, 1], the middle one last, and the weights of the 3-point Gauss rule inside it.
+/// Nodes and weights of Kronrod's 7-point rule on [−1, 1], the middle one last; the weights of two rules inside it, Gauss's
+/// of 3 points, which is good to degree 5, and that of the outermost two and the middle, good to degree 3.
 const NODES: [f64; 3] = [0.960_491_268_708_020_3, 0.774_596_669_241_483_4, 0.434_243_749_346_802_55];
 const WEIGHTS: [f64; 4] =
     [0.104_656_226_026_467_27, 0.268_488_089_868_333_44, 0.401_397_414_775_962_2, 0.450_916_538_658_474_14];
 const INNER_WEIGHTS: [f64; 2] = [5.0 / 9.0, 8.0 / 9.0];
+const OUTER_WEIGHTS: [f64; 2] = [0.361_326_288_494_254_1, 1.277_347_423_011_491_7];
 
-/// Where the two rules differ by no more than this, the better one is good to about its square, 1e-11.
+/// Gauss's rule may be right by chance: then the other one tells. Of what it is off so much counts: where a function is so
+/// smooth that both are small it is about as much as Gauss's rule is off.
+const CHANCE: f64 = 3e-3;
+
+/// Where Gauss's rule is off by no more than this, Kronrod's is good to about the square of that, 1e-11.
 const RULES_AGREE: f64 = 3e-6;
 
 /// The same on pieces of other degrees, where it is not known how far away p has a pole.
@@ -25,33 +31,31 @@ const THIN: f64 = 1e-12;
 /// Halvings of an interval before it counts as one that cannot be integrated; right arcs need some forty.
 pub(super) const MOST_HALVINGS: u32 = 400;
 
-/// The integral of f from a to b by both rules, the better one first.
+/// The integral of f from a to b by Kronrod's rule, and how far the others are from it.
 #[inline(always)]
 pub(super) fn kronrod(f: impl Fn(f64) -> f64, a: f64, b: f64) -> [f64; 2] {
     let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
-    let centre = f(middle);
-    let mut fine = WEIGHTS[3] * centre;
-    let mut coarse = INNER_WEIGHTS[1] * centre;
-    for (i, node) in NODES.iter().enumerate() {
-        let both = f(middle - half * node) + f(middle + half * node);
-        fine += WEIGHTS[i] * both;
-        if i == 1 {
-            coarse += INNER_WEIGHTS[0] * both;
-        }
-    }
-    [half * fine, half * coarse]
+    let pairs = NODES.map(|node| f(middle - half * node) + f(middle + half * node));
+    by_rules(pairs, f(middle), half)
 }
 
 /// The same of a function of four places at once.
 pub(super) fn kronrod_lanes(f: impl Fn(f64x4) -> f64x4, a: f64, b: f64) -> [f64; 2] {
     let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
     let to = f64x4::new([NODES[0], NODES[1], NODES[2], 0.0]) * half;
-    let (below, above) = (f(f64x4::splat(middle) - to), f(f64x4::splat(middle) + to));
-    // The middle is there twice.
-    let both = below + above;
-    let fine = f64x4::new([WEIGHTS[0], WEIGHTS[1], WEIGHTS[2], 0.5 * WEIGHTS[3]]) * both;
-    let coarse = f64x4::new([0.0, INNER_WEIGHTS[0], 0.0, 0.5 * INNER_WEIGHTS[1]]) * both;
-    [half * fine.reduce_add(), half * coarse.reduce_add()]
+    let [outer, gauss, inner, twice] =
+        (f(f64x4::splat(middle) - to) + f(f64x4::splat(middle) + to)).to_array();
+    by_rules([outer, gauss, inner], 0.5 * twice, half)
+}
+
+/// The integral and its doubt from the sums of the values at each pair of nodes and the value in the middle.
+#[inline(always)]
+fn by_rules(pairs: [f64; 3], centre: f64, half: f64) -> [f64; 2] {
+    let [outer, gauss, inner] = pairs;
+    let fine = WEIGHTS[0] * outer + WEIGHTS[1] * gauss + WEIGHTS[2] * inner + WEIGHTS[3] * centre;
+    let miss = (INNER_WEIGHTS[0] * gauss + INNER_WEIGHTS[1] * centre - fine).abs();
+    let rough = (OUTER_WEIGHTS[0] * outer + OUTER_WEIGHTS[1] * centre - fine).abs();
+    [half * fine, half * miss.max(CHANCE * rough)]
 }
 
 impl<const M: usize> Motion<M> {
@@ -84,9 +88,9 @@ impl<const M: usize> Motion<M> {
     #[inline]
     fn rule(&self, y0: f64, y1: f64) -> (f64, bool) {
         let smooth = self.is_smooth(self.distance(y0), self.distance(y1));
-        let [fine, coarse] = kronrod(|y| self.integrand(y), y0, y1).map(|sum| self.time_scale * sum);
+        let [time, doubt] = kronrod(|y| self.integrand(y), y0, y1).map(|sum| self.time_scale * sum);
         let agree = if self.is_general() { RULES_AGREE_CLOSELY } else { RULES_AGREE };
-        (fine, smooth && (fine - coarse).abs() <= agree * fine)
+        (time, smooth && doubt.abs() <= agree * time)
     }
 
     /// Walks from `from` to `to` and calls `step` for every interval whose time is known well enough; for what
@@ -228,6 +232,39 @@ mod tests {
             let exact = if degree % 2 == 0 { 2.0 / f64::from(degree + 1) } else { 0.0 };
             assert!((sum - exact).abs() < 1e-15, "degree {degree}: {sum} instead of {exact}");
         }
+    }
+
+    #[test]
+    fn a_rule_that_agrees_by_chance_is_not_believed() {
+        // Of 2 + cos kx Gauss's rule and Kronrod's are the same at some k, and both are wrong.
+        let rules = |k: f64| {
+            let f = |x: f64| 2.0 + (k * x).cos();
+            let gauss = INNER_WEIGHTS[0] * 2.0 * f(NODES[1]) + INNER_WEIGHTS[1] * f(0.0);
+            let [fine, doubt] = kronrod(f, -1.0, 1.0);
+            (gauss - fine, doubt, (fine - 4.0 - 2.0 * k.sin() / k).abs())
+        };
+        let mut met = 0;
+        for step in 10..400 {
+            let (mut low, mut high) = (0.05 * f64::from(step), 0.05 * f64::from(step + 1));
+            if rules(low).0 * rules(high).0 > 0.0 {
+                continue;
+            }
+            for _ in 0..60 {
+                let middle = 0.5 * (low + high);
+                if rules(low).0 * rules(middle).0 > 0.0 {
+                    low = middle;
+                } else {
+                    high = middle;
+                }
+            }
+            let (_, doubt, error) = rules(low);
+            met += i32::from(error > 1e-6);
+            assert!(
+                error <= 1e-10 || doubt > 4.0 * RULES_AGREE,
+                "off by {error} at {low}, in doubt by {doubt}"
+            );
+        }
+        assert!(met > 0);
     }
 
     #[test]

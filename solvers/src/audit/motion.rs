@@ -121,9 +121,9 @@ impl<const M: usize> Motion<M> {
 
     /// Adds the lengths of parts between two distances from the anchor.
     fn measure(&self, from: f64, to: f64, halvings: &mut u32, lengths: &mut Vec<[f64; 2]>) {
-        let [fine, coarse] = self.length_between(from, to);
+        let [fine, doubt] = self.length_between(from, to);
         let middle = 0.5 * (from + to);
-        let good = (fine - coarse).abs() <= RULES_AGREE_CLOSELY * fine;
+        let good = doubt.abs() <= RULES_AGREE_CLOSELY * fine;
         if good || *halvings == 0 || !(from < middle && middle < to) {
             lengths.push([to, lengths[lengths.len() - 1][1] + fine]);
             return;
@@ -133,7 +133,7 @@ impl<const M: usize> Motion<M> {
         self.measure(middle, to, halvings, lengths);
     }
 
-    /// The length between two distances from the anchor, by both rules.
+    /// The length between two distances from the anchor, and its doubt.
     fn length_between(&self, from: f64, to: f64) -> [f64; 2] {
         match &self.general {
             None => {
