@@ -114,6 +114,45 @@ def test_random_curves_keep_every_limit_whenever_they_are_stopped(part: int) -> 
     assert found == []
 
 
+def test_a_piece_is_not_cut_where_its_speed_hardly_changes() -> None:
+    # A corner of degree 7 leaves its lines with three derivatives: its speed per parameter is flat there.
+    control = np.array(
+        [
+            [0.6171706581843494, 0.03421859924724033],
+            [0.6170636123549124, 0.03484948504537392],
+            [0.6169565665254754, 0.03548037084350739],
+            [0.6168495206960384, 0.03611125664164097],
+            [0.6168373216090614, 0.0381514976571373],
+            [0.6169368156227507, 0.03878361820193011],
+            [0.6170363096364401, 0.03941573874672281],
+            [0.6171358036501294, 0.04004785929151564],
+        ]
+    )
+    before, after = 2 * control[0] - control[1], 50 * control[-1] - 49 * control[-2]
+    points = [[before, control[0]], control, [control[-1], after]]
+    curve = CompositeCurve.joined([CompositeCurve.from_bezier(own) for own in points])
+    problem = build_problem(Path.from_curve(curve, axes=("X", "Y"), feed=3.0), CURVES)
+    assert plan(problem).duration.min() > 1e-7
+
+
+def test_the_chord_speed_is_kept_where_the_radius_comes_to_be_the_tolerance() -> None:
+    # A parabola whose radius at its tip is 2/3 of the tolerance: a smaller circle allows no less speed.
+    curve = CompositeCurve.from_bezier([[-0.1, 1.5], [0.0, -1.5], [0.1, 1.5]]).elevated(5)
+    machine = replace(curves_machine(500.0, 50_000.0, 5e7), chord_tolerance=0.01, period=0.004)
+    assert_held(build_problem(Path.from_curve(curve, axes=("X", "Y"), feed=FREE), machine))
+
+
+def test_a_piece_of_a_nanometre_keeps_the_limit_of_jerk() -> None:
+    ends = np.array([[0.0, 0.0], [1.0, 0.5], [1.0 + 8e-7, 0.5 + 4e-7], [10.0, 5.0]])
+    curve = CompositeCurve.joined([CompositeCurve.from_bezier(ends[i : i + 2]) for i in range(3)])
+    path = replace(Path.from_curve(curve, axes=("X", "Y"), feed=90.0), feed=np.array([90.0, 91.0, 92.0]))
+    problem = build_problem(path, CURVES)
+    profile = plan(problem)
+    assert (profile.kind == ArcKind.PATH_JERK).sum() == 3
+    assert jerk_excess(problem, profile).worst <= EXCESS
+    assert audit(problem, profile, CURVES, jerk=True).ok
+
+
 # Turns so sharp that the tool rests at them or nearly, rests beside turns, cusps on lines and on curves of
 # degree 2 and more, ends next to rest, two axes in turn at their greatest speeds, a ramp of 0.3 nm at the end
 # of 721 mm.
