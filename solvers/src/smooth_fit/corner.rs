@@ -19,8 +19,8 @@ const WIDTH: f64 = DEGREE as f64 * (LEG[0] - LEG[1]);
 const FILL: f64 = 0.99;
 /// Legs are no longer than this part of their chord: neighbouring corners do not meet.
 const HALF: f64 = 0.5;
-/// What corners leave of a line, where it is a smaller part of it than this: it goes to the corner after it. A profile has
-/// no digits for so short a line.
+/// Corners between which a smaller part of a line than this would be left, or which overlap by no more, meet: a profile
+/// has no digits for so short a line.
 const SLIVER: f64 = 1e-3;
 /// Vertices that turn by less, in |t₊ − t₋|, are none.
 const STRAIGHT: f64 = 1e-9;
@@ -30,29 +30,34 @@ pub fn append_corners<const D: usize>(line: &Polyline<D>, first: usize, end: usi
     let mut from = line.vertex[first];
     let mut begun = 0.0;
     for chord in first..end {
-        let length = line.chord_length(chord);
+        let room = line.chord_length(chord) - begun;
         let corner = (chord + 1 < end).then(|| leg(line, chord + 1)).filter(|leg| *leg > 0.0);
-        let left = length - begun - corner.unwrap_or(0.0);
-        let sliver = corner.is_some() && left <= SLIVER * length;
+        let corner = corner.map(|leg| {
+            let meets = (room - leg).abs() <= SLIVER * line.chord_length(chord);
+            if meets {
+                room
+            } else {
+                leg
+            }
+        });
         let to = match corner {
-            Some(_) if sliver => from,
-            Some(leg) => at(line, chord, length - leg),
+            Some(leg) if leg == room => from,
+            Some(leg) => at(line, chord, begun + room - leg),
             None => line.vertex[chord + 1],
         };
-        if !sliver && to != from {
-            out.push(&[from, to], left, Stretch::new(chord, chord, 0.0));
+        if to != from {
+            out.push(&[from, to], room - corner.unwrap_or(0.0), Stretch::new(chord, chord, 0.0));
         }
         if let Some(leg) = corner {
             let next = chord + 1;
-            let legs = [if sliver { length - begun } else { leg }, leg];
             let mut control = [[0.0; D]; DEGREE + 1];
             for (k, part) in LEG.iter().enumerate() {
-                control[k] = at(line, chord, length - part * legs[0]);
-                control[DEGREE - k] = at(line, next, part * legs[1]);
+                control[k] = at(line, chord, line.chord_length(chord) - part * leg);
+                control[DEGREE - k] = at(line, next, part * leg);
             }
             control[0] = to;
             let turn: [f64; D] = std::array::from_fn(|k| line.direction[next][k] - line.direction[chord][k]);
-            out.push(&control, WIDTH * leg, Stretch::new(chord, next, MIDDLE * legs[0] * norm(&turn)));
+            out.push(&control, WIDTH * leg, Stretch::new(chord, next, MIDDLE * leg * norm(&turn)));
             (from, begun) = (control[DEGREE], leg);
         } else {
             (from, begun) = (line.vertex[chord + 1], 0.0);
@@ -104,7 +109,7 @@ mod tests {
         }
         assert!((norm(&sub(&points[0], &[10.0, 0.0])) - 0.099).abs() < 1e-12);
         assert!((out.stretches[1].deviation - 0.099).abs() < 1e-12);
-        // What two corners leave of a line is none if it is next to nothing: the second reaches back to the first.
+        // Where two corners leave next to nothing of a line they meet.
         let left = 2e-7;
         let mut out = Smooth::default();
         let points = vec![[0.0, 0.0], [0.01, 0.0], [0.01, 0.01 + left], [0.02, 0.01 + left]];
@@ -112,7 +117,9 @@ mod tests {
         assert_eq!(out.curve.pieces().map(|piece| piece.degree()).collect::<Vec<_>>(), [1, 7, 7, 1]);
         let [before, after] = [1, 2].map(|i| out.curve.piece(i).control);
         assert_eq!(before[DEGREE], after[0]);
-        assert!((0..=3).all(|k| (after[k][0] - 0.01).abs() < 1e-17));
+        let steps = [sub(&before[DEGREE], &before[DEGREE - 1]), sub(&after[1], &after[0])];
+        let speeds = [0, 1].map(|i| 7.0 * norm(&steps[i]) / out.curve.piece(i + 1).width);
+        assert!(speeds.iter().all(|speed| (speed - 1.0).abs() < 1e-12), "{speeds:?}");
         // Short chords are shared by halves.
         let zig_zag = (0..9).map(|i| [0.01 * i as f64, 0.01 * (i % 2) as f64]).collect();
         let mut out = Smooth::default();
