@@ -115,7 +115,6 @@ def _point_series(
     the digits of its place.
     """
     points = np.asarray(control_points)
-    origin = np.zeros_like(points[:, 0])
     if weights is not None:
         origin = np.where(np.asarray(fraction)[:, None] < 0.5, points[:, 0], points[:, -1])
         points = points - origin[:, None]
@@ -130,9 +129,9 @@ def _point_series(
         coefficients[k] = math.comb(degree, k) * level[:, 0] / np.asarray(width)[:, None] ** k
         points = np.diff(points, axis=1)
     series = [Series(coefficients[..., i]) for i in range(coefficients.shape[2])]
-    if weights is not None:
-        series = [axis / series[-1] for axis in series[:-1]]
-    return [axis + start for axis, start in zip(series, origin.T, strict=True)]
+    if weights is None:
+        return series
+    return [axis / series[-1] + start for axis, start in zip(series[:-1], origin.T, strict=True)]
 
 
 def _restricted(

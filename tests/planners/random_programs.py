@@ -75,9 +75,8 @@ class _Walk:
 
     def spline(self) -> None:
         (i, j), (p, q), end = self.step() * self.rng.normal(size=(3, 2))
-        place = np.round(self.at + np.array([*end, 0.0]), 5)
-        self.at = place
-        self.lines.append(f"G5 I{i:.5f} J{j:.5f} P{p:.5f} Q{q:.5f} X{place[0]:.5f} Y{place[1]:.5f}")
+        self.at = np.round(self.at + np.array([*end, 0.0]), 5)
+        self.lines.append(f"G5 I{i:.5f} J{j:.5f} P{p:.5f} Q{q:.5f} X{self.at[0]:.5f} Y{self.at[1]:.5f}")
 
     def rapid(self) -> None:
         self.to("G0", self.at + np.array([0.0, 0.0, 5.0]))
