@@ -375,10 +375,7 @@ impl<'a, const M: usize> ByLength<'a, M> {
 
     /// Curvature of the tool's way at a length on a part, in 1/mm.
     pub fn curvature(&self, part: usize, s: f64) -> f64 {
-        match tip_piece(self.problem, self.parts[part].piece) {
-            None => norm(&self.at(part, s).second),
-            Some(tip) => curvature(&tip, self.locate(part, s)),
-        }
+        tool_curvature(self.problem, self.parts[part].piece, self.locate(part, s))
     }
 
     /// The greatest speed by the chord error on a curvature.

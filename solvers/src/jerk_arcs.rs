@@ -184,9 +184,6 @@ impl Arcs {
         path: &ByLength<M>,
         sections: &[Section],
     ) {
-        // What rounding leaves between two sections is none: the one before ends where the one after begins.
-        let kept = |(i, section): &(usize, &Section)| *i == 0 || section.duration > SHORTEST;
-        let sections: Vec<&Section> = sections.iter().enumerate().filter(kept).map(|(_, one)| one).collect();
         for (i, section) in sections.iter().enumerate() {
             let from = State { s: section.position, v: section.speed, a: section.acceleration };
             let to = match sections.get(i + 1) {
@@ -245,7 +242,7 @@ impl Arcs {
                 states[count - 1].a = -jerk * duration;
             }
             for n in 1..count {
-                let arc = between(path, jerk_limits, part, lengths[n], [states[n - 1], states[n]]);
+                let arc = arc_between(path, jerk_limits, part, lengths[n], [states[n - 1], states[n]]);
                 self.push(problem, at.piece, [u[n], u[n + 1]], &arc);
             }
             if stops {
@@ -307,7 +304,7 @@ fn settled(profile: &Profile, nodes: Range<usize>, [from, to]: [f64; 2], lengths
 ///
 /// v² as a cubic is known by v² at its ends: their rounding is 3 ε v³/h² in its jerk, more than the limit on a piece of
 /// a nanometre. There the accelerations tell the jerk, which has no way to change.
-fn between<const M: usize>(
+fn arc_between<const M: usize>(
     path: &ByLength<M>,
     jerk_limits: &[f64; M],
     part: usize,

@@ -146,10 +146,14 @@ fn slow_places<const M: usize>(problem: &Problem<M>, i: usize) -> Vec<f64> {
             (0..M).map(axis).fold(Polynomial::constant(0.0), |sum, g| sum.combine(1.0, &g.multiply(&g), 1.0))
         }
     };
-    let greatest = square.range().1;
-    let mut turns = vec![0.0];
+    let mut turns = vec![];
     square.derivative().sign_changes(&mut |t| turns.push(t));
+    if turns.is_empty() {
+        return turns;
+    }
+    turns.insert(0, 0.0);
     turns.push(1.0);
+    let greatest = square.range().1;
     let speeds: Vec<f64> = turns.iter().map(|&t| square.value(t)).collect();
     let is_low = |n: usize| {
         let least = speeds[n];
@@ -174,21 +178,22 @@ fn chord_kinks<const M: usize>(problem: &Problem<M>, i: usize) -> Vec<f64> {
     if !tolerance.is_finite() {
         return vec![];
     }
-    let over = |u: f64| tool_curvature(problem, i, u) * tolerance - 1.0;
+    // In parts of the tolerance.
+    let inverse_radius = |u: f64| tool_curvature(problem, i, u) * tolerance;
     let places = |count: usize| (0..=count).map(move |n| width * n as f64 / count as f64);
-    if places(PLACES[0]).all(|u| TIGHT * (over(u) + 1.0) < 1.0) {
+    if places(PLACES[0]).all(|u| TIGHT * inverse_radius(u) < 1.0) {
         return vec![];
     }
-    let places: Vec<f64> = places(PLACES[1]).collect();
-    let crossed = places.windows(2).filter(|pair| over(pair[0]) * over(pair[1]) < 0.0);
+    let looked: Vec<(f64, bool)> = places(PLACES[1]).map(|u| (u, inverse_radius(u) > 1.0)).collect();
+    let crossed = looked.windows(2).filter(|pair| pair[0].1 != pair[1].1);
     let kinks = crossed.map(|pair| {
-        let (mut low, mut high) = (pair[0], pair[1]);
+        let (mut low, tight, mut high) = (pair[0].0, pair[0].1, pair[1].0);
         loop {
             let middle = 0.5 * (low + high);
             if middle <= low || middle >= high {
                 return middle;
             }
-            if over(low) * over(middle) > 0.0 {
+            if (inverse_radius(middle) > 1.0) == tight {
                 low = middle;
             } else {
                 high = middle;

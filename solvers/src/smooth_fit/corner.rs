@@ -30,10 +30,11 @@ pub fn append_corners<const D: usize>(line: &Polyline<D>, first: usize, end: usi
     let mut from = line.vertex[first];
     let mut begun = 0.0;
     for chord in first..end {
-        let room = line.chord_length(chord) - begun;
+        let length = line.chord_length(chord);
+        let room = length - begun;
         let corner = (chord + 1 < end).then(|| leg(line, chord + 1)).filter(|leg| *leg > 0.0);
         let corner = corner.map(|leg| {
-            let meets = (room - leg).abs() <= SLIVER * line.chord_length(chord);
+            let meets = (room - leg).abs() <= SLIVER * length;
             if meets {
                 room
             } else {
@@ -42,7 +43,7 @@ pub fn append_corners<const D: usize>(line: &Polyline<D>, first: usize, end: usi
         });
         let to = match corner {
             Some(leg) if leg == room => from,
-            Some(leg) => at(line, chord, begun + room - leg),
+            Some(leg) => at(line, chord, length - leg),
             None => line.vertex[chord + 1],
         };
         if to != from {
@@ -52,7 +53,7 @@ pub fn append_corners<const D: usize>(line: &Polyline<D>, first: usize, end: usi
             let next = chord + 1;
             let mut control = [[0.0; D]; DEGREE + 1];
             for (k, part) in LEG.iter().enumerate() {
-                control[k] = at(line, chord, line.chord_length(chord) - part * leg);
+                control[k] = at(line, chord, length - part * leg);
                 control[DEGREE - k] = at(line, next, part * leg);
             }
             control[0] = to;
