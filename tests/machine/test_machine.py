@@ -1,11 +1,15 @@
 """Machine files: what is bundled loads, what is wrong is refused in one sentence."""
 
+import math
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
-from feedplan import Machine, MachineError
-from feedplan.machine.machine import bundled_machines
+from feedplan import Machine, MachineError, plan
+from feedplan.machine.machine import Axis, bundled_machines
 
 GOOD = """
 name = "one"
@@ -104,3 +108,50 @@ def test_unknown_names_and_files_say_what_there_is(tmp_path: Path) -> None:
         Machine.load(tmp_path / "none.toml")
     with pytest.raises(MachineError, match="no axis W"):
         Machine.load("mill").axis("W")
+
+
+def test_whole_numbers_are_numbers(tmp_path: Path) -> None:
+    axes = tuple(Axis(name, np.int64(100), 1000, max_jerk=20000, travel=(-5, 5)) for name in "XYZ")
+    machine = Machine("own", axes, period=1, home=[1, 2, 3])
+    assert [type(value) for value in (axes[0].max_velocity, axes[0].travel[0], machine.home[0])] == [
+        float
+    ] * 3
+    program = tmp_path / "own.ngc"
+    program.write_text("G1 F600 X5\nY3\n")
+    assert plan(program, replace(machine, period=0.001)).audit().ok
+
+
+@pytest.mark.parametrize(
+    ("fields", "word"),
+    [
+        ({"max_velocity": 0}, "axis X: max_velocity is 0: give a positive number \\[mm/s\\]"),
+        ({"max_velocity": "fast"}, "max_velocity is 'fast'"),
+        ({"max_acceleration": math.inf}, "max_acceleration is inf"),
+        ({"max_jerk": math.nan}, "max_jerk is nan"),
+        ({"travel": (1.0, -1.0)}, "travel"),
+        ({"travel": 3}, "travel"),
+        ({"travel": (math.nan, 1.0)}, "travel"),
+        ({"name": "XY"}, "axis name is 'XY'"),
+        ({"name": 3}, "axis name is 3"),
+        ({"kind": "round"}, "kind"),
+    ],
+)
+def test_wrong_limits_are_refused_where_they_are_given(fields: dict[str, Any], word: str) -> None:
+    with pytest.raises(MachineError, match=word):
+        Axis(**{"name": "X", "max_velocity": 1.0, "max_acceleration": 1.0, **fields})
+
+
+@pytest.mark.parametrize(
+    ("fields", "word"),
+    [
+        ({"axes": ()}, "1 to 6 axes"),
+        ({"axes": "XYZ"}, "1 to 6 axes"),
+        ({"axes": 2 * (Axis("X", 1, 1),)}, "each axis letter once"),
+        ({"period": -1}, "period is -1: give a positive number \\[s\\]"),
+        ({"home": (1, 2)}, "home is .*: give 1 numbers, for the program's axes X"),
+        ({"kinematics": "delta"}, "delta"),
+    ],
+)
+def test_a_wrong_machine_is_refused_where_it_is_made(fields: dict[str, Any], word: str) -> None:
+    with pytest.raises(MachineError, match=word):
+        Machine(**{"name": "own", "axes": (Axis("X", 1, 1),), **fields})
