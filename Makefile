@@ -37,7 +37,7 @@ campaign: $(VENV)/built
 	FEEDPLAN_SEEDS=1250 $(BIN)/pytest --numprocesses auto tests/constraints/test_joints.py -k random
 	FEEDPLAN_SEEDS=200 $(BIN)/pytest --numprocesses auto tests/planners/test_meshes.py -k random
 	FEEDPLAN_SEEDS=10000 $(BIN)/pytest --numprocesses auto tests/planners/test_jerk_limited.py -k random
-	FEEDPLAN_SEEDS=1000 $(BIN)/pytest --numprocesses auto tests/planners/test_jerk_programs.py
+	FEEDPLAN_SEEDS=1000 $(BIN)/pytest --numprocesses auto tests/planners/test_random_programs.py
 	FEEDPLAN_EXAMPLES=5000 $(BIN)/pytest --numprocesses auto tests/test_setpoints_curves.py -k planned
 
 clean:

@@ -71,7 +71,7 @@ def path_of_points(
         array[1:].copy(),
         np.full(count, speed),
         np.zeros(count, dtype=np.int32),
-        np.full(count, tolerance),
+        np.full(count, float(tolerance)),
         np.full(count, settings.fit_share * tolerance),
         np.zeros(count, dtype=np.bool_),
         np.empty(0, dtype=np.int64),

@@ -166,14 +166,29 @@ impl Arcs {
                 }
             }
             let end = State { s: knot, ..start.after(high, jerk) };
-            let arc = Arc { kind: PATH_JERK, value: jerk, ends: [start, end], duration: high };
-            let at = path.parts[part];
-            self.push(problem, at.piece, [path.locate(part, start.s), at.u[1]], &arc);
+            self.push_within(problem, path, part, [start, end], jerk, high);
             (start, left) = (end, left - high);
             part += 1;
         }
-        let arc = Arc { kind: PATH_JERK, value: jerk, ends: [start, to], duration: left };
-        let u = [start.s, to.s].map(|s| path.locate(part, s));
+        self.push_within(problem, path, part, [start, to], jerk, left);
+    }
+
+    /// Appends a section of constant jerk within a part. Its time is that of the length between its parameters: what
+    /// rounding of a place on a long path moves it by is much of an arc of some nanometres.
+    fn push_within<const M: usize>(
+        &mut self,
+        problem: &Problem<M>,
+        path: &ByLength<M>,
+        part: usize,
+        ends: [State; 2],
+        jerk: f64,
+        duration: f64,
+    ) {
+        let u = ends.map(|end| path.locate(part, end.s));
+        let way = State { s: 0.0, ..ends[0] }.after(duration, jerk).s;
+        let moved = path.between(part, u[0], u[1]) - way;
+        let duration = if way > 0.0 { duration * (1.0 + moved / way) } else { duration };
+        let arc = Arc { kind: PATH_JERK, value: jerk, ends, duration };
         self.push(problem, path.parts[part].piece, u, &arc);
     }
 

@@ -118,7 +118,7 @@ def test_points_are_fitted_and_corners_rounded_within_the_tolerance() -> None:
     assert path.move[-1, 1] == 100
     ends = path.curve.control_points[[0, -1]]
     np.testing.assert_array_equal(ends, points[[0, -1]])
-    exact = Path.from_points(points, 0.0)
+    exact = Path.from_points(points, 0)
     np.testing.assert_array_equal(exact.runs, np.arange(102))
     sharp = Path.from_points([[0, 0, 0], [10, 0, 0], [10, 10, 0]], 0.1)
     # As far as the tolerance allows: the apex is at it.

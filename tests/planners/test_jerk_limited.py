@@ -21,17 +21,15 @@ from feedplan.geometry.path import Path
 from feedplan.machine.machine import Axis, Machine
 from feedplan.planners import bound_of, planner
 from feedplan.profile import ArcKind
-from feedplan.setpoints import setpoints
 from tests.constraints.test_joints import NOT_PLAIN
 from tests.constraints.test_joints import random_problem as random_joints
+from tests.planners.audited import audited
 from tests.planners.random_paths import random_case, random_problem
 
 plan = planner("jerk-limited")
 SEEDS = int(os.environ.get("FEEDPLAN_SEEDS", "12"))
 # They are run in so many parts, beside each other.
 PARTS = 12
-# A plan stopped at once may take minutes: setpoints are made of those that take no longer [s].
-LONGEST = 60.0
 # What limits may be exceeded by, as a part of them.
 EXCESS = 1e-6
 # What the planner is asked for where nothing is said.
@@ -99,10 +97,7 @@ def faults_of(seed: int, **options: float) -> list[str]:
     profile = planner("jerk-limited", **options)(problem)
     excess = jerk_excess(problem, profile)
     found = [] if excess.worst <= EXCESS and excess.gaps <= 1e-9 else [f"{seed}: {excess}"]
-    short = profile.time <= LONGEST
-    points = setpoints(problem, profile, machine.period, "sarfraz") if short else None
-    verdict = audit(problem, profile, machine, jerk=True, setpoints=points)
-    return found + [f"{seed}: {sentence}" for sentence in verdict.failures]
+    return found + [f"{seed}: {sentence}" for sentence in audited(problem, profile, machine)]
 
 
 @pytest.mark.parametrize("part", range(PARTS))

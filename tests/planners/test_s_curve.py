@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path as FilePath
 
 import numpy as np
 import pytest
 
 from benchmarks.jerk_excess import jerk_excess
 from benchmarks.named import FREE, lemniscate
+from feedplan import plan
 from feedplan.constraints.problem import build_problem
 from feedplan.geometry.path import Path
+from feedplan.machine.machine import Axis, Machine
 from feedplan.planners import planner
 from feedplan.planners.ruckig import repaired
 from tests.planners.random_paths import random_problem
@@ -39,6 +42,32 @@ def test_states_between_segments_make_profiles_faster_and_keep_every_limit() -> 
         if not (fast.time <= slow.time * (1 + HELD) and excess.worst <= 1e-6 and excess.gaps <= 1e-9):
             faults.append((seed, slow.time, fast.time, excess))
     assert faults == []
+
+
+# Its spline ends in a piece of 3e-5 mm, on which sections at a constant speed are as short as rounding.
+SLIVER = """
+G21 G90 G64
+G0 X28.24815 Y6.04278 Z5.80670
+G1 F293.1
+G1 X20.65007 Y6.80437 Z3.82098
+G1 X18.69306 Y4.65491 Z3.58741
+G1 X14.39114 Y1.96914 Z3.70870
+G5 I2.81426 J-4.67883 P5.75366 Q-8.37044 X-30.98675 Y-20.16791
+G1 F518 X-36.71051 Y-23.22159 Z4.16506
+G1 X-36.98411 Y-28.96802 Z4.49596
+G1 X-45.44216 Y-24.77432 Z5.43666
+G1 X-47.61769 Y-22.48774 Z5.18249
+G1 X-51.63884 Y-8.95594 Z6.71489
+M2
+"""
+
+
+def test_a_section_as_short_as_rounding_keeps_its_time(tmp_path: FilePath) -> None:
+    program = tmp_path / "sliver.ngc"
+    program.write_text(SLIVER)
+    limits = [("X", 86, 3744, 29755), ("Y", 152, 1738, 112819), ("Z", 94, 2569, 48154)]
+    machine = Machine("sliver", tuple(Axis(*rest, max_jerk=jerk) for *rest, jerk in limits), period=0.002)
+    assert plan(program, machine, method="s-curve").audit().failures == ()
 
 
 def test_the_lemniscate_orders_the_methods() -> None:
