@@ -5,7 +5,8 @@
 //! feed, or X speeding up and slowing down piece by piece.
 
 use criterion::{criterion_group, criterion_main, BenchmarkId, Criterion, Throughput};
-use feedplan_solvers::motion::{ArcKind, ProfileArc};
+use feedplan_solvers::arc_kind::ArcKind;
+use feedplan_solvers::motion::ProfileArc;
 use feedplan_solvers::sampling::{Interpolator, PathData, Sampler};
 use feedplan_solvers::spline::bezier::elevate;
 use feedplan_solvers::spline::length::CurveLength;

@@ -32,7 +32,7 @@ mod subpiece;
 mod turns;
 
 pub(crate) use profile::Row;
-pub use profile::{ArcKind, Profile, NO_AXIS};
+pub use profile::{Profile, NO_AXIS};
 
 use std::cell::RefCell;
 

@@ -5,11 +5,11 @@
 
 use std::ops::Range;
 
+use crate::arc_kind::ArcKind;
 use crate::arc_length::{W, X};
 use crate::bang_bang::Problem;
 use crate::by_length::{speed_sq, ByLength};
 use crate::jerk_limited::{Geometry, Profile};
-use crate::motion::ArcKind;
 use crate::s_curve::Section;
 
 const PATH_JERK: u8 = ArcKind::PathJerk as u8;

@@ -2,6 +2,7 @@
 //! `python` alone binds them (feature `python`). Lengths are millimetres, times seconds.
 
 pub mod arc;
+pub mod arc_kind;
 pub mod arc_length;
 pub mod audit;
 pub mod bang_bang;

@@ -16,6 +16,7 @@ mod even;
 mod quadratic;
 mod rate;
 
+use crate::arc_kind::ArcKind;
 use crate::arc_length::{quadrature, tabulate};
 use crate::arc_length::{Integrand, Node, Table, TABLE_ERROR};
 use crate::quadratic::Quadratic;
@@ -32,37 +33,6 @@ pub use rate::{TipSpeed, MAX_TIP};
 const STEP_ERROR: f64 = 1e-10;
 /// The same on arcs whose jerk is limited, for the third differences.
 const JERK_STEP_ERROR: f64 = 1e-13;
-
-/// What stays constant on an arc; the numbers are those of the profile's arrays.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ArcKind {
-    AxisAcceleration = 0,
-    ParameterAcceleration = 1,
-    Feed = 2,
-    AxisVelocity = 3,
-    Chord = 4,
-    SpeedLine = 5,
-    PathJerk = 6,
-    SpeedCubic = 7,
-}
-
-impl ArcKind {
-    /// The kind with a number.
-    pub fn from_number(number: u8) -> Option<Self> {
-        [
-            Self::AxisAcceleration,
-            Self::ParameterAcceleration,
-            Self::Feed,
-            Self::AxisVelocity,
-            Self::Chord,
-            Self::SpeedLine,
-            Self::PathJerk,
-            Self::SpeedCubic,
-        ]
-        .into_iter()
-        .find(|&kind| kind as u8 == number)
-    }
-}
 
 /// One arc of a profile: `value` is the constant of its kind, u0 < u1 local parameters, p at both ends, and on arcs of
 /// limited jerk the acceleration along the path.

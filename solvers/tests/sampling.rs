@@ -1,6 +1,7 @@
 //! Motion along arcs and the time grid, against hand calculation, their own derivatives and each other.
 
-use feedplan_solvers::motion::{ArcKind, Motion, ProfileArc, State};
+use feedplan_solvers::arc_kind::ArcKind;
+use feedplan_solvers::motion::{Motion, ProfileArc, State};
 use feedplan_solvers::quadratic::{norm, sub, Quadratic};
 use feedplan_solvers::sampling::{Interpolator, PathData, Sampler};
 use feedplan_solvers::spline::bezier::elevate;

@@ -8,7 +8,8 @@ use super::split::{split, Cut, Limits};
 use super::store::Store;
 use super::time::time_at_speed;
 use super::{Task, TIP_AXES};
-use crate::bang_bang_quadratic::{ArcKind, Fault, Profile, Row, Workspace as QuadraticWorkspace, NO_AXIS};
+use crate::arc_kind::ArcKind;
+use crate::bang_bang_quadratic::{Fault, Profile, Row, Workspace as QuadraticWorkspace, NO_AXIS};
 use crate::polynomial::MOST;
 use crate::quadratic::norm;
 

@@ -4,24 +4,7 @@ use super::arc::{Arc, Kind};
 use super::duration;
 use super::split::{Part, Placed};
 use super::subpiece::{Axes, Cap};
-
-/// What is constant on an arc; the numbers are those of `feedplan.profile.ArcKind`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum ArcKind {
-    /// q'_k s + q''_k p = value in mm/s², signed.
-    AxisAcceleration = 0,
-    /// s = value in mm/s²: p is linear in u.
-    ParameterAcceleration = 1,
-    /// |C'|² p = value in mm²/s².
-    Feed = 2,
-    /// q'_k² p = value in mm²/s².
-    AxisVelocity = 3,
-    /// p = value · |C'|.
-    Chord = 4,
-    /// |C'|² p is linear in u between its ends.
-    SpeedLine = 5,
-}
+use crate::arc_kind::ArcKind;
 
 /// No axis belongs to the arc.
 pub const NO_AXIS: u8 = 255;

@@ -4,8 +4,9 @@
 //! where the tangent reverses does it stop.
 
 use super::piece::Straight;
-use super::profile::{ArcKind, Profile, Row, NO_AXIS};
+use super::profile::{Profile, Row, NO_AXIS};
 use super::subpiece::Axes;
+use crate::arc_kind::ArcKind;
 
 /// A shorter part of the length than this is rounding.
 const NO_PART: f64 = 1e-15;

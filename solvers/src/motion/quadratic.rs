@@ -6,7 +6,8 @@
 //! where |q'_k| is smaller: there every term is positive and no digit is lost, not even where q'_k vanishes.
 
 use super::even::EvenLaw;
-use super::{fill, invert, parts, ArcKind, ProfileArc, Rates, State};
+use super::{fill, invert, parts, ProfileArc, Rates, State};
+use crate::arc_kind::ArcKind;
 use crate::arc_length::{ChordTime, Hodograph, Length, Node, Table};
 use crate::quadratic::{dot, Quadratic};
 

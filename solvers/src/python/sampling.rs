@@ -10,7 +10,8 @@ use pyo3::prelude::*;
 use super::arrays::to_array2;
 use super::spline::curve;
 use super::with_padded_axes;
-use crate::motion::{ArcKind, ProfileArc};
+use crate::arc_kind::ArcKind;
+use crate::motion::ProfileArc;
 use crate::sampling::{Interpolator, PathData, Resume, Sampler};
 
 pyo3::import_exception!(feedplan.errors, InputError);

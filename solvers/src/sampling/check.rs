@@ -1,7 +1,8 @@
 //! Whether the arrays of a path and a profile fit together, before anything is computed from them.
 
 use super::PathData;
-use crate::motion::{flaw, ArcKind, ProfileArc, MAX_TIP};
+use crate::arc_kind::ArcKind;
+use crate::motion::{flaw, ProfileArc, MAX_TIP};
 
 /// The error is a sentence for the user.
 pub(super) fn check<const M: usize>(
