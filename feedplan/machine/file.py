@@ -64,4 +64,4 @@ def _axis(row: dict[str, Any]) -> Axis:
 def _check_keys(table: dict[str, Any], known: set[str], place: str) -> None:
     unknown = sorted(set(table) - known)
     if unknown:
-        raise MachineError(f"{place}keys is {unknown}: give only {', '.join(sorted(known))}")
+        raise MachineError(f"{place}the keys {unknown} are not known: give only {', '.join(sorted(known))}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib import resources
@@ -87,18 +87,22 @@ class Machine:
     parameters: Mapping[str, Any] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
-        good = isinstance(self.axes, tuple) and all(isinstance(axis, Axis) for axis in self.axes)
-        _require(good and 0 < len(self.axes) <= MAX_AXES, "axes", self.axes, f"1 to {MAX_AXES} axes")
+        remedy = f"1 to {MAX_AXES} axes"
+        axes = _tuple(self.axes, "axes", remedy)
+        good = 0 < len(axes) <= MAX_AXES and all(isinstance(axis, Axis) for axis in axes)
+        _require(good, "axes", self.axes, remedy)
+        object.__setattr__(self, "axes", axes)
         names = list(self.axis_names)
         _require(len(set(names)) == len(names), "axes", names, "each axis letter once")
         _set_positive(self, "period", "", "s")
         _set_positive(self, "chord_tolerance", "", "mm", infinite=True)
         letters = self.program_letters
         remedy = f"{len(letters)} numbers, for the program's axes {', '.join(letters)}"
-        home = _numbers(self.home or (0.0,) * len(letters), len(letters), "home", remedy)
-        offsets = ((key, _numbers(row, len(letters), key, remedy)) for key, row in self.offsets)
-        object.__setattr__(self, "home", home)
-        object.__setattr__(self, "offsets", tuple(offsets))
+        home = _tuple(self.home, "home", remedy) or (0.0,) * len(letters)
+        object.__setattr__(self, "home", _numbers(home, len(letters), "home", remedy))
+        pairs = _pairs(self.offsets)
+        offsets = tuple((key, _numbers(row, len(letters), str(key), remedy)) for key, row in pairs)
+        object.__setattr__(self, "offsets", offsets)
 
     @property
     def axis_names(self) -> tuple[str, ...]:
@@ -177,11 +181,27 @@ def _is_number(value: object) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool)
 
 
+def _tuple(values: Any, what: str, remedy: str) -> tuple[Any, ...]:
+    """The values one by one; raises MachineError where they cannot be told so."""
+    _require(isinstance(values, Iterable), what, values, remedy)
+    return tuple(values)
+
+
+def _pairs(offsets: Any) -> tuple[tuple[str, Any], ...]:
+    """Names and places, given as such or as a mapping; raises MachineError for anything else."""
+    remedy = 'pairs such as ("G54", (0.0, 0.0, 0.0))'
+    pairs = _tuple(offsets.items() if isinstance(offsets, Mapping) else offsets, "offsets", remedy)
+    good = all(isinstance(pair, tuple) and len(pair) == 2 for pair in pairs)
+    _require(good, "offsets", offsets, remedy)
+    return pairs
+
+
 def _numbers(values: Any, count: int, what: str, remedy: str, infinite: bool = False) -> tuple[float, ...]:
-    """A sequence of so many numbers, as floats; raises MachineError for anything else."""
-    good = isinstance(values, Sequence) and len(values) == count and all(map(_is_number, values))
-    _require(good and (infinite or all(map(math.isfinite, values))), what, values, remedy)
-    return tuple(map(float, values))
+    """So many numbers, as floats; raises MachineError for anything else."""
+    numbers = _tuple(values, what, remedy)
+    good = len(numbers) == count and all(map(_is_number, numbers))
+    _require(good and (infinite or all(map(math.isfinite, numbers))), what, values, remedy)
+    return tuple(map(float, numbers))
 
 
 def _set_positive(owner: Axis | Machine, key: str, place: str, unit: str, infinite: bool = False) -> None:

@@ -111,8 +111,10 @@ def test_unknown_names_and_files_say_what_there_is(tmp_path: Path) -> None:
 
 
 def test_whole_numbers_are_numbers(tmp_path: Path) -> None:
-    axes = tuple(Axis(name, np.int64(100), 1000, max_jerk=20000, travel=(-5, 5)) for name in "XYZ")
-    machine = Machine("own", axes, period=1, home=[1, 2, 3])
+    travel = np.array([-5, 50])
+    axes = [Axis(name, np.int64(100), 1000, max_jerk=20000, travel=travel) for name in "XYZ"]
+    machine = Machine("own", axes, period=1, home=np.array([1, 2, 3]), offsets={"G54": [4, 5, 6]})
+    assert machine.offsets == (("G54", (4.0, 5.0, 6.0)),)
     assert [type(value) for value in (axes[0].max_velocity, axes[0].travel[0], machine.home[0])] == [
         float
     ] * 3
@@ -148,6 +150,11 @@ def test_wrong_limits_are_refused_where_they_are_given(fields: dict[str, Any], w
         ({"axes": "XYZ"}, "1 to 6 axes"),
         ({"axes": 2 * (Axis("X", 1, 1),)}, "each axis letter once"),
         ({"period": -1}, "period is -1: give a positive number \\[s\\]"),
+        ({"axes": Axis("X", 1, 1)}, "1 to 6 axes"),
+        ({"home": 2}, "home is 2: give 1 numbers"),
+        ({"offsets": 3}, "offsets is 3"),
+        ({"offsets": ("G54",)}, "offsets is"),
+        ({"offsets": (("G54", 3),)}, "G54 is 3: give 1 numbers"),
         ({"home": (1, 2)}, "home is .*: give 1 numbers, for the program's axes X"),
         ({"kinematics": "delta"}, "delta"),
     ],
