@@ -280,6 +280,17 @@ def test_help_and_version_exit_0(capsys: Any) -> None:
     assert capsys.readouterr().out.splitlines()[-1].startswith("feedplan ")
 
 
+def test_the_package_runs_as_a_module() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "feedplan", "--version"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert (done.returncode, done.stdout.split()[0]) == (0, "feedplan")
+
+
 def test_machines_lists_every_one_and_shows_each(capsys: Any) -> None:
     assert main(["machines"]) == 0
     lines = capsys.readouterr().out.splitlines()
