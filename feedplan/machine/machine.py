@@ -97,9 +97,9 @@ class Machine:
         _set_positive(self, "period", "", "s")
         _set_positive(self, "chord_tolerance", "", "mm", infinite=True)
         letters = self.program_letters
-        remedy = f"{len(letters)} numbers, for the program's axes {', '.join(letters)}"
-        home = _tuple(self.home, "home", remedy) or (0.0,) * len(letters)
-        object.__setattr__(self, "home", _numbers(home, len(letters), "home", remedy))
+        remedy = f"{len(letters)} finite numbers, for the program's axes {', '.join(letters)}"
+        home = _tuple(self.home, "home", remedy)
+        object.__setattr__(self, "home", _numbers(home, len(letters), "home", remedy) if home else ())
         pairs = _pairs(self.offsets)
         offsets = tuple((key, _numbers(row, len(letters), str(key), remedy)) for key, row in pairs)
         object.__setattr__(self, "offsets", offsets)

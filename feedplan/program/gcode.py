@@ -146,7 +146,8 @@ def _places(machine: Machine | None) -> NDArray[np.float64]:
         if key not in WORK_OFFSETS:
             raise MachineError(f"machine {machine.name}: offsets has {key!r}: use {', '.join(WORK_OFFSETS)}")
         places[WORK_OFFSETS.index(key), columns] = row
-    places[-2, columns] = machine.home
+    if machine.home:
+        places[-2, columns] = machine.home
     if not machine.words_are_joints:
         # Zero may be a place that the tip cannot reach, as the axis of a turning column.
         places[-1] = places[-2]

@@ -92,11 +92,11 @@ def test_home_and_offsets_are_in_the_letters_of_a_program(tmp_path: Path) -> Non
     assert gantry.program_letters == ("X", "Y", "Z")
     assert gantry.home == (1, 2, 3)
     assert gantry.offsets == (("G54", (4, 5, 6)),)
-    assert load(GANTRY.replace("home", "# home"), tmp_path).home == (0, 0, 0)
+    assert load(GANTRY.replace("home", "# home"), tmp_path).home == ()
     for key in ("home", "G54"):
         wrong = GANTRY.replace(f"{key} = [", f"{key} = [0.0, ")
         with pytest.raises(
-            MachineError, match=f"{key} is .*: give 3 numbers, for the program's axes X, Y, Z"
+            MachineError, match=f"{key} is .*: give 3 finite numbers, for the program's axes X, Y, Z"
         ):
             load(wrong, tmp_path)
 
@@ -151,11 +151,12 @@ def test_wrong_limits_are_refused_where_they_are_given(fields: dict[str, Any], w
         ({"axes": 2 * (Axis("X", 1, 1),)}, "each axis letter once"),
         ({"period": -1}, "period is -1: give a positive number \\[s\\]"),
         ({"axes": Axis("X", 1, 1)}, "1 to 6 axes"),
-        ({"home": 2}, "home is 2: give 1 numbers"),
+        ({"home": (math.inf,)}, "home is .*: give 1 finite numbers"),
+        ({"home": 2}, "home is 2: give 1 finite numbers"),
         ({"offsets": 3}, "offsets is 3"),
         ({"offsets": ("G54",)}, "offsets is"),
-        ({"offsets": (("G54", 3),)}, "G54 is 3: give 1 numbers"),
-        ({"home": (1, 2)}, "home is .*: give 1 numbers, for the program's axes X"),
+        ({"offsets": (("G54", 3),)}, "G54 is 3: give 1 finite numbers"),
+        ({"home": (1, 2)}, "home is .*: give 1 finite numbers, for the program's axes X"),
         ({"kinematics": "delta"}, "delta"),
     ],
 )
