@@ -1,6 +1,5 @@
 """Work offsets, G92, tool lengths and the home position."""
 
-
 import pytest
 
 from feedplan.errors import MachineError, ProgramError
