@@ -1,7 +1,7 @@
-//! Time per interval and iteration of the jerk-limited planner in three axes on one thread, its preparation and its checks
-//! between the nodes included.
+//! Time per interval and iteration of the jerk-limited planner in three axes on one thread: of whole plans, preparation and
+//! checks between the nodes included, and of iterations alone, from plans that differ in nothing but their number.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use criterion::{criterion_group, criterion_main, BenchmarkId, Criterion, Throughput};
 use feedplan_solvers::jerk_limited::{plan, Effort, End, Geometry, Limits, Place, Problem};
@@ -36,7 +36,10 @@ impl Geometry<3> for Winding {
     }
 }
 
-fn iterations(criterion: &mut Criterion) {
+/// Iterations of the two plans whose difference is taken: neither has converged.
+const ITERATIONS: [usize; 2] = [3, 12];
+
+fn jerk_limited(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("jerk_limited");
     group.sample_size(10).warm_up_time(Duration::from_millis(300)).measurement_time(Duration::from_secs(2));
     let limits = Limits { velocity: [250.0; 3], acceleration: [3000.0; 3], jerk: [50_000.0; 3] };
@@ -44,16 +47,37 @@ fn iterations(criterion: &mut Criterion) {
     for length in [100.0, 1_000.0, 10_000.0] {
         let geometry = Winding([0.0, length]);
         let problem = Problem { geometry: &geometry, limits, caps: &[], ends: [End::Rest; 2] };
-        let planned = || one.install(|| plan(&problem, &Effort::default()).expect("a plan"));
-        let first = planned();
-        let count = (first.profile.s.len() - 1) as f64 * first.iterations;
-        group.throughput(Throughput::Elements(count.round() as u64));
-        group.bench_with_input(BenchmarkId::new("winding", format!("{length}_mm")), &length, |bencher, _| {
-            bencher.iter(planned);
+        let planned = |max_iterations: usize| {
+            let effort = Effort { max_iterations, ..Effort::default() };
+            one.install(|| plan(&problem, &effort).expect("a plan"))
+        };
+        let steps = |max_iterations: usize| {
+            let plan = planned(max_iterations);
+            (plan.profile.s.len() - 1) as f64 * plan.iterations
+        };
+        let whole = Effort::default().max_iterations;
+        group.throughput(Throughput::Elements(steps(whole) as u64));
+        group.bench_with_input(BenchmarkId::new("plan", length), &whole, |bencher, &whole| {
+            bencher.iter(|| planned(whole));
+        });
+        let [few, many] = ITERATIONS;
+        group.throughput(Throughput::Elements((steps(many) - steps(few)) as u64));
+        group.bench_with_input(BenchmarkId::new("iterations", length), &[few, many], |bencher, both| {
+            bencher.iter_custom(|count| {
+                let one = || {
+                    let [few, many] = both.map(|most| {
+                        let start = Instant::now();
+                        planned(most);
+                        start.elapsed()
+                    });
+                    many.saturating_sub(few)
+                };
+                (0..count).map(|_| one()).sum()
+            });
         });
     }
     group.finish();
 }
 
-criterion_group!(benches, iterations);
+criterion_group!(benches, jerk_limited);
 criterion_main!(benches);
