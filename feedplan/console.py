@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
-from feedplan.units import duration_text, mm_per_min
+from feedplan.units import duration_text, mm_per_min, ratio_text
 
 if TYPE_CHECKING:
     from feedplan.audit import Audit, LimitCheck
@@ -124,9 +124,9 @@ def fit_rows(fit: Mapping[str, Any]) -> list[tuple[str, str]]:
     points, splines, polynomials = (int(fit.get(key) or 0) for key in ("points", "splines", "polynomials"))
     if not points or not splines:
         return []
-    text = f"{points} points as {splines} splines ({points / splines:.1f} : 1)"
+    text = f"{points} points as {splines} splines ({ratio_text(points, splines)})"
     if polynomials:
-        text += f" of {polynomials} polynomials ({points / polynomials:.1f} : 1)"
+        text += f" of {polynomials} polynomials ({ratio_text(points, polynomials)})"
     return [("fit", text), ("deviation", f"{float(fit['deviation']):.3g} mm")]
 
 

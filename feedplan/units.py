@@ -24,3 +24,9 @@ def duration_text(seconds: float) -> str:
         return f"{minutes:.0f} min {rest:04.1f} s"
     hours, minutes = divmod(minutes, 60)
     return f"{hours:.0f} h {minutes:02.0f} min {rest:02.0f} s"
+
+
+def ratio_text(number: float, other: float) -> str:
+    """`3.0 : 1`, `0.048 : 1`: how many for one of the other."""
+    ratio = number / other
+    return f"{ratio:.1f} : 1" if ratio >= 1 else f"{ratio:.2g} : 1"

@@ -9,7 +9,7 @@ from typing import Any
 
 from feedplan.audit import Audit, LimitCheck
 from feedplan.report.losses import Share, SlowLine
-from feedplan.units import duration_text, mm_per_min
+from feedplan.units import duration_text, mm_per_min, ratio_text
 
 # Limits of the machine and the program; every other check is one of consistency.
 _OF_AXES = {"velocity", "acceleration", "acceleration_jump", "jerk", "travel", "jump"}
@@ -104,11 +104,11 @@ def fit_table(summary: Mapping[str, Any]) -> str:
     if points and splines:
         rows += [
             ("Points fitted", f"{points}"),
-            ("B-splines", f"{splines} <span class='tag'>{points / splines:.1f} : 1</span>"),
+            ("B-splines", f"{splines} <span class='tag'>{ratio_text(points, splines)}</span>"),
         ]
         if polynomials:
             rows.append(
-                ("Polynomials", f"{polynomials} <span class='tag'>{points / polynomials:.1f} : 1</span>")
+                ("Polynomials", f"{polynomials} <span class='tag'>{ratio_text(points, polynomials)}</span>")
             )
     else:
         rows.append(("Fit", "nothing to fit"))
