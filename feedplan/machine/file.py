@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +15,9 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-_MACHINE_KEYS = {"name", "description", "period", "chord_tolerance", "kinematics", "home", "offsets", "axes"}
-_AXIS_KEYS = {"name", "max_velocity", "max_acceleration", "max_jerk", "travel", "max_velocity_jump", "kind"}
-_NEEDED = ("name", "max_velocity", "max_acceleration")
+_AXIS_KEYS = {own.name for own in fields(Axis)}
+_NEEDED = [own.name for own in fields(Axis) if own.default is MISSING]
+_MACHINE_KEYS = {own.name for own in fields(Machine)} - {"parameters"} | {"description"}
 
 
 def parse(text: str, name: str) -> Machine:
@@ -34,20 +35,16 @@ def _machine(table: dict[str, Any], name: str) -> Machine:
     rows = table.get("axes")
     if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
         raise MachineError(f"axes is {rows!r}: give an [[axes]] table for each axis")
-    given = {key: table[key] for key in ("period", "chord_tolerance", "home") if key in table}
+    given = {key: table[key] for key in ("period", "chord_tolerance", "home", "offsets") if key in table}
     kinematics = table.get("kinematics", "cartesian")
     parameters = {"type": kinematics} if isinstance(kinematics, str) else kinematics
     if not (isinstance(parameters, dict) and isinstance(parameters.get("type"), str)):
         raise MachineError(f'kinematics is {kinematics!r}: give a name, or a table with type = "cartesian"')
-    offsets = table.get("offsets", {})
-    if not isinstance(offsets, dict):
-        raise MachineError(f"offsets is {offsets!r}: give a table such as G54 = [0.0, 0.0, 0.0]")
     return Machine(
         name=str(table.get("name", Path(name).stem)),
         axes=tuple(_axis(row) for row in rows),
         kinematics=parameters["type"],
         parameters={key: value for key, value in parameters.items() if key != "type"},
-        offsets=tuple(offsets.items()),
         **given,
     )
 

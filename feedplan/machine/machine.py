@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib import resources
-from numbers import Real
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 from feedplan.errors import MachineError
+from feedplan.machine.checks import is_number, numbers, one_by_one, require, set_positive
 
 if TYPE_CHECKING:
     from feedplan.machine.kinematics import Kinematics
@@ -42,20 +42,21 @@ class Axis:
 
     def __post_init__(self) -> None:
         letter = isinstance(self.name, str) and len(self.name) == 1 and self.name in AXIS_LETTERS
-        _require(letter, "axis name", self.name, f"one of the letters {AXIS_LETTERS}")
-        kind, place = self.kind or ("rotary" if self.name in "ABC" else "linear"), f"axis {self.name}: "
-        _require(kind in ("linear", "rotary"), f"{place}kind", kind, '"linear" or "rotary"')
+        require(letter, "axis name", self.name, f"one of the letters {AXIS_LETTERS}")
+        place = f"axis {self.name}: "
+        kind = self.kind or ("rotary" if self.name in "ABC" else "linear")
+        require(kind in ("linear", "rotary"), f"{place}kind", kind, '"linear" or "rotary"')
         object.__setattr__(self, "kind", kind)
         units = {"max_velocity": "/s", "max_acceleration": "/s²", "max_jerk": "/s³"}
         for key, unit in units.items():
-            _set_positive(self, key, place, f"{self.unit}{unit}", infinite=key == "max_jerk")
+            set_positive(self, key, place, f"{self.unit}{unit}", infinite=key == "max_jerk")
         jump = self.max_velocity_jump
-        good = _is_number(jump) and 0 <= jump < math.inf
-        _require(good, f"{place}max_velocity_jump", jump, f"a finite number ≥ 0 [{self.unit}/s]")
+        good = is_number(jump) and 0 <= jump < math.inf
+        require(good, f"{place}max_velocity_jump", jump, f"a finite number ≥ 0 [{self.unit}/s]")
         object.__setattr__(self, "max_velocity_jump", float(jump))
         remedy = "the least position and a greater one"
-        least, greatest = _numbers(self.travel, 2, f"{place}travel", remedy, infinite=True)
-        _require(least < greatest, f"{place}travel", self.travel, remedy)
+        least, greatest = numbers(self.travel, 2, f"{place}travel", remedy, infinite=True)
+        require(least < greatest, f"{place}travel", self.travel, remedy)
         object.__setattr__(self, "travel", (least, greatest))
 
     @property
@@ -88,20 +89,20 @@ class Machine:
 
     def __post_init__(self) -> None:
         remedy = f"1 to {MAX_AXES} axes"
-        axes = _tuple(self.axes, "axes", remedy)
+        axes = one_by_one(self.axes, "axes", remedy)
         good = 0 < len(axes) <= MAX_AXES and all(isinstance(axis, Axis) for axis in axes)
-        _require(good, "axes", self.axes, remedy)
+        require(good, "axes", self.axes, remedy)
         object.__setattr__(self, "axes", axes)
         names = list(self.axis_names)
-        _require(len(set(names)) == len(names), "axes", names, "each axis letter once")
-        _set_positive(self, "period", "", "s")
-        _set_positive(self, "chord_tolerance", "", "mm", infinite=True)
+        require(len(set(names)) == len(names), "axes", names, "each axis letter once")
+        set_positive(self, "period", "", "s")
+        set_positive(self, "chord_tolerance", "", "mm", infinite=True)
         letters = self.program_letters
         remedy = f"{len(letters)} finite numbers, for the program's axes {', '.join(letters)}"
-        home = _tuple(self.home, "home", remedy)
-        object.__setattr__(self, "home", _numbers(home, len(letters), "home", remedy) if home else ())
+        home = one_by_one(self.home, "home", remedy)
+        object.__setattr__(self, "home", numbers(home, len(letters), "home", remedy) if home else ())
         pairs = _pairs(self.offsets)
-        offsets = tuple((key, _numbers(row, len(letters), str(key), remedy)) for key, row in pairs)
+        offsets = tuple((key, numbers(row, len(letters), str(key), remedy)) for key, row in pairs)
         object.__setattr__(self, "offsets", offsets)
 
     @property
@@ -172,41 +173,10 @@ def bundled_machines() -> tuple[str, ...]:
     return tuple(sorted(entry.name[:-5] for entry in models.iterdir() if entry.name.endswith(".toml")))
 
 
-def _require(condition: bool, what: str, value: object, remedy: str) -> None:
-    if not condition:
-        raise MachineError(f"{what} is {value!r}: give {remedy}")
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, Real) and not isinstance(value, bool)
-
-
-def _tuple(values: Any, what: str, remedy: str) -> tuple[Any, ...]:
-    """The values one by one; raises MachineError where they cannot be told so."""
-    _require(isinstance(values, Iterable), what, values, remedy)
-    return tuple(values)
-
-
 def _pairs(offsets: Any) -> tuple[tuple[str, Any], ...]:
     """Names and places, given as such or as a mapping; raises MachineError for anything else."""
-    remedy = 'pairs such as ("G54", (0.0, 0.0, 0.0))'
-    pairs = _tuple(offsets.items() if isinstance(offsets, Mapping) else offsets, "offsets", remedy)
+    remedy = "names with places, such as G54 with [0.0, 0.0, 0.0]"
+    pairs = one_by_one(offsets.items() if isinstance(offsets, Mapping) else offsets, "offsets", remedy)
     good = all(isinstance(pair, tuple) and len(pair) == 2 for pair in pairs)
-    _require(good, "offsets", offsets, remedy)
+    require(good, "offsets", offsets, remedy)
     return pairs
-
-
-def _numbers(values: Any, count: int, what: str, remedy: str, infinite: bool = False) -> tuple[float, ...]:
-    """So many numbers, as floats; raises MachineError for anything else."""
-    numbers = _tuple(values, what, remedy)
-    good = len(numbers) == count and all(map(_is_number, numbers))
-    _require(good and (infinite or all(map(math.isfinite, numbers))), what, values, remedy)
-    return tuple(map(float, numbers))
-
-
-def _set_positive(owner: Axis | Machine, key: str, place: str, unit: str, infinite: bool = False) -> None:
-    """Makes a field a float; raises MachineError unless it is positive, and where it has to be, finite."""
-    value = getattr(owner, key)
-    good = _is_number(value) and value > 0 and (infinite or value < math.inf)
-    _require(good, place + key, value, f"a positive number [{unit}]")
-    object.__setattr__(owner, key, float(value))

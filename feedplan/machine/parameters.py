@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from feedplan.errors import MachineError
+from feedplan.machine.checks import is_number, require
 
 Vector = tuple[float, float, float]
 
@@ -53,8 +53,7 @@ class Parameters:
 
     def require(self, condition: bool, key: str, value: object, remedy: str) -> None:
         """Refuses a value in one sentence."""
-        if not condition:
-            raise MachineError(f"machine {self.machine}: kinematics {key} is {value!r}: give {remedy}")
+        require(condition, f"machine {self.machine}: kinematics {key}", value, remedy)
 
     def finish(self) -> None:
         """Refuses keys that were never read."""
@@ -68,5 +67,5 @@ class Parameters:
         return "missing" if value is None else value
 
 
-def _finite(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+def _finite(value: Any) -> bool:
+    return is_number(value) and math.isfinite(value)

@@ -64,7 +64,7 @@ fn jerk_limited(criterion: &mut Criterion) {
         group.throughput(Throughput::Elements((steps(many) - steps(few)) as u64));
         group.bench_with_input(BenchmarkId::new("iterations", length), &[few, many], |bencher, both| {
             bencher.iter_custom(|count| {
-                let one = || {
+                let difference = || {
                     let [few, many] = both.map(|most| {
                         let start = Instant::now();
                         planned(most);
@@ -72,7 +72,7 @@ fn jerk_limited(criterion: &mut Criterion) {
                     });
                     many.saturating_sub(few)
                 };
-                (0..count).map(|_| one()).sum()
+                (0..count).map(|_| difference()).sum()
             });
         });
     }

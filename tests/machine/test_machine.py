@@ -115,9 +115,8 @@ def test_whole_numbers_are_numbers(tmp_path: Path) -> None:
     axes = [Axis(name, np.int64(100), 1000, max_jerk=20000, travel=travel) for name in "XYZ"]
     machine = Machine("own", axes, period=1, home=np.array([1, 2, 3]), offsets={"G54": [4, 5, 6]})
     assert machine.offsets == (("G54", (4.0, 5.0, 6.0)),)
-    assert [type(value) for value in (axes[0].max_velocity, axes[0].travel[0], machine.home[0])] == [
-        float
-    ] * 3
+    values = (axes[0].max_velocity, axes[0].travel[0], machine.period, machine.home[0])
+    assert all(type(value) is float for value in values)
     program = tmp_path / "own.ngc"
     program.write_text("G1 F600 X5\nY3\n")
     assert plan(program, replace(machine, period=0.001)).audit().ok

@@ -66,7 +66,7 @@ def test_a_section_as_short_as_rounding_keeps_its_time(tmp_path: FilePath) -> No
     program = tmp_path / "sliver.ngc"
     program.write_text(SLIVER)
     limits = [("X", 86, 3744, 29755), ("Y", 152, 1738, 112819), ("Z", 94, 2569, 48154)]
-    machine = Machine("sliver", tuple(Axis(*rest, max_jerk=jerk) for *rest, jerk in limits), period=0.002)
+    machine = Machine("sliver", tuple(Axis(*row) for row in limits), period=0.002)
     assert plan(program, machine, method="s-curve").audit().failures == ()
 
 

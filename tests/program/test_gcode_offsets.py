@@ -122,3 +122,8 @@ def test_an_axis_that_the_machine_lacks_is_an_error() -> None:
 def test_an_offset_with_an_unknown_name_is_an_error() -> None:
     with pytest.raises(MachineError, match=r"shop: offsets has 'G60': use G54, .*G59\.3$"):
         targets("G0 X1", machine(offsets=(("G60", (0.0, 0.0, 0.0)),)))
+
+
+def test_a_home_that_is_no_place_is_an_error() -> None:
+    with pytest.raises(ProgramError, match="line 3: X would go to 2000000 mm"):
+        targets("G0 Y1\nG28", machine(home=(2e6, 0.0, 0.0)))

@@ -1,0 +1,43 @@
+"""Values of a machine as numbers; what is wrong is one sentence with place, value and remedy."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from numbers import Real
+from typing import Any
+
+from feedplan.errors import MachineError
+
+
+def require(condition: bool, what: str, value: object, remedy: str) -> None:
+    """Raises MachineError unless the condition holds."""
+    if not condition:
+        raise MachineError(f"{what} is {value!r}: give {remedy}")
+
+
+def is_number(value: object) -> bool:
+    """A number of any type; truth values are none."""
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def one_by_one(values: Any, what: str, remedy: str) -> tuple[Any, ...]:
+    """The values one by one; raises MachineError where they cannot be told so."""
+    require(isinstance(values, Iterable), what, values, remedy)
+    return tuple(values)
+
+
+def numbers(values: Any, count: int, what: str, remedy: str, infinite: bool = False) -> tuple[float, ...]:
+    """So many numbers, as floats; raises MachineError for anything else."""
+    given = one_by_one(values, what, remedy)
+    good = len(given) == count and all(map(is_number, given))
+    require(good and (infinite or all(map(math.isfinite, given))), what, values, remedy)
+    return tuple(map(float, given))
+
+
+def set_positive(owner: object, key: str, place: str, unit: str, infinite: bool = False) -> None:
+    """Makes a field a float; raises MachineError unless it is positive, and where it has to be, finite."""
+    value = getattr(owner, key)
+    good = is_number(value) and value > 0 and (infinite or value < math.inf)
+    require(good, place + key, value, f"a positive number [{unit}]")
+    object.__setattr__(owner, key, float(value))
