@@ -71,12 +71,7 @@ def audit(
     program and setpoints do not belong together.
     """
     axes = problem.axes
-    if program is not None and program.axes != problem.path.axes:
-        raise InputError(
-            f"the program has the axes {' '.join(program.axes)}, its path "
-            f"{' '.join(problem.path.axes)}: audit a path "
-            "with the program that it was built from"
-        )
+    program = program.along(problem.path.axes) if program else None
     machine_axes = _machine_axes(machine, axes)
     jump = [axis.max_velocity_jump for axis in machine_axes]
     limits = _Limits(

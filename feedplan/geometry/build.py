@@ -13,9 +13,9 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError, ProgramError
 from feedplan.geometry.corners import Corners
 from feedplan.geometry.path import FitSummary, Path
-from feedplan.geometry.path_words import LINEAR_AXES, path_words
+from feedplan.geometry.path_words import path_words
 from feedplan.machine.machine import Machine
-from feedplan.program.program import MoveKind, PathControl, Program
+from feedplan.program.program import LINEAR_AXES, MoveKind, PathControl, Program
 
 PARALLEL_AXES = "UVW"
 
@@ -104,40 +104,36 @@ def build_path(
             f"the tolerance is {tolerance}: give 0 (exact lines with stops) or a positive number [mm]"
         )
     words = path_words(program, machine)
-    columns, names = words.columns, words.names
-    starts = program.starts()
-    start = np.ascontiguousarray(program.start[columns])
-    target = np.ascontiguousarray(program.target[:, columns])
-    changed = program.change_start.reshape(-1, len(program.axes))[:, columns]
-    arc_plane = _arc_planes(program, names)
-    splines = _splines(program, columns, starts)
+    program = program.along(words.names)
+    names, starts = program.axes, program.starts()
+    splines = _splines(program, starts)
     limit, fit_limit = _tolerances(program, tolerance, settings, corners)
     exact = settings.exact_tolerance if not tolerance else min(tolerance, settings.exact_tolerance)
     halt = program.stop | (program.dwell > 0) | (program.control == PathControl.EXACT_STOP)
     halt[:-1] |= words.changes
-    feed = _feed_in_all_axes(program, starts, columns, names)
+    feed = _feed_in_all_axes(program, starts)
     if not words.joints.all():
         feed = np.where(words.joints, feed, program.feed)
 
     (curve, feed, move, allowed, runs), summary, outside, rough = native_build_path(
         program.name,
-        start,
+        program.start,
         program.kind,
-        target,
+        program.target,
         feed,
         program.line,
         limit,
         fit_limit,
         halt,
         program.arc_move,
-        arc_plane,
+        _arc_planes(program),
         np.ascontiguousarray(np.take_along_axis(program.arc_centre, _plane_letters(program), axis=1)),
         program.arc_angle,
         np.ascontiguousarray(program.spline_move, dtype=np.int64),
         np.ascontiguousarray(program.spline_pieces, dtype=np.int64),
         splines,
         np.ascontiguousarray(program.change_move, dtype=np.int64),
-        np.ascontiguousarray(changed),
+        program.change_start,
         words.joints,
         words.max_velocity,
         words.max_acceleration,
@@ -205,19 +201,19 @@ def _lines(program: Program, moves: NDArray[np.int64], most: int = 5) -> str:
 
 
 def _splines(
-    program: Program, columns: list[int], starts: NDArray[np.float64]
+    program: Program, starts: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.int64], NDArray[np.float64]] | None:
-    """The program's splines in the axes of the path, from exactly where moves start to their targets."""
+    """The program's splines, from exactly where moves start to their targets."""
     if program.splines is None or len(program.spline_move) == 0:
         return None
     curve, move, pieces = program.splines, program.spline_move, program.spline_pieces
-    control = curve.control_points[:, columns].copy()
+    control = curve.control_points.copy()
     # Every piece starts with the last control point of the one before, the first one where its move does.
     first, last = curve.offsets[:-1], curve.offsets[1:] - 1
     given = control[first].copy()
     control[first[1:]] = control[last[:-1]]
-    control[first[pieces[:-1]]] = starts[move][:, columns]
-    ends = program.target[move][:, columns]
+    control[first[pieces[:-1]]] = starts[move]
+    ends = program.target[move]
     end_missed = np.abs(control[last[pieces[1:] - 1]] - ends).max(axis=1, initial=0.0)
     control[last[pieces[1:] - 1]] = ends
     start_missed = np.abs(control[first] - given).max(axis=1, initial=0.0)
@@ -242,8 +238,9 @@ def _plane_letters(program: Program) -> NDArray[np.int64]:
     return np.stack([(normal + 1) % 3, (normal + 2) % 3], axis=1)
 
 
-def _arc_planes(program: Program, names: tuple[str, ...]) -> NDArray[np.int64]:
-    """(k, 2) the columns of the path for the plane of each arc."""
+def _arc_planes(program: Program) -> NDArray[np.int64]:
+    """(k, 2) the columns for the plane of each arc."""
+    names = program.axes
     columns = np.array([names.index(name) if name in names else -1 for name in LINEAR_AXES])
     return np.ascontiguousarray(columns[_plane_letters(program)])
 
@@ -267,29 +264,23 @@ def _tolerances(
     return limit, np.minimum(fit_limit, settings.fit_share * limit)
 
 
-def _feed_in_all_axes(
-    program: Program, starts: NDArray[np.float64], columns: list[int], names: tuple[str, ...]
-) -> NDArray[np.float64]:
+def _feed_in_all_axes(program: Program, starts: NDArray[np.float64]) -> NDArray[np.float64]:
     """Feeds as speeds in all axes together: the speed at which the axes that a feed counts along have it."""
     groups = [
-        [column for column, name in enumerate(names) if name in letters]
+        [column for column, name in enumerate(program.axes) if name in letters]
         for letters in (LINEAR_AXES, PARALLEL_AXES)
     ]
-    if len(groups[0]) == len(names):
+    if len(groups[0]) == len(program.axes):
         return program.feed
-    step = (program.target - starts)[:, columns]
-    length_sq = step**2
+    length_sq = (program.target - starts) ** 2
     # Along an arc the plane axes move by more than the chord says.
-    arc = program.arc_move
-    linear = [program.axes.index(letter) for letter in LINEAR_AXES]
-    arc_start = starts[arc][:, linear]
-    spoke = np.take_along_axis(arc_start - program.arc_centre, _plane_letters(program), axis=1)
-    radius = np.linalg.norm(spoke, axis=1)
-    planes = _arc_planes(program, names)
+    arc, planes = program.arc_move, _arc_planes(program)
+    centre = np.take_along_axis(program.arc_centre, _plane_letters(program), axis=1)
+    radius = np.linalg.norm(np.take_along_axis(starts[arc], planes, axis=1) - centre, axis=1)
     length_sq[arc, planes[:, 0]] = (radius * program.arc_angle) ** 2
     length_sq[arc, planes[:, 1]] = 0.0
     counted = np.zeros(len(program))
-    for group in (*groups, list(range(len(names)))):
+    for group in (*groups, list(range(len(program.axes)))):
         counted = np.where(counted > 0, counted, length_sq[:, group].sum(axis=1))
     with np.errstate(divide="ignore", invalid="ignore"):
         speed: NDArray[np.float64] = program.feed * np.sqrt(length_sq.sum(axis=1) / counted)

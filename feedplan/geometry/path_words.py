@@ -12,22 +12,20 @@ from feedplan.machine.machine import Machine
 from feedplan.machine.meaning import Meaning
 from feedplan.program.program import Program
 
-LINEAR_AXES = "XYZ"
-
 
 @dataclass(frozen=True)
 class PathWords:
-    """The axes of a path: `names`, and `columns`, where they stand in the program.
+    """The axes of a path.
 
-    `joints` (n,) tells of each move whether its words are joint positions, `changes` (n − 1,) whether the
-    words of the next move mean something else. `max_velocity`, `max_acceleration` (axes,) are for rounding
+    `names` are those of the machine that the program names, in the machine's order. `joints` (n,) tells of
+    each move whether its words are joint positions, `changes` (n − 1,) whether the words of the next move
+    mean something else. `max_velocity`, `max_acceleration` (axes,) are for rounding
     corners: those of the joint where all words are joints; otherwise the least of all linear joints, or of
     the rotary axis itself. `travel` (axes, 2) counts where words are joints. `may_jump`: all words are
     joints, and those that move allow a velocity jump at corners.
     """
 
     names: tuple[str, ...]
-    columns: list[int]
     joints: NDArray[np.bool_]
     changes: NDArray[np.bool_]
     max_velocity: NDArray[np.float64]
@@ -45,7 +43,7 @@ def path_words(program: Program, machine: Machine) -> PathWords:
     given = program.meaning
     meaning = np.full(len(program), default, dtype=np.uint8) if given is None else given
     known: dict[str, None] = {}
-    moving = _moving_letters(program)
+    moving = program.moving()
     used: NDArray[np.bool_] = np.logical_or.reduce(moving, axis=0)
     for value in [default] if given is None or len(given) == 0 else np.unique(given):
         letters = _letters(machine, Meaning(value))
@@ -75,7 +73,6 @@ def path_words(program: Program, machine: Machine) -> PathWords:
     )
     return PathWords(
         names=names,
-        columns=[program.axes.index(name) for name in names],
         joints=joints,
         changes=changes,
         max_velocity=_limits(machine, names, bool(joints.all()), "max_velocity"),
@@ -97,22 +94,6 @@ def _letters(machine: Machine, meaning: Meaning) -> tuple[str, ...]:
     from feedplan.machine.words import axis_words
 
     return axis_words(machine, ("I", "J", "K"), meaning).kinematics.tip_names
-
-
-def _moving_letters(program: Program) -> NDArray[np.bool_]:
-    """(n, axes) which moves move which letters."""
-    moves: NDArray[np.bool_] = program.target != program.starts()
-    for column, name in enumerate(LINEAR_AXES):
-        moves[program.arc_move[program.arc_normal != column], program.axes.index(name)] = True
-    if program.splines is not None and len(program.spline_move):
-        curve = program.splines
-        # The points of a move reach from the offset of its first piece to that of the next move's.
-        points = curve.offsets[program.spline_pieces[:-1]]
-        ends = int(curve.offsets[program.spline_pieces[-1]])
-        greatest = np.maximum.reduceat(curve.control_points[:ends], points)
-        least = np.minimum.reduceat(curve.control_points[:ends], points)
-        moves[program.spline_move] |= greatest > least
-    return moves
 
 
 def _limits(machine: Machine, names: tuple[str, ...], joints: bool, limit: str) -> NDArray[np.float64]:

@@ -29,7 +29,6 @@ from numpy.typing import NDArray
 
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError, MissingPackageError, ProgramError
-from feedplan.machine.machine import Machine
 from feedplan.program.moves import NO_FEED, TOUCHING, Moves
 from feedplan.program.program import Program
 
@@ -94,7 +93,7 @@ class _UnsupportedError(Exception):
     """Why an entity is left out."""
 
 
-def read_dxf(content: bytes, machine: Machine | None = None, name: str = "drawing.dxf") -> Program:
+def read_dxf(content: bytes, name: str = "drawing.dxf") -> Program:
     """The moves of a drawing; `line` is the number of the entity in its model space, from 1.
 
     Feeds are `NO_FEED`: the plan's `feed` sets one. Raises ProgramError in one sentence, MissingPackageError
@@ -109,10 +108,6 @@ def read_dxf(content: bytes, machine: Machine | None = None, name: str = "drawin
             f"{name}: drawings are read with the package ezdxf, which is not installed: "
             "pip install feedplan[dxf]"
         ) from None
-    if machine is not None:
-        missing = [letter for letter in "XYZ" if letter not in machine.program_letters]
-        if missing:
-            raise ProgramError(f"{name}: a drawing moves X, Y and Z, and the machine has no {missing[0]}")
     try:
         document: Any = recover.read(io.BytesIO(content))[0]
         units = int(document.header.get("$INSUNITS", 0))

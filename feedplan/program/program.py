@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.curves.composite import CompositeCurve
+from feedplan.errors import InputError
+
+LINEAR_AXES = "XYZ"
 
 
 class MoveKind(IntEnum):
@@ -32,7 +35,8 @@ class PathControl(IntEnum):
 class Program:
     """Moves of a part program in order, in machine coordinates.
 
-    `axes` are the letters that the program uses, always X, Y and Z, in the order XYZABCUVWIJK. `start`
+    `axes` are its letters: readers give X, Y, Z and what else the program uses, in the order XYZABCUVWIJK;
+    `along` takes some of them, in any order. `start`
     (axes,) is where the first move begins [mm, deg], after standing still for `start_dwell` [s]. Per move,
     `n` rows: `kind` (MoveKind), `target` (n, axes) [mm, deg], `feed` [mm/s] (infinite on rapids alone),
     `line` (1-based source line), `control` (PathControl), `blend_tolerance` and `fit_tolerance` (G64 P and Q
@@ -89,3 +93,51 @@ class Program:
         if len(self.change_move):
             starts[self.change_move] = self.change_start
         return starts
+
+    def moving(self) -> NDArray[np.bool_]:
+        """Which moves move which axes (n, axes); an arc moves both axes of its plane."""
+        moves: NDArray[np.bool_] = self.target != self.starts()
+        for column, name in enumerate(LINEAR_AXES):
+            if name in self.axes:
+                moves[self.arc_move[self.arc_normal != column], self.axes.index(name)] = True
+        if self.splines is not None and len(self.spline_move):
+            # The points of a move reach from the offset of its first piece to that of the next move's.
+            points = self.splines.offsets[self.spline_pieces[:-1]]
+            control = self.splines.control_points[: self.splines.offsets[self.spline_pieces[-1]]]
+            greatest, least = np.maximum.reduceat(control, points), np.minimum.reduceat(control, points)
+            moves[self.spline_move] |= greatest > least
+        return moves
+
+    def along(self, axes: tuple[str, ...]) -> Program:
+        """The same moves in some axes alone, in that order.
+
+        Raises InputError where the program has no such axis, or moves another one.
+        """
+        if axes == self.axes:
+            return self
+        missing = [name for name in axes if name not in self.axes]
+        if missing:
+            raise InputError(f"{self.name} has no axis {missing[0]}: it has {', '.join(self.axes)}")
+        others = np.array([name not in axes for name in self.axes])
+        moved = np.argwhere(self.moving() & others)
+        if len(moved):
+            move, column = moved[0]
+            raise InputError(
+                f"{self.name}, line {self.line[move]}: axis {self.axes[column]} moves, and only "
+                f"{', '.join(axes)} may: name {self.axes[column]} as well"
+            )
+        columns = [self.axes.index(name) for name in axes]
+        splines = self.splines
+        if splines is not None:
+            splines = replace(
+                splines, control_points=np.ascontiguousarray(splines.control_points[:, columns])
+            )
+        changed = self.change_start.reshape(-1, len(self.axes))[:, columns]
+        return replace(
+            self,
+            axes=axes,
+            start=np.ascontiguousarray(self.start[columns]),
+            target=np.ascontiguousarray(self.target[:, columns]),
+            splines=splines,
+            change_start=np.ascontiguousarray(changed),
+        )

@@ -17,7 +17,7 @@ Reader = Callable[[bytes, Machine | None, str], Program]
 # By the end of the file's name, with the most bytes that are read; everything else is G-code.
 READERS: dict[str, tuple[Reader, int]] = {
     ".json": (read_path_file, path_file.MAX_BYTES),
-    ".dxf": (read_dxf, path_file.MAX_BYTES),
+    ".dxf": (lambda content, machine, name: read_dxf(content, name), path_file.MAX_BYTES),
 }
 
 

@@ -459,8 +459,11 @@ def test_parts_that_do_not_belong_together_are_refused(part: Any) -> None:
         audit(part.problem, part.profile, plane())
     with pytest.raises(InputError, match="differ in length"):
         part.with_profile(p0=part.profile.p0[:-1]).audit()
-    with pytest.raises(InputError, match="has the axes"):
+    with pytest.raises(InputError, match=r"has no axis Z: it has X, Y, A"):
         part.with_program(axes=("X", "Y", "A")).audit()
+    flat = problem_of(LINE)
+    with pytest.raises(InputError, match=r"axis Z moves, and only X, Y may"):
+        audit(flat, None, plane(), part.program)
 
 
 def _columns(profile: SpeedProfile) -> list[NDArray[Any]]:

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 import feedplan
-from feedplan.errors import MissingPackageError, ProgramError
+from feedplan.errors import MachineError, MissingPackageError, ProgramError
+from feedplan.geometry.build import build_path
 from feedplan.machine.machine import Machine
 from feedplan.program.dxf import read_dxf
 from feedplan.program.moves import NO_FEED
@@ -33,7 +34,7 @@ def drawing(draw: Callable[[Any], object], units: int = MILLIMETRES) -> bytes:
 
 
 def read(draw: Callable[[Any], object], units: int = MILLIMETRES) -> Program:
-    return read_dxf(drawing(draw, units), None, "part.dxf")
+    return read_dxf(drawing(draw, units), "part.dxf")
 
 
 def test_lines_that_touch_are_one_path_in_either_direction() -> None:
@@ -193,7 +194,7 @@ def test_a_drawing_can_be_planned_at_a_feed(tmp_path: Path) -> None:
 def test_what_is_no_drawing_is_one_sentence() -> None:
     for content in (b"", b"G21 G0 X1\n", b"\x00\x01\x02", b"0\nSECTION\n2\nENTITIES\n0\nLINE\n10\nx\n"):
         with pytest.raises(ProgramError) as caught:
-            read_dxf(content, None, "part.dxf")
+            read_dxf(content, "part.dxf")
         assert str(caught.value).startswith("part.dxf ")
         assert "\n" not in str(caught.value)
     with pytest.raises(ProgramError, match=r"part\.dxf has no line, arc or curve in its model space"):
@@ -202,10 +203,13 @@ def test_what_is_no_drawing_is_one_sentence() -> None:
         read(lambda space: space.add_line((0, 0), (2e6, 0)))
 
 
-def test_a_machine_without_y_is_refused() -> None:
+def test_a_drawing_needs_the_axes_that_it_moves() -> None:
     lathe = Machine("lathe", tuple(axis for axis in Machine.load("mill").axes if axis.name != "Y"))
-    with pytest.raises(ProgramError, match="a drawing moves X, Y and Z, and the machine has no Y"):
-        read_dxf(drawing(lambda space: space.add_line((0, 0), (1, 0))), lathe, "part.dxf")
+    along = read(lambda space: space.add_line((0, 0), (1, 0)))
+    assert build_path(along, lathe).axes == ("X", "Z")
+    across = read(lambda space: space.add_line((0, 0), (1, 2)))
+    with pytest.raises(MachineError, match=r"part\.dxf, line 1: axis Y moves and machine lathe has none"):
+        build_path(across, lathe)
 
 
 def test_without_the_package_the_command_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
