@@ -104,6 +104,20 @@ def look_ahead(
     speed: NDArray[np.float64], gain: NDArray[np.float64], hold: NDArray[np.float64]
 ) -> NDArray[np.float64]: ...
 
+# t, position, velocity, acceleration, jerk, line, piece, u, rounds of the interpolator, length error.
+_Chunk = tuple[
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.int32],
+    NDArray[np.uint32],
+    NDArray[np.float64],
+    int,
+    float,
+]
+
 @final
 class Sampler:
     def __new__(
@@ -136,20 +150,9 @@ class Sampler:
     def count(self) -> int: ...
     @property
     def duration(self) -> float: ...
-    def chunk(
-        self, start: int, stop: int
-    ) -> tuple[
-        NDArray[np.float64],
-        NDArray[np.float64],
-        NDArray[np.float64],
-        NDArray[np.float64],
-        NDArray[np.float64],
-        NDArray[np.int32],
-        NDArray[np.uint32],
-        NDArray[np.float64],
-        int,
-        float,
-    ]: ...
+    def chunk(self, start: int, stop: int) -> _Chunk: ...
+    def at(self, times: NDArray[np.float64]) -> _Chunk: ...
+    def along(self, piece: NDArray[np.uint32], u: NDArray[np.float64]) -> _Chunk: ...
 
 def csv_rows(values: NDArray[np.float64], last: NDArray[np.int32]) -> bytes: ...
 def read_gcode(

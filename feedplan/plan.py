@@ -8,10 +8,12 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from feedplan.audit import Audit, audit
 from feedplan.bound import lower_bound
@@ -25,6 +27,7 @@ from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 from feedplan.program.read import read_program
 from feedplan.setpoints import Setpoints, setpoints
+from feedplan.trajectory import State, Trajectory
 
 Progress = Callable[[str, float], None]
 
@@ -69,6 +72,17 @@ class Plan:
         return setpoints(
             self.problem, self.profile, period or self.machine.period, interpolator or self.interpolator
         )
+
+    @cached_property
+    def trajectory(self) -> Trajectory:
+        """The plan as functions of time and length."""
+        return Trajectory(self.problem, self.profile)
+
+    def at(self, t: ArrayLike) -> State:
+        """Position, velocity, acceleration, jerk and source line at one time or at times (n,) [s]; exact.
+
+        See `Trajectory.at`."""
+        return self.trajectory.at(t)
 
     def audit(self, progress: Progress | None = None) -> Audit:
         """The independent check of profile, geometry and setpoints; computed once.

@@ -68,29 +68,7 @@ class Setpoints:
             raise InputError(
                 f"there is no interpolator '{interpolator}': use one of {', '.join(INTERPOLATORS)}"
             )
-        path, tip = problem.path, problem.tip_speed
-        self._sampler = Sampler(
-            *problem.curve.columns(),
-            None if tip is None else (_array(tip.coefficients, np.float64), _array(tip.offsets, np.int64)),
-            _array(path.line, np.int32),
-            _array(path.runs, np.int64),
-            float(path.start_dwell),
-            _array(path.dwell, np.float64),
-            _array(profile.piece, np.uint32),
-            _array(profile.kind, np.uint8),
-            _array(profile.axis, np.uint8),
-            _array(profile.value, np.float64),
-            _array(profile.u0, np.float64),
-            _array(profile.u1, np.float64),
-            _array(profile.p0, np.float64),
-            _array(profile.p1, np.float64),
-            _array(profile.duration, np.float64),
-            _array(profile.a0, np.float64),
-            _array(profile.a1, np.float64),
-            _array(profile.runs, np.int64),
-            float(period),
-            interpolator == "newton",
-        )
+        self._sampler = sampler(problem, profile, period, interpolator)
         self.period = float(period)
         self.axes = problem.axes
         self.interpolator = interpolator
@@ -150,6 +128,33 @@ def setpoints(
     Raises InputError for a period or an interpolator that cannot be used, or a profile of another path.
     """
     return Setpoints(problem, profile, period, interpolator)
+
+
+def sampler(problem: Problem, profile: SpeedProfile, period: float, interpolator: str = "sarfraz") -> Sampler:
+    """The native reader of a profile on its path. Raises InputError as `setpoints`."""
+    path, tip = problem.path, problem.tip_speed
+    return Sampler(
+        *problem.curve.columns(),
+        None if tip is None else (_array(tip.coefficients, np.float64), _array(tip.offsets, np.int64)),
+        _array(path.line, np.int32),
+        _array(path.runs, np.int64),
+        float(path.start_dwell),
+        _array(path.dwell, np.float64),
+        _array(profile.piece, np.uint32),
+        _array(profile.kind, np.uint8),
+        _array(profile.axis, np.uint8),
+        _array(profile.value, np.float64),
+        _array(profile.u0, np.float64),
+        _array(profile.u1, np.float64),
+        _array(profile.p0, np.float64),
+        _array(profile.p1, np.float64),
+        _array(profile.duration, np.float64),
+        _array(profile.a0, np.float64),
+        _array(profile.a1, np.float64),
+        _array(profile.runs, np.int64),
+        float(period),
+        interpolator == "newton",
+    )
 
 
 def _array(values: ArrayLike, dtype: type[Scalar]) -> NDArray[Scalar]:

@@ -58,6 +58,8 @@ struct Run {
     /// Setpoint on which the run starts.
     first: usize,
     periods: usize,
+    /// Seconds from the start of the plan, pauses counted, to the start of the run.
+    begin: f64,
     /// Time in motion in seconds.
     time: f64,
     last_piece: usize,
@@ -129,6 +131,7 @@ impl<const M: usize> Sampler<M> {
         let mut starts = Vec::with_capacity(arcs.len());
         let (mut runs, mut ends_moving) = (Vec::with_capacity(path.dwell.len()), false);
         let mut first = periods_of(path.start_dwell, period);
+        let mut begin = path.start_dwell;
         for r in 0..path.dwell.len() {
             let (arc_range, pieces) = (arc_runs[r]..arc_runs[r + 1], path.runs[r]..path.runs[r + 1]);
             let mut time = 0.0;
@@ -169,10 +172,12 @@ impl<const M: usize> Sampler<M> {
                 arcs: arc_range,
                 first: first as usize,
                 periods: periods as usize,
+                begin,
                 time,
                 last_piece: pieces.end - 1,
             });
             first += periods;
+            begin += time + path.dwell[r];
         }
         let count = first as usize + 1;
         let sampler = Self { path, arcs, starts, runs, period, interpolator, count, ends_moving };
@@ -226,6 +231,61 @@ impl<const M: usize> Sampler<M> {
         chunk
     }
 
+    /// The states at times of the plan's own clock, in seconds: runs and pauses follow each other without waiting
+    /// for whole periods. At the moment of a stop the tool rests; a time beyond an end gives that end.
+    pub fn at(&self, times: &[f64]) -> Chunk<M> {
+        let mut chunk = Chunk::with_size(times.len());
+        let cuts: Vec<usize> = (0..times.len()).step_by(BLOCK).skip(1).collect();
+        chunk.slices(0).split(&cuts).into_par_iter().for_each(|mut part| {
+            let mut cursor = Cursor::new(self, false);
+            for i in 0..part.t.len() {
+                let t = times[part.start + i];
+                match self.runs.partition_point(|run| run.begin < t).checked_sub(1) {
+                    None => self.set_start(&mut part, i),
+                    Some(r) if t - self.runs[r].begin < self.runs[r].time => {
+                        let arc = cursor.seek(&self.runs[r], t - self.runs[r].begin);
+                        let state =
+                            cursor.motion().at_time(t - self.runs[r].begin - self.starts[arc], self.period);
+                        self.set(&mut part, i, arc, cursor.motion(), &state);
+                    }
+                    Some(r) => self.set_end(
+                        &self.runs[r],
+                        &mut part,
+                        i,
+                        self.ends_moving && r + 1 == self.runs.len(),
+                    ),
+                }
+                part.t[i] = t;
+            }
+        });
+        chunk
+    }
+
+    /// The states at places of the path, with their times on the plan's own clock. In the last place of a piece
+    /// the arc that ends there counts.
+    pub fn along(&self, pieces: &[u32], u: &[f64]) -> Chunk<M> {
+        let mut chunk = Chunk::with_size(pieces.len());
+        let cuts: Vec<usize> = (0..pieces.len()).step_by(BLOCK).skip(1).collect();
+        chunk.slices(0).split(&cuts).into_par_iter().for_each(|mut part| {
+            for i in 0..part.t.len() {
+                let (piece, u) = (pieces[part.start + i], u[part.start + i]);
+                let after = self.arcs.partition_point(|arc| (arc.piece, arc.u1) < (piece, u));
+                let Some(found) = self.arcs.get(after) else {
+                    let run = &self.runs[self.runs.len() - 1];
+                    self.set_end(run, &mut part, i, self.ends_moving);
+                    part.t[i] = run.begin + run.time;
+                    continue;
+                };
+                let run = &self.runs[self.runs.partition_point(|run| run.arcs.end <= after)];
+                let motion = self.path.motion(found, false);
+                let state = motion.at(u.clamp(found.u0, found.u1));
+                self.set(&mut part, i, after, &motion, &state);
+                part.t[i] = run.begin + self.starts[after] + motion.time(&state);
+            }
+        });
+        chunk
+    }
+
     /// Where a range is cut into tasks: anywhere, or between runs where the steps depend on each other.
     fn cuts(&self, range: &Range<usize>) -> Vec<usize> {
         match self.interpolator {
@@ -257,14 +317,17 @@ impl<const M: usize> Sampler<M> {
             let index = part.start + i;
             if index <= self.runs[0].first {
                 self.set_start(&mut part, i);
+                part.t[i] = self.time(index);
                 i += 1;
                 continue;
             }
             let run = self.run_of(index);
             let stop = part.t.len().min(run.first + run.periods + 1 - part.start);
             for i in i..stop {
-                let Some(time) = self.run_time(run, part.start + i - run.first) else {
-                    self.set_end(run, &mut part, i);
+                let index = part.start + i;
+                part.t[i] = self.time(index);
+                let Some(time) = self.run_time(run, index - run.first) else {
+                    self.set_end(run, &mut part, i, self.ends_moving && index + 1 == self.count);
                     continue;
                 };
                 let arc = cursor.seek(run, time);
@@ -285,6 +348,7 @@ impl<const M: usize> Sampler<M> {
         let begin = (self.runs[0].first + 1).saturating_sub(part.start).min(part.t.len());
         for i in 0..begin {
             self.set_start(&mut part, i);
+            part.t[i] = self.time(part.start + i);
         }
         if begin == part.t.len() {
             return (effort, None);
@@ -299,7 +363,8 @@ impl<const M: usize> Sampler<M> {
             let out = (at.index >= part.start).then(|| at.index - part.start);
             let Some(time) = self.run_time(run, at.index - run.first) else {
                 if let Some(i) = out {
-                    self.set_end(run, &mut part, i);
+                    self.set_end(run, &mut part, i, self.ends_moving && at.index + 1 == self.count);
+                    part.t[i] = self.time(at.index);
                 }
                 continue;
             };
@@ -313,6 +378,7 @@ impl<const M: usize> Sampler<M> {
             effort.raise(rounds, error);
             if let Some(i) = out {
                 self.set(&mut part, i, arc, motion, &motion.at(at.u));
+                part.t[i] = self.time(at.index);
             }
         }
         (effort, Some(at))
@@ -357,7 +423,6 @@ impl<const M: usize> Sampler<M> {
     fn set(&self, part: &mut Slices<M>, i: usize, arc: usize, motion: &Motion<M>, state: &State) {
         let (position, Rates { velocity, acceleration, jerk }) = motion.sample(state);
         let piece = self.arcs[arc].piece;
-        part.t[i] = self.time(part.start + i);
         part.position[i] = position;
         part.velocity[i] = velocity;
         part.acceleration[i] = acceleration;
@@ -382,21 +447,19 @@ impl<const M: usize> Sampler<M> {
                 self.set(part, i, arc, &motion, &motion.at(self.arcs[arc].u0));
             }
         }
-        part.t[i] = self.time(part.start + i);
         part.position[i] = self.path.curve.control[0];
         part.line[i] = self.path.lines[0];
         part.piece[i] = 0;
         part.u[i] = 0.0;
     }
 
-    fn set_end(&self, run: &Run, part: &mut Slices<M>, i: usize) {
+    /// The end of a run; `moving` where the path ends there at a speed.
+    fn set_end(&self, run: &Run, part: &mut Slices<M>, i: usize, moving: bool) {
         let curve = &self.path.curve;
-        let last = self.ends_moving && part.start + i == self.count - 1;
-        if let (true, Some(arc)) = (last, self.arcs[run.arcs.clone()].last()) {
+        if let (true, Some(arc)) = (moving, self.arcs[run.arcs.clone()].last()) {
             let motion = self.path.motion(arc, false);
             self.set(part, i, run.arcs.end - 1, &motion, &motion.at(arc.u1));
         }
-        part.t[i] = self.time(part.start + i);
         part.position[i] = curve.control[curve.offsets[run.last_piece + 1] - 1];
         part.line[i] = self.path.lines[run.last_piece];
         part.piece[i] = run.last_piece as u32;

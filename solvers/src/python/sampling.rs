@@ -12,7 +12,7 @@ use super::spline::curve;
 use super::with_padded_axes;
 use crate::arc_kind::ArcKind;
 use crate::motion::ProfileArc;
-use crate::sampling::{Interpolator, PathData, Resume, Sampler};
+use crate::sampling::{Chunk, Interpolator, PathData, Resume, Sampler};
 
 pyo3::import_exception!(feedplan.errors, InputError);
 
@@ -41,6 +41,8 @@ trait Stream: Send + Sync {
         resume: &Mutex<Option<Resume>>,
         axes: usize,
     ) -> ChunkArrays<'py>;
+    fn at<'py>(&self, py: Python<'py>, times: &[f64], axes: usize) -> ChunkArrays<'py>;
+    fn along<'py>(&self, py: Python<'py>, piece: &[u32], u: &[f64], axes: usize) -> ChunkArrays<'py>;
 }
 
 impl<const M: usize> Stream for Sampler<M> {
@@ -65,19 +67,33 @@ impl<const M: usize> Stream for Sampler<M> {
             *resume.lock().unwrap_or_else(PoisonError::into_inner) = state;
             chunk
         });
-        (
-            PyArray1::from_vec(py, chunk.t),
-            to_array2(py, chunk.position, axes),
-            to_array2(py, chunk.velocity, axes),
-            to_array2(py, chunk.acceleration, axes),
-            to_array2(py, chunk.jerk, axes),
-            PyArray1::from_vec(py, chunk.line),
-            PyArray1::from_vec(py, chunk.piece),
-            PyArray1::from_vec(py, chunk.u),
-            chunk.effort.iterations,
-            chunk.effort.length_error,
-        )
+        arrays(py, chunk, axes)
     }
+
+    fn at<'py>(&self, py: Python<'py>, times: &[f64], axes: usize) -> ChunkArrays<'py> {
+        let chunk = py.detach(|| self.at(times));
+        arrays(py, chunk, axes)
+    }
+
+    fn along<'py>(&self, py: Python<'py>, piece: &[u32], u: &[f64], axes: usize) -> ChunkArrays<'py> {
+        let chunk = py.detach(|| self.along(piece, u));
+        arrays(py, chunk, axes)
+    }
+}
+
+fn arrays<const M: usize>(py: Python<'_>, chunk: Chunk<M>, axes: usize) -> ChunkArrays<'_> {
+    (
+        PyArray1::from_vec(py, chunk.t),
+        to_array2(py, chunk.position, axes),
+        to_array2(py, chunk.velocity, axes),
+        to_array2(py, chunk.acceleration, axes),
+        to_array2(py, chunk.jerk, axes),
+        PyArray1::from_vec(py, chunk.line),
+        PyArray1::from_vec(py, chunk.piece),
+        PyArray1::from_vec(py, chunk.u),
+        chunk.effort.iterations,
+        chunk.effort.length_error,
+    )
 }
 
 /// A profile on its path, ready to be read at any setpoint.
@@ -197,6 +213,25 @@ impl PySampler {
             )));
         }
         Ok(self.stream.chunk(py, start..stop, &self.resume, self.axes))
+    }
+
+    /// The states at times of the plan's own clock.
+    fn at<'py>(&self, py: Python<'py>, times: PyReadonlyArray1<'_, f64>) -> PyResult<ChunkArrays<'py>> {
+        Ok(self.stream.at(py, slice(&times)?, self.axes))
+    }
+
+    /// The states at places of the path.
+    fn along<'py>(
+        &self,
+        py: Python<'py>,
+        piece: PyReadonlyArray1<'_, u32>,
+        u: PyReadonlyArray1<'_, f64>,
+    ) -> PyResult<ChunkArrays<'py>> {
+        let (piece, u) = (slice(&piece)?, slice(&u)?);
+        if piece.len() != u.len() {
+            return Err(PyValueError::new_err(format!("{} pieces and {} parameters", piece.len(), u.len())));
+        }
+        Ok(self.stream.along(py, piece, u, self.axes))
     }
 }
 

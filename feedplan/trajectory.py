@@ -1,0 +1,107 @@
+"""A plan as functions of time and of length: exact, from the profile's own phases, not from setpoints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from feedplan.constraints.problem import Problem, speed_square
+from feedplan.curves.length import CurveLength
+from feedplan.errors import InputError
+from feedplan.profile import SpeedProfile
+from feedplan.setpoints import sampler
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """The motion at times `t` [s]: `position` [mm, deg], `velocity`, `acceleration` and `jerk` of the axes,
+    and the source `line`. For one time each is one row (axes,) and `line` a number, for (n,) times (n, axes)
+    and (n,)."""
+
+    t: Array
+    position: Array
+    velocity: Array
+    acceleration: Array
+    jerk: Array
+    line: NDArray[np.int32]
+
+
+class Trajectory:
+    """A profile on its path, by the plan's own clock: pauses are in it, waits for whole periods are not.
+
+    Lengths `s` are those of the tool's way from the start [mm].
+    """
+
+    def __init__(self, problem: Problem, profile: SpeedProfile) -> None:
+        self._problem = problem
+        self._sampler = sampler(problem, profile, problem.period)
+        self.axes = problem.axes
+        self.duration = profile.time + problem.path.pauses
+
+    @cached_property
+    def _lengths(self) -> CurveLength:
+        return CurveLength(self._problem.tip_curve or self._problem.path.curve)
+
+    @property
+    def length(self) -> float:
+        """Length of the tool's way [mm]."""
+        return self._lengths.total
+
+    def at(self, t: ArrayLike) -> State:
+        """The state at one time or at times (n,) [s].
+
+        At the moment of a stop the tool rests; where the acceleration jumps, the values after the jump hold.
+        Raises InputError for a time that is not within the plan.
+        """
+        times = self._within(t, "time", self.duration, "s")
+        _, position, velocity, acceleration, jerk, line, piece, *_ = self._sampler.at(np.atleast_1d(times))
+        if self._problem.joint_origin is not None:
+            position += self._problem.joint_origin[piece]
+        row = 0 if times.ndim == 0 else slice(None)
+        return State(times, position[row], velocity[row], acceleration[row], jerk[row], line[row])
+
+    def distance(self, t: ArrayLike) -> Array:
+        """s(t): the length of the way [mm] at one time or at times (n,) [s]. Raises as `at`."""
+        times = self._within(t, "time", self.duration, "s")
+        piece, u = self._sampler.at(np.atleast_1d(times))[6:8]
+        return self._lengths.length(piece, u).reshape(times.shape)
+
+    def time(self, s: ArrayLike) -> Array:
+        """t(s): when the tool is at one length or at lengths (n,) [mm], before the pause at a stop [s].
+
+        Raises InputError for a length that is not on the path."""
+        lengths = self._within(s, "length", self.length, "mm")
+        places = self._lengths.locate(np.atleast_1d(lengths))
+        return self._sampler.along(places.piece, places.u)[0].reshape(lengths.shape)
+
+    def speed(self, s: ArrayLike) -> Array:
+        """v(s): the speed of the tool [mm/s] at one length or at lengths (n,) [mm]. Raises as `time`."""
+        lengths = self._within(s, "length", self.length, "mm")
+        places = self._lengths.locate(np.atleast_1d(lengths))
+        velocity = self._sampler.along(places.piece, places.u)[2]
+        speed = np.linalg.norm(velocity, axis=1)
+        if self._problem.joints is not None:
+            # The joints' speed by that of the parameter, and so the tool's.
+            joints = self._problem.curve.evaluate(places.piece, places.u, 1)[1]
+            ratio = speed_square(self._problem, places.piece, places.u) / (joints**2).sum(axis=1)
+            speed = speed * np.sqrt(ratio)
+        return np.asarray(speed.reshape(lengths.shape))
+
+    def _within(self, given: ArrayLike, name: str, end: float, unit: str) -> Array:
+        try:
+            values = np.asarray(given, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError(f"the {name} is {given!r:.60}: give a number or a list of numbers") from None
+        if values.ndim > 1:
+            raise InputError(f"the {name}s have {values.ndim} dimensions: give a number or a list of numbers")
+        # The end of the plan, summed up in another order, is the end.
+        outside = ~((values >= 0.0) & (values <= end * (1.0 + 1e-12)))
+        if outside.any():
+            worst = float(values[outside].flat[0])
+            raise InputError(f"the {name} is {worst:g} {unit}: give one from 0 to {end:g} {unit}")
+        return values
