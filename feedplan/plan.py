@@ -32,7 +32,7 @@ from feedplan.trajectory import State, Trajectory
 Progress = Callable[[str, float], None]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Plan:
     """A planned program.
 
@@ -51,6 +51,33 @@ class Plan:
     interpolator: str = "sarfraz"
     warnings: tuple[str, ...] = field(default=())
     _verdict: list[Audit] = field(default_factory=list, init=False, repr=False, compare=False)
+
+    def __repr__(self) -> str:
+        name = self.program.name if self.program else "a path"
+        return (
+            f"<Plan of {name} on {self.machine.name} by {self.method}: {self.time:.6g} s, "
+            f"gap {100 * self.gap:.3g} %, {len(self.path)} pieces>"
+        )
+
+    def _repr_html_(self) -> str:
+        from feedplan.report.card import card
+
+        return card(self.figures(), self.trajectory)
+
+    def figures(self) -> dict[str, str]:
+        """The key figures by name, in words: what a notebook shows. The audit is told if it has been made."""
+        verdict = self._verdict[0] if self._verdict else None
+        judged = "not made yet" if verdict is None else "every limit holds" if verdict.ok else "failed"
+        return {
+            "program": self.program.name if self.program else "a path",
+            "machine": self.machine.name,
+            "method": self.method,
+            "time": f"{self.time:.6g} s",
+            "no plan of this path is faster than": f"{self.lower_bound:.6g} s (gap {100 * self.gap:.3g} %)",
+            "pieces": f"{len(self.path)} in {len(self.path.runs) - 1} runs",
+            "audit": judged,
+            **({"warnings": "; ".join(self.warnings)} if self.warnings else {}),
+        }
 
     @property
     def path(self) -> Path:

@@ -25,7 +25,7 @@ class ArcKind(IntEnum):
     SPEED_CUBIC = 7  # v² is a cubic polynomial of the length from end to end, slopes 2a; value is 0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SpeedProfile:
     """Arcs in the order of the path.
 
@@ -70,6 +70,9 @@ class SpeedProfile:
 
     def __len__(self) -> int:
         return len(self.piece)
+
+    def __repr__(self) -> str:
+        return f"<SpeedProfile of {len(self)} arcs: {self.time:.6g} s>"
 
     @property
     def time(self) -> float:

@@ -21,7 +21,7 @@ Scalar = TypeVar("Scalar", bound=np.generic)
 MAX_CHUNK = 20_000_000
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SetpointChunk:
     """Consecutive setpoints: `t` (n,) [s]; `position` [mm], `velocity` [mm/s], `acceleration` [mm/s²] and
     `jerk` [mm/s³], each (n, axes); `line` (n,) source line; `axes` names.
@@ -42,6 +42,10 @@ class SetpointChunk:
     def __len__(self) -> int:
         return len(self.t)
 
+    def __repr__(self) -> str:
+        span = f", {self.t[0]:.6g} to {self.t[-1]:.6g} s" if len(self) else ""
+        return f"<SetpointChunk of {len(self)} setpoints of {' '.join(self.axes)}{span}>"
+
 
 @dataclass(frozen=True)
 class SamplingStats:
@@ -53,7 +57,7 @@ class SamplingStats:
 
 
 class Setpoints:
-    """The stream of setpoints, computed as it is read.
+    """The stream of setpoints, computed as it is read; iterating gives chunks.
 
     Setpoint 0 is the start of the path. A pause D before the first run takes ceil(D/period) periods there. A
     run with time T and pause D takes ceil((T + D)/period) periods: each stop is hit exactly and the stream
@@ -69,6 +73,7 @@ class Setpoints:
                 f"there is no interpolator '{interpolator}': use one of {', '.join(INTERPOLATORS)}"
             )
         self._sampler = sampler(problem, profile, period, interpolator)
+        self._source = (problem, profile, period, interpolator)
         self.period = float(period)
         self.axes = problem.axes
         self.interpolator = interpolator
@@ -87,6 +92,15 @@ class Setpoints:
 
     def __len__(self) -> int:
         return self.count
+
+    def __iter__(self) -> Iterator[SetpointChunk]:
+        return self.chunks()
+
+    def __repr__(self) -> str:
+        return f"<Setpoints: {self.count} of {' '.join(self.axes)}, one every {self.period:g} s>"
+
+    def __reduce__(self) -> tuple[type[Setpoints], tuple[Problem, SpeedProfile, float, str]]:
+        return Setpoints, self._source
 
     def chunks(self, size: int = 100_000) -> Iterator[SetpointChunk]:
         """The stream in chunks of `size` setpoints, the last one shorter: memory does not grow with it.

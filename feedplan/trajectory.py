@@ -38,10 +38,16 @@ class Trajectory:
     """
 
     def __init__(self, problem: Problem, profile: SpeedProfile) -> None:
-        self._problem = problem
+        self._problem, self._profile = problem, profile
         self._sampler = sampler(problem, profile, problem.period)
         self.axes = problem.axes
         self.duration = profile.time + problem.path.pauses
+
+    def __repr__(self) -> str:
+        return f"<Trajectory of {' '.join(self.axes)}: {self.duration:.6g} s>"
+
+    def __reduce__(self) -> tuple[type[Trajectory], tuple[Problem, SpeedProfile]]:
+        return Trajectory, (self._problem, self._profile)
 
     @cached_property
     def _lengths(self) -> CurveLength:

@@ -123,6 +123,11 @@ class Audit:
         """Whether everything was measured and every limit holds."""
         return bool(self.checks) and not self.broken
 
+    def __repr__(self) -> str:
+        failures = self.failures
+        said = "every limit holds" if self.ok else f"failed, {len(failures)} in all: {failures[0]}"
+        return f"<Audit of {self.checked_samples} samples: {said}>"
+
     def check(self, name: str, axis: str | None = None) -> LimitCheck:
         """One check by its name and axis. Raises KeyError where it was not made."""
         for check in self.checks:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 NO_FEED = 1e9
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TipSpeed:
     """|C'(u)|² of the tool as a polynomial on each piece: Bernstein `coefficients` (total,), those of piece i
     from `offsets[i]` to `offsets[i + 1]`."""
@@ -33,7 +33,7 @@ class TipSpeed:
     offsets: NDArray[np.int64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Cut:
     """What the pieces of a path were cut from: fractions `part` (n, 2) of `piece` (n,) of `curve`.
 
@@ -50,7 +50,7 @@ class Cut:
         return self.curve.elevated(int(self.curve.degree.max()))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Problem:
     """Minimise the time along `path` under these limits.
 
@@ -90,6 +90,9 @@ class Problem:
         for name in ("max_velocity", "max_acceleration", "max_jerk", "feed", "junction_speed"):
             column = np.ascontiguousarray(getattr(self, name), dtype=np.float64)
             object.__setattr__(self, name, column)
+
+    def __repr__(self) -> str:
+        return f"<Problem of the joints {' '.join(self.axes)} on {self.path!r}>"
 
     @property
     def axes(self) -> tuple[str, ...]:

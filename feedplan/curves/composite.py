@@ -44,7 +44,7 @@ class JointKind(IntEnum):
     C3 = 5
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Joints:
     """The joints (j,) of a curve: `piece` before each, `kind` (a `JointKind`), `gap` between the ends [mm],
     `turn` of the direction of motion [rad], `speed` (j, 2) = |C'| before and after, 0 at a cusp."""
@@ -59,7 +59,7 @@ class Joints:
         return len(self.piece)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Cusps:
     """Places (c,) where the derivative vanishes: `piece` and local `u`."""
 
@@ -70,7 +70,7 @@ class Cusps:
         return len(self.piece)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CompositeCurve:
     """Bézier pieces C_i(u), u in [0, width_i], each of its own degree 1 to 9, polynomial or rational.
 
@@ -221,6 +221,10 @@ class CompositeCurve:
 
     def __len__(self) -> int:
         return len(self.width)
+
+    def __repr__(self) -> str:
+        kind = "rational" if self.weights is not None else "polynomial"
+        return f"<CompositeCurve of {len(self)} {kind} pieces in {self.axes} axes>"
 
     def __getitem__(self, pieces: slice) -> CompositeCurve:
         """Consecutive pieces."""

@@ -15,7 +15,7 @@ from feedplan.errors import InputError
 INTERPOLATORS = ("sarfraz", "newton")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Places:
     """Places on a curve (n,): `piece` and local `u`; `iterations` that the search took (0 at an end) and the
     remaining `miss` of the length [mm]."""

@@ -43,7 +43,7 @@ class FitSummary:
         return self.points / self.polynomials if self.polynomials else 1.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Path:
     """Pieces C_i(u), u in [0, width_i], joined end to end.
 
@@ -179,6 +179,9 @@ class Path:
 
     def __len__(self) -> int:
         return len(self.curve)
+
+    def __repr__(self) -> str:
+        return f"<Path of {' '.join(self.axes)}: {len(self)} pieces in {len(self.runs) - 1} runs>"
 
     @property
     def width(self) -> NDArray[np.float64]:

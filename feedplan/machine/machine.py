@@ -105,6 +105,9 @@ class Machine:
         offsets = tuple((key, numbers(row, len(letters), str(key), remedy)) for key, row in pairs)
         object.__setattr__(self, "offsets", offsets)
 
+    def __repr__(self) -> str:
+        return f"<Machine {self.name}: {self.kinematics}, axes {' '.join(self.axis_names)}>"
+
     @property
     def axis_names(self) -> tuple[str, ...]:
         """The axis letters in order."""

@@ -31,7 +31,7 @@ class PathControl(IntEnum):
     TOLERANCE = 2
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Program:
     """Moves of a part program in order, in machine coordinates.
 
@@ -86,6 +86,9 @@ class Program:
 
     def __len__(self) -> int:
         return len(self.kind)
+
+    def __repr__(self) -> str:
+        return f"<Program {self.name}: {len(self)} moves of {' '.join(self.axes)}>"
 
     def starts(self) -> NDArray[np.float64]:
         """Where each move starts, in its own words (n, axes) [mm, deg]."""
