@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -18,11 +17,11 @@ from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
 from feedplan.profile import ArcKind, SpeedProfile
 from feedplan.setpoints import SetpointChunk
+from tests.campaign import EXAMPLES, examples
 
 # No test depends on how fast the machine is, nor on chance; a campaign takes more cases, and new ones.
-EXAMPLES = os.environ.get("FEEDPLAN_EXAMPLES")
 settings.register_profile("same", deadline=None, derandomize=True)
-settings.register_profile("campaign", deadline=None, max_examples=int(EXAMPLES or 100))
+settings.register_profile("campaign", deadline=None, database=None, max_examples=examples(100))
 settings.load_profile("campaign" if EXAMPLES else "same")
 
 SIDE, FEED, ACCELERATION = 20.0, 50.0, 500.0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +17,7 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Path
 from feedplan.planners import planner
 from feedplan.profile import ArcKind, SpeedProfile
+from tests.campaign import seeds
 from tests.constraints.test_joints import NOT_PLAIN
 from tests.constraints.test_joints import random_problem as random_joints
 from tests.planners.test_curves import Planned, problem_of, random_curve
@@ -94,7 +94,7 @@ def test_the_bound_is_far_above_zero_without_any_profile() -> None:
 @pytest.mark.parametrize("weights", [False, True])
 def test_random_curves_are_certified(weights: bool) -> None:
     gaps = []
-    for seed in range(int(os.environ.get("FEEDPLAN_SEEDS", "200"))):
+    for seed in range(seeds(200)):
         rng = np.random.default_rng(seed + 10_000)
         curve = random_curve(seed, weights)
         limits = np.exp(rng.uniform(0.0, 3.0, curve.axes)), np.exp(rng.uniform(0.0, 5.0, curve.axes))
@@ -108,7 +108,7 @@ def test_random_curves_are_certified(weights: bool) -> None:
 @pytest.mark.parametrize("name", NOT_PLAIN)
 def test_random_motions_of_joints_are_certified(name: str) -> None:
     gaps = []
-    for seed in range(int(os.environ.get("FEEDPLAN_SEEDS", "4"))):
+    for seed in range(seeds(4)):
         problem = random_joints(name, seed)
         gaps.append(gap(problem, plan(problem)))
         assert gaps[-1] > 0.0, seed

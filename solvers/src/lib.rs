@@ -39,3 +39,19 @@ pub mod text;
 
 #[cfg(feature = "python")]
 mod python;
+
+#[cfg(test)]
+mod tests {
+    use proptest::test_runner::{Config, RngSeed};
+
+    #[test]
+    fn property_tests_draw_the_same_cases_in_every_run() {
+        let config = Config::default();
+        assert_ne!(
+            config.rng_seed,
+            RngSeed::Random,
+            ".cargo/config.toml gives a seed: run cargo in the project"
+        );
+        assert!(config.failure_persistence.is_none());
+    }
+}

@@ -5,6 +5,8 @@
 mod bends;
 #[path = "support/by_length.rs"]
 mod by_length;
+#[path = "support/campaign.rs"]
+mod campaign;
 #[path = "support/wave.rs"]
 mod wave;
 
@@ -13,6 +15,7 @@ use std::time::Instant;
 
 use bends::{Bend, Bends};
 use by_length::{ByLength, Lemniscate, Nurbs, Trefoil};
+use campaign::seeds;
 use feedplan_solvers::jerk_limited::{
     certify, plan, stream, Effort, End, Fault, Geometry, Limits, Place, Plan, Problem, Profile, SpeedCap,
 };
@@ -223,11 +226,6 @@ fn random_case(seed: u64) -> (Bends, [f64; 3]) {
         })
         .collect();
     (Bends::new(length, bends), [random.power(1.5, 3.0), random.power(3.0, 4.3), random.power(3.5, 6.5)])
-}
-
-/// As many seeds, or as many as FEEDPLAN_SEEDS says for a long campaign.
-fn seeds(count: u64) -> std::ops::Range<u64> {
-    0..std::env::var("FEEDPLAN_SEEDS").map_or(count, |text| text.parse().expect("a number of seeds"))
 }
 
 #[test]

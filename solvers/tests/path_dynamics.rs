@@ -5,17 +5,12 @@ mod support;
 
 use feedplan_solvers::path_dynamics::{allowable, bounded, chord_speed, sampled, AxisLimits, Curve, Shape};
 use feedplan_solvers::s_curve::{plan, Limits, Section, Segment};
-use support::Random;
+use support::{seeds, Random};
 
 const AXES: AxisLimits<2> =
     AxisLimits { velocity: [170.0, 180.0], acceleration: [400.0, 600.0], jerk: [4000.0, 6000.0] };
 /// Servo period in s; differences over it are averages of the derivatives.
 const PERIOD: f64 = 0.002;
-
-/// As many seeds, or as many as FEEDPLAN_SEEDS says for a long campaign.
-fn seeds(count: u64) -> std::ops::Range<u64> {
-    0..std::env::var("FEEDPLAN_SEEDS").map_or(count, |text| text.parse().expect("a number of seeds"))
-}
 
 type Control = Vec<[f64; 2]>;
 

@@ -4,12 +4,7 @@ mod support;
 
 use feedplan_solvers::s_curve::{plan, Limits, Profiler, Section, SectionKind, Segment};
 use proptest::prelude::*;
-use support::Random;
-
-/// As many seeds, or as many as FEEDPLAN_SEEDS says for a long campaign.
-fn seeds(count: u64) -> std::ops::Range<u64> {
-    0..std::env::var("FEEDPLAN_SEEDS").map_or(count, |text| text.parse().expect("a number of seeds"))
-}
+use support::{seeds, Random};
 
 /// A segment of a machine with 100 mm/s, 500 mm/s², 50 000 mm/s³.
 fn segment(length: f64) -> Segment {

@@ -4,10 +4,13 @@
 #[path = "support/by_length.rs"]
 #[allow(dead_code)]
 mod by_length;
+#[path = "support/campaign.rs"]
+mod campaign;
 #[path = "support/polylines.rs"]
 mod polylines;
 
 use by_length::{ByLength, Curve};
+use campaign::seeds;
 use feedplan_solvers::jerk_limited::{plan, Effort, End, Limits, Problem};
 use feedplan_solvers::smooth_fit::polyline::Polyline;
 use feedplan_solvers::smooth_fit::{smooth_fit, Smooth, SmoothOptions};
@@ -183,7 +186,7 @@ fn random_polylines<const D: usize>(seed: u64, count: usize) -> usize {
 
 #[test]
 fn random_polylines_are_followed_within_their_tolerance() {
-    let count = std::env::var("FEEDPLAN_SEEDS").map_or(60, |seeds| seeds.parse().expect("a number"));
+    let count = seeds(60).end as usize;
     let rough = [
         random_polylines::<2>(1, count),
         random_polylines::<3>(2, count),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +15,7 @@ from feedplan.geometry.path import Path
 from feedplan.machine.machine import Axis, Machine, bundled_machines
 from feedplan.machine.meaning import Meaning
 from feedplan.planners import planner
+from tests.campaign import seeds
 from tests.planners.excess import worst_excess
 
 plan = planner("bang-bang")
@@ -114,7 +114,7 @@ def random_problem(name: str, seed: int) -> Problem:
 @pytest.mark.parametrize("name", NOT_PLAIN)
 def test_random_curves_keep_every_limit_of_the_true_joints(name: str) -> None:
     faults = []
-    for seed in range(int(os.environ.get("FEEDPLAN_SEEDS", "4"))):
+    for seed in range(seeds(4)):
         problem = random_problem(name, seed)
         excess, use = worst_excess(problem, plan(problem))
         if not (excess <= 1e-8 and use >= 1 - 1e-6):

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from feedplan.geometry.build import build_path
 from feedplan.machine.machine import Machine
 from feedplan.program.program import MoveKind
+from tests.campaign import examples
 
 MILL = Machine.load("mill")
 
@@ -46,7 +47,7 @@ def polylines(draw: st.DrawFn) -> tuple[np.ndarray[Any, Any], dict[str, Any]]:
     return points, columns
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60))
 @given(polylines(), st.sampled_from([None, None, 0.0, 1e-4, 0.05, 2.0]))
 def test_random_polylines_keep_every_promise(
     make_program: Any, check: Any, polyline: tuple[Any, dict[str, Any]], tolerance: float | None
@@ -59,7 +60,7 @@ def test_random_polylines_keep_every_promise(
     check(program, path)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=examples(25))
 @given(st.integers(0, 2**32 - 1), st.sampled_from([None, 1e-3, 0.2]))
 def test_random_mixtures_of_lines_and_arcs_keep_every_promise(
     make_program: Any, check: Any, seed: int, tolerance: float | None

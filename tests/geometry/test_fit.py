@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 
 from feedplan.errors import InputError
 from feedplan.geometry.fit import FittedCurve, fit_points
+from tests.campaign import examples
 
 Array = NDArray[np.float64]
 
@@ -213,7 +214,7 @@ def test_a_tolerance_that_is_no_number_is_refused() -> None:
     tolerance=st.sampled_from([0.002, 0.02, 0.2]),
     max_curvature=st.sampled_from([0.5, math.inf]),
 )
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(100))
 def test_every_promise_holds_of_random_chains(
     steps: list[tuple[float, float]], tolerance: float, max_curvature: float
 ) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from math import comb
 
@@ -15,6 +14,7 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.plan import rounding_stops
 from feedplan.profile import ArcKind, SpeedProfile
 from feedplan.setpoints import setpoints
+from tests.campaign import seeds
 from tests.planners.excess import worst_excess, worst_excess_exactly
 from tests.planners.test_curves import problem_of
 
@@ -168,11 +168,11 @@ def test_no_arc_goes_on_where_its_axis_turns_round(seed: int) -> None:
 
 def test_random_curves_next_to_cusps_keep_every_limit() -> None:
     slowed = 0
-    seeds = int(os.environ.get("FEEDPLAN_SEEDS", "400"))
-    for seed in range(seeds):
+    count = seeds(400)
+    for seed in range(count):
         problem = problem_of(*random_curve(seed))
         profile = SpeedProfile(*plan_bang_bang(problem))
         assert np.isfinite(profile.time), seed
         assert worst_excess(problem, profile)[0] <= 1e-8, seed
         slowed += len(profile.slowed) > 0
-    assert slowed <= 2 + seeds / 300
+    assert slowed <= 2 + count / 300

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Callable
 from contextlib import suppress
@@ -24,6 +23,7 @@ from feedplan.geometry.path import Path
 from feedplan.machine.machine import Axis, Machine
 from feedplan.planners import _refinement, bang_bang, casadi, clarabel, methods, planner, toppra
 from feedplan.profile import ArcKind, SpeedProfile
+from tests.campaign import seeds
 from tests.constraints.test_joints import random_problem, without_travel
 from tests.planners.meshes import NAMED, machine_of, random_path_problem
 
@@ -90,7 +90,7 @@ def test_the_solvers_agree_with_the_exact_time_as_meshes_get_finer(name: str) ->
     assert abs(below[1]) < 0.6 * abs(below[0])
 
 
-@pytest.mark.parametrize("seed", range(int(os.environ.get("FEEDPLAN_SEEDS", "12"))))
+@pytest.mark.parametrize("seed", range(seeds(12)))
 def test_random_paths_take_the_exact_time_and_keep_every_limit(seed: int) -> None:
     problem = random_path_problem(seed)
     exact = bang_bang.plan(problem).time
@@ -101,7 +101,7 @@ def test_random_paths_take_the_exact_time_and_keep_every_limit(seed: int) -> Non
     assert verdict.ok, [check for check in verdict.checks if check.judged and not check.ok]
 
 
-@pytest.mark.parametrize("seed", range(int(os.environ.get("FEEDPLAN_SEEDS", "24"))))
+@pytest.mark.parametrize("seed", range(seeds(24)))
 def test_other_solvers_agree_on_random_paths_and_none_is_below_the_bound(seed: int) -> None:
     problem = random_path_problem(seed)
     exact = bang_bang.plan(problem)
@@ -123,7 +123,7 @@ def test_other_solvers_agree_on_random_paths_and_none_is_below_the_bound(seed: i
         assert not time < exact.time * (1 - slack)
 
 
-@pytest.mark.parametrize("seed", range(1, int(os.environ.get("FEEDPLAN_SEEDS", "4")), 3))
+@pytest.mark.parametrize("seed", range(1, seeds(4), 3))
 @pytest.mark.parametrize("name", ["cylindrical", "trunnion-ac", "head-head", "corexy"])
 def test_random_paths_of_joints_take_the_exact_time_and_keep_every_limit(name: str, seed: int) -> None:
     problem = random_problem(name, seed)

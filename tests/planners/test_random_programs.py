@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
 
 from feedplan import plan
 from feedplan.planners import limits_jerk
+from tests.campaign import seeds
 from tests.planners.audited import audited
 from tests.planners.random_programs import random_machine, random_program
 
-SEEDS = int(os.environ.get("FEEDPLAN_SEEDS", "24"))
+SEEDS = seeds(24)
 # They are run in so many parts, beside each other.
 PARTS = 4
 # What states between segments may be improved for: their first ones are a plan [s].

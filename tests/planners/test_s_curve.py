@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -16,10 +15,11 @@ from feedplan.geometry.path import Path
 from feedplan.machine.machine import Axis, Machine
 from feedplan.planners import planner
 from feedplan.planners.ruckig import repaired
+from tests.campaign import seeds
 from tests.planners.random_paths import random_problem
 from tests.planners.test_jerk_limited import CURVES
 
-SEEDS = int(os.environ.get("FEEDPLAN_SEEDS", "12"))
+SEEDS = seeds(12)
 HELD = 1e-9
 
 

@@ -14,6 +14,7 @@ from feedplan.errors import FeedplanError, ProgramError
 from feedplan.machine.machine import Machine
 from feedplan.program.gcode import read_gcode
 from feedplan.program.program import MoveKind, Program
+from tests.campaign import examples
 
 
 def read(text: str, machine: Machine | None = None) -> Program:
@@ -266,7 +267,7 @@ M2
 WORDS = ["G5", "G5.2", "G5.3", "G6.2", "G43.4", "G43.5", "G49", "K1", "P2", "L4", "X3", "I1", "G91", "G20"]
 
 
-@settings(max_examples=300)
+@settings(max_examples=examples(300))
 @given(st.randoms(use_true_random=False))
 def test_mutated_programs_are_read_or_refused(rng: random.Random) -> None:
     lines = SEED.splitlines()

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from feedplan.report.reduce import Envelope, Polyline
+from tests.campaign import examples
 
 
 def envelope(values: np.ndarray, points: int, cuts: tuple[int, ...] = ()) -> Envelope:
@@ -70,7 +71,7 @@ def test_gaps_hide_no_peak() -> None:
 
 
 @given(st.lists(st.floats(-1e9, 1e9), min_size=1, max_size=200), st.integers(2, 60), st.data())
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200))
 def test_extremes_ends_and_order_survive_any_cuts(
     values: list[float], points: int, data: st.DataObject
 ) -> None:

@@ -3,15 +3,10 @@
 
 use rayon::prelude::*;
 
-use crate::support::{audit, random_case, Case, Elevated, Random, FEW_AXES};
+use crate::support::{audit, random_case, seeds, Case, Elevated, Random, FEW_AXES};
 use feedplan_solvers::bang_bang_quadratic::Profile;
 use feedplan_solvers::bound::{lower_bound, Hint};
 use feedplan_solvers::quadratic::Quadratic;
-
-/// As many seeds, or as many as FEEDPLAN_SEEDS says for a long campaign.
-fn seeds(count: u64) -> std::ops::Range<u64> {
-    0..std::env::var("FEEDPLAN_SEEDS").map_or(count, |text| text.parse().expect("a number of seeds"))
-}
 
 fn hint(profile: &Profile) -> Hint<'_> {
     Hint { piece: &profile.piece, axis: &profile.axis, u1: &profile.u1, duration: &profile.duration }

@@ -1,7 +1,7 @@
 //! The planner for pieces of any degree on curves made to break it: it comes to an end, with times that are times.
 
 use crate::support::curves::{random_curves, CurveCase, Piece};
-use crate::support::FEW_AXES;
+use crate::support::{seeds, FEW_AXES};
 
 /// Rounding decides where the axes turn round: planning still comes to an end.
 #[test]
@@ -21,10 +21,8 @@ fn a_cubic_that_comes_back_on_its_own_way_is_planned() {
 /// Cases that rounding makes too hard are told; they are a few in ten thousand.
 #[test]
 fn curves_made_to_break_the_planner_are_planned_in_finite_time() {
-    let count =
-        std::env::var("FEEDPLAN_SEEDS").map_or(6_000, |text| text.parse().expect("a number of seeds"));
     let (mut slowed, mut stuck, mut arcs) = (0, 0, 0);
-    for seed in 0..count {
+    for seed in seeds(6_000) {
         for_few_axes!(FEW_AXES[(seed % 3) as usize], M, {
             let case = random_curves::<M>(seed);
             match case.plan() {

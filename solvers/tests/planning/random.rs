@@ -1,13 +1,8 @@
 //! Random and adversarial paths: every limit holds, some limit is active everywhere, and what does not matter to
 //! the path does not change its time.
 
-use crate::support::{audit, random_case, Audit, Case, Random};
+use crate::support::{audit, random_case, seeds, Audit, Case, Random};
 use feedplan_solvers::quadratic::Quadratic;
-
-/// As many seeds, or as many as FEEDPLAN_SEEDS says for a long campaign.
-fn seeds(count: u64) -> std::ops::Range<u64> {
-    0..std::env::var("FEEDPLAN_SEEDS").map_or(count, |text| text.parse().expect("a number of seeds"))
-}
 
 /// The worst figures over cases with these seeds, and every failure as a sentence.
 fn campaign(seeds: std::ops::Range<u64>) -> (Audit, Vec<String>) {

@@ -2,11 +2,13 @@
 #![allow(dead_code, unused_imports)]
 
 mod audit;
+mod campaign;
 mod cases;
 pub mod curves;
 mod elevated;
 
 pub use audit::{audit, Audit};
+pub use campaign::seeds;
 pub use cases::{milder_case, random_case, Case, Random};
 pub use elevated::Elevated;
 
