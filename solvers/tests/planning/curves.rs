@@ -21,8 +21,9 @@ fn a_cubic_that_comes_back_on_its_own_way_is_planned() {
 /// Cases that rounding makes too hard are told; they are a few in ten thousand.
 #[test]
 fn curves_made_to_break_the_planner_are_planned_in_finite_time() {
+    let count = seeds(6_000).end;
     let (mut slowed, mut stuck, mut arcs) = (0, 0, 0);
-    for seed in seeds(6_000) {
+    for seed in 0..count {
         for_few_axes!(FEW_AXES[(seed % 3) as usize], M, {
             let case = random_curves::<M>(seed);
             match case.plan() {
