@@ -108,6 +108,7 @@ _ACCURACY = click.option(
 _TIME_LIMIT_HELP = "Time that a method with a mesh may take."
 _JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 _QUIET = click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
+_NO_SETPOINTS = "none"
 _ZERO_OR_MORE = _Number(or_zero=True)
 
 
@@ -142,9 +143,9 @@ def cli(context: click.Context) -> int:
 @click.option(
     "--format",
     "formats",
-    type=click.Choice(outputs.formats()),
+    type=click.Choice((*outputs.formats(), _NO_SETPOINTS)),
     multiple=True,
-    help="Format of the setpoints, npz by default; may be given several times.",
+    help="Format of the setpoints, npz by default; may be given several times. none: a report without them.",
 )
 @_JSON
 @_QUIET
@@ -176,6 +177,8 @@ def plan(
 
     if formats and not output:
         raise click.UsageError("--format needs a folder to write to: give -o DIR as well")
+    if _NO_SETPOINTS in formats and len(formats) > 1:
+        raise click.UsageError(f"--format {_NO_SETPOINTS} excludes other formats: leave one of them out")
     if output:
         require_folder(FilePath(output))
     with console.progress_bar(quiet) as progress:
@@ -200,7 +203,7 @@ def plan(
             files = write_plan(
                 result,
                 output,
-                formats or ("npz",),
+                () if _NO_SETPOINTS in formats else formats or ("npz",),
                 source=FilePath(program),
                 progress=progress,
             )
@@ -319,34 +322,22 @@ def fit(program: str, machine: str, tolerance: float | None, smooth: bool, as_js
 
 @cli.command()
 @click.argument("place", metavar="DIR|SETPOINTS")
-@click.option("--machine", "-m", metavar="NAME|FILE", help=f"{_MACHINE_HELP}  [default: the plan's]")
+@click.option("--machine", "-m", metavar="NAME|FILE", help=f"{_MACHINE_HELP}  [default: the plan's own]")
 @click.option(
     "--resolution", type=_ZERO_OR_MORE, default=0.0, metavar="MM", help="Last digit of rounded positions."
 )
 @click.option("--jerk", is_flag=True, help="Judge jerk whatever the method.")
 @_JSON
 def check(place: str, machine: str | None, resolution: float, jerk: bool, as_json: bool) -> int:
-    """Audit setpoints against the limits of a machine.
+    """Audit setpoints from files alone, against the limits of the machine that plan.json holds.
 
     Positions, velocities and accelerations are measured by differences alone, and so is the jerk where the
     plan's method limits it. Exit code 1: a limit is broken.
     """
-    from feedplan.audit import audit_setpoints
-    from feedplan.files import planned_machine, planned_method, summary_text
-    from feedplan.planners import limits_jerk
+    from feedplan.check import check as check_files
+    from feedplan.files import summary_text
 
-    points = outputs.load_setpoints(place)
-    audit = audit_setpoints(
-        points.t,
-        points.position,
-        Machine.load(machine or planned_machine(FilePath(place))),
-        axes=points.axes,
-        velocity=points.velocity,
-        acceleration=points.acceleration,
-        line=points.line,
-        resolution=resolution,
-        jerk=jerk or limits_jerk(planned_method(FilePath(place))),
-    )
+    audit = check_files(place, machine, resolution=resolution, jerk=jerk)
     if as_json:
         sys.stdout.write(summary_text(audit.to_json()))
     else:

@@ -11,7 +11,7 @@ from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 from feedplan.errors import InputError
-from feedplan.outputs import format_named
+from feedplan.outputs import Header, format_named
 from feedplan.outputs._staging import require_folder, staged
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def write_plan(
     source: FilePath | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> tuple[FilePath, ...]:
-    """Writes the plan, its setpoints in these formats, and its report; returns the files.
+    """Writes the plan, its setpoints in these formats (none for ()), and its report; returns the files.
 
     All is written beside and renamed at the end, so `folder` never holds half a plan; other files in it stay.
     `source` is the part program, quoted in the report; `progress` is called with a stage and 0 to 1. Raises
@@ -44,15 +44,21 @@ def write_plan(
 
     folder = FilePath(folder)
     require_folder(folder)
-    outputs = [format_named(name) for name in dict.fromkeys(formats)]
+    outputs = {name: format_named(name) for name in dict.fromkeys(formats)}
+    by_file = {output.FILE: name for name, output in outputs.items()}
+    for name, output in outputs.items():
+        if (other := by_file[output.FILE]) != name:
+            raise InputError(f"{name} and {other} are both {output.FILE}: ask for one of them")
     audit = plan.audit()
     setpoints = plan.setpoints()
+    units = tuple(plan.machine.axis(name).unit for name in setpoints.axes)
+    header = Header(setpoints.axes, units, setpoints.period)
     figures = SetpointFigures(plan.problem, setpoints.count, [check.time for check in audit.broken])
     with staged(folder, last=SUMMARY_FILE) as stage:
         with ExitStack() as stack:
             sinks = [
-                stack.enter_context(output.writer(stage / output.FILE, setpoints.axes, setpoints.count))
-                for output in outputs
+                stack.enter_context(output.writer(stage / output.FILE, header, setpoints.count))
+                for output in outputs.values()
             ]
             for chunk in _timed(setpoints.chunks(_ROWS_AT_ONCE), plan.compute):
                 for sink in (*sinks, figures.add):
@@ -135,30 +141,6 @@ def _timed(chunks: Iterator[SetpointChunk], compute: dict[str, float]) -> Iterat
         if chunk is None:
             return
         yield chunk
-
-
-def planned_machine(place: FilePath) -> str:
-    """The machine that these setpoints were planned for. Raises InputError where none is known."""
-    name = _planned(place, "machine")
-    if name is None:
-        raise InputError(f"{_summary(place)} names no machine: give the machine with --machine")
-    return name
-
-
-def planned_method(place: FilePath) -> str | None:
-    """The method that planned these setpoints, None where that is not known."""
-    return _planned(place, "method")
-
-
-def _summary(place: FilePath) -> FilePath:
-    return (place if place.is_dir() else place.parent) / SUMMARY_FILE
-
-
-def _planned(place: FilePath, name: str) -> str | None:
-    try:
-        return str(json.loads(_summary(place).read_text(encoding="utf-8"))[name])
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
 
 
 def summary_text(summary: dict[str, Any]) -> str:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -22,6 +23,7 @@ from feedplan.curves.length import CurveLength
 from feedplan.geometry.build import build_path
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
+from feedplan.outputs import FORMAT
 from feedplan.planners import bound_of, corners, limits_jerk, planner
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
@@ -38,7 +40,7 @@ class Plan:
 
     `profile` is the speed along `problem.path`; `lower_bound` [s] is proven: no feasible profile of this path
     is faster (a method with a bound of its own, as jerk-limited, may prove its on a grid and say so);
-    `compute` is the computing time of each stage [s].
+    `compute` is the computing time of each stage [s]; `options` those that the plan was made with.
     """
 
     program: Program | None
@@ -50,6 +52,7 @@ class Plan:
     compute: dict[str, float]
     interpolator: str = "sarfraz"
     warnings: tuple[str, ...] = field(default=())
+    options: Mapping[str, Any] = field(default_factory=dict)
     _verdict: list[Audit] = field(default_factory=list, init=False, repr=False, compare=False)
 
     def __repr__(self) -> str:
@@ -132,15 +135,31 @@ class Plan:
         return self._verdict[0]
 
     def summary(self) -> dict[str, Any]:
-        """What `plan.json` holds: plain numbers and strings."""
-        fit = self.path.fit
+        """What `plan.json` holds: plain numbers and strings.
+
+        `setpoints` are those of the machine's period. Hashes tell whether a text was changed.
+        """
+        fit, program, points = self.path.fit, self.program, self.setpoints()
+        machine_file = self.machine.to_toml()
         return {
+            "format": FORMAT,
+            "units": {"length": "mm", "angle": "deg", "time": "s"},
             "time": self.time,
             "lower_bound": self.lower_bound,
             "gap": self.gap,
             "method": self.method,
+            "options": dict(self.options),
             "machine": self.machine.name,
-            "program": self.program.name if self.program else None,
+            "machine_file": machine_file,
+            "machine_file_sha256": hashlib.sha256(machine_file.encode()).hexdigest(),
+            "program": program.name if program else None,
+            "program_sha256": program.sha256 if program else None,
+            "setpoints": {
+                "axes": list(points.axes),
+                "period": points.period,
+                "count": points.count,
+                "duration": points.duration,
+            },
             "length": CurveLength(self.problem.tip_curve or self.path.curve).total,
             "pieces": len(self.path),
             "runs": len(self.path.runs) - 1,
@@ -186,8 +205,8 @@ def plan(
     on. Raises ProgramError, MachineError, InputError or InfeasibleError, each a sentence with place and
     remedy.
     """
-    options = {"accuracy": accuracy, "cells": cells, "time_limit": time_limit}
-    solve = planner(method, **options)
+    of_method = {"accuracy": accuracy, "cells": cells, "time_limit": time_limit}
+    solve = planner(method, **of_method)
     if not isinstance(machine, Machine):
         machine = Machine.load(machine)
     if period is not None:
@@ -217,7 +236,7 @@ def plan(
         profile = solve(problem)
     with _timed(compute, "bound"):
         least = lower_bound(problem, profile)
-        known = bound_of(method, **options)
+        known = bound_of(method, **of_method)
         if known is not None:
             least = max(least, known(problem, profile))
         least += path.pauses
@@ -235,6 +254,16 @@ def plan(
         + path.warnings
         + rounding_stops(problem, profile)
         + curvature_jumps(problem, profile),
+        options={
+            **of_method,
+            "tolerance": tolerance,
+            "feed": feed,
+            "feed_override": feed_override,
+            "period": period,
+            "start_speed": start_speed,
+            "end_speed": end_speed,
+            "interpolator": interpolator,
+        },
     )
 
 

@@ -73,6 +73,7 @@ class _Stream:
     def __init__(self, chunk: SetpointChunk) -> None:
         self._chunk = chunk
         self.axes = chunk.axes
+        self.period = 0.001
         self.count = len(chunk.t)
 
     def chunks(self, size: int) -> Iterator[SetpointChunk]:

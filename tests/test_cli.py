@@ -15,7 +15,7 @@ import pytest
 from feedplan.cli import main
 from feedplan.errors import InfeasibleError, MissingPackageError, ProgramError, SolverError
 from feedplan.machine.machine import bundled_machines
-from feedplan.outputs import formats
+from feedplan.outputs import format_named, formats
 
 
 @pytest.fixture
@@ -200,7 +200,8 @@ def test_every_format_passes_the_check(program: Path, tmp_path: Path) -> None:
     for name in formats():
         folder = tmp_path / name
         assert main(["plan", str(program), "-m", "router", "-o", str(folder), "--format", name, "-q"]) == 0
-        assert main(["check", str(folder / f"setpoints.{name}")]) == 0
+        assert main(["check", str(folder)]) == 0
+        assert main(["check", str(folder / format_named(name).FILE)]) == 0
 
 
 def test_jerk_is_judged_where_the_method_of_the_plan_limits_it(

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from feedplan._solvers import SetpointAudit, audit_plan
 from feedplan.audit.joint_profile import audit_joint_profile
 from feedplan.audit.joint_setpoints import JointSetpoints
+from feedplan.audit.recorded import audit_recorded
 from feedplan.audit.verdict import PASS_MARK, Audit, LimitCheck, join
 from feedplan.audit.worst import Findings
 from feedplan.constraints.problem import Problem
@@ -190,16 +191,24 @@ def audit_setpoints(
     axes: tuple[str, ...] | None = None,
     velocity: ArrayLike | None = None,
     acceleration: ArrayLike | None = None,
+    recorded_jerk: ArrayLike | None = None,
     line: ArrayLike | None = None,
     resolution: float = 0.0,
     jerk: bool = False,
+    corners: bool = False,
+    period: float | None = None,
 ) -> Audit:
     """Measures setpoints from anywhere against the limits of a machine, by finite differences alone.
 
-    `t` (n,) [s] and `position` (n, axes) [mm]; optional `velocity` [mm/s] and `acceleration` [mm/s²] of the
-    same shape as position, and source `line` (n,). `axes` names the columns (default: the machine's axes).
+    `t` (n,) [s] and `position` (n, axes) [mm]; optional `velocity` [mm/s], `acceleration` [mm/s²] and
+    `recorded_jerk` [mm/s³] of the same shape as position, and source `line` (n,). `axes` names the columns
+    (default: the machine's axes). Recorded velocities must be those of the positions, recorded accelerations
+    within the limit and those of the velocities, and where jerk is judged recorded jerks those of the
+    accelerations (`feedplan.audit.recorded`). `corners`: the velocity may jump from one period to the next
+    by what the acceleration limit gives in one, as where corners of lines are passed.
     `resolution` [mm] is the last digit of positions that were written as text: what its rounding adds to a
-    difference is allowed. The period is that of the times. Jerk is judged only if `jerk` says so.
+    difference is allowed. The `period` [s] is that of the times unless given. Jerk is judged only if `jerk`
+    says so.
     A jump of velocity that the machine allows at corners shows as one or two accelerations above the limit
     where the direction turns; only there it is allowed for. So are up to three jerks on end above their limit
     for a jump of the acceleration by what the jerk limit makes in one period: there the curvature may jump.
@@ -217,24 +226,29 @@ def audit_setpoints(
         raise InputError(f"{len(times)} setpoints cannot be audited: give at least two")
     if not resolution >= 0:
         raise InputError(f"the resolution is {resolution} mm: give 0 or more")
-    velocities = None if velocity is None else _array(velocity, np.float64)
-    accelerations = None if acceleration is None else _array(acceleration, np.float64)
-    if any(rates is not None and rates.shape != positions.shape for rates in (velocities, accelerations)):
-        raise InputError("recorded velocities and accelerations must have the shape of the positions")
-    jump = [axis.max_velocity_jump for axis in machine_axes]
-    lines = None if line is None else _array(line, np.int32)
-    if lines is not None and lines.shape != times.shape:
+    recorded = {"velocity": velocity, "acceleration": acceleration, "jerk": recorded_jerk}
+    rates = {
+        name: None if values is None else _array(values, np.float64) for name, values in recorded.items()
+    }
+    for name, values in rates.items():
+        if values is not None and values.shape != positions.shape:
+            raise InputError(f"the recorded {name} must have the shape of the positions {positions.shape}")
+    lines = np.zeros(len(times), np.int32) if line is None else _array(line, np.int32)
+    if lines.shape != times.shape:
         raise InputError("source lines must be as many as the times")
+    period = _period(times, machine.period) if period is None else float(period)
+    own_jump = [axis.max_velocity_jump for axis in machine_axes]
+    jump = [max(axis.max_velocity_jump, corners * period * axis.max_acceleration) for axis in machine_axes]
     limits = _Limits(
         max_velocity=[axis.max_velocity for axis in machine_axes],
         max_acceleration=[axis.max_acceleration for axis in machine_axes],
         max_jerk=[axis.max_jerk for axis in machine_axes],
         judges_jerk=jerk,
         max_velocity_jump=jump,
-        jump_beyond=jump,
+        jump_beyond=own_jump,
         travel=[axis.travel for axis in machine_axes],
         chord_tolerance=math.inf,
-        period=_period(times, machine.period),
+        period=period,
         end_speeds=(0.0, 0.0),
     )
     stream = SetpointAudit(limits, float(resolution))
@@ -243,11 +257,19 @@ def audit_setpoints(
         stream.push(
             times[part],
             positions[part],
-            None if velocities is None else velocities[part],
-            None if accelerations is None else accelerations[part],
-            None if lines is None else lines[part],
+            None if rates["velocity"] is None else rates["velocity"][part],
+            None if rates["acceleration"] is None else rates["acceleration"][part],
+            lines[part],
         )
-    return join([stream.finish()], names, jerk)
+    results = [stream.finish()]
+    pairs = [("recorded_change", "velocity", "acceleration", limits.max_acceleration, jump)]
+    if jerk:
+        pairs += [("recorded_jerk", "acceleration", "jerk", limits.max_jerk, [0.0] * len(names))]
+    for check, rate, change, limit, steps in pairs:
+        of, by = rates[rate], rates[change]
+        if of is not None and by is not None:
+            results.append(audit_recorded(check, times, of, by, np.array(limit), np.array(steps), lines))
+    return join(results, names, jerk)
 
 
 def _reported(setpoints: Setpoints, report: Callable[[float], None]) -> Iterator[SetpointChunk]:

@@ -42,8 +42,13 @@ _KINDS = {
     "grid": _Kind("irregularity of the time steps", "s"),
     "recorded_velocity": _Kind("error of the recorded velocity", "mm/s"),
     "recorded_acceleration": _Kind("error of the recorded acceleration", "mm/s²"),
+    "recorded_change": _Kind("change of the recorded velocity beyond the recorded acceleration", "mm/s²"),
+    "recorded_jerk": _Kind("change of the recorded acceleration beyond the recorded jerk", "mm/s³"),
     "numbers": _Kind("number that is not finite or out of its range", ""),
 }
+
+# Where these fail, the differences over those times and numbers mean nothing.
+_EXPLAINING = ("numbers", "grid")
 
 
 @dataclass(frozen=True)
@@ -113,10 +118,11 @@ class Audit:
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """A sentence for every check that fails: place, value, limit."""
+        """A sentence for every check that fails: place, value, limit; what explains others comes first."""
         if not self.checks:
             return ("there is nothing that could be measured",)
-        return tuple(check.sentence() for check in self.broken)
+        broken = sorted(self.broken, key=lambda check: check.name not in _EXPLAINING)
+        return tuple(check.sentence() for check in broken)
 
     @property
     def ok(self) -> bool:

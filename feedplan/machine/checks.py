@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from numbers import Real
+from collections.abc import Iterable, Mapping
+from numbers import Integral, Real
 from typing import Any
 
 from feedplan.errors import MachineError
@@ -41,3 +41,33 @@ def set_positive(owner: object, key: str, place: str, unit: str, infinite: bool 
     good = is_number(value) and value > 0 and (infinite or value < math.inf)
     require(good, place + key, value, f"a positive number [{unit}]")
     object.__setattr__(owner, key, float(value))
+
+
+def require_text(value: object, what: str) -> None:
+    """Raises MachineError unless the value is text that is not empty and that a file can hold."""
+    require(_is_text(value) and value != "", what, value, "a text")
+
+
+def written(value: Any, what: str) -> Any:
+    """A value as a machine file gives it: text, true or false, a number, or a list or table of these.
+
+    Tuples and arrays become lists. Raises MachineError for what a file cannot hold.
+    """
+    if hasattr(value, "tolist"):  # of numpy
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        for key in value:
+            require_text(key, f"{what}: a key")
+        return {key: written(entry, f"{what} {key}") for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [written(entry, what) for entry in value]
+    if isinstance(value, bool) or _is_text(value):
+        return value
+    remedy = "text, true or false, a number, or a list or table of these, as a machine file can hold"
+    require(is_number(value) and value == value, what, value, remedy)
+    return int(value) if isinstance(value, Integral) else float(value)
+
+
+def _is_text(value: object) -> bool:
+    """Text without lone surrogates, which no file can hold."""
+    return isinstance(value, str) and not any("\ud800" <= letter <= "\udfff" for letter in value)

@@ -1,8 +1,10 @@
-"""Machine files: the keys of a TOML file become the fields of a machine."""
+"""Machine files: the keys of a TOML file become the fields of a machine, and the other way round."""
 
 from __future__ import annotations
 
+import json
 import sys
+from collections.abc import Mapping
 from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
@@ -17,17 +19,62 @@ else:
 
 _AXIS_KEYS = {own.name for own in fields(Axis)}
 _NEEDED = [own.name for own in fields(Axis) if own.default is MISSING]
+_OF_KINEMATICS = {"kinematics", "home", "offsets"}
 _MACHINE_KEYS = {own.name for own in fields(Machine)} - {"parameters"} | {"description"}
 
 
-def parse(text: str, name: str) -> Machine:
-    """The machine that the text of the file `name` tells; raises MachineError naming file, key and remedy."""
+def parse(text: str, name: str, joints_only: bool = False) -> Machine:
+    """The machine that the text of the file `name` tells; raises MachineError naming file, key and remedy.
+
+    `joints_only`: its joints with their limits, whatever its kinematics. Setpoints need no more, and so are
+    checked where a kinematics that a user registered is not known.
+    """
     try:
-        return _machine(tomllib.loads(text), name)
+        table = tomllib.loads(text)
+        if joints_only:
+            table = {key: value for key, value in table.items() if key not in _OF_KINEMATICS}
+        return _machine(table, name)
     except tomllib.TOMLDecodeError as error:
         raise MachineError(f"machine file {name} is not valid TOML: {error}") from None
     except MachineError as error:
         raise MachineError(f"machine file {name}: {error}") from None
+
+
+def text_of(machine: Machine) -> str:
+    """The text of a machine file that gives the same machine."""
+    defaults = {own.name: own.default for own in fields(Axis)}
+    rows: dict[str, Any] = {"name": machine.name, "period": machine.period}
+    rows |= {"chord_tolerance": machine.chord_tolerance, "home": list(machine.home)}
+    if not machine.home:
+        del rows["home"]
+    lines = [f"{key} = {_value(value)}" for key, value in rows.items()]
+    lines += _table("[kinematics]", {"type": machine.kinematics, **machine.parameters})
+    lines += _table("[offsets]", dict(machine.offsets)) if machine.offsets else []
+    for axis in machine.axes:
+        given = {key: getattr(axis, key) for key in defaults}
+        own = {key: value for key, value in given.items() if value != defaults[key]}
+        lines += _table("[[axes]]", own)
+    return "\n".join(lines) + "\n"
+
+
+def _table(head: str, rows: Mapping[str, Any]) -> list[str]:
+    return [head, *(f"{_key(key)} = {_value(value)}" for key, value in rows.items())]
+
+
+def _key(key: str) -> str:
+    plain = key.isascii() and key.replace("_", "").replace("-", "").isalnum()
+    return key if plain else _value(key)
+
+
+def _value(value: Any) -> str:
+    """A value in TOML; JSON has the same texts, but for one control character."""
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{_key(key)} = {_value(entry)}' for key, entry in value.items())}}}"
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(_value, value))}]"
+    return str(value).lower() if isinstance(value, bool) else repr(value)
 
 
 def _machine(table: dict[str, Any], name: str) -> Machine:

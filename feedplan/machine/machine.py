@@ -11,7 +11,15 @@ from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 from feedplan.errors import MachineError
-from feedplan.machine.checks import is_number, numbers, one_by_one, require, set_positive
+from feedplan.machine.checks import (
+    is_number,
+    numbers,
+    one_by_one,
+    require,
+    require_text,
+    set_positive,
+    written,
+)
 
 if TYPE_CHECKING:
     from feedplan.machine.kinematics import Kinematics
@@ -88,6 +96,8 @@ class Machine:
     parameters: Mapping[str, Any] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
+        require_text(self.name, "name")
+        require_text(self.kinematics, "kinematics")
         remedy = f"1 to {MAX_AXES} axes"
         axes = one_by_one(self.axes, "axes", remedy)
         good = 0 < len(axes) <= MAX_AXES and all(isinstance(axis, Axis) for axis in axes)
@@ -97,12 +107,17 @@ class Machine:
         require(len(set(names)) == len(names), "axes", names, "each axis letter once")
         set_positive(self, "period", "", "s")
         set_positive(self, "chord_tolerance", "", "mm", infinite=True)
+        remedy = "a table of its keys, other than type, as in a machine file"
+        keyed = isinstance(self.parameters, Mapping) and "type" not in self.parameters
+        require(keyed, "kinematics", self.parameters, remedy)
+        object.__setattr__(self, "parameters", written(self.parameters, "kinematics"))
         letters = self.program_letters
         remedy = f"{len(letters)} finite numbers, for the program's axes {', '.join(letters)}"
         home = one_by_one(self.home, "home", remedy)
         object.__setattr__(self, "home", numbers(home, len(letters), "home", remedy) if home else ())
         pairs = _pairs(self.offsets)
         offsets = tuple((key, numbers(row, len(letters), str(key), remedy)) for key, row in pairs)
+        require(len(dict(offsets)) == len(offsets), "offsets", self.offsets, "each name once")
         object.__setattr__(self, "offsets", offsets)
 
     def __repr__(self) -> str:
@@ -165,6 +180,12 @@ class Machine:
             )
         return parse(resources.files(__package__).joinpath("models", f"{text}.toml").read_text("utf-8"), text)
 
+    def to_toml(self) -> str:
+        """The text of a machine file that gives the same machine."""
+        from feedplan.machine.file import text_of
+
+        return text_of(self)
+
     def with_period(self, period: float) -> Machine:
         """The same machine with another servo period [s]."""
         return replace(self, period=period)
@@ -182,4 +203,6 @@ def _pairs(offsets: Any) -> tuple[tuple[str, Any], ...]:
     pairs = one_by_one(offsets.items() if isinstance(offsets, Mapping) else offsets, "offsets", remedy)
     good = all(isinstance(pair, tuple) and len(pair) == 2 for pair in pairs)
     require(good, "offsets", offsets, remedy)
+    for name, _ in pairs:
+        require_text(name, "offsets: a name")
     return pairs

@@ -3,25 +3,49 @@
 A format is a module here whose name does not begin with an underscore. It has
 
 - `FILE`, the name of the file it writes;
-- `writer(file, axes, count)`, a context that writes `count` setpoints of these axes: it gives a function that
-  takes them chunk by chunk in the order of time, and completes the file at its end;
-- `load(file)`, which reads them back as one SetpointChunk.
+- `writer(file, header, count)`, a context that writes `count` setpoints: it gives a function that takes them
+  chunk by chunk in the order of time, and completes the file at its end;
+- `load(file)`, which reads them back as one chunk, a SetpointFile.
 """
 
 from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Protocol, cast
 
 from feedplan.errors import InputError
 from feedplan.setpoints import SetpointChunk
 
-# The columns of a setpoint that have one value an axis, with their units.
-QUANTITIES = {"position": "mm", "velocity": "mm/s", "acceleration": "mm/s^2", "jerk": "mm/s^3"}
+# The columns of a setpoint that have one value an axis, with what follows the unit of the axis in theirs.
+QUANTITIES = {"position": "", "velocity": "/s", "acceleration": "/s^2", "jerk": "/s^3"}
+
+# The version of all files of a plan. Files without one come from elsewhere and are read as this one.
+FORMAT = 1
+
+
+@dataclass(frozen=True)
+class Header:
+    """What all setpoints of a file have in common: names of the `axes`, their `units` (mm or deg), the servo
+    `period` [s]."""
+
+    axes: tuple[str, ...]
+    units: tuple[str, ...]
+    period: float
+
+
+@dataclass(frozen=True)
+class SetpointFile(SetpointChunk):
+    """Setpoints read from a `file`; `units` are those of the axes, empty where the file tells none; `period`
+    [s], None where it tells none."""
+
+    file: FilePath = FilePath()
+    units: tuple[str, ...] = ()
+    period: float | None = None
 
 
 Add = Callable[[SetpointChunk], None]
@@ -32,24 +56,33 @@ class Format(Protocol):
 
     FILE: str
 
-    def writer(self, file: FilePath, axes: Sequence[str], count: int) -> AbstractContextManager[Add]: ...
+    def writer(self, file: FilePath, header: Header, count: int) -> AbstractContextManager[Add]: ...
 
-    def load(self, file: FilePath) -> SetpointChunk: ...
+    def load(self, file: FilePath) -> SetpointFile: ...
 
 
 def formats() -> tuple[str, ...]:
     """The names of all formats."""
-    return tuple(sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_")))
+    names = (module.name for module in pkgutil.iter_modules(__path__))
+    return tuple(sorted(name.replace("_", "-") for name in names if not name.startswith("_")))
 
 
 def format_named(name: str) -> Format:
     """The format of that name. Raises InputError naming those there are."""
     if name not in formats():
         raise InputError(f"there is no output format '{name}': use one of {', '.join(formats())}")
-    return cast(Format, importlib.import_module(f"{__name__}.{name}"))
+    return cast(Format, importlib.import_module(f"{__name__}.{name.replace('-', '_')}"))
 
 
-def load_setpoints(place: str | FilePath) -> SetpointChunk:
+def require_format(version: object, what: str) -> None:
+    """Raises InputError for a file of a version that this feedplan does not read."""
+    if version != FORMAT or isinstance(version, bool):
+        raise InputError(
+            f"{what} has the format {version!r}, this feedplan reads {FORMAT}: use the feedplan that wrote it"
+        )
+
+
+def load_setpoints(place: str | FilePath) -> SetpointFile:
     """The setpoints in a file, or in the folder of a plan, as one chunk.
 
     The arrays of an npz file stay on disk and are read where they are used. Raises InputError naming the
@@ -63,20 +96,20 @@ def load_setpoints(place: str | FilePath) -> SetpointChunk:
                 f"{file} holds no setpoints: `feedplan plan PROGRAM -o {file}` writes them there"
             )
         file = found[0]
-    for name in formats():
-        if file.suffix == f".{name}":
-            return _load(name, file)
-    known = ", ".join(f".{name}" for name in formats())
+    endings = {FilePath(format_named(name).FILE).suffix: name for name in formats()}
+    if file.suffix in endings:
+        return _load(endings[file.suffix], file)
+    known = ", ".join(sorted(endings))
     raise InputError(f"{file}: setpoints cannot be read from this kind of file: give a file in {known}")
 
 
 def files_in(folder: FilePath) -> list[FilePath]:
     """The files of setpoints in a folder, the newest first."""
-    files = [folder / format_named(name).FILE for name in formats()]
+    files = {folder / format_named(name).FILE for name in formats()}
     return sorted((file for file in files if file.exists()), key=lambda file: -file.stat().st_mtime_ns)
 
 
-def _load(name: str, file: FilePath) -> SetpointChunk:
+def _load(name: str, file: FilePath) -> SetpointFile:
     try:
         return format_named(name).load(file)
     except FileNotFoundError:

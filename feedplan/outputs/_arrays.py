@@ -9,16 +9,30 @@ from typing import Any
 import numpy as np
 
 from feedplan.errors import InputError
-from feedplan.outputs import QUANTITIES
-from feedplan.setpoints import SetpointChunk
+from feedplan.outputs import FORMAT, QUANTITIES, SetpointFile, require_format
+
+_UNITS = ("mm", "deg")
 
 
-def chunk_of(arrays: Mapping[str, Any], file: FilePath) -> SetpointChunk:
-    """The chunk in these named arrays. Raises InputError naming the file and what is wrong with it."""
+def chunk_of(arrays: Mapping[str, Any], file: FilePath) -> SetpointFile:
+    """The chunk in these named arrays. Raises InputError naming the file and what is wrong with it.
+
+    `format`, `units` and `period` may be missing, as in files from elsewhere.
+    """
     missing = [name for name in ("t", *QUANTITIES, "line", "axes") if name not in arrays]
     if missing:
         raise InputError(f"{file} is not a file of setpoints: {', '.join(missing)} is missing")
+    require_format(_single(arrays.get("format", FORMAT)), str(file))
     axes = tuple(str(name) for name in np.asarray(arrays["axes"]).ravel())
+    twice = next((name for name in axes if axes.count(name) > 1), None)
+    if twice is not None:
+        raise InputError(f"{file}: the axis {twice} comes {axes.count(twice)} times: give each axis once")
+    units = tuple(str(unit) for unit in np.asarray(arrays.get("units", ())).ravel())
+    if units and (len(units) != len(axes) or not set(units) <= set(_UNITS)):
+        raise InputError(f"{file}: units are {' '.join(units)}: give mm or deg for each of {' '.join(axes)}")
+    period = _single(arrays["period"]) if "period" in arrays else None
+    if period is not None and not (isinstance(period, (int, float)) and 0 < period < np.inf):
+        raise InputError(f"{file}: the period is {period!r}: give a positive number [s]")
     t = np.asanyarray(arrays["t"])
     if t.ndim != 1 or len(t) == 0:
         raise InputError(f"{file} holds no setpoints: t has the shape {t.shape}, (n,) is needed")
@@ -32,4 +46,12 @@ def chunk_of(arrays: Mapping[str, Any], file: FilePath) -> SetpointChunk:
     )
     with np.errstate(invalid="ignore"):
         line = np.asanyarray(arrays["line"]).astype(np.int32, copy=False)
-    return SetpointChunk(t, position, velocity, acceleration, jerk, line, axes)
+    return SetpointFile(
+        t, position, velocity, acceleration, jerk, line, axes, file=file, units=units, period=period
+    )
+
+
+def _single(value: Any) -> Any:
+    """A number that a file may hold as an array of one."""
+    array = np.asarray(value)
+    return array.item() if array.size == 1 else value

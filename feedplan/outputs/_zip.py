@@ -58,11 +58,11 @@ class NpyArchive:
         self._end = place
 
     def append(self, name: str, rows: NDArray[Any]) -> None:
-        """The next rows of the array of that name."""
-        if len(rows) == 0:
-            return
+        """The next rows of the array of that name, or the number where it is a single one."""
         member = self._members[name]
-        self._write(member, np.ascontiguousarray(rows, dtype=member.dtype).data.cast("B"))
+        rows = np.ascontiguousarray(rows, dtype=member.dtype)
+        if rows.size:
+            self._write(member, rows.data.cast("B"))
 
     def close(self) -> None:
         """Writes the heads, now that the checksums are known, and the directory."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from feedplan._solvers import csv_rows
 from feedplan.errors import InputError
-from feedplan.outputs import QUANTITIES, Add
+from feedplan.outputs import QUANTITIES, Add, Header, SetpointFile
 from feedplan.outputs._arrays import chunk_of
 from feedplan.setpoints import SetpointChunk
 
@@ -23,17 +23,21 @@ FILE = "setpoints.csv"
 _BYTES_AT_ONCE = 16_000_000
 
 
-def header(axes: Sequence[str]) -> str:
+def column_names(axes: Sequence[str], units: Sequence[str]) -> str:
     """The names of the columns: `t [s],position X [mm],…,line`."""
-    columns = [f"{name} {axis} [{unit}]" for name, unit in QUANTITIES.items() for axis in axes]
+    columns = [
+        f"{name} {axis} [{unit}{per}]"
+        for name, per in QUANTITIES.items()
+        for axis, unit in zip(axes, units, strict=True)
+    ]
     return ",".join(["t [s]", *columns, "line"])
 
 
 @contextmanager
-def writer(file: FilePath, axes: Sequence[str], count: int) -> Iterator[Add]:
+def writer(file: FilePath, header: Header, count: int) -> Iterator[Add]:
     """Writes the header, then a line for every setpoint."""
     with file.open("wb") as stream:
-        stream.write(f"{header(axes)}\n".encode())
+        stream.write(f"{column_names(header.axes, header.units)}\n".encode())
 
         def add(chunk: SetpointChunk) -> None:
             values = np.column_stack([chunk.t, *(getattr(chunk, name) for name in QUANTITIES)])
@@ -43,16 +47,17 @@ def writer(file: FilePath, axes: Sequence[str], count: int) -> Iterator[Add]:
         yield add
 
 
-def load(file: FilePath) -> SetpointChunk:
+def load(file: FilePath) -> SetpointFile:
     """The setpoints of a csv file with the header that this format writes."""
     parts: list[NDArray[np.float64]] = []
     done = 1
     try:
         with file.open(encoding="utf-8") as stream:
             first = stream.readline().strip()
-            axes = tuple(re.findall(r"position (\S+) \[", first))
-            if not axes or first != header(axes):
-                raise InputError(f"{file}, line 1: the columns must be named {header(axes or ('X', 'Y'))}")
+            found = re.findall(r"position (\S+) \[(mm|deg)\]", first)
+            axes, units = zip(*found, strict=True) if found else (("X", "Y"), ("mm", "mm"))
+            if first != (names := column_names(axes, units)):
+                raise InputError(f"{file}, line 1: the columns must be named {names}")
             width = 2 + len(QUANTITIES) * len(axes)
             while lines := stream.readlines(_BYTES_AT_ONCE):
                 parts.append(_rows(lines, width, file, done))
@@ -63,7 +68,7 @@ def load(file: FilePath) -> SetpointChunk:
     groups = np.split(table[:, 1:-1], len(QUANTITIES), axis=1)
     arrays = dict(zip(QUANTITIES, groups, strict=True))
     line = table[:, -1].astype(np.int32)
-    return chunk_of({"t": table[:, 0], **arrays, "line": line, "axes": axes}, file)
+    return chunk_of({"t": table[:, 0], **arrays, "line": line, "axes": axes, "units": units}, file)
 
 
 def _rows(lines: list[str], width: int, file: FilePath, done: int) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path as FilePath
 from typing import IO, Any
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.errors import InputError
-from feedplan.outputs import QUANTITIES, Add
+from feedplan.outputs import FORMAT, QUANTITIES, Add, Header, SetpointFile
 from feedplan.outputs._arrays import chunk_of
 from feedplan.setpoints import SetpointChunk
 
@@ -26,7 +26,7 @@ _ROWS_AT_ONCE = 10_000
 
 
 @contextmanager
-def writer(file: FilePath, axes: Sequence[str], count: int) -> Iterator[Add]:
+def writer(file: FilePath, header: Header, count: int) -> Iterator[Add]:
     """Writes one object; each array grows in a file of its own until all are joined, so memory stays flat."""
     names = ("t", *QUANTITIES, "line")
     with ExitStack() as stack:
@@ -44,8 +44,8 @@ def writer(file: FilePath, axes: Sequence[str], count: int) -> Iterator[Add]:
 
         yield add
         stream = stack.enter_context(file.open("w", encoding="utf-8"))
-        units = {"t": "s", **QUANTITIES}
-        stream.write(f'{{"axes":{json.dumps(list(axes))},"units":{json.dumps(units)}')
+        head = {"format": FORMAT, "period": header.period, "axes": header.axes, "units": header.units}
+        stream.write(json.dumps(head)[:-1])
         for name, part in parts.items():
             stream.write(f',\n"{name}":[')
             part.seek(0)
@@ -62,7 +62,7 @@ def _text(rows: NDArray[Any]) -> str:
     return json.dumps(rows.tolist(), separators=(",", ":"))[1:-1]
 
 
-def load(file: FilePath) -> SetpointChunk:
+def load(file: FilePath) -> SetpointFile:
     """The setpoints of a json file."""
     try:
         table = json.loads(file.read_text(encoding="utf-8"))
@@ -77,5 +77,5 @@ def load(file: FilePath) -> SetpointChunk:
         arrays |= {"line": np.array(table["line"], dtype=np.int32)} if "line" in table else {}
     except (TypeError, ValueError, OverflowError):
         raise InputError(f"{file}: t, position, … must be arrays of numbers, one row a setpoint") from None
-    arrays |= {"axes": table["axes"]} if "axes" in table else {}
+    arrays |= {name: table[name] for name in ("format", "period", "axes", "units") if name in table}
     return chunk_of(arrays, file)

@@ -1,4 +1,5 @@
-"""Setpoints as numpy's npz: `t`, `position`, `velocity`, `acceleration`, `jerk`, `line`, `axes`.
+"""Setpoints as numpy's npz: `t`, `position`, `velocity`, `acceleration`, `jerk`, `line`, `axes`, and single
+numbers `format` and `period` [s]; `units` are those of the axes, mm or deg.
 
 Uncompressed: servo setpoints hardly shrink, and so they can be mapped into memory instead of read.
 """
@@ -6,15 +7,16 @@ Uncompressed: servo setpoints hardly shrink, and so they can be mapped into memo
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feedplan.errors import InputError
-from feedplan.outputs import QUANTITIES, Add
+from feedplan.outputs import FORMAT, QUANTITIES, Add, Header, SetpointFile
 from feedplan.outputs._arrays import chunk_of
 from feedplan.outputs._zip import NpyArchive
 from feedplan.setpoints import SetpointChunk
@@ -23,19 +25,25 @@ FILE = "setpoints.npz"
 
 
 @contextmanager
-def writer(file: FilePath, axes: Sequence[str], count: int) -> Iterator[Add]:
+def writer(file: FilePath, header: Header, count: int) -> Iterator[Add]:
     """Writes `count` setpoints in one pass; only the chunk at hand is in memory."""
-    names = np.array(axes, dtype=np.str_)
     double, integer = np.dtype("<f8"), np.dtype("<i4")
+    common: dict[str, NDArray[Any]] = {
+        "format": np.array(FORMAT, integer),
+        "period": np.array(header.period, double),
+        "axes": np.array(header.axes, np.str_),
+        "units": np.array(header.units, np.str_),
+    }
     arrays: dict[str, tuple[tuple[int, ...], np.dtype[Any]]] = {
         "t": ((count,), double),
-        **{name: ((count, len(axes)), double) for name in QUANTITIES},
+        **{name: ((count, len(header.axes)), double) for name in QUANTITIES},
         "line": ((count,), integer),
-        "axes": (names.shape, names.dtype),
+        **{name: (array.shape, array.dtype) for name, array in common.items()},
     }
     with file.open("wb") as stream:
         archive = NpyArchive(stream, arrays)
-        archive.append("axes", names)
+        for name, array in common.items():
+            archive.append(name, array)
 
         def add(chunk: SetpointChunk) -> None:
             for name in ("t", *QUANTITIES, "line"):
@@ -45,7 +53,7 @@ def writer(file: FilePath, axes: Sequence[str], count: int) -> Iterator[Add]:
         archive.close()
 
 
-def load(file: FilePath) -> SetpointChunk:
+def load(file: FilePath) -> SetpointFile:
     """The setpoints of an npz file; arrays that are not compressed stay on disk until they are used."""
     try:
         with zipfile.ZipFile(file) as archive:

@@ -55,7 +55,7 @@ class Program:
     in deg/s of the tool's turning; columns that a meaning does not use stay as they are. A change of meaning
     is a full stop and moves no joint: `change_move` (c,) are the first moves in a new meaning, and
     `change_start` (c, axes) where they start in the new words, `starts` takes both into account.
-    `warnings` are sentences for the user.
+    `warnings` are sentences for the user; `sha256` is the hash of the file it was read from, if it was.
     """
 
     name: str
@@ -83,6 +83,7 @@ class Program:
     change_move: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
     change_start: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0)))
     warnings: tuple[str, ...] = ()
+    sha256: str | None = None
 
     def __len__(self) -> int:
         return len(self.kind)

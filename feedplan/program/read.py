@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from feedplan.machine.machine import Machine
@@ -38,5 +40,7 @@ def read_program(
     reader, most = READERS.get(file.suffix.lower(), (None, max_bytes))
     content = read_bytes(file, min(max_bytes, most))
     if reader is None:
-        return read_gcode(content, machine, file.name, block_delete=block_delete)
-    return reader(content, machine, file.name)
+        program = read_gcode(content, machine, file.name, block_delete=block_delete)
+    else:
+        program = reader(content, machine, file.name)
+    return replace(program, sha256=hashlib.sha256(content).hexdigest())

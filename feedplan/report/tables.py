@@ -33,6 +33,8 @@ _NAMES = {
     "grid": "time grid",
     "recorded_velocity": "recorded velocity",
     "recorded_acceleration": "recorded acceleration",
+    "recorded_change": "recorded acceleration and velocity",
+    "recorded_jerk": "recorded jerk and acceleration",
     "numbers": "numbers that are not finite",
 }
 

@@ -363,7 +363,8 @@ def test_recorded_columns_are_compared_where_there_are_any() -> None:
     result = audit_setpoints(
         T, STRAIGHT, PLANE, velocity=1.05 * speed, acceleration=np.full((251, 2), 1001.0)
     )
-    assert {name for name, _ in broken(result)} == {"recorded_velocity", "recorded_acceleration"}
+    names = {"recorded_velocity", "recorded_acceleration", "recorded_change"}
+    assert {name for name, _ in broken(result)} == names
 
 
 @pytest.mark.parametrize("place", [(0, 0), (100, 1), (250, 0)])

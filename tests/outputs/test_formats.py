@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from feedplan.errors import InputError
-from feedplan.outputs import format_named, formats, load_setpoints
-from feedplan.outputs.csv import header
+from feedplan.outputs import FORMAT, Header, format_named, formats, load_setpoints
+from feedplan.outputs.csv import column_names
 from feedplan.setpoints import SetpointChunk
 
 NAMES = ("t", "position", "velocity", "acceleration", "jerk", "line")
@@ -31,10 +31,18 @@ def part_of(whole: SetpointChunk, first: int, last: int) -> SetpointChunk:
 
 def written(name: str, folder: Path, whole: SetpointChunk, cuts: tuple[int, ...] = ()) -> Path:
     output = format_named(name)
-    with output.writer(folder / output.FILE, whole.axes, len(whole.t)) as add:
+    with output.writer(folder / output.FILE, header(whole.axes), len(whole.t)) as add:
         for first, last in zip((0, *cuts), (*cuts, len(whole.t)), strict=True):
             add(part_of(whole, first, last))
     return folder / output.FILE
+
+
+def ending(name: str) -> str:
+    return Path(format_named(name).FILE).suffix
+
+
+def header(axes: tuple[str, ...]) -> Header:
+    return Header(axes, tuple("deg" if axis in "ABC" else "mm" for axis in axes), 0.001)
 
 
 def same(a: SetpointChunk, b: SetpointChunk) -> bool:
@@ -42,14 +50,18 @@ def same(a: SetpointChunk, b: SetpointChunk) -> bool:
 
 
 def test_the_three_formats_are_found() -> None:
-    assert set(formats()) >= {"npz", "csv", "json"}
+    assert set(formats()) >= {"npz", "npz-compressed", "csv", "json"}
 
 
 @pytest.mark.parametrize("name", formats())
 @pytest.mark.parametrize("axes", ["X", "XYZ", "XYZABC"])
 def test_what_is_read_is_what_was_written(name: str, axes: str, tmp_path: Path) -> None:
     whole = chunk(1000, axes)
-    assert same(load_setpoints(written(name, tmp_path, whole)), whole)
+    file = written(name, tmp_path, whole)
+    read = load_setpoints(file)
+    assert same(read, whole)
+    assert (read.file, read.units) == (file, header(whole.axes).units)
+    assert read.period == (None if name == "csv" else 0.001)
 
 
 @pytest.mark.parametrize("name", formats())
@@ -81,7 +93,7 @@ def test_a_single_setpoint_is_enough(name: str, tmp_path: Path) -> None:
 def test_a_file_of_something_else_is_refused_in_one_sentence(
     name: str, content: bytes, tmp_path: Path
 ) -> None:
-    file = tmp_path / f"other.{name}"
+    file = tmp_path / f"other{ending(name)}"
     file.write_bytes(content)
     with pytest.raises(InputError, match=str(file)) as error:
         load_setpoints(file)
@@ -99,14 +111,14 @@ def test_a_truncated_file_is_refused(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", formats())
 def test_a_missing_file_is_named(name: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"none\.\w+ does not exist"):
-        load_setpoints(tmp_path / f"none.{name}")
+        load_setpoints(tmp_path / f"none{ending(name)}")
 
 
 @pytest.mark.parametrize("name", formats())
 def test_an_interrupted_write_raises_what_interrupted_it(name: str, tmp_path: Path) -> None:
     def write() -> None:
         output = format_named(name)
-        with output.writer(tmp_path / output.FILE, ("X",), 100) as add:
+        with output.writer(tmp_path / output.FILE, header(("X",)), 100) as add:
             add(chunk(10, "X"))
             raise KeyError
 
@@ -119,7 +131,7 @@ def test_an_unknown_ending_and_an_empty_folder_name_the_remedy(tmp_path: Path) -
         load_setpoints(tmp_path / "setpoints.txt")
     with pytest.raises(InputError, match="feedplan plan PROGRAM -o"):
         load_setpoints(tmp_path)
-    with pytest.raises(InputError, match="use one of csv, json, npz"):
+    with pytest.raises(InputError, match="use one of csv, json, npz, npz-compressed"):
         format_named("parquet")
 
 
@@ -127,8 +139,10 @@ def test_npz_is_what_numpy_reads_and_maps_instead_of_loading(tmp_path: Path) -> 
     whole = chunk(50)
     file = written("npz", tmp_path, whole)
     with np.load(file) as arrays:
-        assert sorted(arrays) == sorted((*NAMES, "axes"))
+        assert sorted(arrays) == sorted((*NAMES, "axes", "format", "period", "units"))
         assert arrays["axes"].tolist() == ["X", "Y", "Z"]
+        assert arrays["units"].tolist() == ["mm", "mm", "mm"]
+        assert (arrays["format"], arrays["period"]) == (FORMAT, 0.001)
         for name in NAMES:
             np.testing.assert_array_equal(arrays[name], getattr(whole, name))
     read = load_setpoints(file)
@@ -176,9 +190,52 @@ def test_csv_has_a_header_with_units_and_exact_numbers(tmp_path: Path) -> None:
     ]
 
 
+def test_csv_tells_angles_in_degrees(tmp_path: Path) -> None:
+    first = written("csv", tmp_path, chunk(1, "XA")).read_text().splitlines()[0]
+    assert first.startswith("t [s],position X [mm],position A [deg],velocity X [mm/s],velocity A [deg/s],")
+
+
+@pytest.mark.parametrize("name", ["npz", "json"])
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"format": 7}, r"has the format 7, this feedplan reads 1: use the feedplan that wrote it"),
+        ({"axes": ["X", "X"]}, "the axis X comes 2 times: give each axis once"),
+        ({"units": ["mm"]}, "units are mm: give mm or deg for each of X Y"),
+        ({"units": ["mm", "ft"]}, "units are mm ft: give mm or deg"),
+        ({"period": 0.0}, r"the period is 0.0: give a positive number \[s\]"),
+        ({"period": [1.0, 2.0]}, r"the period is .*: give a positive number \[s\]"),
+    ],
+)
+def test_what_a_file_says_of_its_setpoints_is_read_and_judged(
+    name: str, change: dict[str, object], sentence: str, tmp_path: Path
+) -> None:
+    whole = chunk(5, "XY")
+    table = {key: getattr(whole, key).tolist() for key in NAMES} | {"axes": ["X", "Y"]} | change
+    file = tmp_path / f"a.{name}"
+    if name == "npz":
+        np.savez(file, **{key: np.array(value) for key, value in table.items()})
+    else:
+        file.write_text(json.dumps(table))
+    with pytest.raises(InputError, match=sentence):
+        load_setpoints(file)
+
+
+def test_npz_is_smaller_where_it_is_compressed(tmp_path: Path) -> None:
+    (tmp_path / "packed").mkdir()
+    whole = SetpointChunk(*(np.zeros((1000, 3)) for _ in range(5)), np.zeros(1000, np.int32), tuple("XYZ"))
+    whole = SetpointChunk(np.arange(1000.0), *(getattr(whole, name) for name in NAMES[1:]), axes=whole.axes)
+    plain, packed = written("npz", tmp_path, whole), written("npz-compressed", tmp_path / "packed", whole)
+    assert packed.stat().st_size < 0.1 * plain.stat().st_size
+    assert [entry.name for entry in packed.parent.iterdir()] == ["setpoints.npz"]
+    with np.load(plain) as one, np.load(packed) as other:
+        assert set(one) == set(other)
+        assert all(np.array_equal(one[name], other[name]) for name in one)
+
+
 def test_csv_errors_name_the_line(tmp_path: Path) -> None:
     file = tmp_path / "a.csv"
-    rows = f"{header('X')}\n0,0,0,0,0,1\n"
+    rows = f"{column_names('X', ['mm'])}\n0,0,0,0,0,1\n"
     file.write_text(rows + "0,0,0,0,0\n")
     with pytest.raises(InputError, match="line 3: 5 values where 6 are needed"):
         load_setpoints(file)
@@ -193,7 +250,7 @@ def test_json_has_the_names_of_npz_and_null_for_what_is_not_finite(tmp_path: Pat
     file = written("json", tmp_path, whole)
     table = json.loads(file.read_text())
     assert table["axes"] == ["X", "Y"]
-    assert table["units"]["jerk"] == "mm/s^3"
+    assert (table["format"], table["period"], table["units"]) == (FORMAT, 0.001, ["mm", "mm"])
     assert table["position"] == whole.position.tolist()
     assert table["jerk"][1][0] is None
     assert np.isnan(load_setpoints(file).jerk[1, 0])
@@ -201,7 +258,10 @@ def test_json_has_the_names_of_npz_and_null_for_what_is_not_finite(tmp_path: Pat
 
 def test_fewer_rows_than_announced_are_a_defect(tmp_path: Path) -> None:
     output = format_named("npz")
-    with pytest.raises(ValueError, match="lacks"), output.writer(tmp_path / "a.npz", ("X",), 100) as add:
+    with (
+        pytest.raises(ValueError, match="lacks"),
+        output.writer(tmp_path / "a.npz", header(("X",)), 100) as add,
+    ):
         add(chunk(10, "X"))
 
 

@@ -1,0 +1,181 @@
+"""The check of setpoints in files: against each other, against the plan they are of, and by the audit.
+
+A plan's folder is complete: plan.json holds the machine and says which setpoints belong to it. Other
+setpoints need a machine only.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Any
+
+from feedplan.audit import Audit, audit_setpoints
+from feedplan.errors import InputError
+from feedplan.files import SUMMARY_FILE
+from feedplan.geometry.corners import Corners
+from feedplan.machine.file import parse
+from feedplan.machine.machine import Machine
+from feedplan.outputs import SetpointFile, load_setpoints, require_format
+from feedplan.planners import corners, limits_jerk, methods
+
+# What the last time of setpoints may differ from the plan's by rounding, relative.
+ROUNDING = 1e-9
+
+
+def check(
+    place: str | FilePath,
+    machine: Machine | str | None = None,
+    *,
+    resolution: float = 0.0,
+    jerk: bool = False,
+) -> Audit:
+    """Audits setpoints from files alone: those of a plan's folder, or a file.
+
+    Where plan.json stands beside the setpoints they must be the ones of that plan. `machine`, or the name or
+    file of one, replaces that of the plan. `resolution` [mm] is the last digit of rounded positions. Jerk is
+    judged where the plan's method limits it, or where `jerk` says so. Raises InputError for files that cannot
+    be read, contradict each other or were changed.
+    """
+    points = load_setpoints(place)
+    file = points.file.parent / SUMMARY_FILE
+    plan = _read(file) if file.exists() else None
+    if plan is not None:
+        _require_same(plan, points)
+    if machine is None:
+        if plan is None:
+            raise InputError(
+                f"without {file} {points.file.name} names no machine: give the machine with --machine"
+            )
+        known = plan.machine
+    else:
+        known = machine if isinstance(machine, Machine) else Machine.load(machine)
+    _require_units(points, known)
+    return audit_setpoints(
+        points.t,
+        points.position,
+        known,
+        axes=points.axes,
+        velocity=points.velocity,
+        acceleration=points.acceleration,
+        recorded_jerk=points.jerk,
+        line=points.line,
+        resolution=resolution,
+        jerk=jerk or (plan is not None and limits_jerk(plan.method)),
+        corners=plan is not None and corners(plan.method) is Corners.PROGRAMMED,
+        period=plan.period if plan else points.period or known.period,
+    )
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """What plan.json says of its setpoints: the `count`, from 0 to `duration` [s] every `period` [s]."""
+
+    file: FilePath
+    machine: Machine
+    method: str
+    axes: tuple[str, ...]
+    count: int
+    duration: float
+    period: float
+
+
+def _read(file: FilePath) -> _Plan:
+    """What a plan.json says. Raises InputError where it is damaged, changed or of another version."""
+    try:
+        summary = json.loads(file.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{file} is not valid JSON ({error}): plan again") from None
+    except OSError as error:
+        raise InputError(f"{file} cannot be read: {error.strerror or error}") from None
+    entries = _Entries(file, summary)
+    require_format(entries.take("format", int), str(file))
+    text = entries.take("machine_file", str)
+    if hashlib.sha256(text.encode("utf-8", "replace")).hexdigest() != entries.take(
+        "machine_file_sha256", str
+    ):
+        raise InputError(f"{file}: machine_file was changed: plan again, or give the machine with --machine")
+    method = entries.take("method", str)
+    if method not in methods():
+        raise InputError(f"{file}: the method '{method}' is unknown: use the feedplan that wrote it")
+    points = _Entries(file, entries.take("setpoints", dict), "setpoints ")
+    plan = _Plan(
+        file=file,
+        machine=parse(text, f"in {file}", joints_only=True),
+        method=method,
+        axes=tuple(map(str, points.take("axes", list))),
+        count=points.take("count", int),
+        duration=points.number("duration"),
+        period=points.number("period"),
+    )
+    # Each run, and the pause before the first, takes less than one period more than in the plan.
+    time, waits = entries.number("time"), (entries.take("runs", int) + 1) * plan.period
+    if not time * (1.0 - ROUNDING) <= plan.duration <= time + waits:
+        raise InputError(
+            f"{file}: the time is {time:.9g} s, its setpoints take {plan.duration:.9g} s: "
+            "one of them was changed, plan again"
+        )
+    return plan
+
+
+class _Entries:
+    """The entries of a table in a file."""
+
+    def __init__(self, file: FilePath, table: Any, place: str = "") -> None:
+        if not isinstance(table, Mapping):
+            raise InputError(
+                f"{file} is no plan: an object with format, machine_file, … is needed: plan again"
+            )
+        self._file, self._table, self._place = file, table, place
+
+    def take(self, name: str, kind: type) -> Any:
+        """An entry of that type. Raises InputError where it is missing or something else."""
+        value = self._table.get(name)
+        if not isinstance(value, kind) or isinstance(value, bool):
+            what = "missing" if value is None else repr(value)
+            raise InputError(f"{self._file}: {self._place}{name} is {what}: plan again")
+        return value
+
+    def number(self, name: str) -> float:
+        """A finite number that is not negative."""
+        value = self._table.get(name)
+        good = isinstance(value, (int, float)) and not isinstance(value, bool) and 0 <= value < math.inf
+        if not good:
+            raise InputError(f"{self._file}: {self._place}{name} is {value!r}: plan again")
+        return float(value)  # type: ignore[arg-type]
+
+
+def _require_same(plan: _Plan, points: SetpointFile) -> None:
+    """Raises InputError unless the setpoints are those that the plan tells of."""
+    rows: list[tuple[str, Any, Any, str]] = [
+        ("axes", " ".join(points.axes), " ".join(plan.axes), ""),
+        ("number of setpoints", len(points), plan.count, ""),
+        ("period", points.period or plan.period, plan.period, " s"),
+    ]
+    for what, own, planned, unit in rows:
+        if own != planned:
+            raise _other(points, plan, what, f"{own}{unit}", f"{planned}{unit}")
+    last = float(points.t[-1])
+    # What is not a number the audit tells, with its place.
+    if math.isfinite(last) and abs(last - plan.duration) > ROUNDING * max(plan.duration, plan.period):
+        raise _other(points, plan, "last time", f"{last:.9g} s", f"{plan.duration:.9g} s")
+
+
+def _other(points: SetpointFile, plan: _Plan, what: str, own: str, planned: str) -> InputError:
+    return InputError(
+        f"{points.file}: the {what} is {own}, {plan.file} says {planned}: these are not the setpoints of "
+        "this plan, plan again or move them elsewhere and give the machine with --machine"
+    )
+
+
+def _require_units(points: SetpointFile, machine: Machine) -> None:
+    for name, unit in zip(points.axes, points.units, strict=False):
+        if name in machine.axis_names and (own := machine.axis(name).unit) != unit:
+            raise InputError(
+                f"{points.file}: axis {name} is in {unit}, on the machine {machine.name} in {own}: "
+                "give the machine that it was planned for"
+            )
