@@ -38,7 +38,7 @@ class Header:
     period: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class SetpointFile(SetpointChunk):
     """Setpoints read from a `file`; `units` are those of the axes, empty where the file tells none; `period`
     [s], None where it tells none."""
