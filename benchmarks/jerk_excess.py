@@ -8,7 +8,7 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
-from feedplan.constraints.problem import Problem
+from feedplan.constraints.problem import Problem, speed_square
 from feedplan.profile import ArcKind, SpeedProfile
 
 Array = NDArray[np.float64]
@@ -56,7 +56,8 @@ def jerk_excess(problem: Problem, profile: SpeedProfile, samples: int = 20) -> E
     velocity = np.abs(q1 * v) / problem.max_velocity
     acceleration = np.abs(q2 * v**2 + q1 * a) / problem.max_acceleration
     jerk = np.abs(q3 * v**3 + 3 * q2 * v * a + q1 * j) / problem.max_jerk
-    feed = v[:, 0] / problem.feed[piece]
+    tool_v = v[:, 0] * _tool_share(problem, piece, inside.ravel())
+    feed = tool_v / problem.feed[piece]
     chord = np.zeros(1)
     if np.isfinite(problem.chord_tolerance):
         tool = (problem.tip_curve or problem.path.curve).evaluate(piece, inside.ravel(), 2)
@@ -66,7 +67,7 @@ def jerk_excess(problem: Problem, profile: SpeedProfile, samples: int = 20) -> E
         delta = problem.chord_tolerance
         with np.errstate(divide="ignore"):
             limit = np.where(curvature * delta < 1, 8 * delta / curvature - 4 * delta**2, 4 * delta**2)
-        chord = v[:, 0] * problem.period / np.sqrt(limit)
+        chord = tool_v * problem.period / np.sqrt(limit)
     v, a, _ = pace
     joined = np.ones(len(profile) - 1, dtype=bool)
     joined[profile.runs[1:-1] - 1] = False
@@ -86,7 +87,7 @@ def jerk_excess(problem: Problem, profile: SpeedProfile, samples: int = 20) -> E
 def _by_length(problem: Problem, piece: NDArray[np.integer], u: Array) -> tuple[Array, Array, Array]:
     """Derivatives of the axes by the length of the tool's way (places, axes) up to the third."""
     _, c1, c2, c3 = problem.derivatives(piece, u, 3)
-    if problem.tip_speed is None:
+    if problem.way_speed is None:
         # With T the direction and P = I - T Tᵀ: nothing across a straight way at any parameter speed.
         d = (c1**2).sum(axis=1, keepdims=True)
         tangent = c1 / np.sqrt(d)
@@ -161,9 +162,16 @@ def lengths(problem: Problem, piece: NDArray[np.uint32], start: Array, u: Array)
     return np.cumsum(half * (speed @ WEIGHTS), axis=1)
 
 
+def _tool_share(problem: Problem, piece: NDArray[np.integer], u: Array) -> Array:
+    """The speed that the feed is about over that along the path, at places."""
+    if problem.way_speed is None:
+        return np.ones(len(u))
+    return np.sqrt(speed_square(problem, piece, u) / _speed_sq(problem, piece, u, 0)[0])
+
+
 def _speed_sq(problem: Problem, piece: NDArray[np.integer], u: Array, order: int) -> list[Array]:
-    """|C'|² of the tool at places and its derivatives by u."""
-    tip = problem.tip_speed
+    """|C'|² of the path at places and its derivatives by u."""
+    tip = problem.way_speed
     if tip is None:
         _, c1, c2, c3 = problem.path.curve.evaluate(piece, u, 3)
         return [

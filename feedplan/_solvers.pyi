@@ -127,6 +127,7 @@ class Sampler:
         offsets: NDArray[np.int64],
         width: NDArray[np.float64],
         tip_speed: tuple[NDArray[np.float64], NDArray[np.int64]] | None,
+        way_speed: tuple[NDArray[np.float64], NDArray[np.int64]] | None,
         line: NDArray[np.int32],
         runs: NDArray[np.int64],
         start_dwell: float,

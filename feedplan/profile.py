@@ -43,7 +43,8 @@ class SpeedProfile:
     q'_k0² p0 = q'_k1² p1 − 2·value·Δq_k, and from the duration where both ends are of that kind. Where it is
     a stop, p is its limit.
     On PATH_JERK and SPEED_CUBIC `a0`, `a1` are the acceleration along the path at both ends, v̇ [mm/s²]; 0 on
-    all other kinds. Speed v = |C'| √p and length are those of the tool where the problem has a `tip_speed`.
+    all other kinds. Speed v = |C'| √p and length are those along the path, by the problem's `way_speed` where
+    it has one.
     `kinked` (m,) pieces at whose start a jump of curvature holds the speed.
     PATH_JERK: v1 = v0 + a0·T + value·T²/2, a1 = a0 + value·T, T the duration. SPEED_CUBIC: v0, v1 > 0.
     """

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import Sampler
-from feedplan.constraints.problem import Problem
+from feedplan.constraints.problem import Problem, TipSpeed
 from feedplan.curves.length import INTERPOLATORS as INTERPOLATORS
 from feedplan.errors import InputError
 from feedplan.profile import SpeedProfile
@@ -146,10 +146,11 @@ def setpoints(
 
 def sampler(problem: Problem, profile: SpeedProfile, period: float, interpolator: str = "sarfraz") -> Sampler:
     """The native reader of a profile on its path. Raises InputError as `setpoints`."""
-    path, tip = problem.path, problem.tip_speed
+    path = problem.path
     return Sampler(
         *problem.curve.columns(),
-        None if tip is None else (_array(tip.coefficients, np.float64), _array(tip.offsets, np.int64)),
+        _columns(problem.tip_speed),
+        _columns(problem.way_speed),
         _array(path.line, np.int32),
         _array(path.runs, np.int64),
         float(path.start_dwell),
@@ -169,6 +170,12 @@ def sampler(problem: Problem, profile: SpeedProfile, period: float, interpolator
         float(period),
         interpolator == "newton",
     )
+
+
+def _columns(speed: TipSpeed | None) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
+    if speed is None:
+        return None
+    return _array(speed.coefficients, np.float64), _array(speed.offsets, np.int64)
 
 
 def _array(values: ArrayLike, dtype: type[Scalar]) -> NDArray[Scalar]:

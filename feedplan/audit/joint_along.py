@@ -1,4 +1,4 @@
-"""The motion of the tool tip on arcs of limited jerk, from the length of its way from the start of each arc.
+"""The motion along the path on arcs of limited jerk, from the length of the way from the start of each arc.
 
 At constant jerk the time of a length is found by Newton's method within a bracket that is halved; where v² is
 a cubic polynomial of the length the time is integrated.
@@ -21,7 +21,7 @@ ROUNDS = 100
 
 @dataclass(frozen=True)
 class Pace:
-    """Speed `v` of the tip, its change `a`, that one's change `j`, and the `time` since the arc's start."""
+    """Speed `v` along the path, its change `a`, that one's change `j`; the `time` since the arc's start."""
 
     v: Array
     a: Array
@@ -30,12 +30,12 @@ class Pace:
 
 
 def ways(path: JointPath, piece: Numbers, u: Array) -> Array:
-    """Length of the tip's path (a, places) from the first place of each row to every one."""
+    """Length of the path (a, places) from the first place of each row to every one."""
 
     def rule(a: Array, b: Array) -> Array:
         middle, half = 0.5 * (a + b), 0.5 * (b - a)
         at = middle[..., None] + half[..., None] * GAUSS
-        speed = path.feed_slope(np.repeat(piece, at[0].size), at.ravel()).reshape(at.shape)
+        speed = path.way_slope(np.repeat(piece, at[0].size), at.ravel()).reshape(at.shape)
         return np.asarray((speed @ GAUSS_WEIGHTS) * half)
 
     a, b = u[:, :-1], u[:, 1:]
@@ -45,22 +45,18 @@ def ways(path: JointPath, piece: Numbers, u: Array) -> Array:
 
 
 def paces(path: JointPath, profile: SpeedProfile, arcs: Numbers, way: Array) -> Pace:
-    """The motion of arcs of kind PATH_JERK, SPEED_CUBIC or FEED at lengths (a, places) from end to end."""
+    """The motion of arcs of kind PATH_JERK or SPEED_CUBIC at lengths (a, places) from end to end."""
     piece = profile.piece[arcs].astype(np.int64)
-    ends = [path.feed_slope(piece, u[arcs]) for u in (profile.u0, profile.u1)]
+    ends = [path.way_slope(piece, u[arcs]) for u in (profile.u0, profile.u1)]
     v0, v1 = (slope * np.sqrt(p[arcs]) for slope, p in zip(ends, (profile.p0, profile.p1), strict=True))
     a0, a1 = profile.a0[arcs], profile.a1[arcs]
     value, duration = profile.value[arcs], profile.duration[arcs]
-    kind = profile.kind[arcs][:, None]
+    has_jerk = (profile.kind[arcs] == ArcKind.PATH_JERK)[:, None]
     by_jerk = constant_jerk(way, v0, v1, a0, a1, value, duration)
     by_cubic = cubic(way, v0, v1, a0, a1)
-    steady = np.sqrt(np.where(kind == ArcKind.FEED, value[:, None], 1.0)) + 0.0 * way
-    still = np.zeros_like(way)
-    feed = Pace(steady, still, still, way / steady)
-    kinds = [kind == ArcKind.PATH_JERK, kind == ArcKind.SPEED_CUBIC]
     return Pace(
         *(
-            np.select(kinds, [getattr(by_jerk, name), getattr(by_cubic, name)], getattr(feed, name))
+            np.where(has_jerk, getattr(by_jerk, name), getattr(by_cubic, name))
             for name in ("v", "a", "j", "time")
         )
     )

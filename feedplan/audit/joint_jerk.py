@@ -1,9 +1,9 @@
 """Jerk of joints that are not the path's axes, and how far their accelerations jump where arcs meet.
 
-With g the slope of the tip's way by u: g u̇ = v, g ü = a − g' u̇², g u⃛ = j − 3 g' u̇ ü − g'' u̇³, and a joint's
-jerk is q' u⃛ + 3 q'' u̇ ü + q''' u̇³. The derivatives of q and g are differences over seven places. The step
-between these is chosen, for each derivative, by what two of them, one twice the other, agree on; how far they
-may still be wrong is allowed for.
+With g the slope of the way along the path by u: g u̇ = v, g ü = a − g' u̇², g u⃛ = j − 3 g' u̇ ü − g'' u̇³,
+and a joint's jerk is q' u⃛ + 3 q'' u̇ ü + q''' u̇³. The derivatives of q and g are differences over seven
+places. The step between these is chosen, for each derivative, by what two of them, one twice the other, agree
+on; how far they may still be wrong is allowed for.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ WIDEST, STEPS, LEFT = 2.0**-4, 7, 0.25
 # Joints that leave a joint at a smaller angle than this, in rad, pass without a corner.
 SMOOTH = 1e-6
 
-KINDS = (ArcKind.FEED, ArcKind.PATH_JERK, ArcKind.SPEED_CUBIC)
+KINDS = (ArcKind.PATH_JERK, ArcKind.SPEED_CUBIC)
 
 
 def _stencils() -> tuple[Array, ...]:
@@ -52,7 +52,7 @@ STENCILS = _stencils()
 
 @dataclass(frozen=True)
 class Slopes:
-    """First to third derivatives by u of joints and tip's way at places, and how far each may be wrong.
+    """First to third derivatives by u of joints and way at places, and how far each may be wrong.
 
     `joints` and `joints_error` (3, n, joints); `way` and `way_error` (3, n).
     """
@@ -76,8 +76,8 @@ def slopes(path: JointPath, piece: Numbers, u: Array) -> Slopes:
             best, error = np.where(better, value, best), np.where(better, bound, error)
         coarse = fine
     joints = len(path.problem.axes)
-    # The last column is the tip's slope, whose first two derivatives are the second and third of its way.
-    speed = path.feed_slope(piece, u)
+    # The last column is the slope of the way: its first two derivatives are the second and third of the way.
+    speed = path.way_slope(piece, u)
     way = np.stack([speed, best[0, :, joints], best[1, :, joints]])
     way_error = np.stack([ROUNDINGS * EPS * speed, error[0, :, joints], error[1, :, joints]])
     return Slopes(best[:, :, :joints], error[:, :, :joints], way, way_error)
@@ -93,7 +93,7 @@ def _differences(path: JointPath, piece: Numbers, u: Array, share: float) -> tup
     many = np.repeat(piece, len(NODES))
     tip, slope = path.tip(many, places.ravel())
     q = path.joints(many, tip).reshape(count, len(NODES), -1)
-    speed = path.feed_slope(many, places.ravel()).reshape(count, len(NODES), 1)
+    speed = path.way_slope(many, places.ravel()).reshape(count, len(NODES), 1)
     change = path.between(piece, q[:, 3:4], q)
     values = np.concatenate([change, speed - speed[:, 3:4]], axis=2)
     # A joint feels the rounding of the tip as much as it moves with it.
@@ -215,10 +215,8 @@ def _joints(path: JointPath, profile: SpeedProfile, arcs: Numbers, starts: Array
     before, after = (profile.piece[x].astype(np.int64) for x in (arcs - 1, arcs))
     time, line = starts[arcs], problem.path.line[after]
     from_, to = profile.a1[arcs - 1], profile.a0[arcs]
-    alike = (path.feed_axes[before] == path.feed_axes[after]).all(axis=1)
     off = np.abs(to - from_) - ROUNDINGS * EPS * (np.abs(to) + np.abs(from_))
-    # Where the feed is about other axes the speed is another quantity.
-    worst.offer("acceleration_continuity", np.where(alike, off, 0.0), _negligible(path), time, line)
+    worst.offer("acceleration_continuity", off, _negligible(path), time, line)
     meet = before != after
     if not meet.any():
         return

@@ -3,7 +3,7 @@
 On an arc of constant acceleration of joint k: v_k² = v_k(slower end)² + 2 a Δq_k, u̇ = |v_k| / |dq_k/du|,
 and a way Δq_k takes 2 Δq_k over the sum of the speeds at its ends. Where a joint's speed is constant: the
 way over it; where p is linear in u: Δu over the mean √p; along a speed limit: ∫ |C'| du over the speed, by
-Gauss's rule; where jerk is limited, speed and time follow from the length of the tip's way.
+Gauss's rule; where jerk is limited, speed and time follow from the length of the way along the path.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from feedplan.profile import ArcKind, SpeedProfile
 
 SPEED_LINE = 5
 
-# Kinds whose speed follows from the length of the tip's way.
+# Kinds whose speed follows from the length of the way.
 BY_WAY = (ArcKind.PATH_JERK, ArcKind.SPEED_CUBIC)
 
 # Places of an arc, as shares of the variable in which √p would be linear if p were: close at the ends, where
@@ -83,6 +83,7 @@ def motion(path: JointPath, profile: SpeedProfile, arcs: Numbers, u: Array | Non
     steps = path.between(piece, position[:, :-1], position[:, 1:])
     way = np.concatenate([np.zeros((count, 1, steps.shape[2])), np.cumsum(steps, axis=1)], axis=1)
     tip_speed = path.feed_slope(many, u.ravel()).reshape(count, width)
+    way_speed = path.way_slope(many, u.ravel()).reshape(count, width)
     p = np.stack([profile.p0[arcs], profile.p1[arcs]], axis=1)
     with np.errstate(all="ignore"):
         own = np.where(profile.axis[arcs] < slope.shape[2], profile.axis[arcs], 0).astype(np.int64)
@@ -125,7 +126,7 @@ def motion(path: JointPath, profile: SpeedProfile, arcs: Numbers, u: Array | Non
                 speed / g,
                 np.sqrt(value * tip_speed),
                 line / tip_speed,
-                pace.v / tip_speed,
+                pace.v / way_speed,
             ],
             np.nan,
         )
@@ -162,7 +163,7 @@ def motion(path: JointPath, profile: SpeedProfile, arcs: Numbers, u: Array | Non
 def _by_way(
     path: JointPath, profile: SpeedProfile, arcs: Numbers, u: Array, by_way: NDArray[np.bool_]
 ) -> Pace:
-    """The motion of the tip (a, places) on arcs on which it follows from the length, 0 on the others."""
+    """The motion along the path (a, places) on arcs on which it follows from the length, 0 on the others."""
     pace = Pace(*(np.zeros(u.shape) for _ in range(4)))
     if by_way.any():
         piece = profile.piece[arcs[by_way]].astype(np.int64)

@@ -90,6 +90,12 @@ class JointPath:
         slope = self.tip(piece, u)[1]
         return np.asarray(np.linalg.norm(np.where(self.feed_axes[piece], slope, 0.0), axis=1))
 
+    def way_slope(self, piece: Numbers, u: Array) -> Array:
+        """Way along the path in all its axes, per u (n,), at places."""
+        assert self.problem.way_curve is not None
+        slope = audit_places(self.problem.way_curve, piece, np.ascontiguousarray(u))[1]
+        return np.asarray(np.linalg.norm(slope, axis=1))
+
     def joints(self, piece: Numbers, tip: Array) -> Array:
         """Positions (n, joints) [mm, deg] for points of pieces, angles as the kinematics gives them."""
         group = self._group[self.run[piece]]

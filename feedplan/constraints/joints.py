@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Cut, TipSpeed
 from feedplan.curves.composite import CompositeCurve
-from feedplan.curves.hodograph import chebyshev, from_chebyshev, interpolation, speed_squares
+from feedplan.curves.hodograph import SPEED_NODES, chebyshev, interpolation, speed_squares
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
 from feedplan.machine.along import derivatives, positions
@@ -25,7 +25,7 @@ from feedplan.machine.machine import Machine
 from feedplan.machine.meaning import Meaning
 from feedplan.machine.proxies import Proxies, build_proxies
 from feedplan.machine.survey import JointPath, survey
-from feedplan.machine.words import AxisWords, axis_words
+from feedplan.machine.words import DIRECTION, AxisWords, axis_words
 
 Array = NDArray[np.float64]
 # Part of an acceleration limit by which the stand-ins may be off.
@@ -36,8 +36,8 @@ POSITION = 1e-9
 ROUNDING = 1e-13
 # Chebyshev points of q'': the joints' pieces then have the greatest degree that a curve may have.
 NODES = 8
-# Chebyshev points of |C'|² of rational pieces, and how far it may be off, as a part of itself.
-SPEED_NODES, SPEED_SHARE = 12, 1e-9
+# How far |C'|² of rational pieces may be off, as a part of itself.
+SPEED_SHARE = 1e-9
 # Of the greatest |C'|² of a piece: what rounding leaves of it elsewhere.
 SPEED_NOISE = 1e-12
 # Places of a part at which the greatest possible u̇² is estimated, and how many times more it may be.
@@ -64,6 +64,20 @@ def has_joints_of_its_own(path: Path, machine: Machine) -> bool:
     if machine.inverse.always:
         return True
     return path.meaning is not None and bool((path.meaning != Meaning.JOINTS).any())
+
+
+def way_scale(axes: tuple[str, ...], machine: Machine) -> Array:
+    """What each axis of a path counts in its length (axes,), linear ones 1.
+
+    A degree counts as the way that the slowest linear axis has while the rotary axis turns by it, both at
+    full speed; a direction as the angle it turns by, on the slowest rotary axis.
+    """
+    linear = [axis.max_velocity for axis in machine.axes if axis.kind == "linear"]
+    rotary = {axis.name: axis.max_velocity for axis in machine.axes if axis.kind == "rotary"}
+    speed = min(linear, default=1.0)
+    direction = math.degrees(speed / min(rotary.values(), default=1.0))
+    scale = [direction if name in DIRECTION else speed / rotary.get(name, speed) for name in axes]
+    return np.array(scale)
 
 
 def joint_motion(path: Path, machine: Machine, feed: Array) -> JointMotion:
@@ -338,13 +352,9 @@ def _joint_pieces(proxies: Proxies) -> CompositeCurve:
 
 def _tool_speed(linear: CompositeCurve) -> TipSpeed:
     """|C'|²: exact for polynomials; for rational pieces interpolated, and above the true one."""
-    if linear.weights is None:
-        return TipSpeed(*speed_squares(linear))
-    piece = np.repeat(np.arange(len(linear)), SPEED_NODES)
-    u = (linear.width[:, None] * chebyshev(SPEED_NODES)).ravel()
-    square = (linear.evaluate(piece, u, 1)[1] ** 2).sum(axis=1).reshape(-1, SPEED_NODES)
-    coefficients = from_chebyshev(square) * (1 + SPEED_SHARE)
-    return TipSpeed(coefficients.ravel(), np.arange(len(linear) + 1) * SPEED_NODES)
+    coefficients, offsets = speed_squares(linear)
+    above = np.repeat(np.where(linear.rational, 1 + SPEED_SHARE, 1.0), np.diff(offsets))
+    return TipSpeed(coefficients * above, offsets)
 
 
 def _either(first: TipSpeed, second: TipSpeed, chosen: NDArray[np.bool_]) -> TipSpeed:

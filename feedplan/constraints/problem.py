@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from feedplan.constraints.feed import feed_limit
 from feedplan.constraints.junction import junction_limit
 from feedplan.curves.composite import CompositeCurve
+from feedplan.curves.hodograph import speed_squares
 from feedplan.errors import InputError
 from feedplan.geometry.corners import Corners
 from feedplan.geometry.path import Path
@@ -26,7 +27,7 @@ NO_FEED = 1e9
 
 @dataclass(frozen=True, eq=False)
 class TipSpeed:
-    """|C'(u)|² of the tool as a polynomial on each piece: Bernstein `coefficients` (total,), those of piece i
+    """|C'(u)|² of a motion as a polynomial on each piece: Bernstein `coefficients` (total,), those of piece i
     from `offsets[i]` to `offsets[i + 1]`."""
 
     coefficients: NDArray[np.float64]
@@ -64,8 +65,9 @@ class Problem:
     Where the path's axes are not the joints of the machine, `joints` is the motion of the joints [mm, deg],
     one polynomial piece for each of the path and over the same parameter, counted from `joint_origin`
     (n, joints), 0 without one; `tip_speed` the square of the speed that feed and junctions are about, per
-    u̇²; `words` (one a run) the kinematics from path to joints; and `cut` what the path was before it was cut
-    to match the joints' pieces, if it was.
+    u̇²; `way_scale` (path axes,) what each axis of the path counts in its length [mm per mm, deg, or unit of a
+    direction], 1 by default; `words` (one a run) the kinematics from path to joints; and `cut` what the path
+    was before it was cut to match the joints' pieces, if it was.
     """
 
     path: Path
@@ -83,6 +85,7 @@ class Problem:
     joints: CompositeCurve | None = None
     joint_origin: NDArray[np.float64] | None = None
     tip_speed: TipSpeed | None = None
+    way_scale: NDArray[np.float64] | None = None
     words: tuple[AxisWords, ...] = ()
     cut: Cut | None = None
 
@@ -138,6 +141,23 @@ class Problem:
     def _uncut(self) -> Cut:
         count = len(self.path)
         return self.cut or Cut(self.path.curve, np.arange(count), np.tile([0.0, 1.0], (count, 1)))
+
+    @cached_property
+    def way_curve(self) -> CompositeCurve | None:
+        """The path with its axes scaled [mm], where the joints have pieces of their own.
+
+        Its length is that of laws of jerk: its speed vanishes only where all joints rest, while the tool's in
+        X, Y, Z also does where it only turns."""
+        if self.joints is None:
+            return None
+        curve = self.path.curve
+        scale = 1.0 if self.way_scale is None else self.way_scale
+        return replace(curve, control_points=curve.control_points * scale)
+
+    @cached_property
+    def way_speed(self) -> TipSpeed | None:
+        """The square of the speed of `way_curve`, per u̇²."""
+        return None if self.way_curve is None else TipSpeed(*speed_squares(self.way_curve))
 
     @cached_property
     def tip_curve(self) -> CompositeCurve | None:
@@ -219,7 +239,7 @@ def _joint_problem(
     path: Path, machine: Machine, feed: float | None, override: float, ends: tuple[float, float]
 ) -> Problem:
     """The problem where the joints move in another way than the path's axes; corners are stops."""
-    from feedplan.constraints.joints import joint_motion
+    from feedplan.constraints.joints import joint_motion, way_scale
 
     limit = feed_limit(path, NO_FEED, feed, override)
     motion = joint_motion(path, machine, limit)
@@ -239,6 +259,7 @@ def _joint_problem(
         joints=motion.joints,
         joint_origin=motion.origin,
         tip_speed=motion.tip_speed,
+        way_scale=way_scale(path.axes, machine),
         words=motion.words,
         cut=motion.cut,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +13,18 @@ from feedplan.curves.composite import CompositeCurve
 Array = NDArray[np.float64]
 
 
+# Chebyshev points of |C'|² of rational pieces.
+SPEED_NODES = 12
+
+
 def speed_squares(curve: CompositeCurve) -> tuple[Array, NDArray[np.int64]]:
-    """Bernstein coefficients (total,) of |C'(u)|² on polynomial pieces, and their offsets (n + 1,)."""
+    """Bernstein coefficients (total,) of |C'(u)|², and their offsets (n + 1,).
+
+    Exact on polynomial pieces; on rational ones |C'|² is interpolated at `SPEED_NODES` Chebyshev points.
+    """
+    rational = curve.rational
+    if rational.any():
+        return _interpolated(curve, rational)
     degree, first = curve.degree, curve.offsets[:-1]
     offsets = np.concatenate([[0], np.cumsum(2 * degree - 1)])
     result = np.zeros(int(offsets[-1]))
@@ -27,6 +38,22 @@ def speed_squares(curve: CompositeCurve) -> tuple[Array, NDArray[np.int64]]:
         for i in range(d):
             square[:, i : i + d] += (scaled[:, i : i + 1] * scaled).sum(axis=2)
         result[offsets[rows][:, None] + np.arange(2 * d - 1)] = square / _binomials(2 * d - 2)
+    return result, offsets
+
+
+def _interpolated(curve: CompositeCurve, rational: NDArray[np.bool_]) -> tuple[Array, NDArray[np.int64]]:
+    count = np.where(rational, SPEED_NODES, 2 * curve.degree - 1)
+    offsets = np.concatenate([[0], np.cumsum(count)])
+    result = np.zeros(int(offsets[-1]))
+    rows = np.flatnonzero(rational)
+    u = (curve.width[rows, None] * chebyshev(SPEED_NODES)).ravel()
+    square = (curve.evaluate(np.repeat(rows, SPEED_NODES), u, 1)[1] ** 2).sum(axis=1)
+    places = offsets[rows][:, None] + np.arange(SPEED_NODES)
+    result[places] = from_chebyshev(square.reshape(-1, SPEED_NODES))
+    others = np.flatnonzero(~rational)
+    if len(others):
+        own, _ = speed_squares(replace(curve.take(others), weights=None))
+        result[np.repeat(~rational, count)] = own
     return result, offsets
 
 

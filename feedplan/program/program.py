@@ -36,9 +36,9 @@ class Program:
     """Moves of a part program in order, in machine coordinates.
 
     `axes` are its letters: readers give X, Y, Z and what else the program uses, in the order XYZABCUVWIJK;
-    `along` takes some of them, in any order. `start`
-    (axes,) is where the first move begins [mm, deg], after standing still for `start_dwell` [s]. Per move,
-    `n` rows: `kind` (MoveKind), `target` (n, axes) [mm, deg], `feed` [mm/s] (infinite on rapids alone),
+    `along` takes some of them, in any order. `start` (axes,) is where the first move begins, in its own words
+    [mm, deg], after standing still for `start_dwell` [s]. Per move, `n` rows: `kind` (MoveKind), `target`
+    (n, axes) [mm, deg], `feed` [mm/s] (infinite on rapids alone),
     `line` (1-based source line), `control` (PathControl), `blend_tolerance` and `fit_tolerance` (G64 P and Q
     [mm], NaN where the program gives none), `stop` (a full stop after the move: M words, dwells, the end),
     `dwell` [s] after it. A feed counts along X, Y, Z where one of these moves, else along U, V, W, else it is

@@ -94,6 +94,7 @@ fn setpoints(c: &mut Criterion) {
                 let path = PathData {
                     curve,
                     tip_speed: None,
+                    way_speed: None,
                     lines: vec![1; PIECES],
                     runs: vec![0, PIECES],
                     start_dwell: 0.0,

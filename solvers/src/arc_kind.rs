@@ -22,6 +22,11 @@ pub enum ArcKind {
 }
 
 impl ArcKind {
+    /// Whether the law is about the way along the path: that of all axes, where the feed is about some of them.
+    pub fn is_along(self) -> bool {
+        matches!(self, Self::PathJerk | Self::SpeedCubic)
+    }
+
     /// The kind with a number.
     pub fn from_number(number: u8) -> Option<Self> {
         [

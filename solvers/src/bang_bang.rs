@@ -39,12 +39,40 @@ use split::Axes;
 /// Axes that the tool itself moves in.
 pub const TIP_AXES: usize = 3;
 
+/// Squares of a speed per (du/dt)², a polynomial on each piece.
+#[derive(Clone, Copy)]
+pub struct SpeedSquare<'a> {
+    /// Bernstein coefficients; those of piece i from offset[i] to offset[i + 1].
+    pub coefficients: &'a [f64],
+    pub offset: &'a [usize],
+}
+
+impl<'a> SpeedSquare<'a> {
+    /// The coefficients of piece `i`.
+    pub fn of(&self, i: usize) -> &'a [f64] {
+        &self.coefficients[self.offset[i]..self.offset[i + 1]]
+    }
+
+    /// Finite numbers for each of `count` pieces.
+    fn fits(&self, count: usize) -> bool {
+        is_rising(self.offset, count, self.coefficients.len(), 1)
+            && self.coefficients.iter().all(|value| value.is_finite())
+    }
+}
+
+/// Whether offsets give each of `count` pieces at least so many of `total` rows.
+fn is_rising(offset: &[usize], count: usize, total: usize, least: usize) -> bool {
+    offset.len() == count + 1
+        && offset[0] == 0
+        && offset[count] == total
+        && offset.windows(2).all(|pair| pair[1] >= pair[0] + least)
+}
+
 /// The tool's path beside that of the joints, piece by piece over the same parameter.
 #[derive(Clone, Copy)]
 pub struct Tip<'a> {
-    /// Bernstein coefficients of its speed squared per du/dτ squared, |C'(u)|², and their offsets.
-    pub speed: &'a [f64],
-    pub speed_offset: &'a [usize],
+    /// The speed that the feed is about, |C'(u)|².
+    pub speed: SpeedSquare<'a>,
     /// Its pieces as those of the joints, for the chord error.
     pub control: &'a [[f64; TIP_AXES]],
     pub weight: &'a [f64],
@@ -63,6 +91,9 @@ pub struct Problem<'a, const M: usize> {
     pub width: &'a [f64],
     /// Where the axes are not those of the tool.
     pub tip: Option<Tip<'a>>,
+    /// The speed along the path that laws of jerk are about, where it is not that of the axes: it vanishes only where
+    /// all axes rest.
+    pub way: Option<SpeedSquare<'a>>,
     /// The rest as of the quadratic planner.
     pub runs: &'a [usize],
     pub feed: &'a [f64],
@@ -179,18 +210,13 @@ pub(crate) fn check_pieces<const M: usize>(problem: &Problem<M>) -> Result<(), F
             return wrong("a weight is not a positive number");
         }
     }
-    let Some(tip) = &problem.tip else { return Ok(()) };
-    let rising = |offset: &[usize], total: usize, least: usize| {
-        offset.len() == count + 1
-            && offset[0] == 0
-            && offset[count] == total
-            && offset.windows(2).all(|pair| pair[1] >= pair[0] + least)
-    };
-    if !rising(tip.offset, tip.control.len(), 2)
-        || !rising(tip.speed_offset, tip.speed.len(), 1)
-        || !(tip.weight.is_empty() || tip.weight.len() == tip.control.len())
-        || !tip.control.iter().flatten().chain(tip.speed).chain(tip.weight).all(|value| value.is_finite())
-    {
+    let tip_fits = problem.tip.is_none_or(|tip| {
+        is_rising(tip.offset, count, tip.control.len(), 2)
+            && tip.speed.fits(count)
+            && (tip.weight.is_empty() || tip.weight.len() == tip.control.len())
+            && tip.control.iter().flatten().chain(tip.weight).all(|value| value.is_finite())
+    });
+    if !(tip_fits && problem.way.is_none_or(|way| way.fits(count))) {
         let what = format!("the tool's path does not fit the {count} pieces of the joints");
         return Err(Fault::Input { piece: None, what });
     }

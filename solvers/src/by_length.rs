@@ -1,6 +1,8 @@
 //! A stretch of a path by its length: the parameter at a length, derivatives of the axes along it, the greatest speed.
 //!
-//! With D(u) the square of the tool's speed per parameter, s' = √D, so that
+//! The length is that of all axes of the path together, so that it grows wherever an axis moves; the feed may be about
+//! some of them, and then limits the speed along the length by the quotient of both. With D(u) the square of the speed
+//! per parameter, s' = √D, so that
 //!
 //!   u' = D^(−1/2),   u'' = −D_u / (2 D²),   u''' = D^(−1/2) (D_u² / D³ − D_uu / (2 D²))
 //!
@@ -65,8 +67,8 @@ struct Row {
 #[derive(Clone, Debug)]
 struct Table<const M: usize> {
     rows: Vec<Row>,
-    /// The direction of motion where it does not change and the axes are those of the tool.
-    straight: Option<[f64; M]>,
+    /// The direction of motion, where it does not change and the length is that of the axes, and its speed by the feed.
+    straight: Option<([f64; M], f64)>,
     /// Derivatives are asked for within these lengths.
     inside: [f64; 2],
 }
@@ -124,11 +126,16 @@ pub fn straight<const M: usize>(piece: &Piece<M>, u: f64) -> Option<[f64; M]> {
 /// D, D_u and D_uu at u of piece `i`, whose axes move with these derivatives.
 #[inline]
 fn rate<const M: usize>(problem: &Problem<M>, i: usize, u: f64, [_, c1, c2, c3]: &[[f64; M]; 4]) -> [f64; 3] {
-    let Some(tip) = problem.tip else {
-        return [dot(c1, c1), 2.0 * dot(c1, c2), 2.0 * (dot(c2, c2) + dot(c1, c3))];
-    };
-    let coefficients = &tip.speed[tip.speed_offset[i]..tip.speed_offset[i + 1]];
-    let (width, n) = (problem.width[i], coefficients.len() - 1);
+    match problem.way {
+        Some(way) => polynomial(way.of(i), problem.width[i], u),
+        None => [dot(c1, c1), 2.0 * dot(c1, c2), 2.0 * (dot(c2, c2) + dot(c1, c3))],
+    }
+}
+
+/// A square of a speed and its derivatives at u, from its Bernstein coefficients.
+#[inline]
+fn polynomial(coefficients: &[f64], width: f64, u: f64) -> [f64; 3] {
+    let n = coefficients.len() - 1;
     let t = u / width;
     let mut b = [0.0; MAX_RATE];
     b[..=n].copy_from_slice(coefficients);
@@ -151,19 +158,26 @@ fn rate<const M: usize>(problem: &Problem<M>, i: usize, u: f64, [_, c1, c2, c3]:
     out
 }
 
+/// The speed along the length over that which the feed is about, at u of piece `i`, where D is this; infinite where the
+/// feed limits nothing.
+pub fn per_feed<const M: usize>(problem: &Problem<M>, i: usize, u: f64, d: f64) -> f64 {
+    problem.tip.map_or(1.0, |tip| (d / polynomial(tip.speed.of(i), problem.width[i], u)[0]).sqrt())
+}
+
 /// D at u of piece `i`.
 pub fn speed_sq<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> f64 {
-    if problem.tip.is_some() {
-        rate(problem, i, u, &[[0.0; M]; 4])[0]
-    } else {
-        let tangent = derivatives(&piece(problem, i), u)[1];
-        dot(&tangent, &tangent)
+    match problem.way {
+        Some(way) => polynomial(way.of(i), problem.width[i], u)[0],
+        None => {
+            let tangent = derivatives(&piece(problem, i), u)[1];
+            dot(&tangent, &tangent)
+        }
     }
 }
 
 /// D at four u of piece `i`.
 fn speeds_sq<const M: usize>(problem: &Problem<M>, i: usize, u: Lanes) -> Lanes {
-    if problem.tip.is_some() {
+    if problem.way.is_some() {
         Lanes::new(u.values().map(|u| speed_sq(problem, i, u)))
     } else {
         bezier::speeds_sq(&piece(problem, i), u)
@@ -256,9 +270,13 @@ impl<const M: usize> Table<M> {
         let slowest = (b - a) / length / CUSP;
         let inset = |row: &Row| if row.rate < slowest { 0.0 } else { INSET * length };
         let inside = [inset(&rows[0]), length - inset(&rows[rows.len() - 1])];
-        let straight = match problem.tip {
+        let straight = match problem.way {
             Some(_) => None,
-            None => straight(&piece(problem, part.piece), 0.5 * (a + b)),
+            None => {
+                let (i, u) = (part.piece, 0.5 * (a + b));
+                let feed = problem.feed[i] * per_feed(problem, i, u, speed_sq(problem, i, u));
+                straight(&piece(problem, i), u).map(|direction| (direction, feed))
+            }
         };
         Self { rows, straight, inside }
     }
@@ -337,11 +355,11 @@ impl<'a, const M: usize> ByLength<'a, M> {
 
     /// The one direction of all parts and their one feed, if there are such.
     pub fn line(&self) -> Option<([f64; M], f64)> {
-        let direction = self.tables[0].straight?;
-        let feed = self.problem.feed[self.parts[0].piece];
-        let alike = self.tables.iter().zip(self.parts).all(|(table, part)| {
-            table.straight.is_some_and(|other| (0..M).all(|k| (other[k] - direction[k]).abs() <= OFF_LINE))
-                && self.problem.feed[part.piece] == feed
+        let (direction, feed) = self.tables[0].straight?;
+        let alike = self.tables.iter().all(|table| {
+            table.straight.is_some_and(|(other, speed)| {
+                speed == feed && (0..M).all(|k| (other[k] - direction[k]).abs() <= OFF_LINE)
+            })
         });
         alike.then_some((direction, feed))
     }
@@ -361,21 +379,16 @@ impl<'a, const M: usize> ByLength<'a, M> {
             }
             let corner = self.problem.junction_speed[self.parts[i].piece];
             let jump = jump_sq.sqrt();
-            (SpeedCap { s, speed: corner.min(jump) }, jump < corner)
+            let cap = SpeedCap { s, speed: corner.min(jump) };
+            // What feed and chord error keep lower needs no cap.
+            (cap.speed < before.speed_cap.min(after.speed_cap)).then_some((cap, jump < corner))
         });
-        // What the limits of the axes keep lower needs no cap.
-        let fastest = self.parts.iter().fold(0.0, |most: f64, part| most.max(self.problem.feed[part.piece]));
-        caps.filter(|(cap, _)| cap.speed < fastest).collect()
+        caps.flatten().collect()
     }
 
     /// The direction of motion on a part where it does not change.
     pub fn direction(&self, part: usize) -> Option<[f64; M]> {
-        self.tables[part].straight
-    }
-
-    /// Curvature of the tool's way at a length on a part, in 1/mm.
-    pub fn curvature(&self, part: usize, s: f64) -> f64 {
-        tool_curvature(self.problem, self.parts[part].piece, self.locate(part, s))
+        self.tables[part].straight.map(|(direction, _)| direction)
     }
 
     /// The greatest speed by the chord error on a curvature.
@@ -387,8 +400,8 @@ impl<'a, const M: usize> ByLength<'a, M> {
 /// Curvature of the tool's way at u of piece `i`, in 1/mm.
 pub fn tool_curvature<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> f64 {
     match tip_piece(problem, i) {
-        Some(tip) => curvature(&tip, u),
-        None => curvature(&piece(problem, i), u),
+        Some(tip) => curvature(&tip, u).0,
+        None => curvature(&piece(problem, i), u).0,
     }
 }
 
@@ -406,13 +419,16 @@ pub fn place<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> Place<M>
         second[k] = c2[k] * u1 * u1 + c1[k] * u2;
         third[k] = c3[k] * u1 * u1 * u1 + 3.0 * c2[k] * u1 * u2 + c1[k] * u3;
     }
-    let mut speed_cap = problem.feed[i];
+    let mut speed_cap = problem.feed[i] * per_feed(problem, i, u, d);
     if problem.chord_tolerance.is_finite() {
-        let curvature = match tip_piece(problem, i) {
-            None => norm(&second),
-            Some(tip) => curvature(&tip, u),
+        let chord = match tip_piece(problem, i) {
+            None => chord_limit(problem, norm(&second)),
+            Some(tip) => {
+                let (curvature, square) = curvature(&tip, u);
+                chord_limit(problem, curvature) * (d / square).sqrt()
+            }
         };
-        speed_cap = speed_cap.min(chord_limit(problem, curvature));
+        speed_cap = speed_cap.min(chord);
     }
     Place { first, second, third, speed_cap }
 }
@@ -425,17 +441,13 @@ fn chord_limit<const M: usize>(problem: &Problem<M>, curvature: f64) -> f64 {
     }
 }
 
-/// Curvature of a piece at u; 0 where it stands.
-fn curvature<const M: usize>(piece: &Piece<M>, u: f64) -> f64 {
+/// Curvature of a piece at u, 0 where it stands, and the square of its speed there.
+fn curvature<const M: usize>(piece: &Piece<M>, u: f64) -> (f64, f64) {
     let [_, c1, c2, _] = derivatives(piece, u);
     let square = dot(&c1, &c1);
     let along = dot(&c1, &c2) / square;
     let off: [f64; M] = std::array::from_fn(|k| c2[k] - along * c1[k]);
-    if square > 0.0 {
-        norm(&off) / square
-    } else {
-        0.0
-    }
+    (if square > 0.0 { norm(&off) / square } else { 0.0 }, square)
 }
 
 impl<const M: usize> Geometry<M> for ByLength<'_, M> {
@@ -445,8 +457,7 @@ impl<const M: usize> Geometry<M> for ByLength<'_, M> {
 
     fn at(&self, part: usize, s: f64) -> Place<M> {
         let table = &self.tables[part];
-        if let Some(direction) = table.straight {
-            let speed_cap = self.problem.feed[self.parts[part].piece];
+        if let Some((direction, speed_cap)) = table.straight {
             return Place { first: direction, second: [0.0; M], third: [0.0; M], speed_cap };
         }
         let x = (s - self.knots[part]).clamp(table.inside[0], table.inside[1]);

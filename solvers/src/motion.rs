@@ -90,7 +90,7 @@ macro_rules! each {
 }
 
 impl<'a, const M: usize> Motion<'a, M> {
-    /// Prepares an arc; `tip` is the speed that the feed is about where it is not that of the piece.
+    /// Prepares an arc; `tip` is the speed that its law is about where it is not that of the piece.
     /// `with_lengths` tabulates the length of the arc whatever its kind.
     pub fn new(piece: Piece<'a, M>, tip: Option<TipSpeed<'a>>, arc: &ProfileArc, with_lengths: bool) -> Self {
         match Quadratic::from_piece(&piece) {
@@ -139,9 +139,10 @@ impl<'a, const M: usize> Motion<'a, M> {
 
     /// How closely a step's length is to be met, in parts of the step.
     pub fn step_error(&self) -> f64 {
-        match each!(self, motion, motion.arc.kind) {
-            ArcKind::PathJerk | ArcKind::SpeedCubic => JERK_STEP_ERROR,
-            _ => STEP_ERROR,
+        if each!(self, motion, motion.arc.kind).is_along() {
+            JERK_STEP_ERROR
+        } else {
+            STEP_ERROR
         }
     }
 
@@ -166,7 +167,7 @@ impl<'a, const M: usize> Motion<'a, M> {
 
 /// Whether the general form follows such an arc on quadratic pieces too.
 fn needs_curve(kind: ArcKind) -> bool {
-    matches!(kind, ArcKind::SpeedLine | ArcKind::PathJerk | ArcKind::SpeedCubic)
+    kind == ArcKind::SpeedLine || kind.is_along()
 }
 
 /// Tabulates f from one end to another.

@@ -143,6 +143,8 @@ fn along<const M: usize>(
 struct Cut<const M: usize> {
     shape: Shape<M>,
     segment: Segment,
+    /// The greatest speed by feed and chord error.
+    cap: f64,
     /// The greatest speed that one of its parts has alone.
     highest: f64,
 }
@@ -158,44 +160,44 @@ pub fn segments<const M: usize>(
     let caps = path.caps(&limits.jerk);
     let mut out: Vec<Cut<M>> = vec![];
     let mut caps = caps.iter().map(|(cap, _)| cap).peekable();
-    for (part, at) in path.parts.iter().enumerate() {
+    for part in 0..path.parts.len() {
         let (start, end) = (path.knots()[part], path.knots()[part + 1]);
         let straight = path.direction(part);
         let count = if straight.is_some() { 1 } else { cutting.parts };
         let place = |i: usize| if i == count { end } else { start + (end - start) * i as f64 / count as f64 };
         for i in 0..count {
             let (from, to) = (place(i), place(i + 1));
-            let shape = match straight {
-                Some(direction) => Shape {
-                    first: direction.map(f64::abs),
-                    second: [0.0; M],
-                    third: [0.0; M],
-                    curvature: 0.0,
-                },
+            let (shape, cap) = match straight {
+                Some(direction) => {
+                    let first = direction.map(f64::abs);
+                    let shape = Shape { first, second: [0.0; M], third: [0.0; M], curvature: 0.0 };
+                    (shape, path.at(part, from).speed_cap)
+                }
                 None => shape(problem, path, part, [from, to]),
             };
-            let feed = problem.feed[at.piece].min(path.chord_speed(shape.curvature));
-            let make = |shape: &Shape<M>, length: f64| -> Option<Segment> {
-                let allowed = allowable(shape, &axes, feed, cutting.stretch).ok()?;
+            let make = |shape: &Shape<M>, cap: f64, length: f64| -> Option<Segment> {
+                let allowed = allowable(shape, &axes, cap, cutting.stretch).ok()?;
                 Some(Segment {
                     length,
                     allowable: allowed.speed,
-                    desired: feed,
+                    // The cap has no end where the feed is about axes that stand still.
+                    desired: cap.min(allowed.speed),
                     limits: allowed.limits,
                     junction: f64::INFINITY,
                 })
             };
-            let segment = make(&shape, to - from)?;
-            let cut = Cut { shape, segment, highest: segment.speed() };
+            let segment = make(&shape, cap, to - from)?;
+            let cut = Cut { shape, segment, cap, highest: segment.speed() };
             // One with the segment before, where that costs no part of it much.
             let joined = out.last().filter(|last| last.segment.junction == f64::INFINITY).and_then(|last| {
                 let shape = last.shape.with(&cut.shape);
-                let mut segment = make(&shape, last.segment.length + cut.segment.length)?;
-                segment.desired = last.segment.desired.min(cut.segment.desired);
+                let cap = last.cap.min(cut.cap);
+                let segment = make(&shape, cap, last.segment.length + cut.segment.length)?;
                 let highest = last.highest.max(cut.highest);
                 (segment.speed() >= (1.0 - cutting.alike) * highest).then_some(Cut {
                     shape,
                     segment,
+                    cap,
                     highest,
                 })
             });
@@ -211,24 +213,26 @@ pub fn segments<const M: usize>(
     Some(out.into_iter().map(|cut| cut.segment).collect())
 }
 
-/// Bounds of the derivatives between two lengths of a part: proven where the axes are those of the tool.
+/// Bounds of the derivatives between two lengths of a part, and the greatest speed by feed and chord error: proven where
+/// the axes are those of the tool.
 fn shape<const M: usize>(
     problem: &Problem<M>,
     path: &ByLength<M>,
     part: usize,
     [from, to]: [f64; 2],
-) -> Shape<M> {
+) -> (Shape<M>, f64) {
     if problem.tip.is_none() {
-        let own = piece(problem, path.parts[part].piece);
+        let i = path.parts[part].piece;
+        let own = piece(problem, i);
         let (a, b) = (path.locate(part, from), path.locate(part, to));
         let mut pieces = CompositeCurve::default();
         split(&own, &[a, b], &mut pieces);
         let middle = pieces.piece(1);
-        return bounded(&Curve { joints: middle.control, tip: None, weight: middle.weights }, ACCURACY);
+        let shape = bounded(&Curve { joints: middle.control, tip: None, weight: middle.weights }, ACCURACY);
+        return (shape, problem.feed[i].min(path.chord_speed(shape.curvature)));
     }
-    let lengths: Vec<f64> =
-        (0..PLACES).map(|i| from + (to - from) * i as f64 / (PLACES - 1) as f64).collect();
-    let places: Vec<Place<M>> = lengths.iter().map(|&s| path.at(part, s)).collect();
+    let length = |i: usize| from + (to - from) * i as f64 / (PLACES - 1) as f64;
+    let places: Vec<Place<M>> = (0..PLACES).map(|i| path.at(part, length(i))).collect();
     let most = |of: &dyn Fn(&Place<M>) -> f64| {
         let mut greatest: f64 = places.iter().map(|place| of(place).abs()).fold(0.0, f64::max);
         // A peak between places is above them by no more than an eighth of the second difference there.
@@ -238,10 +242,11 @@ fn shape<const M: usize>(
         }
         greatest
     };
-    Shape {
+    let shape = Shape {
         first: std::array::from_fn(|k| most(&|place| place.first[k])),
         second: std::array::from_fn(|k| most(&|place| place.second[k])),
         third: std::array::from_fn(|k| most(&|place| place.third[k])),
-        curvature: lengths.iter().map(|&s| path.curvature(part, s)).fold(0.0, f64::max),
-    }
+        curvature: 0.0,
+    };
+    (shape, 1.0 / most(&|place| 1.0 / place.speed_cap))
 }

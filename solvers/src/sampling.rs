@@ -73,12 +73,13 @@ pub struct Resume {
     u: f64,
 }
 
-/// What a path gives: the curve that the axes follow; where the feed is about another one, the Bernstein
-/// coefficients of the square of its speed per parameter and their offsets; the source lines of the pieces, runs
-/// as piece offsets, and the pauses before the first run and after each.
+/// What a path gives: the curve that the axes follow; where the feed is about another one, and where laws of jerk are,
+/// the Bernstein coefficients of the squares of their speeds per parameter, with offsets; the source lines of the
+/// pieces, runs as piece offsets, and the pauses before the first run and after each.
 pub struct PathData<const M: usize> {
     pub curve: CompositeCurve<M>,
     pub tip_speed: Option<(Vec<f64>, Vec<usize>)>,
+    pub way_speed: Option<(Vec<f64>, Vec<usize>)>,
     pub lines: Vec<i32>,
     pub runs: Vec<usize>,
     pub start_dwell: f64,
@@ -103,12 +104,14 @@ impl<const M: usize> PathData<M> {
     /// The motion along an arc.
     fn motion(&self, arc: &ProfileArc, with_lengths: bool) -> Motion<'_, M> {
         let i = arc.piece as usize;
-        Motion::new(self.curve.piece(i), self.tip_of(i), arc, with_lengths)
+        Motion::new(self.curve.piece(i), self.speed_of(arc), arc, with_lengths)
     }
 
-    /// The speed that the feed is about on a piece, where it is not that of the path.
-    fn tip_of(&self, i: usize) -> Option<TipSpeed<'_>> {
-        self.tip_speed.as_ref().map(|(coefficients, offsets)| TipSpeed {
+    /// The speed that the law of an arc is about, where it is not that of the axes.
+    fn speed_of(&self, arc: &ProfileArc) -> Option<TipSpeed<'_>> {
+        let i = arc.piece as usize;
+        let speed = if arc.kind.is_along() { &self.way_speed } else { &self.tip_speed };
+        speed.as_ref().map(|(coefficients, offsets)| TipSpeed {
             coefficients: &coefficients[offsets[i]..offsets[i + 1]],
             width: self.curve.width[i],
         })

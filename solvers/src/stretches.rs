@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::bang_bang::{check_pieces, Problem};
 use crate::bang_bang_quadratic::Fault;
-use crate::by_length::{piece, place, straight, tip_piece, tool_curvature, Part, MAX_RATE};
+use crate::by_length::{per_feed, piece, place, speed_sq, straight, tool_curvature, Part, MAX_RATE};
 use crate::jerk_arcs::Arcs;
 use crate::jerk_limited::Limits;
 use crate::planning;
@@ -105,21 +105,25 @@ pub fn stretches<const M: usize>(problem: &Problem<M>) -> Vec<Stretch> {
             rests = cusped[1];
         }
     }
-    let last = out.len() - 1;
-    out[0].ends[0] = problem.start_speed;
-    out[last].ends[1] = problem.end_speed;
+    // The speeds at the ends are those that the feed is about.
+    let along = |speed: f64, i: usize, u: f64| {
+        if speed > 0.0 {
+            speed * per_feed(problem, i, u, speed_sq(problem, i, u))
+        } else {
+            0.0
+        }
+    };
+    let (last, end) = (out.len() - 1, problem.width.len() - 1);
+    out[0].ends[0] = along(problem.start_speed, 0, 0.0);
+    out[last].ends[1] = along(problem.end_speed, end, problem.width[end]);
     out
 }
 
 /// Parameters inside piece `i` at which the tool has to rest, and whether it has to at either end.
 fn cusps<const M: usize>(problem: &Problem<M>, i: usize) -> (Vec<f64>, [bool; 2]) {
     let own = piece(problem, i);
-    let mut places = match tip_piece(problem, i) {
-        // A tool that does not move has the speed of the joints that turn.
-        Some(tip) if tip.extent().0 > 0.0 => piece_cusps(&tip, CUSP),
-        _ => piece_cusps(&own, CUSP),
-    };
-    let line = problem.tip.is_none() && straight(&own, 0.5 * own.width).is_some();
+    let mut places = piece_cusps(&own, CUSP);
+    let line = problem.way.is_none() && straight(&own, 0.5 * own.width).is_some();
     let ends =
         [places.first().is_some_and(|&t| t < AT_END), places.last().is_some_and(|&t| t > 1.0 - AT_END)];
     if line {
@@ -131,13 +135,10 @@ fn cusps<const M: usize>(problem: &Problem<M>, i: usize) -> (Vec<f64>, [bool; 2]
     (places.iter().map(|t| t * own.width).collect(), ends)
 }
 
-/// Parameters inside piece `i` where the tool's speed per parameter is least, and low: its way may turn sharply there.
+/// Parameters inside piece `i` where the speed per parameter is least, and low: the way may turn sharply there.
 fn slow_places<const M: usize>(problem: &Problem<M>, i: usize) -> Vec<f64> {
-    let square: Polynomial<MAX_RATE> = match problem.tip {
-        Some(tip) => {
-            let coefficients = &tip.speed[tip.speed_offset[i]..tip.speed_offset[i + 1]];
-            Polynomial::from_bernstein(coefficients.iter().copied())
-        }
+    let square: Polynomial<MAX_RATE> = match problem.way {
+        Some(way) => Polynomial::from_bernstein(way.of(i).iter().copied()),
         None => {
             let hodograph = Hodograph::new(&piece(problem, i));
             let axis = |k: usize| -> Polynomial<MAX_RATE> {

@@ -36,6 +36,7 @@ fn path_of(piece: &Quadratic<2>) -> PathData<2> {
     PathData {
         curve: raised(piece, 0),
         tip_speed: None,
+        way_speed: None,
         lines: vec![7],
         runs: vec![0, 1],
         start_dwell: 0.0,

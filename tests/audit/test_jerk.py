@@ -277,9 +277,9 @@ def joints(request: pytest.FixtureRequest) -> tuple[Problem, SpeedProfile, Machi
     machine = replace(machine, axes=free, chord_tolerance=math.inf)
     means = None if meaning is None else np.array([meaning], np.uint8)
     problem = build_problem(path_along(curve(), letters, meaning=means), machine, feed=FREE)
-    tip = problem.tip_curve
-    assert tip is not None
-    profile = constant_jerk(tip, rest_to_rest(CurveLength(tip).total, 2000.0, 0.8))
+    way = problem.way_curve
+    assert way is not None
+    profile = constant_jerk(way, rest_to_rest(CurveLength(way).total, 2000.0, 0.8))
     return problem, profile, machine
 
 
@@ -305,7 +305,8 @@ def test_the_jerk_of_joints_is_that_of_their_setpoints(joints: Any) -> None:
     result = audit(problem, profile, machine, None, stream, jerk=True)
     assert result.failures == ()
     for k, name in enumerate(problem.axes):
-        assert result.check("jerk", name).worst == pytest.approx(most[k], rel=5e-3, abs=1e-3)
+        # Some ten places of an arc are measured: peaks between them are above by some thousandths.
+        assert result.check("jerk", name).worst == pytest.approx(most[k], rel=1e-2, abs=1e-3)
     assert audit(replace(problem, max_jerk=most + 1.0), profile, machine, None, None, jerk=True).ok
     k = int(np.argmax(most))
     tight = most + 1.0

@@ -130,7 +130,7 @@ def test_a_length_that_is_not_known_is_the_machine_files_with_a_warning() -> Non
 
 def test_a_change_before_the_first_move_starts_at_the_joints_zero() -> None:
     program = read("G43.4 H1\nG0 X1 Z0")
-    assert program.start.tolist() == [0, 0, 0, 0, 0]
+    assert program.start.tolist() == [0, 0, -120, 0, 0]
     assert program.starts().tolist() == [[0, 0, -120, 0, 0]]
     assert program.start_dwell == 0
 

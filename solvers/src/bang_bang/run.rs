@@ -110,9 +110,7 @@ macro_rules! with_capacity {
 impl<const M: usize> Task<'_, M> {
     fn piece<const C: usize>(&self, i: usize) -> Piece<M, C> {
         let problem = self.problem;
-        let speed_sq = problem
-            .tip
-            .map(|tip| (&tip.speed[tip.speed_offset[i]..tip.speed_offset[i + 1]], problem.width[i].powi(2)));
+        let speed_sq = problem.tip.map(|tip| (tip.speed.of(i), problem.width[i].powi(2)));
         Piece::new(
             &problem.control[problem.offset[i]..problem.offset[i + 1]],
             weights_of(problem.weight, problem.offset, i),
@@ -141,7 +139,7 @@ impl<const M: usize> Task<'_, M> {
         };
         let (degree, own) = of(problem.offset, problem.weight);
         let Some(tip) = problem.tip else { return own };
-        let speed = tip.speed_offset[i + 1] - tip.speed_offset[i];
+        let speed = tip.speed.of(i).len();
         let chord = if self.chord.is_some() { of(tip.offset, tip.weight).1 } else { 0 };
         own.max(2 * speed).max(2 * degree + speed).max(chord)
     }

@@ -41,7 +41,7 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
     pub fn new(task: &'a Task<'a, M>, i: usize) -> Self {
         let problem = task.problem;
         let tip_speed = problem.tip.map(|tip| {
-            let coefficients = &tip.speed[tip.speed_offset[i]..tip.speed_offset[i + 1]];
+            let coefficients = tip.speed.of(i);
             let factor = problem.width[i].powi(2);
             let greatest = coefficients.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
             let noise = (8 * coefficients.len() + 4) as f64 * f64::EPSILON * factor * greatest;
@@ -67,6 +67,12 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
             let (value, noise) = tip.at(node.t, node.order);
             return ((value - noise).max(0.0) * DOWN, (value + noise).max(0.0) * UP);
         }
+        self.axes_speed(node)
+    }
+
+    /// The speed of all axes squared over x at a node: between these.
+    #[inline(always)]
+    pub fn axes_speed(&self, node: &Node<M>) -> (f64, f64) {
         let (mut least, mut most) = (0.0, 0.0);
         for k in 0..M {
             let (size, noise) = (node.rate[k].abs(), self.curve.noise[k]);
@@ -74,6 +80,17 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
             most += (size + noise).powi(2);
         }
         (least * DOWN, most * UP)
+    }
+
+    /// Not below x at a node where the squares of the speeds of the axes and of the tool are at most these; `speed` is
+    /// the least of `self.speed`.
+    #[inline(always)]
+    pub fn entered(&self, node: &Node<M>, axes_sq: f64, tool_sq: f64, speed: f64) -> f64 {
+        if axes_sq == 0.0 || tool_sq == 0.0 {
+            return 0.0;
+        }
+        let axes = if self.tip_speed.is_some() { self.axes_speed(node).0 } else { speed };
+        (axes_sq / axes).min(tool_sq / speed) * UP
     }
 
     /// Not below x at a node; `speed` is the least of `self.speed`.

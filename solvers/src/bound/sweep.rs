@@ -8,9 +8,11 @@ use super::{Task, DOWN, UP};
 /// Directions at a cusp that differ by more than this form a corner, which is a stop.
 const CORNER: f64 = 1e-9;
 
-/// What one piece tells the next: the tool's greatest speed squared, and the direction on the near side.
+/// What one piece tells the next: the greatest speed squared of all axes, which is the same on both sides where the tool's
+/// may vanish, the tool's where a limit holds it, and the direction on the near side.
 struct Between<const M: usize> {
-    speed_sq: f64,
+    axes_sq: f64,
+    tool_sq: f64,
     end: Option<End<M>>,
 }
 
@@ -97,10 +99,10 @@ pub fn backward<const M: usize>(
     end_sq: f64,
     cells: &mut Cells,
 ) {
-    let mut at = Between { speed_sq: end_sq * task.speed_share, end: None };
+    let mut at = Between { axes_sq: f64::INFINITY, tool_sq: end_sq * task.speed_share, end: None };
     for i in (first..last).rev() {
         if i + 1 < last {
-            at.speed_sq = at.speed_sq.min(task.junction_sq(i + 1));
+            at.tool_sq = task.junction_sq(i + 1);
         }
         with_capacity!(task, i, backward_over(task, i, i - first, &mut at, cells));
     }
@@ -118,10 +120,10 @@ fn backward_over<const M: usize, const C: usize, const R: usize>(
     let mut node = piece.curve.node(1.0);
     let end = End::new(&piece, &node);
     if at.end.as_ref().is_some_and(|after| after.is_corner(&end)) {
-        at.speed_sq = 0.0;
+        at.axes_sq = 0.0;
     }
     let (mut speed, _) = piece.speed(&node);
-    let mut x = at.speed_sq / speed * UP;
+    let mut x = piece.entered(&node, at.axes_sq, at.tool_sq, speed);
     for cell in range.clone().rev() {
         x = x.min(piece.greatest(&node, speed));
         if x.is_nan() {
@@ -134,7 +136,7 @@ fn backward_over<const M: usize, const C: usize, const R: usize>(
         (speed, _) = piece.speed(&node);
     }
     x = x.min(piece.greatest(&node, speed));
-    at.speed_sq = x * piece.speed(&node).1 * UP;
+    at.axes_sq = x * piece.axes_speed(&node).1 * task.speed_share * UP;
     at.end = Some(End::new(&piece, &node));
 }
 
@@ -147,13 +149,11 @@ pub fn forward<const M: usize>(
     wanted: impl Fn(u32) -> (usize, f64),
     cells: &mut Cells,
 ) -> f64 {
-    let mut speed_sq = start_sq * task.speed_share;
-    let mut time = 0.0;
+    let (mut axes_sq, mut time) = (f64::INFINITY, 0.0);
     for i in first..last {
-        if i > first {
-            speed_sq = speed_sq.min(task.junction_sq(i));
-        }
-        with_capacity!(task, i, forward_over(task, i, i - first, &mut speed_sq, &mut time, &wanted, cells));
+        let tool_sq = if i > first { task.junction_sq(i) } else { start_sq * task.speed_share };
+        let entered = (&mut axes_sq, tool_sq);
+        with_capacity!(task, i, forward_over(task, i, i - first, entered, &mut time, &wanted, cells));
     }
     time * (1.0 - cells.end.len() as f64 * f64::EPSILON) * DOWN
 }
@@ -162,14 +162,14 @@ fn forward_over<const M: usize, const C: usize, const R: usize>(
     task: &Task<M>,
     i: usize,
     own: usize,
-    speed_sq: &mut f64,
+    (axes_sq, tool_sq): (&mut f64, f64),
     time: &mut f64,
     wanted: &impl Fn(u32) -> (usize, f64),
     cells: &mut Cells,
 ) {
     let piece = Piece::<M, C, R>::new(task, i);
     let mut node = piece.curve.node(0.0);
-    let mut x = *speed_sq / piece.speed(&node).0 * UP;
+    let mut x = piece.entered(&node, *axes_sq, tool_sq, piece.speed(&node).0);
     if x.is_nan() {
         x = f64::INFINITY;
     }
@@ -182,5 +182,5 @@ fn forward_over<const M: usize, const C: usize, const R: usize>(
         *time += cells.time[cell];
         (x, node) = (reached, end);
     }
-    *speed_sq = x * piece.speed(&node).1 * UP;
+    *axes_sq = x * piece.axes_speed(&node).1 * task.speed_share * UP;
 }

@@ -76,7 +76,7 @@ pub fn flaw<const M: usize>(
     tip: Option<TipSpeed>,
     arc: &ProfileArc,
 ) -> Option<&'static str> {
-    if !matches!(arc.kind, ArcKind::PathJerk | ArcKind::SpeedCubic) {
+    if !arc.kind.is_along() {
         return None;
     }
     let motion = CurveMotion::bare(piece, tip, arc);
@@ -114,7 +114,7 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
     /// Prepares an arc; `with_lengths` tabulates its length whatever its kind.
     pub fn new(piece: Piece<'a, M>, tip: Option<TipSpeed>, arc: &ProfileArc, with_lengths: bool) -> Self {
         let mut motion = Self::bare(piece, tip, arc);
-        if matches!(arc.kind, ArcKind::PathJerk | ArcKind::SpeedCubic) {
+        if arc.kind.is_along() {
             let mut nodes = vec![];
             motion.way_error = fill(motion.time_rate(Line::ONE), (arc.u0, arc.u1), &mut nodes);
             motion.ways = nodes;

@@ -4,7 +4,7 @@ use numpy::{PyReadonlyArray1, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 use super::arrays::{indices, row, rows, CurveArrays};
-use crate::bang_bang::{Problem, Tip, TIP_AXES};
+use crate::bang_bang::{Problem, SpeedSquare, Tip, TIP_AXES};
 
 impl CurveArrays<'_> {
     /// Whether all pieces are polynomials of degree 2.
@@ -18,7 +18,7 @@ impl CurveArrays<'_> {
 
 /// `feedplan.constraints.problem.TipSpeed`.
 #[derive(FromPyObject)]
-pub struct TipSpeedArrays<'py> {
+pub struct SpeedSquareArrays<'py> {
     pub coefficients: PyReadonlyArray1<'py, f64>,
     pub offsets: PyReadonlyArray1<'py, i64>,
 }
@@ -34,7 +34,8 @@ pub struct PathArrays<'py> {
 pub struct ProblemArrays<'py> {
     pub path: PathArrays<'py>,
     pub curve: CurveArrays<'py>,
-    pub tip_speed: Option<TipSpeedArrays<'py>>,
+    pub tip_speed: Option<SpeedSquareArrays<'py>>,
+    pub way_speed: Option<SpeedSquareArrays<'py>>,
     pub tip_curve: Option<CurveArrays<'py>>,
     pub feed: PyReadonlyArray1<'py, f64>,
     pub junction_speed: PyReadonlyArray1<'py, f64>,
@@ -53,6 +54,7 @@ pub struct ProblemRows<'a, 'py, const M: usize> {
     offset: Vec<usize>,
     runs: Vec<usize>,
     tip: Option<TipRows>,
+    way_offset: Vec<usize>,
 }
 
 /// Control points of the tool's path, their offsets, and those of its speed.
@@ -60,6 +62,12 @@ struct TipRows {
     control: Vec<[f64; TIP_AXES]>,
     offset: Vec<usize>,
     speed_offset: Vec<usize>,
+}
+
+impl SpeedSquareArrays<'_> {
+    fn square<'a>(&'a self, offset: &'a [usize]) -> PyResult<SpeedSquare<'a>> {
+        Ok(SpeedSquare { coefficients: self.coefficients.as_slice()?, offset })
+    }
 }
 
 impl<'a, 'py, const M: usize> ProblemRows<'a, 'py, M> {
@@ -78,6 +86,7 @@ impl<'a, 'py, const M: usize> ProblemRows<'a, 'py, M> {
             offset: indices(&arrays.curve.offsets),
             runs: indices(&arrays.path.runs),
             tip,
+            way_offset: arrays.way_speed.as_ref().map_or(vec![], |way| indices(&way.offsets)),
         })
     }
 
@@ -85,8 +94,7 @@ impl<'a, 'py, const M: usize> ProblemRows<'a, 'py, M> {
         let arrays = self.arrays;
         let tip = match (&self.tip, &arrays.tip_speed, &arrays.tip_curve) {
             (Some(rows), Some(speed), Some(tip)) => Some(Tip {
-                speed: speed.coefficients.as_slice()?,
-                speed_offset: &rows.speed_offset,
+                speed: speed.square(&rows.speed_offset)?,
                 control: &rows.control,
                 weight: tip.weights()?,
                 offset: &rows.offset,
@@ -99,6 +107,7 @@ impl<'a, 'py, const M: usize> ProblemRows<'a, 'py, M> {
             offset: &self.offset,
             width: arrays.curve.width.as_slice()?,
             tip,
+            way: arrays.way_speed.as_ref().map(|way| way.square(&self.way_offset)).transpose()?,
             runs: &self.runs,
             feed: arrays.feed.as_slice()?,
             junction_speed: arrays.junction_speed.as_slice()?,

@@ -30,6 +30,16 @@ type ChunkArrays<'py> = (
     f64,
 );
 
+/// Bernstein coefficients and their offsets.
+type SpeedArrays<'py> = (PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, i64>);
+
+fn speed(arrays: &Option<SpeedArrays>) -> PyResult<Option<(Vec<f64>, Vec<usize>)>> {
+    let speed = arrays.as_ref().map(|(coefficients, offsets)| -> PyResult<_> {
+        Ok((slice(coefficients)?.to_vec(), indices(offsets)?))
+    });
+    speed.transpose()
+}
+
 /// A sampler whatever its number of axes.
 trait Stream: Send + Sync {
     fn count(&self) -> usize;
@@ -114,7 +124,8 @@ impl PySampler {
         weights: Option<PyReadonlyArray1<'_, f64>>,
         offsets: PyReadonlyArray1<'_, i64>,
         width: PyReadonlyArray1<'_, f64>,
-        tip_speed: Option<(PyReadonlyArray1<'_, f64>, PyReadonlyArray1<'_, i64>)>,
+        tip_speed: Option<SpeedArrays<'_>>,
+        way_speed: Option<SpeedArrays<'_>>,
         line: PyReadonlyArray1<'_, i32>,
         runs: PyReadonlyArray1<'_, i64>,
         start_dwell: f64,
@@ -177,10 +188,8 @@ impl PySampler {
         let stream = with_padded_axes!(axes, M, {
             let path = PathData::<M> {
                 curve: curve(&control_points, weights.as_ref(), &offsets, &width)?,
-                tip_speed: match &tip_speed {
-                    None => None,
-                    Some((coefficients, offsets)) => Some((slice(coefficients)?.to_vec(), indices(offsets)?)),
-                },
+                tip_speed: speed(&tip_speed)?,
+                way_speed: speed(&way_speed)?,
                 lines: slice(&line)?.to_vec(),
                 runs: indices(&runs)?,
                 start_dwell,

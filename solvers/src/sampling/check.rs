@@ -27,10 +27,12 @@ pub(super) fn check<const M: usize>(
     {
         return Err("the arrays of the path do not fit together".into());
     }
-    if path.tip_speed.as_ref().is_some_and(|(values, offsets)| !fits_pieces(values, offsets, pieces)) {
-        return Err(format!(
-            "the tip speed does not fit the {pieces} pieces: give 1 to {MAX_TIP} finite coefficients for each"
-        ));
+    for (name, speed) in [("tip", &path.tip_speed), ("way", &path.way_speed)] {
+        if speed.as_ref().is_some_and(|(values, offsets)| !fits_pieces(values, offsets, pieces)) {
+            return Err(format!(
+                "the {name} speed does not fit the {pieces} pieces: give 1 to {MAX_TIP} finite coefficients for each"
+            ));
+        }
     }
     if path.dwell.iter().chain([&path.start_dwell]).any(|dwell| !(dwell.is_finite() && *dwell >= 0.0)) {
         return Err("the path has a pause that is negative or not finite".into());
@@ -99,10 +101,9 @@ fn check_arc<const M: usize>(path: &PathData<M>, run: usize, arc: &ProfileArc) -
     {
         return Err("has a speed that is negative or not finite");
     }
-    let of_way = matches!(arc.kind, ArcKind::PathJerk | ArcKind::SpeedCubic);
-    let right = |a: f64| if of_way { a.is_finite() } else { a == 0.0 };
+    let right = |a: f64| if arc.kind.is_along() { a.is_finite() } else { a == 0.0 };
     if !(right(arc.a0) && right(arc.a1)) {
         return Err("has an acceleration along the path that is not finite, or not of its kind");
     }
-    flaw(piece, path.tip_of(arc.piece as usize), arc).map_or(Ok(()), Err)
+    flaw(piece, path.speed_of(arc), arc).map_or(Ok(()), Err)
 }

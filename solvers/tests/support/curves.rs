@@ -46,6 +46,7 @@ impl<const M: usize> CurveCase<M> {
             offset: &offset,
             width: &width,
             tip: None,
+            way: None,
             runs: &[0, self.pieces.len()],
             feed: &vec![self.feed; self.pieces.len()],
             junction_speed: &self.junction,

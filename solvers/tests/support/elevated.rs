@@ -45,6 +45,7 @@ impl Elevated {
             offset: &self.offset,
             width: &self.width,
             tip: None,
+            way: None,
             runs: &self.runs,
             feed: &case.feed,
             junction_speed: &case.junction,

@@ -64,8 +64,12 @@ impl Moves {
             blend_tolerance.resize(end, now.blend);
             fit_tolerance.resize(end, now.fit);
         }
-        // A change after the last move changes nothing.
+        // A change after the last move changes nothing; one before the first says where that begins.
         self.changes.retain(|change| change.row < count);
+        let (start, direction) = match self.changes.first() {
+            Some(change) if change.row == 0 => (change.start, change.direction),
+            _ => (self.start, UPRIGHT),
+        };
         let first = self.changes.first().map_or(count, |change| change.row);
         let mut meaning = vec![Meaning::Joints as u8; first];
         let mut tool_length = vec![f64::NAN; first];
@@ -80,7 +84,7 @@ impl Moves {
         self.line.shrink_to_fit();
         Columns {
             axes: self.letters(),
-            start: self.place(&self.start, &UPRIGHT),
+            start: self.place(&start, &direction),
             change_move: self.changes.iter().map(|change| change.row as i64).collect(),
             change_start: self
                 .changes
