@@ -74,12 +74,16 @@ def plan_jerk_limited(
     resolution: float,
     tolerance: float,
     time_limit: float | None = None,
-) -> tuple[_Profile, _Changes]: ...
+) -> tuple[_Profile, _Changes, tuple[bool, float]]: ...
 def bound_jerk_limited(
     problem: Problem, jerk: NDArray[np.float64], profile: SpeedProfile, time_limit: float | None = None
 ) -> float: ...
 def plan_s_curve(
-    problem: Problem, jerk: NDArray[np.float64], cutting: tuple[int, float, float], look_ahead: int
+    problem: Problem,
+    jerk: NDArray[np.float64],
+    cutting: tuple[int, float, float],
+    look_ahead: int,
+    time_limit: float | None = None,
 ) -> tuple[_Profile, _Changes]: ...
 def path_segments(
     problem: Problem, jerk: NDArray[np.float64], cutting: tuple[int, float, float]

@@ -106,6 +106,11 @@ _ACCURACY = click.option(
     "--accuracy", type=_Number(), metavar="PART", help="Relative error of the time, of methods with a mesh."
 )
 _TIME_LIMIT_HELP = "Time that a method with a mesh may take."
+_WHOLE_LIMIT_HELP = (
+    "Time that a method with a mesh may take. With jerk-limited it is for the whole command: reading, "
+    "fitting, a first plan, the audit and the files are never left out, 0 ends after them; what is left "
+    "improves the plan and its bound."
+)
 _JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 _QUIET = click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
 _NO_SETPOINTS = "none"
@@ -131,7 +136,7 @@ def cli(context: click.Context) -> int:
 @_MACHINE
 @click.option("--method", type=click.Choice(planners.methods()), default="bang-bang", show_default=True)
 @_ACCURACY
-@click.option("--time-limit", type=_Number(), metavar="S", help=_TIME_LIMIT_HELP)
+@click.option("--time-limit", type=_ZERO_OR_MORE, metavar="S", help=_WHOLE_LIMIT_HELP)
 @_TOLERANCE
 @click.option("--feed", type=_Number(), metavar="MM/S", help="Feed in place of the programmed one.")
 @click.option("--feed-override", type=_Number(), default=1.0, metavar="FACTOR", help="Factor on the feed.")

@@ -95,7 +95,9 @@ def plan_rows(summary: Mapping[str, Any], audit: Audit, files: Sequence[FilePath
     rows.append(("time", duration_text(time) + seconds))
     if summary.get("lower_bound") is not None:
         gap = 100.0 * float(summary.get("gap") or 0.0)
-        rows.append(("lower bound", f"{summary['lower_bound']:.6f} s, gap {gap:.3g} %"))
+        own = summary.get("estimated_gap")
+        by_itself = "" if own is None else f", by its own estimate {100.0 * float(own):.2g} %"
+        rows.append(("lower bound", f"{summary['lower_bound']:.6f} s, gap {gap:.3g} %{by_itself}"))
     mean = length / time if time > 0 else 0.0
     rows.append(("length", f"{length:.3f} mm, mean {mean:.4g} mm/s ({mm_per_min(mean):.5g} mm/min)"))
     rows.append(("path", f"{pieces_text(summary)}, {counted(summary['stops'], 'stop')} on the way"))

@@ -9,13 +9,14 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from feedplan.accuracy import estimate, shortfalls
 from feedplan.audit import Audit, audit
 from feedplan.bound import lower_bound
 from feedplan.constraints.problem import Problem, build_problem, speed_square
@@ -24,11 +25,20 @@ from feedplan.geometry.build import build_path
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
 from feedplan.outputs import FORMAT
-from feedplan.planners import bound_of, corners, limits_jerk, planner
+from feedplan.planners import (
+    bound_of,
+    corners,
+    default_accuracy,
+    grid_error,
+    limits_jerk,
+    options_of,
+    planner,
+)
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 from feedplan.program.read import read_program
 from feedplan.setpoints import Setpoints, setpoints
+from feedplan.time_limit import TimeLimit
 from feedplan.trajectory import State, Trajectory
 
 Progress = Callable[[str, float], None]
@@ -147,6 +157,8 @@ class Plan:
             "time": self.time,
             "lower_bound": self.lower_bound,
             "gap": self.gap,
+            "estimated_gap": estimate(self.profile),
+            "stopped": self.profile.stopped,
             "method": self.method,
             "options": dict(self.options),
             "machine": self.machine.name,
@@ -197,16 +209,21 @@ def plan(
 
     `source`: a file, a Program or a Path. `machine`: a Machine, or the name or file of one. Methods that
     solve on a mesh refine it to the relative `accuracy` of the time, or take `cells` a piece, and give up
-    after `time_limit` [s]; others take none of these. `tolerance` [mm] is the greatest distance from the
-    programmed path where the program lets the tool leave it (default: the program's own, else 0.01); how the
-    path follows the program within it is the method's choice (`planners.corners`). `feed` [mm/s] replaces
-    the programmed feeds, `feed_override` multiplies them. `period` [s] replaces the machine's servo period;
+    after `time_limit` [s]; others take none of these. With jerk-limited the limit is for all work from here
+    to the files: reading, fitting, a first plan, audit, setpoints and report are never left out (how long the
+    last three will take is known from some setpoints of the first plan), the rest of the time is for a
+    better plan and its bound. `tolerance` [mm] is the greatest distance from the programmed path where the
+    program lets the tool leave it (default: the program's own, else 0.01); how the path follows the program
+    within it is the method's choice (`planners.corners`). `feed` [mm/s] replaces the programmed feeds,
+    `feed_override` multiplies them. `period` [s] replaces the machine's servo period;
     `start_speed` and `end_speed` [mm/s] hold at the ends. `progress(stage, done)` is called as the work goes
     on. Raises ProgramError, MachineError, InputError or InfeasibleError, each a sentence with place and
     remedy.
     """
     of_method = {"accuracy": accuracy, "cells": cells, "time_limit": time_limit}
-    solve = planner(method, **of_method)
+    solve: Callable[..., SpeedProfile] = planner(method, **of_method)
+    # The limit of a method that can tell early what follows its plan is one for all of it.
+    limit = TimeLimit(time_limit) if time_limit is not None and "reserve" in options_of(method) else None
     if not isinstance(machine, Machine):
         machine = Machine.load(machine)
     if period is not None:
@@ -233,12 +250,26 @@ def plan(
             start_speed=start_speed,
             end_speed=end_speed,
         )
+        if limit is not None:
+            solve = partial(
+                solve, time_limit=limit.left, reserve=_following(limit, problem, machine, interpolator)
+            )
         profile = solve(problem)
     with _timed(compute, "bound"):
         least = lower_bound(problem, profile)
-        known = bound_of(method, **of_method)
+        left = time_limit if limit is None else limit.left
+        known = bound_of(method, **{**of_method, "time_limit": left})
         if known is not None:
             least = max(least, known(problem, profile))
+        wanted = accuracy or default_accuracy(method)
+        short = shortfalls(
+            profile,
+            least,
+            accuracy=wanted,
+            to_prove=accuracy is not None,
+            time_limit=time_limit,
+            left_to_grids=wanted * grid_error(method),
+        )
         least += path.pauses
     report("plan", 1.0)
     return Plan(
@@ -252,6 +283,7 @@ def plan(
         interpolator=interpolator,
         warnings=(program.warnings if program else ())
         + path.warnings
+        + short
         + rounding_stops(problem, profile)
         + curvature_jumps(problem, profile),
         options={
@@ -265,6 +297,13 @@ def plan(
             "interpolator": interpolator,
         },
     )
+
+
+def _following(
+    limit: TimeLimit, problem: Problem, machine: Machine, interpolator: str
+) -> Callable[[SpeedProfile], float]:
+    """Keeps of a limit what will follow a plan, by a first one of the problem; returns that [s]."""
+    return lambda first: limit.keep_for(setpoints(problem, first, machine.period, interpolator))
 
 
 def rounding_stops(problem: Problem, profile: SpeedProfile) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from enum import IntEnum
 
@@ -46,6 +47,8 @@ class SpeedProfile:
     all other kinds. Speed v = |C'| √p and length are those along the path, by the problem's `way_speed` where
     it has one.
     `kinked` (m,) pieces at whose start a jump of curvature holds the speed.
+    `stopped`: a time limit ended the planning early. `excess`: how far the planner itself takes the time to
+    be above the least on its grid [s], an estimate and no proof; NaN where it does not say.
     PATH_JERK: v1 = v0 + a0·T + value·T²/2, a1 = a0 + value·T, T the duration. SPEED_CUBIC: v0, v1 > 0.
     """
 
@@ -63,6 +66,8 @@ class SpeedProfile:
     a0: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     a1: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     kinked: NDArray[np.uint32] = field(default_factory=lambda: np.empty(0, dtype=np.uint32))
+    stopped: bool = False
+    excess: float = math.nan
 
     def __post_init__(self) -> None:
         for name in ("a0", "a1"):

@@ -5,7 +5,8 @@ keywords. The method `bang-bang` is the module `bang_bang`; modules that begin w
 methods share. A method that is made for another path than the rounded one says so in `CORNERS`
 (`feedplan.geometry.corners.Corners`); one whose profiles keep the jerk limits of the axes says
 `LIMITS_JERK = True`, and the audit judges them. One that knows a bound of the time beside that of
-`feedplan.bound` has a function `lower_bound(problem, profile)` with the same options.
+`feedplan.bound` has a function `lower_bound(problem, profile)` with the same options, and `GRID_ERROR` if
+that leaves so many times the accuracy to finer grids.
 """
 
 from __future__ import annotations
@@ -47,6 +48,17 @@ def bound_of(method: str, **options: float | None) -> Callable[[Problem, SpeedPr
     bound: Callable[..., float] | None = getattr(_module(method), "lower_bound", None)
     given = {name: value for name, value in options.items() if value is not None}
     return None if bound is None else partial(bound, **given)
+
+
+def default_accuracy(method: str) -> float:
+    """The accuracy that a method plans to where none is given; 0 for one that has none."""
+    known = inspect.signature(_module(method).plan).parameters.get("accuracy")
+    return 0.0 if known is None else float(known.default)
+
+
+def grid_error(method: str) -> float:
+    """How many times the accuracy a method's own bound leaves to finer grids, 0 for most."""
+    return float(getattr(_module(method), "GRID_ERROR", 0.0))
 
 
 def options_of(method: str) -> frozenset[str]:

@@ -24,8 +24,18 @@ def plan(problem: Problem) -> SpeedProfile:
 
     Raises SolverError for an axis without a limit of jerk.
     """
+    return _planned(problem, None)
+
+
+def plan_by_itself(problem: Problem) -> SpeedProfile:
+    """The same without the runs of which this method leaves a stretch to jerk-limited: they have no arcs."""
+    return _planned(problem, 0.0)
+
+
+def _planned(problem: Problem, time_limit: float | None) -> SpeedProfile:
+    """`time_limit` [s] is for what is left to jerk-limited."""
     try:
-        columns, changes = plan_s_curve(problem, jerk_limits(problem), CUTTING, LOOK_AHEAD)
+        columns, changes = plan_s_curve(problem, jerk_limits(problem), CUTTING, LOOK_AHEAD, time_limit)
     except PlanError as fault:
         raise error_of(problem, fault) from None
     return SpeedProfile(*columns, *changes)

@@ -45,6 +45,10 @@ pub struct Arcs {
     pub runs: Vec<i64>,
     /// Pieces at whose start a jump of curvature holds the speed.
     pub kinks: Vec<u32>,
+    /// How far the planner takes its time to be above the least, in s.
+    pub excess: f64,
+    /// A deadline came before the planner's end.
+    pub stopped: bool,
     left_out: f64,
     /// Where the arcs that were left out at the start of a piece begin.
     left_from: Option<(usize, f64)>,
@@ -88,6 +92,11 @@ impl Arcs {
         self.piece.is_empty()
     }
 
+    /// What stands for a plan that a deadline left no time for.
+    pub fn unplanned() -> Self {
+        Self { stopped: true, ..Self::default() }
+    }
+
     /// The time of all arcs, in seconds.
     pub fn time(&self) -> f64 {
         self.duration.iter().sum()
@@ -106,6 +115,8 @@ impl Arcs {
         self.a0.append(&mut other.a0);
         self.a1.append(&mut other.a1);
         self.kinks.append(&mut other.kinks);
+        self.excess += other.excess;
+        self.stopped |= other.stopped;
     }
 
     /// Appends an arc between two parameters of a piece. One too short for u to show it is left out, its time and its

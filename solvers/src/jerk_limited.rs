@@ -116,6 +116,13 @@ impl Default for Effort {
     }
 }
 
+impl Effort {
+    /// Whether the deadline has passed.
+    pub fn expired(&self) -> bool {
+        self.deadline.is_some_and(|end| Instant::now() >= end)
+    }
+}
+
 /// Why there is no plan.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Fault {
@@ -134,6 +141,9 @@ pub struct Plan {
     pub time: f64,
     /// Whether every stretch came to its optimum.
     pub converged: bool,
+    /// How far it may be above the least time on its grid, in s, by the complementarity that the multipliers leave; an
+    /// estimate and no bound, and of no meaning where the deadline came first.
+    pub excess: f64,
     /// Newton steps, summed over the intervals they were taken on, in parts of all intervals.
     pub iterations: f64,
 }

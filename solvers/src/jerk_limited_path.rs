@@ -24,9 +24,12 @@ const CUTS: u32 = 12;
 const TRIALS: u32 = 12;
 
 /// The fastest profile with these jerk limits, in mm/s³.
+///
+/// A run of which a stretch is not planned when the deadline comes has no arcs; what is being planned then is the best
+/// so far.
 pub fn plan<const M: usize>(problem: &Problem<M>, jerk: &[f64; M], effort: &Effort) -> Result<Arcs, Fault> {
     over_stretches(problem, jerk, |stretch, limits| {
-        Task { problem, limits: *limits, effort }.plan(&stretch.parts, stretch.ends, 0)
+        Task { problem, limits: *limits, effort }.stretch(stretch)
     })
 }
 
@@ -45,7 +48,7 @@ pub struct Columns<'a> {
 }
 
 /// A bound in s of the time on the grids of a profile: see `jerk_limited::certify`. A stretch that this planner did not
-/// plan as one counts for nothing.
+/// plan as one counts for nothing, and so do those that the deadline leaves no time for.
 pub fn certified<const M: usize>(
     problem: &Problem<M>,
     jerk: &[f64; M],
@@ -67,10 +70,12 @@ pub fn certified<const M: usize>(
     }
     offsets.push(count);
     let task = Task { problem, limits, effort };
-    let bounds = stretches
-        .par_iter()
-        .enumerate()
-        .map(|(i, stretch)| task.certified(stretch, columns, offsets[i]..offsets[i + 1]).unwrap_or(0.0));
+    let bounds = stretches.par_iter().enumerate().map(|(i, stretch)| {
+        if effort.expired() {
+            return 0.0;
+        }
+        task.certified(stretch, columns, offsets[i]..offsets[i + 1]).unwrap_or(0.0)
+    });
     Ok(bounds.sum())
 }
 
@@ -82,8 +87,16 @@ pub struct Task<'a, const M: usize> {
 }
 
 impl<const M: usize> Task<'_, M> {
+    /// The profile of a stretch; none that is begun after the deadline.
+    pub fn stretch(&self, stretch: &Stretch) -> Result<Arcs, Fault> {
+        if self.effort.expired() {
+            return Ok(Arcs::unplanned());
+        }
+        self.plan(&stretch.parts, stretch.ends, 0)
+    }
+
     /// The profile of parts between speeds at their ends; cut so often already.
-    pub fn plan(&self, parts: &[Part], speeds: [f64; 2], cuts: u32) -> Result<Arcs, Fault> {
+    fn plan(&self, parts: &[Part], speeds: [f64; 2], cuts: u32) -> Result<Arcs, Fault> {
         let path = ByLength::new(self.problem, parts);
         let mut arcs = Arcs::default();
         if speeds == [0.0; 2] {
@@ -100,22 +113,22 @@ impl<const M: usize> Task<'_, M> {
             caps: &speed_caps,
             ends: speeds.map(end),
         };
-        let solve = |effort: &Effort| jerk_limited::plan(&problem, effort);
         let moving = speeds != [0.0; 2];
-        let mut plan = solve(self.effort);
-        if moving && plan.is_err() && self.effort.deadline.is_some() {
-            // There is no plan to a moving end before it is found.
-            plan = solve(&Effort { deadline: None, ..*self.effort });
-        }
-        match plan {
+        match jerk_limited::plan(&problem, self.effort) {
             Ok(plan) => {
                 arcs.push_profile(self.problem, &path, &self.limits.jerk, &plan.profile);
+                arcs.excess = plan.excess;
+                arcs.stopped = !plan.converged && self.effort.expired();
                 for (cap, jumps) in &caps {
                     if *jumps && plan.profile.at(cap.s)[0] >= HELD * cap.speed * cap.speed {
                         arcs.kinks.push(parts[path.part(cap.s)].piece as u32);
                     }
                 }
                 Ok(arcs)
+            }
+            // There is no plan to a moving end before it is found.
+            Err(jerk_limited::Fault::NoPlan { .. }) if moving && self.effort.expired() => {
+                Ok(Arcs::unplanned())
             }
             Err(jerk_limited::Fault::Input(what)) => Err(Fault::Input { piece: Some(parts[0].piece), what }),
             Err(jerk_limited::Fault::NoPlan { .. }) if moving => {

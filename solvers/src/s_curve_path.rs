@@ -14,7 +14,7 @@ use crate::path_dynamics::{allowable, bounded, AxisLimits, Curve, Shape};
 use crate::s_curve::{self, Section, Segment};
 use crate::spline::bezier::split;
 use crate::spline::CompositeCurve;
-use crate::stretches::{checked, over_stretches, stretches, Stretch};
+use crate::stretches::{checked, over_stretches, stretches};
 
 /// Bounds of derivatives are greater than these by this part.
 const ACCURACY: f64 = 0.05;
@@ -38,12 +38,13 @@ pub struct Cutting {
 }
 
 /// The profile of a path, planned with so many segments of look-ahead. Where a segment has no speed, next to a
-/// cusp, and where the path begins or ends in motion, the jerk-limited planner plans the stretch.
+/// cusp, and where the path begins or ends in motion, the jerk-limited planner plans the stretch with this effort.
 pub fn plan<const M: usize>(
     problem: &Problem<M>,
     jerk: &[f64; M],
     cutting: &Cutting,
     look_ahead: usize,
+    effort: &Effort,
 ) -> Result<Arcs, Fault> {
     over_stretches(problem, jerk, |stretch, limits| {
         let path = ByLength::new(problem, &stretch.parts);
@@ -51,7 +52,7 @@ pub fn plan<const M: usize>(
             if stretch.ends == [0.0; 2] { segments(problem, &path, limits, cutting) } else { None };
         match segments {
             Some(segments) => Ok(along(problem, &path, limits, &s_curve::plan(&segments, look_ahead)?)),
-            None => otherwise(problem, stretch, limits),
+            None => Task { problem, limits: *limits, effort }.stretch(stretch),
         }
     })
 }
@@ -103,18 +104,9 @@ pub fn follow<const M: usize>(
         let own = offsets.get(stretch.number).zip(offsets.get(stretch.number + 1));
         match own.and_then(|(&from, &to)| sections.get(from..to)).filter(|own| !own.is_empty()) {
             Some(own) => Ok(along(problem, &ByLength::new(problem, &stretch.parts), limits, own)),
-            None => otherwise(problem, stretch, limits),
+            None => Task { problem, limits: *limits, effort: &Effort::default() }.stretch(stretch),
         }
     })
-}
-
-/// A stretch that has no segments.
-fn otherwise<const M: usize>(
-    problem: &Problem<M>,
-    stretch: &Stretch,
-    limits: &Limits<M>,
-) -> Result<Arcs, Fault> {
-    Task { problem, limits: *limits, effort: &Effort::default() }.plan(&stretch.parts, stretch.ends, 0)
 }
 
 /// The arcs of sections from rest to rest, with the joints that hold the speed.

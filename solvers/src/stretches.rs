@@ -40,7 +40,8 @@ pub struct Stretch {
     pub ends: [f64; 2],
 }
 
-/// The profile of a path with these jerk limits in mm/s³, each stretch planned alone.
+/// The profile of a path with these jerk limits in mm/s³, each stretch planned alone. A run with a stretch that was not
+/// planned has no arcs.
 pub fn over_stretches<const M: usize>(
     problem: &Problem<M>,
     jerk: &[f64; M],
@@ -50,16 +51,18 @@ pub fn over_stretches<const M: usize>(
     let stretches = stretches(problem);
     let planned: Result<Vec<Arcs>, Fault> =
         stretches.par_iter().map(|stretch| plan(stretch, &limits)).collect();
+    let mut planned = planned?.into_iter();
     let mut all = Arcs::default();
-    let mut run = usize::MAX;
-    for (stretch, arcs) in stretches.iter().zip(planned?) {
-        if stretch.run != run {
-            run = stretch.run;
-            all.runs.push(all.len() as i64);
+    all.runs.push(0);
+    for run in stretches.chunk_by(|a, b| a.run == b.run) {
+        let own: Vec<Arcs> = planned.by_ref().take(run.len()).collect();
+        if own.iter().any(|arcs| arcs.stopped && arcs.is_empty()) {
+            all.stopped = true;
+        } else {
+            own.into_iter().for_each(|arcs| all.append(arcs));
         }
-        all.append(arcs);
+        all.runs.push(all.len() as i64);
     }
-    all.runs.push(all.len() as i64);
     Ok(all)
 }
 

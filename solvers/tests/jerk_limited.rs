@@ -413,3 +413,17 @@ fn bad_numbers_are_refused_with_their_place() {
         Fault::Input("the acceleration limit of axis 0 is 0 mm/s²: give a positive number".into())
     );
 }
+
+#[test]
+fn the_excess_of_a_plan_says_how_far_it_is_from_the_best_on_its_grid() {
+    let nurbs = Nurbs::butterfly();
+    let problem = problem(&nurbs, FAST);
+    let at = |tolerance: f64| plan(&problem, &Effort { tolerance, ..Effort::default() }).expect("a plan");
+    let best = at(1e-8);
+    assert!(best.excess < 1e-7 * best.time, "{}", best.excess);
+    for tolerance in [1e-1, 1e-2, 1e-3] {
+        let rough = at(tolerance);
+        assert!(rough.converged && rough.excess < 2.0 * tolerance * rough.time);
+        assert!(rough.time - best.time < rough.excess, "{} of {}", rough.time - best.time, rough.excess);
+    }
+}

@@ -66,6 +66,8 @@ pub struct Report {
     pub iterations: usize,
     /// Time of the stretch with its ramps, in s.
     pub time: f64,
+    /// What the multipliers leave between it and the least one, in s.
+    pub excess: f64,
 }
 
 /// Part of the way to the boundary.
@@ -132,13 +134,14 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         let mut time = self.time(rows, bounds, x, false);
         let Some(mut logarithm) = self.enter(rows, bounds, x, effort.barrier * time / total, effort.warm)
         else {
-            return Report { outcome: Outcome::NotInside, iterations: 0, time };
+            return Report { outcome: Outcome::NotInside, iterations: 0, time, excess: time };
         };
         let ties = [tie(&bounds[0], 1.0), tie(&bounds[1], -1.0)];
         let mut floor = 0.3 * effort.barrier;
         // The part of the multipliers' step that is still to be taken, and their least complementarity then.
         let (mut dual, mut least_dual) = (0.0, 0.0);
         let mut gain = f64::INFINITY;
+        let mut excess = time;
         let mut outcome = Outcome::Stopped;
         let mut iterations = 0;
         while iterations < effort.max_iterations && effort.deadline.is_none_or(|end| Instant::now() < end) {
@@ -146,6 +149,7 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
             dual = 0.0;
             let mu = work / total;
             let gap = work / time;
+            excess = work;
             let missing = missing(&bounds, x);
             let met = miss(&bounds, x, &rows.intervals) < MET;
             if met && gap < effort.tolerance && gain.abs() < effort.tolerance.max(1e-6) * time {
@@ -209,7 +213,7 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         } else {
             outcome = Outcome::Missed;
         }
-        Report { outcome, iterations, time: self.time(rows, bounds, x, false) }
+        Report { outcome, iterations, time: self.time(rows, bounds, x, false), excess }
     }
 
     fn resize(&mut self, count: usize) {

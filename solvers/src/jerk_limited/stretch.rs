@@ -45,6 +45,8 @@ pub struct Stretch<const M: usize> {
 pub struct Verdict {
     /// The optimum was reached, to the tolerance.
     pub converged: bool,
+    /// How far above the least time on its grid the plan is, in s, by the complementarity that its multipliers leave.
+    pub excess: f64,
     pub iterations: usize,
 }
 
@@ -59,7 +61,7 @@ impl<const M: usize> Stretch<M> {
         space: &mut InteriorPoint<Exact, M>,
     ) -> Verdict {
         self.rows.waive(&bounds);
-        let mut verdict = Verdict::default();
+        let mut verdict = Verdict { excess: self.time(&bounds, x), ..Verdict::default() };
         let (mut best, mut improved) = (f64::INFINITY, x.to_vec());
         let rough = Effort { tolerance: effort.tolerance.max(ROUGH.0), ..*effort };
         let mut attempts = vec![(x.to_vec(), rough)];
@@ -73,6 +75,7 @@ impl<const M: usize> Stretch<M> {
             if holds && (round > 0 || stopped) {
                 if report.time < best {
                     improved = y;
+                    verdict.excess = report.excess;
                 }
                 verdict.converged = !stopped;
                 break;
@@ -82,6 +85,7 @@ impl<const M: usize> Stretch<M> {
                 if time < best {
                     best = time;
                     improved.copy_from_slice(&z);
+                    verdict.excess = report.excess + (time - report.time);
                 }
                 verdict.converged =
                     !stopped && round > 0 && time <= report.time * (1.0 + CHEAP * effort.tolerance);

@@ -6,7 +6,6 @@
 //! to start from. A few windows at a time are in memory.
 
 use std::ops::Range;
-use std::time::Instant;
 
 use rayon::prelude::*;
 
@@ -39,10 +38,10 @@ pub fn solve<G: Geometry<M>, const M: usize>(
     let mut x = prepared.x.clone();
     let run = Run { prepared: &prepared, effort, nodes: &prepared.grid.nodes };
     let windows = run.windows();
-    let mut counts = Counts { converged: true, steps: 0.0 };
+    let mut counts = Counts { converged: true, steps: 0.0, excess: 0.0 };
     let mut done = 0;
     for first in (0..windows.len()).step_by(BATCH * rayon::current_num_threads()) {
-        if effort.deadline.is_some_and(|end| Instant::now() >= end) {
+        if effort.expired() {
             counts.converged = false;
             break;
         }
@@ -81,6 +80,7 @@ pub fn solve<G: Geometry<M>, const M: usize>(
     Ok(Plan {
         time: time + ramps(&prepared.bounds, &x),
         converged: counts.converged,
+        excess: counts.excess,
         iterations: counts.steps / count as f64,
         profile: run.profile(&x, 0..count),
     })
@@ -90,11 +90,14 @@ struct Counts {
     converged: bool,
     /// Newton steps times intervals.
     steps: f64,
+    /// In s; what windows share counts in each of them.
+    excess: f64,
 }
 
 impl Counts {
     fn add(&mut self, verdict: &Verdict, intervals: usize) {
         self.converged &= verdict.converged;
+        self.excess += verdict.excess;
         self.steps += (verdict.iterations * intervals) as f64;
     }
 }

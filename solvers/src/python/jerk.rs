@@ -37,8 +37,12 @@ fn deadline(time_limit: Option<f64>) -> Option<Instant> {
     Instant::now().checked_add(limit)
 }
 
-/// The fastest profile within `jerk` [mm/s³] of every axis: the columns of all profiles, and (a0, a1,
-/// kinked).
+/// The columns of all profiles, (a0, a1, kinked), and whether a time limit stopped the planner and how far it takes the
+/// time to be above the least, in s.
+type Planned<'py> = (Columns<'py>, Changes<'py>, (bool, f64));
+
+/// The fastest profile within `jerk` [mm/s³] of every axis. Runs that are not planned when the time limit comes have no
+/// arcs.
 #[pyfunction]
 #[pyo3(signature = (problem, jerk, resolution, tolerance, time_limit=None))]
 fn plan_jerk_limited<'py>(
@@ -48,7 +52,7 @@ fn plan_jerk_limited<'py>(
     resolution: f64,
     tolerance: f64,
     time_limit: Option<f64>,
-) -> PyResult<(Columns<'py>, Changes<'py>)> {
+) -> PyResult<Planned<'py>> {
     let effort = Effort { resolution, tolerance, deadline: deadline(time_limit), ..Effort::default() };
     with_padded_axes!(problem.curve.axes(), M, {
         let rows = ProblemRows::<M>::new(&problem)?;
@@ -56,7 +60,9 @@ fn plan_jerk_limited<'py>(
         let arcs = py
             .detach(|| jerk_limited_path::plan(&problem, &jerk, &effort))
             .map_err(|fault| to_exception(&fault))?;
-        Ok(to_columns(py, arcs))
+        let end = (arcs.stopped, arcs.excess);
+        let (columns, changes) = to_columns(py, arcs);
+        Ok((columns, changes, end))
     })
 }
 
@@ -105,22 +111,25 @@ fn bound_jerk_limited(
 }
 
 /// The two-pass profile within `jerk` of every axis, of segments cut as `s_curve_path::Cutting` says (parts, stretch,
-/// alike): the same columns.
+/// alike): the same columns. The time limit is that of stretches left to the jerk-limited planner; see there.
 #[pyfunction]
+#[pyo3(signature = (problem, jerk, cutting, look_ahead, time_limit=None))]
 fn plan_s_curve<'py>(
     py: Python<'py>,
     problem: ProblemArrays<'py>,
     jerk: PyReadonlyArray1<'py, f64>,
     cutting: (usize, f64, f64),
     look_ahead: usize,
+    time_limit: Option<f64>,
 ) -> PyResult<(Columns<'py>, Changes<'py>)> {
     let (parts, stretch, alike) = cutting;
     let cutting = Cutting { parts, stretch, alike };
+    let effort = Effort { deadline: deadline(time_limit), ..Effort::default() };
     with_padded_axes!(problem.curve.axes(), M, {
         let rows = ProblemRows::<M>::new(&problem)?;
         let (problem, jerk) = (rows.problem()?, row::<M>(&jerk, 1.0)?);
         let arcs = py
-            .detach(|| s_curve_path::plan(&problem, &jerk, &cutting, look_ahead))
+            .detach(|| s_curve_path::plan(&problem, &jerk, &cutting, look_ahead, &effort))
             .map_err(|fault| to_exception(&fault))?;
         Ok(to_columns(py, arcs))
     })

@@ -1,0 +1,54 @@
+"""What a plan reaches of the accuracy that it was asked for, and what of it is proven, in words."""
+
+from __future__ import annotations
+
+import math
+
+from feedplan.profile import SpeedProfile
+
+
+def estimate(profile: SpeedProfile) -> float | None:
+    """How far above the least time on its grid the planner takes a plan to be, as a part of its time: an
+    estimate by the complementarity that is left, no proof. None where the planner does not say."""
+    if profile.stopped or math.isnan(profile.excess) or profile.time <= 0:
+        return None
+    return profile.excess / profile.time
+
+
+def shortfalls(
+    profile: SpeedProfile,
+    lower_bound: float,
+    *,
+    accuracy: float,
+    to_prove: bool,
+    time_limit: float | None,
+    left_to_grids: float,
+) -> tuple[str, ...]:
+    """A sentence where a plan was stopped by its time limit [s], where it does not reach the `accuracy`, and
+    where it does, but its bound does not prove it though that is asked for (`to_prove`).
+
+    `lower_bound` [s] is that of the profile's time, less the part `left_to_grids` that finer ones may gain.
+    """
+    slower = profile.time / lower_bound - 1.0 if lower_bound > 0 else math.inf
+    most = f"the plan may be up to {percent(slower)} slower than the optimum"
+    if profile.stopped and time_limit is not None:
+        return (f"stopped after {time_limit:g} s: {most}",)
+    own = estimate(profile)
+    if own is None or slower <= accuracy:
+        return ()
+    if own > accuracy:
+        return (f"the accuracy {accuracy:g} was not reached: {most}, by its own estimate {percent(own)}",)
+    if not to_prove:
+        return ()
+    gap = 1.0 - lower_bound / profile.time
+    loose = max(gap - left_to_grids - own, 0.0)
+    return (
+        f"by its own estimate the plan is within {percent(own)} of the optimum on its grid and reaches the "
+        f"accuracy {accuracy:g}, but the lower bound leaves a gap of {percent(gap)}: {percent(left_to_grids)} "
+        f"for what finer grids may gain, {percent(loose)} where it is not tight",
+    )
+
+
+def percent(part: float) -> str:
+    """`3.1 %`, in two digits."""
+    return f"{100.0 * part:.2g} %" if math.isfinite(part) else "any part"
