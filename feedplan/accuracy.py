@@ -44,8 +44,8 @@ def shortfalls(
     loose = max(gap - left_to_grids - own, 0.0)
     return (
         f"by its own estimate the plan is within {percent(own)} of the optimum on its grid and reaches the "
-        f"accuracy {accuracy:g}, but the lower bound leaves a gap of {percent(gap)}: {percent(left_to_grids)} "
-        f"for what finer grids may gain, {percent(loose)} where it is not tight",
+        f"accuracy {accuracy:g}, but the lower bound leaves a gap of {percent(gap)}: "
+        f"{percent(left_to_grids)} for what finer grids may gain, {percent(loose)} where it is not tight",
     )
 
 
