@@ -20,6 +20,7 @@ from benchmarks import (
     methods,
     planner_cost,
     results,
+    time_limit,
     zhang_comparison,
 )
 
@@ -36,6 +37,7 @@ BENCHMARKS = {
         interpolators,
         kinematics_cost,
         jerk,
+        time_limit,
     )
 }
 

@@ -115,6 +115,8 @@ impl<const M: usize> Task<'_, M> {
         };
         let moving = speeds != [0.0; 2];
         match jerk_limited::plan(&problem, self.effort) {
+            // The deadline came before the first step of all windows.
+            Ok(plan) if plan.iterations == 0.0 && self.effort.expired() => Ok(Arcs::unplanned()),
             Ok(plan) => {
                 arcs.push_profile(self.problem, &path, &self.limits.jerk, &plan.profile);
                 arcs.excess = plan.excess;

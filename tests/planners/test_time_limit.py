@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import replace
 from pathlib import Path as FilePath
 
@@ -27,6 +28,7 @@ from tests.planners.random_paths import random_problem
 MACHINE = Machine(
     "jerk", tuple(Axis(name, 250.0, 3000.0, max_jerk=50_000.0) for name in "XYZ"), chord_tolerance=np.inf
 )
+SEEDS = int(os.environ.get("FEEDPLAN_SEEDS", "6"))
 PROGRAM = """G21 G90 G64 P0.01
 G1 X20 F{feed}
 X40 Y10
@@ -56,7 +58,7 @@ def problems(tmp_path: FilePath) -> list[Problem]:
     """Named and random curves, and a program with feeds far below what the axes allow, at which the method
     s-curve is nearly optimal."""
     found = [named(curve) for curve in (lemniscate, trefoil, butterfly)]
-    found += [random_problem(seed) for seed in range(6)]
+    found += [random_problem(seed) for seed in range(SEEDS)]
     for feed in (60, 600, 6000):
         file = tmp_path / f"{feed}.ngc"
         file.write_text(PROGRAM.format(feed=feed))
