@@ -42,6 +42,7 @@ def test_every_benchmark_runs_and_stores_its_table(tmp_path: Path) -> None:
         "interpolators",
         "kinematics-cost",
         "jerk",
+        "time-limit",
     }
     assert all(row["error [steps]"] <= 1.001e-6 for row in tables["interpolators"]["rows"])
     assert all(-1e-9 < row["gap"] < 1e-3 for row in tables["certificate-cost"]["rows"])

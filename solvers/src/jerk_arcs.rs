@@ -97,6 +97,11 @@ impl Arcs {
         Self { stopped: true, ..Self::default() }
     }
 
+    /// Whether it is that.
+    pub fn is_unplanned(&self) -> bool {
+        self.stopped && self.is_empty()
+    }
+
     /// The time of all arcs, in seconds.
     pub fn time(&self) -> f64 {
         self.duration.iter().sum()

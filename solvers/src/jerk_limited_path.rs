@@ -234,7 +234,11 @@ impl<const M: usize> Task<'_, M> {
             return Err(Fault::Stuck { piece: at.piece, u });
         }
         let mut arcs = self.plan(&left, [0.0; 2], cuts + 1)?;
-        arcs.append(self.plan(&right, [0.0; 2], cuts + 1)?);
+        let rest = self.plan(&right, [0.0; 2], cuts + 1)?;
+        if arcs.is_unplanned() || rest.is_unplanned() {
+            return Ok(Arcs::unplanned());
+        }
+        arcs.append(rest);
         Ok(arcs)
     }
 

@@ -56,7 +56,7 @@ pub fn over_stretches<const M: usize>(
     all.runs.push(0);
     for run in stretches.chunk_by(|a, b| a.run == b.run) {
         let own: Vec<Arcs> = planned.by_ref().take(run.len()).collect();
-        if own.iter().any(|arcs| arcs.stopped && arcs.is_empty()) {
+        if own.iter().any(Arcs::is_unplanned) {
             all.stopped = true;
         } else {
             own.into_iter().for_each(|arcs| all.append(arcs));
