@@ -186,7 +186,7 @@ def plan(
         raise click.UsageError(f"--format {_NO_SETPOINTS} excludes other formats: leave one of them out")
     if output:
         require_folder(FilePath(output))
-    with console.progress_bar(quiet) as progress:
+    with console.progress_bar(quiet) as progress, console.without_others():
         result = make_plan(
             program,
             Machine.load(machine),
@@ -232,7 +232,7 @@ def plan(
 @click.option("--methods", metavar="A,B,…", help="Methods to compare.  [default: all]")
 @_ACCURACY
 @click.option(
-    "--time-limit", type=_Number(), default=60.0, show_default=True, metavar="S", help=_TIME_LIMIT_HELP
+    "--time-limit", type=_Number(), default=10.0, show_default=True, metavar="S", help=_TIME_LIMIT_HELP
 )
 @_TOLERANCE
 @click.option("--feed", type=_Number(), metavar="MM/S", help="Feed in place of the programmed one.")
@@ -265,7 +265,7 @@ def compare(
     if output:
         require_folder(FilePath(output))
     names = planners.methods() if methods is None else [name.strip() for name in methods.split(",")]
-    with console.progress_bar(quiet) as progress:
+    with console.progress_bar(quiet) as progress, console.without_others():
         rows = make_comparison(
             program,
             machine,

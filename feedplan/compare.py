@@ -1,4 +1,7 @@
-"""Several methods on one program: time, proven gap, computing time and the worst use of every limit."""
+"""Several methods on one program: time, proven gap, computing time and the worst use of every limit.
+
+Methods may follow different paths within the tolerance; a bound is one of its path alone.
+"""
 
 from __future__ import annotations
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout, suppress
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
-from feedplan.units import duration_text, mm_per_min, ratio_text
+from feedplan.units import duration_text, mm_per_min, ratio_text, tolerance_text
 
 if TYPE_CHECKING:
     from feedplan.audit import Audit, LimitCheck
@@ -68,7 +69,11 @@ def progress_bar(quiet: bool) -> Iterator[Callable[[str, float], None] | None]:
 
     columns = (TextColumn("{task.description:<7}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"))
     tasks: dict[str, TaskID] = {}
-    with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True) as bars:
+    # A stream of its own, for where those of the process are silenced.
+    with (
+        os.fdopen(os.dup(sys.stderr.fileno()), "w", encoding="utf-8", errors="replace") as stream,
+        Progress(*columns, TimeElapsedColumn(), console=Console(file=stream), transient=True) as bars,
+    ):
 
         def show(stage: str, done: float) -> None:
             if stage not in tasks:
@@ -81,6 +86,22 @@ def progress_bar(quiet: bool) -> Iterator[Callable[[str, float], None] | None]:
         yield show
 
 
+@contextmanager
+def without_others() -> Iterator[None]:
+    """What others print meanwhile, the solvers' C code too, goes nowhere; the progress bar stays."""
+    with ExitStack() as stack:
+        nothing = stack.enter_context(open(os.devnull, "w", encoding="utf-8"))
+        for stream, number in ((sys.stdout, 1), (sys.stderr, 2)):
+            stream.flush()
+            with suppress(OSError):  # closed by who started the process
+                kept = os.dup(number)
+                stack.callback(os.close, kept)
+                stack.callback(os.dup2, kept, number)
+                os.dup2(nothing.fileno(), number)
+        with redirect_stdout(nothing), redirect_stderr(nothing):
+            yield
+
+
 def _style(name: str, value: str) -> str:
     if name == "audit":
         return "bold green" if value.startswith("passed") else "bold red"
@@ -89,7 +110,7 @@ def _style(name: str, value: str) -> str:
 
 def plan_rows(summary: Mapping[str, Any], audit: Audit, files: Sequence[FilePath]) -> Rows:
     """The result of a plan as names and values."""
-    time, length = float(summary["time"]), float(summary["length"])
+    time = float(summary["time"])
     rows = [(name, str(summary[name])) for name in ("program", "machine", "method")]
     seconds = f" ({time:.6f} s)" if time >= 60 else ""
     rows.append(("time", duration_text(time) + seconds))
@@ -97,9 +118,19 @@ def plan_rows(summary: Mapping[str, Any], audit: Audit, files: Sequence[FilePath
         gap = 100.0 * float(summary.get("gap") or 0.0)
         own = summary.get("estimated_gap")
         by_itself = "" if own is None else f", by its own estimate {100.0 * float(own):.2g} %"
-        rows.append(("lower bound", f"{summary['lower_bound']:.6f} s, gap {gap:.3g} %{by_itself}"))
-    mean = length / time if time > 0 else 0.0
-    rows.append(("length", f"{length:.3f} mm, mean {mean:.4g} mm/s ({mm_per_min(mean):.5g} mm/min)"))
+        bound = f"{summary['lower_bound']:.6f} s for this path"
+        rows.append(("lower bound", f"{bound}, gap {gap:.3g} %{by_itself}"))
+    mean = float(summary["mean_speed"])
+    rows.append(
+        ("length", f"{summary['length']:.3f} mm, mean {mean:.4g} mm/s ({mm_per_min(mean):.5g} mm/min)")
+    )
+    if summary["turn"] > 0:
+        rows.append(("turning alone", f"{summary['turn']:.3f} deg"))
+    totals = summary["totals"]
+    rows += [(name, _total_text(totals[name])) for name in ("feed", "rapid") if totals[name]["time"] > 0]
+    rows.append(("limits", _limits_text(summary["limits"])))
+    rows.append(("stops", _stops_text(summary["stops_by_cause"])))
+    rows.append(("tolerance", tolerance_text(**summary["tolerance"])))
     rows.append(("path", f"{pieces_text(summary)}, {counted(summary['stops'], 'stop')} on the way"))
     rows += fit_rows(summary.get("fit") or {})
     rows.append(("audit", audit_text(audit)))
@@ -109,6 +140,23 @@ def plan_rows(summary: Mapping[str, Any], audit: Audit, files: Sequence[FilePath
     if files:
         rows.append(("files", " ".join(str(file) for file in files)))
     return rows
+
+
+def _total_text(total: Mapping[str, float]) -> str:
+    """`1.2 s, 80 mm`, with degrees where rotary axes move alone."""
+    turn = f", {total['turn']:.4g} deg alone" if total["turn"] > 0 else ""
+    return f"{duration_text(total['time'])}, {total['length']:.6g} mm{turn}"
+
+
+def _limits_text(limits: Mapping[str, Mapping[str, float]]) -> str:
+    """The limits by the time that they are active; those below a thousandth are left out."""
+    parts = [f"{name} {100 * share['part']:.1f} %" for name, share in limits.items() if share["part"] >= 1e-3]
+    return ", ".join(parts)
+
+
+def _stops_text(stops: Sequence[Mapping[str, Any]]) -> str:
+    """`2 × start and end, 3 × exact stop (G61.1)`."""
+    return ", ".join(f"{row['count']} × {row['cause']}" for row in stops)
 
 
 def pieces_text(summary: Mapping[str, Any]) -> str:
@@ -183,7 +231,7 @@ def comparison_table(
     """Header and rows of a comparison: one row a method that has a plan, one column a limit that there is."""
     planned = [row for row in rows if row.plan is not None]
     limits = [name for name in limits if any(_is_limited(row.worst(name)) for row in planned)]
-    header = ("method", "time s", "bound s", "gap", "computing", *limits, "audit")
+    header = ("method", "time s", "path's bound s", "gap", "computing", *limits, "audit")
     fastest = min((row.time for row in planned if row.time is not None), default=0.0)
     digits = 6 if fastest < 1e3 else 3
     body = [

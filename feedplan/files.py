@@ -53,7 +53,9 @@ def write_plan(
     setpoints = plan.setpoints()
     units = tuple(plan.machine.axis(name).unit for name in setpoints.axes)
     header = Header(setpoints.axes, units, setpoints.period)
-    figures = SetpointFigures(plan.problem, setpoints.count, [check.time for check in audit.broken])
+    figures = SetpointFigures(
+        plan.problem, plan.account.motion, setpoints.count, [check.time for check in audit.broken]
+    )
     with staged(folder, last=SUMMARY_FILE) as stage:
         with ExitStack() as stack:
             sinks = [
@@ -71,6 +73,7 @@ def write_plan(
             summary=summary,
             problem=plan.problem,
             profile=plan.profile,
+            account=plan.account,
             audit=audit,
             figures=figures,
             source=source,
@@ -103,7 +106,7 @@ def write_comparison(
     for number, row in enumerate(rows):
         entry: dict[str, Any] = {"method": row.method, "time": row.time, "error": row.error}
         if row.plan is not None:
-            tool = ToolPath(row.plan.problem)
+            tool = ToolPath(row.plan.problem, row.plan.account.motion)
             for chunk in row.plan.setpoints().chunks(_ROWS_AT_ONCE):
                 tool.add(chunk)
             paths.append({"method": row.method, **tool.data()})

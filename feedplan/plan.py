@@ -20,7 +20,6 @@ from feedplan.accuracy import estimate, shortfalls
 from feedplan.audit import Audit, audit
 from feedplan.bound import lower_bound
 from feedplan.constraints.problem import Problem, build_problem, speed_square
-from feedplan.curves.length import CurveLength
 from feedplan.geometry.build import build_path
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
@@ -37,6 +36,7 @@ from feedplan.planners import (
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 from feedplan.program.read import read_program
+from feedplan.report.account import Account, account
 from feedplan.setpoints import Setpoints, setpoints
 from feedplan.time_limit import TimeLimit
 from feedplan.trajectory import State, Trajectory
@@ -49,8 +49,9 @@ class Plan:
     """A planned program.
 
     `profile` is the speed along `problem.path`; `lower_bound` [s] is proven: no feasible profile of this path
-    is faster (a method with a bound of its own, as jerk-limited, may prove its on a grid and say so);
-    `compute` is the computing time of each stage [s]; `options` those that the plan was made with.
+    is faster, though one of another path within the tolerance may be (a method with a bound of its own, as
+    jerk-limited, may prove its on a grid and say so); `compute` is the computing time of each stage [s];
+    `options` those that the plan was made with.
     """
 
     program: Program | None
@@ -118,6 +119,11 @@ class Plan:
         """The plan as functions of time and length."""
         return Trajectory(self.problem, self.profile)
 
+    @cached_property
+    def account(self) -> Account:
+        """What the time and the way are made of: limits, slow lines, stops, feed and rapid motion."""
+        return account(self.problem, self.profile, self.program, limits_jerk(self.method))
+
     def at(self, t: ArrayLike) -> State:
         """Position, velocity, acceleration, jerk and source line at one time or at times (n,) [s]; exact.
 
@@ -172,7 +178,7 @@ class Plan:
                 "count": points.count,
                 "duration": points.duration,
             },
-            "length": CurveLength(self.problem.tip_curve or self.path.curve).total,
+            **self.account.to_json(),
             "pieces": len(self.path),
             "runs": len(self.path.runs) - 1,
             "stops": len(self.path.runs) - 2,

@@ -26,6 +26,11 @@ def duration_text(seconds: float) -> str:
     return f"{hours:.0f} h {minutes:02.0f} min {rest:02.0f} s"
 
 
+def tolerance_text(least: float, greatest: float) -> str:
+    """`0.01 mm`, or the least and the greatest tolerance [mm] of a path that has several."""
+    return f"{greatest:g} mm" if least == greatest else f"{least:g} to {greatest:g} mm"
+
+
 def ratio_text(number: float, other: float) -> str:
     """`3.0 : 1`, `0.048 : 1`: how many for one of the other."""
     ratio = number / other

@@ -16,6 +16,7 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
 from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.report.account import Account, account
 from feedplan.setpoints import SetpointChunk
 from tests.campaign import EXAMPLES, examples
 
@@ -44,6 +45,10 @@ class SquarePlan:
     def path(self) -> Path:
         return self.problem.path
 
+    @property
+    def account(self) -> Account:
+        return account(self.problem, self.profile, None, False)
+
     def setpoints(self) -> Any:
         return _Stream(self.chunk)
 
@@ -58,7 +63,7 @@ class SquarePlan:
             "method": "bang-bang",
             "machine": "router",
             "program": "square <1>.ngc",
-            "length": 80.0,
+            **self.account.to_json(),
             "pieces": 4,
             "runs": 4,
             "stops": 5,
@@ -82,7 +87,7 @@ class _Stream:
 
 
 def part_of(chunk: SetpointChunk, first: int, last: int) -> SetpointChunk:
-    names = ("t", "position", "velocity", "acceleration", "jerk", "line")
+    names = ("t", "position", "velocity", "acceleration", "jerk", "line", "piece", "u")
     return SetpointChunk(**{name: getattr(chunk, name)[first:last] for name in names}, axes=chunk.axes)
 
 
@@ -158,4 +163,6 @@ def _chunk(corners: Any) -> SetpointChunk:
         jerk=np.zeros((len(t), 3)),
         line=(3 + side).astype(np.int32),
         axes=("X", "Y", "Z"),
+        piece=side.astype(np.uint32),
+        u=np.clip(s, 0.0, SIDE),
     )

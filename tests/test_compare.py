@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import logging
+import os
 import re
 from pathlib import Path
 from typing import Any
@@ -12,7 +14,7 @@ import pytest
 from feedplan.cli import main
 from feedplan.compare import compare
 from feedplan.errors import InputError, SolverError
-from feedplan.planners import planner, tangential
+from feedplan.planners import bang_bang, planner, tangential
 
 # A right angle that the tool passes within a tolerance, and half a circle.
 PROGRAM = "G21 G90 G64 P0.05 F3000\nG0 X0 Y0 Z0\nG1 X20\nY10\nG3 X0 Y10 I-10\nM2\n"
@@ -92,6 +94,38 @@ def test_the_command_prints_one_row_a_method_and_writes_a_page_that_holds_them(
     assert [path["method"] for path in data["methods"]] == list(METHODS)
     assert "http://" not in page.split("<script>")[0]
     assert page.count('class="broken-row"') == sum(not row["audit"]["ok"] for row in content["methods"])
+
+
+def test_no_word_of_other_packages_is_printed(
+    program: Path, capfd: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def wordy(*_: Any, **__: Any) -> None:
+        os.write(1, b"banner of a library in C\n")
+        os.write(2, b"its warning\n")
+        print("banner of a package in Python")
+        logging.getLogger("package").warning("its warning")
+        raise SolverError("line 3: gave up")
+
+    monkeypatch.setattr("feedplan.planners.clarabel.plan", wordy)
+    assert main(["compare", str(program), "--methods", "bang-bang,clarabel"]) == 0
+    out, err = capfd.readouterr()
+    assert [line.split()[0] for line in out.splitlines()] == ["method", "bang-bang"]
+    assert err == "clarabel: line 3: gave up\n"
+    assert main(["plan", str(program), "--method", "clarabel"]) == 1
+    assert capfd.readouterr() == ("", "error: line 3: gave up\n")
+
+
+def test_each_method_has_ten_seconds_unless_told_otherwise(
+    program: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    limits: list[float | None] = []
+    monkeypatch.setattr(
+        "feedplan.planners.clarabel.plan",
+        lambda problem, *, time_limit=None: limits.append(time_limit) or bang_bang.plan(problem),
+    )
+    for more in ([], ["--time-limit", "3"]):
+        assert main(["compare", str(program), "--methods", "clarabel", "-q", *more]) == 0
+    assert limits == [10.0, 3.0]
 
 
 def test_a_comparison_without_any_plan_exits_1(program: Path, capsys: Any) -> None:

@@ -23,6 +23,18 @@ class MoveKind(IntEnum):
     SPLINE = 3
 
 
+class StopCause(IntEnum):
+    """Why a program asks for a full stop after a move; of several causes the last one here."""
+
+    NONE = 0
+    CHANGE = 1  # of the meaning of words or the tool length
+    SWITCH = 2  # of spindle, coolant and the like
+    DWELL = 3
+    PAUSE = 4  # M0, M1, M60
+    TOOL = 5  # M6
+    END = 6
+
+
 class PathControl(IntEnum):
     """How closely the programmed path is followed: G61.1, G61, G64."""
 
@@ -41,8 +53,9 @@ class Program:
     (n, axes) [mm, deg], `feed` [mm/s] (infinite on rapids alone),
     `line` (1-based source line), `control` (PathControl), `blend_tolerance` and `fit_tolerance` (G64 P and Q
     [mm], NaN where the program gives none), `stop` (a full stop after the move: M words, dwells, the end),
-    `dwell` [s] after it. A feed counts along X, Y, Z where one of these moves, else along U, V, W, else it is
-    in deg/s of the rotary axes; on an arc it counts along the circle or helix.
+    `stop_cause` (StopCause; None where only the end stops), `dwell` [s] after it. A feed counts along X, Y, Z
+    where one of these moves, else along U, V, W, else it is in deg/s of the rotary axes; on an arc it counts
+    along the circle or helix.
     Arcs, one row each: `arc_move` (index of the move), `arc_centre` (k, 3) [mm] in X, Y, Z, `arc_normal`
     (k,) the axis 0, 1, 2 the arc turns about, `arc_angle` (k,) signed sweep [rad], positive
     counter-clockwise seen from the tip of the normal; it may exceed a turn. All other axes move linearly with
@@ -84,6 +97,7 @@ class Program:
     change_start: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0)))
     warnings: tuple[str, ...] = ()
     sha256: str | None = None
+    stop_cause: NDArray[np.uint8] | None = None
 
     def __len__(self) -> int:
         return len(self.kind)

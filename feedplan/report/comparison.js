@@ -48,7 +48,7 @@
       return {
         type: "scatter", mode: "lines", name: method.method, x: few.x, y: few.y, customdata: Array.from(few.line),
         line: { color: colour(k), width: k === chosen ? 2.2 : 1.3, dash: dash(k) },
-        hovertemplate: "%{y:.4~g} mm/s, line %{customdata}",
+        hovertemplate: `%{y:.4~g} ${method.unit}/s, line %{customdata}`,
         visible: element("speed").data?.[k]?.visible ?? true,
       };
     });
@@ -58,7 +58,7 @@
       margin: { l: 64, r: 20, t: 34, b: 46 }, hovermode: "x unified", dragmode: "zoom", uirevision: across,
       legend: { orientation: "h", traceorder: "normal", x: 0, y: 1.02, yanchor: "bottom", font: { size: 13 } },
       xaxis: axis({ title: title(unit), ...(old && Number.isFinite(from) ? { range: [from, to] } : {}) }),
-      yaxis: axis({ title: title("speed [mm/s]"), range: [0, 1.25 * top] }),
+      yaxis: axis({ title: title(`speed [${methods[chosen].unit}/s]`), range: [0, 1.25 * top] }),
     }), { ...config, ...flatTools });
   }
 
@@ -70,7 +70,7 @@
   function choose(k) {
     chosen = k;
     press("methods", "method", k);
-    element("fast").textContent = `${Number(methods[k].cutting_speed.toPrecision(4))} mm/s`;
+    element("fast").textContent = `${Number(methods[k].cutting_speed.toPrecision(4))} ${methods[k].unit}/s`;
     toolPath.show(methods[k], methods[k].cutting_speed);
     drawSpeed();
   }

@@ -10,8 +10,9 @@ import numpy as np
 from feedplan.audit import Audit
 from feedplan.constraints.problem import Problem
 from feedplan.profile import SpeedProfile
-from feedplan.report.limits import limit_samples, samples_per_arc
+from feedplan.report.limits import drawn_arcs, limit_samples, samples_per_arc
 from feedplan.report.reduce import Envelope, packed
+from feedplan.report.tool_motion import ToolMotion
 from feedplan.report.tool_path import ToolPath
 from feedplan.setpoints import SetpointChunk
 
@@ -28,11 +29,11 @@ class SetpointFigures:
     `count` setpoints will come; `marks` are times [s] whose place on the tool path is wanted.
     """
 
-    def __init__(self, problem: Problem, count: int, marks: Sequence[float] = ()) -> None:
+    def __init__(self, problem: Problem, motion: ToolMotion, count: int, marks: Sequence[float] = ()) -> None:
         self._axes = problem.axes
         columns = 1 + 3 * len(self._axes)
         self._curves = Envelope(count, min(_TIME_POINTS_PER_CURVE, _TIME_POINTS // columns))
-        self._path = ToolPath(problem, marks)
+        self._path = ToolPath(problem, motion, marks)
         self.count = 0
         self.duration = 0.0
 
@@ -71,17 +72,17 @@ def _curve(curves: Envelope, column: int, with_line: bool = False) -> dict[str, 
     return result | ({"line": packed(line)} if with_line else {})
 
 
-def over_length(problem: Problem, profile: SpeedProfile) -> dict[str, Any]:
+def over_length(problem: Problem, profile: SpeedProfile, motion: ToolMotion) -> dict[str, Any]:
     """Speed and the limits on it over the path's length; limits that hold nowhere are left out.
 
     `cutting_speed` is the greatest speed on moves with a feed: rapids would flatten the colours.
     """
     names = ("speed", "acceleration", "feed", "velocity", "chord")
-    count = len(profile) * samples_per_arc(profile)
+    count = len(drawn_arcs(profile, motion)) * samples_per_arc(profile)
     curves = Envelope(count, _LENGTH_POINTS)
     is_cut = np.isfinite(problem.path.feed)[profile.piece.astype(np.int64)]
     top = cutting = 0.0
-    for block in limit_samples(problem, profile):
+    for block in limit_samples(problem, profile, motion):
         table = np.column_stack([getattr(block, name) for name in names])
         piece = profile.piece[block.arc].astype(np.int64)
         curves.add(block.length, table, problem.path.line[piece].astype(np.int64))
@@ -103,7 +104,7 @@ def over_length(problem: Problem, profile: SpeedProfile) -> dict[str, Any]:
 
 
 def chart_data(
-    problem: Problem, profile: SpeedProfile, figures: SetpointFigures, audit: Audit
+    problem: Problem, profile: SpeedProfile, motion: ToolMotion, figures: SetpointFigures, audit: Audit
 ) -> dict[str, Any]:
     """Everything the page's script draws."""
     limits = {
@@ -118,7 +119,7 @@ def chart_data(
         "feed": float(problem.feed.max()) if len(problem.feed) else None,
         "duration": figures.duration,
         "path": figures.tool_path(),
-        "length": over_length(problem, profile),
+        "length": over_length(problem, profile, motion),
         "time": figures.over_time(),
         "failures": [{"name": check.name, "axis": check.axis, "time": check.time} for check in audit.broken],
     }

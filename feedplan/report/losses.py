@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
-from feedplan.profile import ArcKind, SpeedProfile
-from feedplan.report.limits import arc_lengths, least_times
+from feedplan.profile import SpeedProfile
+from feedplan.report.activity import Activity
+from feedplan.report.tool_motion import ToolMotion
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,9 @@ class Share:
 class SlowLine:
     """A source line that takes longer than its feed and the axis velocities ask for.
 
-    `time` spent and `lost` [s], mean `speed` and the mean speed `wanted` [mm/s], the `limit` that costs most
-    and its part of the loss; `stops` where the tool stands still at an end of the line, `rapid` where no feed
-    is programmed.
+    `time` spent and `lost` [s], mean `speed` and the mean speed `wanted` [mm/s, deg/s where the line mostly
+    `turns`], the `limit` that costs most and its part of the loss; `stops` where the tool stands still at an
+    end of the line, `rapid` where no feed is programmed.
     """
 
     line: int
@@ -39,79 +39,58 @@ class SlowLine:
     part: float
     stops: bool
     rapid: bool
+    turns: bool
 
 
-def limit_names(problem: Problem, profile: SpeedProfile) -> tuple[NDArray[np.int64], list[str]]:
-    """The number of the active limit of each arc, and the limits' names."""
-    codes, of_arc = np.unique(profile.kind.astype(np.int64) * 256 + profile.axis, return_inverse=True)
-    texts = [_name(problem, int(code) // 256, int(code) % 256) for code in codes]
-    names = sorted(set(texts))
-    number = np.array([names.index(text) for text in texts], dtype=np.int64)
-    return number[of_arc], names
-
-
-def _name(problem: Problem, kind: int, axis: int) -> str:
-    letter = f"{problem.axes[axis]} " if axis < len(problem.axes) else ""
-    # An arc with p held is held by an axis too: at its acceleration limit while the path turns under it.
-    if kind in (ArcKind.AXIS_ACCELERATION, ArcKind.PARAMETER_ACCELERATION):
-        return f"{letter}acceleration"
-    if kind == ArcKind.AXIS_VELOCITY:
-        return f"{letter}velocity"
-    names = {
-        ArcKind.FEED: "feed",
-        ArcKind.CHORD: "chord error",
-        ArcKind.SPEED_LINE: "acceleration along the path",
-    }
-    return names.get(ArcKind(kind), "motion of limited jerk")
-
-
-def time_per_limit(problem: Problem, profile: SpeedProfile) -> list[Share]:
+def time_per_limit(problem: Problem, activity: Activity) -> list[Share]:
     """The time each limit is active, the longest first; dwells stand as a limit of their own."""
-    number, names = limit_names(problem, profile)
-    times = np.bincount(number, weights=profile.duration, minlength=len(names))
-    dwell = problem.path.pauses
-    total = float(times.sum()) + dwell
-    rows = [*zip(names, times.tolist(), strict=True), *([("dwell", dwell)] if dwell > 0 else [])]
-    shares = [Share(name, time, time / total if total > 0 else 0.0) for name, time in rows]
-    return sorted(shares, key=lambda share: -share.time)
+    times = np.bincount(activity.active, activity.weight, len(activity.names)).tolist()
+    rows = [*zip(activity.names, times, strict=True), ("dwell", problem.path.pauses)]
+    total = sum(time for _, time in rows)
+    return sorted(
+        (Share(name, time, time / total) for name, time in rows if time > 0), key=lambda share: -share.time
+    )
 
 
-def slowest_lines(problem: Problem, profile: SpeedProfile, count: int = 20) -> list[SlowLine]:
+def slowest_lines(
+    problem: Problem, profile: SpeedProfile, motion: ToolMotion, activity: Activity, count: int = 20
+) -> list[SlowLine]:
     """The source lines that lose most time, the worst first."""
     if len(profile) == 0:
         return []
     path = problem.path
-    piece = profile.piece.astype(np.int64)
-    lines, row = np.unique(path.line[piece], return_inverse=True)
-    length = arc_lengths(problem, profile)
-    least = least_times(problem, profile)
-    time = np.bincount(row, weights=profile.duration)
-    wanted = np.bincount(row, weights=least)
-    distance = np.bincount(row, weights=length)
-    lost = time - wanted
-    worst = np.argsort(-lost, kind="stable")[:count]
+    lines, row_of_piece = np.unique(path.line, return_inverse=True)
+    row = row_of_piece[activity.piece]
+    time, lost = (np.bincount(row, values, len(lines)) for values in (activity.weight, activity.lost))
+    # Lines that lose alike but for rounding stay in order.
+    worst = np.argsort(-np.round(lost / time.sum(), 12), kind="stable")[:count]
     worst = worst[lost[worst] > 1e-9 * time.sum()]
-
-    number, names = limit_names(problem, profile)
     ends = np.zeros(len(lines), dtype=bool)
-    at_rest = np.concatenate((profile.runs[:-1], np.maximum(profile.runs[1:] - 1, 0)))
-    ends[row[at_rest[at_rest < len(profile)]]] = True
+    ends[row_of_piece[np.concatenate((path.runs[:-1], path.runs[1:] - 1))]] = True
     result = []
-    for index in worst:
-        arcs = np.flatnonzero(row == index)
-        costs = np.bincount(number[arcs], weights=profile.duration[arcs] - least[arcs])
+    for index in worst.tolist():
+        own = np.flatnonzero(row == index)
+        pieces = np.flatnonzero(row_of_piece == index)
+        costs = np.bincount(activity.active[own], activity.lost[own])
         active = int(costs.argmax())
+        # Its speed is that of what it does longer, moving or turning alone.
+        turning = motion.turns[activity.piece[own]]
+        turns = bool(activity.weight[own][turning].sum() > 0.5 * time[index])
+        own = own[turning == turns]
+        way, spent = (activity.speed[own] * activity.weight[own]).sum(), activity.weight[own].sum()
+        needed = spent - activity.lost[own].sum()
         result.append(
             SlowLine(
                 line=int(lines[index]),
                 time=float(time[index]),
                 lost=float(lost[index]),
-                speed=float(distance[index] / time[index]),
-                wanted=float(distance[index] / wanted[index]),
-                limit=names[active],
+                speed=float(way / spent),
+                wanted=float(way / needed) if needed > 0 else 0.0,
+                limit=activity.names[active],
                 part=min(1.0, float(costs[active] / lost[index])),
                 stops=bool(ends[index]),
-                rapid=bool(np.isinf(path.feed[piece[arcs]]).all()),
+                rapid=bool(np.isinf(path.feed[pieces]).all()),
+                turns=turns,
             )
         )
     return result

@@ -6,6 +6,7 @@
   /* Rapids much faster than cutting would flatten the rest: they run out of the charts of speed. */
   const { top_speed: topSpeed, cutting_speed: cuttingSpeed } = data.length;
   const hidesRapids = topSpeed > 1.5 * cuttingSpeed;
+  const { unit } = data.path;
   const shownSpeed = (hidesRapids ? cuttingSpeed : topSpeed) || 1;
   const toolPath = pathChart({ path: data.path, top: cuttingSpeed, failures: data.failures });
 
@@ -23,23 +24,23 @@
     for (const [name, [label, colour, dash]] of Object.entries(LIMITS)) {
       if (!data.length[name]) continue;
       const more = { name: label, line: { dash } };
-      traces.push(...curveTraces(data.length[name], from, to, { colour, width: 1.1, pixels, more, isLimit: true, top, unit: "mm/s" }));
+      traces.push(...curveTraces(data.length[name], from, to, { colour, width: 1.1, pixels, more, isLimit: true, top, unit: `${unit}/s` }));
     }
     const more = { name: "planned speed", fill: "tozeroy", fillcolor: wash("--accent", 0.12) };
-    traces.push(...curveTraces(data.length.speed, from, to, { colour: "--accent", width: 2, pixels, more, unit: "mm/s" }));
+    traces.push(...curveTraces(data.length.speed, from, to, { colour: "--accent", width: 2, pixels, more, unit: `${unit}/s` }));
     const chart = element("length");
     const old = chart.layout;
     Plotly.react(chart, traces, layout({
       margin: { l: 64, r: 20, t: 34, b: 46 }, hovermode: "x unified", dragmode: "zoom", uirevision: "length",
       legend: { orientation: "h", traceorder: "normal", x: 0, y: 1.02, yanchor: "bottom", font: { size: 13 } },
-      xaxis: axis({ title: title("path length [mm]"), ...(old && Number.isFinite(from) ? { range: [from, to] } : {}) }),
-      yaxis: axis({ title: title("speed [mm/s]"), range: old ? old.yaxis.range : [0, top] }),
+      xaxis: axis({ title: title(`path length [${unit}]`), ...(old && Number.isFinite(from) ? { range: [from, to] } : {}) }),
+      yaxis: axis({ title: title(`speed [${unit}/s]`), range: old ? old.yaxis.range : [0, top] }),
     }), { ...config, ...flatTools });
   }
 
   /* Axes over time ------------------------------------------------------------------------------- */
   const turns = data.axes.some((name) => "ABC".includes(name));
-  const ROWS = [["speed", "mm/s"], ...[["velocity", "s"], ["acceleration", "s²"], ["jerk", "s³"]]
+  const ROWS = [["speed", `${unit}/s`], ...[["velocity", "s"], ["acceleration", "s²"], ["jerk", "s³"]]
     .map(([name, per]) => [name, turns ? `mm/${per}, deg/${per}` : `mm/${per}`])];
   const tops = Object.fromEntries(ROWS.slice(1).map(([name]) => [name, data.time[name].map((c) => greatest(c.y))]));
   /* What is no limit may have lone spikes; they run out of the chart rather than flatten it. */
@@ -92,7 +93,7 @@
       const limits = data.limits[name];
       const known = limits ? limits.map((limit, k) => (limit ? `${data.axes[k]} ${Number(limit.toPrecision(6))}` : null)).filter(Boolean) : [];
       const shownUnit = relative && limits && limits.every(Boolean) ? "% of limit" : unit;
-      const rapids = name === "speed" && hidesRapids && !isNarrow ? `rapids up to ${Number(topSpeed.toPrecision(4))} mm/s run out of the chart` : "";
+      const rapids = name === "speed" && hidesRapids && !isNarrow ? `rapids up to ${Number(topSpeed.toPrecision(4))} ${unit}/s run out of the chart` : "";
       const note = rapids ? rapids : !known.length || isNarrow ? "" : data.judged.includes(name) ? `limits ${known.join(", ")} ${unit}` : `not limited by this method (machine: ${known.join(", ")} ${unit})`;
       annotations.push({
         xref: "paper", yref: "paper", x: 0, y: bottom + height, xanchor: "left", yanchor: "bottom", showarrow: false,

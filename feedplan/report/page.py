@@ -13,9 +13,19 @@ from typing import Any
 from feedplan.audit import Audit
 from feedplan.constraints.problem import Problem
 from feedplan.profile import SpeedProfile
+from feedplan.report.account import Account
+from feedplan.report.activity import ACTIVE
 from feedplan.report.figures import SetpointFigures, chart_data
-from feedplan.report.losses import slowest_lines, time_per_limit
-from feedplan.report.tables import audit_table, fit_table, limits_table, numbers, slowest_table, verdict
+from feedplan.report.tables import (
+    audit_table,
+    fit_table,
+    limits_table,
+    numbers,
+    slowest_table,
+    stops_table,
+    totals_table,
+    verdict,
+)
 
 FILE = "report.html"
 
@@ -35,22 +45,29 @@ def write_report(
     summary: Mapping[str, Any],
     problem: Problem,
     profile: SpeedProfile,
+    account: Account,
     audit: Audit,
     figures: SetpointFigures,
     source: FilePath | None = None,
 ) -> None:
     """Writes the page. `summary` is the content of plan.json, `source` the text of the part program."""
-    slow = slowest_lines(problem, profile)
-    texts = _lines(source, {row.line for row in slow}) if source else {}
-    data = chart_data(problem, profile, figures, audit)
+    texts = _lines(source, {row.line for row in account.slow}) if source else {}
+    data = chart_data(problem, profile, account.motion, figures, audit)
     name = FilePath(str(summary.get("program") or "path")).name
-    judged = verdict(audit), numbers(summary, figures.count), _warnings(summary.get("warnings") or ())
+    judged = (
+        verdict(audit),
+        numbers(summary, account, figures.count),
+        _warnings(summary.get("warnings") or ()),
+    )
     sections = Template(asset("page.html")).substitute(
         speed=_SPEED[any(check.name == "jerk" and check.judged for check in audit.checks)],
-        fast=f"{data['length']['cutting_speed']:.4g}",
-        limits=limits_table(time_per_limit(problem, profile)),
-        fit=fit_table(summary),
-        slowest=slowest_table(slow, texts),
+        fast=f"{data['length']['cutting_speed']:.4g} {account.motion.unit}/s",
+        limits=limits_table(account.limits),
+        active=f"{100 * ACTIVE:g} %",
+        totals=totals_table(account),
+        stops=stops_table(account.stops),
+        fit=fit_table(summary, account.tolerance),
+        slowest=slowest_table(account.slow, texts),
         audit=audit_table(audit),
     )
     about = _about(summary, problem)

@@ -45,7 +45,7 @@ function pathChart({ path, top, failures = [], onHover }) {
     return `rgb(${channel(0)},${channel(1)},${channel(2)})`;
   }
 
-  const spot = (i) => `line ${path.line[i]}<br>${path.speed[i].toPrecision(4)} mm/s`;
+  const spot = (i) => `line ${path.line[i]}<br>${path.speed[i].toPrecision(4)} ${path.unit}/s`;
 
   /* Equal scales on all three axes, and the whole in view: the projection is parallel, so size alone matters. */
   function proportions() {

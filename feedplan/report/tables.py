@@ -8,8 +8,10 @@ from html import escape
 from typing import Any
 
 from feedplan.audit import Audit, LimitCheck
+from feedplan.report.account import Account, Total
 from feedplan.report.losses import Share, SlowLine
-from feedplan.units import duration_text, mm_per_min, ratio_text
+from feedplan.report.stops import Stops
+from feedplan.units import duration_text, mm_per_min, ratio_text, tolerance_text
 
 # Limits of the machine and the program; every other check is one of consistency.
 _OF_AXES = {"velocity", "acceleration", "acceleration_jump", "jerk", "travel", "jump"}
@@ -58,22 +60,21 @@ def verdict(audit: Audit) -> str:
     )
 
 
-def numbers(summary: Mapping[str, Any], setpoints: int) -> str:
+def numbers(summary: Mapping[str, Any], account: Account, setpoints: int) -> str:
     """The big numbers under the title."""
-    time, length = float(summary["time"]), float(summary["length"])
-    mean = length / time if time > 0 else 0.0
+    time, whole = float(summary["time"]), account.all
+    turned = f"turns alone {whole.turn:.4g} deg" if whole.turn > 0 else ""
     bound, gap = summary.get("lower_bound"), summary.get("gap")
     cells = [
         ("Time", *_value_unit(duration_text(time)), f"{time:.6g} s" if time >= 60 else ""),
-        ("Length", *_length(length), f"{summary['pieces']} pieces"),
-        ("Mean speed", f"{mean:.4g}", "mm/s", f"{mm_per_min(mean):.5g} mm/min"),
+        ("Length", *_length(whole.length), turned or f"{summary['pieces']} pieces"),
+        ("Mean speed", f"{whole.mean:.4g}", "mm/s", f"{mm_per_min(whole.mean):.5g} mm/min"),
         ("Stops on the way", str(summary["stops"]), "", _counted(summary["runs"], "run")),
         ("Setpoints", f"{setpoints:,}".replace(",", " "), "", ""),
     ]
     if bound is not None:
-        proof = (
-            "proved optimal" if gap is not None and gap <= 1e-9 else f"no plan is faster than {bound:.6g} s"
-        )
+        optimal = gap is not None and gap <= 1e-9
+        proof = "no plan of this path is faster" + ("" if optimal else f" than {bound:.6g} s")
         cells.insert(1, ("Gap to the bound", _short(100.0 * (gap or 0.0)), "%", proof))
     items = "".join(_number(*cell) for cell in cells)
     return f'<dl class="numbers card">{items}</dl>'
@@ -98,8 +99,42 @@ def limits_table(shares: Sequence[Share]) -> str:
     return f"<table><tr>{head}</tr>{rows}</table>"
 
 
-def fit_table(summary: Mapping[str, Any]) -> str:
-    """What the fit did and how long each stage took."""
+def totals_table(account: Account) -> str:
+    """Time and length at a feed and in rapids; what rotary axes turn alone stands apart."""
+    head = '<th>Motion</th><th class="n">Time</th><th class="n">Length</th><th class="n">Mean speed</th>'
+    kinds = (("at a feed", account.feed), ("rapid", account.rapid))
+    rows = "".join(_total_rows(name, total) for name, total in kinds if total.time > 0)
+    return f"<table><tr>{head}</tr>{rows}</table>"
+
+
+def _total_rows(name: str, total: Total) -> str:
+    turning = total.turn / total.turn_time if total.turn_time > 0 else 0.0
+    parts = [
+        (name, total.time - total.turn_time, f"{total.length:.6g} mm", f"{total.mean:.4g} mm/s"),
+        (f"{name}, turning alone", total.turn_time, f"{total.turn:.6g} deg", f"{turning:.4g} deg/s"),
+    ]
+    return "".join(
+        f'<tr><td>{label}</td><td class="n">{duration_text(time)}</td><td class="n">{way}</td>'
+        f'<td class="n">{mean}</td></tr>'
+        for label, time, way, mean in parts
+        if time > 0
+    )
+
+
+def stops_table(stops: Sequence[Stops]) -> str:
+    """Stops by cause: how many, how long the tool waits, and what slowing to them and leaving them costs."""
+    head = '<th>Stops</th><th class="n">Number</th><th class="n">Waits</th><th class="n">Lost</th>'
+    rows = "".join(
+        f'<tr><td>{escape(stop.cause)}</td><td class="n">{stop.count}</td>'
+        f'<td class="n">{duration_text(stop.pause) if stop.pause > 0 else "–"}</td>'
+        f'<td class="n">{duration_text(stop.lost)}</td></tr>'
+        for stop in stops
+    )
+    return f"<table><tr>{head}</tr>{rows}</table>"
+
+
+def fit_table(summary: Mapping[str, Any], tolerance: tuple[float, float]) -> str:
+    """What the fit did and how long each stage took; the `tolerance` asked for, least and greatest [mm]."""
     fit = summary.get("fit") or {}
     rows: list[tuple[str, str]] = []
     points, splines, polynomials = (int(fit.get(key) or 0) for key in ("points", "splines", "polynomials"))
@@ -114,6 +149,7 @@ def fit_table(summary: Mapping[str, Any]) -> str:
             )
     else:
         rows.append(("Fit", "nothing to fit"))
+    rows.append(("Tolerance asked for", f"{tolerance_text(*tolerance)}"))
     if fit.get("deviation") is not None:
         rows.append(("Deviation from the program", f"{_short(fit['deviation'] * 1e3)} µm"))
     rows.append(("Pieces planned", f"{summary['pieces']} in {_counted(summary['runs'], 'run')}"))
@@ -130,18 +166,19 @@ def slowest_table(rows: Sequence[SlowLine], texts: Mapping[int, str]) -> str:
     head = '<th class="n">Line</th>' + ("<th>Source</th>" if texts else "")
     body = "".join(_slow_row(row, texts) for row in rows)
     return (
-        f'<table><tr>{head}<th class="n">Lost</th><th class="n">Time</th><th class="n">Mean speed [mm/s]</th>'
-        f'<th class="n">Wanted [mm/s]</th><th>Because of</th></tr>{body}</table>'
+        f'<table><tr>{head}<th class="n">Lost</th><th class="n">Time</th><th class="n">Mean speed</th>'
+        f'<th class="n">Wanted</th><th>Because of</th></tr>{body}</table>'
     )
 
 
 def _slow_row(row: SlowLine, texts: Mapping[int, str]) -> str:
     text = escape(texts.get(row.line, "").strip()[:120])
+    unit = "deg/s" if row.turns else "mm/s"
     cells = [
         f'<td class="n">{row.line}</td>',
         f'<td class="code"><code>{text}</code></td>' if texts else "",
         f'<td class="n">{duration_text(row.lost)}</td><td class="n">{duration_text(row.time)}</td>',
-        f'<td class="n">{row.speed:.4g}</td><td class="n">{row.wanted:.4g}</td>',
+        f'<td class="n">{row.speed:.4g} {unit}</td><td class="n">{row.wanted:.4g} {unit}</td>',
         f"<td>{escape(row.limit)} <span class='tag'>{100 * row.part:.0f} %</span>",
         "<span class='tag'>stop</span>" if row.stops else "",
         "<span class='tag'>rapid</span></td>" if row.rapid else "</td>",

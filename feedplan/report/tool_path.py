@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
+from feedplan.report.limits import parameter_speed
 from feedplan.report.reduce import Polyline, packed
+from feedplan.report.tool_motion import ToolMotion
 from feedplan.setpoints import SetpointChunk
 
 _POINTS = 60_000
@@ -26,9 +28,11 @@ class ToolPath:
     `marks` are times [s] whose place on the tool path is wanted; at most `points` points are kept.
     """
 
-    def __init__(self, problem: Problem, marks: Sequence[float] = (), points: int = _POINTS) -> None:
+    def __init__(
+        self, problem: Problem, motion: ToolMotion, marks: Sequence[float] = (), points: int = _POINTS
+    ) -> None:
         self._axes = problem.axes
-        self._problem = problem
+        self._problem, self._motion = problem, motion
         self._linear = [self._axes.index(name) for name in "XYZ" if name in self._axes]
         columns = [column for column, name in enumerate(problem.path.axes) if name in "XYZ"]
         low = problem.path.curve.control_points[:, columns]
@@ -44,7 +48,7 @@ class ToolPath:
         self._top = self._cutting = 0.0
 
     def add(self, chunk: SetpointChunk) -> NDArray[np.float64]:
-        """The next setpoints; returns the tool's speed at each [mm/s]."""
+        """The next setpoints; returns the tool's speed at each, in the unit drawn a second."""
         places, speed = self._tool(chunk)
         if len(chunk) == 0:
             return speed
@@ -60,7 +64,8 @@ class ToolPath:
     def data(self) -> dict[str, Any]:
         """Points in X, Y, Z with speed, source line and time; the marks; how far off the line may be [mm].
 
-        `cutting_speed` [mm/s] is the greatest speed on moves with a feed: rapids would flatten the colours.
+        `cutting_speed` is the greatest speed on moves with a feed: rapids would flatten the colours. `unit`
+        is that of the way, mm, or deg where nothing but rotary axes moves.
         """
         points, tags = self._path.result()
         points = points if points.size else np.empty((0, 4))
@@ -70,20 +75,23 @@ class ToolPath:
             "speed": packed(points[:, 3] / self._speed_weight),
             "line": packed(tags[:, 0]),
             "time": packed(1e-6 * tags[:, 1]),
+            "unit": self._motion.unit,
             "cutting_speed": self._cutting or self._top,
             "marks": np.nan_to_num(self._mark_places).tolist(),
             "tolerance": self._path.tolerance,
         }
 
     def _tool(self, chunk: SetpointChunk) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Where the tool is in X, Y, Z, and how fast."""
-        tool, joints = self._problem.tip_curve, self._problem.joints
-        if tool is not None and joints is not None:
-            place, tangent = tool.evaluate(chunk.piece, chunk.u, 1)
-            slope = np.linalg.norm(joints.evaluate(chunk.piece, chunk.u, 1)[1], axis=1)
-            rate = np.linalg.norm(chunk.velocity, axis=1) / np.where(slope > 0, slope, np.inf)
-            return place, np.linalg.norm(tangent, axis=1) * rate
-        places = np.zeros((len(chunk), 3))
-        for column in self._linear:
-            places[:, "XYZ".index(self._axes[column])] = chunk.position[:, column]
-        return places, np.linalg.norm(chunk.velocity, axis=1)
+        """Where the tool is in X, Y, Z, and how fast it is in the unit drawn; 0 where it only turns."""
+        problem, motion = self._problem, self._motion
+        if problem.tip_curve is not None and problem.joints is not None:
+            (places,) = problem.tip_curve.evaluate(chunk.piece, chunk.u)
+            tangent = problem.joints.evaluate(chunk.piece, chunk.u, 1)[1]
+            speed = motion.slope(chunk.piece, chunk.u) * parameter_speed(tangent, chunk.velocity)
+        else:
+            places = np.zeros((len(chunk), 3))
+            for column in self._linear:
+                places[:, "XYZ".index(self._axes[column])] = chunk.position[:, column]
+            counts = 1.0 if motion.share is None else motion.share[chunk.piece]
+            speed = np.linalg.norm(chunk.velocity * counts, axis=1)
+        return places, speed if motion.drawn.all() else speed * motion.drawn[chunk.piece]

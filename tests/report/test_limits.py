@@ -13,11 +13,12 @@ from scipy.optimize import linprog
 from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Path
 from feedplan.profile import ArcKind, SpeedProfile
-from feedplan.report.limits import LimitSamples, arc_lengths, limit_curve, limit_samples
+from feedplan.report.limits import LimitSamples, limit_curve, limit_samples
+from feedplan.report.tool_motion import tool_motion
 
 
 def sampled(problem: Any, profile: SpeedProfile) -> LimitSamples:
-    blocks = list(limit_samples(problem, profile))
+    blocks = list(limit_samples(problem, profile, tool_motion(problem)))
     names = ("length", "speed", "acceleration", "feed", "velocity", "chord", "arc")
     return LimitSamples(*(np.concatenate([getattr(block, name) for block in blocks]) for name in names))
 
@@ -60,10 +61,6 @@ def test_the_square_rises_to_its_feed_and_stops_at_its_corners(square: Any) -> N
     assert np.isinf(samples.chord).all()
 
 
-def test_arcs_are_as_long_as_they_are(square: Any) -> None:
-    assert arc_lengths(square.problem, square.profile) == pytest.approx([2.5, 15.0, 2.5] * 4)
-
-
 def bend(
     square: Any, kind: ArcKind, axis: int, value: float, p: tuple[float, float]
 ) -> tuple[Any, SpeedProfile]:
@@ -73,6 +70,7 @@ def bend(
         curve=CompositeCurve.from_pieces([[[0.0, 0, 0], [10, 0, 0], [10, 10, 0]]], [10.0]),
         line=np.array([1], np.int32),
         runs=np.array([0, 1]),
+        dwell=np.zeros(1),
     )
     one = {
         "piece": np.array([0], np.uint32),

@@ -9,7 +9,20 @@ import numpy as np
 import pytest
 
 from feedplan.profile import ArcKind, SpeedProfile
-from feedplan.report.losses import slowest_lines, time_per_limit
+from feedplan.report.activity import NONE, activity
+from feedplan.report.losses import Share, SlowLine
+from feedplan.report.losses import slowest_lines as slowest_of
+from feedplan.report.losses import time_per_limit as time_of
+from feedplan.report.tool_motion import tool_motion
+
+
+def time_per_limit(problem: Any, profile: SpeedProfile) -> list[Share]:
+    return time_of(problem, activity(problem, profile, tool_motion(problem), False))
+
+
+def slowest_lines(problem: Any, profile: SpeedProfile, count: int = 20) -> list[SlowLine]:
+    motion = tool_motion(problem)
+    return slowest_of(problem, profile, motion, activity(problem, profile, motion, False), count)
 
 
 def test_the_square_is_at_its_feed_for_three_fifths(square: Any) -> None:
@@ -63,11 +76,19 @@ def test_a_rapid_is_measured_against_its_axes(square: Any) -> None:
 
 
 def test_the_worst_lines_come_first_and_no_more_than_asked(square: Any) -> None:
-    duration = square.profile.duration.copy()
-    duration[6] += 0.3
-    rows = slowest_lines(square.problem, replace(square.profile, duration=duration), count=2)
+    # The third side at half of the feed: 0.05 s up, 0.75 s at 25 mm/s, 0.05 s down in place of 0.4 s.
+    slow = {
+        name: getattr(square.profile, name).copy() for name in ("u0", "u1", "p0", "p1", "value", "duration")
+    }
+    slow["u1"][6:8], slow["u0"][7:9] = [0.625, 19.375], [0.625, 19.375]
+    slow["p1"][6:8], slow["p0"][7:9] = 625.0, 625.0
+    slow["value"][7] = 625.0
+    slow["duration"][6:9] = [0.05, 0.75, 0.05]
+    profile = replace(square.profile, **slow)
+    rows = slowest_lines(square.problem, profile, count=2)
     assert [row.line for row in rows] == [5, 3]
-    assert rows[0].lost == pytest.approx(0.4)
+    assert rows[0].lost == pytest.approx(0.45)
+    assert (rows[0].limit, rows[0].speed) == (NONE, pytest.approx(20.0 / 0.85))
 
 
 def test_a_line_at_its_feed_all_the_time_loses_nothing(square: Any) -> None:
@@ -81,6 +102,7 @@ def test_a_line_at_its_feed_all_the_time_loses_nothing(square: Any) -> None:
         p0=np.full(4, 2500.0),
         p1=np.full(4, 2500.0),
         duration=np.full(4, 0.4),
-        runs=np.arange(5),
+        runs=np.array([0, 4]),
     )
-    assert slowest_lines(square.problem, steady) == []
+    one_run = replace(square.path, runs=steady.runs, dwell=np.zeros(1))
+    assert slowest_lines(replace(square.problem, path=one_run), steady) == []

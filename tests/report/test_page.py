@@ -20,13 +20,15 @@ from feedplan.report.reduce import packed
 
 def page(plan: Any, file: Path, source: Path | None = None) -> str:
     marks = [check.time for check in plan.verdict.broken]
-    figures = SetpointFigures(plan.problem, len(plan.chunk.t), marks)
+    account = plan.account
+    figures = SetpointFigures(plan.problem, account.motion, len(plan.chunk.t), marks)
     figures.add(plan.chunk)
     write_report(
         file,
         summary=plan.summary(),
         problem=plan.problem,
         profile=plan.profile,
+        account=account,
         audit=plan.verdict,
         figures=figures,
         source=source,
@@ -106,7 +108,14 @@ def test_a_failed_audit_names_what_is_broken_where(broken_square: Any, tmp_path:
 
 def test_the_numbers_of_the_plan_are_there(square: Any, tmp_path: Path) -> None:
     text = without_plotly(page(square, tmp_path / "report.html"))
-    for shown in ("2.000<small>s", "proved optimal", "80.0<small>mm", "2400 mm/min", "60.0 %", "not judged"):
+    for shown in (
+        "2.000<small>s",
+        "no plan of this path is faster",
+        "80.0<small>mm",
+        "2400 mm/min",
+        "60.0 %",
+        "not judged",
+    ):
         assert shown in text
 
 
@@ -142,7 +151,7 @@ def test_a_program_that_is_gone_costs_only_its_text(square: Any, tmp_path: Path)
 
 
 def test_the_page_of_a_million_setpoints_stays_small(square: Any) -> None:
-    figures = SetpointFigures(square.problem, 1_000_000)
+    figures = SetpointFigures(square.problem, square.account.motion, 1_000_000)
     random = np.random.default_rng(5)
     chunk = square.chunk
     for first in range(0, 1_000_000, 50_000):

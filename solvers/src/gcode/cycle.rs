@@ -7,7 +7,7 @@ use super::block::{g_name, Block, AXES};
 use super::execute::Interpreter;
 use super::fault::{fault, Outcome};
 use super::modal::FeedMode;
-use super::moves::{Control, Kind, Mode, Point};
+use super::moves::{Control, Kind, Mode, Point, Stop};
 use super::words::count;
 
 /// Where G73 and G83 stop above the last depth, unless D says, in mm: 0.010 inch.
@@ -187,7 +187,7 @@ impl Interpreter<'_> {
             740 | 840 => {
                 self.dwell(block, b'P', hole.dwell)?;
                 self.feed_to(&mut place, normal, hole.clear, feed)?;
-                self.moves.stop();
+                self.moves.stop(Stop::Switch);
             }
             _ => {}
         }

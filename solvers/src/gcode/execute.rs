@@ -10,7 +10,7 @@ use super::block::{bit, bits, rotary, Block, Group, MGroup, AXES, AXIS_OF_LETTER
 use super::fault::{fault, Outcome};
 use super::intent::{axis_words, check_use, is_cycle, motion_of, ARC_WORDS, FREE_WORDS};
 use super::modal::{Feed, FeedMode, State};
-use super::moves::{Control, Kind, Mode, Moves, Point};
+use super::moves::{Control, Kind, Mode, Moves, Point, Stop};
 use super::spline::Nurbs;
 use super::tip::{takes_direction, Meaning};
 use super::Options;
@@ -147,8 +147,9 @@ impl<'a> Interpreter<'a> {
         }
         match block.m_code(MGroup::Stop) {
             Some(code) => {
-                self.moves.stop();
-                Ok(matches!(code, 2 | 30))
+                let ends = matches!(code, 2 | 30);
+                self.moves.stop(if ends { Stop::End } else { Stop::Pause });
+                Ok(ends)
             }
             None => Ok(false),
         }
@@ -210,7 +211,7 @@ impl<'a> Interpreter<'a> {
     fn switch(&mut self, block: &Block) -> Outcome<()> {
         let codes = [MGroup::ToolChange, MGroup::Spindle, MGroup::Coolant, MGroup::User];
         for code in codes.into_iter().filter_map(|group| block.m_code(group)) {
-            self.moves.stop();
+            self.moves.stop(if code == 6 { Stop::Tool } else { Stop::Switch });
             match code {
                 3 | 4 => self.state.spindle_on = true,
                 5 => self.state.spindle_on = false,

@@ -62,6 +62,23 @@ pub struct Arc {
     pub angle: f64,
 }
 
+/// Why the program asks for a full stop after a move; of several causes the greatest counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Stop {
+    None = 0,
+    /// Of the meaning of words or the tool length.
+    Change = 1,
+    /// Of spindle, coolant and the like.
+    Switch = 2,
+    Dwell = 3,
+    /// M0, M1, M60.
+    Pause = 4,
+    /// M6.
+    Tool = 5,
+    End = 6,
+}
+
 /// A tool direction I, J, K: a unit vector from the tip to the spindle.
 pub type Direction = [f64; 3];
 
@@ -98,7 +115,7 @@ pub struct Moves {
     feed: Vec<f64>,
     line: Vec<i32>,
     control: Vec<(usize, Control)>,
-    stops: Vec<usize>,
+    stops: Vec<(usize, Stop)>,
     dwells: Vec<(usize, f64)>,
     start_dwell: f64,
     arcs: Vec<(usize, Arc)>,
@@ -240,7 +257,7 @@ impl Moves {
 
     /// From here on words have another meaning: the same place is `start` and `direction` in the new words.
     pub fn change(&mut self, meaning: Meaning, tool_length: f64, start: Point, direction: Direction) {
-        self.stop();
+        self.stop(Stop::Change);
         let row = self.kind.len();
         if self.changes.last().is_some_and(|last| last.row == row) {
             self.changes.pop();
@@ -296,18 +313,19 @@ impl Moves {
         Ok(())
     }
 
-    /// A full stop where the program is now.
-    pub fn stop(&mut self) {
+    /// A full stop where the program is now; of several causes the last one of `Stop` is kept.
+    pub fn stop(&mut self, cause: Stop) {
         // Before the first move everything stands still already.
         let Some(last) = self.kind.len().checked_sub(1) else { return };
-        if self.stops.last() != Some(&last) {
-            self.stops.push(last);
+        match self.stops.last_mut() {
+            Some((row, known)) if *row == last => *known = (*known).max(cause),
+            _ => self.stops.push((last, cause)),
         }
     }
 
     /// A full stop and a pause in seconds.
     pub fn dwell(&mut self, seconds: f64) {
-        self.stop();
+        self.stop(Stop::Dwell);
         match self.kind.len().checked_sub(1) {
             Some(last) => self.dwells.push((last, seconds)),
             None => self.start_dwell += seconds,
@@ -364,17 +382,19 @@ mod tests {
     fn stops_and_dwells_stay_where_nothing_moves() {
         let mut moves = Moves::new(4, 10, [0.0; 9]);
         let control = Control::new(Mode::ExactPath);
-        moves.stop();
+        moves.stop(Stop::Tool);
         moves.dwell(0.5);
         moves.straight(Kind::Line, &point(1.0, 0.0), 1.0, &control, 1).unwrap();
         moves.straight(Kind::Line, &point(1.0, 1e-13), 1.0, &control, 2).unwrap();
         moves.dwell(1.0);
         moves.dwell(0.25);
+        moves.stop(Stop::Switch);
         moves.straight(Kind::Line, &point(2.0, 0.0), 1.0, &Control::new(Mode::Tolerance), 3).unwrap();
         moves.straight(Kind::Line, &point(3.0, 0.0), 1.0, &Control::new(Mode::Tolerance), 4).unwrap();
         let columns = moves.finish(Vec::new());
         assert_eq!(columns.line, [1, 3, 4]);
         assert_eq!(columns.stop, [true, false, true]);
+        assert_eq!(columns.stop_cause, [Stop::Dwell, Stop::None, Stop::End].map(|cause| cause as u8));
         assert_eq!(columns.dwell, [1.25, 0.0, 0.0]);
         assert_eq!(columns.start_dwell, 0.5);
         assert_eq!(columns.control, [1, 2, 2]);

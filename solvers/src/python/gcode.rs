@@ -103,6 +103,7 @@ fn read_gcode<'py>(
     fields.set_item("blend_tolerance", PyArray1::from_vec(py, columns.blend_tolerance))?;
     fields.set_item("fit_tolerance", PyArray1::from_vec(py, columns.fit_tolerance))?;
     fields.set_item("stop", PyArray1::from_vec(py, columns.stop))?;
+    fields.set_item("stop_cause", PyArray1::from_vec(py, columns.stop_cause))?;
     fields.set_item("dwell", PyArray1::from_vec(py, columns.dwell))?;
     fields.set_item("arc_move", PyArray1::from_vec(py, columns.arc_move))?;
     let centres = columns.arc_centre.into_flattened();

@@ -1,6 +1,6 @@
 //! The columns that the moves of a whole program become.
 
-use super::{Direction, Meaning, Moves, Point, UPRIGHT};
+use super::{Direction, Meaning, Moves, Point, Stop, UPRIGHT};
 use crate::gcode::block::AXES;
 
 /// The letters of a tool direction's columns, after those of the axes.
@@ -19,6 +19,8 @@ pub struct Columns {
     pub blend_tolerance: Vec<f64>,
     pub fit_tolerance: Vec<f64>,
     pub stop: Vec<bool>,
+    /// `Stop` of each move.
+    pub stop_cause: Vec<u8>,
     pub dwell: Vec<f64>,
     pub arc_move: Vec<i64>,
     pub arc_centre: Vec<[f64; 3]>,
@@ -45,11 +47,11 @@ pub struct Columns {
 impl Moves {
     /// The columns; the last move ends with a stop.
     pub fn finish(mut self, warnings: Vec<String>) -> Columns {
-        self.stop();
+        self.stop(Stop::End);
         let count = self.kind.len();
-        let mut stop = vec![false; count];
-        for &row in &self.stops {
-            stop[row] = true;
+        let mut stop_cause = vec![Stop::None as u8; count];
+        for &(row, cause) in &self.stops {
+            stop_cause[row] = cause as u8;
         }
         let mut dwell = vec![0.0; count];
         for &(row, seconds) in &self.dwells {
@@ -113,7 +115,8 @@ impl Moves {
             control,
             blend_tolerance,
             fit_tolerance,
-            stop,
+            stop: stop_cause.iter().map(|&cause| cause != Stop::None as u8).collect(),
+            stop_cause,
             dwell,
             meaning,
             tool_length,

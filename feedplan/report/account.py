@@ -1,0 +1,88 @@
+"""What a plan's time and way are made of: limits, slow lines, stops, feed and rapid motion."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from feedplan.constraints.problem import Problem
+from feedplan.profile import SpeedProfile
+from feedplan.program.program import Program
+from feedplan.report.activity import activity
+from feedplan.report.losses import Share, SlowLine, slowest_lines, time_per_limit
+from feedplan.report.stops import Stops, stops_by_cause
+from feedplan.report.tool_motion import ToolMotion, tool_motion
+
+
+@dataclass(frozen=True)
+class Total:
+    """`time` of motion [s], its `length` [mm], and what rotary axes `turn` while nothing else moves [deg];
+    `turn_time` [s] is that part of the time."""
+
+    time: float
+    length: float
+    turn: float
+    turn_time: float
+
+    @property
+    def mean(self) -> float:
+        """Mean speed of motion that has a length [mm/s]."""
+        moving = self.time - self.turn_time
+        return self.length / moving if moving > 0 and self.length > 0 else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Account:
+    """`limits` with their times, the longest first; the lines that lose most; `stops` by cause; totals of
+    motion at a `feed`, `rapid` motion and `all`; `tolerance` [mm] asked for, the least and the greatest."""
+
+    motion: ToolMotion
+    limits: tuple[Share, ...]
+    slow: tuple[SlowLine, ...]
+    stops: tuple[Stops, ...]
+    feed: Total
+    rapid: Total
+    all: Total
+    tolerance: tuple[float, float]
+
+    def to_json(self) -> dict[str, Any]:
+        """The numbers by name, as plan.json has them."""
+        return {
+            "length": self.all.length,
+            "turn": self.all.turn,
+            "mean_speed": self.all.mean,
+            "totals": {"feed": asdict(self.feed), "rapid": asdict(self.rapid)},
+            "limits": {share.limit: {"time": share.time, "part": share.part} for share in self.limits},
+            "stops_by_cause": [asdict(stops) for stops in self.stops],
+            "tolerance": {"least": self.tolerance[0], "greatest": self.tolerance[1]},
+        }
+
+
+def account(problem: Problem, profile: SpeedProfile, program: Program | None, jerk: bool) -> Account:
+    """The account of a profile on its path; `jerk`: its method limits jerk."""
+    path, motion = problem.path, tool_motion(problem)
+    time = np.bincount(profile.piece.astype(np.int64), profile.duration, len(path))
+    moments = activity(problem, profile, motion, jerk)
+
+    def total(own: Any) -> Total:
+        turns = own & motion.turns
+        way, moved = motion.lengths, own & ~motion.turns
+        return Total(
+            *(math.fsum(values) for values in (time[own], way[moved], way[turns], time[turns])),
+        )
+
+    feed = np.isfinite(path.feed)
+    tolerance = path.tolerance if len(path) else np.zeros(1)
+    return Account(
+        motion=motion,
+        limits=tuple(time_per_limit(problem, moments)),
+        slow=tuple(slowest_lines(problem, profile, motion, moments)),
+        stops=tuple(stops_by_cause(problem, program, moments)),
+        feed=total(feed),
+        rapid=total(~feed),
+        all=total(np.ones(len(path), dtype=bool)),
+        tolerance=(float(tolerance.min()), float(tolerance.max())),
+    )

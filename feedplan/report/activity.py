@@ -1,0 +1,95 @@
+"""Which limit is active when: the use of every limit at moments of a plan, from its states alone.
+
+At a moment the active limit is the one that is used most; below `ACTIVE` of it none is, and the motion is on
+its way from one limit to another. One form for all methods: it needs to know no law of motion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.constraints.problem import Problem, speed_square
+from feedplan.profile import SpeedProfile
+from feedplan.report.limits import chord_speed, parameter_speed
+from feedplan.report.tool_motion import ToolMotion
+from feedplan.setpoints import sampler
+
+Floats = NDArray[np.float64]
+
+# The use from which a limit counts as active.
+ACTIVE = 0.95
+NONE = "no limit active (transition)"
+
+# Moments looked at, at most, and in each arc.
+_MOMENTS = 100_000
+_MOMENTS_PER_ARC = 33
+
+
+@dataclass(frozen=True, eq=False)
+class Activity:
+    """Moments of a plan in motion, in order (m,).
+
+    `weight` is the time that each stands for [s], `piece` and `speed` of the tool [mm/s, deg/s where it only
+    turns] are those of the moment, `active` the number in `names` of the active limit. `pace` is the part of
+    the speed that feed and axis velocities alone would allow. `run` is the run of the path.
+    """
+
+    names: tuple[str, ...]
+    weight: Floats
+    piece: NDArray[np.uint32]
+    run: NDArray[np.int64]
+    speed: Floats
+    active: NDArray[np.int64]
+    pace: Floats
+
+    @property
+    def lost(self) -> Floats:
+        """Of `weight`, what the way of the moment would not take at the speed of feed and axis velocities."""
+        return self.weight * np.maximum(1.0 - self.pace, 0.0)
+
+
+def activity(problem: Problem, profile: SpeedProfile, motion: ToolMotion, jerk: bool) -> Activity:
+    """The activity of all limits, that of jerk where it is limited (`jerk`)."""
+    time, weight, run = _moments(problem, profile)
+    _, _, velocity, acceleration, jerks, _, piece, u, *_ = sampler(problem, profile, problem.period).at(time)
+    _, tangent, second = problem.curve.evaluate(piece, u, 2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rate = parameter_speed(tangent, velocity)
+        feed = np.where(np.isfinite(problem.path.feed[piece]), problem.feed[piece], np.inf)
+        at_feed = np.sqrt(speed_square(problem, piece, u)) * rate / feed
+        chord = np.linalg.norm(velocity, axis=1) / chord_speed(problem, tangent, second)
+        at_velocity = np.abs(velocity) / problem.max_velocity
+        groups = {"velocity": at_velocity, "acceleration": np.abs(acceleration) / problem.max_acceleration}
+        if jerk:
+            groups["jerk"] = np.abs(jerks) / problem.max_jerk
+        speed = motion.slope(piece, u) * rate
+    names = ("feed", "chord error", *(f"{axis} {name}" for name in groups for axis in problem.axes), NONE)
+    use = np.nan_to_num(np.column_stack([at_feed, chord, *groups.values()]), posinf=0.0)
+    # Limits that are used alike but for rounding: the first one counts.
+    most = use.max(axis=1, initial=0.0)
+    active = np.where(most >= ACTIVE, (use >= most[:, None] * (1.0 - 1e-6)).argmax(axis=1), len(names) - 1)
+    pace = np.column_stack([at_feed, at_velocity]).max(axis=1, initial=0.0)
+    return Activity(names, weight, piece, run, np.nan_to_num(speed), active, np.nan_to_num(pace))
+
+
+def _moments(problem: Problem, profile: SpeedProfile) -> tuple[Floats, Floats, NDArray[np.int64]]:
+    """Times by the plan's clock, the time that each stands for, and the run that it is in.
+
+    Arcs are divided evenly; where there are too many of them all time is.
+    """
+    count = len(profile)
+    if 0 < count <= _MOMENTS:
+        parts = int(np.clip(_MOMENTS // count, 1, _MOMENTS_PER_ARC))
+        weight = np.repeat(profile.duration / parts, parts)
+        start = np.repeat(np.cumsum(profile.duration) - profile.duration, parts)
+        time = start + weight * (np.tile(np.arange(parts), count) + 0.5)
+    else:
+        weight = np.full(_MOMENTS if count else 0, profile.time / _MOMENTS)
+        time = weight * (np.arange(len(weight)) + 0.5)
+    ends = np.cumsum(profile.run_times)
+    run = np.minimum(np.searchsorted(ends, time, side="right"), max(len(ends) - 1, 0))
+    pauses = problem.path.start_dwell + np.cumsum(problem.path.dwell) - problem.path.dwell
+    return time + pauses[run] if len(time) else time, weight, run

@@ -1,0 +1,131 @@
+"""Full stops by their causes: how many, how long the tool waits there, and what stopping costs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.constraints.problem import Problem
+from feedplan.program.program import MoveKind, PathControl, Program, StopCause
+from feedplan.report.activity import ACTIVE, Activity
+
+Floats = NDArray[np.float64]
+
+ENDS = "start and end"
+TURN_BACK = "turning back"
+CORNER = "corner that cannot be rounded"
+EXACT_CORNER = "corner on the exact path (G61)"
+CONTROL = "change between G64 and G61 or G61.1"
+OTHER = "other"
+_ASKED = {
+    StopCause.TOOL: "tool change (M6)",
+    StopCause.PAUSE: "programmed stop (M0, M1, M60)",
+    StopCause.DWELL: "dwell (G4)",
+    StopCause.SWITCH: "spindle, coolant and the like",
+    StopCause.CHANGE: "change of mode or tool length (G43.4, G43.5, G49)",
+}
+_EXACT_STOP = "exact stop (G61.1)"
+_RAPID = "change between G0 and G1"
+
+# A path that turns by more than this [deg] turns back; by less than this it has no corner.
+_BACK, _STRAIGHT = 135.0, 0.5
+
+
+@dataclass(frozen=True)
+class Stops:
+    """`count` stops of one `cause`; the tool waits for `pause` [s] in all, and loses `lost` [s] by slowing to
+    them and leaving them, against what feeds and axis velocities alone would allow."""
+
+    cause: str
+    count: int
+    pause: float
+    lost: float
+
+
+def stops_by_cause(problem: Problem, program: Program | None, activity: Activity) -> list[Stops]:
+    """The stops of a path, by what they cost, the greatest first; start and end count as two."""
+    path = problem.path
+    runs = len(path.runs) - 1
+    if runs < 1:
+        return []
+    causes = [ENDS, *_causes(problem, program), ENDS]
+    pauses = np.concatenate(([path.start_dwell], path.dwell))
+    before, after = _slow_parts(activity, runs)
+    lost = np.concatenate(([0.0], before)) + np.concatenate((after, [0.0]))
+    found = [
+        Stops(
+            cause,
+            len(own),
+            float(pauses[own].sum()),
+            float(lost[own].sum()),
+        )
+        for cause in dict.fromkeys(causes)
+        for own in [[k for k, other in enumerate(causes) if other == cause]]
+    ]
+    return sorted(found, key=lambda stops: -(stops.pause + stops.lost))
+
+
+def _causes(problem: Problem, program: Program | None) -> list[str]:
+    """Why the path stops after each of its runs but the last."""
+    path = problem.path
+    last, first = path.runs[1:-1] - 1, path.runs[1:-1]
+    turn = _turns(problem, last, first)
+    control = program.control if program is not None and len(program) else None
+    result = []
+    for k, (before, after) in enumerate(zip(path.move[last, 1], path.move[first, 0], strict=True)):
+        cause = OTHER
+        if program is not None and control is not None and program.stop_cause is not None:
+            asked = StopCause(int(program.stop_cause[before : max(after, before + 1)].max()))
+            rapid = program.kind[[before, after]] == MoveKind.RAPID
+            if asked in _ASKED:
+                result.append(_ASKED[asked])
+                continue
+            if control[before] == PathControl.EXACT_STOP:
+                result.append(_EXACT_STOP)
+                continue
+            if rapid[0] != rapid[1]:
+                result.append(_RAPID)
+                continue
+        if turn[k] > _BACK:
+            cause = TURN_BACK
+        elif turn[k] > _STRAIGHT:
+            exact = control is not None and PathControl.EXACT_PATH in control[[before, after]]
+            cause = EXACT_CORNER if exact else CORNER
+        elif control is not None and control[before] != control[after]:
+            cause = CONTROL
+        result.append(cause)
+    return result
+
+
+def _turns(problem: Problem, last: NDArray[np.integer], first: NDArray[np.integer]) -> Floats:
+    """By how much the path turns from the end of one piece to the start of another [deg]."""
+    curve = problem.path.curve
+    with np.errstate(divide="ignore", invalid="ignore"):
+        one, other = (
+            tangent / np.linalg.norm(tangent, axis=1)[:, None]
+            for tangent in (
+                curve.evaluate(last, curve.width[last], 1)[1],
+                curve.evaluate(first, np.zeros(len(first)), 1)[1],
+            )
+        )
+    half = np.linalg.norm(one - other, axis=1) / 2.0
+    return np.asarray(np.degrees(2.0 * np.arcsin(np.clip(np.nan_to_num(half), 0.0, 1.0))))
+
+
+def _slow_parts(activity: Activity, runs: int) -> tuple[Floats, Floats]:
+    """Time lost before the end and after the start of each run [s].
+
+    That counts from rest to where the tool is at a feed or an axis velocity, or first slows down.
+    """
+    lost, pace, run = activity.lost, activity.pace, activity.run
+    total = np.concatenate(([0.0], np.cumsum(lost)))
+    start, end = np.searchsorted(run, np.arange(runs), "left"), np.searchsorted(run, np.arange(runs), "right")
+    slower = np.append(pace[1:] < pace[:-1], True)
+    faster = np.insert(pace[1:] > pace[:-1], 0, True) if len(pace) else np.empty(0, bool)
+    risen = np.append(np.flatnonzero((pace >= ACTIVE) | slower), len(pace))
+    fallen = np.insert(np.flatnonzero((pace >= ACTIVE) | faster), 0, -1)
+    reach = np.minimum(risen[np.searchsorted(risen, start)] + 1, end)
+    back = np.maximum(fallen[np.searchsorted(fallen, end, "left") - 1], reach)
+    return total[end] - total[np.minimum(back, end)], total[reach] - total[start]

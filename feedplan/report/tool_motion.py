@@ -1,0 +1,83 @@
+"""The tool's way: X, Y, Z [mm] where a piece moves one of them, else U, V, W [mm], else what it turns [deg].
+
+So millimetres and degrees are never added. Feeds of part programs count along the same axes.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.constraints.problem import Problem
+from feedplan.curves.composite import CompositeCurve
+from feedplan.curves.length import CurveLength
+
+Floats = NDArray[np.float64]
+
+# In this order the first group that moves counts. I, J, K are the tool's direction, a unit vector.
+_GROUPS = ("XYZ", "UVW", "ABCIJK")
+_DEGREES = {name: math.degrees(1.0) for name in "IJK"}
+
+# Roundings of a control point, in units of the last digit of the greatest: they are no motion.
+_ROUNDINGS = 64.0
+
+
+@dataclass(frozen=True, eq=False)
+class ToolMotion:
+    """`curve` has a path's pieces with the axes that count, the others at 0; `turns` (n,) are those pieces on
+    which nothing but rotary axes moves. `share` (n, axes) is what each axis counts, None where all do."""
+
+    curve: CompositeCurve
+    share: Floats | None
+    turns: NDArray[np.bool_]
+
+    @property
+    def unit(self) -> str:
+        """The unit of what is drawn: mm, or deg where nothing but rotary axes moves anywhere."""
+        return "deg" if self.turns.all() else "mm"
+
+    @cached_property
+    def drawn(self) -> NDArray[np.bool_]:
+        """Pieces (n,) whose way is in that unit."""
+        return np.asarray(~self.turns | self.turns.all())
+
+    def slope(self, piece: NDArray[np.integer], u: Floats) -> Floats:
+        """Way by u at places (m,) [mm or deg]."""
+        return np.asarray(np.linalg.norm(self.curve.evaluate(piece, u, 1)[1], axis=1))
+
+    @cached_property
+    def lengths(self) -> Floats:
+        """Way of each piece (n,), [deg] where it turns and [mm] elsewhere."""
+        ends = CurveLength(self.curve).length(np.arange(len(self.curve)), self.curve.width)
+        return np.diff(ends, prepend=0.0)
+
+    @property
+    def length(self) -> float:
+        """Length of the way [mm]."""
+        return math.fsum(self.lengths[~self.turns])
+
+    @property
+    def turn(self) -> float:
+        """What the rotary axes turn while nothing else moves [deg]."""
+        return math.fsum(self.lengths[self.turns])
+
+
+def tool_motion(problem: Problem) -> ToolMotion:
+    """The way of the tool along a problem's path."""
+    curve, axes = problem.path.curve, problem.path.axes
+    if set(axes) <= set(_GROUPS[0]):
+        return ToolMotion(curve, None, np.zeros(len(curve), dtype=bool))
+    points, first = curve.control_points, curve.offsets[:-1]
+    extent = np.maximum.reduceat(points, first) - np.minimum.reduceat(points, first)
+    rounding = _ROUNDINGS * np.finfo(float).eps * np.abs(points).max(axis=0, initial=0.0)
+    member = np.array([[name in group for name in axes] for group in _GROUPS])
+    moves = ((extent > rounding)[:, None, :] & member).any(axis=2)
+    counts = np.where(moves.any(axis=1), moves.argmax(axis=1), len(_GROUPS) - 1)
+    scale = np.array([_DEGREES.get(name, 1.0) for name in axes])
+    share = member[counts] * scale
+    points = points * np.repeat(share, np.diff(curve.offsets), axis=0)
+    return ToolMotion(replace(curve, control_points=points), share, counts == len(_GROUPS) - 1)
