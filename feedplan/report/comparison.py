@@ -42,7 +42,7 @@ def write_comparison(
 def _table(rows: Sequence[Mapping[str, Any]], limits: Sequence[str]) -> str:
     shown = [name for name in limits if any((row.get("worst") or {}).get(name) for row in rows)]
     heads = [
-        '<th>Method</th><th class="n">Time</th><th></th><th class="n">Gap of its path, proven</th>',
+        '<th>Method</th><th class="n">Time</th><th></th><th class="n">Gap of its path</th>',
         '<th class="n">Computing</th>',
         *(f'<th class="n">{escape(name.capitalize())}</th>' for name in shown),
         "<th>Audit</th>",

@@ -93,7 +93,7 @@
       const limits = data.limits[name];
       const known = limits ? limits.map((limit, k) => (limit ? `${data.axes[k]} ${Number(limit.toPrecision(6))}` : null)).filter(Boolean) : [];
       const shownUnit = relative && limits && limits.every(Boolean) ? "% of limit" : unit;
-      const rapids = name === "speed" && hidesRapids && !isNarrow ? `rapids up to ${Number(topSpeed.toPrecision(4))} ${unit}/s run out of the chart` : "";
+      const rapids = name === "speed" && hidesRapids && !isNarrow ? `rapids up to ${Number(topSpeed.toPrecision(4))} ${data.path.unit}/s run out of the chart` : "";
       const note = rapids ? rapids : !known.length || isNarrow ? "" : data.judged.includes(name) ? `limits ${known.join(", ")} ${unit}` : `not limited by this method (machine: ${known.join(", ")} ${unit})`;
       annotations.push({
         xref: "paper", yref: "paper", x: 0, y: bottom + height, xanchor: "left", yanchor: "bottom", showarrow: false,
