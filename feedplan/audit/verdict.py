@@ -77,8 +77,9 @@ class LimitCheck:
 
     @property
     def unit(self) -> str:
-        """Unit of `worst` and `limit`."""
-        return _KINDS[self.name].unit
+        """Unit of `worst` and `limit`: degrees in place of mm on the rotary axes A, B and C."""
+        unit = _KINDS[self.name].unit
+        return unit.replace("mm", "deg") if self.axis in ("A", "B", "C") else unit
 
     def sentence(self) -> str:
         """Place, value and limit in words."""
@@ -87,7 +88,7 @@ class LimitCheck:
         what = f"{self.axis} {kind.quantity}" if self.axis else kind.quantity
         if self.name == "numbers":
             return f"{place}: {what}"
-        unit = f" {kind.unit}" if kind.unit else ""
+        unit = f" {self.unit}" if self.unit else ""
         times = f" ({self.ratio:.7g} times)" if math.isfinite(self.ratio) else ""
         return f"{place}: {what} {self.worst:.7g}{unit}, the limit is {self.limit:.7g}{unit}{times}"
 

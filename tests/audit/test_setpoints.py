@@ -388,3 +388,11 @@ def test_columns_by_name_and_wrong_shapes() -> None:
             audit_setpoints(T, STRAIGHT, PLANE, **arguments)
     with pytest.raises(InputError, match="at least two"):
         audit_setpoints(T[:1], STRAIGHT[:1], PLANE)
+
+
+def test_what_rotary_axes_do_is_told_in_degrees() -> None:
+    turning = Machine("turning", (Axis("X", 100, 1000), Axis("A", 40, 1000)))
+    result = audit_setpoints(T, STRAIGHT[:, ::-1], turning)
+    assert result.check("velocity", "A").unit == "deg/s"
+    assert result.check("velocity", "X").unit == "mm/s"
+    assert "A velocity 50 deg/s, the limit is 40 deg/s" in result.failures[0]
