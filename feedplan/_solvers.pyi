@@ -1,5 +1,6 @@
 """Types of the native module."""
 
+from collections.abc import Sequence
 from typing import Any, final
 
 import numpy as np
@@ -81,12 +82,15 @@ def bound_jerk_limited(
 def plan_s_curve(
     problem: Problem,
     jerk: NDArray[np.float64],
-    cutting: tuple[int, float, float],
+    cuttings: Sequence[tuple[float, float]],
     look_ahead: int,
     time_limit: float | None = None,
 ) -> tuple[_Profile, _Changes]: ...
 def path_segments(
-    problem: Problem, jerk: NDArray[np.float64], cutting: tuple[int, float, float]
+    problem: Problem,
+    jerk: NDArray[np.float64],
+    cuttings: Sequence[tuple[float, float]],
+    look_ahead: int,
 ) -> tuple[
     NDArray[np.int64],
     NDArray[np.float64],

@@ -1,8 +1,8 @@
 """State-to-state profiles along the path: states where segments meet, and the quickest motions between them.
 
-The segments are those of the S-curve, and finer ones, with its limits along the path. At first they meet
-without acceleration, as fast as looking ahead over the whole of a stretch allows. Then speed and acceleration
-are improved joint after joint, forward and backward, each time with the quickest motions to both neighbours,
+The segments are those of the S-curve, with its limits along the path. At first they meet without
+acceleration, as fast as looking ahead over the whole of a stretch allows. Then speed and acceleration are
+improved joint after joint, forward and backward, each time with the quickest motions to both neighbours,
 which the package ruckig finds: Berscheid and Kröger, "Jerk-limited real-time trajectory generation with
 arbitrary target states" (2021). No step makes the profile slower: it is at least as fast as the S-curve.
 """
@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -35,13 +36,11 @@ Section = tuple[float, float, float, float, float]
 # The profile keeps the limits of jerk, best where curvature does not jump.
 LIMITS_JERK = True
 CORNERS = Corners.SMOOTH
-# Cuttings that are tried: the S-curve's own and a finer one.
-CUTTINGS = (s_curve.CUTTING, (16, 30.0, 0.02))
 # Times that all joints are improved, at most, and the gain of one round below which steps are halved.
 ROUNDS, GAIN = 24, 3e-4
 # Steps of speed and acceleration as parts of their limits: the first, and the least.
 STEP, LEAST_STEP = 0.25, 0.002
-# A motion may be out of its limits by rounding, as a part of them.
+# A motion may be out of its limits by rounding, as a part of them. What is quicker is so by more than that.
 ROUNDING = 1e-9
 # Halvings for a speed that can be reached: to the last digit.
 HALVINGS = 60
@@ -62,6 +61,13 @@ class Segment:
         """Whether an acceleration of `change` can be reached from or left to `speed` within the limits."""
         beyond = change * abs(change) / (2 * self.jerk)
         return 0 <= speed + beyond <= self.speed
+
+    @cached_property
+    def unit(self) -> float:
+        """A unit of time [s] in which no limit is below 1, the unit of length being the segment's length: the
+        package ruckig takes numbers for 0 that are below its own least ones."""
+        by_acceleration, by_jerk = self.length / self.acceleration, self.length / self.jerk
+        return max(self.length / self.speed, math.sqrt(by_acceleration), math.pow(by_jerk, 1 / 3))
 
     def highest(self, speed: float) -> float:
         """The greatest speed that can be reached on it from another one, without acceleration at both."""
@@ -116,7 +122,7 @@ class Motions:
             ) from None
         self._generator, self._input, self._trajectory = Ruckig(1), InputParameter(1), Trajectory(1)
         self._done, self._fault = Result.Working, RuckigError
-        self._input.current_position = [0.0]
+        self._input.current_position, self._input.target_position = [0.0], [1.0]
 
     def duration(self, segment: Segment, start: State, end: State) -> float:
         """The time [s]; infinite where there is no motion within the limits."""
@@ -126,34 +132,40 @@ class Motions:
             return math.inf
         profile = self._trajectory.profiles[0][0]
         v, a, j = profile.v, profile.a, profile.j
-        low, high = -ROUNDING * segment.speed, (1 + ROUNDING) * segment.speed
+        speed = segment.speed * segment.unit / segment.length
+        low, high = -ROUNDING * speed, (1 + ROUNDING) * speed
         for k in range(7):
             turns = a[k] * a[k + 1] < 0
-            for speed in (v[k + 1], v[k] - a[k] ** 2 / (2 * j[k]) if turns else v[k]):
-                if not low <= speed <= high:
+            for met in (v[k + 1], v[k] - a[k] ** 2 / (2 * j[k]) if turns else v[k]):
+                if not low <= met <= high:
                     return math.inf
-        return float(self._trajectory.duration) if profile.brake.duration == 0 else math.inf
+        return segment.unit * float(self._trajectory.duration) if profile.brake.duration == 0 else math.inf
 
     def sections(self, segment: Segment, start: State, end: State, position: float) -> list[Section]:
         """The sections of a motion that there is, the first at `position`."""
         self._calculate(segment, start, end)
         profile = self._trajectory.profiles[0][0]
+        length, unit = segment.length, segment.unit
         return [
-            (t, position + p, max(v, 0.0), a, j)
+            (
+                t * unit,
+                position + p * length,
+                max(v, 0.0) * length / unit,
+                a * length / unit**2,
+                j * length / unit**3,
+            )
             for t, p, v, a, j in zip(profile.t, profile.p, profile.v, profile.a, profile.j, strict=False)
             if t > 0
         ]
 
     def _calculate(self, segment: Segment, start: State, end: State) -> bool:
         given = self._input
-        given.current_velocity, given.current_acceleration = [start[0]], [start[1]]
-        given.target_position, given.target_velocity, given.target_acceleration = (
-            [segment.length],
-            [end[0]],
-            [end[1]],
-        )
-        given.max_velocity = [segment.speed]
-        given.max_acceleration, given.max_jerk = [segment.acceleration], [segment.jerk]
+        speed, acceleration = segment.unit / segment.length, segment.unit**2 / segment.length
+        given.current_velocity, given.current_acceleration = [speed * start[0]], [acceleration * start[1]]
+        given.target_velocity, given.target_acceleration = [speed * end[0]], [acceleration * end[1]]
+        given.max_velocity = [speed * segment.speed]
+        given.max_acceleration = [acceleration * segment.acceleration]
+        given.max_jerk = [segment.jerk * segment.unit**3 / segment.length]
         try:
             return bool(self._generator.calculate(given, self._trajectory) == self._done)
         except self._fault:
@@ -165,7 +177,8 @@ def plan(problem: Problem, *, time_limit: float | None = None) -> SpeedProfile:
 
     Raises SolverError for an axis without a limit of jerk, MissingPackageError.
     """
-    return _planned(problem, time_limit, None)
+    profiles = _planned(problem, time_limit, None), s_curve.plan(problem)
+    return min(profiles, key=lambda profile: profile.time)
 
 
 def repaired(problem: Problem, profile: SpeedProfile, *, time_limit: float | None = None) -> SpeedProfile:
@@ -180,32 +193,21 @@ def _planned(problem: Problem, time_limit: float | None, guide: SpeedProfile | N
     motions = Motions()
     limits = jerk_limits(problem)
     deadline = math.inf if time_limit is None else time.perf_counter() + time_limit
-    best: list[list[Section]] = []
     try:
-        for cutting in CUTTINGS:
-            stretches = _stretches(problem, limits, cutting, guide)
-            found = [_improved(stretch, motions, deadline) for stretch in stretches]
-            best = [min(pair, key=_time) for pair in zip(best or found, found, strict=True)]
-            if time.perf_counter() >= deadline:
-                break
-        offsets = np.cumsum([0] + [len(sections) for sections in best])
-        rows = np.array([section for sections in best for section in sections]).reshape(-1, 5)
+        stretches = _stretches(problem, limits, guide)
+        found = [_improved(stretch, motions, deadline) for stretch in stretches]
+        offsets = np.cumsum([0] + [len(sections) for sections in found])
+        rows = np.array([section for sections in found for section in sections]).reshape(-1, 5)
         columns, changes = profile_of_sections(problem, limits, offsets, rows)
     except PlanError as fault:
         raise error_of(problem, fault) from None
     return SpeedProfile(*columns, *changes)
 
 
-def _time(sections: list[Section]) -> float:
-    """The time of sections [s]; infinite for none."""
-    return sum(section[0] for section in sections) or math.inf
-
-
-def _stretches(
-    problem: Problem, limits: Array, cutting: tuple[int, float, float], guide: SpeedProfile | None
-) -> list[Stretch]:
+def _stretches(problem: Problem, limits: Array, guide: SpeedProfile | None) -> list[Stretch]:
     """The stretches of the path; those for the jerk-limited planner have no segments."""
-    offsets, length, speed, acceleration, jerk, junction, piece, u = path_segments(problem, limits, cutting)
+    segmented = path_segments(problem, limits, s_curve.CUTTINGS, s_curve.LOOK_AHEAD)
+    offsets, length, speed, acceleration, jerk, junction, piece, u = segmented
     stretches = []
     for first, last in pairwise(offsets.tolist()):
         own = slice(first, last)
@@ -279,10 +281,11 @@ def _improve(
         )
         if state == (v, a):
             continue
+        most_time = (1 - ROUNDING) * (durations[i - 1] + durations[i])
         first = motions.duration(before, states[i - 1], state)
-        if first >= durations[i - 1] + durations[i]:
+        if first >= most_time:
             continue
         second = motions.duration(after, state, states[i + 1])
-        if first + second < durations[i - 1] + durations[i]:
+        if first + second < most_time:
             states[i], durations[i - 1], durations[i] = state, first, second
             return

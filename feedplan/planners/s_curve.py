@@ -14,9 +14,10 @@ LIMITS_JERK = True
 CORNERS = Corners.SMOOTH
 # Segments known beyond the one that the motion enters.
 LOOK_AHEAD = 256
-# Parts of a curved piece, the length over which a speed has to pay [mm], and by what part of them the speeds
-# of parts may differ that are one segment.
-CUTTING = (8, 30.0, 0.05)
+# Each stretch is cut as gives the quickest profile. A cutting is the length over which a speed has to pay, in
+# lengths from rest to rest that just reach the greatest speed, and the part of them by which the speeds of
+# parts may differ that are one segment.
+CUTTINGS = ((4.0, 0.05), (16.0, 0.05), (64.0, 0.05), (4.0, 0.2), (16.0, 0.2))
 
 
 def plan(problem: Problem) -> SpeedProfile:
@@ -35,7 +36,7 @@ def plan_by_itself(problem: Problem) -> SpeedProfile:
 def _planned(problem: Problem, time_limit: float | None) -> SpeedProfile:
     """`time_limit` [s] is for what is left to jerk-limited."""
     try:
-        columns, changes = plan_s_curve(problem, jerk_limits(problem), CUTTING, LOOK_AHEAD, time_limit)
+        columns, changes = plan_s_curve(problem, jerk_limits(problem), CUTTINGS, LOOK_AHEAD, time_limit)
     except PlanError as fault:
         raise error_of(problem, fault) from None
     return SpeedProfile(*columns, *changes)

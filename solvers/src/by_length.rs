@@ -391,6 +391,11 @@ impl<'a, const M: usize> ByLength<'a, M> {
         self.tables[part].straight.map(|(direction, _)| direction)
     }
 
+    /// The servo period, in s.
+    pub fn period(&self) -> f64 {
+        self.problem.period
+    }
+
     /// The greatest speed by the chord error on a curvature.
     pub fn chord_speed(&self, curvature: f64) -> f64 {
         chord_limit(self.problem, curvature)

@@ -14,15 +14,15 @@ use crate::s_curve::Section;
 
 const PATH_JERK: u8 = ArcKind::PathJerk as u8;
 pub const SPEED_CUBIC: u8 = ArcKind::SpeedCubic as u8;
-/// A section that takes no longer is rounding, in s.
-const SHORTEST: f64 = 1e-10;
+/// A section that takes no longer than this part of the servo period is rounding.
+const SHORTEST: f64 = 1e-7;
 /// What states have been moved by is taken back by this part of each arc: there its length shows nothing of it.
 const TAKEN_BACK: f64 = 1e-10;
 /// What halves of an arc may differ from the whole in time, where the speed is not too near to none; and their halvings.
 const QUADRATURE: f64 = 1e-12;
 const DEPTH: u32 = 12;
-/// On arcs shorter than this, in s, the rounding of v² may show in the jerk of a cubic …
-const BRIEF: f64 = 1e-5;
+/// On arcs shorter than this part of the servo period the rounding of v² may show in the jerk of a cubic …
+const BRIEF: f64 = 1e-2;
 /// … which is constant where it would by more than this part of its limit.
 const SHOWN: f64 = 1e-7;
 /// Halvings for the time at which a section of constant jerk passes a place.
@@ -131,7 +131,7 @@ impl Arcs {
         let last = self.len().wrapping_sub(1);
         let goes_on = last < self.len() && self.piece[last] as usize == piece && self.u1[last] == u0;
         let speed = |u: f64, v: f64| if v == 0.0 { 0.0 } else { v * v / speed_sq(problem, piece, u) };
-        if u1 <= u0 || arc.duration <= SHORTEST {
+        if u1 <= u0 || arc.duration <= SHORTEST * problem.period {
             let u1 = u1.max(u0);
             if goes_on {
                 self.duration[last] += arc.duration;
@@ -208,18 +208,19 @@ impl Arcs {
         self.push(problem, path.parts[part].piece, u, &arc);
     }
 
-    /// Appends sections of constant jerk from rest to rest along a whole stretch.
+    /// Appends sections of constant jerk along a whole stretch, to a speed in mm/s without acceleration.
     pub fn push_sections<const M: usize>(
         &mut self,
         problem: &Problem<M>,
         path: &ByLength<M>,
         sections: &[Section],
+        end: f64,
     ) {
         for (i, section) in sections.iter().enumerate() {
             let from = State { s: section.position, v: section.speed, a: section.acceleration };
             let to = match sections.get(i + 1) {
                 Some(next) => State { s: next.position, v: next.speed, a: next.acceleration },
-                None => State { s: path.total(), v: 0.0, a: 0.0 },
+                None => State { s: path.total(), v: end, a: 0.0 },
             };
             self.push_jerk(problem, path, [from, to], section.jerk, section.duration);
         }
@@ -343,7 +344,7 @@ fn arc_between<const M: usize>(
     ends: [State; 2],
 ) -> Arc {
     let duration = cubic_time(h, &ends);
-    if duration < BRIEF {
+    if duration < BRIEF * path.period() {
         let first = path.at(part, ends[0].s).first;
         let limit = (0..M).map(|k| jerk_limits[k] / first[k].abs()).fold(f64::INFINITY, f64::min);
         if 3.0 * f64::EPSILON * ends[1].v.powi(3) > SHOWN * limit * h * h {

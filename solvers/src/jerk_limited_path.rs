@@ -99,9 +99,9 @@ impl<const M: usize> Task<'_, M> {
     fn plan(&self, parts: &[Part], speeds: [f64; 2], cuts: u32) -> Result<Arcs, Fault> {
         let path = ByLength::new(self.problem, parts);
         let mut arcs = Arcs::default();
-        if speeds == [0.0; 2] {
-            if let Some((direction, feed)) = path.line() {
-                self.cross(&path, &direction, feed, &mut arcs)?;
+        if let Some((direction, feed)) = path.line() {
+            if let Some(sections) = self.cross(path.total(), &direction, feed, speeds)? {
+                arcs.push_sections(self.problem, &path, &sections, speeds[1]);
                 return Ok(arcs);
             }
         }
@@ -150,7 +150,7 @@ impl<const M: usize> Task<'_, M> {
         let is_cubic = |arc: &usize| columns.kind[*arc] == SPEED_CUBIC;
         let Some(first) = arcs.clone().find(is_cubic) else {
             let time = columns.duration[arcs].iter().sum();
-            return path.line().filter(|_| stretch.ends == [0.0; 2]).map(|_| time);
+            return path.line().map(|_| time);
         };
         let last = arcs.clone().rev().find(is_cubic)?;
         if (first..last).any(|arc| columns.p1[arc] == 0.0) {
@@ -192,18 +192,18 @@ impl<const M: usize> Task<'_, M> {
         Some(jerk_limited::certify(&problem, &profile, self.effort).least_time)
     }
 
-    /// A line from rest to rest in one direction with one feed.
+    /// The quickest sections of a line with one feed between speeds at its ends; None where it does not join them.
     fn cross(
         &self,
-        path: &ByLength<M>,
+        length: f64,
         direction: &[f64; M],
         feed: f64,
-        arcs: &mut Arcs,
-    ) -> Result<(), Fault> {
+        speeds: [f64; 2],
+    ) -> Result<Option<Vec<s_curve::Section>>, Fault> {
         let most =
             |limit: &[f64; M]| (0..M).map(|k| limit[k] / direction[k].abs()).fold(f64::INFINITY, f64::min);
         let segment = s_curve::Segment {
-            length: path.total(),
+            length,
             allowable: most(&self.limits.velocity),
             desired: feed,
             limits: s_curve::Limits {
@@ -212,8 +212,7 @@ impl<const M: usize> Task<'_, M> {
             },
             junction: 0.0,
         };
-        arcs.push_sections(self.problem, path, &s_curve::plan(&[segment], 1)?);
-        Ok(())
+        s_curve::cross(&segment, speeds)
     }
 
     /// With a rest where the planner sees no speed, or half-way.

@@ -71,7 +71,7 @@ pub fn allowable<const M: usize>(
     stretch: f64,
 ) -> Result<Allowable, Fault> {
     let rows = Rows { shape, axes };
-    let most_speed = rows.most_speed().min(speed);
+    let Allowable { speed: most_speed, limits: most } = greatest(shape, axes, speed);
     if !(most_speed > 0.0 && most_speed.is_finite()) {
         return Err(Fault::Input {
             piece: None,
@@ -80,6 +80,11 @@ pub fn allowable<const M: usize>(
                 shape.curvature
             ),
         });
+    }
+    if rows.most_acceleration(most_speed) == most.acceleration
+        && rows.most_jerk(most_speed, most.acceleration) == most.jerk
+    {
+        return Ok(Allowable { speed: most_speed, limits: most });
     }
     let with = |speed: f64| {
         let most = rows.most_acceleration(speed);
@@ -99,6 +104,13 @@ pub fn allowable<const M: usize>(
     let acceleration = with(speed).0;
     let jerk = rows.most_jerk(speed, acceleration);
     Ok(Allowable { speed, limits: Limits { acceleration, jerk } })
+}
+
+/// The greatest V, at most a `speed`, and the greatest A and J, each where the others take nothing: on lines V, A, J.
+pub fn greatest<const M: usize>(shape: &Shape<M>, axes: &AxisLimits<M>, speed: f64) -> Allowable {
+    let rows = Rows { shape, axes };
+    let limits = Limits { acceleration: rows.most_acceleration(0.0), jerk: rows.most_jerk(0.0, 0.0) };
+    Allowable { speed: rows.most_speed().min(speed), limits }
 }
 
 /// The inequalities at the head.
@@ -159,7 +171,6 @@ fn golden_section(f: impl Fn(f64) -> f64) -> f64 {
         }
     }
     let middle = 0.5 * (low + high);
-    // Straight lines take all.
     if f(1.0) <= f(middle) {
         1.0
     } else {
@@ -193,8 +204,9 @@ mod tests {
         let found = allowable(&line, &AXES, f64::INFINITY, 1000.0).unwrap();
         assert_eq!(found.speed, 250.0);
         assert_eq!(found.limits, Limits { acceleration: 3750.0, jerk: 62_500.0 });
-        let slow = allowable(&line, &AXES, 80.0, 1000.0).unwrap();
-        assert_eq!(slow.speed, 80.0);
+        // Over any length: neither takes of the other.
+        let slow = allowable(&line, &AXES, 80.0, 1e-6).unwrap();
+        assert_eq!(slow, Allowable { speed: 80.0, ..found });
     }
 
     #[test]

@@ -133,6 +133,18 @@ pub fn plan(segments: &[Segment], look_ahead: usize) -> Result<Vec<Section>, Fau
     Ok(sections)
 }
 
+/// The quickest sections of one segment between speeds at its ends, no acceleration there; None where it does not join
+/// them.
+pub fn cross(segment: &Segment, [from, to]: [f64; 2]) -> Result<Option<Vec<Section>>, Fault> {
+    segment.check(0)?;
+    let joins = from.max(to) <= segment.speed() && segment.joins(from, to);
+    Ok(joins.then(|| {
+        let mut sections = vec![];
+        section::cross(segment, from, to, section::Place::default(), &mut sections);
+        sections
+    }))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

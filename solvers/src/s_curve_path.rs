@@ -1,8 +1,10 @@
 //! The two-pass profiler on a path of the package: segments with limits along the path, and what they become.
 //!
-//! Neighbouring straight pieces of one direction are one segment. A curved piece is cut into parts of equal length,
-//! and parts whose limits differ little are one segment again: the acceleration is 0 where segments meet, so that
-//! each more costs time, and each less lets the tightest place of more of the path hold all of it.
+//! Neighbouring straight pieces of one direction are one segment. A curved piece is halved where the limits of its halves
+//! differ and the axes can make use of that, and parts whose limits differ little are one segment again: the
+//! acceleration is 0 where segments meet, so that each more costs time, and each less lets the tightest place of more of
+//! the path hold all of it. What is little, and how much of the limits turning may take, is tried in some ways, of which
+//! each stretch takes the quickest.
 
 use crate::bang_bang::Problem;
 use crate::bang_bang_quadratic::Fault;
@@ -10,11 +12,11 @@ use crate::by_length::{piece, ByLength};
 use crate::jerk_arcs::Arcs;
 use crate::jerk_limited::{Effort, Geometry, Limits, Place};
 use crate::jerk_limited_path::Task;
-use crate::path_dynamics::{allowable, bounded, AxisLimits, Curve, Shape};
+use crate::path_dynamics::{allowable, bounded, greatest, AxisLimits, Curve, Shape};
 use crate::s_curve::{self, Section, Segment};
 use crate::spline::bezier::split;
 use crate::spline::CompositeCurve;
-use crate::stretches::{checked, over_stretches, stretches};
+use crate::stretches::{checked, over_stretches, stretches, Stretch};
 
 /// Bounds of derivatives are greater than these by this part.
 const ACCURACY: f64 = 0.05;
@@ -26,32 +28,35 @@ const HELD: f64 = 0.998;
 /// Lengths this near to one another, as parts of them, are the same.
 const CLOSE: f64 = 1e-9;
 
-/// How to cut a path into segments.
+/// Halves of a part are parts of their own where one may be passed faster than both together by more than this part of
+/// the speed, and halvings of a piece.
+const WORTH: f64 = 0.05;
+const DEPTH: u32 = 5;
+
+/// A way to join parts to segments.
 #[derive(Clone, Copy, Debug)]
 pub struct Cutting {
-    /// Parts of a curved piece.
-    pub parts: usize,
-    /// The length in mm over which a speed has to pay: short ones give more to acceleration.
-    pub stretch: f64,
+    /// The length over which a speed has to pay, in lengths from rest to rest that just reach the greatest speed; from 1
+    /// on a line takes all of it. Short ones give more to acceleration.
+    pub lengths: f64,
     /// Parts are joined where that lowers the speed on none of them by more than this part of it.
     pub alike: f64,
 }
 
-/// The profile of a path, planned with so many segments of look-ahead. Where a segment has no speed, next to a
-/// cusp, and where the path begins or ends in motion, the jerk-limited planner plans the stretch with this effort.
+/// The profile of a path, each stretch by the quickest of some cuttings, planned with so many segments of look-ahead.
+/// Where a segment has no speed, next to a cusp, and where the path begins or ends in motion, the jerk-limited planner
+/// plans the stretch with this effort.
 pub fn plan<const M: usize>(
     problem: &Problem<M>,
     jerk: &[f64; M],
-    cutting: &Cutting,
+    cuttings: &[Cutting],
     look_ahead: usize,
     effort: &Effort,
 ) -> Result<Arcs, Fault> {
     over_stretches(problem, jerk, |stretch, limits| {
         let path = ByLength::new(problem, &stretch.parts);
-        let segments =
-            if stretch.ends == [0.0; 2] { segments(problem, &path, limits, cutting) } else { None };
-        match segments {
-            Some(segments) => Ok(along(problem, &path, limits, &s_curve::plan(&segments, look_ahead)?)),
+        match quickest(problem, &path, stretch, limits, cuttings, look_ahead)? {
+            Some((_, sections)) => Ok(along(problem, &path, limits, &sections)),
             None => Task { problem, limits: *limits, effort }.stretch(stretch),
         }
     })
@@ -68,19 +73,20 @@ pub struct Segmented {
     pub u: Vec<f64>,
 }
 
-/// Cuts all stretches into segments.
+/// Cuts all stretches into the segments that `plan` plans on.
 pub fn cut<const M: usize>(
     problem: &Problem<M>,
     jerk: &[f64; M],
-    cutting: &Cutting,
+    cuttings: &[Cutting],
+    look_ahead: usize,
 ) -> Result<Segmented, Fault> {
     let limits = checked(problem, jerk)?;
     let mut all = Segmented { stretches: vec![0], ..Segmented::default() };
     for stretch in stretches(problem) {
         let path = ByLength::new(problem, &stretch.parts);
-        let own = if stretch.ends == [0.0; 2] { segments(problem, &path, &limits, cutting) } else { None };
+        let own = quickest(problem, &path, &stretch, &limits, cuttings, look_ahead)?;
         let mut s = 0.0;
-        for segment in own.unwrap_or_default() {
+        for segment in own.map(|own| own.0).unwrap_or_default() {
             let part = path.part(s);
             all.piece.push(path.parts[part].piece as u32);
             all.u.push(path.locate(part, s));
@@ -117,7 +123,7 @@ fn along<const M: usize>(
     sections: &[Section],
 ) -> Arcs {
     let mut arcs = Arcs::default();
-    arcs.push_sections(problem, path, sections);
+    arcs.push_sections(problem, path, sections, 0.0);
     let mut next = 0;
     for (cap, jumps) in path.caps(&limits.jerk) {
         while next + 1 < sections.len() && sections[next + 1].position <= cap.s * (1.0 + CLOSE) {
@@ -131,78 +137,130 @@ fn along<const M: usize>(
     arcs
 }
 
+/// The segments of a stretch from rest to rest by the quickest of some cuttings, and its sections; None where one has no
+/// speed.
+fn quickest<const M: usize>(
+    problem: &Problem<M>,
+    path: &ByLength<M>,
+    stretch: &Stretch,
+    limits: &Limits<M>,
+    cuttings: &[Cutting],
+    look_ahead: usize,
+) -> Result<Option<(Vec<Segment>, Vec<Section>)>, Fault> {
+    if stretch.ends != [0.0; 2] {
+        return Ok(None);
+    }
+    let parts = Parts::new(problem, path, limits);
+    let mut best: Option<(Vec<Segment>, Vec<Section>)> = None;
+    let mut least = f64::INFINITY;
+    for cutting in cuttings {
+        let Some(segments) = parts.joined(cutting) else { return Ok(None) };
+        if best.as_ref().is_some_and(|best| best.0 == segments) {
+            continue;
+        }
+        let sections = s_curve::plan(&segments, look_ahead)?;
+        let time = sections.iter().map(|section| section.duration).sum();
+        if time < least {
+            (least, best) = (time, Some((segments, sections)));
+        }
+    }
+    Ok(best)
+}
+
 /// A part of the path on its way to a segment.
 struct Cut<const M: usize> {
     shape: Shape<M>,
-    segment: Segment,
     /// The greatest speed by feed and chord error.
     cap: f64,
-    /// The greatest speed that one of its parts has alone.
-    highest: f64,
+    length: f64,
+    /// The limit where it meets the next one.
+    junction: f64,
 }
 
-/// The segments of a stretch from rest to rest; None where one has no speed.
-pub fn segments<const M: usize>(
-    problem: &Problem<M>,
-    path: &ByLength<M>,
-    limits: &Limits<M>,
-    cutting: &Cutting,
-) -> Option<Vec<Segment>> {
-    let axes = AxisLimits { velocity: limits.velocity, acceleration: limits.acceleration, jerk: limits.jerk };
-    let caps = path.caps(&limits.jerk);
-    let mut out: Vec<Cut<M>> = vec![];
-    let mut caps = caps.iter().map(|(cap, _)| cap).peekable();
-    for part in 0..path.parts.len() {
-        let (start, end) = (path.knots()[part], path.knots()[part + 1]);
-        let straight = path.direction(part);
-        let count = if straight.is_some() { 1 } else { cutting.parts };
-        let place = |i: usize| if i == count { end } else { start + (end - start) * i as f64 / count as f64 };
-        for i in 0..count {
-            let (from, to) = (place(i), place(i + 1));
-            let (shape, cap) = match straight {
+/// A stretch from rest to rest in parts whose limits differ little.
+struct Parts<'a, const M: usize> {
+    problem: &'a Problem<'a, M>,
+    path: &'a ByLength<'a, M>,
+    axes: AxisLimits<M>,
+    cuts: Vec<Cut<M>>,
+}
+
+impl<'a, const M: usize> Parts<'a, M> {
+    fn new(problem: &'a Problem<'a, M>, path: &'a ByLength<'a, M>, limits: &Limits<M>) -> Self {
+        let Limits { velocity, acceleration, jerk } = *limits;
+        let axes = AxisLimits { velocity, acceleration, jerk };
+        let mut parts = Self { problem, path, axes, cuts: vec![] };
+        let caps = path.caps(&limits.jerk);
+        let mut caps = caps.iter().map(|(cap, _)| cap).peekable();
+        for part in 0..path.parts.len() {
+            let ends = [path.knots()[part], path.knots()[part + 1]];
+            match path.direction(part) {
                 Some(direction) => {
-                    let first = direction.map(f64::abs);
-                    let shape = Shape { first, second: [0.0; M], third: [0.0; M], curvature: 0.0 };
-                    (shape, path.at(part, from).speed_cap)
+                    let (first, none) = (direction.map(f64::abs), [0.0; M]);
+                    let line = Shape { first, second: none, third: none, curvature: 0.0 };
+                    parts.push(ends, (line, path.at(part, ends[0]).speed_cap));
                 }
-                None => shape(problem, path, part, [from, to]),
-            };
-            let make = |shape: &Shape<M>, cap: f64, length: f64| -> Option<Segment> {
-                let allowed = allowable(shape, &axes, cap, cutting.stretch).ok()?;
-                Some(Segment {
-                    length,
-                    allowable: allowed.speed,
-                    // The cap has no end where the feed is about axes that stand still.
-                    desired: cap.min(allowed.speed),
-                    limits: allowed.limits,
-                    junction: f64::INFINITY,
-                })
-            };
-            let segment = make(&shape, cap, to - from)?;
-            let cut = Cut { shape, segment, cap, highest: segment.speed() };
+                None => parts.halve(part, ends, shape(problem, path, part, ends), 0),
+            }
+            if let (Some(cap), Some(last)) = (caps.next_if(|cap| cap.s <= ends[1]), parts.cuts.last_mut()) {
+                last.junction = last.junction.min(cap.speed);
+            }
+        }
+        parts
+    }
+
+    fn push(&mut self, [from, to]: [f64; 2], (shape, cap): (Shape<M>, f64)) {
+        if to > from {
+            self.cuts.push(Cut { shape, cap, length: to - from, junction: f64::INFINITY });
+        }
+    }
+
+    /// Appends a part, or its halves where that is worth it.
+    fn halve(&mut self, part: usize, [from, to]: [f64; 2], whole: (Shape<M>, f64), depth: u32) {
+        let middle = 0.5 * (from + to);
+        let [left, right] =
+            [[from, middle], [middle, to]].map(|ends| (ends, shape(self.problem, self.path, part, ends)));
+        let most = |(shape, cap): &(Shape<M>, f64)| greatest(shape, &self.axes, *cap);
+        let slow = most(&whole);
+        let fast = most(&left.1).speed.max(most(&right.1).speed);
+        let reached = slow.limits.highest(slow.speed, middle - from);
+        if depth == DEPTH || fast.min(reached) <= (1.0 + WORTH) * slow.speed {
+            self.push([from, to], whole);
+            return;
+        }
+        for (ends, half) in [left, right] {
+            self.halve(part, ends, half, depth + 1);
+        }
+    }
+
+    /// The segments; None where one has no speed.
+    fn joined(&self, cutting: &Cutting) -> Option<Vec<Segment>> {
+        let make = |shape: &Shape<M>, cap: f64, length: f64, junction: f64| -> Option<Segment> {
+            let most = greatest(shape, &self.axes, cap);
+            let stretch = cutting.lengths * most.speed * most.limits.duration(most.speed);
+            let allowed = allowable(shape, &self.axes, cap, stretch).ok()?;
+            // The cap has no end where the feed is about axes that stand still.
+            let desired = cap.min(allowed.speed);
+            Some(Segment { length, allowable: allowed.speed, desired, limits: allowed.limits, junction })
+        };
+        // Each with its bounds, its cap, and the greatest speed that one of its parts has alone.
+        let mut out: Vec<(Segment, Shape<M>, f64, f64)> = vec![];
+        for cut in &self.cuts {
+            let own = make(&cut.shape, cut.cap, cut.length, cut.junction)?;
             // One with the segment before, where that costs no part of it much.
-            let joined = out.last().filter(|last| last.segment.junction == f64::INFINITY).and_then(|last| {
-                let shape = last.shape.with(&cut.shape);
-                let cap = last.cap.min(cut.cap);
-                let segment = make(&shape, cap, last.segment.length + cut.segment.length)?;
-                let highest = last.highest.max(cut.highest);
-                (segment.speed() >= (1.0 - cutting.alike) * highest).then_some(Cut {
-                    shape,
-                    segment,
-                    cap,
-                    highest,
-                })
+            let joined = out.last().filter(|last| last.0.junction == f64::INFINITY).and_then(|last| {
+                let (shape, cap) = (last.1.with(&cut.shape), last.2.min(cut.cap));
+                let both = make(&shape, cap, last.0.length + cut.length, cut.junction)?;
+                let highest = last.3.max(own.speed());
+                (both.speed() >= (1.0 - cutting.alike) * highest).then_some((both, shape, cap, highest))
             });
             match (joined, out.last_mut()) {
                 (Some(joined), Some(last)) => *last = joined,
-                _ => out.push(cut),
+                _ => out.push((own, cut.shape, cut.cap, own.speed())),
             }
         }
-        if let (Some(cap), Some(last)) = (caps.next_if(|cap| cap.s <= end), out.last_mut()) {
-            last.segment.junction = cap.speed;
-        }
+        Some(out.into_iter().map(|(segment, ..)| segment).collect())
     }
-    Some(out.into_iter().map(|cut| cut.segment).collect())
 }
 
 /// Bounds of the derivatives between two lengths of a part, and the greatest speed by feed and chord error: proven where

@@ -6,11 +6,13 @@ from pathlib import Path as FilePath
 
 import numpy as np
 import pytest
+from ruckig import InputParameter, Result, Ruckig, Trajectory
 
 from benchmarks.jerk_excess import jerk_excess
 from benchmarks.named import FREE, lemniscate
 from feedplan import plan
 from feedplan.constraints.problem import build_problem
+from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import Axis, Machine
 from feedplan.planners import planner
@@ -68,6 +70,40 @@ def test_a_section_as_short_as_rounding_keeps_its_time(tmp_path: FilePath) -> No
     limits = [("X", 86, 3744, 29755), ("Y", 152, 1738, 112819), ("Z", 94, 2569, 48154)]
     machine = Machine("sliver", tuple(Axis(*row) for row in limits), period=0.002)
     assert plan(program, machine, method="s-curve").audit().failures == ()
+
+
+def own_time(limits: list[float], length: float, speeds: tuple[float, float]) -> float:
+    """What the package ruckig says of a line with limits of velocity, acceleration and jerk along it [s]."""
+    given, trajectory = InputParameter(1), Trajectory(1)
+    given.current_position, given.target_position = [0.0], [length]
+    given.current_velocity, given.target_velocity = [speeds[0]], [speeds[1]]
+    given.max_velocity, given.max_acceleration, given.max_jerk = ([limit] for limit in limits)
+    assert Ruckig(1).calculate(given, trajectory) == Result.Working
+    return float(trajectory.duration)
+
+
+@pytest.mark.parametrize("method", ["s-curve", "ruckig"])
+def test_lines_take_ruckigs_own_time(method: str) -> None:
+    random = np.random.default_rng(1)
+    for case in range(60):
+        rows = 10.0 ** random.uniform([1, 2, 3.5], [3, 4, 6], (3, 3))
+        machine = Machine("line", tuple(Axis("XYZ"[k], *rows[k, :2], max_jerk=rows[k, 2]) for k in range(3)))
+        direction = random.normal(size=3)
+        direction /= np.linalg.norm(direction)
+        length, feed = 10.0 ** random.uniform([-3, 0.5], [3.5, 3])
+        # One line, or several on end.
+        cuts = np.sort(random.uniform(0.0, length, case % 4))
+        ends = direction * np.concatenate([[0.0], cuts, [length]])[:, None]
+        lines = [CompositeCurve.from_bezier(ends[i : i + 2]) for i in range(len(ends) - 1)]
+        path = Path.from_curve(CompositeCurve.joined(lines), feed=feed)
+        limits = (rows / np.abs(direction)[:, None]).min(axis=0).tolist()
+        limits[0] = min(limits[0], feed)
+        # Speeds that can be had: so much of what is reached from rest on a quarter of the way.
+        most = min(limits[0], (length / 8 * limits[1]) ** (1 / 2), (length**2 / 64 * limits[2]) ** (1 / 3))
+        for start, end in ((0.0, 0.0), (0.5, 0.0), (0.3, 0.9)):
+            problem = build_problem(path, machine, start_speed=start * most, end_speed=end * most)
+            expected = own_time(limits, length, (start * most, end * most))
+            assert planner(method)(problem).time == pytest.approx(expected, rel=HELD), (case, start, end)
 
 
 def test_the_lemniscate_orders_the_methods() -> None:

@@ -110,26 +110,25 @@ fn bound_jerk_limited(
     })
 }
 
-/// The two-pass profile within `jerk` of every axis, of segments cut as `s_curve_path::Cutting` says (parts, stretch,
+/// The two-pass profile within `jerk` of every axis, of segments by the quickest of some `s_curve_path::Cutting` (lengths,
 /// alike): the same columns. The time limit is that of stretches left to the jerk-limited planner; see there.
 #[pyfunction]
-#[pyo3(signature = (problem, jerk, cutting, look_ahead, time_limit=None))]
+#[pyo3(signature = (problem, jerk, cuttings, look_ahead, time_limit=None))]
 fn plan_s_curve<'py>(
     py: Python<'py>,
     problem: ProblemArrays<'py>,
     jerk: PyReadonlyArray1<'py, f64>,
-    cutting: (usize, f64, f64),
+    cuttings: Vec<(f64, f64)>,
     look_ahead: usize,
     time_limit: Option<f64>,
 ) -> PyResult<(Columns<'py>, Changes<'py>)> {
-    let (parts, stretch, alike) = cutting;
-    let cutting = Cutting { parts, stretch, alike };
+    let cuttings = to_cuttings(&cuttings);
     let effort = Effort { deadline: deadline(time_limit), ..Effort::default() };
     with_padded_axes!(problem.curve.axes(), M, {
         let rows = ProblemRows::<M>::new(&problem)?;
         let (problem, jerk) = (rows.problem()?, row::<M>(&jerk, 1.0)?);
         let arcs = py
-            .detach(|| s_curve_path::plan(&problem, &jerk, &cutting, look_ahead, &effort))
+            .detach(|| s_curve_path::plan(&problem, &jerk, &cuttings, look_ahead, &effort))
             .map_err(|fault| to_exception(&fault))?;
         Ok(to_columns(py, arcs))
     })
@@ -142,15 +141,15 @@ fn path_segments<'py>(
     py: Python<'py>,
     problem: ProblemArrays<'py>,
     jerk: PyReadonlyArray1<'py, f64>,
-    cutting: (usize, f64, f64),
+    cuttings: Vec<(f64, f64)>,
+    look_ahead: usize,
 ) -> PyResult<Segments<'py>> {
-    let (parts, stretch, alike) = cutting;
-    let cutting = Cutting { parts, stretch, alike };
+    let cuttings = to_cuttings(&cuttings);
     with_padded_axes!(problem.curve.axes(), M, {
         let rows = ProblemRows::<M>::new(&problem)?;
         let (problem, jerk) = (rows.problem()?, row::<M>(&jerk, 1.0)?);
         let segmented = py
-            .detach(|| s_curve_path::cut(&problem, &jerk, &cutting))
+            .detach(|| s_curve_path::cut(&problem, &jerk, &cuttings, look_ahead))
             .map_err(|fault| to_exception(&fault))?;
         let column =
             |of: fn(&Segment) -> f64| PyArray1::from_vec(py, segmented.segments.iter().map(of).collect());
@@ -199,6 +198,10 @@ fn profile_of_sections<'py>(
             .map_err(|fault| to_exception(&fault))?;
         Ok(to_columns(py, arcs))
     })
+}
+
+fn to_cuttings(pairs: &[(f64, f64)]) -> Vec<Cutting> {
+    pairs.iter().map(|&(lengths, alike)| Cutting { lengths, alike }).collect()
 }
 
 fn to_columns(py: Python<'_>, arcs: Arcs) -> (Columns<'_>, Changes<'_>) {

@@ -1,0 +1,43 @@
+"""No planner has a length of its own: scaled with its machine, a path takes the same time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from feedplan.constraints.problem import Problem, build_problem
+from feedplan.geometry.path import Path
+from feedplan.machine.machine import Axis, Machine
+from feedplan.planners import methods, planner
+from feedplan.planners.junction_deviation import GRBL_DEVIATION
+
+CLOSE = 1e-6
+# Of the axes X, Y, Z [mm/s, mm/s², mm/s³].
+LIMITS = [(200.0, 2500.0, 60_000.0), (250.0, 3000.0, 50_000.0), (180.0, 3500.0, 70_000.0)]
+FEED, CHORD = 150.0, 0.002
+SPLINE = np.random.default_rng(7).uniform(-20.0, 20.0, (6, 3))
+KNOTS = np.concatenate([np.zeros(4), [0.3, 0.45], np.ones(4)])
+LINES = {"long": [1000.0, 0.0, 0.0], "oblique": [30.0, -10.0, 5.0], "short": [0.02, 0.01, 0.0]}
+PATHS = ("spline", *LINES)
+
+
+def problem_of(name: str, scale: float) -> Problem:
+    """A path on its machine, all lengths times `scale`."""
+    if name == "spline":
+        path = Path.from_nurbs(scale * SPLINE, KNOTS, 3, feed=scale * FEED)
+    else:
+        path = Path.from_bezier(scale * np.array([[0.0] * 3, LINES[name]]), feed=scale * FEED)
+    rows = zip("XYZ", scale * np.array(LIMITS), strict=True)
+    axes = tuple(Axis(axis, *row[:2], max_jerk=row[2]) for axis, row in rows)
+    return build_problem(path, Machine("scaled", axes, chord_tolerance=scale * CHORD))
+
+
+@pytest.mark.parametrize("name", PATHS)
+@pytest.mark.parametrize("method", methods())
+def test_scaling_all_lengths_changes_no_time(method: str, name: str) -> None:
+    def time(scale: float) -> float:
+        lengths = {"deviation": scale * GRBL_DEVIATION} if method == "junction-deviation" else {}
+        return planner(method, **lengths)(problem_of(name, scale)).time
+
+    for scale in (1e-3, 1e3):
+        assert time(scale) == pytest.approx(time(1.0), rel=CLOSE)
