@@ -33,11 +33,6 @@ bench: $(VENV)/built
 # Random paths by the million, on every machine by the thousand, and property tests on cases never drawn before. What is
 # found becomes a case of the test that found it; the figures stand in benchmarks/README.md.
 campaign: $(VENV)/built
-	for i in 1 2 3 4 5 6 7 8 9 10; do \
-		seed=$$(date +%s%N); echo "property tests of native code, PROPTEST_RNG_SEED=$$seed"; \
-		PROPTEST_RNG_SEED=$$seed PROPTEST_CASES=5000 cargo test --release --quiet --manifest-path solvers/Cargo.toml || exit 1; \
-	done
-	FEEDPLAN_EXAMPLES=1000 $(BIN)/pytest --numprocesses auto -m hypothesis
 	FEEDPLAN_SEEDS=1000000 cargo test --release --manifest-path solvers/Cargo.toml --test planning random:: -- --nocapture
 	FEEDPLAN_SEEDS=1000000 cargo test --release --manifest-path solvers/Cargo.toml --test planning bound:: -- --nocapture
 	FEEDPLAN_SEEDS=1250 $(BIN)/pytest --numprocesses auto tests/constraints/test_joints.py -k random
@@ -45,6 +40,11 @@ campaign: $(VENV)/built
 	FEEDPLAN_SEEDS=10000 $(BIN)/pytest --numprocesses auto tests/planners/test_jerk_limited.py -k random
 	FEEDPLAN_SEEDS=1000 $(BIN)/pytest --numprocesses auto tests/planners/test_random_programs.py
 	FEEDPLAN_EXAMPLES=5000 $(BIN)/pytest --numprocesses auto tests/test_setpoints_curves.py -k planned
+	for i in 1 2 3 4 5 6 7 8 9 10; do \
+		seed=$$(date +%s%N); echo "property tests of native code, PROPTEST_RNG_SEED=$$seed"; \
+		PROPTEST_RNG_SEED=$$seed PROPTEST_CASES=5000 cargo test --release --quiet --manifest-path solvers/Cargo.toml || exit 1; \
+	done
+	FEEDPLAN_EXAMPLES=1000 $(BIN)/pytest --numprocesses auto -m hypothesis
 
 clean:
 	rm -rf $(VENV) out solvers/target

@@ -25,6 +25,7 @@ from feedplan.geometry.corners import Corners
 from feedplan.planners import s_curve
 from feedplan.planners._faults import error_of
 from feedplan.planners._jerk import jerk_limits
+from feedplan.planners._runs import fastest_runs
 from feedplan.profile import SpeedProfile
 
 Array = NDArray[np.float64]
@@ -177,8 +178,7 @@ def plan(problem: Problem, *, time_limit: float | None = None) -> SpeedProfile:
 
     Raises SolverError for an axis without a limit of jerk, MissingPackageError.
     """
-    profiles = _planned(problem, time_limit, None), s_curve.plan(problem)
-    return min(profiles, key=lambda profile: profile.time)
+    return fastest_runs([_planned(problem, time_limit, None), s_curve.plan(problem)])
 
 
 def repaired(problem: Problem, profile: SpeedProfile, *, time_limit: float | None = None) -> SpeedProfile:

@@ -15,8 +15,6 @@ from tests.planners.random_programs import random_machine, random_program
 SEEDS = seeds(24)
 # They are run in so many parts, beside each other.
 PARTS = 4
-# What states between segments may be improved for: their first ones are a plan [s].
-TIME_LIMITS = {"ruckig": 0.2}
 
 
 @pytest.mark.parametrize("method", ["bang-bang", "jerk-limited", "ruckig", "s-curve"])
@@ -27,7 +25,7 @@ def test_random_programs_keep_every_limit(part: int, method: str, tmp_path: Path
         program = tmp_path / f"{seed}.ngc"
         program.write_text(random_program(seed))
         machine = random_machine(seed)
-        planned = plan(program, machine, method=method, time_limit=TIME_LIMITS.get(method))
+        planned = plan(program, machine, method=method)
         jerk = limits_jerk(method)
         broken = audited(planned.problem, planned.profile, machine, planned.program, jerk)
         found += [f"{seed}: {sentence}" for sentence in broken]

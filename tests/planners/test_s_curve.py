@@ -39,9 +39,9 @@ def test_states_between_segments_make_profiles_faster_and_keep_every_limit() -> 
     faults = []
     for seed in range(max(SEEDS // 4, 1)):
         problem = random_problem(seed)
-        slow, fast = planner("s-curve")(problem), planner("ruckig", time_limit=1.0)(problem)
+        slow, fast = planner("s-curve")(problem), planner("ruckig")(problem)
         excess = jerk_excess(problem, fast)
-        if not (fast.time <= slow.time * (1 + HELD) and excess.worst <= 1e-6 and excess.gaps <= 1e-9):
+        if not (fast.time <= slow.time and excess.worst <= 1e-6 and excess.gaps <= 1e-9):
             faults.append((seed, slow.time, fast.time, excess))
     assert faults == []
 
@@ -109,7 +109,7 @@ def test_lines_take_ruckigs_own_time(method: str) -> None:
 def test_the_lemniscate_orders_the_methods() -> None:
     problem = build_problem(Path.from_curve(lemniscate(), feed=FREE), CURVES)
     best, states, passes = (planner(name)(problem).time for name in ("jerk-limited", "ruckig", "s-curve"))
-    assert best < states < 0.95 * passes
+    assert best < states < 0.99 * passes < 1.5 * best
 
 
 def test_a_bang_bang_profile_is_repaired() -> None:
