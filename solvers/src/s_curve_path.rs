@@ -56,7 +56,7 @@ pub fn plan<const M: usize>(
     over_stretches(problem, jerk, |stretch, limits| {
         let path = ByLength::new(problem, &stretch.parts);
         match quickest(problem, &path, stretch, limits, cuttings, look_ahead)? {
-            Some((_, sections)) => Ok(along(problem, &path, limits, &sections)),
+            Some(own) => Ok(along(problem, &path, limits, &own.sections)),
             None => Task { problem, limits: *limits, effort }.stretch(stretch),
         }
     })
@@ -86,7 +86,7 @@ pub fn cut<const M: usize>(
         let path = ByLength::new(problem, &stretch.parts);
         let own = quickest(problem, &path, &stretch, &limits, cuttings, look_ahead)?;
         let mut s = 0.0;
-        for segment in own.map(|own| own.0).unwrap_or_default() {
+        for segment in own.map(|own| own.segments).unwrap_or_default() {
             let part = path.part(s);
             all.piece.push(path.parts[part].piece as u32);
             all.u.push(path.locate(part, s));
@@ -137,8 +137,13 @@ fn along<const M: usize>(
     arcs
 }
 
-/// The segments of a stretch from rest to rest by the quickest of some cuttings, and its sections; None where one has no
-/// speed.
+/// A stretch: what it was planned on, and its profile.
+struct Planned {
+    segments: Vec<Segment>,
+    sections: Vec<Section>,
+}
+
+/// A stretch from rest to rest by the quickest of some cuttings; None where a segment has no speed.
 fn quickest<const M: usize>(
     problem: &Problem<M>,
     path: &ByLength<M>,
@@ -146,22 +151,22 @@ fn quickest<const M: usize>(
     limits: &Limits<M>,
     cuttings: &[Cutting],
     look_ahead: usize,
-) -> Result<Option<(Vec<Segment>, Vec<Section>)>, Fault> {
+) -> Result<Option<Planned>, Fault> {
     if stretch.ends != [0.0; 2] {
         return Ok(None);
     }
     let parts = Parts::new(problem, path, limits);
-    let mut best: Option<(Vec<Segment>, Vec<Section>)> = None;
+    let mut best: Option<Planned> = None;
     let mut least = f64::INFINITY;
     for cutting in cuttings {
         let Some(segments) = parts.joined(cutting) else { return Ok(None) };
-        if best.as_ref().is_some_and(|best| best.0 == segments) {
+        if best.as_ref().is_some_and(|best| best.segments == segments) {
             continue;
         }
         let sections = s_curve::plan(&segments, look_ahead)?;
         let time = sections.iter().map(|section| section.duration).sum();
         if time < least {
-            (least, best) = (time, Some((segments, sections)));
+            (least, best) = (time, Some(Planned { segments, sections }));
         }
     }
     Ok(best)
