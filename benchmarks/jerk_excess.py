@@ -121,16 +121,20 @@ def _motion(problem: Problem, profile: SpeedProfile, s: Array) -> tuple[Array, A
     bend = ((6 - 12 * x) * (w1 - w0) + (6 * x - 4) * s0 + (6 * x - 2) * s1) / h**2
     v = np.sqrt(np.maximum(w, 0.0))
     a, j = slope / 2, v * bend / 2
-    # Constant jerk: the time at each length, by halving.
+    # Constant jerk: the time at each length, by halving, from the slower end, where rounding is felt most.
     rows = profile.kind == ArcKind.PATH_JERK
-    low, high = np.zeros_like(s[rows]), np.repeat(profile.duration[rows, None], s.shape[1], axis=1)
-    a0, value, start = (c[rows, None] for c in (profile.a0, profile.value, v0))
+    back = (v1 < v0)[rows, None]
+    way = np.where(back, h[rows] - s[rows], s[rows])
+    low, high = np.zeros_like(way), np.repeat(profile.duration[rows, None], s.shape[1], axis=1)
+    value = profile.value[rows, None]
+    a0 = np.where(back, -profile.a1[rows, None], profile.a0[rows, None])
+    start = np.where(back, v1[rows, None], v0[rows, None])
     for _ in range(60):
         t = (low + high) / 2
-        before = t * (start + t * (a0 / 2 + t * value / 6)) < s[rows]
+        before = t * (start + t * (a0 / 2 + t * value / 6)) < way
         low, high = np.where(before, t, low), np.where(before, high, t)
     v[rows] = np.maximum(start + t * (a0 + t * value / 2), 0.0)
-    a[rows], j[rows] = a0 + value * t, value + 0 * t
+    a[rows], j[rows] = np.where(back, -1.0, 1.0) * (a0 + value * t), value + 0 * t
     return v, a, j
 
 

@@ -19,9 +19,8 @@ from feedplan.errors import InfeasibleError
 from feedplan.planners._segments import Array, Rule, Segments, segments
 from feedplan.profile import NO_AXIS, ArcKind, SpeedProfile
 
-# A shorter part of a segment is rounding: this share of it, and so many roundings of its parameter and of v².
-# What v jumps by where a ramp is left out is less than the audit can see.
-NO_PART, ROUNDINGS = 1e-12, 64.0
+# A part of a segment as short as so many roundings of its parameter and of v² is left out.
+ROUNDINGS = 4.0
 
 # Reached speeds may miss those asked for by this share.
 ROUNDING = 1e-12
@@ -114,7 +113,7 @@ def _profile(problem: Problem, parts: Segments, speed: Array, room: Array) -> Sp
     place = np.stack([np.zeros(len(parts)), still[:, 0], top, down, end, whole], axis=1)
     place = np.maximum.accumulate(np.clip(place, 0.0, whole[:, None]), axis=1)
     digits = parts.u1 + (start_sq + end_sq) / parts.slope
-    none = NO_PART * whole + ROUNDINGS * np.finfo(float).eps * digits
+    none = ROUNDINGS * np.finfo(float).eps * digits
     for i in range(1, 5):
         place[:, i] = np.where(place[:, i] - place[:, i - 1] <= none, place[:, i - 1], place[:, i])
     for i in range(4, 0, -1):
@@ -137,6 +136,12 @@ def _profile(problem: Problem, parts: Segments, speed: Array, room: Array) -> Sp
         length[curved] = _weighted_length(
             problem, piece[curved], u0[curved], u1[curved], from_sq[curved], to_sq[curved]
         )
+    # The speeds at the ends of the segments hold where a ramp is left out as well.
+    first = np.flatnonzero(np.diff(segment, prepend=-1))
+    last = np.flatnonzero(np.diff(segment, append=len(parts)))
+    p0, p1 = from_sq / rate[0] ** 2, to_sq / rate[1] ** 2
+    p0[first] = start_sq[segment[first]] / rate[0, first] ** 2
+    p1[last] = end_sq[segment[last]] / rate[1, last] ** 2
     return SpeedProfile(
         piece=piece.astype(np.uint32),
         kind=np.where(constant, ArcKind.FEED, ramp_kind).astype(np.uint8),
@@ -144,8 +149,8 @@ def _profile(problem: Problem, parts: Segments, speed: Array, room: Array) -> Sp
         value=np.where(constant, from_sq, _SIGN[phase] * parts.value[segment]),
         u0=u0,
         u1=u1,
-        p0=from_sq / rate[0] ** 2,
-        p1=to_sq / rate[1] ** 2,
+        p0=p0,
+        p1=p1,
         duration=2.0 * length / (np.sqrt(from_sq) + np.sqrt(to_sq)),
         runs=np.searchsorted(piece, problem.path.runs),
     )

@@ -340,6 +340,20 @@ impl<'a, const M: usize> ByLength<'a, M> {
         u
     }
 
+    /// The parameter at a way from another one, ahead or back, to the digits of the way; s is about where it lies.
+    pub fn beside(&self, part: usize, from: f64, way: f64, s: f64) -> f64 {
+        let (at, u) = (&self.parts[part], self.locate(part, s));
+        let passed = self.between(part, from.min(u), from.max(u)).copysign(u - from);
+        let next = u + (way - passed) / speed_sq(self.problem, at.piece, u).sqrt();
+        // Next to a cusp the step says nothing.
+        let [low, high] = if way > 0.0 { [from, at.u[1]] } else { [at.u[0], from] };
+        if next.is_finite() {
+            next.clamp(low, high)
+        } else {
+            u
+        }
+    }
+
     /// The length between two parameters of a part; short ones to their own digits.
     pub fn between(&self, part: usize, a: f64, b: f64) -> f64 {
         let (rows, at) = (&self.tables[part].rows, self.parts[part].piece);

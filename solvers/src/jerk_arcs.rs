@@ -74,6 +74,48 @@ impl State {
     }
 }
 
+/// A section of constant jerk, on one part once it is cut.
+struct Span {
+    part: usize,
+    ends: [State; 2],
+    jerk: f64,
+    duration: f64,
+}
+
+impl Span {
+    /// The length that it takes its time for.
+    fn way(&self) -> f64 {
+        State { s: 0.0, ..self.ends[0] }.after(self.duration, self.jerk).s
+    }
+
+    /// Appends what lies on each part.
+    fn cut<const M: usize>(self, path: &ByLength<M>, out: &mut Vec<Self>) {
+        let Self { ends: [from, to], jerk, duration, .. } = self;
+        let mut part = path.part(from.s);
+        let (mut start, mut left) = (from, duration);
+        while part + 1 < path.parts.len() && path.knots()[part + 1] < to.s {
+            let knot = path.knots()[part + 1];
+            let (mut low, mut high) = (0.0, left);
+            for _ in 0..HALVINGS {
+                let middle = 0.5 * (low + high);
+                if middle <= low || middle >= high {
+                    break;
+                }
+                if start.after(middle, jerk).s < knot {
+                    low = middle;
+                } else {
+                    high = middle;
+                }
+            }
+            let end = State { s: knot, ..start.after(high, jerk) };
+            out.push(Self { part, ends: [start, end], jerk, duration: high });
+            (start, left) = (end, left - high);
+            part += 1;
+        }
+        out.push(Self { part, ends: [start, to], jerk, duration: left });
+    }
+}
+
 /// One arc on a part of a stretch.
 struct Arc {
     kind: u8,
@@ -157,55 +199,17 @@ impl Arcs {
     }
 
     /// Appends a section of constant jerk that ends as given; `duration` in s.
-    pub fn push_jerk<const M: usize>(
+    fn push_jerk<const M: usize>(
         &mut self,
         problem: &Problem<M>,
         path: &ByLength<M>,
-        [from, to]: [State; 2],
-        jerk: f64,
-        duration: f64,
-    ) {
-        let mut part = path.part(from.s);
-        let (mut start, mut left) = (from, duration);
-        while part + 1 < path.parts.len() && path.knots()[part + 1] < to.s {
-            let knot = path.knots()[part + 1];
-            let (mut low, mut high) = (0.0, left);
-            for _ in 0..HALVINGS {
-                let middle = 0.5 * (low + high);
-                if middle <= low || middle >= high {
-                    break;
-                }
-                if start.after(middle, jerk).s < knot {
-                    low = middle;
-                } else {
-                    high = middle;
-                }
-            }
-            let end = State { s: knot, ..start.after(high, jerk) };
-            self.push_within(problem, path, part, [start, end], jerk, high);
-            (start, left) = (end, left - high);
-            part += 1;
-        }
-        self.push_within(problem, path, part, [start, to], jerk, left);
-    }
-
-    /// Appends a section of constant jerk within a part. Its time is that of the length between its parameters: what
-    /// rounding of a place on a long path moves it by is much of an arc of some nanometres.
-    fn push_within<const M: usize>(
-        &mut self,
-        problem: &Problem<M>,
-        path: &ByLength<M>,
-        part: usize,
         ends: [State; 2],
         jerk: f64,
         duration: f64,
     ) {
-        let u = ends.map(|end| path.locate(part, end.s));
-        let way = State { s: 0.0, ..ends[0] }.after(duration, jerk).s;
-        let moved = path.between(part, u[0], u[1]) - way;
-        let duration = if way > 0.0 { duration * (1.0 + moved / way) } else { duration };
-        let arc = Arc { kind: PATH_JERK, value: jerk, ends, duration };
-        self.push(problem, path.parts[part].piece, u, &arc);
+        let mut spans = vec![];
+        Span { part: 0, ends, jerk, duration }.cut(path, &mut spans);
+        self.push_spans(problem, path, &spans);
     }
 
     /// Appends sections of constant jerk along a whole stretch, to a speed in mm/s without acceleration.
@@ -216,13 +220,42 @@ impl Arcs {
         sections: &[Section],
         end: f64,
     ) {
+        let mut spans = vec![];
         for (i, section) in sections.iter().enumerate() {
             let from = State { s: section.position, v: section.speed, a: section.acceleration };
             let to = match sections.get(i + 1) {
                 Some(next) => State { s: next.position, v: next.speed, a: next.acceleration },
                 None => State { s: path.total(), v: end, a: 0.0 },
             };
-            self.push_jerk(problem, path, [from, to], section.jerk, section.duration);
+            let Section { jerk, duration, .. } = *section;
+            Span { part: 0, ends: [from, to], jerk, duration }.cut(path, &mut spans);
+        }
+        self.push_spans(problem, path, &spans);
+    }
+
+    /// Appends sections cut at the knots. Places far along a path have not the digits of a section of some nanometres, so
+    /// that on each part sections follow one another from both its ends by their own ways, and the longest one takes what
+    /// rounding leaves. The time of each is that of the length between its parameters.
+    fn push_spans<const M: usize>(&mut self, problem: &Problem<M>, path: &ByLength<M>, spans: &[Span]) {
+        for spans in spans.chunk_by(|a, b| a.part == b.part) {
+            let (part, last) = (spans[0].part, spans.len());
+            let longest =
+                (0..last).fold(0, |most, i| if spans[i].way() > spans[most].way() { i } else { most });
+            let mut u = vec![path.locate(part, spans[0].ends[0].s); last + 1];
+            u[last] = path.locate(part, spans[last - 1].ends[1].s);
+            for i in 0..longest {
+                u[i + 1] = path.beside(part, u[i], spans[i].way(), spans[i].ends[1].s);
+            }
+            for i in (longest + 1..last).rev() {
+                u[i] = path.beside(part, u[i + 1], -spans[i].way(), spans[i].ends[0].s);
+            }
+            for (i, span) in spans.iter().enumerate() {
+                let (u, way) = ([u[i], u[i + 1]], span.way());
+                let moved = path.between(part, u[0], u[1]) - way;
+                let duration = if way > 0.0 { span.duration * (1.0 + moved / way) } else { span.duration };
+                let arc = Arc { kind: PATH_JERK, value: span.jerk, ends: span.ends, duration };
+                self.push(problem, path.parts[part].piece, u, &arc);
+            }
         }
     }
 

@@ -29,8 +29,8 @@ pub const MAX_COUNT: f64 = 2e9;
 /// A run that ends this part of a period after a setpoint ends on it.
 const SLACK: f64 = 1e-9;
 
-/// An end is at rest when its speed is this part of the speed at the other end of its arc: a rounding error of
-/// p leaves the square root of one.
+/// An end is at rest when its p is 0, whatever the arc's law: a ramp may be too short for its places to show it. And when
+/// its speed is this part of the speed at the other end of its arc: a rounding error of p leaves the square root of one.
 const STANDSTILL: f64 = 1e-6;
 
 /// A speed is none beside one so many times greater that a step gains.
@@ -146,7 +146,7 @@ impl<const M: usize> Sampler<M> {
             if let Some(arc) = arcs[arc_range.clone()].last() {
                 let motion = path.motion(arc, false);
                 let speed = |u| norm(&motion.rates(&motion.at(u)).velocity);
-                if speed(arc.u1) > STANDSTILL * speed(arc.u0) {
+                if arc.p1 > 0.0 && speed(arc.u1) > STANDSTILL * speed(arc.u0) {
                     let line = path.lines[arc.piece as usize];
                     if !last {
                         return Err(format!(
@@ -441,7 +441,8 @@ impl<const M: usize> Sampler<M> {
         let arc = &self.arcs[first];
         let motion = self.path.motion(arc, false);
         let [begin, end] = [arc.u0, arc.u1].map(|u| norm(&motion.rates(&motion.at(u)).velocity));
-        Some((if begin <= STANDSTILL * end { 0.0 } else { begin }, first, motion))
+        let rests = arc.p0 == 0.0 || begin <= STANDSTILL * end;
+        Some((if rests { 0.0 } else { begin }, first, motion))
     }
 
     fn set_start(&self, part: &mut Slices<M>, i: usize) {

@@ -3,7 +3,7 @@
 //! At constant jerk the time of a length is found by halving; where v² is a cubic polynomial of the length it is
 //! integrated.
 
-use super::integral::{kronrod, MOST_HALVINGS, RULES_AGREE_CLOSELY};
+use super::integral::{kronrod, MOST_HALVINGS, RULES_AGREE};
 
 /// Halvings of a bracket of the time until it is as narrow as its numbers.
 const MOST_STEPS: u32 = 1100;
@@ -109,7 +109,7 @@ fn square(c: &[f64; 4], x: f64) -> f64 {
 pub fn integral(f: &impl Fn(f64) -> f64, a: f64, b: f64, halvings: &mut u32) -> f64 {
     let [fine, doubt] = kronrod(f, a, b);
     let middle = 0.5 * (a + b);
-    if doubt.abs() <= RULES_AGREE_CLOSELY * fine.abs() || !(a < middle && middle < b) {
+    if doubt.abs() <= RULES_AGREE * fine.abs() || !(a < middle && middle < b) {
         return fine;
     }
     if *halvings == 0 || !fine.is_finite() {

@@ -150,7 +150,7 @@ impl Arcs<'_> {
                 Shape::General { whole: polygon.clone(), ends, part, tangent, size: curve.derivative_size() }
             }
         };
-        let motion = Motion::new(law, shape, width, [p_anchor, p_far], anchored_at_end);
+        let motion = Motion::new(law, shape, [width, curve.width()], [p_anchor, p_far], anchored_at_end);
         if !matches!(law, Law::Along) {
             return motion;
         }
@@ -178,12 +178,14 @@ impl Arcs<'_> {
         }
     }
 
-    /// How far the accelerations recorded at both ends of arc `i` are from its constant jerk, in mm/s².
-    pub fn acceleration_error(&self, i: usize) -> f64 {
+    /// How far the accelerations recorded at both ends of arc `i` are from its constant jerk, in mm/s², less what the part
+    /// of its width does that is rounding.
+    pub fn acceleration_error(&self, i: usize, width_rounding: f64) -> f64 {
         if self.kind[i] != PATH_JERK {
             return 0.0;
         }
         let (from, to, change) = (self.a0[i], self.a1[i], self.value[i] * self.duration[i]);
-        (to - from - change).abs() - ROUNDINGS * EPS * (to.abs() + from.abs() + change.abs())
+        let rounding = EPS * (to.abs() + from.abs() + change.abs()) + width_rounding * change.abs();
+        (to - from - change).abs() - ROUNDINGS * rounding
     }
 }

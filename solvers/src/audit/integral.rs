@@ -19,11 +19,9 @@ const OUTER_WEIGHTS: [f64; 2] = [0.361_326_288_494_254_1, 1.277_347_423_011_491_
 /// smooth that both are small it is about as much as Gauss's rule is off.
 const CHANCE: f64 = 3e-3;
 
-/// Where Gauss's rule is off by no more than this, Kronrod's is good to about the square of that, 1e-11.
-const RULES_AGREE: f64 = 3e-6;
-
-/// The same on pieces of other degrees, where it is not known how far away p has a pole.
-pub(super) const RULES_AGREE_CLOSELY: f64 = 3e-8;
+/// Where Gauss's rule is off by no more than this part, Kronrod's is good to about the square of that where the function
+/// is smooth, and to this part at a layer that both rules step over: next to a crawl the speed may change so.
+pub(super) const RULES_AGREE: f64 = 3e-8;
 
 /// A boundary layer that takes less than this share of an interval's time is left out.
 const THIN: f64 = 1e-12;
@@ -89,8 +87,7 @@ impl<const M: usize> Motion<M> {
     fn rule(&self, y0: f64, y1: f64) -> (f64, bool) {
         let smooth = self.is_smooth(self.distance(y0), self.distance(y1));
         let [time, doubt] = kronrod(|y| self.integrand(y), y0, y1).map(|sum| self.time_scale * sum);
-        let agree = if self.is_general() { RULES_AGREE_CLOSELY } else { RULES_AGREE };
-        (time, smooth && doubt.abs() <= agree * time)
+        (time, smooth && doubt.abs() <= RULES_AGREE * time)
     }
 
     /// Walks from `from` to `to` and calls `step` for every interval whose time is known well enough; for what

@@ -44,7 +44,7 @@ impl<const M: usize> Jerks<'_, M> {
     pub fn arc(&self, i: usize, motion: &Motion<M>, curve: &Curve<M>, line: i32, tally: &mut Tally<M>) {
         let (arcs, limits) = (self.arcs, self.limits);
         let (start, duration) = (self.starts[i], arcs.duration[i]);
-        let error = arcs.acceleration_error(i);
+        let error = arcs.acceleration_error(i, motion.width_rounding());
         tally.offer(Check::AccelerationContinuity, 0, error, self.negligible(), start, line);
         let places = PLACES + ((duration / limits.period).min((MOST_PLACES - PLACES) as f64) as usize);
         for place in 0..=places {

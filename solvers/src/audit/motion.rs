@@ -11,7 +11,7 @@ pub use law::{Law, Pole, Shape};
 
 use super::along::{Along, Pace};
 use super::curve::{inner, length};
-use super::integral::{kronrod, kronrod_lanes, MOST_HALVINGS, RULES_AGREE_CLOSELY};
+use super::integral::{kronrod, kronrod_lanes, MOST_HALVINGS, RULES_AGREE};
 use super::polygon::Polygon;
 use super::EPS;
 
@@ -31,6 +31,8 @@ pub struct Motion<const M: usize> {
     pub(super) direction: f64,
     /// Length of the arc in u.
     pub width: f64,
+    /// How many times as long its piece is. One rounding of an end of the arc is this many of its length.
+    grain: f64,
     /// Recorded √p at the anchor and at the other end.
     pub root_anchor: f64,
     pub root_far: f64,
@@ -79,8 +81,9 @@ pub struct State<const M: usize> {
 }
 
 impl<const M: usize> Motion<M> {
-    /// `p` are the recorded values at the anchor and at the other end.
-    pub fn new(law: Law, shape: Shape<M>, width: f64, p: [f64; 2], anchored_at_end: bool) -> Self {
+    /// `widths` are those of the arc and of its piece; `p` the recorded values at the anchor and at the other end.
+    pub fn new(law: Law, shape: Shape<M>, widths: [f64; 2], p: [f64; 2], anchored_at_end: bool) -> Self {
+        let [width, whole] = widths;
         let direction = if anchored_at_end { -1.0 } else { 1.0 };
         let (tangent, bend, general) = match shape {
             Shape::Quadratic { tangent, bend } => (tangent, bend, None),
@@ -99,6 +102,7 @@ impl<const M: usize> Motion<M> {
             general,
             direction,
             width,
+            grain: whole / width,
             root_anchor,
             root_far,
             near,
@@ -123,7 +127,7 @@ impl<const M: usize> Motion<M> {
     fn measure(&self, from: f64, to: f64, halvings: &mut u32, lengths: &mut Vec<[f64; 2]>) {
         let [fine, doubt] = self.length_between(from, to);
         let middle = 0.5 * (from + to);
-        let good = doubt.abs() <= RULES_AGREE_CLOSELY * fine;
+        let good = doubt.abs() <= RULES_AGREE * fine;
         if good || *halvings == 0 || !(from < middle && middle < to) {
             lengths.push([to, lengths[lengths.len() - 1][1] + fine]);
             return;
@@ -350,15 +354,22 @@ impl<const M: usize> Motion<M> {
             }
             Some(general) => general.size,
         };
-        // How much the rounding of C' is enlarged in p.
+        // How much the rounding of C' is enlarged in p, and that of the way in the square of a speed that grows with it.
         let enlarged = match self.law {
-            Law::AxisAcceleration { axis, .. } | Law::AxisVelocity { axis, .. }
-                if !self.keeps_recorded(y) =>
-            {
-                terms[axis] / tangent[axis].abs()
+            Law::AxisAcceleration { axis, start_sq, .. } if !self.keeps_recorded(y) => {
+                let gained = (1.0 - start_sq / velocity[axis].powi(2)).max(0.0);
+                terms[axis] / tangent[axis].abs() + 0.5 * gained * self.grain
             }
-            Law::Feed { .. } | Law::Chord { .. } | Law::SpeedLine { .. } => length(&terms) / length(&tangent),
-            Law::Along => length(&terms) / length(&tangent) + self.felt(d),
+            Law::AxisVelocity { axis, .. } => terms[axis] / tangent[axis].abs(),
+            Law::Feed { .. } | Law::Chord { .. } => length(&terms) / length(&tangent),
+            Law::SpeedLine { start_sq, .. } => {
+                let gained = (1.0 - start_sq / inner(&velocity, &velocity)).max(0.0);
+                length(&terms) / length(&tangent) + 0.5 * gained * self.grain
+            }
+            Law::Along => length(&terms) / length(&tangent) + self.felt(d) * self.grain,
+            Law::ParameterAcceleration { start, .. } => {
+                1.0 + 0.5 * (1.0 - start / root_p.powi(2)).max(0.0) * self.grain
+            }
             _ => 1.0,
         };
         let magnitude = std::array::from_fn(|k| {
@@ -411,15 +422,19 @@ impl<const M: usize> Motion<M> {
         }
     }
 
-    /// What one rounding of the parameter does to the recorded p: the relative error of the arc's width.
-    pub fn width_rounding(&self, piece_width: f64) -> f64 {
-        EPS * piece_width / self.width
+    /// What one rounding of an end of the arc is of its width.
+    pub fn width_rounding(&self) -> f64 {
+        EPS * self.grain
     }
 }
 
-/// What √p at both ends the integration variable is made for: where one is infinite the speed, not p, is smooth.
+/// What √p at both ends the integration variable is made for: where one is infinite the speed, not p, is smooth. Where both
+/// are 0 the ramps at both ends are too short to be arcs, and the law alone tells the speed.
 fn substitution(roots: [f64; 2]) -> [f64; 2] {
     let [near, far] = roots;
+    if near == 0.0 && far == 0.0 {
+        return [1.0, 1.0];
+    }
     match (near.is_infinite(), far.is_infinite()) {
         (false, false) => [near, far],
         (true, false) => [if far > 0.0 { far } else { 1.0 }, far],
@@ -458,7 +473,7 @@ mod tests {
             size: [3.0, 0.0],
         };
         let start = Pace { v: 0.0, a: 0.0, j: 6.0 };
-        let motion = Motion::new(Law::Along, shape, 1.0, [0.0, 1.0], false)
+        let motion = Motion::new(Law::Along, shape, [1.0; 2], [0.0, 1.0], false)
             .with_along(|_| Along::Jerk { start, duration: 1.0 });
         assert_eq!(motion.velocity(0.0), [0.0; 2]);
         assert!((motion.velocity(1.0)[0] - 3.0).abs() < 1e-12);

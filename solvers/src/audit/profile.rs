@@ -23,8 +23,10 @@ const SLIDE_INTERVALS: usize = 64;
 /// Share of an acceleration limit from which a slide is looked at more closely.
 const NEAR: f64 = 0.9;
 
-/// The end intervals are as short as lets rounding hide this share of the acceleration limit.
+/// The end intervals are as short as lets rounding hide this share of the acceleration limit, but no shorter than this part
+/// of the arc: their time would have no digits.
 const HIDDEN: f64 = 1e-7;
+const SHORTEST: f64 = 1e-8;
 
 /// The direction of a piece at a cusp is known to this share.
 const CUSP_ROUNDING: f64 = 1e-12;
@@ -93,13 +95,13 @@ impl<const M: usize> Auditor<'_, M> {
             let mut probe = Probe::new(self, &motion, tally, i, line);
             probe.run_evenly(SLIDE_INTERVALS);
         }
-        self.recorded_ends(i, &motion, width, line, tally);
+        self.recorded_ends(i, &motion, line, tally);
         if self.limits.judges_jerk {
             self.jerks().arc(i, &motion, &curve, line, tally);
         }
 
         // A rounding of u0 or u1 changes the width, and with it the time, by this share.
-        let rounding = ROUNDINGS * motion.width_rounding(width);
+        let rounding = ROUNDINGS * motion.width_rounding();
         let error = (arcs.duration[i] - elapsed).abs() / elapsed - rounding;
         tally.offer(Check::Duration, 0, error, PASS_EXCESS, time, line);
     }
@@ -109,15 +111,10 @@ impl<const M: usize> Auditor<'_, M> {
         Jerks { path, arcs, limits, starts }
     }
 
-    /// The recorded p at both ends against what the arc's definition gives there, as a jump of axis velocity.
-    fn recorded_ends(&self, i: usize, motion: &Motion<M>, width: f64, line: i32, tally: &mut Tally<M>) {
-        // At a cusp √p is infinite: it falls from there to the other end as a power of the way.
-        let change = match (motion.root_anchor.is_finite(), motion.root_far.is_finite()) {
-            (true, true) => (motion.root_anchor - motion.root_far).abs(),
-            (true, false) => motion.root_anchor,
-            (false, _) => motion.root_far,
-        };
-        let spread = change * motion.width_rounding(width);
+    /// The recorded p at both ends against what the arc's definition gives there, as a jump of axis velocity. A place is
+    /// known to its rounding: over that way the axis may accelerate.
+    fn recorded_ends(&self, i: usize, motion: &Motion<M>, line: i32, tally: &mut Tally<M>) {
+        let way = ROUNDINGS * motion.width_rounding() * motion.width;
         for (y, recorded) in [(0.0, motion.root_anchor), (1.0, motion.root_far)] {
             if recorded.is_infinite() {
                 continue; // the next arc's velocity is compared with that of the law
@@ -126,8 +123,11 @@ impl<const M: usize> Auditor<'_, M> {
             let at_end = (y == 1.0) != motion.anchored_at_end;
             let time = self.starts[i] + if at_end { self.arcs.duration[i] } else { 0.0 };
             for k in 0..M {
-                let rounding = ROUNDINGS * (EPS * state.magnitude[k] + state.tangent[k].abs() * spread);
-                let jump = state.tangent[k].abs() * (state.root_p - recorded).abs() - rounding;
+                let size = state.tangent[k].abs();
+                let [slow, fast] = [state.root_p.min(recorded), state.root_p.max(recorded)].map(|p| size * p);
+                let gained = 2.0 * self.limits.acceleration[k] * way * size;
+                let reached = (slow * slow + gained).sqrt().max(slow);
+                let jump = fast - reached - ROUNDINGS * EPS * state.magnitude[k];
                 tally.offer(Check::Jump, k, jump, self.limits.negligible_jump(k), time, line);
             }
         }
@@ -345,7 +345,7 @@ impl<'a, const M: usize> Probe<'a, M> {
             let rounding = 2.0 * ROUNDINGS * EPS * end.magnitude[k];
             time = time.max(rounding / (HIDDEN * self.limits.acceleration[k]));
         }
-        time / self.duration
+        (time / self.duration).max(SHORTEST)
     }
 
     fn advance(&mut self, from: &State<M>, to: &State<M>) {

@@ -8,7 +8,7 @@ use super::profile::{Profile, Row, NO_AXIS};
 use super::subpiece::Axes;
 use crate::arc_kind::ArcKind;
 
-/// A shorter part of the length than this is rounding.
+/// A shorter part of the length, or of v², than this is rounding.
 const NO_PART: f64 = 1e-15;
 
 /// Backward: the greatest v² at the start from which `speed_sq` at the end can be met.
@@ -91,9 +91,7 @@ impl Stretch<'_> {
         // Nothing between the two in a triangle.
         let cruise = if peak_sq < top_sq { 0.0 } else { (length - first_part - last_part).max(0.0) };
         let place = |before: f64, after: f64| {
-            if before <= none {
-                Place { speed_sq: peak_sq, ..start }
-            } else if after <= none {
+            if after <= none {
                 Place { speed_sq: peak_sq, ..last }
             } else if before <= after {
                 self.after_start(before, peak_sq)
@@ -101,7 +99,13 @@ impl Stretch<'_> {
                 self.before_end(after, peak_sq)
             }
         };
-        let (from, to) = (place(first_part, cruise + last_part), place(first_part + cruise, last_part));
+        // Next to its start a place shows the shortest ramp that is more than rounding of v²; next to its end none does.
+        let from = if peak_sq - start_sq <= NO_PART * peak_sq {
+            Place { speed_sq: peak_sq, ..start }
+        } else {
+            place(first_part, cruise + last_part)
+        };
+        let to = if cruise > 0.0 { place(first_part + cruise, last_part) } else { from };
         self.push(out, start, from, first_part, Motion::SpeedUp);
         self.push(out, from, to, cruise, Motion::Cruise);
         self.push(out, to, last, last_part, Motion::SlowDown);
@@ -128,7 +132,9 @@ impl Stretch<'_> {
 
     #[inline(always)]
     fn push(&self, out: &mut Profile, from: Place, to: Place, length: f64, motion: Motion) {
-        if to.t <= from.t {
+        // A ramp too short for its places to show it still says how fast the end is.
+        let slows_down = matches!(motion, Motion::SlowDown) && to.speed_sq < from.speed_sq && to.rate > 0.0;
+        if to.t <= from.t && !slows_down {
             return;
         }
         let (v0, v1) = (from.speed_sq.sqrt(), to.speed_sq.sqrt());

@@ -1,7 +1,7 @@
 //! A feasible plan in one pass: the envelope r = w^(3/4), averaged in logarithm over local time.
 //!
-//! The envelope rises by K at most, so ln r rises by 1 at most per local time τ = ∫ K ds/r; its mean over τ ± δ less
-//! δ nowhere exceeds it, and is smooth enough for the jerk.
+//! The envelope rises by K at most, so ln r rises by 1 at most per local time τ = ∫ K ds/r (see `Slopes::length`); its
+//! mean over τ ± δ less δ nowhere exceeds it, and is smooth enough for the jerk.
 
 use super::interior_point::Bound;
 use super::rows::Rows;
@@ -22,7 +22,7 @@ pub fn smooth(nodes: &[f64], caps: &[f64], slopes: Slopes, bounds: &[Bound; 2]) 
     let mut r: Vec<f64> = (0..=last).map(|i| caps[i.saturating_sub(1)].min(caps[i.min(last - 1)])).collect();
     slopes.end(&mut r, bounds);
     slopes.limit(nodes, &mut r);
-    let mean = Mean::new(nodes, &r, slopes.k, bounds);
+    let mean = Mean::new(nodes, &r, slopes, bounds);
     let mut x = Vec::with_capacity(2 * nodes.len());
     let mut at = [0, 0];
     for i in 0..=last {
@@ -31,7 +31,7 @@ pub fn smooth(nodes: &[f64], caps: &[f64], slopes: Slopes, bounds: &[Bound; 2]) 
         let rho = (high.1 - low.1) / (2.0 * MEAN) - MEAN;
         let slope = (high.0 - low.0) / (2.0 * MEAN);
         let w = (rho * 4.0 / 3.0).exp();
-        x.extend([w, 4.0 / 3.0 * w * slope * slopes.k / r[i]]);
+        x.extend([w, 4.0 / 3.0 * w * slope / slopes.length(r[i])]);
     }
     for (end, bound) in bounds.iter().enumerate() {
         if let Bound::Rest { ramp, greatest } = *bound {
@@ -51,7 +51,7 @@ struct Mean {
 }
 
 impl Mean {
-    fn new(nodes: &[f64], r: &[f64], k: f64, bounds: &[Bound; 2]) -> Self {
+    fn new(nodes: &[f64], r: &[f64], slopes: Slopes, bounds: &[Bound; 2]) -> Self {
         let last = nodes.len() - 1;
         let beyond = bounds.map(|bound| match bound {
             Bound::Rest { .. } => 2.0 * MEAN,
@@ -60,7 +60,7 @@ impl Mean {
         let (mut tau, mut rho) = (vec![-2.0 * MEAN, 0.0], vec![r[0].ln() - beyond[0], r[0].ln()]);
         let mut t = 0.0;
         for i in 1..=last {
-            t += 2.0 * k * (nodes[i] - nodes[i - 1]) / (r[i - 1] + r[i]);
+            t += (nodes[i] - nodes[i - 1]) / slopes.length(0.5 * (r[i - 1] + r[i]));
             tau.push(t);
             rho.push(r[i].ln());
         }

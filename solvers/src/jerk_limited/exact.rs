@@ -18,16 +18,17 @@ impl<const M: usize> Model<M> for Exact {
 
     #[inline(always)]
     fn slack(&mut self, rows: &Rows<M>, n: usize, u: &[f64; 4], _: bool, out: &mut [Lanes]) {
-        let w = rows.intervals[n].motion(u)[0];
+        let [w, w1, _] = rows.intervals[n].motion(u);
         let pace = w.max(Lanes::all(f64::MIN_POSITIVE)).sqrt().inverse();
-        rows.slack(n, u, pace, w, out);
+        rows.slack(n, u, pace, w + w1 * rows.intervals[n].inwards(), out);
         self.pace[n] = pace;
     }
 
     #[inline(always)]
     fn slack_step(&self, rows: &Rows<M>, n: usize, d: &[f64; 4], out: &mut [Lanes]) {
-        let w = rows.intervals[n].motion(d)[0];
-        rows.slack_step(n, d, -(fall(self.pace[n]) * w), w, out);
+        let [w, w1, _] = rows.intervals[n].motion(d);
+        let last = w + w1 * rows.intervals[n].inwards();
+        rows.slack_step(n, d, -(fall(self.pace[n]) * w), last, out);
     }
 
     #[inline(always)]
@@ -35,7 +36,10 @@ impl<const M: usize> Model<M> for Exact {
         let mut form = rows.curvature(n, weight);
         let fall = fall(self.pace[n]);
         let interval = &rows.intervals[n];
-        form[0] += weight[Order::<M>::POSITIVE];
+        let (last, inwards) = (weight[Order::<M>::POSITIVE], interval.inwards());
+        form[0] += last;
+        form[1] += last * inwards;
+        form[3] += last * inwards * inwards;
         for k in 0..M {
             // What the slope of w^(−1/2) adds to the two rows of an axis's jerk.
             let at = Order::<M>::jerk(k);
@@ -58,7 +62,9 @@ impl<const M: usize> Model<M> for Exact {
     #[inline(always)]
     fn pull(&mut self, rows: &Rows<M>, n: usize, aim: &[Lanes], _: usize) -> [Lanes; 3] {
         let (mut pull, jerk) = rows.pull(n, aim);
-        pull[0] += aim[Order::<M>::POSITIVE] - fall(self.pace[n]) * jerk;
+        let last = aim[Order::<M>::POSITIVE];
+        pull[0] += last - fall(self.pace[n]) * jerk;
+        pull[1] += last * rows.intervals[n].inwards();
         pull
     }
 

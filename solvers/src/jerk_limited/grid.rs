@@ -14,7 +14,8 @@ const CHANGING: f64 = 0.02;
 const TURNING: f64 = 0.02;
 /// Lengths of intervals grow by at most this part of the distance.
 const GROWTH: f64 = 0.5;
-/// The longest interval, in s.
+/// The longest interval, in parts of the length over which the path turns: about one radian of a circle. No interval is
+/// planned longer than the path.
 const LONGEST: f64 = 0.5;
 /// Every path has at least so many intervals, in parts of the resolution.
 const FEWEST: f64 = 26.0;
@@ -130,12 +131,18 @@ fn density(stations: &[Station], slopes: Slopes, bounds: &[Bound; 2], resolution
             let turning = stations[i].turning;
             let active = (i < last && changing(i)) || (i > 0 && changing(i - 1));
             if active || turning * r[i] > TURNING * slopes.k {
-                1.0 / (slopes.k / r[i] + turning)
+                1.0 / (1.0 / slopes.length(r[i]) + turning)
             } else {
                 f64::INFINITY
             }
         })
         .collect();
+    // A ramp ends where its speed is that of the path at the latest.
+    for (bound, i) in bounds.iter().zip([0, last]) {
+        if let Bound::Rest { ramp, .. } = *bound {
+            length[i] = length[i].min(1.0 / (1.0 / ramp + stations[i].turning));
+        }
+    }
     for i in 1..=last {
         length[i] = length[i].min(length[i - 1] + GROWTH * (s[i] - s[i - 1]));
     }
@@ -144,7 +151,7 @@ fn density(stations: &[Station], slopes: Slopes, bounds: &[Bound; 2], resolution
     }
     (0..=last)
         .map(|i| {
-            let longest = LONGEST * r[i].cbrt().powi(2);
+            let longest = (LONGEST / stations[i].turning).min(s[last] - s[0]);
             if length[i].is_finite() { resolution / length[i] } else { 0.0 }.max(1.0 / longest)
         })
         .collect()

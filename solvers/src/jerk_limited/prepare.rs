@@ -110,7 +110,7 @@ pub fn bounds<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>) -> [Bound
         End::Moving { speed, acceleration } => Bound::Fixed { w: speed * speed, slope: 2.0 * acceleration },
         End::Rest => {
             let (piece, s) = if end == 0 { (0, 0.0) } else { (pieces - 1, total) };
-            let ramp = rest::length(limits, &problem.geometry.at(piece, s).first, total);
+            let ramp = rest::length(limits, &problem.geometry.at(piece, s), total);
             let greatest = rest::greatest(problem.geometry, limits, problem.caps, ramp, end);
             Bound::Rest { ramp, greatest }
         }

@@ -2,12 +2,13 @@
 
 use std::ops::Range;
 
-use super::{Geometry, Limits, SpeedCap};
+use super::{Geometry, Limits, Place, SpeedCap};
 
 /// Ramps are this part of the length on which constant jerk reaches the acceleration or the speed …
 const RAMP: f64 = 1.0 / 90.0;
 /// … and at least and at most these parts of the path: the nodes beside a shorter one would have no digits.
-const PARTS: [f64; 2] = [1e-11, 1.0 / 400.0];
+const PARTS: [f64; 2] = [SHORTEST, 1.0 / 400.0];
+pub const SHORTEST: f64 = 1e-11;
 /// Places of a piece under a ramp, even in time: halved at least and at most so often …
 const DEPTH: Range<u32> = 4..40;
 /// … where the greatest speed between them changes by more than this in logarithm, and they are further apart than this
@@ -20,20 +21,20 @@ const OCTAVES: i32 = 12;
 const PLACES: usize = 16;
 const ROUNDS: usize = 2;
 
-/// The length of the ramps of a path, in mm, from |q'| of its axes at the end.
+/// The length of the ramps of a path, in mm, from its derivatives and its speed cap at the end.
 ///
 /// It is as far as a place on the path can be from the path's end: places have the digits of the whole way, and a ramp is
 /// so short that the slope at its node, 4/3 w over its length, shows what the node rounds off.
-pub fn length<const M: usize>(limits: &Limits<M>, first: &[f64; M], path: f64) -> f64 {
+pub fn length<const M: usize>(limits: &Limits<M>, place: &Place<M>, path: f64) -> f64 {
     let [least, most] = PARTS.map(|part| part * path);
-    let mut ramp = most;
-    for k in 0..M {
-        let q = first[k].abs().max(f64::MIN_POSITIVE);
-        let (v, a, j) = (limits.velocity[k] / q, limits.acceleration[k] / q, limits.jerk[k] / q);
-        let by_acceleration = a * a * a / (6.0 * j * j);
-        let by_speed = (8.0 * v * v * v / j).sqrt() / 6.0;
-        ramp = ramp.min(RAMP * by_acceleration.min(by_speed));
-    }
+    let along = |limit: &[f64; M]| {
+        (0..M).map(|k| limit[k] / place.first[k].abs().max(f64::MIN_POSITIVE)).fold(f64::INFINITY, f64::min)
+    };
+    let (v, a, j) =
+        (along(&limits.velocity).min(place.speed_cap), along(&limits.acceleration), along(&limits.jerk));
+    let by_acceleration = a * a * a / (6.0 * j * j);
+    let by_speed = (8.0 * v * v * v / j).sqrt() / 6.0;
+    let ramp = most.min(RAMP * by_acceleration.min(by_speed));
     path - (path - ramp.max(least))
 }
 
@@ -115,7 +116,6 @@ fn halve(at: &impl Fn(f64) -> (f64, f64), [a, b]: [(f64, f64); 2], depth: u32, p
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::jerk_limited::Place;
 
     struct Arc {
         curvature: f64,
@@ -184,20 +184,28 @@ mod tests {
         assert!((capped - 0.25).abs() < 1e-6, "{capped}");
     }
 
+    /// A place on a line along the first axis.
+    fn line(speed_cap: f64) -> Place<2> {
+        Place { first: [1.0, 0.0], second: [0.0; 2], third: [0.0; 2], speed_cap }
+    }
+
     #[test]
     fn ramps_are_short_on_the_scale_of_the_limits_and_of_the_path() {
         // A³/(6 J²) = 1/15 mm is the shorter way to a limit.
-        assert!((length(&LIMITS, &[1.0, 0.0], 100.0) - 1.0 / 15.0 / 90.0).abs() < 1e-12);
-        assert!((length(&LIMITS, &[1.0, 0.0], 0.1) - 0.1 / 400.0).abs() < 1e-16);
+        assert!((length(&LIMITS, &line(f64::INFINITY), 100.0) - 1.0 / 15.0 / 90.0).abs() < 1e-12);
+        assert!((length(&LIMITS, &line(f64::INFINITY), 0.1) - 0.1 / 400.0).abs() < 1e-16);
+        // Constant jerk reaches 0.01 mm/s on √(8 · 1e-6/50000)/6 mm.
+        let slow = length(&LIMITS, &line(0.01), 100.0) * 90.0 * 6.0;
+        assert!((slow / (8e-6f64 / 50_000.0).sqrt() - 1.0).abs() < 1e-6);
         let jerk = Limits { jerk: [1e12; 2], ..LIMITS };
-        assert!((length(&jerk, &[1.0, 0.0], 0.1) - 1e-12).abs() < 1e-16);
+        assert!((length(&jerk, &line(f64::INFINITY), 0.1) - 1e-12).abs() < 1e-16);
     }
 
     #[test]
     fn a_ramp_is_as_long_as_its_node_is_from_the_end_of_the_path() {
         for i in 0..60 {
             let path = 10f64.powf(0.1 * i as f64);
-            let ramp = length(&LIMITS, &[1.0, 0.0], path);
+            let ramp = length(&LIMITS, &line(f64::INFINITY), path);
             let node = path - ramp;
             assert_eq!(path - node, ramp, "on {path} mm");
         }

@@ -6,6 +6,9 @@
 //!   jerk           w^(−1/2) ∓ (q''' w + 3/2 q'' w' + 1/2 q' w'')/J ≥ 0
 //!   speed          1 − w/w_max ≥ 0,   w ≥ 0
 //!
+//! At the ends of an interval it is not w that is held above 0 but the inner Bernstein coefficients of the cubic, of which
+//! those on both sides of a node have w between them: so w is above 0 everywhere, however little its time matters.
+//!
 //! The slack of the jerk is convex in w: its tangent at a valid plan is a safe inner constraint.
 
 use super::hermite::{self, combine, local, BEND, SLOPE, VALUE};
@@ -13,6 +16,8 @@ use super::interior_point::Bound;
 use super::model::Form;
 use super::{Geometry, Limits, Place};
 use crate::lanes::Lanes;
+
+const INWARDS: Lanes = Lanes::new([1.0 / 3.0, 0.0, 0.0, -1.0 / 3.0]);
 
 /// One interval between two nodes.
 #[derive(Clone, Copy, Debug)]
@@ -86,6 +91,13 @@ impl<const M: usize> Interval<M> {
         self.speed = self.speed * (speed * speed);
         self.acceleration = self.acceleration * acceleration;
         self.jerk *= jerk;
+    }
+
+    /// The steps from the ends of the interval to where the tangents of w are its inner Bernstein coefficients: with those
+    /// and w at the nodes above 0 so is w everywhere between.
+    #[inline(always)]
+    pub fn inwards(&self) -> Lanes {
+        INWARDS * self.h
     }
 
     /// w, w', w'' at the collocation points.

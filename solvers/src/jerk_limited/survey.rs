@@ -2,7 +2,7 @@
 //! linear, at stations dense enough to lay a grid over.
 
 use super::interior_point::Bound;
-use super::{Fault, Geometry, Limits, Place, SpeedCap};
+use super::{rest, Fault, Geometry, Limits, Place, SpeedCap};
 
 /// Parts of the limits that the caps of the envelope leave to a plan through them.
 const SPEED: f64 = 0.9;
@@ -19,11 +19,13 @@ const DEPTH: std::ops::Range<u32> = 2..30;
 /// Stations are at most this part of r/K apart.
 const SPACING: f64 = 0.25;
 
-/// The slopes of the envelope: r' ≤ min(k, acceleration · r^(−1/3)).
+/// The slopes of the envelope: r' ≤ min(k, acceleration · r^(−1/3), r/shortest).
 #[derive(Clone, Copy, Debug)]
 pub struct Slopes {
     pub k: f64,
     acceleration: f64,
+    /// The least length over which r changes to its like, in mm: places on the path have no digits for shorter ones.
+    shortest: f64,
 }
 
 /// A place of the survey.
@@ -64,18 +66,28 @@ impl<const M: usize> Limits<M> {
 }
 
 impl Slopes {
-    /// From the greatest |q'| of each axis.
-    pub fn new<const M: usize>(limits: &Limits<M>, greatest: &[f64; M]) -> Self {
+    /// From the greatest |q'| of each axis and the length of the path.
+    pub fn new<const M: usize>(limits: &Limits<M>, greatest: &[f64; M], path: f64) -> Self {
         let least = |limit: &[f64; M]| {
             (0..M).map(|k| limit[k] / greatest[k].max(f64::MIN_POSITIVE)).fold(f64::INFINITY, f64::min)
         };
-        Self { k: SLOPE * least(&limits.jerk).sqrt(), acceleration: RISE * least(&limits.acceleration) }
+        Self {
+            k: SLOPE * least(&limits.jerk).sqrt(),
+            acceleration: RISE * least(&limits.acceleration),
+            shortest: rest::SHORTEST * path,
+        }
+    }
+
+    /// The length over which r changes to its like at its greatest slope.
+    #[inline]
+    pub fn length(&self, r: f64) -> f64 {
+        (r / self.k).max(self.shortest)
     }
 
     /// The greatest r a distance h further.
     #[inline]
     pub fn reach(&self, r: f64, h: f64) -> f64 {
-        r + h * self.k.min(self.acceleration / r.cbrt())
+        r + h * self.k.min(self.acceleration / r.cbrt()).min(r / self.shortest)
     }
 
     /// The time of a stop from a speed.
@@ -141,7 +153,7 @@ pub fn survey<const M: usize>(
             }
         }
     }
-    let slopes = Slopes::new(limits, &greatest);
+    let slopes = Slopes::new(limits, &greatest, knots[knots.len() - 1]);
     let station = |piece: u32, s: f64| {
         let place = geometry.at(piece as usize, s);
         Station { s, piece, cap: limits.envelope_cap(&place, slopes.k), turning: turning(limits, &place) }
@@ -193,7 +205,8 @@ fn halve(
     }
 }
 
-/// Stations between the surveyed ones, dense where the envelope is low; caps between them are interpolated.
+/// Stations between the surveyed ones, dense where the envelope rises to the caps or falls from them, and the sparser the
+/// farther from there; caps between them are interpolated.
 fn densify(stations: &[Station], slopes: Slopes, bounds: &[Bound; 2]) -> Vec<Station> {
     let r = slopes.envelope(stations, bounds);
     let last = r.len() - 1;
@@ -203,9 +216,10 @@ fn densify(stations: &[Station], slopes: Slopes, bounds: &[Bound; 2]) -> Vec<Sta
         out.push(a);
         let mut at = a.s;
         loop {
-            let low = (r[i] + slopes.k * (at - a.s)).min(r[i + 1] + slopes.k * (b.s - at));
-            let low = low.min(a.cap.max(b.cap));
-            let step = SPACING * low / slopes.k;
+            let top = a.cap.max(b.cap);
+            let near = |r: f64| if r < 2.0 * top { r.min(top) } else { r - top };
+            let [rise, fall] = [r[i] + slopes.k * (at - a.s), r[i + 1] + slopes.k * (b.s - at)];
+            let step = SPACING * slopes.length(near(rise).min(near(fall)));
             if at + 1.5 * step >= b.s {
                 break;
             }

@@ -1,0 +1,78 @@
+"""Feeds down to 1e-6 mm/s: ramps are shorter than the rounding of the places they are at."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from feedplan import Axis, Machine, Plan, plan
+from feedplan.audit import audit
+from feedplan.planners import limits_jerk
+
+# Speeds [mm/s]: the fastest feed that once failed, the least that is promised, and one between.
+SPEEDS = (3e-3, 1e-4, 1e-6)
+EXACT = ("bang-bang", "jerk-limited", "s-curve", "ruckig")
+HEURISTIC = ("junction-deviation", "arc-transition", "constant-velocity-transition")
+# This one does not keep the accelerations of curves at any feed: it is asked to move along a line.
+LINE_ONLY = ("tangential",)
+
+MACHINE = Machine(
+    "four axes",
+    (
+        Axis("X", 500.0, 3000.0, max_jerk=50_000.0),
+        Axis("Y", 500.0, 3000.0, max_jerk=50_000.0),
+        Axis("Z", 400.0, 2500.0, max_jerk=40_000.0),
+        Axis("A", 200.0, 2000.0, max_jerk=30_000.0),
+    ),
+    chord_tolerance=0.005,
+)
+LINE = "G1 X400 Y100 Z-50 F{f}"
+PROGRAMS = {
+    "line": LINE,
+    "corners": "G0 X100\nG1 X110 F{f}\nY10\nX100 Y5\nX90 Y7",
+    "arcs": "G0 X100\nG2 X110 I5 F{f}\nG3 X100 Y10 I-5 J5",
+    "points": "G1 F{f}\n"
+    + "\n".join(f"X{10 * np.sin(a):.4f} Y{10 - 10 * np.cos(a):.4f}" for a in np.linspace(0.02, 3, 100)),
+    "slow between fast": "G0 X100\nG1 X110 F{f}\nX120 F1000\nX130 Y1 F{f}\nX140 Y0 F2000\nG0 X0",
+    "rotary": "G0 X100\nG1 X110 A5 F{f}\nX110 Y10 A-5\nA20\nX100 Y5 A0",
+}
+CASES = [(name, method) for name in PROGRAMS for method in EXACT + HEURISTIC]
+CASES += [("line", method) for method in LINE_ONLY]
+
+
+def planned(moves: str, speed: float, method: str, folder: Path) -> Plan:
+    program = folder / "slow.ngc"
+    program.write_text(f"G21 G90 G64 P0.01\n{moves.format(f=f'{60.0 * speed:.12f}')}\nM2\n")
+    return plan(program, MACHINE, method, time_limit=0.5 if method == "ruckig" else None)
+
+
+@pytest.mark.parametrize(("name", "method"), CASES)
+def test_profile_and_setpoints_of_slow_feeds_are_right(name: str, method: str, tmp_path: Path) -> None:
+    for speed in SPEEDS:
+        slow = planned(PROGRAMS[name], speed, method, tmp_path)
+        period = slow.time / 1000.0
+        points = slow.setpoints(period)
+        verdict = audit(slow.problem, slow.profile, MACHINE, slow.program, points, limits_jerk(method))
+        assert verdict.ok, f"{speed} mm/s: {verdict.failures}"
+        chunk = points.all()
+        end = slow.problem.curve.control_points[-1]
+        assert np.abs(chunk.position[-1] - end).max() < 1e-12
+        assert slow.lower_bound <= slow.time * (1.0 + 1e-12)
+        assert slow.gap < 1e-3
+
+
+@pytest.mark.parametrize("method", EXACT + HEURISTIC + LINE_ONLY)
+def test_a_slow_line_takes_its_length_over_the_feed(method: str, tmp_path: Path) -> None:
+    slow = planned(LINE, 1e-6, method, tmp_path)
+    length = np.sqrt(400.0**2 + 100.0**2 + 50.0**2)
+    assert slow.time == pytest.approx(length / 1e-6, rel=1e-9)
+
+
+@pytest.mark.parametrize("method", EXACT)
+def test_every_setpoint_of_a_short_slow_path_is_right(method: str, tmp_path: Path) -> None:
+    slow = planned("G0 X100\nG1 X100.003 Y0.001 F{f}\nX100.002 Y0.004", 1e-4, method, tmp_path)
+    assert 4e4 < slow.setpoints().count < 1e5
+    verdict = slow.audit()
+    assert verdict.ok, verdict.failures
