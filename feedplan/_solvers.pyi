@@ -28,6 +28,7 @@ __all__ = [
     "curve_elevate",
     "curve_evaluate",
     "curve_joints",
+    "curve_regular",
     "curve_reverse",
     "curve_split",
     "fit_points",
@@ -331,6 +332,12 @@ def curve_joints(
 ) -> tuple[
     NDArray[np.uint32], NDArray[np.uint8], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
 ]: ...
+def curve_regular(
+    control_points: NDArray[np.float64],
+    weights: NDArray[np.float64] | None,
+    offsets: NDArray[np.int64],
+    width: NDArray[np.float64],
+) -> tuple[_CurveColumns, NDArray[np.int64], NDArray[np.bool_]]: ...
 def curve_cusps(
     control_points: NDArray[np.float64],
     weights: NDArray[np.float64] | None,

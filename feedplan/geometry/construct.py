@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import build_path as native_build_path
+from feedplan._solvers import curve_regular
 from feedplan.curves._arrays import MAX_AXES, points, refuse
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
@@ -32,14 +33,14 @@ _ANY_SPEED, _ANY_ACCELERATION = 1e6, 1.0
 def path_of_curve(curve: CompositeCurve, axes: Sequence[str] | None, feed: float) -> Path:
     """See `Path.from_curve`."""
     names, speed = _names(axes, curve.axes), _feed(feed)
-    curve = _without(curve, curve.zero_length)
-    if len(curve) == 0:
+    moving = np.delete(np.arange(len(curve)), curve.zero_length)
+    columns, piece, rests = curve_regular(*_closed_gaps(curve.take(moving)).columns())
+    if len(piece) == 0:
         raise InputError("the curve has no length: give control points that differ")
-    cusps = curve.cusps()
-    curve = curve.split(cusps.piece, cusps.u)
-    curve = _closed_gaps(_without(curve, curve.zero_length))
-    corners = np.flatnonzero((tangent_jumps(curve) > 0).any(axis=1)) + 1
-    return _path(names, curve, speed, np.concatenate([[0], corners, [len(curve)]]))
+    curve = CompositeCurve(*columns)
+    stops = (tangent_jumps(curve) > 0).any(axis=1) | rests[:-1, 1] | rests[1:, 0]
+    runs = np.concatenate([[0], np.flatnonzero(stops) + 1, [len(curve)]])
+    return _path(names, curve, speed, runs, moving[piece])
 
 
 def path_of_points(
@@ -120,21 +121,6 @@ def _path(
         dwell=np.zeros(len(runs) - 1),
         tolerance=np.zeros(count) if tolerance is None else tolerance,
         fit=fit or FitSummary(),
-    )
-
-
-def _without(curve: CompositeCurve, pieces: NDArray[np.int64]) -> CompositeCurve:
-    """The curve without some pieces."""
-    if len(pieces) == 0:
-        return curve
-    keep = np.ones(len(curve), dtype=bool)
-    keep[pieces] = False
-    points = np.repeat(keep, curve.degree + 1)
-    return CompositeCurve(
-        curve.control_points[points],
-        None if curve.weights is None else curve.weights[points],
-        np.concatenate([[0], np.cumsum((curve.degree + 1)[keep])]),
-        curve.width[keep],
     )
 
 

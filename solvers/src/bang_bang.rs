@@ -34,6 +34,7 @@ use std::cell::RefCell;
 use crate::bang_bang_quadratic::{Fault, Profile, Task as QuadraticTask};
 use crate::planning::{ChordLimit, Limits};
 use crate::quadratic::{norm, Quadratic};
+use crate::spline::Piece;
 use split::Axes;
 
 /// Axes that the tool itself moves in.
@@ -111,16 +112,16 @@ struct Task<'a, const M: usize> {
     problem: &'a Problem<'a, M>,
     axes: Axes<M>,
     chord: Option<ChordLimit>,
-    /// The planner of polynomial quadratics, for those that are.
+    /// The planner of lines and polynomial quadratics, for those that are.
     quadratic: Option<QuadraticTask<'a, M>>,
 }
 
 impl<const M: usize> Task<'_, M> {
-    /// The planner of quadratics, if piece `i` is for it.
+    /// That planner, if piece `i` is for it.
     fn quadratic(&self, i: usize) -> Option<&QuadraticTask<'_, M>> {
         let range = self.problem.offset[i]..self.problem.offset[i + 1];
         let weights = self.problem.weight.get(range.clone()).unwrap_or(&[]);
-        let is_one = range.len() == 3 && weights.windows(2).all(|pair| pair[0] == pair[1]);
+        let is_one = range.len() <= 3 && weights.windows(2).all(|pair| pair[0] == pair[1]);
         self.quadratic.as_ref().filter(|_| is_one)
     }
 }
@@ -130,7 +131,7 @@ pub fn plan<const M: usize>(problem: &Problem<M>) -> Result<Profile, Fault> {
     plan_with(problem, None)
 }
 
-/// The same; polynomial quadratics go to the planner made for them.
+/// The same; lines and polynomial quadratics go to the planner made for them.
 pub fn plan_each<const M: usize>(problem: &Problem<M>) -> Result<Profile, Fault> {
     if problem.tip.is_some() {
         return plan(problem);
@@ -139,7 +140,7 @@ pub fn plan_each<const M: usize>(problem: &Problem<M>) -> Result<Profile, Fault>
     let nothing = Quadratic { control: [[0.0; M]; 3], width: 0.0 };
     let quadratic = |i: usize| {
         let control = problem.control.get(*problem.offset.get(i)?..*problem.offset.get(i + 1)?)?;
-        Some(Quadratic { control: control.try_into().ok()?, width: problem.width[i] })
+        Quadratic::from_piece(&Piece { control, weights: &[], width: problem.width[i] })
     };
     let pieces: Vec<_> = (0..problem.width.len()).map(|i| quadratic(i).unwrap_or(nothing)).collect();
     plan_with(problem, Some(&pieces))

@@ -4,6 +4,7 @@
 //! is a plain convolution, and a root of known order at 0 is divided out by dropping the first coefficients. `C` bounds
 //! the number of coefficients; no operation allocates.
 
+mod integral;
 mod parts;
 mod roots;
 
@@ -327,13 +328,7 @@ impl<const C: usize> Polynomial<C> {
             }
             return Self { n, c };
         }
-        for i in 0..degree {
-            let mut rest = self.c[i];
-            for a in 1..=i {
-                rest -= (2.0 * a as f64 - (i + 1) as f64) * c[a] * weight.c[i + 1 - a];
-            }
-            c[i + 1] = rest / ((i + 1) as f64 * weight.c[0]);
-        }
+        integral::over_weight(&self.c[..=self.n], &weight.c[..=degree], &mut c);
         Self { n: degree, c }
     }
 

@@ -70,6 +70,17 @@ impl<const M: usize> Quadratic<M> {
         (std::array::from_fn(|k| scale * (b[k] - a[k])), std::array::from_fn(|k| scale * (c[k] - b[k])))
     }
 
+    /// The same by t = u/width, exactly alike on a line as `line` makes it: the middle of a short one far from the
+    /// origin is rounded, and would bend it.
+    #[inline(always)]
+    pub fn tangents(&self) -> ([f64; M], [f64; M]) {
+        let [a, b, c] = &self.control;
+        if *b == lerp(a, c, 0.5) {
+            return (sub(c, a), sub(c, a));
+        }
+        (std::array::from_fn(|k| 2.0 * (b[k] - a[k])), std::array::from_fn(|k| 2.0 * (c[k] - b[k])))
+    }
+
     /// The part on [u0, u1] as a piece of its own, on [0, u1 − u0].
     pub fn part(&self, u0: f64, u1: f64) -> Self {
         let [a, b, c] = &self.control;

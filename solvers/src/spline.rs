@@ -3,7 +3,7 @@
 //! A piece is C(u) on u in [0, width]. It is given by its Bernstein control points in mm and, where it is
 //! rational, one positive weight each. `knots` and `extract` make pieces of B-splines and NURBS, `circle` of
 //! arcs and helices; `bezier` and `rational` evaluate and transform them; `joints` and `cusps` say where they
-//! are not smooth; `speed` and `length` measure them.
+//! are not smooth, `regular` leaves no such place inside a piece; `speed` and `length` measure them.
 
 pub mod bezier;
 pub mod circle;
@@ -14,6 +14,7 @@ pub mod joints;
 pub mod knots;
 pub mod length;
 pub mod rational;
+pub mod regular;
 pub mod speed;
 
 /// The greatest degree of a piece.

@@ -16,10 +16,17 @@ use crate::spline::rational::Hodograph;
 
 /// Cusps closer to the end of a piece than this part of it are at the end.
 const AT_END: f64 = 1e-9;
-/// The tool creeps where the axes turn it only below this part of what they gain in a servo period.
+/// The tool creeps where the axes turn it only below this part of what they gain in a servo period, and a turn is tight
+/// below so many times that.
 const CREEP: f64 = 0.02;
+const TIGHT_TURN: f64 = 10.0;
 /// Places are slow where the square of the speed is below this part of the greatest on their piece.
 const SLOW: f64 = 0.25;
+/// Beside a slow place a turn is sought at so many distances, each half the one before, then between two of them so often
+/// in thirds; it counts where the curvature is so many times that of the place itself.
+const LEVELS: i32 = 40;
+const ROUNDS: usize = 20;
+const SHARPER: f64 = 2.0;
 /// To either side of a slow place the square of the speed rises by more than this part: less may be rounding of a
 /// speed that hardly changes there, and then its least place is anywhere.
 const RISE: f64 = 1e-6;
@@ -87,8 +94,15 @@ pub fn stretches<const M: usize>(problem: &Problem<M>) -> Vec<Stretch> {
         for i in pair[0]..pair[1] {
             let (cuts, cusped) = cusps(problem, i);
             let mut cuts: Vec<(f64, bool)> = cuts.into_iter().map(|u| (u, true)).collect();
-            cuts.extend(slow_places(problem, i).into_iter().map(|u| (u, is_sharp(problem, i, u))));
+            let at_cusp = |u: f64| cusped[0] && u == 0.0 || cusped[1] && u == problem.width[i];
+            for u in slow_places(problem, i).into_iter().filter(|&u| !at_cusp(u)) {
+                cuts.push((u, turn_speed(problem, i, u) < CREEP));
+                let turns = turns_beside(problem, i, u).into_iter().map(|u| (u, turn_speed(problem, i, u)));
+                cuts.extend(turns.filter(|turn| turn.1 < TIGHT_TURN).map(|(u, speed)| (u, speed < CREEP)));
+            }
             cuts.extend(chord_kinks(problem, i).into_iter().map(|u| (u, false)));
+            let inside = AT_END * problem.width[i]..=(1.0 - AT_END) * problem.width[i];
+            cuts.retain(|(u, _)| inside.contains(u));
             cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
             cuts.dedup_by(|b, a| {
                 let same = b.0 - a.0 <= AT_END * problem.width[i];
@@ -138,7 +152,7 @@ fn cusps<const M: usize>(problem: &Problem<M>, i: usize) -> (Vec<f64>, [bool; 2]
     (places.iter().map(|t| t * own.width).collect(), ends)
 }
 
-/// Parameters inside piece `i` where the speed per parameter is least, and low: the way may turn sharply there.
+/// Parameters of piece `i` where the speed per parameter is least, and low: the way may turn sharply there, or beside.
 fn slow_places<const M: usize>(problem: &Problem<M>, i: usize) -> Vec<f64> {
     let square: Polynomial<MAX_RATE> = match problem.way {
         Some(way) => Polynomial::from_bernstein(way.of(i).iter().copied()),
@@ -150,24 +164,50 @@ fn slow_places<const M: usize>(problem: &Problem<M>, i: usize) -> Vec<f64> {
             (0..M).map(axis).fold(Polynomial::constant(0.0), |sum, g| sum.combine(1.0, &g.multiply(&g), 1.0))
         }
     };
-    let mut turns = vec![];
+    let mut turns = vec![0.0];
     square.derivative().sign_changes(&mut |t| turns.push(t));
-    if turns.is_empty() {
-        return turns;
-    }
-    turns.insert(0, 0.0);
     turns.push(1.0);
     let greatest = square.range().1;
     let speeds: Vec<f64> = turns.iter().map(|&t| square.value(t)).collect();
     let is_low = |n: usize| {
         let least = speeds[n];
         least < SLOW * greatest
-            && rises(least, speeds[..n].iter().rev())
-            && rises(least, speeds[n + 1..].iter())
+            && (n == 0 || rises(least, speeds[..n].iter().rev()))
+            && (n + 1 == speeds.len() || rises(least, speeds[n + 1..].iter()))
     };
-    let inside = |t: f64| t > AT_END && t < 1.0 - AT_END;
-    let places = (1..turns.len() - 1).filter(|&n| inside(turns[n]) && is_low(n));
-    places.map(|n| turns[n] * problem.width[i]).collect()
+    (0..turns.len()).filter(|&n| is_low(n)).map(|n| turns[n] * problem.width[i]).collect()
+}
+
+/// Parameters of piece `i` to either side of a slow place where the tool's way turns the most, if it turns more there
+/// than at the place itself: where the speed falls to no less than a rest of itself, the turn from its one direction to
+/// that of the rest is where both are alike.
+fn turns_beside<const M: usize>(problem: &Problem<M>, i: usize, slow: f64) -> Vec<f64> {
+    let width = problem.width[i];
+    let curvature = |u: f64| {
+        let curvature = tool_curvature(problem, i, u);
+        if curvature.is_finite() {
+            curvature
+        } else {
+            0.0
+        }
+    };
+    let sharpest = |reach: f64| {
+        let at = |n: i32| slow + reach * 0.5_f64.powi(n);
+        let n = (1..LEVELS).max_by(|&a, &b| curvature(at(a)).total_cmp(&curvature(at(b))))?;
+        let (mut low, mut high) = (at(n + 1), at(n - 1));
+        for _ in 0..ROUNDS {
+            let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+            if curvature(a) < curvature(b) {
+                low = a;
+            } else {
+                high = b;
+            }
+        }
+        let u = 0.5 * (low + high);
+        (curvature(u) > SHARPER * curvature(slow)).then_some(u)
+    };
+    let both = [-slow, width - slow].into_iter().filter(|reach| reach.abs() > AT_END * width);
+    both.filter_map(sharpest).collect()
 }
 
 /// Whether the square of the speed rises from a place to one side before it falls below what it is there.
@@ -207,12 +247,13 @@ fn chord_kinks<const M: usize>(problem: &Problem<M>, i: usize) -> Vec<f64> {
     kinks.filter(|&u| u > AT_END * width && u < (1.0 - AT_END) * width).collect()
 }
 
-/// Whether the tool would creep through a place on piece `i`: a rest there takes no longer that setpoints could tell.
-fn is_sharp<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> bool {
+/// The greatest speed at a place on piece `i` that turns with it, in parts of what the axes gain in a servo period. Where
+/// the tool would creep, a rest takes no longer that setpoints could tell.
+fn turn_speed<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> f64 {
     let place = place(problem, i, u);
-    (0..M).any(|k| {
+    let of_axis = |k: usize| {
         let most = problem.max_acceleration[k];
-        let speed = (most / place.second[k].abs()).sqrt();
-        speed < CREEP * most * problem.period
-    })
+        (most / place.second[k].abs()).sqrt() / (most * problem.period)
+    };
+    (0..M).map(of_axis).fold(f64::INFINITY, f64::min)
 }

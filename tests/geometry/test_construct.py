@@ -86,18 +86,42 @@ def test_a_cusp_is_the_end_of_a_piece_and_of_a_run_where_the_motion_turns() -> N
     assert len(path) == 2
     assert path.width[0] / path.width.sum() == pytest.approx(0.3, abs=1e-9)
     np.testing.assert_array_equal(path.runs, [0, 1, 2])
+    # A curve rests in its cusp, even where the motion goes on: the curvature has no bound there.
+    flat = Path.from_bezier([[0, 0], [0, 0], [0, 0], [1, 0], [2, 1]])
+    line = CompositeCurve.from_bezier([[-1, 0], [0, 0]])
+    joined = CompositeCurve.joined([line, flat.curve])
+    np.testing.assert_array_equal(Path.from_curve(joined).runs, [0, 1, 2])
+
+
+def test_straight_curves_are_lines_from_turn_to_turn() -> None:
     # A line that stands still for a moment goes on: t³ about one half.
     line = Path.from_bezier([[-1, -2], [1, 2], [-1, -2], [1, 2]])
-    assert len(line) == 2
-    np.testing.assert_array_equal(line.runs, [0, 2])
+    np.testing.assert_array_equal(line.curve.control_points, [[-1, -2], [1, 2]])
+    # A conic with its turn at half way; before and after it spans of the same line.
+    spline = CompositeCurve.joined(
+        [
+            CompositeCurve.from_bspline([[0, 0], [1, 1], [2, 2]], [0, 0, 1, 2, 2], 1),
+            CompositeCurve.from_bezier([[2, 2], [4, 4], [2, 2]], [1, 3, 1], width=2.0),
+            CompositeCurve.from_bezier([[2, 2], [-3, -3]]),
+        ]
+    )
+    path = Path.from_curve(spline, feed=5.0)
+    np.testing.assert_array_equal(path.curve.degree, [1, 1])
+    np.testing.assert_array_equal(path.runs, [0, 1, 2])
+    np.testing.assert_array_equal(path.move, [[0, 2], [2, 3]])
+    # 3/(1 + 3) of the way to the middle point; at the ends of pieces the parameter is that of the curve.
+    np.testing.assert_allclose(path.curve.control_points[1], [3.5, 3.5], rtol=1e-15)
+    np.testing.assert_array_equal(path.width, [3.0, 2.0])
+    np.testing.assert_allclose(spline.at([3.0])[0, 0], [3.5, 3.5], rtol=1e-15)
 
 
 def test_pieces_without_length_are_left_out_and_gaps_refused() -> None:
     line = CompositeCurve.from_bezier([[0, 0], [1, 0]])
     still = CompositeCurve.from_bezier([[1, 0], [1, 0], [1, 0]], [1, 2, 1])
-    on = CompositeCurve.from_bezier([[1 + 5e-7, 0], [2, 0]])
+    on = CompositeCurve.from_bezier([[1 + 5e-7, 0], [2, 1]])
     path = Path.from_curve(CompositeCurve.joined([line, still, on]))
-    np.testing.assert_array_equal(path.runs, [0, 2])
+    np.testing.assert_array_equal(path.runs, [0, 1, 2])
+    np.testing.assert_array_equal(path.move, [[0, 0], [2, 2]])
     np.testing.assert_array_equal(path.curve.control_points[2], [1, 0])
     far = CompositeCurve.joined([line, CompositeCurve.from_bezier([[1, 0.5], [2, 0]])], gap=1.0)
     with pytest.raises(InputError, match=r"piece 1 starts 0\.5 mm from the end of piece 0"):

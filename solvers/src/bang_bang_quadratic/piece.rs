@@ -33,9 +33,7 @@ pub struct Piece<const M: usize> {
 impl<const M: usize> Piece<M> {
     #[inline(always)]
     pub fn new(piece: &Quadratic<M>) -> Self {
-        let [a, b, c] = &piece.control;
-        let mut left: [f64; M] = std::array::from_fn(|k| 2.0 * (b[k] - a[k]));
-        let mut right: [f64; M] = std::array::from_fn(|k| 2.0 * (c[k] - b[k]));
+        let (mut left, mut right) = piece.tangents();
         let speed = [dot(&left, &left), dot(&left, &right), dot(&right, &right)];
         let (left_zero, right_zero) = (ZERO * speed[0].sqrt(), ZERO * speed[2].sqrt());
         for k in 0..M {

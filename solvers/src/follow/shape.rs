@@ -2,6 +2,7 @@
 
 use crate::conic::Conic;
 use crate::quadratic::{norm, sub};
+use crate::spline::cusps::{rests_at_ends, CUSP};
 use crate::spline::{bezier, CompositeCurve, Piece};
 
 /// Edges of a control polygon that are shorter than this part of it are none, as next to a cusp.
@@ -24,6 +25,8 @@ pub struct Spline<const M: usize> {
     /// The edges of the control polygon at both ends that have a length.
     start_edge: [f64; M],
     end_edge: [f64; M],
+    /// The tool rests there, in a cusp.
+    rests: [bool; 2],
 }
 
 impl<const M: usize> Spline<M> {
@@ -38,7 +41,15 @@ impl<const M: usize> Spline<M> {
         let (extent, _) = piece.extent();
         let long = |edge: &[f64; M]| norm(edge) > VANISHING * extent;
         let (start_edge, end_edge) = (edges().find(long)?, edges().rev().find(long)?);
-        Some(Self { index: index as u32, made, width, start: piece.control[0], start_edge, end_edge })
+        Some(Self {
+            index: index as u32,
+            made,
+            width,
+            start: piece.control[0],
+            start_edge,
+            end_edge,
+            rests: rests_at_ends(piece, CUSP),
+        })
     }
 
     /// The part between two places in [0, width] as a made piece that can be bent, so of degree 2 or more;
@@ -108,6 +119,15 @@ impl<const M: usize> Shape<M> {
         match self {
             Self::Conic(conic) => sub(&conic.control[2], &conic.control[1]),
             Self::Spline(spline) => spline.end_edge,
+        }
+    }
+
+    /// Whether it begins and ends in a cusp, where the tool rests.
+    #[inline]
+    pub fn rests(&self) -> [bool; 2] {
+        match self {
+            Self::Conic(_) => [false; 2],
+            Self::Spline(spline) => spline.rests,
         }
     }
 

@@ -23,7 +23,7 @@ pub const TASK: usize = 1024;
 struct Joint<const M: usize> {
     /// The first piece after it.
     at: usize,
-    /// None at a halt, at the ends of the path and where there is no tangent.
+    /// None at a halt, in a cusp, at the ends of the path and where there is no tangent.
     jump: Option<Jump<M>>,
 }
 
@@ -56,7 +56,8 @@ impl<'a, const M: usize> Stretches<'a, M> {
         let end = |at| Joint { at, jump: None };
         let inner = (1..pieces.len()).into_par_iter().filter_map(|at| {
             let (before, after) = (&pieces[at - 1], &pieces[at]);
-            if after.first > before.last && halt[before.last as usize] {
+            let halts = after.first > before.last && halt[before.last as usize];
+            if halts || before.piece.rests()[1] || after.piece.rests()[0] {
                 return Some(end(at));
             }
             let jump = Jump::new(&before.piece, &after.piece);

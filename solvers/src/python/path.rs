@@ -14,6 +14,7 @@ use crate::arc::ArcError;
 use crate::corner::Rounding;
 use crate::follow::{ArcShape, Fault, FollowOptions, Followed, Moves, Shape};
 use crate::path_builder::{build_path as build_path_of, build_smooth_path, Axes, BuiltPath, Part};
+use crate::spline::regular::{regular, Regular};
 use crate::spline::{CompositeCurve, Piece};
 
 pyo3::import_exception!(feedplan.errors, ProgramError);
@@ -144,12 +145,16 @@ fn build_path<'py>(
         FollowOptions { exact_tolerance, max_chord, corner_acceleration, max_speed, corner_angle, rounding };
     with_path_axes!(axes, M, {
         let target = rows::<M>(&target)?;
-        let splines = match &splines {
+        let given = match &splines {
             Some((control, weights, offsets, width)) => {
                 curve::<M>(control, weights.as_ref(), offsets, width)?
             }
             None => CompositeCurve::default(),
         };
+        let ranges: Vec<Range<usize>> = spline_moves.iter().map(|(_, range)| range.clone()).collect();
+        let Regular { curve: splines, ranges, .. } = py.detach(|| regular(&given, &ranges));
+        let spline_moves: Vec<(usize, Range<usize>)> =
+            spline_moves.iter().zip(ranges).map(|((index, _), range)| (*index, range)).collect();
         let starts = if change_move.len() > 0 { rows::<M>(&change_start)? } else { vec![] };
         let changes: Vec<(usize, [f64; M])> = change_move
             .as_slice()?

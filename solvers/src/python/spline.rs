@@ -17,6 +17,7 @@ use crate::spline::extract::extract;
 use crate::spline::joints::{joints, JointTolerance};
 use crate::spline::knots::{check_points, Spline};
 use crate::spline::length::CurveLength as Kernel;
+use crate::spline::regular::regular;
 use crate::spline::{CompositeCurve, MAX_DEGREE};
 
 pyo3::import_exception!(feedplan.errors, InputError);
@@ -32,6 +33,7 @@ pub fn register(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(curve_split, module)?)?;
     module.add_function(wrap_pyfunction!(curve_reverse, module)?)?;
     module.add_function(wrap_pyfunction!(curve_joints, module)?)?;
+    module.add_function(wrap_pyfunction!(curve_regular, module)?)?;
     module.add_function(wrap_pyfunction!(curve_cusps, module)?)
 }
 
@@ -348,6 +350,32 @@ fn curve_joints<'py>(
             PyArray1::from_iter(py, found.iter().map(|joint| joint.gap)),
             PyArray1::from_iter(py, found.iter().map(|joint| joint.turn)),
             to_array2(py, found.iter().map(|joint| joint.speed).collect(), 2),
+        ))
+    })
+}
+
+/// The curve as lines and as curves without a cusp inside; of each piece the first and the last one that it goes along
+/// (n, 2), and whether it rests at its start and at its end (n, 2).
+#[pyfunction]
+#[allow(clippy::type_complexity)]
+fn curve_regular<'py>(
+    py: Python<'py>,
+    control_points: Array2<'py>,
+    weights: Option<Array1<'py>>,
+    offsets: PyReadonlyArray1<'py, i64>,
+    width: Array1<'py>,
+) -> PyResult<(Columns<'py>, Bound<'py, PyArray2<i64>>, Bound<'py, PyArray2<bool>>)> {
+    let axes = control_points.shape()[1];
+    with_path_axes!(axes, M, {
+        let curve = curve::<M>(&control_points, weights.as_ref(), &offsets, &width)?;
+        let whole = [0..curve.len()];
+        let made = py.detach(|| regular(&curve, &whole));
+        let source = made.source.iter().flatten().map(|&source| source as i64);
+        let shape = [made.source.len(), 2];
+        Ok((
+            columns(py, made.curve, axes),
+            PyArray1::from_iter(py, source).reshape(shape)?,
+            PyArray1::from_iter(py, made.rests.iter().flatten().copied()).reshape(shape)?,
         ))
     })
 }

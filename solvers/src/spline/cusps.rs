@@ -49,6 +49,14 @@ pub fn piece_cusps<const M: usize>(piece: &Piece<M>, tolerance: f64) -> Vec<f64>
     slow.into_iter().map(|part| least(h, part)).collect()
 }
 
+/// Whether a piece has a cusp at its start and at its end.
+pub fn rests_at_ends<const M: usize>(piece: &Piece<M>, tolerance: f64) -> [bool; 2] {
+    let hodograph = Hodograph::new(piece);
+    let h = hodograph.coefficients();
+    let greatest = h.iter().fold(0.0, |most: f64, v| most.max(dot(v, v)));
+    [h[0], h[h.len() - 1]].map(|end| dot(&end, &end) <= tolerance * tolerance * greatest)
+}
+
 /// Joins to `slow` the parts of [lo, hi] where |h|² may be at most `threshold`.
 fn search<const M: usize>(
     h: &[[f64; M]],

@@ -1,0 +1,492 @@
+//! A curve as pieces that never stand still inside: straight ones as lines cut where they turn back, curved ones cut in
+//! their cusps.
+//!
+//! Where C' vanishes a parameter says nothing of a motion, and next to it little. A straight piece, whatever its degree
+//! and its weights, goes over the same places as the lines of degree 1 from one of its turns to the next; so that is what
+//! it becomes. In the cusp of a curved piece the curvature has no bound, and the tool has to rest there: a cusp is the
+//! end of a piece, and of the run that it is in.
+
+use std::ops::Range;
+
+use super::bezier::{point, split};
+use super::cusps::{piece_cusps, rests_at_ends, CUSP};
+use super::{CompositeCurve, Piece, MAX_HODOGRAPH};
+use crate::polynomial::Polynomial;
+use crate::quadratic::{dot, norm, sub};
+
+/// Differences of places below this part of the greatest coordinate are rounding: that of control points, of what made
+/// them from a spline, and of a few sums.
+const ROUNDING: f64 = 16.0 * f64::EPSILON;
+/// A cusp nearer to an end than this part of the piece is at the end.
+const AT_END: f64 = 1e-9;
+/// Directions that differ by less (rad), and by what rounding does to an edge, are one: half of what the path allows
+/// where pieces meet.
+const SMOOTH: f64 = 5e-10;
+/// Edges shorter than this part of a piece have no direction.
+const VANISHING: f64 = 1e-12;
+
+/// What a curve becomes.
+pub struct Regular<const M: usize> {
+    pub curve: CompositeCurve<M>,
+    /// Of each piece the first and the last of the given ones that it goes along.
+    pub source: Vec<[usize; 2]>,
+    /// Whether a piece begins and ends in a cusp, where the tool rests.
+    pub rests: Vec<[bool; 2]>,
+    /// The pieces that each of the given ranges has become.
+    pub ranges: Vec<Range<usize>>,
+}
+
+impl<const M: usize> Regular<M> {
+    fn push(&mut self, source: [usize; 2], piece: &Piece<M>, rounding: f64) {
+        self.curve.push(piece.control, piece.weights, piece.width);
+        let last = self.curve.len() - 1;
+        // A piece without length between two that meet is left out.
+        if last > 0 {
+            let end = self.curve.control[self.curve.offsets[last] - 1];
+            let start = &mut self.curve.control_mut(last)[0];
+            if near(&end, start, rounding) {
+                *start = end;
+            }
+        }
+        self.source.push(source);
+        self.rests.push(rests_at_ends(&self.curve.piece(last), CUSP));
+    }
+}
+
+/// How a piece runs.
+enum Course<const M: usize> {
+    /// From its start through its turns to its end.
+    Straight(Vec<Place<M>>),
+    Curved,
+    Nowhere,
+}
+
+/// A place on a straight course.
+#[derive(Clone, Copy)]
+struct Place<const M: usize> {
+    point: [f64; M],
+    /// The parameter from the start of the course.
+    u: f64,
+    /// The pieces before and after it.
+    pieces: [usize; 2],
+}
+
+/// A straight line through some points.
+struct Line<const M: usize> {
+    origin: [f64; M],
+    direction: [f64; M],
+    length: f64,
+}
+
+impl<const M: usize> Line<M> {
+    /// Through two of the points that are far apart, and all others within rounding; None for a single place.
+    fn through(points: impl Iterator<Item = [f64; M]> + Clone) -> Option<Self> {
+        let farthest = |from: &[f64; M]| {
+            let apart = |point: &[f64; M]| norm(&sub(point, from));
+            points.clone().max_by(|a, b| apart(a).total_cmp(&apart(b)))
+        };
+        let origin = farthest(&points.clone().next()?)?;
+        let way = sub(&farthest(&origin)?, &origin);
+        let length = norm(&way);
+        (length > 0.0).then(|| Self { origin, direction: way.map(|x| x / length), length })
+    }
+
+    fn along(&self, point: &[f64; M]) -> f64 {
+        dot(&sub(point, &self.origin), &self.direction)
+    }
+
+    /// Whether a point is on it, but for rounding.
+    fn meets(&self, point: &[f64; M], rounding: f64) -> bool {
+        let (offset, along) = (sub(point, &self.origin), self.along(point));
+        norm(&std::array::from_fn::<f64, M, _>(|k| offset[k] - along * self.direction[k])) <= rounding
+    }
+}
+
+/// The pieces of a curve as lines and curves without a cusp inside, each range of pieces by itself.
+///
+/// What has no length is left out, and neighbours on one line are one. Parameter intervals stay; lines are passed evenly.
+pub fn regular<const M: usize>(given: &CompositeCurve<M>, ranges: &[Range<usize>]) -> Regular<M> {
+    let greatest = given.control.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
+    let rounding = ROUNDING * greatest;
+    let mut out = Regular { curve: CompositeCurve::default(), source: vec![], rests: vec![], ranges: vec![] };
+    for range in ranges {
+        let first = out.curve.len();
+        let pieces: Vec<Piece<M>> = range.clone().map(|i| given.piece(i)).collect();
+        let courses = range.clone().zip(&pieces).map(|(i, piece)| course(i, piece, rounding));
+        let mut moving: Vec<(usize, Piece<M>, Course<M>)> = range
+            .clone()
+            .zip(&pieces)
+            .zip(courses)
+            .map(|((i, piece), course)| (i, *piece, course))
+            .filter(|(_, _, course)| !matches!(course, Course::Nowhere))
+            .collect();
+        keep_joints(&mut moving, rounding);
+        let mut straight = Straight::default();
+        for (i, piece, course) in &moving {
+            if let Course::Straight(places) = course {
+                if !straight.joins(places, rounding) {
+                    straight.leave(rounding, &mut out);
+                    straight.joins(places, rounding);
+                }
+            } else {
+                straight.leave(rounding, &mut out);
+                cut_in_cusps(*i, piece, rounding, &mut out);
+            }
+        }
+        straight.leave(rounding, &mut out);
+        out.ranges.push(first..out.curve.len());
+    }
+    out
+}
+
+/// The course of piece `i`.
+fn course<const M: usize>(i: usize, piece: &Piece<M>, rounding: f64) -> Course<M> {
+    let control = piece.control;
+    let Some(line) = Line::through(control.iter().copied()).filter(|line| line.length > rounding) else {
+        return Course::Nowhere;
+    };
+    if !control.iter().all(|point| line.meets(point, rounding)) {
+        return Course::Curved;
+    }
+    let place = |u: f64, point: [f64; M]| Place { point, u, pieces: [i, i] };
+    let mut places = vec![place(0.0, control[0])];
+    if piece.degree() > 1 {
+        let turn = |u: f64| place(u, point(piece, u));
+        rate(piece, |point| line.along(point)).sign_changes(&mut |t| places.push(turn(t * piece.width)));
+    }
+    places.push(place(piece.width, control[control.len() - 1]));
+    Course::Straight(places)
+}
+
+/// Neighbours on one line.
+struct Straight<const M: usize> {
+    places: Vec<Place<M>>,
+    line: Option<Line<M>>,
+}
+
+impl<const M: usize> Default for Straight<M> {
+    fn default() -> Self {
+        Self { places: vec![], line: None }
+    }
+}
+
+impl<const M: usize> Straight<M> {
+    /// Takes a straight piece, if it begins where this one ends and goes along the same line.
+    fn joins(&mut self, next: &[Place<M>], rounding: f64) -> bool {
+        let Some((line, end)) = self.line.as_ref().zip(self.places.last().copied()) else {
+            self.places.extend_from_slice(next);
+            self.line = Line::through(next.iter().map(|place| place.point));
+            return true;
+        };
+        if !near(&end.point, &next[0].point, rounding) {
+            return false;
+        }
+        let points = || self.places.iter().chain(next).map(|place| place.point);
+        // A line twice as long as the one that is known may be another one.
+        let known = |place: &Place<M>| {
+            let reached = line.along(&place.point);
+            line.meets(&place.point, rounding) && reached.abs() <= 2.0 * line.length
+        };
+        if !next.iter().all(known) {
+            let Some(line) =
+                Line::through(points()).filter(|line| points().all(|p| line.meets(&p, rounding)))
+            else {
+                return false;
+            };
+            self.line = Some(line);
+        }
+        if let Some(joint) = self.places.last_mut() {
+            joint.pieces[1] = next[0].pieces[1];
+        }
+        self.places.extend(next[1..].iter().map(|place| Place { u: end.u + place.u, ..*place }));
+        true
+    }
+
+    /// Appends the lines from turn to turn, and is empty again.
+    fn leave(&mut self, rounding: f64, out: &mut Regular<M>) {
+        let (Some(line), mut places) = (self.line.take(), std::mem::take(&mut self.places)) else { return };
+        let along = |place: &Place<M>| line.along(&place.point);
+        leave_out_rounding(&mut places, along, rounding);
+        let turns = |i: usize| {
+            let inside = i > 0 && i + 1 < places.len();
+            !inside
+                || (along(&places[i]) - along(&places[i - 1])) * (along(&places[i + 1]) - along(&places[i]))
+                    < 0.0
+        };
+        let ends: Vec<Place<M>> = (0..places.len()).filter(|&i| turns(i)).map(|i| places[i]).collect();
+        for pair in ends.windows(2) {
+            let control = [pair[0].point, pair[1].point];
+            let piece = Piece { control: &control, weights: &[], width: pair[1].u - pair[0].u };
+            out.push([pair[0].pieces[1], pair[1].pieces[0]], &piece, rounding);
+        }
+    }
+}
+
+/// The derivative of a coordinate of the control points, or its numerator.
+fn rate<const M: usize>(
+    piece: &Piece<M>,
+    along: impl Fn(&[f64; M]) -> f64,
+) -> Polynomial<{ MAX_HODOGRAPH + 1 }> {
+    let weight = |i: usize| if piece.is_rational() { piece.weights[i] / piece.weights[0] } else { 1.0 };
+    let start = along(&piece.control[0]);
+    let form = |of: &dyn Fn(usize) -> f64| Polynomial::from_bernstein((0..piece.control.len()).map(of));
+    let places = form(&|i| weight(i) * (along(&piece.control[i]) - start));
+    if piece.is_rational() {
+        places.wronskian(&form(&weight))
+    } else {
+        places.derivative()
+    }
+}
+
+/// Leaves out turns between which the way is rounding, the shortest first; the ends stay where they are.
+fn leave_out_rounding<T>(places: &mut Vec<T>, along: impl Fn(&T) -> f64, rounding: f64) {
+    loop {
+        let way = |i: usize| (along(&places[i + 1]) - along(&places[i])).abs();
+        let Some(shortest) = (0..places.len() - 1).min_by(|&i, &j| way(i).total_cmp(&way(j))) else { return };
+        if way(shortest) > rounding {
+            return;
+        }
+        let last = places.len() - 1;
+        match shortest {
+            // Two turns, of which one undoes the other.
+            i if i > 0 && i + 1 < last => drop(places.drain(i..i + 2)),
+            // From one end to the other and back.
+            _ if last == 1 => drop(places.drain(..)),
+            0 => drop(places.remove(1)),
+            i => drop(places.remove(i)),
+        }
+        if places.is_empty() {
+            return;
+        }
+    }
+}
+
+/// Takes back what is no line for its neighbours: where a line turns a smooth joint into a corner, for it is so short
+/// that the directions of both are rounding, pieces stay as they are.
+fn keep_joints<const M: usize>(moving: &mut [(usize, Piece<M>, Course<M>)], rounding: f64) {
+    let mut kept = false;
+    while !std::mem::replace(&mut kept, true) {
+        for n in 1..moving.len() {
+            let [(_, before, course), (_, after, next)] = &moving[n - 1..=n] else { return };
+            let (own, own_next) = (edge(before, true), edge(after, false));
+            let (line, line_next) = (course.edge(true), next.edge(false));
+            if (line.is_none() && line_next.is_none())
+                || !near(&before.control[before.degree()], &after.control[0], rounding)
+                || !is_smooth(&own, &own_next, rounding)
+                || is_smooth(&line.unwrap_or(own), &line_next.unwrap_or(own_next), rounding)
+            {
+                continue;
+            }
+            for (_, piece, course) in &mut moving[n - 1..=n] {
+                if piece.degree() > 1 && matches!(course, Course::Straight(_)) {
+                    *course = Course::Curved;
+                    kept = false;
+                }
+            }
+        }
+    }
+}
+
+impl<const M: usize> Course<M> {
+    /// From its first place to its second, or from the last but one to the last.
+    fn edge(&self, at_end: bool) -> Option<[f64; M]> {
+        let Self::Straight(places) = self else { return None };
+        let i = if at_end { places.len() - 2 } else { 0 };
+        Some(sub(&places[i + 1].point, &places[i].point))
+    }
+}
+
+/// The first or the last edge of a control polygon that has a direction.
+fn edge<const M: usize>(piece: &Piece<M>, at_end: bool) -> [f64; M] {
+    let (extent, _) = piece.extent();
+    let mut edges = piece.control.windows(2).map(|pair| sub(&pair[1], &pair[0]));
+    let long = |edge: &[f64; M]| norm(edge) > VANISHING * extent;
+    let found = if at_end { edges.rfind(long) } else { edges.find(long) };
+    found.unwrap_or([0.0; M])
+}
+
+/// Whether two edges have one direction, as far as their ends are known.
+fn is_smooth<const M: usize>(before: &[f64; M], after: &[f64; M], rounding: f64) -> bool {
+    let (own, others) = (norm(before), norm(after));
+    let turn = norm(&std::array::from_fn::<f64, M, _>(|k| after[k] / others - before[k] / own));
+    turn <= SMOOTH + rounding / own.min(others)
+}
+
+fn near<const M: usize>(a: &[f64; M], b: &[f64; M], rounding: f64) -> bool {
+    norm(&sub(a, b)) <= rounding
+}
+
+/// Appends a curved piece, cut in its cusps; control points that only rounding keeps from one are put there.
+fn cut_in_cusps<const M: usize>(source: usize, piece: &Piece<M>, rounding: f64, out: &mut Regular<M>) {
+    let cusps = piece_cusps(piece, CUSP);
+    if cusps.is_empty() {
+        return out.push([source; 2], piece, rounding);
+    }
+    let inside = cusps.iter().filter(|t| (AT_END..=1.0 - AT_END).contains(*t));
+    let cuts: Vec<f64> = inside.map(|t| t * piece.width).collect();
+    let mut parts = CompositeCurve::default();
+    split(piece, &cuts, &mut parts);
+    for i in 0..parts.len() {
+        let rests =
+            [i > 0 || cusps[0] < AT_END, i + 1 < parts.len() || cusps[cusps.len() - 1] > 1.0 - AT_END];
+        let control = parts.control_mut(i);
+        if rests[0] {
+            join_first(control.iter_mut(), rounding);
+        }
+        if rests[1] {
+            join_first(control.iter_mut().rev(), rounding);
+        }
+        let part = parts.piece(i);
+        if part.extent().0 > rounding {
+            out.push([source; 2], &part, rounding);
+        }
+    }
+}
+
+/// Puts the points that follow the first one within rounding there.
+fn join_first<'a, const M: usize>(mut points: impl Iterator<Item = &'a mut [f64; M]>, rounding: f64) {
+    let Some(&mut first) = points.next() else { return };
+    for point in points.take_while(|point| near(point, &first, rounding)) {
+        *point = first;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn of<const M: usize>(control: &[[f64; M]], weights: &[f64]) -> Regular<M> {
+        let mut curve = CompositeCurve::default();
+        curve.push(control, weights, 2.0);
+        regular(&curve, &[0..1])
+    }
+
+    #[test]
+    fn a_line_of_any_degree_is_one_of_degree_one() {
+        for weights in [&[][..], &[1.0, 10.0, 0.1, 3.0]] {
+            let line = of(&[[1.0, 0.0], [1.0, 0.0], [4.0, 6.0], [3.0, 4.0]], weights);
+            let turn = line.curve.control[1];
+            assert_eq!((&line.curve.offsets[..], &line.source[..]), (&[0, 2, 4][..], &[[0; 2]; 2][..]));
+            assert_eq!((line.curve.control[0], line.curve.control[3]), ([1.0, 0.0], [3.0, 4.0]));
+            assert!(turn[0] > 3.0 && (turn[1] - 2.0 * (turn[0] - 1.0)).abs() < 1e-15);
+            assert_eq!(line.curve.width.iter().sum::<f64>(), 2.0);
+            assert_eq!(line.rests, [[false; 2]; 2]);
+        }
+    }
+
+    #[test]
+    fn a_line_on_one_axis_goes_from_each_of_its_turns_to_the_next() {
+        // C' = 8 (t − ¼)(t − ¾).
+        let line = of(&[[0.0], [0.5], [-1.0 / 3.0], [1.0 / 6.0]], &[]);
+        let place = |t: f64| 8.0 * (t * t * t / 3.0 - t * t / 2.0 + 3.0 * t / 16.0);
+        for (i, t) in [(1, 0.25), (3, 0.75)] {
+            assert!((line.curve.control[i][0] - place(t)).abs() < 1e-15);
+        }
+        assert_eq!(line.curve.len(), 3);
+        // It stands still for a moment and goes on: t³.
+        assert_eq!(of(&[[0.0], [0.0], [0.0], [1.0]], &[]).curve.control, [[0.0], [1.0]]);
+        assert_eq!(of(&[[-1.0], [1.0], [-1.0], [1.0]], &[]).curve.control, [[-1.0], [1.0]]);
+    }
+
+    #[test]
+    fn what_has_no_length_is_left_out_and_a_curve_stays_as_it_is() {
+        let mut curve = CompositeCurve::default();
+        let bow: &[[f64; 2]] = &[[0.0, 0.0], [1.0, 1.0], [2.0, 0.0]];
+        curve.push(bow, &[1.0, 2.0, 1.0], 1.0);
+        curve.push(&[[2.0, 0.0], [2.0, 1e-16], [2.0, 2e-16]], &[], 1.0);
+        curve.push(&[[2.0, 2e-16], [3.0, -1.0]], &[], 1.0);
+        let made = regular(&curve, &[0..3]);
+        assert_eq!((made.source, made.curve.control[4]), (vec![[0; 2], [2; 2]], [3.0, -1.0]));
+        assert_eq!(made.curve.control[3], [2.0, 0.0]);
+        assert_eq!(&made.curve.control[..3], bow);
+        assert_eq!(regular(&curve, &[1..2, 2..3, 0..0]).ranges, [0..0, 0..1, 1..1]);
+    }
+
+    #[test]
+    fn neighbours_on_one_line_are_one_from_turn_to_turn() {
+        let mut curve = CompositeCurve::default();
+        curve.push(&[[0.1, 0.1], [0.2, 0.2]], &[], 1.0);
+        curve.push(&[[0.2, 0.2], [0.2 + 3e-9, 0.2 + 3e-9], [0.2 + 7e-9, 0.2 + 7e-9]], &[], 1e-6);
+        curve.push(&[[0.2 + 7e-9, 0.2 + 7e-9], [0.9, 0.9], [0.7, 0.7]], &[1.0, 2.0, 1.0], 1.0);
+        curve.push(&[[0.7, 0.7], [0.5, 0.5]], &[], 1.0);
+        curve.push(&[[0.5, 0.5], [0.5, 0.9]], &[], 1.0);
+        let made = regular(&curve, &[0..5]);
+        assert_eq!(made.source, [[0, 2], [2, 3], [4, 4]]);
+        assert_eq!((made.curve.control[0], made.curve.control[3]), ([0.1; 2], [0.5; 2]));
+        assert!((made.curve.width.iter().sum::<f64>() - 4.000001).abs() < 1e-15);
+        // Each of its own where they belong to different moves.
+        assert_eq!(regular(&curve, &[0..1, 1..2, 2..5]).ranges, [0..1, 1..2, 2..5]);
+    }
+
+    #[test]
+    fn a_cusp_is_the_end_of_a_piece_that_rests_there() {
+        // (s², s³) about t = 0.3.
+        let blossom = |a: f64, b: f64, e: f64| {
+            let [a, b, e] = [a, b, e].map(|x| x - 0.3);
+            [(a * b + a * e + b * e) / 3.0, a * b * e]
+        };
+        let control = [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 1.0], [1.0, 1.0, 1.0]]
+            .map(|[a, b, e]| blossom(a, b, e));
+        let made = of(&control, &[]);
+        assert_eq!(made.rests, [[false, true], [true, false]]);
+        let control = &made.curve.control;
+        assert!(control[2] == control[3] && control[3] == control[4] && control[4] == control[5]);
+        assert!(norm(&control[3]) < 1e-16 && (made.curve.width[0] - 0.6).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_short_arc_that_rounding_makes_straight_stays_smooth_for_its_neighbours() {
+        // Ten chords of a circle of 90 mm, of 1e-4 mm each, a metre away: each bows by less than its rounding.
+        let point = |angle: f64| [1000.0 + 90.0 * angle.cos(), 90.0 * angle.sin()];
+        let mut curve = CompositeCurve::default();
+        for i in 0..10 {
+            let (a, b) = (1e-6 * i as f64, 1e-6 * (i + 1) as f64);
+            let (p, q) = (point(a), point(b));
+            let third = |from: [f64; 2], angle: f64, sign: f64| {
+                let reach = sign * 90.0 * 1e-6 / 3.0;
+                [from[0] - reach * angle.sin(), from[1] + reach * angle.cos()]
+            };
+            curve.push(&[p, third(p, a, 1.0), third(q, b, -1.0), q], &[], 1.0);
+        }
+        let made = regular(&curve, &[0..10]);
+        for i in 1..made.curve.len() {
+            let (before, after) = (made.curve.piece(i - 1), made.curve.piece(i));
+            assert!(is_smooth(&edge(&before, true), &edge(&after, false), 2.0 * ROUNDING * 1100.0), "{i}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn lines_cover_what_the_piece_does(
+            places in prop::collection::vec(-1.0..1.0_f64, 2..11),
+            weights in prop::collection::vec(-2.3..2.3_f64, 10),
+            direction in prop::array::uniform3(-1.0..1.0_f64),
+            origin in prop::array::uniform3(-100.0..100.0_f64),
+            rational: bool,
+        ) {
+            prop_assume!(norm(&direction) > 0.1 && places.windows(2).any(|pair| (pair[0] - pair[1]).abs() > 0.1));
+            let on_line = |x: f64| -> [f64; 3] { std::array::from_fn(|k| origin[k] + 10.0 * x * direction[k]) };
+            let control: Vec<[f64; 3]> = places.iter().map(|&x| on_line(x)).collect();
+            let weights: Vec<f64> = weights[..control.len()].iter().map(|w| w.exp()).collect();
+            let given = Piece { control: &control, weights: if rational { &weights } else { &[] }, width: 1.0 };
+            let made = of(&control, given.weights);
+            prop_assert!(made.curve.pieces().all(|piece| piece.degree() == 1));
+            let along = |p: &[f64; 3]| dot(&sub(p, &origin), &direction) / dot(&direction, &direction) / 10.0;
+            // At no place of the piece is it outside the line of that parameter.
+            let breaks: Vec<f64> = made.curve.width.iter().scan(0.0, |sum, w| { *sum += w / 2.0; Some(*sum) }).collect();
+            for i in 0..=200 {
+                let t = i as f64 / 200.0;
+                let n = breaks.partition_point(|&end| end < t).min(made.curve.len() - 1);
+                let line = made.curve.piece(n);
+                let (a, b, x) = (along(&line.control[0]), along(&line.control[1]), along(&point(&given, t)));
+                prop_assert!(x >= a.min(b) - 1e-13 && x <= a.max(b) + 1e-13, "{t}: {x} on {a} {b}");
+            }
+            // Each line turns back against the one before.
+            for pair in made.curve.control.chunks(2).collect::<Vec<_>>().windows(2) {
+                let way = |line: &[[f64; 3]]| along(&line[1]) - along(&line[0]);
+                prop_assert!(way(pair[0]) * way(pair[1]) < 0.0);
+            }
+        }
+    }
+}
