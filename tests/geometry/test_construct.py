@@ -106,21 +106,21 @@ def test_straight_curves_are_lines_from_turn_to_turn() -> None:
         ]
     )
     path = Path.from_curve(spline, feed=5.0)
-    np.testing.assert_array_equal(path.curve.degree, [1, 1])
-    np.testing.assert_array_equal(path.runs, [0, 1, 2])
-    np.testing.assert_array_equal(path.move, [[0, 2], [2, 3]])
+    np.testing.assert_array_equal(path.curve.degree, [1, 1, 1])
+    np.testing.assert_array_equal(path.runs, [0, 2, 3])
+    np.testing.assert_array_equal(path.move, [[0, 0], [1, 2], [2, 3]])
     # 3/(1 + 3) of the way to the middle point; at the ends of pieces the parameter is that of the curve.
-    np.testing.assert_allclose(path.curve.control_points[1], [3.5, 3.5], rtol=1e-15)
-    np.testing.assert_array_equal(path.width, [3.0, 2.0])
+    np.testing.assert_allclose(path.curve.control_points[3], [3.5, 3.5], rtol=1e-15)
+    np.testing.assert_array_equal(path.width, [1.0, 2.0, 2.0])
     np.testing.assert_allclose(spline.at([3.0])[0, 0], [3.5, 3.5], rtol=1e-15)
 
 
 def test_pieces_without_length_are_left_out_and_gaps_refused() -> None:
     line = CompositeCurve.from_bezier([[0, 0], [1, 0]])
     still = CompositeCurve.from_bezier([[1, 0], [1, 0], [1, 0]], [1, 2, 1])
-    on = CompositeCurve.from_bezier([[1 + 5e-7, 0], [2, 1]])
+    on = CompositeCurve.from_bezier([[1 + 5e-7, 0], [2, 0]])
     path = Path.from_curve(CompositeCurve.joined([line, still, on]))
-    np.testing.assert_array_equal(path.runs, [0, 1, 2])
+    np.testing.assert_array_equal(path.runs, [0, 2])
     np.testing.assert_array_equal(path.move, [[0, 0], [2, 2]])
     np.testing.assert_array_equal(path.curve.control_points[2], [1, 0])
     far = CompositeCurve.joined([line, CompositeCurve.from_bezier([[1, 0.5], [2, 0]])], gap=1.0)

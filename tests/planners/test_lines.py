@@ -18,7 +18,7 @@ from tests.planners.lines import seven_sections, straight_case, trapezoid, ways
 def test_the_closed_forms_by_hand() -> None:
     assert trapezoid(1.0, 1e9, 1.0) == 2.0
     assert trapezoid(1.0, 0.5, 1.0) == 2.5
-    # Jerk 1 up, down, down, up for half a second each; then with a level of acceleration, then with one of speed.
+    # Jerk 1 up, down, down, up for half a second each; with a level of acceleration; with one of speed.
     assert seven_sections(2 * 0.5**3, 1e9, 1e9, 1.0) == pytest.approx(2.0, rel=1e-15)
     assert seven_sections(6.0, 1e9, 1.0, 1.0) == pytest.approx(6.0, rel=1e-15)
     assert seven_sections(10.0, 2.0, 1.0, 1.0) == pytest.approx(8.0, rel=1e-15)

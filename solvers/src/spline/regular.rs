@@ -104,7 +104,8 @@ impl<const M: usize> Line<M> {
 
 /// The pieces of a curve as lines and curves without a cusp inside, each range of pieces by itself.
 ///
-/// What has no length is left out, and neighbours on one line are one. Parameter intervals stay; lines are passed evenly.
+/// What has no length is left out, and neighbours on one line are one, unless both are lines already. Parameter intervals
+/// stay; lines are passed evenly.
 pub fn regular<const M: usize>(given: &CompositeCurve<M>, ranges: &[Range<usize>]) -> Regular<M> {
     let greatest = given.control.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
     let rounding = ROUNDING * greatest;
@@ -122,9 +123,10 @@ pub fn regular<const M: usize>(given: &CompositeCurve<M>, ranges: &[Range<usize>
             .collect();
         keep_joints(&mut moving, rounding);
         let mut straight = Straight::default();
-        for (i, piece, course) in &moving {
+        for (n, (i, piece, course)) in moving.iter().enumerate() {
             if let Course::Straight(places) = course {
-                if !straight.joins(places, rounding) {
+                let lines = n > 0 && piece.degree() == 1 && moving[n - 1].1.degree() == 1;
+                if lines || !straight.joins(places, rounding) {
                     straight.leave(rounding, &mut out);
                     straight.joins(places, rounding);
                 }
@@ -410,12 +412,12 @@ mod tests {
         curve.push(&[[0.2, 0.2], [0.2 + 3e-9, 0.2 + 3e-9], [0.2 + 7e-9, 0.2 + 7e-9]], &[], 1e-6);
         curve.push(&[[0.2 + 7e-9, 0.2 + 7e-9], [0.9, 0.9], [0.7, 0.7]], &[1.0, 2.0, 1.0], 1.0);
         curve.push(&[[0.7, 0.7], [0.5, 0.5]], &[], 1.0);
-        curve.push(&[[0.5, 0.5], [0.5, 0.9]], &[], 1.0);
+        curve.push(&[[0.5, 0.5], [0.4, 0.4]], &[], 1.0);
         let made = regular(&curve, &[0..5]);
         assert_eq!(made.source, [[0, 2], [2, 3], [4, 4]]);
         assert_eq!((made.curve.control[0], made.curve.control[3]), ([0.1; 2], [0.5; 2]));
         assert!((made.curve.width.iter().sum::<f64>() - 4.000001).abs() < 1e-15);
-        // Each of its own where they belong to different moves.
+        // What is a line already stays one; each is one of its own where they belong to different moves.
         assert_eq!(regular(&curve, &[0..1, 1..2, 2..5]).ranges, [0..1, 1..2, 2..5]);
     }
 
