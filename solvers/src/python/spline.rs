@@ -368,8 +368,8 @@ fn curve_regular<'py>(
     let axes = control_points.shape()[1];
     with_path_axes!(axes, M, {
         let curve = curve::<M>(&control_points, weights.as_ref(), &offsets, &width)?;
-        let whole = [0..curve.len()];
-        let made = py.detach(|| regular(&curve, &whole));
+        let whole = 0..curve.len();
+        let made = py.detach(|| regular(&curve, std::slice::from_ref(&whole)));
         let source = made.source.iter().flatten().map(|&source| source as i64);
         let shape = [made.source.len(), 2];
         Ok((

@@ -358,10 +358,14 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    fn whole<const M: usize>(curve: &CompositeCurve<M>) -> Regular<M> {
+        regular(curve, std::slice::from_ref(&(0..curve.len())))
+    }
+
     fn of<const M: usize>(control: &[[f64; M]], weights: &[f64]) -> Regular<M> {
         let mut curve = CompositeCurve::default();
         curve.push(control, weights, 2.0);
-        regular(&curve, &[0..1])
+        whole(&curve)
     }
 
     #[test]
@@ -398,7 +402,7 @@ mod tests {
         curve.push(bow, &[1.0, 2.0, 1.0], 1.0);
         curve.push(&[[2.0, 0.0], [2.0, 1e-16], [2.0, 2e-16]], &[], 1.0);
         curve.push(&[[2.0, 2e-16], [3.0, -1.0]], &[], 1.0);
-        let made = regular(&curve, &[0..3]);
+        let made = whole(&curve);
         assert_eq!((made.source, made.curve.control[4]), (vec![[0; 2], [2; 2]], [3.0, -1.0]));
         assert_eq!(made.curve.control[3], [2.0, 0.0]);
         assert_eq!(&made.curve.control[..3], bow);
@@ -413,7 +417,7 @@ mod tests {
         curve.push(&[[0.2 + 7e-9, 0.2 + 7e-9], [0.9, 0.9], [0.7, 0.7]], &[1.0, 2.0, 1.0], 1.0);
         curve.push(&[[0.7, 0.7], [0.5, 0.5]], &[], 1.0);
         curve.push(&[[0.5, 0.5], [0.4, 0.4]], &[], 1.0);
-        let made = regular(&curve, &[0..5]);
+        let made = whole(&curve);
         assert_eq!(made.source, [[0, 2], [2, 3], [4, 4]]);
         assert_eq!((made.curve.control[0], made.curve.control[3]), ([0.1; 2], [0.5; 2]));
         assert!((made.curve.width.iter().sum::<f64>() - 4.000001).abs() < 1e-15);
@@ -451,7 +455,7 @@ mod tests {
             };
             curve.push(&[p, third(p, a, 1.0), third(q, b, -1.0), q], &[], 1.0);
         }
-        let made = regular(&curve, &[0..10]);
+        let made = whole(&curve);
         for i in 1..made.curve.len() {
             let (before, after) = (made.curve.piece(i - 1), made.curve.piece(i));
             assert!(is_smooth(&edge(&before, true), &edge(&after, false), 2.0 * ROUNDING * 1100.0), "{i}");
