@@ -8,6 +8,7 @@ on; how far they may still be wrong is allowed for.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,10 @@ from feedplan.profile import ArcKind, SpeedProfile
 
 # What the pass mark allows beyond a limit.
 EXCESS = 1e-6
+
+# A jerk is known closely enough where it may be off by no more than this part of its limit, or where it is
+# below this part of the limit and may be off by no more than that.
+CLOSE, LOW, ROUGH = 1e-9, 0.9, 1e-3
 
 # Places of an arc: those of arcs up to so many servo periods long.
 PLACES = ((10, 10.0), (80, 80.0), (640, np.inf))
@@ -63,24 +68,39 @@ class Slopes:
     way_error: Array
 
 
-def slopes(path: JointPath, piece: Numbers, u: Array) -> Slopes:
-    """The derivatives at places (n,)."""
-    coarse = _differences(path, piece, u, WIDEST)
-    best, error = coarse[0], np.full_like(coarse[0], np.inf)
-    for number in range(1, STEPS):
-        fine = _differences(path, piece, u, WIDEST * 0.5**number)
-        apart = np.abs(fine[0] - coarse[0])
-        for (value, rounding), left in ((coarse, 1.0), (fine, LEFT)):
-            bound = left * apart + rounding
-            better = bound < error
-            best, error = np.where(better, value, best), np.where(better, bound, error)
-        coarse = fine
+def slopes(
+    path: JointPath,
+    piece: Numbers,
+    u: Array,
+    is_enough: Callable[[Slopes, Numbers], NDArray[np.bool_]] = lambda at, rows: np.zeros(len(rows), bool),
+) -> Slopes:
+    """The derivatives at places (n,); `is_enough` says of some rows (m,) whether what is known will do."""
     joints = len(path.problem.axes)
-    # The last column is the slope of the way: its first two derivatives are the second and third of the way.
     speed = path.way_slope(piece, u)
-    way = np.stack([speed, best[0, :, joints], best[1, :, joints]])
-    way_error = np.stack([ROUNDINGS * EPS * speed, error[0, :, joints], error[1, :, joints]])
-    return Slopes(best[:, :, :joints], error[:, :, :joints], way, way_error)
+
+    def known(best: Array, error: Array, speed: Array) -> Slopes:
+        # The last column is the slope of the way: its derivatives are the second and third of the way.
+        way = np.stack([speed, best[0, :, joints], best[1, :, joints]])
+        way_error = np.stack([ROUNDINGS * EPS * speed, error[0, :, joints], error[1, :, joints]])
+        return Slopes(best[:, :, :joints], error[:, :, :joints], way, way_error)
+
+    coarse = _differences(path, piece, u, WIDEST)
+    best, error = coarse[0].copy(), np.full_like(coarse[0], np.inf)
+    rows = np.arange(len(piece))
+    for number in range(1, STEPS):
+        fine = _differences(path, piece[rows], u[rows], WIDEST * 0.5**number)
+        apart = np.abs(fine[0] - coarse[0])
+        value, least = best[:, rows], error[:, rows]
+        for (found, rounding), left in ((coarse, 1.0), (fine, LEFT)):
+            bound = left * apart + rounding
+            better = bound < least
+            value, least = np.where(better, found, value), np.where(better, bound, least)
+        best[:, rows], error[:, rows] = value, least
+        open_ = ~is_enough(known(value, least, speed[rows]), rows)
+        rows, coarse = rows[open_], (fine[0][:, open_], fine[1][:, open_])
+        if not len(rows):
+            break
+    return known(best, error, speed)
 
 
 def _differences(path: JointPath, piece: Numbers, u: Array, share: float) -> tuple[Array, Array]:
@@ -93,7 +113,7 @@ def _differences(path: JointPath, piece: Numbers, u: Array, share: float) -> tup
     many = np.repeat(piece, len(NODES))
     tip, slope = path.tip(many, places.ravel())
     q = path.joints(many, tip).reshape(count, len(NODES), -1)
-    speed = path.way_slope(many, places.ravel()).reshape(count, len(NODES), 1)
+    speed = path.way_of(slope).reshape(count, len(NODES), 1)
     change = path.between(piece, q[:, 3:4], q)
     values = np.concatenate([change, speed - speed[:, 3:4]], axis=2)
     # A joint feels the rounding of the tip as much as it moves with it.
@@ -177,8 +197,15 @@ def _jerks(
     share = np.linspace(0.0, 1.0, count + 1)
     u = profile.u0[arcs, None] * (1.0 - share) + profile.u1[arcs, None] * share
     pace = paces(path, profile, arcs, ways(path, piece, u))
-    at = slopes(path, np.repeat(piece, count + 1), u.ravel())
-    _, (jerk, error) = rates(at, pace.v.ravel(), pace.a.ravel(), pace.j.ravel())
+    v, a, j = pace.v.ravel(), pace.a.ravel(), pace.j.ravel()
+
+    def is_enough(at: Slopes, rows: Numbers) -> NDArray[np.bool_]:
+        jerk, error = (part / problem.max_jerk for part in rates(at, v[rows], a[rows], j[rows])[1])
+        is_low = (np.abs(jerk) + error <= LOW) & (error <= ROUGH)
+        return np.asarray((is_low | (error <= CLOSE)).all(axis=1))
+
+    at = slopes(path, np.repeat(piece, count + 1), u.ravel(), is_enough)
+    _, (jerk, error) = rates(at, v, a, j)
     time = (starts[arcs][:, None] + pace.time).ravel()
     line = np.repeat(problem.path.line[piece], count + 1)
     worst.samples += len(time)

@@ -77,13 +77,15 @@ def motion(path: JointPath, profile: SpeedProfile, arcs: Numbers, u: Array | Non
     count, width = u.shape
     piece = profile.piece[arcs].astype(np.int64)
     kind, value = profile.kind[arcs], profile.value[arcs][:, None]
-    many = np.repeat(piece, width)
-    slope, error, unknown = (x.reshape(count, width, x.shape[1]) for x in path.slopes(many, u.ravel()))
-    position = path.at(many, u.ravel()).reshape(count, width, slope.shape[2])
+    # Arcs are asked for again and again, as by setpoints: each place is measured once.
+    spots, again = np.unique(np.repeat(piece, width) + 1j * u.ravel(), return_inverse=True)
+    many, at = spots.real.astype(np.int64), spots.imag.copy()
+    again = again.reshape(count, width)
+    slope, error, unknown = (x[again] for x in path.slopes(many, at))
+    position = path.at(many, at)[again]
     steps = path.between(piece, position[:, :-1], position[:, 1:])
     way = np.concatenate([np.zeros((count, 1, steps.shape[2])), np.cumsum(steps, axis=1)], axis=1)
-    tip_speed = path.feed_slope(many, u.ravel()).reshape(count, width)
-    way_speed = path.way_slope(many, u.ravel()).reshape(count, width)
+    tip_speed, way_speed = path.feed_slope(many, at)[again], path.way_slope(many, at)[again]
     p = np.stack([profile.p0[arcs], profile.p1[arcs]], axis=1)
     with np.errstate(all="ignore"):
         own = np.where(profile.axis[arcs] < slope.shape[2], profile.axis[arcs], 0).astype(np.int64)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from feedplan._solvers import audit_places
 from feedplan.constraints.problem import Problem
+from feedplan.machine.meaning import Meaning
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
@@ -85,16 +86,45 @@ class JointPath:
         """C and C' (n, axes) at places."""
         return audit_places(self.problem.path.curve, piece, np.ascontiguousarray(u))
 
+    @cached_property
+    def _turned(self) -> NDArray[np.bool_]:
+        """The pieces on which only the tool's direction I, J, K turns (n,): the feed is in degrees of it."""
+        meaning = np.array([words.meaning is Meaning.VECTOR for words in self.problem.words])
+        return np.asarray(meaning[self.run] & ~(self.feed_axes & self._of("XYZ")).any(axis=1))
+
+    def _of(self, letters: str) -> NDArray[np.bool_]:
+        """The axes of the path with these letters (axes,)."""
+        return np.array([name in letters for name in self.problem.path.axes])
+
     def feed_slope(self, piece: Numbers, u: Array) -> Array:
         """Way that the feed is about, per u (n,), at places."""
-        slope = self.tip(piece, u)[1]
-        return np.asarray(np.linalg.norm(np.where(self.feed_axes[piece], slope, 0.0), axis=1))
+        place, slope = self.tip(piece, u)
+        way = np.linalg.norm(np.where(self.feed_axes[piece], slope, 0.0), axis=1)
+        rows = np.flatnonzero(self._turned[piece])
+        if len(rows):
+            direction, change = (value[np.ix_(rows, self._of("IJK"))] for value in (place, slope))
+            across = np.linalg.norm(np.cross(direction, change), axis=1)
+            way[rows] = np.degrees(across / (direction**2).sum(axis=1))
+        return np.asarray(way)
+
+    def feed_way(self, piece: Numbers, start: Array, end: Array) -> Array:
+        """Way that the feed is about (n,), straight from one point of a piece (n, axes) to another."""
+        way = np.linalg.norm(np.where(self.feed_axes[piece], end - start, 0.0), axis=1)
+        rows = np.flatnonzero(self._turned[piece])
+        if len(rows):
+            first, last = (point[np.ix_(rows, self._of("IJK"))] for point in (start, end))
+            across = np.linalg.norm(np.cross(first, last), axis=1)
+            way[rows] = np.degrees(np.arctan2(across, (first * last).sum(axis=1)))
+        return np.asarray(way)
 
     def way_slope(self, piece: Numbers, u: Array) -> Array:
         """Way along the path in all its axes, per u (n,), at places."""
-        assert self.problem.way_curve is not None
-        slope = audit_places(self.problem.way_curve, piece, np.ascontiguousarray(u))[1]
-        return np.asarray(np.linalg.norm(slope, axis=1))
+        return self.way_of(self.tip(piece, u)[1])
+
+    def way_of(self, slope: Array) -> Array:
+        """The same (n,) from C' (n, axes)."""
+        scale = 1.0 if self.problem.way_scale is None else self.problem.way_scale
+        return np.asarray(np.sqrt(((slope * scale) ** 2).sum(axis=1)))
 
     def joints(self, piece: Numbers, tip: Array) -> Array:
         """Positions (n, joints) [mm, deg] for points of pieces, angles as the kinematics gives them."""
@@ -113,10 +143,14 @@ class JointPath:
         """Positions (n, joints) at places."""
         return self.joints(piece, self.tip(piece, u)[0])
 
-    def between(self, piece: Numbers, before: Array, after: Array) -> Array:
-        """From one position to another (n, …, joints), turning joints the short way round."""
+    def between(self, piece: Numbers, before: Array, after: Array, other: Numbers | None = None) -> Array:
+        """From one position to another (n, …, joints), both of the piece or the first of an `other` one.
+
+        Joints that turn on one of them go the short way round."""
         way = after - before
         turning = self.turning[self.run[piece]]
+        if other is not None:
+            turning = turning | self.turning[self.run[other]]
         turning = turning.reshape(len(piece), *([1] * (way.ndim - 2)), way.shape[-1])
         with np.errstate(invalid="ignore"):
             return np.where(turning, way - TURN * np.round(way / TURN), way)

@@ -154,6 +154,8 @@ class _Auditor:
         self.reach = np.full((2, self.names), np.nan)
         self.reached = np.zeros((2, self.names), [("time", float), ("line", int)])
         self.last: tuple[int, Array, Array] | None = None
+        # What these angles are off by, in whole turns [deg]; not a number before a joint's turn is known.
+        self.turns = np.full(self.names, np.nan)
         # The arc before the chunk: velocities of its end with their errors, speed, piece.
         self.before: tuple[int, Array, Array, float] | None = None
 
@@ -313,10 +315,16 @@ class _Auditor:
             offset = first[0]
         else:
             number, position, seen = self.last
-            offset = seen + self.path.between(np.array([number]), position[None], first[:1])[0]
-        steps = self.path.between(piece[1:], state.position[:-1, -1], first[1:])
+            before = np.array([number])
+            offset = seen + self.path.between(piece[:1], position[None], first[:1], before)[0]
+        steps = self.path.between(piece[1:], state.position[:-1, -1], first[1:], piece[:-1])
         ways = state.way[:-1, -1] + steps
         begin = offset + np.concatenate([np.zeros((1, self.names)), np.cumsum(ways, axis=0)])
+        # Angles known up to whole turns are those that they are where they are known.
+        known = ~self.path.turning[self.path.run[piece]] & np.isnan(self.turns)
+        for k in np.flatnonzero(known.any(axis=0)):
+            row = int(known[:, k].argmax())
+            self.turns[k] = TURN * np.round((first[row, k] - begin[row, k]) / TURN)
         positions = begin[:, None] + state.way
         flat, times = positions.reshape(-1, self.names), clock.ravel()
         lines = np.broadcast_to(line, clock.shape).ravel()
@@ -331,17 +339,17 @@ class _Auditor:
         self.last = int(piece[-1]), state.position[-1, -1], positions[-1, -1]
 
     def finish(self) -> None:
-        """The travel, angles on the turn that suits them best: the path cannot say on which one it starts."""
-        turning = np.all(self.path.turning, axis=0).tolist()
+        """The travel; angles that are known up to whole turns everywhere on the turn that suits them best."""
         for k in range(self.names):
             lower, upper = (float(bound) for bound in self.travel[k])
             least, most = (float(q) for q in self.reach[:, k])
             if not (np.isfinite(upper - lower) and np.isfinite(most - least)):
                 continue
             middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
-            if turning[k]:
+            turns = float(self.turns[k])
+            if np.isnan(turns):
                 turns = TURN * np.round((middle - 0.5 * (least + most)) / TURN)
-                least, most = least + turns, most + turns
+            least, most = least + turns, most + turns
             end = int(most - middle > middle - least)
             value, bound = (most, upper) if end else (least, lower)
             ratio = (abs(value - middle) - 2.0 * ROUNDINGS * EPS * abs(value)) / half

@@ -84,15 +84,15 @@ class JointSetpoints:
 
     def _off(self, piece: Numbers, position: Array, place: Array) -> Array:
         """Distance (n,) of positions from places, less rounding; the same angle on whichever turn."""
-        size = np.maximum(np.abs(position), np.abs(place)).max(axis=1)
         away = np.linalg.norm(self.path.between(piece, place, position), axis=1)
-        return np.asarray(away - ROUNDINGS * EPS * np.sqrt(position.shape[1]) * self._size(piece, size))
+        return np.asarray(away - self._rounding(piece, np.maximum(np.abs(position), np.abs(place))))
 
-    def _size(self, piece: Numbers, size: Array) -> Array:
-        """Greatest coordinate of joints and tip: what rounding is relative to (n,)."""
+    def _rounding(self, piece: Numbers, position: Array) -> Array:
+        """What rounding makes of a distance (n,): relative to the greatest coordinate of joints and tip."""
         curve = self.problem.path.curve
-        first = curve.control_points[curve.offsets[piece]]
-        return np.asarray(np.maximum(size, np.abs(first).max(axis=1)))
+        first = np.abs(curve.control_points[curve.offsets[piece]]).max(axis=1)
+        size = np.maximum(np.abs(position).max(axis=1), first)
+        return np.asarray(ROUNDINGS * EPS * np.sqrt(position.shape[1]) * size)
 
     def _take(self, rows: SetpointChunk, count: int, last: bool = False) -> None:
         if self.last is None and len(rows.t):
@@ -195,6 +195,8 @@ class JointSetpoints:
         place = self.path.at(piece, u)
         away = np.linalg.norm(self.path.between(piece, place, target), axis=1)
         step = NEARBY * (high - low)
+        # No place is known more closely: next to rest it would be passed at another time.
+        known = self._rounding(piece, target)
         for _ in range(MOST_STEPS):
             side = np.where(u + step > high, -step, step)
             slope = self.path.between(piece, place, self.path.at(piece, u + side)) / side[:, None]
@@ -203,7 +205,7 @@ class JointSetpoints:
             new = np.clip(u + np.nan_to_num(move), low, high)
             there = self.path.at(piece, new)
             distance = np.linalg.norm(self.path.between(piece, there, target), axis=1)
-            better = distance < away
+            better = (distance < away) & (away > known)
             if not better.any():
                 break
             u, away = np.where(better, new, u), np.where(better, distance, away)
@@ -245,31 +247,39 @@ class JointSetpoints:
         time = t - t0
         is_step = (time > 0.0) & (time <= 2.0 * self.period) & (piece - piece0 <= 1) & (piece >= piece0)
         line = problem.path.line[piece]
-        axes = path.feed_axes[piece]
-        way = np.linalg.norm(np.where(axes, tip - tip0, 0.0), axis=1)
-        rounding = ROUNDINGS * EPS * np.abs(tip).max(axis=1)
-        feed = np.maximum(problem.feed[piece], problem.feed[piece0])
+        crosses = piece != piece0
+        # To the end of the piece before, and from the start of this one, whose words may mean another thing.
+        until = np.where(crosses, problem.path.width[piece0], u)
+        since = np.where(crosses, 0.0, u)
+        parts = [
+            (piece0, tip0, path.tip(piece0, until)[0]),
+            (piece, path.tip(piece, since)[0], tip),
+        ]
+        rounding = ROUNDINGS * EPS * np.maximum(np.abs(tip), np.abs(tip0)).max(axis=1)
+        way, least = np.zeros(len(t)), np.zeros(len(t))
+        for number, start, end in parts:
+            step = np.maximum(path.feed_way(number, start, end) - 2.0 * rounding, 0.0)
+            way, least = way + step, least + step / problem.feed[number]
         with np.errstate(all="ignore"):
-            speed = np.where(is_step, (way - 2.0 * rounding) / time, 0.0)
+            speed = np.where(is_step, way / time, 0.0)
+            feed = np.where(way > 0.0, way / least, problem.feed[piece])
         self.worst.offer("feed", speed, feed, t, line)
         if not np.isfinite(problem.chord_tolerance):
             return
-        # The path between: to the end of the piece before, from the start of this one.
-        linear = axes & np.array([name in "XYZ" for name in problem.path.axes])
-        crosses = piece != piece0
-        until = np.where(crosses, problem.path.width[piece0], u)
+        # From one run to the next the tool stands still: each side has a chord of its own.
+        stops = (path.run[piece] != path.run[piece0])[:, None]
+        chords = [
+            (piece0, u0, until, tip0, np.where(stops, parts[0][2], tip)),
+            (piece, np.where(crosses, 0.0, u0), u, np.where(stops, parts[1][1], tip0), tip),
+        ]
         error = np.zeros(len(t))
-        for share in (0.25, 0.5, 0.75, 1.0):
-            for number, start, end in (
-                (piece0, u0, until),
-                (piece, np.where(crosses, 0.0, u0), u),
-            ):
+        for number, start, end, from_, to in chords:
+            linear = path.feed_axes[number] & np.array([name in "XYZ" for name in problem.path.axes])
+            for share in (0.25, 0.5, 0.75, 1.0):
                 point = path.tip(number, start + share * (end - start))[0]
-                error = np.maximum(
-                    error, _from_chord(np.where(linear, point, 0.0), tip0 * linear, tip * linear)
-                )
+                error = np.maximum(error, _from_chord(point * linear, from_ * linear, to * linear))
+            length = np.linalg.norm((to - from_) * linear, axis=1)
         with np.errstate(all="ignore"):
-            length = np.linalg.norm(np.where(linear, tip - tip0, 0.0), axis=1)
             before_length = np.concatenate([length[:1], length[:-1]])
             after_length = np.concatenate([length[1:], length[-1:]])
             # The limit is that of a circle: where the tip gains speed the path leans to one end of the chord.

@@ -8,6 +8,7 @@ an axis's acceleration is met within 1e-8 of its limit at every speed that the o
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby, pairwise
@@ -17,7 +18,13 @@ from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Cut, TipSpeed
 from feedplan.curves.composite import CompositeCurve
-from feedplan.curves.hodograph import SPEED_NODES, chebyshev, interpolation, speed_squares
+from feedplan.curves.hodograph import (
+    SPEED_NODES,
+    chebyshev,
+    interpolated_squares,
+    interpolation,
+    speed_squares,
+)
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
 from feedplan.machine.along import derivatives, positions
@@ -132,6 +139,11 @@ class _Task:
         points = curve.control_points[:, columns] if columns else np.zeros((len(curve.control_points), 1))
         return replace(curve, control_points=points)
 
+    def direction(self, curve: CompositeCurve) -> CompositeCurve:
+        """The motion in I, J and K alone."""
+        columns = [self.path.axes.index(name) for name in DIRECTION]
+        return replace(curve, control_points=curve.control_points[:, columns])
+
 
 @dataclass(frozen=True)
 class _Stretch:
@@ -197,7 +209,7 @@ def _affine(task: _Task) -> _Stretch:
     travel = np.array([axis.travel for axis in machine.axes])
     if ((joints.control_points < travel[:, 0]) | (joints.control_points > travel[:, 1])).any():
         _survey(task, tips)
-    linear = tool if words.meaning is Meaning.JOINTS else task.linear(tool)
+    linear = task.linear(tool)
     speed = _either(TipSpeed(*speed_squares(linear)), TipSpeed(*speed_squares(tool)), _moving(linear))
     origin = joints.control_points[joints.offsets[:-1]]
     local = joints.control_points - np.repeat(origin, np.diff(joints.offsets), axis=0)
@@ -244,7 +256,17 @@ def _curved(task: _Task) -> _Stretch:
     route = _survey(task, tips)
     linear = task.linear(curve)
     moves = _moving(linear)
-    allowed = _Allowed(task, tips, linear, moves)
+    whole = curve.width
+    squares = []
+    if curve.weights is not None:
+        scaled = replace(curve, control_points=curve.control_points * way_scale(task.path.axes, task.machine))
+        squares += [
+            _Interpolated(_speed_of(linear), curve.rational & moves, whole),
+            _Interpolated(_speed_of(scaled), curve.rational, whole),
+        ]
+    if task.words.meaning is Meaning.VECTOR:
+        squares.append(_Interpolated(_turning_of(task.direction(curve)), ~moves, whole))
+    allowed = _Allowed(task, tips, linear, moves, squares)
     proxies = build_proxies(kinematics, control, width, allowed, NODES, weights)
     near = np.isinf(proxies.curvature_error).any(axis=1)
     if near.any():
@@ -258,11 +280,18 @@ def _curved(task: _Task) -> _Stretch:
     origin = route.positions(proxies.piece, proxies.part[:, 0])
     speed = _tool_speed(task.linear(tool))
     if not moves.all():
-        rotary = np.array(kinematics.rotary)
-        columns = rotary if rotary.any() else ~rotary
-        turning = replace(joints, control_points=joints.control_points[:, columns])
-        speed = _either(speed, TipSpeed(*speed_squares(turning)), moves[proxies.piece])
+        speed = _either(speed, _turning_speed(task, tool, joints), moves[proxies.piece])
     return _Stretch(task.words, task.pieces[proxies.piece], proxies.part, tool, joints, origin, speed)
+
+
+def _turning_speed(task: _Task, tool: CompositeCurve, joints: CompositeCurve) -> TipSpeed:
+    """What the feed is about where X, Y and Z stand still: the rotary joints, or the tool's direction."""
+    if task.words.meaning is Meaning.VECTOR:
+        square = interpolated_squares(_turning_of(task.direction(tool)), np.arange(len(tool)), tool.width)
+        return TipSpeed((1 + SPEED_SHARE) * square.ravel(), SPEED_NODES * np.arange(len(tool) + 1))
+    rotary = np.array(task.words.kinematics.rotary)
+    columns = rotary if rotary.any() else ~rotary
+    return TipSpeed(*speed_squares(replace(joints, control_points=joints.control_points[:, columns])))
 
 
 def _moving(curve: CompositeCurve) -> NDArray[np.bool_]:
@@ -274,12 +303,13 @@ def _moving(curve: CompositeCurve) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True)
 class _Allowed:
-    """How far q'' may be off on parts of pieces; nothing where |C'|² would not be met."""
+    """How far q'' may be off on parts of pieces; nothing where the square of a speed would not be met."""
 
     task: _Task
     tips: CompositeCurve
     linear: CompositeCurve
     moves: NDArray[np.bool_]
+    squares: list[_Interpolated]
 
     def __call__(self, piece: NDArray[np.int64], part: Array) -> Array:
         acceleration = np.array([axis.max_acceleration for axis in self.task.machine.axes])
@@ -288,7 +318,7 @@ class _Allowed:
         allowed: Array = np.minimum(SHARE * acceleration / rate_sq[:, None], (POSITION / length**2)[:, None])
         # Near a cusp u̇² has no bound that would help; no stand-in is nearer than rounding.
         allowed = np.maximum(allowed, ROUNDING * bend)
-        allowed[~self._speed_is_met(piece, part)] = 0.0
+        allowed[~self._is_met(piece, part)] = 0.0
         return allowed
 
     def _rates(self, piece: NDArray[np.int64], part: Array) -> tuple[Array, Array]:
@@ -311,34 +341,67 @@ class _Allowed:
         rate_sq: Array = MARGIN * np.where(greatest > 0, greatest, 1.0)
         return rate_sq, bend
 
-    def _speed_is_met(self, piece: NDArray[np.int64], part: Array) -> NDArray[np.bool_]:
-        """Whether interpolation meets |C'|² halfway between its nodes, where it is off the most."""
-        if self.tips.weights is None:
-            return np.ones(len(piece), dtype=bool)
-        between = 0.5 - 0.5 * np.cos(np.pi * np.arange(SPEED_NODES + 1) / SPEED_NODES)
-        found, true = (self._speed_sq(piece, part, at) for at in (chebyshev(SPEED_NODES), between))
-        miss = np.abs(found @ interpolation(SPEED_NODES, between).T - true)
-        # In a near cusp the speed is rounding, and no limit of the feed.
-        floor = SPEED_NOISE * self._fastest[piece][:, None]
-        met: NDArray[np.bool_] = (miss <= SPEED_SHARE * true + floor).all(axis=1) | ~self.moves[piece]
+    def _is_met(self, piece: NDArray[np.int64], part: Array) -> NDArray[np.bool_]:
+        """Whether interpolation meets the squares of speeds that are no polynomials."""
+        met = np.ones(len(piece), dtype=bool)
+        for square in self.squares:
+            met &= square.is_met(piece, part)
+        return met
+
+
+Square = Callable[[NDArray[np.int64], Array], Array]
+
+
+@dataclass(frozen=True)
+class _Interpolated:
+    """The square of a speed by piece and u that is interpolated, on those `pieces` (n,) of these widths."""
+
+    square: Square
+    pieces: NDArray[np.bool_]
+    width: Array
+
+    def is_met(self, piece: NDArray[np.int64], part: Array) -> NDArray[np.bool_]:
+        """Whether it is met halfway between the nodes on parts (m, 2), where it is off the most."""
+        met: NDArray[np.bool_] = ~self.pieces[piece]
+        rows = np.flatnonzero(~met)
+        if len(rows):
+            between = 0.5 - 0.5 * np.cos(np.pi * np.arange(SPEED_NODES + 1) / SPEED_NODES)
+            found, true = (self._at(piece[rows], part[rows], at) for at in (chebyshev(SPEED_NODES), between))
+            miss = np.abs(found @ interpolation(SPEED_NODES, between).T - true)
+            # In a near cusp the speed is rounding, and no limit of the feed.
+            floor = SPEED_NOISE * self._greatest[piece[rows], None]
+            met[rows] = (miss <= SPEED_SHARE * true + floor).all(axis=1)
         return met
 
     @cached_property
-    def _fastest(self) -> Array:
-        """About the greatest |C'|² of each piece (n,), from its polygon."""
-        steps = np.linalg.norm(np.diff(self.linear.control_points, axis=0), axis=1)
-        inside = np.ones(len(steps), dtype=bool)
-        inside[self.linear.offsets[1:-1] - 1] = False
-        longest = np.maximum.reduceat(np.append(np.where(inside, steps, 0.0), 0.0), self.linear.offsets[:-1])
-        fastest: Array = (longest * self.linear.degree / self.linear.width) ** 2
-        return fastest
+    def _greatest(self) -> Array:
+        """About the greatest square on each piece (n,)."""
+        piece = np.arange(len(self.width))
+        greatest: Array = self._at(piece, np.tile([0.0, 1.0], (len(piece), 1)), chebyshev(SPEED_NODES)).max(
+            axis=1
+        )
+        return greatest
 
-    def _speed_sq(self, piece: NDArray[np.int64], part: Array, at: Array) -> Array:
+    def _at(self, piece: NDArray[np.int64], part: Array, at: Array) -> Array:
         fraction = part[:, :1] + at * (part[:, 1:] - part[:, :1])
-        u = fraction * self.linear.width[piece][:, None]
-        tangent = self.linear.evaluate(np.repeat(piece, len(at)), u.ravel(), 1)[1]
-        square: Array = (tangent**2).sum(axis=1).reshape(u.shape)
-        return square
+        u = fraction * self.width[piece][:, None]
+        return self.square(np.repeat(piece, len(at)), u.ravel()).reshape(u.shape)
+
+
+def _speed_of(curve: CompositeCurve) -> Square:
+    """|C'|² of a curve."""
+    return lambda piece, u: np.asarray((curve.evaluate(piece, u, 1)[1] ** 2).sum(axis=1))
+
+
+def _turning_of(curve: CompositeCurve) -> Square:
+    """The square of the rate at which a direction of any length turns [deg²], by u."""
+
+    def square(piece: NDArray[np.int64], u: Array) -> Array:
+        direction, slope = curve.evaluate(piece, u, 1)
+        across = (np.cross(direction, slope) ** 2).sum(axis=1)
+        return np.asarray(np.degrees(1.0) ** 2 * across / (direction**2).sum(axis=1) ** 2)
+
+    return square
 
 
 def _joint_pieces(proxies: Proxies) -> CompositeCurve:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -46,15 +47,23 @@ def _interpolated(curve: CompositeCurve, rational: NDArray[np.bool_]) -> tuple[A
     offsets = np.concatenate([[0], np.cumsum(count)])
     result = np.zeros(int(offsets[-1]))
     rows = np.flatnonzero(rational)
-    u = (curve.width[rows, None] * chebyshev(SPEED_NODES)).ravel()
-    square = (curve.evaluate(np.repeat(rows, SPEED_NODES), u, 1)[1] ** 2).sum(axis=1)
-    places = offsets[rows][:, None] + np.arange(SPEED_NODES)
-    result[places] = from_chebyshev(square.reshape(-1, SPEED_NODES))
+    result[offsets[rows][:, None] + np.arange(SPEED_NODES)] = interpolated_squares(
+        lambda piece, u: (curve.evaluate(piece, u, 1)[1] ** 2).sum(axis=1), rows, curve.width[rows]
+    )
     others = np.flatnonzero(~rational)
     if len(others):
         own, _ = speed_squares(replace(curve.take(others), weights=None))
         result[np.repeat(~rational, count)] = own
     return result, offsets
+
+
+def interpolated_squares(
+    square: Callable[[NDArray[np.int64], Array], Array], piece: NDArray[np.int64], width: Array
+) -> Array:
+    """Bernstein coefficients (n, SPEED_NODES) through a function of piece and u, on these pieces (n,)."""
+    u = (width[:, None] * chebyshev(SPEED_NODES)).ravel()
+    values = square(np.repeat(piece, SPEED_NODES), u)
+    return from_chebyshev(values.reshape(-1, SPEED_NODES))
 
 
 def from_chebyshev(values: Array) -> Array:

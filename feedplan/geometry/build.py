@@ -92,8 +92,8 @@ def build_path(
     the machine's order and within their travel; where they are the tool tip (and its direction), in the
     order of the machine's kinematics, and travel is a matter of the joints that follow. A fitted chain is
     followed across changes of feed; its pieces are cut there, so that none is faster than a block it covers.
-    Where rotary axes move along with X, Y and Z, a feed counts along X, Y and Z; where words are joints it
-    is handed on as the speed in all axes that gives it (on splines as it is, which is not faster).
+    Where rotary axes move along with X, Y and Z, a feed counts along X, Y and Z; where all words are joints
+    it is handed on as the speed in all axes that gives it (on splines as it is, which is not faster).
 
     Raises MachineError (an axis is missing), ProgramError (a move has no length, an arc no radius, a spline
     does not fit its move), InputError (a position outside the travel, a negative tolerance).
@@ -111,9 +111,8 @@ def build_path(
     exact = settings.exact_tolerance if not tolerance else min(tolerance, settings.exact_tolerance)
     halt = program.stop | (program.dwell > 0) | (program.control == PathControl.EXACT_STOP)
     halt[:-1] |= words.changes
-    feed = _feed_in_all_axes(program, starts)
-    if not words.joints.all():
-        feed = np.where(words.joints, feed, program.feed)
+    # Where some words are the tip's, feeds count along X, Y, Z everywhere.
+    feed = _feed_in_all_axes(program, starts) if words.joints.all() else program.feed
 
     (curve, feed, move, allowed, runs), summary, outside, rough = native_build_path(
         program.name,

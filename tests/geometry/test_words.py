@@ -65,13 +65,13 @@ def test_runs_end_where_the_meaning_or_the_tool_changes(make_program: Any) -> No
     assert even.tool_length is None
 
 
-def test_feeds_of_the_tip_stay_and_feeds_of_joints_become_speeds_in_all_axes(make_program: Any) -> None:
+def test_feeds_are_numbers_of_the_program_whatever_its_words_mean(make_program: Any) -> None:
     machine = Machine.load("trunnion-ac")
     points = [[0, 0, 0, 0, 0], [3, 0, 0, 4, 0], [6, 0, 0, 8, 0]]
     meaning = np.array([Meaning.JOINTS, Meaning.TIP], dtype=np.uint8)
     program = make_program(points, axes="XYZAC", feed=6.0, meaning=meaning)
     path = build_path(program, machine)
-    np.testing.assert_allclose(path.feed, [10.0, 6.0])
+    np.testing.assert_array_equal(path.feed, 6.0)
 
 
 def test_a_direction_has_columns_of_its_own(make_program: Any) -> None:

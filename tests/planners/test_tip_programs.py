@@ -1,0 +1,120 @@
+"""Five-axis programs: G43.4, G43.5 and G49 in any order are planned within the limits, or refused."""
+
+from __future__ import annotations
+
+import os
+import re
+
+import numpy as np
+import pytest
+
+from feedplan import InputError, Machine, Plan, ProgramError, SolverError, plan
+from feedplan.planners import limits_jerk
+from feedplan.program.gcode import read_gcode
+from tests.planners.audited import audited
+from tests.planners.tip_programs import random_tip_program
+
+SEEDS = int(os.environ.get("FEEDPLAN_SEEDS", "2"))
+MACHINES = ["trunnion-ac", "trunnion-bc", "head-table", "head-head", "rotary-table"]
+METHODS = ["bang-bang", "jerk-limited", "s-curve", "ruckig"]
+# What states between segments may be improved for: their first ones are a plan [s].
+TIME_LIMITS = {"ruckig": 0.2}
+# Reasons to refuse a program that a machinist accepts.
+REASONS = (
+    r"its travel (begins|ends) at",
+    r"the tool is at a tool axis parallel to",
+    r"the tool passes so near a singular position",
+    r"the tool turns over by 180 degrees",
+    r"goes to machine positions and G43\.[45] is in force: cancel it by G49 before",
+)
+
+# What a tool of 120 mm on a BC trunnion does after the way up, by what is at fault where it fails.
+UP = "G21 G90 G94\nG0 Z400\n"
+PROGRAMS = {
+    "the first block changes the meaning": (
+        "trunnion-ac",
+        "G21 G90\nG43.4 H1\nG0 X10 Y0 Z50 A0 C0\nG1 X20 A-10 C10 F600",
+    ),
+    "a rapid that only turns": ("trunnion-bc", UP + "G0 B0 C0\nG43.4 H1\nG0 X40 Y2 Z5\nG0 C64"),
+    "turns there and back": (
+        "trunnion-bc",
+        UP + "G0 B0 C0\nG43.4 H1\nG0 X40 Y2 Z5\nG0 B-5 C64\nG0 B0\nG0 Z10",
+    ),
+    "joints after the tip": (
+        "trunnion-bc",
+        UP + "G0 B-5 C64\nG43.4 H1\nG0 X40 Y2 Z5\nG49\nG0 Z400\nG0 Y0 B0 C0",
+    ),
+    "a direction that only turns": (
+        "trunnion-bc",
+        UP + "G0 B9 C5\nG43.5 H1\nG1 I0.3 J0.1 K0.9 F500\nG49\nG0 Z450\nG28",
+    ),
+    "a feed before a turn": (
+        "head-head",
+        "G21 G90 G64 P0.5\nG0 Z900\nG1 C40 F800\nG43.4 H1\nG1 A-20\nG1 X9 A-22\nG49\nG0 Z1000",
+    ),
+}
+
+
+def excess(planned: Plan, jerk: bool) -> list[str]:
+    """Joint limits that plain differences of the setpoints exceed."""
+    machine = planned.machine
+    chunk = planned.setpoints().all()
+    axes = [machine.axis(name) for name in chunk.axes]
+    period = machine.period
+    found = []
+    for order, limit, share in (
+        (1, "max_velocity", 1e-6),
+        (2, "max_acceleration", 1e-5),
+        (3, "max_jerk", 1e-4),
+    ):
+        if len(chunk) <= order or (order == 3 and not jerk):
+            continue
+        most = np.abs(np.diff(chunk.position, order, axis=0)).max(axis=0) / period**order
+        for axis, value in zip(axes, most.tolist(), strict=True):
+            if value > getattr(axis, limit) * (1 + share):
+                found.append(f"{axis.name} {limit} {value / getattr(axis, limit):.6g} times")
+    low, high = np.array([axis.travel for axis in axes]).T
+    if ((chunk.position < low - 1e-6) | (chunk.position > high + 1e-6)).any():
+        found.append("travel")
+    return found
+
+
+def broken(text: str, machine: Machine, method: str, refuses: bool = True) -> list[str]:
+    """What audit and differences say of the plan; nothing of a program that `refuses` lets be refused."""
+    try:
+        program = read_gcode(text, machine, name="part.ngc")
+        if len(program) == 0:
+            return []
+        planned = plan(program, machine, method=method, time_limit=TIME_LIMITS.get(method))
+    except (InputError, ProgramError) as refused:
+        sentence = str(refused)
+        return [] if refuses and any(re.search(reason, sentence) for reason in REASONS) else [sentence]
+    jerk = limits_jerk(method)
+    found = [*audited(planned.problem, planned.profile, machine, program, jerk), *excess(planned, jerk)]
+    if not planned.lower_bound <= planned.time * (1 + 1e-9):
+        found.append(f"the time {planned.time} s is below its bound {planned.lower_bound} s")
+    return found
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("name", list(PROGRAMS))
+def test_everyday_sequences_keep_every_limit(name: str, method: str) -> None:
+    machine, text = PROGRAMS[name]
+    assert broken(f"{text}\nM30\n", Machine.load(machine), method, refuses=False) == []
+
+
+@pytest.mark.parametrize("method", ["bang-bang", "jerk-limited"])
+@pytest.mark.parametrize("name", MACHINES)
+def test_random_sequences_keep_every_limit(name: str, method: str) -> None:
+    machine = Machine.load(name)
+    found = {seed: broken(random_tip_program(seed, machine), machine, method) for seed in range(SEEDS)}
+    assert {seed: sentences for seed, sentences in found.items() if sentences} == {}
+
+
+@pytest.mark.parametrize("method", ["junction-deviation", "tangential", "arc-transition"])
+def test_methods_of_the_programs_axes_say_so(method: str) -> None:
+    machine, text = PROGRAMS["a rapid that only turns"]
+    with pytest.raises(
+        SolverError, match=r"takes the program's axes as the machine's: .* plan with bang-bang"
+    ):
+        plan(read_gcode(f"{text}\nM30\n", Machine.load(machine)), machine, method=method)
