@@ -4,7 +4,9 @@
 //! on, errors grow by a factor of ten or more at each step: all digits are gone at degree 9, whatever the weights. The
 //! least squares of all rows lose none. With m_i = q_i w_i row r is
 //!
-//!     Σ (b − a) w_a w_b (q_b − q_a) = p_r,   a < b, a + b = r + 1,
+//! ```text
+//! Σ (b − a) w_a w_b (q_b − q_a) = p_r,   a < b, a + b = r + 1,
+//! ```
 //!
 //! a mean of differences once it is divided by the sum of its factors, which is also what the rounding of p_r is
 //! relative to: so each row counts as much as it is known.
