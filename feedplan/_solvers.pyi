@@ -31,6 +31,7 @@ __all__ = [
     "curve_regular",
     "curve_reverse",
     "curve_split",
+    "feed_between",
     "fit_points",
     "look_ahead",
     "lower_bound",
@@ -109,6 +110,9 @@ def profile_of_sections(
     sections: NDArray[np.float64],
 ) -> tuple[_Profile, _Changes]: ...
 def lower_bound(problem: Problem, profile: SpeedProfile) -> float: ...
+def feed_between(
+    problem: Problem, piece: NDArray[np.int64], u0: NDArray[np.float64], u1: NDArray[np.float64]
+) -> NDArray[np.float64]: ...
 def look_ahead(
     speed: NDArray[np.float64], gain: NDArray[np.float64], hold: NDArray[np.float64]
 ) -> NDArray[np.float64]: ...
@@ -137,6 +141,7 @@ class Sampler:
         width: NDArray[np.float64],
         tip_speed: tuple[NDArray[np.float64], NDArray[np.int64]] | None,
         way_speed: tuple[NDArray[np.float64], NDArray[np.int64]] | None,
+        feed_share: NDArray[np.float64] | None,
         line: NDArray[np.int32],
         runs: NDArray[np.int64],
         start_dwell: float,
@@ -233,6 +238,7 @@ _Findings = tuple[list[tuple[str, int, float, float, float, float, int]], int]
 def audit_plan(
     problem: Problem,
     limits: _Limits,
+    feed: NDArray[np.float64],
     profile: SpeedProfile | None = None,
     program: Program | None = None,
 ) -> _Findings: ...
@@ -247,6 +253,7 @@ class SetpointAudit:
         limits: _Limits,
         resolution: float = 0.0,
         problem: Problem | None = None,
+        feed: NDArray[np.float64] | None = None,
         profile: SpeedProfile | None = None,
         program: Program | None = None,
     ) -> SetpointAudit: ...

@@ -151,6 +151,7 @@ def sampler(problem: Problem, profile: SpeedProfile, period: float, interpolator
         *problem.curve.columns(),
         _columns(problem.tip_speed),
         _columns(problem.way_speed),
+        None if problem.feed_share is None else _array(problem.feed_share, np.float64),
         _array(path.line, np.int32),
         _array(path.runs, np.int64),
         float(path.start_dwell),

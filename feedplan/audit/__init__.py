@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import SetpointAudit, audit_plan
+from feedplan.audit.feed import feed_axes, feed_limits
 from feedplan.audit.joint_profile import audit_joint_profile
 from feedplan.audit.joint_setpoints import JointSetpoints
 from feedplan.audit.recorded import audit_recorded
@@ -43,6 +44,7 @@ class _Limits:
     max_velocity_jump: list[float]
     jump_beyond: list[float]
     travel: list[tuple[float, float]]
+    feed_axes: list[list[float]]
     chord_tolerance: float
     period: float
     end_speeds: tuple[float, float]
@@ -72,7 +74,7 @@ def audit(
     program and setpoints do not belong together.
     """
     axes = problem.axes
-    program = program.along(problem.path.axes) if program else None
+    program = None if program is None else program.along(problem.path.axes)
     machine_axes = _machine_axes(machine, axes)
     jump = [axis.max_velocity_jump for axis in machine_axes]
     limits = _Limits(
@@ -83,6 +85,7 @@ def audit(
         max_velocity_jump=jump if problem.velocity_jump is None else _numbers(problem.velocity_jump),
         jump_beyond=jump,
         travel=[axis.travel for axis in machine_axes],
+        feed_axes=feed_axes(axes),
         chord_tolerance=float(problem.chord_tolerance),
         period=float(problem.period),
         end_speeds=(float(problem.start_speed), float(problem.end_speed)),
@@ -115,10 +118,11 @@ def _audit_axes(
 ) -> Results:
     """Where the path's axes are the joints."""
     plan_limits = replace(limits, period=float(problem.period))
-    results = [audit_plan(problem, plan_limits, profile, program)]
+    feed = feed_limits(problem, program)
+    results = [audit_plan(problem, plan_limits, feed, profile, program)]
     if setpoints is not None:
         report(PLAN_SHARE)
-        stream = SetpointAudit(limits, 0.0, problem, profile, program)
+        stream = SetpointAudit(limits, 0.0, problem, feed, profile, program)
         for chunk in setpoints:
             _push(stream, chunk)
         results.append(stream.finish())
@@ -144,8 +148,9 @@ def _audit_joints(
         max_velocity_jump=[0.0] * axes,
         jump_beyond=[0.0] * axes,
         travel=[(-math.inf, math.inf)] * axes,
+        feed_axes=feed_axes(problem.path.axes),
     )
-    findings, samples = audit_plan(problem, free, None, program)
+    findings, samples = audit_plan(problem, free, feed_limits(problem, program), None, program)
     results: Results = [([found for found in findings if found[1] < 0], samples)]
     jump = np.array(limits.max_velocity_jump)
     if profile is not None:
@@ -247,6 +252,7 @@ def audit_setpoints(
         max_velocity_jump=jump,
         jump_beyond=own_jump,
         travel=[axis.travel for axis in machine_axes],
+        feed_axes=feed_axes(names),
         chord_tolerance=math.inf,
         period=period,
         end_speeds=(0.0, 0.0),
@@ -313,6 +319,7 @@ _PATH = {
     **_dtypes(np.int32, "line"),
 }
 _PROBLEM = _dtypes(np.float64, "feed", "junction_speed")
+_SHARES = _dtypes(np.float64, "feed_share")
 _PROFILE = {
     **_dtypes(np.float64, "value", "u0", "u1", "p0", "p1", "duration", "a0", "a1"),
     **_dtypes(np.uint8, "kind", "axis"),
@@ -333,6 +340,8 @@ def _native(
     """The same with arrays as the native module takes them; nothing is copied that is so already."""
     path = _with_dtypes(problem.path, _PATH)
     problem = _with_dtypes(replace(problem, path=path), _PROBLEM)
+    if problem.feed_share is not None:
+        problem = _with_dtypes(problem, _SHARES)
     return (
         problem,
         None if profile is None else _with_dtypes(profile, _PROFILE),

@@ -1,21 +1,58 @@
-"""The feed limit: the commanded feed of each piece, overridden where the user asks."""
+"""The feed limit: the commanded feed of each piece, or what the user asks for, and what axes count in it."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.errors import InputError
+from feedplan.geometry.feed_groups import feed_groups, leading_feed, moving_axes
 from feedplan.geometry.path import Path
 
 
-def feed_limit(path: Path, greatest: float, feed: float | None, override: float) -> NDArray[np.float64]:
+@dataclass(frozen=True)
+class FeedRequest:
+    """What the user asks for in place of the programmed feeds: `feed` [mm/s], if given, times `override`."""
+
+    feed: float | None = None
+    override: float = 1.0
+
+    def __post_init__(self) -> None:
+        feed, override = self.feed, self.override
+        if not (math.isfinite(override) and override > 0):
+            raise InputError(
+                f"feed override is {override}: give a positive factor (1 is the programmed feed)"
+            )
+        if feed is not None and not (math.isfinite(feed) and feed > 0):
+            raise InputError(f"feed is {feed} mm/s: give a positive feed")
+
+    def of(self, feed: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The feed in place of a programmed one; infinite ones stay."""
+        given = feed if self.feed is None else np.where(np.isfinite(feed), self.feed, feed)
+        return np.asarray(given * self.override)
+
+
+def feed_limit(path: Path, greatest: float, request: FeedRequest) -> NDArray[np.float64]:
     """Greatest speed of each piece (n,) [mm/s], at most `greatest`, which is what a rapid gets."""
-    if not (math.isfinite(override) and override > 0):
-        raise InputError(f"feed override is {override}: give a positive factor (1 is the programmed feed)")
-    if feed is not None and not (math.isfinite(feed) and feed > 0):
-        raise InputError(f"feed is {feed} mm/s: give a positive feed")
-    commanded = path.feed if feed is None else np.where(np.isfinite(path.feed), feed, path.feed)
-    return np.minimum(commanded * override, greatest)
+    return np.minimum(request.of(path.feed), greatest)
+
+
+def feed_share(path: Path, greatest: float, request: FeedRequest) -> NDArray[np.float64] | None:
+    """What the velocity of each axis counts in the speed that `feed_limit` limits (n, axes).
+
+    1 on the axes along which that feed counts, 0 on those that no feed is about. Where a piece keeps feeds
+    along two groups of axes, the second ones count by the quotient of both feeds: the sum of squares keeps
+    each of them. None where all axes that move count as they are.
+    """
+    if path.group_feed is None:
+        return None
+    by_group = np.minimum(request.of(path.group_feed), greatest)
+    by_group[np.isinf(path.group_feed)] = np.inf
+    first = leading_feed(by_group, np.ones(len(path)))
+    by_axis = (first[:, None] / by_group) @ feed_groups(path.axes)
+    by_axis[np.isinf(by_group).all(axis=1)] = 1.0
+    by_axis[((by_axis == 1.0) | ~moving_axes(path.curve)).all(axis=1)] = 1.0
+    return None if (by_axis == 1.0).all() else np.ascontiguousarray(by_axis)

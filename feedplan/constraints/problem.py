@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feedplan.constraints.feed import feed_limit
+from feedplan.constraints.feed import FeedRequest, feed_limit, feed_share
 from feedplan.constraints.junction import junction_limit
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.hodograph import speed_squares
@@ -56,11 +56,13 @@ class Problem:
     """Minimise the time along `path` under these limits.
 
     Per joint (`axes` names them): `max_velocity` [mm/s], `max_acceleration` [mm/s²], `max_jerk` [mm/s³] (may
-    be infinite). Per piece: `feed` (n,) greatest speed [mm/s], finite. At piece ends: `junction_speed`
+    be infinite). Per piece: `feed` (n,) greatest speed [mm/s], finite, of |(share_k q'_k)| u̇, `feed_share`
+    (n, axes) being what each axis counts in it (None: all as they are). At piece ends: `junction_speed`
     (n + 1,) greatest speed [mm/s]: 0 at a stop, infinite where nothing but the other limits holds.
     `chord_tolerance` [mm] and `period` [s] limit the speed on a curve of radius ρ to (2/T)·√(2ρδ − δ²); an
     infinite tolerance switches that off. `start_speed` and `end_speed` [mm/s] hold at the ends of the path.
     `velocity_jump` [mm/s] is what each axis velocity may jump by at a corner; None for the machine's own.
+    `request` is what the user asked for in place of the programmed feeds.
 
     Where the path's axes are not the joints of the machine, `joints` is the motion of the joints [mm, deg],
     one polynomial piece for each of the path and over the same parameter, counted from `joint_origin`
@@ -88,6 +90,8 @@ class Problem:
     way_scale: NDArray[np.float64] | None = None
     words: tuple[AxisWords, ...] = ()
     cut: Cut | None = None
+    feed_share: NDArray[np.float64] | None = None
+    request: FeedRequest = field(default_factory=FeedRequest)
 
     def __post_init__(self) -> None:
         for name in ("max_velocity", "max_acceleration", "max_jerk", "feed", "junction_speed"):
@@ -191,15 +195,17 @@ def build_problem(
     for name, value in (("start speed", start_speed), ("end speed", end_speed)):
         if not (np.isfinite(value) and value >= 0):
             raise InputError(f"{name} is {value} mm/s: give a finite speed of 0 or more")
+    request = FeedRequest(feed, feed_override)
     if not machine.is_plain:
         # Kinematics are loaded where they are needed.
         from feedplan.constraints.joints import has_joints_of_its_own
 
         if has_joints_of_its_own(path, machine):
-            return _joint_problem(path, machine, feed, feed_override, (start_speed, end_speed))
+            return _joint_problem(path, machine, request, (start_speed, end_speed))
     axes = [machine.axis(name) for name in path.axes]
     max_velocity = np.array([axis.max_velocity for axis in axes])
     max_acceleration = np.array([axis.max_acceleration for axis in axes])
+    greatest = 2.0 * float(np.linalg.norm(max_velocity))
     jump = np.array([axis.max_velocity_jump for axis in axes])
     if path.corners is Corners.PROGRAMMED:
         jump = np.maximum(jump, max_acceleration * machine.period)
@@ -208,7 +214,9 @@ def build_problem(
         max_velocity=max_velocity,
         max_acceleration=max_acceleration,
         max_jerk=np.array([axis.max_jerk for axis in axes]),
-        feed=feed_limit(path, 2.0 * float(np.linalg.norm(max_velocity)), feed, feed_override),
+        feed=feed_limit(path, greatest, request),
+        feed_share=feed_share(path, greatest, request),
+        request=request,
         junction_speed=_with_ends(junction_limit(path, jump), start_speed, end_speed),
         chord_tolerance=machine.chord_tolerance,
         period=machine.period,
@@ -216,6 +224,14 @@ def build_problem(
         end_speed=end_speed,
         velocity_jump=jump,
     )
+
+
+def feed_square(problem: Problem, piece: NDArray[np.integer], u: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The square of the speed that the feed limits over p at places (n,)."""
+    if problem.feed_share is None:
+        return speed_square(problem, piece, u)
+    slope = problem.curve.evaluate(piece, u, 1)[1]
+    return np.asarray(((problem.feed_share[piece] * slope) ** 2).sum(axis=1))
 
 
 def speed_square(problem: Problem, piece: NDArray[np.integer], u: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -235,13 +251,11 @@ def speed_square(problem: Problem, piece: NDArray[np.integer], u: NDArray[np.flo
     return square
 
 
-def _joint_problem(
-    path: Path, machine: Machine, feed: float | None, override: float, ends: tuple[float, float]
-) -> Problem:
+def _joint_problem(path: Path, machine: Machine, request: FeedRequest, ends: tuple[float, float]) -> Problem:
     """The problem where the joints move in another way than the path's axes; corners are stops."""
     from feedplan.constraints.joints import joint_motion, way_scale
 
-    limit = feed_limit(path, NO_FEED, feed, override)
+    limit = feed_limit(path, NO_FEED, request)
     motion = joint_motion(path, machine, limit)
     path = motion.path
     return Problem(
@@ -249,7 +263,8 @@ def _joint_problem(
         max_velocity=np.array([axis.max_velocity for axis in machine.axes]),
         max_acceleration=np.array([axis.max_acceleration for axis in machine.axes]),
         max_jerk=np.array([axis.max_jerk for axis in machine.axes]),
-        feed=feed_limit(path, NO_FEED, feed, override),
+        feed=feed_limit(path, NO_FEED, request),
+        request=request,
         junction_speed=_with_ends(junction_limit(path, np.zeros(len(path.axes))), *ends),
         chord_tolerance=machine.chord_tolerance,
         period=machine.period,

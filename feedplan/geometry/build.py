@@ -12,12 +12,11 @@ from feedplan._solvers import build_path as native_build_path
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError, ProgramError
 from feedplan.geometry.corners import Corners
+from feedplan.geometry.feed_groups import group_feeds, leading_feed, moved_groups
 from feedplan.geometry.path import FitSummary, Path
 from feedplan.geometry.path_words import path_words
 from feedplan.machine.machine import Machine
-from feedplan.program.program import LINEAR_AXES, MoveKind, PathControl, Program
-
-PARALLEL_AXES = "UVW"
+from feedplan.program.program import LINEAR_AXES, PathControl, Program
 
 # Splines and their moves come from sums of the same offsets; more than this between them [mm] is no rounding.
 _SPLINE_GAP = 1e-6
@@ -92,8 +91,9 @@ def build_path(
     the machine's order and within their travel; where they are the tool tip (and its direction), in the
     order of the machine's kinematics, and travel is a matter of the joints that follow. A fitted chain is
     followed across changes of feed; its pieces are cut there, so that none is faster than a block it covers.
-    Where rotary axes move along with X, Y and Z, a feed counts along X, Y and Z; where all words are joints
-    it is handed on as the speed in all axes that gives it (on splines as it is, which is not faster).
+    A feed counts along X, Y and Z where a move moves one of these, else along U, V and W, else it is that of
+    the rotary axes, at every place of the path; a blend of moves whose feeds count along different axes keeps
+    both (`Path.group_feed`), and where words are the tool tip it is a stop.
 
     Raises MachineError (an axis is missing), ProgramError (a move has no length, an arc no radius, a spline
     does not fit its move), InputError (a position outside the travel, a negative tolerance).
@@ -111,15 +111,16 @@ def build_path(
     exact = settings.exact_tolerance if not tolerance else min(tolerance, settings.exact_tolerance)
     halt = program.stop | (program.dwell > 0) | (program.control == PathControl.EXACT_STOP)
     halt[:-1] |= words.changes
-    # Where some words are the tip's, feeds count along X, Y, Z everywhere.
-    feed = _feed_in_all_axes(program, starts) if words.joints.all() else program.feed
+    moving = program.moving()
+    if not words.joints.all():
+        halt[:-1] |= _changes_of_group(names, moving)
 
     (curve, feed, move, allowed, runs), summary, outside, rough = native_build_path(
         program.name,
         program.start,
         program.kind,
         program.target,
-        feed,
+        program.feed,
         program.line,
         limit,
         fit_limit,
@@ -155,10 +156,13 @@ def build_path(
         )
     points, fitted, polynomials, deviation = summary
     first = move[runs[:-1], 0]
+    followed = CompositeCurve(*curve)
+    by_group = group_feeds(names, moving, program.feed, followed, move)
     return Path(
         axes=names,
-        curve=CompositeCurve(*curve),
-        feed=feed,
+        curve=followed,
+        feed=feed if by_group is None else leading_feed(by_group, feed),
+        group_feed=by_group,
         move=move,
         line=program.line[move[:, 0]],
         runs=runs,
@@ -171,6 +175,13 @@ def build_path(
         corners=corners,
         warnings=_rough_places(program, *rough),
     )
+
+
+def _changes_of_group(names: tuple[str, ...], moving: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(m − 1,) whether the feed of the next move counts along other axes."""
+    groups = moved_groups(names, moving)
+    leading = np.where(np.logical_or.reduce(groups, axis=1), groups.argmax(axis=1), -1)
+    return np.asarray((leading[1:] != leading[:-1]) & (leading[1:] >= 0) & (leading[:-1] >= 0))
 
 
 def _rough_places(
@@ -261,27 +272,3 @@ def _tolerances(
     if corners is not Corners.ROUNDED:  # only that fits a part of the program by itself
         return limit, np.zeros(len(program))
     return limit, np.minimum(fit_limit, settings.fit_share * limit)
-
-
-def _feed_in_all_axes(program: Program, starts: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Feeds as speeds in all axes together: the speed at which the axes that a feed counts along have it."""
-    groups = [
-        [column for column, name in enumerate(program.axes) if name in letters]
-        for letters in (LINEAR_AXES, PARALLEL_AXES)
-    ]
-    if len(groups[0]) == len(program.axes):
-        return program.feed
-    length_sq = (program.target - starts) ** 2
-    # Along an arc the plane axes move by more than the chord says.
-    arc, planes = program.arc_move, _arc_planes(program)
-    centre = np.take_along_axis(program.arc_centre, _plane_letters(program), axis=1)
-    radius = np.linalg.norm(np.take_along_axis(starts[arc], planes, axis=1) - centre, axis=1)
-    length_sq[arc, planes[:, 0]] = (radius * program.arc_angle) ** 2
-    length_sq[arc, planes[:, 1]] = 0.0
-    counted = np.zeros(len(program))
-    for group in (*groups, list(range(len(program.axes)))):
-        counted = np.where(counted > 0, counted, length_sq[:, group].sum(axis=1))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        speed: NDArray[np.float64] = program.feed * np.sqrt(length_sq.sum(axis=1) / counted)
-    as_it_is = (program.kind == MoveKind.RAPID) | (program.kind == MoveKind.SPLINE) | (counted == 0)
-    return np.where(as_it_is, program.feed, speed)

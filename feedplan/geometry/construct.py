@@ -16,6 +16,7 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
 from feedplan.geometry.build import FitSettings
 from feedplan.geometry.corners import Corners
+from feedplan.geometry.feed_groups import group_feeds, moving_axes
 from feedplan.geometry.joints import tangent_jumps
 from feedplan.geometry.path import FitSummary, Path
 from feedplan.machine.machine import AXIS_LETTERS
@@ -37,10 +38,11 @@ def path_of_curve(curve: CompositeCurve, axes: Sequence[str] | None, feed: float
     columns, piece, rests = curve_regular(*_closed_gaps(curve.take(moving)).columns())
     if len(piece) == 0:
         raise InputError("the curve has no length: give control points that differ")
+    moves = moving_axes(curve)
     curve = CompositeCurve(*columns)
     stops = (tangent_jumps(curve) > 0).any(axis=1) | rests[:-1, 1] | rests[1:, 0]
     runs = np.concatenate([[0], np.flatnonzero(stops) + 1, [len(curve)]])
-    return _path(names, curve, speed, runs, moving[piece])
+    return _path(names, curve, speed, runs, moves, moving[piece])
 
 
 def path_of_points(
@@ -96,7 +98,8 @@ def path_of_points(
         math.radians(settings.corner_angle),
         corners.value,
     )
-    path = _path(names, CompositeCurve(*curve), speed, runs, move, allowed, FitSummary(*summary))
+    moving = np.diff(array, axis=0) != 0.0
+    path = _path(names, CompositeCurve(*curve), speed, runs, moving, move, allowed, FitSummary(*summary))
     return replace(path, corners=corners)
 
 
@@ -105,17 +108,20 @@ def _path(
     curve: CompositeCurve,
     feed: float,
     runs: NDArray[np.int64],
+    moving: NDArray[np.bool_],
     move: NDArray[np.int64] | None = None,
     tolerance: NDArray[np.float64] | None = None,
     fit: FitSummary | None = None,
 ) -> Path:
     count = len(curve)
     number = np.arange(count)
+    move = np.stack([number, number], axis=1) if move is None else move
     return Path(
         axes=axes,
         curve=curve,
         feed=np.full(count, feed),
-        move=np.stack([number, number], axis=1) if move is None else move,
+        move=move,
+        group_feed=group_feeds(axes, moving, np.full(len(moving), feed), curve, move),
         line=np.zeros(count, dtype=np.int32),
         runs=runs,
         dwell=np.zeros(len(runs) - 1),

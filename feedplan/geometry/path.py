@@ -48,13 +48,17 @@ class Path:
     """Pieces C_i(u), u in [0, width_i], joined end to end.
 
     `axes` names; `curve` the n pieces [mm, deg], each of its own degree, polynomial or rational; `feed` (n,)
-    commanded feed [mm/s], infinite on rapids; `move` (n, 2) first and last program move that the piece
-    follows; `line` (n,) source line of the first; `runs` (r + 1,) piece offsets: the tool stands still at the
-    start and the end of each run; `dwell` (r,) pause after each run [s]; `tolerance` (n,) allowed distance
-    from the programmed path [mm]; `start_dwell` pause before the first run [s].
+    commanded feed [mm/s], infinite on rapids, `group_feed` says along which axes; `move` (n, 2) first and
+    last program move that the piece follows; `line` (n,) source line of the first; `runs` (r + 1,) piece
+    offsets: the tool stands still at the start and the end of each run; `dwell` (r,) pause after each run [s];
+    `tolerance` (n,) allowed distance from the programmed path [mm]; `start_dwell` pause before the first run
+    [s].
     `meaning` (r,) what the axes are on the machine in each run (`feedplan.machine.meaning.Meaning`) and
     `tool_length` (r,) [mm], NaN for the machine file's; None where the machine knows one meaning only.
     `corners` is what became of those of the program; `warnings` are sentences for the user.
+    `group_feed` (n, 3): greatest speed along X, Y, Z, along U, V, W [mm/s], and of all other axes together
+    [deg/s], infinite where none is commanded; more than one of them holds on a blend of moves whose feeds
+    count along different axes, and `feed` is the first. None where all axes count together.
     Within a run the tangent is continuous, unless corners are passed with a velocity jump.
     """
 
@@ -72,6 +76,7 @@ class Path:
     tool_length: NDArray[np.float64] | None = None
     corners: Corners = Corners.ROUNDED
     warnings: tuple[str, ...] = ()
+    group_feed: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         dtypes = {"feed": float, "move": np.int64, "line": np.int32, "runs": np.int64, "dwell": float}
@@ -84,8 +89,9 @@ class Path:
     ) -> Path:
         """The path along a curve [mm, deg].
 
-        `axes` names them, by default the first of XYZABC. `feed` [mm/s] is the greatest speed in all axes
-        together; by default there is none, and the axes' limits alone hold. Gaps up to 1e-6 mm are closed.
+        `axes` names them, by default the first of XYZABC. `feed` [mm/s] is the greatest speed along X, Y and
+        Z on pieces that move one of these, else along U, V and W, else of the rotary axes [deg/s], as in a
+        program; by default there is none, and the axes' limits alone hold. Gaps up to 1e-6 mm are closed.
 
         Straight pieces, of any degree and with any weights, become lines of degree 1 from each place where
         they turn back to the next, neighbours on one line together but where both are of degree 1 already;
@@ -166,7 +172,8 @@ class Path:
 
         It stays within `tolerance` [mm] of the polygon, both ways: chains are fitted by B-splines, corners
         rounded as far as the tolerance allows, or as `corners` says (ROUNDED, ARCS or SMOOTH); 0 means exact
-        lines with stops. `move` counts the chords.
+        lines with stops. `move` counts the chords; `feed` counts along the axes that a chord moves as in
+        `from_curve`.
         Raises InputError for points that are too few, repeated or not finite.
         """
         from feedplan.geometry.construct import path_of_points
@@ -212,6 +219,7 @@ class Path:
             self,
             curve=curve,
             feed=self.feed[piece],
+            group_feed=None if self.group_feed is None else self.group_feed[piece],
             move=self.move[piece],
             line=self.line[piece],
             runs=np.searchsorted(piece, self.runs),

@@ -126,6 +126,8 @@ def _profile(problem: Problem, parts: Segments, speed: Array, room: Array) -> Sp
     from_sq, to_sq = speed_sq[segment, phase], speed_sq[segment, phase + 1]
     piece, line = parts.piece[segment], ~np.isnan(parts.rate[segment])
     constant = _CONSTANT[phase]
+    # What is constant is the speed in all axes; the feed of such pieces is another one.
+    even = np.where(_counts_by_shares(problem)[piece], ArcKind.SPEED_LINE, ArcKind.FEED)
     ramp_kind = np.where(line, ArcKind.AXIS_ACCELERATION, ArcKind.SPEED_LINE)
     rate = np.stack([parts.rate[segment]] * 2)
     length = rate[0] * (u1 - u0)
@@ -144,9 +146,11 @@ def _profile(problem: Problem, parts: Segments, speed: Array, room: Array) -> Sp
     p1[last] = end_sq[segment[last]] / rate[1, last] ** 2
     return SpeedProfile(
         piece=piece.astype(np.uint32),
-        kind=np.where(constant, ArcKind.FEED, ramp_kind).astype(np.uint8),
+        kind=np.where(constant, even, ramp_kind).astype(np.uint8),
         axis=np.where(constant, NO_AXIS, parts.axis[segment]).astype(np.uint8),
-        value=np.where(constant, from_sq, _SIGN[phase] * parts.value[segment]),
+        value=np.where(
+            constant, np.where(even == ArcKind.FEED, from_sq, 0.0), _SIGN[phase] * parts.value[segment]
+        ),
         u0=u0,
         u1=u1,
         p0=p0,
@@ -154,6 +158,13 @@ def _profile(problem: Problem, parts: Segments, speed: Array, room: Array) -> Sp
         duration=2.0 * length / (np.sqrt(from_sq) + np.sqrt(to_sq)),
         runs=np.searchsorted(piece, problem.path.runs),
     )
+
+
+def _counts_by_shares(problem: Problem) -> NDArray[np.bool_]:
+    """(n,) whether the feed of a piece is another speed than that in all axes."""
+    if problem.feed_share is None:
+        return np.zeros(len(problem.path), dtype=np.bool_)
+    return np.asarray((problem.feed_share != 1.0).any(axis=1))
 
 
 def _weighted_length(

@@ -226,7 +226,10 @@ def mesh(problem: Problem, stretch: Stretch, cuts: Cuts) -> Mesh:
         slope[:, straight] = way / np.linalg.norm(way, axis=1)[:, None]
         bend[:, straight], square[:, straight] = 0.0, 1.0
     limits = [(slope / problem.max_velocity) ** 2]
-    limits += [(square / most)[..., None] for most in (problem.feed[piece] ** 2, chord)]
+    counted = square
+    if problem.feed_share is not None:
+        counted = ((problem.feed_share[piece] * slope) ** 2).sum(axis=2)
+    limits += [(counted / problem.feed[piece] ** 2)[..., None], (square / chord)[..., None]]
     per_p = np.concatenate(limits, axis=2)
     with np.errstate(divide="ignore"):
         most = 1.0 / per_p.max(axis=2)

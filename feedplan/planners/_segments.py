@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan._solvers import feed_between
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import SolverError
@@ -142,6 +143,9 @@ def _curves(problem: Problem, pieces: NDArray[np.int64], rule: Rule) -> Segments
     speed = np.minimum(speed, _chord_speed(problem, radius))
     shape = (-1, len(PLACES))
     speed = speed.reshape(shape).min(axis=1)
+    if problem.feed_share is not None:
+        # Between the places the axes that the feed counts along may have more of the speed.
+        speed = np.minimum(speed, feed_between(problem, piece, u0, u1))
     # On a circle the parts differ by rounding alone: one speed for all of them.
     least = np.repeat(np.minimum.reduceat(speed, np.cumsum(count) - count), count)
     speed = np.where(speed <= least * (1.0 + ONE_SPEED), least, speed)
@@ -174,7 +178,10 @@ def _part_counts(problem: Problem, piece: NDArray[np.int64]) -> NDArray[np.int64
 def _speed(problem: Problem, piece: NDArray[np.int64], tangent: Array) -> Array:
     """The least of feed and what the axis velocities allow in a direction."""
     by_axis = _over(problem.max_velocity, np.abs(tangent))
-    return np.asarray(np.minimum(problem.feed[piece], by_axis.min(axis=1)))
+    feed = problem.feed[piece]
+    if problem.feed_share is not None:
+        feed = _over(feed, np.linalg.norm(problem.feed_share[piece] * tangent, axis=1))
+    return np.asarray(np.minimum(feed, by_axis.min(axis=1)))
 
 
 def _chord_speed(problem: Problem, radius: Array) -> Array:

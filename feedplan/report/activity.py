@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from feedplan.constraints.problem import Problem, speed_square
+from feedplan.constraints.problem import Problem, feed_square
 from feedplan.profile import SpeedProfile
 from feedplan.report.limits import chord_speed, parameter_speed
 from feedplan.report.tool_motion import ToolMotion
@@ -59,7 +59,7 @@ def activity(problem: Problem, profile: SpeedProfile, motion: ToolMotion, jerk: 
     with np.errstate(divide="ignore", invalid="ignore"):
         rate = parameter_speed(tangent, velocity)
         feed = np.where(np.isfinite(problem.path.feed[piece]), problem.feed[piece], np.inf)
-        at_feed = np.sqrt(speed_square(problem, piece, u)) * rate / feed
+        at_feed = np.sqrt(feed_square(problem, piece, u)) * rate / feed
         chord = np.linalg.norm(velocity, axis=1) / chord_speed(problem, tangent, second)
         at_velocity = np.abs(velocity) / problem.max_velocity
         groups = {"velocity": at_velocity, "acceleration": np.abs(acceleration) / problem.max_acceleration}

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan._solvers import Sampler
-from feedplan.constraints.problem import Problem, speed_square
+from feedplan.constraints.problem import Problem, feed_square
 from feedplan.profile import SpeedProfile
 from feedplan.report.tool_motion import ToolMotion
 from feedplan.setpoints import sampler
@@ -106,7 +106,7 @@ def _sample(
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         velocity = states.along(piece.astype(np.uint32), u)[2]
         joint = np.linalg.norm(tangent, axis=1)
-        feed = _quotient(problem.feed[piece], np.sqrt(speed_square(problem, piece, u)))
+        feed = _quotient(problem.feed[piece], np.sqrt(feed_square(problem, piece, u)))
         return LimitSamples(
             length=length.ravel(),
             speed=way * parameter_speed(tangent, velocity),

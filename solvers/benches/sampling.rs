@@ -95,6 +95,7 @@ fn setpoints(c: &mut Criterion) {
                     curve,
                     tip_speed: None,
                     way_speed: None,
+                    feed_share: vec![],
                     lines: vec![1; PIECES],
                     runs: vec![0, PIECES],
                     start_dwell: 0.0,

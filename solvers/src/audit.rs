@@ -219,6 +219,9 @@ impl<const M: usize> Tally<M> {
     }
 }
 
+/// Speeds that feeds are about: along X, Y, Z, along U, V, W, of all other axes, and of all together.
+pub const FEEDS: usize = 4;
+
 /// The limits that hold everywhere.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits<const M: usize> {
@@ -237,6 +240,8 @@ pub struct Limits<const M: usize> {
     pub jump_beyond: [f64; M],
     /// Least and greatest position, in mm.
     pub travel: [[f64; 2]; M],
+    /// What the velocity of each axis counts in each speed that a feed is about, 0 or 1.
+    pub feed_axes: [[f64; M]; FEEDS],
     /// In mm; infinite: not limited.
     pub chord_tolerance: f64,
     /// Servo period in s.
@@ -246,6 +251,12 @@ pub struct Limits<const M: usize> {
 }
 
 impl<const M: usize> Limits<M> {
+    /// What of a velocity or a way counts in a speed that a feed is about.
+    #[inline]
+    pub fn counted(&self, feed: usize, of: &[f64; M]) -> [f64; M] {
+        std::array::from_fn(|k| self.feed_axes[feed][k] * of[k])
+    }
+
     /// The jump of one axis velocity that means nothing: over a servo period it adds no more than the pass mark
     /// to the acceleration.
     #[inline]

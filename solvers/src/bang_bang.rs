@@ -95,6 +95,9 @@ pub struct Problem<'a, const M: usize> {
     /// The speed along the path that laws of jerk are about, where it is not that of the axes: it vanishes only where
     /// all axes rest.
     pub way: Option<SpeedSquare<'a>>,
+    /// Of each piece: what the velocity of each axis counts in the speed that the feed limits, |(share_k q_k')| u̇;
+    /// empty where all axes count as they are, as where the tool is another one.
+    pub feed_share: &'a [[f64; M]],
     /// The rest as of the quadratic planner.
     pub runs: &'a [usize],
     pub feed: &'a [f64],
@@ -105,6 +108,13 @@ pub struct Problem<'a, const M: usize> {
     pub period: f64,
     pub start_speed: f64,
     pub end_speed: f64,
+}
+
+impl<'a, const M: usize> Problem<'a, M> {
+    /// What the axes count in the feed on piece `i`, where that is not all of them as they are.
+    pub fn share(&self, i: usize) -> Option<&'a [f64; M]> {
+        self.feed_share.get(i).filter(|share| **share != [1.0; M])
+    }
 }
 
 /// The problem as the runs see it.
@@ -121,7 +131,9 @@ impl<const M: usize> Task<'_, M> {
     fn quadratic(&self, i: usize) -> Option<&QuadraticTask<'_, M>> {
         let range = self.problem.offset[i]..self.problem.offset[i + 1];
         let weights = self.problem.weight.get(range.clone()).unwrap_or(&[]);
-        let is_one = range.len() <= 3 && weights.windows(2).all(|pair| pair[0] == pair[1]);
+        let is_one = range.len() <= 3
+            && weights.windows(2).all(|pair| pair[0] == pair[1])
+            && self.problem.share(i).is_none();
         self.quadratic.as_ref().filter(|_| is_one)
     }
 }
@@ -210,6 +222,13 @@ pub(crate) fn check_pieces<const M: usize>(problem: &Problem<M>) -> Result<(), F
         if !weights.iter().all(|weight| *weight > 0.0 && weight.is_finite()) {
             return wrong("a weight is not a positive number");
         }
+    }
+    let shares = problem.feed_share;
+    if !(shares.is_empty() || shares.len() == count)
+        || !shares.iter().flatten().all(|share| share.is_finite() && *share >= 0.0)
+    {
+        let what = format!("the shares of the axes in the feed do not fit {count} pieces");
+        return Err(Fault::Input { piece: None, what });
     }
     let tip_fits = problem.tip.is_none_or(|tip| {
         is_rising(tip.offset, count, tip.control.len(), 2)

@@ -161,7 +161,15 @@ fn polynomial(coefficients: &[f64], width: f64, u: f64) -> [f64; 3] {
 /// The speed along the length over that which the feed is about, at u of piece `i`, where D is this; infinite where the
 /// feed limits nothing.
 pub fn per_feed<const M: usize>(problem: &Problem<M>, i: usize, u: f64, d: f64) -> f64 {
-    problem.tip.map_or(1.0, |tip| (d / polynomial(tip.speed.of(i), problem.width[i], u)[0]).sqrt())
+    let square = match (problem.tip, problem.share(i)) {
+        (Some(tip), _) => polynomial(tip.speed.of(i), problem.width[i], u)[0],
+        (None, None) => return 1.0,
+        (None, Some(share)) => {
+            let tangent = derivatives(&piece(problem, i), u)[1];
+            (0..M).map(|k| (share[k] * tangent[k]).powi(2)).sum()
+        }
+    };
+    (d / square).sqrt()
 }
 
 /// D at u of piece `i`.
@@ -367,7 +375,7 @@ impl<'a, const M: usize> ByLength<'a, M> {
         panel(self.problem, at, a, rows[i + 1].u) + inside + panel(self.problem, at, rows[j].u, b)
     }
 
-    /// The one direction of all parts and their one feed, if there are such.
+    /// The one direction of all parts and the one speed that their feed lets the tool have, if there are such.
     pub fn line(&self) -> Option<([f64; M], f64)> {
         let (direction, feed) = self.tables[0].straight?;
         let alike = self.tables.iter().all(|table| {

@@ -90,14 +90,21 @@ macro_rules! each {
 }
 
 impl<'a, const M: usize> Motion<'a, M> {
-    /// Prepares an arc; `tip` is the speed that its law is about where it is not that of the piece.
-    /// `with_lengths` tabulates the length of the arc whatever its kind.
-    pub fn new(piece: Piece<'a, M>, tip: Option<TipSpeed<'a>>, arc: &ProfileArc, with_lengths: bool) -> Self {
+    /// Prepares an arc; `tip` is the speed that its law is about where it is not that of the piece, `share` what the axes
+    /// count in the feed. `with_lengths` tabulates the length of the arc whatever its kind.
+    pub fn new(
+        piece: Piece<'a, M>,
+        tip: Option<TipSpeed<'a>>,
+        share: Option<&[f64; M]>,
+        arc: &ProfileArc,
+        with_lengths: bool,
+    ) -> Self {
+        let share = share.filter(|_| arc.kind == ArcKind::Feed);
         match Quadratic::from_piece(&piece) {
-            Some(quadratic) if tip.is_none() && !needs_curve(arc.kind) => {
+            Some(quadratic) if tip.is_none() && share.is_none() && !needs_curve(arc.kind) => {
                 Self::Quadratic(Box::new(QuadraticMotion::new(&quadratic, arc, with_lengths)))
             }
-            _ => Self::Curve(Box::new(CurveMotion::new(piece, tip, arc, with_lengths))),
+            _ => Self::Curve(Box::new(CurveMotion::new(piece, tip, share, arc, with_lengths))),
         }
     }
 

@@ -9,6 +9,7 @@
 use crate::bang_bang::Problem;
 use crate::bang_bang_quadratic::Fault;
 use crate::by_length::{piece, ByLength};
+use crate::feed;
 use crate::jerk_arcs::Arcs;
 use crate::jerk_limited::{Effort, Geometry, Limits, Place};
 use crate::jerk_limited_path::Task;
@@ -284,7 +285,7 @@ fn shape<const M: usize>(
         split(&own, &[a, b], &mut pieces);
         let middle = pieces.piece(1);
         let shape = bounded(&Curve { joints: middle.control, tip: None, weight: middle.weights }, ACCURACY);
-        return (shape, problem.feed[i].min(path.chord_speed(shape.curvature)));
+        return (shape, feed::on(problem, i, &middle).min(path.chord_speed(shape.curvature)));
     }
     let length = |i: usize| from + (to - from) * i as f64 / (PLACES - 1) as f64;
     let places: Vec<Place<M>> = (0..PLACES).map(|i| path.at(part, length(i))).collect();

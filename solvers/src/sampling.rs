@@ -80,6 +80,8 @@ pub struct PathData<const M: usize> {
     pub curve: CompositeCurve<M>,
     pub tip_speed: Option<(Vec<f64>, Vec<usize>)>,
     pub way_speed: Option<(Vec<f64>, Vec<usize>)>,
+    /// What the axes count in the feed on each piece; empty where that is not by shares.
+    pub feed_share: Vec<[f64; M]>,
     pub lines: Vec<i32>,
     pub runs: Vec<usize>,
     pub start_dwell: f64,
@@ -104,7 +106,8 @@ impl<const M: usize> PathData<M> {
     /// The motion along an arc.
     fn motion(&self, arc: &ProfileArc, with_lengths: bool) -> Motion<'_, M> {
         let i = arc.piece as usize;
-        Motion::new(self.curve.piece(i), self.speed_of(arc), arc, with_lengths)
+        let share = self.feed_share.get(i).filter(|share| **share != [1.0; M]);
+        Motion::new(self.curve.piece(i), self.speed_of(arc), share, arc, with_lengths)
     }
 
     /// The speed that the law of an arc is about, where it is not that of the axes.

@@ -16,7 +16,7 @@ fn raised<const M: usize>(piece: &Quadratic<M>, by: usize) -> CompositeCurve<M> 
 }
 
 fn motion<'a, const M: usize>(curve: &'a CompositeCurve<M>, arc: &ProfileArc) -> Motion<'a, M> {
-    Motion::new(curve.piece(0), None, arc, true)
+    Motion::new(curve.piece(0), None, None, arc, true)
 }
 
 fn arc(kind: ArcKind, value: f64, u: (f64, f64), p: (f64, f64), duration: f64) -> ProfileArc {
@@ -37,6 +37,7 @@ fn path_of(piece: &Quadratic<2>) -> PathData<2> {
         curve: raised(piece, 0),
         tip_speed: None,
         way_speed: None,
+        feed_share: vec![],
         lines: vec![7],
         runs: vec![0, 1],
         start_dwell: 0.0,

@@ -174,7 +174,11 @@ def test_a_feed_counts_along_the_linear_axes_where_they_move(make_program: Any, 
     rotary = dataclasses.replace(MILL, axes=(*MILL.axes, Axis("A", 100.0, 1000.0)))
     points = [[0, 0, 0, 0], [3, 0, 0, 4], [3, 0, 0, 10], [5, 0, 0, 10]]
     program = make_program(points, axes="XYZA", control=PathControl.EXACT_STOP, feed=6.0)
-    np.testing.assert_allclose(build_path(program, rotary).feed, [10.0, 6.0, 6.0])
+    path = build_path(program, rotary)
+    np.testing.assert_array_equal(path.feed, 6.0)
+    # X and A, A alone, X alone.
+    free = np.inf
+    np.testing.assert_array_equal(path.group_feed, [[6.0, free, free], [free, free, 6.0], [6.0, free, free]])
     helix = make_program(
         [[10, 0, 0, 0], [-10, 0, 0, 30 * math.pi]],
         axes="XYZA",
@@ -182,7 +186,13 @@ def test_a_feed_counts_along_the_linear_axes_where_they_move(make_program: Any, 
         feed=6.0,
         control=PathControl.EXACT_PATH,
     )
-    np.testing.assert_allclose(build_path(helix, rotary).feed, 6.0 * math.hypot(1, 3))
+    np.testing.assert_array_equal(build_path(helix, rotary).group_feed[:, 0], 6.0)
+    blend = make_program([[0, 0, 0, 0], [9, 0, 0, 0], [9, 0, 0, 9]], axes="XYZA", feed=np.array([6.0, 2.0]))
+    path = build_path(blend, rotary)
+    # Each half of the corner keeps the feeds of both moves.
+    corner = [[6.0, free, 2.0]] * (len(path) - 2)
+    np.testing.assert_array_equal(path.group_feed, [[6.0, free, free], *corner, [free, free, 2.0]])
+    assert build_path(make_program([[0, 0, 0], [3, 0, 4]]), rotary).group_feed is None
 
 
 def test_positions_outside_the_travel_name_line_axis_and_limit(make_program: Any) -> None:

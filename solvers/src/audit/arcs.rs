@@ -22,6 +22,11 @@ pub struct Arcs<'a> {
     /// Acceleration along the path at both ends, in mm/s².
     pub a0: &'a [f64],
     pub a1: &'a [f64],
+    /// What the velocities of the axes count in the speed that is constant on arcs at the feed, one row a piece; empty
+    /// where all count as they are.
+    pub share: &'a [f64],
+    /// Number of pieces of the path.
+    pub pieces: usize,
     /// Arc offsets of the runs.
     pub runs: &'a [i64],
 }
@@ -150,7 +155,8 @@ impl Arcs<'_> {
                 Shape::General { whole: polygon.clone(), ends, part, tangent, size: curve.derivative_size() }
             }
         };
-        let motion = Motion::new(law, shape, [width, curve.width()], [p_anchor, p_far], anchored_at_end);
+        let widths = [width, curve.width()];
+        let motion = Motion::new(law, shape, widths, [p_anchor, p_far], anchored_at_end, &self.counted(i));
         if !matches!(law, Law::Along) {
             return motion;
         }
@@ -169,10 +175,17 @@ impl Arcs<'_> {
         })
     }
 
+    /// What the axes count in the speed that is constant on arc `i`.
+    fn counted<const M: usize>(&self, i: usize) -> [f64; M] {
+        let axes = self.share.len().checked_div(self.pieces).unwrap_or(0);
+        let row = self.piece[i] as usize * axes;
+        std::array::from_fn(|k| if k < axes { self.share[row + k] } else { 1.0 })
+    }
+
     /// The recorded acceleration along the path at an end of arc `i`, where its kind tells one.
     pub fn end_acceleration(&self, i: usize, at_end: bool) -> Option<f64> {
         match self.kind[i] {
-            FEED => Some(0.0),
+            FEED if self.counted::<9>(i) == [1.0; 9] => Some(0.0),
             PATH_JERK | SPEED_CUBIC => Some(if at_end { self.a1[i] } else { self.a0[i] }),
             _ => None,
         }

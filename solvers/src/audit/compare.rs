@@ -7,7 +7,7 @@ use super::jerk::Jerks;
 use super::moves::Neighbours;
 use super::setpoints::Row;
 use super::timed::Reader;
-use super::{Check, Limits, Tally, PLACE_TOLERANCE};
+use super::{Check, Limits, Tally, FEEDS, PLACE_TOLERANCE};
 
 /// A recorded velocity may differ from the profile's by this share of what one period of acceleration changes.
 const VELOCITY_SHARE: f64 = 1e-3;
@@ -91,16 +91,21 @@ impl<'a, const M: usize> Comparison<'a, M> {
         let (from, to) = (before.spot.place, row.spot.place);
         let (time, line) = (row.t, row.line);
         let chord = Segment::new(&before.q, &row.q);
-        let (mut way, mut least_time, mut error_sq) = (0.0, 0.0, 0.0_f64);
+        let (mut ways, mut least_times, mut error_sq) = ([0.0; FEEDS], [0.0; FEEDS], 0.0_f64);
         let mut last = before.q;
         for piece in from.piece..=to.piece {
             let curve = path.curve::<M>(piece);
             let start = if piece == from.piece { from.u } else { 0.0 };
             let end = if piece == to.piece { to.u } else { curve.width() };
             let next = if piece == to.piece { row.q } else { curve.at(end) };
-            let part = distance(&last, &next);
-            way += part;
-            least_time += part / path.feed[piece];
+            let part = from_to(&last, &next);
+            for (feed, limit) in path.feeds(piece).into_iter().enumerate() {
+                if limit != f64::INFINITY {
+                    let part = length(&limits.counted(feed, &part));
+                    ways[feed] += part;
+                    least_times[feed] += part / limit;
+                }
+            }
             last = next;
             if limits.chord_tolerance.is_finite() && end > start {
                 for share in [0.25, 0.5, 0.75, 1.0] {
@@ -108,8 +113,10 @@ impl<'a, const M: usize> Comparison<'a, M> {
                 }
             }
         }
-        let feed = if least_time > 0.0 { way / least_time } else { f64::INFINITY };
-        tally.offer(Check::Feed, 0, (way - 2.0 * rounding) / step, feed, time, line);
+        for (way, least_time) in ways.into_iter().zip(least_times) {
+            let feed = if least_time > 0.0 { way / least_time } else { f64::INFINITY };
+            tally.offer(Check::Feed, 0, (way - 2.0 * rounding) / step, feed, time, line);
+        }
         if limits.chord_tolerance.is_finite() {
             let certain = error_sq.sqrt() - rounding - before.spot.off.max(row.spot.off).max(0.0);
             let mut limit = limits.chord_tolerance;

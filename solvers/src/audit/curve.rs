@@ -4,6 +4,7 @@
 //! The kernels take `M` axes; where there are fewer, the last ones rest at 0 and have nothing to break.
 
 use super::polygon::Polygon;
+use super::FEEDS;
 
 /// Pieces joined end to end; see `feedplan.curves.composite.CompositeCurve`.
 #[derive(Clone, Copy)]
@@ -24,7 +25,8 @@ pub struct Pieces<'a> {
 #[derive(Clone, Copy)]
 pub struct Followed<'a> {
     pub pieces: Pieces<'a>,
-    /// Greatest speed, in mm/s: the problem's feed.
+    /// The greatest of each speed that a feed is about, in mm/s and degrees/s, `FEEDS` numbers a piece; infinite where
+    /// it is not limited.
     pub feed: &'a [f64],
     /// Source line.
     pub line: &'a [i32],
@@ -51,6 +53,11 @@ impl<'a> std::ops::Deref for Followed<'a> {
 }
 
 impl Followed<'_> {
+    /// The feeds of piece `i`.
+    pub fn feeds(&self, i: usize) -> [f64; FEEDS] {
+        std::array::from_fn(|feed| self.feed[FEEDS * i + feed])
+    }
+
     /// Whether piece `i` begins a run whose axes mean something else than before.
     pub fn begins_elsewhere(&self, i: usize) -> bool {
         self.runs.binary_search(&(i as i64)).is_ok_and(|run| self.new_words.get(run) == Some(&true))

@@ -200,6 +200,8 @@ mod tests {
             duration: &[1.0],
             a0: &[0.0],
             a1: &[0.0],
+            share: &[],
+            pieces: 1,
             runs: &[0, 1],
         }
         .motion(0, curve)

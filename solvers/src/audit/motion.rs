@@ -48,6 +48,8 @@ pub struct Motion<const M: usize> {
     pub(super) pole: Option<Pole>,
     /// The speed by the length of the path from the anchor.
     along: Option<Box<Measured>>,
+    /// What the axes count in the speed that is constant at the feed.
+    share: [f64; M],
 }
 
 #[derive(Clone, Debug)]
@@ -81,8 +83,16 @@ pub struct State<const M: usize> {
 }
 
 impl<const M: usize> Motion<M> {
-    /// `widths` are those of the arc and of its piece; `p` the recorded values at the anchor and at the other end.
-    pub fn new(law: Law, shape: Shape<M>, widths: [f64; 2], p: [f64; 2], anchored_at_end: bool) -> Self {
+    /// `widths` are those of the arc and of its piece; `p` the recorded values at the anchor and at the other end; `share` is
+    /// what the axes count in a feed.
+    pub fn new(
+        law: Law,
+        shape: Shape<M>,
+        widths: [f64; 2],
+        p: [f64; 2],
+        anchored_at_end: bool,
+        share: &[f64; M],
+    ) -> Self {
         let [width, whole] = widths;
         let direction = if anchored_at_end { -1.0 } else { 1.0 };
         let (tangent, bend, general) = match shape {
@@ -93,12 +103,18 @@ impl<const M: usize> Motion<M> {
         };
         let [root_anchor, root_far] = p.map(f64::sqrt);
         let [near, far] = substitution([root_anchor, root_far]);
-        let share = width / (near + far);
+        let part = width / (near + far);
+        let share = if matches!(law, Law::Feed { .. }) { *share } else { [1.0; M] };
+        let counted = |of: &[f64; M]| std::array::from_fn(|k| share[k] * of[k]);
         Self {
             tangent,
             bend,
             law,
-            pole: if general.is_some() { None } else { law.pole(&tangent, &bend, p[0]) },
+            pole: if general.is_some() {
+                None
+            } else {
+                law.pole::<M>(&counted(&tangent), &counted(&bend), p[0])
+            },
             general,
             direction,
             width,
@@ -107,11 +123,12 @@ impl<const M: usize> Motion<M> {
             root_far,
             near,
             far,
-            first_order: direction * share * 2.0 * near,
-            second_order: direction * share * (far - near),
-            time_scale: 2.0 * share,
+            first_order: direction * part * 2.0 * near,
+            second_order: direction * part * (far - near),
+            time_scale: 2.0 * part,
             anchored_at_end,
             along: None,
+            share,
         }
     }
 
@@ -170,7 +187,7 @@ impl<const M: usize> Motion<M> {
 
     /// The motion along the path at `y`, in the order of time, where the arc's kind says something of its jerk.
     pub fn pace(&self, y: f64) -> Option<Pace> {
-        if let Law::Feed { speed } = self.law {
+        if let (Law::Feed { speed }, true) = (self.law, self.share == [1.0; M]) {
             return Some(Pace { v: speed, a: 0.0, j: 0.0 });
         }
         let (along, way) = self.along_at(self.distance(y))?;
@@ -206,6 +223,12 @@ impl<const M: usize> Motion<M> {
         self.general.is_some()
     }
 
+    /// What of C' counts in the speed that the law is about.
+    #[inline(always)]
+    fn counted(&self, tangent: &[f64; M]) -> [f64; M] {
+        std::array::from_fn(|k| self.share[k] * tangent[k])
+    }
+
     /// √p at the signed distance `d` from the anchor, where C' is `tangent`, on a piece of degree 2.
     #[inline(always)]
     pub(super) fn root_p(&self, d: f64, tangent: &[f64; M]) -> f64 {
@@ -225,7 +248,7 @@ impl<const M: usize> Motion<M> {
         match self.law {
             Law::AxisAcceleration { .. } => f64::NAN,
             Law::ParameterAcceleration { start, slope } => (start + slope * d).sqrt(),
-            Law::Feed { speed } => speed / length(tangent),
+            Law::Feed { speed } => speed / length(&self.counted(tangent)),
             Law::AxisVelocity { axis, speed } => speed / tangent[axis].abs(),
             Law::Chord { value } => (value * length(tangent)).sqrt(),
             Law::SpeedLine { start_sq, change_sq } => {
@@ -286,7 +309,7 @@ impl<const M: usize> Motion<M> {
                 let way = general.part.local(y.round()).way[axis];
                 (start_sq + 2.0 * value * way).sqrt() / direction[axis].abs()
             }
-            Law::Feed { speed } => speed,
+            Law::Feed { speed } => speed / length(&self.counted(&direction)),
             Law::AxisVelocity { axis, speed } => speed / direction[axis].abs(),
             Law::Along => self.speed_by_way(self.distance(y)),
             _ => f64::NAN,
@@ -361,7 +384,8 @@ impl<const M: usize> Motion<M> {
                 terms[axis] / tangent[axis].abs() + 0.5 * gained * self.grain
             }
             Law::AxisVelocity { axis, .. } => terms[axis] / tangent[axis].abs(),
-            Law::Feed { .. } | Law::Chord { .. } => length(&terms) / length(&tangent),
+            Law::Feed { .. } => length(&self.counted(&terms)) / length(&self.counted(&tangent)),
+            Law::Chord { .. } => length(&terms) / length(&tangent),
             Law::SpeedLine { start_sq, .. } => {
                 let gained = (1.0 - start_sq / inner(&velocity, &velocity)).max(0.0);
                 length(&terms) / length(&tangent) + 0.5 * gained * self.grain
@@ -473,7 +497,7 @@ mod tests {
             size: [3.0, 0.0],
         };
         let start = Pace { v: 0.0, a: 0.0, j: 6.0 };
-        let motion = Motion::new(Law::Along, shape, [1.0; 2], [0.0, 1.0], false)
+        let motion = Motion::new(Law::Along, shape, [1.0; 2], [0.0, 1.0], false, &[1.0; 2])
             .with_along(|_| Along::Jerk { start, duration: 1.0 });
         assert_eq!(motion.velocity(0.0), [0.0; 2]);
         assert!((motion.velocity(1.0)[0] - 3.0).abs() < 1e-12);

@@ -12,7 +12,7 @@ use super::arcs::Arcs;
 use super::curve::{length, Followed};
 use super::jerk::Jerks;
 use super::motion::{Motion, State};
-use super::{Check, Limits, Tally, EPS, GAP_TOLERANCE, PASS_EXCESS, ROUNDINGS};
+use super::{Check, Limits, Tally, EPS, FEEDS, GAP_TOLERANCE, PASS_EXCESS, ROUNDINGS};
 
 /// Even intervals of an arc.
 const INTERVALS: usize = 8;
@@ -281,7 +281,7 @@ struct Probe<'a, const M: usize> {
     motion: &'a Motion<M>,
     limits: &'a Limits<M>,
     tally: &'a mut Tally<M>,
-    feed: f64,
+    feeds: [f64; FEEDS],
     start: f64,
     duration: f64,
     line: i32,
@@ -303,7 +303,7 @@ impl<'a, const M: usize> Probe<'a, M> {
             motion,
             limits: auditor.limits,
             tally,
-            feed: auditor.path.feed[auditor.arcs.piece[i] as usize],
+            feeds: auditor.path.feeds(auditor.arcs.piece[i] as usize),
             start: auditor.starts[i],
             duration: auditor.arcs.duration[i],
             line,
@@ -377,10 +377,14 @@ impl<'a, const M: usize> Probe<'a, M> {
             let velocity = state.velocity[k].abs() - ROUNDINGS * EPS * state.magnitude[k];
             self.tally.offer(Check::Velocity, k, velocity, self.limits.velocity[k], time, self.line);
         }
-        let speed = length(&state.velocity);
-        let rounding = ROUNDINGS * EPS * length(&state.magnitude);
-        self.tally.offer(Check::Feed, 0, speed - rounding, self.feed, time, self.line);
+        for (feed, limit) in self.feeds.into_iter().enumerate().filter(|(_, limit)| *limit != f64::INFINITY) {
+            let speed = length(&self.limits.counted(feed, &state.velocity));
+            let rounding = ROUNDINGS * EPS * length(&self.limits.counted(feed, &state.magnitude));
+            self.tally.offer(Check::Feed, 0, speed - rounding, limit, time, self.line);
+        }
         if self.limits.chord_tolerance.is_finite() {
+            let speed = length(&state.velocity);
+            let rounding = ROUNDINGS * EPS * length(&state.magnitude);
             let error = chord_error((speed - rounding) * self.limits.period, self.motion.curvature(state));
             self.tally.offer(Check::Chord, 0, error, self.limits.chord_tolerance, time, self.line);
         }

@@ -1,6 +1,6 @@
 //! A part of a piece on which no axis turns round and one velocity cap is the lowest, and that part as a pass travels it.
 
-use super::piece::Piece;
+use super::piece::{counted, Piece};
 use crate::polynomial::Polynomial;
 
 /// Turns closer than this part of the piece are one.
@@ -15,6 +15,8 @@ const AT_END: f64 = 1e-6;
 pub enum Cap {
     /// The speed squared, linear in t between its two ends: the feed, or a bound below the chord-error limit.
     Speed([f64; 2]),
+    /// The square of the feed, where the axes count in it by shares.
+    Feed(f64),
     /// The square of the velocity limit of an axis.
     Axis(usize, f64),
 }
@@ -134,11 +136,11 @@ impl Part {
             }
             g
         });
-        // Next to a cusp |C'|² is lost in the rounding of that of the whole piece.
-        let speed = if piece.own_speed && !whole {
-            Polynomial::sum_of_squares(&g)
-        } else {
-            piece.speed.part(self.from, self.to).scale(length * length)
+        let speed = match (self.cap, &piece.share) {
+            (Cap::Feed(_), Some(share)) => counted(&g, share),
+            // Next to a cusp |C'|² is lost in the rounding of that of the whole piece.
+            _ if piece.own_speed && !whole => Polynomial::sum_of_squares(&g),
+            _ => piece.speed.part(self.from, self.to).scale(length * length),
         };
         SubPiece {
             cusp_orders: [false, true].map(|at_end| cusp_order(&g, at_end)),
@@ -149,7 +151,7 @@ impl Part {
             moving: self.moving,
             degree: piece.degree,
             straight: piece.straight,
-            own_speed: piece.own_speed,
+            own_speed: piece.own_speed && !matches!(self.cap, Cap::Feed(_)),
         }
     }
 }
@@ -173,9 +175,14 @@ impl<const M: usize, const C: usize> SubPiece<M, C> {
 
     /// The tool's speed squared over that of the axes at an end, also in the limit where both are at rest.
     pub fn tip_share(&self, at_end: bool) -> f64 {
-        if self.own_speed {
+        if self.own_speed || matches!(self.cap, Cap::Feed(_)) {
             return 1.0;
         }
+        self.speed_share(at_end)
+    }
+
+    /// D over |g|² at an end, also in the limit where both vanish.
+    pub fn speed_share(&self, at_end: bool) -> f64 {
         let lead = |p: &Polynomial<C>, r: usize| {
             let c = p.coefficients();
             c.get(if at_end { c.len().wrapping_sub(1 + r) } else { r }).copied().unwrap_or(0.0)

@@ -174,6 +174,7 @@ fn end_speed_sq<const M: usize, const C: usize>(
         Kind::Braking(k) => arc.slow_sq / direction[k].powi(2),
         Kind::Cap => match sub.cap {
             Cap::Speed([_, f1]) => f1 / sub.tip_share(true),
+            Cap::Feed(f) => f / sub.speed_share(true),
             Cap::Axis(k, v_sq) => v_sq / direction[k].powi(2),
         },
         Kind::LimitCurve => 0.0,

@@ -21,6 +21,8 @@ pub struct Piece<const M: usize, const C: usize> {
     pub straight: bool,
     /// D = |g|²: the axes are those of the tool.
     pub own_speed: bool,
+    /// What the axes count in the feed, where that is not D.
+    pub share: Option<[f64; M]>,
 }
 
 /// Tangents are known to this part of the greatest one, and coordinates to this part of their size, which is not held
@@ -72,8 +74,24 @@ impl<const M: usize, const C: usize> Piece<M, C> {
             Some((values, factor)) => Polynomial::from_bernstein(values.iter().map(|value| factor * value)),
             None => Polynomial::sum_of_squares(&g),
         };
-        Self { g, weight, speed, noise, degree, straight: along.is_some(), own_speed: speed_sq.is_none() }
+        let own_speed = speed_sq.is_none();
+        Self { g, weight, speed, noise, degree, straight: along.is_some(), own_speed, share: None }
     }
+
+    /// The same where the axes count in the feed by these shares.
+    pub fn with_share(self, share: Option<&[f64; M]>) -> Self {
+        Self { share: share.copied(), ..self }
+    }
+
+    /// The square of the speed that the feed limits over π, where it is not D.
+    pub fn feed_rate(&self) -> Option<Polynomial<C>> {
+        self.share.map(|share| counted(&self.g, &share))
+    }
+}
+
+/// The sum of squares of tangents, each by its share.
+pub fn counted<const M: usize, const C: usize>(g: &[Polynomial<C>; M], share: &[f64; M]) -> Polynomial<C> {
+    Polynomial::sum_of_squares(&std::array::from_fn::<_, M, _>(|k| g[k].scale(share[k])))
 }
 
 /// The same tangents with exactly one direction, if they have one but for rounding.

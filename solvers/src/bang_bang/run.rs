@@ -116,6 +116,7 @@ impl<const M: usize> Task<'_, M> {
             weights_of(problem.weight, problem.offset, i),
             speed_sq,
         )
+        .with_share(problem.share(i))
     }
 
     /// The tool's own piece where it is another one and its chord error is limited.
@@ -395,9 +396,10 @@ fn push<const M: usize, const C: usize>(
             Kind::LimitCurve => continue,
             Kind::Cap => match sub.cap {
                 Cap::Axis(k, v_sq) => (ArcKind::AxisVelocity, k as u8, v_sq, way(k) / v_sq.sqrt()),
+                Cap::Feed(f) => (ArcKind::Feed, NO_AXIS, f, time_at_speed(sub, (f, f), arc.x0, arc.x1)),
                 Cap::Speed([f0, f1]) => {
                     let time = time_at_speed(sub, (f0, f1), arc.x0, arc.x1);
-                    if f0 == f1 {
+                    if f0 == f1 && task.problem.share(number).is_none() {
                         (ArcKind::Feed, NO_AXIS, f0, time)
                     } else {
                         (ArcKind::SpeedLine, NO_AXIS, 0.0, time)

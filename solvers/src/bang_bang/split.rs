@@ -84,16 +84,18 @@ pub fn split<const M: usize, const C: usize>(
     cuts.clear();
     cuts.extend([Cut::plain(0.0), Cut::plain(1.0)]);
     let moving = cut_at_turns(piece, cuts);
-    let (whole, mut below_chord) = ([SpeedLine { from: 0.0, to: 1.0, speed_sq: [feed_sq; 2] }], vec![]);
+    let feed = piece.feed_rate().map(|rate| (rate, feed_sq));
+    let most_sq = if feed.is_some() { f64::INFINITY } else { feed_sq };
+    let (whole, mut below_chord) = ([SpeedLine { from: 0.0, to: 1.0, speed_sq: [most_sq; 2] }], vec![]);
     match (chord, tip) {
-        (Some(chord), Some(tip)) => chord.lines(tip, feed_sq, &mut below_chord),
-        (Some(chord), None) if piece.own_speed => chord.lines(piece, feed_sq, &mut below_chord),
+        (Some(chord), Some(tip)) => chord.lines(tip, most_sq, &mut below_chord),
+        (Some(chord), None) if piece.own_speed => chord.lines(piece, most_sq, &mut below_chord),
         _ => {}
     }
     let lines = if below_chord.is_empty() { &whole } else { below_chord.as_slice() };
     // Where the axes are the tool's none is faster than the tool.
     let can_cap = (0..M).fold(0u8, |bits, k| {
-        let slow = piece.own_speed && axes.velocity_sq[k] >= feed_sq;
+        let slow = piece.own_speed && axes.velocity_sq[k] >= most_sq;
         bits | u8::from(!slow && moving >> k & 1 == 1) << k
     });
     let mut fast = 0u8;
@@ -102,7 +104,7 @@ pub fn split<const M: usize, const C: usize>(
             cuts.push(Cut::plain(line.from));
         }
         if can_cap != 0 {
-            fast |= cut_by_cap(piece, axes, line, can_cap, cuts);
+            fast |= cut_by_cap(piece, axes, feed.as_ref(), line, can_cap, cuts);
         }
     }
     merge_near_cusps(piece, cuts);
@@ -123,10 +125,11 @@ pub fn split<const M: usize, const C: usize>(
         let Some(line) = lines.peek() else { break };
         let middle = 0.5 * (from + to);
         let g: [f64; M] = std::array::from_fn(|k| piece.g[k].value(middle));
+        let feed = feed.as_ref().map(|(rate, feed_sq)| (rate.value(middle), *feed_sq));
         out.push(Part {
             from,
             to,
-            cap: lowest_cap(&g, piece.speed.value(middle), axes, line, (from, to), fast),
+            cap: lowest_cap(&g, piece.speed.value(middle), axes, feed, line, (from, to), fast),
             left: pair[0].end,
             right: pair[1].end,
             negative: (0..M).fold(0, |bits, k| bits | u8::from(g[k] < 0.0) << k),
@@ -258,6 +261,7 @@ fn cut_by_weight<const C: usize>(weight: &Polynomial<C>, (from, to): (f64, f64),
 fn cut_by_cap<const M: usize, const C: usize>(
     piece: &Piece<M, C>,
     axes: &Axes<M>,
+    feed: Option<&(Polynomial<C>, f64)>,
     line: &SpeedLine,
     can_cap: u8,
     cuts: &mut Vec<Cut>,
@@ -272,16 +276,26 @@ fn cut_by_cap<const M: usize, const C: usize>(
     let binds = !piece.own_speed || f0.min(f1) < axes.velocity_sq.iter().sum();
     let bound =
         if f0 == f1 { Polynomial::constant(f0) } else { Polynomial::from_bernstein([f0, f1].into_iter()) };
+    let finite = f0.is_finite() && f1.is_finite();
+    let feed = feed.map(|(rate, feed_sq)| (on_line(rate), *feed_sq));
     for k in (0..M).filter(|&k| can_cap >> k & 1 == 1 && axes.velocity_sq[k] < f64::MAX) {
-        if binds && f0.is_finite() && f1.is_finite() {
-            let square = on_line(&piece.g[k].multiply(&piece.g[k]));
-            let excess = square.multiply(&bound).combine(1.0, &speed, -axes.velocity_sq[k]);
-            if excess.coefficients().iter().all(|&value| value <= 0.0) {
-                continue;
-            }
-            crossings(&excess, &mut cut);
+        let square = || on_line(&piece.g[k].multiply(&piece.g[k]));
+        let mut excesses = [None, None];
+        if binds && finite {
+            excesses[0] = Some(square().multiply(&bound).combine(1.0, &speed, -axes.velocity_sq[k]));
         }
+        if let Some((rate, feed_sq)) = &feed {
+            excesses[1] = Some(square().combine(*feed_sq, rate, -axes.velocity_sq[k]));
+        }
+        let is_slow = |excess: &Polynomial<C>| excess.coefficients().iter().all(|&value| value <= 0.0);
+        if excesses.iter().flatten().any(is_slow) {
+            continue;
+        }
+        excesses.iter().flatten().for_each(|excess| crossings(excess, &mut cut));
         fast |= 1 << k;
+    }
+    if let Some((rate, feed_sq)) = feed.filter(|_| finite) {
+        crossings(&rate.multiply(&bound).combine(1.0, &speed, -feed_sq), &mut cut);
     }
     for j in (0..M).filter(|&j| fast >> j & 1 == 1) {
         for k in (j + 1..M).filter(|&k| fast >> k & 1 == 1) {
@@ -316,6 +330,7 @@ fn lowest_cap<const M: usize>(
     g: &[f64; M],
     speed: f64,
     axes: &Axes<M>,
+    feed: Option<(f64, f64)>,
     line: &SpeedLine,
     (from, to): (f64, f64),
     fast: u8,
@@ -325,6 +340,9 @@ fn lowest_cap<const M: usize>(
     let ends = [at(from), at(to)];
     let mut lowest = 0.5 * (ends[0] + ends[1]) / speed;
     let mut cap = Cap::Speed(ends);
+    if let Some((rate, feed_sq)) = feed.filter(|(rate, feed_sq)| rate * lowest > *feed_sq) {
+        (lowest, cap) = (feed_sq / rate, Cap::Feed(feed_sq));
+    }
     for k in (0..M).filter(|&k| fast >> k & 1 == 1) {
         if g[k] * g[k] * lowest > axes.velocity_sq[k] {
             lowest = axes.velocity_sq[k] / (g[k] * g[k]);

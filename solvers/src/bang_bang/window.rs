@@ -36,6 +36,7 @@ impl<const M: usize, const C: usize> Window<M, C> {
         let bound = match sub.cap {
             Cap::Speed([f0, f1]) if f0 == f1 => Bound::Speed(Polynomial::constant(f0)),
             Cap::Speed(ends) => Bound::Speed(Polynomial::from_bernstein(ends.into_iter())),
+            Cap::Feed(f) => Bound::Speed(Polynomial::constant(f)),
             Cap::Axis(k, v_sq) => Bound::Axis(k, v_sq),
         };
         Self { g: sub.g, weight: sub.weight, speed: sub.speed, bound, known: [None; 2], x0: 0.0, x1: 1.0 }

@@ -33,6 +33,8 @@ pub struct Piece<'a, const M: usize, const C: usize, const R: usize> {
     /// Where the chord error limits the speed and the tool has a curve of its own.
     tip_curve: Option<TipCurve>,
     feed_sq: f64,
+    /// What the axes count in the feed, where that is not the tool's speed.
+    share: Option<&'a [f64; M]>,
 }
 
 impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
@@ -57,6 +59,7 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
             tip_speed,
             tip_curve,
             feed_sq: problem.feed[i].powi(2) * task.speed_share,
+            share: problem.share(i),
         }
     }
 
@@ -93,11 +96,19 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
         (axes_sq / axes).min(tool_sq / speed) * UP
     }
 
+    /// The square of the speed that the feed limits over x at a node, at least; `speed` is the least of `self.speed`.
+    #[inline(always)]
+    fn feed_rate(&self, node: &Node<M>, speed: f64) -> f64 {
+        let Some(share) = self.share else { return speed };
+        let least = |k: usize| share[k] * (node.rate[k].abs() - self.curve.noise[k]).max(0.0);
+        (0..M).map(|k| least(k).powi(2)).sum::<f64>() * DOWN
+    }
+
     /// Not below x at a node; `speed` is the least of `self.speed`.
     #[inline(always)]
     pub fn greatest(&self, node: &Node<M>, speed: f64) -> f64 {
         let (task, noise) = (self.task, &self.curve.noise);
-        let mut most = self.feed_sq / speed;
+        let mut most = self.feed_sq / self.feed_rate(node, speed);
         for k in 0..M {
             let least = (node.rate[k].abs() - noise[k]).max(0.0);
             most = most.min(task.velocity_sq[k] / (least * least));
@@ -144,7 +155,7 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
         if !(is_near(a, x[0]) || is_near(b, x[1])) {
             return 0.0;
         }
-        let feed_sq = self.feed_sq * UP;
+        let feed_sq = if self.share.is_some() { f64::INFINITY } else { self.feed_sq * UP };
         let time = match &self.tip_curve {
             Some(tip) => tip.chord_time(chord, feed_sq, &tip.node(a.t), &tip.node(b.t)),
             None => self.curve.chord_time(chord, feed_sq, a, b),
@@ -213,14 +224,15 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
         time
     }
 
-    /// Not above the tool's way from `a` to `b`.
+    /// Not above the way from `a` to `b` along which the feed counts.
     fn length(&self, a: &Node<M>, b: &Node<M>, ways: &Ways<M>) -> f64 {
         if let Some(tip) = &self.tip_speed {
             let d = |t: f64| tip.at(t, 0).0;
             return root_integral(&d, tip.coefficients.len() - 1, tip.noise, (a.t, b.t)) * DOWN;
         }
-        let chord = ways.least.iter().map(|way| way * way).sum::<f64>().sqrt() * DOWN;
-        if self.curve.degree == 0 {
+        let share = self.share.unwrap_or(&[1.0; M]);
+        let chord = (0..M).map(|k| (share[k] * ways.least[k]).powi(2)).sum::<f64>().sqrt() * DOWN;
+        if self.curve.degree == 0 || (self.share.is_some() && self.curve.is_rational()) {
             return chord;
         }
         if self.curve.is_rational() {
@@ -229,9 +241,12 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
             let parts = (cosine.clamp(-1.0, 1.0).acos() / CHORD_TURN).ceil().clamp(2.0, MOST_CHORDS);
             return chord.max(self.curve.chords(a, b, parts as usize));
         }
-        let noise: f64 = self.curve.noise.iter().sum();
-        let greatest: f64 = self.curve.size.iter().sum();
-        let d = |t: f64| self.curve.node(t).g.iter().map(|value| value * value).sum();
+        let noise: f64 = (0..M).map(|k| share[k] * self.curve.noise[k]).sum();
+        let greatest: f64 = (0..M).map(|k| share[k] * self.curve.size[k]).sum();
+        let d = |t: f64| {
+            let g = self.curve.node(t).g;
+            (0..M).map(|k| (share[k] * g[k]).powi(2)).sum()
+        };
         let bound = root_integral(&d, 2 * self.curve.degree, 2.0 * greatest * noise, (a.t, b.t));
         chord.max(bound * DOWN)
     }

@@ -52,6 +52,8 @@ pub struct CurveMotion<'a, const M: usize> {
     own: Coefficients<M>,
     /// D of the tip and its two derivatives.
     tip: Option<[Polynomial<MAX_TIP>; 3]>,
+    /// What the axes count in D, and the hodograph of what counts, where the law is about their shares.
+    counted: Option<Box<([f64; M], Coefficients<M>)>>,
     pub(super) arc: ProfileArc,
     law: Law,
     /// Derivatives are taken between these places.
@@ -79,7 +81,7 @@ pub fn flaw<const M: usize>(
     if !arc.kind.is_along() {
         return None;
     }
-    let motion = CurveMotion::bare(piece, tip, arc);
+    let motion = CurveMotion::bare(piece, tip, None, arc);
     let length = quadrature(&motion.time_rate(Line::ONE), arc.u0, arc.u1);
     if arc.kind == ArcKind::PathJerk {
         JerkLaw::new(arc, motion.end_speeds(), length).flaw()
@@ -90,11 +92,12 @@ pub fn flaw<const M: usize>(
 
 impl<'a, const M: usize> CurveMotion<'a, M> {
     /// Without a law and its tables.
-    fn bare(piece: Piece<'a, M>, tip: Option<TipSpeed>, arc: &ProfileArc) -> Self {
+    fn bare(piece: Piece<'a, M>, tip: Option<TipSpeed>, share: Option<&[f64; M]>, arc: &ProfileArc) -> Self {
         let mut motion = Self {
             piece,
             own: Coefficients::new(&piece),
             tip: tip.map(|tip| tip.derivatives()),
+            counted: share.map(|share| Box::new((*share, Coefficients::new(&piece).scaled(share)))),
             arc: *arc,
             law: Law::Even(EvenLaw::new(arc)),
             safe: [arc.u0, arc.u1],
@@ -112,8 +115,14 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
     }
 
     /// Prepares an arc; `with_lengths` tabulates its length whatever its kind.
-    pub fn new(piece: Piece<'a, M>, tip: Option<TipSpeed>, arc: &ProfileArc, with_lengths: bool) -> Self {
-        let mut motion = Self::bare(piece, tip, arc);
+    pub fn new(
+        piece: Piece<'a, M>,
+        tip: Option<TipSpeed>,
+        share: Option<&[f64; M]>,
+        arc: &ProfileArc,
+        with_lengths: bool,
+    ) -> Self {
+        let mut motion = Self::bare(piece, tip, share, arc);
         if arc.kind.is_along() {
             let mut nodes = vec![];
             motion.way_error = fill(motion.time_rate(Line::ONE), (arc.u0, arc.u1), &mut nodes);
@@ -234,9 +243,17 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
         match &self.tip {
             Some([square, ..]) => square.value(u / self.piece.width),
             None => {
-                let q = derivatives(&self.piece, u)[1];
+                let q = self.counts(&derivatives(&self.piece, u)[1]);
                 dot(&q, &q)
             }
+        }
+    }
+
+    /// What of a derivative counts in D.
+    fn counts(&self, q: &[f64; M]) -> [f64; M] {
+        match &self.counted {
+            Some(counted) => std::array::from_fn(|k| counted.0[k] * q[k]),
+            None => *q,
         }
     }
 
@@ -264,8 +281,12 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
     }
 
     fn own(&self) -> Source<'_, M> {
+        self.speed_of(&self.own)
+    }
+
+    fn speed_of<'b>(&'b self, coefficients: &'b Coefficients<M>) -> Source<'b, M> {
         let foot = self.foot;
-        let speed = Speed::new(self.own.hodograph(), self.own.denominator(), self.piece.width);
+        let speed = Speed::new(coefficients.hodograph(), coefficients.denominator(), self.piece.width);
         Source::Own(if foot.is_nan() { speed.without_foot() } else { speed.with_foot(foot) })
     }
 
@@ -276,7 +297,7 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
     fn source(&self) -> Source<'_, M> {
         match &self.tip {
             Some([square, ..]) => Source::Tip(Tip { square, width: self.piece.width }),
-            None => self.own(),
+            None => self.speed_of(self.counted.as_ref().map_or(&self.own, |counted| &counted.1)),
         }
     }
 
@@ -420,7 +441,9 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
                 let q = derivatives(&self.piece, u);
                 let (square, slope) = (dot(&q[1], &q[1]), 2.0 * dot(&q[1], &q[2]));
                 let a = 0.5 * line.slope / square.sqrt();
-                [line.at(state.u).sqrt(), a, -0.5 * a * slope / square * (line.at(u) / square).sqrt()]
+                // A law about shares has one speed, of what counts.
+                let speed = line.at(state.u).sqrt() / norm(&self.counts(direction));
+                [speed, a, -0.5 * a * slope / square * (line.at(u) / square).sqrt()]
             }
             Law::Jerk(_) | Law::Cubic(_) => [state.along.v, state.along.a, state.along.j],
             // Such an arc has no end where the quotients are 0/0.
@@ -435,6 +458,7 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
         match &self.tip {
             Some(tip) => [0, 1, 2].map(|order| tip[order].value(u / self.piece.width)),
             None => {
+                let q = q.each_ref().map(|q| self.counts(q));
                 let bend = 2.0 * (dot(&q[2], &q[2]) + dot(&q[1], &q[3]));
                 [dot(&q[1], &q[1]), 2.0 * dot(&q[1], &q[2]), bend]
             }

@@ -38,9 +38,14 @@ pub fn indices(array: &PyReadonlyArray1<i64>) -> Vec<usize> {
 
 /// (n, m) array to rows of M ≥ m axes; the axes beyond m rest at 0.
 pub fn rows<const M: usize>(array: &PyReadonlyArray2<f64>) -> PyResult<Vec<[f64; M]>> {
+    rows_with(array, 0.0)
+}
+
+/// The same with `rest` for the axes beyond m.
+pub fn rows_with<const M: usize>(array: &PyReadonlyArray2<f64>, rest: f64) -> PyResult<Vec<[f64; M]>> {
     let flat = array.as_slice().map_err(|_| contiguous())?;
     let axes = array.shape()[1];
-    Ok(flat.chunks_exact(axes).map(|row| padded(row, 0.0)).collect())
+    Ok(flat.chunks_exact(axes).map(|row| padded(row, rest)).collect())
 }
 
 /// (m,) array to one row of M ≥ m axes; the axes beyond m get `rest`.

@@ -15,7 +15,7 @@ use crate::audit::polygon::MOST;
 use crate::audit::profile::audit_profile;
 use crate::audit::setpoints::{Chunk, Stream};
 use crate::audit::timed::Timed;
-use crate::audit::{Check, Limits, Tally};
+use crate::audit::{Check, Limits, Tally, FEEDS};
 
 /// Name, axis (−1: none), worst value, limit, ratio, time, source line of one limit.
 type Finding = (&'static str, i64, f64, f64, f64, f64, i32);
@@ -85,7 +85,7 @@ struct PathArrays<'py> {
 #[derive(FromPyObject)]
 struct ProblemArrays<'py> {
     path: PathArrays<'py>,
-    feed: PyReadonlyArray1<'py, f64>,
+    feed_share: Option<PyReadonlyArray2<'py, f64>>,
     junction_speed: PyReadonlyArray1<'py, f64>,
 }
 
@@ -94,11 +94,17 @@ impl ProblemArrays<'_> {
         self.path.curve.axes()
     }
 
-    fn followed(&self) -> PyResult<Followed<'_>> {
+    /// What the axes count in the feed, one row a piece or none.
+    fn share(&self) -> PyResult<&[f64]> {
+        Ok(self.feed_share.as_ref().map_or(Ok(&[][..]), |share| share.as_slice())?)
+    }
+
+    /// `feed` are the greatest speeds of each piece.
+    fn followed<'a>(&'a self, feed: &'a PyReadonlyArray2<'_, f64>) -> PyResult<Followed<'a>> {
         let path = &self.path;
         let followed = Followed {
             pieces: path.curve.pieces("path")?,
-            feed: self.feed.as_slice()?,
+            feed: feed.as_slice()?,
             line: path.line.as_slice()?,
             moves: path.moves.as_slice()?,
             tolerance: path.tolerance.as_slice()?,
@@ -111,7 +117,9 @@ impl ProblemArrays<'_> {
         let runs = followed.runs;
         let ordered = runs.windows(2).all(|pair| pair[0] <= pair[1]);
         let spanned = runs.first() == Some(&0) && runs.last() == Some(&(pieces as i64));
-        let good = [followed.feed.len(), followed.line.len(), followed.tolerance.len()] == [pieces; 3]
+        let good = [followed.line.len(), followed.tolerance.len()] == [pieces; 2]
+            && followed.feed.len() == FEEDS * pieces
+            && self.share()?.len() % (self.axes() * pieces).max(1) == 0
             && followed.moves.len() == 2 * pieces
             && followed.dwell.len() + 1 == runs.len()
             && self.junction_speed.as_slice()?.len() == pieces + 1
@@ -140,7 +148,7 @@ struct ProfileArrays<'py> {
 }
 
 impl ProfileArrays<'_> {
-    fn arcs(&self) -> PyResult<Arcs<'_>> {
+    fn arcs<'a>(&'a self, problem: &'a ProblemArrays<'_>) -> PyResult<Arcs<'a>> {
         let arcs = Arcs {
             piece: self.piece.as_slice()?,
             kind: self.kind.as_slice()?,
@@ -153,6 +161,8 @@ impl ProfileArrays<'_> {
             duration: self.duration.as_slice()?,
             a0: self.a0.as_slice()?,
             a1: self.a1.as_slice()?,
+            share: problem.share()?,
+            pieces: problem.path.line.len(),
             runs: self.runs.as_slice()?,
         };
         let [a0, a1] = [arcs.a0, arcs.a1];
@@ -228,6 +238,7 @@ struct LimitArrays {
     max_velocity_jump: Vec<f64>,
     jump_beyond: Vec<f64>,
     travel: Vec<[f64; 2]>,
+    feed_axes: Vec<Vec<f64>>,
     chord_tolerance: f64,
     period: f64,
     end_speeds: [f64; 2],
@@ -238,7 +249,11 @@ impl LimitArrays {
     fn limits<const M: usize>(&self, axes: usize) -> PyResult<Limits<M>> {
         let jumps = [&self.max_velocity_jump, &self.jump_beyond];
         let lengths = [&self.max_velocity, &self.max_acceleration, &self.max_jerk, jumps[0], jumps[1]];
-        let good = axes <= M && lengths.iter().all(|row| row.len() == axes) && self.travel.len() == axes;
+        let good = axes <= M
+            && self.feed_axes.len() == FEEDS
+            && self.feed_axes.iter().all(|row| row.len() == axes)
+            && lengths.iter().all(|row| row.len() == axes)
+            && self.travel.len() == axes;
         require(good, "limits")?;
         fn padded<const M: usize>(values: &[f64]) -> [f64; M] {
             std::array::from_fn(|k| values.get(k).copied().unwrap_or(0.0))
@@ -253,6 +268,7 @@ impl LimitArrays {
             jump: padded(&self.max_velocity_jump),
             jump_beyond: padded(&self.jump_beyond),
             travel: std::array::from_fn(|k| self.travel.get(k).copied().unwrap_or(anywhere)),
+            feed_axes: std::array::from_fn(|feed| padded(&self.feed_axes[feed])),
             chord_tolerance: self.chord_tolerance,
             period: self.period,
             end_speeds: self.end_speeds,
@@ -262,17 +278,18 @@ impl LimitArrays {
 
 /// Audits path and profile, and the path against the program.
 #[pyfunction]
-#[pyo3(signature = (problem, limits, profile=None, program=None))]
+#[pyo3(signature = (problem, limits, feed, profile=None, program=None))]
 fn audit_plan(
     py: Python<'_>,
     problem: ProblemArrays<'_>,
     limits: LimitArrays,
+    feed: PyReadonlyArray2<'_, f64>,
     profile: Option<ProfileArrays<'_>>,
     program: Option<ProgramArrays<'_>>,
 ) -> PyResult<Findings> {
-    let path = problem.followed()?;
+    let path = problem.followed(&feed)?;
     let junction_speed = problem.junction_speed.as_slice()?;
-    let arcs = profile.as_ref().map(ProfileArrays::arcs).transpose()?;
+    let arcs = profile.as_ref().map(|profile| profile.arcs(&problem)).transpose()?;
     let program = program.as_ref().map(|program| program.programmed(problem.axes())).transpose()?;
     with_path_axes!(problem.axes(), M, {
         let limits = limits.limits::<M>(path.axes)?;
@@ -345,6 +362,7 @@ impl<const M: usize> AnyStream for Stream<M> {
 /// What a stream of setpoints is compared with, kept as Python holds it.
 struct Compared {
     problem: Py<PyAny>,
+    feed: Py<PyAny>,
     profile: Option<Py<PyAny>>,
     program: Option<Py<PyAny>>,
     /// When every arc of the profile begins.
@@ -355,12 +373,13 @@ impl Compared {
     /// Calls `work` with the plan, free of Python's lock.
     fn with_plan<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&Plan) -> T + Send) -> PyResult<T> {
         let problem: ProblemArrays = self.problem.bind(py).extract()?;
+        let feed: PyReadonlyArray2<f64> = self.feed.bind(py).extract()?;
         let profile: Option<ProfileArrays> =
             self.profile.as_ref().map(|profile| profile.bind(py).extract()).transpose()?;
         let program: Option<ProgramArrays> =
             self.program.as_ref().map(|program| program.bind(py).extract()).transpose()?;
-        let path = problem.followed()?;
-        let arcs = profile.as_ref().map(ProfileArrays::arcs).transpose()?;
+        let path = problem.followed(&feed)?;
+        let arcs = profile.as_ref().map(|profile| profile.arcs(&problem)).transpose()?;
         let program = program.as_ref().map(|program| program.programmed(problem.axes())).transpose()?;
         let profile = arcs.map(|arcs| Timed { arcs, starts: &self.starts, clock: &[] });
         let plan = Plan { path, profile, program };
@@ -379,11 +398,12 @@ struct SetpointAudit {
 #[pymethods]
 impl SetpointAudit {
     #[new]
-    #[pyo3(signature = (limits, resolution=0.0, problem=None, profile=None, program=None))]
+    #[pyo3(signature = (limits, resolution=0.0, problem=None, feed=None, profile=None, program=None))]
     fn new(
         limits: LimitArrays,
         resolution: f64,
         problem: Option<Bound<'_, PyAny>>,
+        feed: Option<Bound<'_, PyAny>>,
         profile: Option<Bound<'_, PyAny>>,
         program: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
@@ -393,7 +413,10 @@ impl SetpointAudit {
             M,
             Ok(Box::new(Stream::new(limits.limits::<M>(axes)?, resolution)) as _)
         )?;
-        let compared = problem.map(|problem| compare(axes, problem, profile, program)).transpose()?;
+        let compared = problem
+            .zip(feed)
+            .map(|(problem, feed)| compare(axes, problem, feed, profile, program))
+            .transpose()?;
         Ok(Self { axes, stream: Some(stream), compared: compared.flatten() })
     }
 
@@ -447,11 +470,13 @@ impl SetpointAudit {
 fn compare(
     axes: usize,
     problem: Bound<'_, PyAny>,
+    feed: Bound<'_, PyAny>,
     profile: Option<Bound<'_, PyAny>>,
     program: Option<Bound<'_, PyAny>>,
 ) -> PyResult<Option<Compared>> {
     let arrays: ProblemArrays = problem.extract()?;
-    let path = arrays.followed()?;
+    let feeds: PyReadonlyArray2<f64> = feed.extract()?;
+    let path = arrays.followed(&feeds)?;
     require(arrays.axes() == axes, "limits and the path")?;
     if path.is_empty() {
         return Ok(None);
@@ -460,7 +485,7 @@ fn compare(
     let mut usable = None;
     if let Some(profile) = profile {
         let extracted: ProfileArrays = profile.extract()?;
-        let arcs = extracted.arcs()?;
+        let arcs = extracted.arcs(&arrays)?;
         let runs = arcs.runs;
         let good = !arcs.is_empty()
             && runs.len() == path.runs.len()
@@ -474,7 +499,7 @@ fn compare(
         }
     }
     let program = program.map(Bound::unbind);
-    Ok(Some(Compared { problem: problem.unbind(), profile: usable, program, starts }))
+    Ok(Some(Compared { problem: problem.unbind(), feed: feed.unbind(), profile: usable, program, starts }))
 }
 
 fn finished() -> PyErr {

@@ -9,6 +9,7 @@ use super::problem::{ProblemArrays, ProblemRows};
 use super::with_padded_axes;
 use crate::bang_bang::{self, plan_each};
 use crate::bang_bang_quadratic::{self, Fault, Profile};
+use crate::feed;
 use crate::look_ahead::Segments;
 
 pyo3::create_exception!(
@@ -54,7 +55,11 @@ fn plan_curves<'py>(py: Python<'py>, problem: ProblemArrays<'py>) -> PyResult<Co
 
 fn plan<'py>(py: Python<'py>, arrays: &ProblemArrays<'py>, by: Quadratics) -> PyResult<Columns<'py>> {
     let curve = &arrays.curve;
-    if matches!(by, Quadratics::Their) && arrays.tip_speed.is_none() && curve.is_quadratic() {
+    if matches!(by, Quadratics::Their)
+        && arrays.tip_speed.is_none()
+        && arrays.feed_share.is_none()
+        && curve.is_quadratic()
+    {
         return plan_quadratics(py, arrays);
     }
     with_padded_axes!(curve.axes(), M, {
@@ -121,6 +126,27 @@ pub fn to_exception(fault: &Fault) -> PyErr {
     PlanError::new_err((kind, piece, reachable, text))
 }
 
+/// The greatest speed along each of these parts of pieces that keeps the feed everywhere on it (n,).
+#[pyfunction]
+fn feed_between<'py>(
+    py: Python<'py>,
+    problem: ProblemArrays<'py>,
+    piece: PyReadonlyArray1<'py, i64>,
+    u0: PyReadonlyArray1<'py, f64>,
+    u1: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let (piece, u0, u1) = (indices(&piece), u0.as_slice()?, u1.as_slice()?);
+    if [u0.len(), u1.len()] != [piece.len(); 2] {
+        return Err(PyValueError::new_err("the arrays of the parts differ in length"));
+    }
+    with_padded_axes!(problem.curve.axes(), M, {
+        let rows = ProblemRows::<M>::new(&problem)?;
+        let problem = rows.problem()?;
+        let part = |i: usize| feed::between(&problem, piece[i], [u0[i], u1[i]]);
+        Ok(PyArray1::from_vec(py, py.detach(|| (0..piece.len()).map(part).collect())))
+    })
+}
+
 /// The greatest speeds at the ends of segments, lowered to those that the segments between lead to.
 #[pyfunction]
 fn look_ahead<'py>(
@@ -141,6 +167,7 @@ fn look_ahead<'py>(
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("PlanError", module.py().get_type::<PlanError>())?;
     module.add_function(wrap_pyfunction!(plan_curves, module)?)?;
+    module.add_function(wrap_pyfunction!(feed_between, module)?)?;
     module.add_function(wrap_pyfunction!(look_ahead, module)?)?;
     module.add_function(wrap_pyfunction!(plan_bang_bang, module)?)
 }

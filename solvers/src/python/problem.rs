@@ -1,9 +1,9 @@
 //! The package's own problem as the kernels take it.
 
-use numpy::{PyReadonlyArray1, PyUntypedArrayMethods};
+use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use super::arrays::{indices, row, rows, CurveArrays};
+use super::arrays::{indices, row, rows, rows_with, CurveArrays};
 use crate::bang_bang::{Problem, SpeedSquare, Tip, TIP_AXES};
 
 impl CurveArrays<'_> {
@@ -37,6 +37,7 @@ pub struct ProblemArrays<'py> {
     pub tip_speed: Option<SpeedSquareArrays<'py>>,
     pub way_speed: Option<SpeedSquareArrays<'py>>,
     pub tip_curve: Option<CurveArrays<'py>>,
+    pub feed_share: Option<PyReadonlyArray2<'py, f64>>,
     pub feed: PyReadonlyArray1<'py, f64>,
     pub junction_speed: PyReadonlyArray1<'py, f64>,
     pub max_velocity: PyReadonlyArray1<'py, f64>,
@@ -55,6 +56,7 @@ pub struct ProblemRows<'a, 'py, const M: usize> {
     runs: Vec<usize>,
     tip: Option<TipRows>,
     way_offset: Vec<usize>,
+    feed_share: Vec<[f64; M]>,
 }
 
 /// Control points of the tool's path, their offsets, and those of its speed.
@@ -87,6 +89,10 @@ impl<'a, 'py, const M: usize> ProblemRows<'a, 'py, M> {
             runs: indices(&arrays.path.runs),
             tip,
             way_offset: arrays.way_speed.as_ref().map_or(vec![], |way| indices(&way.offsets)),
+            feed_share: match &arrays.feed_share {
+                Some(share) => rows_with::<M>(share, 1.0)?,
+                None => vec![],
+            },
         })
     }
 
@@ -108,6 +114,7 @@ impl<'a, 'py, const M: usize> ProblemRows<'a, 'py, M> {
             width: arrays.curve.width.as_slice()?,
             tip,
             way: arrays.way_speed.as_ref().map(|way| way.square(&self.way_offset)).transpose()?,
+            feed_share: &self.feed_share,
             runs: &self.runs,
             feed: arrays.feed.as_slice()?,
             junction_speed: arrays.junction_speed.as_slice()?,

@@ -7,7 +7,7 @@ use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArr
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 
-use super::arrays::to_array2;
+use super::arrays::{rows_with, to_array2};
 use super::spline::curve;
 use super::with_padded_axes;
 use crate::arc_kind::ArcKind;
@@ -126,6 +126,7 @@ impl PySampler {
         width: PyReadonlyArray1<'_, f64>,
         tip_speed: Option<SpeedArrays<'_>>,
         way_speed: Option<SpeedArrays<'_>>,
+        feed_share: Option<PyReadonlyArray2<'_, f64>>,
         line: PyReadonlyArray1<'_, i32>,
         runs: PyReadonlyArray1<'_, i64>,
         start_dwell: f64,
@@ -190,6 +191,10 @@ impl PySampler {
                 curve: curve(&control_points, weights.as_ref(), &offsets, &width)?,
                 tip_speed: speed(&tip_speed)?,
                 way_speed: speed(&way_speed)?,
+                feed_share: match &feed_share {
+                    None => vec![],
+                    Some(share) => rows_with(share, 1.0)?,
+                },
                 lines: slice(&line)?.to_vec(),
                 runs: indices(&runs)?,
                 start_dwell,

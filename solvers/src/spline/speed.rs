@@ -52,6 +52,14 @@ impl<const M: usize> Coefficients<M> {
         coefficients
     }
 
+    /// Those of the piece with each axis times a factor.
+    pub fn scaled(mut self, factor: &[f64; M]) -> Self {
+        for row in &mut self.h {
+            *row = std::array::from_fn(|k| factor[k] * row[k]);
+        }
+        self
+    }
+
     /// Bernstein coefficients of the hodograph times binomials.
     pub fn hodograph(&self) -> &[[f64; M]] {
         &self.h[..self.counts[0]]

@@ -47,6 +47,7 @@ impl<const M: usize> CurveCase<M> {
             width: &width,
             tip: None,
             way: None,
+            feed_share: &[],
             runs: &[0, self.pieces.len()],
             feed: &vec![self.feed; self.pieces.len()],
             junction_speed: &self.junction,

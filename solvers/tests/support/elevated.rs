@@ -46,6 +46,7 @@ impl Elevated {
             width: &self.width,
             tip: None,
             way: None,
+            feed_share: &[],
             runs: &self.runs,
             feed: &case.feed,
             junction_speed: &case.junction,

@@ -53,6 +53,7 @@ pub enum Shape<const M: usize> {
 }
 
 impl Law {
+    /// `tangent` and `bend` are what counts in the speed that the law is about.
     pub fn pole<const M: usize>(&self, tangent: &[f64; M], bend: &[f64; M], p_anchor: f64) -> Option<Pole> {
         match *self {
             // p − a/q''_k falls off as (q'_k(anchor) / q'_k)².

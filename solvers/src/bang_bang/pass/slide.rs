@@ -1,6 +1,7 @@
 //! Along the bound: an arc of the backward pass to its end, the velocity cap while no axis needs more than it has.
 
 use super::{kept_until, Kind, Pass, NOISE};
+use crate::bang_bang::part::Cap;
 use crate::bang_bang::window::Bound;
 use crate::polynomial::Polynomial;
 
@@ -45,7 +46,8 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
     }
 
     fn slide_at_speed(&self, f: &Polynomial<C>) -> (f64, Option<usize>, Option<(usize, usize)>) {
-        if self.straight && self.sub.own_speed && f.degree() == 0 {
+        let even = self.sub.own_speed || matches!(self.sub.cap, Cap::Feed(_));
+        if self.straight && even && f.degree() == 0 {
             return (1.0, None, None);
         }
         let window = &self.window;

@@ -1,0 +1,81 @@
+"""Along which axes a feed counts: X, Y, Z, else U, V, W, else the rotary axes, as RS-274 has it.
+
+A piece of a path keeps the feeds of the moves that it follows. Where it also moves axes that none of these
+moves, as a blend does, it keeps the feed of the next move on either side that counts along those axes. So
+where a move of X, Y, Z and one of rotary axes alone are blended, both feeds hold on the whole blend.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.curves.composite import CompositeCurve
+
+GROUPS = 3
+
+_LETTERS = ("XYZ", "UVW")
+
+
+def feed_groups(axes: tuple[str, ...]) -> NDArray[np.bool_]:
+    """Which axes belong to which group (3, axes): X, Y, Z; U, V, W; all others."""
+    linear, parallel = ([name in letters for name in axes] for letters in _LETTERS)
+    others = [not (x or u) for x, u in zip(linear, parallel, strict=True)]
+    return np.array([linear, parallel, others], dtype=np.bool_)
+
+
+def moved_groups(axes: tuple[str, ...], moving: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which groups have an axis that moves (m, 3), from which axes move (m, axes)."""
+    return np.asarray(np.logical_or.reduce(moving[:, None, :] & feed_groups(axes), axis=2), dtype=np.bool_)
+
+
+def moving_axes(curve: CompositeCurve) -> NDArray[np.bool_]:
+    """Which axes each piece moves (n, axes)."""
+    control, first = curve.control_points, curve.offsets[:-1]
+    return np.asarray(np.maximum.reduceat(control, first) > np.minimum.reduceat(control, first))
+
+
+def group_feeds(
+    axes: tuple[str, ...],
+    moving: NDArray[np.bool_],
+    feed: NDArray[np.float64],
+    curve: CompositeCurve,
+    covered: NDArray[np.int64],
+) -> NDArray[np.float64] | None:
+    """The greatest speed of pieces along each group of axes (n, 3) [mm/s, deg/s], infinite where none holds.
+
+    `moving` (m, axes) are the axes that each move moves, `feed` (m,) its feed, infinite on rapids, `covered`
+    (n, 2) the first and the last move that each piece of `curve` follows. None where all axes are one group.
+    """
+    if np.logical_or.reduce(feed_groups(axes), axis=1).sum() == 1:
+        return None
+    moves = moved_groups(axes, moving)
+    limit = np.where(moves & (np.cumsum(moves, axis=1) == 1), feed[:, None], np.inf)
+    own = _over(np.minimum, limit, covered, np.inf)
+    foreign = moved_groups(axes, moving_axes(curve)) & ~_over(np.logical_or, moves, covered, False)
+    # The next moves on both sides that go anywhere; the last row stands for none.
+    limit = np.concatenate([limit, np.full((1, GROUPS), np.inf)])
+    goes = np.append(np.flatnonzero(np.logical_or.reduce(moves, axis=1)), len(moves))
+    first, last = covered.T
+    before = goes[np.searchsorted(goes, first) - 1]
+    after = goes[np.minimum(np.searchsorted(goes, last, side="right"), len(goes) - 1)]
+    beside = np.minimum(limit[before], limit[after])
+    return np.asarray(np.where(foreign, np.minimum(own, beside), own))
+
+
+def leading_feed(by_group: NDArray[np.float64], otherwise: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The feed along the first group that has one (n,), `otherwise` where none has."""
+    finite = np.isfinite(by_group)
+    first = np.take_along_axis(by_group, finite.argmax(axis=1)[:, None], axis=1)[:, 0]
+    return np.where(np.logical_or.reduce(finite, axis=1), first, otherwise)
+
+
+def _over(
+    function: np.ufunc, values: NDArray[Any], covered: NDArray[np.int64], nothing: float | bool
+) -> NDArray[Any]:
+    """The function over the rows from the first to the last (n, …)."""
+    padded = np.concatenate([values, np.full((1, *values.shape[1:]), nothing, dtype=values.dtype)])
+    ends = np.stack([covered[:, 0], covered[:, 1] + 1], axis=1).ravel()
+    return np.asarray(function.reduceat(padded, ends, axis=0)[::2])
