@@ -18,7 +18,7 @@ class ArcKind(IntEnum):
 
     AXIS_ACCELERATION = 0  # q'_k s + q''_k p = value [mm/s²], signed
     PARAMETER_ACCELERATION = 1  # s = p'/2 = value [mm/s²], so that p is linear in u
-    FEED = 2  # the speed: |C'|² p = value [mm²/s²]
+    FEED = 2  # the speed that the feed limits: |C'|² p = value [mm²/s²], by the problem's `feed_share`
     AXIS_VELOCITY = 3  # one axis's speed: q'_k² p = value [mm²/s²]
     CHORD = 4  # the chord-error limit on a quadratic piece: p = value · |C'|
     SPEED_LINE = 5  # |C'|² p is linear in u from end to end [mm²/s²]; value is 0

@@ -12,7 +12,7 @@ from feedplan._solvers import build_path as native_build_path
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError, ProgramError
 from feedplan.geometry.corners import Corners
-from feedplan.geometry.feed_groups import group_feeds, leading_feed, moved_groups
+from feedplan.geometry.feed_groups import group_feeds, leading_feed, leading_group, told_apart
 from feedplan.geometry.path import FitSummary, Path
 from feedplan.geometry.path_words import path_words
 from feedplan.machine.machine import Machine
@@ -120,7 +120,7 @@ def build_path(
         program.start,
         program.kind,
         program.target,
-        program.feed,
+        told_apart(names, moving, program.feed),
         program.line,
         limit,
         fit_limit,
@@ -179,8 +179,7 @@ def build_path(
 
 def _changes_of_group(names: tuple[str, ...], moving: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """(m − 1,) whether the feed of the next move counts along other axes."""
-    groups = moved_groups(names, moving)
-    leading = np.where(np.logical_or.reduce(groups, axis=1), groups.argmax(axis=1), -1)
+    leading = leading_group(names, moving)
     return np.asarray((leading[1:] != leading[:-1]) & (leading[1:] >= 0) & (leading[:-1] >= 0))
 
 

@@ -37,6 +37,24 @@ def moving_axes(curve: CompositeCurve) -> NDArray[np.bool_]:
     return np.asarray(np.maximum.reduceat(control, first) > np.minimum.reduceat(control, first))
 
 
+def leading_group(axes: tuple[str, ...], moving: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """The group that the feed of each move counts along (m,), −1 where nothing moves."""
+    moves = moved_groups(axes, moving)
+    return np.where(np.logical_or.reduce(moves, axis=1), moves.argmax(axis=1), -1)
+
+
+def told_apart(
+    axes: tuple[str, ...], moving: NDArray[np.bool_], feed: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """The feeds (m,), equal numbers along different axes made to differ by a rounding: they are other feeds."""
+    if _are_one_group(axes):
+        return feed
+    group = leading_group(axes, moving)
+    for number in range(1, GROUPS):
+        feed = np.where(group >= number, np.nextafter(feed, np.inf), feed)
+    return feed
+
+
 def group_feeds(
     axes: tuple[str, ...],
     moving: NDArray[np.bool_],
@@ -49,7 +67,7 @@ def group_feeds(
     `moving` (m, axes) are the axes that each move moves, `feed` (m,) its feed, infinite on rapids, `covered`
     (n, 2) the first and the last move that each piece of `curve` follows. None where all axes are one group.
     """
-    if np.logical_or.reduce(feed_groups(axes), axis=1).sum() == 1:
+    if _are_one_group(axes):
         return None
     moves = moved_groups(axes, moving)
     limit = np.where(moves & (np.cumsum(moves, axis=1) == 1), feed[:, None], np.inf)
@@ -70,6 +88,10 @@ def leading_feed(by_group: NDArray[np.float64], otherwise: NDArray[np.float64]) 
     finite = np.isfinite(by_group)
     first = np.take_along_axis(by_group, finite.argmax(axis=1)[:, None], axis=1)[:, 0]
     return np.where(np.logical_or.reduce(finite, axis=1), first, otherwise)
+
+
+def _are_one_group(axes: tuple[str, ...]) -> bool:
+    return int(np.logical_or.reduce(feed_groups(axes), axis=1).sum()) == 1
 
 
 def _over(

@@ -50,9 +50,9 @@ class Path:
     `axes` names; `curve` the n pieces [mm, deg], each of its own degree, polynomial or rational; `feed` (n,)
     commanded feed [mm/s], infinite on rapids, `group_feed` says along which axes; `move` (n, 2) first and
     last program move that the piece follows; `line` (n,) source line of the first; `runs` (r + 1,) piece
-    offsets: the tool stands still at the start and the end of each run; `dwell` (r,) pause after each run [s];
-    `tolerance` (n,) allowed distance from the programmed path [mm]; `start_dwell` pause before the first run
-    [s].
+    offsets: the tool stands still at the start and the end of each run; `dwell` (r,) pause after each run
+    [s]; `tolerance` (n,) allowed distance from the programmed path [mm]; `start_dwell` pause before the first
+    run [s].
     `meaning` (r,) what the axes are on the machine in each run (`feedplan.machine.meaning.Meaning`) and
     `tool_length` (r,) [mm], NaN for the machine file's; None where the machine knows one meaning only.
     `corners` is what became of those of the program; `warnings` are sentences for the user.

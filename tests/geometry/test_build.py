@@ -193,6 +193,10 @@ def test_a_feed_counts_along_the_linear_axes_where_they_move(make_program: Any, 
     corner = [[6.0, free, 2.0]] * (len(path) - 2)
     np.testing.assert_array_equal(path.group_feed, [[6.0, free, free], *corner, [free, free, 2.0]])
     assert build_path(make_program([[0, 0, 0], [3, 0, 4]]), rotary).group_feed is None
+    # A chain is cut where the same number counts along other axes.
+    turn = [[0.2 * min(i, 10), 0, 0, 0.2 * max(i, 10)] for i in range(21)]
+    path = build_path(make_program(turn, axes="XYZA", feed=6.0), rotary)
+    assert (np.isfinite(path.group_feed).sum(axis=1) == 1).sum() >= 2
 
 
 def test_positions_outside_the_travel_name_line_axis_and_limit(make_program: Any) -> None:
