@@ -46,7 +46,7 @@ def leading_group(axes: tuple[str, ...], moving: NDArray[np.bool_]) -> NDArray[n
 def told_apart(
     axes: tuple[str, ...], moving: NDArray[np.bool_], feed: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """The feeds (m,), equal numbers along different axes made to differ by a rounding: they are other feeds."""
+    """The feeds (m,), equal numbers along different axes made to differ by a rounding: other feeds."""
     if _are_one_group(axes):
         return feed
     group = leading_group(axes, moving)
