@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan._solvers import look_ahead as native_look_ahead
-from feedplan.constraints.problem import Problem
+from feedplan.constraints.problem import Problem, feed_square, speed_square
 from feedplan.errors import InfeasibleError
 from feedplan.planners._segments import Array, Rule, Segments, segments
 from feedplan.profile import NO_AXIS, ArcKind, SpeedProfile
@@ -126,8 +126,9 @@ def _profile(problem: Problem, parts: Segments, speed: Array, room: Array) -> Sp
     from_sq, to_sq = speed_sq[segment, phase], speed_sq[segment, phase + 1]
     piece, line = parts.piece[segment], ~np.isnan(parts.rate[segment])
     constant = _CONSTANT[phase]
-    # What is constant is the speed in all axes; the feed of such pieces is another one.
-    even = np.where(_counts_by_shares(problem)[piece], ArcKind.SPEED_LINE, ArcKind.FEED)
+    # What is constant is the speed in all axes: on lines that is so of the speed that the feed limits too.
+    counted, by_shares = _counted(problem, piece, u0)
+    even = np.where(by_shares & ~line, ArcKind.SPEED_LINE, ArcKind.FEED)
     ramp_kind = np.where(line, ArcKind.AXIS_ACCELERATION, ArcKind.SPEED_LINE)
     rate = np.stack([parts.rate[segment]] * 2)
     length = rate[0] * (u1 - u0)
@@ -139,8 +140,9 @@ def _profile(problem: Problem, parts: Segments, speed: Array, room: Array) -> Sp
             problem, piece[curved], u0[curved], u1[curved], from_sq[curved], to_sq[curved]
         )
     # The speeds at the ends of the segments hold where a ramp is left out as well.
-    first = np.flatnonzero(np.diff(segment, prepend=-1))
-    last = np.flatnonzero(np.diff(segment, append=len(parts)))
+    by_law = ~constant | (even == ArcKind.FEED)
+    first = np.flatnonzero(np.diff(segment, prepend=-1) * by_law)
+    last = np.flatnonzero(np.diff(segment, append=len(parts)) * by_law)
     p0, p1 = from_sq / rate[0] ** 2, to_sq / rate[1] ** 2
     p0[first] = start_sq[segment[first]] / rate[0, first] ** 2
     p1[last] = end_sq[segment[last]] / rate[1, last] ** 2
@@ -149,7 +151,9 @@ def _profile(problem: Problem, parts: Segments, speed: Array, room: Array) -> Sp
         kind=np.where(constant, even, ramp_kind).astype(np.uint8),
         axis=np.where(constant, NO_AXIS, parts.axis[segment]).astype(np.uint8),
         value=np.where(
-            constant, np.where(even == ArcKind.FEED, from_sq, 0.0), _SIGN[phase] * parts.value[segment]
+            constant,
+            np.where(even == ArcKind.FEED, counted * from_sq, 0.0),
+            _SIGN[phase] * parts.value[segment],
         ),
         u0=u0,
         u1=u1,
@@ -160,11 +164,13 @@ def _profile(problem: Problem, parts: Segments, speed: Array, room: Array) -> Sp
     )
 
 
-def _counts_by_shares(problem: Problem) -> NDArray[np.bool_]:
-    """(n,) whether the feed of a piece is another speed than that in all axes."""
+def _counted(problem: Problem, piece: NDArray[np.int64], u: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """The square of the speed that the feed limits over that in all axes (n,), and where they differ."""
     if problem.feed_share is None:
-        return np.zeros(len(problem.path), dtype=np.bool_)
-    return np.asarray((problem.feed_share != 1.0).any(axis=1))
+        return np.ones(len(piece)), np.zeros(len(piece), dtype=np.bool_)
+    by_shares = np.logical_or.reduce(problem.feed_share[piece] != 1.0, axis=1)
+    quotient = feed_square(problem, piece, u) / speed_square(problem, piece, u)
+    return np.where(by_shares, quotient, 1.0), by_shares
 
 
 def _weighted_length(

@@ -93,7 +93,7 @@ impl<const M: usize> Stretch<M> {
             if stopped || verdict.converged {
                 break;
             }
-            attempts = self.starts(x, &y, effort);
+            attempts = self.starts(&bounds, x, &y, effort);
         }
         x.copy_from_slice(&improved);
         verdict
@@ -118,22 +118,25 @@ impl<const M: usize> Stretch<M> {
         None
     }
 
-    /// Starts inside the tightened limits, on the way from the first plan x to the last one y, nearest to it first.
-    fn starts(&self, x: &[f64], y: &[f64], effort: &Effort) -> Vec<(Vec<f64>, Effort)> {
+    /// Starts inside the tightened limits, on the ways back from the last plan y, nearest to it first.
+    fn starts(&self, bounds: &[Bound; 2], x: &[f64], y: &[f64], effort: &Effort) -> Vec<(Vec<f64>, Effort)> {
         let inside = |z: &[f64]| {
             (0..self.rows.intervals.len()).all(|n| self.rows.utilisation(z, n).iter().all(|&used| used < 1.0))
         };
-        let near = BACK.into_iter().position(|part| inside(&blend(x, y, part))).unwrap_or(BACK.len());
-        BACK[near..]
-            .iter()
+        let ways = ways_back(bounds, x);
+        let is_near = |part: f64| ways.iter().find(|way| inside(&blend(way, y, part)));
+        let near = BACK.into_iter().find_map(|part| Some((part, is_near(part)?)));
+        let Some((least, way)) = near else { return vec![] };
+        BACK.into_iter()
+            .filter(|&part| part >= least)
             .map(|part| {
                 let start = Effort { barrier: BARRIER * part, warm: true, ..*effort };
-                (blend(x, y, FURTHER * part), start)
+                (blend(way, y, FURTHER * part), start)
             })
             .collect()
     }
 
-    /// The spline nearest to y on the way from x that holds all limits, and its time.
+    /// The spline nearest to y on a way back that holds all limits, and its time.
     fn retreat(
         &self,
         limits: &Limits<M>,
@@ -144,14 +147,12 @@ impl<const M: usize> Stretch<M> {
         if !bounds.iter().zip([0, x.len() - 2]).all(|(bound, at)| bound.is_met(x[at], x[at + 1])) {
             return None;
         }
-        for part in RETREATS {
-            let z = blend(x, y, part);
-            if self.holds(limits, &z, HELD) {
-                let time = self.time(bounds, &z);
-                return Some((z, time));
-            }
-        }
-        None
+        let ways = ways_back(bounds, x);
+        let held =
+            |part: f64| ways.iter().map(|way| blend(way, y, part)).find(|z| self.holds(limits, z, HELD));
+        let z = RETREATS.into_iter().find_map(held)?;
+        let time = self.time(bounds, &z);
+        Some((z, time))
     }
 
     /// Whether x uses no limit of the machine by more than a part.
@@ -205,6 +206,14 @@ pub fn ramps(bounds: &[Bound; 2], x: &[f64]) -> f64 {
         Bound::Fixed { .. } => 0.0,
     };
     time(0, x[0]) + time(1, x[x.len() - 2])
+}
+
+/// Where ways back from a plan lead: to the first plan x, and where both ends rest to standstill. On the first the jerk
+/// may rise, which is the product of two numbers that both change; on the second every limit is used less and less.
+fn ways_back(bounds: &[Bound; 2], x: &[f64]) -> Vec<Vec<f64>> {
+    let rests = bounds.iter().all(|bound| matches!(bound, Bound::Rest { .. }));
+    let standstill = rests.then(|| vec![0.0; x.len()]);
+    std::iter::once(x.to_vec()).chain(standstill).collect()
 }
 
 /// A part of the way back from y to x.
