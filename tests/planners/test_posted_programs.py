@@ -1,0 +1,70 @@
+"""Programs as shops post them, from text to setpoints: audit and plain differences agree."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from feedplan import plan
+from feedplan.errors import FeedplanError
+from feedplan.planners import limits_jerk
+from tests.planners.differences import beside_the_path, exceeded, too_fast
+from tests.planners.posted_programs import posted_program
+
+SEEDS = int(os.environ.get("FEEDPLAN_SEEDS", "18"))
+# They are run in so many parts, beside each other.
+PARTS = 2
+# What states between segments may be improved for: their first ones are a plan [s].
+TIME_LIMITS = {"ruckig": 0.2}
+# Plans of more than this time [s] are judged by their profile alone.
+LONGEST = 120.0
+
+
+@pytest.mark.parametrize("method", ["bang-bang", "jerk-limited", "ruckig", "s-curve"])
+@pytest.mark.parametrize("part", range(PARTS))
+def test_posted_programs_keep_every_limit(part: int, method: str, tmp_path: Path) -> None:
+    found = []
+    for seed in range(part, SEEDS, PARTS):
+        found += [f"{seed}: {sentence}" for sentence in faults(seed, method, tmp_path)]
+    assert found == []
+
+
+def faults(seed: int, method: str, folder: Path) -> list[str]:
+    """What is wrong with the plan of a seed's program by a method."""
+    posted = posted_program(seed)
+    file = folder / f"{seed}.ngc"
+    file.write_text(posted.text)
+    try:
+        made = plan(file, posted.machine, method=method, time_limit=TIME_LIMITS.get(method))
+        made.audit()
+    except FeedplanError as error:
+        return [str(error)]
+    if made.time > LONGEST:
+        return list(made.audit().failures)
+    points = made.setpoints().all()
+    period = posted.machine.period
+    return [
+        *made.audit().failures,
+        *([] if made.lower_bound <= made.time else [f"bound {made.lower_bound} above {made.time} s"]),
+        *exceeded(points, posted.machine, period, limits_jerk(method)),
+        *too_fast(points, posted, period),
+        *beside_the_path(points, posted),
+    ]
+
+
+def test_the_checks_can_fail(tmp_path: Path) -> None:
+    posted = posted_program(3)
+    file = tmp_path / "part.ngc"
+    file.write_text(posted.text)
+    made = plan(file, posted.machine)
+    points, period = made.setpoints().all(), posted.machine.period
+    quick = replace(points, position=points.position.copy())
+    quick.position[len(points) // 2 :] += 10 * posted.tolerance
+    assert exceeded(quick, posted.machine, period, jerk=False)
+    assert beside_the_path(quick, posted)
+    fastest = np.linalg.norm(np.diff(points.position, axis=0), axis=1).max() / period
+    assert too_fast(points, replace(posted, linear=dict.fromkeys(posted.linear, 0.99 * fastest)), period)
