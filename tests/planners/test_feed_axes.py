@@ -127,8 +127,8 @@ def test_a_blend_of_a_linear_and_a_rotary_move_keeps_both_feeds(method: str, tmp
     assert len(plan.path.runs) == 2
     assert len(plan.path) >= 3
     speed, _, _ = speeds(plan)
-    assert speed[:, 0].max() == pytest.approx(1.0, rel=1e-6)
-    assert speed[:, 2].max() == pytest.approx(1.0, rel=1e-6)
+    for k in (0, 2):
+        assert 1.0 - 1e-5 < speed[:, k].max() <= 1.0 + 1e-6
     # 10 mm and 10 deg less what the blend cuts off, and no slower than the way through the corner.
     assert 19.0 < plan.time < 20.1
 
