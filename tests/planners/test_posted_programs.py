@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,10 +11,11 @@ import pytest
 from feedplan import plan
 from feedplan.errors import FeedplanError
 from feedplan.planners import limits_jerk
+from tests.campaign import seeds
 from tests.planners.differences import beside_the_path, exceeded, too_fast
 from tests.planners.posted_programs import posted_program
 
-SEEDS = int(os.environ.get("FEEDPLAN_SEEDS", "18"))
+SEEDS = seeds(18)
 # They are run in so many parts, beside each other.
 PARTS = 2
 # What states between segments may be improved for: their first ones are a plan [s].

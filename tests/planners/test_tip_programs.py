@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 
 import numpy as np
@@ -11,10 +10,11 @@ import pytest
 from feedplan import InputError, Machine, Plan, ProgramError, SolverError, plan
 from feedplan.planners import limits_jerk
 from feedplan.program.gcode import read_gcode
+from tests.campaign import seeds
 from tests.planners.audited import audited
 from tests.planners.tip_programs import random_tip_program
 
-SEEDS = int(os.environ.get("FEEDPLAN_SEEDS", "2"))
+SEEDS = seeds(2)
 MACHINES = ["trunnion-ac", "trunnion-bc", "head-table", "head-head", "rotary-table"]
 METHODS = ["bang-bang", "jerk-limited", "s-curve", "ruckig"]
 # What states between segments may be improved for: their first ones are a plan [s].
