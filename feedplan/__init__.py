@@ -1,6 +1,18 @@
-"""feedplan: time-optimal speed along a part program's exact path, with proof and audit."""
+"""feedplan: time-optimal speed along a part program's exact path, with proof and audit.
 
+    plan = feedplan.plan("part.ngc", "mill")
+    plan.time, plan.lower_bound, plan.audit().ok
+    feedplan.write_plan(plan, "part")
+
+`plan` plans a program on a machine, `compare` by several methods, `check` audits setpoints in files.
+Millimetres, degrees and seconds throughout. Whatever is wrong with what is given raises a `FeedplanError`,
+one sentence with the remedy.
+"""
+
+from feedplan._solvers import __version__ as __version__
 from feedplan.audit import Audit, LimitCheck
+from feedplan.checking import check
+from feedplan.comparison import Row, compare
 from feedplan.errors import (
     FeedplanError,
     InfeasibleError,
@@ -10,12 +22,17 @@ from feedplan.errors import (
     ProgramError,
     SolverError,
 )
+from feedplan.files import write_plan
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import Axis, Machine
-from feedplan.plan import Plan, plan
+from feedplan.machine.machine import bundled_machines as machines
+from feedplan.planners import methods
+from feedplan.planning import Plan, plan
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
+from feedplan.program.read import read_program
 from feedplan.setpoints import SetpointChunk, Setpoints
+from feedplan.trajectory import State, Trajectory
 
 __all__ = [
     "Audit",
@@ -31,9 +48,22 @@ __all__ = [
     "Plan",
     "Program",
     "ProgramError",
+    "Row",
     "SetpointChunk",
     "Setpoints",
     "SolverError",
     "SpeedProfile",
+    "State",
+    "Trajectory",
+    "check",
+    "compare",
+    "machines",
+    "methods",
     "plan",
+    "read_program",
+    "write_plan",
 ]
+
+
+def __dir__() -> list[str]:
+    return [*__all__, *(name for name in globals() if name.startswith("__"))]

@@ -13,14 +13,15 @@ import sys
 from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import click
 
-from feedplan import console, outputs, planners
+from feedplan import __version__, console, outputs, planners
+from feedplan.comparison import TIME_LIMIT
 from feedplan.errors import FeedplanError, InfeasibleError, SolverError
 from feedplan.machine.machine import Axis, Machine, bundled_machines
-from feedplan.setpoints import INTERPOLATORS
+from feedplan.setpoints import INTERPOLATORS, Interpolator
 
 if TYPE_CHECKING:
     NumberType = click.ParamType[float]
@@ -114,14 +115,33 @@ _WHOLE_LIMIT_HELP = (
 _JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 _QUIET = click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
 _NO_SETPOINTS = "none"
+_PROGRAM = click.argument("program", callback=lambda context, parameter, given: _source(given))
 _ZERO_OR_MORE = _Number(or_zero=True)
+
+
+def _source(given: str) -> str | IO[bytes]:
+    """The file of that name, or standard input for `-`."""
+    if given != "-":
+        return given
+    if sys.stdin is None:
+        raise click.UsageError("standard input is closed: give the path of a program")
+    return sys.stdin.buffer
+
+
+def _name(program: str | IO[bytes]) -> str:
+    return program if isinstance(program, str) else program.name
+
+
+def _given(**options: Any) -> dict[str, Any]:
+    """The options that were given: which of them a method takes is for the method to say."""
+    return {name: value for name, value in options.items() if value is not None}
 
 
 @click.group(
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     invoke_without_command=True,
 )
-@click.version_option(package_name="feedplan", message="%(prog)s %(version)s")
+@click.version_option(__version__, message="%(prog)s %(version)s")
 @click.pass_context
 def cli(context: click.Context) -> int:
     """Time-optimal speed along the exact tool path of a part program, with proof and audit."""
@@ -132,7 +152,7 @@ def cli(context: click.Context) -> int:
 
 
 @cli.command()
-@click.argument("program")
+@_PROGRAM
 @_MACHINE
 @click.option("--method", type=click.Choice(planners.methods()), default="bang-bang", show_default=True)
 @_ACCURACY
@@ -155,30 +175,30 @@ def cli(context: click.Context) -> int:
 @_JSON
 @_QUIET
 def plan(
-    program: str,
+    program: str | IO[bytes],
     machine: str,
-    method: str,
+    method: planners.MethodName,
     accuracy: float | None,
     time_limit: float | None,
     tolerance: float | None,
     feed: float | None,
     feed_override: float,
     period: float | None,
-    interpolator: str,
+    interpolator: Interpolator,
     start_speed: float,
     end_speed: float,
     output: str | None,
-    formats: tuple[str, ...],
+    formats: tuple[Any, ...],
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Plan PROGRAM: G-code, a path file (.json) or a drawing (.dxf).
+    """Plan PROGRAM: G-code, a path file (.json) or a drawing (.dxf); - is standard input.
 
     Exit code 1: a limit is broken, or no plan is feasible.
     """
     from feedplan.files import summary_text, write_plan
     from feedplan.outputs._staging import require_folder
-    from feedplan.plan import plan as make_plan
+    from feedplan.planning import plan as make_plan
 
     if formats and not output:
         raise click.UsageError("--format needs a folder to write to: give -o DIR as well")
@@ -191,8 +211,6 @@ def plan(
             program,
             Machine.load(machine),
             method=method,
-            accuracy=accuracy,
-            time_limit=time_limit,
             tolerance=tolerance,
             feed=feed,
             feed_override=feed_override,
@@ -201,6 +219,7 @@ def plan(
             end_speed=end_speed,
             interpolator=interpolator,
             progress=progress,
+            **_given(accuracy=accuracy, time_limit=time_limit),
         )
         audit = result.audit(progress)
         files: tuple[FilePath, ...] = ()
@@ -209,7 +228,6 @@ def plan(
                 result,
                 output,
                 () if _NO_SETPOINTS in formats else formats or ("npz",),
-                source=FilePath(program),
                 progress=progress,
             )
     warnings = list(result.warnings)
@@ -227,12 +245,12 @@ def plan(
 
 
 @cli.command()
-@click.argument("program")
+@_PROGRAM
 @_MACHINE
 @click.option("--methods", metavar="A,B,…", help="Methods to compare.  [default: all]")
 @_ACCURACY
 @click.option(
-    "--time-limit", type=_Number(), default=10.0, show_default=True, metavar="S", help=_TIME_LIMIT_HELP
+    "--time-limit", type=_Number(), default=TIME_LIMIT, show_default=True, metavar="S", help=_TIME_LIMIT_HELP
 )
 @_TOLERANCE
 @click.option("--feed", type=_Number(), metavar="MM/S", help="Feed in place of the programmed one.")
@@ -241,7 +259,7 @@ def plan(
 @_JSON
 @_QUIET
 def compare(
-    program: str,
+    program: str | IO[bytes],
     machine: str,
     methods: str | None,
     accuracy: float | None,
@@ -255,38 +273,39 @@ def compare(
 ) -> int:
     """Plan PROGRAM by several methods: time, proven gap, computing time, and what the audit says of each.
 
-    Exit code 0 if any method has a plan, whether or not its limits hold: that is what the table tells.
+    PROGRAM is as for plan. Exit code 0 if any method has a plan, whether or not its limits hold: that is what
+    the table tells.
     """
-    from feedplan.compare import LIMITS
-    from feedplan.compare import compare as make_comparison
+    from feedplan.comparison import LIMITS
+    from feedplan.comparison import compare as make_comparison
     from feedplan.files import summary_text, write_comparison
     from feedplan.outputs._staging import require_folder
 
     if output:
         require_folder(FilePath(output))
-    names = planners.methods() if methods is None else [name.strip() for name in methods.split(",")]
+    names: Any = None if methods is None else [name.strip() for name in methods.split(",")]
     with console.progress_bar(quiet) as progress, console.without_others():
         rows = make_comparison(
             program,
             machine,
             names,
-            progress=progress,
-            accuracy=accuracy,
             time_limit=time_limit,
+            progress=progress,
             tolerance=tolerance,
             feed=feed,
             period=period,
+            **_given(accuracy=accuracy),
         )
         summary = {
-            "program": program,
+            "program": _name(program),
             "machine": Machine.load(machine).name,
             "methods": [row.to_json() for row in rows],
         }
         files = write_comparison(rows, output, summary, progress) if output else ()
-    for row in rows:
-        if row.error and not quiet:
-            print(f"{row.method}: {row.error}", file=sys.stderr)
     if not quiet:
+        for row in rows:
+            if row.error:
+                print(f"{row.method}: {row.error}", file=sys.stderr)
         if as_json:
             sys.stdout.write(summary_text(summary))
         else:
@@ -297,13 +316,13 @@ def compare(
 
 
 @cli.command()
-@click.argument("program")
+@_PROGRAM
 @_MACHINE
 @_TOLERANCE
 @click.option("--smooth", is_flag=True, help="Fit all moves by curves fit for limits of jerk.")
 @_JSON
-def fit(program: str, machine: str, tolerance: float | None, smooth: bool, as_json: bool) -> None:
-    """Fit PROGRAM's points by splines, without planning."""
+def fit(program: str | IO[bytes], machine: str, tolerance: float | None, smooth: bool, as_json: bool) -> None:
+    """Fit PROGRAM's points by splines, without planning; PROGRAM is as for plan."""
     from dataclasses import asdict
 
     from feedplan.files import summary_text
@@ -322,7 +341,7 @@ def fit(program: str, machine: str, tolerance: float | None, smooth: bool, as_js
         sys.stdout.write(summary_text(summary))
     else:
         path_row = ("path", console.pieces_text(summary))
-        console.print_rows([("program", program), *console.fit_rows(summary), path_row])
+        console.print_rows([("program", _name(program)), *console.fit_rows(summary), path_row])
 
 
 @cli.command()
@@ -339,7 +358,7 @@ def check(place: str, machine: str | None, resolution: float, jerk: bool, as_jso
     Positions, velocities and accelerations are measured by differences alone, and so is the jerk where the
     plan's method limits it. Exit code 1: a limit is broken.
     """
-    from feedplan.check import check as check_files
+    from feedplan.checking import check as check_files
     from feedplan.files import summary_text
 
     audit = check_files(place, machine, resolution=resolution, jerk=jerk)

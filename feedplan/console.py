@@ -10,11 +10,11 @@ from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdo
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
-from feedplan.units import duration_text, mm_per_min, ratio_text, tolerance_text
+from feedplan.units import counted, duration_text, mm_per_min, ratio_text, tolerance_text
 
 if TYPE_CHECKING:
     from feedplan.audit import Audit, LimitCheck
-    from feedplan.compare import Row
+    from feedplan.comparison import Row
 
 _LIMITS = {"feed", "velocity", "acceleration", "jerk", "chord", "deviation", "travel"}
 Rows = Sequence[tuple[str, str]]
@@ -162,11 +162,6 @@ def _stops_text(stops: Sequence[Mapping[str, Any]]) -> str:
 def pieces_text(summary: Mapping[str, Any]) -> str:
     """`605 pieces in 29 runs`."""
     return f"{counted(summary['pieces'], 'piece')} in {counted(summary['runs'], 'run')}"
-
-
-def counted(number: int, noun: str) -> str:
-    """`1 run`, `2 runs`."""
-    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def fit_rows(fit: Mapping[str, Any]) -> list[tuple[str, str]]:

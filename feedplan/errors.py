@@ -2,9 +2,24 @@
 
 from __future__ import annotations
 
+# No sentence is longer: the middle of its longest words, such as paths, is left out, and then its own.
+LONGEST, LONGEST_WORD = 300, 60
+
 
 class FeedplanError(Exception):
-    """Base of every error that feedplan raises on purpose; its text is meant for the user."""
+    """Base of every error that feedplan raises on purpose; its text, one line, is meant for the user."""
+
+    def __init__(self, message: str = "") -> None:
+        line = " ".join(message.splitlines())
+        if len(line) > LONGEST:
+            line = " ".join(_shortened(word, LONGEST_WORD) for word in line.split(" "))
+        super().__init__(_shortened(line, LONGEST))
+
+
+def _shortened(text: str, most: int) -> str:
+    """The text, or its start and its end where it has more than `most` characters, the end the longer one."""
+    start = (most - 3) // 3
+    return text if len(text) <= most else f"{text[:start]}...{text[start + 3 - most :]}"
 
 
 class InputError(FeedplanError):

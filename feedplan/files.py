@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
+from numbers import Real
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
+from feedplan.arguments import callback, file_path, list_of_names, refuse
 from feedplan.errors import InputError
-from feedplan.outputs import Header, format_named
+from feedplan.outputs import FormatName, Header, format_named
 from feedplan.outputs._staging import require_folder, staged
 
 if TYPE_CHECKING:
-    from feedplan.compare import Row
-    from feedplan.plan import Plan
+    from feedplan.comparison import Row
+    from feedplan.planning import Plan
     from feedplan.setpoints import SetpointChunk
 
 SUMMARY_FILE = "plan.json"
@@ -26,24 +29,26 @@ _ROWS_AT_ONCE = 100_000
 
 def write_plan(
     plan: Plan,
-    folder: str | FilePath,
-    formats: Sequence[str] = ("npz",),
+    folder: str | os.PathLike[str],
+    formats: Sequence[FormatName] = ("npz",),
     *,
-    source: FilePath | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> tuple[FilePath, ...]:
     """Writes the plan, its setpoints in these formats (none for ()), and its report; returns the files.
 
     All is written beside and renamed at the end, so `folder` never holds half a plan; other files in it stay.
-    `source` is the part program, quoted in the report; `progress` is called with a stage and 0 to 1. Raises
-    InputError where the folder or the file system refuses.
+    `progress` is called with a stage and 0 to 1. Raises InputError where the folder or the file system
+    refuses.
     """
     from feedplan.report.figures import SetpointFigures
     from feedplan.report.page import FILE as REPORT_FILE
     from feedplan.report.page import write_report
 
-    folder = FilePath(folder)
-    require_folder(folder)
+    formats = list_of_names(formats, "formats", "a list of names, such as ['npz', 'csv']")  # type: ignore[assignment]
+    folder = _folder(folder)
+    callback(progress)
+    if not callable(getattr(plan, "summary", None)):
+        raise refuse("the plan", plan, "what feedplan.plan returns")
     outputs = {name: format_named(name) for name in dict.fromkeys(formats)}
     by_file = {output.FILE: name for name, output in outputs.items()}
     for name, output in outputs.items():
@@ -76,7 +81,7 @@ def write_plan(
             account=plan.account,
             audit=audit,
             figures=figures,
-            source=source,
+            text=plan.program.text if plan.program else None,
         )
         (stage / SUMMARY_FILE).write_text(summary_text(summary), encoding="utf-8")
         names = sorted(file.name for file in stage.iterdir())
@@ -87,7 +92,7 @@ def write_plan(
 
 def write_comparison(
     rows: Sequence[Row],
-    folder: str | FilePath,
+    folder: str | os.PathLike[str],
     summary: dict[str, Any],
     progress: Callable[[str, float], None] | None = None,
 ) -> tuple[FilePath, ...]:
@@ -95,13 +100,12 @@ def write_comparison(
 
     Both appear whole or not at all. Raises InputError where the folder or the file system refuses.
     """
-    from feedplan.compare import LIMITS
+    from feedplan.comparison import LIMITS
     from feedplan.report.comparison import FILE as PAGE_FILE
     from feedplan.report.comparison import write_comparison as write_page
     from feedplan.report.tool_path import ToolPath
 
-    folder = FilePath(folder)
-    require_folder(folder)
+    folder = _folder(folder)
     paths, shown = [], []
     for number, row in enumerate(rows):
         entry: dict[str, Any] = {"method": row.method, "time": row.time, "error": row.error}
@@ -134,6 +138,12 @@ def write_comparison(
     return tuple(folder / name for name in names)
 
 
+def _folder(given: str | os.PathLike[str]) -> FilePath:
+    folder = file_path(given, "the folder", "the path of a folder, as a text or a pathlib.Path")
+    require_folder(folder)
+    return folder
+
+
 def _timed(chunks: Iterator[SetpointChunk], compute: dict[str, float]) -> Iterator[SetpointChunk]:
     """The same chunks; the time that computing them took is added to `compute` as `sample` [s]."""
     compute["sample"] = 0.0
@@ -158,4 +168,6 @@ def _plain(value: Any) -> Any:
         return [_plain(entry) for entry in value]
     if hasattr(value, "item"):  # a numpy scalar
         value = value.item()
+    if isinstance(value, Real) and not isinstance(value, int):
+        value = float(value)
     return None if isinstance(value, float) and not math.isfinite(value) else value

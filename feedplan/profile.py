@@ -9,6 +9,8 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.units import counted
+
 # The `axis` of an arc whose constant belongs to none.
 NO_AXIS = 255
 
@@ -78,7 +80,7 @@ class SpeedProfile:
         return len(self.piece)
 
     def __repr__(self) -> str:
-        return f"<SpeedProfile of {len(self)} arcs: {self.time:.6g} s>"
+        return f"<SpeedProfile of {counted(len(self), 'arc')}: {self.time:.6g} s>"
 
     @property
     def time(self) -> float:

@@ -10,10 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import Sampler
+from feedplan.arguments import is_whole, number, one_of, positive, shown
 from feedplan.constraints.problem import Problem, TipSpeed
 from feedplan.curves.length import INTERPOLATORS as INTERPOLATORS
+from feedplan.curves.length import Interpolator as Interpolator
 from feedplan.errors import InputError
 from feedplan.profile import SpeedProfile
+from feedplan.units import counted
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
@@ -44,7 +47,7 @@ class SetpointChunk:
 
     def __repr__(self) -> str:
         span = f", {self.t[0]:.6g} to {self.t[-1]:.6g} s" if len(self) else ""
-        return f"<SetpointChunk of {len(self)} setpoints of {' '.join(self.axes)}{span}>"
+        return f"<SetpointChunk of {counted(len(self), 'setpoint')} of {' '.join(self.axes)}{span}>"
 
 
 @dataclass(frozen=True)
@@ -67,16 +70,16 @@ class Setpoints:
     a setpoint has the values of the arc that begins there.
     """
 
-    def __init__(self, problem: Problem, profile: SpeedProfile, period: float, interpolator: str) -> None:
-        if interpolator not in INTERPOLATORS:
-            raise InputError(
-                f"there is no interpolator '{interpolator}': use one of {', '.join(INTERPOLATORS)}"
-            )
+    def __init__(
+        self, problem: Problem, profile: SpeedProfile, period: float, interpolator: Interpolator
+    ) -> None:
+        one_of(interpolator, "interpolator", INTERPOLATORS)
+        period = number(period, "the period", "a positive number", positive, "s")
         self._sampler = sampler(problem, profile, period, interpolator)
         self._source = (problem, profile, period, interpolator)
         self.period = float(period)
         self.axes = problem.axes
-        self.interpolator = interpolator
+        self.interpolator: Interpolator = interpolator
         self.stats = SamplingStats()
         self._origin = problem.joint_origin
 
@@ -99,7 +102,7 @@ class Setpoints:
     def __repr__(self) -> str:
         return f"<Setpoints: {self.count} of {' '.join(self.axes)}, one every {self.period:g} s>"
 
-    def __reduce__(self) -> tuple[type[Setpoints], tuple[Problem, SpeedProfile, float, str]]:
+    def __reduce__(self) -> tuple[type[Setpoints], tuple[Problem, SpeedProfile, float, Interpolator]]:
         return Setpoints, self._source
 
     def chunks(self, size: int = 100_000) -> Iterator[SetpointChunk]:
@@ -107,8 +110,8 @@ class Setpoints:
 
         The numbers do not depend on the size. Raises InputError for a size out of range.
         """
-        if not 1 <= size <= MAX_CHUNK:
-            raise InputError(f"chunks of {size} setpoints: give a size from 1 to {MAX_CHUNK}")
+        if not is_whole(size, most=MAX_CHUNK):
+            raise InputError(f"chunks of {shown(size)} setpoints: give a size from 1 to {MAX_CHUNK}")
         return (self._chunk(start, min(start + size, self.count)) for start in range(0, self.count, size))
 
     def all(self) -> SetpointChunk:
@@ -130,7 +133,7 @@ class Setpoints:
 
 
 def setpoints(
-    problem: Problem, profile: SpeedProfile, period: float, interpolator: str = "sarfraz"
+    problem: Problem, profile: SpeedProfile, period: float, interpolator: Interpolator = "sarfraz"
 ) -> Setpoints:
     """Setpoints every `period` [s] of the joints along a problem's path, by the profile planned for it.
 
@@ -144,7 +147,9 @@ def setpoints(
     return Setpoints(problem, profile, period, interpolator)
 
 
-def sampler(problem: Problem, profile: SpeedProfile, period: float, interpolator: str = "sarfraz") -> Sampler:
+def sampler(
+    problem: Problem, profile: SpeedProfile, period: float, interpolator: Interpolator = "sarfraz"
+) -> Sampler:
     """The native reader of a profile on its path. Raises InputError as `setpoints`."""
     path = problem.path
     return Sampler(

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from feedplan.arguments import number
 from feedplan.setpoints import Setpoints
 
 # Audit, setpoints and report take about so many times as long as computing the setpoints once.
@@ -25,6 +26,7 @@ class TimeLimit:
     start: float = field(init=False)
 
     def __post_init__(self) -> None:
+        self.seconds = number(self.seconds, "the time limit", "0 or more", lambda limit: limit >= 0, "s")
         self.start = self.clock()
 
     @property

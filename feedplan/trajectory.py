@@ -8,7 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from feedplan.arguments import refuse
 from feedplan.constraints.problem import Problem, speed_square
+from feedplan.curves._arrays import floats
 from feedplan.curves.length import CurveLength
 from feedplan.errors import InputError
 from feedplan.profile import SpeedProfile
@@ -100,9 +102,9 @@ class Trajectory:
 
     def _within(self, given: ArrayLike, name: str, end: float, unit: str) -> Array:
         try:
-            values = np.asarray(given, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise InputError(f"the {name} is {given!r:.60}: give a number or a list of numbers") from None
+            values = floats(given, name).reshape(np.shape(given))
+        except InputError:
+            raise refuse(f"the {name}", given, "a number or a list of numbers") from None
         if values.ndim > 1:
             raise InputError(f"the {name}s have {values.ndim} dimensions: give a number or a list of numbers")
         # The end of the plan, summed up in another order, is the end.

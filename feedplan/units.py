@@ -11,6 +11,11 @@ def mm_per_min(speed: float) -> float:
     return speed * SECONDS_PER_MINUTE
 
 
+def counted(number: int, noun: str) -> str:
+    """`1 run`, `2 runs`."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
 def duration_text(seconds: float) -> str:
     """A duration as people read it: `842 µs`, `1.234 s`, `12 min 03.4 s`, `2 h 05 min 10 s`."""
     if seconds < 1e-3:

@@ -38,6 +38,7 @@ class SquarePlan:
     profile: SpeedProfile
     chunk: SetpointChunk
     verdict: Audit
+    program: None = None
     compute: dict[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from feedplan import Axis, Machine, plan, planners
-from feedplan.check import check
+from feedplan.checking import check
 from feedplan.cli import main
 from feedplan.errors import InputError
 from feedplan.files import write_plan

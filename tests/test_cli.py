@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import subprocess
@@ -29,9 +30,9 @@ def planned(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
             raise box["result"]
         return box["result"]
 
-    module = ModuleType("feedplan.plan")
+    module = ModuleType("feedplan.planning")
     module.plan = fake  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "feedplan.plan", module)
+    monkeypatch.setitem(sys.modules, "feedplan.planning", module)
     return box
 
 
@@ -260,6 +261,49 @@ def test_a_program_that_is_none_is_one_sentence_and_writes_nothing(
     assert "a.ngc" in err
     assert err.count("\n") == 1
     assert not out.exists()
+
+
+def test_a_program_comes_from_standard_input_as_well(
+    program: Path, tmp_path: Path, capsys: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    printed = []
+    for source in (str(program), "-"):
+        text = program.read_bytes()
+        monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BufferedReader(_Named(text))))
+        assert main(["plan", source, "--json", "-o", str(tmp_path / "out")]) == 0
+        printed.append(json.loads(capsys.readouterr().out))
+        report = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+        assert f"<code>{text.decode().splitlines()[3]}" in report
+    assert printed[1]["program"] == "<stdin>"
+    same = ("time", "program_sha256", "pieces", "slow_lines")
+    assert [printed[0].get(name) for name in same] == [printed[1].get(name) for name in same]
+
+
+@pytest.mark.parametrize("command", ["plan", "fit", "compare"])
+def test_every_command_that_reads_a_program_reads_standard_input(command: str, program: Path) -> None:
+    more = ["--methods", "bang-bang"] if command == "compare" else []
+    done = run(command, "-", *more, input=program.read_text())
+    assert (done.returncode, done.stderr) == (0, "")
+    assert run(command, str(program), *more).stdout.splitlines()[1].split()[0] in done.stdout
+    done = run(command, "-", *more, input="")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "error: <stdin> is empty: give a part program\n"
+    done = run(command, "-", *more, input="G21 G1 F60 X1\nQ2\n")
+    assert done.stderr.startswith("error: <stdin> line 2: word Q2")
+
+
+def test_a_closed_standard_input_is_one_sentence() -> None:
+    done = subprocess.run(
+        ["sh", "-c", f"{sys.executable} -m feedplan plan - <&-"], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "standard input is closed: give the path of a program" in done.stderr
+
+
+class _Named(io.BytesIO):
+    """What a program is piped into, under the name that it has."""
+
+    name = "<stdin>"
 
 
 def test_an_end_speed_out_of_reach_exits_1(program: Path, tmp_path: Path, capsys: Any) -> None:

@@ -11,8 +11,9 @@ from typing import Any
 
 import pytest
 
+import feedplan
 from feedplan.cli import main
-from feedplan.compare import compare
+from feedplan.comparison import compare
 from feedplan.errors import InputError, SolverError
 from feedplan.planners import bang_bang, planner, tangential
 
@@ -126,6 +127,33 @@ def test_each_method_has_ten_seconds_unless_told_otherwise(
     for more in ([], ["--time-limit", "3"]):
         assert main(["compare", str(program), "--methods", "clarabel", "-q", *more]) == 0
     assert limits == [10.0, 3.0]
+
+
+def test_python_compares_all_methods_with_the_same_limit_of_time(
+    program: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    limits: list[float | None] = []
+    for method in ("casadi", "clarabel", "jerk_limited", "ruckig", "toppra"):
+        monkeypatch.setattr(
+            f"feedplan.planners.{method}.plan",
+            lambda problem, *, time_limit=None: limits.append(time_limit) or bang_bang.plan(problem),
+        )
+    assert tuple(row.method for row in feedplan.compare(program, "mill")) == feedplan.methods()
+    assert limits == [10.0] * 5
+    for limit in (3.0, None):
+        feedplan.compare(program, "mill", ("clarabel",), time_limit=limit)
+        assert limits.pop() == limit
+
+
+def test_options_that_no_method_of_a_comparison_takes_are_refused(program: Path) -> None:
+    with pytest.raises(
+        InputError, match=r"no method of these takes speed: give tolerance, .*, cells, time_limit"
+    ):
+        feedplan.compare(program, "mill", ("bang-bang", "clarabel"), speed=3)
+    with pytest.raises(InputError, match="methods is 'bang-bang': give a list of methods' names"):
+        feedplan.compare(program, "mill", "bang-bang")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="the time limit is 'long': give a positive number, or None"):
+        feedplan.compare(program, "mill", ("bang-bang",), time_limit="long")  # type: ignore[arg-type]
 
 
 def test_a_comparison_without_any_plan_exits_1(program: Path, capsys: Any) -> None:

@@ -29,6 +29,16 @@ def test_every_text_is_short(made: Plan) -> None:
     assert repr(made.audit()).endswith("samples: every limit holds>")
 
 
+def test_one_of_a_thing_is_told_as_one() -> None:
+    one = plan("G21 G1 F1000 X10\nM2\n", "mill")
+    assert one.figures()["path"] == "1 piece in 1 run"
+    assert repr(one.path).endswith("1 piece in 1 run>")
+    assert repr(one).endswith(", 1 piece>")
+    assert ": 1 move of " in repr(one.program)
+    two = plan("G21 G61 G1 F1000 X10\nY10\nM2\n", "mill")
+    assert two.figures()["path"] == "2 pieces in 2 runs"
+
+
 def test_what_holds_arrays_is_compared_by_identity(made: Plan) -> None:
     for thing in (made, made.program, made.path, made.problem, made.profile, made.path.curve):
         assert thing == thing

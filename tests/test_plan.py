@@ -10,7 +10,7 @@ import pytest
 
 from feedplan.audit import audit
 from feedplan.machine.machine import Machine
-from feedplan.plan import Plan, plan
+from feedplan.planning import Plan, plan
 
 MILL = Machine.load("mill")
 PROGRAM = """G21 G90 G64 P0.01

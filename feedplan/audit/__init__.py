@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import SetpointAudit, audit_plan
+from feedplan.arguments import flag, instance, list_of_names, not_negative, number, positive
 from feedplan.audit.feed import feed_axes, feed_limits
 from feedplan.audit.joint_profile import audit_joint_profile
 from feedplan.audit.joint_setpoints import JointSetpoints
@@ -18,6 +19,7 @@ from feedplan.audit.recorded import audit_recorded
 from feedplan.audit.verdict import PASS_MARK, Audit, LimitCheck, join
 from feedplan.audit.worst import Findings
 from feedplan.constraints.problem import Problem
+from feedplan.curves._arrays import floats, whole_numbers
 from feedplan.errors import InputError
 from feedplan.machine.machine import Axis, Machine
 from feedplan.profile import SpeedProfile
@@ -219,9 +221,10 @@ def audit_setpoints(
     for a jump of the acceleration by what the jerk limit makes in one period: there the curvature may jump.
     Raises InputError for arrays that do not belong together.
     """
-    names = machine.axis_names if axes is None else axes
+    instance(machine, Machine, "the machine", "a Machine")
+    names = machine.axis_names if axes is None else list_of_names(axes, "axes", "a list of axis letters")
     machine_axes = _machine_axes(machine, names)
-    times, positions = _array(t, np.float64), _array(position, np.float64)
+    times, positions = floats(t, "times", 1), floats(position, "positions", 2)
     if times.ndim != 1 or positions.shape != (len(times), len(names)):
         raise InputError(
             f"{positions.shape} positions at {times.shape} times: give one row for each time and one column "
@@ -229,19 +232,27 @@ def audit_setpoints(
         )
     if len(times) < 2:
         raise InputError(f"{len(times)} setpoints cannot be audited: give at least two")
-    if not resolution >= 0:
-        raise InputError(f"the resolution is {resolution} mm: give 0 or more")
+    resolution = number(resolution, "the resolution", "0 or more", not_negative, "mm")
+    jerk, corners = flag(jerk, "jerk"), flag(corners, "corners")
     recorded = {"velocity": velocity, "acceleration": acceleration, "jerk": recorded_jerk}
     rates = {
-        name: None if values is None else _array(values, np.float64) for name, values in recorded.items()
+        name: None if values is None else floats(values, f"recorded values of the {name}")
+        for name, values in recorded.items()
     }
     for name, values in rates.items():
         if values is not None and values.shape != positions.shape:
-            raise InputError(f"the recorded {name} must have the shape of the positions {positions.shape}")
-    lines = np.zeros(len(times), np.int32) if line is None else _array(line, np.int32)
+            raise InputError(
+                f"the recorded {name} has the shape {values.shape}: give the shape of the positions, "
+                f"{positions.shape}"
+            )
+    lines = np.zeros(len(times), np.int32) if line is None else _lines(line)
     if lines.shape != times.shape:
-        raise InputError("source lines must be as many as the times")
-    period = _period(times, machine.period) if period is None else float(period)
+        raise InputError(f"{len(lines)} source lines: give as many as the times, {len(times)}")
+    period = (
+        _period(times, machine.period)
+        if period is None
+        else number(period, "the period", "a positive number", positive, "s")
+    )
     own_jump = [axis.max_velocity_jump for axis in machine_axes]
     jump = [max(axis.max_velocity_jump, corners * period * axis.max_acceleration) for axis in machine_axes]
     limits = _Limits(
@@ -295,6 +306,14 @@ def _machine_axes(machine: Machine, names: tuple[str, ...]) -> list[Axis]:
             f"machine {machine.name} has no axis {missing[0]}: use a machine with {' '.join(names)}"
         )
     return [by_name[name] for name in names]
+
+
+def _lines(given: ArrayLike) -> NDArray[np.int32]:
+    lines = whole_numbers(given, "source lines")
+    narrow = len(lines) == 0 or np.can_cast(lines.dtype, np.int32)
+    if not narrow and not (lines.min() >= -(2**31) and lines.max() < 2**31):
+        raise InputError("source lines are beyond 2147483647: give the lines of a program")
+    return _array(lines, np.int32)
 
 
 def _period(times: NDArray[np.float64], default: float) -> float:

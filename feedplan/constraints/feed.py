@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feedplan.errors import InputError
+from feedplan.arguments import number, positive
 from feedplan.geometry.feed_groups import feed_groups, leading_feed, moving_axes
 from feedplan.geometry.path import Path
 
@@ -21,13 +20,11 @@ class FeedRequest:
     override: float = 1.0
 
     def __post_init__(self) -> None:
-        feed, override = self.feed, self.override
-        if not (math.isfinite(override) and override > 0):
-            raise InputError(
-                f"feed override is {override}: give a positive factor (1 is the programmed feed)"
-            )
-        if feed is not None and not (math.isfinite(feed) and feed > 0):
-            raise InputError(f"feed is {feed} mm/s: give a positive feed")
+        remedy = "a positive factor (1 is the programmed feed)"
+        object.__setattr__(self, "override", number(self.override, "feed override", remedy, positive))
+        if self.feed is not None:
+            feed = number(self.feed, "feed", "a positive feed", positive, "mm/s")
+            object.__setattr__(self, "feed", feed)
 
     def of(self, feed: NDArray[np.float64]) -> NDArray[np.float64]:
         """The feed in place of a programmed one; infinite ones stay."""

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.arguments import not_negative, number
 from feedplan.constraints.feed import FeedRequest, feed_limit, feed_share
 from feedplan.constraints.junction import junction_limit
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.hodograph import speed_squares
-from feedplan.errors import InputError
 from feedplan.geometry.corners import Corners
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
@@ -192,9 +192,9 @@ def build_problem(
     give in one servo period if that is more.
     Raises InputError for a value out of range.
     """
-    for name, value in (("start speed", start_speed), ("end speed", end_speed)):
-        if not (np.isfinite(value) and value >= 0):
-            raise InputError(f"{name} is {value} mm/s: give a finite speed of 0 or more")
+    remedy = "a finite speed of 0 or more"
+    start_speed = number(start_speed, "start speed", remedy, not_negative, "mm/s")
+    end_speed = number(end_speed, "end speed", remedy, not_negative, "mm/s")
     request = FeedRequest(feed, feed_override)
     if not machine.is_plain:
         # Kinematics are loaded where they are needed.

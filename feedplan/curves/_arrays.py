@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from feedplan.arguments import is_number, shown
 from feedplan.errors import InputError
 
 MAX_AXES = 9
@@ -23,15 +25,20 @@ def points(
         raise InputError(
             f"control points of shape {control.shape}: give (points, axes) with 1 to {MAX_AXES} axes"
         )
-    return control, None if weights is None else floats(weights, "weights", 1)
+    if weights is None:
+        return control, None
+    weight = floats(weights, "weights", 1)
+    if len(weight) != len(control):
+        raise InputError(f"{len(weight)} weights for {len(control)} control points: give one for each")
+    return control, weight
 
 
 def places(piece: ArrayLike, u: ArrayLike) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
     """Pieces and parameters of places (m,)."""
-    pieces, at = np.atleast_1d(np.asarray(piece)), np.atleast_1d(np.asarray(u, dtype=np.float64))
-    if pieces.size and pieces.dtype.kind not in "iu":
-        raise InputError(f"pieces are given as {pieces.dtype}: give whole numbers from 0")
+    pieces, at = whole_numbers(piece, "pieces"), floats(u, "parameters")
     refuse(pieces < 0, lambda i: f"place {i} is on piece {pieces[i]}: pieces are counted from 0")
+    if at.ndim > 1 or len({len(pieces), len(at)} - {1}) > 1:
+        raise InputError(f"{len(pieces)} pieces and parameters of shape {at.shape}: give one for each place")
     pieces, at = np.broadcast_arrays(pieces, at)
     return (
         np.ascontiguousarray(np.minimum(pieces, 2**32 - 1), dtype=np.uint32),
@@ -39,14 +46,30 @@ def places(piece: ArrayLike, u: ArrayLike) -> tuple[NDArray[np.uint32], NDArray[
     )
 
 
+def whole_numbers(values: ArrayLike, name: str) -> NDArray[Any]:
+    """An array (n,) of whole numbers of any type; one number is an array of one."""
+    try:
+        given = np.atleast_1d(np.asarray(values))
+    except ValueError:  # lists of different lengths
+        given = np.empty((0, 0))
+    if given.dtype.kind == "f" and (np.abs(given) < 2**53).all() and (given == np.floor(given)).all():
+        given = given.astype(np.int64)
+    if given.ndim != 1 or given.dtype.kind not in "iu":
+        raise InputError(f"{name} are {shown(values)}: give whole numbers from 0")
+    return given
+
+
 def floats(values: ArrayLike, name: str, dimensions: int | None = None) -> NDArray[np.float64]:
     """A C-contiguous array of numbers with so many dimensions."""
     try:
         given = np.asarray(values)
-        if given.dtype.kind == "c":
+        # Objects may be numbers, such as fractions; numpy would take texts and truth values for numbers.
+        if given.dtype.kind not in "iufO" or (
+            given.dtype.kind == "O" and not all(map(is_number, given.flat))
+        ):
             raise TypeError
         array = np.ascontiguousarray(given, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{name} are not all real numbers: correct the list") from None
     if dimensions is not None and given.ndim != dimensions:
         raise InputError(f"{name} of shape {given.shape}: give a list of {dimensions} dimension")

@@ -22,8 +22,11 @@ from feedplan._solvers import (
     spline_insert,
     spline_pieces,
 )
-from feedplan.curves._arrays import floats, places, points, refuse
+from feedplan.arguments import flag, instance, is_number, is_whole, not_negative, number, positive, shown
+from feedplan.arguments import refuse as refusal
+from feedplan.curves._arrays import floats, places, points, refuse, whole_numbers
 from feedplan.errors import InputError
+from feedplan.units import counted
 
 MAX_DEGREE = 9
 
@@ -90,7 +93,7 @@ class CompositeCurve:
         control, weights = points(self.control_points, self.weights)
         if len(control):
             check_control_points(control, weights, 1)
-        offsets = np.ascontiguousarray(self.offsets, dtype=np.int64)
+        offsets = np.ascontiguousarray(whole_numbers(self.offsets, "offsets"), dtype=np.int64)
         width = floats(self.width, "widths", 1)
         if len(offsets) != len(width) + 1:
             raise InputError(
@@ -138,7 +141,8 @@ class CompositeCurve:
                 f"a Bézier curve of {len(control)} control points: 2 to {MAX_DEGREE + 1} are supported "
                 f"(degrees 1 to {MAX_DEGREE}); split the curve"
             )
-        return cls(control, weight, np.array([0, len(control)]), np.array([width], dtype=np.float64))
+        size = number(width, "the width", "a positive number", positive)
+        return cls(control, weight, np.array([0, len(control)]), np.array([size]))
 
     @classmethod
     def from_bspline(
@@ -188,13 +192,18 @@ class CompositeCurve:
         Raises InputError for lists that do not fit together and values that cannot be used.
         """
         control, weight = points(control_points, weights)
-        return cls(*spline_pieces(control, weight, floats(knots, "knots", 1), _degree(degree), periodic))
+        around = flag(periodic, "periodic")
+        return cls(*spline_pieces(control, weight, floats(knots, "knots", 1), _degree(degree), around))
 
     @classmethod
     def joined(cls, curves: Sequence[CompositeCurve], gap: float = 1e-6) -> CompositeCurve:
         """Curves one after the other; the end of each is the start of the next within `gap` [mm]."""
+        remedy = "a list of at least one CompositeCurve"
+        if not isinstance(curves, Sequence) or not all(isinstance(curve, CompositeCurve) for curve in curves):
+            raise refusal("curves", curves, remedy)
         if not curves:
             raise InputError("no curves to join: give at least one")
+        number(gap, "the gap", "0 or more [mm]", lambda given: given >= 0)
         for i, (before, after) in enumerate(pairwise(curves)):
             if before.axes != after.axes:
                 raise InputError(
@@ -224,11 +233,12 @@ class CompositeCurve:
 
     def __repr__(self) -> str:
         kind = "rational" if self.weights is not None else "polynomial"
-        return f"<CompositeCurve of {len(self)} {kind} pieces in {self.axes} axes>"
+        axes = f"{self.axes} {'axis' if self.axes == 1 else 'axes'}"
+        return f"<CompositeCurve of {counted(len(self), f'{kind} piece')} in {axes}>"
 
     def __getitem__(self, pieces: slice) -> CompositeCurve:
         """Consecutive pieces."""
-        first, last, step = pieces.indices(len(self))
+        first, last, step = instance(pieces, slice, "pieces", "a slice").indices(len(self))
         if step != 1:
             raise InputError(f"pieces in steps of {step}: take consecutive ones")
         own = slice(int(self.offsets[first]), int(self.offsets[max(last, first)]))
@@ -300,9 +310,9 @@ class CompositeCurve:
 
     def evaluate(self, piece: ArrayLike, u: ArrayLike, order: int = 0) -> NDArray[np.float64]:
         """C and its derivatives by u to `order` ≤ 3 at places (m,): (order + 1, m, axes)."""
-        if order not in (0, 1, 2, 3):
-            raise InputError(f"derivatives to order {order}: orders 0 to 3 are supported")
-        return curve_evaluate(*self.columns(), *places(piece, u), order)
+        if not is_whole(order, 0, 3):
+            raise InputError(f"derivatives to order {shown(order)}: orders 0 to 3 are supported")
+        return curve_evaluate(*self.columns(), *places(piece, u), int(order))
 
     def at(self, parameter: ArrayLike, order: int = 0) -> NDArray[np.float64]:
         """The same at parameters (m,) from the start of the curve, 0 to breakpoints[-1]; at a joint, of the
@@ -337,7 +347,7 @@ class CompositeCurve:
 
     def with_width(self, width: ArrayLike) -> CompositeCurve:
         """The same pieces on parameter intervals of other widths (n,), or all of one width."""
-        array = np.asarray(width, dtype=np.float64)
+        array = floats(width, "widths").reshape(np.shape(width))
         if array.ndim and array.shape != self.width.shape:
             raise InputError(f"{array.shape} widths for {len(self)} pieces: give one for each, or one number")
         return CompositeCurve(
@@ -353,7 +363,9 @@ class CompositeCurve:
         part `derivative` of what the size of the pieces lets expect. `closed` includes the joint from end to
         start; by default where the curve is closed.
         """
-        around = self.closed if closed is None else closed
+        around = self.closed if closed is None else flag(closed, "closed")
+        for name, value in (("gap", gap), ("angle", angle), ("derivative", derivative)):
+            number(value, f"the {name}", "a number of 0 or more", not_negative)
         return Joints(*curve_joints(*self.columns(), around, gap, angle, derivative))
 
     def cusps(self, tolerance: float = 1e-9) -> Cusps:
@@ -362,8 +374,7 @@ class CompositeCurve:
         Proven to be all; of rational pieces ω²C' is meant. Of neighbouring places the slowest is given. A
         piece of length zero has one at u = 0.
         """
-        if not 1e-12 <= tolerance < 1:
-            raise InputError(f"the tolerance of cusps is {tolerance:g}: give a part from 1e-12 to 1")
+        number(tolerance, "the tolerance of cusps", "a part from 1e-12 to 1", lambda part: 1e-12 <= part < 1)
         return Cusps(*curve_cusps(*self.columns(), tolerance))
 
     @property
@@ -388,8 +399,9 @@ def insert_knot(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None]:
     """Control points, knots and weights of the same spline with the knot `value` inserted `times` times."""
     control, weight = points(control_points, weights)
-    if times < 1:
-        raise InputError(f"the knot {value} is to be inserted {times} times: give 1 or more")
+    number(value, "the knot", "a number")
+    if not is_whole(times, most=2**31 - 1):
+        raise InputError(f"the knot {value} is to be inserted {shown(times)} times: give 1 or more")
     new, new_weights, new_knots = spline_insert(
         control, weight, floats(knots, "knots", 1), _degree(degree), value, times
     )
@@ -407,8 +419,8 @@ def knot_continuity(knots: ArrayLike, degree: int) -> tuple[NDArray[np.float64],
 
 
 def _degree(degree: int) -> int:
-    if degree != int(degree) or not 1 <= degree <= MAX_DEGREE:
+    if not is_whole(int(degree) if is_number(degree) and degree == degree // 1 else degree, most=MAX_DEGREE):
         raise InputError(
-            f"the degree is {degree}: degrees 1 to {MAX_DEGREE} are supported; convert the curve"
+            f"the degree is {shown(degree)}: degrees 1 to {MAX_DEGREE} are supported; convert the curve"
         )
     return int(degree)

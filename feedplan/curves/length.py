@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import CurveLength as NativeCurveLength
+from feedplan.arguments import one_of
 from feedplan.curves._arrays import floats, places
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
 
-INTERPOLATORS = ("sarfraz", "newton")
+Interpolator = Literal["sarfraz", "newton"]
+INTERPOLATORS: tuple[Interpolator, ...] = get_args(Interpolator)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,14 +59,13 @@ class CurveLength:
         """Length from the start of the curve to places (m,) [mm]."""
         return self._table.lengths(*places(piece, u))
 
-    def locate(self, lengths: ArrayLike, tolerance: float = 1e-12, interpolator: str = "sarfraz") -> Places:
+    def locate(
+        self, lengths: ArrayLike, tolerance: float = 1e-12, interpolator: Interpolator = "sarfraz"
+    ) -> Places:
         """The places at lengths (m,) [mm], within `tolerance` [mm]; a length beyond an end gives that end.
 
         `sarfraz` finds each by itself, in parallel; `newton` finds each from the one before.
         """
-        if interpolator not in INTERPOLATORS:
-            raise InputError(
-                f"there is no interpolator '{interpolator}': use one of {', '.join(INTERPOLATORS)}"
-            )
+        one_of(interpolator, "interpolator", INTERPOLATORS)
         wanted = floats(lengths, "lengths", 1)
         return Places(*self._table.locate(wanted, tolerance, interpolator == "newton"))

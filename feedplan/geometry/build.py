@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan._solvers import build_path as native_build_path
+from feedplan.arguments import not_negative, number
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError, ProgramError
 from feedplan.geometry.corners import Corners
@@ -52,10 +53,16 @@ class FitSettings:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if not value > 0:
-                raise InputError(f"fit setting {field.name} is {value}: give a positive number")
+            number(value, f"fit setting {field.name}", "a positive number", lambda given: given > 0)
         if self.fit_share >= 1:
             raise InputError(f"fit setting fit_share is {self.fit_share}: give a number below 1")
+
+
+def tolerance_of(given: float) -> float:
+    """A tolerance [mm] as it is used; raises InputError for one that cannot be."""
+    return number(
+        given, "the tolerance", "0 (exact lines with stops) or a positive number [mm]", not_negative
+    )
 
 
 def build_path(
@@ -99,10 +106,8 @@ def build_path(
     does not fit its move), InputError (a position outside the travel, a negative tolerance).
     """
     settings = settings or FitSettings()
-    if tolerance is not None and not 0 <= tolerance < math.inf:
-        raise InputError(
-            f"the tolerance is {tolerance}: give 0 (exact lines with stops) or a positive number [mm]"
-        )
+    if tolerance is not None:
+        tolerance = tolerance_of(tolerance)
     words = path_words(program, machine)
     program = program.along(words.names)
     names, starts = program.axes, program.starts()

@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import build_path as native_build_path
 from feedplan._solvers import curve_regular
-from feedplan.curves._arrays import MAX_AXES, points, refuse
+from feedplan.arguments import instance, list_of_names, number
+from feedplan.curves._arrays import points, refuse
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
-from feedplan.geometry.build import FitSettings
+from feedplan.geometry.build import FitSettings, tolerance_of
 from feedplan.geometry.corners import Corners
 from feedplan.geometry.feed_groups import group_feeds, moving_axes
 from feedplan.geometry.joints import tangent_jumps
@@ -33,6 +34,7 @@ _ANY_SPEED, _ANY_ACCELERATION = 1e6, 1.0
 
 def path_of_curve(curve: CompositeCurve, axes: Sequence[str] | None, feed: float) -> Path:
     """See `Path.from_curve`."""
+    instance(curve, CompositeCurve, "the curve", "a CompositeCurve")
     names, speed = _names(axes, curve.axes), _feed(feed)
     moving = np.delete(np.arange(len(curve)), curve.zero_length)
     columns, piece, rests = curve_regular(*_closed_gaps(curve.take(moving)).columns())
@@ -55,13 +57,14 @@ def path_of_points(
 ) -> Path:
     """See `Path.from_points`."""
     array, _ = points(given, None)
-    names, speed, settings = _names(axes, array.shape[1]), _feed(feed), settings or FitSettings()
+    names, speed = _names(axes, array.shape[1]), _feed(feed)
+    settings = (
+        FitSettings() if settings is None else instance(settings, FitSettings, "settings", "FitSettings")
+    )
     if len(array) < 2:
         raise InputError(f"a path of {len(array)} points: give two or more")
-    if not 0 <= tolerance < math.inf:
-        raise InputError(
-            f"the tolerance is {tolerance}: give 0 (exact lines with stops) or a positive number [mm]"
-        )
+    tolerance = tolerance_of(tolerance)
+    instance(corners, Corners, "corners", "one of Corners")
     finite: NDArray[np.bool_] = np.logical_and.reduce(np.isfinite(array), axis=1)
     refuse(~finite, lambda i: f"point {i} is not finite: correct its coordinates")
     same: NDArray[np.bool_] = (array[1:] == array[:-1]).all(axis=1)
@@ -147,9 +150,18 @@ def _closed_gaps(curve: CompositeCurve) -> CompositeCurve:
 
 
 def _names(axes: Sequence[str] | None, count: int) -> tuple[str, ...]:
-    if axes is None and count <= MAX_AXES:
+    if axes is None:
+        if count > len(DEFAULT_AXES):
+            raise InputError(
+                f"{count} coordinates and no names: name the axes, with the letters {AXIS_LETTERS} "
+                f"(without names there are the first of {DEFAULT_AXES})"
+            )
         return tuple(DEFAULT_AXES[:count])
-    names = tuple(axes or ())
+    names = list_of_names(
+        tuple(axes) if isinstance(axes, str) else axes,
+        "axes",
+        f"a list of letters, such as {tuple(DEFAULT_AXES[:count])}",
+    )
     known = set(AXIS_LETTERS) | set("IJK")
     if len(names) != count or len(set(names)) != count or not set(names) <= known:
         raise InputError(
@@ -160,6 +172,5 @@ def _names(axes: Sequence[str] | None, count: int) -> tuple[str, ...]:
 
 
 def _feed(feed: float) -> float:
-    if not feed > 0:
-        raise InputError(f"feed is {feed} mm/s: give a positive feed, or none for the axes' limits alone")
-    return float(feed)
+    remedy = "a positive feed, or none for the axes' limits alone"
+    return number(feed, "feed", remedy, lambda given: given > 0, "mm/s")

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.corners import Corners
+from feedplan.units import counted
 
 if TYPE_CHECKING:
     from feedplan.geometry.build import FitSettings
@@ -195,7 +196,8 @@ class Path:
         return len(self.curve)
 
     def __repr__(self) -> str:
-        return f"<Path of {' '.join(self.axes)}: {len(self)} pieces in {len(self.runs) - 1} runs>"
+        pieces, runs = counted(len(self), "piece"), counted(len(self.runs) - 1, "run")
+        return f"<Path of {' '.join(self.axes)}: {pieces} in {runs}>"
 
     @property
     def width(self) -> NDArray[np.float64]:

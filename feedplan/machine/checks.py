@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from numbers import Integral, Real
+from numbers import Integral
 from typing import Any
 
+from feedplan.arguments import is_number, is_text, shown
 from feedplan.errors import MachineError
 
 
 def require(condition: bool, what: str, value: object, remedy: str) -> None:
     """Raises MachineError unless the condition holds."""
     if not condition:
-        raise MachineError(f"{what} is {value!r}: give {remedy}")
-
-
-def is_number(value: object) -> bool:
-    """A number of any type; truth values are none."""
-    return isinstance(value, Real) and not isinstance(value, bool)
+        raise MachineError(f"{what} is {shown(value)}: give {remedy}")
 
 
 def one_by_one(values: Any, what: str, remedy: str) -> tuple[Any, ...]:
@@ -45,7 +41,7 @@ def set_positive(owner: object, key: str, place: str, unit: str, infinite: bool 
 
 def require_text(value: object, what: str) -> None:
     """Raises MachineError unless the value is text that is not empty and that a file can hold."""
-    require(_is_text(value) and value != "", what, value, "a text")
+    require(is_text(value) and value != "", what, value, "a text")
 
 
 def written(value: Any, what: str) -> Any:
@@ -61,13 +57,8 @@ def written(value: Any, what: str) -> Any:
         return {key: written(entry, f"{what} {key}") for key, entry in value.items()}
     if isinstance(value, (list, tuple)):
         return [written(entry, what) for entry in value]
-    if isinstance(value, bool) or _is_text(value):
+    if isinstance(value, bool) or is_text(value):
         return value
     remedy = "text, true or false, a number, or a list or table of these, as a machine file can hold"
     require(is_number(value) and value == value, what, value, remedy)
     return int(value) if isinstance(value, Integral) else float(value)
-
-
-def _is_text(value: object) -> bool:
-    """Text without lone surrogates, which no file can hold."""
-    return isinstance(value, str) and not any("\ud800" <= letter <= "\udfff" for letter in value)

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib import resources
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
+from feedplan.arguments import is_number, shown
 from feedplan.errors import MachineError
 from feedplan.machine.checks import (
-    is_number,
     numbers,
     one_by_one,
     require,
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
 MAX_AXES = 6
 AXIS_LETTERS = "XYZABCUVW"
+AxisKind = Literal["linear", "rotary"]
 
 
 @dataclass(frozen=True)
@@ -46,14 +48,20 @@ class Axis:
     max_jerk: float = math.inf
     travel: tuple[float, float] = (-math.inf, math.inf)
     max_velocity_jump: float = 0.0
-    kind: str = ""
+    kind: AxisKind | Literal[""] = ""
 
     def __post_init__(self) -> None:
         letter = isinstance(self.name, str) and len(self.name) == 1 and self.name in AXIS_LETTERS
         require(letter, "axis name", self.name, f"one of the letters {AXIS_LETTERS}")
         place = f"axis {self.name}: "
-        kind = self.kind or ("rotary" if self.name in "ABC" else "linear")
-        require(kind in ("linear", "rotary"), f"{place}kind", kind, '"linear" or "rotary"')
+        kind: object = self.kind
+        require(
+            isinstance(kind, str) and kind in ("linear", "rotary", ""),
+            f"{place}kind",
+            kind,
+            '"linear" or "rotary"',
+        )
+        kind = kind or ("rotary" if self.name in "ABC" else "linear")
         object.__setattr__(self, "kind", kind)
         units = {"max_velocity": "/s", "max_acceleration": "/s²", "max_jerk": "/s³"}
         for key, unit in units.items():
@@ -131,9 +139,10 @@ class Machine:
     def axis(self, name: str) -> Axis:
         """The axis of that letter; raises MachineError where there is none."""
         for axis in self.axes:
-            if axis.name == name:
+            if isinstance(name, str) and axis.name == name:
                 return axis
-        raise MachineError(f"machine {self.name} has no axis {name}: it has {', '.join(self.axis_names)}")
+        own = ", ".join(self.axis_names)
+        raise MachineError(f"machine {self.name} has no axis {name!s:.60}: it has {own}")
 
     @property
     def is_plain(self) -> bool:
@@ -158,27 +167,35 @@ class Machine:
         return kinematics.create(self.kinematics, self.axes, self.parameters, self.name)
 
     @classmethod
-    def load(cls, source: str | FilePath) -> Machine:
+    def load(cls, source: str | os.PathLike[str]) -> Machine:
         """The bundled machine of that name, or the machine in a TOML file.
 
         Raises MachineError naming the file, the key and the remedy.
         """
         from feedplan.machine.file import parse
 
-        text = str(source)
+        remedy = "the name of a bundled machine, or the path of a .toml file"
+        require(isinstance(source, (str, os.PathLike)), "the machine", source, remedy)
+        text = os.fspath(source)
+        require(isinstance(text, str), "the machine", source, remedy)
         if text.endswith(".toml") or "/" in text or "\\" in text:
             path = FilePath(text)
             try:
                 content = path.read_text(encoding="utf-8")
-            except (OSError, UnicodeDecodeError) as error:
+            except (OSError, ValueError) as error:
                 raise MachineError(f"machine file {text} cannot be read: {error}") from None
             return parse(content, text)
         if text not in bundled_machines():
             known = ", ".join(bundled_machines())
             raise MachineError(
-                f"there is no bundled machine '{text}': use one of {known}, or the path of a .toml file"
+                f"there is no bundled machine {shown(text)}: use one of {known}, or the path of a .toml file"
             )
         return parse(resources.files(__package__).joinpath("models", f"{text}.toml").read_text("utf-8"), text)
+
+    @classmethod
+    def of(cls, given: Machine | str | os.PathLike[str]) -> Machine:
+        """A machine as it is, or what `load` makes of a name or file."""
+        return given if isinstance(given, Machine) else cls.load(given)
 
     def to_toml(self) -> str:
         """The text of a machine file that gives the same machine."""

@@ -6,7 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from feedplan.machine.checks import is_number, require
+from feedplan.arguments import is_number
+from feedplan.machine.checks import require
 
 Vector = tuple[float, float, float]
 

@@ -1,6 +1,6 @@
 """Outputs: one file a format, found by its name, and setpoints read back from them.
 
-A format is a module here whose name does not begin with an underscore. It has
+A format is a module here whose name does not begin with an underscore, and `FormatName` has its name. It has
 
 - `FILE`, the name of the file it writes;
 - `writer(file, header, count)`, a context that writes `count` setpoints: it gives a function that takes them
@@ -11,18 +11,22 @@ A format is a module here whose name does not begin with an underscore. It has
 from __future__ import annotations
 
 import importlib
+import os
 import pkgutil
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path as FilePath
-from typing import Protocol, cast
+from typing import Literal, Protocol, cast
 
+from feedplan.arguments import file_path, one_of
 from feedplan.errors import InputError
 from feedplan.setpoints import SetpointChunk
 
 # The columns of a setpoint that have one value an axis, with what follows the unit of the axis in theirs.
 QUANTITIES = {"position": "", "velocity": "/s", "acceleration": "/s^2", "jerk": "/s^3"}
+
+FormatName = Literal["csv", "json", "npz", "npz-compressed"]
 
 # The version of all files of a plan. Files without one come from elsewhere and are read as this one.
 FORMAT = 1
@@ -61,16 +65,16 @@ class Format(Protocol):
     def load(self, file: FilePath) -> SetpointFile: ...
 
 
-def formats() -> tuple[str, ...]:
+def formats() -> tuple[FormatName, ...]:
     """The names of all formats."""
     names = (module.name for module in pkgutil.iter_modules(__path__))
-    return tuple(sorted(name.replace("_", "-") for name in names if not name.startswith("_")))
+    known = sorted(name.replace("_", "-") for name in names if not name.startswith("_"))
+    return cast("tuple[FormatName, ...]", tuple(known))
 
 
 def format_named(name: str) -> Format:
     """The format of that name. Raises InputError naming those there are."""
-    if name not in formats():
-        raise InputError(f"there is no output format '{name}': use one of {', '.join(formats())}")
+    one_of(name, "output format", formats())
     return cast(Format, importlib.import_module(f"{__name__}.{name.replace('-', '_')}"))
 
 
@@ -82,13 +86,13 @@ def require_format(version: object, what: str) -> None:
         )
 
 
-def load_setpoints(place: str | FilePath) -> SetpointFile:
+def load_setpoints(place: str | os.PathLike[str]) -> SetpointFile:
     """The setpoints in a file, or in the folder of a plan, as one chunk.
 
     The arrays of an npz file stay on disk and are read where they are used. Raises InputError naming the
     file and the remedy.
     """
-    file = FilePath(place)
+    file = file_path(place, "the place", "a file of setpoints or the folder of a plan")
     if file.is_dir():
         found = files_in(file)
         if not found:

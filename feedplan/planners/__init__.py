@@ -1,12 +1,14 @@
 """Planners: a problem in, a speed profile out; one file a method, found by its name.
 
 A planner module has one function `plan(problem: Problem) -> SpeedProfile`, with what options it has as
-keywords. The method `bang-bang` is the module `bang_bang`; modules that begin with an underscore are what
-methods share. A method that is made for another path than the rounded one says so in `CORNERS`
+keywords, each with a default. The method `bang-bang` is the module `bang_bang`, `MethodName` has its name,
+and the documentation of `feedplan.plan` its options; modules that begin with an underscore are what methods
+share. A method that is made for another path than the rounded one says so in `CORNERS`
 (`feedplan.geometry.corners.Corners`); one whose profiles keep the jerk limits of the axes says
 `LIMITS_JERK = True`, and the audit judges them. One that knows a bound of the time beside that of
 `feedplan.bound` has a function `lower_bound(problem, profile)` with the same options, and `GRID_ERROR` if
-that leaves so many times the accuracy to finer grids.
+that leaves so many times the accuracy to finer grids. One that can tell what follows its plan before it is
+made (`planners.jerk_limited`) takes `RESERVE`.
 """
 
 from __future__ import annotations
@@ -14,46 +16,71 @@ from __future__ import annotations
 import importlib
 import inspect
 import pkgutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from types import ModuleType
+from typing import Any, Literal, cast
 
+from feedplan.arguments import one_of
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InputError
 from feedplan.geometry.corners import Corners
 from feedplan.profile import SpeedProfile
 
+MethodName = Literal[
+    "arc-transition",
+    "bang-bang",
+    "casadi",
+    "clarabel",
+    "constant-velocity-transition",
+    "jerk-limited",
+    "junction-deviation",
+    "ruckig",
+    "s-curve",
+    "tangential",
+    "toppra",
+]
 
-def methods() -> tuple[str, ...]:
-    """The names of all planning methods."""
+# Keeps time for the work that follows a plan; it is given by `feedplan.plan`, and no option of users.
+RESERVE = "reserve"
+
+
+def methods() -> tuple[MethodName, ...]:
+    """The names of all planning methods; `feedplan.plan` tells the options of each."""
     names = (module.name for module in pkgutil.iter_modules(__path__))
-    return tuple(sorted(name.replace("_", "-") for name in names if not name.startswith("_")))
+    known = sorted(name.replace("_", "-") for name in names if not name.startswith("_"))
+    return cast("tuple[MethodName, ...]", tuple(known))
 
 
-def planner(method: str, **options: float | None) -> Callable[[Problem], SpeedProfile]:
+def planner(method: str, **options: Any) -> Callable[[Problem], SpeedProfile]:
     """The planning function of a method, with those `options` that are not None.
 
-    Raises InputError naming the methods there are, or the option that the method does not have.
+    Raises InputError naming the methods there are, or the options that the method has.
     """
     plan: Callable[..., SpeedProfile] = _module(method).plan
-    given = {name: value for name, value in options.items() if value is not None}
-    for name in given.keys() - options_of(method):
-        raise InputError(f"the method {method} takes no {name.replace('_', ' ')}: leave it out")
-    return partial(plan, **given)
+    return partial(plan, **given_options(method, options))
 
 
-def bound_of(method: str, **options: float | None) -> Callable[[Problem, SpeedProfile], float] | None:
+def given_options(method: str, options: Mapping[str, Any], others: Iterable[str] = ()) -> dict[str, Any]:
+    """Those options of a method that are not None; one that only other methods take may be None.
+
+    Raises as `planner`; `others` may be given as well.
+    """
+    known = options_of(method)
+    for name, value in options.items():
+        if name in known or (value is None and any(name in options_of(other) for other in methods())):
+            continue
+        some = ", ".join((*known, *others))
+        remedy = f"give {some}, or leave it out" if some else "leave it out"
+        raise InputError(f"the method {method} takes no {name}: {remedy}")
+    return {name: value for name, value in options.items() if value is not None}
+
+
+def bound_of(method: str, **options: Any) -> Callable[[Problem, SpeedProfile], float] | None:
     """What a method itself knows of the least time [s] from one of its profiles, with the same options; None
     for most; raises as `planner`."""
     bound: Callable[..., float] | None = getattr(_module(method), "lower_bound", None)
-    given = {name: value for name, value in options.items() if value is not None}
-    return None if bound is None else partial(bound, **given)
-
-
-def default_accuracy(method: str) -> float:
-    """The accuracy that a method plans to where none is given; 0 for one that has none."""
-    known = inspect.signature(_module(method).plan).parameters.get("accuracy")
-    return 0.0 if known is None else float(known.default)
+    return None if bound is None else partial(bound, **given_options(method, options))
 
 
 def grid_error(method: str) -> float:
@@ -61,9 +88,15 @@ def grid_error(method: str) -> float:
     return float(getattr(_module(method), "GRID_ERROR", 0.0))
 
 
-def options_of(method: str) -> frozenset[str]:
-    """The names of a method's options; raises as `planner`."""
-    return frozenset(inspect.signature(_module(method).plan).parameters) - {"problem"}
+def options_of(method: str) -> dict[str, Any]:
+    """A method's options by name, with their defaults; raises as `planner`."""
+    parameters = inspect.signature(_module(method).plan).parameters.values()
+    return {own.name: own.default for own in parameters if own.name not in ("problem", RESERVE)}
+
+
+def tells_early(method: str) -> bool:
+    """Whether a method can tell what follows its plan before it is made (`RESERVE`); raises as `planner`."""
+    return RESERVE in inspect.signature(_module(method).plan).parameters
 
 
 def corners(method: str) -> Corners:
@@ -78,6 +111,5 @@ def limits_jerk(method: str | None) -> bool:
 
 
 def _module(method: str) -> ModuleType:
-    if method not in methods():
-        raise InputError(f"there is no method '{method}': use one of {', '.join(methods())}")
-    return importlib.import_module(f"{__name__}.{method.replace('-', '_')}")
+    name = one_of(method, "method", methods())
+    return importlib.import_module(f"{__name__}.{name.replace('-', '_')}")

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.arguments import is_whole, number, shown
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InfeasibleError, InputError, MissingPackageError, SolverError
 from feedplan.planners._arcs import Arcs, arcs_between, profile
@@ -34,6 +35,8 @@ Array = NDArray[np.float64]
 _LEAST, _FIRST = 4, 32
 # More cells are not tried; the solvers need some 10 kB for each.
 MAX_CELLS = 400_000
+# So many in a piece are no mistake of typing.
+_MOST_CELLS = 1_000_000_000
 # How often limits are lowered where the arcs go beyond them, and what is left to scaling; more often where
 # speeds given at the ends cannot be scaled. The audit allows 1e-6.
 _ROUNDS = 3
@@ -105,12 +108,12 @@ def plan_on_meshes(
     time_limit: float | None,
 ) -> SpeedProfile:
     """The profile of all runs: on `cells` cells a piece, or on meshes refined to the relative `accuracy`."""
-    if not 0.0 < accuracy < 1.0:
-        raise InputError(f"the accuracy is {accuracy}: give a part of the time between 0 and 1, as 1e-4")
-    if cells is not None and cells < 1:
-        raise InputError(f"{cells} cells a piece: give 1 or more")
-    if time_limit is not None and not time_limit > 0.0:
-        raise InputError(f"the time limit is {time_limit} s: give a positive number")
+    remedy = "a part of the time between 0 and 1, as 1e-4"
+    accuracy = number(accuracy, "the accuracy", remedy, lambda part: 0.0 < part < 1.0)
+    if cells is not None and not is_whole(cells, most=_MOST_CELLS):
+        raise InputError(f"{shown(cells)} cells a piece: give a whole number from 1 to {_MOST_CELLS}")
+    if time_limit is not None:
+        time_limit = number(time_limit, "the time limit", "a positive number", lambda limit: limit > 0, "s")
     method.require()
     deadline = time.monotonic() + (math.inf if time_limit is None else time_limit)
     parts: list[tuple[Mesh, Arcs]] = []

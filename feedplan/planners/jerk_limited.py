@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan._solvers import PlanError, bound_jerk_limited, plan_jerk_limited
+from feedplan.arguments import number
 from feedplan.constraints.problem import Problem
-from feedplan.errors import InfeasibleError, InputError
+from feedplan.errors import InfeasibleError
 from feedplan.geometry.corners import Corners
 from feedplan.planners import s_curve
 from feedplan.planners._faults import error_of
@@ -54,10 +55,11 @@ def plan(
     says `stopped`. It keeps all limits too. Raises SolverError for an axis without a limit of jerk,
     InfeasibleError where the start or end speed cannot be had, with the speed that can.
     """
-    if not FINEST <= accuracy <= COARSEST:
-        raise InputError(f"the accuracy is {accuracy:g}: give {FINEST:g} to {COARSEST:g}")
-    if time_limit is not None and not time_limit >= 0:
-        raise InputError(f"the time limit is {time_limit:g} s: give 0 or more")
+    accuracy = number(
+        accuracy, "the accuracy", f"{FINEST:g} to {COARSEST:g}", lambda part: FINEST <= part <= COARSEST
+    )
+    if time_limit is not None:
+        time_limit = number(time_limit, "the time limit", "0 or more", lambda limit: limit >= 0, "s")
     limits = jerk_limits(problem)
     resolution = max(RESOLUTION * (1e-4 / accuracy) ** 0.5, LEAST_RESOLUTION)
     whole = partial(_kept, problem, limits, resolution, GAP * accuracy)

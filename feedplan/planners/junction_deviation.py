@@ -17,8 +17,8 @@ import math
 
 import numpy as np
 
+from feedplan.arguments import number, positive
 from feedplan.constraints.problem import Problem
-from feedplan.errors import InputError
 from feedplan.geometry.corners import Corners
 from feedplan.geometry.joints import end_edges, tangent_jumps
 from feedplan.planners._look_ahead import look_ahead
@@ -37,12 +37,12 @@ def plan(
 
     Raises InputError for those, SolverError and InfeasibleError, all as sentences.
     """
-    for name, value in (
-        ("junction deviation", deviation),
-        ("square corner velocity", square_corner_velocity),
+    for name, value, unit in (
+        ("junction deviation", deviation, "mm"),
+        ("square corner velocity", square_corner_velocity, "mm/s"),
     ):
-        if value is not None and not 0.0 < value < math.inf:
-            raise InputError(f"the {name} is {value}: give a positive number")
+        if value is not None:
+            number(value, f"the {name}", f"a positive number [{unit}]", positive, unit)
     return look_ahead(problem, corner_speed(problem, deviation, square_corner_velocity), each_direction)
 
 

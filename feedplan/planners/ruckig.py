@@ -19,8 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan._solvers import PlanError, path_segments, profile_of_sections
+from feedplan.arguments import number
 from feedplan.constraints.problem import Problem, speed_square
-from feedplan.errors import InputError, MissingPackageError
+from feedplan.errors import MissingPackageError
 from feedplan.geometry.corners import Corners
 from feedplan.planners import s_curve
 from feedplan.planners._faults import error_of
@@ -188,8 +189,8 @@ def repaired(problem: Problem, profile: SpeedProfile, *, time_limit: float | Non
 
 
 def _planned(problem: Problem, time_limit: float | None, guide: SpeedProfile | None) -> SpeedProfile:
-    if time_limit is not None and not time_limit >= 0:
-        raise InputError(f"the time limit is {time_limit:g} s: give 0 or more")
+    if time_limit is not None:
+        time_limit = number(time_limit, "the time limit", "0 or more", lambda limit: limit >= 0, "s")
     motions = Motions()
     limits = jerk_limits(problem)
     deadline = math.inf if time_limit is None else time.perf_counter() + time_limit

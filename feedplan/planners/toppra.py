@@ -11,13 +11,13 @@ nodes and whose time rises to it. Both are of first order.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.arguments import one_of
 from feedplan.constraints.problem import Problem
-from feedplan.errors import InputError
 from feedplan.planners._mesh import Mesh
 from feedplan.planners._refinement import Method, Refusal, plan_on_meshes
 from feedplan.planners._transcription import Rows, Transcription, end_rows
@@ -28,7 +28,8 @@ Array = NDArray[np.float64]
 ACCURACY = 1e-3
 # x is bounded, where nothing else does, by so much of what is usual.
 _FASTEST = 1e6
-SCHEMES = ("one-sided", "collocation")
+Scheme = Literal["one-sided", "collocation"]
+SCHEMES: tuple[Scheme, ...] = get_args(Scheme)
 
 
 def plan(
@@ -37,7 +38,7 @@ def plan(
     accuracy: float = ACCURACY,
     cells: int | None = None,
     time_limit: float | None = None,
-    scheme: str = "one-sided",
+    scheme: Scheme = "one-sided",
 ) -> SpeedProfile:
     """The fastest profile on a mesh of about the relative `accuracy` of the time, or of `cells` cells a
     piece.
@@ -46,8 +47,7 @@ def plan(
     `collocation`, whose profile is faster than the limits allow. Raises SolverError where toppra fails,
     InfeasibleError where a speed given at an end cannot be had, MissingPackageError.
     """
-    if scheme not in SCHEMES:
-        raise InputError(f"there is no scheme '{scheme}' of toppra: use one of {', '.join(SCHEMES)}")
+    one_of(scheme, "scheme of toppra", SCHEMES)
     feasible = scheme == "one-sided"
     rows = _at_both_ends if feasible else _at_start
     method = Method("toppra", _solve, rows, by_axis=False, feasible=feasible, platform="Linux on x86-64")

@@ -50,25 +50,23 @@ elsewhere.
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from numpy.typing import NDArray
 
 from feedplan._solvers import read_gcode as read_native
 from feedplan.curves.composite import CompositeCurve
-from feedplan.errors import MachineError, ProgramError
+from feedplan.errors import MachineError
 from feedplan.machine.machine import AXIS_LETTERS, Machine
 from feedplan.program.program import Program
+from feedplan.program.source import MAX_BYTES, Source, content_of
 
 WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 
-MAX_BYTES = 1 << 30
 MAX_MOVES = 50_000_000
 
 
 def read_gcode(
-    source: str | Path | bytes,
+    source: Source,
     machine: Machine | None = None,
     name: str | None = None,
     *,
@@ -78,27 +76,20 @@ def read_gcode(
 ) -> Program:
     """The moves of a G-code program.
 
-    `source` is a path, or the program itself: bytes, or a str with a line break. `machine` gives the work
-    offsets, the home position and the axes there are; without it offsets and home are 0. `name` stands in
-    messages, instead of the file's name. `block_delete` leaves out blocks that start with `/`, as LinuxCNC
-    does; `max_bytes` and `max_moves` bound what is read.
+    `source` is a path, a stream, or the program itself: bytes, or a str with a line break. `machine` gives
+    the work offsets, the home position and the axes there are; without it offsets and home are 0. `name`
+    stands in messages, instead of the file's name. `block_delete` leaves out blocks that start with `/`, as
+    LinuxCNC does; `max_bytes` and `max_moves` bound what is read.
     Raises ProgramError naming file, line, word and remedy, MachineError where an offset's name is unknown.
     """
-    if isinstance(source, str) and ("\n" in source or "\r" in source):
-        source = source.encode("utf-8", "surrogateescape")
-    if isinstance(source, bytes):
-        content, default = source, "program"
-        _check_size(len(content), default if name is None else name, max_bytes)
-    else:
-        default = Path(source).name
-        content = read_bytes(Path(source), max_bytes)
+    content, name, _ = content_of(source, name, max_bytes)
     # Kinematics are loaded where a program is read, not where feedplan is imported.
     from feedplan.program.tip import TipControl
 
     control = None if machine is None else TipControl(machine)
     columns = read_native(
         content,
-        default if name is None else name,
+        name,
         _places(machine),
         "" if machine is None else "".join(machine.program_letters),
         control,
@@ -110,30 +101,7 @@ def read_gcode(
         columns["splines"] = CompositeCurve(*splines)
     if control is None or not control.applies:
         columns["meaning"] = columns["tool_length"] = None
-    return Program(name=default if name is None else name, **columns)
-
-
-def read_bytes(path: Path, max_bytes: int = MAX_BYTES) -> bytes:
-    """The content of a program file; ProgramError where it is missing, no file, empty or too large."""
-    if path.is_dir():
-        raise ProgramError(f"{path} is a directory: give the program file in it")
-    try:
-        _check_size(path.stat().st_size, str(path), max_bytes)
-        content = path.read_bytes()
-    except OSError as error:
-        raise ProgramError(f"{path} cannot be read: {error.strerror or error}") from None
-    except ValueError as error:
-        raise ProgramError(f"{path} is no path of a file: {error}") from None
-    if not content:
-        raise ProgramError(f"{path} is empty: give a part program")
-    return content
-
-
-def _check_size(size: int, place: str, max_bytes: int) -> None:
-    if size > max_bytes:
-        raise ProgramError(
-            f"{place} has {size} bytes, more than the {max_bytes} that are read: split it, or raise max_bytes"
-        )
+    return Program(name=name, **columns)
 
 
 def _places(machine: Machine | None) -> NDArray[np.float64]:

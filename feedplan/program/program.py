@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
+from pathlib import Path as FilePath
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
+from feedplan.units import counted
 
 LINEAR_AXES = "XYZ"
 
@@ -68,7 +70,8 @@ class Program:
     in deg/s of the tool's turning; columns that a meaning does not use stay as they are. A change of meaning
     is a full stop and moves no joint: `change_move` (c,) are the first moves in a new meaning, and
     `change_start` (c, axes) where they start in the new words, `starts` takes both into account.
-    `warnings` are sentences for the user; `sha256` is the hash of the file it was read from, if it was.
+    `warnings` are sentences for the user. If it was read, `text` is the file it was read from, or the bytes
+    themselves, and `sha256` the hash of these.
     """
 
     name: str
@@ -97,13 +100,14 @@ class Program:
     change_start: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0)))
     warnings: tuple[str, ...] = ()
     sha256: str | None = None
+    text: FilePath | bytes | None = None
     stop_cause: NDArray[np.uint8] | None = None
 
     def __len__(self) -> int:
         return len(self.kind)
 
     def __repr__(self) -> str:
-        return f"<Program {self.name}: {len(self)} moves of {' '.join(self.axes)}>"
+        return f"<Program {self.name}: {counted(len(self), 'move')} of {' '.join(self.axes)}>"
 
     def starts(self) -> NDArray[np.float64]:
         """Where each move starts, in its own words (n, axes) [mm, deg]."""

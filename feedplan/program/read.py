@@ -1,46 +1,74 @@
-"""Reads a part program from a file, in whatever language it is written."""
+"""Reads a part program, in whatever language it is written."""
 
 from __future__ import annotations
 
 import hashlib
+import os
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+from feedplan.arguments import flag, is_text, refuse, whole
 from feedplan.machine.machine import Machine
 from feedplan.program import path_file
 from feedplan.program.dxf import read_dxf
-from feedplan.program.gcode import MAX_BYTES, read_bytes, read_gcode
+from feedplan.program.gcode import read_gcode
 from feedplan.program.path_file import read_path_file
 from feedplan.program.program import Program
+from feedplan.program.source import MAX_BYTES, Source, content_of
 
 Reader = Callable[[bytes, Machine | None, str], Program]
 
-# By the end of the file's name, with the most bytes that are read; everything else is G-code.
+# By the end of the name, with the most bytes that are read; everything else is G-code.
 READERS: dict[str, tuple[Reader, int]] = {
     ".json": (read_path_file, path_file.MAX_BYTES),
     ".dxf": (lambda content, machine, name: read_dxf(content, name), path_file.MAX_BYTES),
 }
+# How programs without an ending begin; no G-code does.
+_BEGINNINGS = {
+    ".json": re.compile(rb"(\xef\xbb\xbf)?\s*\{"),
+    ".dxf": re.compile(rb"\s*(0\s+SECTION|999\s|AutoCAD Binary DXF)"),
+}
 
 
 def read_program(
-    path: str | Path,
-    machine: Machine | None = None,
+    source: Source,
+    machine: Machine | str | os.PathLike[str] | None = None,
     *,
+    name: str | None = None,
     block_delete: bool = True,
     max_bytes: int = MAX_BYTES,
 ) -> Program:
-    """The moves of the program in a file: a path file (.json), a drawing (.dxf), else G-code.
+    """The moves of a part program: a path file (.json), a drawing (.dxf), else G-code.
 
-    `machine` gives work offsets and home, see `read_gcode`, and the axes there are. Raises ProgramError in
-    one sentence where the file is missing, a directory, empty, binary, larger than `max_bytes` or not
-    understood, MissingPackageError where a drawing needs a package.
+    `source`: the path of a file; or the program itself, as bytes, as a str with a line break, or as an open
+    file or another stream. `name` stands in messages instead of the file's name, and its ending tells the
+    language; where there is none the first characters do. `machine`, or the name or file of one, gives work
+    offsets and home, see `feedplan.program.gcode.read_gcode`, and the axes there are. `block_delete` leaves
+    out blocks that start with `/`.
+    Raises ProgramError in one sentence where the program is missing, a directory, empty, binary, larger than
+    `max_bytes` or not understood, MissingPackageError where a drawing needs a package, MachineError,
+    InputError for other arguments that cannot be used.
     """
-    file = Path(path)
-    reader, most = READERS.get(file.suffix.lower(), (None, max_bytes))
-    content = read_bytes(file, min(max_bytes, most))
+    known = None if machine is None else Machine.of(machine)
+    if name is not None and not is_text(name):
+        raise refuse("the name", name, "a text")
+    block_delete = flag(block_delete, "block_delete")
+    max_bytes = whole(max_bytes, "max_bytes", "a whole number from 1")
+    content, name, text = content_of(source, name, max_bytes)
+    reader, most = READERS.get(_language(content, name), (None, max_bytes))
     if reader is None:
-        program = read_gcode(content, machine, file.name, block_delete=block_delete)
+        program = read_gcode(content, known, name, block_delete=block_delete)
     else:
-        program = reader(content, machine, file.name)
-    return replace(program, sha256=hashlib.sha256(content).hexdigest())
+        content_of(content, name, min(max_bytes, most))
+        program = reader(content, known, name)
+    return replace(program, sha256=hashlib.sha256(content).hexdigest(), text=text)
+
+
+def _language(content: bytes, name: str) -> str:
+    """The ending that a program of this name has, or would have by its first characters."""
+    ending = Path(name).suffix.lower()
+    if ending:
+        return ending
+    return next((own for own, begins in _BEGINNINGS.items() if begins.match(content)), "")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Mapping, Sequence
 from html import escape
@@ -48,10 +49,10 @@ def write_report(
     account: Account,
     audit: Audit,
     figures: SetpointFigures,
-    source: FilePath | None = None,
+    text: FilePath | bytes | None = None,
 ) -> None:
-    """Writes the page. `summary` is the content of plan.json, `source` the text of the part program."""
-    texts = _lines(source, {row.line for row in account.slow}) if source else {}
+    """Writes the page. `summary` is the content of plan.json, `text` the part program's, or its file."""
+    texts = {} if text is None else _lines(text, {row.line for row in account.slow})
     data = chart_data(problem, profile, account.motion, figures, audit)
     name = FilePath(str(summary.get("program") or "path")).name
     judged = (
@@ -93,11 +94,11 @@ def framed(
     )
 
 
-def _lines(source: FilePath, wanted: set[int]) -> dict[int, str]:
+def _lines(text: FilePath | bytes, wanted: set[int]) -> dict[int, str]:
     """The text of these lines; none where the file is gone or is no text."""
     texts: dict[int, str] = {}
     try:
-        with source.open("rb") as stream:
+        with io.BytesIO(text) if isinstance(text, bytes) else text.open("rb") as stream:
             for number, line in enumerate(stream, start=1):
                 if number in wanted:
                     texts[number] = line.decode("utf-8", errors="replace")

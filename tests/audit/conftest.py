@@ -16,8 +16,8 @@ from feedplan.constraints.problem import Problem, build_problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
-from feedplan.plan import plan
 from feedplan.planners import planner
+from feedplan.planning import plan
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 from feedplan.setpoints import SetpointChunk, setpoints

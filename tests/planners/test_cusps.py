@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from feedplan._solvers import plan_bang_bang
 from feedplan.curves.composite import CompositeCurve
-from feedplan.plan import rounding_stops
+from feedplan.planning import rounding_stops
 from feedplan.profile import ArcKind, SpeedProfile
 from feedplan.setpoints import setpoints
 from tests.campaign import seeds

@@ -31,7 +31,7 @@ def page(plan: Any, file: Path, source: Path | None = None) -> str:
         account=account,
         audit=plan.verdict,
         figures=figures,
-        source=source,
+        text=source,
     )
     return file.read_text(encoding="utf-8")
 

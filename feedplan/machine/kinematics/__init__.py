@@ -15,6 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from feedplan.errors import MachineError
+from feedplan.machine.checks import require, require_text
 from feedplan.machine.numbers.elementary import Number
 from feedplan.machine.parameters import Parameters
 
@@ -74,6 +75,8 @@ def register(name: str, factory: Factory) -> None:
 
     `factory(axes, parameters)` gets the machine's axes in order and its `[kinematics]` keys.
     """
+    require_text(name, "the name of a kinematics")
+    require(callable(factory), "the factory", factory, "a function of the axes and their parameters")
     if name in _bundled():
         raise MachineError(f"the kinematics '{name}' comes with feedplan: register yours under another name")
     _registered[name] = factory
@@ -93,7 +96,7 @@ def create(name: str, axes: tuple[Axis, ...], values: Mapping[str, Any], machine
     else:
         raise MachineError(
             f"machine {machine}: kinematics is {name!r}: give one of {', '.join(types())}, "
-            "or register it with feedplan.machine.kinematics.register before loading the machine"
+            "or register it by feedplan.machine.kinematics.register"
         )
     parameters = Parameters(values, machine)
     kinematics = factory(axes, parameters)

@@ -9,11 +9,13 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
+from feedplan.arguments import flag, not_negative, number
 from feedplan.audit import Audit, audit_setpoints
 from feedplan.errors import InputError
 from feedplan.files import SUMMARY_FILE
@@ -28,8 +30,8 @@ ROUNDING = 1e-9
 
 
 def check(
-    place: str | FilePath,
-    machine: Machine | str | None = None,
+    place: str | os.PathLike[str],
+    machine: Machine | str | os.PathLike[str] | None = None,
     *,
     resolution: float = 0.0,
     jerk: bool = False,
@@ -41,6 +43,8 @@ def check(
     judged where the plan's method limits it, or where `jerk` says so. Raises InputError for files that cannot
     be read, contradict each other or were changed.
     """
+    resolution = number(resolution, "the resolution", "0 or more", not_negative, "mm")
+    jerk = flag(jerk, "jerk")
     points = load_setpoints(place)
     file = points.file.parent / SUMMARY_FILE
     plan = _read(file) if file.exists() else None
@@ -53,7 +57,7 @@ def check(
             )
         known = plan.machine
     else:
-        known = machine if isinstance(machine, Machine) else Machine.load(machine)
+        known = Machine.of(machine)
     _require_units(points, known)
     return audit_setpoints(
         points.t,

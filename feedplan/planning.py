@@ -10,13 +10,13 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from feedplan.accuracy import estimate, shortfalls
+from feedplan.arguments import callback, one_of, refuse
 from feedplan.audit import Audit, audit
 from feedplan.bound import lower_bound
 from feedplan.constraints.problem import Problem, build_problem, speed_square
@@ -25,21 +25,25 @@ from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
 from feedplan.outputs import FORMAT
 from feedplan.planners import (
+    MethodName,
     bound_of,
     corners,
-    default_accuracy,
+    given_options,
     grid_error,
     limits_jerk,
     options_of,
     planner,
+    tells_early,
 )
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 from feedplan.program.read import read_program
+from feedplan.program.source import Source
 from feedplan.report.account import Account, account
-from feedplan.setpoints import Setpoints, setpoints
+from feedplan.setpoints import INTERPOLATORS, Interpolator, Setpoints, setpoints
 from feedplan.time_limit import TimeLimit
 from feedplan.trajectory import State, Trajectory
+from feedplan.units import counted
 
 Progress = Callable[[str, float], None]
 
@@ -58,10 +62,10 @@ class Plan:
     machine: Machine
     problem: Problem
     profile: SpeedProfile
-    method: str
+    method: MethodName
     lower_bound: float
     compute: dict[str, float]
-    interpolator: str = "sarfraz"
+    interpolator: Interpolator = "sarfraz"
     warnings: tuple[str, ...] = field(default=())
     options: Mapping[str, Any] = field(default_factory=dict)
     _verdict: list[Audit] = field(default_factory=list, init=False, repr=False, compare=False)
@@ -70,7 +74,7 @@ class Plan:
         name = self.program.name if self.program else "a path"
         return (
             f"<Plan of {name} on {self.machine.name} by {self.method}: {self.time:.6g} s, "
-            f"gap {100 * self.gap:.3g} %, {len(self.path)} pieces>"
+            f"gap {100 * self.gap:.3g} %, {counted(len(self.path), 'piece')}>"
         )
 
     def _repr_html_(self) -> str:
@@ -88,7 +92,7 @@ class Plan:
             "method": self.method,
             "time": f"{self.time:.6g} s",
             "no plan of this path is faster than": f"{self.lower_bound:.6g} s (gap {100 * self.gap:.3g} %)",
-            "pieces": f"{len(self.path)} in {len(self.path.runs) - 1} runs",
+            "path": f"{counted(len(self.path), 'piece')} in {counted(len(self.path.runs) - 1, 'run')}",
             "audit": judged,
             **({"warnings": "; ".join(self.warnings)} if self.warnings else {}),
         }
@@ -108,10 +112,16 @@ class Plan:
         """How far the time can be from the optimum at most: (time − lower_bound) / time."""
         return (self.time - self.lower_bound) / self.time if self.time > 0 else 0.0
 
-    def setpoints(self, period: float | None = None, interpolator: str | None = None) -> Setpoints:
-        """Setpoints at the servo period [s] (the machine's unless given), computed as they are read."""
+    def setpoints(self, period: float | None = None, interpolator: Interpolator | None = None) -> Setpoints:
+        """Setpoints at the servo period [s] (the machine's unless given), computed as they are read.
+
+        Raises InputError for a period or an interpolator that cannot be used.
+        """
         return setpoints(
-            self.problem, self.profile, period or self.machine.period, interpolator or self.interpolator
+            self.problem,
+            self.profile,
+            self.machine.period if period is None else period,
+            self.interpolator if interpolator is None else interpolator,
         )
 
     @cached_property
@@ -135,6 +145,7 @@ class Plan:
 
         `progress("audit", done)` is called as it goes on.
         """
+        callback(progress)
         if not self._verdict:
             share = (lambda done: progress("audit", done)) if progress else None
             with _timed(self.compute, "audit"):
@@ -195,54 +206,71 @@ class Plan:
 
 
 def plan(
-    source: str | os.PathLike[str] | Program | Path,
-    machine: Machine | str,
-    method: str = "bang-bang",
+    source: Source | Program | Path,
+    machine: Machine | str | os.PathLike[str],
+    method: MethodName = "bang-bang",
     *,
-    accuracy: float | None = None,
-    cells: int | None = None,
-    time_limit: float | None = None,
     tolerance: float | None = None,
     feed: float | None = None,
     feed_override: float = 1.0,
     period: float | None = None,
     start_speed: float = 0.0,
     end_speed: float = 0.0,
-    interpolator: str = "sarfraz",
+    interpolator: Interpolator = "sarfraz",
     progress: Progress | None = None,
+    **options: Any,
 ) -> Plan:
     """The plan of a part program on a machine, time-optimal unless another method is asked for.
 
-    `source`: a file, a Program or a Path. `machine`: a Machine, or the name or file of one. Methods that
-    solve on a mesh refine it to the relative `accuracy` of the time, or take `cells` a piece, and give up
-    after `time_limit` [s]; others take none of these. With jerk-limited the limit is for all work from here
-    to the files: reading, fitting, a first plan, audit, setpoints and report are never left out (how long the
-    last three will take is known from some setpoints of the first plan), the rest of the time is for a
-    better plan and its bound. `tolerance` [mm] is the greatest distance from the programmed path where the
-    program lets the tool leave it (default: the program's own, else 0.01); how the path follows the program
-    within it is the method's choice (`planners.corners`). `feed` [mm/s] replaces the programmed feeds,
-    `feed_override` multiplies them. `period` [s] replaces the machine's servo period;
-    `start_speed` and `end_speed` [mm/s] hold at the ends. `progress(stage, done)` is called as the work goes
-    on. Raises ProgramError, MachineError, InputError or InfeasibleError, each a sentence with place and
-    remedy.
+    `source`: a file, the text of a program as str or bytes, a stream (see `read_program`), a Program or a
+    Path. `machine`: a Machine, or the name or file of one. `method`: one of `methods()`.
+    `tolerance` [mm] is the greatest distance from the programmed path where the program lets the tool leave
+    it (default: the program's own, else 0.01; a Path has its own); how the path follows the program within it
+    is the method's choice. `feed` [mm/s] replaces the programmed feeds, `feed_override` multiplies them.
+    `period` [s] replaces the machine's servo period; `start_speed` and `end_speed` [mm/s] hold at the ends.
+    `interpolator` makes the setpoints: "sarfraz" or "newton". `progress(stage, done)` is called as the work
+    goes on.
+
+    What some methods take besides, by keyword, with what holds where it is not given:
+
+        jerk-limited        accuracy=1e-4, time_limit=None
+        casadi, clarabel    accuracy=1e-4, cells=None, time_limit=None
+        toppra              accuracy=1e-3, cells=None, time_limit=None, scheme="one-sided"
+        ruckig              time_limit=None
+        junction-deviation  deviation=0.01, square_corner_velocity=None
+
+    `accuracy` is relative, of the time: grids are refined to it, or have so many `cells` a piece. After
+    `time_limit` [s] ruckig and jerk-limited return the best plan so far, the others raise. With jerk-limited
+    the limit is for all work from here to the files: reading, fitting, a first plan, audit, setpoints and
+    report are never left out (how long the last three will take is known from some setpoints of the first
+    plan), the rest of the time is for a better plan and its bound. `scheme` "collocation" keeps the limits at
+    the nodes alone and shows how toppra's usual profiles break them. `deviation` [mm] is grbl's setting $11,
+    `square_corner_velocity` [mm/s] Klipper's in its place.
+
+    Raises ProgramError, MachineError, InputError, InfeasibleError, SolverError or MissingPackageError, each a
+    sentence with place and remedy.
     """
-    of_method = {"accuracy": accuracy, "cells": cells, "time_limit": time_limit}
-    solve: Callable[..., SpeedProfile] = planner(method, **of_method)
+    given = given_options(method, options, OF_ALL_METHODS)
+    solve: Callable[..., SpeedProfile] = planner(method, **given)
+    time_limit = given.get("time_limit")
     # The limit of a method that can tell early what follows its plan is one for all of it.
-    limit = TimeLimit(time_limit) if time_limit is not None and "reserve" in options_of(method) else None
-    if not isinstance(machine, Machine):
-        machine = Machine.load(machine)
+    limit = TimeLimit(time_limit) if time_limit is not None and tells_early(method) else None
+    machine = Machine.of(machine)
     if period is not None:
         machine = machine.with_period(period)
+    one_of(interpolator, "interpolator", INTERPOLATORS)
+    callback(progress)
     report = progress or (lambda stage, done: None)
     compute: dict[str, float] = {}
     program: Program | None = None
     if isinstance(source, Path):
+        if tolerance is not None:
+            raise refuse("the tolerance", tolerance, "it where the path is made: a Path has its own")
         path = source
     else:
         report("read", 0.0)
         with _timed(compute, "read"):
-            program = source if isinstance(source, Program) else read_program(FilePath(source), machine)
+            program = source if isinstance(source, Program) else read_program(source, machine)
         report("fit", 0.0)
         with _timed(compute, "fit"):
             path = build_path(program, machine, tolerance, corners=corners(method))
@@ -264,15 +292,18 @@ def plan(
     with _timed(compute, "bound"):
         least = lower_bound(problem, profile)
         left = time_limit if limit is None else limit.left
-        known = bound_of(method, **{**of_method, "time_limit": left})
+        settings = {**options_of(method), **given}
+        known = bound_of(
+            method, **{name: left if name == "time_limit" else own for name, own in given.items()}
+        )
         if known is not None:
             least = max(least, known(problem, profile))
-        wanted = accuracy or default_accuracy(method)
+        wanted = settings.get("accuracy", 0.0)
         short = shortfalls(
             profile,
             least,
             accuracy=wanted,
-            to_prove=accuracy is not None,
+            to_prove="accuracy" in given,
             time_limit=time_limit,
             left_to_grids=wanted * grid_error(method),
         )
@@ -293,7 +324,7 @@ def plan(
         + rounding_stops(problem, profile)
         + curvature_jumps(problem, profile),
         options={
-            **of_method,
+            **settings,
             "tolerance": tolerance,
             "feed": feed,
             "feed_override": feed_override,
@@ -305,8 +336,12 @@ def plan(
     )
 
 
+# What every method takes.
+OF_ALL_METHODS: tuple[str, ...] = tuple(plan.__kwdefaults__ or ())
+
+
 def _following(
-    limit: TimeLimit, problem: Problem, machine: Machine, interpolator: str
+    limit: TimeLimit, problem: Problem, machine: Machine, interpolator: Interpolator
 ) -> Callable[[SpeedProfile], float]:
     """Keeps of a limit what will follow a plan, by a first one of the problem; returns that [s]."""
     return lambda first: limit.keep_for(setpoints(problem, first, machine.period, interpolator))

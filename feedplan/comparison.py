@@ -5,27 +5,31 @@ Methods may follow different paths within the tolerance; a bound is one of its p
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path as FilePath
+from itertools import chain
 from typing import Any
 
 import numpy as np
 
+from feedplan.arguments import callback, list_of_names, number, one_of
 from feedplan.audit import Audit, LimitCheck
 from feedplan.errors import InfeasibleError, InputError, MissingPackageError, SolverError
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
-from feedplan.plan import Plan, Progress, plan
-from feedplan.planners import limits_jerk, options_of
+from feedplan.planners import MethodName, limits_jerk, options_of
+from feedplan.planners import methods as all_methods
+from feedplan.planning import OF_ALL_METHODS, Plan, Progress, plan
 from feedplan.program.program import Program
 from feedplan.program.read import read_program
+from feedplan.program.source import Source
 
 # What the limits of machine and program are called in an audit.
 LIMITS = ("feed", "velocity", "acceleration", "jerk", "chord", "deviation")
 
-# Options of `feedplan.plan` that only some methods take.
-OF_SOME_METHODS = frozenset({"accuracy", "cells", "time_limit"})
+# What each method may take [s] unless the user says otherwise: solvers on meshes may need hours.
+TIME_LIMIT = 10.0
 
 
 @dataclass(frozen=True)
@@ -35,7 +39,7 @@ class Row:
     `lower_bound` [s] is the greatest proven by any method on this method's path.
     """
 
-    method: str
+    method: MethodName
     plan: Plan | None
     lower_bound: float
     error: str | None = None
@@ -79,34 +83,44 @@ class Row:
 
 
 def compare(
-    source: str | FilePath | Program | Path,
-    machine: Machine | str,
-    methods: Sequence[str],
+    source: Source | Program | Path,
+    machine: Machine | str | os.PathLike[str],
+    methods: Sequence[MethodName] | None = None,
     *,
+    time_limit: float | None = TIME_LIMIT,
     progress: Progress | None = None,
     **options: Any,
 ) -> tuple[Row, ...]:
-    """Plans one program by each of the methods and audits every plan.
+    """Plans one program by each of the methods, all unless given, and audits every plan.
 
-    `options` are those of `feedplan.plan`; what only some methods take goes to those. A method that finds no
-    plan, or whose package is missing, says why in its row. `progress(method, done)` is called as it goes on.
+    `source` and `machine` are as for `feedplan.plan`, and so are `options`: those that only some methods take
+    go to these, and so does the `time_limit` [s] of each (None: no limit). A method that finds no plan, or
+    whose package is missing, says why in its row. `progress(method, done)` is called as it goes on.
     Raises what `feedplan.plan` raises about the program, the machine and the options.
     """
-    if not methods:
+    chosen = (
+        all_methods() if methods is None else list_of_names(methods, "methods", "a list of methods' names")
+    )
+    if not chosen:
         raise InputError("there is no method to compare: name one or more")
-    has = {method: options_of(method) for method in methods}
-    if not isinstance(machine, Machine):
-        machine = Machine.load(machine)
+    has = {one_of(method, "method", all_methods()): options_of(method) for method in chosen}
+    if time_limit is not None:
+        remedy = "a positive number, or None"
+        options["time_limit"] = number(time_limit, "the time limit", remedy, lambda given: given > 0, "s")
+    known = dict.fromkeys((*OF_ALL_METHODS, *chain.from_iterable(has.values()), "time_limit"))
+    for name in options:
+        if name not in known:
+            raise InputError(f"no method of these takes {name}: give {', '.join(known)}, or leave it out")
+    callback(progress)
+    machine = Machine.of(machine)
     if not isinstance(source, (Program, Path)):
         source = read_program(source, machine)
     report = progress or (lambda stage, done: None)
-    plans: list[tuple[str, Plan | None, str | None]] = []
-    for method in dict.fromkeys(methods):
+    plans: list[tuple[MethodName, Plan | None, str | None]] = []
+    for method, takes in has.items():
         report(method, 0.0)
         try:
-            own = {
-                name: value for name, value in options.items() if name not in OF_SOME_METHODS - has[method]
-            }
+            own = {name: value for name, value in options.items() if name in takes or name in OF_ALL_METHODS}
             made = plan(source, machine, method, **own)
             made.audit(lambda _, done, method=method: report(method, done))  # type: ignore[misc]
             plans.append((method, made, None))

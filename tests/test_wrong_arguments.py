@@ -1,0 +1,310 @@
+"""Arguments of wrong types: every public function takes them or refuses them in one sentence."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable
+from dataclasses import fields, replace
+from fractions import Fraction
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+import pytest
+
+import feedplan
+from feedplan import Axis, FeedplanError, Machine, Path
+from feedplan.audit import audit_setpoints
+from feedplan.curves.composite import CompositeCurve, insert_knot, knot_continuity
+from feedplan.geometry.build import FitSettings
+from feedplan.geometry.corners import Corners
+from feedplan.machine import kinematics
+from feedplan.machine.kinematics import register
+from feedplan.outputs import load_setpoints
+from feedplan.planners import options_of
+
+PROGRAM = "G21 G90 G64 P0.05\nG1 F1000\nX10 Y0 Z0\nY10\nM2\n"
+POINTS = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]]
+KNOTS = [0.0, 0.0, 0.0, 1.0, 1.0, 1.0]
+LONGEST = 300
+
+
+class Odd:
+    """Nothing that any function wants, with a text that is no help either."""
+
+    def __repr__(self) -> str:
+        return "very odd\n" * 1000
+
+
+WRONG: list[Any] = [
+    None,
+    True,
+    0,
+    3,
+    -1.5,
+    10**400,
+    float("nan"),
+    float("inf"),
+    1j,
+    "",
+    "text",
+    "two\nlines",
+    "nul\0",
+    "\ud800",
+    b"bytes",
+    b"\xff\xfe",
+    [],
+    [None],
+    [[1.0], [2.0, 3.0]],
+    ["a", 1],
+    (1, 2),
+    {},
+    {"a": 1},
+    {1},
+    np.array([1.0, np.nan]),
+    np.array(["a"]),
+    np.zeros((2, 2, 2)),
+    range(3),
+    slice(None),
+    len,
+    int,
+    Odd(),
+]
+# What a function for progress raises is for its owner.
+NO_FUNCTIONS = [value for value in WRONG if not callable(value)]
+
+
+def cases(tmp_path: FilePath) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
+    """Functions by name, with arguments that they take; positional ones by the names in the signature."""
+    file = tmp_path / "part.ngc"
+    file.write_text(PROGRAM)
+    machine = Machine.load("mill")
+    plan = feedplan.plan(file, machine)
+    points = plan.setpoints()
+    feedplan.write_plan(plan, tmp_path / "part")
+    curve = CompositeCurve.from_nurbs(POINTS, KNOTS, 2)
+    common = {
+        "source": PROGRAM,
+        "machine": machine,
+        "tolerance": 0.01,
+        "feed": 50.0,
+        "feed_override": 1.0,
+        "period": 0.001,
+        "start_speed": 0.0,
+        "end_speed": 0.0,
+        "interpolator": "newton",
+        "progress": None,
+    }
+    spline = {"control_points": POINTS, "knots": KNOTS, "degree": 2}
+    named = {"axes": ("X", "Y"), "feed": 50.0}
+    limits = {"max_velocity": 100.0, "max_acceleration": 1000.0, "max_jerk": 1e4}
+    axis = Axis("X", **limits)
+    found: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
+        "plan": (feedplan.plan, {**common, "method": "bang-bang"}),
+        "plan of a path": (feedplan.plan, {"source": plan.path, "machine": machine, "feed": 50.0}),
+        "compare": (
+            feedplan.compare,
+            {**common, "methods": ("bang-bang", "tangential"), "time_limit": 1.0, "accuracy": 1e-3},
+        ),
+        "check": (
+            feedplan.check,
+            {"place": tmp_path / "part", "machine": machine, "resolution": 0.0, "jerk": False},
+        ),
+        "read_program": (
+            feedplan.read_program,
+            {"source": PROGRAM, "machine": machine, "name": "a", "block_delete": True, "max_bytes": 1000},
+        ),
+        "write_plan": (
+            feedplan.write_plan,
+            {"plan": plan, "folder": tmp_path / "again", "formats": ("csv",), "progress": None},
+        ),
+        "Axis": (
+            Axis,
+            {"name": "X", **limits, "travel": (0.0, 1.0), "max_velocity_jump": 0.0, "kind": "linear"},
+        ),
+        "Machine": (
+            Machine,
+            {
+                "name": "own",
+                "axes": (axis,),
+                "period": 0.001,
+                "chord_tolerance": 0.01,
+                "kinematics": "cartesian",
+                "home": (0.0,),
+                "offsets": {"G54": (1.0,)},
+                "parameters": {},
+            },
+        ),
+        "register": (
+            register,
+            {"name": "odd", "factory": lambda axes, parameters: None},
+        ),
+        "FitSettings": (FitSettings, {own.name: own.default for own in fields(FitSettings)}),
+        "audit_setpoints": (
+            audit_setpoints,
+            {
+                "t": [0.0, 0.001, 0.002],
+                "position": np.zeros((3, 3)),
+                "machine": machine,
+                "axes": ("X", "Y", "Z"),
+                "velocity": np.zeros((3, 3)),
+                "acceleration": np.zeros((3, 3)),
+                "recorded_jerk": np.zeros((3, 3)),
+                "line": [1, 2, 3],
+                "resolution": 0.0,
+                "jerk": True,
+                "corners": False,
+                "period": 0.001,
+            },
+        ),
+        "load_setpoints": (load_setpoints, {"place": tmp_path / "part"}),
+        "Machine.load": (Machine.load, {"source": "mill"}),
+        "Machine.of": (Machine.of, {"given": "mill"}),
+        "Machine.axis": (machine.axis, {"name": "X"}),
+        "Machine.with_period": (machine.with_period, {"period": 0.001}),
+        "Path.from_points": (
+            Path.from_points,
+            {"points": POINTS, "tolerance": 0.01, **named, "settings": None, "corners": Corners.ROUNDED},
+        ),
+        "Path.from_curve": (Path.from_curve, {"curve": curve, **named}),
+        "Path.from_bezier": (Path.from_bezier, {"control_points": POINTS, "weights": [1, 1, 1], **named}),
+        "Path.from_bspline": (Path.from_bspline, {**spline, "periodic": False, **named}),
+        "Path.from_nurbs": (
+            Path.from_nurbs,
+            {**spline, "weights": [1.0, 2.0, 1.0], "periodic": False, **named},
+        ),
+        "Plan.setpoints": (plan.setpoints, {"period": 0.001, "interpolator": "newton"}),
+        "Plan.at": (plan.at, {"t": 0.5}),
+        "Plan.audit": (replace(plan).audit, {"progress": None}),
+        "Setpoints.chunks": (lambda size: list(points.chunks(size)), {"size": 1000}),
+        "Trajectory.at": (plan.trajectory.at, {"t": [0.1, 0.2]}),
+        "Trajectory.distance": (plan.trajectory.distance, {"t": 0.5}),
+        "Trajectory.time": (plan.trajectory.time, {"s": 1.0}),
+        "Trajectory.speed": (plan.trajectory.speed, {"s": [1.0]}),
+        "CompositeCurve": (
+            CompositeCurve,
+            {"control_points": POINTS, "weights": None, "offsets": [0, 3], "width": [1.0]},
+        ),
+        "CompositeCurve.from_pieces": (
+            CompositeCurve.from_pieces,
+            {"control_points": [POINTS], "width": [1.0]},
+        ),
+        "CompositeCurve.from_bezier": (
+            CompositeCurve.from_bezier,
+            {"control_points": POINTS, "weights": None, "width": 1.0},
+        ),
+        "CompositeCurve.joined": (CompositeCurve.joined, {"curves": [curve], "gap": 1e-6}),
+        "CompositeCurve.evaluate": (curve.evaluate, {"piece": 0, "u": 0.5, "order": 1}),
+        "CompositeCurve.at": (curve.at, {"parameter": [0.5], "order": 1}),
+        "CompositeCurve.elevated": (curve.elevated, {"degree": 3}),
+        "CompositeCurve.split": (curve.split, {"piece": [0], "u": [0.5]}),
+        "CompositeCurve.with_width": (curve.with_width, {"width": 2.0}),
+        "CompositeCurve.joints": (
+            curve.joints,
+            {"gap": 1e-6, "angle": 1e-6, "derivative": 1e-9, "closed": False},
+        ),
+        "CompositeCurve.cusps": (curve.cusps, {"tolerance": 1e-9}),
+        "CompositeCurve[]": (curve.__getitem__, {"pieces": slice(0, 1)}),
+        "insert_knot": (insert_knot, {**spline, "value": 0.5, "weights": None, "times": 1}),
+        "knot_continuity": (knot_continuity, {"knots": KNOTS, "degree": 2}),
+    }
+    for method in feedplan.methods():
+        options = options_of(method)
+        if options:
+            found[f"plan by {method}"] = (
+                feedplan.plan,
+                {"source": plan.path, "machine": machine, "method": method, **options},
+            )
+    return found
+
+
+def outcome(function: Callable[..., Any], arguments: dict[str, Any]) -> str | None:
+    """What is wrong with how a function takes its arguments, if anything is."""
+    try:
+        function(**arguments)
+    except FeedplanError as error:
+        sentence = str(error)
+        if "\n" in sentence or not 0 < len(sentence) <= LONGEST or ": " not in sentence:
+            return f"its sentence is {sentence!r:.400}"
+    except Exception as error:
+        return f"{type(error).__name__}: {error}"
+    return None
+
+
+def test_every_argument_of_a_wrong_type_is_one_sentence(
+    tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = cases(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(kinematics, "_registered", {})
+    faults = []
+    for name, (function, arguments) in found.items():
+        assert outcome(function, arguments) is None, name
+        for argument in arguments:
+            for value in WRONG if argument != "progress" else NO_FUNCTIONS:
+                fault = outcome(function, {**arguments, argument: value})
+                if fault is not None:
+                    faults.append(f"{name}({argument}={value!r:.40}): {fault}")
+    assert not faults, f"{len(faults)} faults\n" + "\n".join(faults)
+
+
+def test_the_cases_are_all_public_functions_with_all_their_arguments(tmp_path: FilePath) -> None:
+    found = cases(tmp_path)
+    for name in feedplan.__all__:
+        thing = getattr(feedplan, name)
+        if inspect.isfunction(thing) and inspect.signature(thing).parameters:
+            arguments = {
+                own.name
+                for own in inspect.signature(thing).parameters.values()
+                if own.kind is not inspect.Parameter.VAR_KEYWORD
+            }
+            assert arguments <= set(found[name][1]), name
+    for name, kind in (("Plan", feedplan.Plan), ("Machine", Machine), ("Path", Path)):
+        for method, function in inspect.getmembers(kind, callable):
+            if method.startswith("_") or not hasattr(function, "__doc__") or isinstance(function, type):
+                continue
+            parameters = [own for own in inspect.signature(function).parameters if own != "self"]
+            if parameters and (name, method) not in {("Path", "cut")}:
+                assert set(parameters) <= set(found[f"{name}.{method}"][1]), (name, method)
+
+
+def test_what_is_close_to_a_number_counts_as_one(tmp_path: FilePath) -> None:
+    exact = feedplan.plan(PROGRAM, "mill", feed=8, tolerance=0.5, start_speed=0)
+    for number in (np.float32, np.int64, np.float64, Fraction):
+        own = feedplan.plan(PROGRAM, "mill", feed=number(8), tolerance=number(1) / 2, start_speed=number(0))
+        assert own.time == exact.time
+        feedplan.write_plan(own, tmp_path, ())
+
+
+def test_a_sentence_is_one_line_and_loses_its_middle_where_it_is_long() -> None:
+    assert str(feedplan.InputError("one\ntwo")) == "one two"
+    long = feedplan.ProgramError(f"the name is {'n' * 5000}/part.ngc: give a shorter one", line=3)
+    assert re.fullmatch(r"the name is n{19}\.\.\.n+/part\.ngc: give a shorter one", str(long))
+    long = feedplan.InputError(f"use one of {'a, ' * 500}or z")
+    assert len(str(long)) == LONGEST
+    assert re.fullmatch(r"use one of (a, )*a?\.\.\.,?( a,)* or z", str(long))
+    path = f"/{'folder/' * 30}part.ngc"
+    assert path in str(feedplan.InputError(f"{path} is missing: write it"))
+
+
+def test_a_period_of_zero_is_refused_and_not_the_machines() -> None:
+    with pytest.raises(feedplan.InputError, match="the period is 0 s: give a positive number"):
+        feedplan.plan(PROGRAM, "mill").setpoints(0)
+
+
+def test_a_path_has_its_own_tolerance() -> None:
+    path = Path.from_points(POINTS, 0.01)
+    with pytest.raises(feedplan.InputError, match=r"the tolerance is 0\.1: give it where the path is made"):
+        feedplan.plan(path, "mill", tolerance=0.1)
+
+
+@pytest.mark.parametrize("columns", [7, 8, 9])
+def test_more_columns_than_axis_names_are_refused(columns: int) -> None:
+    points = np.zeros((3, columns))
+    points[:, 0] = range(3)
+    with pytest.raises(feedplan.InputError, match=f"{columns} coordinates and no names: name the axes"):
+        Path.from_points(points, 0.01)
+    assert Path.from_points(points, 0.01, axes="XYZABCUVW"[:columns]).axes == tuple("XYZABCUVW"[:columns])
+    with pytest.raises(feedplan.InputError, match=f"for points of {columns} coordinates"):
+        Path.from_points(points, 0.01, axes="XYZ")
