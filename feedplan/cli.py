@@ -199,6 +199,7 @@ def plan(
     from feedplan.files import summary_text, write_plan
     from feedplan.outputs._staging import require_folder
     from feedplan.planning import plan as make_plan
+    from feedplan.report.page import missing_pictures
 
     if formats and not output:
         raise click.UsageError("--format needs a folder to write to: give -o DIR as well")
@@ -234,6 +235,7 @@ def plan(
     if output:
         earlier = (file for file in outputs.files_in(FilePath(output)) if file not in files)
         warnings += [f"{file} is of an earlier plan" for file in earlier]
+        warnings += filter(None, [missing_pictures()])
     if not quiet:
         for warning in warnings:
             print(f"warning: {warning}", file=sys.stderr)
@@ -280,6 +282,7 @@ def compare(
     from feedplan.comparison import compare as make_comparison
     from feedplan.files import summary_text, write_comparison
     from feedplan.outputs._staging import require_folder
+    from feedplan.report.page import missing_pictures
 
     if output:
         require_folder(FilePath(output))
@@ -306,6 +309,8 @@ def compare(
         for row in rows:
             if row.error:
                 print(f"{row.method}: {row.error}", file=sys.stderr)
+        if output and (missing := missing_pictures()):
+            print(f"warning: {missing}", file=sys.stderr)
         if as_json:
             sys.stdout.write(summary_text(summary))
         else:

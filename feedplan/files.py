@@ -37,8 +37,8 @@ def write_plan(
     """Writes the plan, its setpoints in these formats (none for ()), and its report; returns the files.
 
     All is written beside and renamed at the end, so `folder` never holds half a plan; other files in it stay.
-    `progress` is called with a stage and 0 to 1. Raises InputError where the folder or the file system
-    refuses.
+    `progress` is called with a stage and 0 to 1. Without the package plotly the report has no pictures and
+    says so. Raises InputError where the folder or the file system refuses.
     """
     from feedplan.report.figures import SetpointFigures
     from feedplan.report.page import FILE as REPORT_FILE

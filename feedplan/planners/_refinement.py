@@ -76,7 +76,7 @@ class Method:
     both ends (n,), and what its result is.
 
     `by_axis`: arcs may be of constant joint acceleration. `feasible`: limits are kept between the nodes.
-    `platform`: where the package can be had, if not everywhere.
+    `platform`: where the package can be had, if not everywhere. `others` are packages that it needs besides.
     """
 
     name: str
@@ -85,18 +85,23 @@ class Method:
     by_axis: bool = True
     feasible: bool = True
     platform: str = ""
+    others: tuple[str, ...] = ()
 
     def require(self) -> None:
-        """Raises MissingPackageError where the package cannot be imported."""
+        """Raises MissingPackageError where its packages cannot be imported."""
+        for package in (self.name, *self.others):
+            self._require(package)
+
+    def _require(self, package: str) -> None:
         try:
             with warnings.catch_warnings():
                 # The docstrings of toppra hold escapes that Python warns of.
                 warnings.simplefilter("ignore")
-                importlib.import_module(self.name)
+                importlib.import_module(package)
         except ImportError:
             where = f", which there is for {self.platform}" if self.platform else ""
             raise MissingPackageError(
-                f"the method {self.name} needs the package {self.name}{where}: `pip install {self.name}`"
+                f"the method {self.name} needs the package {package}{where}: `pip install {package}`"
             ) from None
 
 

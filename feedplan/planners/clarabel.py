@@ -40,7 +40,9 @@ def plan(
     `time_limit` [s]. Raises SolverError with Clarabel's status, InfeasibleError where a speed given at an end
     cannot be had, MissingPackageError.
     """
-    return plan_on_meshes(problem, Method("clarabel", _solve, mean_rows), accuracy, cells, time_limit)
+    return plan_on_meshes(
+        problem, Method("clarabel", _solve, mean_rows, others=("scipy",)), accuracy, cells, time_limit
+    )
 
 
 def _solve(task: Transcription, seconds: float) -> Array:

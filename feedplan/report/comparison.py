@@ -9,7 +9,7 @@ from pathlib import Path as FilePath
 from string import Template
 from typing import TYPE_CHECKING, Any
 
-from feedplan.report.page import asset, framed
+from feedplan.report.page import asset, framed, pictures
 from feedplan.units import duration_text
 
 if TYPE_CHECKING:
@@ -34,7 +34,8 @@ def write_comparison(
     have a plan, with their `method`.
     """
     told = " · ".join(f"{escape(name)} <b>{escape(value)}</b>" for name, value in about.items())
-    sections = Template(asset("comparison.html")).substitute(table=_table(rows, limits))
+    table = Template(asset("comparison.html")).substitute(table=_table(rows, limits))
+    sections = table + pictures(asset("comparison_charts.html"))
     data = {"methods": list(paths)}
     file.write_text(framed("comparison", title, told, "", sections, data, "comparison.js"), encoding="utf-8")
 

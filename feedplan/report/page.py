@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import io
 import json
 from collections.abc import Mapping, Sequence
@@ -60,9 +61,11 @@ def write_report(
         numbers(summary, account, figures.count),
         _warnings(summary.get("warnings") or ()),
     )
-    sections = Template(asset("page.html")).substitute(
+    charts = Template(asset("page_charts.html")).substitute(
         speed=_SPEED[any(check.name == "jerk" and check.judged for check in audit.checks)],
         fast=f"{data['length']['cutting_speed']:.4g} {account.motion.unit}/s",
+    )
+    tables = Template(asset("page.html")).substitute(
         limits=limits_table(account.limits),
         active=f"{100 * ACTIVE:g} %",
         totals=totals_table(account),
@@ -71,7 +74,7 @@ def write_report(
         slowest=slowest_table(account.slow, texts),
         audit=audit_table(audit),
     )
-    about = _about(summary, problem)
+    about, sections = _about(summary, problem), pictures(charts) + tables
     file.write_text(
         framed("report", name, about, "\n".join(judged), sections, data, "page.js"), encoding="utf-8"
     )
@@ -80,7 +83,8 @@ def write_report(
 def framed(
     kind: str, title: str, about: str, summary: str, sections: str, data: Mapping[str, Any], script: str
 ) -> str:
-    """A whole page of HTML around its sections, with the data that its script draws."""
+    """A whole page of HTML around its sections, with the data that its script draws, if it can."""
+    drawn = not missing_pictures()
     return Template(asset("frame.html")).substitute(
         kind=kind,
         title=escape(title),
@@ -88,10 +92,23 @@ def framed(
         about=about,
         summary=summary,
         sections=sections,
-        data=_script_data(data),
-        plotly=_plotly_script(),
-        script="".join(asset(name) for name in ("charts.js", "path.js", script)),
+        data=_script_data(data if drawn else {}),
+        plotly=_plotly_script() if drawn else "",
+        script="".join(asset(name) for name in ("charts.js", "path.js", script)) if drawn else "",
     )
+
+
+def missing_pictures() -> str:
+    """Why a page has no pictures, in a sentence; empty where it has them."""
+    if importlib.util.find_spec("plotly") is not None:
+        return ""
+    return "the page has no pictures, which need the package plotly: `pip install plotly`"
+
+
+def pictures(charts: str) -> str:
+    """The sections with charts, or why there are none."""
+    missing = missing_pictures()
+    return f'<section><p class="note">{escape(missing)}</p></section>\n' if missing else charts
 
 
 def _lines(text: FilePath | bytes, wanted: set[int]) -> dict[int, str]:

@@ -221,6 +221,14 @@ def test_a_missing_package_is_named_with_its_command(method: str, monkeypatch: p
         planner(method)(line_problem())
 
 
+def test_a_package_that_a_solver_needs_besides_is_named_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "scipy", None)
+    with pytest.raises(
+        MissingPackageError, match="method clarabel needs the package scipy: `pip install scipy`"
+    ):
+        planner("clarabel")(line_problem())
+
+
 @pytest.mark.parametrize("method", MESHED)
 def test_a_speed_that_cannot_be_had_is_told_with_its_place(method: str) -> None:
     with pytest.raises(InfeasibleError, match=r"no profile starts at 120 mm/s: at most 100 mm/s is allowed"):

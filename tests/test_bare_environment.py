@@ -1,0 +1,133 @@
+"""What works with numpy, click and rich alone, in an environment that holds nothing else."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import venv
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
+
+import pytest
+
+import feedplan
+
+NEEDED = ("numpy", "click", "rich", "tomli")
+# Packages of methods and of pictures, which are not there, with the command that installs each.
+INSTALLS = {name: f"`pip install {name}`" for name in ("casadi", "clarabel", "ruckig", "toppra")}
+NATIVE = [name for name in feedplan.methods() if name not in INSTALLS]
+PICTURES = "the page has no pictures, which need the package plotly: `pip install plotly`"
+PROGRAM = "G21 G90 G64 P0.05\nG1 F1000\nX10 Y0 Z0\nY10\nG2 X20 Y0 R10\nM2\n"
+
+
+def _with_dependencies(names: tuple[str, ...]) -> set[str]:
+    """Distributions that are installed, with all that they need."""
+    found: set[str] = set()
+    waiting = list(names)
+    while waiting:
+        name = waiting.pop()
+        try:
+            needs = distribution(name).requires or []
+        except PackageNotFoundError:
+            continue  # of another platform or another Python
+        if name not in found:
+            found.add(name)
+            waiting += [re.split(r"[^\w.-]", need)[0] for need in needs if "extra ==" not in need]
+    return found
+
+
+@pytest.fixture(scope="module")
+def python(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The interpreter of a virtual environment without pip: links to these packages and to feedplan."""
+    home: Path = tmp_path_factory.mktemp("bare")
+    venv.create(home, symlinks=True, with_pip=False)
+    site = next(home.glob("lib/python*/site-packages"))
+    for name in _with_dependencies(NEEDED):
+        files = distribution(name)
+        for top in {
+            file.parts[0] for file in files.files or () if file.parts[0] not in ("..", "__pycache__")
+        }:
+            (site / top).symlink_to(Path(str(files.locate_file(top))))
+    (site / "feedplan").symlink_to(Path(feedplan.__file__).parent)
+    return home / "bin" / "python"
+
+
+def run(python: Path, *arguments: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    clean = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+    return subprocess.run(
+        [python, *arguments], cwd=folder, env=clean, capture_output=True, text=True, check=False, timeout=120
+    )
+
+
+@pytest.fixture
+def part(tmp_path: Path) -> Path:
+    file = tmp_path / "part.ngc"
+    file.write_text(PROGRAM)
+    return file
+
+
+def test_nothing_else_is_there(python: Path, tmp_path: Path) -> None:
+    names = [*INSTALLS, "plotly", "scipy", "ezdxf", "pytest"]
+    code = f"import importlib.util as u; print([n for n in {names} if u.find_spec(n)])"
+    done = run(python, "-c", code, folder=tmp_path)
+    assert (done.stdout, done.stderr) == ("[]\n", "")
+
+
+def test_plan_check_fit_and_machines_work_without_pictures(python: Path, part: Path) -> None:
+    for method in ("bang-bang", "jerk-limited"):
+        out = part.parent / method
+        arguments = ["plan", "part.ngc", "--method", method, "-o", method]
+        done = run(python, "-m", "feedplan", *arguments, folder=part.parent)
+        assert (done.returncode, done.stderr) == (0, f"warning: {PICTURES}\n")
+        assert "audit        passed" in done.stdout
+        assert json.loads((out / "plan.json").read_text())["audit"]["ok"]
+        report = (out / "report.html").read_text(encoding="utf-8")
+        assert PICTURES in report
+        assert "Audit passed" in report
+        assert 'class="chart"' not in report
+        assert 'id="data">{}</script>' in report
+        done = run(python, "-m", "feedplan", "check", method, folder=part.parent)
+        assert (done.returncode, done.stderr) == (0, "")
+    for arguments in (["fit", "part.ngc"], ["machines"], ["--version"], ["plan", "--help"]):
+        assert run(python, "-m", "feedplan", *arguments, folder=part.parent).returncode == 0
+
+
+def test_every_native_method_plans_and_each_missing_package_is_one_sentence(python: Path, part: Path) -> None:
+    done = run(python, "-m", "feedplan", "compare", "part.ngc", "-o", "comparison", folder=part.parent)
+    assert done.returncode == 0
+    assert [line.split()[0] for line in done.stdout.splitlines()[1:-2]] == NATIVE
+    *missing, pictures = done.stderr.splitlines()
+    assert [line.split(":")[0] for line in missing] == list(INSTALLS)
+    for line, (name, command) in zip(missing, INSTALLS.items(), strict=True):
+        assert line.startswith(f"{name}: the method {name} needs the package {name}")
+        assert line.endswith(f": {command}")
+    assert pictures == f"warning: {PICTURES}"
+    page = (part.parent / "comparison" / "comparison.html").read_text(encoding="utf-8")
+    assert PICTURES in page
+    assert all(f"<b>{method}</b>" in page for method in NATIVE)
+
+
+def test_one_missing_package_ends_the_command_with_its_sentence(python: Path, part: Path) -> None:
+    for name, command in INSTALLS.items():
+        done = run(python, "-m", "feedplan", "plan", "part.ngc", "--method", name, folder=part.parent)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert re.fullmatch(rf"error: the method {name} needs the package {name}.*: {command}\n", done.stderr)
+    (part.parent / "drawing.dxf").write_text("0\nSECTION\n")
+    done = run(python, "-m", "feedplan", "plan", "drawing.dxf", folder=part.parent)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    assert done.stderr.endswith(": pip install feedplan[dxf]\n")
+
+
+def test_a_notebook_and_path_files_work(python: Path, part: Path) -> None:
+    code = """
+import feedplan
+plan = feedplan.plan("part.ngc", "mill")
+print(plan.audit().ok, len(plan.setpoints()) > 100, "<svg" in plan._repr_html_(), plan.at(0.1).position.shape)
+print(feedplan.plan(b'{"curves": [{"degree": 1, "control_points": [[0, 0], [9, 0]]}]}', "mill"))
+"""
+    done = run(python, "-c", code, folder=part.parent)
+    assert done.stderr == ""
+    assert done.stdout.splitlines()[0] == "True True True (3,)"
+    assert done.stdout.splitlines()[1].startswith("<Plan of program on mill by bang-bang: ")
