@@ -227,7 +227,7 @@ def build_path(
         NDArray[np.float64],
         NDArray[np.int64],
     ],
-    tuple[int, int, int, float],
+    tuple[int, int, int, float, list[float] | None],
     tuple[int, int, float] | None,
     tuple[NDArray[np.int64], NDArray[np.int64]],
 ]: ...

@@ -88,9 +88,10 @@ def build_path(
     with PROGRAMMED nothing is rounded either, and corners lie within runs. With SMOOTH all moves between two
     stops are one curve of continuous fourth derivative within the tolerance (Q does not count), arcs and
     splines too; where the program asks for the exact path, those are followed within `exact_tolerance` with
-    the lines that they touch. Lines longer than `max_chord` are straight in the middle. It stops where G0
-    and other moves, or the exact path and another, meet, and where the path turns back by more than 135°;
-    where no curve is found, corners are rounded one by one between stops, and `Path.warnings` says so.
+    the lines that they touch. Lines longer than `max_chord` are straight in the middle. Arcs, splines and
+    bends of points keep their size, but for FASTEST. It stops where G0 and other moves, or the exact path
+    and another, meet, and where the path turns back by more than 135°; where no curve is found,
+    corners are rounded one by one between stops, and `Path.warnings` says so.
 
     Corners that cannot be rounded are stops, unless every axis that moves has a `max_velocity_jump`. The
     tool stops also where the meaning of words or the tool length changes. Axes that the program moves must
@@ -159,7 +160,6 @@ def build_path(
             f"{program.name}, line {program.line[index]}: {names[axis]} reaches {position:.6g} mm, "
             f"its travel {end} at {bound:.6g} mm: move the work, or correct the travel of the machine"
         )
-    points, fitted, polynomials, deviation = summary
     first = move[runs[:-1], 0]
     followed = CompositeCurve(*curve)
     by_group = group_feeds(names, moving, program.feed, followed, move)
@@ -173,7 +173,7 @@ def build_path(
         runs=runs,
         dwell=program.dwell[move[runs[1:] - 1, 1]],
         tolerance=allowed,
-        fit=FitSummary(points, fitted, polynomials, deviation),
+        fit=FitSummary.of(*summary),
         start_dwell=program.start_dwell,
         meaning=None if program.meaning is None else program.meaning[first],
         tool_length=None if program.tool_length is None else program.tool_length[first],

@@ -102,7 +102,7 @@ def path_of_points(
         corners.value,
     )
     moving = np.diff(array, axis=0) != 0.0
-    path = _path(names, CompositeCurve(*curve), speed, runs, moving, move, allowed, FitSummary(*summary))
+    path = _path(names, CompositeCurve(*curve), speed, runs, moving, move, allowed, FitSummary.of(*summary))
     return replace(path, corners=corners)
 
 

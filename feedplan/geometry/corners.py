@@ -13,10 +13,12 @@ class Corners(Enum):
     the program itself; its corners may be passed with a jump of velocity, of what the accelerations give
     in one servo period. `SMOOTH`: all moves between two stops, arcs and splines too, are one curve of
     continuous fourth derivative, in which long lines are straight; its curvature has no jumps, which is what
-    limits of jerk ask for.
+    limits of jerk ask for. Away from their ends arcs and bends of G1 moves (each turning by less than 30°)
+    keep their size. `FASTEST`: as SMOOTH, but bends are cut like corners, up to the tolerance.
     """
 
     ROUNDED = "rounded"
     ARCS = "arcs"
     PROGRAMMED = "programmed"
     SMOOTH = "smooth"
+    FASTEST = "fastest"

@@ -26,12 +26,28 @@ class FitSummary:
     those counts as a spline and a polynomial. `splines` and `polynomials` count what the fit made, before
     pieces are cut at changes of feed and at corners. `deviation` is a certified upper bound of the distance
     between the whole path (arcs and corners too) and the programmed one, both ways.
+
+    Of a smooth path (`Corners.SMOOTH`, `FASTEST`), else None: on which side of the program it lies, positive
+    outside, away from the centre of curvature. `mean_offset` [mm] is the mean over all bends, that is arcs
+    and points that turn by less than 30°, away from corners: a hole or a boss is off by as much in radius.
+    `inside` and `outside` [mm] are the greatest distances on each side, corners included, at the programmed
+    points and at places between them.
     """
 
     points: int = 0
     splines: int = 0
     polynomials: int = 0
     deviation: float = 0.0
+    mean_offset: float | None = None
+    inside: float | None = None
+    outside: float | None = None
+
+    @classmethod
+    def of(
+        cls, points: int, splines: int, polynomials: int, deviation: float, offsets: list[float] | None
+    ) -> FitSummary:
+        """From the numbers of the native fit; `offsets` are the mean and the greatest on both sides."""
+        return cls(points, splines, polynomials, deviation, *(offsets or (None, None, None)))
 
     @property
     def spline_ratio(self) -> float:

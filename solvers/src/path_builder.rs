@@ -14,6 +14,7 @@ use rayon::prelude::*;
 
 use crate::corner::{share_lengths, Sides};
 use crate::follow::{follow, FollowError, FollowOptions, FollowedProgram, Moves};
+use crate::smooth_fit::Offsets;
 pub use smooth::{build_smooth_path, Rough};
 pub use stretches::Part;
 use stretches::{Cuts, Stretches, TASK};
@@ -39,6 +40,8 @@ pub struct BuiltPath<const M: usize> {
     pub runs: Vec<usize>,
     /// Upper bound of the distance between path and program, both ways.
     pub deviation: f64,
+    /// On which side of the program a smooth path lies, and how far.
+    pub offsets: Option<Offsets>,
     /// Chords that were fitted, splines and polynomials that came of it.
     pub points: usize,
     pub splines: usize,
@@ -71,6 +74,7 @@ pub fn build_path<const M: usize>(
     }
     Ok(BuiltPath {
         deviation: deviation(&parts),
+        offsets: None,
         outside: outside(&parts, moves, &axes.travel),
         parts,
         runs,

@@ -3,12 +3,14 @@
 //! | file | idea |
 //! |---|---|
 //! | `polyline` | what is to be followed: vertices, stations, directions, tolerances |
+//! | `bends` | which vertices draw the curve, so that bends keep their size |
 //! | `size` | how long intervals may be, and knots of them |
 //! | `spline`, `bezier` | the curve, its energy; its pieces and bounds on them |
 //! | `rows` | the band around the polyline as linear rows |
 //! | `band`, `interior_point` | the convex problem of least ∫ \|C'''\|² du in a window |
 //! | `windows` | all windows of a run in parallel, and their seams |
 //! | `certificate` | the proof: distances both ways, and that the curve never stops |
+//! | `offsets` | on which side of the polyline the curve lies |
 //! | `refine` | intervals halved where it fails |
 //! | `corner` | corners rounded one by one, where no refinement helps |
 //!
@@ -16,10 +18,12 @@
 //! number of axes that move. Time and memory are linear in the number of vertices.
 
 mod band;
+mod bends;
 mod bezier;
 mod certificate;
 mod corner;
 mod interior_point;
+mod offsets;
 pub mod polyline;
 mod refine;
 mod rows;
@@ -32,6 +36,7 @@ use crate::spline::CompositeCurve;
 use bezier::split;
 use certificate::Certificate;
 use corner::append_corners;
+pub use offsets::Offsets;
 use polyline::Polyline;
 use spline::DEGREE;
 use std::ops::Range;
@@ -83,6 +88,8 @@ pub struct Smooth<const D: usize> {
     pub polynomials: usize,
     /// Chords that are left to their corners, between stops.
     pub corners: Vec<Range<usize>>,
+    /// On which side of the polyline the curve lies, and how far.
+    pub offsets: Offsets,
     /// Newton steps times intervals that the fit took.
     pub work: usize,
 }
@@ -136,6 +143,7 @@ impl<const D: usize> Run<'_, D> {
         let (fit, pieces, certificate) = self.refined(&part);
         out.work += fit.work;
         if certificate.good.iter().all(|&good| good) {
+            out.offsets.merge(&Offsets::of(&part, &fit.spline.knots, &pieces, &certificate.foot));
             return out.after_stop(|out| self.append_spline(&chords, &fit, &pieces, &certificate, out));
         }
         let mut next = chords.start;
@@ -158,10 +166,16 @@ impl<const D: usize> Run<'_, D> {
         loop {
             let pieces = fit.spline.pieces();
             let certificate = Certificate::new(part, &fit.spline.knots, &pieces, &self.options.bounds);
-            if refinement == REFINEMENTS || certificate.good.iter().all(|&good| good) {
+            if refinement == REFINEMENTS {
                 return (fit, pieces, certificate);
             }
-            let bad: Vec<bool> = certificate.good.iter().map(|good| !good).collect();
+            let mut bad = bends::missed(part, &fit.spline.knots, &pieces, &certificate.foot);
+            for (bad, good) in bad.iter_mut().zip(&certificate.good) {
+                *bad |= !good;
+            }
+            if !bad.contains(&true) {
+                return (fit, pieces, certificate);
+            }
             let (mut next, ranges) = refine::halved(&fit, &bad, long);
             next.solve(&ranges);
             fit = next;
@@ -218,6 +232,10 @@ impl<const D: usize> Run<'_, D> {
         out.after_stop(|out| append_corners(self.line, chords.start, chords.end, out));
         out.splines += chords.len();
         out.polynomials += out.stretches.len() - before;
+        // Corners lie between their legs.
+        for stretch in &out.stretches[before..] {
+            out.offsets.offer(-stretch.deviation);
+        }
         out.corners.push(chords);
     }
 

@@ -14,7 +14,7 @@ use super::{deviation, Axes, BuiltPath, Part};
 use crate::conic::Conic;
 use crate::follow::{Chord, Chords, FollowError, FollowOptions, Followed, Moves, Shape, RAPID};
 use crate::smooth_fit::polyline::{angle, Polyline};
-use crate::smooth_fit::{smooth_fit, SmoothOptions};
+use crate::smooth_fit::{smooth_fit, Offsets, SmoothOptions};
 
 /// A path that turns by more, in rad, stops: no curve is near both sides of the corner at any speed.
 const TURNS_BACK: f64 = 2.356;
@@ -37,26 +37,30 @@ pub struct Rough {
 }
 
 /// The pieces of some moves between stops, and the first of each run.
+#[derive(Default)]
 struct Group<const M: usize> {
     part: Part<M>,
     runs: Vec<usize>,
     rough: Rough,
     /// Chords that were fitted, splines and polynomials.
     fit: [usize; 3],
+    offsets: Offsets,
 }
 
-/// The path of a program.
+/// The path of a program. Bends keep their size where `sized`; else they are cut as far as the tolerance allows, which
+/// is faster.
 pub fn build_smooth_path<const M: usize>(
     moves: &Moves<M>,
     options: &FollowOptions,
     axes: &Axes<M>,
+    sized: bool,
 ) -> Result<BuiltPath<M>, FollowError> {
     let groups: Vec<Group<M>> = groups(moves)
         .into_par_iter()
-        .map(|range| Group::new(moves, options, axes, range))
+        .map(|range| Group::new(moves, options, axes, range, sized))
         .collect::<Result<_, _>>()?;
     let mut path = BuiltPath { runs: vec![], ..BuiltPath::default() };
-    let mut total = 0;
+    let (mut total, mut offsets) = (0, Offsets::default());
     for group in groups {
         path.runs.extend(group.runs.iter().map(|start| start + total));
         total += group.part.pieces.len();
@@ -64,11 +68,13 @@ pub fn build_smooth_path<const M: usize>(
         path.points += group.fit[0];
         path.splines += group.fit[1];
         path.polynomials += group.fit[2];
+        offsets.merge(&group.offsets);
         path.rough.reversals.extend(group.rough.reversals);
         path.rough.corners.extend(group.rough.corners);
     }
     path.runs.push(total);
     path.deviation = deviation(&path.parts);
+    path.offsets = Some(offsets);
     path.outside = outside(&path.parts, moves, &axes.travel);
     Ok(path)
 }
@@ -93,18 +99,30 @@ fn groups<const M: usize>(moves: &Moves<M>) -> Vec<Range<usize>> {
     groups
 }
 
+/// How the runs of a group follow their chords.
+struct Rules<const M: usize> {
+    exact: bool,
+    travel: [[f64; 2]; M],
+    /// Longer chords are lines, in mm.
+    long: f64,
+    /// Bends keep their size.
+    sized: bool,
+}
+
 impl<const M: usize> Group<M> {
     fn new(
         moves: &Moves<M>,
         options: &FollowOptions,
         axes: &Axes<M>,
         range: Range<usize>,
+        sized: bool,
     ) -> Result<Self, FollowError> {
         let exact = moves.tolerance[range.start] <= 0.0;
         let judged = range.clone().all(|i| moves.joints[i]);
         let travel = if judged { axes.travel } else { [[f64::NEG_INFINITY, f64::INFINITY]; M] };
+        let rules = Rules { exact, travel, long: options.max_chord, sized };
         let chords = moves.chords(options, range)?;
-        let mut group = Self { part: Part::default(), runs: vec![], rough: Rough::default(), fit: [0; 3] };
+        let mut group = Self::default();
         let count = chords.chords.len();
         let mut first = 0;
         for end in 1..=count {
@@ -117,7 +135,7 @@ impl<const M: usize> Group<M> {
                 turn > TURNS_BACK || exact && !chords.meet(end)
             };
             if stops {
-                group.append(&chords, first..end, exact, &travel, options.max_chord);
+                group.append(&chords, first..end, &rules);
                 first = end;
             }
         }
@@ -125,17 +143,10 @@ impl<const M: usize> Group<M> {
     }
 
     /// Appends a run.
-    fn append(
-        &mut self,
-        chords: &Chords<M>,
-        run: Range<usize>,
-        exact: bool,
-        travel: &[[f64; 2]; M],
-        long: f64,
-    ) {
+    fn append(&mut self, chords: &Chords<M>, run: Range<usize>, rules: &Rules<M>) {
         self.runs.push(self.part.pieces.len());
         let own = &chords.chords[run.clone()];
-        if exact && own.iter().all(|chord| chord.bow.is_none()) {
+        if rules.exact && own.iter().all(|chord| chord.bow.is_none()) {
             for i in run {
                 let line = [chords.points[i], chords.points[i + 1]];
                 let like = followed(&chords.chords[i..=i], 0.0, true);
@@ -149,12 +160,12 @@ impl<const M: usize> Group<M> {
             })
             .collect();
         match moving.len() {
-            0..=2 => self.append_curve::<2>(chords, run, &moving, exact, travel, long),
-            3 => self.append_curve::<3>(chords, run, &moving, exact, travel, long),
-            4 => self.append_curve::<4>(chords, run, &moving, exact, travel, long),
-            5 => self.append_curve::<5>(chords, run, &moving, exact, travel, long),
-            6 => self.append_curve::<6>(chords, run, &moving, exact, travel, long),
-            _ => self.append_curve::<9>(chords, run, &moving, exact, travel, long),
+            0..=2 => self.append_curve::<2>(chords, run, &moving, rules),
+            3 => self.append_curve::<3>(chords, run, &moving, rules),
+            4 => self.append_curve::<4>(chords, run, &moving, rules),
+            5 => self.append_curve::<5>(chords, run, &moving, rules),
+            6 => self.append_curve::<6>(chords, run, &moving, rules),
+            _ => self.append_curve::<9>(chords, run, &moving, rules),
         }
     }
 
@@ -164,14 +175,15 @@ impl<const M: usize> Group<M> {
         chords: &Chords<M>,
         run: Range<usize>,
         moving: &[usize],
-        exact: bool,
-        travel: &[[f64; 2]; M],
-        long: f64,
+        rules: &Rules<M>,
     ) {
+        let Rules { exact, travel, long, sized } = rules;
         let own = &chords.chords[run.clone()];
         let narrow = |p: &[f64; M]| std::array::from_fn(|k| moving.get(k).map_or(0.0, |&axis| p[axis]));
         let points: Vec<[f64; D]> = chords.points[run.start..=run.end].iter().map(narrow).collect();
-        let line = Polyline::new(points, own.iter().map(Chord::left).collect());
+        let mut line = Polyline::new(points, own.iter().map(Chord::left).collect());
+        line.sized = *sized;
+        line.hold_bends(*long, |i| own[i].bow.is_some());
         let apart = |a: &Chord, b: &Chord| a.feed != b.feed || a.allowed != b.allowed;
         let cut: Vec<bool> =
             (0..=own.len()).map(|i| i > 0 && i < own.len() && apart(&own[i - 1], &own[i])).collect();
@@ -179,7 +191,7 @@ impl<const M: usize> Group<M> {
             Some(&axis) => [travel[axis][0] - TRAVEL_SLACK, travel[axis][1] + TRAVEL_SLACK],
             None => [f64::NEG_INFINITY, f64::INFINITY],
         };
-        let options = SmoothOptions { long, bounds: std::array::from_fn(bounds) };
+        let options = SmoothOptions { long: *long, bounds: std::array::from_fn(bounds) };
         let smooth = smooth_fit(&line, &cut, &options);
         let rest = chords.points[run.start];
         for (piece, stretch) in smooth.curve.pieces().zip(&smooth.stretches) {
@@ -197,12 +209,13 @@ impl<const M: usize> Group<M> {
             if stretch.stop {
                 self.runs.push(self.part.pieces.len());
             }
-            let followed = followed(&own[stretch.first..=stretch.last], stretch.deviation, exact);
+            let followed = followed(&own[stretch.first..=stretch.last], stretch.deviation, *exact);
             self.part.push(&control, piece.width, followed);
         }
         self.fit[0] += (own[own.len() - 1].last - own[0].first) as usize + 1;
         self.fit[1] += smooth.splines;
         self.fit[2] += smooth.polynomials;
+        self.offsets.merge(&smooth.offsets);
         let rough = smooth.corners.iter().map(|zone| [own[zone.start].first, own[zone.end - 1].last]);
         self.rough.corners.extend(rough);
     }

@@ -40,8 +40,9 @@ type Columns<'py> = (
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<i64>>,
 );
-/// Points, splines and polynomials of the fit, and the deviation.
-type Summary = (usize, usize, usize, f64);
+/// Points, splines and polynomials of the fit, the deviation; of a smooth path the mean distance of bends with its sign,
+/// and the greatest distances inside and outside.
+type Summary = (usize, usize, usize, f64, Option<[f64; 3]>);
 /// Move, axis and position of the first place outside the travel.
 type Place = (usize, usize, f64);
 /// Moves at whose end a smooth path turns back, first and last moves (k, 2) of the places where it keeps its corners.
@@ -140,7 +141,7 @@ fn build_path<'py>(
         })
         .collect::<PyResult<_>>()?;
     let rounding = if corners == "arcs" { Rounding::Circle } else { Rounding::Parabola };
-    let smooth = corners == "smooth";
+    let smooth = ["smooth", "fastest"].contains(&corners);
     let options =
         FollowOptions { exact_tolerance, max_chord, corner_acceleration, max_speed, corner_angle, rounding };
     with_path_axes!(axes, M, {
@@ -184,7 +185,7 @@ fn build_path<'py>(
             jump,
         };
         let build = || match smooth {
-            true => build_smooth_path(&moves, &options, &limits),
+            true => build_smooth_path(&moves, &options, &limits, corners == "smooth"),
             false => build_path_of(&moves, &options, &limits),
         };
         let path = py.detach(build).map_err(|error| {
@@ -283,7 +284,8 @@ fn columns<'py, const M: usize>(
         PyArray1::from_vec(py, tolerance),
         PyArray1::from_vec(py, path.runs.iter().map(|&start| start as i64).collect()),
     );
-    let summary = (path.points, path.splines, path.polynomials, path.deviation);
+    let offsets = path.offsets.map(|offsets| [offsets.mean(), offsets.inside, offsets.outside]);
+    let summary = (path.points, path.splines, path.polynomials, path.deviation, offsets);
     let zones: Vec<i64> = path.rough.corners.iter().flatten().map(|&i| i64::from(i)).collect();
     let rough = (
         PyArray1::from_iter(py, path.rough.reversals.iter().map(|&i| i64::from(i))),

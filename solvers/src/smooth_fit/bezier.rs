@@ -33,6 +33,20 @@ pub fn point_and_slope<const D: usize>(control: &Control<D>, t: f64) -> ([f64; D
     (lerp(&c[0], &c[1], t), slope.map(|x| DEGREE as f64 * x))
 }
 
+/// The point and its first two derivatives at t, by t.
+pub fn derivatives<const D: usize>(control: &Control<D>, t: f64) -> [[f64; D]; 3] {
+    let mut c = *control;
+    for level in 1..DEGREE - 1 {
+        for i in 0..ORDER - level {
+            c[i] = lerp(&c[i], &c[i + 1], t);
+        }
+    }
+    let edges = [sub(&c[1], &c[0]), sub(&c[2], &c[1])];
+    let second = sub(&edges[1], &edges[0]).map(|x| (DEGREE * (DEGREE - 1)) as f64 * x);
+    let slope = lerp(&edges[0], &edges[1], t).map(|x| DEGREE as f64 * x);
+    [lerp(&lerp(&c[0], &c[1], t), &lerp(&c[1], &c[2], t), t), slope, second]
+}
+
 /// An upper bound of the distance from a chord, no closer than needed to tell that it is below `enough`: the
 /// distance from a segment is convex, so that none is greater than that of the farthest control point.
 pub fn distance_bound<const D: usize>(
@@ -112,6 +126,9 @@ mod tests {
         assert!(norm(&sub(&left[DEGREE], &[0.25, 0.0625])) < 1e-15);
         let (point, slope) = point_and_slope(&PARABOLA, 0.5);
         assert!(norm(&sub(&point, &[0.5, 0.25])) < 1e-15 && norm(&sub(&slope, &[1.0, 1.0])) < 1e-14);
+        let [point, slope, second] = derivatives(&PARABOLA, 0.5);
+        assert!(norm(&sub(&point, &[0.5, 0.25])) < 1e-15 && norm(&sub(&slope, &[1.0, 1.0])) < 1e-14);
+        assert!(norm(&sub(&second, &[0.0, 2.0])) < 1e-13);
     }
 
     #[test]

@@ -10,11 +10,16 @@
 use super::band::Band;
 use super::rows::Row;
 use super::spline::ORDER;
+use crate::quadratic::dot;
 
 /// It ends when complementarity is below this part of the energy,
 const GAP: f64 = 1e-3;
 /// and when rows, and Newton's other residual, are off by less than this part of their size.
 const OFF: f64 = 1e-3;
+/// Where vertices pull, what is left over must be less than if they were off by this part of their limits.
+const OFF_VERTEX: f64 = 1e-2;
+/// The weight of all targets where it starts, in parts of the stiffness of their interval.
+const START: f64 = 50.0;
 const MOST_ITERATIONS: usize = 40;
 /// Part of the way to the boundary.
 const STEP: f64 = 0.99;
@@ -54,8 +59,11 @@ impl<const D: usize> Problem<D> {
         let total = (2 * D * count) as f64;
         let least_energy = NO_ENERGY * self.unit_energy;
         let mut off = vec![[0.0; D]; count];
-        self.residuals(&mut off);
         let mut gradient = vec![[0.0; D]; self.x.len()];
+        let mut weight = vec![[0.0; D]; count];
+        let mut step = vec![[0.0; D]; self.x.len()];
+        self.approximate(band, &mut off, &mut weight, &mut step);
+        self.residuals(&mut off);
         let mu = self.energy_gradient(&mut gradient).max(least_energy) / total;
         let mut state: Vec<Pairs<D>> = (0..count)
             .map(|i| {
@@ -68,12 +76,16 @@ impl<const D: usize> Problem<D> {
             })
             .collect();
         let mut steps = state.clone();
-        let mut weight = vec![[0.0; D]; count];
-        let mut step = vec![[0.0; D]; self.x.len()];
+        let draw = self.draw();
 
         for iteration in 0..MOST_ITERATIONS {
             self.residuals(&mut off);
-            let energy = self.energy_gradient(&mut gradient);
+            let mut energy = self.energy_gradient(&mut gradient);
+            for (weight, (row, off)) in weight.iter_mut().zip(self.rows.iter().zip(&off)) {
+                *weight = std::array::from_fn(|r| row.pull * off[r]);
+                energy += 0.5 * (0..D).map(|r| weight[r] * off[r]).sum::<f64>();
+            }
+            self.add_transposed(&weight, &mut gradient);
             let (mut work, mut worst) = (0.0, 0.0f64);
             for (i, pairs) in state.iter().enumerate() {
                 let e = &self.rows[i].half;
@@ -96,13 +108,15 @@ impl<const D: usize> Problem<D> {
                 *weight = std::array::from_fn(|r| pairs.l[0][r] - pairs.l[1][r]);
             }
             self.add_transposed(&weight, &mut gradient);
-            if work < GAP * energy.max(least_energy) && worst < OFF && self.greatest(&gradient) < OFF * size {
+            let settled = || self.is_settled(&gradient, &state, &draw, OFF * size);
+            if work < GAP * energy.max(least_energy) && worst < OFF && settled() {
                 return iteration;
             }
 
-            for (weight, pairs) in weight.iter_mut().zip(&state) {
+            for (weight, (row, pairs)) in weight.iter_mut().zip(self.rows.iter().zip(&state)) {
                 let [lower, upper] = &pairs.inverse;
-                *weight = std::array::from_fn(|r| pairs.l[0][r] * lower[r] + pairs.l[1][r] * upper[r]);
+                *weight =
+                    std::array::from_fn(|r| pairs.l[0][r] * lower[r] + pairs.l[1][r] * upper[r] + row.pull);
             }
             self.assemble(&weight, band);
             band.factor();
@@ -152,6 +166,43 @@ impl<const D: usize> Problem<D> {
             }
         }
         MOST_ITERATIONS
+    }
+
+    /// Moves x to the best approximation of all targets, smoothed a little. Where a corner leaves the solution no way, as
+    /// intervals too long do, bends of the same window are where they belong all the same.
+    fn approximate(
+        &mut self,
+        band: &mut Band,
+        off: &mut [[f64; D]],
+        weight: &mut [[f64; D]],
+        step: &mut [[f64; D]],
+    ) {
+        for (form, pair) in self.energy.iter().zip(self.start.windows(2)) {
+            let stiffness: f64 = (0..ORDER).map(|a| form[a][a]).sum();
+            for (weight, row) in weight[pair[0]..pair[1]].iter_mut().zip(&self.rows[pair[0]..pair[1]]) {
+                *weight = [START * stiffness + row.pull; D];
+            }
+        }
+        self.assemble(weight, band);
+        band.factor();
+        self.residuals(off);
+        self.energy_gradient(step);
+        for (weight, off) in weight.iter_mut().zip(off.iter()) {
+            *weight = std::array::from_fn(|r| weight[r] * off[r]);
+        }
+        self.add_transposed(weight, step);
+        self.downhill(band, step);
+        for (x, step) in self.x.iter_mut().zip(step.iter()) {
+            *x = std::array::from_fn(|k| x[k] + step[k]);
+        }
+    }
+
+    /// From a gradient to the step of Newton's matrix against it.
+    fn downhill(&self, band: &Band, step: &mut [[f64; D]]) {
+        for (step, &fixed) in step.iter_mut().zip(&self.fixed) {
+            *step = if fixed { [0.0; D] } else { step.map(|x| -x) };
+        }
+        band.solve(step.as_flattened_mut());
     }
 
     /// Ax − b of every row.
@@ -222,6 +273,45 @@ impl<const D: usize> Problem<D> {
     fn greatest(&self, gradient: &[[f64; D]]) -> f64 {
         let free = gradient.iter().zip(&self.fixed).filter(|(_, fixed)| !**fixed);
         free.flat_map(|(g, _)| g).fold(0.0, |a: f64, x| a.max(x.abs()))
+    }
+
+    /// What vertices draw each coefficient by where they are off by a small part of their limits, and the work of that
+    /// in each interval.
+    fn draw(&self) -> (Vec<f64>, Vec<f64>) {
+        let mut force = vec![0.0; self.x.len()];
+        let mut work = vec![0.0; self.start.len() - 1];
+        for (j, pair) in self.start.windows(2).enumerate() {
+            for row in &self.rows[pair[0]..pair[1]] {
+                let draw = row.pull * OFF_VERTEX * row.half[0];
+                work[j] += draw * row.half[0];
+                for a in 0..ORDER {
+                    force[j + a] += row.basis[a] * draw;
+                }
+            }
+        }
+        (force, work)
+    }
+
+    /// What is left over is small everywhere: of the gradient in parts of the multipliers, and where vertices draw, of
+    /// gradient and complementarity in parts of what they draw. A corner has so much of both that those alone say
+    /// nothing of an arc beside it.
+    fn is_settled(
+        &self,
+        gradient: &[[f64; D]],
+        state: &[Pairs<D>],
+        draw: &(Vec<f64>, Vec<f64>),
+        most: f64,
+    ) -> bool {
+        let free = gradient.iter().zip(&draw.0).zip(&self.fixed).filter(|(_, fixed)| !**fixed);
+        let still = free.into_iter().all(|((g, &draw), _)| {
+            let most = if draw > 0.0 { draw } else { most };
+            g.iter().all(|x| x.abs() <= most)
+        });
+        let work = |pairs: &Pairs<D>| -> f64 { (0..2).map(|side| dot(&pairs.s[side], &pairs.l[side])).sum() };
+        still
+            && self.start.windows(2).zip(&draw.1).all(|(pair, &draw)| {
+                draw == 0.0 || state[pair[0]..pair[1]].iter().map(work).sum::<f64>() <= draw
+            })
     }
 
     /// Newton's matrix.
@@ -301,10 +391,7 @@ impl<const D: usize> Problem<D> {
         }
         step.copy_from_slice(gradient);
         self.add_transposed(weight, step);
-        for (step, &fixed) in step.iter_mut().zip(&self.fixed) {
-            *step = if fixed { [0.0; D] } else { step.map(|x| -x) };
-        }
-        band.solve(step.as_flattened_mut());
+        self.downhill(band, step);
         self.over_rows(step, |i, row, point| {
             for r in 0..D {
                 let moved: f64 = (0..D).map(|k| row.direction[r][k] * point[k]).sum();

@@ -1,5 +1,6 @@
 //! The programmed polyline of a run: vertices, stations, directions and tolerances.
 
+use super::bends::Hold;
 use crate::quadratic::{dot, norm, sub};
 
 /// Chords between vertices, none of them without a length.
@@ -12,10 +13,15 @@ pub struct Polyline<const D: usize> {
     pub direction: Vec<[f64; D]>,
     /// The distance that the curve may have from each chord, in mm.
     pub tolerance: Vec<f64>,
+    /// What each vertex is to the curve.
+    pub hold: Vec<Hold>,
+    /// Bends keep their size: vertices that are held draw the curve.
+    pub sized: bool,
 }
 
 impl<const D: usize> Polyline<D> {
-    /// The polyline through `vertex`, with a tolerance for each chord.
+    /// The polyline through `vertex`, with a tolerance for each chord; all vertices are free, and bends of any
+    /// size.
     pub fn new(vertex: Vec<[f64; D]>, tolerance: Vec<f64>) -> Self {
         let mut station = Vec::with_capacity(vertex.len());
         let mut direction = Vec::with_capacity(tolerance.len());
@@ -28,12 +34,14 @@ impl<const D: usize> Polyline<D> {
             station.push(sum);
             direction.push(chord.map(|x| x / length));
         }
-        Self { vertex, station, direction, tolerance }
+        let hold = vec![Hold::Free; vertex.len()];
+        Self { vertex, station, direction, tolerance, hold, sized: false }
     }
 
     /// The part between two vertices, its stations from 0.
     pub fn part(&self, first: usize, last: usize) -> Self {
-        Self::new(self.vertex[first..=last].to_vec(), self.tolerance[first..last].to_vec())
+        let part = Self::new(self.vertex[first..=last].to_vec(), self.tolerance[first..last].to_vec());
+        Self { hold: self.hold[first..=last].to_vec(), sized: self.sized, ..part }
     }
 
     /// Number of chords.
@@ -47,6 +55,11 @@ impl<const D: usize> Polyline<D> {
 
     pub fn chord_length(&self, i: usize) -> f64 {
         self.station[i + 1] - self.station[i]
+    }
+
+    /// The mean length of the chords at inner vertex i.
+    pub fn mean_chord(&self, i: usize) -> f64 {
+        0.5 * (self.station[i + 1] - self.station[i - 1])
     }
 
     /// The chord at station u.

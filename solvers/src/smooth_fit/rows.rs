@@ -6,6 +6,7 @@
 //! ```
 //!
 //! At a vertex that turns by more than SHARP, t is the bisector's tangent, and the curve may slip along it by little.
+//! Vertices that are held draw the curve as well (see `bends`).
 
 use super::polyline::Polyline;
 use super::spline::{around, basis, ORDER};
@@ -27,6 +28,8 @@ pub struct Row<const D: usize> {
     pub target: [f64; D],
     pub direction: [[f64; D]; D],
     pub half: [f64; D],
+    /// The weight of half the square of the distance.
+    pub pull: f64,
 }
 
 /// The rows of intervals `first` to `end`, and the number of rows before each of them.
@@ -49,6 +52,7 @@ pub fn rows<const D: usize>(
                 target: std::array::from_fn(|k| point[k] - origin[k]),
                 direction: frame(&along),
                 half: std::array::from_fn(|r| if r + 1 == D { limits[1] } else { limits[0] }),
+                pull: vertex.map_or(0.0, |i| pull(line, i, high - low)),
             });
         };
         for sample in 0..SAMPLES {
@@ -66,6 +70,15 @@ pub fn rows<const D: usize>(
         start.push(rows.len());
     }
     (rows, start)
+}
+
+/// How strongly a vertex draws the curve in an interval of length h.
+fn pull<const D: usize>(line: &Polyline<D>, vertex: usize, h: f64) -> f64 {
+    if !line.sized {
+        return 0.0;
+    }
+    let chords = [vertex - 1, vertex].map(|chord| line.chord_length(chord));
+    line.hold[vertex].weight(chords, h, line.tolerance_at(vertex))
 }
 
 /// The tangent at a place, and the limits across and along it.
