@@ -103,6 +103,13 @@ _MACHINE = click.option(
 _TOLERANCE = click.option(
     "--tolerance", type=_Number(), metavar="MM", help="Allowed distance from the programmed path."
 )
+_PATH = click.option(
+    "--path",
+    type=click.Choice(("as-fitted", "fastest")),
+    default="as-fitted",
+    show_default=True,
+    help="Smooth paths keep the size of arcs, or cut them up to the tolerance.",
+)
 _ACCURACY = click.option(
     "--accuracy", type=_Number(), metavar="PART", help="Relative error of the time, of methods with a mesh."
 )
@@ -158,6 +165,7 @@ def cli(context: click.Context) -> int:
 @_ACCURACY
 @click.option("--time-limit", type=_ZERO_OR_MORE, metavar="S", help=_WHOLE_LIMIT_HELP)
 @_TOLERANCE
+@_PATH
 @click.option("--feed", type=_Number(), metavar="MM/S", help="Feed in place of the programmed one.")
 @click.option("--feed-override", type=_Number(), default=1.0, metavar="FACTOR", help="Factor on the feed.")
 @click.option("--period", type=_Number(), metavar="S", help="Servo period in place of the machine's.")
@@ -181,6 +189,7 @@ def plan(
     accuracy: float | None,
     time_limit: float | None,
     tolerance: float | None,
+    path: FollowedPath,
     feed: float | None,
     feed_override: float,
     period: float | None,
@@ -213,6 +222,7 @@ def plan(
             Machine.load(machine),
             method=method,
             tolerance=tolerance,
+            path=path,
             feed=feed,
             feed_override=feed_override,
             period=period,
@@ -255,6 +265,7 @@ def plan(
     "--time-limit", type=_Number(), default=TIME_LIMIT, show_default=True, metavar="S", help=_TIME_LIMIT_HELP
 )
 @_TOLERANCE
+@_PATH
 @click.option("--feed", type=_Number(), metavar="MM/S", help="Feed in place of the programmed one.")
 @click.option("--period", type=_Number(), metavar="S", help="Servo period in place of the machine's.")
 @click.option("--output", "-o", metavar="DIR", help="Write comparison.json and comparison.html there.")
@@ -267,6 +278,7 @@ def compare(
     accuracy: float | None,
     time_limit: float,
     tolerance: float | None,
+    path: FollowedPath,
     feed: float | None,
     period: float | None,
     output: str | None,
@@ -295,6 +307,7 @@ def compare(
             time_limit=time_limit,
             progress=progress,
             tolerance=tolerance,
+            path=path,
             feed=feed,
             period=period,
             **_given(accuracy=accuracy),

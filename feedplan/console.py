@@ -172,7 +172,16 @@ def fit_rows(fit: Mapping[str, Any]) -> list[tuple[str, str]]:
     text = f"{points} points as {splines} splines ({ratio_text(points, splines)})"
     if polynomials:
         text += f" of {polynomials} polynomials ({ratio_text(points, polynomials)})"
-    return [("fit", text), ("deviation", f"{float(fit['deviation']):.3g} mm")]
+    return [("fit", text), ("deviation", f"{float(fit['deviation']):.3g} mm"), *_side_rows(fit)]
+
+
+def _side_rows(fit: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """On which side of the program a smooth path lies; nothing for others."""
+    if fit.get("mean_offset") is None:
+        return []
+    inside, outside, mean = (1e3 * float(fit[key]) for key in ("inside", "outside", "mean_offset"))
+    text = f"{inside:.3g} µm inside at most, {outside:.3g} µm outside, bends {mean:+.2g} µm in the mean"
+    return [("sides", text)]
 
 
 def audit_text(audit: Audit) -> str:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +21,7 @@ from feedplan.audit import Audit, audit
 from feedplan.bound import lower_bound
 from feedplan.constraints.problem import Problem, build_problem, speed_square
 from feedplan.geometry.build import build_path
+from feedplan.geometry.corners import Corners
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
 from feedplan.outputs import FORMAT
@@ -46,6 +47,10 @@ from feedplan.trajectory import State, Trajectory
 from feedplan.units import counted
 
 Progress = Callable[[str, float], None]
+
+# What smooth paths do with the size of arcs and bends.
+FollowedPath = Literal["as-fitted", "fastest"]
+PATHS: tuple[FollowedPath, ...] = get_args(FollowedPath)
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,6 +203,9 @@ class Plan:
                 "splines": fit.splines,
                 "polynomials": fit.polynomials,
                 "deviation": fit.deviation,
+                "mean_offset": fit.mean_offset,
+                "inside": fit.inside,
+                "outside": fit.outside,
             },
             "compute": dict(self.compute),
             "audit": self.audit().to_json(),
@@ -217,6 +225,7 @@ def plan(
     start_speed: float = 0.0,
     end_speed: float = 0.0,
     interpolator: Interpolator = "sarfraz",
+    path: FollowedPath = "as-fitted",
     progress: Progress | None = None,
     **options: Any,
 ) -> Plan:
@@ -226,10 +235,11 @@ def plan(
     Path. `machine`: a Machine, or the name or file of one. `method`: one of `methods()`.
     `tolerance` [mm] is the greatest distance from the programmed path where the program lets the tool leave
     it (default: the program's own, else 0.01; a Path has its own); how the path follows the program within it
-    is the method's choice. `feed` [mm/s] replaces the programmed feeds, `feed_override` multiplies them.
-    `period` [s] replaces the machine's servo period; `start_speed` and `end_speed` [mm/s] hold at the ends.
-    `interpolator` makes the setpoints: "sarfraz" or "newton". `progress(stage, done)` is called as the work
-    goes on.
+    is the method's choice. Where the method takes smooth paths, `path` "as-fitted" keeps the size of arcs and
+    bends, "fastest" cuts them as far as the tolerance allows. `feed` [mm/s] replaces the programmed feeds,
+    `feed_override` multiplies them. `period` [s] replaces the machine's servo period; `start_speed` and
+    `end_speed` [mm/s] hold at the ends. `interpolator` makes the setpoints: "sarfraz" or "newton".
+    `progress(stage, done)` is called as the work goes on.
 
     What some methods take besides, by keyword, with what holds where it is not given:
 
@@ -256,6 +266,9 @@ def plan(
     # The limit of a method that can tell early what follows its plan is one for all of it.
     limit = TimeLimit(time_limit) if time_limit is not None and tells_early(method) else None
     machine = Machine.of(machine)
+    choice = corners(method)
+    if one_of(path, "path", PATHS) == "fastest" and choice is Corners.SMOOTH:
+        choice = Corners.FASTEST
     if period is not None:
         machine = machine.with_period(period)
     one_of(interpolator, "interpolator", INTERPOLATORS)
@@ -266,18 +279,18 @@ def plan(
     if isinstance(source, Path):
         if tolerance is not None:
             raise refuse("the tolerance", tolerance, "it where the path is made: a Path has its own")
-        path = source
+        followed = source
     else:
         report("read", 0.0)
         with _timed(compute, "read"):
             program = source if isinstance(source, Program) else read_program(source, machine)
         report("fit", 0.0)
         with _timed(compute, "fit"):
-            path = build_path(program, machine, tolerance, corners=corners(method))
+            followed = build_path(program, machine, tolerance, corners=choice)
     report("plan", 0.0)
     with _timed(compute, "plan"):
         problem = build_problem(
-            path,
+            followed,
             machine,
             feed=feed,
             feed_override=feed_override,
@@ -307,7 +320,7 @@ def plan(
             time_limit=time_limit,
             left_to_grids=wanted * grid_error(method),
         )
-        least += path.pauses
+        least += followed.pauses
     report("plan", 1.0)
     return Plan(
         program=program,
@@ -319,7 +332,7 @@ def plan(
         compute=compute,
         interpolator=interpolator,
         warnings=(program.warnings if program else ())
-        + path.warnings
+        + followed.warnings
         + short
         + rounding_stops(problem, profile)
         + curvature_jumps(problem, profile),
@@ -332,6 +345,7 @@ def plan(
             "start_speed": start_speed,
             "end_speed": end_speed,
             "interpolator": interpolator,
+            "path": path,
         },
     )
 

@@ -152,6 +152,15 @@ def fit_table(summary: Mapping[str, Any], tolerance: tuple[float, float]) -> str
     rows.append(("Tolerance asked for", f"{tolerance_text(*tolerance)}"))
     if fit.get("deviation") is not None:
         rows.append(("Deviation from the program", f"{_short(fit['deviation'] * 1e3)} µm"))
+    if fit.get("mean_offset") is not None:
+        rows += [
+            (name, f"{_short(fit[key] * 1e3)} µm")
+            for name, key in (
+                ("… inside, at most", "inside"),
+                ("… outside, at most", "outside"),
+                ("… of bends in the mean, outside positive", "mean_offset"),
+            )
+        ]
     rows.append(("Pieces planned", f"{summary['pieces']} in {_counted(summary['runs'], 'run')}"))
     compute = summary.get("compute") or {}
     rows += [(f"Time to {name}", duration_text(float(seconds))) for name, seconds in compute.items()]
