@@ -20,6 +20,7 @@ from benchmarks import (
     methods,
     planner_cost,
     results,
+    size,
     time_limit,
     zhang_comparison,
 )
@@ -38,6 +39,7 @@ BENCHMARKS = {
         kinematics_cost,
         jerk,
         time_limit,
+        size,
     )
 }
 
