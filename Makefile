@@ -41,6 +41,7 @@ campaign: $(VENV)/built
 	FEEDPLAN_SEEDS=1000 $(BIN)/pytest --numprocesses auto tests/planners/test_random_programs.py
 	FEEDPLAN_SEEDS=2000 $(BIN)/pytest --numprocesses auto tests/planners/test_posted_programs.py
 	FEEDPLAN_SEEDS=100000 $(BIN)/pytest --numprocesses auto tests/planners/test_lines.py -k random
+	FEEDPLAN_SEEDS=5000 $(BIN)/pytest --numprocesses auto tests/planners/test_awkward_paths.py -k random
 	FEEDPLAN_SEEDS=2000 $(BIN)/pytest --numprocesses auto tests/planners/test_tip_programs.py -k random
 	FEEDPLAN_EXAMPLES=5000 $(BIN)/pytest --numprocesses auto tests/test_setpoints_curves.py -k planned
 	for i in 1 2 3 4 5 6 7 8 9 10; do \

@@ -41,10 +41,10 @@ class SpeedProfile:
     axis l accelerates with (q'_l·value − W_kl p)/q'_k, W_kl = q''_k q'_l − q''_l q'_k, which keeps its digits
     where q'' p is large. On PARAMETER_ACCELERATION, `axis` is the one whose
     acceleration limit holds p where s is 0, if it is one.
-    An arc may begin or end with C' = 0 (as a straight piece with two equal control points does). Where such a
-    place is passed at a speed, p is infinite there; the axis velocity follows from the other end of the arc:
-    q'_k0² p0 = q'_k1² p1 − 2·value·Δq_k, and from the duration where both ends are of that kind. Where it is
-    a stop, p is its limit.
+    An arc may begin or end with C' = 0. Paths are made so that the tool rests there: p is its limit then, or
+    0 where it has none. Where a path of another making passes such a place at a speed, p is infinite there;
+    the axis velocity follows from the other end of the arc: q'_k0² p0 = q'_k1² p1 − 2·value·Δq_k, and from
+    the duration where both ends are of that kind.
     On PATH_JERK and SPEED_CUBIC `a0`, `a1` are the acceleration along the path at both ends, v̇ [mm/s²]; 0 on
     all other kinds. Speed v = |C'| √p and length are those along the path, by the problem's `way_speed` where
     it has one.

@@ -115,9 +115,11 @@ class Path:
         curved pieces are cut in their cusps, and pieces without length are left out. The path goes over the
         same places as `curve`, and parameter intervals stay: `path.curve` is `curve` at the ends of its
         pieces and on curved ones, but goes over lines evenly. Differences of 16 roundings of the greatest
-        coordinate are none: within them the control points of a straight piece are on a line. Runs end at
-        corners, at turns and in cusps, which are stops. `path.move` gives the first and the last piece of
-        `curve` that a piece goes along, and the source line of all is 0.
+        coordinate are none: within them the control points of a straight piece are on a line. Where a curved
+        piece turns within such a difference it has a cusp, and control points nearer to that than 1e-9 of the
+        greatest coordinate are put there. Runs end at corners, at turns and in cusps, which are stops.
+        `path.move` gives the first and the last piece of `curve` that a piece goes along, and the source line
+        of all is 0.
         Raises InputError for gaps, and for axes or a feed that cannot be used.
         """
         # The constructors build paths, so they stand above this module.

@@ -17,7 +17,7 @@ use crate::path_dynamics::{allowable, bounded, greatest, AxisLimits, Curve, Shap
 use crate::s_curve::{self, Section, Segment};
 use crate::spline::bezier::split;
 use crate::spline::CompositeCurve;
-use crate::stretches::{checked, over_stretches, stretches, Stretch};
+use crate::stretches::{checked, over_stretches, stretches, Stretch, CREEP};
 
 /// Bounds of derivatives are greater than these by this part.
 const ACCURACY: f64 = 0.05;
@@ -30,9 +30,11 @@ const HELD: f64 = 0.998;
 const CLOSE: f64 = 1e-9;
 
 /// Halves of a part are parts of their own where one may be passed faster than both together by more than this part of
-/// the speed, and halvings of a piece.
+/// the speed, and halvings of a piece; more of them where it is by so much, which is next to a tight turn.
 const WORTH: f64 = 0.05;
 const DEPTH: u32 = 5;
+const WELL_WORTH: f64 = 1.0;
+const MOST_DEPTH: u32 = 40;
 
 /// A way to join parts to segments.
 #[derive(Clone, Copy, Debug)]
@@ -45,8 +47,8 @@ pub struct Cutting {
 }
 
 /// The profile of a path, each stretch by the quickest of some cuttings, planned with so many segments of look-ahead.
-/// Where a segment has no speed, next to a cusp, and where the path begins or ends in motion, the jerk-limited planner
-/// plans the stretch with this effort.
+/// Where a segment has no speed or hardly one, next to a cusp, and where the path begins or ends in motion, the
+/// jerk-limited planner plans the stretch with this effort.
 pub fn plan<const M: usize>(
     problem: &Problem<M>,
     jerk: &[f64; M],
@@ -144,7 +146,7 @@ struct Planned {
     sections: Vec<Section>,
 }
 
-/// A stretch from rest to rest by the quickest of some cuttings; None where a segment has no speed.
+/// A stretch from rest to rest by the quickest of some cuttings; None where a segment has no speed, or hardly one.
 fn quickest<const M: usize>(
     problem: &Problem<M>,
     path: &ByLength<M>,
@@ -230,7 +232,8 @@ impl<'a, const M: usize> Parts<'a, M> {
         let slow = most(&whole);
         let fast = most(&left.1).speed.max(most(&right.1).speed);
         let reached = slow.limits.highest(slow.speed, middle - from);
-        if depth == DEPTH || fast.min(reached) <= (1.0 + WORTH) * slow.speed {
+        let worth = if depth < DEPTH { WORTH } else { WELL_WORTH };
+        if depth == MOST_DEPTH || fast.min(reached) <= (1.0 + worth) * slow.speed {
             self.push([from, to], whole);
             return;
         }
@@ -239,12 +242,16 @@ impl<'a, const M: usize> Parts<'a, M> {
         }
     }
 
-    /// The segments; None where one has no speed.
+    /// The segments; None where one has no speed, or one that the axes creep at.
     fn joined(&self, cutting: &Cutting) -> Option<Vec<Segment>> {
         let make = |shape: &Shape<M>, cap: f64, length: f64, junction: f64| -> Option<Segment> {
             let most = greatest(shape, &self.axes, cap);
             let stretch = cutting.lengths * most.speed * most.limits.duration(most.speed);
             let allowed = allowable(shape, &self.axes, cap, stretch).ok()?;
+            let crept = CREEP * allowed.limits.acceleration * self.problem.period;
+            if allowed.speed < crept && allowed.speed < CREEP * cap {
+                return None;
+            }
             // The cap has no end where the feed is about axes that stand still.
             let desired = cap.min(allowed.speed);
             Some(Segment { length, allowable: allowed.speed, desired, limits: allowed.limits, junction })

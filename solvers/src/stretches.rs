@@ -18,7 +18,7 @@ use crate::spline::rational::Hodograph;
 const AT_END: f64 = 1e-9;
 /// The tool creeps where the axes turn it only below this part of what they gain in a servo period, and a turn is tight
 /// below so many times that.
-const CREEP: f64 = 0.02;
+pub const CREEP: f64 = 0.02;
 const TIGHT_TURN: f64 = 10.0;
 /// Places are slow where the square of the speed is below this part of the greatest on their piece.
 const SLOW: f64 = 0.25;

@@ -40,3 +40,42 @@ def random_case(seed: int) -> tuple[Problem, Machine]:
     if rng.random() >= 0.5:
         problem = replace(problem, chord_tolerance=np.inf)
     return problem, machine
+
+
+def awkward_case(seed: int) -> tuple[Path, Machine]:
+    """A curve of degree 1 to 9 in one to five axes, made to break planners, with its machine.
+
+    Spans as short as 1e-6 of all, rational or not, on one axis, on a line or nearly, turning back, standing
+    still for a moment, or with double and triple knots.
+    """
+    rng = np.random.default_rng(seed)
+    degree, axes = int(rng.integers(1, 10)), int(rng.choice([1, 2, 3, 5]))
+    spans = int(rng.integers(1, 8))
+    short = rng.random(spans) < 0.3
+    spacing = np.where(short, 10 ** rng.uniform(-6, -1, spans), rng.uniform(0.2, 1, spans))
+    inner = np.repeat(np.cumsum(spacing)[:-1], rng.integers(1, min(4, degree + 1), spans - 1))
+    knots = np.concatenate([np.zeros(degree + 1), inner, np.full(degree + 1, spacing.sum())])
+    count = len(knots) - degree - 1
+    size = 10 ** rng.uniform(-1, 2.5)
+    points = rng.uniform(-1, 1, (count, axes))
+    kind = rng.choice(["free", "walk", "line", "nearly", "repeated"])
+    if kind == "walk":
+        points = np.cumsum(rng.normal(size=(count, axes)), axis=0) / np.sqrt(count)
+    elif kind in ("line", "nearly"):
+        places = rng.uniform(0, 1, count)
+        if rng.random() < 0.5:
+            places.sort()
+        off = 0.0 if kind == "line" else 10 ** rng.uniform(-12, -1)
+        points = points[0] + np.outer(places, rng.normal(size=axes)) + off * points
+    elif kind == "repeated":
+        points[rng.integers(0, count, count // 2)] = points[0]
+        points[-1] += 0.1
+    weights = 10 ** rng.uniform(-1, 1, count) if rng.random() < 0.4 else None
+    scale = [10 ** rng.uniform(*bounds) for bounds in ((1, 3), (2.5, 4), (3.5, 6))]
+    own = rng.uniform(0.5, 2, (axes, 3)) * scale
+    machine = Machine(
+        "awkward", tuple(Axis("XYZAB"[k], *own[k, :2], max_jerk=own[k, 2]) for k in range(axes)), period=1e-3
+    )
+    curve = CompositeCurve.from_nurbs(points * size, knots, degree, weights)
+    feed = 10 ** rng.uniform(0.5, 3) if rng.random() < 0.5 else np.inf
+    return Path.from_curve(curve, axes=tuple("XYZAB"[:axes]), feed=feed), machine

@@ -64,8 +64,8 @@ impl<'a, const M: usize> Comparison<'a, M> {
             let rest = self.plan.path.width[spot.place.piece] - spot.place.u;
             let at_joint = spot.place.u.min(rest) <= PLACE_TOLERANCE;
             for k in 0..M {
-                // From rest, a place known to `away` is passed at a speed known to this.
-                let unknown = (2.0 * limits.acceleration[k] * away).sqrt();
+                // Over a way of `away`, to a turn and back from it, no velocity changes by more than this.
+                let unknown = 2.0 * (limits.acceleration[k] * away).sqrt();
                 let off = (recorded[k] - velocity[k]).abs() - unknown;
                 let jump = if at_joint { limits.jump[k] } else { 0.0 };
                 let limit = VELOCITY_SHARE * limits.acceleration[k] * limits.period + jump;
@@ -74,10 +74,16 @@ impl<'a, const M: usize> Comparison<'a, M> {
         }
         if let Some(recorded) = row.acceleration {
             let range = profile.accelerations(here, row.t, limits.period);
+            let mut off: [f64; M] =
+                std::array::from_fn(|k| (range[k][0] - recorded[k]).max(recorded[k] - range[k][1]));
+            if (0..M).any(|k| off[k] > ACCELERATION_SHARE * limits.acceleration[k]) {
+                if let Some(then) = profile.acceleration_at(row.t) {
+                    off = std::array::from_fn(|k| off[k].min((recorded[k] - then[k]).abs()));
+                }
+            }
             for k in 0..M {
-                let off = (range[k][0] - recorded[k]).max(recorded[k] - range[k][1]);
                 let limit = ACCELERATION_SHARE * limits.acceleration[k];
-                tally.offer(Check::RecordedAcceleration, k, off, limit, row.t, row.line);
+                tally.offer(Check::RecordedAcceleration, k, off[k], limit, row.t, row.line);
             }
         }
     }

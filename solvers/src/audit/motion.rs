@@ -10,13 +10,18 @@ mod law;
 pub use law::{Law, Pole, Shape};
 
 use super::along::{Along, Pace};
-use super::curve::{inner, length};
+use super::curve::{from_to, inner, length};
 use super::integral::{kronrod, kronrod_lanes, MOST_HALVINGS, RULES_AGREE};
 use super::polygon::Polygon;
 use super::EPS;
 
 /// Slopes of tangents are taken over this part of the arc.
 const BESIDE: f64 = 1e-6;
+/// Within this part of an arc of its anchor the slope of a tangent is that at the anchor.
+const NEXT_TO: f64 = 1e-3;
+
+/// No rule has a node nearer to the ends of its interval than this part of it.
+pub(super) const STEPPED_OVER: f64 = 0.02;
 
 /// One arc, ready to be evaluated at any distance from its anchor.
 #[derive(Clone, Debug)]
@@ -46,10 +51,20 @@ pub struct Motion<const M: usize> {
     /// Whether the anchor is the end of the arc.
     pub anchored_at_end: bool,
     pub(super) pole: Option<Pole>,
+    pub(super) layer: Option<Layer>,
     /// The speed by the length of the path from the anchor.
     along: Option<Box<Measured>>,
     /// What the axes count in the speed that is constant at the feed.
     share: [f64; M],
+}
+
+/// Next to a slow anchor √p turns from its slope there to that of the whole arc.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Layer {
+    /// About how far it reaches, in y.
+    pub thickness: f64,
+    /// Share of √p that changes in it.
+    pub strength: f64,
 }
 
 #[derive(Clone, Debug)]
@@ -65,6 +80,16 @@ struct General<const M: usize> {
     ends: [f64; 2],
     part: Box<Polygon<M>>,
     size: [f64; M],
+}
+
+impl<const M: usize> General<M> {
+    /// Where the axis at its limit turns next to the anchor of an arc of this width (negative: backward), if it does.
+    fn pole(&self, law: &Law, tangent: &[f64; M], p_anchor: f64, width: f64) -> Option<Pole> {
+        let Law::AxisAcceleration { .. } = law else { return None };
+        let beside = self.part.local(BESIDE).slope;
+        let bend = std::array::from_fn(|k| (beside[k] / width - tangent[k]) / (BESIDE * width));
+        law.pole(tangent, &bend, p_anchor).filter(|pole| pole.at.abs() < NEXT_TO * width.abs())
+    }
 }
 
 /// The motion at one place of an arc.
@@ -110,11 +135,11 @@ impl<const M: usize> Motion<M> {
             tangent,
             bend,
             law,
-            pole: if general.is_some() {
-                None
-            } else {
-                law.pole::<M>(&counted(&tangent), &counted(&bend), p[0])
+            pole: match &general {
+                None => law.pole::<M>(&counted(&tangent), &counted(&bend), p[0]),
+                Some(general) => general.pole(&law, &tangent, p[0], direction * width),
             },
+            layer: Layer::new(&law, &tangent, [near, far], width),
             general,
             direction,
             width,
@@ -346,18 +371,23 @@ impl<const M: usize> Motion<M> {
         }
     }
 
-    /// About how far from `y` the arc's axis turns round, where p changes fast, on a piece that has no pole: by its tangent
-    /// and the slope of that.
+    /// About how far from `y` the arc's axis turns round, or the path where the speed along it is given: p changes fast
+    /// there, on a piece that has no pole. By the tangent and its slope.
     pub(super) fn way_to_turn(&self, y: f64) -> f64 {
-        let (Some(_), Law::AxisAcceleration { axis, .. } | Law::AxisVelocity { axis, .. }) =
-            (&self.general, self.law)
-        else {
+        if self.general.is_none() {
             return f64::INFINITY;
-        };
+        }
         let beside = if y < 0.5 { y + BESIDE } else { y - BESIDE };
         let [here, there] = [y, beside].map(|y| self.distance(y));
-        let (tangent, next) = (self.at(here).0[axis], self.at(there).0[axis]);
-        (tangent / (next - tangent) * (there - here)).abs()
+        let (tangent, next) = (self.at(here).0, self.at(there).0);
+        let change = from_to(&tangent, &next);
+        let share = match self.law {
+            Law::AxisAcceleration { axis, .. } | Law::AxisVelocity { axis, .. } => {
+                tangent[axis] / change[axis]
+            }
+            _ => length(&tangent) / length(&change),
+        };
+        (share * (there - here)).abs()
     }
 
     /// Whether `y` is an end where the recorded p is infinite.
@@ -449,6 +479,19 @@ impl<const M: usize> Motion<M> {
     /// What one rounding of an end of the arc is of its width.
     pub fn width_rounding(&self) -> f64 {
         EPS * self.grain
+    }
+}
+
+impl Layer {
+    /// On an arc of constant axis acceleration that the rules could step over it, with √p at both ends.
+    fn new<const M: usize>(law: &Law, tangent: &[f64; M], [near, far]: [f64; 2], width: f64) -> Option<Self> {
+        let Law::AxisAcceleration { axis, value, .. } = *law else { return None };
+        if near <= 0.0 || near >= STEPPED_OVER * far {
+            return None;
+        }
+        // p' at the anchor beside its mean.
+        let steeper = 2.0 * value.abs() * width / (tangent[axis].abs() * far * far);
+        Some(Self { thickness: near / far, strength: (1.0 - 1.0 / steeper.sqrt()).abs() })
     }
 }
 

@@ -357,9 +357,12 @@ impl<'a, const M: usize> Probe<'a, M> {
         let middle = self.clock(self.elapsed + 0.5 * time);
         self.elapsed += time;
         let held = self.motion.held_axis();
+        // The time is known as well as the width of the arc.
+        let in_time = ROUNDINGS * self.motion.width_rounding();
         for k in 0..M {
             let rounding = ROUNDINGS * EPS * (from.magnitude[k] + to.magnitude[k]) / time;
-            let acceleration = (to.velocity[k] - from.velocity[k]).abs() / time - rounding;
+            let mean = (to.velocity[k] - from.velocity[k]).abs() / time;
+            let acceleration = mean * (1.0 - in_time) - rounding;
             let limit = self.limits.acceleration[k];
             self.tally.offer(Check::Acceleration, k, acceleration, limit, middle, self.line);
             if held != Some(k) {

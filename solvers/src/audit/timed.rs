@@ -176,6 +176,14 @@ impl<'a, const M: usize> Reader<'a, M> {
 
     /// Where the profile is at `time`, in the reader's run.
     fn place_at(&self, time: f64) -> Option<Place> {
+        let (arc, motion, y) = self.motion_at(time)?;
+        let arcs = &self.timed.arcs;
+        let piece = arcs.piece[arc] as usize;
+        Some(Place { piece, u: motion.parameter(y, [arcs.u0[arc], arcs.u1[arc]]) })
+    }
+
+    /// The arc that `time` falls into, in the reader's run, and where on it the profile is then.
+    fn motion_at(&self, time: f64) -> Option<(usize, Motion<M>, f64)> {
         let (timed, run) = (&self.timed, self.timed.arcs_of(self.run));
         let time = time - timed.shift(self.run);
         let passed = timed.starts[run.clone()].partition_point(|&start| start <= time);
@@ -186,8 +194,7 @@ impl<'a, const M: usize> Reader<'a, M> {
         if !(since <= duration && arcs.u0[arc] < arcs.u1[arc]) {
             return None;
         }
-        let piece = arcs.piece[arc] as usize;
-        let motion = arcs.motion::<M>(arc, &self.path.curve(piece));
+        let motion = arcs.motion::<M>(arc, &self.path.curve(arcs.piece[arc] as usize));
         let wanted = if motion.anchored_at_end { duration - since } else { since };
         let (mut low, mut high) = (0.0, 1.0);
         for _ in 0..f64::MANTISSA_DIGITS {
@@ -198,7 +205,13 @@ impl<'a, const M: usize> Reader<'a, M> {
                 high = middle;
             }
         }
-        Some(Place { piece, u: motion.parameter(0.5 * (low + high), [arcs.u0[arc], arcs.u1[arc]]) })
+        Some((arc, motion, 0.5 * (low + high)))
+    }
+
+    /// The acceleration of each axis at `time`, in the reader's run: where the tool creeps back from a turn, the place of
+    /// a setpoint does not tell the ways to and from it apart.
+    pub fn acceleration_at(&self, time: f64) -> Option<[f64; M]> {
+        self.motion_at(time).map(|(_, motion, y)| motion.acceleration_near(y).0)
     }
 
     /// Least and greatest acceleration of each axis just before and just after `time`, at a place of the reader's arc.

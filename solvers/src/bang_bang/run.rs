@@ -368,8 +368,14 @@ fn push<const M: usize, const C: usize>(
     for arc in arcs {
         let t = if arc.x1 == 1.0 { part.to } else { part.from + span * arc.x1 };
         let weight = |x: f64| sub.weight.value(x);
-        // p = (dt/dτ)² from π of x.
-        let p = |pi: f64, x: f64| pi * weight(x).powi(4) * span * span;
+        // p = (dt/dτ)² from π of x. At rest in a cusp p has no limit, and counts as 0.
+        let p = |pi: f64, x: f64, rests: bool| {
+            if rests && pi.is_infinite() {
+                0.0
+            } else {
+                pi * weight(x).powi(4) * span * span
+            }
+        };
         let way = |k: usize| distance(sub, k, arc.x0, arc.x1);
         let signed = |k: usize| {
             let a = task.axes.acceleration[k];
@@ -408,7 +414,9 @@ fn push<const M: usize, const C: usize>(
             },
         };
         let joins = joins && !matches!(kind, ArcKind::SpeedLine);
-        let p = [p(arc.pi[0], arc.x0), p(arc.pi[1], arc.x1)];
+        let rests = [matches!(arc.kind, Kind::Accelerating(_)), matches!(arc.kind, Kind::Braking(_))]
+            .map(|slow| slow && arc.slow_sq == 0.0);
+        let p = [p(arc.pi[0], arc.x0, rests[0]), p(arc.pi[1], arc.x1, rests[1])];
         out.push(number as u32, width, Row { kind, axis, value, t, p, duration, joins });
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::conic::Conic;
 use crate::quadratic::{norm, sub};
-use crate::spline::cusps::{rests_at_ends, CUSP};
+use crate::spline::cusps::rests_at_ends;
 use crate::spline::{bezier, CompositeCurve, Piece};
 
 /// Edges of a control polygon that are shorter than this part of it are none, as next to a cusp.
@@ -48,7 +48,7 @@ impl<const M: usize> Spline<M> {
             start: piece.control[0],
             start_edge,
             end_edge,
-            rests: rests_at_ends(piece, CUSP),
+            rests: rests_at_ends(piece),
         })
     }
 

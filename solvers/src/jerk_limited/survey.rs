@@ -176,8 +176,12 @@ pub fn survey<const M: usize>(
             last = there;
         }
     }
-    // Also what is not a number is no speed.
-    if let Some(station) = stations.iter().find(|station| station.cap.is_nan() || station.cap <= 0.0) {
+    // Also what is not a number is no speed; and no grid resolves a turn that is shorter than places are known.
+    let is_bad = |station: &&Station| {
+        let (cap, turns) = (station.cap, station.turning * slopes.shortest);
+        cap.is_nan() || cap <= 0.0 || turns.is_nan() || turns > 1.0
+    };
+    if let Some(station) = stations.iter().find(is_bad) {
         return Err(Fault::NoPlan { s: station.s });
     }
     Ok((densify(&stations, slopes, bounds), slopes))

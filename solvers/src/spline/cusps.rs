@@ -49,12 +49,10 @@ pub fn piece_cusps<const M: usize>(piece: &Piece<M>, tolerance: f64) -> Vec<f64>
     slow.into_iter().map(|part| least(h, part)).collect()
 }
 
-/// Whether a piece has a cusp at its start and at its end.
-pub fn rests_at_ends<const M: usize>(piece: &Piece<M>, tolerance: f64) -> [bool; 2] {
-    let hodograph = Hodograph::new(piece);
-    let h = hodograph.coefficients();
-    let greatest = h.iter().fold(0.0, |most: f64, v| most.max(dot(v, v)));
-    [h[0], h[h.len() - 1]].map(|end| dot(&end, &end) <= tolerance * tolerance * greatest)
+/// Whether C' is exactly 0 at the start of a piece and at its end.
+pub fn rests_at_ends<const M: usize>(piece: &Piece<M>) -> [bool; 2] {
+    let (control, last) = (piece.control, piece.degree());
+    [control[0] == control[1], control[last - 1] == control[last]]
 }
 
 /// Joins to `slow` the parts of [lo, hi] where |h|² may be at most `threshold`.

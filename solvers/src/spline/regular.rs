@@ -49,7 +49,6 @@ impl<const M: usize> Regular<M> {
             }
         }
         self.source.push(source);
-        self.rests.push(rests_at_ends(&self.curve.piece(last), CUSP));
     }
 }
 
@@ -138,6 +137,8 @@ pub fn regular<const M: usize>(given: &CompositeCurve<M>, ranges: &[Range<usize>
         straight.leave(rounding, &mut out);
         out.ranges.push(first..out.curve.len());
     }
+    out.curve = joined_in_cusps(&out.curve, rounding);
+    out.rests = out.curve.pieces().map(|piece| rests_at_ends(&piece)).collect();
     out
 }
 
@@ -318,37 +319,81 @@ fn near<const M: usize>(a: &[f64; M], b: &[f64; M], rounding: f64) -> bool {
     norm(&sub(a, b)) <= rounding
 }
 
-/// Appends a curved piece, cut in its cusps; control points that only rounding keeps from one are put there.
+/// Appends a curved piece, cut in its cusps.
 fn cut_in_cusps<const M: usize>(source: usize, piece: &Piece<M>, rounding: f64, out: &mut Regular<M>) {
     let cusps = piece_cusps(piece, CUSP);
-    if cusps.is_empty() {
-        return out.push([source; 2], piece, rounding);
-    }
     let inside = cusps.iter().filter(|t| (AT_END..=1.0 - AT_END).contains(*t));
     let cuts: Vec<f64> = inside.map(|t| t * piece.width).collect();
+    if cuts.is_empty() {
+        return out.push([source; 2], piece, rounding);
+    }
     let mut parts = CompositeCurve::default();
     split(piece, &cuts, &mut parts);
-    for i in 0..parts.len() {
-        let rests =
-            [i > 0 || cusps[0] < AT_END, i + 1 < parts.len() || cusps[cusps.len() - 1] > 1.0 - AT_END];
-        let control = parts.control_mut(i);
-        if rests[0] {
-            join_first(control.iter_mut(), rounding);
-        }
-        if rests[1] {
-            join_first(control.iter_mut().rev(), rounding);
-        }
-        let part = parts.piece(i);
-        if part.extent().0 > rounding {
-            out.push([source; 2], &part, rounding);
-        }
+    for part in parts.pieces().filter(|part| part.extent().0 > rounding) {
+        out.push([source; 2], &part, rounding);
     }
 }
 
-/// Puts the points that follow the first one within rounding there.
-fn join_first<'a, const M: usize>(mut points: impl Iterator<Item = &'a mut [f64; M]>, rounding: f64) {
+/// The same curve with the control points next to a cusp put there, on both sides of it: the tool rests where C' is
+/// exactly 0. What has become a line is one.
+fn joined_in_cusps<const M: usize>(curve: &CompositeCurve<M>, rounding: f64) -> CompositeCurve<M> {
+    let sides = |piece| [false, true].map(|at_end| turns_in_cusp(&piece, at_end, rounding));
+    let sides: Vec<[Option<bool>; 2]> = curve.pieces().map(sides).collect();
+    let mut out = CompositeCurve::default();
+    for (i, piece) in curve.pieces().enumerate() {
+        let before = i.checked_sub(1).and_then(|before| sides[before][1]);
+        let after = sides.get(i + 1).and_then(|after| after[0]);
+        let [start, end] = [(sides[i][0], before), (sides[i][1], after)]
+            .map(|(own, beside)| own.is_some_and(|turns| turns || beside == Some(true)));
+        if !start && !end {
+            out.push(piece.control, piece.weights, piece.width);
+            continue;
+        }
+        let mut control = piece.control.to_vec();
+        let reach = cusp_reach(&piece, rounding);
+        if start {
+            join_first(control.iter_mut(), reach);
+        }
+        if end {
+            join_first(control.iter_mut().rev(), reach);
+        }
+        let joined = Piece { control: &control, ..piece };
+        match course(i, &joined, rounding) {
+            Course::Straight(ends) if ends.len() == 2 => {
+                out.push(&[ends[0].point, ends[1].point], &[], piece.width);
+            }
+            _ => out.push(joined.control, joined.weights, joined.width),
+        }
+    }
+    out
+}
+
+/// How near to an end of a piece the next control point is in a cusp. The way turns there within reach² over the length
+/// of the piece, which is rounding; and no place is moved by more than `CUSP` of the greatest coordinate.
+fn cusp_reach<const M: usize>(piece: &Piece<M>, rounding: f64) -> f64 {
+    let size = rounding / ROUNDING;
+    (rounding * piece.extent().0).sqrt().min(CUSP * size).max(rounding)
+}
+
+/// Whether the way turns in the cusp at an end of a piece, or nothing but rounding says where it goes; None where no cusp is.
+fn turns_in_cusp<const M: usize>(piece: &Piece<M>, at_end: bool, rounding: f64) -> Option<bool> {
+    let (control, last, reach) = (piece.control, piece.degree(), cusp_reach(piece, rounding));
+    let away = |n: usize| match at_end {
+        false => sub(&control[n], &control[0]),
+        true => sub(&control[last - n], &control[last]),
+    };
+    let edge = away(1);
+    if norm(&edge) > reach {
+        return None;
+    }
+    let long = (2..=last).map(away).find(|edge| norm(edge) > reach)?;
+    Some(norm(&edge) <= rounding || !is_smooth(&edge, &long, rounding))
+}
+
+/// Puts the points that follow the first one within reach of it there.
+fn join_first<'a, const M: usize>(mut points: impl Iterator<Item = &'a mut [f64; M]>, reach: f64) {
     let Some(&mut first) = points.next() else { return };
-    for point in points.take_while(|point| near(point, &first, rounding)) {
+    for point in points.take_while(|point| near(point, &first, reach)) {
         *point = first;
     }
 }
@@ -439,6 +484,30 @@ mod tests {
         let control = &made.curve.control;
         assert!(control[2] == control[3] && control[3] == control[4] && control[4] == control[5]);
         assert!(norm(&control[3]) < 1e-16 && (made.curve.width[0] - 0.6).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_turn_within_rounding_is_a_cusp_on_both_sides() {
+        // (s², 1e-10 s + s³) about t = 0.3: the way turns back within 1e-20.
+        let blossom = |a: f64, b: f64, e: f64| {
+            let [a, b, e] = [a, b, e].map(|x| x - 0.3);
+            [(a * b + a * e + b * e) / 3.0, 1e-10 * (a + b + e) / 3.0 + a * b * e]
+        };
+        let control = [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 1.0], [1.0, 1.0, 1.0]]
+            .map(|[a, b, e]| blossom(a, b, e));
+        let made = of(&control, &[]);
+        assert_eq!(made.rests, [[false, true], [true, false]]);
+        // Where the way goes on, it is slow and no more: (s³ + 1e-10 s, s⁴).
+        let along = |t: f64| [(t - 0.3).powi(3) + 1e-10 * (t - 0.3), (t - 0.3).powi(4)];
+        let rate = |t: f64| [3.0 * (t - 0.3).powi(2) + 1e-10, 4.0 * (t - 0.3).powi(3)];
+        let control = {
+            let ([p, v], [q, w]) = ([along(0.0), rate(0.0)], [along(1.0), rate(1.0)]);
+            let [a, c] = [[0, 1].map(|k| p[k] + v[k] / 4.0), [0, 1].map(|k| q[k] - w[k] / 4.0)];
+            // The middle point by the blossoms at (0, 0, 1, 1).
+            let x = (2.0 * 0.09 * 0.7 - 2.0 * 0.3 * 0.49) / 4.0 + 0.2e-10;
+            [p, a, [x, 0.09 * 0.49], c, q]
+        };
+        assert_eq!(of(&control, &[]).rests, [[false; 2]; 2]);
     }
 
     #[test]

@@ -1,0 +1,96 @@
+"""Curves made to break planners: what is planned keeps every limit, the rest is refused in a sentence."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import feedplan
+from feedplan.curves.composite import JointKind
+from feedplan.errors import FeedplanError
+from feedplan.geometry.path import Path
+from feedplan.planners import limits_jerk
+from tests.campaign import seeds
+from tests.planners.audited import LONGEST, audited
+from tests.planners.differences import exceeded
+from tests.planners.random_paths import awkward_case
+
+METHODS = ("bang-bang", "jerk-limited", "s-curve")
+# They keep accelerations on lines; on curves they look at places, and the audit tells what they miss.
+CONTROLLERS = ("arc-transition", "constant-velocity-transition", "junction-deviation", "tangential")
+COUNT = seeds(18)
+# They are run in so many parts, beside each other.
+PARTS = 3
+
+
+def has_steps_of_curvature(path: Path) -> bool:
+    """Whether accelerations step at a joint that is passed: third differences show such a step as jerk."""
+    joints = path.curve.joints()
+    inside = ~np.isin(joints.piece + 1, path.runs)
+    return bool((joints.kind[inside] < JointKind.C2).any())
+
+
+def faults(seed: int, method: str) -> list[str]:
+    """What is wrong with the plan of a seed's curve by a method that keeps its limits on every curve."""
+    path, machine = awkward_case(seed)
+    made = feedplan.plan(path, machine, method=method)
+    jerk = limits_jerk(method)
+    found = list(audited(made.problem, made.profile, machine, jerk=jerk))
+    if made.time < made.lower_bound:
+        found.append(f"{made.time} s is below the bound, {made.lower_bound} s")
+    if not np.isfinite([made.profile.p0, made.profile.p1]).all():
+        found.append("p is infinite")
+    if made.time <= LONGEST:
+        points = made.setpoints().all()
+        found += exceeded(points, machine, machine.period, jerk and not has_steps_of_curvature(path))
+        end = path.curve.control_points[-1]
+        if np.abs(points.position[-1] - end).max() > 1e-12 * np.abs(path.curve.control_points).max():
+            found.append(f"the last setpoint is not the end of the path, {end}")
+    return [f"{seed}: {sentence}" for sentence in found]
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("part", range(PARTS))
+def test_random_awkward_curves_keep_every_limit(part: int, method: str) -> None:
+    found = []
+    for seed in range(part, COUNT, PARTS):
+        found += faults(seed, method)
+    assert found == []
+
+
+# Turns within 1e-20 mm between pieces that do not stand still (439, 652, 824); the time of an arc that begins
+# at a crawl (473); a direction that changes within a millisecond at the feed (711); a rest in a cusp of order
+# 4 (1056).
+@pytest.mark.parametrize("seed", [439, 473, 652, 711, 824, 1056])
+def test_curves_that_broke_the_exact_planner_or_its_audit(seed: int) -> None:
+    assert faults(seed, "bang-bang") == []
+
+
+# A turn finer than any grid (71), a rest whose place is that of the way to it (194).
+@pytest.mark.parametrize("method", ["jerk-limited", "s-curve"])
+@pytest.mark.parametrize("seed", [71, 194])
+def test_curves_that_broke_planners_with_a_limit_of_jerk_or_their_audit(seed: int, method: str) -> None:
+    assert faults(seed, method) == []
+
+
+def test_segments_are_as_short_as_the_turns_between_them() -> None:
+    # By segments of a 32nd of a piece this took 1000 s: they crept through the turn of a part.
+    path, machine = awkward_case(236)
+    assert feedplan.plan(path, machine, method="s-curve").time < 0.4
+
+
+@pytest.mark.parametrize("method", CONTROLLERS)
+def test_random_awkward_curves_do_not_look_fine_where_controllers_break_a_limit(method: str) -> None:
+    refused = []
+    for seed in range(COUNT):
+        path, machine = awkward_case(seed)
+        try:
+            made = feedplan.plan(path, machine, method=method)
+        except FeedplanError as error:
+            refused.append(str(error))
+            continue
+        assert np.isfinite(made.time), seed
+        if made.time <= LONGEST and made.audit().ok:
+            assert exceeded(made.setpoints().all(), machine, machine.period, jerk=False) == [], seed
+            assert made.time >= made.lower_bound, seed
+    assert all(sentence.startswith("line 0: ") for sentence in refused), refused
