@@ -40,8 +40,12 @@ LIMITS_JERK = True
 CORNERS = Corners.SMOOTH
 # Times that all joints are improved, at most, and the gain of one round below which steps are halved.
 ROUNDS, GAIN = 24, 3e-4
-# Steps of speed and acceleration as parts of their limits: the first, and the least.
-STEP, LEAST_STEP = 0.25, 0.002
+# Steps of speed and acceleration as parts of their limits: the first, and the least. All are whole numbers of
+# a grid, so that no rounding decides between states.
+STEP, LEAST_STEP, GRID = 0.25, 0.002, 2.0**-30
+# By what part of them the first speeds are lower than can be had, the first of these that does: the package
+# ruckig misses some motions that only just are possible.
+MARGINS = [2.0**-k for k in range(24, -1, -1)]
 # A motion may be out of its limits by rounding, as a part of them. What is quicker is so by more than that.
 ROUNDING = 1e-9
 # Halvings for a speed that can be reached: to the last digit.
@@ -102,14 +106,21 @@ class Stretch:
     segments: list[Segment]
     speeds: list[float]
 
-    def first_states(self) -> list[State]:
-        """The greatest speeds without acceleration that lead from one to the next."""
+    def state(self, i: int, share: State) -> State:
+        """Speed and acceleration where segment i begins, from their parts of the limits there."""
+        before, after = self.segments[i - 1], self.segments[i]
+        return share[0] * self.speeds[i], share[1] * min(before.acceleration, after.acceleration)
+
+    def first_shares(self, margin: float) -> list[State]:
+        """The greatest speeds without acceleration that lead from one to the next, as parts of the limits,
+        each lower by a part of it."""
         v = list(self.speeds)
         for i, segment in enumerate(self.segments):
             v[i + 1] = min(v[i + 1], segment.highest(v[i]))
         for i, segment in reversed(list(enumerate(self.segments))):
             v[i] = min(v[i], segment.highest(v[i + 1]))
-        return [((1 - ROUNDING) * speed, 0.0) for speed in v]
+        parts = (speed / most if most > 0 else 0.0 for speed, most in zip(v, self.speeds, strict=True))
+        return [(GRID * math.floor((1 - margin) * part / GRID), 0.0) for part in parts]
 
 
 class Motions:
@@ -236,20 +247,27 @@ def _speeds(problem: Problem, guide: SpeedProfile, piece: NDArray[np.uint32], u:
 
 
 def _improved(stretch: Stretch, motions: Motions, deadline: float) -> list[Section]:
-    """The sections of the quickest profile found; none where the first one is none."""
-    segments, states = stretch.segments, stretch.first_states()
-    durations = [
-        motions.duration(segment, *ends) for segment, ends in zip(segments, pairwise(states), strict=True)
-    ]
-    if not math.isfinite(sum(durations)):
+    """The sections of the quickest profile found; none where there are no segments, or none is found."""
+    segments, inner = stretch.segments, range(1, len(stretch.segments))
+    for margin in MARGINS:
+        shares = stretch.first_shares(margin)
+        states = [(0.0, 0.0)] * len(shares)
+        for i in inner:
+            states[i] = stretch.state(i, shares[i])
+        durations = [
+            motions.duration(segment, *ends) for segment, ends in zip(segments, pairwise(states), strict=True)
+        ]
+        if math.isfinite(sum(durations)):
+            break
+    else:
         return []
-    step, inner = STEP, range(1, len(segments))
+    step = STEP
     for count in range(ROUNDS):
         before = sum(durations)
         for i in inner if count % 2 == 0 else reversed(inner):
             if time.perf_counter() >= deadline:
                 break
-            _improve(stretch, motions, states, durations, i, step)
+            _improve(stretch, motions, shares, states, durations, i, step)
         if before - sum(durations) < GAIN * before:
             step /= 2
         if step < LEAST_STEP or time.perf_counter() >= deadline:
@@ -265,6 +283,7 @@ def _improved(stretch: Stretch, motions: Motions, deadline: float) -> list[Secti
 def _improve(
     stretch: Stretch,
     motions: Motions,
+    shares: list[State],
     states: list[State],
     durations: list[float],
     i: int,
@@ -272,21 +291,17 @@ def _improve(
 ) -> None:
     """Takes a step of the state between segments i − 1 and i that makes both quicker together."""
     before, after = stretch.segments[i - 1], stretch.segments[i]
-    most = stretch.speeds[i]
-    steepest = min(before.acceleration, after.acceleration)
-    v, a = states[i]
+    speed, acceleration = shares[i]
     for dv, da in ((1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1), (-1, 0)):
-        state = (
-            min(max(v + dv * step * most, 0.0), most),
-            min(max(a + da * step * steepest, -steepest), steepest),
-        )
-        if state == (v, a):
+        share = min(max(speed + dv * step, 0.0), 1.0), min(max(acceleration + da * step, -1.0), 1.0)
+        if share == shares[i]:
             continue
+        state = stretch.state(i, share)
         most_time = (1 - ROUNDING) * (durations[i - 1] + durations[i])
         first = motions.duration(before, states[i - 1], state)
         if first >= most_time:
             continue
         second = motions.duration(after, state, states[i + 1])
         if first + second < most_time:
-            states[i], durations[i - 1], durations[i] = state, first, second
+            shares[i], states[i], durations[i - 1], durations[i] = share, state, first, second
             return

@@ -13,7 +13,7 @@ use crate::feed;
 use crate::jerk_arcs::Arcs;
 use crate::jerk_limited::{Effort, Geometry, Limits, Place};
 use crate::jerk_limited_path::Task;
-use crate::path_dynamics::{allowable, bounded, greatest, AxisLimits, Curve, Shape};
+use crate::path_dynamics::{allowable, bounded, greatest, Allowable, AxisLimits, Curve, Shape};
 use crate::s_curve::{self, Section, Segment};
 use crate::spline::bezier::split;
 use crate::spline::CompositeCurve;
@@ -30,8 +30,10 @@ const HELD: f64 = 0.998;
 const CLOSE: f64 = 1e-9;
 
 /// Halves of a part are parts of their own where one may be passed faster than both together by more than this part of
-/// the speed, and halvings of a piece; more of them where it is by so much, which is next to a tight turn.
+/// the speed, at some places of them; and halvings of a piece. More of them where the bounds of one half allow so much
+/// more speed than those of both, which is next to a tight turn.
 const WORTH: f64 = 0.05;
+const LOOKED: usize = 9;
 const DEPTH: u32 = 5;
 const WELL_WORTH: f64 = 1.0;
 const MOST_DEPTH: u32 = 40;
@@ -226,20 +228,44 @@ impl<'a, const M: usize> Parts<'a, M> {
     /// Appends a part, or its halves where that is worth it.
     fn halve(&mut self, part: usize, [from, to]: [f64; 2], whole: (Shape<M>, f64), depth: u32) {
         let middle = 0.5 * (from + to);
-        let [left, right] =
-            [[from, middle], [middle, to]].map(|ends| (ends, shape(self.problem, self.path, part, ends)));
-        let most = |(shape, cap): &(Shape<M>, f64)| greatest(shape, &self.axes, *cap);
-        let slow = most(&whole);
-        let fast = most(&left.1).speed.max(most(&right.1).speed);
-        let reached = slow.limits.highest(slow.speed, middle - from);
-        let worth = if depth < DEPTH { WORTH } else { WELL_WORTH };
-        if depth == MOST_DEPTH || fast.min(reached) <= (1.0 + worth) * slow.speed {
+        let halves = [[from, middle], [middle, to]].map(|ends| (ends, shape(self.problem, self.path, part, ends)));
+        let by_places = depth < DEPTH && self.is_worth(part, [from, to]);
+        if by_places || depth < MOST_DEPTH && self.is_well_worth(&whole, &halves) {
+            for (ends, half) in halves {
+                self.halve(part, ends, half, depth + 1);
+            }
+        } else {
             self.push([from, to], whole);
-            return;
         }
-        for (ends, half) in [left, right] {
-            self.halve(part, ends, half, depth + 1);
-        }
+    }
+
+    /// Whether, by the bounds of both, one half may be passed far faster than both together, as far as the axes reach.
+    fn is_well_worth(&self, whole: &(Shape<M>, f64), halves: &[([f64; 2], (Shape<M>, f64)); 2]) -> bool {
+        let most = |(shape, cap): &(Shape<M>, f64)| greatest(shape, &self.axes, *cap);
+        let [([from, middle], left), (_, right)] = halves;
+        let slow = most(whole);
+        let reached = slow.limits.highest(slow.speed, middle - from);
+        most(left).speed.max(most(right).speed).min(reached) > (1.0 + WELL_WORTH) * slow.speed
+    }
+
+    /// Whether, by some of their places, one half may be passed faster than both together, as far as the axes reach.
+    fn is_worth(&self, part: usize, [from, to]: [f64; 2]) -> bool {
+        let looked: [Allowable; LOOKED] = std::array::from_fn(|i| {
+            let place = self.path.at(part, from + (to - from) * i as f64 / (LOOKED - 1) as f64);
+            let [first, second, third] = [place.first, place.second, place.third].map(|q| q.map(f64::abs));
+            greatest(&Shape { first, second, third, curvature: 0.0 }, &self.axes, place.speed_cap)
+        });
+        let least = |places: &[Allowable], of: fn(&Allowable) -> f64| {
+            places.iter().map(of).fold(f64::INFINITY, f64::min)
+        };
+        let [left, right] =
+            [&looked[..=LOOKED / 2], &looked[LOOKED / 2..]].map(|half| least(half, |at| at.speed));
+        let limits = s_curve::Limits {
+            acceleration: least(&looked, |at| at.limits.acceleration),
+            jerk: least(&looked, |at| at.limits.jerk),
+        };
+        let slow = left.min(right);
+        left.max(right).min(limits.highest(slow, 0.5 * (to - from))) > (1.0 + WORTH) * slow
     }
 
     /// The segments; None where one has no speed, or one that the axes creep at.

@@ -10,6 +10,8 @@ from feedplan.geometry.path import Path
 from feedplan.machine.machine import Axis, Machine
 from feedplan.planners import methods, planner
 from feedplan.planners.junction_deviation import GRBL_DEVIATION
+from tests.campaign import seeds
+from tests.planners.random_paths import random_case
 
 CLOSE = 1e-6
 # Of the axes X, Y, Z [mm/s, mm/s², mm/s³].
@@ -41,3 +43,13 @@ def test_scaling_all_lengths_changes_no_time(method: str, name: str) -> None:
 
     for scale in (1e-3, 1e3):
         assert time(scale) == pytest.approx(time(1.0), rel=CLOSE)
+
+
+@pytest.mark.parametrize("method", ["bang-bang", "s-curve", "ruckig"])
+def test_scaling_all_lengths_changes_no_time_of_random_curves(method: str) -> None:
+    found = {}
+    for seed in range(seeds(20)):
+        times = [planner(method)(random_case(seed, scale)[0]).time for scale in (1.0, 1e-3, 1e3)]
+        if max(times) > (1 + CLOSE) * min(times):
+            found[seed] = times
+    assert found == {}
