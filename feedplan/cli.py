@@ -20,6 +20,7 @@ import click
 from feedplan import __version__, console, outputs, planners
 from feedplan.comparison import TIME_LIMIT
 from feedplan.errors import FeedplanError, InfeasibleError, SolverError
+from feedplan.geometry.corners import PATHS, FollowedPath
 from feedplan.machine.machine import Axis, Machine, bundled_machines
 from feedplan.setpoints import INTERPOLATORS, Interpolator
 
@@ -105,7 +106,7 @@ _TOLERANCE = click.option(
 )
 _PATH = click.option(
     "--path",
-    type=click.Choice(("as-fitted", "fastest")),
+    type=click.Choice(PATHS),
     default="as-fitted",
     show_default=True,
     help="Smooth paths keep the size of arcs, or cut them up to the tolerance.",

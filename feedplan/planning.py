@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import Any, Literal, get_args
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,7 +21,7 @@ from feedplan.audit import Audit, audit
 from feedplan.bound import lower_bound
 from feedplan.constraints.problem import Problem, build_problem, speed_square
 from feedplan.geometry.build import build_path
-from feedplan.geometry.corners import Corners
+from feedplan.geometry.corners import PATHS, Corners, FollowedPath
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
 from feedplan.outputs import FORMAT
@@ -47,10 +47,6 @@ from feedplan.trajectory import State, Trajectory
 from feedplan.units import counted
 
 Progress = Callable[[str, float], None]
-
-# What smooth paths do with the size of arcs and bends.
-FollowedPath = Literal["as-fitted", "fastest"]
-PATHS: tuple[FollowedPath, ...] = get_args(FollowedPath)
 
 
 @dataclass(frozen=True, eq=False)

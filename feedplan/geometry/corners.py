@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 from enum import Enum
+from typing import Literal, get_args
+
+# What smooth paths do with the size of arcs and bends.
+FollowedPath = Literal["as-fitted", "fastest"]
+PATHS: tuple[FollowedPath, ...] = get_args(FollowedPath)
 
 
 class Corners(Enum):

@@ -228,7 +228,8 @@ impl<'a, const M: usize> Parts<'a, M> {
     /// Appends a part, or its halves where that is worth it.
     fn halve(&mut self, part: usize, [from, to]: [f64; 2], whole: (Shape<M>, f64), depth: u32) {
         let middle = 0.5 * (from + to);
-        let halves = [[from, middle], [middle, to]].map(|ends| (ends, shape(self.problem, self.path, part, ends)));
+        let halves =
+            [[from, middle], [middle, to]].map(|ends| (ends, shape(self.problem, self.path, part, ends)));
         let by_places = depth < DEPTH && self.is_worth(part, [from, to]);
         if by_places || depth < MOST_DEPTH && self.is_well_worth(&whole, &halves) {
             for (ends, half) in halves {

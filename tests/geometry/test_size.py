@@ -19,7 +19,7 @@ from feedplan.geometry.build import build_path
 from feedplan.geometry.corners import Corners
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
-from feedplan.plan import plan
+from feedplan.planning import plan
 from feedplan.program.gcode import read_gcode
 from feedplan.program.program import Program
 from tests.campaign import examples
