@@ -94,6 +94,7 @@ def cases(tmp_path: FilePath) -> dict[str, tuple[Callable[..., Any], dict[str, A
         "start_speed": 0.0,
         "end_speed": 0.0,
         "interpolator": "newton",
+        "path": "as-fitted",
         "progress": None,
     }
     spline = {"control_points": POINTS, "knots": KNOTS, "degree": 2}
