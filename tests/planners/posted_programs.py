@@ -70,7 +70,7 @@ class _Post:
     def timed(self, words: dict[str, float], minutes: float) -> None:
         """A line that takes `minutes` at least."""
         rate = float(f"{1.0 / minutes:.6g}")
-        step = self._step(words)
+        step = self._end(words) - self.at
         linear = np.linalg.norm([step[k] for k in range(len(step)) if self.axes[k] in LINEAR])
         way = linear if linear > 0 else np.linalg.norm(step)
         self._move("G1", words, float(way) * rate / 60.0, f"F{rate:.6g}")
@@ -94,16 +94,17 @@ class _Post:
     def scale(self) -> NDArray[np.float64]:
         return np.array([self.unit if axis in LINEAR else 1.0 for axis in self.axes])
 
-    def _step(self, words: dict[str, float]) -> NDArray[np.float64]:
-        return np.array([round(words.get(axis, self.at[k]), 6) for k, axis in enumerate(self.axes)]) - self.at
+    def _end(self, words: dict[str, float]) -> NDArray[np.float64]:
+        return np.array([round(words.get(axis, self.at[k]), 6) for k, axis in enumerate(self.axes)])
 
     def _move(self, code: str, words: dict[str, float], speed: float, more: str = "") -> None:
-        step = self._step(words)
+        end = self._end(words)
+        step = end - self.at
         if not np.abs(step).max() > 0:
             return
         text = " ".join(f"{axis}{value:.6f}" for axis, value in words.items())
         self.block(f"{code} {text} {more}".rstrip())
-        self.at = self.at + step
+        self.at = end
         self.corners.append(self.at)
         moves_linear = any(step[k] != 0 for k in range(len(step)) if self.axes[k] in LINEAR)
         if moves_linear:
