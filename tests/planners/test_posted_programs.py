@@ -20,8 +20,8 @@ SEEDS = seeds(18)
 PARTS = 2
 # What states between segments may be improved for: their first ones are a plan [s].
 TIME_LIMITS = {"ruckig": 0.2}
-# Plans of more than this time [s] are judged by their profile alone.
-LONGEST = 120.0
+# Programs of more setpoints are planned for a machine of a longer period, in which they have so many.
+MOST_SETPOINTS = 60_000
 
 
 @pytest.mark.parametrize("method", ["bang-bang", "jerk-limited", "ruckig", "s-curve"])
@@ -40,11 +40,13 @@ def faults(seed: int, method: str, folder: Path) -> list[str]:
     file.write_text(posted.text)
     try:
         made = plan(file, posted.machine, method=method, time_limit=TIME_LIMITS.get(method))
+        if made.time > MOST_SETPOINTS * posted.machine.period:
+            longer = posted.machine.with_period(made.time / MOST_SETPOINTS)
+            posted = replace(posted, machine=longer)
+            made = plan(file, longer, method=method, time_limit=TIME_LIMITS.get(method))
         made.audit()
     except FeedplanError as error:
         return [str(error)]
-    if made.time > LONGEST:
-        return list(made.audit().failures)
     points = made.setpoints().all()
     period = posted.machine.period
     return [
