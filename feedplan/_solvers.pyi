@@ -1,6 +1,6 @@
 """Types of the native module."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, final
 
 import numpy as np
@@ -69,7 +69,10 @@ _Profile = tuple[
 # Its accelerations at both ends of the arcs, and `kinked`.
 _Changes = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.uint32]]
 
-def plan_bang_bang(problem: Problem) -> _Profile: ...
+# Who is told how far the work is, 0 to 1; what it raises ends the work and is raised.
+_Progress = Callable[[float], None]
+
+def plan_bang_bang(problem: Problem, progress: _Progress | None = None) -> _Profile: ...
 def plan_curves(problem: Problem) -> _Profile: ...
 def plan_jerk_limited(
     problem: Problem,
@@ -77,9 +80,14 @@ def plan_jerk_limited(
     resolution: float,
     tolerance: float,
     time_limit: float | None = None,
+    progress: _Progress | None = None,
 ) -> tuple[_Profile, _Changes, tuple[bool, float]]: ...
 def bound_jerk_limited(
-    problem: Problem, jerk: NDArray[np.float64], profile: SpeedProfile, time_limit: float | None = None
+    problem: Problem,
+    jerk: NDArray[np.float64],
+    profile: SpeedProfile,
+    time_limit: float | None = None,
+    progress: _Progress | None = None,
 ) -> float: ...
 def plan_s_curve(
     problem: Problem,
@@ -87,6 +95,7 @@ def plan_s_curve(
     cuttings: Sequence[tuple[float, float]],
     look_ahead: int,
     time_limit: float | None = None,
+    progress: _Progress | None = None,
 ) -> tuple[_Profile, _Changes]: ...
 def path_segments(
     problem: Problem,
@@ -109,7 +118,7 @@ def profile_of_sections(
     offsets: NDArray[np.int64],
     sections: NDArray[np.float64],
 ) -> tuple[_Profile, _Changes]: ...
-def lower_bound(problem: Problem, profile: SpeedProfile) -> float: ...
+def lower_bound(problem: Problem, profile: SpeedProfile, progress: _Progress | None = None) -> float: ...
 def feed_between(
     problem: Problem, piece: NDArray[np.int64], u0: NDArray[np.float64], u1: NDArray[np.float64]
 ) -> NDArray[np.float64]: ...
@@ -160,6 +169,7 @@ class Sampler:
         arc_runs: NDArray[np.int64],
         period: float,
         newton: bool,
+        progress: _Progress | None = None,
     ) -> Sampler: ...
     @property
     def count(self) -> int: ...
@@ -178,6 +188,7 @@ def read_gcode(
     tip_control: object | None,
     block_delete: bool,
     max_moves: int,
+    progress: _Progress | None = None,
 ) -> dict[str, Any]: ...
 def fit_points(
     points: NDArray[np.float64],
@@ -219,6 +230,7 @@ def build_path(
     max_speed: float,
     corner_angle: float,
     corners: str,
+    progress: _Progress | None = None,
 ) -> tuple[
     tuple[
         tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.int64], NDArray[np.float64]],
@@ -241,6 +253,7 @@ def audit_plan(
     feed: NDArray[np.float64],
     profile: SpeedProfile | None = None,
     program: Program | None = None,
+    progress: _Progress | None = None,
 ) -> _Findings: ...
 def audit_places(
     curve: CompositeCurve, piece: NDArray[np.int64], u: NDArray[np.float64]
@@ -264,6 +277,7 @@ class SetpointAudit:
         velocity: NDArray[np.float64] | None = None,
         acceleration: NDArray[np.float64] | None = None,
         line: NDArray[np.int32] | None = None,
+        progress: _Progress | None = None,
     ) -> None: ...
     def finish(self) -> _Findings: ...
 
@@ -362,6 +376,7 @@ class CurveLength:
         offsets: NDArray[np.int64],
         width: NDArray[np.float64],
         accuracy: float,
+        progress: _Progress | None = None,
     ) -> CurveLength: ...
     @property
     def total(self) -> float: ...

@@ -133,8 +133,8 @@ def file_path(value: object, what: str, remedy: str) -> FilePath:
     return FilePath(text)
 
 
-def callback(value: Any, what: str = "progress") -> Any:
+def callback(value: Any, told: str = "the stage and the part done") -> Any:
     """A function, or None; raises InputError for anything else."""
     if value is None or callable(value):
         return value
-    raise refuse(what, value, "a function that is called with the stage and the part done, or None")
+    raise refuse("progress", value, f"a function that is called with {told}, or None")

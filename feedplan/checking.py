@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
-from feedplan.arguments import flag, not_negative, number
+from feedplan.arguments import callback, flag, not_negative, number
 from feedplan.audit import Audit, audit_setpoints
 from feedplan.errors import InputError
 from feedplan.files import SUMMARY_FILE
@@ -24,6 +24,7 @@ from feedplan.machine.file import parse
 from feedplan.machine.machine import Machine
 from feedplan.outputs import SetpointFile, load_setpoints, require_format
 from feedplan.planners import corners, limits_jerk, methods
+from feedplan.progress import Progress, of_stage, tell
 
 # What the last time of setpoints may differ from the plan's by rounding, relative.
 ROUNDING = 1e-9
@@ -35,17 +36,22 @@ def check(
     *,
     resolution: float = 0.0,
     jerk: bool = False,
+    progress: Progress | None = None,
 ) -> Audit:
     """Audits setpoints from files alone: those of a plan's folder, or a file.
 
     Where plan.json stands beside the setpoints they must be the ones of that plan. `machine`, or the name or
     file of one, replaces that of the plan. `resolution` [mm] is the last digit of rounded positions. Jerk is
-    judged where the plan's method limits it, or where `jerk` says so. Raises InputError for files that cannot
-    be read, contradict each other or were changed.
+    judged where the plan's method limits it, or where `jerk` says so. `progress(stage, done)` is called with
+    `read`, then `audit`, and the part of that stage that is done; what it raises ends the work and is raised
+    here. Raises InputError for files that cannot be read, contradict each other or were changed.
     """
     resolution = number(resolution, "the resolution", "0 or more", not_negative, "mm")
     jerk = flag(jerk, "jerk")
-    points = load_setpoints(place)
+    callback(progress)
+    reading, auditing = of_stage(progress, "read"), of_stage(progress, "audit")
+    tell(reading, 0.0)
+    points = load_setpoints(place, reading)
     file = points.file.parent / SUMMARY_FILE
     plan = _read(file) if file.exists() else None
     if plan is not None:
@@ -59,6 +65,7 @@ def check(
     else:
         known = Machine.of(machine)
     _require_units(points, known)
+    tell(reading, 1.0)
     return audit_setpoints(
         points.t,
         points.position,
@@ -72,6 +79,7 @@ def check(
         jerk=jerk or (plan is not None and limits_jerk(plan.method)),
         corners=plan is not None and corners(plan.method) is Corners.PROGRAMMED,
         period=plan.period if plan else points.period or known.period,
+        progress=auditing,
     )
 
 

@@ -348,10 +348,13 @@ def fit(program: str | IO[bytes], machine: str, tolerance: float | None, smooth:
     from feedplan.geometry.build import build_path
     from feedplan.geometry.corners import Corners
     from feedplan.program.read import read_program
+    from feedplan.progress import of_stage
 
     known = Machine.load(machine)
-    moves = read_program(program, known)
-    path = build_path(moves, known, tolerance, corners=Corners.SMOOTH if smooth else Corners.ROUNDED)
+    choice = Corners.SMOOTH if smooth else Corners.ROUNDED
+    with console.progress_bar(quiet=False) as progress:
+        moves = read_program(program, known, progress=of_stage(progress, "read"))
+        path = build_path(moves, known, tolerance, corners=choice, progress=of_stage(progress, "fit"))
     for warning in path.warnings:
         print(f"warning: {warning}", file=sys.stderr)
     ratios = {"spline_ratio": path.fit.spline_ratio, "polynomial_ratio": path.fit.polynomial_ratio}
@@ -380,7 +383,8 @@ def check(place: str, machine: str | None, resolution: float, jerk: bool, as_jso
     from feedplan.checking import check as check_files
     from feedplan.files import summary_text
 
-    audit = check_files(place, machine, resolution=resolution, jerk=jerk)
+    with console.progress_bar(quiet=False) as progress:
+        audit = check_files(place, machine, resolution=resolution, jerk=jerk, progress=progress)
     if as_json:
         sys.stdout.write(summary_text(audit.to_json()))
     else:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain
 from typing import Any
 
@@ -20,16 +21,20 @@ from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
 from feedplan.planners import MethodName, limits_jerk, options_of
 from feedplan.planners import methods as all_methods
-from feedplan.planning import OF_ALL_METHODS, Plan, Progress, plan
+from feedplan.planning import OF_ALL_METHODS, Plan, plan
 from feedplan.program.program import Program
 from feedplan.program.read import read_program
 from feedplan.program.source import Source
+from feedplan.progress import Progress
 
 # What the limits of machine and program are called in an audit.
 LIMITS = ("feed", "velocity", "acceleration", "jerk", "chord", "deviation")
 
 # What each method may take [s] unless the user says otherwise: solvers on meshes may need hours.
 TIME_LIMIT = 10.0
+
+# Where the stages of a plan begin and end in the work on one method, for the progress shown.
+STAGES = {"fit": (0.0, 0.2), "plan": (0.2, 0.6), "audit": (0.6, 1.0)}
 
 
 @dataclass(frozen=True)
@@ -115,18 +120,19 @@ def compare(
     machine = Machine.of(machine)
     if not isinstance(source, (Program, Path)):
         source = read_program(source, machine)
-    report = progress or (lambda stage, done: None)
     plans: list[tuple[MethodName, Plan | None, str | None]] = []
     for method, takes in has.items():
-        report(method, 0.0)
+        shown = partial(_show, progress, method)
+        shown("fit", 0.0)
         try:
             own = {name: value for name, value in options.items() if name in takes or name in OF_ALL_METHODS}
-            made = plan(source, machine, method, **own)
-            made.audit(lambda _, done, method=method: report(method, done))  # type: ignore[misc]
+            made = plan(source, machine, method, **own, progress=shown)
+            made.audit(shown)
             plans.append((method, made, None))
         except (InfeasibleError, MissingPackageError, SolverError) as error:
             plans.append((method, None, str(error)))
-        report(method, 1.0)
+        if progress:
+            progress(method, 1.0)
     bounds = [
         max((other.lower_bound for _, other, _ in plans if other and _bounds(other, made)), default=0.0)
         if made
@@ -136,6 +142,12 @@ def compare(
     return tuple(
         Row(method, made, bound, error) for (method, made, error), bound in zip(plans, bounds, strict=True)
     )
+
+
+def _show(progress: Progress | None, method: str, stage: str, done: float) -> None:
+    if progress and stage in STAGES:
+        start, end = STAGES[stage]
+        progress(method, start + (end - start) * done)
 
 
 def _bounds(other: Plan, made: Plan) -> bool:

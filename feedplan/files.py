@@ -6,7 +6,7 @@ import json
 import math
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from numbers import Real
 from pathlib import Path as FilePath
@@ -16,6 +16,7 @@ from feedplan.arguments import callback, file_path, list_of_names, refuse
 from feedplan.errors import InputError
 from feedplan.outputs import FormatName, Header, format_named
 from feedplan.outputs._staging import require_folder, staged
+from feedplan.progress import Progress, of_stage, part, tell
 
 if TYPE_CHECKING:
     from feedplan.comparison import Row
@@ -24,7 +25,9 @@ if TYPE_CHECKING:
 
 SUMMARY_FILE = "plan.json"
 COMPARISON_FILE = "comparison.json"
-_ROWS_AT_ONCE = 100_000
+_ROWS_AT_ONCE = 25_000
+# How far the writing is after the account, when the times of the setpoints are laid out, and after these.
+ACCOUNT, LAID_OUT, SETPOINTS = 0.08, 0.1, 0.75
 
 
 def write_plan(
@@ -32,7 +35,7 @@ def write_plan(
     folder: str | os.PathLike[str],
     formats: Sequence[FormatName] = ("npz",),
     *,
-    progress: Callable[[str, float], None] | None = None,
+    progress: Progress | None = None,
 ) -> tuple[FilePath, ...]:
     """Writes the plan, its setpoints in these formats (none for ()), and its report; returns the files.
 
@@ -54,12 +57,18 @@ def write_plan(
     for name, output in outputs.items():
         if (other := by_file[output.FILE]) != name:
             raise InputError(f"{name} and {other} are both {output.FILE}: ask for one of them")
-    audit = plan.audit()
-    setpoints = plan.setpoints()
+    audit = plan.audit(progress)
+    share = of_stage(progress, "write")
+    tell(share, 0.0)
+    account = plan.make_account(part(share, 0.0, ACCOUNT))
+    tell(share, ACCOUNT)
+    setpoints = plan.setpoints(progress=part(share, ACCOUNT, LAID_OUT))
+    tell(share, LAID_OUT)
+    report = part(share, LAID_OUT, SETPOINTS)
     units = tuple(plan.machine.axis(name).unit for name in setpoints.axes)
     header = Header(setpoints.axes, units, setpoints.period)
     figures = SetpointFigures(
-        plan.problem, plan.account.motion, setpoints.count, [check.time for check in audit.broken]
+        plan.problem, account.motion, setpoints.count, [check.time for check in audit.broken]
     )
     with staged(folder, last=SUMMARY_FILE) as stage:
         with ExitStack() as stack:
@@ -70,23 +79,23 @@ def write_plan(
             for chunk in _timed(setpoints.chunks(_ROWS_AT_ONCE), plan.compute):
                 for sink in (*sinks, figures.add):
                     sink(chunk)
-                if progress:
-                    progress("write", 0.95 * figures.count / max(setpoints.count, 1))
+                tell(report, figures.count / max(setpoints.count, 1))
         summary = plan.summary()
+        tell(share, SETPOINTS)
         write_report(
             stage / REPORT_FILE,
             summary=summary,
             problem=plan.problem,
             profile=plan.profile,
-            account=plan.account,
+            account=account,
             audit=audit,
             figures=figures,
             text=plan.program.text if plan.program else None,
+            progress=part(share, SETPOINTS, 1.0),
         )
         (stage / SUMMARY_FILE).write_text(summary_text(summary), encoding="utf-8")
         names = sorted(file.name for file in stage.iterdir())
-    if progress:
-        progress("write", 1.0)
+    tell(share, 1.0)
     return tuple(folder / name for name in names)
 
 
@@ -94,7 +103,7 @@ def write_comparison(
     rows: Sequence[Row],
     folder: str | os.PathLike[str],
     summary: dict[str, Any],
-    progress: Callable[[str, float], None] | None = None,
+    progress: Progress | None = None,
 ) -> tuple[FilePath, ...]:
     """Writes a comparison's numbers (`summary`) and its page; returns the files.
 

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,7 @@ from feedplan.constraints.problem import Problem, build_problem, speed_square
 from feedplan.geometry.build import build_path
 from feedplan.geometry.corners import PATHS, Corners, FollowedPath
 from feedplan.geometry.path import Path
+from feedplan.lazy import cached_property
 from feedplan.machine.machine import Machine
 from feedplan.outputs import FORMAT
 from feedplan.planners import (
@@ -35,18 +36,23 @@ from feedplan.planners import (
     options_of,
     planner,
     tells_early,
+    tells_progress,
 )
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 from feedplan.program.read import read_program
 from feedplan.program.source import Source
+from feedplan.progress import Listener, Progress, of_stage, part
 from feedplan.report.account import Account, account
 from feedplan.setpoints import INTERPOLATORS, Interpolator, Setpoints, setpoints
 from feedplan.time_limit import TimeLimit
 from feedplan.trajectory import State, Trajectory
 from feedplan.units import counted
 
-Progress = Callable[[str, float], None]
+# How far the stage `plan` is when the profile is there, and the bound that is known for all methods.
+PLANNING, BOUND = 0.6, 0.8
+# How far an audit is when the times of the setpoints are laid out.
+LAID_OUT = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +76,7 @@ class Plan:
     warnings: tuple[str, ...] = field(default=())
     options: Mapping[str, Any] = field(default_factory=dict)
     _verdict: list[Audit] = field(default_factory=list, init=False, repr=False, compare=False)
+    _account: list[Account] = field(default_factory=list, init=False, repr=False, compare=False)
 
     def __repr__(self) -> str:
         name = self.program.name if self.program else "a path"
@@ -113,16 +120,24 @@ class Plan:
         """How far the time can be from the optimum at most: (time − lower_bound) / time."""
         return (self.time - self.lower_bound) / self.time if self.time > 0 else 0.0
 
-    def setpoints(self, period: float | None = None, interpolator: Interpolator | None = None) -> Setpoints:
+    def setpoints(
+        self,
+        period: float | None = None,
+        interpolator: Interpolator | None = None,
+        progress: Listener | None = None,
+    ) -> Setpoints:
         """Setpoints at the servo period [s] (the machine's unless given), computed as they are read.
 
-        Raises InputError for a period or an interpolator that cannot be used.
+        `progress` is told how far the laying out of their times is. Raises InputError for a period or an
+        interpolator that cannot be used.
         """
+        callback(progress, "the part done")
         return setpoints(
             self.problem,
             self.profile,
             self.machine.period if period is None else period,
             self.interpolator if interpolator is None else interpolator,
+            progress,
         )
 
     @cached_property
@@ -130,10 +145,18 @@ class Plan:
         """The plan as functions of time and length."""
         return Trajectory(self.problem, self.profile)
 
-    @cached_property
+    @property
     def account(self) -> Account:
         """What the time and the way are made of: limits, slow lines, stops, feed and rapid motion."""
-        return account(self.problem, self.profile, self.program, limits_jerk(self.method))
+        return self.make_account()
+
+    def make_account(self, progress: Listener | None = None) -> Account:
+        """The `account`, computed once; `progress` is told how far it is."""
+        callback(progress, "the part done")
+        if not self._account:
+            jerk = limits_jerk(self.method)
+            self._account.append(account(self.problem, self.profile, self.program, jerk, progress))
+        return self._account[0]
 
     def at(self, t: ArrayLike) -> State:
         """Position, velocity, acceleration, jerk and source line at one time or at times (n,) [s]; exact.
@@ -148,16 +171,16 @@ class Plan:
         """
         callback(progress)
         if not self._verdict:
-            share = (lambda done: progress("audit", done)) if progress else None
+            share = of_stage(progress, "audit")
             with _timed(self.compute, "audit"):
                 verdict = audit(
                     self.problem,
                     self.profile,
                     self.machine,
                     self.program,
-                    self.setpoints(),
+                    self.setpoints(progress=part(share, 0.0, LAID_OUT)),
                     jerk=limits_jerk(self.method),
-                    progress=share,
+                    progress=part(share, LAID_OUT, 1.0),
                 )
             self._verdict.append(verdict)
         return self._verdict[0]
@@ -235,7 +258,9 @@ def plan(
     bends, "fastest" cuts them as far as the tolerance allows. `feed` [mm/s] replaces the programmed feeds,
     `feed_override` multiplies them. `period` [s] replaces the machine's servo period; `start_speed` and
     `end_speed` [mm/s] hold at the ends. `interpolator` makes the setpoints: "sarfraz" or "newton".
-    `progress(stage, done)` is called as the work goes on.
+    `progress(stage, done)` is called some times a second as the work goes on, with `read`, `fit`, then
+    `plan`, and the part of that stage that is done, which never falls; what it raises ends the work and is
+    raised here.
 
     What some methods take besides, by keyword, with what holds where it is not given:
 
@@ -279,10 +304,18 @@ def plan(
     else:
         report("read", 0.0)
         with _timed(compute, "read"):
-            program = source if isinstance(source, Program) else read_program(source, machine)
+            if isinstance(source, Program):
+                program = source
+            else:
+                program = read_program(source, machine, progress=of_stage(progress, "read"))
+        report("read", 1.0)
         report("fit", 0.0)
         with _timed(compute, "fit"):
-            followed = build_path(program, machine, tolerance, corners=choice)
+            followed = build_path(
+                program, machine, tolerance, corners=choice, progress=of_stage(progress, "fit")
+            )
+        report("fit", 1.0)
+    share = of_stage(progress, "plan")
     report("plan", 0.0)
     with _timed(compute, "plan"):
         problem = build_problem(
@@ -293,20 +326,24 @@ def plan(
             start_speed=start_speed,
             end_speed=end_speed,
         )
+        report("plan", 0.0)
         if limit is not None:
             solve = partial(
                 solve, time_limit=limit.left, reserve=_following(limit, problem, machine, interpolator)
             )
+        if tells_progress(method):
+            solve = partial(solve, progress=part(share, 0.0, PLANNING))
         profile = solve(problem)
     with _timed(compute, "bound"):
-        least = lower_bound(problem, profile)
+        share_of_all = part(share, PLANNING, 1.0 if bound_of(method) is None else BOUND)
+        least = lower_bound(problem, profile, share_of_all)
         left = time_limit if limit is None else limit.left
         settings = {**options_of(method), **given}
         known = bound_of(
             method, **{name: left if name == "time_limit" else own for name, own in given.items()}
         )
         if known is not None:
-            least = max(least, known(problem, profile))
+            least = max(least, known(problem, profile, progress=part(share, BOUND, 1.0)))
         wanted = settings.get("accuracy", 0.0)
         short = shortfalls(
             profile,

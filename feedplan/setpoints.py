@@ -16,6 +16,7 @@ from feedplan.curves.length import INTERPOLATORS as INTERPOLATORS
 from feedplan.curves.length import Interpolator as Interpolator
 from feedplan.errors import InputError
 from feedplan.profile import SpeedProfile
+from feedplan.progress import Listener
 from feedplan.units import counted
 
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -71,11 +72,16 @@ class Setpoints:
     """
 
     def __init__(
-        self, problem: Problem, profile: SpeedProfile, period: float, interpolator: Interpolator
+        self,
+        problem: Problem,
+        profile: SpeedProfile,
+        period: float,
+        interpolator: Interpolator,
+        progress: Listener | None = None,
     ) -> None:
         one_of(interpolator, "interpolator", INTERPOLATORS)
         period = number(period, "the period", "a positive number", positive, "s")
-        self._sampler = sampler(problem, profile, period, interpolator)
+        self._sampler = sampler(problem, profile, period, interpolator, progress)
         self._source = (problem, profile, period, interpolator)
         self.period = float(period)
         self.axes = problem.axes
@@ -133,7 +139,11 @@ class Setpoints:
 
 
 def setpoints(
-    problem: Problem, profile: SpeedProfile, period: float, interpolator: Interpolator = "sarfraz"
+    problem: Problem,
+    profile: SpeedProfile,
+    period: float,
+    interpolator: Interpolator = "sarfraz",
+    progress: Listener | None = None,
 ) -> Setpoints:
     """Setpoints every `period` [s] of the joints along a problem's path, by the profile planned for it.
 
@@ -141,14 +151,18 @@ def setpoints(
     on quadratic pieces; table of length or time with Sarfraz predictor-corrector elsewhere, the length at a
     time in closed form where the jerk along the path is constant. `newton`: steps
     of speed times period, to third order, and Newton–Raphson. Pieces may have any degree, polynomial or
-    rational; arcs of kind CHORD are for quadratic ones.
+    rational; arcs of kind CHORD are for quadratic ones. `progress` is told how far the laying out is.
     Raises InputError for a period or an interpolator that cannot be used, or a profile of another path.
     """
-    return Setpoints(problem, profile, period, interpolator)
+    return Setpoints(problem, profile, period, interpolator, progress)
 
 
 def sampler(
-    problem: Problem, profile: SpeedProfile, period: float, interpolator: Interpolator = "sarfraz"
+    problem: Problem,
+    profile: SpeedProfile,
+    period: float,
+    interpolator: Interpolator = "sarfraz",
+    progress: Listener | None = None,
 ) -> Sampler:
     """The native reader of a profile on its path. Raises InputError as `setpoints`."""
     path = problem.path
@@ -175,6 +189,7 @@ def sampler(
         _array(profile.runs, np.int64),
         float(period),
         interpolator == "newton",
+        progress,
     )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +12,7 @@ from feedplan.constraints.problem import Problem, speed_square
 from feedplan.curves._arrays import floats
 from feedplan.curves.length import CurveLength
 from feedplan.errors import InputError
+from feedplan.lazy import cached_property
 from feedplan.profile import SpeedProfile
 from feedplan.setpoints import sampler
 

@@ -50,7 +50,10 @@ class SquarePlan:
     def account(self) -> Account:
         return account(self.problem, self.profile, None, False)
 
-    def setpoints(self) -> Any:
+    def make_account(self, progress: object = None) -> Account:
+        return self.account
+
+    def setpoints(self, progress: object = None) -> Any:
         return _Stream(self.chunk)
 
     def audit(self, progress: object = None) -> Audit:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import SetpointAudit, audit_plan
-from feedplan.arguments import flag, instance, list_of_names, not_negative, number, positive
+from feedplan.arguments import callback, flag, instance, list_of_names, not_negative, number, positive
 from feedplan.audit.feed import feed_axes, feed_limits
 from feedplan.audit.joint_profile import audit_joint_profile
 from feedplan.audit.joint_setpoints import JointSetpoints
@@ -24,15 +24,18 @@ from feedplan.errors import InputError
 from feedplan.machine.machine import Axis, Machine
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
+from feedplan.progress import Listener, part, tell
 from feedplan.setpoints import SetpointChunk, Setpoints
 
 __all__ = ["PASS_MARK", "Audit", "LimitCheck", "audit", "audit_setpoints"]
 
 # Share of the audit's time that path and profile take where setpoints follow, for the progress shown.
 PLAN_SHARE = 0.25
+# How far the audit of setpoints from files is before what is recorded of them is compared.
+RECORDED_SHARE = 0.8
 
 # Chunk of setpoints that goes through the audit at once when they are all at hand.
-CHUNK = 100_000
+CHUNK = 50_000
 
 
 @dataclass(frozen=True)
@@ -59,7 +62,7 @@ def audit(
     program: Program | None = None,
     setpoints: Setpoints | Iterable[SetpointChunk] | None = None,
     jerk: bool = False,
-    progress: Callable[[float], None] | None = None,
+    progress: Listener | None = None,
 ) -> Audit:
     """Measures a plan against every limit of its problem and machine.
 
@@ -68,7 +71,7 @@ def audit(
     joints are not the path's axes, their limits are measured by the kinematics' positions alone. Jerk is
     judged only if the method claims it (`jerk`): then on the continuous profile as well, and the
     acceleration may jump only where the curvature of the path does, by what the jerk limit makes in one
-    servo period. `progress` is called with the share done, 0 to 1.
+    servo period. `progress` is told how far it is; what it raises ends the audit.
 
     At a corner the profile's axis velocities may jump by the problem's `velocity_jump`. In setpoints a
     jump is an acceleration over one period, judged like any other by second differences: only the jump
@@ -92,22 +95,34 @@ def audit(
         period=float(problem.period),
         end_speeds=(float(problem.start_speed), float(problem.end_speed)),
     )
-    report = progress or (lambda done: None)
+    raised: list[Exception] = []
+
+    def report(done: float) -> None:
+        try:
+            if progress is not None:
+                progress(done)
+        except Exception as error:
+            raised.append(error)
+            raise
+
     if isinstance(setpoints, Setpoints):
         limits = replace(limits, period=setpoints.period)
-        setpoints = _reported(setpoints, report)
+    stream = None if setpoints is None else _with_shares(setpoints, part(report, PLAN_SHARE, 1.0))
     try:
         problem, profile, program = _native(problem, profile, program)
         report(0.0)
         work = _audit_axes if problem.joints is None else _audit_joints
-        results = work(problem, profile, limits, program, setpoints, report)
+        results = work(problem, profile, limits, program, stream, report)
         report(1.0)
     except ValueError as error:
+        if error in raised:
+            raise
         raise InputError(f"this plan cannot be audited: {error}") from None
     return join(results, axes, jerk)
 
 
 Results = list[Findings]
+Chunks = Iterator[tuple[SetpointChunk, Listener | None]]
 
 
 def _audit_axes(
@@ -115,18 +130,20 @@ def _audit_axes(
     profile: SpeedProfile | None,
     limits: _Limits,
     program: Program | None,
-    setpoints: Iterable[SetpointChunk] | None,
-    report: Callable[[float], None],
+    setpoints: Chunks | None,
+    report: Listener,
 ) -> Results:
     """Where the path's axes are the joints."""
     plan_limits = replace(limits, period=float(problem.period))
     feed = feed_limits(problem, program)
-    results = [audit_plan(problem, plan_limits, feed, profile, program)]
+    report(0.0)
+    whole = part(report, 0.0, 1.0 if setpoints is None else PLAN_SHARE)
+    results = [audit_plan(problem, plan_limits, feed, profile, program, whole)]
     if setpoints is not None:
         report(PLAN_SHARE)
         stream = SetpointAudit(limits, 0.0, problem, feed, profile, program)
-        for chunk in setpoints:
-            _push(stream, chunk)
+        for chunk, share in setpoints:
+            _push(stream, chunk, share)
         results.append(stream.finish())
     return results
 
@@ -136,8 +153,8 @@ def _audit_joints(
     profile: SpeedProfile | None,
     limits: _Limits,
     program: Program | None,
-    setpoints: Iterable[SetpointChunk] | None,
-    report: Callable[[float], None],
+    setpoints: Chunks | None,
+    report: Listener,
 ) -> Results:
     """Where the path is the tool tip's: what is the tip's natively, what is the joints' by the kinematics."""
     axes = len(problem.path.axes)
@@ -156,13 +173,13 @@ def _audit_joints(
     results: Results = [([found for found in findings if found[1] < 0], samples)]
     jump = np.array(limits.max_velocity_jump)
     if profile is not None:
-        share = PLAN_SHARE if setpoints is not None else 1.0
+        whole = 1.0 if setpoints is None else PLAN_SHARE
         worst = audit_joint_profile(
             problem,
             profile,
             jump,
             np.array(limits.travel),
-            lambda done: report(share * done),
+            lambda done: report(whole * done),
             limits.judges_jerk,
         )
         results.append(worst.findings())
@@ -170,8 +187,8 @@ def _audit_joints(
         report(PLAN_SHARE)
         stream = SetpointAudit(limits, 0.0)
         places = None if profile is None else JointSetpoints(problem, profile, jump, limits.period)
-        for chunk in setpoints:
-            _push(stream, chunk)
+        for chunk, share in setpoints:
+            _push(stream, chunk, share)
             if places is not None:
                 places.push(chunk)
         results.append(stream.finish())
@@ -180,13 +197,14 @@ def _audit_joints(
     return results
 
 
-def _push(stream: SetpointAudit, chunk: SetpointChunk) -> None:
+def _push(stream: SetpointAudit, chunk: SetpointChunk, share: Listener | None) -> None:
     stream.push(
         _array(chunk.t, np.float64),
         _array(chunk.position, np.float64),
         _array(chunk.velocity, np.float64),
         _array(chunk.acceleration, np.float64),
         _array(chunk.line, np.int32),
+        share,
     )
 
 
@@ -204,6 +222,7 @@ def audit_setpoints(
     jerk: bool = False,
     corners: bool = False,
     period: float | None = None,
+    progress: Listener | None = None,
 ) -> Audit:
     """Measures setpoints from anywhere against the limits of a machine, by finite differences alone.
 
@@ -219,7 +238,8 @@ def audit_setpoints(
     A jump of velocity that the machine allows at corners shows as one or two accelerations above the limit
     where the direction turns; only there it is allowed for. So are up to three jerks on end above their limit
     for a jump of the acceleration by what the jerk limit makes in one period: there the curvature may jump.
-    Raises InputError for arrays that do not belong together.
+    `progress` is told how far it is; what it raises ends the audit. Raises InputError for arrays that do not
+    belong together.
     """
     instance(machine, Machine, "the machine", "a Machine")
     names = machine.axis_names if axes is None else list_of_names(axes, "axes", "a list of axis letters")
@@ -234,6 +254,7 @@ def audit_setpoints(
         raise InputError(f"{len(times)} setpoints cannot be audited: give at least two")
     resolution = number(resolution, "the resolution", "0 or more", not_negative, "mm")
     jerk, corners = flag(jerk, "jerk"), flag(corners, "corners")
+    callback(progress, "the part done")
     recorded = {"velocity": velocity, "acceleration": acceleration, "jerk": recorded_jerk}
     rates = {
         name: None if values is None else floats(values, f"recorded values of the {name}")
@@ -270,32 +291,44 @@ def audit_setpoints(
     )
     stream = SetpointAudit(limits, float(resolution))
     for start in range(0, len(times), CHUNK):
-        part = slice(start, start + CHUNK)
+        tell(progress, RECORDED_SHARE * start / len(times))
+        own = slice(start, start + CHUNK)
         stream.push(
-            times[part],
-            positions[part],
-            None if rates["velocity"] is None else rates["velocity"][part],
-            None if rates["acceleration"] is None else rates["acceleration"][part],
-            lines[part],
+            times[own],
+            positions[own],
+            None if rates["velocity"] is None else rates["velocity"][own],
+            None if rates["acceleration"] is None else rates["acceleration"][own],
+            lines[own],
         )
     results = [stream.finish()]
+    rest = part(progress, RECORDED_SHARE, 1.0)
     pairs = [("recorded_change", "velocity", "acceleration", limits.max_acceleration, jump)]
     if jerk:
         pairs += [("recorded_jerk", "acceleration", "jerk", limits.max_jerk, [0.0] * len(names))]
-    for check, rate, change, limit, steps in pairs:
+    for i, (check, rate, change, limit, steps) in enumerate(pairs):
         of, by = rates[rate], rates[change]
+        share = part(rest, i / len(pairs), (i + 1) / len(pairs))
         if of is not None and by is not None:
-            results.append(audit_recorded(check, times, of, by, np.array(limit), np.array(steps), lines))
+            results.append(
+                audit_recorded(check, times, of, by, np.array(limit), np.array(steps), lines, share)
+            )
+    tell(progress, 1.0)
     return join(results, names, jerk)
 
 
-def _reported(setpoints: Setpoints, report: Callable[[float], None]) -> Iterator[SetpointChunk]:
-    """The setpoints in chunks; says how far they are when the next one is asked for."""
-    done = 0
+def _with_shares(setpoints: Setpoints | Iterable[SetpointChunk], report: Listener | None) -> Chunks:
+    """The setpoints in chunks, and who is told how far each is; nobody where their number is not known."""
+    if not isinstance(setpoints, Setpoints):
+        yield from ((chunk, None) for chunk in setpoints)
+        return
+    done = 0.0
     for chunk in setpoints.chunks(CHUNK):
-        yield chunk
-        done += len(chunk)
-        report(PLAN_SHARE + (1.0 - PLAN_SHARE) * done / setpoints.count)
+        after = done + len(chunk) / setpoints.count
+        share = part(report, done, min(after, 1.0))
+        yield chunk, share
+        if share is not None:
+            share(1.0)
+        done = after
 
 
 def _machine_axes(machine: Machine, names: tuple[str, ...]) -> list[Axis]:

@@ -36,36 +36,40 @@ def feed_limits(problem: Problem, program: Program | None) -> NDArray[np.float64
     axes by shares, else in all axes together.
     """
     path = problem.path
-    limits = np.full((len(path), 4), np.inf)
+    # Speed by speed, (4, n): much faster than four numbers for each of many pieces.
+    limits = np.full((4, len(path)), np.inf)
     groups = np.array(feed_axes(path.axes), dtype=bool)[:ALL]
     if program is not None:
         moves = _any(program.moving(), groups)
-        feed = np.full((len(program), ALL), np.inf)
-        leads = np.flatnonzero(np.logical_or.reduce(moves, axis=1))
-        feed[leads, moves[leads].argmax(axis=1)] = problem.request.of(program.feed)[leads]
-        beyond = np.full((1, ALL), np.inf)
-        feed, moves = np.concatenate([feed, beyond]), np.concatenate([moves, beyond < 0.0])
+        goes = np.logical_or.reduce(moves)
         first, last = np.clip(path.move.T, 0, len(program) - 1)
         ends = np.stack([first, last + 1], axis=1).ravel()
-        own = np.minimum.reduceat(feed, ends, axis=0)[::2]
-        foreign = ~np.logical_or.reduceat(moves, ends, axis=0)[::2]
-        # The blocks before and after that move anything; the last row stands for none.
-        leads = np.append(leads, len(program))
-        before = leads[np.searchsorted(leads, first) - 1]
-        after = leads[np.minimum(np.searchsorted(leads, last, side="right"), len(leads) - 1)]
-        beside = np.minimum(feed[before], feed[after])
-        limits[:, :ALL] = np.where(foreign, np.minimum(own, beside), own)
+        # The blocks before and after that move anything; beyond the last one stands for none.
+        leads = np.append(np.flatnonzero(goes), len(program))
+        count = np.concatenate([[0], np.cumsum(goes)])
+        before, after = leads[count[first] - 1], leads[count[last + 1]]
+        feeds, led = problem.request.of(program.feed), np.zeros(len(program), dtype=np.bool_)
+        for group in np.flatnonzero(np.logical_or.reduce(moves, axis=1)):
+            feed = np.append(np.where(moves[group] & ~led, feeds, np.inf), np.inf)
+            led |= moves[group]
+            own = np.minimum.reduceat(feed, ends)[::2]
+            foreign = ~np.logical_or.reduceat(np.append(moves[group], False), ends)[::2]
+            beside = np.minimum(feed[before], feed[after])
+            limits[group] = np.where(foreign, np.minimum(own, beside), own)
     elif problem.feed_share is not None:
         control, start = path.curve.control_points, path.curve.offsets[:-1]
         moves = _any(np.maximum.reduceat(control, start) > np.minimum.reduceat(control, start), groups)
-        limits[np.arange(len(path)), moves.argmax(axis=1)] = problem.feed
-    every = np.logical_and.reduce(np.isinf(limits), axis=1)
+        limits[moves.argmax(axis=0), np.arange(len(path))] = problem.feed
     if problem.feed_share is None:
-        every[:] = True
-    limits[every, ALL] = problem.feed[every]
-    return limits
+        limits[ALL] = problem.feed
+    else:
+        limits[ALL] = np.where(np.isinf(limits).all(axis=0), problem.feed, np.inf)
+    return np.ascontiguousarray(limits.T)
 
 
 def _any(moving: NDArray[np.bool_], groups: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which groups have an axis that moves (n, 3)."""
-    return np.asarray(np.logical_or.reduce(moving[:, None, :] & groups, axis=2), dtype=np.bool_)
+    """Which groups have an axis that moves (3, n)."""
+    moves = np.zeros((len(groups), len(moving)), dtype=np.bool_)
+    for group, axis in np.argwhere(groups):
+        moves[group] |= moving[:, axis]
+    return moves

@@ -8,13 +8,13 @@ place it has to be small, elsewhere it may be wide, which leaves rounding less t
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feedplan._solvers import audit_places
 from feedplan.constraints.problem import Problem
+from feedplan.lazy import cached_property
 from feedplan.machine.meaning import Meaning
 
 Array = NDArray[np.float64]

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.audit.worst import Findings, Worst
+from feedplan.progress import Listener, tell
 
 Array = NDArray[np.float64]
 
@@ -27,15 +28,24 @@ _AT_ONCE = 100_000
 
 
 def audit_recorded(
-    name: str, t: Array, rate: Array, change: Array, limit: Array, jump: Array, line: NDArray[np.int32]
+    name: str,
+    t: Array,
+    rate: Array,
+    change: Array,
+    limit: Array,
+    jump: Array,
+    line: NDArray[np.int32],
+    progress: Listener | None = None,
 ) -> Findings:
     """The greatest contradiction, as the check `name`.
 
     `t` (n,) [s]; `rate` (n, axes) and what is recorded as its `change` by time, which the `limit` (axes,)
     holds for; `jump` (axes,) is what a rate may jump by in each step. `line` (n,) source lines.
+    `progress` is told how far it is.
     """
     worst = Worst()
     for start in range(0, len(t) - STEPS, _AT_ONCE):
+        tell(progress, start / len(t))
         part = slice(start, start + _AT_ONCE + STEPS)
         time, values = t[part], change[part]
         span = (time[STEPS:] - time[:-STEPS])[:, None]

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import groupby, pairwise
 
 import numpy as np
@@ -27,6 +26,7 @@ from feedplan.curves.hodograph import (
 )
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
+from feedplan.lazy import cached_property
 from feedplan.machine.along import derivatives, positions
 from feedplan.machine.machine import Machine
 from feedplan.machine.meaning import Meaning

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +15,7 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.hodograph import speed_squares
 from feedplan.geometry.corners import Corners
 from feedplan.geometry.path import Path
+from feedplan.lazy import cached_property
 from feedplan.machine.machine import Machine
 
 if TYPE_CHECKING:

@@ -13,6 +13,7 @@ from feedplan.arguments import one_of
 from feedplan.curves._arrays import floats, places
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
+from feedplan.progress import Listener
 
 Interpolator = Literal["sarfraz", "newton"]
 INTERPOLATORS: tuple[Interpolator, ...] = get_args(Interpolator)
@@ -34,16 +35,21 @@ class CurveLength:
 
     `accuracy` is the error allowed to each piece, a part of its length; rounding is added to it. Source:
     Cheatham 2007, chapter 3, corrected, for curves of any degree and halved towards cusps; Zhang et al. 2010,
-    section 4.2, for `newton`.
+    section 4.2, for `newton`. `progress` is told how far the table is.
     Raises InputError for an empty curve and an accuracy that cannot be had.
     """
 
-    def __init__(self, curve: CompositeCurve, accuracy: float = 1e-13) -> None:
+    def __init__(
+        self,
+        curve: CompositeCurve,
+        accuracy: float = 1e-13,
+        progress: Listener | None = None,
+    ) -> None:
         if len(curve) == 0:
             raise InputError("the curve is empty: it has no length table")
         if not 1e-16 <= accuracy < 1:
             raise InputError(f"the accuracy of lengths is {accuracy:g}: give a part from 1e-16 to 1")
-        self._table = NativeCurveLength(*curve.columns(), accuracy)
+        self._table = NativeCurveLength(*curve.columns(), accuracy, progress)
 
     @property
     def total(self) -> float:

@@ -18,6 +18,7 @@ from feedplan.geometry.path import FitSummary, Path
 from feedplan.geometry.path_words import path_words
 from feedplan.machine.machine import Machine
 from feedplan.program.program import LINEAR_AXES, PathControl, Program
+from feedplan.progress import Listener, tell
 
 # Splines and their moves come from sums of the same offsets; more than this between them [mm] is no rounding.
 _SPLINE_GAP = 1e-6
@@ -71,6 +72,7 @@ def build_path(
     tolerance: float | None = None,
     settings: FitSettings | None = None,
     corners: Corners = Corners.ROUNDED,
+    progress: Listener | None = None,
 ) -> Path:
     """The path that the machine follows.
 
@@ -103,16 +105,17 @@ def build_path(
     the rotary axes, at every place of the path; a blend of moves whose feeds count along different axes keeps
     both (`Path.group_feed`), and where words are the tool tip it is a stop.
 
-    Raises MachineError (an axis is missing), ProgramError (a move has no length, an arc no radius, a spline
-    does not fit its move), InputError (a position outside the travel, a negative tolerance).
+    `progress` is told how far it is. Raises MachineError (an axis is missing), ProgramError (a move has no
+    length, an arc no radius, a spline does not fit its move), InputError (a position outside the travel, a
+    negative tolerance).
     """
     settings = settings or FitSettings()
     if tolerance is not None:
         tolerance = tolerance_of(tolerance)
     words = path_words(program, machine)
+    tell(progress, 0.0)
     program = program.along(words.names)
-    names, starts = program.axes, program.starts()
-    splines = _splines(program, starts)
+    names, splines = program.axes, _splines(program)
     limit, fit_limit = _tolerances(program, tolerance, settings, corners)
     exact = settings.exact_tolerance if not tolerance else min(tolerance, settings.exact_tolerance)
     halt = program.stop | (program.dwell > 0) | (program.control == PathControl.EXACT_STOP)
@@ -121,6 +124,7 @@ def build_path(
     if not words.joints.all():
         halt[:-1] |= _changes_of_group(names, moving)
 
+    tell(progress, 0.0)
     (curve, feed, move, allowed, runs), summary, outside, rough = native_build_path(
         program.name,
         program.start,
@@ -151,7 +155,9 @@ def build_path(
         float(np.linalg.norm(words.max_velocity)),
         math.radians(settings.corner_angle),
         corners.value,
+        progress,
     )
+    tell(progress, 1.0)
     if outside is not None:
         index, axis, position = outside
         least, greatest = words.travel[axis]
@@ -215,7 +221,7 @@ def _lines(program: Program, moves: NDArray[np.int64], most: int = 5) -> str:
 
 
 def _splines(
-    program: Program, starts: NDArray[np.float64]
+    program: Program,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.int64], NDArray[np.float64]] | None:
     """The program's splines, from exactly where moves start to their targets."""
     if program.splines is None or len(program.spline_move) == 0:
@@ -226,7 +232,7 @@ def _splines(
     first, last = curve.offsets[:-1], curve.offsets[1:] - 1
     given = control[first].copy()
     control[first[1:]] = control[last[:-1]]
-    control[first[pieces[:-1]]] = starts[move]
+    control[first[pieces[:-1]]] = program.starts()[move]
     ends = program.target[move]
     end_missed = np.abs(control[last[pieces[1:] - 1]] - ends).max(axis=1, initial=0.0)
     control[last[pieces[1:] - 1]] = ends

@@ -6,13 +6,13 @@ import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from importlib import resources
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, Literal
 
 from feedplan.arguments import is_number, shown
 from feedplan.errors import MachineError
+from feedplan.lazy import cached_property
 from feedplan.machine.checks import (
     numbers,
     one_by_one,

@@ -19,8 +19,9 @@ from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Literal, Protocol, cast
 
-from feedplan.arguments import file_path, one_of
+from feedplan.arguments import callback, file_path, one_of
 from feedplan.errors import InputError
+from feedplan.progress import Listener
 from feedplan.setpoints import SetpointChunk
 
 # The columns of a setpoint that have one value an axis, with what follows the unit of the axis in theirs.
@@ -62,7 +63,7 @@ class Format(Protocol):
 
     def writer(self, file: FilePath, header: Header, count: int) -> AbstractContextManager[Add]: ...
 
-    def load(self, file: FilePath) -> SetpointFile: ...
+    def load(self, file: FilePath, progress: Listener | None = None) -> SetpointFile: ...
 
 
 def formats() -> tuple[FormatName, ...]:
@@ -86,12 +87,13 @@ def require_format(version: object, what: str) -> None:
         )
 
 
-def load_setpoints(place: str | os.PathLike[str]) -> SetpointFile:
+def load_setpoints(place: str | os.PathLike[str], progress: Listener | None = None) -> SetpointFile:
     """The setpoints in a file, or in the folder of a plan, as one chunk.
 
-    The arrays of an npz file stay on disk and are read where they are used. Raises InputError naming the
-    file and the remedy.
+    The arrays of an npz file stay on disk and are read where they are used. `progress` is told how far the
+    reading of a text is. Raises InputError naming the file and the remedy.
     """
+    callback(progress, "the part done")
     file = file_path(place, "the place", "a file of setpoints or the folder of a plan")
     if file.is_dir():
         found = files_in(file)
@@ -102,7 +104,7 @@ def load_setpoints(place: str | os.PathLike[str]) -> SetpointFile:
         file = found[0]
     endings = {FilePath(format_named(name).FILE).suffix: name for name in formats()}
     if file.suffix in endings:
-        return _load(endings[file.suffix], file)
+        return _load(endings[file.suffix], file, progress)
     known = ", ".join(sorted(endings))
     raise InputError(f"{file}: setpoints cannot be read from this kind of file: give a file in {known}")
 
@@ -113,9 +115,9 @@ def files_in(folder: FilePath) -> list[FilePath]:
     return sorted((file for file in files if file.exists()), key=lambda file: -file.stat().st_mtime_ns)
 
 
-def _load(name: str, file: FilePath) -> SetpointFile:
+def _load(name: str, file: FilePath, progress: Listener | None) -> SetpointFile:
     try:
-        return format_named(name).load(file)
+        return format_named(name).load(file, progress)
     except FileNotFoundError:
         raise InputError(f"{file} does not exist: give the setpoints or the folder of a plan") from None
     except OSError as error:

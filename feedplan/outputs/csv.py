@@ -17,10 +17,11 @@ from feedplan._solvers import csv_rows
 from feedplan.errors import InputError
 from feedplan.outputs import QUANTITIES, Add, Header, SetpointFile
 from feedplan.outputs._arrays import chunk_of
+from feedplan.progress import Listener, tell
 from feedplan.setpoints import SetpointChunk
 
 FILE = "setpoints.csv"
-_BYTES_AT_ONCE = 16_000_000
+_BYTES_AT_ONCE = 1_000_000
 
 
 def column_names(axes: Sequence[str], units: Sequence[str]) -> str:
@@ -47,10 +48,10 @@ def writer(file: FilePath, header: Header, count: int) -> Iterator[Add]:
         yield add
 
 
-def load(file: FilePath) -> SetpointFile:
+def load(file: FilePath, progress: Listener | None = None) -> SetpointFile:
     """The setpoints of a csv file with the header that this format writes."""
     parts: list[NDArray[np.float64]] = []
-    done = 1
+    done, read, size = 1, 0, max(file.stat().st_size, 1)
     try:
         with file.open(encoding="utf-8") as stream:
             first = stream.readline().strip()
@@ -62,6 +63,8 @@ def load(file: FilePath) -> SetpointFile:
             while lines := stream.readlines(_BYTES_AT_ONCE):
                 parts.append(_rows(lines, width, file, done))
                 done += len(lines)
+                read += sum(map(len, lines))
+                tell(progress, min(read / size, 1.0))
     except UnicodeDecodeError:
         raise InputError(f"{file} is not text: give a csv file of setpoints") from None
     table = np.concatenate(parts) if parts else np.empty((0, width))

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from feedplan.errors import InputError
 from feedplan.outputs import FORMAT, QUANTITIES, Add, Header, SetpointFile
 from feedplan.outputs._arrays import chunk_of
+from feedplan.progress import Listener, tell
 from feedplan.setpoints import SetpointChunk
 
 FILE = "setpoints.json"
@@ -62,7 +63,7 @@ def _text(rows: NDArray[Any]) -> str:
     return json.dumps(rows.tolist(), separators=(",", ":"))[1:-1]
 
 
-def load(file: FilePath) -> SetpointFile:
+def load(file: FilePath, progress: Listener | None = None) -> SetpointFile:
     """The setpoints of a json file."""
     try:
         table = json.loads(file.read_text(encoding="utf-8"))
@@ -78,4 +79,5 @@ def load(file: FilePath) -> SetpointFile:
     except (TypeError, ValueError, OverflowError):
         raise InputError(f"{file}: t, position, … must be arrays of numbers, one row a setpoint") from None
     arrays |= {name: table[name] for name in ("format", "period", "axes", "units") if name in table}
+    tell(progress, 1.0)
     return chunk_of(arrays, file)

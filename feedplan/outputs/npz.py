@@ -19,6 +19,7 @@ from feedplan.errors import InputError
 from feedplan.outputs import FORMAT, QUANTITIES, Add, Header, SetpointFile
 from feedplan.outputs._arrays import chunk_of
 from feedplan.outputs._zip import NpyArchive
+from feedplan.progress import Listener, tell
 from feedplan.setpoints import SetpointChunk
 
 FILE = "setpoints.npz"
@@ -53,7 +54,7 @@ def writer(file: FilePath, header: Header, count: int) -> Iterator[Add]:
         archive.close()
 
 
-def load(file: FilePath) -> SetpointFile:
+def load(file: FilePath, progress: Listener | None = None) -> SetpointFile:
     """The setpoints of an npz file; arrays that are not compressed stay on disk until they are used."""
     try:
         with zipfile.ZipFile(file) as archive:
@@ -64,6 +65,7 @@ def load(file: FilePath) -> SetpointFile:
             }
     except (zipfile.BadZipFile, ValueError, EOFError, zipfile.LargeZipFile) as error:
         raise InputError(f"{file} is not a whole npz file: {error}") from None
+    tell(progress, 1.0)
     return chunk_of(arrays, file)
 
 

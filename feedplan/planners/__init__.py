@@ -7,8 +7,9 @@ share. A method that is made for another path than the rounded one says so in `C
 (`feedplan.geometry.corners.Corners`); one whose profiles keep the jerk limits of the axes says
 `LIMITS_JERK = True`, and the audit judges them. One that knows a bound of the time beside that of
 `feedplan.bound` has a function `lower_bound(problem, profile)` with the same options, and `GRID_ERROR` if
-that leaves so many times the accuracy to finer grids. One that can tell what follows its plan before it is
-made (`planners.jerk_limited`) takes `RESERVE`.
+that leaves so many times the accuracy to finer grids. One that tells how far it is takes `PROGRESS`, and so
+does its bound; one that can tell what follows its plan before it is made (`planners.jerk_limited`) takes
+`RESERVE`.
 """
 
 from __future__ import annotations
@@ -43,6 +44,8 @@ MethodName = Literal[
 
 # Keeps time for the work that follows a plan; it is given by `feedplan.plan`, and no option of users.
 RESERVE = "reserve"
+# Is told how far the plan is; given by `feedplan.plan` too.
+PROGRESS = "progress"
 
 
 def methods() -> tuple[MethodName, ...]:
@@ -76,7 +79,7 @@ def given_options(method: str, options: Mapping[str, Any], others: Iterable[str]
     return {name: value for name, value in options.items() if value is not None}
 
 
-def bound_of(method: str, **options: Any) -> Callable[[Problem, SpeedProfile], float] | None:
+def bound_of(method: str, **options: Any) -> Callable[..., float] | None:
     """What a method itself knows of the least time [s] from one of its profiles, with the same options; None
     for most; raises as `planner`."""
     bound: Callable[..., float] | None = getattr(_module(method), "lower_bound", None)
@@ -91,12 +94,17 @@ def grid_error(method: str) -> float:
 def options_of(method: str) -> dict[str, Any]:
     """A method's options by name, with their defaults; raises as `planner`."""
     parameters = inspect.signature(_module(method).plan).parameters.values()
-    return {own.name: own.default for own in parameters if own.name not in ("problem", RESERVE)}
+    return {own.name: own.default for own in parameters if own.name not in ("problem", RESERVE, PROGRESS)}
 
 
 def tells_early(method: str) -> bool:
     """Whether a method can tell what follows its plan before it is made (`RESERVE`); raises as `planner`."""
     return RESERVE in inspect.signature(_module(method).plan).parameters
+
+
+def tells_progress(method: str) -> bool:
+    """Whether a method tells how far its plan is (`PROGRESS`); raises as `planner`."""
+    return PROGRESS in inspect.signature(_module(method).plan).parameters
 
 
 def corners(method: str) -> Corners:

@@ -12,11 +12,11 @@ only where a joint turns round inside the cell.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.lazy import cached_property
 from feedplan.planners._mesh import Mesh
 
 Array = NDArray[np.float64]

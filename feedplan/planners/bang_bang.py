@@ -6,15 +6,16 @@ from feedplan._solvers import PlanError, plan_bang_bang
 from feedplan.constraints.problem import Problem
 from feedplan.planners._faults import error_of
 from feedplan.profile import SpeedProfile
+from feedplan.progress import Listener
 
 
-def plan(problem: Problem) -> SpeedProfile:
+def plan(problem: Problem, *, progress: Listener | None = None) -> SpeedProfile:
     """The fastest profile; its time is the least that the limits allow, to rounding.
 
     Raises InfeasibleError where the start or end speed cannot be had, with the speed that can.
     """
     try:
-        columns = plan_bang_bang(problem)
+        columns = plan_bang_bang(problem, progress)
     except PlanError as fault:
         raise error_of(problem, fault) from None
     return SpeedProfile(*columns)

@@ -20,6 +20,7 @@ from feedplan.planners._faults import error_of
 from feedplan.planners._jerk import jerk_limits, lowered_limits
 from feedplan.planners._runs import fastest_runs
 from feedplan.profile import SpeedProfile
+from feedplan.progress import Listener, part
 
 # The profile keeps the limits of jerk, best where curvature does not jump.
 LIMITS_JERK = True
@@ -37,6 +38,9 @@ RESOLUTION, LEAST_RESOLUTION = 16.0, 6.0
 # Those of the first plan, and its gap of complementarity: it is some tenths of a percent slower than the
 # best in a fifth of the time.
 FIRST_RESOLUTION, FIRST_GAP = 3.0, 1e-2
+# How far a plan with a time limit is after its first plan, and before that of the other method, for the
+# progress shown.
+FIRST, OTHER = 0.2, 0.9
 
 
 def plan(
@@ -45,6 +49,7 @@ def plan(
     accuracy: float = 1e-4,
     time_limit: float | None = None,
     reserve: Callable[[SpeedProfile], float] | None = None,
+    progress: Listener | None = None,
 ) -> SpeedProfile:
     """The fastest profile, its time within about `accuracy` of the least, as a part of it.
 
@@ -64,29 +69,34 @@ def plan(
     resolution = max(RESOLUTION * (1e-4 / accuracy) ** 0.5, LEAST_RESOLUTION)
     whole = partial(_kept, problem, limits, resolution, GAP * accuracy)
     if time_limit is None:
-        return whole(None)
+        return whole(None, progress)
     end = time.perf_counter() + time_limit
     try:
-        first = _kept(problem, limits, FIRST_RESOLUTION, FIRST_GAP, None)
+        first = _kept(problem, limits, FIRST_RESOLUTION, FIRST_GAP, None, part(progress, 0.0, FIRST))
     except InfeasibleError:
         # A coarse grid may miss a speed at an end that can just be had.
-        return whole(None)
+        return whole(None, part(progress, FIRST, 1.0))
     if reserve is not None and time.perf_counter() < end:
         end -= reserve(first)
     found = [first]
     if time.perf_counter() < end:
-        best = whole(end)
+        best = whole(end, part(progress, FIRST, OTHER))
         if not best.stopped:
             return best
         found.append(best)
-    other = s_curve.plan_by_itself(problem)
+    other = s_curve.plan_by_itself(problem, part(progress, OTHER, 1.0))
     if lowered_limits(problem, limits, other) is None:
         found.append(other)
     return replace(fastest_runs(found), stopped=True)
 
 
 def lower_bound(
-    problem: Problem, profile: SpeedProfile, *, accuracy: float = 1e-4, time_limit: float | None = None
+    problem: Problem,
+    profile: SpeedProfile,
+    *,
+    accuracy: float = 1e-4,
+    time_limit: float | None = None,
+    progress: Listener | None = None,
 ) -> float:
     """A bound [s] on the time of every profile, from one planned with the same accuracy, if that is of use.
 
@@ -96,25 +106,40 @@ def lower_bound(
     """
     if profile.stopped or time_limit == 0:
         return 0.0
-    found = bound_jerk_limited(problem, jerk_limits(problem), profile, time_limit)
+    found = bound_jerk_limited(problem, jerk_limits(problem), profile, time_limit, progress)
     return (1.0 - GRID_ERROR * accuracy) * min(found, profile.time)
 
 
 def _kept(
-    problem: Problem, limits: NDArray[np.float64], resolution: float, gap: float, end: float | None
+    problem: Problem,
+    limits: NDArray[np.float64],
+    resolution: float,
+    gap: float,
+    end: float | None,
+    progress: Listener | None,
 ) -> SpeedProfile:
     """The plan by a time of the clock; again with lower limits where the joints miss those of jerk."""
-    profile = _planned(problem, limits, resolution, gap, end)
+    once = 0.5 if problem.words else 1.0
+    profile = _planned(problem, limits, resolution, gap, end, part(progress, 0.0, once))
     lowered = lowered_limits(problem, limits, profile)
-    return profile if lowered is None else _planned(problem, lowered, resolution, gap, end)
+    if lowered is None:
+        return profile
+    return _planned(problem, lowered, resolution, gap, end, part(progress, once, 1.0))
 
 
 def _planned(
-    problem: Problem, limits: NDArray[np.float64], resolution: float, gap: float, end: float | None
+    problem: Problem,
+    limits: NDArray[np.float64],
+    resolution: float,
+    gap: float,
+    end: float | None,
+    progress: Listener | None,
 ) -> SpeedProfile:
     left = None if end is None else max(end - time.perf_counter(), 0.0)
     try:
-        columns, changes, (stopped, excess) = plan_jerk_limited(problem, limits, resolution, gap, left)
+        columns, changes, (stopped, excess) = plan_jerk_limited(
+            problem, limits, resolution, gap, left, progress
+        )
     except PlanError as fault:
         raise error_of(problem, fault) from None
     return SpeedProfile(*columns, *changes, stopped=stopped, excess=excess)

@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -23,6 +22,7 @@ from feedplan.arguments import number
 from feedplan.constraints.problem import Problem, speed_square
 from feedplan.errors import MissingPackageError
 from feedplan.geometry.corners import Corners
+from feedplan.lazy import cached_property
 from feedplan.planners import s_curve
 from feedplan.planners._faults import error_of
 from feedplan.planners._jerk import jerk_limits

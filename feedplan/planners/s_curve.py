@@ -8,6 +8,7 @@ from feedplan.geometry.corners import Corners
 from feedplan.planners._faults import error_of
 from feedplan.planners._jerk import jerk_limits
 from feedplan.profile import SpeedProfile
+from feedplan.progress import Listener
 
 # The profile keeps the limits of jerk, best where curvature does not jump.
 LIMITS_JERK = True
@@ -20,23 +21,25 @@ LOOK_AHEAD = 256
 CUTTINGS = ((4.0, 0.05), (16.0, 0.05), (64.0, 0.05), (4.0, 0.2), (16.0, 0.2))
 
 
-def plan(problem: Problem) -> SpeedProfile:
+def plan(problem: Problem, *, progress: Listener | None = None) -> SpeedProfile:
     """The profile of a controller that looks some segments ahead; not the fastest.
 
     Raises SolverError for an axis without a limit of jerk.
     """
-    return _planned(problem, None)
+    return _planned(problem, None, progress)
 
 
-def plan_by_itself(problem: Problem) -> SpeedProfile:
+def plan_by_itself(problem: Problem, progress: Listener | None = None) -> SpeedProfile:
     """The same without the runs of which this method leaves a stretch to jerk-limited: they have no arcs."""
-    return _planned(problem, 0.0)
+    return _planned(problem, 0.0, progress)
 
 
-def _planned(problem: Problem, time_limit: float | None) -> SpeedProfile:
+def _planned(problem: Problem, time_limit: float | None, progress: Listener | None) -> SpeedProfile:
     """`time_limit` [s] is for what is left to jerk-limited."""
     try:
-        columns, changes = plan_s_curve(problem, jerk_limits(problem), CUTTINGS, LOOK_AHEAD, time_limit)
+        columns, changes = plan_s_curve(
+            problem, jerk_limits(problem), CUTTINGS, LOOK_AHEAD, time_limit, progress
+        )
     except PlanError as fault:
         raise error_of(problem, fault) from None
     return SpeedProfile(*columns, *changes)

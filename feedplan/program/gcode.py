@@ -59,6 +59,7 @@ from feedplan.errors import MachineError
 from feedplan.machine.machine import AXIS_LETTERS, Machine
 from feedplan.program.program import Program
 from feedplan.program.source import MAX_BYTES, Source, content_of
+from feedplan.progress import Listener
 
 WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 
@@ -73,13 +74,14 @@ def read_gcode(
     block_delete: bool = True,
     max_bytes: int = MAX_BYTES,
     max_moves: int = MAX_MOVES,
+    progress: Listener | None = None,
 ) -> Program:
     """The moves of a G-code program.
 
     `source` is a path, a stream, or the program itself: bytes, or a str with a line break. `machine` gives
     the work offsets, the home position and the axes there are; without it offsets and home are 0. `name`
     stands in messages, instead of the file's name. `block_delete` leaves out blocks that start with `/`, as
-    LinuxCNC does; `max_bytes` and `max_moves` bound what is read.
+    LinuxCNC does; `max_bytes` and `max_moves` bound what is read. `progress` is told how far it is.
     Raises ProgramError naming file, line, word and remedy, MachineError where an offset's name is unknown.
     """
     content, name, _ = content_of(source, name, max_bytes)
@@ -95,6 +97,7 @@ def read_gcode(
         control,
         block_delete,
         max_moves,
+        progress,
     )
     splines = columns.pop("spline_columns")
     if len(columns["spline_move"]):

@@ -118,7 +118,11 @@ class Program:
 
     def moving(self) -> NDArray[np.bool_]:
         """Which moves move which axes (n, axes); an arc moves both axes of its plane."""
-        moves: NDArray[np.bool_] = self.target != self.starts()
+        moves = np.empty(self.target.shape, dtype=np.bool_)
+        moves[:1] = self.target[:1] != self.start
+        moves[1:] = self.target[1:] != self.target[:-1]
+        if len(self.change_move):
+            moves[self.change_move] = self.target[self.change_move] != self.change_start
         for column, name in enumerate(LINEAR_AXES):
             if name in self.axes:
                 moves[self.arc_move[self.arc_normal != column], self.axes.index(name)] = True

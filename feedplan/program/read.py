@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from feedplan.arguments import flag, is_text, refuse, whole
+from feedplan.arguments import callback, flag, is_text, refuse, whole
 from feedplan.machine.machine import Machine
 from feedplan.program import path_file
 from feedplan.program.dxf import read_dxf
@@ -17,6 +17,7 @@ from feedplan.program.gcode import read_gcode
 from feedplan.program.path_file import read_path_file
 from feedplan.program.program import Program
 from feedplan.program.source import MAX_BYTES, Source, content_of
+from feedplan.progress import Listener
 
 Reader = Callable[[bytes, Machine | None, str], Program]
 
@@ -39,6 +40,7 @@ def read_program(
     name: str | None = None,
     block_delete: bool = True,
     max_bytes: int = MAX_BYTES,
+    progress: Listener | None = None,
 ) -> Program:
     """The moves of a part program: a path file (.json), a drawing (.dxf), else G-code.
 
@@ -46,7 +48,7 @@ def read_program(
     file or another stream. `name` stands in messages instead of the file's name, and its ending tells the
     language; where there is none the first characters do. `machine`, or the name or file of one, gives work
     offsets and home, see `feedplan.program.gcode.read_gcode`, and the axes there are. `block_delete` leaves
-    out blocks that start with `/`.
+    out blocks that start with `/`. `progress` is told how far it is.
     Raises ProgramError in one sentence where the program is missing, a directory, empty, binary, larger than
     `max_bytes` or not understood, MissingPackageError where a drawing needs a package, MachineError,
     InputError for other arguments that cannot be used.
@@ -56,10 +58,11 @@ def read_program(
         raise refuse("the name", name, "a text")
     block_delete = flag(block_delete, "block_delete")
     max_bytes = whole(max_bytes, "max_bytes", "a whole number from 1")
+    callback(progress, "the part done")
     content, name, text = content_of(source, name, max_bytes)
     reader, most = READERS.get(_language(content, name), (None, max_bytes))
     if reader is None:
-        program = read_gcode(content, known, name, block_delete=block_delete)
+        program = read_gcode(content, known, name, block_delete=block_delete, progress=progress)
     else:
         content_of(content, name, min(max_bytes, most))
         program = reader(content, known, name)

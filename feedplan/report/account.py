@@ -11,6 +11,7 @@ import numpy as np
 from feedplan.constraints.problem import Problem
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
+from feedplan.progress import Listener, part, tell
 from feedplan.report.activity import activity
 from feedplan.report.losses import Share, SlowLine, slowest_lines, time_per_limit
 from feedplan.report.stops import Stops, stops_by_cause
@@ -61,15 +62,27 @@ class Account:
         }
 
 
-def account(problem: Problem, profile: SpeedProfile, program: Program | None, jerk: bool) -> Account:
-    """The account of a profile on its path; `jerk`: its method limits jerk."""
+def account(
+    problem: Problem,
+    profile: SpeedProfile,
+    program: Program | None,
+    jerk: bool,
+    progress: Listener | None = None,
+) -> Account:
+    """The account of a profile on its path; `jerk`: its method limits jerk.
+
+    `progress` is told how far it is.
+    """
     path, motion = problem.path, tool_motion(problem)
+    way = motion.lengths(part(progress, 0.0, 0.5))
+    tell(progress, 0.5)
     time = np.bincount(profile.piece.astype(np.int64), profile.duration, len(path))
-    moments = activity(problem, profile, motion, jerk)
+    moments = activity(problem, profile, motion, jerk, part(progress, 0.5, 1.0))
+    tell(progress, 1.0)
 
     def total(own: Any) -> Total:
         turns = own & motion.turns
-        way, moved = motion.lengths, own & ~motion.turns
+        moved = own & ~motion.turns
         return Total(
             *(math.fsum(values) for values in (time[own], way[moved], way[turns], time[turns])),
         )

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem, feed_square
 from feedplan.profile import SpeedProfile
+from feedplan.progress import Listener, part, tell
 from feedplan.report.limits import chord_speed, parameter_speed
 from feedplan.report.tool_motion import ToolMotion
 from feedplan.setpoints import sampler
@@ -51,10 +52,20 @@ class Activity:
         return self.weight * np.maximum(1.0 - self.pace, 0.0)
 
 
-def activity(problem: Problem, profile: SpeedProfile, motion: ToolMotion, jerk: bool) -> Activity:
+def activity(
+    problem: Problem,
+    profile: SpeedProfile,
+    motion: ToolMotion,
+    jerk: bool,
+    progress: Listener | None = None,
+) -> Activity:
     """The activity of all limits, that of jerk where it is limited (`jerk`)."""
     time, weight, run = _moments(problem, profile)
-    _, _, velocity, acceleration, jerks, _, piece, u, *_ = sampler(problem, profile, problem.period).at(time)
+    reader = sampler(problem, profile, problem.period, progress=part(progress, 0.0, 0.6))
+    tell(progress, 0.6)
+    states = reader.at(time)
+    tell(progress, 0.8)
+    _, _, velocity, acceleration, jerks, _, piece, u, *_ = states
     _, tangent, second = problem.curve.evaluate(piece, u, 2)
     with np.errstate(divide="ignore", invalid="ignore"):
         rate = parameter_speed(tangent, velocity)

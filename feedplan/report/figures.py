@@ -10,6 +10,7 @@ import numpy as np
 from feedplan.audit import Audit
 from feedplan.constraints.problem import Problem
 from feedplan.profile import SpeedProfile
+from feedplan.progress import Listener
 from feedplan.report.limits import drawn_arcs, limit_samples, samples_per_arc
 from feedplan.report.reduce import Envelope, packed
 from feedplan.report.tool_motion import ToolMotion
@@ -72,7 +73,9 @@ def _curve(curves: Envelope, column: int, with_line: bool = False) -> dict[str, 
     return result | ({"line": packed(line)} if with_line else {})
 
 
-def over_length(problem: Problem, profile: SpeedProfile, motion: ToolMotion) -> dict[str, Any]:
+def over_length(
+    problem: Problem, profile: SpeedProfile, motion: ToolMotion, progress: Listener | None = None
+) -> dict[str, Any]:
     """Speed and the limits on it over the path's length; limits that hold nowhere are left out.
 
     `cutting_speed` is the greatest speed on moves with a feed: rapids would flatten the colours.
@@ -82,7 +85,7 @@ def over_length(problem: Problem, profile: SpeedProfile, motion: ToolMotion) -> 
     curves = Envelope(count, _LENGTH_POINTS)
     is_cut = np.isfinite(problem.path.feed)[profile.piece.astype(np.int64)]
     top = cutting = 0.0
-    for block in limit_samples(problem, profile, motion):
+    for block in limit_samples(problem, profile, motion, progress):
         table = np.column_stack([getattr(block, name) for name in names])
         piece = profile.piece[block.arc].astype(np.int64)
         curves.add(block.length, table, problem.path.line[piece].astype(np.int64))
@@ -104,9 +107,14 @@ def over_length(problem: Problem, profile: SpeedProfile, motion: ToolMotion) -> 
 
 
 def chart_data(
-    problem: Problem, profile: SpeedProfile, motion: ToolMotion, figures: SetpointFigures, audit: Audit
+    problem: Problem,
+    profile: SpeedProfile,
+    motion: ToolMotion,
+    figures: SetpointFigures,
+    audit: Audit,
+    progress: Listener | None = None,
 ) -> dict[str, Any]:
-    """Everything the page's script draws."""
+    """Everything the page's script draws; `progress` is told how far it is."""
     limits = {
         name: [float(value) if np.isfinite(value) else None for value in getattr(problem, f"max_{name}")]
         for name in ("velocity", "acceleration", "jerk")
@@ -119,7 +127,7 @@ def chart_data(
         "feed": float(problem.feed.max()) if len(problem.feed) else None,
         "duration": figures.duration,
         "path": figures.tool_path(),
-        "length": over_length(problem, profile, motion),
+        "length": over_length(problem, profile, motion, progress),
         "time": figures.over_time(),
         "failures": [{"name": check.name, "axis": check.axis, "time": check.time} for check in audit.broken],
     }

@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 from feedplan._solvers import Sampler
 from feedplan.constraints.problem import Problem, feed_square
 from feedplan.profile import SpeedProfile
+from feedplan.progress import Listener, part, tell
 from feedplan.report.tool_motion import ToolMotion
 from feedplan.setpoints import sampler
 
 Floats = NDArray[np.float64]
 
 _SAMPLES = 400_000
-_SAMPLES_AT_ONCE = 100_000
+_SAMPLES_AT_ONCE = 25_000
 _SAMPLES_PER_ARC = 33
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 
@@ -55,11 +56,15 @@ def drawn_arcs(profile: SpeedProfile, motion: ToolMotion) -> NDArray[np.int64]:
     return np.flatnonzero(motion.drawn[profile.piece.astype(np.int64)])
 
 
-def limit_samples(problem: Problem, profile: SpeedProfile, motion: ToolMotion) -> Iterator[LimitSamples]:
-    """Samples of every drawn arc, a block of arcs at a time."""
+def limit_samples(
+    problem: Problem, profile: SpeedProfile, motion: ToolMotion, progress: Listener | None = None
+) -> Iterator[LimitSamples]:
+    """Samples of every drawn arc, a block of arcs at a time; `progress` is told how far it is."""
     count = samples_per_arc(profile)
     drawn = drawn_arcs(profile, motion)
-    states = sampler(problem, profile, problem.period)
+    states = sampler(problem, profile, problem.period, progress=part(progress, 0.0, 0.2))
+    report = part(progress, 0.2, 1.0)
+    tell(report, 0.0)
     # Denser towards both ends, where speed changes most on the way from and to a stop.
     fraction = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, count))
     step = max(1, _SAMPLES_AT_ONCE // count)
@@ -68,6 +73,7 @@ def limit_samples(problem: Problem, profile: SpeedProfile, motion: ToolMotion) -
         block = _sample(problem, profile, motion, states, drawn[first : first + step], fraction, start)
         start = float(block.length[-1])
         yield block
+        tell(report, min(first + step, len(drawn)) / len(drawn))
 
 
 def _integral(

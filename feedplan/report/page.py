@@ -15,6 +15,7 @@ from typing import Any
 from feedplan.audit import Audit
 from feedplan.constraints.problem import Problem
 from feedplan.profile import SpeedProfile
+from feedplan.progress import Listener, part, tell
 from feedplan.report.account import Account
 from feedplan.report.activity import ACTIVE
 from feedplan.report.figures import SetpointFigures, chart_data
@@ -51,10 +52,15 @@ def write_report(
     audit: Audit,
     figures: SetpointFigures,
     text: FilePath | bytes | None = None,
+    progress: Listener | None = None,
 ) -> None:
-    """Writes the page. `summary` is the content of plan.json, `text` the part program's, or its file."""
+    """Writes the page. `summary` is the content of plan.json, `text` the part program's, or its file.
+
+    `progress` is told how far it is."""
     texts = {} if text is None else _lines(text, {row.line for row in account.slow})
-    data = chart_data(problem, profile, account.motion, figures, audit)
+    tell(progress, 0.0)
+    data = chart_data(problem, profile, account.motion, figures, audit, part(progress, 0.0, 0.9))
+    tell(progress, 0.9)
     name = FilePath(str(summary.get("program") or "path")).name
     judged = (
         verdict(audit),

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,8 @@ from numpy.typing import NDArray
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.length import CurveLength
+from feedplan.lazy import cached_property
+from feedplan.progress import Listener
 
 Floats = NDArray[np.float64]
 
@@ -49,21 +50,10 @@ class ToolMotion:
         """Way by u at places (m,) [mm or deg]."""
         return np.asarray(np.linalg.norm(self.curve.evaluate(piece, u, 1)[1], axis=1))
 
-    @cached_property
-    def lengths(self) -> Floats:
+    def lengths(self, progress: Listener | None = None) -> Floats:
         """Way of each piece (n,), [deg] where it turns and [mm] elsewhere."""
-        ends = CurveLength(self.curve).length(np.arange(len(self.curve)), self.curve.width)
-        return np.diff(ends, prepend=0.0)
-
-    @property
-    def length(self) -> float:
-        """Length of the way [mm]."""
-        return math.fsum(self.lengths[~self.turns])
-
-    @property
-    def turn(self) -> float:
-        """What the rotary axes turn while nothing else moves [deg]."""
-        return math.fsum(self.lengths[self.turns])
+        table = CurveLength(self.curve, progress=progress)
+        return np.diff(table.length(np.arange(len(self.curve)), self.curve.width), prepend=0.0)
 
 
 def tool_motion(problem: Problem) -> ToolMotion:

@@ -5,6 +5,7 @@ use std::time::Duration;
 use criterion::{criterion_group, criterion_main, BenchmarkId, Criterion, Throughput};
 use feedplan_solvers::bang_bang_quadratic::{plan, Problem};
 use feedplan_solvers::quadratic::{norm, sub, Quadratic};
+use feedplan_solvers::watch::Watch;
 
 /// A random number generator that is the same everywhere (splitmix64).
 struct Random(u64);
@@ -71,6 +72,7 @@ fn problem<'a>(
         period: 0.001,
         start_speed: 0.0,
         end_speed: 0.0,
+        watch: Watch::default(),
     }
 }
 

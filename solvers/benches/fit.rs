@@ -3,6 +3,7 @@
 
 use criterion::{criterion_group, criterion_main, BenchmarkId, Criterion, Throughput};
 use feedplan_solvers::fit::{fit_points, FitOptions};
+use feedplan_solvers::watch::Watch;
 
 const OPTIONS: FitOptions = FitOptions {
     tolerance: 0.01,
@@ -60,7 +61,7 @@ fn fit(criterion: &mut Criterion) {
             BenchmarkId::new("finishing, one thread", count),
             &points,
             |bencher, points| {
-                one.install(|| bencher.iter(|| fit_points(points, &OPTIONS)));
+                one.install(|| bencher.iter(|| fit_points(points, &OPTIONS, Watch::default())));
             },
         );
     }
@@ -69,7 +70,7 @@ fn fit(criterion: &mut Criterion) {
     {
         group.throughput(Throughput::Elements(points.len() as u64));
         group.bench_with_input(BenchmarkId::new(name, points.len()), &points, |bencher, points| {
-            bencher.iter(|| fit_points(points, &OPTIONS));
+            bencher.iter(|| fit_points(points, &OPTIONS, Watch::default()));
         });
     }
     group.finish();

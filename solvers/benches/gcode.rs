@@ -47,11 +47,13 @@ fn bench(criterion: &mut Criterion) {
     group.throughput(Throughput::Elements(BLOCKS as u64)).sample_size(20);
     let options = Options::default();
     for (name, text) in [("lines", lines()), ("short lines", short_lines()), ("arcs", arcs())] {
-        if let Err(error) = read(text.as_bytes(), &options) {
+        if let Err(error) = read(text.as_bytes(), &options, &|_| ()) {
             panic!("{name}: {error:?}");
         }
         group.bench_function(name, |bencher| {
-            bencher.iter(|| read(black_box(text.as_bytes()), &options).map(|columns| columns.kind.len()));
+            bencher.iter(|| {
+                read(black_box(text.as_bytes()), &options, &|_| ()).map(|columns| columns.kind.len())
+            });
         });
     }
     group.finish();

@@ -11,6 +11,7 @@ use feedplan_solvers::sampling::{Interpolator, PathData, Sampler};
 use feedplan_solvers::spline::bezier::elevate;
 use feedplan_solvers::spline::length::CurveLength;
 use feedplan_solvers::spline::CompositeCurve;
+use feedplan_solvers::watch::Watch;
 
 const PIECES: usize = 1000;
 const SETPOINTS: usize = 100_000;
@@ -45,7 +46,7 @@ fn changed(curve: &CompositeCurve<3>, by: usize, r: f64) -> CompositeCurve<3> {
 }
 
 fn profile(kind: ArcKind, curve: &CompositeCurve<3>, r: f64) -> Vec<ProfileArc> {
-    let lengths = CurveLength::new(curve, 1e-13);
+    let lengths = CurveLength::new(curve, 1e-13, Watch::default());
     // x' of the weights 1, r, …, r^d on a piece with x' = 1 without them: r at its start, 1/r at its end.
     let at_ends = |p0: f64, p1: f64| (p0 / (r * r), p1 * r * r);
     (0..PIECES)
@@ -102,11 +103,11 @@ fn setpoints(c: &mut Criterion) {
                     dwell: vec![0.0],
                 };
                 let period = time / (SETPOINTS - 1) as f64;
-                let sampler =
-                    Sampler::new(path, arcs, &[0, PIECES], period, interpolator).expect("a profile");
+                let sampler = Sampler::new(path, arcs, &[0, PIECES], period, interpolator, Watch::default())
+                    .expect("a profile");
                 let name = BenchmarkId::new(format!("{interpolator:?}, {shape}"), format!("{kind:?}"));
                 group.bench_function(name, |b| {
-                    b.iter(|| one_thread.install(|| sampler.chunk(0..SETPOINTS, &mut None)))
+                    b.iter(|| one_thread.install(|| sampler.chunk(0..SETPOINTS, &mut None, Watch::default())))
                 });
             }
         }
@@ -118,8 +119,8 @@ fn lengths(c: &mut Criterion) {
     let mut group = c.benchmark_group("lengths");
     let curve = spline();
     group.throughput(Throughput::Elements(PIECES as u64));
-    group.bench_function("table per piece", |b| b.iter(|| CurveLength::new(&curve, 1e-13)));
-    let table = CurveLength::new(&curve, 1e-13);
+    group.bench_function("table per piece", |b| b.iter(|| CurveLength::new(&curve, 1e-13, Watch::default())));
+    let table = CurveLength::new(&curve, 1e-13, Watch::default());
     for count in [500, 50_000] {
         let wanted: Vec<f64> = (0..count).map(|i| table.total() * i as f64 / count as f64).collect();
         let tolerance = 1e-6 * table.total() / count as f64;

@@ -8,6 +8,7 @@ use feedplan_solvers::spline::extract::extract;
 use feedplan_solvers::spline::knots::Spline;
 use feedplan_solvers::spline::length::CurveLength;
 use feedplan_solvers::spline::CompositeCurve;
+use feedplan_solvers::watch::Watch;
 
 const SPANS: usize = 1000;
 
@@ -35,7 +36,7 @@ fn spline(criterion: &mut Criterion) {
     {
         let spline = winding(degree, rational);
         let curve: CompositeCurve<3> = extract(&spline).expect("one curve");
-        let length = CurveLength::new(&curve, 1e-13);
+        let length = CurveLength::new(&curve, 1e-13, Watch::default());
         group.bench_function(format!("extract, {name}"), |bencher| bencher.iter(|| extract(&spline)));
         group.bench_function(format!("derivatives to the third, {name}"), |bencher| {
             bencher.iter(|| {
@@ -47,9 +48,11 @@ fn spline(criterion: &mut Criterion) {
                 sum
             });
         });
-        group.bench_function(format!("cusps, {name}"), |bencher| bencher.iter(|| cusps(&curve, CUSP)));
+        group.bench_function(format!("cusps, {name}"), |bencher| {
+            bencher.iter(|| cusps(&curve, CUSP, Watch::default()))
+        });
         group.bench_function(format!("length table, {name}"), |bencher| {
-            one.install(|| bencher.iter(|| CurveLength::new(&curve, 1e-13)));
+            one.install(|| bencher.iter(|| CurveLength::new(&curve, 1e-13, Watch::default())));
         });
         group.bench_function(format!("length at a place, {name}"), |bencher| {
             bencher.iter(|| {

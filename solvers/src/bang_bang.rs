@@ -35,6 +35,7 @@ use crate::bang_bang_quadratic::{Fault, Profile, Task as QuadraticTask};
 use crate::planning::{ChordLimit, Limits};
 use crate::quadratic::{norm, Quadratic};
 use crate::spline::Piece;
+use crate::watch::Watch;
 use split::Axes;
 
 /// Axes that the tool itself moves in.
@@ -108,6 +109,7 @@ pub struct Problem<'a, const M: usize> {
     pub period: f64,
     pub start_speed: f64,
     pub end_speed: f64,
+    pub watch: Watch<'a>,
 }
 
 impl<'a, const M: usize> Problem<'a, M> {
@@ -124,6 +126,8 @@ struct Task<'a, const M: usize> {
     chord: Option<ChordLimit>,
     /// The planner of lines and polynomial quadratics, for those that are.
     quadratic: Option<QuadraticTask<'a, M>>,
+    /// Counts pieces.
+    watch: Watch<'a>,
 }
 
 impl<const M: usize> Task<'_, M> {
@@ -182,6 +186,7 @@ fn plan_with<const M: usize>(
             if problem.tip.is_some() { f64::INFINITY } else { norm(&problem.max_acceleration) },
         ),
         quadratic: quadratics.map(|pieces| QuadraticTask::new(pieces, &limits)),
+        watch: problem.watch.each(problem.width.len()),
     };
     limits.over_runs(&SPACE, |pieces, speeds_sq, space, profile| {
         let (first, last) = pieces;

@@ -38,6 +38,7 @@ use std::cell::RefCell;
 
 use crate::planning::{ChordLimit, Limits};
 use crate::quadratic::{norm, Quadratic};
+use crate::watch::Watch;
 use piece::Piece;
 pub(crate) use run::Workspace;
 use subpiece::Axes;
@@ -62,6 +63,8 @@ pub struct Problem<'a, const M: usize> {
     /// At the ends of the path, in mm/s.
     pub start_speed: f64,
     pub end_speed: f64,
+    /// Who waits for the answer.
+    pub watch: Watch<'a>,
 }
 
 /// Why there is no profile.
@@ -101,6 +104,8 @@ pub(crate) struct Task<'a, const M: usize> {
     junction_speed: &'a [f64],
     axes: Axes<M>,
     chord: Option<ChordLimit>,
+    /// Counts pieces.
+    watch: Watch<'a>,
 }
 
 thread_local! {
@@ -119,6 +124,7 @@ pub fn plan<const M: usize>(problem: &Problem<M>) -> Result<Profile, Fault> {
         period: problem.period,
         start_speed: problem.start_speed,
         end_speed: problem.end_speed,
+        watch: problem.watch,
     };
     limits.check(problem.pieces.len())?;
     check_pieces(problem.pieces)?;
@@ -143,6 +149,7 @@ impl<'a, const M: usize> Task<'a, M> {
                 velocity_sq: limits.max_velocity.map(|v| v * v),
             },
             chord: ChordLimit::new(limits.chord_tolerance, limits.period, norm(&acceleration)),
+            watch: limits.watch.each(limits.feed.len()),
         }
     }
 

@@ -67,6 +67,11 @@ const MOST_ROUNDS: usize = 14;
 const MOST_CELLS: usize = 12;
 const FEW_CELLS: usize = 20_000;
 
+/// Computes what all bounds share. A process that is forked while a thread computes it would wait for it for ever.
+pub fn prepare() {
+    length::prepare();
+}
+
 /// The profile beside which the bound is asked for: only where cells begin and what is gained by more of them
 /// depends on it.
 #[derive(Clone, Copy)]
@@ -141,7 +146,10 @@ fn over_run<const M: usize>(
     hint: &Hint,
     (cells, other): &mut (Cells, Cells),
 ) -> f64 {
-    let turn = |i: usize, axis: usize, part: (f64, f64)| sweep::turn(task, i, axis, part);
+    let turn = |i: usize, axis: usize, part: (f64, f64)| {
+        task.problem.watch.check_at(i);
+        sweep::turn(task, i, axis, part)
+    };
     cells.divide(hint, pieces, task.problem.width, turn);
     // Where an axis turns, else half way; the turn at which a cell ends already is none of it.
     let middle = |i: usize, (from, to): (f64, f64)| {
@@ -158,9 +166,13 @@ fn over_run<const M: usize>(
         None => (M, f64::INFINITY),
     };
     let (mut best, mut idle) = (0.0, 0);
+    // How many rounds it takes is not known: each counts as half of what is left.
+    let mut watch = task.problem.watch.each(task.problem.width.len());
     for _ in 0..MOST_ROUNDS {
+        watch = watch.part(0.5);
         sweep::backward(task, pieces, end_sq, cells);
         let bound = sweep::forward(task, pieces, start_sq, wanted, cells);
+        watch.advance(pieces.1 - pieces.0);
         let gained = bound - best > LEAST_GAIN * (duration - best);
         idle = if gained { 0 } else { idle + 1 };
         best = bound.max(best);
@@ -170,5 +182,6 @@ fn over_run<const M: usize>(
             break;
         }
     }
+    watch.advance(pieces.1 - pieces.0);
     best
 }

@@ -296,8 +296,11 @@ impl<const M: usize> Table<M> {
 
 impl<'a, const M: usize> ByLength<'a, M> {
     pub fn new(problem: &'a Problem<'a, M>, parts: &'a [Part]) -> Self {
-        let tables: Vec<Table<M>> =
-            parts.par_iter().with_min_len(16).map(|part| Table::new(problem, part)).collect();
+        let table = |part| {
+            problem.watch.check();
+            Table::new(problem, part)
+        };
+        let tables: Vec<Table<M>> = parts.par_iter().with_min_len(16).map(table).collect();
         let mut knots = vec![0.0];
         let mut total = 0.0;
         for table in &tables {
@@ -392,6 +395,7 @@ impl<'a, const M: usize> ByLength<'a, M> {
         // Parts of one piece are smooth where they meet.
         let joints = (1..self.parts.len()).filter(|&i| self.parts[i].piece != self.parts[i - 1].piece);
         let caps = joints.map(|i| {
+            self.problem.watch.check_at(i);
             let s = self.knots[i];
             let (before, after) = (self.at(i - 1, s), self.at(i, s));
             let mut jump_sq = f64::INFINITY;

@@ -20,6 +20,7 @@ mod spline;
 use rayon::prelude::*;
 
 use crate::quadratic::{dot, norm, sub, Quadratic};
+use crate::watch::Watch;
 use breaking::{turn_cosine, Break};
 use refine::Block;
 use spline::End;
@@ -61,7 +62,11 @@ pub struct FittedPiece<const M: usize> {
 /// does not. Where nothing smooth holds the tolerance, the chords themselves are kept, and their corners.
 /// With no positive tolerance, or points that are not finite, every chord is kept. The result does not depend
 /// on threads.
-pub fn fit_points<const M: usize>(points: &[[f64; M]], options: &FitOptions) -> Vec<FittedPiece<M>> {
+pub fn fit_points<const M: usize>(
+    points: &[[f64; M]],
+    options: &FitOptions,
+    watch: Watch,
+) -> Vec<FittedPiece<M>> {
     if points.len() < 2 {
         return Vec::new();
     }
@@ -83,10 +88,11 @@ pub fn fit_points<const M: usize>(points: &[[f64; M]], options: &FitOptions) -> 
         tolerance: options.tolerance,
         corner_cosine: options.corner_angle.clamp(0.0, std::f64::consts::PI).cos(),
         parallel: points.len() >= PARALLEL,
+        watch,
     };
     let (breaks, extremes) = breaking::group(&chain, options.max_chord, options.max_curvature);
     let groups: Vec<&[Break]> = breaks.windows(2).collect();
-    let features = chain.map(&groups, |group| {
+    let features = chain.map(&groups, watch.part(0.3), |group| {
         let (a, b) = (group[0].at, group[1].at);
         match group[0].line {
             true => vec![a, b],
@@ -97,7 +103,7 @@ pub fn fit_points<const M: usize>(points: &[[f64; M]], options: &FitOptions) -> 
         }
     });
     let blocks = blocks(&chain, &breaks, &features);
-    let fitted = chain.map(&blocks, |block| block.fit(&chain));
+    let fitted = chain.map(&blocks, watch.part(0.7), |block| block.fit(&chain));
 
     // Splines are numbered through; a block that continues its group continues its spline.
     let mut pieces = Vec::with_capacity(fitted.iter().map(|block| block.pieces.len()).sum());
@@ -123,11 +129,17 @@ struct Chain<'a, const M: usize> {
     /// A turn of a smaller cosine is a corner.
     corner_cosine: f64,
     parallel: bool,
+    watch: Watch<'a>,
 }
 
 impl<const M: usize> Chain<'_, M> {
     /// Results in order, in parallel when that pays.
-    fn map<T: Sync, R: Send>(&self, items: &[T], f: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
+    fn map<T: Sync, R: Send>(&self, items: &[T], watch: Watch, f: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
+        let each = watch.each(items.len());
+        let f = |item: &T| {
+            each.advance(1);
+            f(item)
+        };
         match self.parallel && items.len() > 1 {
             true => items.par_iter().with_min_len(items.len().div_ceil(256)).map(f).collect(),
             false => items.iter().map(f).collect(),

@@ -17,6 +17,7 @@ use crate::corner::Rounding;
 use crate::fit::{fit_points, FitOptions};
 use crate::quadratic::{norm, sub};
 use crate::spline::CompositeCurve;
+use crate::watch::Watch;
 pub use chords::{Chord, Chords};
 use feed_cuts::cut_at_feeds;
 pub use shape::{Shape, Spline};
@@ -241,13 +242,18 @@ impl<const M: usize> Moves<'_, M> {
 pub fn follow<const M: usize>(
     moves: &Moves<M>,
     options: &FollowOptions,
+    watch: Watch,
 ) -> Result<FollowedProgram<M>, FollowError> {
+    let each = watch.each(moves.kind.len());
     let parts: Vec<_> = moves
         .spans()
         .into_par_iter()
         .map(|span| match span {
-            Span::Plain(first, end) => plain(moves, options, first, end),
-            Span::Chain(first, end) => chain(moves, options, first, end),
+            Span::Plain(first, end) => {
+                each.advance(end - first);
+                plain(moves, options, first, end)
+            }
+            Span::Chain(first, end) => chain(moves, options, first, end, each.part((end - first) as f64)),
         })
         .collect::<Result<_, _>>()?;
     let total = parts.iter().map(|part| part.pieces.len()).sum();
@@ -307,6 +313,7 @@ fn chain<const M: usize>(
     options: &FollowOptions,
     first: usize,
     end: usize,
+    watch: Watch,
 ) -> Result<FollowedProgram<M>, FollowError> {
     for i in first..end {
         moves.check(i)?;
@@ -323,6 +330,7 @@ fn chain<const M: usize>(
             max_curvature: options.corner_acceleration / (feed * feed),
             corner_angle: options.corner_angle,
         },
+        watch,
     );
     let mut pieces = Vec::with_capacity(fitted.len());
     for fit in &fitted {
@@ -387,7 +395,7 @@ mod tests {
             splines: &CompositeCurve::default(),
             joints: &vec![true; target.len()],
         };
-        follow(&moves, &OPTIONS).unwrap()
+        follow(&moves, &OPTIONS, Watch::default()).unwrap()
     }
 
     #[test]
@@ -458,11 +466,11 @@ mod tests {
             splines: &CompositeCurve::default(),
             joints: &[true; 5],
         };
-        let error = |moves: &Moves<2>| follow(moves, &OPTIONS).err().unwrap();
+        let error = |moves: &Moves<2>| follow(moves, &OPTIONS, Watch::default()).err().unwrap();
         assert_eq!(error(&moves), FollowError { index: 3, fault: Fault::Length });
         let target = circle(5);
         let sound = Moves { target: &target, ..moves };
-        assert!(follow(&sound, &OPTIONS).is_ok());
+        assert!(follow(&sound, &OPTIONS, Watch::default()).is_ok());
         let no_feed = Moves { feed: &[1.0, 1.0, f64::NAN, 0.0, 1.0], ..sound };
         assert_eq!(error(&no_feed), FollowError { index: 2, fault: Fault::Feed });
         let no_arc = Moves { kind: &[LINE, ARC, LINE, LINE, LINE], feed: &[1.0; 5], ..no_feed };

@@ -73,8 +73,11 @@ pub struct ReadError {
     pub message: String,
 }
 
-/// The moves of a program.
-pub fn read(source: &[u8], options: &Options) -> Result<Columns, ReadError> {
+/// Lines between two times that the reader tells how far it is.
+const TOLD: u32 = 1024;
+
+/// The moves of a program. `seen` is told every so often of how many more lines have been read; it may unwind.
+pub fn read(source: &[u8], options: &Options, seen: &dyn Fn(usize)) -> Result<Columns, ReadError> {
     let whole = |message: &str| ReadError { line: None, message: message.into() };
     if source.contains(&0) {
         return Err(whole("the file is binary or UTF-16, not a text of single bytes: give a G-code program"));
@@ -85,7 +88,8 @@ pub fn read(source: &[u8], options: &Options) -> Result<Columns, ReadError> {
     let lines = source.iter().filter(|&&byte| byte == b'\n').count() + 1;
     let mut lexer = Lexer::new(source, options.block_delete);
     let mut interpreter = Interpreter::new(options, lines.min(MOST_EXPECTED));
-    let ended = run(&mut lexer, &mut interpreter).map_err(|fault| locate(*fault, lexer.line, source))?;
+    let ended =
+        run(&mut lexer, &mut interpreter, seen).map_err(|fault| locate(*fault, lexer.line, source))?;
     let (moves, mut warnings) = interpreter.into_parts();
     if moves.is_empty() {
         return Err(whole("the program moves nothing: give one with G0, G1, G2 or G3 and axis words"));
@@ -95,12 +99,21 @@ pub fn read(source: &[u8], options: &Options) -> Result<Columns, ReadError> {
 }
 
 /// Runs the program to its end; sentences about how it ends, and what was left out.
-fn run(lexer: &mut Lexer, interpreter: &mut Interpreter) -> Result<Vec<String>, Box<Fault>> {
+fn run(
+    lexer: &mut Lexer,
+    interpreter: &mut Interpreter,
+    seen: &dyn Fn(usize),
+) -> Result<Vec<String>, Box<Fault>> {
     let mut block = Block::new();
     let mut warnings = Vec::new();
     let mut deleted = 0u32;
     let mut opened = false;
+    let mut told = 0;
     let end = loop {
+        if lexer.line - told >= TOLD {
+            seen((lexer.line - told) as usize);
+            told = lexer.line;
+        }
         match lexer.next_line(&mut block)? {
             Some(Line::Block) => {
                 if interpreter.run(&block, lexer.line)? {

@@ -222,6 +222,7 @@ impl Arcs {
     ) {
         let mut spans = vec![];
         for (i, section) in sections.iter().enumerate() {
+            problem.watch.check_at(i);
             let from = State { s: section.position, v: section.speed, a: section.acceleration };
             let to = match sections.get(i + 1) {
                 Some(next) => State { s: next.position, v: next.speed, a: next.acceleration },
@@ -238,6 +239,7 @@ impl Arcs {
     /// rounding leaves. The time of each is that of the length between its parameters.
     fn push_spans<const M: usize>(&mut self, problem: &Problem<M>, path: &ByLength<M>, spans: &[Span]) {
         for spans in spans.chunk_by(|a, b| a.part == b.part) {
+            problem.watch.check_at(spans[0].part);
             let (part, last) = (spans[0].part, spans.len());
             let longest =
                 (0..last).fold(0, |most, i| if spans[i].way() > spans[most].way() { i } else { most });
@@ -275,6 +277,7 @@ impl Arcs {
         let last = s.len() - 1;
         let (mut first, mut part) = (0, path.part(s[0]));
         while first < last {
+            problem.watch.check_at(part);
             while knots[part + 1] <= s[first] && part + 1 < path.parts.len() {
                 part += 1;
             }

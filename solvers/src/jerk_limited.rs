@@ -33,6 +33,8 @@ mod windows;
 
 use std::time::Instant;
 
+use crate::watch::Watch;
+
 pub use bound::{certify, Certificate};
 pub use profile::Profile;
 
@@ -97,7 +99,7 @@ pub struct Problem<'a, G, const M: usize> {
 
 /// How well, and how long, to plan.
 #[derive(Clone, Copy, Debug)]
-pub struct Effort {
+pub struct Effort<'a> {
     /// Intervals per time in which the speed can change to its like: 16 leave less than 1e-4 of the time.
     pub resolution: f64,
     /// The gap of complementarity at which to stop, in parts of the time.
@@ -108,15 +110,24 @@ pub struct Effort {
     pub deadline: Option<Instant>,
     /// Paths of more intervals than this are solved in overlapping windows of about so many.
     pub window: usize,
+    /// Who waits for the plan.
+    pub watch: Watch<'a>,
 }
 
-impl Default for Effort {
+impl Default for Effort<'_> {
     fn default() -> Self {
-        Self { resolution: 16.0, tolerance: 1e-7, max_iterations: 400, deadline: None, window: 4000 }
+        Self {
+            resolution: 16.0,
+            tolerance: 1e-7,
+            max_iterations: 400,
+            deadline: None,
+            window: 4000,
+            watch: Watch::default(),
+        }
     }
 }
 
-impl Effort {
+impl Effort<'_> {
     /// Whether the deadline has passed.
     pub fn expired(&self) -> bool {
         self.deadline.is_some_and(|end| Instant::now() >= end)

@@ -28,8 +28,8 @@ const TRIALS: u32 = 12;
 /// A run of which a stretch is not planned when the deadline comes has no arcs; what is being planned then is the best
 /// so far.
 pub fn plan<const M: usize>(problem: &Problem<M>, jerk: &[f64; M], effort: &Effort) -> Result<Arcs, Fault> {
-    over_stretches(problem, jerk, |stretch, limits| {
-        Task { problem, limits: *limits, effort }.stretch(stretch)
+    over_stretches(problem, jerk, |stretch, limits, watch| {
+        Task { problem, limits: *limits, effort: &Effort { watch, ..*effort } }.stretch(stretch)
     })
 }
 
@@ -69,11 +69,13 @@ pub fn certified<const M: usize>(
         offsets.push(arc);
     }
     offsets.push(count);
-    let task = Task { problem, limits, effort };
+    let watch = problem.watch.each(problem.width.len());
     let bounds = stretches.par_iter().enumerate().map(|(i, stretch)| {
         if effort.expired() {
             return 0.0;
         }
+        let effort = Effort { watch: watch.part(stretch.parts.len() as f64), ..*effort };
+        let task = Task { problem, limits, effort: &effort };
         task.certified(stretch, columns, offsets[i]..offsets[i + 1]).unwrap_or(0.0)
     });
     Ok(bounds.sum())
@@ -83,7 +85,7 @@ pub fn certified<const M: usize>(
 pub struct Task<'a, const M: usize> {
     pub problem: &'a Problem<'a, M>,
     pub limits: Limits<M>,
-    pub effort: &'a Effort,
+    pub effort: &'a Effort<'a>,
 }
 
 impl<const M: usize> Task<'_, M> {
@@ -160,6 +162,7 @@ impl<const M: usize> Task<'_, M> {
         let mut profile = Profile { ends: [0.0, path.total()], ..Profile::default() };
         let mut part = 0;
         for arc in first..=last {
+            self.problem.watch.check_at(arc);
             let (piece, u) = (columns.piece[arc] as usize, [columns.u0[arc], columns.u1[arc]]);
             while path.parts[part].piece != piece || path.parts[part].u[1] <= u[0] {
                 part += 1;

@@ -37,6 +37,7 @@ pub mod smooth_fit;
 pub mod spline;
 pub mod stretches;
 pub mod text;
+pub mod watch;
 
 #[cfg(feature = "python")]
 mod python;

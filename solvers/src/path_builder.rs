@@ -20,6 +20,8 @@ pub use stretches::Part;
 use stretches::{Cuts, Stretches, TASK};
 use travel::{outside, Outside};
 
+use crate::watch::Watch;
+
 /// What the axes allow.
 pub struct Axes<const M: usize> {
     /// In mm/s and mm/s².
@@ -57,20 +59,32 @@ pub fn build_path<const M: usize>(
     moves: &Moves<M>,
     options: &FollowOptions,
     axes: &Axes<M>,
+    watch: Watch,
 ) -> Result<BuiltPath<M>, FollowError> {
-    let FollowedProgram { pieces, points, splines, polynomials } = follow(moves, options)?;
+    let FollowedProgram { pieces, points, splines, polynomials } = follow(moves, options, watch.part(0.6))?;
     let (mut parts, mut runs) = (Vec::new(), vec![0]);
     if !pieces.is_empty() {
         let stretches = Stretches::new(&pieces, moves.splines, moves.halt, options.rounding);
         let joints = 0..stretches.joint_count();
-        let need: Vec<f64> = joints.clone().into_par_iter().map(|k| stretches.need(k, axes)).collect();
+        let each = watch.part(0.3).each(joints.len());
+        let need: Vec<f64> = joints
+            .clone()
+            .into_par_iter()
+            .map(|k| {
+                watch.check_at(k);
+                stretches.need(k, axes)
+            })
+            .collect();
         let length = share_lengths(&need, &stretches.length);
         let corners: Vec<Option<Cuts>> = joints
             .into_par_iter()
             .with_min_len(TASK)
-            .map_init(Sides::default, |sides, k| stretches.settle(k, &length, sides))
+            .map_init(Sides::default, |sides, k| {
+                each.count(k);
+                stretches.settle(k, &length, sides)
+            })
             .collect();
-        (parts, runs) = stretches.assemble(&corners, axes.jump);
+        (parts, runs) = stretches.assemble(&corners, axes.jump, watch.part(0.1));
     }
     Ok(BuiltPath {
         deviation: deviation(&parts),
@@ -145,7 +159,7 @@ mod tests {
             splines: &CompositeCurve::default(),
             joints: &vec![true; count],
         };
-        let path = build_path(&moves, &OPTIONS, &axes(jump)).unwrap();
+        let path = build_path(&moves, &OPTIONS, &axes(jump), Watch::default()).unwrap();
         (all(&path), path.runs)
     }
 
@@ -186,7 +200,7 @@ mod tests {
             joints: &[true; 4],
         };
         let options = FollowOptions { rounding: Rounding::Circle, ..OPTIONS };
-        let path = build_path(&moves, &options, &axes(false)).unwrap();
+        let path = build_path(&moves, &options, &axes(false), Watch::default()).unwrap();
         let pieces = all(&path);
         let radius = 0.01 / (2f64.sqrt() - 1.0);
         assert_eq!((pieces.len(), &path.runs[..]), (7, &[0, 7][..]));
@@ -247,7 +261,7 @@ mod tests {
             splines: &splines,
             joints,
         };
-        build_path(&moves, &OPTIONS, axes).ok()
+        build_path(&moves, &OPTIONS, axes, Watch::default()).ok()
     }
 
     #[test]

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use crate::bang_bang::Problem;
 use crate::bang_bang_quadratic::{Fault, Profile};
+use crate::watch::Watch;
 
 /// Runs are planned in parallel in groups of about this many pieces.
 const GROUP: usize = 8192;
@@ -22,6 +23,7 @@ pub struct Limits<'a, const M: usize> {
     pub period: f64,
     pub start_speed: f64,
     pub end_speed: f64,
+    pub watch: Watch<'a>,
 }
 
 impl<'a, const M: usize> Limits<'a, M> {
@@ -37,6 +39,7 @@ impl<'a, const M: usize> Limits<'a, M> {
             period: problem.period,
             start_speed: problem.start_speed,
             end_speed: problem.end_speed,
+            watch: problem.watch,
         }
     }
 

@@ -12,6 +12,7 @@ mod problem;
 mod sampling;
 mod spline;
 mod text;
+mod work;
 
 use pyo3::prelude::*;
 
@@ -56,6 +57,7 @@ pub(crate) use with_path_axes;
 /// The native module of feedplan.
 #[pymodule]
 fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    crate::bound::prepare();
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     fit::register(module)?;
     path::register(module)?;

@@ -39,6 +39,7 @@ mod transition;
 use std::collections::VecDeque;
 
 use crate::bang_bang_quadratic::Fault;
+use crate::watch::Watch;
 use buffer::Buffer;
 pub use section::{Section, SectionKind};
 pub use segment::Segment;
@@ -123,10 +124,11 @@ impl Profiler {
 }
 
 /// The sections of a whole path from rest to rest, planned with a look-ahead of so many segments.
-pub fn plan(segments: &[Segment], look_ahead: usize) -> Result<Vec<Section>, Fault> {
+pub fn plan(segments: &[Segment], look_ahead: usize, watch: Watch) -> Result<Vec<Section>, Fault> {
     let mut profiler = Profiler::new(look_ahead);
     let mut sections = Vec::with_capacity(4 * segments.len());
-    for &segment in segments {
+    for (i, &segment) in segments.iter().enumerate() {
+        watch.each(segments.len()).count(i);
         profiler.push(segment, &mut sections)?;
     }
     while profiler.drain(&mut sections) {}

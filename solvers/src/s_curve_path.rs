@@ -18,6 +18,7 @@ use crate::s_curve::{self, Section, Segment};
 use crate::spline::bezier::split;
 use crate::spline::CompositeCurve;
 use crate::stretches::{checked, over_stretches, stretches, Stretch, CREEP};
+use crate::watch::Watch;
 
 /// Bounds of derivatives are greater than these by this part.
 const ACCURACY: f64 = 0.05;
@@ -58,11 +59,11 @@ pub fn plan<const M: usize>(
     look_ahead: usize,
     effort: &Effort,
 ) -> Result<Arcs, Fault> {
-    over_stretches(problem, jerk, |stretch, limits| {
+    over_stretches(problem, jerk, |stretch, limits, watch| {
         let path = ByLength::new(problem, &stretch.parts);
-        match quickest(problem, &path, stretch, limits, cuttings, look_ahead)? {
+        match quickest(problem, &path, stretch, limits, (cuttings, look_ahead), watch)? {
             Some(own) => Ok(along(problem, &path, limits, &own.sections)),
-            None => Task { problem, limits: *limits, effort }.stretch(stretch),
+            None => Task { problem, limits: *limits, effort: &Effort { watch, ..*effort } }.stretch(stretch),
         }
     })
 }
@@ -87,9 +88,11 @@ pub fn cut<const M: usize>(
 ) -> Result<Segmented, Fault> {
     let limits = checked(problem, jerk)?;
     let mut all = Segmented { stretches: vec![0], ..Segmented::default() };
+    let each = problem.watch.each(problem.width.len());
     for stretch in stretches(problem) {
         let path = ByLength::new(problem, &stretch.parts);
-        let own = quickest(problem, &path, &stretch, &limits, cuttings, look_ahead)?;
+        let watch = each.part(stretch.parts.len() as f64);
+        let own = quickest(problem, &path, &stretch, &limits, (cuttings, look_ahead), watch)?;
         let mut s = 0.0;
         for segment in own.map(|own| own.segments).unwrap_or_default() {
             let part = path.part(s);
@@ -111,11 +114,17 @@ pub fn follow<const M: usize>(
     offsets: &[usize],
     sections: &[Section],
 ) -> Result<Arcs, Fault> {
-    over_stretches(problem, jerk, |stretch, limits| {
+    over_stretches(problem, jerk, |stretch, limits, watch| {
         let own = offsets.get(stretch.number).zip(offsets.get(stretch.number + 1));
         match own.and_then(|(&from, &to)| sections.get(from..to)).filter(|own| !own.is_empty()) {
-            Some(own) => Ok(along(problem, &ByLength::new(problem, &stretch.parts), limits, own)),
-            None => Task { problem, limits: *limits, effort: &Effort::default() }.stretch(stretch),
+            Some(own) => {
+                watch.advance(1);
+                Ok(along(problem, &ByLength::new(problem, &stretch.parts), limits, own))
+            }
+            None => {
+                let effort = Effort { watch, ..Effort::default() };
+                Task { problem, limits: *limits, effort: &effort }.stretch(stretch)
+            }
         }
     })
 }
@@ -154,21 +163,22 @@ fn quickest<const M: usize>(
     path: &ByLength<M>,
     stretch: &Stretch,
     limits: &Limits<M>,
-    cuttings: &[Cutting],
-    look_ahead: usize,
+    (cuttings, look_ahead): (&[Cutting], usize),
+    watch: Watch,
 ) -> Result<Option<Planned>, Fault> {
     if stretch.ends != [0.0; 2] {
         return Ok(None);
     }
-    let parts = Parts::new(problem, path, limits);
+    let parts = Parts::new(problem, path, limits, watch.part(0.5));
+    let each = watch.part(0.25).each(cuttings.len());
     let mut best: Option<Planned> = None;
     let mut least = f64::INFINITY;
     for cutting in cuttings {
-        let Some(segments) = parts.joined(cutting) else { return Ok(None) };
+        let Some(segments) = parts.joined(cutting, each) else { return Ok(None) };
         if best.as_ref().is_some_and(|best| best.segments == segments) {
             continue;
         }
-        let sections = s_curve::plan(&segments, look_ahead)?;
+        let sections = s_curve::plan(&segments, look_ahead, each)?;
         let time = sections.iter().map(|section| section.duration).sum();
         if time < least {
             (least, best) = (time, Some(Planned { segments, sections }));
@@ -196,13 +206,14 @@ struct Parts<'a, const M: usize> {
 }
 
 impl<'a, const M: usize> Parts<'a, M> {
-    fn new(problem: &'a Problem<'a, M>, path: &'a ByLength<'a, M>, limits: &Limits<M>) -> Self {
+    fn new(problem: &'a Problem<'a, M>, path: &'a ByLength<'a, M>, limits: &Limits<M>, watch: Watch) -> Self {
         let Limits { velocity, acceleration, jerk } = *limits;
         let axes = AxisLimits { velocity, acceleration, jerk };
         let mut parts = Self { problem, path, axes, cuts: vec![] };
         let caps = path.caps(&limits.jerk);
         let mut caps = caps.iter().map(|(cap, _)| cap).peekable();
         for part in 0..path.parts.len() {
+            watch.each(path.parts.len()).advance(1);
             let ends = [path.knots()[part], path.knots()[part + 1]];
             match path.direction(part) {
                 Some(direction) => {
@@ -270,7 +281,7 @@ impl<'a, const M: usize> Parts<'a, M> {
     }
 
     /// The segments; None where one has no speed, or one that the axes creep at.
-    fn joined(&self, cutting: &Cutting) -> Option<Vec<Segment>> {
+    fn joined(&self, cutting: &Cutting, watch: Watch) -> Option<Vec<Segment>> {
         let make = |shape: &Shape<M>, cap: f64, length: f64, junction: f64| -> Option<Segment> {
             let most = greatest(shape, &self.axes, cap);
             let stretch = cutting.lengths * most.speed * most.limits.duration(most.speed);
@@ -285,7 +296,8 @@ impl<'a, const M: usize> Parts<'a, M> {
         };
         // Each with its bounds, its cap, and the greatest speed that one of its parts has alone.
         let mut out: Vec<(Segment, Shape<M>, f64, f64)> = vec![];
-        for cut in &self.cuts {
+        for (i, cut) in self.cuts.iter().enumerate() {
+            watch.each(self.cuts.len()).count(i);
             let own = make(&cut.shape, cut.cap, cut.length, cut.junction)?;
             // One with the segment before, where that costs no part of it much.
             let joined = out.last().filter(|last| last.0.junction == f64::INFINITY).and_then(|last| {

@@ -22,6 +22,7 @@ pub use self::chunk::{Chunk, Effort};
 use crate::motion::{Motion, ProfileArc, Rates, State, TipSpeed};
 use crate::quadratic::{dot, norm};
 use crate::spline::CompositeCurve;
+use crate::watch::Watch;
 
 /// More setpoints than this are refused: their indices and arrays would serve nobody.
 pub const MAX_COUNT: f64 = 2e9;
@@ -129,8 +130,9 @@ impl<const M: usize> Sampler<M> {
         arc_runs: &[usize],
         period: f64,
         interpolator: Interpolator,
+        watch: Watch,
     ) -> Result<Self, String> {
-        check(&path, &arcs, arc_runs)?;
+        check(&path, &arcs, arc_runs, watch)?;
         if !(period.is_finite() && period > 0.0) {
             return Err(format!("the period is {period} s: give a positive one"));
         }
@@ -218,16 +220,16 @@ impl<const M: usize> Sampler<M> {
 
     /// The setpoints in a range. `resume` carries the state of the Newton–Raphson interpolator from one range to
     /// the next; without it, or going back, a run is followed again from its start.
-    pub fn chunk(&self, range: Range<usize>, resume: &mut Option<Resume>) -> Chunk<M> {
+    pub fn chunk(&self, range: Range<usize>, resume: &mut Option<Resume>, watch: Watch) -> Chunk<M> {
         let mut chunk = Chunk::with_size(range.len());
         let parts = chunk.slices(range.start).split(&self.cuts(&range));
         let results: Vec<(Effort, Option<Resume>)> = match self.interpolator {
             Interpolator::Sarfraz => {
-                parts.into_par_iter().map(|part| (self.fill_by_time(part), None)).collect()
+                parts.into_par_iter().map(|part| (self.fill_by_time(part, watch), None)).collect()
             }
             Interpolator::Newton => {
                 let resume = *resume;
-                parts.into_par_iter().map(|part| self.fill_by_steps(part, resume)).collect()
+                parts.into_par_iter().map(|part| self.fill_by_steps(part, resume, watch)).collect()
             }
         };
         for (effort, state) in results {
@@ -239,12 +241,13 @@ impl<const M: usize> Sampler<M> {
 
     /// The states at times of the plan's own clock, in seconds: runs and pauses follow each other without waiting
     /// for whole periods. At the moment of a stop the tool rests; a time beyond an end gives that end.
-    pub fn at(&self, times: &[f64]) -> Chunk<M> {
+    pub fn at(&self, times: &[f64], watch: Watch) -> Chunk<M> {
         let mut chunk = Chunk::with_size(times.len());
         let cuts: Vec<usize> = (0..times.len()).step_by(BLOCK).skip(1).collect();
         chunk.slices(0).split(&cuts).into_par_iter().for_each(|mut part| {
             let mut cursor = Cursor::new(self, false);
             for i in 0..part.t.len() {
+                watch.check_at(i);
                 let t = times[part.start + i];
                 match self.runs.partition_point(|run| run.begin < t).checked_sub(1) {
                     None => self.set_start(&mut part, i),
@@ -269,11 +272,12 @@ impl<const M: usize> Sampler<M> {
 
     /// The states at places of the path, with their times on the plan's own clock. In the last place of a piece
     /// the arc that ends there counts.
-    pub fn along(&self, pieces: &[u32], u: &[f64]) -> Chunk<M> {
+    pub fn along(&self, pieces: &[u32], u: &[f64], watch: Watch) -> Chunk<M> {
         let mut chunk = Chunk::with_size(pieces.len());
         let cuts: Vec<usize> = (0..pieces.len()).step_by(BLOCK).skip(1).collect();
         chunk.slices(0).split(&cuts).into_par_iter().for_each(|mut part| {
             for i in 0..part.t.len() {
+                watch.check_at(i);
                 let (piece, u) = (pieces[part.start + i], u[part.start + i]);
                 let after = self.arcs.partition_point(|arc| (arc.piece, arc.u1) < (piece, u));
                 let Some(found) = self.arcs.get(after) else {
@@ -315,7 +319,7 @@ impl<const M: usize> Sampler<M> {
         (j < run.periods && time < run.time).then_some(time)
     }
 
-    fn fill_by_time(&self, mut part: Slices<M>) -> Effort {
+    fn fill_by_time(&self, mut part: Slices<M>, watch: Watch) -> Effort {
         let mut effort = Effort::default();
         let mut cursor = Cursor::new(self, false);
         let mut i = 0;
@@ -330,6 +334,7 @@ impl<const M: usize> Sampler<M> {
             let run = self.run_of(index);
             let stop = part.t.len().min(run.first + run.periods + 1 - part.start);
             for i in i..stop {
+                watch.check_at(i);
                 let index = part.start + i;
                 part.t[i] = self.time(index);
                 let Some(time) = self.run_time(run, index - run.first) else {
@@ -349,7 +354,12 @@ impl<const M: usize> Sampler<M> {
     /// Zhang 4.2, corrected. The paper's step v·T is of first order and stands still at rest: here it is of third
     /// order on the arc that it ends on, and is repeated for the time that the profile still has to go from the
     /// place reached, so that errors do not add up and every run ends on time.
-    fn fill_by_steps(&self, mut part: Slices<M>, resume: Option<Resume>) -> (Effort, Option<Resume>) {
+    fn fill_by_steps(
+        &self,
+        mut part: Slices<M>,
+        resume: Option<Resume>,
+        watch: Watch,
+    ) -> (Effort, Option<Resume>) {
         let mut effort = Effort::default();
         let begin = (self.runs[0].first + 1).saturating_sub(part.start).min(part.t.len());
         for i in 0..begin {
@@ -366,6 +376,7 @@ impl<const M: usize> Sampler<M> {
         let mut at = known.unwrap_or(fresh);
         while at.index + 1 < part.start + part.t.len() {
             at.index += 1;
+            watch.check_at(at.index);
             let out = (at.index >= part.start).then(|| at.index - part.start);
             let Some(time) = self.run_time(run, at.index - run.first) else {
                 if let Some(i) = out {

@@ -33,6 +33,7 @@ mod windows;
 
 use crate::quadratic::{dot, norm, sub};
 use crate::spline::CompositeCurve;
+use crate::watch::Watch;
 use bezier::split;
 use certificate::Certificate;
 use corner::append_corners;
@@ -113,11 +114,16 @@ impl<const D: usize> Smooth<D> {
 /// The curve along a polyline of one chord or more, cut beside the vertices that `cut` says.
 ///
 /// Vertices that turn back must end a polyline: no curve passes them without standing still.
-pub fn smooth_fit<const D: usize>(line: &Polyline<D>, cut: &[bool], options: &SmoothOptions<D>) -> Smooth<D> {
+pub fn smooth_fit<const D: usize>(
+    line: &Polyline<D>,
+    cut: &[bool],
+    options: &SmoothOptions<D>,
+    watch: Watch,
+) -> Smooth<D> {
     let mut out = Smooth::default();
     // Not a number is no length.
     let partings = if line.length().is_finite() { PARTINGS } else { 0 };
-    Run { line, cut, options }.fit(0..line.chords(), partings, &mut out);
+    Run { line, cut, options, watch: watch.each(line.chords()) }.fit(0..line.chords(), partings, &mut out);
     out
 }
 
@@ -125,6 +131,8 @@ struct Run<'a, const D: usize> {
     line: &'a Polyline<D>,
     cut: &'a [bool],
     options: &'a SmoothOptions<D>,
+    /// Counts chords.
+    watch: Watch<'a>,
 }
 
 impl<const D: usize> Run<'_, D> {
@@ -143,7 +151,7 @@ impl<const D: usize> Run<'_, D> {
         let (fit, pieces, certificate) = self.refined(&part);
         out.work += fit.work;
         if certificate.good.iter().all(|&good| good) {
-            out.offsets.merge(&Offsets::of(&part, &fit.spline.knots, &pieces, &certificate.foot));
+            out.offsets.merge(&Offsets::of(&part, &fit.spline.knots, &pieces, &certificate.foot, self.watch));
             return out.after_stop(|out| self.append_spline(&chords, &fit, &pieces, &certificate, out));
         }
         let mut next = chords.start;
@@ -159,17 +167,19 @@ impl<const D: usize> Run<'_, D> {
     /// The fit of a part, refined until its certificate holds or refining helps no more.
     fn refined<'b>(&self, part: &'b Polyline<D>) -> (Fit<'b, D>, Vec<bezier::Control<D>>, Certificate) {
         let long = self.options.long;
+        // How often it is refined is not known: each round counts as half of what is left.
+        let mut watch = self.watch.part(0.5 * part.chords() as f64);
         let mut fit = Fit::new(part, size::knots(part, long), long);
         let all = 0..fit.spline.intervals();
-        fit.solve(std::slice::from_ref(&all));
+        fit.solve(std::slice::from_ref(&all), watch);
         let mut refinement = 0;
         loop {
             let pieces = fit.spline.pieces();
-            let certificate = Certificate::new(part, &fit.spline.knots, &pieces, &self.options.bounds);
+            let certificate = Certificate::new(part, &fit.spline.knots, &pieces, &self.options.bounds, watch);
             if refinement == REFINEMENTS {
                 return (fit, pieces, certificate);
             }
-            let mut bad = bends::missed(part, &fit.spline.knots, &pieces, &certificate.foot);
+            let mut bad = bends::missed(part, &fit.spline.knots, &pieces, &certificate.foot, watch);
             for (bad, good) in bad.iter_mut().zip(&certificate.good) {
                 *bad |= !good;
             }
@@ -177,7 +187,8 @@ impl<const D: usize> Run<'_, D> {
                 return (fit, pieces, certificate);
             }
             let (mut next, ranges) = refine::halved(&fit, &bad, long);
-            next.solve(&ranges);
+            watch = watch.part(0.5);
+            next.solve(&ranges, watch);
             fit = next;
             refinement += 1;
         }

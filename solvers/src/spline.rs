@@ -54,7 +54,14 @@ pub struct Piece<'a, const M: usize> {
     pub width: f64,
 }
 
-impl<const M: usize> Piece<'_, M> {
+impl<'a, const M: usize> Piece<'a, M> {
+    /// A piece of as many weights as control points, or none; equal weights make it no rational one.
+    #[inline]
+    pub fn new(control: &'a [[f64; M]], weights: &'a [f64], width: f64) -> Self {
+        let equal = weights.windows(2).all(|pair| pair[0] == pair[1]);
+        Self { control, weights: if equal { &[] } else { weights }, width }
+    }
+
     #[inline(always)]
     pub fn degree(&self) -> usize {
         self.control.len() - 1
@@ -111,11 +118,8 @@ impl<const M: usize> CompositeCurve<M> {
     #[inline]
     pub fn piece(&self, i: usize) -> Piece<'_, M> {
         let range = self.offsets[i]..self.offsets[i + 1];
-        let mut weights = if self.weights.is_empty() { &[][..] } else { &self.weights[range.clone()] };
-        if weights.windows(2).all(|pair| pair[0] == pair[1]) {
-            weights = &[];
-        }
-        Piece { control: &self.control[range], weights, width: self.width[i] }
+        let weights = if self.weights.is_empty() { &[][..] } else { &self.weights[range.clone()] };
+        Piece::new(&self.control[range], weights, self.width[i])
     }
 
     /// The control points of piece i.

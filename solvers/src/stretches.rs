@@ -13,6 +13,7 @@ use crate::quadratic::dot;
 use crate::spline::bezier::derivatives;
 use crate::spline::cusps::{piece_cusps, CUSP};
 use crate::spline::rational::Hodograph;
+use crate::watch::Watch;
 
 /// Cusps closer to the end of a piece than this part of it are at the end.
 const AT_END: f64 = 1e-9;
@@ -36,6 +37,8 @@ const PLACES: [usize; 2] = [4, 64];
 const TIGHT: f64 = 10.0;
 /// How far from a place on a line its direction is looked at, as a part of the piece.
 const BESIDE: f64 = 1e-4;
+/// The share of a plan's work that it is to cut the path into stretches.
+const CUTTING: f64 = 0.1;
 
 /// Parts of pieces from one place of rest, or end of the path, to another.
 #[derive(Clone, Debug)]
@@ -47,17 +50,20 @@ pub struct Stretch {
     pub ends: [f64; 2],
 }
 
-/// The profile of a path with these jerk limits in mm/s³, each stretch planned alone. A run with a stretch that was not
-/// planned has no arcs.
+/// The profile of a path with these jerk limits in mm/s³, each stretch planned alone; `plan` gets who counts it. A run with
+/// a stretch that was not planned has no arcs.
 pub fn over_stretches<const M: usize>(
     problem: &Problem<M>,
     jerk: &[f64; M],
-    plan: impl Fn(&Stretch, &Limits<M>) -> Result<Arcs, Fault> + Sync,
+    plan: impl Fn(&Stretch, &Limits<M>, Watch) -> Result<Arcs, Fault> + Sync,
 ) -> Result<Arcs, Fault> {
     let limits = checked(problem, jerk)?;
     let stretches = stretches(problem);
-    let planned: Result<Vec<Arcs>, Fault> =
-        stretches.par_iter().map(|stretch| plan(stretch, &limits)).collect();
+    let watch = problem.watch.part(1.0 - CUTTING).each(problem.width.len());
+    let planned: Result<Vec<Arcs>, Fault> = stretches
+        .par_iter()
+        .map(|stretch| plan(stretch, &limits, watch.part(stretch.parts.len() as f64)))
+        .collect();
     let mut planned = planned?.into_iter();
     let mut all = Arcs::default();
     all.runs.push(0);
@@ -92,6 +98,7 @@ pub fn stretches<const M: usize>(problem: &Problem<M>) -> Vec<Stretch> {
     for (run, pair) in problem.runs.windows(2).enumerate() {
         let mut rests = true;
         for i in pair[0]..pair[1] {
+            problem.watch.part(CUTTING).each(problem.width.len()).count(i);
             let (cuts, cusped) = cusps(problem, i);
             let mut cuts: Vec<(f64, bool)> = cuts.into_iter().map(|u| (u, true)).collect();
             let at_cusp = |u: f64| cusped[0] && u == 0.0 || cusped[1] && u == problem.width[i];

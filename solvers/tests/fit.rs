@@ -3,6 +3,7 @@
 
 use feedplan_solvers::fit::{fit_points, FitOptions, FittedPiece};
 use feedplan_solvers::quadratic::{dot, lerp, norm, sub};
+use feedplan_solvers::watch::Watch;
 use proptest::prelude::*;
 
 const TOLERANCE: f64 = 0.01;
@@ -93,7 +94,7 @@ fn check<const M: usize>(points: &[[f64; M]], pieces: &[FittedPiece<M>], options
 }
 
 fn fitted<const M: usize>(points: &[[f64; M]], options: &FitOptions) -> Vec<FittedPiece<M>> {
-    let pieces = fit_points(points, options);
+    let pieces = fit_points(points, options, Watch::default());
     check(points, &pieces, options);
     pieces
 }
@@ -141,7 +142,9 @@ fn a_run_that_bends_by_less_than_rounding_at_a_time_still_holds_the_tolerance() 
     let points: Vec<[f64; 2]> =
         (0..1000).map(f64::from).map(|x| [x, 1e-15 * (x - 500.0) * (x - 500.0)]).collect();
     let options = FitOptions { tolerance: 1e-10, ..OPTIONS };
-    assert!(fit_points(&points, &options).iter().all(|piece| piece.deviation <= options.tolerance));
+    assert!(fit_points(&points, &options, Watch::default())
+        .iter()
+        .all(|piece| piece.deviation <= options.tolerance));
 }
 
 #[test]
@@ -213,14 +216,14 @@ fn a_bulge_between_one_and_two_tolerances_is_shared_and_stays_smooth() {
 fn no_tolerance_and_no_numbers_keep_every_chord() {
     let points: Vec<[f64; 2]> = (0..50).map(|i| [f64::from(i), f64::from(i * i) * 0.01]).collect();
     for tolerance in [0.0, -1.0, f64::NAN] {
-        assert_eq!(fit_points(&points, &FitOptions { tolerance, ..OPTIONS }).len(), 49);
+        assert_eq!(fit_points(&points, &FitOptions { tolerance, ..OPTIONS }, Watch::default()).len(), 49);
     }
     for bad in [f64::NAN, f64::INFINITY, 1e300] {
         let mut points = points.clone();
         points[20][1] = bad;
-        assert_eq!(fit_points(&points, &OPTIONS).len(), 49);
+        assert_eq!(fit_points(&points, &OPTIONS, Watch::default()).len(), 49);
     }
-    assert!(fit_points(&points[..1], &OPTIONS).is_empty());
+    assert!(fit_points(&points[..1], &OPTIONS, Watch::default()).is_empty());
     let odd = FitOptions { max_chord: f64::NAN, max_curvature: f64::NAN, corner_angle: f64::NAN, ..OPTIONS };
     fitted(&points, &odd);
 }
@@ -233,7 +236,7 @@ fn the_unit_does_not_matter() {
         .map(|t| [20.0 * t.cos() + 0.002 * random(&mut state), t * t.sin(), (3.0 * t).sin().abs()])
         .collect();
     let options = FitOptions { max_chord: 2.0, max_curvature: 0.9, ..OPTIONS };
-    let pieces = fit_points(&points, &options);
+    let pieces = fit_points(&points, &options, Watch::default());
     // A power of two scales without rounding.
     for scale in [1024.0, 1.0 / 1024.0] {
         let scaled: Vec<[f64; 3]> = points.iter().map(|p| p.map(|value| scale * value)).collect();
@@ -243,7 +246,7 @@ fn the_unit_does_not_matter() {
             max_curvature: options.max_curvature / scale,
             ..options
         };
-        let again = fit_points(&scaled, &options);
+        let again = fit_points(&scaled, &options, Watch::default());
         assert_eq!(pieces.len(), again.len());
         for (piece, other) in pieces.iter().zip(&again) {
             assert_eq!((piece.first, piece.last, piece.spline), (other.first, other.last, other.spline));
@@ -261,7 +264,7 @@ fn threads_do_not_matter() {
         .collect();
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| fit_points(&points, &FitOptions { max_curvature: 4.0, ..OPTIONS }))
+        pool.install(|| fit_points(&points, &FitOptions { max_curvature: 4.0, ..OPTIONS }, Watch::default()))
     };
     assert!(with(1) == with(4));
 }

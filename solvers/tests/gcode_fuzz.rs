@@ -33,7 +33,7 @@ fn limited() -> Options {
 
 fn check(source: &[u8]) -> Result<(), TestCaseError> {
     for block_delete in [true, false] {
-        match read(source, &Options { block_delete, ..limited() }) {
+        match read(source, &Options { block_delete, ..limited() }, &|_| ()) {
             Ok(columns) => check_columns(source, &columns)?,
             Err(error) => check_error(source, &error)?,
         }

@@ -5,6 +5,7 @@ mod support;
 
 use feedplan_solvers::path_dynamics::{allowable, bounded, chord_speed, sampled, AxisLimits, Curve, Shape};
 use feedplan_solvers::s_curve::{plan, Limits, Section, Segment};
+use feedplan_solvers::watch::Watch;
 use support::{seeds, Random};
 
 const AXES: AxisLimits<2> =
@@ -124,7 +125,7 @@ fn uses(control: &Control, weight: &[f64], shape: impl Fn(&Curve<2>) -> Shape<2>
             }
         })
         .collect();
-    let sections = plan(&segments, PARTS).expect("a profile");
+    let sections = plan(&segments, PARTS, Watch::default()).expect("a profile");
     let places: Vec<[f64; 2]> = positions(&sections)
         .into_iter()
         .map(|length| evaluate(control, weight, locate(control, weight, &table, length)).0)

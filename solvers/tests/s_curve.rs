@@ -3,6 +3,7 @@
 mod support;
 
 use feedplan_solvers::s_curve::{plan, Limits, Profiler, Section, SectionKind, Segment};
+use feedplan_solvers::watch::Watch;
 use proptest::prelude::*;
 use support::{seeds, Random};
 
@@ -171,7 +172,7 @@ fn random_segments(random: &mut Random) -> Vec<Segment> {
 #[test]
 fn a_line_by_hand_takes_seven_sections() {
     // 0.21 s to 100 mm/s in 10.5 mm, 79 mm in 0.79 s, 0.21 s down.
-    let sections = plan(&[segment(100.0)], 10).unwrap();
+    let sections = plan(&[segment(100.0)], 10, Watch::default()).unwrap();
     assert_eq!(sections.len(), 7);
     assert!((time(&sections) - 1.21).abs() < 1e-14);
 }
@@ -180,7 +181,7 @@ fn a_line_by_hand_takes_seven_sections() {
 fn a_square_with_exact_stops_takes_four_lines() {
     let side = Segment { junction: 0.0, ..segment(100.0) };
     for look_ahead in [0, 1, 2, 10] {
-        let sections = plan(&[side; 4], look_ahead).unwrap();
+        let sections = plan(&[side; 4], look_ahead, Watch::default()).unwrap();
         assert_eq!(sections.len(), 28);
         assert!((time(&sections) - 4.84).abs() < 1e-13);
     }
@@ -188,7 +189,7 @@ fn a_square_with_exact_stops_takes_four_lines() {
 
 #[test]
 fn a_line_cut_where_its_changes_end_takes_the_same_time() {
-    let sections = plan(&[10.5, 79.0, 10.5].map(segment), 10).unwrap();
+    let sections = plan(&[10.5, 79.0, 10.5].map(segment), 10, Watch::default()).unwrap();
     assert!((time(&sections) - 1.21).abs() < 1e-12);
 }
 
@@ -196,7 +197,7 @@ fn a_line_cut_where_its_changes_end_takes_the_same_time() {
 fn a_slow_segment_ahead_is_met_by_falling_in_time() {
     // 100 to 40 mm/s: 0.13 s and 9.1 mm at the end of the first; the second at 40 mm/s; from there up again.
     let slow = Segment { desired: 40.0, ..segment(40.0) };
-    let sections = plan(&[segment(100.0), slow, segment(100.0)], 10).unwrap();
+    let sections = plan(&[segment(100.0), slow, segment(100.0)], 10, Watch::default()).unwrap();
     let line = 0.21 + (100.0 - 10.5 - 9.1) / 100.0 + 0.13;
     assert!((time(&sections) - (2.0 * line + 1.0)).abs() < 1e-12);
 }
@@ -204,7 +205,7 @@ fn a_slow_segment_ahead_is_met_by_falling_in_time() {
 #[test]
 fn a_desired_speed_below_the_allowable_one_is_kept() {
     let slow = Segment { desired: 50.0, ..segment(100.0) };
-    let sections = plan(&[slow; 3], 10).unwrap();
+    let sections = plan(&[slow; 3], 10, Watch::default()).unwrap();
     // 0.11 s and 2.75 mm up and down.
     assert!((time(&sections) - (0.22 + (300.0 - 5.5) / 50.0)).abs() < 1e-12);
 }
@@ -212,15 +213,15 @@ fn a_desired_speed_below_the_allowable_one_is_kept() {
 #[test]
 fn segments_without_length_change_nothing() {
     let path = [0.0, 10.5, 0.0, 0.0, 79.0, 0.0, 10.5, 0.0].map(segment);
-    assert!((time(&plan(&path, 10).unwrap()) - 1.21).abs() < 1e-12);
-    assert!(plan(&[segment(0.0); 3], 1).unwrap().is_empty());
-    assert!(plan(&[], 1).unwrap().is_empty());
+    assert!((time(&plan(&path, 10, Watch::default()).unwrap()) - 1.21).abs() < 1e-12);
+    assert!(plan(&[segment(0.0); 3], 1, Watch::default()).unwrap().is_empty());
+    assert!(plan(&[], 1, Watch::default()).unwrap().is_empty());
 }
 
 #[test]
 fn a_wrong_segment_is_named() {
     let path = [segment(1.0), segment(1.0), segment(f64::NAN)];
-    let message = plan(&path, 0).unwrap_err().to_string();
+    let message = plan(&path, 0, Watch::default()).unwrap_err().to_string();
     assert_eq!(message, "the length of segment 2 is NaN mm: give 0 or 1e-12 to 1e15 mm");
 }
 
@@ -261,9 +262,9 @@ fn a_stream_that_sees_far_enough_to_stop_gives_the_profile_of_the_whole() {
                 junction: if random.chance(0.1) { 0.0 } else { f64::INFINITY },
             })
             .collect();
-        let whole = plan(&segments, segments.len()).unwrap();
-        assert_eq!(plan(&segments, 20).unwrap(), whole, "seed {seed}");
-        apart += usize::from(plan(&segments, 1).unwrap() != whole);
+        let whole = plan(&segments, segments.len(), Watch::default()).unwrap();
+        assert_eq!(plan(&segments, 20, Watch::default()).unwrap(), whole, "seed {seed}");
+        apart += usize::from(plan(&segments, 1, Watch::default()).unwrap() != whole);
     }
     assert!(apart > 0, "a look-ahead of one segment sees as much");
 }
@@ -272,7 +273,7 @@ fn a_stream_that_sees_far_enough_to_stop_gives_the_profile_of_the_whole() {
 fn the_unit_of_length_does_not_matter() {
     for seed in seeds(2_000) {
         let segments = random_segments(&mut Random(seed));
-        let whole = time(&plan(&segments, 20).unwrap());
+        let whole = time(&plan(&segments, 20, Watch::default()).unwrap());
         for unit in [1.0 / 1024.0, 1024.0] {
             let scaled: Vec<Segment> = segments
                 .iter()
@@ -287,7 +288,7 @@ fn the_unit_of_length_does_not_matter() {
                     junction: unit * segment.junction,
                 })
                 .collect();
-            let again = time(&plan(&scaled, 20).unwrap());
+            let again = time(&plan(&scaled, 20, Watch::default()).unwrap());
             assert!((again - whole).abs() <= 1e-12 * whole, "seed {seed}: {again} s for {whole} s");
         }
     }

@@ -6,6 +6,7 @@ use feedplan_solvers::quadratic::{norm, sub, Quadratic};
 use feedplan_solvers::sampling::{Interpolator, PathData, Sampler};
 use feedplan_solvers::spline::bezier::elevate;
 use feedplan_solvers::spline::{CompositeCurve, Piece};
+use feedplan_solvers::watch::Watch;
 use proptest::prelude::*;
 
 /// A curve of one piece, its degree raised: the same motion by the closed forms and by the general ones.
@@ -48,7 +49,7 @@ fn path_of(piece: &Quadratic<2>) -> PathData<2> {
 fn sampler(period: f64, interpolator: Interpolator) -> Sampler<2> {
     let (line, arcs) = triangle();
     let path = path_of(&line);
-    Sampler::new(path, arcs.to_vec(), &[0, 2], period, interpolator).unwrap()
+    Sampler::new(path, arcs.to_vec(), &[0, 2], period, interpolator, Watch::default()).unwrap()
 }
 
 #[test]
@@ -80,7 +81,7 @@ fn a_run_of_a_whole_number_of_periods_ends_on_the_grid() {
         for interpolator in [Interpolator::Sarfraz, Interpolator::Newton] {
             let sampler = sampler(period, interpolator);
             assert_eq!(sampler.count(), count, "{period}");
-            let chunk = sampler.chunk(0..count, &mut None);
+            let chunk = sampler.chunk(0..count, &mut None, Watch::default());
             assert_eq!(chunk.position[count - 1], [10.0, 5.0]);
             assert_eq!((chunk.velocity[count - 1], chunk.acceleration[count - 1]), ([0.0; 2], [0.0; 2]));
             assert_eq!(sampler.duration(), (count - 1) as f64 * period);
@@ -92,13 +93,13 @@ fn a_run_of_a_whole_number_of_periods_ends_on_the_grid() {
 fn any_part_of_the_stream_has_the_same_digits() {
     for interpolator in [Interpolator::Sarfraz, Interpolator::Newton] {
         let sampler = sampler(1e-5, interpolator);
-        let whole = sampler.chunk(0..sampler.count(), &mut None);
+        let whole = sampler.chunk(0..sampler.count(), &mut None, Watch::default());
         assert!(whole.t.len() > 20_000);
         // Onwards, with gaps, and back; with the state of the part before and without.
         let mut state = None;
         for range in [0..1, 1..2, 4095..4097, 4097..4200, 12_345..20_001, 9_999..10_002] {
             for resume in [&mut None, &mut state] {
-                let part = sampler.chunk(range.clone(), resume);
+                let part = sampler.chunk(range.clone(), resume, Watch::default());
                 assert_eq!(part.position, whole.position[range.clone()]);
                 assert_eq!(part.velocity, whole.velocity[range.clone()]);
                 assert_eq!(part.t, whole.t[range.clone()]);
@@ -171,7 +172,7 @@ fn nonsense_is_refused_with_a_sentence() {
         let (line, mut arcs) = triangle();
         change(&mut arcs[1]);
         let path = path_of(&line);
-        Sampler::new(path, arcs.to_vec(), &[0, 2], period, Interpolator::Sarfraz).err()
+        Sampler::new(path, arcs.to_vec(), &[0, 2], period, Interpolator::Sarfraz, Watch::default()).err()
     };
     assert!(build(&|_| (), 0.001).is_none());
     for period in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-12, 5e-324] {

@@ -14,6 +14,7 @@ use campaign::seeds;
 use feedplan_solvers::jerk_limited::{plan, Effort, End, Limits, Problem};
 use feedplan_solvers::smooth_fit::polyline::Polyline;
 use feedplan_solvers::smooth_fit::{smooth_fit, Smooth, SmoothOptions};
+use feedplan_solvers::watch::Watch;
 use polylines::{dense, derivatives, distance, length, random_polyline, to_segment, walk, Random};
 
 const LONG: f64 = 5.0;
@@ -22,13 +23,13 @@ fn polyline<const D: usize>(points: Vec<[f64; D]>, tolerance: f64) -> Polyline<D
     let chords = points.len() - 1;
     let mut line = Polyline::new(points, vec![tolerance; chords]);
     line.sized = true;
-    line.hold_bends(LONG, |_| false);
+    line.hold_bends(LONG, |_| false, Watch::default());
     line
 }
 
 fn fit<const D: usize>(line: &Polyline<D>) -> Smooth<D> {
     let options = SmoothOptions { long: LONG, bounds: [[f64::NEG_INFINITY, f64::INFINITY]; D] };
-    smooth_fit(line, &vec![false; line.vertex.len()], &options)
+    smooth_fit(line, &vec![false; line.vertex.len()], &options, Watch::default())
 }
 
 fn square(side: f64) -> Vec<[f64; 2]> {
@@ -91,7 +92,7 @@ fn a_line_is_reproduced_exactly() {
     let mut cut = vec![false; 31];
     cut[10] = true;
     let options = SmoothOptions { long: LONG, bounds: [[f64::NEG_INFINITY, f64::INFINITY]; 2] };
-    let parts = smooth_fit(&many, &cut, &options);
+    let parts = smooth_fit(&many, &cut, &options, Watch::default());
     assert_eq!(parts.stretches.iter().map(|s| (s.first, s.last)).collect::<Vec<_>>(), [(0, 9), (10, 29)]);
     assert!(distance(&parts.curve.piece(0).control[1], &many.vertex[10]) < 1e-15);
 }
@@ -168,7 +169,7 @@ fn a_circle_keeps_its_radius() {
     let mut line = polyline(points, 0.1);
     let [mean, ..] = radii(&line, &fit(&line));
     assert!((mean - 2.0).abs() < 0.01, "{mean}");
-    line.hold_bends(LONG, |_| true);
+    line.hold_bends(LONG, |_| true, Watch::default());
     let [_, least, greatest] = radii(&line, &fit(&line));
     assert!(least > 1.998 && greatest < 2.002, "{least} to {greatest}");
     line.sized = false;
@@ -204,7 +205,7 @@ fn derivatives_to_the_fourth_agree_at_joints_also_where_pieces_are_cut() {
     assert!(worst.iter().all(|&jump| jump < 1e-9), "{worst:?}");
     let cut: Vec<bool> = (0..=400).map(|i| i % 7 == 3).collect();
     let options = SmoothOptions { long: LONG, bounds: [[f64::NEG_INFINITY, f64::INFINITY]; 3] };
-    let parts = smooth_fit(&line, &cut, &options);
+    let parts = smooth_fit(&line, &cut, &options, Watch::default());
     assert!(parts.curve.len() > smooth.curve.len() + 40);
     check(&line, &parts, "cut");
     for stretch in &parts.stretches {
@@ -217,7 +218,7 @@ fn derivatives_to_the_fourth_agree_at_joints_also_where_pieces_are_cut() {
 fn a_curve_that_would_leave_its_bounds_keeps_its_corners() {
     let line = polyline(square(20.0), 0.1);
     let bounds = [[-1e-6, 100.0], [-100.0, 100.0]];
-    let smooth = smooth_fit(&line, &[false; 5], &SmoothOptions { long: LONG, bounds });
+    let smooth = smooth_fit(&line, &[false; 5], &SmoothOptions { long: LONG, bounds }, Watch::default());
     check(&line, &smooth, "bounds");
     assert!(smooth.curve.control.iter().all(|point| point[0] >= -1e-6));
     // The side on the bound is a line, with a stop where it begins.

@@ -11,7 +11,7 @@ use super::arcs::Arcs;
 use super::curve::{distance, Followed};
 use super::moves::{Move, Neighbours, Programmed};
 use super::place::distance_to_piece;
-use super::{Check, Limits, Tally, Worst, EPS, GAP_TOLERANCE, ROUNDINGS};
+use super::{tell, Check, Limits, Seen, Tally, Worst, EPS, GAP_TOLERANCE, ROUNDINGS};
 
 /// Even places of a piece of degree 2, and as many again between two of them where it comes near its tolerance.
 /// Others have more: each degree is another turn.
@@ -28,9 +28,14 @@ const FEW: usize = 8;
 const BLOCK: usize = 2048;
 
 /// The path on its own: finite numbers, piece on piece, within the travel of the axes.
-pub fn audit_path<const M: usize>(path: &Followed, arcs: Option<&Arcs>, limits: &Limits<M>) -> Tally<M> {
+pub fn audit_path<const M: usize>(
+    path: &Followed,
+    arcs: Option<&Arcs>,
+    limits: &Limits<M>,
+    seen: Seen,
+) -> Tally<M> {
     let times = entry_times(path, arcs);
-    blocks(path.len(), |i, tally| {
+    blocks(path.len(), seen, |i, tally| {
         let (time, line) = (times[i], path.line[i]);
         let (rows, width) = (path.rows(i), path.width[i]);
         let control = &path.control[rows.start * path.axes..rows.end * path.axes];
@@ -102,13 +107,14 @@ pub fn audit_deviation<const M: usize>(
     path: &Followed,
     program: &Programmed,
     arcs: Option<&Arcs>,
+    seen: Seen,
 ) -> Tally<M> {
     let times = entry_times(path, arcs);
     let followers = followers(path, program.len());
     let from_path =
-        blocks(path.len(), |i, tally| piece_to_moves(path, program, &followers, i, times[i], tally));
+        blocks(path.len(), seen, |i, tally| piece_to_moves(path, program, &followers, i, times[i], tally));
     let from_program =
-        blocks(program.len(), |m, tally| move_to_pieces(path, program, m, followers[m], &times, tally));
+        blocks(program.len(), seen, |m, tally| move_to_pieces(path, program, m, followers[m], &times, tally));
     let mut ends = Tally::default();
     if !path.is_empty() && !program.is_empty() {
         let last = path.len() - 1;
@@ -284,12 +290,13 @@ fn entry_times(path: &Followed, arcs: Option<&Arcs>) -> Vec<f64> {
 }
 
 /// Calls `check` for every index, in parallel.
-fn blocks<const M: usize>(count: usize, check: impl Fn(usize, &mut Tally<M>) + Sync) -> Tally<M> {
+fn blocks<const M: usize>(count: usize, seen: Seen, check: impl Fn(usize, &mut Tally<M>) + Sync) -> Tally<M> {
     (0..count.div_ceil(BLOCK))
         .into_par_iter()
         .map(|block| {
             let mut tally = Tally::default();
             for i in block * BLOCK..((block + 1) * BLOCK).min(count) {
+                tell(seen, i);
                 check(i, &mut tally);
             }
             tally

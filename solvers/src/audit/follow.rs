@@ -11,7 +11,7 @@ use super::moves::Programmed;
 use super::place::{Place, Search};
 use super::setpoints::Row;
 use super::timed::{Reader, Timed};
-use super::{Limits, EPS, GAP_TOLERANCE, PASS_EXCESS, PLACE_TOLERANCE, ROUNDINGS};
+use super::{tell, Limits, Seen, EPS, GAP_TOLERANCE, PASS_EXCESS, PLACE_TOLERANCE, ROUNDINGS};
 
 /// Setpoints a thread takes at a time.
 const BLOCK: usize = 4096;
@@ -105,7 +105,13 @@ impl Plan<'_> {
     }
 
     /// Finds the places of the rows from `old` on.
-    pub fn find_spots<const M: usize>(&self, limits: &Limits<M>, rows: &mut [Row<M>], old: usize) {
+    pub fn find_spots<const M: usize>(
+        &self,
+        limits: &Limits<M>,
+        rows: &mut [Row<M>],
+        old: usize,
+        seen: Seen,
+    ) {
         let (known, fresh) = rows.split_at_mut(old);
         // Without a profile every search starts from the place before; with one its time says where to start.
         let block = if self.profile.is_some() { BLOCK } else { fresh.len().max(1) };
@@ -113,6 +119,7 @@ impl Plan<'_> {
             let mut finder = Finder::new(self, limits);
             let mut astray = 0;
             for i in 0..rows.len() {
+                tell(seen, i);
                 let (before, rest) = rows.split_at_mut(i);
                 let first = if number == 0 { known.last() } else { None };
                 let (previous, row) = (before.last().or(first), &mut rest[0]);

@@ -12,7 +12,7 @@ use super::arcs::Arcs;
 use super::curve::{length, Followed};
 use super::jerk::Jerks;
 use super::motion::{Motion, State};
-use super::{Check, Limits, Tally, EPS, FEEDS, GAP_TOLERANCE, PASS_EXCESS, ROUNDINGS};
+use super::{tell, Check, Limits, Seen, Tally, EPS, FEEDS, GAP_TOLERANCE, PASS_EXCESS, ROUNDINGS};
 
 /// Even intervals of an arc.
 const INTERVALS: usize = 8;
@@ -40,6 +40,7 @@ pub fn audit_profile<const M: usize>(
     junction_speed: &[f64],
     arcs: &Arcs,
     limits: &Limits<M>,
+    seen: Seen,
 ) -> Tally<M> {
     let starts = arcs.starts(path);
     let auditor = Auditor { path, junction_speed, arcs, limits, starts: &starts };
@@ -49,6 +50,7 @@ pub fn audit_profile<const M: usize>(
         .map(|block| {
             let mut tally = Tally::default();
             for i in block * BLOCK..((block + 1) * BLOCK).min(arcs.len()) {
+                tell(seen, i);
                 auditor.arc(i, &mut tally);
                 if i > 0 && arcs.runs.binary_search(&(i as i64)).is_err() {
                     auditor.joint(i - 1, i, &mut tally);

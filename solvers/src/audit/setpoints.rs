@@ -11,7 +11,7 @@ use super::curve::{distance, length, vector};
 use super::deviation::offer_travel;
 use super::differences::{Differences, Quotient};
 use super::follow::{Plan, Spot};
-use super::{Check, Limits, Tally, PLACE_TOLERANCE};
+use super::{Check, Limits, Seen, Tally, PLACE_TOLERANCE};
 
 /// Setpoints before and after the one at which an acceleration is judged.
 const AROUND: usize = 3;
@@ -74,8 +74,8 @@ impl<const M: usize> Stream<M> {
         self.limits.axes
     }
 
-    /// The next setpoints; `plan` must be the same every time.
-    pub fn push(&mut self, plan: Option<&Plan>, chunk: &Chunk) {
+    /// The next setpoints; `plan` must be the same every time. What `seen` ends is of no more use.
+    pub fn push(&mut self, plan: Option<&Plan>, chunk: &Chunk, seen: Seen) {
         let old = self.kept.len();
         let mut rows = std::mem::take(&mut self.kept);
         rows.par_extend((0..chunk.t.len()).into_par_iter().map(|i| Row {
@@ -92,14 +92,17 @@ impl<const M: usize> Stream<M> {
         let plan = plan.map(|plan| plan.with_clock(&self.clock));
         let plan = plan.as_ref();
         if let Some(plan) = plan {
-            plan.find_spots(&self.limits, &mut rows, old);
+            plan.find_spots(&self.limits, &mut rows, old, seen);
         }
         let view = View { differences: self.differences(&rows), plan };
         let found = (old..rows.len())
             .step_by(BLOCK)
             .collect::<Vec<_>>()
             .into_par_iter()
-            .map(|first| view.block(first..(first + BLOCK).min(rows.len())))
+            .map(|first| {
+                seen(BLOCK.min(rows.len() - first));
+                view.block(first..(first + BLOCK).min(rows.len()))
+            })
             .reduce(Tally::default, Tally::merge);
         let mut first = Tally::default();
         if self.count == 0 && !rows.is_empty() {

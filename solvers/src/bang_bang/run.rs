@@ -220,6 +220,7 @@ fn backward<const M: usize>(
     space.clear(last - first);
     let mut at = Between { state: State { speed_sq: f64::INFINITY }, end: None, tip_sq: end_sq };
     for i in (first..last).rev() {
+        task.watch.part(0.5).count(i);
         if i + 1 < last {
             at.tip_sq = task.problem.junction_speed[i + 1].powi(2);
         }
@@ -295,6 +296,7 @@ fn forward<const M: usize>(
     let mut at = Between { state: State { speed_sq: f64::INFINITY }, end: None, tip_sq: start_sq };
     let mut index = space.offsets.len();
     for i in first..last {
+        task.watch.part(0.5).count(i);
         if i > first {
             at.tip_sq = task.problem.junction_speed[i].powi(2);
         }

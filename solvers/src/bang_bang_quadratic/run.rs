@@ -69,6 +69,7 @@ pub fn plan_run<const M: usize>(
             speed_sq = start_sq.min(reachable);
         }
         speed_sq = forward_over(task, (begin, end), first, speed_sq, space, out)?;
+        task.watch.advance(end - begin);
         begin = end;
     }
     out.end_run();
@@ -116,6 +117,7 @@ fn backward_over<const M: usize>(
     let mut speed_sq = end_sq;
     let mut next = (end < last).then(|| Piece::new(&task.pieces[end]));
     for i in (begin..end).rev() {
+        task.watch.check_at(i);
         let piece = Piece::new(&task.pieces[i]);
         if let Some(next) = &next {
             speed_sq = speed_sq.min(junction(&piece, next, task.junction_speed[i + 1]));
@@ -138,6 +140,7 @@ fn forward_over<const M: usize>(
     let mut speed_sq = start_sq;
     let mut previous = (begin > first).then(|| Piece::new(&task.pieces[begin - 1]));
     for i in begin..end {
+        task.watch.check_at(i);
         let piece = Piece::new(&task.pieces[i]);
         if let Some(previous) = &previous {
             speed_sq = speed_sq.min(junction(previous, &piece, task.junction_speed[i]));

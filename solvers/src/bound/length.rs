@@ -54,6 +54,11 @@ fn halves(
     (to - from) * (sum - ROUNDING * greatest - 2.5 * first.max(last) * noise).max(0.0)
 }
 
+/// See `bound::prepare`.
+pub fn prepare() {
+    rule(0);
+}
+
 /// Gauss's rule on [0, 1] of that many places: exact for polynomials of a degree less than twice as great.
 fn rule(count: usize) -> &'static [(f64, f64)] {
     static RULES: OnceLock<Vec<Vec<(f64, f64)>>> = OnceLock::new();

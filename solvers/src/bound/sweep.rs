@@ -101,6 +101,7 @@ pub fn backward<const M: usize>(
 ) {
     let mut at = Between { axes_sq: f64::INFINITY, tool_sq: end_sq * task.speed_share, end: None };
     for i in (first..last).rev() {
+        task.problem.watch.check_at(i);
         if i + 1 < last {
             at.tool_sq = task.junction_sq(i + 1);
         }
@@ -151,6 +152,7 @@ pub fn forward<const M: usize>(
 ) -> f64 {
     let (mut axes_sq, mut time) = (f64::INFINITY, 0.0);
     for i in first..last {
+        task.problem.watch.check_at(i);
         let tool_sq = if i > first { task.junction_sq(i) } else { start_sq * task.speed_share };
         let entered = (&mut axes_sq, tool_sq);
         with_capacity!(task, i, forward_over(task, i, i - first, entered, &mut time, &wanted, cells));

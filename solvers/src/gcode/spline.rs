@@ -385,11 +385,11 @@ mod tests {
     use crate::gcode::{read, Columns, Options};
 
     fn columns(text: &str) -> Columns {
-        read(format!("G21 F600\n{text}\nM2\n").as_bytes(), &Options::default()).unwrap()
+        read(format!("G21 F600\n{text}\nM2\n").as_bytes(), &Options::default(), &|_| ()).unwrap()
     }
 
     fn message(text: &str) -> (Option<u32>, String) {
-        let error = read(text.as_bytes(), &Options::default()).unwrap_err();
+        let error = read(text.as_bytes(), &Options::default(), &|_| ()).unwrap_err();
         (error.line, error.message)
     }
 

@@ -46,7 +46,7 @@ pub fn certify<G: Geometry<M>, const M: usize>(
     profile: &Profile,
     effort: &Effort,
 ) -> Certificate {
-    let grid = Grid::of(profile, problem.geometry.knots(), problem.caps);
+    let grid = Grid::of(profile, problem.geometry.knots(), problem.caps, effort.watch);
     let bounds = prepare::bounds(problem);
     let x: Vec<f64> =
         profile.speed_sq.iter().zip(&profile.slope).flat_map(|(w, slope)| [*w, *slope]).collect();
@@ -68,7 +68,9 @@ pub fn certify<G: Geometry<M>, const M: usize>(
                 bounds[1] = fixed(x.len() - 2);
             }
             let rows = grid.rows(problem, window.clone());
-            part(&rows, bounds, x, core.start - window.start..core.end - window.start, effort)
+            let part = part(&rows, bounds, x, core.start - window.start..core.end - window.start, effort);
+            effort.watch.each(cores.len()).advance(1);
+            part
         })
         .collect();
     let time: f64 = parts.iter().map(|part| part.time).sum::<f64>() + ramps(&bounds, &x);
@@ -108,6 +110,7 @@ fn part<const M: usize>(
         deadline: effort.deadline,
         barrier: 1.0,
         warm: false,
+        watch: effort.watch,
     };
     let mut waived = rows.clone();
     waived.waive(&bounds);

@@ -7,6 +7,7 @@ use std::ops::Range;
 use super::interior_point::Bound;
 use super::rows::Rows;
 use super::{Geometry, Problem, Profile, SpeedCap};
+use crate::watch::Watch;
 
 /// r counts as changing where it uses more than this part of the greatest slope.
 const CHANGING: f64 = 0.02;
@@ -87,11 +88,13 @@ impl Grid {
     }
 
     /// The grid of a profile on a path with these knots and caps.
-    pub fn of(profile: &Profile, knots: &[f64], caps: &[SpeedCap]) -> Self {
+    pub fn of(profile: &Profile, knots: &[f64], caps: &[SpeedCap], watch: Watch) -> Self {
         let nodes = profile.s.clone();
-        let piece =
-            |pair: &[f64]| knots.partition_point(|&knot| knot <= 0.5 * (pair[0] + pair[1])) as u32 - 1;
-        let pieces = nodes.windows(2).map(piece).collect();
+        let piece = |(n, pair): (usize, &[f64])| {
+            watch.check_at(n);
+            knots.partition_point(|&knot| knot <= 0.5 * (pair[0] + pair[1])) as u32 - 1
+        };
+        let pieces = nodes.windows(2).enumerate().map(piece).collect();
         let node = |s: f64| nodes.binary_search_by(|node| node.total_cmp(&s)).ok();
         let caps = caps.iter().filter_map(|cap| Some((node(cap.s)?, cap.speed))).collect();
         Self { nodes, pieces, caps }
@@ -180,7 +183,8 @@ mod tests {
         let limits = Limits { velocity: [250.0], acceleration: [3000.0], jerk: [50_000.0] };
         let caps = [SpeedCap { s: 3.0, speed: 20.0 }, SpeedCap { s: 30.0, speed: 5.0 }];
         let bounds = [Bound::Rest { ramp: 0.01, greatest: 1.0 }; 2];
-        let (stations, slopes) = survey(&Line, &limits, &caps, [0.01, 49.99], &bounds).expect("speeds");
+        let (stations, slopes) =
+            survey(&Line, &limits, &caps, [0.01, 49.99], &bounds, Watch::default()).expect("speeds");
         let grid = Grid::new(&stations, slopes, &caps, &bounds, 16.0);
         let node = |s: f64| grid.nodes.binary_search_by(|node| node.total_cmp(&s)).expect("a node");
         assert_eq!((grid.cap(node(3.0)), grid.cap(node(30.0))), (20.0, 5.0));

@@ -14,6 +14,7 @@ use super::model::Model;
 use super::newton::State;
 use super::rows::{Order, Rows};
 use crate::lanes::{Lanes, LogProduct};
+use crate::watch::Watch;
 
 /// What is known at an end of a stretch.
 #[derive(Clone, Copy, Debug)]
@@ -36,7 +37,7 @@ impl Bound {
 
 /// When to stop.
 #[derive(Clone, Copy, Debug)]
-pub struct Effort {
+pub struct Effort<'a> {
     /// The gap of complementarity, in parts of the time.
     pub tolerance: f64,
     pub max_iterations: usize,
@@ -45,6 +46,7 @@ pub struct Effort {
     pub barrier: f64,
     /// Multipliers begin as the last solution, of these intervals, left them; with those of μ where they are greater.
     pub warm: bool,
+    pub watch: Watch<'a>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -145,6 +147,7 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         let mut outcome = Outcome::Stopped;
         let mut iterations = 0;
         while iterations < effort.max_iterations && effort.deadline.is_none_or(|end| Instant::now() < end) {
+            effort.watch.check();
             let work = self.assemble(rows, x, dual, least_dual);
             dual = 0.0;
             let mu = work / total;

@@ -10,12 +10,15 @@ use super::rest;
 use super::rows::Rows;
 use super::stretch::Stretch;
 use super::survey::{survey, Slopes};
-use super::{End, Fault, Geometry, Problem};
+use super::{Effort, End, Fault, Geometry, Problem};
+use crate::watch::Watch;
 
 /// Intervals sampled at a time.
 const CHUNK: usize = 1024;
 /// Rounds of lowering the first plan where it exceeds a limit.
 const ROUNDS: usize = 12;
+/// The share of the work of a plan that it is to prepare it.
+pub const PREPARING: f64 = 0.1;
 
 /// A problem on its grid.
 pub struct Prepared<'a, G, const M: usize> {
@@ -26,23 +29,26 @@ pub struct Prepared<'a, G, const M: usize> {
     pub x: Vec<f64>,
     /// The time of a stop from the greatest speed, in s.
     pub stop_time: f64,
+    watch: Watch<'a>,
 }
 
 impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
-    pub fn new(problem: &'a Problem<'a, G, M>, resolution: f64) -> Result<Self, Fault> {
+    pub fn new(problem: &'a Problem<'a, G, M>, effort: &Effort<'a>) -> Result<Self, Fault> {
         check(problem)?;
         let knots = problem.geometry.knots();
         let total = knots[knots.len() - 1];
         let limits = &problem.limits;
         let bounds = bounds(problem);
+        let watch = effort.watch.part(PREPARING);
         let span = |end: usize| match bounds[end] {
             Bound::Rest { ramp, .. } => ramp,
             Bound::Fixed { .. } => 0.0,
         };
         let (stations, slopes) =
-            survey(problem.geometry, limits, problem.caps, [span(0), total - span(1)], &bounds)?;
-        let grid = Grid::new(&stations, slopes, problem.caps, &bounds, resolution);
-        let mut prepared = Self { problem, grid, bounds, x: vec![], stop_time: 0.0 };
+            survey(problem.geometry, limits, problem.caps, [span(0), total - span(1)], &bounds, watch)?;
+        let grid = Grid::new(&stations, slopes, problem.caps, &bounds, effort.resolution);
+        watch.check();
+        let mut prepared = Self { problem, grid, bounds, x: vec![], stop_time: 0.0, watch };
         prepared.begin(slopes)?;
         Ok(prepared)
     }
@@ -56,6 +62,7 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         self.stop_time = slopes.stop_time(fastest);
         let mut worst = f64::INFINITY;
         for _ in 0..ROUNDS {
+            self.watch.check();
             self.x = baseline::smooth(&self.grid.nodes, &caps, slopes, &self.bounds);
             let used = self.each(|rows, n, x| baseline::used(rows, x, n), 0.0);
             worst = used.iter().copied().fold(0.0, f64::max);
@@ -81,6 +88,7 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
     fn each(&self, f: impl Fn(&Rows<M>, usize, &[f64]) -> f64 + Sync, fill: f64) -> Vec<f64> {
         let mut out = vec![fill; self.grid.pieces.len()];
         out.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, out)| {
+            self.watch.check();
             let first = chunk * CHUNK;
             let rows = self.grid.rows(self.problem, first..first + out.len());
             let x = self.x.get(2 * first..2 * (first + out.len() + 1)).unwrap_or(&[]);

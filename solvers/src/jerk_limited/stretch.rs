@@ -103,7 +103,7 @@ impl<const M: usize> Stretch<M> {
     fn attempt(
         &self,
         bounds: [Bound; 2],
-        starts: Vec<(Vec<f64>, Effort)>,
+        starts: Vec<(Vec<f64>, Effort<'_>)>,
         space: &mut InteriorPoint<Exact, M>,
         spent: &mut usize,
     ) -> Option<(Vec<f64>, Report)> {
@@ -119,7 +119,13 @@ impl<const M: usize> Stretch<M> {
     }
 
     /// Starts inside the tightened limits, on the ways back from the last plan y, nearest to it first.
-    fn starts(&self, bounds: &[Bound; 2], x: &[f64], y: &[f64], effort: &Effort) -> Vec<(Vec<f64>, Effort)> {
+    fn starts<'e>(
+        &self,
+        bounds: &[Bound; 2],
+        x: &[f64],
+        y: &[f64],
+        effort: &Effort<'e>,
+    ) -> Vec<(Vec<f64>, Effort<'e>)> {
         let inside = |z: &[f64]| {
             (0..self.rows.intervals.len()).all(|n| self.rows.utilisation(z, n).iter().all(|&used| used < 1.0))
         };

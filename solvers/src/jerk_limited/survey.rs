@@ -3,6 +3,7 @@
 
 use super::interior_point::Bound;
 use super::{rest, Fault, Geometry, Limits, Place, SpeedCap};
+use crate::watch::Watch;
 
 /// Parts of the limits that the caps of the envelope leave to a plan through them.
 const SPEED: f64 = 0.9;
@@ -138,6 +139,7 @@ pub fn survey<const M: usize>(
     caps: &[SpeedCap],
     [from, to]: [f64; 2],
     bounds: &[Bound; 2],
+    watch: Watch,
 ) -> Result<(Vec<Station>, Slopes), Fault> {
     let knots = geometry.knots();
     let pieces: Vec<(u32, f64, f64)> = (0..knots.len() - 1)
@@ -146,6 +148,7 @@ pub fn survey<const M: usize>(
         .collect();
     let mut greatest = [0.0f64; M];
     for &(piece, start, end) in &pieces {
+        watch.check_at(piece as usize);
         for part in [0.0, 0.25, 0.5, 0.75, 1.0] {
             let place = geometry.at(piece as usize, start + part * (end - start));
             for k in 0..M {
@@ -160,7 +163,9 @@ pub fn survey<const M: usize>(
     };
     let mut stations = vec![];
     let mut next_cap = caps.partition_point(|cap| cap.s <= from);
+    let each = watch.each(pieces.len());
     for &(piece, start, end) in &pieces {
+        each.count(piece as usize);
         let mut last = station(piece, start);
         stations.push(last);
         while last.s < end {
@@ -184,7 +189,7 @@ pub fn survey<const M: usize>(
     if let Some(station) = stations.iter().find(is_bad) {
         return Err(Fault::NoPlan { s: station.s });
     }
-    Ok((densify(&stations, slopes, bounds), slopes))
+    Ok((densify(&stations, slopes, bounds, watch), slopes))
 }
 
 /// Stations between two others of a piece.
@@ -211,11 +216,12 @@ fn halve(
 
 /// Stations between the surveyed ones, dense where the envelope rises to the caps or falls from them, and the sparser the
 /// farther from there; caps between them are interpolated.
-fn densify(stations: &[Station], slopes: Slopes, bounds: &[Bound; 2]) -> Vec<Station> {
+fn densify(stations: &[Station], slopes: Slopes, bounds: &[Bound; 2], watch: Watch) -> Vec<Station> {
     let r = slopes.envelope(stations, bounds);
     let last = r.len() - 1;
     let mut out = Vec::with_capacity(2 * stations.len());
     for (i, pair) in stations.windows(2).enumerate() {
+        watch.check_at(i);
         let [a, b] = [pair[0], pair[1]];
         out.push(a);
         let mut at = a.s;

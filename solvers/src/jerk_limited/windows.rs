@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::exact::Exact;
 use super::hermite::duration;
 use super::interior_point::{self, Bound, InteriorPoint};
-use super::prepare::Prepared;
+use super::prepare::{Prepared, PREPARING};
 use super::stretch::{ramps, Verdict};
 use super::{Effort, Fault, Geometry, Plan, Problem, Profile};
 
@@ -34,10 +34,11 @@ pub fn solve<G: Geometry<M>, const M: usize>(
     effort: &Effort,
     mut finished: impl FnMut(&Profile),
 ) -> Result<Plan, Fault> {
-    let prepared = Prepared::new(problem, effort.resolution)?;
+    let prepared = Prepared::new(problem, effort)?;
     let mut x = prepared.x.clone();
     let run = Run { prepared: &prepared, effort, nodes: &prepared.grid.nodes };
     let windows = run.windows();
+    let watch = effort.watch.part(1.0 - PREPARING).each(windows.iter().map(Range::len).sum());
     let mut counts = Counts { converged: true, steps: 0.0, excess: 0.0 };
     let mut done = 0;
     for first in (0..windows.len()).step_by(BATCH * rayon::current_num_threads()) {
@@ -48,7 +49,11 @@ pub fn solve<G: Geometry<M>, const M: usize>(
         let batch = first..windows.len().min(first + BATCH * rayon::current_num_threads());
         let solved: Vec<_> = windows[batch.clone()]
             .par_iter()
-            .map_init(InteriorPoint::default, |space, range| run.solve(range, space))
+            .map_init(InteriorPoint::default, |space, range| {
+                let solved = run.solve(range, space);
+                watch.advance(range.len());
+                solved
+            })
             .collect();
         for (at, (y, verdict)) in batch.clone().zip(solved) {
             counts.add(&verdict, windows[at].len());
@@ -104,7 +109,7 @@ impl Counts {
 
 struct Run<'a, G, const M: usize> {
     prepared: &'a Prepared<'a, G, M>,
-    effort: &'a Effort,
+    effort: &'a Effort<'a>,
     nodes: &'a [f64],
 }
 
@@ -177,6 +182,7 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
             deadline: self.effort.deadline,
             barrier: 1.0,
             warm: false,
+            watch: self.effort.watch,
         };
         let limits = &self.prepared.problem.limits;
         let mut stretch = self.prepared.stretch(range.clone());

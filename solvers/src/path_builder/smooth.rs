@@ -15,6 +15,7 @@ use crate::conic::Conic;
 use crate::follow::{Chord, Chords, FollowError, FollowOptions, Followed, Moves, Shape, RAPID};
 use crate::smooth_fit::polyline::{angle, Polyline};
 use crate::smooth_fit::{smooth_fit, Offsets, SmoothOptions};
+use crate::watch::Watch;
 
 /// A path that turns by more, in rad, stops: no curve is near both sides of the corner at any speed.
 const TURNS_BACK: f64 = 2.356;
@@ -54,10 +55,12 @@ pub fn build_smooth_path<const M: usize>(
     options: &FollowOptions,
     axes: &Axes<M>,
     sized: bool,
+    watch: Watch,
 ) -> Result<BuiltPath<M>, FollowError> {
+    let each = watch.each(moves.kind.len());
     let groups: Vec<Group<M>> = groups(moves)
         .into_par_iter()
-        .map(|range| Group::new(moves, options, axes, range, sized))
+        .map(|range| Group::new(moves, options, axes, range.clone(), sized, each.part(range.len() as f64)))
         .collect::<Result<_, _>>()?;
     let mut path = BuiltPath { runs: vec![], ..BuiltPath::default() };
     let (mut total, mut offsets) = (0, Offsets::default());
@@ -116,6 +119,7 @@ impl<const M: usize> Group<M> {
         axes: &Axes<M>,
         range: Range<usize>,
         sized: bool,
+        watch: Watch,
     ) -> Result<Self, FollowError> {
         let exact = moves.tolerance[range.start] <= 0.0;
         let judged = range.clone().all(|i| moves.joints[i]);
@@ -124,6 +128,7 @@ impl<const M: usize> Group<M> {
         let chords = moves.chords(options, range)?;
         let mut group = Self::default();
         let count = chords.chords.len();
+        let each = watch.each(count);
         let mut first = 0;
         for end in 1..=count {
             let stops = end == count || {
@@ -135,7 +140,8 @@ impl<const M: usize> Group<M> {
                 turn > TURNS_BACK || exact && !chords.meet(end)
             };
             if stops {
-                group.append(&chords, first..end, &rules);
+                let watch = each.part((end - first) as f64);
+                group.append(&chords, first..end, &rules, watch);
                 first = end;
             }
         }
@@ -143,7 +149,7 @@ impl<const M: usize> Group<M> {
     }
 
     /// Appends a run.
-    fn append(&mut self, chords: &Chords<M>, run: Range<usize>, rules: &Rules<M>) {
+    fn append(&mut self, chords: &Chords<M>, run: Range<usize>, rules: &Rules<M>, watch: Watch) {
         self.runs.push(self.part.pieces.len());
         let own = &chords.chords[run.clone()];
         if rules.exact && own.iter().all(|chord| chord.bow.is_none()) {
@@ -160,12 +166,12 @@ impl<const M: usize> Group<M> {
             })
             .collect();
         match moving.len() {
-            0..=2 => self.append_curve::<2>(chords, run, &moving, rules),
-            3 => self.append_curve::<3>(chords, run, &moving, rules),
-            4 => self.append_curve::<4>(chords, run, &moving, rules),
-            5 => self.append_curve::<5>(chords, run, &moving, rules),
-            6 => self.append_curve::<6>(chords, run, &moving, rules),
-            _ => self.append_curve::<9>(chords, run, &moving, rules),
+            0..=2 => self.append_curve::<2>(chords, run, &moving, rules, watch),
+            3 => self.append_curve::<3>(chords, run, &moving, rules, watch),
+            4 => self.append_curve::<4>(chords, run, &moving, rules, watch),
+            5 => self.append_curve::<5>(chords, run, &moving, rules, watch),
+            6 => self.append_curve::<6>(chords, run, &moving, rules, watch),
+            _ => self.append_curve::<9>(chords, run, &moving, rules, watch),
         }
     }
 
@@ -176,6 +182,7 @@ impl<const M: usize> Group<M> {
         run: Range<usize>,
         moving: &[usize],
         rules: &Rules<M>,
+        watch: Watch,
     ) {
         let Rules { exact, travel, long, sized } = rules;
         let own = &chords.chords[run.clone()];
@@ -183,7 +190,7 @@ impl<const M: usize> Group<M> {
         let points: Vec<[f64; D]> = chords.points[run.start..=run.end].iter().map(narrow).collect();
         let mut line = Polyline::new(points, own.iter().map(Chord::left).collect());
         line.sized = *sized;
-        line.hold_bends(*long, |i| own[i].bow.is_some());
+        line.hold_bends(*long, |i| own[i].bow.is_some(), watch);
         let apart = |a: &Chord, b: &Chord| a.feed != b.feed || a.allowed != b.allowed;
         let cut: Vec<bool> =
             (0..=own.len()).map(|i| i > 0 && i < own.len() && apart(&own[i - 1], &own[i])).collect();
@@ -192,7 +199,7 @@ impl<const M: usize> Group<M> {
             None => [f64::NEG_INFINITY, f64::INFINITY],
         };
         let options = SmoothOptions { long: *long, bounds: std::array::from_fn(bounds) };
-        let smooth = smooth_fit(&line, &cut, &options);
+        let smooth = smooth_fit(&line, &cut, &options, watch);
         let rest = chords.points[run.start];
         for (piece, stretch) in smooth.curve.pieces().zip(&smooth.stretches) {
             let control: Vec<[f64; M]> = piece

@@ -8,6 +8,7 @@ use crate::conic::Conic;
 use crate::corner::{Jump, Rounding, Sides};
 use crate::follow::{Followed, Shape, Spline};
 use crate::spline::{CompositeCurve, Piece};
+use crate::watch::Watch;
 
 /// Exact paths are smoothed only where an arc or a spline meets its neighbour with a turn below this (rad): that is
 /// what rounded coordinates leave of a tangent joint.
@@ -230,12 +231,13 @@ impl<'a, const M: usize> Stretches<'a, M> {
     }
 
     /// Corners and what they leave of the stretches, in order and in parts, and the runs.
-    pub fn assemble(&self, corners: &[Option<Cuts>], jump: bool) -> (Vec<Part<M>>, Vec<usize>) {
+    pub fn assemble(&self, corners: &[Option<Cuts>], jump: bool, watch: Watch) -> (Vec<Part<M>>, Vec<usize>) {
         let count = self.length.len();
         let tasks: Vec<(Part<M>, Vec<usize>)> = (0..count.div_ceil(TASK))
             .into_par_iter()
             .map(|task| {
                 let stretches = task * TASK..count.min((task + 1) * TASK);
+                watch.each(count).advance(stretches.len());
                 let inside = self.joints[stretches.end].at - self.joints[stretches.start].at;
                 let mut part = Part::default();
                 part.pieces.reserve(inside + 2 * stretches.len());

@@ -5,6 +5,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::arrays::{to_array2, CurveArrays};
+use super::work::run;
 use super::{with_padded_axes, with_path_axes};
 use crate::audit::arcs::Arcs;
 use crate::audit::curve::{Curve, Followed, Pieces};
@@ -16,6 +17,7 @@ use crate::audit::profile::audit_profile;
 use crate::audit::setpoints::{Chunk, Stream};
 use crate::audit::timed::Timed;
 use crate::audit::{Check, Limits, Tally, FEEDS};
+use crate::watch::Watch;
 
 /// Name, axis (−1: none), worst value, limit, ratio, time, source line of one limit.
 type Finding = (&'static str, i64, f64, f64, f64, f64, i32);
@@ -278,7 +280,7 @@ impl LimitArrays {
 
 /// Audits path and profile, and the path against the program.
 #[pyfunction]
-#[pyo3(signature = (problem, limits, feed, profile=None, program=None))]
+#[pyo3(signature = (problem, limits, feed, profile=None, program=None, progress=None))]
 fn audit_plan(
     py: Python<'_>,
     problem: ProblemArrays<'_>,
@@ -286,6 +288,7 @@ fn audit_plan(
     feed: PyReadonlyArray2<'_, f64>,
     profile: Option<ProfileArrays<'_>>,
     program: Option<ProgramArrays<'_>>,
+    progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<Findings> {
     let path = problem.followed(&feed)?;
     let junction_speed = problem.junction_speed.as_slice()?;
@@ -293,16 +296,22 @@ fn audit_plan(
     let program = program.as_ref().map(|program| program.programmed(problem.axes())).transpose()?;
     with_path_axes!(problem.axes(), M, {
         let limits = limits.limits::<M>(path.axes)?;
-        Ok(py.detach(|| {
-            let mut tally = audit_path(&path, arcs.as_ref(), &limits);
+        run(py, progress.as_ref(), |watch| {
+            let pieces = path.len();
+            // About what each takes of the time.
+            let [of_path, of_profile, of_deviation] = [0.05, 0.45, 0.5].map(|share| watch.part(share));
+            let seen = |count| of_path.each(pieces).advance(count);
+            let mut tally = audit_path(&path, arcs.as_ref(), &limits, &seen);
             if let Some(arcs) = &arcs {
-                tally = tally.merge(audit_profile(&path, junction_speed, arcs, &limits));
+                let seen = |count| of_profile.each(arcs.len()).advance(count);
+                tally = tally.merge(audit_profile(&path, junction_speed, arcs, &limits, &seen));
             }
             if let Some(program) = &program {
-                tally = tally.merge(audit_deviation(&path, program, arcs.as_ref()));
+                let seen = |count| of_deviation.each(pieces + program.len()).advance(count);
+                tally = tally.merge(audit_deviation(&path, program, arcs.as_ref(), &seen));
             }
             findings(&tally, path.axes)
-        }))
+        })
     })
 }
 
@@ -324,10 +333,11 @@ fn audit_places<'py>(
     require(piece.len() == u.len() && inside, "places")?;
     let axes = pieces.axes;
     with_path_axes!(axes, M, {
-        let (points, slopes) = py.detach(|| {
+        let (points, slopes) = run(py, None, |watch| {
             let (mut points, mut slopes) = (Vec::new(), Vec::new());
             let mut last: Option<(i64, Curve<M>)> = None;
-            for (&number, &u) in piece.iter().zip(u) {
+            for (i, (&number, &u)) in piece.iter().zip(u).enumerate() {
+                watch.check_at(i);
                 let curve = match last.take() {
                     Some((known, curve)) if known == number => curve,
                     _ => pieces.curve::<M>(number as usize),
@@ -337,20 +347,22 @@ fn audit_places<'py>(
                 last = Some((number, curve));
             }
             (points, slopes)
-        });
+        })?;
         Ok((to_array2(py, points, axes), to_array2(py, slopes, axes)))
     })
 }
 
 /// A stream whatever its number of axes.
 trait AnyStream: Send + Sync {
-    fn push(&mut self, plan: Option<&Plan>, chunk: &Chunk);
+    fn push(&mut self, plan: Option<&Plan>, chunk: &Chunk, watch: Watch);
     fn finish(self: Box<Self>, plan: Option<&Plan>) -> Findings;
 }
 
 impl<const M: usize> AnyStream for Stream<M> {
-    fn push(&mut self, plan: Option<&Plan>, chunk: &Chunk) {
-        Stream::push(self, plan, chunk);
+    fn push(&mut self, plan: Option<&Plan>, chunk: &Chunk, watch: Watch) {
+        // Places are found, then judged.
+        let each = watch.each(2 * chunk.t.len());
+        Stream::push(self, plan, chunk, &|count| each.advance(count));
     }
 
     fn finish(self: Box<Self>, plan: Option<&Plan>) -> Findings {
@@ -371,7 +383,12 @@ struct Compared {
 
 impl Compared {
     /// Calls `work` with the plan, free of Python's lock.
-    fn with_plan<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&Plan) -> T + Send) -> PyResult<T> {
+    fn with_plan<T: Send>(
+        &self,
+        py: Python<'_>,
+        progress: Option<&Bound<'_, PyAny>>,
+        work: impl FnOnce(&Plan, Watch) -> T + Send,
+    ) -> PyResult<T> {
         let problem: ProblemArrays = self.problem.bind(py).extract()?;
         let feed: PyReadonlyArray2<f64> = self.feed.bind(py).extract()?;
         let profile: Option<ProfileArrays> =
@@ -383,7 +400,7 @@ impl Compared {
         let program = program.as_ref().map(|program| program.programmed(problem.axes())).transpose()?;
         let profile = arcs.map(|arcs| Timed { arcs, starts: &self.starts, clock: &[] });
         let plan = Plan { path, profile, program };
-        Ok(py.detach(|| work(&plan)))
+        run(py, progress, |watch| work(&plan, watch))
     }
 }
 
@@ -421,7 +438,8 @@ impl SetpointAudit {
     }
 
     /// The next setpoints.
-    #[pyo3(signature = (t, position, velocity=None, acceleration=None, line=None))]
+    #[pyo3(signature = (t, position, velocity=None, acceleration=None, line=None, progress=None))]
+    #[allow(clippy::too_many_arguments)]
     fn push(
         &mut self,
         py: Python<'_>,
@@ -430,6 +448,7 @@ impl SetpointAudit {
         velocity: Option<PyReadonlyArray2<'_, f64>>,
         acceleration: Option<PyReadonlyArray2<'_, f64>>,
         line: Option<PyReadonlyArray1<'_, i32>>,
+        progress: Option<Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let chunk = Chunk {
             axes: self.axes,
@@ -446,21 +465,24 @@ impl SetpointAudit {
             && chunk.acceleration.is_none_or(|flat| flat.len() == rows)
             && chunk.line.is_none_or(|flat| flat.len() == count);
         require(good, "setpoints")?;
-        let stream = self.stream.as_mut().ok_or_else(finished)?;
+        // An audit that is interrupted is finished.
+        let mut stream = self.stream.take().ok_or_else(finished)?;
+        let (pushed, progress) = (&mut stream, progress.as_ref());
         match &self.compared {
-            Some(compared) => compared.with_plan(py, |plan| stream.push(Some(plan), &chunk)),
-            None => {
-                py.detach(|| stream.push(None, &chunk));
-                Ok(())
+            Some(compared) => {
+                compared.with_plan(py, progress, |plan, watch| pushed.push(Some(plan), &chunk, watch))?;
             }
+            None => run(py, progress, |watch| pushed.push(None, &chunk, watch))?,
         }
+        self.stream = Some(stream);
+        Ok(())
     }
 
     /// What was found; nothing can be pushed afterwards.
     fn finish(&mut self, py: Python<'_>) -> PyResult<Findings> {
         let stream = self.stream.take().ok_or_else(finished)?;
         match &self.compared {
-            Some(compared) => compared.with_plan(py, |plan| stream.finish(Some(plan))),
+            Some(compared) => compared.with_plan(py, None, |plan, _| stream.finish(Some(plan))),
             None => Ok(stream.finish(None)),
         }
     }

@@ -6,6 +6,8 @@ use pyo3::prelude::*;
 use super::plan::to_exception;
 use super::problem::{ProblemArrays, ProblemRows};
 use super::with_padded_axes;
+use super::work::run;
+use crate::bang_bang::Problem;
 use crate::bound::{self, Hint};
 
 /// `feedplan.profile.SpeedProfile`.
@@ -19,7 +21,13 @@ struct ProfileArrays<'py> {
 
 /// A lower bound in s on the time of every profile of the problem; of `profile` only its division counts.
 #[pyfunction]
-fn lower_bound(py: Python<'_>, problem: ProblemArrays<'_>, profile: ProfileArrays<'_>) -> PyResult<f64> {
+#[pyo3(signature = (problem, profile, progress=None))]
+fn lower_bound(
+    py: Python<'_>,
+    problem: ProblemArrays<'_>,
+    profile: ProfileArrays<'_>,
+    progress: Option<Bound<'_, PyAny>>,
+) -> PyResult<f64> {
     let hint = Hint {
         piece: profile.piece.as_slice()?,
         axis: profile.axis.as_slice()?,
@@ -29,7 +37,8 @@ fn lower_bound(py: Python<'_>, problem: ProblemArrays<'_>, profile: ProfileArray
     with_padded_axes!(problem.curve.axes(), M, {
         let rows = ProblemRows::<M>::new(&problem)?;
         let problem = rows.problem()?;
-        py.detach(|| bound::lower_bound(&problem, &hint)).map_err(|fault| to_exception(&fault))
+        run(py, progress.as_ref(), |watch| bound::lower_bound(&Problem { watch, ..problem }, &hint))?
+            .map_err(|fault| to_exception(&fault))
     })
 }
 

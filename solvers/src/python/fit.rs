@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 
 use super::arrays::{rows, to_array2, to_array3};
 use super::with_padded_axes;
+use super::work::run;
 use crate::fit::{fit_points, FitOptions};
 
 type Fitted<'py> = (
@@ -29,7 +30,7 @@ fn fit<'py>(
     let axes = points.shape()[1];
     with_padded_axes!(axes, M, {
         let points = rows::<M>(&points)?;
-        let pieces = py.detach(|| fit_points(&points, &options));
+        let pieces = run(py, None, |watch| fit_points(&points, &options, watch))?;
         let curves: Vec<_> = pieces.iter().map(|piece| piece.piece).collect();
         let chords = pieces.iter().map(|piece| [piece.first as i64, piece.last as i64]).collect();
         Ok((

@@ -5,7 +5,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use super::arrays;
+use super::work::run;
 use crate::gcode::{read, Meaning, Options, Place, Point, TipControl};
+use crate::watch::Watch;
 
 pyo3::import_exception!(feedplan.errors, ProgramError);
 
@@ -60,7 +62,9 @@ impl TipControl for PyTipControl {
 /// `spline_columns` in place of `splines`.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
-#[pyo3(signature = (source, name, places, machine_axes, tip_control, block_delete, max_moves))]
+#[pyo3(signature = (
+    source, name, places, machine_axes, tip_control, block_delete, max_moves, progress=None
+))]
 fn read_gcode<'py>(
     py: Python<'py>,
     source: &[u8],
@@ -70,6 +74,7 @@ fn read_gcode<'py>(
     tip_control: Option<Py<PyAny>>,
     block_delete: bool,
     max_moves: usize,
+    progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let places = arrays::rows::<9>(&places)?;
     let Ok(places) = <[[f64; 9]; 11]>::try_from(places) else {
@@ -86,7 +91,9 @@ fn read_gcode<'py>(
         block_delete,
         max_moves,
     };
-    let columns = py.detach(|| read(source, &options)).map_err(|error| {
+    let lines = source.iter().filter(|&&byte| byte == b'\n').count();
+    let read = |watch: Watch| read(source, &options, &|more| watch.each(lines).advance(more));
+    let columns = run(py, progress.as_ref(), read)?.map_err(|error| {
         let place = error.line.map_or(name.to_string(), |line| format!("{name} line {line}"));
         ProgramError::new_err((format!("{place}: {}", error.message), error.line))
     })?;

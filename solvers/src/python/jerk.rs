@@ -9,12 +9,15 @@ use super::arrays::{indices, row, rows};
 use super::plan::{to_exception, Columns};
 use super::problem::{ProblemArrays, ProblemRows};
 use super::with_padded_axes;
+use super::work::run;
+use crate::bang_bang::Problem;
 use crate::bang_bang_quadratic::NO_AXIS;
 use crate::jerk_arcs::Arcs;
 use crate::jerk_limited::Effort;
 use crate::jerk_limited_path;
 use crate::s_curve::{Section, SectionKind, Segment};
 use crate::s_curve_path::{self, Cutting};
+use crate::watch::Watch;
 
 /// The accelerations at both ends of the arcs, and `kinked`.
 type Changes<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u32>>);
@@ -44,7 +47,7 @@ type Planned<'py> = (Columns<'py>, Changes<'py>, (bool, f64));
 /// The fastest profile within `jerk` [mm/s³] of every axis. Runs that are not planned when the time limit comes have no
 /// arcs.
 #[pyfunction]
-#[pyo3(signature = (problem, jerk, resolution, tolerance, time_limit=None))]
+#[pyo3(signature = (problem, jerk, resolution, tolerance, time_limit=None, progress=None))]
 fn plan_jerk_limited<'py>(
     py: Python<'py>,
     problem: ProblemArrays<'py>,
@@ -52,14 +55,14 @@ fn plan_jerk_limited<'py>(
     resolution: f64,
     tolerance: f64,
     time_limit: Option<f64>,
+    progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Planned<'py>> {
     let effort = Effort { resolution, tolerance, deadline: deadline(time_limit), ..Effort::default() };
     with_padded_axes!(problem.curve.axes(), M, {
         let rows = ProblemRows::<M>::new(&problem)?;
         let (problem, jerk) = (rows.problem()?, row::<M>(&jerk, 1.0)?);
-        let arcs = py
-            .detach(|| jerk_limited_path::plan(&problem, &jerk, &effort))
-            .map_err(|fault| to_exception(&fault))?;
+        let plan = |watch: Watch| jerk_limited_path::plan(&Problem { watch, ..problem }, &jerk, &effort);
+        let arcs = run(py, progress.as_ref(), plan)?.map_err(|fault| to_exception(&fault))?;
         let end = (arcs.stopped, arcs.excess);
         let (columns, changes) = to_columns(py, arcs);
         Ok((columns, changes, end))
@@ -82,13 +85,14 @@ struct ProfileArrays<'py> {
 
 /// A lower bound in s of the time on the grid of a profile of `plan_jerk_limited`.
 #[pyfunction]
-#[pyo3(signature = (problem, jerk, profile, time_limit=None))]
+#[pyo3(signature = (problem, jerk, profile, time_limit=None, progress=None))]
 fn bound_jerk_limited(
     py: Python<'_>,
     problem: ProblemArrays<'_>,
     jerk: PyReadonlyArray1<'_, f64>,
     profile: ProfileArrays<'_>,
     time_limit: Option<f64>,
+    progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<f64> {
     let columns = jerk_limited_path::Columns {
         piece: profile.piece.as_slice()?,
@@ -105,15 +109,17 @@ fn bound_jerk_limited(
     with_padded_axes!(problem.curve.axes(), M, {
         let rows = ProblemRows::<M>::new(&problem)?;
         let (problem, jerk) = (rows.problem()?, row::<M>(&jerk, 1.0)?);
-        py.detach(|| jerk_limited_path::certified(&problem, &jerk, &columns, &effort))
-            .map_err(|fault| to_exception(&fault))
+        let bound = |watch: Watch| {
+            jerk_limited_path::certified(&Problem { watch, ..problem }, &jerk, &columns, &effort)
+        };
+        run(py, progress.as_ref(), bound)?.map_err(|fault| to_exception(&fault))
     })
 }
 
 /// The two-pass profile within `jerk` of every axis, of segments by the quickest of some `s_curve_path::Cutting` (lengths,
 /// alike): the same columns. The time limit is that of stretches left to the jerk-limited planner; see there.
 #[pyfunction]
-#[pyo3(signature = (problem, jerk, cuttings, look_ahead, time_limit=None))]
+#[pyo3(signature = (problem, jerk, cuttings, look_ahead, time_limit=None, progress=None))]
 fn plan_s_curve<'py>(
     py: Python<'py>,
     problem: ProblemArrays<'py>,
@@ -121,15 +127,17 @@ fn plan_s_curve<'py>(
     cuttings: Vec<(f64, f64)>,
     look_ahead: usize,
     time_limit: Option<f64>,
+    progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<(Columns<'py>, Changes<'py>)> {
     let cuttings = to_cuttings(&cuttings);
     let effort = Effort { deadline: deadline(time_limit), ..Effort::default() };
     with_padded_axes!(problem.curve.axes(), M, {
         let rows = ProblemRows::<M>::new(&problem)?;
         let (problem, jerk) = (rows.problem()?, row::<M>(&jerk, 1.0)?);
-        let arcs = py
-            .detach(|| s_curve_path::plan(&problem, &jerk, &cuttings, look_ahead, &effort))
-            .map_err(|fault| to_exception(&fault))?;
+        let plan = |watch: Watch| {
+            s_curve_path::plan(&Problem { watch, ..problem }, &jerk, &cuttings, look_ahead, &effort)
+        };
+        let arcs = run(py, progress.as_ref(), plan)?.map_err(|fault| to_exception(&fault))?;
         Ok(to_columns(py, arcs))
     })
 }
@@ -148,9 +156,9 @@ fn path_segments<'py>(
     with_padded_axes!(problem.curve.axes(), M, {
         let rows = ProblemRows::<M>::new(&problem)?;
         let (problem, jerk) = (rows.problem()?, row::<M>(&jerk, 1.0)?);
-        let segmented = py
-            .detach(|| s_curve_path::cut(&problem, &jerk, &cuttings, look_ahead))
-            .map_err(|fault| to_exception(&fault))?;
+        let cut =
+            |watch: Watch| s_curve_path::cut(&Problem { watch, ..problem }, &jerk, &cuttings, look_ahead);
+        let segmented = run(py, None, cut)?.map_err(|fault| to_exception(&fault))?;
         let column =
             |of: fn(&Segment) -> f64| PyArray1::from_vec(py, segmented.segments.iter().map(of).collect());
         Ok((
@@ -193,9 +201,9 @@ fn profile_of_sections<'py>(
     with_padded_axes!(problem.curve.axes(), M, {
         let rows = ProblemRows::<M>::new(&problem)?;
         let (problem, jerk) = (rows.problem()?, row::<M>(&jerk, 1.0)?);
-        let arcs = py
-            .detach(|| s_curve_path::follow(&problem, &jerk, &offsets, &sections))
-            .map_err(|fault| to_exception(&fault))?;
+        let follow =
+            |watch: Watch| s_curve_path::follow(&Problem { watch, ..problem }, &jerk, &offsets, &sections);
+        let arcs = run(py, None, follow)?.map_err(|fault| to_exception(&fault))?;
         Ok(to_columns(py, arcs))
     })
 }

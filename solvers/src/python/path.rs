@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::arrays::{row, rows};
 use super::spline::curve;
+use super::work::run;
 use super::{with_padded_axes, with_path_axes};
 use crate::arc::ArcError;
 use crate::corner::Rounding;
@@ -16,6 +17,7 @@ use crate::follow::{ArcShape, Fault, FollowOptions, Followed, Moves, Shape};
 use crate::path_builder::{build_path as build_path_of, build_smooth_path, Axes, BuiltPath, Part};
 use crate::spline::regular::{regular, Regular};
 use crate::spline::{CompositeCurve, Piece};
+use crate::watch::Watch;
 
 pyo3::import_exception!(feedplan.errors, ProgramError);
 
@@ -60,7 +62,7 @@ type Splines<'py> = (
 #[pyo3(signature = (
     name, start, kind, target, feed, line, tolerance, fit_tolerance, halt, arc_move, arc_plane, arc_centre,
     arc_sweep, spline_move, spline_pieces, splines, change_move, change_start, joints, max_velocity, max_acceleration, travel, jump, exact_tolerance, max_chord, corner_acceleration,
-    max_speed, corner_angle, corners
+    max_speed, corner_angle, corners, progress=None
 ))]
 #[allow(clippy::too_many_arguments)]
 fn build_path<'py>(
@@ -94,6 +96,7 @@ fn build_path<'py>(
     max_speed: f64,
     corner_angle: f64,
     corners: &str,
+    progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<(Columns<'py>, Summary, Option<Place>, Rough<'py>)> {
     let axes = start.len();
     let count = kind.len();
@@ -153,7 +156,7 @@ fn build_path<'py>(
             None => CompositeCurve::default(),
         };
         let ranges: Vec<Range<usize>> = spline_moves.iter().map(|(_, range)| range.clone()).collect();
-        let Regular { curve: splines, ranges, .. } = py.detach(|| regular(&given, &ranges));
+        let Regular { curve: splines, ranges, .. } = run(py, None, |watch| regular(&given, &ranges, watch))?;
         let spline_moves: Vec<(usize, Range<usize>)> =
             spline_moves.iter().zip(ranges).map(|((index, _), range)| (*index, range)).collect();
         let starts = if change_move.len() > 0 { rows::<M>(&change_start)? } else { vec![] };
@@ -184,15 +187,15 @@ fn build_path<'py>(
             travel: std::array::from_fn(|k| travel.get(k).copied().unwrap_or(ANYWHERE)),
             jump,
         };
-        let build = || match smooth {
-            true => build_smooth_path(&moves, &options, &limits, corners == "smooth"),
-            false => build_path_of(&moves, &options, &limits),
+        let build = |watch: Watch| match smooth {
+            true => build_smooth_path(&moves, &options, &limits, corners == "smooth", watch),
+            false => build_path_of(&moves, &options, &limits, watch),
         };
-        let path = py.detach(build).map_err(|error| {
+        let path = run(py, progress.as_ref(), build)?.map_err(|error| {
             let line = line.as_slice().map_or(0, |lines| lines[error.index]);
             ProgramError::new_err((format!("{name}, line {line}: {}", sentence(error.fault)), line))
         })?;
-        Ok(columns(py, &path, &splines, axes))
+        columns(py, &path, &splines, axes, progress.as_ref())
     })
 }
 
@@ -216,14 +219,17 @@ fn columns<'py, const M: usize>(
     path: &BuiltPath<M>,
     splines: &CompositeCurve<M>,
     axes: usize,
-) -> (Columns<'py>, Summary, Option<Place>, Rough<'py>) {
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<(Columns<'py>, Summary, Option<Place>, Rough<'py>)> {
     let parts = &path.parts;
     let points = |part: &Part<M>, followed: &Followed<M>| match &followed.piece {
         Shape::Conic(_) => 3,
         Shape::Spline(spline) => part.spline(spline, splines).control.len(),
     };
     let one = |_: &Part<M>, _: &Followed<M>| 1;
-    let (control, weights, offsets, width, feed, moves, tolerance) = py.detach(|| {
+    let (control, weights, offsets, width, feed, moves, tolerance) = run(py, progress, |watch| {
+        // The path is there.
+        watch.advance(1);
         let is_rational = |part: &Part<M>, followed: &Followed<M>| match &followed.piece {
             Shape::Conic(conic) => conic.weight != 1.0,
             Shape::Spline(spline) => part.spline(spline, splines).is_rational(),
@@ -270,7 +276,7 @@ fn columns<'py, const M: usize>(
             ),
             gather(parts, one, |_, followed, out| out[0] = followed.tolerance),
         )
-    });
+    })?;
     let (rows, count) = (control.len() / axes, width.len());
     let columns = (
         (
@@ -291,7 +297,7 @@ fn columns<'py, const M: usize>(
         PyArray1::from_iter(py, path.rough.reversals.iter().map(|&i| i64::from(i))),
         PyArray1::from_vec(py, zones).reshape([path.rough.corners.len(), 2]).expect("k × 2 values"),
     );
-    (columns, summary, path.outside.map(|place| (place.index, place.axis, place.position)), rough)
+    Ok((columns, summary, path.outside.map(|place| (place.index, place.axis, place.position)), rough))
 }
 
 /// One column, `stride` values a piece, written by all parts at once.

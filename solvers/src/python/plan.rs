@@ -7,10 +7,12 @@ use pyo3::prelude::*;
 use super::arrays::{indices, quadratics, row, rows};
 use super::problem::{ProblemArrays, ProblemRows};
 use super::with_padded_axes;
+use super::work::run;
 use crate::bang_bang::{self, plan_each};
 use crate::bang_bang_quadratic::{self, Fault, Profile};
 use crate::feed;
 use crate::look_ahead::Segments;
+use crate::watch::Watch;
 
 pyo3::create_exception!(
     _solvers,
@@ -43,24 +45,34 @@ enum Quadratics {
 
 /// The fastest profile: piece, kind, axis, value, u0, u1, p0, p1, duration, runs, slowed.
 #[pyfunction]
-fn plan_bang_bang<'py>(py: Python<'py>, problem: ProblemArrays<'py>) -> PyResult<Columns<'py>> {
-    plan(py, &problem, Quadratics::Their)
+#[pyo3(signature = (problem, progress=None))]
+fn plan_bang_bang<'py>(
+    py: Python<'py>,
+    problem: ProblemArrays<'py>,
+    progress: Option<Bound<'py, PyAny>>,
+) -> PyResult<Columns<'py>> {
+    plan(py, &problem, Quadratics::Their, progress.as_ref())
 }
 
 /// The same by the planner for pieces of any degree alone.
 #[pyfunction]
 fn plan_curves<'py>(py: Python<'py>, problem: ProblemArrays<'py>) -> PyResult<Columns<'py>> {
-    plan(py, &problem, Quadratics::General)
+    plan(py, &problem, Quadratics::General, None)
 }
 
-fn plan<'py>(py: Python<'py>, arrays: &ProblemArrays<'py>, by: Quadratics) -> PyResult<Columns<'py>> {
+fn plan<'py>(
+    py: Python<'py>,
+    arrays: &ProblemArrays<'py>,
+    by: Quadratics,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Columns<'py>> {
     let curve = &arrays.curve;
     if matches!(by, Quadratics::Their)
         && arrays.tip_speed.is_none()
         && arrays.feed_share.is_none()
         && curve.is_quadratic()
     {
-        return plan_quadratics(py, arrays);
+        return plan_quadratics(py, arrays, progress);
     }
     with_padded_axes!(curve.axes(), M, {
         let rows = ProblemRows::<M>::new(arrays)?;
@@ -69,13 +81,18 @@ fn plan<'py>(py: Python<'py>, arrays: &ProblemArrays<'py>, by: Quadratics) -> Py
             Quadratics::Their => plan_each::<M>,
             Quadratics::General => bang_bang::plan::<M>,
         };
-        let profile = py.detach(|| plan(&problem)).map_err(|fault| to_exception(&fault))?;
+        let profile = run(py, progress, |watch| plan(&bang_bang::Problem { watch, ..problem }))?
+            .map_err(|fault| to_exception(&fault))?;
         Ok(to_columns(py, profile))
     })
 }
 
 /// A path of polynomial quadratics alone, without a detour.
-fn plan_quadratics<'py>(py: Python<'py>, arrays: &ProblemArrays<'py>) -> PyResult<Columns<'py>> {
+fn plan_quadratics<'py>(
+    py: Python<'py>,
+    arrays: &ProblemArrays<'py>,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Columns<'py>> {
     let curve = &arrays.curve;
     let runs = indices(&arrays.path.runs);
     with_padded_axes!(curve.axes(), M, {
@@ -91,9 +108,11 @@ fn plan_quadratics<'py>(py: Python<'py>, arrays: &ProblemArrays<'py>) -> PyResul
             period: arrays.period,
             start_speed: arrays.start_speed,
             end_speed: arrays.end_speed,
+            watch: Watch::default(),
         };
-        let profile =
-            py.detach(|| bang_bang_quadratic::plan(&problem)).map_err(|fault| to_exception(&fault))?;
+        let plan =
+            |watch: Watch| bang_bang_quadratic::plan(&bang_bang_quadratic::Problem { watch, ..problem });
+        let profile = run(py, progress, plan)?.map_err(|fault| to_exception(&fault))?;
         Ok(to_columns(py, profile))
     })
 }
@@ -142,8 +161,14 @@ fn feed_between<'py>(
     with_padded_axes!(problem.curve.axes(), M, {
         let rows = ProblemRows::<M>::new(&problem)?;
         let problem = rows.problem()?;
-        let part = |i: usize| feed::between(&problem, piece[i], [u0[i], u1[i]]);
-        Ok(PyArray1::from_vec(py, py.detach(|| (0..piece.len()).map(part).collect())))
+        let speeds = run(py, None, |watch| {
+            let part = |i: usize| {
+                watch.check_at(i);
+                feed::between(&problem, piece[i], [u0[i], u1[i]])
+            };
+            (0..piece.len()).map(part).collect()
+        })?;
+        Ok(PyArray1::from_vec(py, speeds))
     })
 }
 

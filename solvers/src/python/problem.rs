@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 
 use super::arrays::{indices, row, rows, rows_with, CurveArrays};
 use crate::bang_bang::{Problem, SpeedSquare, Tip, TIP_AXES};
+use crate::watch::Watch;
 
 impl CurveArrays<'_> {
     /// Whether all pieces are polynomials of degree 2.
@@ -124,6 +125,7 @@ impl<'a, 'py, const M: usize> ProblemRows<'a, 'py, M> {
             period: arrays.period,
             start_speed: arrays.start_speed,
             end_speed: arrays.end_speed,
+            watch: Watch::default(),
         })
     }
 }

@@ -10,6 +10,7 @@ use pyo3::prelude::*;
 use super::arrays::{rows_with, to_array2};
 use super::spline::curve;
 use super::with_padded_axes;
+use super::work::run;
 use crate::arc_kind::ArcKind;
 use crate::motion::ProfileArc;
 use crate::sampling::{Chunk, Interpolator, PathData, Resume, Sampler};
@@ -50,9 +51,15 @@ trait Stream: Send + Sync {
         range: Range<usize>,
         resume: &Mutex<Option<Resume>>,
         axes: usize,
-    ) -> ChunkArrays<'py>;
-    fn at<'py>(&self, py: Python<'py>, times: &[f64], axes: usize) -> ChunkArrays<'py>;
-    fn along<'py>(&self, py: Python<'py>, piece: &[u32], u: &[f64], axes: usize) -> ChunkArrays<'py>;
+    ) -> PyResult<ChunkArrays<'py>>;
+    fn at<'py>(&self, py: Python<'py>, times: &[f64], axes: usize) -> PyResult<ChunkArrays<'py>>;
+    fn along<'py>(
+        &self,
+        py: Python<'py>,
+        piece: &[u32],
+        u: &[f64],
+        axes: usize,
+    ) -> PyResult<ChunkArrays<'py>>;
 }
 
 impl<const M: usize> Stream for Sampler<M> {
@@ -70,24 +77,29 @@ impl<const M: usize> Stream for Sampler<M> {
         range: Range<usize>,
         resume: &Mutex<Option<Resume>>,
         axes: usize,
-    ) -> ChunkArrays<'py> {
-        let chunk = py.detach(|| {
-            let mut state = *resume.lock().unwrap_or_else(PoisonError::into_inner);
-            let chunk = self.chunk(range, &mut state);
-            *resume.lock().unwrap_or_else(PoisonError::into_inner) = state;
-            chunk
-        });
-        arrays(py, chunk, axes)
+    ) -> PyResult<ChunkArrays<'py>> {
+        // Locked with Python's lock alone: a child that is forked meanwhile does not find it locked.
+        let state = || resume.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut next = *state();
+        let chunk = run(py, None, |watch| self.chunk(range, &mut next, watch))?;
+        *state() = next;
+        Ok(arrays(py, chunk, axes))
     }
 
-    fn at<'py>(&self, py: Python<'py>, times: &[f64], axes: usize) -> ChunkArrays<'py> {
-        let chunk = py.detach(|| self.at(times));
-        arrays(py, chunk, axes)
+    fn at<'py>(&self, py: Python<'py>, times: &[f64], axes: usize) -> PyResult<ChunkArrays<'py>> {
+        let chunk = run(py, None, |watch| self.at(times, watch))?;
+        Ok(arrays(py, chunk, axes))
     }
 
-    fn along<'py>(&self, py: Python<'py>, piece: &[u32], u: &[f64], axes: usize) -> ChunkArrays<'py> {
-        let chunk = py.detach(|| self.along(piece, u));
-        arrays(py, chunk, axes)
+    fn along<'py>(
+        &self,
+        py: Python<'py>,
+        piece: &[u32],
+        u: &[f64],
+        axes: usize,
+    ) -> PyResult<ChunkArrays<'py>> {
+        let chunk = run(py, None, |watch| self.along(piece, u, watch))?;
+        Ok(arrays(py, chunk, axes))
     }
 }
 
@@ -118,6 +130,10 @@ struct PySampler {
 impl PySampler {
     #[new]
     #[allow(clippy::too_many_arguments)]
+    #[pyo3(signature = (
+        control_points, weights, offsets, width, tip_speed, way_speed, feed_share, line, runs, start_dwell, dwell,
+        piece, kind, axis, value, u0, u1, p0, p1, duration, a0, a1, arc_runs, period, newton, progress=None
+    ))]
     fn new(
         py: Python<'_>,
         control_points: PyReadonlyArray2<'_, f64>,
@@ -145,6 +161,7 @@ impl PySampler {
         arc_runs: PyReadonlyArray1<'_, i64>,
         period: f64,
         newton: bool,
+        progress: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let (piece, kind, axis) = (slice(&piece)?, slice(&kind)?, slice(&axis)?);
         let (value, duration) = (slice(&value)?, slice(&duration)?);
@@ -156,36 +173,33 @@ impl PySampler {
         {
             return Err(PyValueError::new_err("the arrays of the profile differ in length"));
         }
-        let arcs = (0..count)
-            .map(|i| {
-                let kind = ArcKind::from_number(kind[i]).ok_or_else(|| {
-                    PyValueError::new_err(format!("arc {i} has the unknown kind {}", kind[i]))
-                })?;
-                Ok(ProfileArc {
-                    piece: piece[i],
-                    kind,
-                    axis: axis[i],
-                    value: value[i],
-                    u0: u0[i],
-                    u1: u1[i],
-                    p0: p0[i],
-                    p1: p1[i],
-                    duration: duration[i],
-                    a0: a0[i],
-                    a1: a1[i],
-                })
-            })
-            .collect::<PyResult<Vec<_>>>()?;
         let arc_runs = indices(&arc_runs)?;
         let interpolator = if newton { Interpolator::Newton } else { Interpolator::Sarfraz };
         let axes = control_points.shape()[1];
         let of_axis = |kind| matches!(kind, ArcKind::AxisAcceleration | ArcKind::AxisVelocity);
-        if let Some(i) = arcs.iter().position(|arc| of_axis(arc.kind) && arc.axis as usize >= axes) {
-            return Err(InputError::new_err(format!(
-                "arc {i} of the profile is governed by axis {}, but the path has {axes}: plan this path again",
-                arcs[i].axis
-            )));
-        }
+        let arc = |i: usize| {
+            let kind = ArcKind::from_number(kind[i])
+                .ok_or_else(|| format!("arc {i} of the profile has the unknown kind {}", kind[i]))?;
+            if of_axis(kind) && axis[i] as usize >= axes {
+                return Err(format!(
+                    "arc {i} of the profile is governed by axis {}, but the path has {axes}: plan this path again",
+                    axis[i]
+                ));
+            }
+            Ok(ProfileArc {
+                piece: piece[i],
+                kind,
+                axis: axis[i],
+                value: value[i],
+                u0: u0[i],
+                u1: u1[i],
+                p0: p0[i],
+                p1: p1[i],
+                duration: duration[i],
+                a0: a0[i],
+                a1: a1[i],
+            })
+        };
         let stream = with_padded_axes!(axes, M, {
             let path = PathData::<M> {
                 curve: curve(&control_points, weights.as_ref(), &offsets, &width)?,
@@ -200,7 +214,15 @@ impl PySampler {
                 start_dwell,
                 dwell: slice(&dwell)?.to_vec(),
             };
-            let sampler = py.detach(|| Sampler::new(path, arcs, &arc_runs, period, interpolator));
+            let sampler = run(py, progress.as_ref(), |watch| {
+                let each = watch.part(0.5).each(count);
+                let counted = |i: usize| {
+                    each.count(i);
+                    arc(i)
+                };
+                let arcs = (0..count).map(counted).collect::<Result<Vec<_>, String>>()?;
+                Sampler::new(path, arcs, &arc_runs, period, interpolator, watch.part(0.5))
+            })?;
             sampler.map(|sampler| Box::new(sampler) as Box<dyn Stream>).map_err(InputError::new_err)
         })?;
         Ok(Self { stream, axes, resume: Mutex::new(None) })
@@ -226,12 +248,12 @@ impl PySampler {
                 self.stream.count()
             )));
         }
-        Ok(self.stream.chunk(py, start..stop, &self.resume, self.axes))
+        self.stream.chunk(py, start..stop, &self.resume, self.axes)
     }
 
     /// The states at times of the plan's own clock.
     fn at<'py>(&self, py: Python<'py>, times: PyReadonlyArray1<'_, f64>) -> PyResult<ChunkArrays<'py>> {
-        Ok(self.stream.at(py, slice(&times)?, self.axes))
+        self.stream.at(py, slice(&times)?, self.axes)
     }
 
     /// The states at places of the path.
@@ -245,7 +267,7 @@ impl PySampler {
         if piece.len() != u.len() {
             return Err(PyValueError::new_err(format!("{} pieces and {} parameters", piece.len(), u.len())));
         }
-        Ok(self.stream.along(py, piece, u, self.axes))
+        self.stream.along(py, piece, u, self.axes)
     }
 }
 

@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 
 use super::arrays::{row, rows, to_array2};
+use super::work::run;
 use super::{with_padded_axes, with_path_axes};
 use crate::spline::bezier::{derivatives, elevate, reverse, split};
 use crate::spline::circle::Turn;
@@ -18,7 +19,7 @@ use crate::spline::joints::{joints, JointTolerance};
 use crate::spline::knots::{check_points, Spline};
 use crate::spline::length::CurveLength as Kernel;
 use crate::spline::regular::regular;
-use crate::spline::{CompositeCurve, MAX_DEGREE};
+use crate::spline::{CompositeCurve, Piece, MAX_DEGREE};
 
 pyo3::import_exception!(feedplan.errors, InputError);
 
@@ -40,6 +41,8 @@ pub fn register(module: &Bound<PyModule>) -> PyResult<()> {
 /// Places that one thread evaluates at a time.
 const BLOCK: usize = 4096;
 
+/// Where the values and the derivatives of some places go; their pieces and parameters.
+type Block<'a> = (Vec<&'a mut [f64]>, &'a [u32], &'a [f64]);
 type Array1<'py> = PyReadonlyArray1<'py, f64>;
 type Array2<'py> = PyReadonlyArray2<'py, f64>;
 /// Control points (total, axes), weights (total,) if any piece is rational, offsets (n + 1,), widths (n,).
@@ -89,7 +92,11 @@ pub(super) fn curve<const M: usize>(
         && curve.offsets.len() == curve.width.len() + 1
         && (curve.weights.is_empty() || curve.weights.len() == total)
         && curve.offsets.windows(2).all(|ends| (ends[0] + 2..=ends[0] + MAX_DEGREE + 1).contains(&ends[1]));
-    fits.then_some(curve).ok_or_else(|| PyValueError::new_err("the columns of the curve do not fit together"))
+    fits.then_some(curve).ok_or_else(unfit)
+}
+
+fn unfit() -> PyErr {
+    PyValueError::new_err("the columns of the curve do not fit together")
 }
 
 fn columns<const M: usize>(py: Python<'_>, curve: CompositeCurve<M>, axes: usize) -> Columns<'_> {
@@ -210,29 +217,58 @@ fn curve_evaluate<'py>(
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
     let axes = control_points.shape()[1];
     with_path_axes!(axes, M, {
-        let curve = curve::<M>(&control_points, weights.as_ref(), &offsets, &width)?;
-        let (piece, u) = (piece.as_slice()?, u.as_slice()?);
-        check_places(&curve.width, piece, u)?;
+        let (piece, u, width) = (piece.as_slice()?, u.as_slice()?, width.as_slice()?);
+        check_places(width, piece, u)?;
+        // Only the pieces of these places are read: few places of a long curve take no long time.
+        let (control, offsets) = (control_points.as_slice()?, offsets.as_slice()?);
+        let weights = weights.as_ref().map_or(Ok(&[][..]), |weights| weights.as_slice())?;
+        let total = control.len() / axes;
+        let points = |i: u32| offsets[i as usize] as usize..offsets[i as usize + 1] as usize;
+        let fits = offsets.len() == width.len() + 1
+            && (weights.is_empty() || weights.len() == total)
+            && piece
+                .iter()
+                .all(|&i| points(i).end <= total && (2..=MAX_DEGREE + 1).contains(&points(i).len()));
+        if !fits {
+            return Err(unfit());
+        }
         let order = order.min(3);
         let mut values = vec![0.0; (order + 1) * u.len() * axes];
-        py.detach(|| {
-            let mut orders: Vec<_> = values
-                .chunks_mut((u.len() * axes).max(1))
-                .map(|of_order| of_order.chunks_mut(BLOCK * axes))
-                .collect();
-            let blocks: Vec<Vec<&mut [f64]>> = (0..u.len().div_ceil(BLOCK))
-                .map(|_| orders.iter_mut().filter_map(Iterator::next).collect())
-                .collect();
-            let places = piece.par_chunks(BLOCK).zip(u.par_chunks(BLOCK));
-            blocks.into_par_iter().zip(places).for_each(|(mut block, (piece, u))| {
-                for (i, (&piece, &u)) in piece.iter().zip(u).enumerate() {
-                    let c = derivatives(&curve.piece(piece as usize), u);
-                    for (rows, value) in block.iter_mut().zip(&c) {
-                        rows[i * axes..(i + 1) * axes].copy_from_slice(&value[..axes]);
-                    }
+        let mut orders: Vec<_> = values
+            .chunks_mut((u.len() * axes).max(1))
+            .map(|of_order| of_order.chunks_mut(BLOCK * axes))
+            .collect();
+        let blocks: Vec<Block> = piece
+            .chunks(BLOCK)
+            .zip(u.chunks(BLOCK))
+            .map(|(piece, u)| (orders.iter_mut().filter_map(Iterator::next).collect(), piece, u))
+            .collect();
+        let fill = |(mut block, piece, u): Block| {
+            let mut own = [[0.0; M]; MAX_DEGREE + 1];
+            for (i, (&piece, &u)) in piece.iter().zip(u).enumerate() {
+                let range = points(piece);
+                let given = control[range.start * axes..range.end * axes].chunks_exact(axes);
+                for (point, row) in own.iter_mut().zip(given) {
+                    point[..axes].copy_from_slice(row);
                 }
-            });
-        });
+                let weights = if weights.is_empty() { weights } else { &weights[range.clone()] };
+                let c = derivatives(&Piece::new(&own[..range.len()], weights, width[piece as usize]), u);
+                for (rows, value) in block.iter_mut().zip(&c) {
+                    rows[i * axes..(i + 1) * axes].copy_from_slice(&value[..axes]);
+                }
+            }
+        };
+        // Few places take less time than to wake other threads.
+        if blocks.len() == 1 {
+            py.detach(|| blocks.into_iter().for_each(fill));
+        } else {
+            run(py, None, |watch| {
+                blocks.into_par_iter().for_each(|block| {
+                    watch.check();
+                    fill(block);
+                });
+            })?;
+        }
         PyArray1::from_vec(py, values).reshape([order + 1, u.len(), axes])
     })
 }
@@ -343,7 +379,8 @@ fn curve_joints<'py>(
 ) -> PyResult<JointColumns<'py>> {
     with_path_axes!(control_points.shape()[1], M, {
         let curve = curve::<M>(&control_points, weights.as_ref(), &offsets, &width)?;
-        let found = py.detach(|| joints(&curve, closed, &JointTolerance { gap, angle, derivative }));
+        let found =
+            run(py, None, |watch| joints(&curve, closed, &JointTolerance { gap, angle, derivative }, watch))?;
         Ok((
             PyArray1::from_iter(py, found.iter().map(|joint| joint.piece as u32)),
             PyArray1::from_iter(py, found.iter().map(|joint| joint.kind as u8)),
@@ -369,7 +406,7 @@ fn curve_regular<'py>(
     with_path_axes!(axes, M, {
         let curve = curve::<M>(&control_points, weights.as_ref(), &offsets, &width)?;
         let whole = 0..curve.len();
-        let made = py.detach(|| regular(&curve, std::slice::from_ref(&whole)));
+        let made = run(py, None, |watch| regular(&curve, std::slice::from_ref(&whole), watch))?;
         let source = made.source.iter().flatten().map(|&source| source as i64);
         let shape = [made.source.len(), 2];
         Ok((
@@ -393,7 +430,7 @@ fn curve_cusps<'py>(
 ) -> PyResult<(Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f64>>)> {
     with_path_axes!(control_points.shape()[1], M, {
         let curve = curve::<M>(&control_points, weights.as_ref(), &offsets, &width)?;
-        let found = py.detach(|| cusps(&curve, tolerance));
+        let found = run(py, None, |watch| cusps(&curve, tolerance, watch))?;
         Ok((
             PyArray1::from_iter(py, found.iter().map(|cusp| cusp.piece as u32)),
             PyArray1::from_iter(py, found.iter().map(|cusp| cusp.u)),
@@ -425,6 +462,7 @@ struct CurveLength {
 #[pymethods]
 impl CurveLength {
     #[new]
+    #[pyo3(signature = (control_points, weights, offsets, width, accuracy, progress=None))]
     fn new(
         py: Python<'_>,
         control_points: Array2<'_>,
@@ -432,13 +470,15 @@ impl CurveLength {
         offsets: PyReadonlyArray1<'_, i64>,
         width: Array1<'_>,
         accuracy: f64,
+        progress: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
+        let progress = progress.as_ref();
         let lengths = if control_points.shape()[1] <= 3 {
             let curve = curve::<3>(&control_points, weights.as_ref(), &offsets, &width)?;
-            Lengths::Three(py.detach(|| Kernel::new(&curve, accuracy)))
+            Lengths::Three(run(py, progress, |watch| Kernel::new(&curve, accuracy, watch))?)
         } else {
             let curve = curve::<6>(&control_points, weights.as_ref(), &offsets, &width)?;
-            Lengths::Six(py.detach(|| Kernel::new(&curve, accuracy)))
+            Lengths::Six(run(py, progress, |watch| Kernel::new(&curve, accuracy, watch))?)
         };
         Ok(Self { lengths, width: width.as_slice()?.to_vec() })
     }
@@ -464,7 +504,7 @@ impl CurveLength {
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let (piece, u) = (piece.as_slice()?, u.as_slice()?);
         check_places(&self.width, piece, u)?;
-        let found = py.detach(|| with_lengths!(&self.lengths, kernel, kernel.lengths(piece, u)));
+        let found = run(py, None, |_| with_lengths!(&self.lengths, kernel, kernel.lengths(piece, u)))?;
         Ok(PyArray1::from_vec(py, found))
     }
 
@@ -483,13 +523,13 @@ impl CurveLength {
         Bound<'py, PyArray1<f64>>,
     )> {
         let wanted = lengths.as_slice()?;
-        let found = py.detach(|| {
+        let found = run(py, None, |_| {
             with_lengths!(
                 &self.lengths,
                 kernel,
                 if newton { kernel.follow(wanted, tolerance) } else { kernel.locate_all(wanted, tolerance) }
             )
-        });
+        })?;
         Ok((
             PyArray1::from_iter(py, found.iter().map(|place| place.piece as u32)),
             PyArray1::from_iter(py, found.iter().map(|place| place.located.u)),

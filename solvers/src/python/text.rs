@@ -5,6 +5,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
+use super::work::run;
 use crate::text;
 
 /// Rows of comma-separated text: `values` (n, k) and the integers `last` (n,) that close them.
@@ -19,7 +20,7 @@ fn csv_rows<'py>(
         return Err(PyValueError::new_err("every row needs values and one integer"));
     }
     let (values, last) = (values.as_slice()?, last.as_slice()?);
-    let text = py.detach(|| text::rows(values, width, last));
+    let text = run(py, None, |_| text::rows(values, width, last))?;
     Ok(PyBytes::new(py, &text))
 }
 

@@ -3,12 +3,14 @@
 use super::PathData;
 use crate::arc_kind::ArcKind;
 use crate::motion::{flaw, ProfileArc, MAX_TIP};
+use crate::watch::Watch;
 
 /// The error is a sentence for the user.
 pub(super) fn check<const M: usize>(
     path: &PathData<M>,
     arcs: &[ProfileArc],
     arc_runs: &[usize],
+    watch: Watch,
 ) -> Result<(), String> {
     let runs = path.dwell.len();
     let offsets = |offsets: &[usize], end: usize| {
@@ -52,6 +54,7 @@ pub(super) fn check<const M: usize>(
             ));
         }
         for (i, arc) in arcs[arc_runs[r]..arc_runs[r + 1]].iter().enumerate() {
+            watch.each(arcs.len()).count(i);
             check_arc(path, r, arc).map_err(|what| {
                 format!("arc {} of the profile {what}: plan this path again", arc_runs[r] + i)
             })?;

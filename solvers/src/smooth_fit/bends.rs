@@ -26,6 +26,7 @@
 use super::bezier::{point_and_slope, Control};
 use super::polyline::{angle, Polyline};
 use crate::quadratic::{dot, norm, sub};
+use crate::watch::Watch;
 
 /// A vertex at which the polyline turns by more, in rad, is a corner,
 const CORNER: f64 = std::f64::consts::FRAC_PI_6;
@@ -88,10 +89,12 @@ pub fn missed<const D: usize>(
     knots: &[f64],
     pieces: &[Control<D>],
     foot: &[f64],
+    watch: Watch,
 ) -> Vec<bool> {
     let mut missed = vec![false; pieces.len()];
     let mut j = 0;
     for i in (1..line.chords()).filter(|_| line.sized) {
+        watch.check_at(i);
         while j + 1 < pieces.len() && knots[j + 1] <= foot[i] {
             j += 1;
         }
@@ -107,9 +110,9 @@ pub fn missed<const D: usize>(
 impl<const D: usize> Polyline<D> {
     /// Tells the vertices of bends from those of corners. Chords longer than `long` are lines, and a lone vertex between
     /// two of them is a corner; `curved` says which chords stand for arcs or splines.
-    pub fn hold_bends(&mut self, long: f64, curved: impl Fn(usize) -> bool) {
+    pub fn hold_bends(&mut self, long: f64, curved: impl Fn(usize) -> bool, watch: Watch) {
         let last = self.chords();
-        let turn = self.turns_in_view();
+        let turn = self.turns_in_view(watch);
         // Up to where the corners before it reach; where a corner is seen from several vertices, the sharpest counts.
         let mut free = vec![false; last + 1];
         let reach = |i: usize| {
@@ -139,11 +142,12 @@ impl<const D: usize> Polyline<D> {
     }
 
     /// The turn at every vertex, in rad, seen from two tolerances before and after it; 0 at the ends.
-    fn turns_in_view(&self) -> Vec<f64> {
+    fn turns_in_view(&self, watch: Watch) -> Vec<f64> {
         let last = self.chords();
         let mut turns = vec![0.0; last + 1];
         let (mut a, mut b) = (0, 0);
         for i in 1..last {
+            watch.check_at(i);
             let view = VIEW * self.tolerance_at(i);
             let (low, high) =
                 ((self.station[i] - view).max(0.0), (self.station[i] + view).min(self.length()));
@@ -188,7 +192,7 @@ mod tests {
     fn held(points: Vec<[f64; 2]>, tolerance: f64) -> Vec<Hold> {
         let chords = points.len() - 1;
         let mut line = Polyline::new(points, vec![tolerance; chords]);
-        line.hold_bends(5.0, |_| false);
+        line.hold_bends(5.0, |_| false, Watch::default());
         line.hold
     }
 

@@ -11,6 +11,7 @@ use super::bezier::{distance_bound, is_inside, point_and_slope, speed_bound, spl
 use super::polyline::Polyline;
 use super::spline::ORDER;
 use crate::quadratic::{dot, norm, sub};
+use crate::watch::Watch;
 
 /// |C'| of a curve that never stops; a vertex that turns by 135° leaves 0.38 of it.
 const LEAST_SPEED: f64 = 0.02;
@@ -37,12 +38,16 @@ impl Certificate {
         knots: &[f64],
         pieces: &[Control<D>],
         bounds: &[[f64; 2]; D],
+        watch: Watch,
     ) -> Self {
         let last = line.chords();
         let free: Vec<f64> = (1..last)
             .into_par_iter()
             .with_min_len(TASK)
-            .map(|i| foot_point(line, knots, pieces, i))
+            .map(|i| {
+                watch.check_at(i);
+                foot_point(line, knots, pieces, i)
+            })
             .collect();
         let mut foot = Vec::with_capacity(last + 1);
         foot.push(0.0);
@@ -54,6 +59,7 @@ impl Certificate {
             .into_par_iter()
             .with_min_len(TASK)
             .map(|j| {
+                watch.check_at(j);
                 let (deviation, good) = interval(line, knots, pieces, &foot, j);
                 (deviation, good && is_inside(&pieces[j], bounds))
             })
@@ -146,15 +152,24 @@ mod tests {
         let length = line.length();
         let knots = [0.0, 0.5 * length, length];
         let piece = |a: f64, b: f64| std::array::from_fn(|k| [a + (b - a) * k as f64 / 5.0, 0.0]);
-        let certificate = Certificate::new(&line, &knots, &[piece(0.0, 2.0), piece(2.0, 4.0)], &ANYWHERE);
+        let certificate =
+            Certificate::new(&line, &knots, &[piece(0.0, 2.0), piece(2.0, 4.0)], &ANYWHERE, Watch::default());
         assert!((certificate.foot[1] - 0.5 * length).abs() < 1e-12);
         assert!(certificate.deviation.iter().all(|deviation| (deviation - 0.3).abs() < 1e-12));
         assert!(certificate.good.iter().all(|&good| good));
         let tight = Polyline { tolerance: vec![0.29; 2], ..line };
-        let certificate = Certificate::new(&tight, &knots, &[piece(0.0, 2.0), piece(2.0, 4.0)], &ANYWHERE);
+        let certificate = Certificate::new(
+            &tight,
+            &knots,
+            &[piece(0.0, 2.0), piece(2.0, 4.0)],
+            &ANYWHERE,
+            Watch::default(),
+        );
         assert!(certificate.good.iter().any(|&good| !good));
         // A curve that stops on its way.
         let stops = [[0.0, 0.0], [0.4, 0.0], [2.0, 0.0], [0.0, 0.0], [1.6, 0.0], [2.0, 0.0]];
-        assert!(!Certificate::new(&tight, &knots, &[stops, piece(2.0, 4.0)], &ANYWHERE).good[0]);
+        assert!(
+            !Certificate::new(&tight, &knots, &[stops, piece(2.0, 4.0)], &ANYWHERE, Watch::default()).good[0]
+        );
     }
 }

@@ -17,6 +17,7 @@ use super::bends::Hold;
 use super::bezier::{derivatives, Control};
 use super::polyline::Polyline;
 use crate::quadratic::{dot, norm, sub};
+use crate::watch::Watch;
 
 /// Places in an interval.
 const PLACES: usize = 4;
@@ -63,6 +64,7 @@ impl Offsets {
         knots: &[f64],
         pieces: &[Control<D>],
         foot: &[f64],
+        watch: Watch,
     ) -> Self {
         let mut offsets = Self::default();
         let place = |j: usize, u: f64| {
@@ -71,6 +73,7 @@ impl Offsets {
         };
         let mut j = 0;
         for i in 1..line.chords() {
+            watch.check_at(i);
             while j + 1 < pieces.len() && knots[j + 1] <= foot[i] {
                 j += 1;
             }
@@ -85,6 +88,7 @@ impl Offsets {
         }
         let mut i = 0;
         for j in 0..pieces.len() {
+            watch.check_at(j);
             for k in 1..=PLACES {
                 let u = knots[j] + (knots[j + 1] - knots[j]) * k as f64 / PLACES as f64;
                 while i + 1 < line.chords() && foot[i + 1] <= u {
@@ -154,9 +158,9 @@ mod tests {
         // A quarter of radius 0.9, to 1e-5, beside points of radius 1, seen at the same angles.
         let points: Vec<[f64; 2]> = (0..=90).map(|i| (i as f64).to_radians().sin_cos().into()).collect();
         let mut line = Polyline::new(points, vec![0.2; 90]);
-        line.hold_bends(5.0, |_| true);
+        line.hold_bends(5.0, |_| true, Watch::default());
         let foot: Vec<f64> = (0..=90).map(|i| line.length() * i as f64 / 90.0).collect();
-        let offsets = Offsets::of(&line, &[0.0, line.length()], &[quarter(0.9)], &foot);
+        let offsets = Offsets::of(&line, &[0.0, line.length()], &[quarter(0.9)], &foot, Watch::default());
         assert!((offsets.mean() + 0.1).abs() < 1e-3, "{offsets:?}");
         assert!((offsets.inside - 0.1).abs() < 1e-3 && offsets.outside == 0.0, "{offsets:?}");
     }
@@ -168,9 +172,9 @@ mod tests {
         let mut points = vec![[-50.0, 0.9]];
         points.extend((0..=90).map(spiral).map(|(r, (sin, cos))| [r * sin, r * cos]));
         let mut line = Polyline::new(points, vec![0.01; 91]);
-        line.hold_bends(5.0, |_| true);
+        line.hold_bends(5.0, |_| true, Watch::default());
         let foot: Vec<f64> = (0..=91).map(|i: usize| i.saturating_sub(1) as f64 / 90.0).collect();
-        let mean = Offsets::of(&line, &[0.0, 1.0], &[quarter(0.9)], &foot).mean();
+        let mean = Offsets::of(&line, &[0.0, 1.0], &[quarter(0.9)], &foot, Watch::default()).mean();
         assert!((mean + 0.1).abs() < 0.015, "{mean}");
     }
 
@@ -178,7 +182,8 @@ mod tests {
     fn corners_are_cut_inside_and_are_no_bends() {
         let line = Polyline::new(vec![[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]], vec![0.1; 2]);
         let bounds = [[f64::NEG_INFINITY, f64::INFINITY]; 2];
-        let offsets = smooth_fit(&line, &[false; 3], &SmoothOptions { long: 5.0, bounds }).offsets;
+        let offsets =
+            smooth_fit(&line, &[false; 3], &SmoothOptions { long: 5.0, bounds }, Watch::default()).offsets;
         assert!(offsets.inside > 0.09 && offsets.inside <= 0.1 && offsets.outside <= 0.1, "{offsets:?}");
         assert_eq!(offsets.mean(), 0.0);
     }

@@ -10,6 +10,7 @@ use super::interior_point::Problem;
 use super::polyline::Polyline;
 use super::rows::rows;
 use super::spline::{around, energy, greville, Spline, DEGREE};
+use crate::watch::Watch;
 use std::ops::Range;
 
 /// Intervals of a window.
@@ -55,7 +56,7 @@ impl<'a, const D: usize> Fit<'a, D> {
     }
 
     /// Solves the problem in ranges of intervals that are far from each other; all else stays as it is.
-    pub fn solve(&mut self, ranges: &[Range<usize>]) {
+    pub fn solve(&mut self, ranges: &[Range<usize>], watch: Watch) {
         let (mut windows, mut seams) = (Vec::new(), Vec::new());
         for range in ranges {
             let parts = (range.len() as f64 / WINDOW as f64).round().max(1.0) as usize;
@@ -77,13 +78,19 @@ impl<'a, const D: usize> Fit<'a, D> {
                 }
             }
         }
-        self.solve_windows(&windows);
-        self.solve_windows(&seams);
+        self.solve_windows(&windows, watch.part(0.7));
+        self.solve_windows(&seams, watch.part(0.3));
     }
 
-    fn solve_windows(&mut self, windows: &[Window]) {
-        let solved: Vec<(Vec<[f64; D]>, usize)> =
-            windows.par_iter().map_init(Band::default, |band, window| self.window(window, band)).collect();
+    fn solve_windows(&mut self, windows: &[Window], watch: Watch) {
+        let each = watch.each(windows.len());
+        let solved: Vec<(Vec<[f64; D]>, usize)> = windows
+            .par_iter()
+            .map_init(Band::default, |band, window| {
+                each.advance(1);
+                self.window(window, band)
+            })
+            .collect();
         for (window, (x, work)) in windows.iter().zip(solved) {
             self.work += work;
             for i in window.keep.clone() {

@@ -210,6 +210,7 @@ mod tests {
     use crate::spline::bezier::derivatives;
     use crate::spline::joints::{joints, Continuity, JointTolerance};
     use crate::spline::length::CurveLength;
+    use crate::watch::Watch;
 
     #[test]
     fn a_full_circle_is_four_quarters_with_exact_corners() {
@@ -219,7 +220,7 @@ mod tests {
         let square = [[3.0, 1.0], [3.0, 3.0], [1.0, 3.0], [1.0, 3.0], [-1.0, 3.0], [-1.0, 1.0]];
         assert_eq!(curve.control[..6], square);
         assert_eq!(curve.control[11], [3.0, 1.0]);
-        let length = CurveLength::new(&curve, 1e-14);
+        let length = CurveLength::new(&curve, 1e-14, Watch::default());
         assert!((length.total() - 2.0 * TAU).abs() < 4e-15);
     }
 
@@ -238,7 +239,9 @@ mod tests {
                 }
             }
             let tolerance = JointTolerance { gap: 0.0, angle: 1e-14, derivative: 1e-14 };
-            assert!(joints(&curve, false, &tolerance).iter().all(|joint| joint.kind >= Continuity::C1));
+            assert!(joints(&curve, false, &tolerance, Watch::default())
+                .iter()
+                .all(|joint| joint.kind >= Continuity::C1));
             let end = curve.control[curve.control.len() - 1];
             let angle = 4f64.atan2(3.0) + sweep;
             assert!((end[2] - 2.0 - 5.0 * angle.cos()).abs() < 1e-14);
@@ -274,8 +277,10 @@ mod tests {
             // The bound is not idle: the true error is within a small factor of it.
             assert!(worst + rounding > 0.2 * bound, "degree {degree}: {worst:e}, bound {bound:e}");
             let joint = JointTolerance { gap: 0.0, angle: 1e-12, derivative: 1e-12 };
-            assert!(joints(&curve, false, &joint).iter().all(|joint| joint.kind >= Continuity::C1));
-            let length = CurveLength::new(&curve, 1e-13).total();
+            assert!(joints(&curve, false, &joint, Watch::default())
+                .iter()
+                .all(|joint| joint.kind >= Continuity::C1));
+            let length = CurveLength::new(&curve, 1e-13, Watch::default()).total();
             assert!((length - (5.0 * sweep).hypot(rise)).abs() < 1e-9 + tolerance);
         }
     }

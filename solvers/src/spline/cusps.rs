@@ -8,6 +8,7 @@
 use super::rational::Hodograph;
 use super::{binomial, CompositeCurve, Piece, MAX_HODOGRAPH, MAX_SQUARE};
 use crate::quadratic::dot;
+use crate::watch::Watch;
 
 /// |C'| below this part of its greatest value is a cusp: it is far above rounding, and a curve passes such a
 /// place as slowly as it would a cusp, whatever the machine.
@@ -25,9 +26,10 @@ pub struct Cusp {
 }
 
 /// The cusps of every piece, in order, ends included. A piece of length zero is one cusp, at its start.
-pub fn cusps<const M: usize>(curve: &CompositeCurve<M>, tolerance: f64) -> Vec<Cusp> {
+pub fn cusps<const M: usize>(curve: &CompositeCurve<M>, tolerance: f64, watch: Watch) -> Vec<Cusp> {
     let mut found = vec![];
     for (i, piece) in curve.pieces().enumerate() {
+        watch.each(curve.len()).count(i);
         for t in piece_cusps(&piece, tolerance) {
             found.push(Cusp { piece: i, u: t * piece.width });
         }

@@ -4,6 +4,7 @@
 use super::bezier::derivatives;
 use super::{CompositeCurve, Piece};
 use crate::quadratic::{norm, sub};
+use crate::watch::Watch;
 
 /// What holds at a joint; each kind implies those before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -52,10 +53,14 @@ pub fn joints<const M: usize>(
     curve: &CompositeCurve<M>,
     closed: bool,
     tolerance: &JointTolerance,
+    watch: Watch,
 ) -> Vec<Joint> {
     let count = curve.len();
     (0..count - usize::from(!closed && count > 0))
-        .map(|i| joint(i, &curve.piece(i), &curve.piece((i + 1) % count), tolerance))
+        .map(|i| {
+            watch.each(count).count(i);
+            joint(i, &curve.piece(i), &curve.piece((i + 1) % count), tolerance)
+        })
         .collect()
 }
 
@@ -138,7 +143,7 @@ mod tests {
         for (control, width) in pieces {
             curve.push(control, &[], *width);
         }
-        joints(&curve, false, &TOLERANCE).into_iter().map(|joint| joint.kind).collect()
+        joints(&curve, false, &TOLERANCE, Watch::default()).into_iter().map(|joint| joint.kind).collect()
     }
 
     #[test]
@@ -164,7 +169,7 @@ mod tests {
         let mut curve = CompositeCurve::default();
         curve.push(&[[0.0, 0.0], [1.0, 0.0], [1.0, 0.0]], &[], 1.0);
         curve.push(&[[1.0, 0.0], [1.0, 0.0], [1.0, 1.0]], &[], 1.0);
-        let joint = joints(&curve, false, &TOLERANCE)[0];
+        let joint = joints(&curve, false, &TOLERANCE, Watch::default())[0];
         assert_eq!((joint.kind, joint.speed), (Continuity::Corner, [0.0, 0.0]));
         assert!((joint.turn - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
     }

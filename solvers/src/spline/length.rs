@@ -12,6 +12,7 @@ use crate::arc_length::{quadrature, tabulate, Hodograph, Length, Node, Table};
 use crate::newton;
 use crate::quadratic::Quadratic;
 use crate::sarfraz::{self, Located};
+use crate::watch::Watch;
 
 /// A place on a curve: piece and local parameter, and how it was found.
 #[derive(Clone, Copy, Debug)]
@@ -63,7 +64,7 @@ macro_rules! on_table {
 
 impl<const M: usize> CurveLength<M> {
     /// Tabulates every piece to the error `accuracy`, a part of its length; the curve has at least one piece.
-    pub fn new(curve: &CompositeCurve<M>, accuracy: f64) -> Self {
+    pub fn new(curve: &CompositeCurve<M>, accuracy: f64, watch: Watch) -> Self {
         let count = curve.len();
         let mut lengths = Self {
             shapes: Vec::with_capacity(count),
@@ -90,14 +91,17 @@ impl<const M: usize> CurveLength<M> {
         let tables: Vec<(Vec<Node>, f64)> = (0..count)
             .into_par_iter()
             .with_min_len(64)
-            .map(|i| match lengths.shapes[i] {
-                Shape::Quadratic(f) => {
-                    let mut nodes = vec![];
-                    let allowed = accuracy * quadrature(&f, 0.0, curve.width[i]);
-                    let bound = tabulate(f, 0.0, curve.width[i], allowed, &mut nodes);
-                    (nodes, bound)
+            .map(|i| {
+                watch.each(count).count(i);
+                match lengths.shapes[i] {
+                    Shape::Quadratic(f) => {
+                        let mut nodes = vec![];
+                        let allowed = accuracy * quadrature(&f, 0.0, curve.width[i]);
+                        let bound = tabulate(f, 0.0, curve.width[i], allowed, &mut nodes);
+                        (nodes, bound)
+                    }
+                    Shape::Curve(h, omega) => table(lengths.speed(h, omega, i), &curve.piece(i), accuracy),
                 }
-                Shape::Curve(h, omega) => table(lengths.speed(h, omega, i), &curve.piece(i), accuracy),
             })
             .collect();
         // Neumaier's sum: the starts of a long path are as good as its pieces.
@@ -233,14 +237,19 @@ mod tests {
 
     #[test]
     fn a_line_is_as_long_as_its_ends_are_apart() {
-        let length = CurveLength::new(&curve_of(&[[1.0, 2.0], [4.0, 6.0]], &[], 7.0), 1e-14);
+        let length =
+            CurveLength::new(&curve_of(&[[1.0, 2.0], [4.0, 6.0]], &[], 7.0), 1e-14, Watch::default());
         assert!((length.total() - 5.0).abs() < 1e-15 && length.nodes() == 2);
         assert!((length.locate(2.0, 1e-15).located.u - 2.8).abs() < 1e-15);
     }
 
     #[test]
     fn the_unit_parabola_has_its_known_length() {
-        let length = CurveLength::new(&curve_of(&[[0.0, 0.0], [0.5, 0.0], [1.0, 0.5]], &[], 1.0), 1e-14);
+        let length = CurveLength::new(
+            &curve_of(&[[0.0, 0.0], [0.5, 0.0], [1.0, 0.5]], &[], 1.0),
+            1e-14,
+            Watch::default(),
+        );
         let expected = 0.5 * (2f64.sqrt() + 1f64.asinh());
         assert!((length.total() - expected).abs() < 4e-16, "{:e}", length.total() - expected);
         assert!(length.error() < 1e-13);
@@ -249,7 +258,7 @@ mod tests {
     #[test]
     fn a_quarter_circle_has_its_known_length_at_every_place() {
         let quarter = curve_of(&[[1.0, 0.0], [1.0, 1.0], [0.0, 1.0]], &[1.0, FRAC_1_SQRT_2, 1.0], 1.0);
-        let length = CurveLength::new(&quarter, 1e-14);
+        let length = CurveLength::new(&quarter, 1e-14, Watch::default());
         assert!((length.total() - FRAC_PI_2).abs() < 1e-15);
         for i in 0..=40 {
             let place = length.locate(FRAC_PI_2 * i as f64 / 40.0, 1e-15);
@@ -280,7 +289,7 @@ mod tests {
         for c in [0.0, 0.3, 0.5, 0.77, 1.0] {
             let (curve, exact) = semicubical(c);
             for accuracy in [1e-6, 1e-9, 1e-12, 1e-14] {
-                let length = CurveLength::new(&curve, accuracy);
+                let length = CurveLength::new(&curve, accuracy, Watch::default());
                 assert!(length.error() <= (accuracy + 1e-14) * length.total(), "{c} {accuracy:e}");
                 for i in 0..=100 {
                     let t = i as f64 / 100.0;
@@ -308,7 +317,7 @@ mod tests {
             // ∫ 2 √(s² + d²) = s √(s² + d²) + d² asinh(s/d), twice from 0 to ½.
             let exact = 2.0 * (half + d * d * (0.5 / d).asinh());
             for accuracy in [1e-5, 1e-10, 1e-13] {
-                let length = CurveLength::new(&curve, accuracy);
+                let length = CurveLength::new(&curve, accuracy, Watch::default());
                 assert!((length.total() - exact).abs() <= length.error(), "{d:e} {accuracy:e}");
                 assert!(length.error() <= 2.0 * (accuracy + 1e-14) * exact);
                 assert!(length.nodes() < 400, "{}", length.nodes());
@@ -322,7 +331,7 @@ mod tests {
         let x = |t: f64| 8.0 * (t * t * t / 3.0 - t * t / 2.0 + 3.0 * t / 16.0);
         let curve = curve_of(&[[0.0], [0.5], [-1.0 / 3.0], [1.0 / 6.0]], &[], 1.0);
         assert!((derivatives(&curve.piece(0), 0.3)[0][0] - x(0.3)).abs() < 1e-15);
-        let length = CurveLength::new(&curve, 1e-14);
+        let length = CurveLength::new(&curve, 1e-14, Watch::default());
         let exact = 2.0 * x(0.25) - 2.0 * x(0.75) + x(1.0);
         assert!((length.total() - exact).abs() <= length.error(), "{:e}", length.total() - exact);
     }
@@ -331,7 +340,7 @@ mod tests {
     fn pieces_of_length_zero_have_no_length() {
         let mut curve = curve_of(&[[1.0, 1.0], [1.0, 1.0]], &[], 1.0);
         curve.push(&[[1.0, 1.0], [2.0, 1.0]], &[], 1.0);
-        let length = CurveLength::new(&curve, 1e-13);
+        let length = CurveLength::new(&curve, 1e-13, Watch::default());
         assert_eq!((length.total(), length.length(0, 0.5)), (1.0, 0.0));
         assert_eq!(length.locate(0.25, 1e-12).piece, 1);
     }
@@ -350,9 +359,9 @@ mod tests {
         #[test]
         fn coarse_tables_agree_with_fine_ones_within_their_bounds((control, weights) in pieces()) {
             let curve = curve_of(&control, &weights, 2.0);
-            let fine = CurveLength::new(&curve, 1e-14);
+            let fine = CurveLength::new(&curve, 1e-14, Watch::default());
             for accuracy in [1e-3, 1e-6, 1e-10] {
-                let coarse = CurveLength::new(&curve, accuracy);
+                let coarse = CurveLength::new(&curve, accuracy, Watch::default());
                 prop_assert!((coarse.total() - fine.total()).abs() <= coarse.error() + fine.error());
                 prop_assert!(coarse.error() <= 1.5 * accuracy * coarse.total() + fine.error());
             }
@@ -363,14 +372,14 @@ mod tests {
             let whole = curve_of(&control, &weights, 2.0);
             let mut parts = CompositeCurve::default();
             split(&whole.piece(0), &[cut], &mut parts);
-            let (a, b) = (CurveLength::new(&whole, 1e-13), CurveLength::new(&parts, 1e-13));
+            let (a, b) = (CurveLength::new(&whole, 1e-13, Watch::default()), CurveLength::new(&parts, 1e-13, Watch::default()));
             prop_assert!((a.total() - b.total()).abs() <= 1e-12 * a.total());
             prop_assert!((a.length(0, cut) - b.length(1, 0.0)).abs() <= 1e-12 * a.total());
         }
 
         #[test]
         fn the_place_at_a_length_has_that_length((control, weights) in pieces(), part in 0.0..1.0f64) {
-            let length = CurveLength::new(&curve_of(&control, &weights, 2.0), 1e-13);
+            let length = CurveLength::new(&curve_of(&control, &weights, 2.0), 1e-13, Watch::default());
             let s = part * length.total();
             let place = length.locate(s, 1e-11);
             prop_assert!((length.length(place.piece, place.located.u) - s).abs() <= 1e-11);

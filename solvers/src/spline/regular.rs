@@ -13,6 +13,7 @@ use super::cusps::{piece_cusps, rests_at_ends, CUSP};
 use super::{CompositeCurve, Piece, MAX_HODOGRAPH};
 use crate::polynomial::Polynomial;
 use crate::quadratic::{dot, norm, sub};
+use crate::watch::Watch;
 
 /// Differences of places below this part of the greatest coordinate are rounding: that of control points, of what made
 /// them from a spline, and of a few sums.
@@ -105,14 +106,21 @@ impl<const M: usize> Line<M> {
 ///
 /// What has no length is left out, and neighbours on one line are one, unless both are lines already. Parameter intervals
 /// stay; lines are passed evenly.
-pub fn regular<const M: usize>(given: &CompositeCurve<M>, ranges: &[Range<usize>]) -> Regular<M> {
+pub fn regular<const M: usize>(
+    given: &CompositeCurve<M>,
+    ranges: &[Range<usize>],
+    watch: Watch,
+) -> Regular<M> {
     let greatest = given.control.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
     let rounding = ROUNDING * greatest;
     let mut out = Regular { curve: CompositeCurve::default(), source: vec![], rests: vec![], ranges: vec![] };
     for range in ranges {
         let first = out.curve.len();
         let pieces: Vec<Piece<M>> = range.clone().map(|i| given.piece(i)).collect();
-        let courses = range.clone().zip(&pieces).map(|(i, piece)| course(i, piece, rounding));
+        let courses = range.clone().zip(&pieces).map(|(i, piece)| {
+            watch.each(given.len()).count(i);
+            course(i, piece, rounding)
+        });
         let mut moving: Vec<(usize, Piece<M>, Course<M>)> = range
             .clone()
             .zip(&pieces)
@@ -123,6 +131,7 @@ pub fn regular<const M: usize>(given: &CompositeCurve<M>, ranges: &[Range<usize>
         keep_joints(&mut moving, rounding);
         let mut straight = Straight::default();
         for (n, (i, piece, course)) in moving.iter().enumerate() {
+            watch.check_at(n);
             if let Course::Straight(places) = course {
                 let lines = n > 0 && piece.degree() == 1 && moving[n - 1].1.degree() == 1;
                 if lines || !straight.joins(places, rounding) {
@@ -404,7 +413,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn whole<const M: usize>(curve: &CompositeCurve<M>) -> Regular<M> {
-        regular(curve, std::slice::from_ref(&(0..curve.len())))
+        regular(curve, std::slice::from_ref(&(0..curve.len())), Watch::default())
     }
 
     fn of<const M: usize>(control: &[[f64; M]], weights: &[f64]) -> Regular<M> {
@@ -451,7 +460,7 @@ mod tests {
         assert_eq!((made.source, made.curve.control[4]), (vec![[0; 2], [2; 2]], [3.0, -1.0]));
         assert_eq!(made.curve.control[3], [2.0, 0.0]);
         assert_eq!(&made.curve.control[..3], bow);
-        assert_eq!(regular(&curve, &[1..2, 2..3, 0..0]).ranges, [0..0, 0..1, 1..1]);
+        assert_eq!(regular(&curve, &[1..2, 2..3, 0..0], Watch::default()).ranges, [0..0, 0..1, 1..1]);
     }
 
     #[test]
@@ -467,7 +476,7 @@ mod tests {
         assert_eq!((made.curve.control[0], made.curve.control[3]), ([0.1; 2], [0.5; 2]));
         assert!((made.curve.width.iter().sum::<f64>() - 4.000001).abs() < 1e-15);
         // What is a line already stays one; each is one of its own where they belong to different moves.
-        assert_eq!(regular(&curve, &[0..1, 1..2, 2..5]).ranges, [0..1, 1..2, 2..5]);
+        assert_eq!(regular(&curve, &[0..1, 1..2, 2..5], Watch::default()).ranges, [0..1, 1..2, 2..5]);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use feedplan_solvers::bang_bang_quadratic::{plan, Fault, Problem, Profile};
 use feedplan_solvers::quadratic::Quadratic;
+use feedplan_solvers::watch::Watch;
 
 /// A random number generator that is the same everywhere (splitmix64).
 pub struct Random(pub u64);
@@ -104,6 +105,7 @@ impl<const M: usize> Case<M> {
             period: self.period,
             start_speed: self.start_speed,
             end_speed: self.end_speed,
+            watch: Watch::default(),
         })
     }
 

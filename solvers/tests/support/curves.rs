@@ -2,6 +2,7 @@
 
 use feedplan_solvers::bang_bang::{plan, plan_each, Problem};
 use feedplan_solvers::bang_bang_quadratic::{Fault, Profile};
+use feedplan_solvers::watch::Watch;
 
 use super::cases::Random;
 use super::{padded, PADDED};
@@ -57,6 +58,7 @@ impl<const M: usize> CurveCase<M> {
             period: 0.001,
             start_speed: 0.0,
             end_speed: 0.0,
+            watch: Watch::default(),
         })
     }
 

@@ -1,6 +1,7 @@
 //! A case of quadratic pieces for the planner of curves, and for the bound: as it is, or with its degree elevated.
 
 use feedplan_solvers::bang_bang::Problem;
+use feedplan_solvers::watch::Watch;
 
 use super::cases::Case;
 use super::{padded, PADDED};
@@ -56,6 +57,7 @@ impl Elevated {
             period: case.period,
             start_speed: case.start_speed,
             end_speed: case.end_speed,
+            watch: Watch::default(),
         }
     }
 }

@@ -1,0 +1,36 @@
+"""`functools.cached_property` without its lock.
+
+Before Python 3.12 that lock is one for all objects of a class, held while a value is computed: objects would
+wait for each other, and for ever in a process that is forked meanwhile. Two threads may compute a value
+twice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar, overload
+
+T = TypeVar("T")
+
+
+class cached_property(Generic[T]):  # noqa: N801
+    """A value computed by a method when it is first asked for, kept in the object."""
+
+    def __init__(self, make: Callable[[Any], T]) -> None:
+        self._make = make
+        self.__doc__ = make.__doc__
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    @overload
+    def __get__(self, instance: None, owner: type) -> cached_property[T]: ...
+    @overload
+    def __get__(self, instance: object, owner: type | None = None) -> T: ...
+    def __get__(self, instance: object | None, owner: type | None = None) -> cached_property[T] | T:
+        if instance is None:
+            return self
+        # The value hides this descriptor from then on.
+        value: T = self._make(instance)
+        instance.__dict__[self._name] = value
+        return value
