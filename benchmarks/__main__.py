@@ -15,6 +15,7 @@ from benchmarks import (
     curve_cost,
     end_to_end,
     interpolators,
+    interrupts,
     jerk,
     kinematics_cost,
     methods,
@@ -40,6 +41,7 @@ BENCHMARKS = {
         jerk,
         time_limit,
         size,
+        interrupts,
     )
 }
 

@@ -1,0 +1,144 @@
+"""Seconds from Ctrl-C to the prompt in each stage of a large plan, and how often its progress is told."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from benchmarks.named import example
+from benchmarks.results import Cell, Result
+from feedplan import Machine, Plan
+from feedplan.audit import audit
+from feedplan.bound import lower_bound
+from feedplan.constraints.problem import build_problem
+from feedplan.files import write_plan
+from feedplan.geometry.build import build_path
+from feedplan.planners import bound_of, corners, limits_jerk, planner
+from feedplan.program.read import read_program
+from feedplan.progress import Listener, part
+from feedplan.setpoints import setpoints
+
+NAME = "interrupts"
+METHODS = ("bang-bang", "s-curve", "jerk-limited")
+PART, MACHINE, BLOCKS, QUICK = "head", "mill", 1_000_000, 200
+# Where in a stage the signal comes, in parts of the time that it takes.
+MOMENTS = (0.1, 0.3, 0.5, 0.7, 0.9)
+
+Stage = Callable[[Listener], Any]
+
+
+def run(quick: bool = False) -> Result:
+    """Each stage once as a whole, with a listener, and in children that get the signal."""
+    blocks = BLOCKS // (QUICK if quick else 1)
+    rows: list[dict[str, Cell]] = []
+    with tempfile.TemporaryDirectory() as directory:
+        program = Path(directory, f"{PART}.ngc")
+        program.write_text(example(PART).program(blocks), encoding="ascii")
+        for method in METHODS:
+            for name, stage in _stages(program, Machine.load(MACHINE), method, Path(directory, "out")):
+                rows.append({"method": method, "stage": name, **_measured(stage)})
+    return Result(
+        NAME,
+        f"From Ctrl-C to the prompt in {blocks} blocks, {os.cpu_count()} cores",
+        tuple(rows),
+        (
+            f"Ctrl-C to end: of a process that does the stage, the worst of {len(MOMENTS)} moments in it.",
+            "silence: the longest time between two times that progress is told; back: how often it falls.",
+        ),
+    )
+
+
+def _stages(program: Path, machine: Machine, method: str, output: Path) -> Iterator[tuple[str, Stage]]:
+    """The stages of a plan; what one makes is for the next, so they are done in order."""
+    made: dict[str, Any] = {}
+
+    def keep(name: str, make: Callable[[Listener], Any]) -> tuple[str, Stage]:
+        return name, lambda progress: made.__setitem__(name, make(progress))
+
+    yield keep("read", lambda progress: read_program(program, machine, progress=progress))
+    yield keep(
+        "fit",
+        lambda progress: build_path(made["read"], machine, corners=corners(method), progress=progress),
+    )
+    problem = build_problem(made["fit"], machine)
+    yield keep("plan", lambda progress: planner(method)(problem, progress=progress))  # type: ignore[call-arg]
+    profile = made["plan"]
+    yield keep("bound", lambda progress: lower_bound(problem, profile, progress))
+    own = bound_of(method)
+    if own is not None:
+        yield keep("own bound", lambda progress: own(problem, profile, progress=progress))
+    plan = Plan(made["read"], machine, problem, profile, method, made["bound"], {"plan": 0.0})
+
+    def audited(progress: Listener) -> Any:
+        points = setpoints(problem, profile, machine.period, progress=part(progress, 0.0, 0.02))
+        jerk = limits_jerk(method)
+        rest = part(progress, 0.02, 1.0)
+        return audit(problem, profile, machine, made["read"], points, jerk=jerk, progress=rest)
+
+    yield keep("audit", audited)
+    plan._verdict.append(made["audit"])
+    write = partial(write_plan, plan, output)
+    yield keep("write", lambda progress: write(progress=lambda _, done: progress(done)))
+
+
+def _measured(stage: Stage) -> dict[str, Cell]:
+    """A stage as a whole in this process, and its ends in children of it that have all that came before."""
+    children = [_child(stage) for _ in MOMENTS]
+    told: list[tuple[float, float]] = [(time.perf_counter(), 0.0)]
+    stage(lambda done: told.append((time.perf_counter(), done)))
+    told.append((time.perf_counter(), 1.0))
+    seconds = told[-1][0] - told[0][0]
+    ends = [_end(child, moment * seconds) for child, moment in zip(children, MOMENTS, strict=True)]
+    pairs = list(pairwise(told))
+    return {
+        "stage [s]": seconds,
+        "Ctrl-C to end [s]": max(ends, default=0.0),
+        "told [1/s]": (len(told) - 2) / seconds,
+        "silence [s]": max(after[0] - before[0] for before, after in pairs),
+        "back": sum(after[1] < before[1] for before, after in pairs),
+    }
+
+
+def _child(stage: Stage) -> tuple[int, int]:
+    """A child that does the stage when a byte comes through the pipe."""
+    sys.stdout.flush()
+    out, into = os.pipe()
+    child = os.fork()
+    if child:
+        os.close(out)
+        return child, into
+    os.close(into)
+    code = 1
+    try:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        os.read(out, 1)
+        stage(lambda done: None)
+        code = 0
+    except KeyboardInterrupt:
+        code = 130
+    finally:
+        os._exit(code)
+
+
+def _end(child: tuple[int, int], moment: float) -> float:
+    """Seconds from a signal at a moment of the stage to the end of the child; 0 where it was done before."""
+    process, into = child
+    os.write(into, b".")
+    os.close(into)
+    time.sleep(moment)
+    sent = time.perf_counter()
+    os.kill(process, signal.SIGINT)
+    _, status = os.waitpid(process, 0)
+    seconds = time.perf_counter() - sent
+    code = os.waitstatus_to_exitcode(status)
+    if code not in (0, 130):
+        raise RuntimeError(f"a child ended with {code}")
+    return seconds if code == 130 else 0.0
