@@ -7,6 +7,7 @@ import signal
 import sys
 import tempfile
 import time
+import traceback
 from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import pairwise
@@ -111,19 +112,26 @@ def _child(stage: Stage) -> tuple[int, int]:
     """A child that does the stage when a byte comes through the pipe."""
     sys.stdout.flush()
     out, into = os.pipe()
+    heard, ready = os.pipe()
     child = os.fork()
     if child:
         os.close(out)
+        os.close(ready)
+        os.read(heard, 1)
+        os.close(heard)
         return child, into
     os.close(into)
     code = 1
     try:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+        os.write(ready, b".")
         os.read(out, 1)
         stage(lambda done: None)
         code = 0
     except KeyboardInterrupt:
         code = 130
+    except BaseException:
+        traceback.print_exc()
     finally:
         os._exit(code)
 

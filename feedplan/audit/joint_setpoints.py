@@ -205,7 +205,7 @@ class JointSetpoints:
             new = np.clip(u + np.nan_to_num(move), low, high)
             there = self.path.at(piece, new)
             distance = np.linalg.norm(self.path.between(piece, there, target), axis=1)
-            better = (distance < away) & (away > known)
+            better = distance + known < away
             if not better.any():
                 break
             u, away = np.where(better, new, u), np.where(better, distance, away)

@@ -18,10 +18,12 @@ from feedplan.geometry.path import FitSummary, Path
 from feedplan.geometry.path_words import path_words
 from feedplan.machine.machine import Machine
 from feedplan.program.program import LINEAR_AXES, PathControl, Program
-from feedplan.progress import Listener, tell
+from feedplan.progress import Listener, part, tell
 
 # Splines and their moves come from sums of the same offsets; more than this between them [mm] is no rounding.
 _SPLINE_GAP = 1e-6
+# How far the work is when the native builder is done.
+_BUILT = 0.9
 
 
 @dataclass(frozen=True)
@@ -155,7 +157,7 @@ def build_path(
         float(np.linalg.norm(words.max_velocity)),
         math.radians(settings.corner_angle),
         corners.value,
-        progress,
+        part(progress, 0.0, _BUILT),
     )
     tell(progress, 1.0)
     if outside is not None:
@@ -183,9 +185,21 @@ def build_path(
         start_dwell=program.start_dwell,
         meaning=None if program.meaning is None else program.meaning[first],
         tool_length=None if program.tool_length is None else program.tool_length[first],
+        new_words=_new_words(program, first),
         corners=corners,
         warnings=_rough_places(program, *rough),
     )
+
+
+def _new_words(program: Program, first: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(r,) whether a run, by its first move, has other words than the run before, or words changed between."""
+    changes = np.searchsorted(program.change_move, first, side="right")
+    new: NDArray[np.bool_] = np.diff(changes, prepend=changes[:1]) > 0
+    if program.meaning is not None:
+        new[1:] |= np.diff(program.meaning[first]) != 0
+    if program.tool_length is not None:
+        new[1:] |= np.diff(np.nan_to_num(program.tool_length[first], nan=-1.0)) != 0
+    return new
 
 
 def _changes_of_group(names: tuple[str, ...], moving: NDArray[np.bool_]) -> NDArray[np.bool_]:

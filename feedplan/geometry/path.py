@@ -72,6 +72,8 @@ class Path:
     run [s].
     `meaning` (r,) what the axes are on the machine in each run (`feedplan.machine.meaning.Meaning`) and
     `tool_length` (r,) [mm], NaN for the machine file's; None where the machine knows one meaning only.
+    `new_words` (r,) whether a run is told in other words than the one before: without a motion of the joints
+    it may begin elsewhere.
     `corners` is what became of those of the program; `warnings` are sentences for the user.
     `group_feed` (n, 3): greatest speed along X, Y, Z, along U, V, W [mm/s], and of all other axes together
     [deg/s], infinite where none is commanded; more than one of them holds on a blend of moves whose feeds
@@ -91,6 +93,7 @@ class Path:
     start_dwell: float = 0.0
     meaning: NDArray[np.uint8] | None = None
     tool_length: NDArray[np.float64] | None = None
+    new_words: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
     corners: Corners = Corners.ROUNDED
     warnings: tuple[str, ...] = ()
     group_feed: NDArray[np.float64] | None = None
@@ -99,6 +102,8 @@ class Path:
         dtypes = {"feed": float, "move": np.int64, "line": np.int32, "runs": np.int64, "dwell": float}
         for name, dtype in {**dtypes, "tolerance": float}.items():
             object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name), dtype=dtype))
+        if len(self.new_words) == 0:
+            object.__setattr__(self, "new_words", np.zeros(len(self.runs) - 1, dtype=bool))
 
     @classmethod
     def from_curve(
@@ -221,17 +226,6 @@ class Path:
     def width(self) -> NDArray[np.float64]:
         """The parameter interval of each piece (n,) [mm: about the length]."""
         return self.curve.width
-
-    @property
-    def new_words(self) -> NDArray[np.bool_]:
-        """(r,) whether the axes of a run mean something else than those of the run before."""
-        new = np.zeros(len(self.runs) - 1, dtype=bool)
-        if self.meaning is not None:
-            new[1:] |= np.diff(self.meaning) != 0
-        if self.tool_length is not None:
-            length = np.nan_to_num(self.tool_length, nan=-1.0)
-            new[1:] |= np.diff(length) != 0
-        return new
 
     def cut(self, curve: CompositeCurve, piece: NDArray[np.int64]) -> Path:
         """The same path with pieces cut: `curve` are the parts in order, `piece` (m,) what they are of."""

@@ -48,6 +48,16 @@ PROGRAMS = {
         "trunnion-bc",
         UP + "G0 B9 C5\nG43.5 H1\nG1 I0.3 J0.1 K0.9 F500\nG49\nG0 Z450\nG28",
     ),
+    "a stop between runs that rounding moves": (
+        "trunnion-ac",
+        "G21 G90\nG53 G0 Z421.682\nG1 A-47.850 F517\nG43.4 H1\nG0 Y48.269 Z68 A9\nG0 A-28\n"
+        "G91 G0 Z12.970\nG90",
+    ),
+    "words that change there and back": (
+        "trunnion-ac",
+        "G21 G90\nG0 X14 Y-31 Z384 A-50\nG43.5 H1\nG1 I-0.68 J0.004 K0.73 F520\nG43.4\nG43.5 H1\n"
+        "G91 G0 Z45\nG90",
+    ),
     "a feed before a turn": (
         "head-head",
         "G21 G90 G64 P0.5\nG0 Z900\nG1 C40 F800\nG43.4 H1\nG1 A-20\nG1 X9 A-22\nG49\nG0 Z1000",

@@ -84,7 +84,7 @@ pub fn run<T: Send>(
     }
 }
 
-/// Waits for the end of the work; what was raised meanwhile, which cancels it.
+/// Waits for the end of the work, which is told as well; what was raised meanwhile, which cancels it.
 fn serve<T>(
     work: &Work,
     progress: Option<&Py<PyAny>>,
@@ -96,15 +96,16 @@ fn serve<T>(
     loop {
         let waited = finished.wait_timeout_while(guard, PERIOD, |outcome| outcome.is_none());
         guard = waited.unwrap_or_else(PoisonError::into_inner).0;
-        if guard.is_some() {
-            return raised;
-        }
+        let done = guard.is_some();
         drop(guard);
         if raised.is_none() {
             raised = Python::attach(|py| tell(py, work, progress)).err();
             if raised.is_some() {
                 work.cancel();
             }
+        }
+        if done {
+            return raised;
         }
         guard = lock(outcome);
     }
