@@ -69,9 +69,10 @@ def audit(
     The `profile` on its path; with a `program` the distance between followed and programmed path; with
     `setpoints`, which are read chunk by chunk, their differences and their places on the path. Where the
     joints are not the path's axes, their limits are measured by the kinematics' positions alone. Jerk is
-    judged only if the method claims it (`jerk`): then on the continuous profile as well, and the
-    acceleration may jump only where the curvature of the path does, by what the jerk limit makes in one
-    servo period. `progress` is told how far it is; what it raises ends the audit.
+    judged only if the method claims it (`jerk`): then in every third difference of the setpoints, and on the
+    continuous profile as well, whose acceleration may jump only where the curvature of the path does, by no
+    more than 4/3 of what the jerk limit makes in one servo period: more alone would break third differences.
+    `progress` is told how far it is; what it raises ends the audit.
 
     At a corner the profile's axis velocities may jump by the problem's `velocity_jump`. In setpoints a
     jump is an acceleration over one period, judged like any other by second differences: only the jump
@@ -236,10 +237,8 @@ def audit_setpoints(
     difference is allowed. The `period` [s] is that of the times unless given. Jerk is judged only if `jerk`
     says so.
     A jump of velocity that the machine allows at corners shows as one or two accelerations above the limit
-    where the direction turns; only there it is allowed for. So are up to three jerks on end above their limit
-    for a jump of the acceleration by what the jerk limit makes in one period: there the curvature may jump.
-    `progress` is told how far it is; what it raises ends the audit. Raises InputError for arrays that do not
-    belong together.
+    where the direction turns; only there it is allowed for. `progress` is told how far it is; what it raises
+    ends the audit. Raises InputError for arrays that do not belong together.
     """
     instance(machine, Machine, "the machine", "a Machine")
     names = machine.axis_names if axes is None else list_of_names(axes, "axes", "a list of axis letters")

@@ -259,5 +259,6 @@ def _joints(path: JointPath, profile: SpeedProfile, arcs: Numbers, starts: Array
     (a, a_error, into), (b, b_error, out) = sides
     turns = ~(np.linalg.norm(out - into, axis=1) <= SMOOTH)
     step = np.where(turns[:, None], 0.0, np.abs(b - a) - a_error - b_error)
-    for k, limit in enumerate(problem.max_jerk * problem.period):
+    # Of a step over the period a third difference of setpoints shows at most three quarters as a jerk.
+    for k, limit in enumerate(problem.max_jerk * problem.period / 0.75):
         worst.offer("acceleration_jump", step[:, k], limit, time[meet], line[meet], k)

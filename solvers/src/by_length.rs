@@ -13,6 +13,7 @@ use rayon::prelude::*;
 
 use crate::arc_length::{W, X};
 use crate::bang_bang::Problem;
+use crate::curvature_jumps::{passages, Jump, Passage};
 use crate::jerk_limited::{Geometry, Place, SpeedCap};
 use crate::lanes::Lanes;
 use crate::path_dynamics::chord_speed;
@@ -52,6 +53,15 @@ pub const MAX_RATE: usize = 40;
 pub struct Part {
     pub piece: usize,
     pub u: [f64; 2],
+}
+
+/// Where two parts meet.
+#[derive(Clone, Copy, Debug)]
+pub struct Joint {
+    /// The speed at which a corner or a jump of q'' holds the tool, and what such a jump leaves of the limits of jerk.
+    pub cap: SpeedCap,
+    /// Whether it is the jump that holds it.
+    pub jumps: bool,
 }
 
 /// One row of a table: u and its derivatives at a length from the start of the part.
@@ -156,6 +166,16 @@ fn polynomial(coefficients: &[f64], width: f64, u: f64) -> [f64; 3] {
     // A D that touches 0 may be a rounding error below it.
     out[0] = out[0].max(0.0);
     out
+}
+
+/// The greatest speed at a place where the accelerations of turning and of speeding up together keep the limits of every
+/// axis, or more: what turning has across the direction of motion nothing can take back. NaN where it has nothing there.
+fn turning_speed<const M: usize>(place: &Place<M>, limits: &[f64; M]) -> f64 {
+    let Place { first, second, .. } = place;
+    let along = dot(second, first) / dot(first, first);
+    let across: [f64; M] = std::array::from_fn(|k| second[k] - along * first[k]);
+    let most = (0..M).map(|k| across[k].abs() * limits[k]).sum::<f64>();
+    (most / dot(&across, &across)).sqrt()
 }
 
 /// The speed along the length over that which the feed is about, at u of piece `i`, where D is this; infinite where the
@@ -389,27 +409,77 @@ impl<'a, const M: usize> ByLength<'a, M> {
         alike.then_some((direction, feed))
     }
 
-    /// The speeds between parts where a corner or a jump of q'' holds them, with whether it is the jump: q'' w is to
-    /// jump by no more than the jerk limit allows in one servo period.
-    pub fn caps(&self, jerk: &[f64; M]) -> Vec<(SpeedCap, bool)> {
-        // Parts of one piece are smooth where they meet.
-        let joints = (1..self.parts.len()).filter(|&i| self.parts[i].piece != self.parts[i - 1].piece);
-        let caps = joints.map(|i| {
-            self.problem.watch.check_at(i);
-            let s = self.knots[i];
-            let (before, after) = (self.at(i - 1, s), self.at(i, s));
-            let mut jump_sq = f64::INFINITY;
-            for k in 0..M {
-                let jump = (after.second[k] - before.second[k]).abs();
-                jump_sq = jump_sq.min(jerk[k] * self.problem.period / jump);
+    /// What the joints between parts ask for, in order: the first one is that of parts 0 and 1.
+    pub fn joints(&self, jerk: &[f64; M]) -> Vec<Joint> {
+        let problem = self.problem;
+        let jumps: Vec<Jump<M>> = (1..self.parts.len())
+            .map(|i| {
+                problem.watch.check_at(i);
+                let s = self.knots[i];
+                let (before, after) = (self.at(i - 1, s), self.at(i, s));
+                let smooth = self.is_smooth(i);
+                let jump = |k: usize| (after.second[k] - before.second[k]).abs() / jerk[k];
+                let mut speed = self.corner(i);
+                for place in [&before, &after] {
+                    for k in 0..M {
+                        speed = speed.min(problem.max_velocity[k] / place.first[k].abs());
+                    }
+                    speed = speed.min(place.speed_cap).min(turning_speed(place, &problem.max_acceleration));
+                }
+                let mut acceleration = f64::INFINITY;
+                for Place { first, second, .. } in [&before, &after] {
+                    for k in 0..M {
+                        let most = problem.max_acceleration[k] + second[k].abs() * speed * speed;
+                        acceleration = acceleration.min(most / first[k].abs());
+                    }
+                }
+                let change = std::array::from_fn(|k| if smooth { 0.0 } else { jump(k) });
+                Jump { s, change, speed, acceleration }
+            })
+            .collect();
+        let passages = passages(&jumps, problem.period);
+        let joint = |(i, (passage, jump)): (usize, (&Passage, &Jump<M>))| {
+            // What is slower for other reasons needs no cap.
+            let corner = Some(self.corner(i + 1)).filter(|corner| *corner <= jump.speed);
+            let Passage { speed, reach, share } = *passage;
+            let cap = SpeedCap { s: jump.s, speed: corner.unwrap_or(f64::INFINITY).min(speed), reach, share };
+            Joint { cap, jumps: speed < f64::INFINITY }
+        };
+        passages.iter().zip(&jumps).enumerate().map(joint).collect()
+    }
+
+    /// Whether a part and the one before it are of one piece, which is smooth where they meet.
+    fn is_smooth(&self, part: usize) -> bool {
+        self.parts[part].piece == self.parts[part - 1].piece
+    }
+
+    /// The greatest speed by the corner between a part and the one before it.
+    fn corner(&self, part: usize) -> f64 {
+        if self.is_smooth(part) {
+            f64::INFINITY
+        } else {
+            self.problem.junction_speed[self.parts[part].piece]
+        }
+    }
+
+    /// The joints that ask for something, and the ends of what is calm around them where that is alone.
+    pub fn caps(&self, joints: &[Joint]) -> Vec<SpeedCap> {
+        let asks = |joint: &&Joint| joint.cap.speed < f64::INFINITY || joint.cap.share > 0.0;
+        let own: Vec<SpeedCap> = joints.iter().filter(asks).map(|joint| joint.cap).collect();
+        let mut out = Vec::with_capacity(3 * own.len());
+        for (i, cap) in own.iter().enumerate() {
+            let before = if i == 0 { 0.0 } else { own[i - 1].s + own[i - 1].reach };
+            let after = own.get(i + 1).map_or(self.total(), |next| next.s - next.reach);
+            let [from, to] = [cap.s - cap.reach, cap.s + cap.reach];
+            if cap.share > 0.0 && before < from && from < cap.s {
+                out.push(SpeedCap::new(from, f64::INFINITY));
             }
-            let corner = self.problem.junction_speed[self.parts[i].piece];
-            let jump = jump_sq.sqrt();
-            let cap = SpeedCap { s, speed: corner.min(jump) };
-            // What feed and chord error keep lower needs no cap.
-            (cap.speed < before.speed_cap.min(after.speed_cap)).then_some((cap, jump < corner))
-        });
-        caps.flatten().collect()
+            out.push(*cap);
+            if cap.share > 0.0 && cap.s < to && to < after {
+                out.push(SpeedCap::new(to, f64::INFINITY));
+            }
+        }
+        out
     }
 
     /// The direction of motion on a part where it does not change.

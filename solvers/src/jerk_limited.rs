@@ -67,13 +67,25 @@ pub struct Limits<const M: usize> {
     pub jerk: [f64; M],
 }
 
-/// A greatest speed at one place: where q'' jumps, the jump of the acceleration is kept small by it.
+/// A greatest speed at one place, and a lower limit of jerk around it: where q'' jumps the acceleration does, and setpoints
+/// show that as a jerk.
 #[derive(Clone, Copy, Debug)]
 pub struct SpeedCap {
     /// Along the path, in mm.
     pub s: f64,
-    /// In mm/s.
+    /// In mm/s; infinite for none.
     pub speed: f64,
+    /// As far as this to both sides, in mm, …
+    pub reach: f64,
+    /// … the limits of jerk are lower by this part, less than 1.
+    pub share: f64,
+}
+
+impl SpeedCap {
+    /// A greatest speed alone.
+    pub fn new(s: f64, speed: f64) -> Self {
+        Self { s, speed, reach: 0.0, share: 0.0 }
+    }
 }
 
 /// How a path begins or ends.

@@ -1,8 +1,8 @@
 //! The jerk-limited planner on a path of the package: from rest to rest, by the length of the tool's way.
 //!
 //! A run is cut where the tool has to rest: at stops and at cusps, whose curvature has no bound. Between those a
-//! corner is passed at its speed, and a joint where q'' jumps at the speed at which the acceleration of no axis jumps
-//! by more than its jerk limit allows in one servo period. Lines from rest to rest take sections of constant jerk.
+//! corner is passed at its speed, and a joint where q'' jumps at the speed at which third differences of setpoints keep the
+//! limits of jerk (`curvature_jumps`). Lines from rest to rest take sections of constant jerk.
 
 use std::ops::Range;
 
@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::bang_bang::Problem;
 use crate::bang_bang_quadratic::Fault;
-use crate::by_length::{speed_sq, ByLength, Part};
+use crate::by_length::{speed_sq, ByLength, Joint, Part};
 use crate::jerk_arcs::{Arcs, SPEED_CUBIC};
 use crate::jerk_limited::{self, Effort, End, Geometry, Limits, Profile};
 use crate::s_curve;
@@ -107,12 +107,12 @@ impl<const M: usize> Task<'_, M> {
                 return Ok(arcs);
             }
         }
-        let caps = path.caps(&self.limits.jerk);
-        let speed_caps: Vec<_> = caps.iter().map(|(cap, _)| *cap).collect();
+        let joints = path.joints(&self.limits.jerk);
+        let caps = path.caps(&joints);
         let problem = jerk_limited::Problem {
             geometry: &path,
             limits: self.limits,
-            caps: &speed_caps,
+            caps: &caps,
             ends: speeds.map(end),
         };
         let moving = speeds != [0.0; 2];
@@ -123,8 +123,8 @@ impl<const M: usize> Task<'_, M> {
                 arcs.push_profile(self.problem, &path, &self.limits.jerk, &plan.profile);
                 arcs.excess = plan.excess;
                 arcs.stopped = !plan.converged && self.effort.expired();
-                for (cap, jumps) in &caps {
-                    if *jumps && plan.profile.at(cap.s)[0] >= HELD * cap.speed * cap.speed {
+                for Joint { cap, jumps } in joints {
+                    if jumps && plan.profile.at(cap.s)[0] >= HELD * cap.speed * cap.speed {
                         arcs.kinks.push(parts[path.part(cap.s)].piece as u32);
                     }
                 }
@@ -136,7 +136,7 @@ impl<const M: usize> Task<'_, M> {
             }
             Err(jerk_limited::Fault::Input(what)) => Err(Fault::Input { piece: Some(parts[0].piece), what }),
             Err(jerk_limited::Fault::NoPlan { .. }) if moving => {
-                self.out_of_reach(&path, parts, speeds, &speed_caps)
+                self.out_of_reach(&path, parts, speeds, &caps)
             }
             Err(jerk_limited::Fault::NoPlan { s }) if cuts < CUTS => self.cut(&path, s, cuts),
             Err(jerk_limited::Fault::NoPlan { s }) => {
@@ -185,7 +185,7 @@ impl<const M: usize> Task<'_, M> {
             profile.speed_sq.push(speed_sq(u[1], columns.p1[arc]));
             profile.slope.push(2.0 * columns.a1[arc]);
         }
-        let caps: Vec<_> = path.caps(&self.limits.jerk).iter().map(|(cap, _)| *cap).collect();
+        let caps = path.caps(&path.joints(&self.limits.jerk));
         let problem = jerk_limited::Problem {
             geometry: &path,
             limits: self.limits,

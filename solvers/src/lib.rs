@@ -12,6 +12,7 @@ pub mod bound;
 pub mod by_length;
 pub mod conic;
 pub mod corner;
+pub mod curvature_jumps;
 pub mod feed;
 pub mod fit;
 pub mod follow;

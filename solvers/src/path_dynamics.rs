@@ -41,6 +41,13 @@ pub struct AxisLimits<const M: usize> {
     pub jerk: [f64; M],
 }
 
+impl<const M: usize> AxisLimits<M> {
+    /// The same with limits of jerk lower by a part.
+    pub fn with_jerk_less(&self, part: f64) -> Self {
+        Self { jerk: self.jerk.map(|jerk| (1.0 - part) * jerk), ..*self }
+    }
+}
+
 /// What is allowed along a segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Allowable {

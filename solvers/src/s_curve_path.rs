@@ -8,10 +8,11 @@
 
 use crate::bang_bang::Problem;
 use crate::bang_bang_quadratic::Fault;
-use crate::by_length::{piece, ByLength};
+use crate::by_length::{piece, ByLength, Joint};
+use crate::curvature_jumps::HALF;
 use crate::feed;
 use crate::jerk_arcs::Arcs;
-use crate::jerk_limited::{Effort, Geometry, Limits, Place};
+use crate::jerk_limited::{Effort, Geometry, Limits, Place, SpeedCap};
 use crate::jerk_limited_path::Task;
 use crate::path_dynamics::{allowable, bounded, greatest, Allowable, AxisLimits, Curve, Shape};
 use crate::s_curve::{self, Section, Segment};
@@ -27,8 +28,9 @@ const PLACES: usize = 33;
 /// A joint holds the speed where it is passed within this part of its cap.
 const HELD: f64 = 0.998;
 
-/// Lengths this near to one another, as parts of them, are the same.
-const CLOSE: f64 = 1e-9;
+/// A jump of the curvature that lowers the limits of jerk by no more than this part does so on all of the parts beside it;
+/// around another one the path is cut.
+const LITTLE: f64 = 0.05;
 
 /// Halves of a part are parts of their own where one may be passed faster than both together by more than this part of
 /// the speed, at some places of them; and halvings of a piece. More of them where the bounds of one half allow so much
@@ -139,12 +141,12 @@ fn along<const M: usize>(
     let mut arcs = Arcs::default();
     arcs.push_sections(problem, path, sections, 0.0);
     let mut next = 0;
-    for (cap, jumps) in path.caps(&limits.jerk) {
-        while next + 1 < sections.len() && sections[next + 1].position <= cap.s * (1.0 + CLOSE) {
+    for Joint { cap, jumps } in path.joints(&limits.jerk) {
+        while next + 1 < sections.len() && sections[next + 1].position <= cap.s {
             next += 1;
         }
-        let section = &sections[next];
-        if jumps && cap.s - section.position <= CLOSE * cap.s && section.speed >= HELD * cap.speed {
+        // Around the joint the speed is at most its cap.
+        if jumps && sections[next].speed >= HELD * cap.speed {
             arcs.kinks.push(path.parts[path.part(cap.s)].piece as u32);
         }
     }
@@ -188,13 +190,25 @@ fn quickest<const M: usize>(
 }
 
 /// A part of the path on its way to a segment.
+#[derive(Clone, Copy)]
 struct Cut<const M: usize> {
     shape: Shape<M>,
     /// The greatest speed by feed and chord error.
     cap: f64,
     length: f64,
+    /// By this part the limits of jerk are lower, near a jump of the curvature.
+    share: f64,
     /// The limit where it meets the next one.
     junction: f64,
+}
+
+/// What holds around a joint, or between joints.
+#[derive(Clone, Copy)]
+struct Around {
+    /// The greatest speed.
+    speed: f64,
+    /// By this part the limits of jerk are lower.
+    share: f64,
 }
 
 /// A stretch from rest to rest in parts whose limits differ little.
@@ -210,50 +224,104 @@ impl<'a, const M: usize> Parts<'a, M> {
         let Limits { velocity, acceleration, jerk } = *limits;
         let axes = AxisLimits { velocity, acceleration, jerk };
         let mut parts = Self { problem, path, axes, cuts: vec![] };
-        let caps = path.caps(&limits.jerk);
-        let mut caps = caps.iter().map(|(cap, _)| cap).peekable();
+        let free = SpeedCap::new(0.0, f64::INFINITY);
+        let mut before = free;
+        let joints = path.joints(&limits.jerk);
         for part in 0..path.parts.len() {
             watch.each(path.parts.len()).advance(1);
             let ends = [path.knots()[part], path.knots()[part + 1]];
-            match path.direction(part) {
-                Some(direction) => {
-                    let (first, none) = (direction.map(f64::abs), [0.0; M]);
-                    let line = Shape { first, second: none, third: none, curvature: 0.0 };
-                    parts.push(ends, (line, path.at(part, ends[0]).speed_cap));
-                }
-                None => parts.halve(part, ends, shape(problem, path, part, ends), 0),
+            let after = joints.get(part).map_or(free, |joint| joint.cap);
+            parts.between(part, ends, [before, after]);
+            // What is slow around a joint is slow at it.
+            if let Some(last) = parts.cuts.last_mut().filter(|_| after.share <= LITTLE) {
+                last.junction = last.junction.min(after.speed);
             }
-            if let (Some(cap), Some(last)) = (caps.next_if(|cap| cap.s <= ends[1]), parts.cuts.last_mut()) {
-                last.junction = last.junction.min(cap.speed);
-            }
+            before = after;
         }
         parts
     }
 
-    fn push(&mut self, [from, to]: [f64; 2], (shape, cap): (Shape<M>, f64)) {
+    /// Appends a part between two joints: around those that lower the limits of jerk by much, what they leave. As slow as
+    /// at a joint that holds the speed, a third difference reaches no farther than that speed does.
+    fn between(&mut self, part: usize, [from, to]: [f64; 2], joints: [SpeedCap; 2]) {
+        let time = HALF * self.problem.period;
+        let reach = joints.map(|cap| if cap.share > LITTLE { cap.reach.min(time * cap.speed) } else { 0.0 });
+        let around = joints.map(|cap| Around {
+            speed: if cap.share > LITTLE { cap.speed } else { f64::INFINITY },
+            share: cap.share,
+        });
+        if reach[0] + reach[1] >= to - from {
+            let [a, b] = around;
+            let both = Around { speed: a.speed.min(b.speed), share: a.share.max(b.share) };
+            self.append(part, [from, to], &both);
+            return;
+        }
+        let little = around.map(|Around { share, .. }| if share > LITTLE { 0.0 } else { share });
+        let inner = [from + reach[0], to - reach[1]];
+        if reach[0] > 0.0 {
+            self.append(part, [from, inner[0]], &around[0]);
+        }
+        self.append(part, inner, &Around { speed: f64::INFINITY, share: little[0].max(little[1]) });
+        if reach[1] > 0.0 {
+            self.append(part, [inner[1], to], &around[1]);
+        }
+    }
+
+    /// Appends what lies between two lengths on a part.
+    fn append(&mut self, part: usize, ends: [f64; 2], around: &Around) {
+        let path = self.path;
+        match path.direction(part) {
+            Some(direction) => {
+                let (first, none) = (direction.map(f64::abs), [0.0; M]);
+                let line = Shape { first, second: none, third: none, curvature: 0.0 };
+                self.push(ends, (line, around.speed.min(path.at(part, ends[0]).speed_cap)), around.share);
+            }
+            None => {
+                let (shape, cap) = shape(self.problem, path, part, ends);
+                self.halve(part, ends, (shape, around.speed.min(cap)), around, 0);
+            }
+        }
+    }
+
+    fn push(&mut self, [from, to]: [f64; 2], (shape, cap): (Shape<M>, f64), share: f64) {
         if to > from {
-            self.cuts.push(Cut { shape, cap, length: to - from, junction: f64::INFINITY });
+            self.cuts.push(Cut { shape, cap, length: to - from, share, junction: f64::INFINITY });
         }
     }
 
     /// Appends a part, or its halves where that is worth it.
-    fn halve(&mut self, part: usize, [from, to]: [f64; 2], whole: (Shape<M>, f64), depth: u32) {
+    fn halve(
+        &mut self,
+        part: usize,
+        [from, to]: [f64; 2],
+        whole: (Shape<M>, f64),
+        around: &Around,
+        depth: u32,
+    ) {
         let middle = 0.5 * (from + to);
-        let halves =
-            [[from, middle], [middle, to]].map(|ends| (ends, shape(self.problem, self.path, part, ends)));
-        let by_places = depth < DEPTH && self.is_worth(part, [from, to]);
-        if by_places || depth < MOST_DEPTH && self.is_well_worth(&whole, &halves) {
+        let halves = [[from, middle], [middle, to]].map(|ends| {
+            let (shape, cap) = shape(self.problem, self.path, part, ends);
+            (ends, (shape, around.speed.min(cap)))
+        });
+        let by_places = depth < DEPTH && self.is_worth(part, [from, to], around);
+        if by_places || depth < MOST_DEPTH && self.is_well_worth(&whole, &halves, around.share) {
             for (ends, half) in halves {
-                self.halve(part, ends, half, depth + 1);
+                self.halve(part, ends, half, around, depth + 1);
             }
         } else {
-            self.push([from, to], whole);
+            self.push([from, to], whole, around.share);
         }
     }
 
     /// Whether, by the bounds of both, one half may be passed far faster than both together, as far as the axes reach.
-    fn is_well_worth(&self, whole: &(Shape<M>, f64), halves: &[([f64; 2], (Shape<M>, f64)); 2]) -> bool {
-        let most = |(shape, cap): &(Shape<M>, f64)| greatest(shape, &self.axes, *cap);
+    fn is_well_worth(
+        &self,
+        whole: &(Shape<M>, f64),
+        halves: &[([f64; 2], (Shape<M>, f64)); 2],
+        share: f64,
+    ) -> bool {
+        let axes = self.axes.with_jerk_less(share);
+        let most = |(shape, cap): &(Shape<M>, f64)| greatest(shape, &axes, *cap);
         let [([from, middle], left), (_, right)] = halves;
         let slow = most(whole);
         let reached = slow.limits.highest(slow.speed, middle - from);
@@ -261,11 +329,16 @@ impl<'a, const M: usize> Parts<'a, M> {
     }
 
     /// Whether, by some of their places, one half may be passed faster than both together, as far as the axes reach.
-    fn is_worth(&self, part: usize, [from, to]: [f64; 2]) -> bool {
+    fn is_worth(&self, part: usize, [from, to]: [f64; 2], around: &Around) -> bool {
+        let axes = self.axes.with_jerk_less(around.share);
         let looked: [Allowable; LOOKED] = std::array::from_fn(|i| {
             let place = self.path.at(part, from + (to - from) * i as f64 / (LOOKED - 1) as f64);
             let [first, second, third] = [place.first, place.second, place.third].map(|q| q.map(f64::abs));
-            greatest(&Shape { first, second, third, curvature: 0.0 }, &self.axes, place.speed_cap)
+            greatest(
+                &Shape { first, second, third, curvature: 0.0 },
+                &axes,
+                around.speed.min(place.speed_cap),
+            )
         });
         let least = |places: &[Allowable], of: fn(&Allowable) -> f64| {
             places.iter().map(of).fold(f64::INFINITY, f64::min)
@@ -282,33 +355,43 @@ impl<'a, const M: usize> Parts<'a, M> {
 
     /// The segments; None where one has no speed, or one that the axes creep at.
     fn joined(&self, cutting: &Cutting, watch: Watch) -> Option<Vec<Segment>> {
-        let make = |shape: &Shape<M>, cap: f64, length: f64, junction: f64| -> Option<Segment> {
-            let most = greatest(shape, &self.axes, cap);
+        let make = |cut: &Cut<M>| -> Option<Segment> {
+            let axes = self.axes.with_jerk_less(cut.share);
+            let most = greatest(&cut.shape, &axes, cut.cap);
             let stretch = cutting.lengths * most.speed * most.limits.duration(most.speed);
-            let allowed = allowable(shape, &self.axes, cap, stretch).ok()?;
+            let allowed = allowable(&cut.shape, &axes, cut.cap, stretch).ok()?;
             let crept = CREEP * allowed.limits.acceleration * self.problem.period;
-            if allowed.speed < crept && allowed.speed < CREEP * cap {
+            if allowed.speed < crept && allowed.speed < CREEP * cut.cap {
                 return None;
             }
             // The cap has no end where the feed is about axes that stand still.
-            let desired = cap.min(allowed.speed);
+            let desired = cut.cap.min(allowed.speed);
+            let Cut { length, junction, .. } = *cut;
             Some(Segment { length, allowable: allowed.speed, desired, limits: allowed.limits, junction })
         };
-        // Each with its bounds, its cap, and the greatest speed that one of its parts has alone.
-        let mut out: Vec<(Segment, Shape<M>, f64, f64)> = vec![];
+        // Each with what it is made of, and the greatest speed that one of its parts has alone.
+        let mut out: Vec<(Segment, Cut<M>, f64)> = vec![];
         for (i, cut) in self.cuts.iter().enumerate() {
             watch.each(self.cuts.len()).count(i);
-            let own = make(&cut.shape, cut.cap, cut.length, cut.junction)?;
+            let own = make(cut)?;
             // One with the segment before, where that costs no part of it much.
-            let joined = out.last().filter(|last| last.0.junction == f64::INFINITY).and_then(|last| {
-                let (shape, cap) = (last.1.with(&cut.shape), last.2.min(cut.cap));
-                let both = make(&shape, cap, last.0.length + cut.length, cut.junction)?;
-                let highest = last.3.max(own.speed());
-                (both.speed() >= (1.0 - cutting.alike) * highest).then_some((both, shape, cap, highest))
+            let joins =
+                |last: &Cut<M>| last.junction == f64::INFINITY && (last.share - cut.share).abs() <= LITTLE;
+            let joined = out.last().filter(|last| joins(&last.1)).and_then(|(_, last, highest)| {
+                let both = Cut {
+                    shape: last.shape.with(&cut.shape),
+                    cap: last.cap.min(cut.cap),
+                    length: last.length + cut.length,
+                    share: last.share.max(cut.share),
+                    junction: cut.junction,
+                };
+                let segment = make(&both)?;
+                let highest = highest.max(own.speed());
+                (segment.speed() >= (1.0 - cutting.alike) * highest).then_some((segment, both, highest))
             });
             match (joined, out.last_mut()) {
                 (Some(joined), Some(last)) => *last = joined,
-                _ => out.push((own, cut.shape, cut.cap, own.speed())),
+                _ => out.push((own, *cut, own.speed())),
             }
         }
         Some(out.into_iter().map(|(segment, ..)| segment).collect())

@@ -348,7 +348,7 @@ fn a_feed_is_reached_and_kept() {
 fn speeds_at_single_places_are_kept() {
     // From rest to 10 mm/s at the middle of each: as long as twice the way to rest over such a place, nearly.
     let path = Line::new(60.0);
-    let caps = [SpeedCap { s: 20.0, speed: 10.0 }, SpeedCap { s: 40.0, speed: 0.1 }];
+    let caps = [SpeedCap::new(20.0, 10.0), SpeedCap::new(40.0, 0.1)];
     let problem = Problem { caps: &caps, ..problem(&path, FAST) };
     let plan = planned(&problem);
     assert_held(&problem, &plan.profile);

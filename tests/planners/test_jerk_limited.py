@@ -215,8 +215,8 @@ def _round_corner() -> Path:
 
 def test_jumps_of_curvature_hold_the_speed_and_are_told() -> None:
     made = plan_program(_round_corner(), CURVES, "jerk-limited")
-    # v²/10 mm jumps by no more than 50 000 mm/s³ in a servo period.
-    allowed = np.sqrt(10.0 * 50_000.0 * CURVES.period)
+    # v²/10 mm jumps by no more than lets three quarters of it over a period use 65 % of 50 000 mm/s³.
+    allowed = np.sqrt(0.65 / 0.75 * 10.0 * 50_000.0 * CURVES.period)
     problem, profile = made.problem, made.profile
     assert jerk_excess(problem, profile).worst <= EXCESS
     assert profile.kinked.tolist() == [1, 2]
@@ -226,7 +226,7 @@ def test_jumps_of_curvature_hold_the_speed_and_are_told() -> None:
     assert speed == pytest.approx(allowed, rel=2e-3)
     (sentence,) = made.warnings
     assert sentence.startswith(
-        "line 0: the tool slows to 22.4 mm/s where the curvature jumps, as it does at 2 "
+        "line 0: the tool slows to 20.8 mm/s where the curvature jumps, as it does at 2 "
     )
 
 

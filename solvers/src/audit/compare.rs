@@ -3,7 +3,6 @@
 use super::curve::{distance, from_to, inner, length, Segment};
 use super::deviation::{settled, window};
 use super::follow::{is_step, Plan};
-use super::jerk::Jerks;
 use super::moves::Neighbours;
 use super::setpoints::Row;
 use super::timed::Reader;
@@ -177,25 +176,6 @@ impl<'a, const M: usize> Comparison<'a, M> {
             }
         }
         corners
-    }
-
-    /// Jumps of each acceleration where the curvature of the path jumps, all those between two rows together; without a
-    /// profile as great as they may be.
-    pub fn acceleration_steps(&self, rows: [&Row<M>; 2]) -> [f64; M] {
-        let (path, limits) = (&self.plan.path, self.limits);
-        let mut steps = [0.0; M];
-        for piece in self.begun(rows) {
-            let step = match &self.plan.profile {
-                Some(timed) => {
-                    Jerks { path, arcs: &timed.arcs, limits, starts: timed.starts }.step_into(piece)
-                }
-                None => Some(limits.jerk.map(|jerk| jerk * limits.period)),
-            };
-            for (sum, step) in steps.iter_mut().zip(step.iter().flatten()) {
-                *sum += step.max(0.0);
-            }
-        }
-        steps
     }
 
     /// The pieces that begin between two rows, those included that the places there cannot be told from.

@@ -90,30 +90,6 @@ impl<const M: usize> Differences<'_, M> {
         3.0 * change / span
     }
 
-    /// Without a path: what of the jerks up to row `n` may be a jump of the acceleration, in mm/s². It shows in at most three
-    /// of them on end, whose excess over the period adds up to the jump.
-    pub fn like_acceleration_steps(&self, n: usize) -> [f64; M] {
-        let period = self.limits.period;
-        std::array::from_fn(|k| {
-            let limit = self.limits.jerk[k];
-            let mut total = 0.0;
-            for row in (n.saturating_sub(3).max(3)..=n).rev() {
-                let (early, late) = (self.acceleration(row - 2), self.acceleration(row - 1));
-                let span = (row - 2..=row).map(|row| self.step(row)).sum();
-                let excess = self.jerk(k, &early, &late, span) - limit;
-                if excess <= 0.0 {
-                    break;
-                }
-                total += if row + 3 > n { excess } else { f64::INFINITY };
-            }
-            if total <= limit * PASS_MARK {
-                limit * period
-            } else {
-                0.0
-            }
-        })
-    }
-
     /// Without a path: a corner shows in at most two neighbouring accelerations, whose excess adds up to the jump,
     /// and the velocities before and after differ by no more than a turn at the same speed explains.
     pub fn looks_like_a_corner(&self, c: usize) -> bool {

@@ -5,8 +5,8 @@
 //! C' u⃛ + 3 C'' u̇ ü + C''' u̇³. Its part along T is j less what the turning direction takes of A: j − Ṫ·A, which tells u⃛.
 //! C and its derivatives come from the control points, v, a and j from what the arc's kind makes of its columns.
 //!
-//! Where the path's curvature jumps A does so too, however smooth v is: by no more than the jerk limit makes in one servo
-//! period, so that no difference of setpoints shows more.
+//! Where the path's curvature jumps A does so too, however smooth v is. A third difference of setpoints that lies half-way
+//! over such a step shows 3/4 of it over the period as a jerk: with more than the limit of that alone, setpoints break it.
 
 use super::along::Pace;
 use super::arcs::Arcs;
@@ -20,6 +20,9 @@ const MOST_PLACES: usize = 1000;
 
 /// Pieces that meet at a smaller angle than this, in rad, meet without a corner.
 const SMOOTH: f64 = 1e-9;
+
+/// The greatest part of a step of the acceleration over a period that a third difference of setpoints shows.
+const MOST_SHOWN: f64 = 0.75;
 
 /// Where |C'| is below this share of its size the piece has no direction to speak of.
 const STILL: f64 = 1e-6;
@@ -86,7 +89,7 @@ impl<const M: usize> Jerks<'_, M> {
         tally.offer(Check::AccelerationContinuity, 0, change, self.negligible(), time, line);
         if let Some(step) = self.step(i, j) {
             for k in 0..self.limits.axes {
-                let limit = self.limits.jerk[k] * self.limits.period;
+                let limit = self.limits.jerk[k] * self.limits.period / MOST_SHOWN;
                 tally.offer(Check::AccelerationJump, k, step[k], limit, time, line);
             }
         }
@@ -94,7 +97,7 @@ impl<const M: usize> Jerks<'_, M> {
 
     /// By how much the acceleration of each axis jumps from arc `i` to arc `j`, less what may be rounding. None within a
     /// piece, at corners, where the velocities jump, and where the path has no direction.
-    pub fn step(&self, i: usize, j: usize) -> Option<[f64; M]> {
+    fn step(&self, i: usize, j: usize) -> Option<[f64; M]> {
         let arcs = self.arcs;
         let pieces = [i, j].map(|arc| arcs.piece[arc] as usize);
         if pieces[0] == pieces[1] {
@@ -122,14 +125,6 @@ impl<const M: usize> Jerks<'_, M> {
         Some(std::array::from_fn(|k| {
             (after.value[k] - before.value[k]).abs() - after.rounding[k] - before.rounding[k]
         }))
-    }
-
-    /// The same from the piece before to a piece, within a run.
-    pub fn step_into(&self, piece: usize) -> Option<[f64; M]> {
-        let arcs = self.arcs;
-        let arc = arcs.piece.partition_point(|&before| (before as usize) < piece);
-        let joined = 0 < arc && arc < arcs.len() && !arcs.runs.contains(&(arc as i64));
-        joined.then(|| self.step(arc - 1, arc)).flatten()
     }
 
     /// A jump of the acceleration that means nothing to any axis: in a servo period it adds no more than the pass mark

@@ -229,7 +229,7 @@ impl<const M: usize> View<'_, M> {
             self.recorded(n, step, rounding, tally);
         }
         if n >= 3 {
-            self.jerk(n, recent, comparison.as_deref(), tally);
+            self.jerk(n, recent, tally);
         }
         if let Some(comparison) = comparison {
             let rounding = length(rounding);
@@ -281,24 +281,14 @@ impl<const M: usize> View<'_, M> {
         }
     }
 
-    /// Mean jerk over three steps. Where the curvature of the path jumps the acceleration does: its step is in the mean
-    /// with at most 3/span, the greatest density of the weights that a third difference puts on the jerk.
-    fn jerk(&self, n: usize, recent: &Recent<M>, comparison: Option<&Comparison<M>>, tally: &mut Tally<M>) {
-        let (rows, limits) = (self.differences.rows, self.differences.limits);
+    /// Mean jerk over three steps.
+    fn jerk(&self, n: usize, recent: &Recent<M>, tally: &mut Tally<M>) {
+        let (row, limits) = (&self.differences.rows[n], self.differences.limits);
         let span: f64 = recent.steps.iter().sum();
         let [_, early, late] = &recent.accelerations;
-        let mut steps = None;
         for k in 0..M {
             let value = self.differences.jerk(k, early, late, span);
-            let mut limit = limits.jerk[k];
-            if value > limit && limits.judges_jerk {
-                let steps = steps.get_or_insert_with(|| match comparison {
-                    Some(comparison) => comparison.acceleration_steps([&rows[n - 3], &rows[n]]),
-                    None => self.differences.like_acceleration_steps(n),
-                });
-                limit += 3.0 * steps[k] / span;
-            }
-            tally.offer(Check::Jerk, k, value, limit, rows[n].t, rows[n].line);
+            tally.offer(Check::Jerk, k, value, limits.jerk[k], row.t, row.line);
         }
     }
 

@@ -46,10 +46,12 @@ pub struct Between<const M: usize> {
     samples: Vec<[Sample<M>; GROUPS]>,
     /// 1/w_max at the nodes on both sides of each interval.
     at_nodes: Vec<[f64; 2]>,
+    /// How much tighter the limits of jerk are on each interval.
+    calm: Vec<f64>,
 }
 
 impl<const M: usize> Between<M> {
-    /// Samples between `nodes`, where the greatest speeds are those of `rows`.
+    /// Samples between `nodes`, where the greatest speeds and how tight the limits of jerk are is as in `rows`.
     pub fn sample(geometry: &impl Geometry<M>, nodes: &[f64], pieces: &[u32], rows: &Rows<M>) -> Self {
         let mut samples = Vec::with_capacity(pieces.len());
         let mut at_nodes = Vec::with_capacity(pieces.len());
@@ -69,7 +71,8 @@ impl<const M: usize> Between<M> {
             samples.push(groups);
             at_nodes.push([0, 3].map(|lane| interval.speed.values()[lane]));
         }
-        Self { samples, at_nodes }
+        let calm = rows.intervals.iter().map(|interval| interval.jerk).collect();
+        Self { samples, at_nodes, calm }
     }
 
     /// The greatest uses of speed, acceleration and jerk on interval n by the spline x.
@@ -92,7 +95,7 @@ impl<const M: usize> Between<M> {
                 let j = (q3 * w + q2 * w1 * 1.5 + q1 * w2 * 0.5) * v;
                 axes[k][0][at.clone()].copy_from_slice((q1 * v * (1.0 / limits.velocity[k])).values());
                 axes[k][1][at.clone()].copy_from_slice((a * (1.0 / limits.acceleration[k])).values());
-                axes[k][2][at.clone()].copy_from_slice((j * (1.0 / limits.jerk[k])).values());
+                axes[k][2][at.clone()].copy_from_slice((j * (self.calm[n] / limits.jerk[k])).values());
             }
         }
         let [from, to] = self.at_nodes[n];

@@ -18,6 +18,8 @@ const GROWTH: f64 = 0.5;
 /// The longest interval, in parts of the length over which the path turns: about one radian of a circle. No interval is
 /// planned longer than the path.
 const LONGEST: f64 = 0.5;
+/// An interval that reaches into the surroundings of a cap by no more than this part of them is outside: rounding.
+const CLOSE: f64 = 1e-6;
 /// Every path has at least so many intervals, in parts of the resolution.
 const FEWEST: f64 = 26.0;
 
@@ -28,6 +30,8 @@ pub struct Grid {
     pub pieces: Vec<u32>,
     /// Node and speed, rising.
     caps: Vec<(usize, f64)>,
+    /// How much tighter the limits of jerk are on each interval: 1 or more.
+    calm: Vec<f64>,
 }
 
 impl Grid {
@@ -41,7 +45,7 @@ impl Grid {
     ) -> Self {
         let density = density(stations, slopes, bounds, resolution);
         let mut grid = Self { nodes: vec![stations[0].s], ..Self::default() };
-        let mut caps = caps.iter().skip_while(|cap| cap.s <= stations[0].s).peekable();
+        let mut next = caps.iter().skip_while(|cap| cap.s <= stations[0].s).peekable();
         let mut whole = 0.0;
         for i in 1..stations.len() {
             whole += 0.5 * (density[i - 1] + density[i]) * (stations[i].s - stations[i - 1].s);
@@ -49,7 +53,7 @@ impl Grid {
         let more = (FEWEST * resolution / whole).max(1.0);
         let mut first = 0;
         for i in 1..stations.len() {
-            let cap = caps.next_if(|cap| cap.s <= stations[i].s);
+            let cap = next.next_if(|cap| cap.s <= stations[i].s);
             let knot = i + 1 == stations.len() || stations[i + 1].piece != stations[i].piece;
             if cap.is_some() || knot {
                 if stations[i].s > stations[first].s {
@@ -61,6 +65,7 @@ impl Grid {
                 grid.caps.push((grid.nodes.len() - 1, cap.speed));
             }
         }
+        grid.calm = calm(&grid.nodes, caps);
         grid
     }
 
@@ -96,8 +101,9 @@ impl Grid {
         };
         let pieces = nodes.windows(2).enumerate().map(piece).collect();
         let node = |s: f64| nodes.binary_search_by(|node| node.total_cmp(&s)).ok();
-        let caps = caps.iter().filter_map(|cap| Some((node(cap.s)?, cap.speed))).collect();
-        Self { nodes, pieces, caps }
+        let speeds = caps.iter().filter_map(|cap| Some((node(cap.s)?, cap.speed))).collect();
+        let calm = calm(&nodes, caps);
+        Self { nodes, pieces, caps: speeds, calm }
     }
 
     /// The limits on a range of intervals.
@@ -107,8 +113,9 @@ impl Grid {
         range: Range<usize>,
     ) -> Rows<M> {
         let nodes = &self.nodes[range.start..=range.end];
-        let pieces = &self.pieces[range.clone()];
-        Rows::sample(problem.geometry, &problem.limits, nodes, pieces, |node| self.cap(range.start + node))
+        let (pieces, calm) = (&self.pieces[range.clone()], &self.calm[range.clone()]);
+        let cap = |node| self.cap(range.start + node);
+        Rows::sample(problem.geometry, &problem.limits, nodes, pieces, calm, cap)
     }
 
     /// The speed allowed at a node, infinite where no cap is given.
@@ -118,6 +125,20 @@ impl Grid {
             Err(_) => f64::INFINITY,
         }
     }
+}
+
+/// How much tighter the caps make the limits of jerk on each interval.
+fn calm(nodes: &[f64], caps: &[SpeedCap]) -> Vec<f64> {
+    let mut calm = vec![1.0_f64; nodes.len() - 1];
+    for cap in caps.iter().filter(|cap| cap.share > 0.0) {
+        let within = (1.0 - CLOSE) * cap.reach;
+        let first = nodes.partition_point(|&node| node <= cap.s - within).saturating_sub(1);
+        let last = nodes.partition_point(|&node| node < cap.s + within).min(calm.len());
+        for calm in &mut calm[first.min(last)..last] {
+            *calm = calm.max(1.0 / (1.0 - cap.share));
+        }
+    }
+    calm
 }
 
 /// Intervals per length at each station.
@@ -181,7 +202,7 @@ mod tests {
     #[test]
     fn knots_and_capped_places_are_nodes() {
         let limits = Limits { velocity: [250.0], acceleration: [3000.0], jerk: [50_000.0] };
-        let caps = [SpeedCap { s: 3.0, speed: 20.0 }, SpeedCap { s: 30.0, speed: 5.0 }];
+        let caps = [SpeedCap::new(3.0, 20.0), SpeedCap::new(30.0, 5.0)];
         let bounds = [Bound::Rest { ramp: 0.01, greatest: 1.0 }; 2];
         let (stations, slopes) =
             survey(&Line, &limits, &caps, [0.01, 49.99], &bounds, Watch::default()).expect("speeds");

@@ -49,6 +49,9 @@ pub fn greatest<const M: usize>(
     let knots = geometry.knots();
     let total = knots[knots.len() - 1];
     let sign = if end == 0 { 1.0 } else { -1.0 };
+    let from_rest = |cap: &SpeedCap| if end == 0 { cap.s } else { total - cap.s };
+    let share = |cap: &SpeedCap| if from_rest(cap) - cap.reach < ramp { cap.share } else { 0.0 };
+    let calm = 1.0 - caps.iter().map(share).fold(0.0, f64::max);
     let mut c = f64::INFINITY;
     for piece in 0..knots.len() - 1 {
         let (start, stop) = if end == 0 {
@@ -71,7 +74,7 @@ pub fn greatest<const M: usize>(
                 let (q1, q2, q3) = (place.first[k], place.second[k], place.third[k]);
                 let a = (q2 * w + 0.5 * q1 * w1).abs();
                 let j = (q3 * cubed + 1.5 * q2 * crossed + 0.5 * q1 * bend).abs();
-                c = c.min(limits.acceleration[k] / a).min((limits.jerk[k] / j).cbrt().powi(2));
+                c = c.min(limits.acceleration[k] / a).min((calm * limits.jerk[k] / j).cbrt().powi(2));
             }
             (t, c)
         };
@@ -93,7 +96,7 @@ pub fn greatest<const M: usize>(
         }
     }
     for cap in caps {
-        let x = if end == 0 { cap.s } else { total - cap.s };
+        let x = from_rest(cap);
         if x <= ramp {
             c = c.min(cap.speed * cap.speed / (x * x.cbrt()));
         }
@@ -179,7 +182,7 @@ mod tests {
         let line = greatest(&Arc { curvature: 0.0 }, &LIMITS, &[], 0.01, 0);
         let arc = greatest(&Arc { curvature: 100.0 }, &LIMITS, &[], 0.01, 0);
         assert!(arc < line, "{arc} and {line}");
-        let cap = [SpeedCap { s: 0.01, speed: 0.5 }];
+        let cap = [SpeedCap::new(0.01, 0.5)];
         let capped = greatest(&Arc { curvature: 0.0 }, &LIMITS, &cap, 0.01, 0);
         assert!((capped - 0.25).abs() < 1e-6, "{capped}");
     }

@@ -109,13 +109,14 @@ impl<const M: usize> Interval<M> {
 }
 
 impl<const M: usize> Rows<M> {
-    /// The limits between `nodes`; interval n lies on `pieces[n]`, `node_cap` is a greatest speed at a node, infinite
-    /// where there is none.
+    /// The limits between `nodes`; interval n lies on `pieces[n]`, its limits of jerk are `calm[n]` times as tight;
+    /// `node_cap` is a greatest speed at a node, infinite where there is none.
     pub fn sample(
         geometry: &impl Geometry<M>,
         limits: &Limits<M>,
         nodes: &[f64],
         pieces: &[u32],
+        calm: &[f64],
         node_cap: impl Fn(usize) -> f64,
     ) -> Self {
         let mut intervals = Vec::with_capacity(pieces.len());
@@ -142,7 +143,7 @@ impl<const M: usize> Rows<M> {
                     Lanes::new(places.map(|place| place.third[k])),
                 ]
             });
-            intervals.push(Interval { h, q, speed, acceleration: Lanes::ONE, jerk: 1.0 });
+            intervals.push(Interval { h, q, speed, acceleration: Lanes::ONE, jerk: calm[n] });
             last = Some(end);
         }
         Self {
