@@ -39,6 +39,7 @@ campaign: $(VENV)/built
 	FEEDPLAN_SEEDS=200 $(BIN)/pytest --numprocesses auto tests/planners/test_meshes.py -k random
 	FEEDPLAN_SEEDS=10000 $(BIN)/pytest --numprocesses auto tests/planners/test_jerk_limited.py -k random
 	FEEDPLAN_SEEDS=2000 $(BIN)/pytest --numprocesses auto tests/planners/test_curvature_jumps.py
+	FEEDPLAN_SEEDS=500 $(BIN)/pytest --numprocesses auto tests/planners/test_slow_feeds.py -k bound
 	FEEDPLAN_SEEDS=1000 $(BIN)/pytest --numprocesses auto tests/planners/test_random_programs.py
 	FEEDPLAN_SEEDS=2000 $(BIN)/pytest --numprocesses auto tests/planners/test_posted_programs.py
 	FEEDPLAN_SEEDS=100000 $(BIN)/pytest --numprocesses auto tests/planners/test_lines.py -k random

@@ -10,6 +10,7 @@ import pytest
 from feedplan import Axis, Machine, Plan, plan
 from feedplan.audit import audit
 from feedplan.planners import limits_jerk
+from tests.campaign import seeds
 
 # Speeds [mm/s]: the fastest feed that once failed, the least that is promised, and one between.
 SPEEDS = (3e-3, 1e-4, 1e-6)
@@ -38,6 +39,7 @@ PROGRAMS = {
     "slow between fast": "G0 X100\nG1 X110 F{f}\nX120 F1000\nX130 Y1 F{f}\nX140 Y0 F2000\nG0 X0",
     "rotary": "G0 X100\nG1 X110 A5 F{f}\nX110 Y10 A-5\nA20\nX100 Y5 A0",
 }
+SEEDS = seeds(12)
 CASES = [(name, method) for name in PROGRAMS for method in EXACT + HEURISTIC]
 CASES += [("line", method) for method in LINE_ONLY]
 
@@ -78,3 +80,26 @@ def test_every_setpoint_of_a_short_slow_path_is_right(method: str, tmp_path: Pat
     assert 4e4 < slow.setpoints().count < 1e5
     verdict = slow.audit()
     assert verdict.ok, verdict.failures
+
+
+def random_moves(rng: np.random.Generator) -> str:
+    """Moves of some of the axes, all at one feed."""
+    lines = ["G0 X100", "G1 F{f}"]
+    for _ in range(rng.integers(1, 5)):
+        places = {"X": 100.0, "Y": 0.0, "Z": 0.0, "A": 0.0}
+        words = [f"{k}{v + rng.uniform(-10.0, 10.0):.4f}" for k, v in places.items() if rng.random() < 0.6]
+        lines += [" ".join(words)] if words else []
+    return "\n".join(lines)
+
+
+def test_no_bound_of_jerk_limited_is_above_the_time_of_s_curve(tmp_path: Path) -> None:
+    # Both follow the same path: a plan that keeps all limits is no faster than the bound.
+    # A first plan of which v² was below 0 between two nodes: no time at all (20).
+    for seed in (*range(SEEDS), 20):
+        rng = np.random.default_rng(seed)
+        moves, speed = random_moves(rng), 10.0 ** rng.uniform(-6.0, 0.0)
+        exact, other = (planned(moves, speed, method, tmp_path) for method in ("jerk-limited", "s-curve"))
+        assert exact.problem.curve.control_points.tolist() == other.problem.curve.control_points.tolist()
+        assert np.isfinite([exact.time, other.time]).all(), seed
+        least = min(exact.time, other.time)
+        assert exact.lower_bound <= least * (1.0 + 1e-12), f"{seed}: {exact.lower_bound} s above {least} s"

@@ -11,6 +11,8 @@ use super::survey::Slopes;
 const MEAN: f64 = 0.7;
 /// w at a rest end, in parts of the greatest.
 const END: f64 = 0.8;
+/// The inner Bernstein coefficients of w, which are to be above 0, are within this part of w from it.
+const STEEPEST: f64 = 0.9;
 /// The limits may be used so far, so that no place between the collocation points breaks them.
 pub const USE: f64 = 0.9;
 /// A place that uses more is lowered to this.
@@ -31,7 +33,11 @@ pub fn smooth(nodes: &[f64], caps: &[f64], slopes: Slopes, bounds: &[Bound; 2]) 
         let rho = (high.1 - low.1) / (2.0 * MEAN) - MEAN;
         let slope = (high.0 - low.0) / (2.0 * MEAN);
         let w = (rho * 4.0 / 3.0).exp();
-        x.extend([w, 4.0 / 3.0 * w * slope / slopes.length(r[i])]);
+        // On intervals that are long beside the ways to other speeds.
+        let steepest = |h: f64| 3.0 * STEEPEST * w / h;
+        let falls = if i < last { steepest(nodes[i + 1] - nodes[i]) } else { f64::INFINITY };
+        let rises = if i > 0 { steepest(nodes[i] - nodes[i - 1]) } else { f64::INFINITY };
+        x.extend([w, (4.0 / 3.0 * w * slope / slopes.length(r[i])).max(-falls).min(rises)]);
     }
     for (end, bound) in bounds.iter().enumerate() {
         if let Bound::Rest { ramp, greatest } = *bound {
