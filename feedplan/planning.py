@@ -130,7 +130,8 @@ class Plan:
 
         Where the curvature of the path jumps, third differences keep the limits of jerk at the machine's
         period: over a shorter one a step of the acceleration is a greater jerk. `progress` is told how far
-        the laying out of their times is. Raises InputError for a period or an interpolator that cannot be used.
+        the laying out of their times is. Raises InputError for a period or an interpolator that cannot be
+        used.
         """
         callback(progress, "the part done")
         return setpoints(

@@ -192,7 +192,7 @@ def build_path(
 
 
 def _new_words(program: Program, first: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(r,) whether a run, by its first move, has other words than the run before, or words changed between."""
+    """(r,) whether the words of a run, by its first move, differ from those before or changed in between."""
     changes = np.searchsorted(program.change_move, first, side="right")
     new: NDArray[np.bool_] = np.diff(changes, prepend=changes[:1]) > 0
     if program.meaning is not None:
