@@ -1,7 +1,7 @@
 # Two commands do everything: `make demo` plans an example, `make test` checks the project.
 VENV := .venv
 BIN := $(VENV)/bin
-NATIVE := $(wildcard solvers/src/*.rs solvers/src/*/*.rs solvers/src/*/*/*.rs) solvers/Cargo.toml pyproject.toml
+NATIVE := $(wildcard $(foreach below,src src/* src/*/*,solvers/*/$(below)/*.rs) solvers/*/Cargo.toml) solvers/Cargo.toml pyproject.toml
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
 .PHONY: demo test native lint bench campaign clean
@@ -24,7 +24,7 @@ lint: $(VENV)/built
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	cargo fmt --check --manifest-path solvers/Cargo.toml
-	cargo clippy --release --quiet --all-targets --features python --manifest-path solvers/Cargo.toml -- -D warnings
+	cargo clippy --release --quiet --workspace --all-targets --manifest-path solvers/Cargo.toml -- -D warnings
 
 bench: $(VENV)/built
 	cargo bench --manifest-path solvers/Cargo.toml
@@ -33,8 +33,8 @@ bench: $(VENV)/built
 # Random paths by the million, on every machine by the thousand, and property tests on cases never drawn before. What is
 # found becomes a case of the test that found it; the figures stand in benchmarks/README.md.
 campaign: $(VENV)/built
-	FEEDPLAN_SEEDS=1000000 cargo test --release --manifest-path solvers/Cargo.toml --test planning random:: -- --nocapture
-	FEEDPLAN_SEEDS=1000000 cargo test --release --manifest-path solvers/Cargo.toml --test planning bound:: -- --nocapture
+	FEEDPLAN_SEEDS=1000000 cargo test --release --manifest-path solvers/Cargo.toml --test kernels planning::random:: -- --nocapture
+	FEEDPLAN_SEEDS=1000000 cargo test --release --manifest-path solvers/Cargo.toml --test kernels planning::bound:: -- --nocapture
 	FEEDPLAN_SEEDS=1250 $(BIN)/pytest --numprocesses auto tests/constraints/test_joints.py -k random
 	FEEDPLAN_SEEDS=200 $(BIN)/pytest --numprocesses auto tests/planners/test_meshes.py -k random
 	FEEDPLAN_SEEDS=10000 $(BIN)/pytest --numprocesses auto tests/planners/test_jerk_limited.py -k random

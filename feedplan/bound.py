@@ -17,7 +17,7 @@ def lower_bound(problem: Problem, profile: SpeedProfile, progress: Listener | No
     No profile that keeps the limits on velocity, acceleration, feed, chord error and junction speed is
     faster; a jerk limit is not looked at. The bound comes from the path and the limits alone: `profile`, of
     any method, says only where to divide the path and which parts to divide further. A bound above its time
-    shows a profile that breaks a limit. `progress` is told how far it is. See `solvers/src/bound.rs`.
+    shows a profile that breaks a limit. `progress` is told how far it is. See `solvers/planner/src/bound.rs`.
     """
     bound: float = native_bound(problem, profile, progress)
     time = profile.time

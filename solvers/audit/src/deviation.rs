@@ -1,0 +1,340 @@
+//! How far the followed path is from the programmed one, both ways, and whether it holds together.
+//!
+//! From the path: places of every piece against the moves it says it follows, one move more on each side. From
+//! the program: ends and inner places of every move against the pieces that follow it, one piece more on each
+//! side. Distances are those from true segments, circles, helices and parabolas. Where a piece comes near its
+//! tolerance it is looked at again, closer.
+
+use rayon::prelude::*;
+
+use super::arcs::Arcs;
+use super::curve::{distance, Followed};
+use super::moves::{Move, Neighbours, Programmed};
+use super::place::distance_to_piece;
+use super::{tell, Check, Limits, Seen, Tally, Worst, EPS, GAP_TOLERANCE, ROUNDINGS};
+
+/// Even places of a piece of degree 2, and as many again between two of them where it comes near its tolerance.
+/// Others have more: each degree is another turn.
+const PLACES: usize = 8;
+
+/// Share of the tolerance from which a piece is looked at more closely: eight places of a parabola miss at most
+/// 1.6 % of its greatest distance from a line.
+const NEAR: f64 = 0.95;
+
+/// Where no more pieces follow a move they are all measured; of more, those whose boxes come near enough.
+const FEW: usize = 8;
+
+/// Pieces or moves a thread takes at a time.
+const BLOCK: usize = 2048;
+
+/// The path on its own: finite numbers, piece on piece, within the travel of the axes.
+pub fn audit_path<const M: usize>(
+    path: &Followed,
+    arcs: Option<&Arcs>,
+    limits: &Limits<M>,
+    seen: Seen,
+) -> Tally<M> {
+    let times = entry_times(path, arcs);
+    blocks(path.len(), seen, |i, tally| {
+        let (time, line) = (times[i], path.line[i]);
+        let (rows, width) = (path.rows(i), path.width[i]);
+        let control = &path.control[rows.start * path.axes..rows.end * path.axes];
+        let weights = if path.weights.is_empty() { &[][..] } else { &path.weights[rows] };
+        let finite = control.iter().all(|q| q.is_finite())
+            && weights.iter().all(|w| w.is_finite() && *w > 0.0)
+            && width.is_finite();
+        if !finite || width < 0.0 || (width == 0.0 && !path.curve::<M>(i).is_motionless()) {
+            tally.offer(Check::Numbers, 0, f64::INFINITY, 0.0, time, line);
+            return;
+        }
+        tally.offer(Check::Numbers, 0, 0.0, 0.0, time, line);
+        if i > 0 {
+            let start = path.start::<M>(i);
+            let rounding = ROUNDINGS * EPS * magnitude(&start);
+            let gap = distance(&path.end(i - 1), &start) - rounding;
+            if gap <= 0.0 || !path.begins_elsewhere(i) {
+                tally.offer(Check::Gap, 0, gap, GAP_TOLERANCE, time, line);
+            }
+        }
+        let curve = path.curve::<M>(i);
+        for k in 0..path.axes {
+            for q in [path.start::<M>(i)[k], path.end::<M>(i)[k]] {
+                offer_travel(tally, limits, k, q, time, line);
+            }
+            // The control points enclose the piece: where they are fine it is.
+            let reach = control.iter().skip(k).step_by(path.axes);
+            let worst = tally.get(Check::Travel, k).ratio;
+            if reach.copied().any(|q| travel_share(limits, k, q) > worst) {
+                for q in curve.extremes(k) {
+                    offer_travel(tally, limits, k, q, time, line);
+                }
+            }
+        }
+        tally.samples += 1;
+    })
+}
+
+/// The share of half the travel that a position is away from the middle.
+fn travel_share<const M: usize>(limits: &Limits<M>, axis: usize, q: f64) -> f64 {
+    let [least, most] = limits.travel[axis];
+    let (middle, half) = (0.5 * (least + most), 0.5 * (most - least));
+    if half.is_finite() {
+        ((q - middle).abs() - ROUNDINGS * EPS * q.abs()) / half
+    } else if q >= least && q <= most {
+        0.0
+    } else {
+        f64::INFINITY
+    }
+}
+
+/// One position of an axis against its travel; the ratio is its share of half the travel, from the middle.
+pub fn offer_travel<const M: usize>(
+    tally: &mut Tally<M>,
+    limits: &Limits<M>,
+    axis: usize,
+    q: f64,
+    time: f64,
+    line: i32,
+) {
+    let [least, most] = limits.travel[axis];
+    let bound = if q < 0.5 * (least + most) { least } else { most };
+    let ratio = travel_share(limits, axis, q);
+    tally.offer_ratio(Check::Travel, axis, Worst { value: q, limit: bound, ratio, time, line });
+}
+
+/// The path against the program.
+pub fn audit_deviation<const M: usize>(
+    path: &Followed,
+    program: &Programmed,
+    arcs: Option<&Arcs>,
+    seen: Seen,
+) -> Tally<M> {
+    let times = entry_times(path, arcs);
+    let followers = followers(path, program.len());
+    let from_path =
+        blocks(path.len(), seen, |i, tally| piece_to_moves(path, program, &followers, i, times[i], tally));
+    let from_program =
+        blocks(program.len(), seen, |m, tally| move_to_pieces(path, program, m, followers[m], &times, tally));
+    let mut ends = Tally::default();
+    if !path.is_empty() && !program.is_empty() {
+        let last = path.len() - 1;
+        let meetings = [
+            (path.start::<M>(0), program.end(None), times[0], path.line[0]),
+            (path.end::<M>(last), program.end(Some(program.len() - 1)), times[last + 1], path.line[last]),
+        ];
+        for (followed, programmed, time, line) in meetings {
+            let gap = distance(&followed, &programmed) - ROUNDINGS * EPS * magnitude(&programmed);
+            ends.offer(Check::Gap, 0, gap, GAP_TOLERANCE, time, line);
+        }
+    }
+    from_path.merge(from_program).merge(ends)
+}
+
+/// The moves that a piece may be compared with: those it follows, then one more on each side.
+pub fn window(path: &Followed, piece: usize, moves: usize) -> impl Iterator<Item = usize> {
+    let [first, last] = [path.moves[2 * piece], path.moves[2 * piece + 1]];
+    let first = first.clamp(0, moves as i64) as usize;
+    let last = last.saturating_add(1).clamp(first as i64, moves as i64) as usize;
+    (first..last).chain(first.checked_sub(1)).chain(Some(last).filter(|&m| m < moves))
+}
+
+/// What a place may be off its nearest neighbour without changing the tally: no more than its worst so far, and not
+/// near the tolerance. The first neighbour within it settles the place.
+pub fn settled<const M: usize>(tally: &Tally<M>) -> f64 {
+    tally.get(Check::Deviation, 0).ratio.clamp(0.0, NEAR)
+}
+
+fn piece_to_moves<const M: usize>(
+    path: &Followed,
+    program: &Programmed,
+    followers: &[Followers],
+    piece: usize,
+    time: f64,
+    tally: &mut Tally<M>,
+) {
+    let curve = path.curve::<M>(piece);
+    let width = curve.width();
+    let (line, tolerance) = (path.line[piece], path.tolerance[piece].max(GAP_TOLERANCE));
+    let rounding = ROUNDINGS * EPS * curve.magnitude();
+    let mut near = Neighbours::default();
+    near.replace(program, window(path, piece, program.len()));
+    near.start_at(followers, piece);
+    let mut off = |t: f64, enough: f64| near.distance(&curve.at(t * width), enough + rounding) - rounding;
+    let (mut worst, mut worst_t) = (0.0_f64, 0.0);
+    let places = PLACES * curve.turns();
+    for i in 0..=places {
+        let t = i as f64 / places as f64;
+        let value = off(t, settled(tally) * tolerance);
+        tally.offer(Check::Deviation, 0, value, tolerance, time, line);
+        if value > worst {
+            (worst, worst_t) = (value, t);
+        }
+    }
+    tally.samples += places as u64 + 1;
+    if worst >= NEAR * tolerance {
+        let step = 1.0 / (places * PLACES) as f64;
+        for i in 0..=2 * PLACES {
+            let t = (worst_t + (i as f64 - PLACES as f64) * step).clamp(0.0, 1.0);
+            tally.offer(Check::Deviation, 0, off(t, 0.0), tolerance, time, line);
+        }
+    }
+}
+
+/// First and last piece that follow a move.
+pub type Followers = (usize, usize);
+
+/// The pieces near every move. A move that no piece names lies between those of the moves around it.
+fn followers(path: &Followed, moves: usize) -> Vec<Followers> {
+    let mut named: Vec<Option<Followers>> = vec![None; moves];
+    for (piece, pair) in path.moves.chunks_exact(2).enumerate() {
+        let first = pair[0].clamp(0, moves as i64) as usize;
+        let last = pair[1].saturating_add(1).clamp(0, moves as i64) as usize;
+        for range in &mut named[first..last.max(first)] {
+            let (low, high) = range.unwrap_or((piece, piece));
+            *range = Some((low.min(piece), high.max(piece)));
+        }
+    }
+    let mut ranges = vec![(0, path.len().saturating_sub(1)); moves];
+    let mut before = 0;
+    for (range, named) in ranges.iter_mut().zip(&named) {
+        range.0 = named.map_or(before, |(low, _)| low);
+        before = named.map_or(before, |(_, high)| high);
+    }
+    let mut after = path.len().saturating_sub(1);
+    for (range, named) in ranges.iter_mut().zip(&named).rev() {
+        range.1 = named.map_or(after, |(_, high)| high);
+        after = named.map_or(after, |(low, _)| low);
+    }
+    ranges
+}
+
+fn move_to_pieces<const M: usize>(
+    path: &Followed,
+    program: &Programmed,
+    m: usize,
+    (first, last): Followers,
+    times: &[f64],
+    tally: &mut Tally<M>,
+) {
+    let programmed: Move<M> = program.get(m);
+    if !programmed.is_motion() {
+        return;
+    }
+    let line = program.line[m];
+    if path.is_empty() {
+        tally.offer(Check::Deviation, 0, f64::INFINITY, GAP_TOLERANCE, 0.0, line);
+        return;
+    }
+    let (first, last) = (first.min(path.len() - 1), last.min(path.len() - 1));
+    let (least, most) = (first.saturating_sub(1), (last + 1).min(path.len() - 1));
+    let places = programmed.places();
+    let rounding = ROUNDINGS * EPS * magnitude(&programmed.to);
+    let mut expected = first;
+    for i in 0..=places {
+        let q = programmed.at(i as f64 / places as f64);
+        // The nearest piece counts, measured by its own tolerance.
+        let mut nearest = (f64::INFINITY, f64::INFINITY, GAP_TOLERANCE);
+        let enough = settled(tally);
+        for piece in outwards(expected, least, most) {
+            let tolerance = path.tolerance[piece].max(GAP_TOLERANCE);
+            let beyond = nearest.0 * tolerance + rounding;
+            if most - least > FEW && beyond.is_finite() && path.distance_at_least(piece, &q) > beyond {
+                continue;
+            }
+            let away = distance_to_piece(&path.curve::<M>(piece), &q) - rounding;
+            if away / tolerance < nearest.0 {
+                nearest = (away / tolerance, away, tolerance);
+                expected = piece;
+            }
+            if nearest.0 <= enough {
+                break;
+            }
+        }
+        tally.offer(Check::Deviation, 0, nearest.1, nearest.2, times[first], line);
+    }
+    tally.samples += places as u64 + 1;
+}
+
+/// `from`, then its neighbours on both sides by turns, within `least` to `most`.
+pub fn outwards(from: usize, least: usize, most: usize) -> impl Iterator<Item = usize> {
+    let (mut after, mut before, mut turn) = (from + 1, from, false);
+    let others = std::iter::from_fn(move || {
+        turn = if after > most { false } else { before <= least || !turn };
+        if turn {
+            after += 1;
+            Some(after - 1)
+        } else {
+            (before > least).then(|| {
+                before -= 1;
+                before
+            })
+        }
+    });
+    std::iter::once(from).chain(others)
+}
+
+/// When the tool enters each piece, and when it leaves the last one, in s.
+fn entry_times(path: &Followed, arcs: Option<&Arcs>) -> Vec<f64> {
+    let mut times = vec![0.0; path.len() + 1];
+    let Some(arcs) = arcs else { return times };
+    let starts = arcs.starts(path);
+    let mut piece = 0;
+    for (i, &entered) in arcs.piece.iter().enumerate() {
+        while piece <= (entered as usize).min(path.len()) {
+            times[piece] = starts[i];
+            piece += 1;
+        }
+    }
+    times[piece..].fill(starts[arcs.len()]);
+    times
+}
+
+/// Calls `check` for every index, in parallel.
+fn blocks<const M: usize>(count: usize, seen: Seen, check: impl Fn(usize, &mut Tally<M>) + Sync) -> Tally<M> {
+    (0..count.div_ceil(BLOCK))
+        .into_par_iter()
+        .map(|block| {
+            let mut tally = Tally::default();
+            for i in block * BLOCK..((block + 1) * BLOCK).min(count) {
+                tell(seen, i);
+                check(i, &mut tally);
+            }
+            tally
+        })
+        .reduce(Tally::default, Tally::merge)
+}
+
+fn magnitude<const M: usize>(q: &[f64; M]) -> f64 {
+    q.iter().fold(0.0, |most, q| q.abs().max(most))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::curve::Pieces;
+
+    #[test]
+    fn places_are_looked_at_from_near_to_far() {
+        assert_eq!(outwards(2, 1, 5).collect::<Vec<_>>(), [2, 3, 1, 4, 5]);
+        assert_eq!(outwards(5, 5, 5).collect::<Vec<_>>(), [5]);
+    }
+
+    #[test]
+    fn a_move_without_a_piece_lies_between_its_neighbours() {
+        let path = Followed {
+            pieces: Pieces { axes: 2, control: &[], weights: &[], offsets: &[], width: &[1.0; 3] },
+            feed: &[],
+            line: &[],
+            moves: &[0, 1, 1, 1, 4, 5],
+            tolerance: &[],
+            runs: &[],
+            new_words: &[],
+            start_dwell: 0.0,
+            dwell: &[],
+        };
+        assert_eq!(followers(&path, 7), [(0, 0), (0, 1), (1, 2), (1, 2), (2, 2), (2, 2), (2, 2)]);
+        assert_eq!(window(&path, 0, 7).collect::<Vec<_>>(), [0, 1, 2]);
+        assert_eq!(window(&path, 1, 7).collect::<Vec<_>>(), [1, 0, 2]);
+        assert_eq!(window(&path, 2, 6).collect::<Vec<_>>(), [4, 5, 3]);
+    }
+}

@@ -1,0 +1,360 @@
+//! Finds the place of a point on the path: the nearest place of a piece, and the next place along the path.
+
+use super::curve::{distance, length, Curve, Followed, Quadratic};
+
+/// A place on the path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    pub piece: usize,
+    /// Local parameter in mm.
+    pub u: f64,
+}
+
+/// A Newton step of this share of the piece is the last one: its error is about the square of that.
+const CLOSE: f64 = 1e-7;
+
+/// At an end where C' is this part of what it is elsewhere it is rounding.
+const STILL: f64 = 1e-12;
+
+/// (C(u) − q)·C'(u) in t = u / width, up to a factor, a cubic: where it turns from negative to positive the distance has
+/// a local minimum. It is taken as the product: of its coefficients nothing is left next to a place where C' vanishes.
+struct Slope<const M: usize> {
+    off: [f64; M],
+    first: [f64; M],
+    bend: [f64; M],
+}
+
+impl<const M: usize> Slope<M> {
+    #[inline]
+    fn new(curve: &Quadratic<M>, q: &[f64; M]) -> Self {
+        Self {
+            off: std::array::from_fn(|k| curve.start[k] - q[k]),
+            first: curve.first,
+            bend: std::array::from_fn(|k| curve.second[k] - curve.first[k]),
+        }
+    }
+
+    /// (C − q)·C' at t, and its derivative.
+    #[inline(always)]
+    fn at(&self, t: f64) -> [f64; 2] {
+        let (mut slope, mut derivative) = (0.0, 0.0);
+        for k in 0..M {
+            let away = self.off[k] + t * (2.0 * self.first[k] + t * self.bend[k]);
+            let tangent = self.first[k] + t * self.bend[k];
+            slope += away * tangent;
+            derivative += 2.0 * tangent * tangent + away * self.bend[k];
+        }
+        [slope, derivative]
+    }
+
+    /// Whether the distance falls at `t`. Where C' is rounding, at an end, the motion beside it tells.
+    fn falls(&self, t: f64) -> bool {
+        let tangent: [f64; M] = std::array::from_fn(|k| self.first[k] + t * self.bend[k]);
+        if length(&tangent) > STILL * length(&self.bend) {
+            return self.at(t)[0] < 0.0;
+        }
+        let inwards = if t < 0.5 { 1.0 } else { -1.0 };
+        let away = |k: usize| self.off[k] + t * (2.0 * self.first[k] + t * self.bend[k]);
+        (0..M).map(|k| away(k) * inwards * self.bend[k]).sum::<f64>() < 0.0
+    }
+
+    /// The root between `a`, where the distance falls, and `b`, where it does not: Newton, halved when it strays.
+    fn root(&self, mut a: f64, mut b: f64) -> f64 {
+        let mut t = a;
+        for _ in 0..100 {
+            let [f, derivative] = self.at(t);
+            if f < 0.0 || t == a {
+                a = t;
+            } else {
+                b = t;
+            }
+            let newton = t - f / derivative;
+            if newton > a && newton < b {
+                if (newton - t).abs() <= CLOSE {
+                    return newton;
+                }
+                t = newton;
+            } else {
+                t = 0.5 * (a + b);
+                if t <= a || t >= b {
+                    break;
+                }
+            }
+        }
+        t
+    }
+
+    /// The ends of the parts of [t0, 1] on which the slope only rises or only falls.
+    fn monotone_parts(&self, t0: f64) -> [f64; 4] {
+        let (mut c1, mut c2, mut c3) = (0.0, 0.0, 0.0);
+        for k in 0..M {
+            let (off, first, bend) = (self.off[k], self.first[k], self.bend[k]);
+            c1 += 2.0 * first * first + off * bend;
+            c2 += 3.0 * first * bend;
+            c3 += bend * bend;
+        }
+        let discriminant = c2 * c2 - 3.0 * c3 * c1;
+        if c3 == 0.0 || discriminant <= 0.0 {
+            return [t0, t0, 1.0, 1.0];
+        }
+        let (root, per) = (discriminant.sqrt(), (3.0 * c3).recip());
+        [t0, ((-c2 - root) * per).clamp(t0, 1.0), ((root - c2) * per).clamp(t0, 1.0), 1.0]
+    }
+}
+
+/// The first local minimum of the distance at or after `from`: its parameter and distance, and whether the
+/// distance still falls at the end of the piece.
+#[inline]
+pub fn first_minimum<const M: usize>(curve: &Curve<M>, q: &[f64; M], from: f64) -> (f64, f64, bool) {
+    let width = curve.width();
+    let t0 = (from / width).clamp(0.0, 1.0);
+    let (mut u, mut falls) = (from, false);
+    match curve {
+        Curve::Quadratic(quadratic) => {
+            let slope = Slope::new(quadratic, q);
+            if slope.falls(t0) {
+                (u, falls) = (width, true);
+                let ends = slope.monotone_parts(t0);
+                for i in 0..3 {
+                    if !slope.falls(ends[i + 1]) {
+                        (u, falls) = (slope.root(ends[i], ends[i + 1]) * width, false);
+                        break;
+                    }
+                }
+            }
+        }
+        Curve::General(polygon, _) => {
+            let (t, falls_on) = polygon.first_minimum(q, t0);
+            if t > t0 {
+                (u, falls) = (t * width, falls_on);
+            }
+        }
+    }
+    (u, distance(q, &curve.at(u)), falls)
+}
+
+/// Calls `found` with the local minima of the distance at or after `from` and with both ends: parameter and distance.
+pub fn all_minima<const M: usize>(
+    curve: &Curve<M>,
+    q: &[f64; M],
+    from: f64,
+    mut found: impl FnMut(f64, f64),
+) {
+    let width = curve.width();
+    let t0 = (from / width).clamp(0.0, 1.0);
+    let mut found = |u: f64| found(u, distance(q, &curve.at(u)));
+    match curve {
+        Curve::Quadratic(quadratic) => {
+            let slope = Slope::new(quadratic, q);
+            let ends = slope.monotone_parts(t0);
+            let falls = ends.map(|t| slope.falls(t));
+            found(from);
+            for i in 0..3 {
+                if falls[i] && !falls[i + 1] {
+                    found(slope.root(ends[i], ends[i + 1]) * width);
+                }
+            }
+            found(width);
+        }
+        Curve::General(polygon, _) => {
+            polygon.all_minima(q, t0, &mut |t| found(if t > t0 { t * width } else { from }));
+        }
+    }
+}
+
+/// Distance of `q` from the nearest place of the piece.
+pub fn distance_to_piece<const M: usize>(curve: &Curve<M>, q: &[f64; M]) -> f64 {
+    let mut nearest = f64::INFINITY;
+    all_minima(curve, q, 0.0, |_, distance| nearest = nearest.min(distance));
+    nearest
+}
+
+/// A place found for a point.
+#[derive(Clone, Copy, Debug)]
+pub struct Found {
+    pub place: Place,
+    /// Distance of the point from the place in mm.
+    pub distance: f64,
+    /// What `judge` says of the place in mm.
+    pub error: f64,
+}
+
+/// What the search may look at.
+pub struct Search<'a, F> {
+    pub path: &'a Followed<'a>,
+    /// Length of path to look along after the first piece, in mm.
+    pub reach: f64,
+    /// Distance at which a point is on the path, in mm.
+    pub close: f64,
+    /// How wrong a place is for other reasons than its distance, in mm, and how wrong it may be.
+    pub judge: F,
+    pub allowed: f64,
+}
+
+impl<F: FnMut(Place) -> f64> Search<'_, F> {
+    /// The first place at or after `from` that is close and judged good; else the least bad within reach.
+    ///
+    /// The second, thorough look takes all minima of every piece: where the path turns back within a step, the
+    /// first minimum may be a wrong one.
+    pub fn next_place<const M: usize>(&mut self, from: Place, q: &[f64; M]) -> Found {
+        let quick = self.look::<M>(from, q, false);
+        if self.is_good(&quick) {
+            return quick;
+        }
+        let thorough = self.look::<M>(from, q, true);
+        if self.badness(&thorough) <= self.badness(&quick) {
+            thorough
+        } else {
+            quick
+        }
+    }
+
+    fn is_good(&self, found: &Found) -> bool {
+        found.distance <= self.close && found.error <= self.allowed
+    }
+
+    /// On the path by the larger of both errors; off it by the distance, and always worse.
+    fn badness(&self, found: &Found) -> f64 {
+        if found.distance <= self.close {
+            found.error.max(found.distance)
+        } else {
+            1e9 + found.distance
+        }
+    }
+
+    fn candidate(&mut self, piece: usize, u: f64, distance: f64) -> Found {
+        let place = Place { piece, u };
+        let error = if distance <= self.close { (self.judge)(place) } else { f64::INFINITY };
+        Found { place, distance, error }
+    }
+
+    fn look<const M: usize>(&mut self, from: Place, q: &[f64; M], thorough: bool) -> Found {
+        let mut best = Found { place: from, distance: f64::INFINITY, error: f64::INFINITY };
+        let (mut travelled, mut start) = (0.0, from.u);
+        for piece in from.piece..self.path.len() {
+            let curve = self.path.curve::<M>(piece);
+            let mut falls_on = false;
+            if thorough {
+                all_minima(&curve, q, start, |u, distance| {
+                    let found = self.candidate(piece, u, distance);
+                    if self.badness(&found) <= self.badness(&best) {
+                        best = found;
+                    }
+                });
+            } else {
+                let (u, distance, falls) = first_minimum(&curve, q, start);
+                let found = self.candidate(piece, u, distance);
+                if self.badness(&found) <= self.badness(&best) {
+                    best = found;
+                    // Its neighbour may hold the true minimum, a rounding further on.
+                    falls_on = falls;
+                }
+            }
+            if self.is_good(&best) && !falls_on {
+                break;
+            }
+            // The first piece does not count: the search may start well before the place looked for.
+            if piece > from.piece {
+                travelled += distance(&curve.at(start), &curve.at(curve.width()));
+            }
+            if travelled > self.reach {
+                break;
+            }
+            start = 0.0;
+        }
+        best
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::curve::Pieces;
+    use proptest::prelude::*;
+
+    /// Two pieces: along X to 10 and back again.
+    const THERE_AND_BACK: Followed = Followed {
+        pieces: Pieces {
+            axes: 2,
+            control: &[0.0, 0.0, 5.0, 0.0, 10.0, 0.0, 10.0, 0.0, 5.0, 0.0, 0.0, 0.0],
+            weights: &[],
+            offsets: &[0, 3, 6],
+            width: &[10.0, 10.0],
+        },
+        feed: &[1.0, 1.0],
+        line: &[1, 2],
+        moves: &[0, 0, 1, 1],
+        tolerance: &[0.0, 0.0],
+        runs: &[0, 2],
+        new_words: &[],
+        start_dwell: 0.0,
+        dwell: &[0.0],
+    };
+
+    fn next(from: Place, q: [f64; 2], judge: impl FnMut(Place) -> f64) -> Found {
+        Search { path: &THERE_AND_BACK, reach: 20.0, close: 1e-9, judge, allowed: 1e-9 }.next_place(from, &q)
+    }
+
+    #[test]
+    fn a_point_ahead_is_found_ahead() {
+        let found = next(Place { piece: 0, u: 2.0 }, [3.0, 0.0], |_| 0.0);
+        assert!(found.place.piece == 0 && found.distance < 1e-15);
+        assert!((found.place.u - 3.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn a_point_behind_is_found_on_the_way_back_and_never_behind() {
+        let found = next(Place { piece: 0, u: 4.0 }, [3.0, 0.0], |_| 0.0);
+        assert_eq!(found.place.piece, 1);
+        assert!((found.place.u - 7.0).abs() < 1e-14);
+        let beside = next(Place { piece: 1, u: 8.0 }, [3.0, 0.0], |_| 0.0);
+        assert_eq!((beside.place, beside.distance), (Place { piece: 1, u: 8.0 }, 1.0));
+    }
+
+    #[test]
+    fn of_two_places_the_one_judged_good_is_taken() {
+        let on_the_way_back = |place: Place| if place.piece == 1 { 0.0 } else { 1.0 };
+        let found = next(Place { piece: 0, u: 2.0 }, [3.0, 0.0], on_the_way_back);
+        assert_eq!((found.place.piece, found.error), (1, 0.0));
+    }
+
+    #[test]
+    fn a_place_next_to_an_end_at_rest_is_before_it() {
+        for step in [0.0, -4e-15] {
+            let points = [[-61.0, 0.0], [-19.0, 0.0], [-19.0 + step, 0.0]];
+            let curve = Curve::Quadratic(Quadratic::new(&points, 1.0));
+            let (u, off, falls) = first_minimum(&curve, &[-19.0 - 42.0 * 1e-12, 0.0], 0.99);
+            assert!(!falls && off < 1e-12 && (1.0 - u - 1e-6).abs() < 1e-8, "{u} is {off} off");
+        }
+    }
+
+    #[test]
+    fn from_a_start_at_rest_the_next_place_is_ahead() {
+        for step in [0.0, -1e-16] {
+            let curve = Curve::Quadratic(Quadratic::new(&[[0.0, 0.0], [step, 0.0], [3.0, 0.0]], 1.0));
+            for x in [1e-9, 0.01, 2.0] {
+                let (u, off, falls) = first_minimum(&curve, &[x, 0.0], 0.0);
+                assert!(!falls && off < 1e-13, "{x}: {u} is {off} off");
+                assert!(distance_to_piece(&curve, &[x, 0.0]) < 1e-13);
+            }
+            let (u, off, falls) = first_minimum(&curve, &[-1.0, 0.0], 0.0);
+            assert!(u < 1e-12 && off == 1.0 && !falls, "{u}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn no_place_of_a_piece_is_nearer_than_its_distance(
+            c in prop::array::uniform6(-2.0..2.0_f64), x in -3.0..3.0_f64, y in -3.0..3.0_f64,
+        ) {
+            let points = [[c[0], c[1]], [c[2], c[3]], [c[4], c[5]]];
+            let curve = Curve::Quadratic(Quadratic::new(&points, 3.0));
+            let dense = (0..=5000)
+                .map(|i| distance(&[x, y], &curve.at(3.0 * f64::from(i) / 5000.0)))
+                .fold(f64::INFINITY, f64::min);
+            let found = distance_to_piece(&curve, &[x, y]);
+            prop_assert!(found <= dense + 1e-12);
+            prop_assert!(found >= dense - 2e-3);
+        }
+    }
+}

@@ -1,0 +1,503 @@
+//! A piece of any degree, polynomial or rational, by the steps of its control polygon.
+//!
+//! De Casteljau's algorithm on the steps d_i = P_(i+1) − P_i instead of the points: with w the weights,
+//! w_i ← (1 − t) w_i + t w_(i+1), τ_i = t w_(i+1) / (the new w_i), every level is
+//!
+//! ```text
+//! d_i ← (1 − τ_i) d_i + τ_(i+1) d_(i+1)
+//! ```
+//!
+//! Points far from the origin and short parts of a piece so lose no digit. The steps of the part up to t are the
+//! τ_0 d_0 of all levels, and C'(t) = n w_0 w_1 d_0 / w² of the last one (Floater 1992).
+
+mod nearest;
+
+use super::curve::{inner, length};
+use wide::f64x4;
+
+/// Greatest degree.
+pub const MOST: usize = 9;
+
+/// Below this share of the greatest step a derivative is nothing but rounding.
+const STILL: f64 = 1e-10;
+
+/// The piece over t in [0, 1].
+#[derive(Clone, Debug)]
+pub struct Polygon<const M: usize> {
+    pub start: [f64; M],
+    pub end: [f64; M],
+    degree: usize,
+    steps: [[f64; M]; MOST],
+    weights: [f64; MOST + 1],
+    rational: bool,
+}
+
+/// A place of the piece: the way to it from the start, and dC/dt.
+#[derive(Clone, Copy, Debug)]
+pub struct Local<const M: usize> {
+    pub way: [f64; M],
+    pub slope: [f64; M],
+}
+
+impl<const M: usize> Polygon<M> {
+    /// From 2 to 10 control points, and as many positive weights or none.
+    pub fn new(points: impl ExactSizeIterator<Item = [f64; M]>, weights: &[f64]) -> Self {
+        let degree = (points.len() - 1).min(MOST);
+        let (mut start, mut end) = ([0.0; M], [0.0; M]);
+        let mut steps = [[0.0; M]; MOST];
+        for (i, point) in points.take(degree + 1).enumerate() {
+            if i == 0 {
+                start = point;
+            } else {
+                steps[i - 1] = std::array::from_fn(|k| point[k] - end[k]);
+            }
+            end = point;
+        }
+        let mut own = [1.0; MOST + 1];
+        let rational = weights.windows(2).any(|pair| pair[0] != pair[1]);
+        if rational {
+            for (own, weight) in own.iter_mut().zip(weights) {
+                *own = *weight;
+            }
+        }
+        Self { start, end, degree, steps, weights: own, rational }
+    }
+
+    pub fn degree(&self) -> usize {
+        self.degree
+    }
+
+    /// De Casteljau's algorithm at t; calls `level` with steps, weights, τ of the first and 1 − τ of the last step.
+    #[inline]
+    fn levels(&self, t: f64, mut level: impl FnMut(&[[f64; M]], &[f64], [f64; 2])) {
+        let s = 1.0 - t;
+        let (mut steps, mut weights) = (self.steps, self.weights);
+        let mut tau = [[s, t]; MOST];
+        for count in (1..=self.degree).rev() {
+            if self.rational {
+                for i in 0..count {
+                    let (a, b) = (s * weights[i], t * weights[i + 1]);
+                    tau[i] = [a / (a + b), b / (a + b)];
+                }
+            }
+            level(&steps[..count], &weights[..=count], [tau[0][1], tau[count - 1][0]]);
+            for i in 0..count - 1 {
+                for k in 0..M {
+                    steps[i][k] = tau[i][0] * steps[i][k] + tau[i + 1][1] * steps[i + 1][k];
+                }
+            }
+            if self.rational {
+                for i in 0..count {
+                    weights[i] = s * weights[i] + t * weights[i + 1];
+                }
+            }
+        }
+    }
+
+    /// |dC/dt| at four places, by the same algorithm.
+    pub fn speeds(&self, t: f64x4) -> f64x4 {
+        let (degree, s) = (self.degree, f64x4::ONE - t);
+        let mut steps = [[f64x4::ZERO; M]; MOST];
+        for i in 0..degree {
+            for k in 0..M {
+                steps[i][k] = f64x4::splat(self.steps[i][k]);
+            }
+        }
+        let mut scale = f64x4::splat(degree as f64);
+        if self.rational {
+            let mut weights = [f64x4::ZERO; MOST + 1];
+            for i in 0..=degree {
+                weights[i] = f64x4::splat(self.weights[i]);
+            }
+            for count in (2..=degree).rev() {
+                let mut left = [f64x4::ZERO; MOST];
+                let mut right = [f64x4::ZERO; MOST];
+                for i in 0..count {
+                    let (a, b) = (s * weights[i], t * weights[i + 1]);
+                    weights[i] = a + b;
+                    let inverse = f64x4::ONE / weights[i];
+                    (left[i], right[i]) = (a * inverse, b * inverse);
+                }
+                for i in 0..count - 1 {
+                    for k in 0..M {
+                        steps[i][k] = left[i] * steps[i][k] + right[i + 1] * steps[i + 1][k];
+                    }
+                }
+            }
+            let inverse = f64x4::ONE / (s * weights[0] + t * weights[1]);
+            scale = scale * weights[0] * weights[1] * inverse * inverse;
+        } else {
+            for count in (1..degree).rev() {
+                for i in 0..count {
+                    for k in 0..M {
+                        steps[i][k] = s * steps[i][k] + t * steps[i + 1][k];
+                    }
+                }
+            }
+        }
+        let mut square = f64x4::ZERO;
+        for k in 0..M {
+            square += steps[0][k] * steps[0][k];
+        }
+        scale * square.sqrt()
+    }
+
+    /// The place at t.
+    #[inline]
+    pub fn local(&self, t: f64) -> Local<M> {
+        let (mut way, mut slope) = ([0.0; M], [0.0; M]);
+        let degree = self.degree as f64;
+        self.levels(t, |steps, weights, [first, _]| {
+            for k in 0..M {
+                way[k] += first * steps[0][k];
+            }
+            if steps.len() == 1 {
+                let weight = (1.0 - t) * weights[0] + t * weights[1];
+                let scale =
+                    if self.rational { degree * weights[0] * weights[1] / (weight * weight) } else { degree };
+                for k in 0..M {
+                    slope[k] = scale * steps[0][k];
+                }
+            }
+        });
+        Local { way, slope }
+    }
+
+    /// C(t).
+    pub fn at(&self, t: f64) -> [f64; M] {
+        if t >= 1.0 {
+            return self.end;
+        }
+        let way = self.local(t).way;
+        std::array::from_fn(|k| self.start[k] + way[k])
+    }
+
+    /// The first three derivatives by t, and what the rounding of each is relative to.
+    ///
+    /// Of ω C and ω, C counted from the nearer end, by the differences of their Bézier points; the quotient rule
+    /// makes those of C of them.
+    pub fn derivatives(&self, t: f64) -> [([f64; M], [f64; M]); 3] {
+        let n = self.degree;
+        let mut rows = [([0.0; M], 0.0); MOST + 1];
+        let (mut way, mut most) = ([0.0; M], [0.0_f64; M]);
+        for place in 0..=n {
+            let i = if t <= 0.5 { place } else { n - place };
+            for k in 0..if place > 0 { M } else { 0 } {
+                way[k] += if t <= 0.5 { self.steps[i - 1][k] } else { -self.steps[i][k] };
+                most[k] = most[k].max(way[k].abs());
+            }
+            rows[i] = (way.map(|x| self.weights[i] * x), self.weights[i]);
+        }
+        let between = |a: &([f64; M], f64), b: &([f64; M], f64), s: f64, t: f64| {
+            (std::array::from_fn(|k| s * a.0[k] + t * b.0[k]), s * a.1 + t * b.1)
+        };
+        // Of every order the differences of as many rows of de Casteljau's triangle as it takes.
+        let mut found = [([0.0; M], 0.0); 4];
+        for level in (0..=n).rev() {
+            if level < found.len() {
+                let mut differences = rows;
+                for order in 1..=level {
+                    for i in 0..=level - order {
+                        differences[i] = between(&differences[i], &differences[i + 1], -1.0, 1.0);
+                    }
+                }
+                let scale: f64 = (0..level).map(|i| (n - i) as f64).product();
+                found[level] = (differences[0].0.map(|x| scale * x), scale * differences[0].1);
+            }
+            for i in 0..level {
+                rows[i] = between(&rows[i], &rows[i + 1], 1.0 - t, t);
+            }
+        }
+        let weight = found[0].1;
+        let [point, a1, a2, a3] = found.map(|(row, _)| row.map(|x| x / weight));
+        let [_, w1, w2, w3] = found.map(|(_, w)| w / weight);
+        let first: [f64; M] = std::array::from_fn(|k| a1[k] - w1 * point[k]);
+        let second: [f64; M] = std::array::from_fn(|k| a2[k] - 2.0 * w1 * first[k] - w2 * point[k]);
+        let third: [f64; M] =
+            std::array::from_fn(|k| a3[k] - 3.0 * (w1 * second[k] + w2 * first[k]) - w3 * point[k]);
+        // Every difference may double what is rounded, and quotients add what the weights are.
+        let rough = 2.0 * self.slope_scale();
+        let size = |order: i32| most.map(|x| rough.powi(order) * x);
+        [(first, size(1)), (second, size(2)), (third, size(3))]
+    }
+
+    /// Curvature in 1/mm at t; 0 where the piece has no direction.
+    ///
+    /// The last three points of de Casteljau's algorithm make a piece of degree 2 with 2 (n − 1)/n of the curvature.
+    pub fn curvature(&self, t: f64) -> f64 {
+        let mut result = 0.0;
+        let degree = self.degree as f64;
+        self.levels(t, |steps, weights, [first, last]| {
+            if steps.len() != 2 {
+                return;
+            }
+            // τ of both steps, and the tangent of the piece of degree 2.
+            let tau = [[1.0 - first, first], [last, 1.0 - last]];
+            let along: [f64; M] = std::array::from_fn(|k| tau[0][0] * steps[0][k] + tau[1][1] * steps[1][k]);
+            let square = inner(&along, &along);
+            let [w0, w1, w2] = [weights[0], weights[1], weights[2]];
+            let s = 1.0 - t;
+            let (left, right) = (s * w0 + t * w1, s * w1 + t * w2);
+            let weight = s * left + t * right;
+            let across = |step: &[f64; M]| -> [f64; M] {
+                let part = inner(step, &along) / square;
+                std::array::from_fn(|k| step[k] - part * along[k])
+            };
+            let (a, b) = (across(&steps[0]), across(&steps[1]));
+            // C'' across the tangent, from the points' distances from the tangent; |C'|.
+            let (from_a, from_b) = (-(w0 * tau[0][1] + 2.0 * w1 * tau[0][0]), w2 * tau[1][0]);
+            let bend: [f64; M] = std::array::from_fn(|k| 2.0 * (from_a * a[k] + from_b * b[k]) / weight);
+            let speed = 2.0 * left * right / (weight * weight);
+            let curvature = 2.0 * (degree - 1.0) / degree * length(&bend) / (speed * speed * square);
+            result = if square > 0.0 { curvature } else { 0.0 };
+        });
+        result
+    }
+
+    /// The part from the start to t, and the part from t to the end.
+    pub fn split(&self, t: f64) -> [Self; 2] {
+        let (mut left, mut right) = (self.clone(), self.clone());
+        let degree = self.degree;
+        let s = 1.0 - t;
+        self.levels(t, |steps, weights, [first, last]| {
+            let count = steps.len();
+            left.steps[degree - count] = steps[0].map(|step| first * step);
+            right.steps[count - 1] = steps[count - 1].map(|step| last * step);
+            left.weights[degree - count + 1] = s * weights[0] + t * weights[1];
+            right.weights[count - 1] = s * weights[count - 1] + t * weights[count];
+        });
+        let middle = self.at(t);
+        (left.end, right.start) = (middle, middle);
+        [left, right]
+    }
+
+    /// The part of the piece from the share `from` on, as long as the share `share`.
+    pub fn part(&self, from: f64, share: f64) -> Self {
+        let mut rest = if from > 0.0 { self.split(from)[1].clone() } else { self.clone() };
+        let length = share / (1.0 - from);
+        if length < 1.0 {
+            return rest.split(length)[0].clone();
+        }
+        // Of a sliver at the end rounding changes the share: the part is as long as was asked.
+        for step in &mut rest.steps[..self.degree] {
+            *step = step.map(|value| value * length);
+        }
+        rest
+    }
+
+    /// The same piece from its end to its start.
+    pub fn reversed(&self) -> Self {
+        let mut other = self.clone();
+        (other.start, other.end) = (self.end, self.start);
+        for i in 0..self.degree {
+            other.steps[i] = self.steps[self.degree - 1 - i].map(|step| -step);
+        }
+        for i in 0..=self.degree {
+            other.weights[i] = self.weights[self.degree - i];
+        }
+        other
+    }
+
+    /// For each axis what the rounding of dC/dt is relative to.
+    pub fn slope_size(&self) -> [f64; M] {
+        let mut most = [0.0_f64; M];
+        for step in &self.steps[..self.degree] {
+            for k in 0..M {
+                most[k] = most[k].max(step[k].abs());
+            }
+        }
+        let scale = self.slope_scale();
+        most.map(|step| scale * step)
+    }
+
+    /// How much the rounding of the control points is enlarged in dC/dt.
+    pub fn slope_scale(&self) -> f64 {
+        let weights = &self.weights[..=self.degree];
+        let most = weights.iter().fold(0.0_f64, |most, w| most.max(*w));
+        let least = weights.iter().fold(f64::INFINITY, |least, w| least.min(*w));
+        let degree = self.degree as f64;
+        degree * f64::max(1.0, 0.5 * degree) * most / least
+    }
+
+    /// The unit direction of motion at the start, also where C' is 0 there.
+    pub fn direction(&self) -> [f64; M] {
+        first_direction(self.steps[..self.degree].iter())
+    }
+
+    /// The same at the end.
+    pub fn end_direction(&self) -> [f64; M] {
+        first_direction(self.steps[..self.degree].iter().rev())
+    }
+
+    pub fn is_motionless(&self) -> bool {
+        self.steps[..self.degree].iter().flatten().all(|&d| d == 0.0)
+    }
+
+    /// Greatest coordinate of the ends.
+    pub fn magnitude(&self) -> f64 {
+        self.start.iter().chain(&self.end).fold(0.0, |most, q| q.abs().max(most))
+    }
+
+    /// Least and greatest position of an axis inside the piece, found among even places and refined.
+    pub fn extremes(&self, axis: usize) -> [f64; 2] {
+        let count = 8 * self.degree;
+        let place = |i: usize| i as f64 / count as f64;
+        let values: Vec<f64> = (0..=count).map(|i| self.at(place(i))[axis]).collect();
+        [-1.0, 1.0].map(|sign: f64| {
+            let better = |a: &usize, b: &usize| (sign * values[*a]).total_cmp(&(sign * values[*b]));
+            let best = (0..=count).max_by(better).unwrap_or(0);
+            let (mut a, mut b) = (place(best.saturating_sub(1)), place((best + 1).min(count)));
+            for _ in 0..60 {
+                let third = (b - a) / 3.0;
+                let [left, right] = [a + third, b - third].map(|t| sign * self.at(t)[axis]);
+                if left < right {
+                    a += third;
+                } else {
+                    b -= third;
+                }
+            }
+            let inside = self.at(0.5 * (a + b))[axis];
+            if sign * inside > sign * values[best] {
+                inside
+            } else {
+                values[best]
+            }
+        })
+    }
+
+    /// The length of the polygon.
+    pub fn way(&self) -> f64 {
+        self.steps[..self.degree].iter().map(length).sum()
+    }
+}
+
+/// The unit direction of the first step that is more than rounding.
+fn first_direction<'a, const M: usize>(mut steps: impl Iterator<Item = &'a [f64; M]> + Clone) -> [f64; M] {
+    let longest = steps.clone().map(length).fold(0.0, f64::max);
+    let step = steps.find(|step| length(step) > STILL * longest);
+    step.map_or([0.0; M], |step| {
+        let length = length(step);
+        step.map(|d| d / length)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::curve::distance;
+
+    /// A quarter of a circle of radius 10 about (1000, 0).
+    fn quarter() -> Polygon<2> {
+        let points = [[1010.0, 0.0], [1010.0, 10.0], [1000.0, 10.0]];
+        Polygon::new(points.into_iter(), &[1.0, 0.5_f64.sqrt(), 1.0])
+    }
+
+    fn cubic() -> Polygon<2> {
+        Polygon::new([[0.0, 0.0], [1.0, 3.0], [4.0, -2.0], [5.0, 1.0]].into_iter(), &[])
+    }
+
+    #[test]
+    fn a_rational_quarter_is_a_circle_everywhere() {
+        let quarter = quarter();
+        for i in 0..=20 {
+            let t = f64::from(i) / 20.0;
+            let [x, y] = quarter.at(t);
+            assert!(((x - 1000.0).hypot(y) - 10.0).abs() < 3e-13, "t = {t}");
+            assert!((quarter.curvature(t) - 0.1).abs() < 1e-14, "t = {t}: {}", quarter.curvature(t));
+            let slope = quarter.local(t).slope;
+            assert!(((x - 1000.0) * slope[0] + y * slope[1]).abs() < 1e-10);
+        }
+    }
+
+    #[test]
+    fn speeds_are_the_lengths_of_slopes() {
+        let t = [0.0, 0.3, 0.8, 1.0];
+        for piece in [quarter(), cubic(), quarter().part(0.2, 0.5), cubic().part(0.9, 0.1)] {
+            let speeds = piece.speeds(f64x4::new(t));
+            for (t, speed) in t.into_iter().zip(speeds.as_array()) {
+                assert!((speed / length(&piece.local(t).slope) - 1.0).abs() < 1e-14, "{speed} at {t}");
+            }
+        }
+    }
+
+    #[test]
+    fn slopes_are_difference_quotients_and_parts_are_the_piece() {
+        for polygon in [quarter(), cubic()] {
+            for t in [0.1, 0.5, 0.83] {
+                let (before, after) = (polygon.at(t - 1e-6), polygon.at(t + 1e-6));
+                let slope = polygon.local(t).slope;
+                for k in 0..2 {
+                    assert!((slope[k] - (after[k] - before[k]) / 2e-6).abs() < 1e-6);
+                }
+                let part = polygon.part(0.3, 0.4);
+                assert!(distance(&part.at(t), &polygon.at(0.3 + 0.4 * t)) < 1e-12);
+                let back = part.reversed();
+                assert!(distance(&back.at(1.0 - t), &part.at(t)) < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn a_sliver_at_the_end_is_as_long_as_was_asked() {
+        for polygon in [quarter(), cubic()] {
+            let (from, share) = (1.0 - 6e-11, 6.00001e-11);
+            let slope = polygon.part(from, share).local(1.0).slope;
+            let whole = polygon.local(1.0).slope;
+            for k in 0..2 {
+                assert!((slope[k] / share - whole[k]).abs() < 1e-8, "{slope:?} {whole:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_curvature_of_a_cubic_is_that_of_its_derivatives() {
+        let cubic = cubic();
+        for t in [0.0, 0.2, 0.7, 1.0] {
+            let h = 1e-4;
+            let slope = cubic.local(t).slope;
+            let bend: [f64; 2] = std::array::from_fn(|k| {
+                (cubic.local(t + h).slope[k] - cubic.local(t - h).slope[k]) / (2.0 * h)
+            });
+            let exact = (slope[0] * bend[1] - slope[1] * bend[0]).abs() / length(&slope).powi(3);
+            assert!((cubic.curvature(t) - exact).abs() < 1e-6 * exact.max(1.0));
+        }
+    }
+
+    #[test]
+    fn every_derivative_is_the_difference_of_the_one_before() {
+        let rational = Polygon::new(
+            [[0.0, 1.0], [2.0, 3.0], [5.0, -1.0], [6.0, 2.0], [9.0, 9.0]].into_iter(),
+            &[1.0, 0.5, 3.0, 2.0, 0.7],
+        );
+        for polygon in [quarter(), cubic(), rational] {
+            for t in [0.1, 0.4, 0.6, 0.9] {
+                let h = 1e-5;
+                let [before, here, after] = [t - h, t, t + h].map(|t| {
+                    let [first, second, third] = polygon.derivatives(t);
+                    [polygon.local(t).way, first.0, second.0, third.0]
+                });
+                for order in 0..3 {
+                    for k in 0..2 {
+                        let slope = (after[order][k] - before[order][k]) / (2.0 * h);
+                        let scale = 1.0 + here[order + 1].map(f64::abs).iter().sum::<f64>();
+                        assert!((slope - here[order + 1][k]).abs() < 1e-7 * scale, "{order} at {t}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_extremes_of_an_axis_lie_inside() {
+        // y of the cubic: 9t − 24t² + 16t³ turns at 1/4 and 3/4.
+        let [least, most] = cubic().extremes(1);
+        assert!((most - 1.0).abs() < 1e-12 && least.abs() < 1e-12);
+        assert_eq!(quarter().extremes(0), [1000.0, 1010.0]);
+    }
+
+    #[test]
+    fn a_piece_that_starts_at_rest_has_the_direction_of_its_first_motion() {
+        let polygon = Polygon::new([[1.0, 1.0], [1.0, 1.0], [4.0, 5.0]].into_iter(), &[]);
+        assert_eq!(polygon.direction(), [0.6, 0.8]);
+    }
+}

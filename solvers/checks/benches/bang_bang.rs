@@ -1,0 +1,98 @@
+//! Time per piece of the exact planner on one thread, from ten pieces to a million: it should not depend on the number.
+
+use std::time::Duration;
+
+use criterion::{criterion_group, criterion_main, BenchmarkId, Criterion, Throughput};
+use feedplan_planner::bang_bang_quadratic::{plan, Problem};
+use feedplan_geometry::quadratic::{norm, sub, Quadratic};
+use feedplan_geometry::watch::Watch;
+
+/// A random number generator that is the same everywhere (splitmix64).
+struct Random(u64);
+
+impl Random {
+    /// Uniform in [0, 1).
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn normal(&mut self) -> f64 {
+        let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
+        radius * (std::f64::consts::TAU * self.uniform()).cos()
+    }
+}
+
+/// A C1 quadratic B-spline as a CAM system's points give it: edges of 0.3 to 3 mm, small turns, 8 % sharp ones.
+fn cam_path(count: usize, seed: u64) -> Vec<Quadratic<3>> {
+    let mut random = Random(seed);
+    let mut direction = [1.0, 0.0, 0.0];
+    let mut points = vec![[0.0; 3]];
+    for _ in 0..=count {
+        let edge = (0.3f64.ln() + random.uniform() * 10f64.ln()).exp();
+        let sharp = random.uniform() < 0.08;
+        let keep = if sharp { random.uniform() - 0.5 } else { 1.0 };
+        let turn = if sharp { 0.6 } else { 0.15 };
+        direction = direction.map(|value: f64| keep * value + turn * random.normal());
+        let length = norm(&direction);
+        direction = direction.map(|value| value / length);
+        let last = points[points.len() - 1];
+        points.push(std::array::from_fn(|k| last[k] + edge * direction[k]));
+    }
+    let edges: Vec<f64> = points.windows(2).map(|pair| norm(&sub(&pair[1], &pair[0]))).collect();
+    let width = |i: usize| if i < count { 0.5 * (edges[i] + edges[i + 1]) } else { 0.0 };
+    // Knots: the piece of control point i + 1 begins where its knot span divides the edge.
+    let knot = |i: usize| {
+        let (before, after) = (if i == 0 { 0.0 } else { width(i - 1) }, width(i));
+        let part = before / (before + after);
+        std::array::from_fn(|k| points[i][k] + part * (points[i + 1][k] - points[i][k]))
+    };
+    (0..count)
+        .map(|i| Quadratic { control: [knot(i), points[i + 1], knot(i + 1)], width: width(i) })
+        .collect()
+}
+
+fn problem<'a>(
+    pieces: &'a [Quadratic<3>],
+    runs: &'a [usize],
+    feed: &'a [f64],
+    junction: &'a [f64],
+) -> Problem<'a, 3> {
+    Problem {
+        pieces,
+        runs,
+        feed,
+        junction_speed: junction,
+        max_velocity: [250.0; 3],
+        max_acceleration: [3000.0, 3000.0, 1000.0],
+        chord_tolerance: 0.01,
+        period: 0.001,
+        start_speed: 0.0,
+        end_speed: 0.0,
+        watch: Watch::default(),
+    }
+}
+
+fn pieces(criterion: &mut Criterion) {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
+    let mut group = criterion.benchmark_group("bang_bang");
+    group.sample_size(10).warm_up_time(Duration::from_millis(300)).measurement_time(Duration::from_secs(2));
+    for (name, feed) in [("feed_100", 100.0), ("feed_400", 400.0)] {
+        for count in [10, 100, 1_000, 10_000, 100_000, 1_000_000] {
+            let path = cam_path(count, 1);
+            let (runs, feed, junction) = ([0, count], vec![feed; count], vec![f64::INFINITY; count + 1]);
+            group.throughput(Throughput::Elements(count as u64));
+            group.bench_with_input(BenchmarkId::new(name, count), &count, |bencher, _| {
+                let problem = problem(&path, &runs, &feed, &junction);
+                pool.install(|| bencher.iter(|| plan(&problem).expect("a profile")));
+            });
+        }
+    }
+    group.finish();
+}
+
+criterion_group!(benches, pieces);
+criterion_main!(benches);

@@ -1,0 +1,139 @@
+//! Time per setpoint with all derivatives, by the law of the arcs, and per inversion of a length table.
+//!
+//! The path is one C1 quadratic spline of 1000 pieces in three axes, about 1.2 mm each, the same with its degree
+//! raised, and with weights that change the parameter; its profile is synthetic (no planner takes part): constant
+//! feed, or X speeding up and slowing down piece by piece.
+
+use criterion::{criterion_group, criterion_main, BenchmarkId, Criterion, Throughput};
+use feedplan_planner::arc_kind::ArcKind;
+use feedplan_setpoints::motion::ProfileArc;
+use feedplan_setpoints::sampling::{Interpolator, PathData, Sampler};
+use feedplan_geometry::spline::bezier::elevate;
+use feedplan_geometry::spline::length::CurveLength;
+use feedplan_geometry::spline::CompositeCurve;
+use feedplan_geometry::watch::Watch;
+
+const PIECES: usize = 1000;
+const SETPOINTS: usize = 100_000;
+
+/// x = u; y and z have slopes that waver between the joints.
+fn spline() -> CompositeCurve<3> {
+    let slope = |i: usize| [1.0, (1.7 * i as f64).sin(), 0.5 * (2.3 * i as f64).cos()];
+    let mut curve = CompositeCurve::default();
+    let mut from = [0.0; 3];
+    for i in 0..PIECES {
+        let (a, b) = (slope(i), slope(i + 1));
+        let middle = std::array::from_fn(|k| from[k] + 0.5 * a[k]);
+        let to = std::array::from_fn(|k| middle[k] + 0.5 * b[k]);
+        curve.push(&[from, middle, to], &[], 1.0);
+        from = to;
+    }
+    curve
+}
+
+/// The same points with the degree raised, and with the weights 1, r, r²: X is no longer linear in u.
+fn changed(curve: &CompositeCurve<3>, by: usize, r: f64) -> CompositeCurve<3> {
+    let mut raised = CompositeCurve::default();
+    for piece in curve.pieces() {
+        elevate(&piece, by, &mut raised);
+    }
+    if r != 1.0 {
+        let powers =
+            |i: usize| (0..raised.piece(i).control.len()).map(|j| r.powi(j as i32)).collect::<Vec<_>>();
+        raised.weights = (0..raised.len()).flat_map(powers).collect();
+    }
+    raised
+}
+
+fn profile(kind: ArcKind, curve: &CompositeCurve<3>, r: f64) -> Vec<ProfileArc> {
+    let lengths = CurveLength::new(curve, 1e-13, Watch::default());
+    // x' of the weights 1, r, …, r^d on a piece with x' = 1 without them: r at its start, 1/r at its end.
+    let at_ends = |p0: f64, p1: f64| (p0 / (r * r), p1 * r * r);
+    (0..PIECES)
+        .map(|i| {
+            let arc = ProfileArc {
+                piece: i as u32,
+                kind,
+                axis: 0,
+                value: 1e4,
+                u0: 0.0,
+                u1: 1.0,
+                p0: 1e4,
+                p1: 1e4,
+                duration: 0.01,
+                a0: 0.0,
+                a1: 0.0,
+            };
+            match kind {
+                ArcKind::Feed => {
+                    ProfileArc { duration: (lengths.length(i, 1.0) - lengths.length(i, 0.0)) / 100.0, ..arc }
+                }
+                // Between 50 and 100 mm/s on 1 mm.
+                ArcKind::AxisAcceleration => {
+                    let (p0, p1) = if i % 2 == 0 { (2500.0, 1e4) } else { (1e4, 2500.0) };
+                    let value = 0.5 * (p1 - p0);
+                    let (p0, p1) = at_ends(p0, p1);
+                    ProfileArc { value, p0, p1, duration: 1.0 / 75.0, ..arc }
+                }
+                _ => arc,
+            }
+        })
+        .collect()
+}
+
+fn setpoints(c: &mut Criterion) {
+    let mut group = c.benchmark_group("setpoints");
+    group.throughput(Throughput::Elements(SETPOINTS as u64)).sample_size(20);
+    let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
+    let shapes = [("quadratic", 0, 1.0), ("cubic", 1, 1.0), ("quintic", 3, 1.0), ("rational cubic", 1, 1.5)];
+    for (shape, by, r) in shapes {
+        for kind in [ArcKind::AxisAcceleration, ArcKind::Feed] {
+            for interpolator in [Interpolator::Sarfraz, Interpolator::Newton] {
+                let curve = changed(&spline(), by, r);
+                let arcs = profile(kind, &curve, r);
+                let time: f64 = arcs.iter().map(|arc| arc.duration).sum();
+                let path = PathData {
+                    curve,
+                    tip_speed: None,
+                    way_speed: None,
+                    feed_share: vec![],
+                    lines: vec![1; PIECES],
+                    runs: vec![0, PIECES],
+                    start_dwell: 0.0,
+                    dwell: vec![0.0],
+                };
+                let period = time / (SETPOINTS - 1) as f64;
+                let sampler = Sampler::new(path, arcs, &[0, PIECES], period, interpolator, Watch::default())
+                    .expect("a profile");
+                let name = BenchmarkId::new(format!("{interpolator:?}, {shape}"), format!("{kind:?}"));
+                group.bench_function(name, |b| {
+                    b.iter(|| one_thread.install(|| sampler.chunk(0..SETPOINTS, &mut None, Watch::default())))
+                });
+            }
+        }
+    }
+    group.finish();
+}
+
+fn lengths(c: &mut Criterion) {
+    let mut group = c.benchmark_group("lengths");
+    let curve = spline();
+    group.throughput(Throughput::Elements(PIECES as u64));
+    group.bench_function("table per piece", |b| b.iter(|| CurveLength::new(&curve, 1e-13, Watch::default())));
+    let table = CurveLength::new(&curve, 1e-13, Watch::default());
+    for count in [500, 50_000] {
+        let wanted: Vec<f64> = (0..count).map(|i| table.total() * i as f64 / count as f64).collect();
+        let tolerance = 1e-6 * table.total() / count as f64;
+        group.throughput(Throughput::Elements(count));
+        group.bench_function(BenchmarkId::new("Sarfraz", count), |b| {
+            b.iter(|| wanted.iter().map(|&s| table.locate(s, tolerance).located.u).sum::<f64>())
+        });
+        group.bench_function(BenchmarkId::new("Newton", count), |b| {
+            b.iter(|| table.follow(&wanted, tolerance))
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, setpoints, lengths);
+criterion_main!(benches);

@@ -1,0 +1,63 @@
+//! Plane paths of smooth bends: the curvature is a sum of bumps, so that everything has a closed form.
+
+use feedplan_jerk::jerk_limited::{Geometry, Place};
+
+/// A bend by an angle within about twice its width.
+#[derive(Clone, Copy, Debug)]
+pub struct Bend {
+    pub s: f64,
+    pub angle: f64,
+    pub width: f64,
+}
+
+/// A path that is straight but for its bends; pieces meet in the middle of each.
+#[derive(Clone, Debug)]
+pub struct Bends {
+    knots: Vec<f64>,
+    bends: Vec<Bend>,
+    /// The direction at the start.
+    theta: f64,
+    pub feed: f64,
+}
+
+impl Bends {
+    /// Bends in rising order inside (0, length).
+    pub fn new(length: f64, bends: Vec<Bend>) -> Self {
+        let knots = std::iter::once(0.0).chain(bends.iter().map(|bend| bend.s)).chain([length]).collect();
+        Self { knots, bends, theta: 0.3, feed: f64::INFINITY }
+    }
+
+    /// The same, beginning in another direction.
+    pub fn turned(length: f64, bends: Vec<Bend>, theta: f64) -> Self {
+        Self { theta, ..Self::new(length, bends) }
+    }
+
+    pub fn bends(&self) -> &[Bend] {
+        &self.bends
+    }
+}
+
+impl Geometry<2> for Bends {
+    fn knots(&self) -> &[f64] {
+        &self.knots
+    }
+
+    fn at(&self, _: usize, s: f64) -> Place<2> {
+        // κ = angle/(2 width) sech²((s − s₀)/width)
+        let (mut theta, mut kappa, mut change) = (self.theta, 0.0, 0.0);
+        for bend in &self.bends {
+            let t = ((s - bend.s) / bend.width).tanh();
+            let hump = 0.5 * bend.angle / bend.width * (1.0 - t * t);
+            theta += 0.5 * bend.angle * (1.0 + t);
+            kappa += hump;
+            change -= 2.0 * hump * t / bend.width;
+        }
+        let (y, x) = theta.sin_cos();
+        Place {
+            first: [x, y],
+            second: [-kappa * y, kappa * x],
+            third: [-change * y - kappa * kappa * x, change * x - kappa * kappa * y],
+            speed_cap: self.feed,
+        }
+    }
+}

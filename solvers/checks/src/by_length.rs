@@ -1,0 +1,216 @@
+//! Curves along their arc length, for tests of the jerk-limited planner.
+
+use feedplan_jerk::jerk_limited::{Geometry, Place};
+
+/// A curve C(t) in M axes with its first three derivatives.
+pub trait Curve<const M: usize>: Sync {
+    fn at(&self, t: f64) -> [[f64; M]; 4];
+}
+
+/// A curve by arc length, with an optional feed.
+pub struct ByLength<C, const M: usize> {
+    curve: C,
+    /// Parameters and lengths of a fine table.
+    t: Vec<f64>,
+    s: Vec<f64>,
+    /// The first entry of each piece.
+    first: Vec<usize>,
+    knots: Vec<f64>,
+    pub feed: f64,
+}
+
+const X: [f64; 4] =
+    [0.183_434_642_495_649_8, 0.525_532_409_916_329, 0.796_666_477_413_626_7, 0.960_289_856_497_536_3];
+const W: [f64; 4] =
+    [0.362_683_783_378_362, 0.313_706_645_877_887_3, 0.222_381_034_453_374_5, 0.101_228_536_290_376_3];
+
+fn dot<const M: usize>(a: &[f64; M], b: &[f64; M]) -> f64 {
+    (0..M).map(|k| a[k] * b[k]).sum()
+}
+
+impl<C: Curve<M>, const M: usize> ByLength<C, M> {
+    /// Pieces between parameters, each of `panels` panels of the table.
+    pub fn new(curve: C, parameters: &[f64], panels: usize) -> Self {
+        let mut out = Self {
+            curve,
+            t: vec![parameters[0]],
+            s: vec![0.0],
+            first: vec![],
+            knots: vec![0.0],
+            feed: f64::INFINITY,
+        };
+        for pair in parameters.windows(2) {
+            out.first.push(out.t.len() - 1);
+            for i in 1..=panels {
+                let a = out.t[out.t.len() - 1];
+                let b = pair[0] + (pair[1] - pair[0]) * i as f64 / panels as f64;
+                let s = out.s[out.s.len() - 1] + out.length(a, b);
+                out.t.push(b);
+                out.s.push(s);
+            }
+            out.knots.push(out.s[out.s.len() - 1]);
+        }
+        out
+    }
+
+    fn length(&self, a: f64, b: f64) -> f64 {
+        let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
+        let speed = |t: f64| {
+            let d = self.curve.at(t)[1];
+            dot(&d, &d).sqrt()
+        };
+        half * (0..4).map(|i| W[i] * (speed(middle - half * X[i]) + speed(middle + half * X[i]))).sum::<f64>()
+    }
+
+    /// The parameter at s inside a piece.
+    fn parameter(&self, piece: usize, s: f64) -> f64 {
+        let (low, high) = (self.first[piece], self.first.get(piece + 1).copied().unwrap_or(self.t.len() - 1));
+        let i = low + self.s[low..=high].partition_point(|&known| known <= s).clamp(1, high - low) - 1;
+        let (a, b) = (self.t[i], self.t[i + 1]);
+        let mut t = a + (b - a) * (s - self.s[i]) / (self.s[i + 1] - self.s[i]);
+        for _ in 0..20 {
+            let d = self.curve.at(t)[1];
+            let step = (s - self.s[i] - self.length(a, t)) / dot(&d, &d).sqrt();
+            t = (t + step).clamp(a, b);
+            if step.abs() < 1e-14 * (b - a) {
+                break;
+            }
+        }
+        t
+    }
+}
+
+impl<C: Curve<M>, const M: usize> Geometry<M> for ByLength<C, M> {
+    fn knots(&self) -> &[f64] {
+        &self.knots
+    }
+
+    fn at(&self, piece: usize, s: f64) -> Place<M> {
+        let (start, end) = (self.knots[piece], self.knots[piece + 1]);
+        // A knot belongs to the piece asked for.
+        let inside = 1e-9 * (end - start);
+        let t = self.parameter(piece, s.clamp(start + inside, end - inside));
+        let [_, d1, d2, d3] = self.curve.at(t);
+        let speed = dot(&d1, &d1).sqrt();
+        let rate = dot(&d1, &d2) / speed;
+        let change = (dot(&d2, &d2) + dot(&d1, &d3) - rate * rate) / speed;
+        let u1 = 1.0 / speed;
+        // u' and u'' = du'/du u' of the parameter along the length.
+        let (slope, bend) =
+            (-rate / (speed * speed), -change / speed.powi(2) + 2.0 * rate * rate / speed.powi(3));
+        let u2 = slope * u1;
+        let u3 = (bend * u1 + slope * slope) * u1;
+        let of = |f: &dyn Fn(usize) -> f64| std::array::from_fn(f);
+        Place {
+            first: of(&|k| d1[k] * u1),
+            second: of(&|k| d2[k] * u1 * u1 + d1[k] * u2),
+            third: of(&|k| d3[k] * u1.powi(3) + 3.0 * d2[k] * u1 * u2 + d1[k] * u3),
+            speed_cap: self.feed,
+        }
+    }
+}
+
+/// x = a cos t, y = a sin t cos t.
+pub struct Lemniscate(pub f64);
+
+impl Curve<2> for Lemniscate {
+    fn at(&self, t: f64) -> [[f64; 2]; 4] {
+        let (a, (s, c), (s2, c2)) = (self.0, t.sin_cos(), (2.0 * t).sin_cos());
+        [[a * c, 0.5 * a * s2], [-a * s, a * c2], [-a * c, -2.0 * a * s2], [a * s, -4.0 * a * c2]]
+    }
+}
+
+pub struct Trefoil(pub f64);
+
+impl Curve<3> for Trefoil {
+    fn at(&self, t: f64) -> [[f64; 3]; 4] {
+        let quarter = std::f64::consts::FRAC_PI_2;
+        std::array::from_fn(|k| {
+            let turn = k as f64 * quarter;
+            let sin = |n: f64| n.powi(k as i32) * (n * t + turn).sin();
+            let cos = |n: f64| n.powi(k as i32) * (n * t + turn).cos();
+            [sin(1.0) + 2.0 * sin(2.0), cos(1.0) - 2.0 * cos(2.0), -sin(3.0)].map(|x| self.0 * x)
+        })
+    }
+}
+
+/// A NURBS curve in the plane.
+pub struct Nurbs {
+    pub degree: usize,
+    pub knots: Vec<f64>,
+    /// (w x, w y, w)
+    pub points: Vec<[f64; 3]>,
+}
+
+impl Nurbs {
+    /// The curve of `benchmarks/curves/butterfly.json`.
+    pub fn butterfly() -> Self {
+        let text = include_str!("../../../benchmarks/curves/butterfly.json");
+        let numbers = |key: &str| -> Vec<f64> {
+            let at = text.find(&format!("\"{key}\"")).expect("the key is there") + key.len() + 3;
+            let end = at + text[at..].find('"').unwrap_or(text.len() - at);
+            text[at..end]
+                .split(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | '-' | 'e' | 'E' | '+')))
+                .filter_map(|word| word.parse().ok())
+                .collect()
+        };
+        let weights = numbers("weights");
+        let points = numbers("control_points");
+        let width = points.len() / weights.len();
+        Self {
+            degree: numbers("degree")[0] as usize,
+            knots: numbers("knots"),
+            points: points
+                .chunks(width)
+                .zip(&weights)
+                .map(|(point, &w)| [point[0] * w, point[1] * w, w])
+                .collect(),
+        }
+    }
+
+    /// Parameters where pieces meet.
+    pub fn parameters(&self) -> Vec<f64> {
+        let mut out = self.knots[self.degree..self.knots.len() - self.degree].to_vec();
+        out.dedup();
+        out
+    }
+}
+
+impl Curve<2> for Nurbs {
+    fn at(&self, t: f64) -> [[f64; 2]; 4] {
+        let (p, u) = (self.degree, &self.knots);
+        let span = u.partition_point(|&knot| knot <= t).clamp(p + 1, self.points.len()) - 1;
+        let mut rows: [[f64; 3]; 4] = [[0.0; 3]; 4];
+        for order in 0..=3.min(p) {
+            // Control points of the derivative, then de Boor's algorithm on them.
+            let mut d: Vec<[f64; 3]> = self.points[span - p..=span].to_vec();
+            for level in 1..=order {
+                let q = p - level + 1;
+                for i in 0..d.len() - 1 {
+                    let at = span - p + level + i;
+                    let width = u[at + q] - u[at];
+                    d[i] = std::array::from_fn(|k| q as f64 * (d[i + 1][k] - d[i][k]) / width);
+                }
+                d.pop();
+            }
+            let q = p - order;
+            for level in 1..=q {
+                for i in (level..=q).rev() {
+                    let at = span - q + i;
+                    let part = (t - u[at]) / (u[at + q + 1 - level] - u[at]);
+                    d[i] = std::array::from_fn(|k| d[i - 1][k] + part * (d[i][k] - d[i - 1][k]));
+                }
+            }
+            rows[order] = d[q];
+        }
+        let w: [f64; 4] = std::array::from_fn(|k| rows[k][2]);
+        let mut c = [[0.0; 2]; 4];
+        for k in 0..2 {
+            c[0][k] = rows[0][k] / w[0];
+            c[1][k] = (rows[1][k] - w[1] * c[0][k]) / w[0];
+            c[2][k] = (rows[2][k] - 2.0 * w[1] * c[1][k] - w[2] * c[0][k]) / w[0];
+            c[3][k] = (rows[3][k] - 3.0 * w[1] * c[2][k] - 3.0 * w[2] * c[1][k] - w[3] * c[0][k]) / w[0];
+        }
+        c
+    }
+}

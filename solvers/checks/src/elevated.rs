@@ -1,0 +1,63 @@
+//! A case of quadratic pieces for the planner of curves, and for the bound: as it is, or with its degree elevated.
+
+use feedplan_planner::bang_bang::Problem;
+use feedplan_geometry::watch::Watch;
+
+use super::cases::Case;
+use super::{padded, PADDED};
+
+/// The arrays of such a problem.
+pub struct Elevated {
+    control: Vec<[f64; PADDED]>,
+    offset: Vec<usize>,
+    width: Vec<f64>,
+    runs: [usize; 2],
+}
+
+impl Elevated {
+    /// The pieces of a case, of degree 2 and so much more.
+    pub fn new<const M: usize>(case: &Case<M>, elevate: usize) -> Self {
+        let mut control = vec![];
+        let mut offset = vec![0];
+        for piece in &case.pieces {
+            let mut points = piece.control.to_vec();
+            for _ in 0..elevate {
+                let n = points.len() as f64;
+                let mut higher = vec![points[0]];
+                for i in 1..points.len() {
+                    let t = i as f64 / n;
+                    higher.push(std::array::from_fn(|k| t * points[i - 1][k] + (1.0 - t) * points[i][k]));
+                }
+                higher.push(points[points.len() - 1]);
+                points = higher;
+            }
+            control.extend(points.iter().map(|point| padded(point, 0.0)));
+            offset.push(control.len());
+        }
+        let width = case.pieces.iter().map(|piece| piece.width).collect();
+        Self { control, offset, width, runs: [0, case.pieces.len()] }
+    }
+
+    /// The problem of the case.
+    pub fn problem<'a, const M: usize>(&'a self, case: &'a Case<M>) -> Problem<'a, PADDED> {
+        Problem {
+            control: &self.control,
+            weight: &[],
+            offset: &self.offset,
+            width: &self.width,
+            tip: None,
+            way: None,
+            feed_share: &[],
+            runs: &self.runs,
+            feed: &case.feed,
+            junction_speed: &case.junction,
+            max_velocity: padded(&case.velocity, 1.0),
+            max_acceleration: padded(&case.acceleration, 1.0),
+            chord_tolerance: case.chord_tolerance,
+            period: case.period,
+            start_speed: case.start_speed,
+            end_speed: case.end_speed,
+            watch: Watch::default(),
+        }
+    }
+}

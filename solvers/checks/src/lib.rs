@@ -1,0 +1,72 @@
+//! Random planning problems and an audit of profiles that shares no formula with the planner.
+
+mod audit;
+pub mod bends;
+pub mod by_length;
+pub mod campaign;
+mod cases;
+pub mod curves;
+mod elevated;
+pub mod polylines;
+pub mod wave;
+
+pub use audit::{audit, Audit};
+pub use campaign::seeds;
+pub use cases::{milder_case, random_case, Case, Random};
+pub use elevated::Elevated;
+
+/// Runs an expression for a number of axes known at run time: `for_axes!(count, M, expression)`.
+#[macro_export]
+macro_rules! for_axes {
+    ($count:expr, $m:ident, $call:expr) => {
+        match $count {
+            4 => {
+                const $m: usize = 4;
+                $call
+            }
+            5 => {
+                const $m: usize = 5;
+                $call
+            }
+            6 => {
+                const $m: usize = 6;
+                $call
+            }
+            few => $crate::for_few_axes!(few, $m, $call),
+        }
+    };
+}
+
+/// As many axes as cases for the kernels of curves have.
+pub const FEW_AXES: [usize; 3] = [1, 2, 3];
+
+/// So many the kernels of curves see, as from Python: each number that they are compiled for costs the compiler a
+/// minute.
+pub const PADDED: usize = 3;
+
+/// The values of all axes, and another one for those that stand still.
+pub fn padded<const M: usize>(values: &[f64; M], still: f64) -> [f64; PADDED] {
+    const { assert!(M <= PADDED) };
+    std::array::from_fn(|k| values.get(k).copied().unwrap_or(still))
+}
+
+/// The same for one of `FEW_AXES`.
+#[macro_export]
+macro_rules! for_few_axes {
+    ($count:expr, $m:ident, $call:expr) => {
+        match $count {
+            1 => {
+                const $m: usize = 1;
+                $call
+            }
+            2 => {
+                const $m: usize = 2;
+                $call
+            }
+            _ => {
+                const $m: usize = 3;
+                $call
+            }
+        }
+    };
+}

@@ -1,0 +1,6 @@
+//! Planners and bound on random paths.
+
+mod bound;
+mod curves;
+mod general;
+mod random;

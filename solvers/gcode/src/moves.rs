@@ -1,0 +1,412 @@
+//! The moves of a program as columns, built directly while it is read.
+//!
+//! What changes seldom (path control, stops, dwells) is kept as changes, for `columns` to spread over the rows.
+
+mod columns;
+
+use super::block::rotary;
+use super::fault::{fault, Outcome};
+use super::tip::Meaning;
+use feedplan_geometry::spline::CompositeCurve;
+pub use columns::Columns;
+
+/// A point of the machine: X Y Z A B C U V W in mm and degrees.
+pub type Point = [f64; 9];
+
+/// What a move is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Kind {
+    Rapid = 0,
+    Line = 1,
+    Arc = 2,
+    Spline = 3,
+}
+
+/// How closely the path is followed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Mode {
+    ExactStop = 0,
+    ExactPath = 1,
+    Tolerance = 2,
+}
+
+/// Path control of a move: G61.1, G61 or G64 with its P and Q in mm, NaN where they are not given.
+#[derive(Clone, Copy, Debug)]
+pub struct Control {
+    pub mode: Mode,
+    pub blend: f64,
+    pub fit: f64,
+}
+
+impl Control {
+    pub fn new(mode: Mode) -> Self {
+        Self { mode, blend: f64::NAN, fit: f64::NAN }
+    }
+
+    /// Equal, NaN to NaN.
+    fn same(&self, other: &Self) -> bool {
+        self.mode == other.mode
+            && self.blend.to_bits() == other.blend.to_bits()
+            && self.fit.to_bits() == other.fit.to_bits()
+    }
+}
+
+/// A circular or helical move: centre in X, Y, Z; the axis it turns about; signed sweep in radians,
+/// counter-clockwise seen from the tip of that axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Arc {
+    pub centre: [f64; 3],
+    pub normal: usize,
+    pub angle: f64,
+}
+
+/// Why the program asks for a full stop after a move; of several causes the greatest counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Stop {
+    None = 0,
+    /// Of the meaning of words or the tool length.
+    Change = 1,
+    /// Of spindle, coolant and the like.
+    Switch = 2,
+    Dwell = 3,
+    /// M0, M1, M60.
+    Pause = 4,
+    /// M6.
+    Tool = 5,
+    End = 6,
+}
+
+/// A tool direction I, J, K: a unit vector from the tip to the spindle.
+pub type Direction = [f64; 3];
+
+/// The tool is upright until the program says otherwise.
+const UPRIGHT: Direction = [0.0, 0.0, 1.0];
+
+/// Where the words get another meaning: the first move in it, the meaning, the tool's length in mm (NaN for the
+/// machine file's), and where that move starts in the new words.
+#[derive(Clone, Copy, Debug)]
+struct Change {
+    row: usize,
+    meaning: Meaning,
+    tool_length: f64,
+    start: Point,
+    direction: Direction,
+}
+
+/// Steps up to this long, in mm or degrees, are rounding of offsets and no motion.
+const NO_MOTION: f64 = 1e-9;
+
+/// The moves so far.
+pub struct Moves {
+    /// Places in a `Point` of the columns of `target`.
+    axes: Vec<usize>,
+    limit: usize,
+    /// Where the first move begins.
+    start: Point,
+    /// Where the last move ends.
+    pub position: Point,
+    /// The tool's direction there, where I, J, K are programmed.
+    pub direction: Direction,
+    kind: Vec<u8>,
+    target: Vec<f64>,
+    feed: Vec<f64>,
+    line: Vec<i32>,
+    control: Vec<(usize, Control)>,
+    stops: Vec<(usize, Stop)>,
+    dwells: Vec<(usize, f64)>,
+    start_dwell: f64,
+    arcs: Vec<(usize, Arc)>,
+    splines: CompositeCurve<9>,
+    /// Rows of the splines, and the first piece of each.
+    spline_rows: Vec<(usize, usize)>,
+    changes: Vec<Change>,
+    /// Rows from which on the tool has another direction.
+    directions: Vec<(usize, Direction)>,
+}
+
+impl Moves {
+    /// Room for `expected` rows, and an error past `limit`.
+    pub fn new(expected: usize, limit: usize, start: Point) -> Self {
+        let expected = expected.min(limit);
+        Self {
+            axes: vec![0, 1, 2],
+            limit,
+            start,
+            position: start,
+            direction: UPRIGHT,
+            kind: Vec::with_capacity(expected),
+            target: Vec::with_capacity(3 * expected),
+            feed: Vec::with_capacity(expected),
+            line: Vec::with_capacity(expected),
+            control: Vec::new(),
+            stops: Vec::new(),
+            dwells: Vec::new(),
+            start_dwell: 0.0,
+            arcs: Vec::new(),
+            splines: CompositeCurve::default(),
+            spline_rows: Vec::new(),
+            changes: Vec::new(),
+            directions: Vec::new(),
+        }
+    }
+
+    /// Number of moves.
+    pub fn len(&self) -> usize {
+        self.kind.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.kind.is_empty()
+    }
+
+    /// Gives an axis a column; so far it stood at the start.
+    #[cold]
+    pub fn add_axis(&mut self, axis: usize) {
+        let Err(place) = self.axes.binary_search(&axis) else { return };
+        let width = self.axes.len();
+        let mut wider = Vec::with_capacity((self.target.capacity() / width) * (width + 1));
+        for row in self.target.chunks_exact(width) {
+            wider.extend_from_slice(&row[..place]);
+            wider.push(self.start[axis]);
+            wider.extend_from_slice(&row[place..]);
+        }
+        self.target = wider;
+        self.axes.insert(place, axis);
+    }
+
+    /// The axes that have a column.
+    pub fn axes(&self) -> &[usize] {
+        &self.axes
+    }
+
+    /// Adds a straight move; none where nothing moves.
+    #[inline(always)]
+    pub fn straight(
+        &mut self,
+        kind: Kind,
+        target: &Point,
+        feed: f64,
+        control: &Control,
+        line: u32,
+    ) -> Outcome<()> {
+        let mut step = 0.0f64;
+        for k in 0..9 {
+            step = step.max((target[k] - self.position[k]).abs());
+        }
+        if step <= NO_MOTION {
+            return Ok(());
+        }
+        self.row(kind, target, feed, control, line)
+    }
+
+    /// Adds an arc.
+    pub fn arc(&mut self, arc: Arc, target: &Point, feed: f64, control: &Control, line: u32) -> Outcome<()> {
+        self.arcs.push((self.kind.len(), arc));
+        self.row(Kind::Arc, target, feed, control, line)
+    }
+
+    /// Adds a spline by its pieces; the first one starts where the tool is.
+    pub fn spline(
+        &mut self,
+        curve: &CompositeCurve<9>,
+        feed: f64,
+        control: &Control,
+        line: u32,
+    ) -> Outcome<()> {
+        let Some(target) = curve.control.last() else { return Ok(()) };
+        if curve.control.iter().all(|point| !apart(point, &self.position)) {
+            return Ok(());
+        }
+        if self.splines.len() + curve.len() > self.limit {
+            return fault(format!(
+                "the splines of the program have more than {} pieces: split it, or raise max_moves",
+                self.limit
+            ));
+        }
+        self.spline_rows.push((self.kind.len(), self.splines.len()));
+        for (i, &width) in curve.width.iter().enumerate() {
+            let range = curve.offsets[i]..curve.offsets[i + 1];
+            let weights = curve.weights.get(range.clone()).unwrap_or_default();
+            self.splines.push(&curve.control[range], weights, width);
+        }
+        self.row(Kind::Spline, target, feed, control, line)
+    }
+
+    /// Adds a straight move that ends with the tool in a direction; none where neither moves.
+    pub fn pointed(
+        &mut self,
+        kind: Kind,
+        target: &Point,
+        direction: Direction,
+        feed: f64,
+        control: &Control,
+        line: u32,
+    ) -> Outcome<()> {
+        let turned = direction != self.direction;
+        if turned {
+            self.direction = direction;
+            self.directions.push((self.kind.len(), direction));
+        } else if !apart(target, &self.position) {
+            return Ok(());
+        }
+        self.row(kind, target, feed, control, line)
+    }
+
+    /// From here on words have another meaning: the same place is `start` and `direction` in the new words.
+    pub fn change(&mut self, meaning: Meaning, tool_length: f64, start: Point, direction: Direction) {
+        self.stop(Stop::Change);
+        let row = self.kind.len();
+        if self.changes.last().is_some_and(|last| last.row == row) {
+            self.changes.pop();
+        }
+        self.changes.push(Change { row, meaning, tool_length, start, direction });
+        self.position = start;
+        if direction != self.direction {
+            self.direction = direction;
+            self.directions.push((row, direction));
+        }
+    }
+
+    /// The places and directions from the start of the last change to here.
+    pub fn since_change(&self) -> Vec<(Point, Direction)> {
+        let Some(change) = self.changes.last() else { return vec![(self.position, self.direction)] };
+        let width = self.axes.len();
+        let mut direction = change.direction;
+        let mut later = self.directions.iter().filter(|(row, _)| *row >= change.row).peekable();
+        let mut places = vec![(change.start, direction)];
+        for (row, target) in self.target.chunks_exact(width).enumerate().skip(change.row) {
+            while let Some(&(_, next)) = later.next_if(|(first, _)| *first <= row) {
+                direction = next;
+            }
+            let mut place = change.start;
+            for (&axis, &value) in self.axes.iter().zip(target) {
+                place[axis] = value;
+            }
+            places.push((place, direction));
+        }
+        places
+    }
+
+    #[inline(always)]
+    fn row(&mut self, kind: Kind, target: &Point, feed: f64, control: &Control, line: u32) -> Outcome<()> {
+        if self.kind.len() >= self.limit {
+            return fault(format!(
+                "the program has more than {} moves: split it, or raise max_moves",
+                self.limit
+            ));
+        }
+        if self.control.last().is_none_or(|(_, last)| !last.same(control)) {
+            self.control.push((self.kind.len(), *control));
+        }
+        if self.axes.len() == 3 {
+            self.target.extend_from_slice(&target[..3]);
+        } else {
+            self.target.extend(self.axes.iter().map(|&axis| target[axis]));
+        }
+        self.kind.push(kind as u8);
+        self.feed.push(feed);
+        self.line.push(line as i32);
+        self.position = *target;
+        Ok(())
+    }
+
+    /// A full stop where the program is now; of several causes the last one of `Stop` is kept.
+    pub fn stop(&mut self, cause: Stop) {
+        // Before the first move everything stands still already.
+        let Some(last) = self.kind.len().checked_sub(1) else { return };
+        match self.stops.last_mut() {
+            Some((row, known)) if *row == last => *known = (*known).max(cause),
+            _ => self.stops.push((last, cause)),
+        }
+    }
+
+    /// A full stop and a pause in seconds.
+    pub fn dwell(&mut self, seconds: f64) {
+        self.stop(Stop::Dwell);
+        match self.kind.len().checked_sub(1) {
+            Some(last) => self.dwells.push((last, seconds)),
+            None => self.start_dwell += seconds,
+        }
+    }
+}
+
+/// True where two places differ by more than rounding.
+fn apart(a: &Point, b: &Point) -> bool {
+    a.iter().zip(b).any(|(a, b)| (a - b).abs() > NO_MOTION)
+}
+
+/// The length that a feed counts along a straight move, as LinuxCNC: in X, Y, Z where one of these moves, else in
+/// U, V, W, else the degrees of A, B, C.
+pub fn straight_length(from: &Point, to: &Point) -> f64 {
+    let length = |axes: std::ops::Range<usize>| axes.map(|k| (to[k] - from[k]).powi(2)).sum::<f64>().sqrt();
+    [0..3, 6..9, 3..6].into_iter().map(length).find(|&length| length > NO_MOTION).unwrap_or(0.0)
+}
+
+/// True where only rotary axes move, so that the feed is in degrees.
+pub fn only_turns(from: &Point, to: &Point) -> bool {
+    (0..9).all(|k| rotary(k) || (to[k] - from[k]).abs() <= NO_MOTION)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(x: f64, y: f64) -> Point {
+        let mut point = [0.0; 9];
+        point[0] = x;
+        point[1] = y;
+        point
+    }
+
+    #[test]
+    fn a_new_axis_gets_its_column_in_order() {
+        let mut moves = Moves::new(4, 10, [0.0; 9]);
+        let control = Control::new(Mode::Tolerance);
+        moves.straight(Kind::Rapid, &point(1.0, 2.0), f64::INFINITY, &control, 1).unwrap();
+        moves.add_axis(8);
+        moves.add_axis(3);
+        moves.add_axis(3);
+        let mut target = point(1.0, 2.0);
+        target[3] = 90.0;
+        target[8] = 5.0;
+        moves.straight(Kind::Line, &target, 10.0, &control, 2).unwrap();
+        let columns = moves.finish(Vec::new());
+        assert_eq!(columns.axes, b"XYZAW");
+        assert_eq!(columns.target, [1.0, 2.0, 0.0, 0.0, 0.0, 1.0, 2.0, 0.0, 90.0, 5.0]);
+    }
+
+    #[test]
+    fn stops_and_dwells_stay_where_nothing_moves() {
+        let mut moves = Moves::new(4, 10, [0.0; 9]);
+        let control = Control::new(Mode::ExactPath);
+        moves.stop(Stop::Tool);
+        moves.dwell(0.5);
+        moves.straight(Kind::Line, &point(1.0, 0.0), 1.0, &control, 1).unwrap();
+        moves.straight(Kind::Line, &point(1.0, 1e-13), 1.0, &control, 2).unwrap();
+        moves.dwell(1.0);
+        moves.dwell(0.25);
+        moves.stop(Stop::Switch);
+        moves.straight(Kind::Line, &point(2.0, 0.0), 1.0, &Control::new(Mode::Tolerance), 3).unwrap();
+        moves.straight(Kind::Line, &point(3.0, 0.0), 1.0, &Control::new(Mode::Tolerance), 4).unwrap();
+        let columns = moves.finish(Vec::new());
+        assert_eq!(columns.line, [1, 3, 4]);
+        assert_eq!(columns.stop, [true, false, true]);
+        assert_eq!(columns.stop_cause, [Stop::Dwell, Stop::None, Stop::End].map(|cause| cause as u8));
+        assert_eq!(columns.dwell, [1.25, 0.0, 0.0]);
+        assert_eq!(columns.start_dwell, 0.5);
+        assert_eq!(columns.control, [1, 2, 2]);
+    }
+
+    #[test]
+    fn the_feed_counts_along_the_leading_axes() {
+        let from = [0.0; 9];
+        assert_eq!(straight_length(&from, &[3.0, 4.0, 0.0, 90.0, 0.0, 0.0, 7.0, 0.0, 0.0]), 5.0);
+        assert_eq!(straight_length(&from, &[0.0, 0.0, 0.0, 90.0, 0.0, 0.0, 0.0, 6.0, 8.0]), 10.0);
+        assert_eq!(straight_length(&from, &[0.0, 0.0, 0.0, 0.0, 0.0, 30.0, 0.0, 0.0, 0.0]), 30.0);
+        assert!(only_turns(&from, &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0]));
+        assert!(!only_turns(&from, &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0]));
+    }
+}

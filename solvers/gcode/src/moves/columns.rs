@@ -1,0 +1,173 @@
+//! The columns that the moves of a whole program become.
+
+use super::{Direction, Meaning, Moves, Point, Stop, UPRIGHT};
+use crate::block::AXES;
+
+/// The letters of a tool direction's columns, after those of the axes.
+const DIRECTION: [u8; 3] = *b"IJK";
+
+/// A program's moves, one row each; see `Program` in the Python package.
+#[derive(Debug)]
+pub struct Columns {
+    pub axes: Vec<u8>,
+    pub start: Vec<f64>,
+    pub kind: Vec<u8>,
+    pub target: Vec<f64>,
+    pub feed: Vec<f64>,
+    pub line: Vec<i32>,
+    pub control: Vec<u8>,
+    pub blend_tolerance: Vec<f64>,
+    pub fit_tolerance: Vec<f64>,
+    pub stop: Vec<bool>,
+    /// `Stop` of each move.
+    pub stop_cause: Vec<u8>,
+    pub dwell: Vec<f64>,
+    pub arc_move: Vec<i64>,
+    pub arc_centre: Vec<[f64; 3]>,
+    pub arc_normal: Vec<u8>,
+    pub arc_angle: Vec<f64>,
+    pub spline_move: Vec<i64>,
+    /// First piece of each spline, and the end of the last.
+    pub spline_pieces: Vec<i64>,
+    /// The pieces: control points in the columns of `axes`, weights (empty where none is rational), offsets, widths.
+    pub spline_control: Vec<f64>,
+    pub spline_weights: Vec<f64>,
+    pub spline_offsets: Vec<i64>,
+    pub spline_width: Vec<f64>,
+    /// `Meaning` and tool length of each move.
+    pub meaning: Vec<u8>,
+    pub tool_length: Vec<f64>,
+    /// Moves that start where their own words say, not where the move before ends, and these places.
+    pub change_move: Vec<i64>,
+    pub change_start: Vec<f64>,
+    pub start_dwell: f64,
+    pub warnings: Vec<String>,
+}
+
+impl Moves {
+    /// The columns; the last move ends with a stop.
+    pub fn finish(mut self, warnings: Vec<String>) -> Columns {
+        self.stop(Stop::End);
+        let count = self.kind.len();
+        let mut stop_cause = vec![Stop::None as u8; count];
+        for &(row, cause) in &self.stops {
+            stop_cause[row] = cause as u8;
+        }
+        let mut dwell = vec![0.0; count];
+        for &(row, seconds) in &self.dwells {
+            dwell[row] += seconds;
+        }
+        let mut control = Vec::with_capacity(count);
+        let mut blend_tolerance = Vec::with_capacity(count);
+        let mut fit_tolerance = Vec::with_capacity(count);
+        for (i, (_, now)) in self.control.iter().enumerate() {
+            let end = self.control.get(i + 1).map_or(count, |next| next.0);
+            control.resize(end, now.mode as u8);
+            blend_tolerance.resize(end, now.blend);
+            fit_tolerance.resize(end, now.fit);
+        }
+        // A change after the last move changes nothing; one before the first says where that begins.
+        self.changes.retain(|change| change.row < count);
+        let (start, direction) = match self.changes.first() {
+            Some(change) if change.row == 0 => (change.start, change.direction),
+            _ => (self.start, UPRIGHT),
+        };
+        let first = self.changes.first().map_or(count, |change| change.row);
+        let mut meaning = vec![Meaning::Joints as u8; first];
+        let mut tool_length = vec![f64::NAN; first];
+        for (i, change) in self.changes.iter().enumerate() {
+            let end = self.changes.get(i + 1).map_or(count, |next| next.row);
+            meaning.resize(end, change.meaning as u8);
+            tool_length.resize(end, change.tool_length);
+        }
+        self.kind.shrink_to_fit();
+        self.target.shrink_to_fit();
+        self.feed.shrink_to_fit();
+        self.line.shrink_to_fit();
+        Columns {
+            axes: self.letters(),
+            start: self.place(&start, &direction),
+            change_move: self.changes.iter().map(|change| change.row as i64).collect(),
+            change_start: self
+                .changes
+                .iter()
+                .flat_map(|change| self.place(&change.start, &change.direction))
+                .collect(),
+            spline_move: self.spline_rows.iter().map(|&(row, _)| row as i64).collect(),
+            spline_pieces: (self.spline_rows.iter().map(|&(_, piece)| piece))
+                .chain([self.splines.len()])
+                .map(|piece| piece as i64)
+                .collect(),
+            // No spline is programmed while I, J, K are words.
+            spline_control: self
+                .splines
+                .control
+                .iter()
+                .flat_map(|point| self.place(point, &UPRIGHT))
+                .collect(),
+            target: self.directed_target(),
+            spline_weights: self.splines.weights,
+            spline_offsets: self.splines.offsets.iter().map(|&offset| offset as i64).collect(),
+            spline_width: self.splines.width,
+            kind: self.kind,
+            feed: self.feed,
+            line: self.line,
+            control,
+            blend_tolerance,
+            fit_tolerance,
+            stop: stop_cause.iter().map(|&cause| cause != Stop::None as u8).collect(),
+            stop_cause,
+            dwell,
+            meaning,
+            tool_length,
+            arc_move: self.arcs.iter().map(|&(row, _)| row as i64).collect(),
+            arc_centre: self.arcs.iter().map(|(_, arc)| arc.centre).collect(),
+            arc_normal: self.arcs.iter().map(|(_, arc)| arc.normal as u8).collect(),
+            arc_angle: self.arcs.iter().map(|(_, arc)| arc.angle).collect(),
+            start_dwell: self.start_dwell,
+            warnings,
+        }
+    }
+
+    /// True where the tool's direction has columns.
+    fn points_tool(&self) -> bool {
+        self.changes.iter().any(|change| change.meaning == Meaning::Vector)
+    }
+
+    /// The letters of the columns.
+    fn letters(&self) -> Vec<u8> {
+        let mut letters: Vec<u8> = self.axes.iter().map(|&axis| AXES[axis]).collect();
+        if self.points_tool() {
+            letters.extend(DIRECTION);
+        }
+        letters
+    }
+
+    /// A place in these columns.
+    fn place(&self, point: &Point, direction: &Direction) -> Vec<f64> {
+        let mut place: Vec<f64> = self.axes.iter().map(|&axis| point[axis]).collect();
+        if self.points_tool() {
+            place.extend(direction);
+        }
+        place
+    }
+
+    /// Targets, with the tool's directions where these have columns.
+    fn directed_target(&mut self) -> Vec<f64> {
+        let target = std::mem::take(&mut self.target);
+        if !self.points_tool() {
+            return target;
+        }
+        let mut direction = UPRIGHT;
+        let mut later = self.directions.iter().peekable();
+        let mut wider = Vec::with_capacity(target.len() / self.axes.len() * (self.axes.len() + 3));
+        for (row, place) in target.chunks_exact(self.axes.len()).enumerate() {
+            while let Some(&(_, next)) = later.next_if(|(first, _)| *first <= row) {
+                direction = next;
+            }
+            wider.extend_from_slice(place);
+            wider.extend(direction);
+        }
+        wider
+    }
+}

@@ -1,0 +1,266 @@
+//! |C'| of a piece of any degree as an integrand, with the bound of its derivatives that a table needs.
+//!
+//! |C'| = |h|/ω², h the hodograph numerator. The bound is Cauchy's on a disc about the middle m of a panel: with
+//! S = h·h = s₀ + s₁z + … about m and Σ_{k>0} |s_k| ρᵏ ≤ s₀, S has no zero in |z| < ρ, so that √S is analytic
+//! there and below √(2 s₀); in the same way ω stays above half of ω(m).
+
+use super::rational::Hodograph;
+use super::{binomial, Piece, MAX_DEGREE, MAX_HODOGRAPH, MAX_SQUARE};
+use crate::arc_length::{Disc, Integrand};
+use crate::quadratic::dot;
+
+/// No disc need be greater than so many half panels: one panel then has no error left.
+const MAX_RATIO: f64 = 64.0;
+/// Steps in which the radius of a disc is bisected, geometrically: to 4 %.
+const BISECTIONS: u32 = 7;
+
+/// |C'(u)| of one piece.
+#[derive(Clone, Copy, Debug)]
+pub struct Speed<'a, const M: usize> {
+    /// Bernstein coefficients of h by t = u / width, times binomials.
+    h: &'a [[f64; M]],
+    /// Those of ω; empty for polynomial pieces.
+    omega: &'a [f64],
+    width: f64,
+    /// The cusp in this part of the piece; not a number without one.
+    foot: f64,
+    /// |C'| at most `at_foot + slope |u − foot|`.
+    at_foot: f64,
+    slope: f64,
+}
+
+/// What `Speed` reads: the coefficients of one piece.
+#[derive(Clone, Copy, Debug)]
+pub struct Coefficients<const M: usize> {
+    h: [[f64; M]; MAX_HODOGRAPH],
+    omega: [f64; MAX_DEGREE + 1],
+    counts: [usize; 2],
+}
+
+impl<const M: usize> Coefficients<M> {
+    pub fn new(piece: &Piece<M>) -> Self {
+        let hodograph = Hodograph::new(piece);
+        let rows = hodograph.coefficients();
+        let counts = [rows.len(), piece.weights.len()];
+        let mut coefficients = Self { h: [[0.0; M]; MAX_HODOGRAPH], omega: [0.0; MAX_DEGREE + 1], counts };
+        for (i, row) in rows.iter().enumerate() {
+            coefficients.h[i] = row.map(|value| value * binomial(rows.len() - 1, i));
+        }
+        for (i, weight) in piece.weights.iter().enumerate() {
+            coefficients.omega[i] = weight * binomial(piece.degree(), i);
+        }
+        coefficients
+    }
+
+    /// Those of the piece with each axis times a factor.
+    pub fn scaled(mut self, factor: &[f64; M]) -> Self {
+        for row in &mut self.h {
+            *row = std::array::from_fn(|k| factor[k] * row[k]);
+        }
+        self
+    }
+
+    /// Bernstein coefficients of the hodograph times binomials.
+    pub fn hodograph(&self) -> &[[f64; M]] {
+        &self.h[..self.counts[0]]
+    }
+
+    /// Those of the denominator; none where the piece is polynomial.
+    pub fn denominator(&self) -> &[f64] {
+        &self.omega[..self.counts[1]]
+    }
+}
+
+impl<'a, const M: usize> Speed<'a, M> {
+    pub fn new(h: &'a [[f64; M]], omega: &'a [f64], width: f64) -> Self {
+        Self { h, omega, width, foot: f64::NAN, at_foot: 0.0, slope: 0.0 }
+    }
+
+    /// The same without a cusp, for tables: |C'| at most its greatest value.
+    pub fn without_foot(mut self) -> Self {
+        self.at_foot = self.greatest(|i| self.plain(i)) * self.inverse_square();
+        self
+    }
+
+    /// Whether C' vanishes everywhere.
+    pub fn is_zero(&self) -> bool {
+        self.h.iter().all(|row| *row == [0.0; M])
+    }
+
+    /// The same with a cusp at u.
+    pub fn with_foot(mut self, u: f64) -> Self {
+        let n = self.h.len() - 1;
+        let growth = self.greatest(|i| {
+            let (low, high) = (self.plain(i), self.plain((i + 1).min(n)));
+            std::array::from_fn(|k| n as f64 * (high[k] - low[k]))
+        });
+        let value = self.numerator(u / self.width).0;
+        self.foot = u;
+        self.at_foot = dot(&value, &value).sqrt() * self.inverse_square();
+        self.slope = growth * self.inverse_square() / self.width;
+        self
+    }
+
+    fn plain(&self, i: usize) -> [f64; M] {
+        self.h[i].map(|value| value / binomial(self.h.len() - 1, i))
+    }
+
+    fn greatest(&self, vector: impl Fn(usize) -> [f64; M]) -> f64 {
+        (0..self.h.len()).fold(0.0, |most: f64, i| most.max(dot(&vector(i), &vector(i)))).sqrt()
+    }
+
+    /// 1/(ω² width) at most.
+    fn inverse_square(&self) -> f64 {
+        let degree = self.omega.len().saturating_sub(1);
+        let least = (0..self.omega.len())
+            .fold(f64::INFINITY, |least, i| least.min(self.omega[i] / binomial(degree, i)));
+        if self.omega.is_empty() {
+            1.0 / self.width
+        } else {
+            1.0 / (least * least * self.width)
+        }
+    }
+
+    /// h(t), and ω(t), by Horner's scheme from the nearer end.
+    #[inline(always)]
+    fn numerator(&self, t: f64) -> ([f64; M], f64) {
+        let s = 1.0 - t;
+        let n = self.h.len() - 1;
+        let (mut h, mut omega);
+        if t <= 0.5 {
+            let ratio = t / s;
+            h = self.h[n];
+            for row in self.h[..n].iter().rev() {
+                for k in 0..M {
+                    h[k] = h[k] * ratio + row[k];
+                }
+            }
+            omega = 0.0;
+            for value in self.omega.iter().rev() {
+                omega = omega * ratio + value;
+            }
+        } else {
+            let ratio = s / t;
+            h = self.h[0];
+            for row in &self.h[1..] {
+                for k in 0..M {
+                    h[k] = h[k] * ratio + row[k];
+                }
+            }
+            omega = 0.0;
+            for value in self.omega {
+                omega = omega * ratio + value;
+            }
+        }
+        let base = t.max(s);
+        if self.omega.is_empty() {
+            omega = 1.0;
+        } else {
+            omega *= base.powi(self.omega.len() as i32 - 1);
+        }
+        let scale = base.powi(n as i32);
+        (h.map(|value| value * scale), omega)
+    }
+}
+
+impl<const M: usize> Integrand for Speed<'_, M> {
+    #[inline(always)]
+    fn at(&self, u: f64) -> f64 {
+        let (h, omega) = self.numerator(u / self.width);
+        dot(&h, &h).sqrt() / (omega * omega * self.width)
+    }
+
+    fn disc(&self, a: f64, b: f64) -> Disc {
+        let (middle, half) = (0.5 * (a + b) / self.width, 0.5 * (b - a) / self.width);
+        let n = self.h.len() - 1;
+        let mut taylor = [[0.0; M]; MAX_HODOGRAPH];
+        for i in 0..=n {
+            taylor[i] = self.plain(i);
+        }
+        to_taylor(&mut taylor[..=n], middle, half);
+        let mut square = [0.0; MAX_SQUARE];
+        for i in 0..=n {
+            for j in 0..=n {
+                square[i + j] += dot(&taylor[i], &taylor[j]);
+            }
+        }
+        let square = &square[..2 * n + 1];
+
+        let mut omega = [[0.0]; MAX_DEGREE + 1];
+        let degree = self.omega.len().saturating_sub(1);
+        for i in 0..self.omega.len() {
+            omega[i] = [self.omega[i] / binomial(degree, i)];
+        }
+        if !self.omega.is_empty() {
+            to_taylor(&mut omega[..=degree], middle, half);
+        }
+        let ratio = greatest_ratio(|rho| {
+            let tail = square[1..].iter().rev().fold(0.0, |sum, s| (sum + s.abs()) * rho);
+            let omega_tail = omega[1..].iter().rev().fold(0.0, |sum, w| (sum + w[0].abs()) * rho);
+            tail <= square[0] && omega_tail <= 0.5 * omega[0][0]
+        });
+        let denominator = if self.omega.is_empty() { 1.0 } else { 0.25 * omega[0][0] * omega[0][0] };
+        Disc {
+            radius: (ratio - 1.0) * half * self.width,
+            bound: (2.0 * square[0]).sqrt() / (denominator * self.width),
+        }
+    }
+
+    fn foot(&self) -> f64 {
+        self.foot
+    }
+
+    // The length of such a panel and its quadrature are both positive and below its width times the bound.
+    fn foot_error(&self, width: f64) -> f64 {
+        width * (self.at_foot + self.slope * width)
+    }
+}
+
+/// The greatest radius of a disc, in half panels, that is clear of singularities; 1 where none is.
+pub fn greatest_ratio(clear: impl Fn(f64) -> bool) -> f64 {
+    let (mut low, mut high) = (1.0, MAX_RATIO);
+    if clear(high) {
+        low = high;
+    } else if clear(low) {
+        for _ in 0..BISECTIONS {
+            let rho = (low * high).sqrt();
+            if clear(rho) {
+                low = rho;
+            } else {
+                high = rho;
+            }
+        }
+    }
+    low
+}
+
+/// Bernstein coefficients on [0, 1] to those of powers of z = (t − middle)/half, up to the sign of z: the part
+/// from the middle to the farther end, and its forward differences.
+pub fn to_taylor<const M: usize>(b: &mut [[f64; M]], middle: f64, half: f64) {
+    let n = b.len() - 1;
+    let t = if middle > 0.5 {
+        b.reverse();
+        1.0 - middle
+    } else {
+        middle
+    };
+    for row in 1..=n {
+        for i in 0..=n - row {
+            for k in 0..M {
+                b[i][k] += t * (b[i + 1][k] - b[i][k]);
+            }
+        }
+    }
+    for row in 1..=n {
+        for i in (row..=n).rev() {
+            for k in 0..M {
+                b[i][k] -= b[i - 1][k];
+            }
+        }
+    }
+    let (ratio, mut power) = (half / (1.0 - t), 1.0);
+    for k in 0..=n {
+        b[k] = b[k].map(|value| value * (binomial(n, k) * power));
+        power *= ratio;
+    }
+}

@@ -1,0 +1,568 @@
+//! A stretch of a path by its length: the parameter at a length, derivatives of the axes along it, the greatest speed.
+//!
+//! The length is that of all axes of the path together, so that it grows wherever an axis moves; the feed may be about
+//! some of them, and then limits the speed along the length by the quotient of both. With D(u) the square of the speed
+//! per parameter, s' = √D, so that
+//!
+//!   u' = D^(−1/2),   u'' = −D_u / (2 D²),   u''' = D^(−1/2) (D_u² / D³ − D_uu / (2 D²))
+//!
+//! A piece is tabulated: between two rows u(s) is the quintic with these u, u' and u''. The places that a profile is
+//! handed out at are found to rounding, by Newton's method on the quadrature of √D.
+
+use rayon::prelude::*;
+
+use feedplan_geometry::arc_length::{W, X};
+use feedplan_planner::bang_bang::Problem;
+use crate::curvature_jumps::{passages, Jump, Passage};
+use crate::jerk_limited::{Geometry, Place, SpeedCap};
+use feedplan_geometry::lanes::Lanes;
+use crate::path_dynamics::chord_speed;
+use feedplan_geometry::quadratic::{dot, norm};
+use feedplan_geometry::spline::bezier::{self, derivatives};
+use feedplan_geometry::spline::cusps::CUSP;
+use feedplan_geometry::spline::rational::Hodograph;
+use feedplan_geometry::spline::Piece;
+
+/// What the quadrature of a panel may be off, as a part of its length …
+const QUADRATURE: f64 = 1e-12;
+/// … and the quintic half-way; in the halves that are kept it is off by a sixty-fourth of that. Near a sharp turn panels
+/// are as short as the turn, and the third derivatives need digits of that length.
+const QUINTIC: f64 = 1e-9;
+/// Panels this short beside their piece are not halved.
+const SHORTEST: f64 = 1e-14;
+/// What rounding leaves of tangents and parameters.
+const ROUNDING: f64 = 4e-15;
+/// No table gets many more rows; next to a turn a part of 1e-10 as long as its piece some 700 are used.
+const MOST_ROWS: usize = 20_000;
+/// Panels are not halved more often.
+const DEPTH: u32 = 48;
+/// Parts of a piece between places at which the speed is looked at.
+const PLACES: usize = 8;
+/// Steps to a place: the quintic is so near that one or two of Newton's do, but next to a cusp, where they stray, halving
+/// needs as many as u has bits.
+const STEPS: usize = 64;
+/// Tangents of a straight piece are off its direction by no more than this part of the longest.
+const OFF_LINE: f64 = 1e-12;
+/// Derivatives are asked for at least so far from a place where D vanishes, as a part of the length.
+const INSET: f64 = 1e-9;
+/// The most coefficients of D.
+pub const MAX_RATE: usize = 40;
+
+/// Pieces between two parameters each, without a cusp inside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Part {
+    pub piece: usize,
+    pub u: [f64; 2],
+}
+
+/// Where two parts meet.
+#[derive(Clone, Copy, Debug)]
+pub struct Joint {
+    /// The speed at which a corner or a jump of q'' holds the tool, and what such a jump leaves of the limits of jerk.
+    pub cap: SpeedCap,
+    /// Whether it is the jump that holds it.
+    pub jumps: bool,
+}
+
+/// One row of a table: u and its derivatives at a length from the start of the part.
+#[derive(Clone, Copy, Debug)]
+struct Row {
+    s: f64,
+    u: f64,
+    rate: f64,
+    bend: f64,
+}
+
+/// What is known of a part.
+#[derive(Clone, Debug)]
+struct Table<const M: usize> {
+    rows: Vec<Row>,
+    /// The direction of motion, where it does not change and the length is that of the axes, and its speed by the feed.
+    straight: Option<([f64; M], f64)>,
+    /// Derivatives are asked for within these lengths.
+    inside: [f64; 2],
+}
+
+/// Parts one after the other, from one place to another.
+#[derive(Clone)]
+pub struct ByLength<'a, const M: usize> {
+    problem: &'a Problem<'a, M>,
+    pub parts: &'a [Part],
+    tables: Vec<Table<M>>,
+    knots: Vec<f64>,
+}
+
+/// Piece `i` of the path; equal weights make none rational.
+pub fn piece<'a, const M: usize>(problem: &Problem<'a, M>, i: usize) -> Piece<'a, M> {
+    plain(problem.control, problem.weight, problem.offset, problem.width, i)
+}
+
+/// The tool's piece beside it, where the axes are not those of the tool.
+pub fn tip_piece<'a, const M: usize>(problem: &Problem<'a, M>, i: usize) -> Option<Piece<'a, 3>> {
+    problem.tip.map(|tip| plain(tip.control, tip.weight, tip.offset, problem.width, i))
+}
+
+fn plain<'a, const M: usize>(
+    control: &'a [[f64; M]],
+    weight: &'a [f64],
+    offset: &[usize],
+    width: &[f64],
+    i: usize,
+) -> Piece<'a, M> {
+    let range = offset[i]..offset[i + 1];
+    let weights = weight.get(range.clone()).unwrap_or(&[]);
+    let weights = if weights.windows(2).all(|pair| pair[0] == pair[1]) { &[] } else { weights };
+    Piece { control: &control[range], weights, width: width[i] }
+}
+
+/// The one direction of a piece, as it goes at u, if it has one.
+pub fn straight<const M: usize>(piece: &Piece<M>, u: f64) -> Option<[f64; M]> {
+    let hodograph = Hodograph::new(piece);
+    let tangents = hodograph.coefficients();
+    let longest = tangents.iter().max_by(|a, b| norm(a).total_cmp(&norm(b)))?;
+    let length = norm(longest);
+    let mut direction = longest.map(|x| x / length);
+    let on_line = tangents.iter().all(|tangent| {
+        let along = dot(tangent, &direction);
+        let off: [f64; M] = std::array::from_fn(|k| tangent[k] - along * direction[k]);
+        norm(&off) <= OFF_LINE * length
+    });
+    if dot(&derivatives(piece, u)[1], &direction) < 0.0 {
+        direction = direction.map(|x| -x);
+    }
+    on_line.then_some(direction)
+}
+
+/// D, D_u and D_uu at u of piece `i`, whose axes move with these derivatives.
+#[inline]
+fn rate<const M: usize>(problem: &Problem<M>, i: usize, u: f64, [_, c1, c2, c3]: &[[f64; M]; 4]) -> [f64; 3] {
+    match problem.way {
+        Some(way) => polynomial(way.of(i), problem.width[i], u),
+        None => [dot(c1, c1), 2.0 * dot(c1, c2), 2.0 * (dot(c2, c2) + dot(c1, c3))],
+    }
+}
+
+/// A square of a speed and its derivatives at u, from its Bernstein coefficients.
+#[inline]
+fn polynomial(coefficients: &[f64], width: f64, u: f64) -> [f64; 3] {
+    let n = coefficients.len() - 1;
+    let t = u / width;
+    let mut b = [0.0; MAX_RATE];
+    b[..=n].copy_from_slice(coefficients);
+    let mut out = [0.0; 3];
+    // De Casteljau's triangle: its last three rows hold the value and the derivatives.
+    for left in (0..=n).rev() {
+        let degree = n as f64;
+        match left {
+            2 => out[2] = degree * (degree - 1.0) * ((b[2] - b[1]) - (b[1] - b[0])) / (width * width),
+            1 => out[1] = degree * (b[1] - b[0]) / width,
+            0 => out[0] = b[0],
+            _ => {}
+        }
+        for j in 0..left {
+            b[j] = (1.0 - t) * b[j] + t * b[j + 1];
+        }
+    }
+    // A D that touches 0 may be a rounding error below it.
+    out[0] = out[0].max(0.0);
+    out
+}
+
+/// The greatest speed at a place where the accelerations of turning and of speeding up together keep the limits of every
+/// axis, or more: what turning has across the direction of motion nothing can take back. NaN where it has nothing there.
+fn turning_speed<const M: usize>(place: &Place<M>, limits: &[f64; M]) -> f64 {
+    let Place { first, second, .. } = place;
+    let along = dot(second, first) / dot(first, first);
+    let across: [f64; M] = std::array::from_fn(|k| second[k] - along * first[k]);
+    let most = (0..M).map(|k| across[k].abs() * limits[k]).sum::<f64>();
+    (most / dot(&across, &across)).sqrt()
+}
+
+/// The speed along the length over that which the feed is about, at u of piece `i`, where D is this; infinite where the
+/// feed limits nothing.
+pub fn per_feed<const M: usize>(problem: &Problem<M>, i: usize, u: f64, d: f64) -> f64 {
+    let square = match (problem.tip, problem.share(i)) {
+        (Some(tip), _) => polynomial(tip.speed.of(i), problem.width[i], u)[0],
+        (None, None) => return 1.0,
+        (None, Some(share)) => {
+            let tangent = derivatives(&piece(problem, i), u)[1];
+            (0..M).map(|k| (share[k] * tangent[k]).powi(2)).sum()
+        }
+    };
+    (d / square).sqrt()
+}
+
+/// D at u of piece `i`.
+pub fn speed_sq<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> f64 {
+    match problem.way {
+        Some(way) => polynomial(way.of(i), problem.width[i], u)[0],
+        None => {
+            let tangent = derivatives(&piece(problem, i), u)[1];
+            dot(&tangent, &tangent)
+        }
+    }
+}
+
+/// D at four u of piece `i`.
+fn speeds_sq<const M: usize>(problem: &Problem<M>, i: usize, u: Lanes) -> Lanes {
+    if problem.way.is_some() {
+        Lanes::new(u.values().map(|u| speed_sq(problem, i, u)))
+    } else {
+        bezier::speeds_sq(&piece(problem, i), u)
+    }
+}
+
+/// The length between two parameters of piece `i`, by one panel.
+fn panel<const M: usize>(problem: &Problem<M>, i: usize, a: f64, b: f64) -> f64 {
+    let (middle, half) = (Lanes::all(0.5 * (a + b)), 0.5 * (b - a));
+    let to = Lanes::new(X) * half;
+    let speeds = speeds_sq(problem, i, middle - to).sqrt() + speeds_sq(problem, i, middle + to).sqrt();
+    half * (Lanes::new(W) * speeds).sum()
+}
+
+impl Row {
+    fn new<const M: usize>(problem: &Problem<M>, i: usize, u: f64, s: f64) -> Self {
+        let [d, d1, _] = rate(problem, i, u, &derivatives(&piece(problem, i), u));
+        Self { s, u, rate: 1.0 / d.sqrt(), bend: -0.5 * d1 / (d * d) }
+    }
+
+    /// u at s between two rows.
+    #[inline]
+    fn between(&self, next: &Self, s: f64) -> f64 {
+        let h = next.s - self.s;
+        let t = if h > 0.0 { (s - self.s) / h } else { 0.0 };
+        let (r, t2) = (1.0 - t, t * t);
+        let r2 = r * r;
+        let left = self.u * (1.0 + 3.0 * t + 6.0 * t2)
+            + self.rate * h * t * (1.0 + 3.0 * t)
+            + 0.5 * self.bend * h * h * t2;
+        let right = next.u * (1.0 + 3.0 * r + 6.0 * r2) - next.rate * h * r * (1.0 + 3.0 * r)
+            + 0.5 * next.bend * h * h * r2;
+        let u = left * r2 * r + right * t2 * t;
+        // Next to a cusp the quintic says nothing.
+        if u >= self.u && u <= next.u {
+            u
+        } else {
+            self.u + t * (next.u - self.u)
+        }
+    }
+}
+
+/// Halves panels of a part until quadrature and quintic hold.
+struct Builder<'a, const M: usize> {
+    problem: &'a Problem<'a, M>,
+    piece: usize,
+    size: f64,
+    fastest: f64,
+    rows: Vec<Row>,
+}
+
+impl<const M: usize> Builder<'_, M> {
+    /// Appends rows for the panel from the last row to b.
+    fn halve(&mut self, b: f64, whole: f64, depth: u32) {
+        let from = self.rows[self.rows.len() - 1];
+        let middle = 0.5 * (from.u + b);
+        let [left, right] =
+            [(from.u, middle), (middle, b)].map(|(a, b)| panel(self.problem, self.piece, a, b));
+        let half = Row::new(self.problem, self.piece, middle, from.s + left);
+        let end = Row::new(self.problem, self.piece, b, from.s + left + right);
+        let mut miss = (from.between(&end, half.s) - middle).abs() / half.rate;
+        if !(from.rate.is_finite() && end.rate.is_finite() && miss.is_finite()) {
+            miss = left + right;
+        }
+        let length = left + right;
+        // Tangents are known to a part of the longest one, u and s to a part of themselves.
+        let noise = ROUNDING * ((b - from.u) * self.fastest + b / half.rate) + f64::EPSILON * end.s;
+        let met = (length - whole).abs() <= QUADRATURE * length + noise && miss <= QUINTIC * length + noise;
+        let met = met || length <= SHORTEST * self.size || self.rows.len() > MOST_ROWS;
+        if met || depth == DEPTH {
+            self.rows.extend([half, end]);
+        } else {
+            self.halve(middle, left, depth + 1);
+            self.halve(b, right, depth + 1);
+        }
+    }
+}
+
+impl<const M: usize> Table<M> {
+    fn new(problem: &Problem<M>, part: &Part) -> Self {
+        let [a, b] = part.u;
+        let whole = panel(problem, part.piece, a, b);
+        let first = Row::new(problem, part.piece, a, 0.0);
+        let places = (0..=PLACES).map(|i| a + (b - a) * i as f64 / PLACES as f64);
+        let fastest = places.map(|u| speed_sq(problem, part.piece, u)).fold(0.0, f64::max).sqrt();
+        let mut builder = Builder { problem, piece: part.piece, size: whole, fastest, rows: vec![first] };
+        builder.halve(b, whole, 0);
+        let rows = builder.rows;
+        let length = rows[rows.len() - 1].s;
+        let slowest = (b - a) / length / CUSP;
+        let inset = |row: &Row| if row.rate < slowest { 0.0 } else { INSET * length };
+        let inside = [inset(&rows[0]), length - inset(&rows[rows.len() - 1])];
+        let straight = match problem.way {
+            Some(_) => None,
+            None => {
+                let (i, u) = (part.piece, 0.5 * (a + b));
+                let feed = problem.feed[i] * per_feed(problem, i, u, speed_sq(problem, i, u));
+                straight(&piece(problem, i), u).map(|direction| (direction, feed))
+            }
+        };
+        Self { rows, straight, inside }
+    }
+
+    fn row(&self, s: f64) -> usize {
+        self.rows[1..self.rows.len() - 1].partition_point(|row| row.s <= s)
+    }
+}
+
+impl<'a, const M: usize> ByLength<'a, M> {
+    pub fn new(problem: &'a Problem<'a, M>, parts: &'a [Part]) -> Self {
+        let table = |part| {
+            problem.watch.check();
+            Table::new(problem, part)
+        };
+        let tables: Vec<Table<M>> = parts.par_iter().with_min_len(16).map(table).collect();
+        let mut knots = vec![0.0];
+        let mut total = 0.0;
+        for table in &tables {
+            total += table.rows[table.rows.len() - 1].s;
+            knots.push(total);
+        }
+        Self { problem, parts, tables, knots }
+    }
+
+    /// The length of all parts, in mm.
+    pub fn total(&self) -> f64 {
+        self.knots[self.knots.len() - 1]
+    }
+
+    /// The part that a length lies in.
+    pub fn part(&self, s: f64) -> usize {
+        self.knots[1..self.knots.len() - 1].partition_point(|&knot| knot <= s)
+    }
+
+    /// The parameter at a length on a part, to rounding.
+    pub fn locate(&self, part: usize, s: f64) -> f64 {
+        let (table, at) = (&self.tables[part], &self.parts[part]);
+        if s <= self.knots[part] {
+            return at.u[0];
+        }
+        if s >= self.knots[part + 1] {
+            return at.u[1];
+        }
+        let x = s - self.knots[part];
+        let i = table.row(x);
+        let (from, to) = (&table.rows[i], &table.rows[i + 1]);
+        let (mut low, mut high) = (from.u, to.u);
+        let mut u = from.between(to, x);
+        for _ in 0..STEPS {
+            let miss = from.s + panel(self.problem, at.piece, from.u, u) - x;
+            if miss > 0.0 {
+                high = u;
+            } else {
+                low = u;
+            }
+            let step = miss / speed_sq(self.problem, at.piece, u).sqrt();
+            let next = u - step;
+            u = if next >= low && next <= high { next } else { 0.5 * (low + high) };
+            if step.abs() <= 1e-15 * at.u[1] {
+                break;
+            }
+        }
+        u
+    }
+
+    /// The parameter at a way from another one, ahead or back, to the digits of the way; s is about where it lies.
+    pub fn beside(&self, part: usize, from: f64, way: f64, s: f64) -> f64 {
+        let (at, u) = (&self.parts[part], self.locate(part, s));
+        let passed = self.between(part, from.min(u), from.max(u)).copysign(u - from);
+        let next = u + (way - passed) / speed_sq(self.problem, at.piece, u).sqrt();
+        // Next to a cusp the step says nothing.
+        let [low, high] = if way > 0.0 { [from, at.u[1]] } else { [at.u[0], from] };
+        if next.is_finite() {
+            next.clamp(low, high)
+        } else {
+            u
+        }
+    }
+
+    /// The length between two parameters of a part; short ones to their own digits.
+    pub fn between(&self, part: usize, a: f64, b: f64) -> f64 {
+        let (rows, at) = (&self.tables[part].rows, self.parts[part].piece);
+        let row = |u: f64| rows[1..rows.len() - 1].partition_point(|row| row.u <= u);
+        let (i, j) = (row(a), row(b));
+        if i == j {
+            return panel(self.problem, at, a, b);
+        }
+        let inside: f64 =
+            rows[i + 1..=j].windows(2).map(|pair| panel(self.problem, at, pair[0].u, pair[1].u)).sum();
+        panel(self.problem, at, a, rows[i + 1].u) + inside + panel(self.problem, at, rows[j].u, b)
+    }
+
+    /// The one direction of all parts and the one speed that their feed lets the tool have, if there are such.
+    pub fn line(&self) -> Option<([f64; M], f64)> {
+        let (direction, feed) = self.tables[0].straight?;
+        let alike = self.tables.iter().all(|table| {
+            table.straight.is_some_and(|(other, speed)| {
+                speed == feed && (0..M).all(|k| (other[k] - direction[k]).abs() <= OFF_LINE)
+            })
+        });
+        alike.then_some((direction, feed))
+    }
+
+    /// What the joints between parts ask for, in order: the first one is that of parts 0 and 1.
+    pub fn joints(&self, jerk: &[f64; M]) -> Vec<Joint> {
+        let problem = self.problem;
+        let jumps: Vec<Jump<M>> = (1..self.parts.len())
+            .map(|i| {
+                problem.watch.check_at(i);
+                let s = self.knots[i];
+                let (before, after) = (self.at(i - 1, s), self.at(i, s));
+                let smooth = self.is_smooth(i);
+                let jump = |k: usize| (after.second[k] - before.second[k]).abs() / jerk[k];
+                let mut speed = self.corner(i);
+                for place in [&before, &after] {
+                    for k in 0..M {
+                        speed = speed.min(problem.max_velocity[k] / place.first[k].abs());
+                    }
+                    speed = speed.min(place.speed_cap).min(turning_speed(place, &problem.max_acceleration));
+                }
+                let mut acceleration = f64::INFINITY;
+                for Place { first, second, .. } in [&before, &after] {
+                    for k in 0..M {
+                        let most = problem.max_acceleration[k] + second[k].abs() * speed * speed;
+                        acceleration = acceleration.min(most / first[k].abs());
+                    }
+                }
+                let change = std::array::from_fn(|k| if smooth { 0.0 } else { jump(k) });
+                Jump { s, change, speed, acceleration }
+            })
+            .collect();
+        let passages = passages(&jumps, problem.period);
+        let joint = |(i, (passage, jump)): (usize, (&Passage, &Jump<M>))| {
+            // What is slower for other reasons needs no cap.
+            let corner = Some(self.corner(i + 1)).filter(|corner| *corner <= jump.speed);
+            let Passage { speed, reach, share } = *passage;
+            let cap = SpeedCap { s: jump.s, speed: corner.unwrap_or(f64::INFINITY).min(speed), reach, share };
+            Joint { cap, jumps: speed < f64::INFINITY }
+        };
+        passages.iter().zip(&jumps).enumerate().map(joint).collect()
+    }
+
+    /// Whether a part and the one before it are of one piece, which is smooth where they meet.
+    fn is_smooth(&self, part: usize) -> bool {
+        self.parts[part].piece == self.parts[part - 1].piece
+    }
+
+    /// The greatest speed by the corner between a part and the one before it.
+    fn corner(&self, part: usize) -> f64 {
+        if self.is_smooth(part) {
+            f64::INFINITY
+        } else {
+            self.problem.junction_speed[self.parts[part].piece]
+        }
+    }
+
+    /// The joints that ask for something, and the ends of what is calm around them where that is alone.
+    pub fn caps(&self, joints: &[Joint]) -> Vec<SpeedCap> {
+        let asks = |joint: &&Joint| joint.cap.speed < f64::INFINITY || joint.cap.share > 0.0;
+        let own: Vec<SpeedCap> = joints.iter().filter(asks).map(|joint| joint.cap).collect();
+        let mut out = Vec::with_capacity(3 * own.len());
+        for (i, cap) in own.iter().enumerate() {
+            let before = if i == 0 { 0.0 } else { own[i - 1].s + own[i - 1].reach };
+            let after = own.get(i + 1).map_or(self.total(), |next| next.s - next.reach);
+            let [from, to] = [cap.s - cap.reach, cap.s + cap.reach];
+            if cap.share > 0.0 && before < from && from < cap.s {
+                out.push(SpeedCap::new(from, f64::INFINITY));
+            }
+            out.push(*cap);
+            if cap.share > 0.0 && cap.s < to && to < after {
+                out.push(SpeedCap::new(to, f64::INFINITY));
+            }
+        }
+        out
+    }
+
+    /// The direction of motion on a part where it does not change.
+    pub fn direction(&self, part: usize) -> Option<[f64; M]> {
+        self.tables[part].straight.map(|(direction, _)| direction)
+    }
+
+    /// The servo period, in s.
+    pub fn period(&self) -> f64 {
+        self.problem.period
+    }
+
+    /// The greatest speed by the chord error on a curvature.
+    pub fn chord_speed(&self, curvature: f64) -> f64 {
+        chord_limit(self.problem, curvature)
+    }
+}
+
+/// Curvature of the tool's way at u of piece `i`, in 1/mm.
+pub fn tool_curvature<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> f64 {
+    match tip_piece(problem, i) {
+        Some(tip) => curvature(&tip, u).0,
+        None => curvature(&piece(problem, i), u).0,
+    }
+}
+
+/// The place at u of piece `i`.
+pub fn place<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> Place<M> {
+    let c = derivatives(&piece(problem, i), u);
+    let [d, d1, d2] = rate(problem, i, u, &c);
+    let [_, c1, c2, c3] = c;
+    let (u1, per_d_sq) = (1.0 / d.sqrt(), 1.0 / (d * d));
+    let u2 = -0.5 * d1 * per_d_sq;
+    let u3 = u1 * per_d_sq * (d1 * d1 / d - 0.5 * d2);
+    let (mut first, mut second, mut third) = ([0.0; M], [0.0; M], [0.0; M]);
+    for k in 0..M {
+        first[k] = c1[k] * u1;
+        second[k] = c2[k] * u1 * u1 + c1[k] * u2;
+        third[k] = c3[k] * u1 * u1 * u1 + 3.0 * c2[k] * u1 * u2 + c1[k] * u3;
+    }
+    let mut speed_cap = problem.feed[i] * per_feed(problem, i, u, d);
+    if problem.chord_tolerance.is_finite() {
+        let chord = match tip_piece(problem, i) {
+            None => chord_limit(problem, norm(&second)),
+            Some(tip) => {
+                let (curvature, square) = curvature(&tip, u);
+                chord_limit(problem, curvature) * (d / square).sqrt()
+            }
+        };
+        speed_cap = speed_cap.min(chord);
+    }
+    Place { first, second, third, speed_cap }
+}
+
+fn chord_limit<const M: usize>(problem: &Problem<M>, curvature: f64) -> f64 {
+    if problem.chord_tolerance.is_finite() {
+        chord_speed(curvature, problem.chord_tolerance, problem.period)
+    } else {
+        f64::INFINITY
+    }
+}
+
+/// Curvature of a piece at u, 0 where it stands, and the square of its speed there.
+fn curvature<const M: usize>(piece: &Piece<M>, u: f64) -> (f64, f64) {
+    let [_, c1, c2, _] = derivatives(piece, u);
+    let square = dot(&c1, &c1);
+    let along = dot(&c1, &c2) / square;
+    let off: [f64; M] = std::array::from_fn(|k| c2[k] - along * c1[k]);
+    (if square > 0.0 { norm(&off) / square } else { 0.0 }, square)
+}
+
+impl<const M: usize> Geometry<M> for ByLength<'_, M> {
+    fn knots(&self) -> &[f64] {
+        &self.knots
+    }
+
+    fn at(&self, part: usize, s: f64) -> Place<M> {
+        let table = &self.tables[part];
+        if let Some((direction, speed_cap)) = table.straight {
+            return Place { first: direction, second: [0.0; M], third: [0.0; M], speed_cap };
+        }
+        let x = (s - self.knots[part]).clamp(table.inside[0], table.inside[1]);
+        let i = table.row(x);
+        place(self.problem, self.parts[part].piece, table.rows[i].between(&table.rows[i + 1], x))
+    }
+}

@@ -1,0 +1,437 @@
+//! Profiles of limited jerk as columns: arcs along the pieces of a path, in the order of the path.
+//!
+//! Two kinds, of `feedplan.profile.ArcKind`: the jerk along the path is constant, or v² is a cubic of the length. What
+//! goes over several pieces is cut where they meet: both kinds stay what they are.
+
+use std::ops::Range;
+
+use feedplan_planner::arc_kind::ArcKind;
+use feedplan_geometry::arc_length::{W, X};
+use feedplan_planner::bang_bang::Problem;
+use crate::by_length::{speed_sq, ByLength};
+use crate::jerk_limited::{Geometry, Profile};
+use crate::s_curve::Section;
+
+const PATH_JERK: u8 = ArcKind::PathJerk as u8;
+pub const SPEED_CUBIC: u8 = ArcKind::SpeedCubic as u8;
+/// A section that takes no longer than this part of the servo period is rounding.
+const SHORTEST: f64 = 1e-7;
+/// What states have been moved by is taken back by this part of each arc: there its length shows nothing of it.
+const TAKEN_BACK: f64 = 1e-10;
+/// What halves of an arc may differ from the whole in time, where the speed is not too near to none; and their halvings.
+const QUADRATURE: f64 = 1e-12;
+const DEPTH: u32 = 12;
+/// On arcs shorter than this part of the servo period the rounding of v² may show in the jerk of a cubic …
+const BRIEF: f64 = 1e-2;
+/// … which is constant where it would by more than this part of its limit.
+const SHOWN: f64 = 1e-7;
+/// Halvings for the time at which a section of constant jerk passes a place.
+const HALVINGS: usize = 200;
+
+/// Columns of arcs; see `feedplan.profile.SpeedProfile`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Arcs {
+    pub piece: Vec<u32>,
+    pub kind: Vec<u8>,
+    pub value: Vec<f64>,
+    pub u0: Vec<f64>,
+    pub u1: Vec<f64>,
+    pub p0: Vec<f64>,
+    pub p1: Vec<f64>,
+    pub duration: Vec<f64>,
+    pub a0: Vec<f64>,
+    pub a1: Vec<f64>,
+    /// Offsets of the runs in the arcs.
+    pub runs: Vec<i64>,
+    /// Pieces at whose start a jump of curvature holds the speed.
+    pub kinks: Vec<u32>,
+    /// How far the planner takes its time to be above the least, in s.
+    pub excess: f64,
+    /// A deadline came before the planner's end.
+    pub stopped: bool,
+    left_out: f64,
+    /// Where the arcs that were left out at the start of a piece begin.
+    left_from: Option<(usize, f64)>,
+}
+
+/// Length along a stretch, speed and acceleration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct State {
+    pub s: f64,
+    pub v: f64,
+    pub a: f64,
+}
+
+impl State {
+    /// After a time with a jerk.
+    pub fn after(&self, t: f64, jerk: f64) -> Self {
+        let Self { s, v, a } = *self;
+        Self {
+            s: s + t * (v + t * (0.5 * a + t * jerk / 6.0)),
+            v: (v + t * (a + 0.5 * t * jerk)).max(0.0),
+            a: a + t * jerk,
+        }
+    }
+}
+
+/// A section of constant jerk, on one part once it is cut.
+struct Span {
+    part: usize,
+    ends: [State; 2],
+    jerk: f64,
+    duration: f64,
+}
+
+impl Span {
+    /// The length that it takes its time for.
+    fn way(&self) -> f64 {
+        State { s: 0.0, ..self.ends[0] }.after(self.duration, self.jerk).s
+    }
+
+    /// Appends what lies on each part.
+    fn cut<const M: usize>(self, path: &ByLength<M>, out: &mut Vec<Self>) {
+        let Self { ends: [from, to], jerk, duration, .. } = self;
+        let mut part = path.part(from.s);
+        let (mut start, mut left) = (from, duration);
+        while part + 1 < path.parts.len() && path.knots()[part + 1] < to.s {
+            let knot = path.knots()[part + 1];
+            let (mut low, mut high) = (0.0, left);
+            for _ in 0..HALVINGS {
+                let middle = 0.5 * (low + high);
+                if middle <= low || middle >= high {
+                    break;
+                }
+                if start.after(middle, jerk).s < knot {
+                    low = middle;
+                } else {
+                    high = middle;
+                }
+            }
+            let end = State { s: knot, ..start.after(high, jerk) };
+            out.push(Self { part, ends: [start, end], jerk, duration: high });
+            (start, left) = (end, left - high);
+            part += 1;
+        }
+        out.push(Self { part, ends: [start, to], jerk, duration: left });
+    }
+}
+
+/// One arc on a part of a stretch.
+struct Arc {
+    kind: u8,
+    value: f64,
+    ends: [State; 2],
+    duration: f64,
+}
+
+impl Arcs {
+    /// Number of arcs.
+    pub fn len(&self) -> usize {
+        self.piece.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.piece.is_empty()
+    }
+
+    /// What stands for a plan that a deadline left no time for.
+    pub fn unplanned() -> Self {
+        Self { stopped: true, ..Self::default() }
+    }
+
+    /// Whether it is that.
+    pub fn is_unplanned(&self) -> bool {
+        self.stopped && self.is_empty()
+    }
+
+    /// The time of all arcs, in seconds.
+    pub fn time(&self) -> f64 {
+        self.duration.iter().sum()
+    }
+
+    /// Appends the arcs of another profile; `runs` stays as it is.
+    pub fn append(&mut self, mut other: Self) {
+        self.piece.append(&mut other.piece);
+        self.kind.append(&mut other.kind);
+        self.value.append(&mut other.value);
+        self.u0.append(&mut other.u0);
+        self.u1.append(&mut other.u1);
+        self.p0.append(&mut other.p0);
+        self.p1.append(&mut other.p1);
+        self.duration.append(&mut other.duration);
+        self.a0.append(&mut other.a0);
+        self.a1.append(&mut other.a1);
+        self.kinks.append(&mut other.kinks);
+        self.excess += other.excess;
+        self.stopped |= other.stopped;
+    }
+
+    /// Appends an arc between two parameters of a piece. One too short for u to show it is left out, its time and its
+    /// way go to its neighbour.
+    fn push<const M: usize>(&mut self, problem: &Problem<M>, piece: usize, [u0, u1]: [f64; 2], arc: &Arc) {
+        let u0 = self.left_from.take().filter(|from| from.0 == piece).map_or(u0, |from| from.1);
+        let last = self.len().wrapping_sub(1);
+        let goes_on = last < self.len() && self.piece[last] as usize == piece && self.u1[last] == u0;
+        let speed = |u: f64, v: f64| if v == 0.0 { 0.0 } else { v * v / speed_sq(problem, piece, u) };
+        if u1 <= u0 || arc.duration <= SHORTEST * problem.period {
+            let u1 = u1.max(u0);
+            if goes_on {
+                self.duration[last] += arc.duration;
+                self.u1[last] = u1;
+                self.p1[last] = speed(u1, arc.ends[1].v);
+                self.a1[last] = arc.ends[1].a;
+            } else {
+                self.left_out += arc.duration;
+                self.left_from = Some((piece, u0));
+            }
+            return;
+        }
+        self.piece.push(piece as u32);
+        self.kind.push(arc.kind);
+        self.value.push(arc.value);
+        self.u0.push(u0);
+        self.u1.push(u1);
+        self.p0.push(speed(u0, arc.ends[0].v));
+        self.p1.push(speed(u1, arc.ends[1].v));
+        self.duration.push(arc.duration + std::mem::take(&mut self.left_out));
+        self.a0.push(arc.ends[0].a);
+        self.a1.push(arc.ends[1].a);
+    }
+
+    /// Appends a section of constant jerk that ends as given; `duration` in s.
+    fn push_jerk<const M: usize>(
+        &mut self,
+        problem: &Problem<M>,
+        path: &ByLength<M>,
+        ends: [State; 2],
+        jerk: f64,
+        duration: f64,
+    ) {
+        let mut spans = vec![];
+        Span { part: 0, ends, jerk, duration }.cut(path, &mut spans);
+        self.push_spans(problem, path, &spans);
+    }
+
+    /// Appends sections of constant jerk along a whole stretch, to a speed in mm/s without acceleration.
+    pub fn push_sections<const M: usize>(
+        &mut self,
+        problem: &Problem<M>,
+        path: &ByLength<M>,
+        sections: &[Section],
+        end: f64,
+    ) {
+        let mut spans = vec![];
+        for (i, section) in sections.iter().enumerate() {
+            problem.watch.check_at(i);
+            let from = State { s: section.position, v: section.speed, a: section.acceleration };
+            let to = match sections.get(i + 1) {
+                Some(next) => State { s: next.position, v: next.speed, a: next.acceleration },
+                None => State { s: path.total(), v: end, a: 0.0 },
+            };
+            let Section { jerk, duration, .. } = *section;
+            Span { part: 0, ends: [from, to], jerk, duration }.cut(path, &mut spans);
+        }
+        self.push_spans(problem, path, &spans);
+    }
+
+    /// Appends sections cut at the knots. Places far along a path have not the digits of a section of some nanometres, so
+    /// that on each part sections follow one another from both its ends by their own ways, and the longest one takes what
+    /// rounding leaves. The time of each is that of the length between its parameters.
+    fn push_spans<const M: usize>(&mut self, problem: &Problem<M>, path: &ByLength<M>, spans: &[Span]) {
+        for spans in spans.chunk_by(|a, b| a.part == b.part) {
+            problem.watch.check_at(spans[0].part);
+            let (part, last) = (spans[0].part, spans.len());
+            let longest =
+                (0..last).fold(0, |most, i| if spans[i].way() > spans[most].way() { i } else { most });
+            let mut u = vec![path.locate(part, spans[0].ends[0].s); last + 1];
+            u[last] = path.locate(part, spans[last - 1].ends[1].s);
+            for i in 0..longest {
+                u[i + 1] = path.beside(part, u[i], spans[i].way(), spans[i].ends[1].s);
+            }
+            for i in (longest + 1..last).rev() {
+                u[i] = path.beside(part, u[i + 1], -spans[i].way(), spans[i].ends[0].s);
+            }
+            for (i, span) in spans.iter().enumerate() {
+                let (u, way) = ([u[i], u[i + 1]], span.way());
+                let moved = path.between(part, u[0], u[1]) - way;
+                let duration = if way > 0.0 { span.duration * (1.0 + moved / way) } else { span.duration };
+                let arc = Arc { kind: PATH_JERK, value: span.jerk, ends: span.ends, duration };
+                self.push(problem, path.parts[part].piece, u, &arc);
+            }
+        }
+    }
+
+    /// Appends a profile of the jerk-limited planner along a whole stretch.
+    ///
+    /// Near a rest arcs are so short that rounding of u changes their length, and w'' by some hundred times as much. So
+    /// lengths of arcs are measured between the rounded parameters, and each state is moved along its profile to
+    /// where they end. Moves add up from the nearer end of each part.
+    pub fn push_profile<const M: usize>(
+        &mut self,
+        problem: &Problem<M>,
+        path: &ByLength<M>,
+        jerk_limits: &[f64; M],
+        profile: &Profile,
+    ) {
+        let (s, knots, ends) = (&profile.s, path.knots(), profile.ends);
+        let last = s.len() - 1;
+        let (mut first, mut part) = (0, path.part(s[0]));
+        while first < last {
+            problem.watch.check_at(part);
+            while knots[part + 1] <= s[first] && part + 1 < path.parts.len() {
+                part += 1;
+            }
+            let at = path.parts[part];
+            let end = first + s[first..].partition_point(|&s| s <= knots[part + 1]) - 1;
+            let mut u = vec![at.u[0]];
+            u.extend(s[first..=end].iter().map(|&s| path.locate(part, s)));
+            u.push(at.u[1]);
+            let lengths: Vec<f64> = u.windows(2).map(|u| path.between(part, u[0], u[1])).collect();
+            let mut states = settled(profile, first..end + 1, [knots[part], knots[part + 1]], &lengths);
+            let count = states.len();
+            if first == 0 && s[0] > ends[0] {
+                let rest = State { s: ends[0], v: 0.0, a: 0.0 };
+                let within = part == 0;
+                let length = if within { lengths[0] } else { s[0] - ends[0] };
+                let (jerk, duration) = ramp(length, states[0].v);
+                states[0].a = jerk * duration;
+                if within {
+                    let arc = Arc { kind: PATH_JERK, value: jerk, ends: [rest, states[0]], duration };
+                    self.push(problem, at.piece, [u[0], u[1]], &arc);
+                } else {
+                    self.push_jerk(problem, path, [rest, states[0]], jerk, duration);
+                }
+            }
+            let stops = end == last && s[last] < ends[1];
+            let within = part + 1 == path.parts.len();
+            let length = if within { lengths[count] } else { ends[1] - s[last] };
+            let (jerk, duration) = ramp(length, states[count - 1].v);
+            if stops {
+                states[count - 1].a = -jerk * duration;
+            }
+            for n in 1..count {
+                let arc = arc_between(path, jerk_limits, part, lengths[n], [states[n - 1], states[n]]);
+                self.push(problem, at.piece, [u[n], u[n + 1]], &arc);
+            }
+            if stops {
+                let rest = State { s: ends[1], v: 0.0, a: 0.0 };
+                let from = states[count - 1];
+                if within {
+                    let arc = Arc { kind: PATH_JERK, value: jerk, ends: [from, rest], duration };
+                    self.push(problem, at.piece, [u[count], u[count + 1]], &arc);
+                } else {
+                    self.push_jerk(problem, path, [from, rest], jerk, duration);
+                }
+            }
+            first = end;
+        }
+    }
+}
+
+/// Jerk and duration of a ramp from rest to a speed: s = J t³/6 and v = J t²/2, so that t = 3 s/v. The acceleration
+/// there is J t, to rounding: the profile's own is of a length that rounding of u has changed.
+fn ramp(length: f64, v: f64) -> (f64, f64) {
+    let t = 3.0 * length / v;
+    (2.0 * v / (t * t), t)
+}
+
+/// The states at some nodes of a part between two knots, moved to where `lengths`, from knot to knot, say they are.
+fn settled(profile: &Profile, nodes: Range<usize>, [from, to]: [f64; 2], lengths: &[f64]) -> Vec<State> {
+    let s = &profile.s[nodes.clone()];
+    let count = s.len();
+    let mut moved = vec![0.0; count];
+    // What the quadratures of long arcs are off must not move states in turns that are shorter than that.
+    let settle = |miss: f64, length: f64| miss - miss.clamp(-TAKEN_BACK * length, TAKEN_BACK * length);
+    let mut miss = 0.0;
+    for n in 0..count {
+        miss += lengths[n] - (s[n] - if n == 0 { from } else { s[n - 1] });
+        miss = settle(miss, lengths[n]);
+        if s[n] < 0.5 * (from + to) && s[n] > from {
+            moved[n] = miss;
+        }
+    }
+    let mut miss = 0.0;
+    for n in (0..count).rev() {
+        miss += if n + 1 == count { to } else { s[n + 1] } - s[n] - lengths[n + 1];
+        miss = settle(miss, lengths[n + 1]);
+        if s[n] >= 0.5 * (from + to) && s[n] < to {
+            moved[n] = miss;
+        }
+    }
+    let state = |n: usize| {
+        let (d, at) = (moved[n], nodes.start + n);
+        // w'' on the side that the node moves to.
+        let bend = profile.at(if d < 0.0 { s[n] * (1.0 - f64::EPSILON) } else { s[n] })[2];
+        let w = profile.speed_sq[at] + d * (profile.slope[at] + 0.5 * d * bend);
+        State { s: s[n], v: w.sqrt(), a: 0.5 * (profile.slope[at] + d * bend) }
+    };
+    (0..count).map(state).collect()
+}
+
+/// The arc between two states of a profile, so far apart on a part of the path.
+///
+/// v² as a cubic is known by v² at its ends: their rounding is 3 ε v³/h² in its jerk, more than the limit on a piece of
+/// a nanometre. There the accelerations tell the jerk, which has no way to change.
+fn arc_between<const M: usize>(
+    path: &ByLength<M>,
+    jerk_limits: &[f64; M],
+    part: usize,
+    h: f64,
+    ends: [State; 2],
+) -> Arc {
+    let duration = cubic_time(h, &ends);
+    if duration < BRIEF * path.period() {
+        let first = path.at(part, ends[0].s).first;
+        let limit = (0..M).map(|k| jerk_limits[k] / first[k].abs()).fold(f64::INFINITY, f64::min);
+        if 3.0 * f64::EPSILON * ends[1].v.powi(3) > SHOWN * limit * h * h {
+            let value = (ends[1].a - ends[0].a) / duration;
+            return Arc { kind: PATH_JERK, value, ends, duration };
+        }
+    }
+    Arc { kind: SPEED_CUBIC, value: 0.0, ends, duration }
+}
+
+/// ∫ ds/√w of the cubic w between two states so far apart.
+fn cubic_time(h: f64, [from, to]: &[State; 2]) -> f64 {
+    let (w0, w1) = (from.v * from.v, to.v * to.v);
+    let (d0, d1) = (2.0 * from.a * h, 2.0 * to.a * h);
+    let speed = |t: f64| {
+        let r = 1.0 - t;
+        (r * r * ((1.0 + 2.0 * t) * w0 + t * d0) + t * t * ((1.0 + 2.0 * r) * w1 - r * d1)).sqrt()
+    };
+    h * halved_time(&|t| 1.0 / speed(t), [0.0, 1.0], 0)
+}
+
+/// The integral by Gauss's rule of eight points, halved until both halves together are as much as the whole.
+fn halved_time(f: &impl Fn(f64) -> f64, [a, b]: [f64; 2], depth: u32) -> f64 {
+    let panel = |a: f64, b: f64| -> f64 {
+        let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
+        (0..4).map(|i| half * W[i] * (f(middle - half * X[i]) + f(middle + half * X[i]))).sum()
+    };
+    let middle = 0.5 * (a + b);
+    let (whole, halves) = (panel(a, b), panel(a, middle) + panel(middle, b));
+    if (whole - halves).abs() <= QUADRATURE * halves || depth == DEPTH {
+        return halves;
+    }
+    halved_time(f, [a, middle], depth + 1) + halved_time(f, [middle, b], depth + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cubic_of_constant_acceleration_takes_its_change_of_speed() {
+        // 10 to 30 mm/s at 200 mm/s²: 2 mm, 0.1 s.
+        let ends = [State { s: 1.0, v: 10.0, a: 200.0 }, State { s: 3.0, v: 30.0, a: 200.0 }];
+        assert!((cubic_time(2.0, &ends) - 0.1).abs() < 1e-9, "{}", cubic_time(2.0, &ends));
+    }
+
+    #[test]
+    fn an_arc_that_ends_next_to_rest_takes_its_time_to_all_digits() {
+        // From 10 mm/s to 0.1 at -50 mm/s².
+        let h = (100.0 - 0.01) / 100.0;
+        let ends = [State { s: 0.0, v: 10.0, a: -50.0 }, State { s: h, v: 0.1, a: -50.0 }];
+        assert!((cubic_time(h, &ends) / 0.198 - 1.0).abs() < 1e-12, "{}", cubic_time(h, &ends));
+    }
+}

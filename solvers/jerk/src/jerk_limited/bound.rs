@@ -1,0 +1,264 @@
+//! A lower bound of the time on a grid, by duality.
+//!
+//! The relaxation of `relaxed` is convex: any multipliers λ ≥ 0 give a bound of its least, and so of the least time,
+//! by the least of the Lagrangian. That is convex in w: with its value and slope g at some w₀ it is at least
+//!
+//!   L(w₀) + Σ g (w − w₀)   with each unknown where it is least in its box,
+//!
+//! boxes from the limits of speed and acceleration at the nodes. So the bound holds whatever the multipliers; those
+//! near the optimum, where g vanishes, make it good. They come from windows that overlap: what an end of a window
+//! changes decays with the travel time from it.
+//!
+//! The bound is one of the problem on its grid: of splines, at collocation points, with the time by the 3/8 rule.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::grid::Grid;
+use super::hermite::{local, MASS};
+use super::interior_point::{self, Bound, InteriorPoint, Outcome};
+use super::model::project;
+use super::prepare;
+use super::relaxed::{fall, pace, Relaxed};
+use super::rows::{Order, Rows};
+use super::stretch::ramps;
+use super::{Effort, Geometry, Problem, Profile};
+use feedplan_geometry::lanes::Lanes;
+
+/// Windows overlap by so many intervals to both sides, at least this part of a window.
+const HALO: usize = 400;
+/// Where the relaxation begins, in parts of the plan: inside the limits.
+const INSIDE: f64 = 0.97;
+
+/// What a plan is proven to be near to.
+#[derive(Clone, Copy, Debug)]
+pub struct Certificate {
+    /// No plan on this grid takes less time, in s.
+    pub least_time: f64,
+    /// Part of the plan's time above it.
+    pub gap: f64,
+}
+
+/// How near to the least time on its grid a plan is.
+pub fn certify<G: Geometry<M>, const M: usize>(
+    problem: &Problem<G, M>,
+    profile: &Profile,
+    effort: &Effort,
+) -> Certificate {
+    let grid = Grid::of(profile, problem.geometry.knots(), problem.caps, effort.watch);
+    let bounds = prepare::bounds(problem);
+    let x: Vec<f64> =
+        profile.speed_sq.iter().zip(&profile.slope).flat_map(|(w, slope)| [*w, *slope]).collect();
+    let count = profile.s.len() - 1;
+    let size = effort.window.max(2 * HALO);
+    let cores: Vec<Range<usize>> =
+        (0..count.div_ceil(size)).map(|i| i * size..((i + 1) * size).min(count)).collect();
+    let parts: Vec<Part> = cores
+        .par_iter()
+        .map(|core| {
+            let window = core.start.saturating_sub(HALO)..(core.end + HALO).min(count);
+            let mut bounds = bounds;
+            let x = &x[2 * window.start..2 * window.end + 2];
+            let fixed = |at: usize| Bound::Fixed { w: INSIDE * x[at], slope: INSIDE * x[at + 1] };
+            if window.start > 0 {
+                bounds[0] = fixed(0);
+            }
+            if window.end < count {
+                bounds[1] = fixed(x.len() - 2);
+            }
+            let rows = grid.rows(problem, window.clone());
+            let part = part(&rows, bounds, x, core.start - window.start..core.end - window.start, effort);
+            effort.watch.each(cores.len()).advance(1);
+            part
+        })
+        .collect();
+    let time: f64 = parts.iter().map(|part| part.time).sum::<f64>() + ramps(&bounds, &x);
+    let least = join(&parts, &cores, &bounds, 2 * (count + 1));
+    let least_time = (profile.time() * least / time).max(0.0);
+    Certificate { least_time, gap: 1.0 - least_time / profile.time() }
+}
+
+/// What the intervals of a core contribute.
+struct Part {
+    /// The plan's time by the 3/8 rule.
+    time: f64,
+    /// The Lagrangian at x.
+    value: f64,
+    /// Where it is expanded, its slope, and the box of each unknown.
+    x: Vec<f64>,
+    slope: Vec<f64>,
+    boxes: Vec<[f64; 2]>,
+    /// By how much w can change on each interval.
+    rise: Vec<f64>,
+    /// Multipliers of the ramps' limits.
+    ends: [f64; 2],
+}
+
+fn part<const M: usize>(
+    rows: &Rows<M>,
+    bounds: [Bound; 2],
+    plan: &[f64],
+    core: Range<usize>,
+    effort: &Effort,
+) -> Part {
+    let mut space = InteriorPoint::<Relaxed, M>::default();
+    let mut x: Vec<f64> = plan.iter().map(|x| INSIDE * x).collect();
+    let own = interior_point::Effort {
+        tolerance: effort.tolerance,
+        max_iterations: effort.max_iterations,
+        deadline: effort.deadline,
+        barrier: 1.0,
+        warm: false,
+        watch: effort.watch,
+    };
+    let mut waived = rows.clone();
+    waived.waive(&bounds);
+    let report = space.solve(&waived, bounds, &mut x, &own);
+    let known = report.outcome != Outcome::NotInside;
+    let nodes = 2 * (core.len() + 1);
+    let mut out = Part {
+        time: 0.0,
+        value: 0.0,
+        x: x[2 * core.start..2 * core.end + 2].to_vec(),
+        slope: vec![0.0; nodes],
+        rise: vec![],
+        boxes: [[0.0, f64::INFINITY], [f64::NEG_INFINITY, f64::INFINITY]].repeat(core.len() + 1),
+        ends: [0, 1].map(|end| space.ends[end].filter(|_| known).map_or(0.0, |row| row.dual)),
+    };
+    for n in core.clone() {
+        let interval = &rows.intervals[n];
+        let h = interval.h;
+        let cost = MASS * h;
+        out.time += (cost * pace(interval.motion(&local(plan, n, h))[0])).sum();
+        let mut dual: Vec<Lanes> = Order::<M>::of(&space.state.dual, n).to_vec();
+        if !known {
+            dual.fill(Lanes::ZERO);
+        }
+        let (value, slope) = lagrangian(rows, n, &local(&x, n, h), &mut dual, cost);
+        out.value += value;
+        for (k, scale) in [1.0, h, 1.0, h].into_iter().enumerate() {
+            out.slope[2 * (n - core.start) + k] += slope[k] * scale;
+        }
+        let mut rise = 0.0;
+        for lane in 0..4 {
+            let [w, w1] = limits_at(rows, n, lane);
+            // The 3/8 rule is exact for w', a quadratic.
+            rise += MASS.values()[lane] * w1 * h;
+            if lane == 0 || lane == 3 {
+                let at = 2 * (n - core.start + lane / 3);
+                out.boxes[at][1] = out.boxes[at][1].min(w);
+                out.boxes[at + 1] = [out.boxes[at + 1][0].max(-w1), out.boxes[at + 1][1].min(w1)];
+            }
+        }
+        out.rise.push(rise);
+    }
+    out
+}
+
+/// Value and local slope of the Lagrangian on interval n, its multipliers made admissible.
+fn lagrangian<const M: usize>(
+    rows: &Rows<M>,
+    n: usize,
+    u: &[f64; 4],
+    dual: &mut [Lanes],
+    cost: Lanes,
+) -> (f64, [f64; 4]) {
+    let interval = &rows.intervals[n];
+    let mut jerk = Lanes::ZERO;
+    for k in 0..M {
+        let at = Order::<M>::jerk(k);
+        jerk += dual[at] + dual[at + 1];
+    }
+    // y is bounded below only if the multipliers of its rows add up to its cost.
+    let fit = Lanes::ONE.min(cost * jerk.max(Lanes::all(f64::MIN_POSITIVE)).inverse());
+    let mut fixed = -dual[Order::<M>::SPEED];
+    for k in 0..M {
+        let (at, to) = (Order::<M>::acceleration(k), Order::<M>::jerk(k));
+        fixed += -(dual[at] + dual[at + 1]);
+        dual[to] *= fit;
+        dual[to + 1] *= fit;
+    }
+    let last = (cost - jerk * fit).max(Lanes::ZERO);
+    let [w, w1, w2] = interval.motion(u);
+    let (pull, _) = rows.pull(n, dual);
+    let pace = pace(w);
+    let value = (fixed + last * pace - pull[0] * w - pull[1] * w1 - pull[2] * w2).sum();
+    let slope = project(interval.h, &[-pull[0] - last * fall(pace), -pull[1], -pull[2]]);
+    (value, slope)
+}
+
+/// The greatest w and |w'| that the limits of speed and acceleration allow at a lane of interval n.
+fn limits_at<const M: usize>(rows: &Rows<M>, n: usize, lane: usize) -> [f64; 2] {
+    let interval = &rows.intervals[n];
+    let w = 1.0 / interval.speed.values()[lane];
+    let mut w1 = f64::INFINITY;
+    for k in 0..M {
+        let [q1, q2, _] = interval.q[k].map(|q| q.values()[lane].abs());
+        w1 = w1.min(2.0 * (1.0 / rows.per_acceleration[k] + q2 * w) / q1);
+    }
+    [w, w1]
+}
+
+/// The bound of all cores together.
+fn join(parts: &[Part], cores: &[Range<usize>], bounds: &[Bound; 2], unknowns: usize) -> f64 {
+    let mut x = vec![0.0; unknowns];
+    let mut slope = vec![0.0; unknowns];
+    let mut boxes = vec![[f64::NEG_INFINITY, f64::INFINITY]; unknowns];
+    let mut value = 0.0;
+    // The Lagrangian is expanded where the windows are: where two differ, its slope accounts for it.
+    for (part, core) in parts.iter().zip(cores) {
+        value += part.value;
+        for i in 0..part.x.len() {
+            let at = 2 * core.start + i;
+            slope[at] += part.slope[i];
+            boxes[at] = [boxes[at][0].max(part.boxes[i][0]), boxes[at][1].min(part.boxes[i][1])];
+            if i < 2 && core.start > 0 {
+                value += part.slope[i] * (x[at] - part.x[i]);
+            } else {
+                x[at] = part.x[i];
+            }
+        }
+    }
+    for end in 0..2 {
+        let (at, sign) = (end * (unknowns - 2), if end == 0 { 1.0 } else { -1.0 });
+        match bounds[end] {
+            Bound::Rest { ramp, greatest } => {
+                let dual = parts[end * (parts.len() - 1)].ends[end];
+                let w = x[at];
+                value += 3.0 * ramp / w.sqrt() - dual * (1.0 - w / greatest);
+                slope[at] += dual / greatest - 1.5 * ramp / (w * w.sqrt());
+                slope[at] += sign * 4.0 / (3.0 * ramp) * slope[at + 1];
+                slope[at + 1] = 0.0;
+                boxes[at][1] = boxes[at][1].min(greatest);
+            }
+            Bound::Fixed { w, .. } => {
+                (slope[at], slope[at + 1]) = (0.0, 0.0);
+                boxes[at][1] = w;
+            }
+        }
+    }
+    narrow(parts, &mut boxes);
+    for i in 0..unknowns {
+        let [low, high] = boxes[i];
+        value += if slope[i] > 0.0 {
+            slope[i] * (low - x[i])
+        } else if slope[i] < 0.0 {
+            slope[i] * (high - x[i])
+        } else {
+            0.0
+        };
+    }
+    value
+}
+
+/// Narrows the boxes of w to what can be reached from one node to the next, forward and backward.
+fn narrow(parts: &[Part], boxes: &mut [[f64; 2]]) {
+    let rise: Vec<f64> = parts.iter().flat_map(|part| part.rise.iter().copied()).collect();
+    for n in 0..rise.len() {
+        boxes[2 * n + 2][1] = boxes[2 * n + 2][1].min(boxes[2 * n][1] + rise[n]);
+    }
+    for n in (0..rise.len()).rev() {
+        boxes[2 * n][1] = boxes[2 * n][1].min(boxes[2 * n + 2][1] + rise[n]);
+    }
+}

@@ -1,0 +1,103 @@
+//! The cubic Hermite basis of one interval at its collocation points and at the nodes of the quadrature.
+//!
+//! On an interval of length h with t in [0, 1], w = Σ u_k B_k(t) with u = (w, h w') at its start and at its end.
+
+use feedplan_geometry::lanes::Lanes;
+
+/// Where the limits are enforced inside an interval, as parts of its length.
+pub const POINTS: [f64; 4] = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0];
+/// Gauss–Legendre nodes and weights on [0, 1].
+const NODES: [f64; 4] =
+    [0.069_431_844_202_973_71, 0.330_009_478_207_571_87, 0.669_990_521_792_428_1, 0.930_568_155_797_026_3];
+pub const WEIGHTS: Lanes = Lanes::new([
+    0.173_927_422_568_726_93,
+    0.326_072_577_431_273_1,
+    0.326_072_577_431_273_1,
+    0.173_927_422_568_726_93,
+]);
+
+/// Weights of the 3/8 rule at the collocation points.
+pub const MASS: Lanes = Lanes::new([0.125, 0.375, 0.375, 0.125]);
+
+pub type Basis = [Lanes; 4];
+
+/// B_k at the collocation points.
+pub const VALUE: Basis = basis(POINTS, 0);
+/// dB_k/dt there.
+pub const SLOPE: Basis = basis(POINTS, 1);
+/// d²B_k/dt² there.
+pub const BEND: Basis = basis(POINTS, 2);
+/// B_k at the nodes of the quadrature.
+pub const AT_NODES: Basis = basis(NODES, 0);
+
+const fn basis(points: [f64; 4], derivative: usize) -> Basis {
+    let mut out = [Lanes::ZERO; 4];
+    let mut i = 0;
+    while i < 4 {
+        let row = at(points[i])[derivative];
+        let mut k = 0;
+        while k < 4 {
+            out[k].values_mut()[i] = row[k];
+            k += 1;
+        }
+        i += 1;
+    }
+    out
+}
+
+/// The basis and its first two derivatives at t.
+pub const fn at(t: f64) -> [[f64; 4]; 3] {
+    let (q, c) = (t * t, t * t * t);
+    [
+        [1.0 - 3.0 * q + 2.0 * c, t - 2.0 * q + c, 3.0 * q - 2.0 * c, c - q],
+        [6.0 * (q - t), 1.0 - 4.0 * t + 3.0 * q, 6.0 * (t - q), 3.0 * q - 2.0 * t],
+        [12.0 * t - 6.0, 6.0 * t - 4.0, 6.0 - 12.0 * t, 6.0 * t - 2.0],
+    ]
+}
+
+/// Σ u_k B_k.
+#[inline(always)]
+pub fn combine(basis: &Basis, u: &[f64; 4]) -> Lanes {
+    basis[0] * u[0] + basis[1] * u[1] + basis[2] * u[2] + basis[3] * u[3]
+}
+
+/// The local coefficients of interval `n` of the spline x = (w_0, w'_0, w_1, w'_1, …).
+#[inline(always)]
+pub fn local(x: &[f64], n: usize, h: f64) -> [f64; 4] {
+    let x = &x[2 * n..2 * n + 4];
+    [x[0], x[1] * h, x[2], x[3] * h]
+}
+
+/// ∫ ds/√w over each interval; infinite where w is not positive.
+pub fn duration(x: &[f64], n: usize, h: f64) -> f64 {
+    let w = combine(&AT_NODES, &local(x, n, h));
+    if w.least() > 0.0 {
+        (WEIGHTS * w.sqrt().inverse()).sum() * h
+    } else {
+        f64::INFINITY
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cubic_is_met_with_its_derivatives() {
+        // w = 2 + t − 3 t² + 4 t³
+        let u = [2.0, 1.0, 4.0, 7.0];
+        for t in [0.0, 0.2, 1.0] {
+            let of = |d: usize| (0..4).map(|k| u[k] * at(t)[d][k]).sum::<f64>();
+            assert!((of(0) - (2.0 + t - 3.0 * t * t + 4.0 * t * t * t)).abs() < 1e-14);
+            assert!((of(1) - (1.0 - 6.0 * t + 12.0 * t * t)).abs() < 1e-14);
+            assert!((of(2) - (24.0 * t - 6.0)).abs() < 1e-13);
+        }
+    }
+
+    #[test]
+    fn a_constant_speed_takes_its_length() {
+        let x = [4.0, 0.0, 4.0, 0.0];
+        assert!((duration(&x, 0, 3.0) - 1.5).abs() < 1e-14);
+        assert_eq!(duration(&[-1.0, 0.0, 4.0, 0.0], 0, 3.0), f64::INFINITY);
+    }
+}

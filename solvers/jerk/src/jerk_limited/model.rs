@@ -1,0 +1,79 @@
+//! What the interior point asks of a problem: its slacks, their steps, and its curvature, interval by interval.
+
+use super::hermite::{AT_NODES, BEND, SLOPE, VALUE};
+use super::rows::Rows;
+use feedplan_geometry::lanes::Lanes;
+
+/// A problem over the rows of a stretch; it may have variables of its own at the collocation points.
+pub trait Model<const M: usize>: Default {
+    /// Its own variables for the spline x.
+    fn begin(&mut self, rows: &Rows<M>, x: &[f64]);
+
+    /// The slacks on interval n for local coefficients u, with its own variables as they are or at the trial.
+    fn slack(&mut self, rows: &Rows<M>, n: usize, u: &[f64; 4], trial: bool, out: &mut [Lanes]);
+
+    /// Their change for the step d, the convex ones along their tangents.
+    fn slack_step(&self, rows: &Rows<M>, n: usize, d: &[f64; 4], out: &mut [Lanes]);
+
+    /// Matrix and gradient of interval n for the weights λ/s and the multipliers λ of its rows.
+    fn local(&mut self, rows: &Rows<M>, n: usize, u: &[f64; 4], weight: &[Lanes], dual: &[Lanes]) -> Local;
+
+    /// Σ aim ∇s over the rows of interval n, as a linear form of (w, w', w'') at the collocation points; aims are of
+    /// the centring (0), or of the predictor's second order (1).
+    fn pull(&mut self, rows: &Rows<M>, n: usize, aim: &[Lanes], which: usize) -> [Lanes; 3];
+
+    /// Its own part of a step whose spline is known, with so much of each pull in it.
+    fn solved(&mut self, rows: &Rows<M>, step: &[f64], pulls: [f64; 2]);
+
+    /// The trial of its own variables is a part of their step away.
+    fn attempt(&mut self, part: f64);
+
+    /// Takes the trial.
+    fn accept(&mut self);
+
+    /// The time of x without its ramps; infinite where w is not positive.
+    fn time(&self, rows: &Rows<M>, x: &[f64], trial: bool) -> f64;
+}
+
+/// The symmetric form of (w, w', w'') at each collocation point: 00 01 02 11 12 22.
+pub type Form = [Lanes; 6];
+
+/// The upper half of a matrix, and a gradient, in the local coefficients (w, h w') of both nodes.
+pub struct Local {
+    pub matrix: [[f64; 4]; 4],
+    pub gradient: [f64; 4],
+}
+
+/// The upper half of a form of (w, w', w'') in local coefficients, with one of w at the nodes of the quadrature.
+#[inline(always)]
+pub fn expand(h: f64, form: &Form, at_nodes: Lanes) -> [[f64; 4]; 4] {
+    let per_h = 1.0 / h;
+    let per_h2 = per_h * per_h;
+    let m = [
+        form[0],
+        form[1] * per_h,
+        form[2] * per_h2,
+        form[3] * per_h2,
+        form[4] * (per_h * per_h2),
+        form[5] * (per_h2 * per_h2),
+    ];
+    let mut matrix = [[0.0; 4]; 4];
+    for j in 0..4 {
+        let (v, s, b, node) = (VALUE[j], SLOPE[j], BEND[j], AT_NODES[j] * at_nodes);
+        let p0 = m[0] * v + m[1] * s + m[2] * b;
+        let p1 = m[1] * v + m[3] * s + m[4] * b;
+        let p2 = m[2] * v + m[4] * s + m[5] * b;
+        for i in 0..=j {
+            matrix[i][j] = (VALUE[i] * p0 + SLOPE[i] * p1 + BEND[i] * p2 + AT_NODES[i] * node).sum();
+        }
+    }
+    matrix
+}
+
+/// A linear form of (w, w', w'') in local coefficients.
+#[inline(always)]
+pub fn project(h: f64, linear: &[Lanes; 3]) -> [f64; 4] {
+    let per_h = 1.0 / h;
+    let [g0, g1, g2] = [linear[0], linear[1] * per_h, linear[2] * (per_h * per_h)];
+    std::array::from_fn(|k| (g0 * VALUE[k] + g1 * SLOPE[k] + g2 * BEND[k]).sum())
+}

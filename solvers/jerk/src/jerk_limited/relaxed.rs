@@ -1,0 +1,150 @@
+//! A convex relaxation on a stretch: the pace w^(−1/2) in the jerk rows and in the time becomes a variable y at each
+//! collocation point,
+//!
+//!   least Σ c y   with   y ≥ w^(−1/2),   y ∓ L(w)/J ≥ 0   and the other rows as they are,
+//!
+//! c the weights of the 3/8 rule. Its least is at most that of the true problem. y is eliminated point by point, so
+//! that Newton's matrix keeps its band.
+
+use super::hermite::{local, MASS};
+use super::model::{expand, project, Local, Model};
+use super::rows::{Order, Rows};
+use feedplan_geometry::lanes::Lanes;
+
+/// The variables of the relaxation, one set of lanes for each interval.
+#[derive(Default)]
+pub struct Relaxed {
+    pub y: Vec<Lanes>,
+    step: Vec<Lanes>,
+    trial: Vec<Lanes>,
+    /// w^(−1/2), where the slacks are.
+    pace: Vec<Lanes>,
+    /// ∂² of y with itself and with (w, w', w''), and the pulls of the rows on y.
+    cross: Vec<[Lanes; 4]>,
+    pulls: Vec<[Lanes; 2]>,
+}
+
+/// y begins at this multiple of the least possible.
+const ABOVE: f64 = 1.1;
+
+impl<const M: usize> Model<M> for Relaxed {
+    fn begin(&mut self, rows: &Rows<M>, x: &[f64]) {
+        let count = rows.intervals.len();
+        for lanes in [&mut self.y, &mut self.step, &mut self.trial, &mut self.pace] {
+            lanes.resize(count, Lanes::ONE);
+        }
+        self.pulls.resize(count, [Lanes::ZERO; 2]);
+        self.cross.resize(count, [Lanes::ONE; 4]);
+        for (n, interval) in rows.intervals.iter().enumerate() {
+            let motion = interval.motion(&local(x, n, interval.h));
+            let mut least = pace(motion[0]);
+            for [_, jerk] in rows.axes(interval, motion) {
+                least = least.max(jerk.abs());
+            }
+            self.y[n] = least * ABOVE;
+        }
+    }
+
+    #[inline(always)]
+    fn slack(&mut self, rows: &Rows<M>, n: usize, u: &[f64; 4], trial: bool, out: &mut [Lanes]) {
+        let pace = pace(rows.intervals[n].motion(u)[0]);
+        let y = if trial { self.trial[n] } else { self.y[n] };
+        rows.slack(n, u, y, y - pace, out);
+        self.pace[n] = pace;
+    }
+
+    #[inline(always)]
+    fn slack_step(&self, rows: &Rows<M>, n: usize, d: &[f64; 4], out: &mut [Lanes]) {
+        let w = rows.intervals[n].motion(d)[0];
+        rows.slack_step(n, d, self.step[n], self.step[n] + fall(self.pace[n]) * w, out);
+    }
+
+    #[inline(always)]
+    fn local(&mut self, rows: &Rows<M>, n: usize, _: &[f64; 4], weight: &[Lanes], dual: &[Lanes]) -> Local {
+        let interval = &rows.intervals[n];
+        let mut form = rows.curvature(n, weight);
+        let (last, pace) = (weight[Order::<M>::POSITIVE], self.pace[n]);
+        let fall = fall(pace);
+        let mut cross = [last, last * fall, Lanes::ZERO, Lanes::ZERO];
+        form[0] += last * fall * fall + dual[Order::<M>::POSITIVE] * fall * pace * pace * 1.5;
+        for k in 0..M {
+            let at = Order::<M>::jerk(k);
+            let (both, turn) = (weight[at] + weight[at + 1], weight[at + 1] - weight[at]);
+            let turn = turn * (rows.per_jerk[k] * interval.jerk);
+            let [q1, q2, q3] = interval.q[k];
+            cross[0] += both;
+            cross[1] += turn * q3;
+            cross[2] += turn * q2 * 1.5;
+            cross[3] += turn * q1 * 0.5;
+        }
+        self.cross[n] = cross;
+        let per = cross[0].inverse();
+        let [p0, p1, p2] = [cross[1] * per, cross[2] * per, cross[3] * per];
+        form[0] += -(p0 * cross[1]);
+        form[1] += -(p0 * cross[2]);
+        form[2] += -(p0 * cross[3]);
+        form[3] += -(p1 * cross[2]);
+        form[4] += -(p1 * cross[3]);
+        form[5] += -(p2 * cross[3]);
+        let cost = MASS * interval.h;
+        let linear = [-(p0 * cost), -(p1 * cost), -(p2 * cost)];
+        Local { matrix: expand(interval.h, &form, Lanes::ZERO), gradient: project(interval.h, &linear) }
+    }
+
+    #[inline(always)]
+    fn pull(&mut self, rows: &Rows<M>, n: usize, aim: &[Lanes], which: usize) -> [Lanes; 3] {
+        let (mut pull, jerk) = rows.pull(n, aim);
+        let last = aim[Order::<M>::POSITIVE];
+        pull[0] += last * fall(self.pace[n]);
+        self.pulls[n][which] = jerk + last;
+        let cross = &self.cross[n];
+        let part = (jerk + last) * cross[0].inverse();
+        for k in 0..3 {
+            pull[k] += -(part * cross[k + 1]);
+        }
+        pull
+    }
+
+    fn solved(&mut self, rows: &Rows<M>, step: &[f64], pulls: [f64; 2]) {
+        for (n, interval) in rows.intervals.iter().enumerate() {
+            let [w, w1, w2] = interval.motion(&local(step, n, interval.h));
+            let [own, c0, c1, c2] = self.cross[n];
+            let aim = self.pulls[n][0] * pulls[0] + self.pulls[n][1] * pulls[1];
+            self.step[n] = (aim - MASS * interval.h - c0 * w - c1 * w1 - c2 * w2) * own.inverse();
+        }
+    }
+
+    fn attempt(&mut self, part: f64) {
+        for ((trial, y), step) in self.trial.iter_mut().zip(&self.y).zip(&self.step) {
+            *trial = *y + *step * part;
+        }
+    }
+
+    fn accept(&mut self) {
+        std::mem::swap(&mut self.y, &mut self.trial);
+    }
+
+    fn time(&self, rows: &Rows<M>, x: &[f64], trial: bool) -> f64 {
+        let y = if trial { &self.trial } else { &self.y };
+        let mut time = 0.0;
+        for (n, interval) in rows.intervals.iter().enumerate() {
+            if interval.motion(&local(x, n, interval.h))[0].least() <= 0.0 {
+                return f64::INFINITY;
+            }
+            time += (MASS * y[n]).sum() * interval.h;
+        }
+        time
+    }
+}
+
+/// w^(−1/2).
+#[inline(always)]
+pub fn pace(w: Lanes) -> Lanes {
+    w.max(Lanes::all(f64::MIN_POSITIVE)).sqrt().inverse()
+}
+
+/// w^(−3/2)/2.
+#[inline(always)]
+pub fn fall(pace: Lanes) -> Lanes {
+    pace * pace * pace * 0.5
+}

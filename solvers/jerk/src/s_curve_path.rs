@@ -1,0 +1,437 @@
+//! The two-pass profiler on a path of the package: segments with limits along the path, and what they become.
+//!
+//! Neighbouring straight pieces of one direction are one segment. A curved piece is halved where the limits of its halves
+//! differ and the axes can make use of that, and parts whose limits differ little are one segment again: the
+//! acceleration is 0 where segments meet, so that each more costs time, and each less lets the tightest place of more of
+//! the path hold all of it. What is little, and how much of the limits turning may take, is tried in some ways, of which
+//! each stretch takes the quickest.
+
+use feedplan_planner::bang_bang::Problem;
+use feedplan_planner::bang_bang_quadratic::Fault;
+use crate::by_length::{piece, ByLength, Joint};
+use crate::curvature_jumps::HALF;
+use crate::feed;
+use crate::jerk_arcs::Arcs;
+use crate::jerk_limited::{Effort, Geometry, Limits, Place, SpeedCap};
+use crate::jerk_limited_path::Task;
+use crate::path_dynamics::{allowable, bounded, greatest, Allowable, AxisLimits, Curve, Shape};
+use crate::s_curve::{self, Section, Segment};
+use feedplan_geometry::spline::bezier::split;
+use feedplan_geometry::spline::CompositeCurve;
+use crate::stretches::{checked, over_stretches, stretches, Stretch, CREEP};
+use feedplan_geometry::watch::Watch;
+
+/// Bounds of derivatives are greater than these by this part.
+const ACCURACY: f64 = 0.05;
+/// Places of a segment looked at where no bound is proven.
+const PLACES: usize = 33;
+/// A joint holds the speed where it is passed within this part of its cap.
+const HELD: f64 = 0.998;
+
+/// A jump of the curvature that lowers the limits of jerk by no more than this part does so on all of the parts beside it;
+/// around another one the path is cut.
+const LITTLE: f64 = 0.05;
+
+/// Halves of a part are parts of their own where one may be passed faster than both together by more than this part of
+/// the speed, at some places of them; and halvings of a piece. More of them where the bounds of one half allow so much
+/// more speed than those of both, which is next to a tight turn.
+const WORTH: f64 = 0.05;
+const LOOKED: usize = 9;
+const DEPTH: u32 = 5;
+const WELL_WORTH: f64 = 1.0;
+const MOST_DEPTH: u32 = 40;
+
+/// A way to join parts to segments.
+#[derive(Clone, Copy, Debug)]
+pub struct Cutting {
+    /// The length over which a speed has to pay, in lengths from rest to rest that just reach the greatest speed; from 1
+    /// on a line takes all of it. Short ones give more to acceleration.
+    pub lengths: f64,
+    /// Parts are joined where that lowers the speed on none of them by more than this part of it.
+    pub alike: f64,
+}
+
+/// The profile of a path, each stretch by the quickest of some cuttings, planned with so many segments of look-ahead.
+/// Where a segment has no speed or hardly one, next to a cusp, and where the path begins or ends in motion, the
+/// jerk-limited planner plans the stretch with this effort.
+pub fn plan<const M: usize>(
+    problem: &Problem<M>,
+    jerk: &[f64; M],
+    cuttings: &[Cutting],
+    look_ahead: usize,
+    effort: &Effort,
+) -> Result<Arcs, Fault> {
+    over_stretches(problem, jerk, |stretch, limits, watch| {
+        let path = ByLength::new(problem, &stretch.parts);
+        match quickest(problem, &path, stretch, limits, (cuttings, look_ahead), watch)? {
+            Some(own) => Ok(along(problem, &path, limits, &own.sections)),
+            None => Task { problem, limits: *limits, effort: &Effort { watch, ..*effort } }.stretch(stretch),
+        }
+    })
+}
+
+/// The segments of all stretches.
+#[derive(Clone, Debug, Default)]
+pub struct Segmented {
+    /// Offsets of the stretches in the segments; a stretch that has none is not for profilers of segments.
+    pub stretches: Vec<i64>,
+    pub segments: Vec<Segment>,
+    /// The place where each begins.
+    pub piece: Vec<u32>,
+    pub u: Vec<f64>,
+}
+
+/// Cuts all stretches into the segments that `plan` plans on.
+pub fn cut<const M: usize>(
+    problem: &Problem<M>,
+    jerk: &[f64; M],
+    cuttings: &[Cutting],
+    look_ahead: usize,
+) -> Result<Segmented, Fault> {
+    let limits = checked(problem, jerk)?;
+    let mut all = Segmented { stretches: vec![0], ..Segmented::default() };
+    let each = problem.watch.each(problem.width.len());
+    for stretch in stretches(problem) {
+        let path = ByLength::new(problem, &stretch.parts);
+        let watch = each.part(stretch.parts.len() as f64);
+        let own = quickest(problem, &path, &stretch, &limits, (cuttings, look_ahead), watch)?;
+        let mut s = 0.0;
+        for segment in own.map(|own| own.segments).unwrap_or_default() {
+            let part = path.part(s);
+            all.piece.push(path.parts[part].piece as u32);
+            all.u.push(path.locate(part, s));
+            s += segment.length;
+            all.segments.push(segment);
+        }
+        all.stretches.push(all.segments.len() as i64);
+    }
+    Ok(all)
+}
+
+/// The profile of given sections: stretch i takes those from `offsets[i]` to `offsets[i + 1]`; where there are none the
+/// jerk-limited planner plans it.
+pub fn follow<const M: usize>(
+    problem: &Problem<M>,
+    jerk: &[f64; M],
+    offsets: &[usize],
+    sections: &[Section],
+) -> Result<Arcs, Fault> {
+    over_stretches(problem, jerk, |stretch, limits, watch| {
+        let own = offsets.get(stretch.number).zip(offsets.get(stretch.number + 1));
+        match own.and_then(|(&from, &to)| sections.get(from..to)).filter(|own| !own.is_empty()) {
+            Some(own) => {
+                watch.advance(1);
+                Ok(along(problem, &ByLength::new(problem, &stretch.parts), limits, own))
+            }
+            None => {
+                let effort = Effort { watch, ..Effort::default() };
+                Task { problem, limits: *limits, effort: &effort }.stretch(stretch)
+            }
+        }
+    })
+}
+
+/// The arcs of sections from rest to rest, with the joints that hold the speed.
+fn along<const M: usize>(
+    problem: &Problem<M>,
+    path: &ByLength<M>,
+    limits: &Limits<M>,
+    sections: &[Section],
+) -> Arcs {
+    let mut arcs = Arcs::default();
+    arcs.push_sections(problem, path, sections, 0.0);
+    let mut next = 0;
+    for Joint { cap, jumps } in path.joints(&limits.jerk) {
+        while next + 1 < sections.len() && sections[next + 1].position <= cap.s {
+            next += 1;
+        }
+        // Around the joint the speed is at most its cap.
+        if jumps && sections[next].speed >= HELD * cap.speed {
+            arcs.kinks.push(path.parts[path.part(cap.s)].piece as u32);
+        }
+    }
+    arcs
+}
+
+/// A stretch: what it was planned on, and its profile.
+struct Planned {
+    segments: Vec<Segment>,
+    sections: Vec<Section>,
+}
+
+/// A stretch from rest to rest by the quickest of some cuttings; None where a segment has no speed, or hardly one.
+fn quickest<const M: usize>(
+    problem: &Problem<M>,
+    path: &ByLength<M>,
+    stretch: &Stretch,
+    limits: &Limits<M>,
+    (cuttings, look_ahead): (&[Cutting], usize),
+    watch: Watch,
+) -> Result<Option<Planned>, Fault> {
+    if stretch.ends != [0.0; 2] {
+        return Ok(None);
+    }
+    let parts = Parts::new(problem, path, limits, watch.part(0.5));
+    let each = watch.part(0.25).each(cuttings.len());
+    let mut best: Option<Planned> = None;
+    let mut least = f64::INFINITY;
+    for cutting in cuttings {
+        let Some(segments) = parts.joined(cutting, each) else { return Ok(None) };
+        if best.as_ref().is_some_and(|best| best.segments == segments) {
+            continue;
+        }
+        let sections = s_curve::plan(&segments, look_ahead, each)?;
+        let time = sections.iter().map(|section| section.duration).sum();
+        if time < least {
+            (least, best) = (time, Some(Planned { segments, sections }));
+        }
+    }
+    Ok(best)
+}
+
+/// A part of the path on its way to a segment.
+#[derive(Clone, Copy)]
+struct Cut<const M: usize> {
+    shape: Shape<M>,
+    /// The greatest speed by feed and chord error.
+    cap: f64,
+    length: f64,
+    /// By this part the limits of jerk are lower, near a jump of the curvature.
+    share: f64,
+    /// The limit where it meets the next one.
+    junction: f64,
+}
+
+/// What holds around a joint, or between joints.
+#[derive(Clone, Copy)]
+struct Around {
+    /// The greatest speed.
+    speed: f64,
+    /// By this part the limits of jerk are lower.
+    share: f64,
+}
+
+/// A stretch from rest to rest in parts whose limits differ little.
+struct Parts<'a, const M: usize> {
+    problem: &'a Problem<'a, M>,
+    path: &'a ByLength<'a, M>,
+    axes: AxisLimits<M>,
+    cuts: Vec<Cut<M>>,
+}
+
+impl<'a, const M: usize> Parts<'a, M> {
+    fn new(problem: &'a Problem<'a, M>, path: &'a ByLength<'a, M>, limits: &Limits<M>, watch: Watch) -> Self {
+        let Limits { velocity, acceleration, jerk } = *limits;
+        let axes = AxisLimits { velocity, acceleration, jerk };
+        let mut parts = Self { problem, path, axes, cuts: vec![] };
+        let free = SpeedCap::new(0.0, f64::INFINITY);
+        let mut before = free;
+        let joints = path.joints(&limits.jerk);
+        for part in 0..path.parts.len() {
+            watch.each(path.parts.len()).advance(1);
+            let ends = [path.knots()[part], path.knots()[part + 1]];
+            let after = joints.get(part).map_or(free, |joint| joint.cap);
+            parts.between(part, ends, [before, after]);
+            // What is slow around a joint is slow at it.
+            if let Some(last) = parts.cuts.last_mut().filter(|_| after.share <= LITTLE) {
+                last.junction = last.junction.min(after.speed);
+            }
+            before = after;
+        }
+        parts
+    }
+
+    /// Appends a part between two joints: around those that lower the limits of jerk by much, what they leave. As slow as
+    /// at a joint that holds the speed, a third difference reaches no farther than that speed does.
+    fn between(&mut self, part: usize, [from, to]: [f64; 2], joints: [SpeedCap; 2]) {
+        let time = HALF * self.problem.period;
+        let reach = joints.map(|cap| if cap.share > LITTLE { cap.reach.min(time * cap.speed) } else { 0.0 });
+        let around = joints.map(|cap| Around {
+            speed: if cap.share > LITTLE { cap.speed } else { f64::INFINITY },
+            share: cap.share,
+        });
+        if reach[0] + reach[1] >= to - from {
+            let [a, b] = around;
+            let both = Around { speed: a.speed.min(b.speed), share: a.share.max(b.share) };
+            self.append(part, [from, to], &both);
+            return;
+        }
+        let little = around.map(|Around { share, .. }| if share > LITTLE { 0.0 } else { share });
+        let inner = [from + reach[0], to - reach[1]];
+        if reach[0] > 0.0 {
+            self.append(part, [from, inner[0]], &around[0]);
+        }
+        self.append(part, inner, &Around { speed: f64::INFINITY, share: little[0].max(little[1]) });
+        if reach[1] > 0.0 {
+            self.append(part, [inner[1], to], &around[1]);
+        }
+    }
+
+    /// Appends what lies between two lengths on a part.
+    fn append(&mut self, part: usize, ends: [f64; 2], around: &Around) {
+        let path = self.path;
+        match path.direction(part) {
+            Some(direction) => {
+                let (first, none) = (direction.map(f64::abs), [0.0; M]);
+                let line = Shape { first, second: none, third: none, curvature: 0.0 };
+                self.push(ends, (line, around.speed.min(path.at(part, ends[0]).speed_cap)), around.share);
+            }
+            None => {
+                let (shape, cap) = shape(self.problem, path, part, ends);
+                self.halve(part, ends, (shape, around.speed.min(cap)), around, 0);
+            }
+        }
+    }
+
+    fn push(&mut self, [from, to]: [f64; 2], (shape, cap): (Shape<M>, f64), share: f64) {
+        if to > from {
+            self.cuts.push(Cut { shape, cap, length: to - from, share, junction: f64::INFINITY });
+        }
+    }
+
+    /// Appends a part, or its halves where that is worth it.
+    fn halve(
+        &mut self,
+        part: usize,
+        [from, to]: [f64; 2],
+        whole: (Shape<M>, f64),
+        around: &Around,
+        depth: u32,
+    ) {
+        let middle = 0.5 * (from + to);
+        let halves = [[from, middle], [middle, to]].map(|ends| {
+            let (shape, cap) = shape(self.problem, self.path, part, ends);
+            (ends, (shape, around.speed.min(cap)))
+        });
+        let by_places = depth < DEPTH && self.is_worth(part, [from, to], around);
+        if by_places || depth < MOST_DEPTH && self.is_well_worth(&whole, &halves, around.share) {
+            for (ends, half) in halves {
+                self.halve(part, ends, half, around, depth + 1);
+            }
+        } else {
+            self.push([from, to], whole, around.share);
+        }
+    }
+
+    /// Whether, by the bounds of both, one half may be passed far faster than both together, as far as the axes reach.
+    fn is_well_worth(
+        &self,
+        whole: &(Shape<M>, f64),
+        halves: &[([f64; 2], (Shape<M>, f64)); 2],
+        share: f64,
+    ) -> bool {
+        let axes = self.axes.with_jerk_less(share);
+        let most = |(shape, cap): &(Shape<M>, f64)| greatest(shape, &axes, *cap);
+        let [([from, middle], left), (_, right)] = halves;
+        let slow = most(whole);
+        let reached = slow.limits.highest(slow.speed, middle - from);
+        most(left).speed.max(most(right).speed).min(reached) > (1.0 + WELL_WORTH) * slow.speed
+    }
+
+    /// Whether, by some of their places, one half may be passed faster than both together, as far as the axes reach.
+    fn is_worth(&self, part: usize, [from, to]: [f64; 2], around: &Around) -> bool {
+        let axes = self.axes.with_jerk_less(around.share);
+        let looked: [Allowable; LOOKED] = std::array::from_fn(|i| {
+            let place = self.path.at(part, from + (to - from) * i as f64 / (LOOKED - 1) as f64);
+            let [first, second, third] = [place.first, place.second, place.third].map(|q| q.map(f64::abs));
+            greatest(
+                &Shape { first, second, third, curvature: 0.0 },
+                &axes,
+                around.speed.min(place.speed_cap),
+            )
+        });
+        let least = |places: &[Allowable], of: fn(&Allowable) -> f64| {
+            places.iter().map(of).fold(f64::INFINITY, f64::min)
+        };
+        let [left, right] =
+            [&looked[..=LOOKED / 2], &looked[LOOKED / 2..]].map(|half| least(half, |at| at.speed));
+        let limits = s_curve::Limits {
+            acceleration: least(&looked, |at| at.limits.acceleration),
+            jerk: least(&looked, |at| at.limits.jerk),
+        };
+        let slow = left.min(right);
+        left.max(right).min(limits.highest(slow, 0.5 * (to - from))) > (1.0 + WORTH) * slow
+    }
+
+    /// The segments; None where one has no speed, or one that the axes creep at.
+    fn joined(&self, cutting: &Cutting, watch: Watch) -> Option<Vec<Segment>> {
+        let make = |cut: &Cut<M>| -> Option<Segment> {
+            let axes = self.axes.with_jerk_less(cut.share);
+            let most = greatest(&cut.shape, &axes, cut.cap);
+            let stretch = cutting.lengths * most.speed * most.limits.duration(most.speed);
+            let allowed = allowable(&cut.shape, &axes, cut.cap, stretch).ok()?;
+            let crept = CREEP * allowed.limits.acceleration * self.problem.period;
+            if allowed.speed < crept && allowed.speed < CREEP * cut.cap {
+                return None;
+            }
+            // The cap has no end where the feed is about axes that stand still.
+            let desired = cut.cap.min(allowed.speed);
+            let Cut { length, junction, .. } = *cut;
+            Some(Segment { length, allowable: allowed.speed, desired, limits: allowed.limits, junction })
+        };
+        // Each with what it is made of, and the greatest speed that one of its parts has alone.
+        let mut out: Vec<(Segment, Cut<M>, f64)> = vec![];
+        for (i, cut) in self.cuts.iter().enumerate() {
+            watch.each(self.cuts.len()).count(i);
+            let own = make(cut)?;
+            // One with the segment before, where that costs no part of it much.
+            let joins =
+                |last: &Cut<M>| last.junction == f64::INFINITY && (last.share - cut.share).abs() <= LITTLE;
+            let joined = out.last().filter(|last| joins(&last.1)).and_then(|(_, last, highest)| {
+                let both = Cut {
+                    shape: last.shape.with(&cut.shape),
+                    cap: last.cap.min(cut.cap),
+                    length: last.length + cut.length,
+                    share: last.share.max(cut.share),
+                    junction: cut.junction,
+                };
+                let segment = make(&both)?;
+                let highest = highest.max(own.speed());
+                (segment.speed() >= (1.0 - cutting.alike) * highest).then_some((segment, both, highest))
+            });
+            match (joined, out.last_mut()) {
+                (Some(joined), Some(last)) => *last = joined,
+                _ => out.push((own, *cut, own.speed())),
+            }
+        }
+        Some(out.into_iter().map(|(segment, ..)| segment).collect())
+    }
+}
+
+/// Bounds of the derivatives between two lengths of a part, and the greatest speed by feed and chord error: proven where
+/// the axes are those of the tool.
+fn shape<const M: usize>(
+    problem: &Problem<M>,
+    path: &ByLength<M>,
+    part: usize,
+    [from, to]: [f64; 2],
+) -> (Shape<M>, f64) {
+    if problem.tip.is_none() {
+        let i = path.parts[part].piece;
+        let own = piece(problem, i);
+        let (a, b) = (path.locate(part, from), path.locate(part, to));
+        let mut pieces = CompositeCurve::default();
+        split(&own, &[a, b], &mut pieces);
+        let middle = pieces.piece(1);
+        let shape = bounded(&Curve { joints: middle.control, tip: None, weight: middle.weights }, ACCURACY);
+        return (shape, feed::on(problem, i, &middle).min(path.chord_speed(shape.curvature)));
+    }
+    let length = |i: usize| from + (to - from) * i as f64 / (PLACES - 1) as f64;
+    let places: Vec<Place<M>> = (0..PLACES).map(|i| path.at(part, length(i))).collect();
+    let most = |of: &dyn Fn(&Place<M>) -> f64| {
+        let mut greatest: f64 = places.iter().map(|place| of(place).abs()).fold(0.0, f64::max);
+        // A peak between places is above them by no more than an eighth of the second difference there.
+        for three in places.windows(3) {
+            let bend = (of(&three[0]) - 2.0 * of(&three[1]) + of(&three[2])).abs();
+            greatest = greatest.max(of(&three[1]).abs() + bend);
+        }
+        greatest
+    };
+    let shape = Shape {
+        first: std::array::from_fn(|k| most(&|place| place.first[k])),
+        second: std::array::from_fn(|k| most(&|place| place.second[k])),
+        third: std::array::from_fn(|k| most(&|place| place.third[k])),
+        curvature: 0.0,
+    };
+    (shape, 1.0 / most(&|place| 1.0 / place.speed_cap))
+}

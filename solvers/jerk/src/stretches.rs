@@ -1,0 +1,266 @@
+//! Stretches of a path between places of rest: stops, and cusps, whose curvature has no bound.
+
+use rayon::prelude::*;
+
+use feedplan_planner::bang_bang::{check_pieces, Problem};
+use feedplan_planner::bang_bang_quadratic::Fault;
+use crate::by_length::{per_feed, piece, place, speed_sq, straight, tool_curvature, Part, MAX_RATE};
+use crate::jerk_arcs::Arcs;
+use crate::jerk_limited::Limits;
+use feedplan_planner::planning;
+use feedplan_geometry::polynomial::Polynomial;
+use feedplan_geometry::quadratic::dot;
+use feedplan_geometry::spline::bezier::derivatives;
+use feedplan_geometry::spline::cusps::{piece_cusps, CUSP};
+use feedplan_geometry::spline::rational::Hodograph;
+use feedplan_geometry::watch::Watch;
+
+/// Cusps closer to the end of a piece than this part of it are at the end.
+const AT_END: f64 = 1e-9;
+/// The tool creeps where the axes turn it only below this part of what they gain in a servo period, and a turn is tight
+/// below so many times that.
+pub const CREEP: f64 = 0.02;
+const TIGHT_TURN: f64 = 10.0;
+/// Places are slow where the square of the speed is below this part of the greatest on their piece.
+const SLOW: f64 = 0.25;
+/// Beside a slow place a turn is sought at so many distances, each half the one before, then between two of them so often
+/// in thirds; it counts where the curvature is so many times that of the place itself.
+const LEVELS: i32 = 40;
+const ROUNDS: usize = 20;
+const SHARPER: f64 = 2.0;
+/// To either side of a slow place the square of the speed rises by more than this part: less may be rounding of a
+/// speed that hardly changes there, and then its least place is anywhere.
+const RISE: f64 = 1e-6;
+/// Parts of a piece between places at which its curvature is looked at, …
+const PLACES: [usize; 2] = [4, 64];
+/// … more of them where at one of the first its radius is less than so many times the chord tolerance.
+const TIGHT: f64 = 10.0;
+/// How far from a place on a line its direction is looked at, as a part of the piece.
+const BESIDE: f64 = 1e-4;
+/// The share of a plan's work that it is to cut the path into stretches.
+const CUTTING: f64 = 0.1;
+
+/// Parts of pieces from one place of rest, or end of the path, to another.
+#[derive(Clone, Debug)]
+pub struct Stretch {
+    pub number: usize,
+    run: usize,
+    pub parts: Vec<Part>,
+    /// Speeds at its ends in mm/s.
+    pub ends: [f64; 2],
+}
+
+/// The profile of a path with these jerk limits in mm/s³, each stretch planned alone; `plan` gets who counts it. A run with
+/// a stretch that was not planned has no arcs.
+pub fn over_stretches<const M: usize>(
+    problem: &Problem<M>,
+    jerk: &[f64; M],
+    plan: impl Fn(&Stretch, &Limits<M>, Watch) -> Result<Arcs, Fault> + Sync,
+) -> Result<Arcs, Fault> {
+    let limits = checked(problem, jerk)?;
+    let stretches = stretches(problem);
+    let watch = problem.watch.part(1.0 - CUTTING).each(problem.width.len());
+    let planned: Result<Vec<Arcs>, Fault> = stretches
+        .par_iter()
+        .map(|stretch| plan(stretch, &limits, watch.part(stretch.parts.len() as f64)))
+        .collect();
+    let mut planned = planned?.into_iter();
+    let mut all = Arcs::default();
+    all.runs.push(0);
+    for run in stretches.chunk_by(|a, b| a.run == b.run) {
+        let own: Vec<Arcs> = planned.by_ref().take(run.len()).collect();
+        if own.iter().any(Arcs::is_unplanned) {
+            all.stopped = true;
+        } else {
+            own.into_iter().for_each(|arcs| all.append(arcs));
+        }
+        all.runs.push(all.len() as i64);
+    }
+    Ok(all)
+}
+
+/// The limits of the axes, every number of the problem checked once.
+pub fn checked<const M: usize>(problem: &Problem<M>, jerk: &[f64; M]) -> Result<Limits<M>, Fault> {
+    planning::Limits::of(problem).check(problem.width.len())?;
+    check_pieces(problem)?;
+    for (axis, &limit) in jerk.iter().enumerate() {
+        if !(limit > 0.0 && limit.is_finite()) {
+            let what = format!("the jerk limit of axis {axis} is {limit} mm/s³: give a positive number");
+            return Err(Fault::Input { piece: None, what });
+        }
+    }
+    Ok(Limits { velocity: problem.max_velocity, acceleration: problem.max_acceleration, jerk: *jerk })
+}
+
+/// The stretches of all runs, in order.
+pub fn stretches<const M: usize>(problem: &Problem<M>) -> Vec<Stretch> {
+    let mut out: Vec<Stretch> = vec![];
+    for (run, pair) in problem.runs.windows(2).enumerate() {
+        let mut rests = true;
+        for i in pair[0]..pair[1] {
+            problem.watch.part(CUTTING).each(problem.width.len()).count(i);
+            let (cuts, cusped) = cusps(problem, i);
+            let mut cuts: Vec<(f64, bool)> = cuts.into_iter().map(|u| (u, true)).collect();
+            let at_cusp = |u: f64| cusped[0] && u == 0.0 || cusped[1] && u == problem.width[i];
+            for u in slow_places(problem, i).into_iter().filter(|&u| !at_cusp(u)) {
+                cuts.push((u, turn_speed(problem, i, u) < CREEP));
+                let turns = turns_beside(problem, i, u).into_iter().map(|u| (u, turn_speed(problem, i, u)));
+                cuts.extend(turns.filter(|turn| turn.1 < TIGHT_TURN).map(|(u, speed)| (u, speed < CREEP)));
+            }
+            cuts.extend(chord_kinks(problem, i).into_iter().map(|u| (u, false)));
+            let inside = AT_END * problem.width[i]..=(1.0 - AT_END) * problem.width[i];
+            cuts.retain(|(u, _)| inside.contains(u));
+            cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
+            cuts.dedup_by(|b, a| {
+                let same = b.0 - a.0 <= AT_END * problem.width[i];
+                a.1 |= same && b.1;
+                same
+            });
+            rests |= i > pair[0] && problem.junction_speed[i] == 0.0;
+            let (mut from, mut rest) = (0.0, rests || cusped[0]);
+            for (to, then) in cuts.into_iter().chain([(problem.width[i], false)]) {
+                if rest {
+                    out.push(Stretch { number: out.len(), run, parts: vec![], ends: [0.0; 2] });
+                }
+                let last = out.len() - 1;
+                out[last].parts.push(Part { piece: i, u: [from, to] });
+                (from, rest) = (to, then);
+            }
+            rests = cusped[1];
+        }
+    }
+    // The speeds at the ends are those that the feed is about.
+    let along = |speed: f64, i: usize, u: f64| {
+        if speed > 0.0 {
+            speed * per_feed(problem, i, u, speed_sq(problem, i, u))
+        } else {
+            0.0
+        }
+    };
+    let (last, end) = (out.len() - 1, problem.width.len() - 1);
+    out[0].ends[0] = along(problem.start_speed, 0, 0.0);
+    out[last].ends[1] = along(problem.end_speed, end, problem.width[end]);
+    out
+}
+
+/// Parameters inside piece `i` at which the tool has to rest, and whether it has to at either end.
+fn cusps<const M: usize>(problem: &Problem<M>, i: usize) -> (Vec<f64>, [bool; 2]) {
+    let own = piece(problem, i);
+    let mut places = piece_cusps(&own, CUSP);
+    let line = problem.way.is_none() && straight(&own, 0.5 * own.width).is_some();
+    let ends =
+        [places.first().is_some_and(|&t| t < AT_END), places.last().is_some_and(|&t| t > 1.0 - AT_END)];
+    if line {
+        // A line that does not turn back has no curvature where it stands; at its ends no finite p tells a speed.
+        let tangent = |t: f64| derivatives(&own, t * own.width)[1];
+        places.retain(|&t| dot(&tangent(t - BESIDE), &tangent(t + BESIDE)) < 0.0);
+    }
+    places.retain(|&t| (AT_END..=1.0 - AT_END).contains(&t));
+    (places.iter().map(|t| t * own.width).collect(), ends)
+}
+
+/// Parameters of piece `i` where the speed per parameter is least, and low: the way may turn sharply there, or beside.
+fn slow_places<const M: usize>(problem: &Problem<M>, i: usize) -> Vec<f64> {
+    let square: Polynomial<MAX_RATE> = match problem.way {
+        Some(way) => Polynomial::from_bernstein(way.of(i).iter().copied()),
+        None => {
+            let hodograph = Hodograph::new(&piece(problem, i));
+            let axis = |k: usize| -> Polynomial<MAX_RATE> {
+                Polynomial::from_bernstein(hodograph.coefficients().iter().map(|row| row[k]))
+            };
+            (0..M).map(axis).fold(Polynomial::constant(0.0), |sum, g| sum.combine(1.0, &g.multiply(&g), 1.0))
+        }
+    };
+    let mut turns = vec![0.0];
+    square.derivative().sign_changes(&mut |t| turns.push(t));
+    turns.push(1.0);
+    let greatest = square.range().1;
+    let speeds: Vec<f64> = turns.iter().map(|&t| square.value(t)).collect();
+    let is_low = |n: usize| {
+        let least = speeds[n];
+        least < SLOW * greatest
+            && (n == 0 || rises(least, speeds[..n].iter().rev()))
+            && (n + 1 == speeds.len() || rises(least, speeds[n + 1..].iter()))
+    };
+    (0..turns.len()).filter(|&n| is_low(n)).map(|n| turns[n] * problem.width[i]).collect()
+}
+
+/// Parameters of piece `i` to either side of a slow place where the tool's way turns the most, if it turns more there
+/// than at the place itself: where the speed falls to no less than a rest of itself, the turn from its one direction to
+/// that of the rest is where both are alike.
+fn turns_beside<const M: usize>(problem: &Problem<M>, i: usize, slow: f64) -> Vec<f64> {
+    let width = problem.width[i];
+    let curvature = |u: f64| {
+        let curvature = tool_curvature(problem, i, u);
+        if curvature.is_finite() {
+            curvature
+        } else {
+            0.0
+        }
+    };
+    let sharpest = |reach: f64| {
+        let at = |n: i32| slow + reach * 0.5_f64.powi(n);
+        let n = (1..LEVELS).max_by(|&a, &b| curvature(at(a)).total_cmp(&curvature(at(b))))?;
+        let (mut low, mut high) = (at(n + 1), at(n - 1));
+        for _ in 0..ROUNDS {
+            let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+            if curvature(a) < curvature(b) {
+                low = a;
+            } else {
+                high = b;
+            }
+        }
+        let u = 0.5 * (low + high);
+        (curvature(u) > SHARPER * curvature(slow)).then_some(u)
+    };
+    let both = [-slow, width - slow].into_iter().filter(|reach| reach.abs() > AT_END * width);
+    both.filter_map(sharpest).collect()
+}
+
+/// Whether the square of the speed rises from a place to one side before it falls below what it is there.
+fn rises<'a>(least: f64, mut beside: impl Iterator<Item = &'a f64>) -> bool {
+    beside.find(|&&speed| speed < least || speed > (1.0 + RISE) * least).is_some_and(|&speed| speed > least)
+}
+
+/// Parameters inside piece `i` where the radius of the tool's way is the chord tolerance: the greatest speed by the chord
+/// error has a kink there, for no chord is farther from a smaller circle.
+fn chord_kinks<const M: usize>(problem: &Problem<M>, i: usize) -> Vec<f64> {
+    let (tolerance, width) = (problem.chord_tolerance, problem.width[i]);
+    if !tolerance.is_finite() {
+        return vec![];
+    }
+    // In parts of the tolerance.
+    let inverse_radius = |u: f64| tool_curvature(problem, i, u) * tolerance;
+    let places = |count: usize| (0..=count).map(move |n| width * n as f64 / count as f64);
+    if places(PLACES[0]).all(|u| TIGHT * inverse_radius(u) < 1.0) {
+        return vec![];
+    }
+    let looked: Vec<(f64, bool)> = places(PLACES[1]).map(|u| (u, inverse_radius(u) > 1.0)).collect();
+    let crossed = looked.windows(2).filter(|pair| pair[0].1 != pair[1].1);
+    let kinks = crossed.map(|pair| {
+        let (mut low, tight, mut high) = (pair[0].0, pair[0].1, pair[1].0);
+        loop {
+            let middle = 0.5 * (low + high);
+            if middle <= low || middle >= high {
+                return middle;
+            }
+            if (inverse_radius(middle) > 1.0) == tight {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+    });
+    kinks.filter(|&u| u > AT_END * width && u < (1.0 - AT_END) * width).collect()
+}
+
+/// The greatest speed at a place on piece `i` that turns with it, in parts of what the axes gain in a servo period. Where
+/// the tool would creep, a rest takes no longer that setpoints could tell.
+fn turn_speed<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> f64 {
+    let place = place(problem, i, u);
+    let of_axis = |k: usize| {
+        let most = problem.max_acceleration[k];
+        (most / place.second[k].abs()).sqrt() / (most * problem.period)
+    };
+    (0..M).map(of_axis).fold(f64::INFINITY, f64::min)
+}

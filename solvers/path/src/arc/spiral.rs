@@ -1,0 +1,104 @@
+//! Arcs and helices whose radius changes linearly with the angle, as tangent-continuous quadratic pieces within a
+//! tolerance.
+//!
+//! The pieces are one uniform quadratic B-spline: with n pieces of half angle α, control point i stands at
+//! radius r/cos α in the middle of its piece, and pieces join half way between control points. On a circle
+//! those joints lie on it and the control polygon touches it there. Everything that is linear in the angle
+//! (the axis of a helix, further axes) stays exactly linear in the parameter.
+//!
+//! With b = sin²α/(2 cos α) and s from −1 to 1 along a piece, a unit circle becomes a curve of
+//! - radius √(1 + b²(1 − s²)²), never inside the circle and at most α⁴/8 outside, and
+//! - polar angle αs − (α³/6)(s − s³) + …, which matters on a helix: the axis runs ahead of the angle.
+//!
+//! Splitting the error to both sides of the circle would save a sixth of the pieces and cost the exact end
+//! points, so it is not done.
+
+use super::{Arc, ArcError, Polar, MAX_PIECES};
+use feedplan_geometry::conic::Conic;
+use std::f64::consts::PI;
+
+/// Greatest half angle of a piece. The curvature of a piece runs from cos²α/r to 1/(r cos α), so even where
+/// the tolerance would allow a quarter circle a piece slows the tool by no more than 8 %.
+const MAX_HALF_ANGLE: f64 = PI / 8.0;
+/// The polar angle of a piece differs from the linear one by at most this times α³ (the supremum is 0.0704
+/// at MAX_HALF_ANGLE and 1/(9√3) in the limit).
+const ANGLE_ERROR: f64 = 0.0715;
+/// An upper bound of the distance between arc and pieces of half angle α, both ways: radial error and,
+/// on a helix, the smaller of the ways to make up for the angle (at equal angle, or at equal height).
+fn deviation(polar: &Polar, alpha: f64) -> f64 {
+    let large = polar.radius.max(polar.radius + polar.growth * polar.sweep.abs());
+    let small = polar.radius.min(polar.radius + polar.growth * polar.sweep.abs());
+    let (sin, cos) = alpha.sin_cos();
+    let b = sin * sin / (2.0 * cos);
+    let circle = large * b * b / (1.0 + (1.0 + b * b).sqrt());
+    // A changing radius shears the piece: by less than 0.4 α³ of the growth across the arc, and by less
+    // than 1.5 α² of it along the arc, where the radius is then another.
+    let growth = polar.growth.abs();
+    let along = 1.5 * growth * alpha * alpha / small;
+    let radial = circle + growth * (0.4 * alpha.powi(3) + along);
+    let angle = ANGLE_ERROR * alpha.powi(3) + along;
+    radial.hypot(angle * polar.pitch.min(large))
+}
+
+/// The least number of pieces within `tolerance`.
+fn count(polar: &Polar, tolerance: f64) -> Result<usize, ArcError> {
+    let half = 0.5 * polar.sweep.abs();
+    let fits = |count: f64| deviation(polar, half / count) <= tolerance;
+    let mut enough = (half / MAX_HALF_ANGLE * (1.0 - 1e-12)).ceil().max(1.0);
+    let mut short = enough - 1.0;
+    while enough <= MAX_PIECES && !fits(enough) {
+        short = enough;
+        enough *= 2.0;
+    }
+    while enough - short > 1.0 && short < MAX_PIECES {
+        let middle = (0.5 * (short + enough)).floor();
+        if fits(middle) {
+            enough = middle;
+        } else {
+            short = middle;
+        }
+    }
+    if enough <= MAX_PIECES {
+        Ok(enough as usize)
+    } else {
+        Err(ArcError::Turns)
+    }
+}
+
+/// The arc as quadratic pieces of equal width, and an upper bound of its distance from them, both ways, at most
+/// `tolerance` > 0. Start and end are met exactly.
+pub fn pieces<const M: usize>(
+    arc: &Arc<M>,
+    polar: &Polar,
+    tolerance: f64,
+) -> Result<(Vec<Conic<M>>, f64), ArcError> {
+    let n = count(polar, tolerance)?;
+    let alpha = polar.sweep.abs() / (2.0 * n as f64);
+    let Polar { radius, growth, sweep, direction: [e0, e1], .. } = *polar;
+    let [x, y] = arc.plane;
+    let control = |i: usize| {
+        let share = (i as f64 + 0.5) / n as f64;
+        let (sin, cos) = (share * sweep).sin_cos();
+        let r = (radius + growth * share * sweep.abs()) / alpha.cos();
+        let mut point = std::array::from_fn(|k| arc.start[k] + share * (arc.end[k] - arc.start[k]));
+        point[x] = arc.centre[0] + r * (cos * e0 - sin * e1);
+        point[y] = arc.centre[1] + r * (sin * e0 + cos * e1);
+        point
+    };
+    let mean_radius = radius + 0.5 * growth * sweep.abs();
+    let width = 2.0 * alpha * mean_radius.hypot(polar.pitch);
+
+    let mut pieces = Vec::with_capacity(n);
+    let (mut joint, mut middle) = (arc.start, control(0));
+    for i in 1..=n {
+        let (next, end) = if i < n {
+            let next = control(i);
+            (next, std::array::from_fn(|k| 0.5 * (middle[k] + next[k])))
+        } else {
+            (middle, arc.end)
+        };
+        pieces.push(Conic { control: [joint, middle, end], weight: 1.0, width });
+        (joint, middle) = (end, next);
+    }
+    Ok((pieces, deviation(polar, alpha)))
+}

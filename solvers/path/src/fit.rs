@@ -1,0 +1,248 @@
+//! A chain of G01 points as C1 quadratic B-splines within a tolerance that is certified both ways.
+//!
+//! The method of Zhang, Yan, Yuan, Wang and Gao, "Curve fitting and optimal interpolation on CNC machines
+//! based on quadratic B-splines", Sci. China Inf. Sci. 53 (2010), section 3, step by step: `breaking` groups
+//! the points (3.1), `features` selects those to interpolate (3.2, Algorithm 1), `spline` interpolates them
+//! (3.3). The paper tests its tolerance on the Bézier curves of Algorithm 1 only; here `certificate` bounds
+//! the distance of the final spline from the programmed polygon and `refine` adds feature points until it
+//! holds, and breaks the spline where none of them helps.
+//!
+//! The tangent at a breaking point that is no corner is the one of the spline through the groups on both
+//! sides, so that the path stays C1 there and every group can be refined by itself, in parallel.
+
+mod breaking;
+mod certificate;
+mod features;
+mod pieces;
+mod refine;
+mod spline;
+
+use rayon::prelude::*;
+
+use feedplan_geometry::quadratic::{dot, norm, sub, Quadratic};
+use feedplan_geometry::watch::Watch;
+use breaking::{turn_cosine, Break};
+use refine::Block;
+use spline::End;
+
+/// Below this many points threads cost more than they save.
+const PARALLEL: usize = 4096;
+/// A long group is refined in blocks of about so many points, so that one refinement touches few of them.
+const BLOCK: usize = 512;
+
+#[derive(Clone, Copy, Debug)]
+pub struct FitOptions {
+    /// Allowed distance between spline and polygon, both ways, in mm.
+    pub tolerance: f64,
+    /// Longer chords stay lines, in mm; infinite: none.
+    pub max_chord: f64,
+    /// Extreme points of a larger curvature separate the groups, in 1/mm (Zhang eq. 2: α a_max / F²);
+    /// infinite: none.
+    pub max_curvature: f64,
+    /// A breaking point that turns by more is a corner, in rad: the tangent may jump there.
+    pub corner_angle: f64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FittedPiece<const M: usize> {
+    pub piece: Quadratic<M>,
+    /// First and last chord that the piece follows; chord i goes from point i to point i + 1.
+    pub first: usize,
+    pub last: usize,
+    /// Certified bound of the distance between the piece and its chords, both ways, in mm.
+    pub deviation: f64,
+    /// Number of the B-spline (or line) that the piece belongs to.
+    pub spline: u32,
+}
+
+/// Fits the chain by lines and C1 quadratic B-splines, each within the tolerance of the polygon both ways.
+///
+/// At least two points, neighbours distinct. Breaking points and both ends are interpolated exactly. Other
+/// features are too, unless that breaks the tolerance on a chord beside them and passing them at an offset
+/// does not. Where nothing smooth holds the tolerance, the chords themselves are kept, and their corners.
+/// With no positive tolerance, or points that are not finite, every chord is kept. The result does not depend
+/// on threads.
+pub fn fit_points<const M: usize>(
+    points: &[[f64; M]],
+    options: &FitOptions,
+    watch: Watch,
+) -> Vec<FittedPiece<M>> {
+    if points.len() < 2 {
+        return Vec::new();
+    }
+    let along = lengths_along(points);
+    let measurable = along.windows(2).all(|pair| pair[1] > pair[0]) && along[points.len() - 1].is_finite();
+    if options.tolerance.is_nan() || options.tolerance <= 0.0 || !measurable {
+        let chord = |i: usize| FittedPiece {
+            piece: Quadratic::line(points[i], points[i + 1]),
+            first: i,
+            last: i,
+            deviation: 0.0,
+            spline: i as u32,
+        };
+        return (0..points.len() - 1).map(chord).collect();
+    }
+    let chain = Chain {
+        points,
+        along: &along,
+        tolerance: options.tolerance,
+        corner_cosine: options.corner_angle.clamp(0.0, std::f64::consts::PI).cos(),
+        parallel: points.len() >= PARALLEL,
+        watch,
+    };
+    let (breaks, extremes) = breaking::group(&chain, options.max_chord, options.max_curvature);
+    let groups: Vec<&[Break]> = breaks.windows(2).collect();
+    let features = chain.map(&groups, watch.part(0.3), |group| {
+        let (a, b) = (group[0].at, group[1].at);
+        match group[0].line {
+            true => vec![a, b],
+            false => {
+                let inside = |at: usize| extremes.partition_point(|&extreme| extreme < at);
+                features::select(&chain, a, b, &extremes[inside(a + 1)..inside(b)])
+            }
+        }
+    });
+    let blocks = blocks(&chain, &breaks, &features);
+    let fitted = chain.map(&blocks, watch.part(0.7), |block| block.fit(&chain));
+
+    // Splines are numbered through; a block that continues its group continues its spline.
+    let mut pieces = Vec::with_capacity(fitted.iter().map(|block| block.pieces.len()).sum());
+    let (mut spline, mut open) = (0, false);
+    for (block, part) in blocks.iter().zip(fitted) {
+        if !(block.continues && open && part.starts_smooth) {
+            spline += u32::from(!pieces.is_empty());
+        }
+        pieces
+            .extend(part.pieces.iter().map(|piece| FittedPiece { spline: spline + piece.spline, ..*piece }));
+        spline += part.pieces.last().map_or(0, |piece| piece.spline);
+        open = part.ends_smooth;
+    }
+    pieces
+}
+
+/// The input as every step sees it.
+struct Chain<'a, const M: usize> {
+    points: &'a [[f64; M]],
+    /// Polygon length from the first point to each.
+    along: &'a [f64],
+    tolerance: f64,
+    /// A turn of a smaller cosine is a corner.
+    corner_cosine: f64,
+    parallel: bool,
+    watch: Watch<'a>,
+}
+
+impl<const M: usize> Chain<'_, M> {
+    /// Results in order, in parallel when that pays.
+    fn map<T: Sync, R: Send>(&self, items: &[T], watch: Watch, f: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
+        let each = watch.each(items.len());
+        let f = |item: &T| {
+            each.advance(1);
+            f(item)
+        };
+        match self.parallel && items.len() > 1 {
+            true => items.par_iter().with_min_len(items.len().div_ceil(256)).map(f).collect(),
+            false => items.iter().map(f).collect(),
+        }
+    }
+
+    /// Unit vector from point `a` to point `b`.
+    fn direction(&self, a: usize, b: usize) -> [f64; M] {
+        let chord = sub(&self.points[b], &self.points[a]);
+        let length = norm(&chord);
+        chord.map(|value| value / length)
+    }
+
+    fn is_corner(&self, at: usize) -> bool {
+        at > 0
+            && at + 1 < self.points.len()
+            && turn_cosine(&self.points[at - 1], &self.points[at], &self.points[at + 1]) < self.corner_cosine
+    }
+}
+
+fn lengths_along<const M: usize>(points: &[[f64; M]]) -> Vec<f64> {
+    let mut total = 0.0;
+    std::iter::once(0.0)
+        .chain(points.windows(2).map(|pair| {
+            total += norm(&sub(&pair[1], &pair[0]));
+            total
+        }))
+        .collect()
+}
+
+/// Cuts the chain at its breaking points, and long groups at feature points, with the tangent of each cut.
+fn blocks<const M: usize>(chain: &Chain<M>, breaks: &[Break], features: &[Vec<usize>]) -> Vec<Block<M>> {
+    let count = features.len();
+    let direction = |g: usize| chain.direction(breaks[g].at, breaks[g + 1].at);
+    let mut blocks = Vec::with_capacity(count);
+    let mut g = 0;
+    while g < count {
+        if breaks[g].line {
+            blocks.push(Block::line(breaks[g].at, breaks[g + 1].at));
+            g += 1;
+            continue;
+        }
+        // A stretch: groups that run into each other without a line or a corner.
+        let first = g;
+        g += 1;
+        while g < count && !breaks[g].corner && !breaks[g].line {
+            g += 1;
+        }
+        let start = match first > 0 && breaks[first - 1].line && !breaks[first].corner {
+            true => End::Tangent(direction(first - 1)),
+            false => End::Free,
+        };
+        let finish = match g < count && breaks[g].line && !breaks[g].corner {
+            true => End::Tangent(direction(g)),
+            false => End::Free,
+        };
+        stretch_blocks(chain, &breaks[first..=g], &features[first..g], start, finish, &mut blocks);
+    }
+    blocks
+}
+
+/// Interpolates a whole stretch once, and cuts it where its tangents are sound.
+fn stretch_blocks<const M: usize>(
+    chain: &Chain<M>,
+    breaks: &[Break],
+    groups: &[Vec<usize>],
+    start: End<M>,
+    finish: End<M>,
+    blocks: &mut Vec<Block<M>>,
+) {
+    let mut features = vec![groups[0][0]];
+    for group in groups {
+        features.extend(&group[1..]);
+    }
+    let through: Vec<_> = features.iter().map(|&at| chain.points[at]).collect();
+    let spline = spline::interpolate(&through, start, finish);
+    let sound = |j: usize| {
+        let (tangent, at) = (&spline.tangent[j], features[j]);
+        let speed = norm(tangent);
+        let along = |direction: [f64; M]| dot(tangent, &direction) > 0.8 * speed;
+        (0.7..1.4).contains(&speed)
+            && along(chain.direction(features[j - 1], at))
+            && along(chain.direction(at, features[j + 1]))
+    };
+
+    let (mut j, mut from, mut begin, mut continues) = (0, 0, start, false);
+    for (group, end) in groups.iter().zip(&breaks[1..]) {
+        let break_at = j + group.len() - 1;
+        while j < break_at {
+            j += 1;
+            let long = features[j] - features[from] >= BLOCK && features[break_at] - features[j] >= BLOCK / 2;
+            let (cut, stop) = if j + 1 == features.len() {
+                (true, finish)
+            } else if j == break_at {
+                let tangent = if sound(j) { spline.tangent[j] } else { end.tangent(chain) };
+                (true, End::Tangent(tangent))
+            } else {
+                (long && sound(j), End::Tangent(spline.tangent[j]))
+            };
+            if cut {
+                blocks.push(Block::curve(features[from..=j].to_vec(), begin, stop, continues));
+                (from, begin, continues) = (j, stop, j != break_at);
+            }
+        }
+    }
+}

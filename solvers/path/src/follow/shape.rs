@@ -1,0 +1,141 @@
+//! What a piece of a path is: a conic, or a piece of a spline, as programmed or as corners cut and bent it.
+
+use feedplan_geometry::conic::Conic;
+use feedplan_geometry::quadratic::{norm, sub};
+use feedplan_geometry::spline::cusps::rests_at_ends;
+use feedplan_geometry::spline::{bezier, CompositeCurve, Piece};
+
+/// Edges of a control polygon that are shorter than this part of it are none, as next to a cusp.
+const VANISHING: f64 = 1e-12;
+
+#[derive(Clone, Copy, Debug)]
+pub enum Shape<const M: usize> {
+    Conic(Conic<M>),
+    Spline(Spline<M>),
+}
+
+/// A piece of a spline, known by its number, and what its neighbours have to know of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Spline<const M: usize> {
+    /// Which piece: of the program's splines, or where `made`, of those that its corners made.
+    pub index: u32,
+    pub made: bool,
+    pub width: f64,
+    start: [f64; M],
+    /// The edges of the control polygon at both ends that have a length.
+    start_edge: [f64; M],
+    end_edge: [f64; M],
+    /// The tool rests there, in a cusp.
+    rests: [bool; 2],
+}
+
+impl<const M: usize> Spline<M> {
+    /// Piece `index` of a program's splines, its width scaled; None where it has no length.
+    pub fn new(splines: &CompositeCurve<M>, index: usize, scale: f64) -> Option<Self> {
+        let piece = splines.piece(index);
+        Self::of(&piece, index, false, piece.width * scale)
+    }
+
+    fn of(piece: &Piece<M>, index: usize, made: bool, width: f64) -> Option<Self> {
+        let edges = || piece.control.windows(2).map(|pair| sub(&pair[1], &pair[0]));
+        let (extent, _) = piece.extent();
+        let long = |edge: &[f64; M]| norm(edge) > VANISHING * extent;
+        let (start_edge, end_edge) = (edges().find(long)?, edges().rev().find(long)?);
+        Some(Self {
+            index: index as u32,
+            made,
+            width,
+            start: piece.control[0],
+            start_edge,
+            end_edge,
+            rests: rests_at_ends(piece),
+        })
+    }
+
+    /// The part between two places in [0, width] as a made piece that can be bent, so of degree 2 or more;
+    /// `splines` are the program's.
+    pub fn part(
+        &self,
+        splines: &CompositeCurve<M>,
+        low: f64,
+        high: f64,
+        made: &mut CompositeCurve<M>,
+    ) -> Option<Self> {
+        let whole = splines.piece(self.index as usize);
+        let scale = whole.width / self.width;
+        let cuts = [low, high].map(|u| u * scale);
+        let inner = usize::from(low <= 0.0)..1 + usize::from(high < self.width);
+        let mut parts = CompositeCurve::default();
+        bezier::split(&whole, &cuts[inner], &mut parts);
+        let part = parts.piece(usize::from(low > 0.0));
+        bezier::elevate(&part, usize::from(part.degree() == 1), made);
+        let index = made.len() - 1;
+        Self::of(&made.piece(index), index, true, high - low)
+    }
+
+    /// The last of the made pieces, its width as it is; None where it has no length.
+    pub fn last_made(made: &CompositeCurve<M>) -> Option<Self> {
+        let index = made.len().checked_sub(1)?;
+        let piece = made.piece(index);
+        Self::of(&piece, index, true, piece.width)
+    }
+
+    /// The same piece after its control points have changed.
+    pub fn bent(&self, made: &CompositeCurve<M>) -> Option<Self> {
+        let index = self.index as usize;
+        Self::of(&made.piece(index), index, true, self.width)
+    }
+}
+
+impl<const M: usize> Shape<M> {
+    #[inline]
+    pub fn width(&self) -> f64 {
+        match self {
+            Self::Conic(conic) => conic.width,
+            Self::Spline(spline) => spline.width,
+        }
+    }
+
+    #[inline]
+    pub fn start(&self) -> &[f64; M] {
+        match self {
+            Self::Conic(conic) => &conic.control[0],
+            Self::Spline(spline) => &spline.start,
+        }
+    }
+
+    /// An edge of the control polygon along the tangent at the start.
+    #[inline]
+    pub fn start_edge(&self) -> [f64; M] {
+        match self {
+            Self::Conic(conic) => sub(&conic.control[1], &conic.control[0]),
+            Self::Spline(spline) => spline.start_edge,
+        }
+    }
+
+    /// The same at the end.
+    #[inline]
+    pub fn end_edge(&self) -> [f64; M] {
+        match self {
+            Self::Conic(conic) => sub(&conic.control[2], &conic.control[1]),
+            Self::Spline(spline) => spline.end_edge,
+        }
+    }
+
+    /// Whether it begins and ends in a cusp, where the tool rests.
+    #[inline]
+    pub fn rests(&self) -> [bool; 2] {
+        match self {
+            Self::Conic(_) => [false; 2],
+            Self::Spline(spline) => spline.rests,
+        }
+    }
+
+    #[inline]
+    pub fn conic(&self) -> Option<&Conic<M>> {
+        match self {
+            Self::Conic(conic) => Some(conic),
+            Self::Spline(_) => None,
+        }
+    }
+}

@@ -1,0 +1,356 @@
+//! A program becomes a path: pieces from `follow`, corners from `corner`, runs between full stops.
+//!
+//! Joints at which the pieces do not meet smoothly divide the path into stretches. A joint is a stop where the
+//! program halts, a rounded corner where the tolerance allows one, and otherwise a corner that is passed with a
+//! velocity jump (if the machine allows one) or at rest. Rounding starts in the stretches on both sides and
+//! cuts away their ends; what is left of them in the middle stays as it is. All stages run over stretches in
+//! parallel and join their results in order, so the path does not depend on the number of threads.
+
+mod smooth;
+mod stretches;
+mod travel;
+
+use rayon::prelude::*;
+
+use crate::corner::{share_lengths, Sides};
+use crate::follow::{follow, FollowError, FollowOptions, FollowedProgram, Moves};
+use crate::smooth_fit::Offsets;
+pub use smooth::{build_smooth_path, Rough};
+pub use stretches::Part;
+use stretches::{Cuts, Stretches, TASK};
+use travel::{outside, Outside};
+
+use feedplan_geometry::watch::Watch;
+
+/// What the axes allow.
+pub struct Axes<const M: usize> {
+    /// In mm/s and mm/s².
+    pub max_velocity: [f64; M],
+    pub max_acceleration: [f64; M],
+    /// Least and greatest position in mm.
+    pub travel: [[f64; 2]; M],
+    /// Corners may be passed with a velocity jump.
+    pub jump: bool,
+}
+
+/// The path of a program.
+#[derive(Default)]
+pub struct BuiltPath<const M: usize> {
+    /// The pieces in order, in the parts that were made in parallel.
+    pub parts: Vec<Part<M>>,
+    /// Index of the first piece of each run, and the number of pieces.
+    pub runs: Vec<usize>,
+    /// Upper bound of the distance between path and program, both ways.
+    pub deviation: f64,
+    /// On which side of the program a smooth path lies, and how far.
+    pub offsets: Option<Offsets>,
+    /// Chords that were fitted, splines and polynomials that came of it.
+    pub points: usize,
+    pub splines: usize,
+    pub polynomials: usize,
+    /// The first place outside the travel of an axis.
+    pub outside: Option<Outside>,
+    /// Where a smooth path is not smooth.
+    pub rough: Rough,
+}
+
+/// The path of a program.
+pub fn build_path<const M: usize>(
+    moves: &Moves<M>,
+    options: &FollowOptions,
+    axes: &Axes<M>,
+    watch: Watch,
+) -> Result<BuiltPath<M>, FollowError> {
+    let FollowedProgram { pieces, points, splines, polynomials } = follow(moves, options, watch.part(0.6))?;
+    let (mut parts, mut runs) = (Vec::new(), vec![0]);
+    if !pieces.is_empty() {
+        let stretches = Stretches::new(&pieces, moves.splines, moves.halt, options.rounding);
+        let joints = 0..stretches.joint_count();
+        let each = watch.part(0.3).each(joints.len());
+        let need: Vec<f64> = joints
+            .clone()
+            .into_par_iter()
+            .map(|k| {
+                watch.check_at(k);
+                stretches.need(k, axes)
+            })
+            .collect();
+        let length = share_lengths(&need, &stretches.length);
+        let corners: Vec<Option<Cuts>> = joints
+            .into_par_iter()
+            .with_min_len(TASK)
+            .map_init(Sides::default, |sides, k| {
+                each.count(k);
+                stretches.settle(k, &length, sides)
+            })
+            .collect();
+        (parts, runs) = stretches.assemble(&corners, axes.jump, watch.part(0.1));
+    }
+    Ok(BuiltPath {
+        deviation: deviation(&parts),
+        offsets: None,
+        outside: outside(&parts, moves, &axes.travel),
+        parts,
+        runs,
+        points,
+        splines,
+        polynomials,
+        rough: Rough::default(),
+    })
+}
+
+/// The greatest bound of the distance between pieces and moves.
+fn deviation<const M: usize>(parts: &[Part<M>]) -> f64 {
+    parts.iter().flat_map(|part| &part.pieces).map(|piece| piece.deviation).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use feedplan_geometry::conic::Conic;
+    use crate::corner::{Jump, Rounding};
+    use crate::follow::{Followed, Shape, LINE, SPLINE};
+    use feedplan_geometry::quadratic::{norm, sub};
+    use feedplan_geometry::spline::CompositeCurve;
+    use proptest::prelude::*;
+
+    const OPTIONS: FollowOptions = FollowOptions {
+        exact_tolerance: 1e-3,
+        max_chord: 5.0,
+        corner_acceleration: 4e3,
+        max_speed: 1e3,
+        corner_angle: 0.48,
+        rounding: Rounding::Parabola,
+    };
+
+    fn axes<const M: usize>(jump: bool) -> Axes<M> {
+        Axes {
+            max_velocity: [500.0; M],
+            max_acceleration: [1000.0; M],
+            travel: [[f64::NEG_INFINITY, f64::INFINITY]; M],
+            jump,
+        }
+    }
+
+    fn all<const M: usize>(path: &BuiltPath<M>) -> Vec<Followed<M>> {
+        path.parts.iter().flat_map(|part| &part.pieces).copied().collect()
+    }
+
+    fn polyline(
+        points: &[[f64; 2]],
+        tolerance: &[f64],
+        fit: bool,
+        jump: bool,
+    ) -> (Vec<Followed<2>>, Vec<usize>) {
+        let count = points.len() - 1;
+        let fit: Vec<f64> =
+            tolerance.iter().map(|tolerance| if fit { 0.5 * tolerance } else { 0.0 }).collect();
+        let moves = Moves {
+            start: points[0],
+            kind: &vec![LINE; count],
+            target: &points[1..],
+            feed: &vec![100.0; count],
+            tolerance,
+            fit_tolerance: &fit,
+            halt: &vec![false; count],
+            arcs: &[],
+            spline_moves: &[],
+            changes: &[],
+            splines: &CompositeCurve::default(),
+            joints: &vec![true; count],
+        };
+        let path = build_path(&moves, &OPTIONS, &axes(jump), Watch::default()).unwrap();
+        (all(&path), path.runs)
+    }
+
+    fn conic<const M: usize>(followed: &Followed<M>) -> &Conic<M> {
+        followed.piece.conic().unwrap()
+    }
+
+    #[test]
+    fn a_square_is_rounded_at_its_corners_and_nowhere_else() {
+        let square = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0], [0.0, 0.0]];
+        let (pieces, runs) = polyline(&square, &[0.01; 4], false, false);
+        let edge = 10.0 - 0.02 * 2f64.sqrt();
+        assert_eq!((pieces.len(), &runs[..]), (7, &[0, 7][..]));
+        assert!(norm(&sub(&conic(&pieces[0]).control[2], &[edge, 0.0])) < 1e-12);
+        assert_eq!(conic(&pieces[1]).control[1], [10.0, 0.0]);
+        assert_eq!((pieces[1].first, pieces[1].last), (0, 1));
+        let (exact, stops) = polyline(&square, &[0.0; 4], false, false);
+        assert_eq!((exact.len(), &stops[..]), (4, &[0, 1, 2, 3, 4][..]));
+        let (passed, none) = polyline(&square, &[0.0; 4], false, true);
+        assert_eq!((passed.len(), &none[..]), (4, &[0, 4][..]));
+    }
+
+    #[test]
+    fn a_square_with_circles_has_a_quarter_of_one_at_each_corner() {
+        let square = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0], [0.0, 0.0]];
+        let moves = Moves {
+            start: square[0],
+            kind: &[LINE; 4],
+            target: &square[1..],
+            feed: &[100.0; 4],
+            tolerance: &[0.01; 4],
+            fit_tolerance: &[0.0; 4],
+            halt: &[false; 4],
+            arcs: &[],
+            spline_moves: &[],
+            changes: &[],
+            splines: &CompositeCurve::default(),
+            joints: &[true; 4],
+        };
+        let options = FollowOptions { rounding: Rounding::Circle, ..OPTIONS };
+        let path = build_path(&moves, &options, &axes(false), Watch::default()).unwrap();
+        let pieces = all(&path);
+        let radius = 0.01 / (2f64.sqrt() - 1.0);
+        assert_eq!((pieces.len(), &path.runs[..]), (7, &[0, 7][..]));
+        for corner in pieces.iter().skip(1).step_by(2) {
+            let arc = conic(corner);
+            assert!((arc.weight - 0.5f64.sqrt()).abs() < 1e-15);
+            assert!((norm(&sub(&arc.control[1], &arc.control[0])) - radius).abs() < 1e-12);
+            assert!((corner.deviation - 0.01).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_zig_zag_of_short_edges_is_all_corners_that_touch() {
+        let points: Vec<[f64; 2]> =
+            (0..41).map(|i| [0.02 * i as f64, if i % 2 == 0 { 0.0 } else { 0.02 }]).collect();
+        let (pieces, runs) = polyline(&points, &[0.1; 40], false, false);
+        // 39 corners; of the first and the last edge half is left.
+        assert_eq!((pieces.len(), runs.len()), (41, 2));
+        for pair in pieces.windows(2) {
+            assert_eq!(conic(&pair[0]).control[2], conic(&pair[1]).control[0]);
+            assert!(Jump::new(&pair[0].piece, &pair[1].piece).unwrap().size < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_corner_far_shorter_than_its_sides_is_rounded_all_the_same() {
+        for (turn, tolerance) in [(1e-4, 1e-3), (1.5, 1e-5), (1.5, 1e-6)] {
+            let end = [100.0 + 100.0 * f64::cos(turn), 100.0 * f64::sin(turn)];
+            let (pieces, runs) = polyline(&[[0.0, 0.0], [100.0, 0.0], end], &[tolerance; 2], false, false);
+            assert_eq!((pieces.len(), &runs[..]), (3, &[0, 3][..]), "{turn} {tolerance}");
+            assert!(pieces[1].deviation <= tolerance * (1.0 + 1e-9));
+        }
+    }
+
+    /// Two splines between lines: a tangent cubic with weights, a piece of no length, a line of degree 1 at a right
+    /// angle; then a corner to a line.
+    fn between_lines(
+        tolerance: f64,
+        joints: &[bool; 3],
+        axes: &Axes<2>,
+        missing: bool,
+    ) -> Option<BuiltPath<2>> {
+        let mut splines = CompositeCurve::default();
+        splines.push(&[[10.0, 0.0], [11.0, 0.0], [12.0, 0.0], [12.0, 2.0]], &[1.0, 2.0, 1.0, 1.0], 1.0);
+        splines.push(&[[12.0, 2.0], [12.0, 2.0]], &[], 1.0);
+        splines.push(&[[12.0, 2.0], [14.0, 2.0]], &[], 1.0);
+        let moves = Moves {
+            start: [0.0, 0.0],
+            kind: &[LINE, SPLINE, LINE],
+            target: &[[10.0, 0.0], [14.0, 2.0], [14.0, 10.0]],
+            feed: &[10.0; 3],
+            tolerance: &[tolerance; 3],
+            fit_tolerance: &[0.0; 3],
+            halt: &[false; 3],
+            arcs: &[],
+            spline_moves: if missing { &[] } else { &[(1, 0..3)] },
+            changes: &[],
+            splines: &splines,
+            joints,
+        };
+        build_path(&moves, &OPTIONS, axes, Watch::default()).ok()
+    }
+
+    #[test]
+    fn an_exact_spline_passes_smoothly_between_lines_and_stops_in_its_corners() {
+        let mut limits = axes(false);
+        let path = between_lines(0.0, &[true; 3], &limits, false).unwrap();
+        let pieces = all(&path);
+        assert_eq!((pieces.len(), &path.runs[..]), (4, &[0, 2, 3, 4][..]));
+        let widths: Vec<f64> = pieces.iter().map(|piece| piece.piece.width()).collect();
+        assert_eq!(widths[0], 10.0);
+        assert!(widths[1] == widths[2] && pieces[1].piece.conic().is_none());
+        assert!(path.outside.is_none() && path.deviation == 0.0);
+        // The polygon reaches 12, the curve less than that before its end.
+        limits.travel[0] = [f64::NEG_INFINITY, 13.0];
+        let outside = between_lines(0.0, &[true; 3], &limits, false).unwrap().outside.unwrap();
+        assert_eq!((outside.index, outside.axis, outside.position), (1, 0, 14.0));
+        let elsewhere = [true, false, false];
+        assert!(between_lines(0.0, &elsewhere, &limits, false).unwrap().outside.is_none());
+        assert!(between_lines(0.0, &elsewhere, &limits, true).is_none());
+        assert_eq!(between_lines(0.0, &elsewhere, &axes(true), false).unwrap().runs, [0, 4]);
+    }
+
+    #[test]
+    fn corners_at_splines_are_rounded_and_what_is_not_bent_stays_as_it_is() {
+        let path = between_lines(0.1, &[true; 3], &axes(false), false).unwrap();
+        let pieces = all(&path);
+        assert_eq!(path.runs, [0, pieces.len()]);
+        assert!(path.deviation > 0.05 && path.deviation <= 0.1 * (1.0 + 1e-9), "{}", path.deviation);
+        assert_joined_smoothly(&pieces, &path.runs);
+        let no_splines = CompositeCurve::default();
+        let [part] = &path.parts[..] else { panic!("one task") };
+        let curves = pieces.iter().filter_map(|followed| match &followed.piece {
+            Shape::Spline(spline) if spline.made => {
+                Some((followed.deviation, part.spline(spline, &no_splines)))
+            }
+            _ => None,
+        });
+        // What is left of the cubic, its end, and the line in three parts, of which the middle one is a line still.
+        let made: Vec<_> =
+            curves.map(|(deviation, piece)| (deviation, piece.degree(), piece.is_rational())).collect();
+        assert_eq!(made.iter().map(|piece| piece.1).collect::<Vec<_>>(), [3, 3, 2, 2, 2]);
+        assert!(
+            made[0].0 == 0.0 && made[0].2 && made[1].0 == made[2].0 && made[2].0 > 0.0 && made[3].0 == 0.0
+        );
+    }
+
+    fn assert_joined_smoothly<const M: usize>(pieces: &[Followed<M>], runs: &[usize]) {
+        for (i, pair) in pieces.windows(2).enumerate() {
+            if runs.binary_search(&(i + 1)).is_err() {
+                let jump = Jump::new(&pair[0].piece, &pair[1].piece).unwrap();
+                assert!(jump.is_smooth(&pair[0].piece, &pair[1].piece), "{i}: {}", jump.size);
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn random_polylines_are_joined_smoothly_within_tolerance(
+            steps in prop::collection::vec((-1.0..1.0f64, -1.0..1.0f64, -3..2i32), 2..60),
+            tolerance in prop::sample::select(vec![1e-4, 1e-2, 1.0]),
+            fit: bool,
+            exact_from in 0..60usize,
+        ) {
+            let mut points = vec![[0.0, 0.0]];
+            for (x, y, exponent) in steps {
+                let scale = 10f64.powi(exponent);
+                let [a, b] = points[points.len() - 1];
+                points.push([a + scale * x + 1e-4, b + scale * y]);
+            }
+            let count = points.len() - 1;
+            let limits: Vec<f64> = (0..count).map(|i| if i < exact_from { tolerance } else { 0.0 }).collect();
+            let (pieces, runs) = polyline(&points, &limits, fit, false);
+            prop_assert_eq!(conic(&pieces[0]).control[0], points[0]);
+            prop_assert_eq!(conic(&pieces[pieces.len() - 1]).control[2], points[count]);
+            prop_assert!(pieces[0].first == 0 && pieces[pieces.len() - 1].last as usize == count - 1);
+            for (i, pair) in pieces.windows(2).enumerate() {
+                prop_assert_eq!(conic(&pair[0]).control[2], conic(&pair[1]).control[0]);
+                prop_assert!(pair[1].first >= pair[0].first && pair[1].first <= pair[0].last + 1);
+                prop_assert!(pair[1].last >= pair[0].last);
+                if runs.binary_search(&(i + 1)).is_err() {
+                    let jump = Jump::new(&pair[0].piece, &pair[1].piece).unwrap();
+                    prop_assert!(jump.is_smooth(&pair[0].piece, &pair[1].piece), "{}", jump.size);
+                }
+            }
+            for piece in &pieces {
+                prop_assert!(piece.deviation <= piece.tolerance * (1.0 + 1e-9));
+                prop_assert!(!piece.exact || piece.deviation == 0.0);
+                prop_assert!(piece.piece.width() > 0.0);
+            }
+        }
+    }
+}

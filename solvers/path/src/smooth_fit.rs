@@ -1,0 +1,329 @@
+//! A run of lines as a C4 quintic B-spline within a tolerance: a convex fit in a band, certified both ways.
+//!
+//! | file | idea |
+//! |---|---|
+//! | `polyline` | what is to be followed: vertices, stations, directions, tolerances |
+//! | `bends` | which vertices draw the curve, so that bends keep their size |
+//! | `size` | how long intervals may be, and knots of them |
+//! | `spline`, `bezier` | the curve, its energy; its pieces and bounds on them |
+//! | `rows` | the band around the polyline as linear rows |
+//! | `band`, `interior_point` | the convex problem of least ∫ \|C'''\|² du in a window |
+//! | `windows` | all windows of a run in parallel, and their seams |
+//! | `certificate` | the proof: distances both ways, and that the curve never stops |
+//! | `offsets` | on which side of the polyline the curve lies |
+//! | `refine` | intervals halved where it fails |
+//! | `corner` | corners rounded one by one, where no refinement helps |
+//!
+//! The parameter u of the curve is the length of the chords, so that blocks and feeds map by their stations; D is the
+//! number of axes that move. Time and memory are linear in the number of vertices.
+
+mod band;
+mod bends;
+mod bezier;
+mod certificate;
+mod corner;
+mod interior_point;
+mod offsets;
+pub mod polyline;
+mod refine;
+mod rows;
+mod size;
+mod spline;
+mod windows;
+
+use feedplan_geometry::quadratic::{dot, norm, sub};
+use feedplan_geometry::spline::CompositeCurve;
+use feedplan_geometry::watch::Watch;
+use bezier::split;
+use certificate::Certificate;
+use corner::append_corners;
+pub use offsets::Offsets;
+use polyline::Polyline;
+use spline::DEGREE;
+use std::ops::Range;
+use windows::{Fit, FREE};
+
+/// Times that intervals are halved.
+const REFINEMENTS: usize = 3;
+/// Times that a run is taken apart where it cannot be fitted, before all of it is left to its corners.
+const PARTINGS: usize = 3;
+/// A run whose vertices are this close to a line, in tolerances, is one.
+const STRAIGHT: f64 = 1e-3;
+/// Parts of an interval that are shorter than this share of it are not cut off.
+const SLIVER: f64 = 1e-6;
+
+/// How a run is fitted.
+#[derive(Clone, Copy, Debug)]
+pub struct SmoothOptions<const D: usize> {
+    /// Chords longer than this are straight in the middle, in mm.
+    pub long: f64,
+    /// Least and greatest position of each axis: where no curve stays inside, corners are rounded one by one.
+    pub bounds: [[f64; 2]; D],
+}
+
+/// What a piece of the curve follows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stretch {
+    /// First and last chord.
+    pub first: usize,
+    pub last: usize,
+    /// Upper bound of the distance between both, both ways, in mm.
+    pub deviation: f64,
+    /// The curve has a corner before this piece: nothing smooth was found.
+    pub stop: bool,
+}
+
+impl Stretch {
+    fn new(first: usize, last: usize, deviation: f64) -> Self {
+        Self { first, last, deviation, stop: false }
+    }
+}
+
+/// The curve of a run. Pieces of degree 1 are lines, of degree 5 parts of splines, of degree 7 corners.
+#[derive(Clone, Debug, Default)]
+pub struct Smooth<const D: usize> {
+    pub curve: CompositeCurve<D>,
+    pub stretches: Vec<Stretch>,
+    /// B-splines and lines, and the polynomials of them before they are cut.
+    pub splines: usize,
+    pub polynomials: usize,
+    /// Chords that are left to their corners, between stops.
+    pub corners: Vec<Range<usize>>,
+    /// On which side of the polyline the curve lies, and how far.
+    pub offsets: Offsets,
+    /// Newton steps times intervals that the fit took.
+    pub work: usize,
+}
+
+impl<const D: usize> Smooth<D> {
+    fn push(&mut self, control: &[[f64; D]], width: f64, stretch: Stretch) {
+        self.curve.push(control, &[], width);
+        self.stretches.push(stretch);
+    }
+
+    /// Calls `append`, and says that the curve stops where its pieces begin, unless they are the first.
+    fn after_stop(&mut self, append: impl FnOnce(&mut Self)) {
+        let at = self.stretches.len();
+        append(self);
+        if at > 0 && at < self.stretches.len() {
+            self.stretches[at].stop = true;
+        }
+    }
+}
+
+/// The curve along a polyline of one chord or more, cut beside the vertices that `cut` says.
+///
+/// Vertices that turn back must end a polyline: no curve passes them without standing still.
+pub fn smooth_fit<const D: usize>(
+    line: &Polyline<D>,
+    cut: &[bool],
+    options: &SmoothOptions<D>,
+    watch: Watch,
+) -> Smooth<D> {
+    let mut out = Smooth::default();
+    // Not a number is no length.
+    let partings = if line.length().is_finite() { PARTINGS } else { 0 };
+    Run { line, cut, options, watch: watch.each(line.chords()) }.fit(0..line.chords(), partings, &mut out);
+    out
+}
+
+struct Run<'a, const D: usize> {
+    line: &'a Polyline<D>,
+    cut: &'a [bool],
+    options: &'a SmoothOptions<D>,
+    /// Counts chords.
+    watch: Watch<'a>,
+}
+
+impl<const D: usize> Run<'_, D> {
+    /// Appends the curve along some chords.
+    fn fit(&self, chords: Range<usize>, partings: usize, out: &mut Smooth<D>) {
+        if chords.is_empty() {
+            return;
+        }
+        if let Some(deviation) = self.straight(&chords) {
+            return out.after_stop(|out| self.append_line(&chords, deviation, out));
+        }
+        if partings == 0 {
+            return self.leave_corners(chords, out);
+        }
+        let part = self.line.part(chords.start, chords.end);
+        let (fit, pieces, certificate) = self.refined(&part);
+        out.work += fit.work;
+        if certificate.good.iter().all(|&good| good) {
+            out.offsets.merge(&Offsets::of(&part, &fit.spline.knots, &pieces, &certificate.foot, self.watch));
+            return out.after_stop(|out| self.append_spline(&chords, &fit, &pieces, &certificate, out));
+        }
+        let mut next = chords.start;
+        for zone in zones(&part, &fit.spline.knots, &certificate) {
+            let zone = zone.start + chords.start..zone.end + chords.start;
+            self.fit(next..zone.start, partings - 1, out);
+            next = zone.end;
+            self.leave_corners(zone, out);
+        }
+        self.fit(next..chords.end, partings - 1, out);
+    }
+
+    /// The fit of a part, refined until its certificate holds or refining helps no more.
+    fn refined<'b>(&self, part: &'b Polyline<D>) -> (Fit<'b, D>, Vec<bezier::Control<D>>, Certificate) {
+        let long = self.options.long;
+        // How often it is refined is not known: each round counts as half of what is left.
+        let mut watch = self.watch.part(0.5 * part.chords() as f64);
+        let mut fit = Fit::new(part, size::knots(part, long), long);
+        let all = 0..fit.spline.intervals();
+        fit.solve(std::slice::from_ref(&all), watch);
+        let mut refinement = 0;
+        loop {
+            let pieces = fit.spline.pieces();
+            let certificate = Certificate::new(part, &fit.spline.knots, &pieces, &self.options.bounds, watch);
+            if refinement == REFINEMENTS {
+                return (fit, pieces, certificate);
+            }
+            let mut bad = bends::missed(part, &fit.spline.knots, &pieces, &certificate.foot, watch);
+            for (bad, good) in bad.iter_mut().zip(&certificate.good) {
+                *bad |= !good;
+            }
+            if !bad.contains(&true) {
+                return (fit, pieces, certificate);
+            }
+            let (mut next, ranges) = refine::halved(&fit, &bad, long);
+            watch = watch.part(0.5);
+            next.solve(&ranges, watch);
+            fit = next;
+            refinement += 1;
+        }
+    }
+
+    /// How far the vertices are from one line that the chords follow without turning back, if that is next to nothing.
+    fn straight(&self, chords: &Range<usize>) -> Option<f64> {
+        let line = self.line;
+        let (start, end) = (line.vertex[chords.start], line.vertex[chords.end]);
+        if chords.len() == 1 {
+            return Some(0.0);
+        }
+        let way = sub(&end, &start);
+        let length = norm(&way);
+        let mut worst = 0.0f64;
+        for i in chords.clone() {
+            let away = sub(&line.vertex[i], &start);
+            let along = dot(&away, &way) / (length * length);
+            let off = norm(&std::array::from_fn::<f64, D, _>(|k| away[k] - along * way[k]));
+            if !(dot(&line.direction[i], &way) > 0.0 && off <= STRAIGHT * line.tolerance_at(i)) {
+                return None;
+            }
+            worst = worst.max(off);
+        }
+        Some(worst)
+    }
+
+    /// A line, cut beside the vertices of the run.
+    fn append_line(&self, chords: &Range<usize>, deviation: f64, out: &mut Smooth<D>) {
+        let (start, end) = (self.line.vertex[chords.start], self.line.vertex[chords.end]);
+        out.splines += 1;
+        out.polynomials += 1;
+        let way = sub(&end, &start);
+        let length = norm(&way);
+        let (mut from, mut first) = (start, chords.start);
+        for i in chords.start + 1..=chords.end {
+            if i < chords.end && !self.cut[i] {
+                continue;
+            }
+            let along = dot(&sub(&self.line.vertex[i], &start), &way) / (length * length);
+            let to = if i == chords.end { end } else { std::array::from_fn(|k| start[k] + along * way[k]) };
+            let width = norm(&sub(&to, &from));
+            if width > 0.0 {
+                out.push(&[from, to], width, Stretch::new(first, i - 1, deviation));
+                (from, first) = (to, i);
+            }
+        }
+    }
+
+    fn leave_corners(&self, chords: Range<usize>, out: &mut Smooth<D>) {
+        let before = out.stretches.len();
+        out.after_stop(|out| append_corners(self.line, chords.start, chords.end, out));
+        out.splines += chords.len();
+        out.polynomials += out.stretches.len() - before;
+        // Corners lie between their legs.
+        for stretch in &out.stretches[before..] {
+            out.offsets.offer(-stretch.deviation);
+        }
+        out.corners.push(chords);
+    }
+
+    /// The pieces of a spline, those that lie on one line joined, cut at the foot points of vertices.
+    fn append_spline(
+        &self,
+        chords: &Range<usize>,
+        fit: &Fit<D>,
+        pieces: &[bezier::Control<D>],
+        certificate: &Certificate,
+        out: &mut Smooth<D>,
+    ) {
+        let knots = &fit.spline.knots;
+        let Certificate { foot, deviation, .. } = certificate;
+        out.splines += 1;
+        // The chord on which an interval lies exactly.
+        let lies = |j: usize| {
+            let pins = &fit.pin[j..=j + DEGREE];
+            (pins[0] != FREE && pins.iter().all(|&pin| pin == pins[0])).then_some(pins[0] as usize)
+        };
+        // The chord at the end of what is appended, and the first that no piece follows yet: none is left out, though
+        // all of it may be nearest to a single place.
+        let last = chords.len() - 1;
+        let (mut chord, mut next) = (0, 0);
+        let mut push = |control: &[[f64; D]], width: f64, [first, end]: [usize; 2], j: usize| {
+            let end = if j + 1 == pieces.len() && foot[end + 1] >= knots[j + 1] { last } else { end };
+            let first = chords.start + first.min(next);
+            out.push(control, width, Stretch::new(first, chords.start + end, deviation[j]));
+            next = end + 1;
+        };
+        let (mut j, mut polynomials) = (0, 0);
+        while j < pieces.len() {
+            polynomials += 1;
+            let (first, start) = (j, knots[j]);
+            if let Some(pinned) = lies(j) {
+                while j + 1 < pieces.len() && lies(j + 1) == Some(pinned) {
+                    j += 1;
+                }
+                push(&[pieces[first][0], pieces[j][DEGREE]], knots[j + 1] - start, [pinned; 2], j);
+                (chord, j) = (pinned, j + 1);
+                continue;
+            }
+            let (end, width) = (knots[j + 1], knots[j + 1] - start);
+            let (mut from, mut rest) = (start, pieces[j]);
+            while chord < last && foot[chord + 1] <= from {
+                chord += 1;
+            }
+            let mut begun = chord;
+            while chord < last && foot[chord + 1] < end {
+                let u = foot[chord + 1];
+                let cut = self.cut[chords.start + chord + 1];
+                if cut && u - from > SLIVER * width && end - u > SLIVER * width {
+                    let (part, after) = split(&rest, (u - from) / (end - from));
+                    push(&part, u - from, [begun, chord], j);
+                    (from, rest, begun) = (u, after, chord + 1);
+                }
+                chord += 1;
+            }
+            push(&rest, end - from, [begun, chord], j);
+            j += 1;
+        }
+        out.polynomials += polynomials;
+    }
+}
+
+/// The chords around the intervals that are not good, an interval more on each side.
+fn zones<const D: usize>(line: &Polyline<D>, knots: &[f64], certificate: &Certificate) -> Vec<Range<usize>> {
+    let last = knots.len() - 1;
+    let mut zones: Vec<Range<usize>> = Vec::new();
+    for (j, _) in certificate.good.iter().enumerate().filter(|(_, good)| !**good) {
+        let (low, high) = (knots[j.saturating_sub(1)], knots[(j + 2).min(last)]);
+        let start = line.chord_at(low);
+        let end = line.chord_at(high) + 1;
+        match zones.last_mut() {
+            Some(zone) if start <= zone.end => zone.end = end.max(zone.end),
+            _ => zones.push(start..end),
+        }
+    }
+    zones
+}

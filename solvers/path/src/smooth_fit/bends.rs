@@ -1,0 +1,243 @@
+//! Bends keep their size: vertices away from corners draw the curve.
+//!
+//! Least ∫ |C'''|² alone draws every bend towards its centre, by the whole tolerance: holes and bosses alike come out
+//! too small. So the vertices V_i of bends add a weight to it,
+//!
+//! ```text
+//! ∫ |C'''|² du + Σ (l_i / λ⁶) |C(u_i) − V_i|²
+//! ```
+//!
+//! where l_i is the length of the chords at V_i and λ the length over which the curve forgets what bends it: noise
+//! of a shorter wave than about 2πλ is smoothed out, on a circle of radius r the curve is off by −λ⁶/r⁵, and by about
+//! λ³/r² where a bend begins or ends, which fades as exp(−u/2λ).
+//!
+//! Vertices of arcs and splines have no noise: there λ is a part of the chord, and the curve nearly the best
+//! approximation. It is no part of the interval, since intervals beside a corner are shorter: weights would fall by a
+//! factor of four from one to the next, and what the corner does to the curve would alternate over many of them.
+//!
+//! Points of a program may have noise; with intervals h = √(6 ε r) the end of a bend leaves no more than OFF ε if
+//!
+//! ```text
+//! λ = h (OFF h / 36 ε)^(1/3)
+//! ```
+//!
+//! At corners and near them nothing is added, and the curve may use the tolerance on one side.
+
+use super::bezier::{point_and_slope, Control};
+use super::polyline::{angle, Polyline};
+use feedplan_geometry::quadratic::{dot, norm, sub};
+use feedplan_geometry::watch::Watch;
+
+/// A vertex at which the polyline turns by more, in rad, is a corner,
+const CORNER: f64 = std::f64::consts::FRAC_PI_6;
+/// seen from places this far from it on both sides, in tolerances: an arc of a radius below about four tolerances is a
+/// corner, and noise far below the tolerance is none.
+const VIEW: f64 = 2.0;
+/// The curve leaves the polyline for a corner over this length, in tolerances by the angle.
+const REACH: f64 = 10.0;
+/// λ of arcs and splines, in chords, of which an interval on a circle has six,
+const EXACT: f64 = 0.18;
+/// and the least, in intervals.
+const LEAST_EXACT: f64 = 0.03;
+/// Of points, by how much the curve may be off at the ends of bends, in tolerances,
+const OFF: f64 = 0.2;
+/// the least λ, in intervals,
+const LEAST: f64 = 0.1;
+/// and the vertices in an interval below which it is smaller: the mean of a few smooths nothing out.
+const FEW: f64 = 2.0;
+/// The greatest λ of all vertices, in intervals.
+const MOST: f64 = 0.6;
+/// An interval shorter than a chord at a vertex, in which the curve is farther from it than this, in tolerances,
+/// is too long to follow it.
+const MISS: f64 = 0.1;
+
+/// What a vertex is to the curve.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Hold {
+    /// Any place within the tolerance will do.
+    Free,
+    /// A point of a program, which may have noise.
+    Point,
+    /// A point of an arc or a spline.
+    Exact,
+}
+
+impl Hold {
+    /// l/λ⁶ in an interval of length h, in mm⁻⁵, of a vertex between two chords. A line beside an arc has no other
+    /// vertices: of arcs the shorter chord counts.
+    pub fn weight(self, chords: [f64; 2], h: f64, tolerance: f64) -> f64 {
+        // Both λ are in parts of h.
+        let (length, lambda) = match self {
+            Self::Free => return 0.0,
+            Self::Exact => {
+                let length = chords[0].min(chords[1]);
+                (length, (EXACT * length / h).clamp(LEAST_EXACT, MOST))
+            }
+            Self::Point => {
+                let length = 0.5 * (chords[0] + chords[1]);
+                let end = (OFF * h / (36.0 * tolerance)).cbrt();
+                (length, end.min(MOST * (h / (FEW * length)).powi(2)).clamp(LEAST, MOST))
+            }
+        };
+        length * (lambda * h).powi(-6)
+    }
+}
+
+/// The intervals that are too long to pass the vertices of bends in them, near places `foot`.
+pub fn missed<const D: usize>(
+    line: &Polyline<D>,
+    knots: &[f64],
+    pieces: &[Control<D>],
+    foot: &[f64],
+    watch: Watch,
+) -> Vec<bool> {
+    let mut missed = vec![false; pieces.len()];
+    let mut j = 0;
+    for i in (1..line.chords()).filter(|_| line.sized) {
+        watch.check_at(i);
+        while j + 1 < pieces.len() && knots[j + 1] <= foot[i] {
+            j += 1;
+        }
+        let h = knots[j + 1] - knots[j];
+        if line.hold[i] == Hold::Point && line.chord_length(i - 1).max(line.chord_length(i)) > h {
+            let (point, _) = point_and_slope(&pieces[j], ((foot[i] - knots[j]) / h).clamp(0.0, 1.0));
+            missed[j] |= norm(&sub(&point, &line.vertex[i])) > MISS * line.tolerance_at(i);
+        }
+    }
+    missed
+}
+
+impl<const D: usize> Polyline<D> {
+    /// Tells the vertices of bends from those of corners. Chords longer than `long` are lines, and a lone vertex between
+    /// two of them is a corner; `curved` says which chords stand for arcs or splines.
+    pub fn hold_bends(&mut self, long: f64, curved: impl Fn(usize) -> bool, watch: Watch) {
+        let last = self.chords();
+        let turn = self.turns_in_view(watch);
+        // Up to where the corners before it reach; where a corner is seen from several vertices, the sharpest counts.
+        let mut free = vec![false; last + 1];
+        let reach = |i: usize| {
+            let sharpest = turn[i] >= turn[i - 1].max(turn[i + 1]);
+            let reach = if sharpest { REACH * self.tolerance_at(i) / turn[i] } else { 0.0 };
+            (turn[i] >= CORNER || self.is_lone(i, long)).then_some(reach)
+        };
+        let reaches: Vec<Option<f64>> =
+            (0..=last).map(|i| if i > 0 && i < last { reach(i) } else { None }).collect();
+        let mut end = f64::NEG_INFINITY;
+        for i in 1..last {
+            if let Some(reach) = reaches[i] {
+                end = end.max(self.station[i] + reach);
+            }
+            free[i] |= self.station[i] <= end;
+        }
+        let mut start = f64::INFINITY;
+        for i in (1..last).rev() {
+            if let Some(reach) = reaches[i] {
+                start = start.min(self.station[i] - reach);
+            }
+            free[i] |= self.station[i] >= start;
+        }
+        for i in (1..last).filter(|&i| !free[i]) {
+            self.hold[i] = if curved(i - 1) || curved(i) { Hold::Exact } else { Hold::Point };
+        }
+    }
+
+    /// The turn at every vertex, in rad, seen from two tolerances before and after it; 0 at the ends.
+    fn turns_in_view(&self, watch: Watch) -> Vec<f64> {
+        let last = self.chords();
+        let mut turns = vec![0.0; last + 1];
+        let (mut a, mut b) = (0, 0);
+        for i in 1..last {
+            watch.check_at(i);
+            let view = VIEW * self.tolerance_at(i);
+            let (low, high) =
+                ((self.station[i] - view).max(0.0), (self.station[i] + view).min(self.length()));
+            // Tolerances change: the view need not move on with the vertex.
+            while a > 0 && self.station[a] > low {
+                a -= 1;
+            }
+            while self.station[a + 1] < low {
+                a += 1;
+            }
+            b = b.max(i);
+            while b > i && self.station[b] > high {
+                b -= 1;
+            }
+            while b + 1 < last && self.station[b + 1] < high {
+                b += 1;
+            }
+            let back = sub(&self.vertex[i], &self.point(a, low));
+            turns[i] = angle(&back, &sub(&self.point(b, high), &self.vertex[i]));
+        }
+        turns
+    }
+
+    /// Vertex i lies between two long chords, and at neither of their other ends the polyline bends on the same way.
+    fn is_lone(&self, i: usize, long: f64) -> bool {
+        if self.chord_length(i - 1) <= long || self.chord_length(i) <= long {
+            return false;
+        }
+        let change = |k: usize| sub(&self.direction[k], &self.direction[k - 1]);
+        let bends_on = |k: usize| {
+            k > 0 && k < self.chords() && self.turn(k) < CORNER && dot(&change(i), &change(k)) > 0.0
+        };
+        !bends_on(i - 1) && !bends_on(i + 1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The hold of every vertex.
+    fn held(points: Vec<[f64; 2]>, tolerance: f64) -> Vec<Hold> {
+        let chords = points.len() - 1;
+        let mut line = Polyline::new(points, vec![tolerance; chords]);
+        line.hold_bends(5.0, |_| false, Watch::default());
+        line.hold
+    }
+
+    fn circle(radius: f64, turn: f64, count: usize) -> Vec<[f64; 2]> {
+        (0..=count).map(|i| (turn * i as f64).sin_cos()).map(|(y, x)| [radius * x, radius * y]).collect()
+    }
+
+    #[test]
+    fn vertices_of_a_bend_are_held_and_those_of_corners_are_free() {
+        let all = held(circle(2.0, 0.1, 30), 0.1);
+        assert!(
+            all[0] == Hold::Free && all[30] == Hold::Free && all[1..30].iter().all(|h| *h == Hold::Point)
+        );
+        // Of the radius of a tolerance: a corner. Of 29 degrees a vertex: a bend; of 31: corners.
+        assert!(held(circle(0.1, 0.1, 30), 0.1).iter().all(|h| *h == Hold::Free));
+        assert!(held(circle(20.0, 0.506, 6), 0.1)[1..6].iter().all(|h| *h == Hold::Point));
+        assert!(held(circle(20.0, 0.541, 6), 0.1).iter().all(|h| *h == Hold::Free));
+    }
+
+    #[test]
+    fn a_corner_frees_as_much_on_both_sides_as_the_curve_needs_to_go_around() {
+        // A right angle at (10, 0) of points 0.1 apart: 10 · 0.1 / (π/2) = 0.64 is six of them on each side.
+        let side = |i: usize| 0.1 * i as f64;
+        let points =
+            (0..=200).map(|i| if i <= 100 { [side(i), 0.0] } else { [10.0, side(i - 100)] }).collect();
+        let held = held(points, 0.1);
+        let free: Vec<usize> = (1..200).filter(|&i| held[i] == Hold::Free).collect();
+        assert_eq!(free, (94..=106).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn a_slight_corner_between_long_lines_is_free_and_a_polygon_of_them_is_a_bend() {
+        let bent = held(vec![[0.0, 0.0], [20.0, 0.0], [40.0, 4.0]], 0.1);
+        assert_eq!(bent[1], Hold::Free);
+        assert!(held(circle(100.0, 0.2, 10), 0.1)[1..10].iter().all(|h| *h == Hold::Point));
+    }
+
+    #[test]
+    fn a_point_draws_less_than_an_arc_and_neither_depends_on_the_unit() {
+        for (h, tolerance) in [(0.6, 0.1), (3.0, 0.1), (0.05, 0.001)] {
+            let weight = |hold: Hold, unit: f64| hold.weight([0.1 * h / unit; 2], h / unit, tolerance / unit);
+            let [point, exact] = [Hold::Point, Hold::Exact].map(|hold| weight(hold, 1.0));
+            assert!(exact >= point && point > 0.0 && weight(Hold::Free, 1.0) == 0.0);
+            let inch = weight(Hold::Point, 25.4) / 25.4f64.powi(5);
+            assert!((inch / point - 1.0).abs() < 1e-9);
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! The band: linear rows that keep samples of the curve within the tolerance of their places on the polyline.
+//!
+//! ```text
+//! |n · (C(u) − R)| ≤ FILL ε          for each of the D − 1 normals n, divided by √(D − 1)
+//! |t · (C(u) − R)| ≤ ε
+//! ```
+//!
+//! At a vertex that turns by more than SHARP, t is the bisector's tangent, and the curve may slip along it by little.
+//! Vertices that are held draw the curve as well (see `bends`).
+
+use super::polyline::Polyline;
+use super::spline::{around, basis, ORDER};
+use feedplan_geometry::quadratic::{dot, norm};
+
+/// Samples of an interval, beside the vertices in it.
+const SAMPLES: usize = 4;
+/// The part of the tolerance that samples may use: between them the curve bulges.
+const FILL: f64 = 0.97;
+/// A vertex that turns by more, in rad, has limits of its own.
+const SHARP: f64 = 0.436;
+const SHARP_ACROSS: f64 = 0.95;
+const SHARP_ALONG: f64 = 0.25;
+
+/// A sample with the limits in D orthogonal directions, the last of them along the polyline.
+#[derive(Clone, Copy, Debug)]
+pub struct Row<const D: usize> {
+    pub basis: [f64; ORDER],
+    pub target: [f64; D],
+    pub direction: [[f64; D]; D],
+    pub half: [f64; D],
+    /// The weight of half the square of the distance.
+    pub pull: f64,
+}
+
+/// The rows of intervals `first` to `end`, and the number of rows before each of them.
+pub fn rows<const D: usize>(
+    line: &Polyline<D>,
+    knots: &[f64],
+    first: usize,
+    end: usize,
+    origin: &[f64; D],
+) -> (Vec<Row<D>>, Vec<usize>) {
+    let (mut rows, mut start) = (Vec::with_capacity(2 * SAMPLES * (end - first)), vec![0]);
+    let mut chord = line.chord_at(knots[first]);
+    for j in first..end {
+        let (t, low, high) = (around(knots, j), knots[j], knots[j + 1]);
+        let mut push = |u: f64, chord: usize, vertex: Option<usize>| {
+            let (along, limits) = limits(line, chord, vertex);
+            let point = line.point(chord, u);
+            rows.push(Row {
+                basis: basis(&t, u),
+                target: std::array::from_fn(|k| point[k] - origin[k]),
+                direction: frame(&along),
+                half: std::array::from_fn(|r| if r + 1 == D { limits[1] } else { limits[0] }),
+                pull: vertex.map_or(0.0, |i| pull(line, i, high - low)),
+            });
+        };
+        for sample in 0..SAMPLES {
+            let u = low + (high - low) * (sample as f64 + 0.5) / SAMPLES as f64;
+            while chord + 1 < line.chords() && line.station[chord + 1] <= u {
+                chord += 1;
+                push(line.station[chord].max(low), chord, Some(chord));
+            }
+            push(u, chord, None);
+        }
+        while chord + 1 < line.chords() && line.station[chord + 1] < high {
+            chord += 1;
+            push(line.station[chord], chord, Some(chord));
+        }
+        start.push(rows.len());
+    }
+    (rows, start)
+}
+
+/// How strongly a vertex draws the curve in an interval of length h.
+fn pull<const D: usize>(line: &Polyline<D>, vertex: usize, h: f64) -> f64 {
+    if !line.sized {
+        return 0.0;
+    }
+    let chords = [vertex - 1, vertex].map(|chord| line.chord_length(chord));
+    line.hold[vertex].weight(chords, h, line.tolerance_at(vertex))
+}
+
+/// The tangent at a place, and the limits across and along it.
+fn limits<const D: usize>(line: &Polyline<D>, chord: usize, vertex: Option<usize>) -> ([f64; D], [f64; 2]) {
+    let across = 1.0 / (D.max(2) as f64 - 1.0).sqrt();
+    let after = line.direction[chord];
+    let Some(vertex) = vertex else {
+        let epsilon = line.tolerance[chord];
+        return (after, [FILL * across * epsilon, epsilon]);
+    };
+    let epsilon = line.tolerance_at(vertex);
+    let before = line.direction[vertex - 1];
+    let sum: [f64; D] = std::array::from_fn(|k| before[k] + after[k]);
+    let length = norm(&sum);
+    let along = if length > 1e-3 { sum.map(|x| x / length) } else { after };
+    if line.turn(vertex) > SHARP {
+        (along, [SHARP_ACROSS * across * epsilon, SHARP_ALONG * epsilon])
+    } else {
+        (along, [FILL * across * epsilon, epsilon])
+    }
+}
+
+/// An orthonormal frame whose last direction is the given one: Gram and Schmidt from the axes farthest from it.
+fn frame<const D: usize>(along: &[f64; D]) -> [[f64; D]; D] {
+    let mut out = [[0.0; D]; D];
+    out[D - 1] = *along;
+    let mut used = [false; D];
+    for r in 0..D.saturating_sub(1) {
+        let mut best = ([0.0; D], 0.0, 0);
+        for axis in (0..D).filter(|&axis| !used[axis]) {
+            let mut e = [0.0; D];
+            e[axis] = 1.0;
+            for known in out[..r].iter().chain(std::iter::once(along)) {
+                let part = dot(&e, known);
+                for k in 0..D {
+                    e[k] -= part * known[k];
+                }
+            }
+            let length = norm(&e);
+            if length > best.1 {
+                best = (e, length, axis);
+            }
+        }
+        used[best.2] = true;
+        out[r] = best.0.map(|x| x / best.1);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_orthonormal() {
+        for along in [[1.0, 0.0, 0.0, 0.0], [0.5, -0.5, 0.5, 0.5], [1e-9, 0.6, 0.0, 0.8]] {
+            let frame = frame(&along);
+            for a in 0..4 {
+                for b in 0..4 {
+                    let expected = if a == b { 1.0 } else { 0.0 };
+                    assert!((dot(&frame[a], &frame[b]) - expected).abs() < 1e-14);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_vertex_is_a_sample_and_the_sharp_one_is_held_along_its_bisector() {
+        let line = Polyline::new(vec![[0.0, 0.0], [1.0, 0.0], [2.0, 0.1], [2.0, 2.0]], vec![0.1; 3]);
+        let knots: Vec<f64> = (0..=4).map(|i| line.length() * i as f64 / 4.0).collect();
+        let (rows, start) = rows(&line, &knots, 0, 4, &[0.0; 2]);
+        assert_eq!((rows.len(), start[4]), (18, 18));
+        let sharp: Vec<&Row<2>> = rows.iter().filter(|row| row.half[1] < 0.03).collect();
+        let [corner] = sharp[..] else { panic!("one sharp vertex") };
+        assert!(norm(&[corner.target[0] - 2.0, corner.target[1] - 0.1]) < 1e-15);
+        assert!((corner.half[0] - 0.095).abs() < 1e-15);
+        assert!((dot(&corner.direction[1], &[1.0, 1.0])).abs() > 1.3);
+    }
+}

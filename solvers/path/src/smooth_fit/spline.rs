@@ -1,0 +1,191 @@
+//! A C4 quintic B-spline over strictly increasing knots, its ends clamped.
+//!
+//! Interval j lies between knots j and j + 1 and sees the coefficients j to j + 5.
+
+use feedplan_geometry::quadratic::{lerp, sub};
+
+pub const DEGREE: usize = 5;
+/// Coefficients that an interval sees.
+pub const ORDER: usize = DEGREE + 1;
+/// Knots that decide the basis in an interval: those five on each side, the ends counted again beyond them.
+const LOCAL: usize = 2 * DEGREE;
+
+#[derive(Clone, Debug, Default)]
+pub struct Spline<const D: usize> {
+    pub knots: Vec<f64>,
+    pub coefficient: Vec<[f64; D]>,
+}
+
+/// The knots around an interval, which is [t₄, t₅].
+pub type Around = [f64; LOCAL];
+
+/// The knots around interval j.
+pub fn around(knots: &[f64], j: usize) -> Around {
+    let last = knots.len() - 1;
+    std::array::from_fn(|k| knots[(j + k).clamp(DEGREE - 1, last + DEGREE - 1) - (DEGREE - 1)])
+}
+
+/// The mean of the five inner knots of coefficient i: linear functions have their own values there as coefficients.
+pub fn greville(knots: &[f64], i: usize) -> f64 {
+    let last = knots.len() - 1;
+    (i + 1..=i + DEGREE).map(|k| knots[k.clamp(DEGREE, last + DEGREE) - DEGREE]).sum::<f64>() / DEGREE as f64
+}
+
+/// The values at u of the six B-splines that are not zero in an interval (de Boor, Cox).
+pub fn basis(t: &Around, u: f64) -> [f64; ORDER] {
+    let mut out = [0.0; ORDER];
+    basis_of_degree(t, u, DEGREE, &mut out);
+    out
+}
+
+fn basis_of_degree(t: &Around, u: f64, degree: usize, out: &mut [f64]) {
+    out[0] = 1.0;
+    for r in 1..=degree {
+        let mut saved = 0.0;
+        for q in 0..r {
+            let (low, high) = (t[DEGREE - r + q], t[DEGREE + q]);
+            let share = out[q] / (high - low);
+            out[q] = saved + (high - u) * share;
+            saved = (u - low) * share;
+        }
+        out[r] = saved;
+    }
+}
+
+/// ∫ |C'''|² du over an interval: the matrix of the form in the coefficients that it sees.
+pub fn energy(t: &Around) -> [[f64; ORDER]; ORDER] {
+    // Abscissae and weights of Gauss on [−1, 1]: exact for the square of a quadratic.
+    const GAUSS: [(f64, f64); 3] =
+        [(-0.774_596_669_241_483_4, 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)];
+    let third = third_differences(t);
+    let (middle, half) = (0.5 * (t[4] + t[5]), 0.5 * (t[5] - t[4]));
+    let mut out = [[0.0; ORDER]; ORDER];
+    for (x, weight) in GAUSS {
+        let mut values = [0.0; 3];
+        basis_of_degree(t, middle + half * x, 2, &mut values);
+        let row: [f64; ORDER] = std::array::from_fn(|a| (0..3).map(|q| values[q] * third[q][a]).sum());
+        for a in 0..ORDER {
+            for b in 0..ORDER {
+                out[a][b] += weight * half * row[a] * row[b];
+            }
+        }
+    }
+    out
+}
+
+/// The coefficients of C''', a quadratic spline, from those of C.
+fn third_differences(t: &Around) -> [[f64; ORDER]; 3] {
+    let mut rows = [[0.0; ORDER]; ORDER];
+    for (a, row) in rows.iter_mut().enumerate() {
+        row[a] = 1.0;
+    }
+    for level in 1..=3 {
+        for a in 0..ORDER - level {
+            let scale = (DEGREE + 1 - level) as f64 / (t[a + DEGREE] - t[a + level - 1]);
+            for b in 0..ORDER {
+                rows[a][b] = scale * (rows[a + 1][b] - rows[a][b]);
+            }
+        }
+    }
+    [rows[0], rows[1], rows[2]]
+}
+
+impl<const D: usize> Spline<D> {
+    pub fn intervals(&self) -> usize {
+        self.knots.len() - 1
+    }
+
+    /// The Bernstein control points of every interval, each starting exactly where the one before ends.
+    pub fn pieces(&self) -> Vec<[[f64; D]; ORDER]> {
+        let mut pieces: Vec<[[f64; D]; ORDER]> = Vec::with_capacity(self.intervals());
+        for j in 0..self.intervals() {
+            let mut piece = self.piece(j);
+            if let Some(before) = pieces.last() {
+                piece[0] = before[DEGREE];
+            }
+            pieces.push(piece);
+        }
+        // Both ends are the coefficients themselves.
+        let last = pieces.len() - 1;
+        (pieces[0][0], pieces[last][DEGREE]) = (self.coefficient[0], self.coefficient[last + DEGREE]);
+        pieces
+    }
+
+    /// The Bernstein control points of interval j: the blossom at its ends.
+    fn piece(&self, j: usize) -> [[f64; D]; ORDER] {
+        let t = around(&self.knots, j);
+        let (a, b) = (t[4], t[5]);
+        // Distances from one point of the interval keep the digits far from the origin.
+        let anchor = self.coefficient[j + 2];
+        let local: [[f64; D]; ORDER] = std::array::from_fn(|k| sub(&self.coefficient[j + k], &anchor));
+        std::array::from_fn(|k| {
+            let mut c = local;
+            for level in 1..=DEGREE {
+                let u = if level <= k { b } else { a };
+                for i in 0..ORDER - level {
+                    let (low, high) = (t[i + level - 1], t[i + DEGREE]);
+                    c[i] = lerp(&c[i], &c[i + 1], (u - low) / (high - low));
+                }
+            }
+            std::array::from_fn(|axis| c[0][axis] + anchor[axis])
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const KNOTS: [f64; 6] = [0.0, 1.0, 1.5, 3.0, 4.0, 7.0];
+
+    #[test]
+    fn the_basis_is_a_partition_of_one_and_reproduces_lines() {
+        for j in 0..5 {
+            let t = around(&KNOTS, j);
+            for part in [0.0, 0.3, 1.0] {
+                let u = KNOTS[j] + part * (KNOTS[j + 1] - KNOTS[j]);
+                let values = basis(&t, u);
+                assert!((values.iter().sum::<f64>() - 1.0).abs() < 1e-14);
+                let line: f64 = (0..ORDER).map(|k| values[k] * greville(&KNOTS, j + k)).sum();
+                assert!((line - u).abs() < 1e-14);
+            }
+        }
+    }
+
+    #[test]
+    fn the_energy_of_a_cube_is_36_times_the_length() {
+        // C = u³ has C''' = 6; its coefficients are the blossom at the five inner knots.
+        let padded: Vec<f64> = [0.0; 5].iter().chain(&KNOTS).chain(&[7.0; 5]).copied().collect();
+        let coefficient: Vec<f64> = (0..10)
+            .map(|i| {
+                let t = &padded[i + 1..=i + DEGREE];
+                let mut sum = 0.0;
+                for a in 0..5 {
+                    for b in a + 1..5 {
+                        for c in b + 1..5 {
+                            sum += t[a] * t[b] * t[c];
+                        }
+                    }
+                }
+                sum / 10.0
+            })
+            .collect();
+        for j in 0..5 {
+            let form = energy(&around(&KNOTS, j));
+            let mut sum = 0.0;
+            for a in 0..ORDER {
+                for b in 0..ORDER {
+                    sum += coefficient[j + a] * form[a][b] * coefficient[j + b];
+                }
+            }
+            let expected = 36.0 * (KNOTS[j + 1] - KNOTS[j]);
+            assert!((sum / expected - 1.0).abs() < 1e-11, "{j}: {sum} {expected}");
+        }
+        let spline =
+            Spline { knots: KNOTS.to_vec(), coefficient: coefficient.iter().map(|&c| [c]).collect() };
+        let ends: Vec<f64> = spline.pieces().iter().map(|piece| piece[DEGREE][0]).collect();
+        for (end, knot) in ends.iter().zip(&KNOTS[1..]) {
+            assert!((end - knot.powi(3)).abs() < 1e-12);
+        }
+    }
+}

@@ -1,0 +1,217 @@
+//! A part of a piece on which no axis turns round and one velocity cap is the lowest, and that part as a pass travels it.
+
+use super::piece::{counted, Piece};
+use feedplan_geometry::polynomial::Polynomial;
+
+/// Turns closer than this part of the piece are one.
+pub const SAME_TURN: f64 = 1e-12;
+/// A part shorter than this part of the piece is not cut once more: its ends become one.
+const NARROW: f64 = 1e-11;
+/// A place nearer to the end of a part than this is at its end.
+const AT_END: f64 = 1e-6;
+
+/// The lowest velocity cap of a sub-piece.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Cap {
+    /// The speed squared, linear in t between its two ends: the feed, or a bound below the chord-error limit.
+    Speed([f64; 2]),
+    /// The square of the feed, where the axes count in it by shares.
+    Feed(f64),
+    /// The square of the velocity limit of an axis.
+    Axis(usize, f64),
+}
+
+/// A part [from, to] of a piece on which no axis turns round and one velocity cap is the lowest.
+#[derive(Clone, Copy, Debug)]
+pub struct Part {
+    pub from: f64,
+    pub to: f64,
+    pub cap: Cap,
+    pub left: End,
+    pub right: End,
+    /// Bit k: axis k moves backward, moves at all.
+    pub negative: u8,
+    pub moving: u8,
+}
+
+/// An end of a part.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct End {
+    /// Bit k: axis k turns round there.
+    pub turns: u8,
+    /// All axes have a zero of this order.
+    pub order: u8,
+    /// As far as this from the end rounding may have moved the zeros.
+    pub reach: f64,
+    /// The plan stops there.
+    pub stops: bool,
+}
+
+impl End {
+    /// Whether axis k has a zero there.
+    fn is_cut_for(&self, k: usize) -> bool {
+        self.order > 0 || self.turns >> k & 1 == 1
+    }
+}
+
+/// A place where a piece is cut once more because a pass came to no end there.
+#[derive(Clone, Copy, Debug)]
+pub struct Remedy {
+    pub piece: usize,
+    pub t: f64,
+    /// All cuts closer than this are one.
+    pub reach: f64,
+    /// The plan stops there.
+    pub stops: bool,
+}
+
+/// A part as a pass travels it, its polynomials over x in [0, 1], every axis moving forward.
+///
+/// Here g and π belong to x: π = (dx/dτ)²/ω⁴.
+#[derive(Clone, Copy, Debug)]
+pub struct SubPiece<const M: usize, const C: usize> {
+    pub g: [Polynomial<C>; M],
+    pub weight: Polynomial<C>,
+    pub speed: Polynomial<C>,
+    pub cap: Cap,
+    /// Bit k: axis k moves at all.
+    pub moving: u8,
+    /// Degree of the curve itself.
+    pub degree: usize,
+    pub straight: bool,
+    pub own_speed: bool,
+    /// The order of the zero that every tangent has at the start and at the end.
+    pub cusp_orders: [u8; 2],
+}
+
+impl Part {
+    /// Whether the plan stops at its left end.
+    pub fn starts_at_rest(&self) -> bool {
+        self.left.stops
+    }
+
+    /// Another cut of the part at x where a pass found no way: in the middle where it has one near x. The ends of a
+    /// part as short as rounding become one.
+    pub fn remedy(&self, piece: usize, x: f64) -> Remedy {
+        let length = self.to - self.from;
+        let narrow = length <= NARROW;
+        let inside = AT_END < x && x < 1.0 - AT_END && !narrow;
+        let t = self.from + length * if inside { x } else { 0.5 };
+        Remedy { piece, t, reach: if narrow { length } else { 0.0 }, stops: false }
+    }
+
+    /// The part as travelled forward.
+    pub fn sub_piece<const M: usize, const C: usize>(&self, piece: &Piece<M, C>) -> SubPiece<M, C> {
+        let length = self.to - self.from;
+        let mut whole = length == 1.0;
+        let g: [Polynomial<C>; M] = std::array::from_fn(|k| {
+            if self.moving >> k & 1 == 0 {
+                return Polynomial::constant(0.0).elevate(piece.g[k].degree());
+            }
+            let sign = if self.negative >> k & 1 == 1 { -length } else { length };
+            let mut g = piece.g[k].part(self.from, self.to).scale(sign);
+            let degree = g.degree();
+            if !self.left.is_cut_for(k) && !self.right.is_cut_for(k) {
+                return g;
+            }
+            for (end, at_end) in [(&self.left, false), (&self.right, true)] {
+                if !end.is_cut_for(k) {
+                    continue;
+                }
+                let turns = end.turns >> k & 1 == 1;
+                let (low, high) = piece.g[k].range();
+                let noise = length * piece.noise[k].max(SAME_TURN * degree as f64 * high.max(-low));
+                let known = usize::from(end.order).max(usize::from(turns));
+                let reach = (end.reach / length).min(1.0);
+                for i in 0..=degree {
+                    let place = if at_end { degree - i } else { i };
+                    // An axis that rounding, or a turn taken for another one, sends back stands still.
+                    let back = -g.coefficients()[place] * reach.powi(i as i32);
+                    if i >= known && !(turns && back > 0.0 && back <= 64.0 * noise) {
+                        break;
+                    }
+                    g.clear(place);
+                    whole = false;
+                }
+            }
+            g
+        });
+        let speed = match (self.cap, &piece.share) {
+            (Cap::Feed(_), Some(share)) => counted(&g, share),
+            // Next to a cusp |C'|² is lost in the rounding of that of the whole piece.
+            _ if piece.own_speed && !whole => Polynomial::sum_of_squares(&g),
+            _ => piece.speed.part(self.from, self.to).scale(length * length),
+        };
+        SubPiece {
+            cusp_orders: [false, true].map(|at_end| cusp_order(&g, at_end)),
+            g,
+            weight: piece.weight.part(self.from, self.to),
+            speed,
+            cap: self.cap,
+            moving: self.moving,
+            degree: piece.degree,
+            straight: piece.straight,
+            own_speed: piece.own_speed && !matches!(self.cap, Cap::Feed(_)),
+        }
+    }
+}
+
+impl<const M: usize, const C: usize> SubPiece<M, C> {
+    /// The order of the zero that every tangent has at an end.
+    #[inline(always)]
+    pub fn cusp_order(&self, at_end: bool) -> usize {
+        usize::from(self.cusp_orders[usize::from(at_end)])
+    }
+
+    /// The speed squared of the axes over π at an end.
+    pub fn rate_sq(&self, at_end: bool) -> f64 {
+        let end = |p: &Polynomial<C>| if at_end { p.last() } else { p.first() };
+        if self.own_speed {
+            end(&self.speed)
+        } else {
+            self.g.iter().map(|g| end(g) * end(g)).sum()
+        }
+    }
+
+    /// The tool's speed squared over that of the axes at an end, also in the limit where both are at rest.
+    pub fn tip_share(&self, at_end: bool) -> f64 {
+        if self.own_speed || matches!(self.cap, Cap::Feed(_)) {
+            return 1.0;
+        }
+        self.speed_share(at_end)
+    }
+
+    /// D over |g|² at an end, also in the limit where both vanish.
+    pub fn speed_share(&self, at_end: bool) -> f64 {
+        let lead = |p: &Polynomial<C>, r: usize| {
+            let c = p.coefficients();
+            c.get(if at_end { c.len().wrapping_sub(1 + r) } else { r }).copied().unwrap_or(0.0)
+        };
+        let order = self.cusp_order(at_end);
+        let axes: f64 = self.g.iter().map(|g| lead(g, order).powi(2)).sum();
+        (lead(&self.speed, 2 * order) / axes).max(0.0)
+    }
+
+    /// The same as the backward pass travels it.
+    pub fn reversed(&self) -> Self {
+        let cap = match self.cap {
+            Cap::Speed([f0, f1]) => Cap::Speed([f1, f0]),
+            cap => cap,
+        };
+        Self {
+            g: std::array::from_fn(|k| self.g[k].reverse()),
+            weight: self.weight.reverse(),
+            speed: self.speed.reverse(),
+            cap,
+            cusp_orders: [self.cusp_orders[1], self.cusp_orders[0]],
+            ..*self
+        }
+    }
+}
+
+/// The order of the zero that all of these have at an end.
+fn cusp_order<const M: usize, const C: usize>(g: &[Polynomial<C>; M], at_end: bool) -> u8 {
+    let degree = g[0].degree();
+    let rests = |r: usize| g.iter().all(|g| g.coefficients()[if at_end { degree - r } else { r }] == 0.0);
+    (0..degree).take_while(|&r| rests(r)).count() as u8
+}

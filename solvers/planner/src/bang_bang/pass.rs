@@ -1,0 +1,466 @@
+//! One pass over one sub-piece, in the sense of travel: the greatest π that stays under a bound.
+//!
+//! As on quadratic pieces: for every λ in [0, 1] a feasible profile scaled by λ stays feasible, so that backward under
+//! the velocity cap and the limit curve, then forward under what that left, are exact. Every event is the first root
+//! of a polynomial; with N, W, M of axes j, l and w = ω v_j²
+//!
+//! | while | holds |
+//! |---|---|
+//! | on an arc of axis j, axis l stays below +A_l | A_l g_j³ − A_j g_l g_j² − ω w (g_l' g_j − g_l g_j') ≥ 0 |
+//! | and above −A_l (backward) | A_l g_j³ + A_j g_l g_j² + ω w (g_l' g_j − g_l g_j') ≥ 0 |
+//! | under a bound π ≤ n/d | n ω g_j² − w d ≥ 0 |
+//! | on the limit curve π = N/(ω² W), N = A_j g_l + A_l g_j, W = g_j' g_l − g_j g_l' | ω (N W' − 3 N' W) + 2 ω' N W ≥ 0 |
+//! | and axis i within ±A_i | A_i W ± (g_i' N − g_i N') ≥ 0 |
+//! | along v² = f | A_l D² − ω² ((g_l' D − g_l D'/2) f + g_l D f'/2) ≥ 0 |
+//! | along v_k = V | A_l g_k³ − V² ω² (g_l' g_k − g_l g_k') ≥ 0 |
+
+mod bang;
+mod limit_curve;
+mod slide;
+
+use super::part::{Cap, SubPiece};
+use super::split::Axes;
+use super::window::{Bound, Window};
+use feedplan_geometry::polynomial::Polynomial;
+use feedplan_geometry::quadratic::norm;
+
+/// Tests are taken for kept while they miss by less than this part of their own terms.
+const NOISE: f64 = 1e-13;
+/// π this close below a bound is on it.
+const ON_BOUND: f64 = 1e-12;
+/// π this close below a bound that an arc meets at once is on it.
+const NEARLY_ON_BOUND: f64 = 1e-10;
+/// Backward, π this close below the limit curve is on it.
+const ON_LIMIT_CURVE: f64 = 1e-11;
+/// Accelerations this close to each other are equal.
+const TIE: f64 = 1e-10;
+/// A zero of g_k and π this close to A_k/|g_k'|: the axis holds π.
+const FLAT: f64 = 1e-9;
+/// The same where π grows to that without a step.
+const NEARLY_FLAT: f64 = 1e-4;
+/// An event this close to the end of the window is at the end.
+const AT_END: f64 = 1e-11;
+/// A step shorter than this part of x, or of the start of the sub-piece, is none.
+const NO_STEP: f64 = 1e-15;
+const START: f64 = 1e-6;
+/// So many events may follow one another without a step.
+const MAX_HOPS: u32 = 10;
+const MAX_EVENTS: u32 = 2000;
+
+/// What stays constant on an arc, in the sense of the pass.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Kind {
+    /// Axis at +A.
+    Accelerating(usize),
+    /// Forward, on an arc of the backward pass: axis at −A.
+    Braking(usize),
+    /// The velocity cap of the sub-piece.
+    Cap,
+    /// The limit curve; backward only.
+    LimitCurve,
+}
+
+/// An arc from x0 to x1 of the sub-piece as the pass travels it.
+#[derive(Clone, Copy, Debug)]
+pub struct Arc {
+    pub x0: f64,
+    pub x1: f64,
+    pub kind: Kind,
+    /// π at its ends, of the whole sub-piece; infinite where the tool passes a place without a tangent.
+    pub pi: [f64; 2],
+    /// The velocity squared of the axis where the arc is slowest: of an accelerating arc at x0, of a braking one at x1.
+    pub slow_sq: f64,
+}
+
+/// A pass made no headway at x.
+#[derive(Clone, Copy, Debug)]
+pub struct Stuck(pub f64);
+
+/// The state where a pass enters or leaves a sub-piece.
+#[derive(Clone, Copy, Debug)]
+pub struct State {
+    /// The sum of the axes' velocities squared; v² where the axes are those of the tool.
+    pub speed_sq: f64,
+}
+
+/// The tangents' scaled coefficients next to an end: from the order of its cusp they have the limit direction.
+#[inline(always)]
+pub fn leading<const M: usize, const C: usize>(sub: &SubPiece<M, C>, at_end: bool) -> [f64; M] {
+    match (sub.cusp_order(at_end), at_end) {
+        (0, false) => sub.g.each_ref().map(Polynomial::first),
+        (0, true) => sub.g.each_ref().map(Polynomial::last),
+        (order, false) => sub.g.each_ref().map(|g| g.coefficients()[order]),
+        (order, true) => sub.g.each_ref().map(|g| g.coefficients()[g.degree() - order]),
+    }
+}
+
+/// The limit direction at an end.
+fn direction<const M: usize, const C: usize>(sub: &SubPiece<M, C>, at_end: bool) -> [f64; M] {
+    let lead = leading(sub, at_end);
+    let length = norm(&lead);
+    lead.map(|x| x / length)
+}
+
+/// Over the sub-piece as travelled, from a state, under its cap (backward) or under the arcs of the backward pass
+/// (forward: from its last to its first); appends the arcs and returns the state at the end.
+pub fn run<const M: usize, const C: usize, const BACK: bool>(
+    sub: &SubPiece<M, C>,
+    axes: &Axes<M>,
+    state: State,
+    bounds: &[Arc],
+    out: &mut Vec<Arc>,
+) -> Result<State, Stuck> {
+    let order = sub.cusp_order(false);
+    let straight = sub.straight;
+    let pi = if order == 0 { state.speed_sq / sub.rate_sq(false) } else { f64::INFINITY };
+    let first = out.len();
+    let mut pass = Pass::<M, C, BACK> {
+        sub,
+        axes,
+        window: Window::new(sub),
+        pi,
+        order,
+        // A curve stops in its cusps, a straight line need not.
+        cusp_sq: if straight && order > 0 {
+            direction(sub, false).map(|x| x * x * state.speed_sq)
+        } else {
+            [0.0; M]
+        },
+        straight,
+        out,
+        control: None,
+        tied: 0,
+        low: None,
+        tangent: false,
+        leaving: false,
+        hops: 0,
+        limit_curve: None,
+        entering: true,
+    };
+    if BACK {
+        pass.over_window()?;
+    } else {
+        pass.under(bounds)?;
+    }
+    let pi = pass.pi;
+    let sound =
+        |arc: &Arc| (arc.pi[0] >= 0.0) & (arc.pi[1] >= 0.0) & (arc.slow_sq >= 0.0) & arc.slow_sq.is_finite();
+    if let Some(arc) = out[first..].iter().find(|arc| !sound(arc)) {
+        return Err(Stuck(arc.x0));
+    }
+    let speed_sq = if sub.cusp_order(true) == 0 {
+        pi * sub.rate_sq(true)
+    } else if straight {
+        let last = out[first..].last();
+        last.map_or(0.0, |arc| end_speed_sq(sub, axes, arc, &direction(sub, true)))
+    } else {
+        0.0
+    };
+    Ok(State { speed_sq: speed_sq.max(0.0) })
+}
+
+/// The speed squared of the axes at the end of the last arc, where the sub-piece has no tangent.
+fn end_speed_sq<const M: usize, const C: usize>(
+    sub: &SubPiece<M, C>,
+    axes: &Axes<M>,
+    arc: &Arc,
+    direction: &[f64; M],
+) -> f64 {
+    match arc.kind {
+        Kind::Accelerating(k) => {
+            let way = distance(sub, k, arc.x0, arc.x1);
+            (arc.slow_sq + 2.0 * axes.acceleration[k] * way) / direction[k].powi(2)
+        }
+        Kind::Braking(k) => arc.slow_sq / direction[k].powi(2),
+        Kind::Cap => match sub.cap {
+            Cap::Speed([_, f1]) => f1 / sub.tip_share(true),
+            Cap::Feed(f) => f / sub.speed_share(true),
+            Cap::Axis(k, v_sq) => v_sq / direction[k].powi(2),
+        },
+        Kind::LimitCurve => 0.0,
+    }
+}
+
+/// The way of axis k from x0 to x1 of a sub-piece.
+pub fn distance<const M: usize, const C: usize>(sub: &SubPiece<M, C>, k: usize, x0: f64, x1: f64) -> f64 {
+    let g = sub.g[k].part(x0, x1);
+    if sub.weight.degree() == 0 {
+        return (x1 - x0) * g.mean();
+    }
+    let weight = sub.weight.part(x0, x1);
+    (x1 - x0) * g.antiderivative(&weight, sub.degree).last() / weight.last()
+}
+
+/// Tangents and their slopes at the start of the window.
+struct Start<const M: usize> {
+    g: [f64; M],
+    c: [f64; M],
+    /// A_k/ω² and its slope.
+    limit: [f64; M],
+    limit_slope: [f64; M],
+}
+
+struct Pass<'a, const M: usize, const C: usize, const BACK: bool> {
+    sub: &'a SubPiece<M, C>,
+    axes: &'a Axes<M>,
+    window: Window<M, C>,
+    /// π of the window.
+    pi: f64,
+    /// All tangents have a zero of this order at the start of the window; then `cusp_sq` holds the squares of the axes'
+    /// velocities.
+    order: usize,
+    cusp_sq: [f64; M],
+    straight: bool,
+    out: &'a mut Vec<Arc>,
+    /// The axis that has just saturated, and bits of those that share its acceleration.
+    control: Option<usize>,
+    tied: u8,
+    /// The axis at −A, where the limit curve has just been left.
+    low: Option<usize>,
+    /// The bound or the limit curve has just been left along its tangent.
+    tangent: bool,
+    leaving: bool,
+    hops: u32,
+    /// The axes at +A and −A on the limit curve.
+    limit_curve: Option<(usize, usize)>,
+    entering: bool,
+}
+
+impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
+    /// Whether there is a way from the start of the window to t.
+    fn is_step(&self, t: f64) -> bool {
+        t * self.window.length() >= NO_STEP * self.window.x0.max(START)
+    }
+
+    fn stuck(&self) -> Stuck {
+        Stuck(self.window.x0)
+    }
+
+    fn moving(&self) -> impl Iterator<Item = usize> {
+        let moving = self.sub.moving;
+        (0..M).filter(move |k| moving >> k & 1 == 1)
+    }
+
+    /// Forward: over one window after the other, each under one arc of the backward pass.
+    fn under(&mut self, bounds: &[Arc]) -> Result<(), Stuck> {
+        let mut x0 = 0.0;
+        for (i, arc) in bounds.iter().rev().enumerate() {
+            let x1 = if i + 1 < bounds.len() { 1.0 - arc.x0 } else { 1.0 };
+            let pi = [arc.pi[1], arc.pi[0]];
+            match arc.kind {
+                // Any other motion under an arc of the backward pass meets it again later.
+                Kind::Accelerating(k) if self.joins(pi[0]) => {
+                    self.out.push(Arc { x0, x1, kind: Kind::Braking(k), pi, slow_sq: arc.slow_sq });
+                    self.pi = pi[1];
+                    self.arrived();
+                }
+                _ => {
+                    if bounds.len() > 1 {
+                        self.window = Window::new(self.sub).part(x0, x1);
+                    }
+                    self.bound_by(arc);
+                    // From π of the sub-piece to that of the window.
+                    self.pi /= self.window.length().powi(2);
+                    self.over_window()?;
+                }
+            }
+            x0 = x1;
+        }
+        Ok(())
+    }
+
+    /// Whether π of the sub-piece is on an arc of the backward pass that begins with this one.
+    fn joins(&self, pi: f64) -> bool {
+        self.order == 0 && !self.leaving && pi.is_finite() && self.pi >= pi * (1.0 - ON_BOUND)
+    }
+
+    /// Puts the window under an arc of the backward pass.
+    fn bound_by(&mut self, arc: &Arc) {
+        let window = &mut self.window;
+        match arc.kind {
+            Kind::Accelerating(k) | Kind::Braking(k) => {
+                let (g, weight) = (window.g[k].reverse(), window.weight.reverse());
+                let gain = g.antiderivative(&weight, self.sub.degree);
+                let w = weight.combine(arc.slow_sq, &gain, 2.0 * self.axes.acceleration[k]);
+                window.bound = Bound::Arc(k, w.reverse());
+            }
+            Kind::Cap => {}
+            Kind::LimitCurve => window.bound = Bound::LimitCurve,
+        }
+        if arc.kind != Kind::LimitCurve {
+            window.known = [Some(arc.pi[1]), Some(arc.pi[0])];
+        }
+    }
+
+    /// To the end of the window; leaves π there, of the whole sub-piece.
+    fn over_window(&mut self) -> Result<(), Stuck> {
+        self.entering = true;
+        for _ in 0..MAX_EVENTS {
+            if self.window.x0 >= self.window.x1 {
+                return Ok(());
+            }
+            let start = self.start();
+            if std::mem::take(&mut self.entering) {
+                self.enter(&start);
+            }
+            if let Some(pair) = self.limit_curve.take() {
+                if self.follow_limit_curve(pair) {
+                    continue;
+                }
+                if self.hops > MAX_HOPS {
+                    return Err(self.stuck());
+                }
+                continue;
+            }
+            let on_bound = self.is_on_bound();
+            if on_bound {
+                self.pi = self.window.bound_at_start();
+                if !self.leaving && self.follow_bound() {
+                    continue;
+                }
+            }
+            self.accelerate(&start, on_bound)?;
+        }
+        Err(self.stuck())
+    }
+
+    /// Whether the state is on the bound; in the cusp of a straight line its velocities say so.
+    fn is_on_bound(&self) -> bool {
+        if self.order == 0 {
+            return self.pi >= self.window.bound_at_start() * (1.0 - ON_BOUND);
+        }
+        let near = |value: f64, limit: f64| self.straight && value >= limit * (1.0 - ON_BOUND);
+        match &self.window.bound {
+            Bound::Speed(f) => near(self.cusp_sq.iter().sum(), f.first() / self.sub.tip_share(false)),
+            Bound::Axis(k, v_sq) => near(self.cusp_sq[*k], *v_sq),
+            Bound::Arc(k, w) => near(self.cusp_sq[*k], w.first() / self.window.weight.first()),
+            Bound::LimitCurve => false,
+        }
+    }
+
+    fn start(&self) -> Start<M> {
+        let (w, slope) = (self.window.weight.first(), self.window.weight.first_slope());
+        let g = &self.window.g;
+        let limit = self.axes.acceleration.map(|a| a / (w * w));
+        Start {
+            g: std::array::from_fn(|k| g[k].first()),
+            c: std::array::from_fn(|k| g[k].first_slope()),
+            limit,
+            limit_slope: if slope == 0.0 { [0.0; M] } else { limit.map(|limit| -2.0 * limit * slope / w) },
+        }
+    }
+
+    /// Puts π under the bound, under the limits of axes that turn here, and backward on or under the limit curve.
+    fn enter(&mut self, start: &Start<M>) {
+        if self.order > 0 {
+            return;
+        }
+        self.pi = self.pi.min(self.window.bound_at_start());
+        for k in 0..M {
+            if start.g[k] == 0.0 && start.c[k] != 0.0 {
+                self.pi = self.pi.min(start.limit[k] / start.c[k].abs());
+            }
+        }
+        if !BACK || self.straight {
+            return;
+        }
+        let mut lowest = f64::INFINITY;
+        for j in 0..M {
+            for l in 0..j {
+                let w = (start.c[j] * start.g[l] - start.c[l] * start.g[j]).abs();
+                if start.g[j] > 0.0 && start.g[l] > 0.0 && w > 0.0 {
+                    lowest = lowest.min((start.limit[j] * start.g[l] + start.limit[l] * start.g[j]) / w);
+                }
+            }
+        }
+        if self.pi < lowest * (1.0 - ON_LIMIT_CURVE) {
+            return;
+        }
+        self.pi = self.pi.min(lowest);
+        let Some((j, s)) = self.least(start).map(|(j, s, ..)| (j, s)) else { return };
+        let mut low: Option<(usize, f64)> = None;
+        for l in self.moving().filter(|&l| l != j && start.g[l] > 0.0) {
+            let needed = (-start.limit[l] - start.c[l] * self.pi) / start.g[l];
+            if low.is_none_or(|(_, most)| needed > most) {
+                low = Some((l, needed));
+            }
+        }
+        if let Some((l, needed)) = low {
+            if needed >= s - 1e-9 * (s.abs() + needed.abs()) {
+                self.limit_curve = Some((j, l));
+            }
+        }
+    }
+
+    /// Appends an arc to t of the window and leaves the rest; without w, π at the end is that of the bound.
+    fn push(&mut self, t: f64, kind: Kind, w: Option<&Polynomial<C>>, slow_sq: f64) {
+        let length = self.window.length();
+        let scale = length * length;
+        let x0 = self.window.x0;
+        let mut pi_start = self.pi * scale;
+        if self.order > 0 {
+            // The limit at a cusp.
+            pi_start = match kind {
+                Kind::Accelerating(j) if self.order == 1 && slow_sq == 0.0 => {
+                    let lead = self.window.g[j].coefficients()[1];
+                    self.axes.acceleration[j] / (lead * self.window.weight.first().powi(2)) * scale
+                }
+                _ => f64::INFINITY,
+            };
+        }
+        // π at the end, of the sub-piece.
+        let of_arc = w.and_then(|w| match kind {
+            Kind::Accelerating(j) => {
+                let at = |p: &Polynomial<C>| if t == 1.0 { p.last() } else { p.value(t) };
+                let (w, g, weight) = (at(w), at(&self.window.g[j]), at(&self.window.weight));
+                let pi = if g > 0.0 { w / (weight * g * g) } else { f64::INFINITY };
+                let turn = if g > 0.0 { None } else { self.at_turn(j) };
+                Some(turn.unwrap_or(pi) * scale)
+            }
+            _ => None,
+        });
+        let pi_end;
+        if t < 1.0 {
+            self.window.leave_before(t);
+            let scale = self.window.length().powi(2);
+            pi_end = of_arc.unwrap_or_else(|| self.window.bound_at_start() * scale);
+            self.pi = pi_end / scale;
+        } else {
+            pi_end = of_arc.unwrap_or_else(|| self.window.bound_at_end());
+            self.window.x0 = self.window.x1;
+            self.pi = pi_end;
+        }
+        self.out.push(Arc { x0, x1: self.window.x0, kind, pi: [pi_start, pi_end], slow_sq });
+        self.order = 0;
+    }
+
+    /// π at the end of the window where axis j turns round: all others hold it there.
+    fn at_turn(&self, j: usize) -> Option<f64> {
+        let slope = self.window.g[j].reverse().first_slope();
+        (slope != 0.0).then(|| self.axes.acceleration[j] / (slope.abs() * self.window.weight.last().powi(2)))
+    }
+}
+
+/// Where a test first fails by more than rounding. `size` gives how much rounding it can hold; `known` roots at 0 are
+/// divided out; without any, a start that misses by less than `slack` is kept.
+#[inline(always)]
+fn kept_until<const C: usize>(
+    test: &Polynomial<C>,
+    size: impl FnOnce() -> Polynomial<C>,
+    known: usize,
+    slack: f64,
+) -> Option<f64> {
+    if test.is_positive()
+        || test.coefficients().iter().skip(known.min(test.degree())).all(|&value| value >= 0.0)
+    {
+        return None;
+    }
+    let mut inflated = test.combine(1.0, &size(), 1.0);
+    if known > 0 {
+        inflated = inflated.deflate(known);
+    }
+    if inflated.first() < 0.0 && inflated.first() > -slack {
+        inflated.set_first(0.0);
+    }
+    inflated.first_root()
+}

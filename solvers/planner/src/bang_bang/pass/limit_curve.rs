@@ -1,0 +1,128 @@
+//! Along the velocity limit curve, backward: two axes at their limits, one up and one down.
+
+use super::{kept_until, Kind, Pass, AT_END, NOISE, ON_BOUND};
+use feedplan_geometry::polynomial::Polynomial;
+
+/// Why the limit curve is left.
+#[derive(Clone, Copy)]
+enum Leave {
+    Tangent,
+    Pair(usize, usize),
+    Bound,
+}
+
+impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
+    /// N and W of the limit curve π = N/(ω² W) with axis j at +A and axis l at −A.
+    pub(super) fn limit_quotient(&self, j: usize, l: usize) -> (Polynomial<C>, Polynomial<C>) {
+        let (g, a) = (&self.window.g, &self.axes.acceleration);
+        (g[l].combine(a[j], &g[j], a[l]), g[j].wronskian(&g[l]))
+    }
+
+    /// Along the limit curve while no arc would leave it downward; says whether it moved.
+    pub(super) fn follow_limit_curve(&mut self, (j, l): (usize, usize)) -> bool {
+        let window = &self.window;
+        let a = &self.axes.acceleration;
+        let (n, w) = self.limit_quotient(j, l);
+        let (n_slope, w_slope) = (n.derivative(), w.derivative());
+        let size = window.g[j].wronskian_magnitude(&window.g[l]);
+        let weight = &window.weight;
+        let mut first = 1.0;
+        let mut event = None;
+        {
+            let mut leave = weight.multiply(&n.multiply(&w_slope).combine(1.0, &n_slope.multiply(&w), -3.0));
+            if weight.degree() > 0 {
+                leave = leave.combine(1.0, &weight.derivative().multiply(&n).multiply(&w), 2.0);
+            }
+            let terms = || {
+                let terms = n.magnitude().multiply(&w_slope.magnitude()).combine(
+                    100.0 * NOISE,
+                    &n_slope.magnitude().multiply(&size),
+                    300.0 * NOISE,
+                );
+                weight.multiply(&terms)
+            };
+            if let Some(t) = kept_until(&leave, terms, 0, 0.0) {
+                (first, event) = (t, Some(Leave::Tangent));
+            }
+        }
+        for i in self.moving().filter(|&i| i != j && i != l) {
+            let g = &window.g[i];
+            let need = g.derivative().multiply(&n).combine(1.0, &g.multiply(&n_slope), -1.0);
+            let terms = || {
+                let parts = g.derivative().magnitude().multiply(&n.magnitude());
+                size.combine(
+                    NOISE * a[i],
+                    &parts.combine(1.0, &g.magnitude().multiply(&n_slope.magnitude()), 1.0),
+                    NOISE,
+                )
+            };
+            for (sign, what) in [(-1.0, Leave::Pair(i, l)), (1.0, Leave::Pair(j, i))] {
+                if let Some(t) = kept_until(&w.combine(a[i], &need, sign), terms, 0, 0.0) {
+                    if t < first {
+                        (first, event) = (t, Some(what));
+                    }
+                }
+            }
+        }
+        if let Some((bound, d)) = window.quotient().filter(|_| !self.cap_is_far()) {
+            if bound.first().is_finite() {
+                let used = n.multiply(&d);
+                let limit = bound.multiply(&weight.multiply(weight)).multiply(&w);
+                let gap = limit.combine(1.0, &used, -1.0);
+                let on = self.pi >= window.bound_at_start() * (1.0 - ON_BOUND);
+                let slack = if on { f64::INFINITY } else { 0.0 };
+                if let Some(t) = kept_until(&gap, || used.magnitude().scale(0.1 * NOISE), 0, slack) {
+                    if t < first {
+                        (first, event) = (t, Some(Leave::Bound));
+                    }
+                }
+            }
+        }
+        if first > 1.0 - AT_END && first < 1.0 {
+            (first, event) = (1.0, None);
+        }
+        let moved = self.is_step(first);
+        if moved {
+            let scale = self.window.length().powi(2);
+            let (n1, w1, weight1) = (n.value(first), w.value(first), weight.value(first));
+            let mut end = if w1 > 0.0 { n1 / (weight1 * weight1 * w1) } else { f64::INFINITY } * scale;
+            if first == 1.0 {
+                for k in self.moving() {
+                    let (g, slope) = (self.window.g[k].last(), -self.window.g[k].reverse().first_slope());
+                    if g == 0.0 && slope != 0.0 {
+                        end = end.min(a[k] / (slope.abs() * weight1 * weight1) * scale);
+                    }
+                }
+            }
+            self.push(first, Kind::LimitCurve, None, 0.0);
+            // π at the end is that of the limit curve, or of the bound where that is met.
+            if let Some(arc) = self.out.last_mut() {
+                if !matches!(event, Some(Leave::Bound)) {
+                    end = end.min(arc.pi[1]);
+                    arc.pi[1] = end;
+                    self.pi = if first == 1.0 { end } else { end / self.window.length().powi(2) };
+                }
+            }
+            self.hops = 0;
+        } else {
+            self.hops += 1;
+        }
+        match event {
+            None => {}
+            Some(Leave::Tangent) => {
+                (self.control, self.low) = (Some(j), Some(l));
+                self.tangent = moved;
+                self.leaving = false;
+            }
+            Some(Leave::Pair(up, low)) => {
+                if self.hops <= 6 {
+                    self.limit_curve = Some((up, low));
+                } else {
+                    (self.control, self.low) = (Some(j), Some(l));
+                }
+            }
+            Some(Leave::Bound) => self.pi = self.window.bound_at_start(),
+        }
+        moved
+    }
+}

@@ -1,0 +1,156 @@
+//! Along the bound: an arc of the backward pass to its end, the velocity cap while no axis needs more than it has.
+
+use super::{kept_until, Kind, Pass, NOISE};
+use crate::bang_bang::part::Cap;
+use crate::bang_bang::window::Bound;
+use feedplan_geometry::polynomial::Polynomial;
+
+impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
+    /// From a place on the bound: along it as far as possible; says whether that moved or led to the limit curve.
+    pub(super) fn follow_bound(&mut self) -> bool {
+        let (end, saturated, pair) = match &self.window.bound {
+            // Any other motion under an arc of the backward pass meets it again later.
+            Bound::Arc(k, w) => {
+                let k = *k;
+                let slow_sq = (w.last() / self.window.weight.last()).max(0.0);
+                self.push(1.0, Kind::Braking(k), None, slow_sq);
+                self.arrived();
+                return true;
+            }
+            Bound::LimitCurve => return false,
+            Bound::Speed(f) => self.slide_at_speed(f),
+            Bound::Axis(k, v_sq) => self.slide_at_axis_speed(*k, *v_sq),
+        };
+        let moved = self.is_step(end);
+        if moved {
+            self.push(end, Kind::Cap, None, 0.0);
+            self.hops = 0;
+            self.control = None;
+            self.tied = 0;
+        }
+        if let Some(pair) = pair {
+            self.hops += 1;
+            if self.hops < 5 {
+                self.limit_curve = Some(pair);
+                return true;
+            }
+        }
+        if end == 1.0 && saturated.is_none() {
+            return true;
+        }
+        self.leaving = true;
+        self.control = saturated;
+        self.tangent = saturated.is_some() && moved;
+        // The state is on the bound still: the arc that leaves it follows at once.
+        moved
+    }
+
+    fn slide_at_speed(&self, f: &Polynomial<C>) -> (f64, Option<usize>, Option<(usize, usize)>) {
+        let even = self.sub.own_speed || matches!(self.sub.cap, Cap::Feed(_));
+        if self.straight && even && f.degree() == 0 {
+            return (1.0, None, None);
+        }
+        let window = &self.window;
+        let d = &window.speed;
+        let constant = f.degree() == 0 && window.weight.degree() == 0 && self.sub.own_speed;
+        if constant && self.bends_little(f.first()) {
+            return (1.0, None, None);
+        }
+        let (d_slope, d_sq) = (d.derivative(), d.multiply(d));
+        let f_slope = f.derivative();
+        let weight_sq = window.weight.multiply(&window.weight);
+        let need = |l: usize| {
+            let g = &window.g[l];
+            let mut need = g.derivative().multiply(d).combine(1.0, &g.multiply(&d_slope), -0.5).multiply(f);
+            if f.degree() > 0 {
+                need = need.combine(1.0, &g.multiply(d).multiply(&f_slope), 0.5);
+            }
+            weight_sq.multiply(&need)
+        };
+        let size = |l: usize| {
+            let g = &window.g[l];
+            let slope = g.derivative().magnitude();
+            let mut size = slope.multiply(d).combine(1.0, &g.multiply(&d_slope.magnitude()), 0.5);
+            size = size.multiply(&f.magnitude());
+            if f.degree() > 0 {
+                size = size.combine(1.0, &g.multiply(d).multiply(&f_slope.magnitude()), 0.5);
+            }
+            weight_sq.multiply(&size)
+        };
+        self.slide(&d_sq, &need, &size)
+    }
+
+    /// Whether v²/ρ = v² |g × g'|/D^1.5 stays below the least acceleration limit.
+    fn bends_little(&self, speed_sq: f64) -> bool {
+        let g = &self.window.g;
+        let mut twist_sq = 0.0;
+        for j in 0..M {
+            for k in 0..j {
+                let w = g[j].wronskian(&g[k]);
+                let most = (0..=w.degree()).fold(0.0_f64, |most, i| most.max(w.bernstein(i).abs()));
+                twist_sq += most * most;
+            }
+        }
+        let least = self.window.speed.range().0.max(0.0);
+        let limit = self.axes.acceleration.iter().fold(f64::INFINITY, |least, &a| least.min(a));
+        speed_sq * twist_sq.sqrt() <= limit * least * least.sqrt()
+    }
+
+    fn slide_at_axis_speed(&self, k: usize, v_sq: f64) -> (f64, Option<usize>, Option<(usize, usize)>) {
+        let window = &self.window;
+        let g = &window.g[k];
+        let cube = g.multiply(g).multiply(g);
+        let weight_sq = window.weight.multiply(&window.weight).scale(v_sq);
+        self.slide(&cube, &|l| weight_sq.multiply(&window.g[l].wronskian(g)), &|l| {
+            weight_sq.multiply(&window.g[l].wronskian_magnitude(g))
+        })
+    }
+
+    /// How far the velocity cap can be followed: axis l has the acceleration `need`(l)/x, with terms of the size
+    /// `size`(l); the axis that saturates, and the axes of the limit curve where that falls below the cap.
+    fn slide(
+        &self,
+        x: &Polynomial<C>,
+        need: &dyn Fn(usize) -> Polynomial<C>,
+        size: &dyn Fn(usize) -> Polynomial<C>,
+    ) -> (f64, Option<usize>, Option<(usize, usize)>) {
+        let mut end = 1.0;
+        let mut saturated = None;
+        let mut low = false;
+        if self.straight && matches!(self.window.bound, Bound::Axis(..)) {
+            return (end, None, None);
+        }
+        for l in self.moving() {
+            let y = need(l);
+            let a = self.axes.acceleration[l];
+            let inside = x.combine(a, &y, -1.0);
+            if let Some(t) = kept_until(&inside, || x.combine(NOISE * a, &size(l), NOISE), 0, 0.0) {
+                if t < end {
+                    (end, saturated) = (t, Some(l));
+                }
+            }
+            low |= BACK && !x.combine(a, &y, 1.0).is_positive();
+        }
+        let mut pair = None;
+        if low && !self.straight {
+            let Some((n, d)) = self.window.quotient() else { return (end, saturated, pair) };
+            let weight_sq = self.window.weight.multiply(&self.window.weight);
+            for j in self.moving() {
+                for l in self.moving().filter(|&l| l != j) {
+                    let (over, under) = self.limit_quotient(j, l);
+                    if under.coefficients().iter().all(|&value| value <= 0.0) {
+                        continue;
+                    }
+                    let over = over.multiply(&d);
+                    let above = over.combine(1.0, &n.multiply(&weight_sq).multiply(&under), -1.0);
+                    if let Some(t) = kept_until(&above, || over.magnitude().scale(NOISE), 0, 0.0) {
+                        if t < end {
+                            (end, saturated, pair) = (t, None, Some((j, l)));
+                        }
+                    }
+                }
+            }
+        }
+        (end, saturated, pair)
+    }
+}

@@ -1,0 +1,118 @@
+//! One piece of the path as the planner sees it: the hodograph over its parameter t in [0, 1].
+
+use feedplan_geometry::polynomial::Polynomial;
+use feedplan_geometry::quadratic::{dot, norm};
+
+/// C'(t) = g(t)/ω(t)² by axis, with ω = 1 on polynomial pieces, and the square of the tool's speed over π.
+///
+/// The state of the planner is π = (dt/dτ)²/ω⁴, τ the time, so that rational pieces keep polynomials everywhere:
+/// axis k has the velocity g_k √π and the acceleration ω² (g_k π'/2 + g_k' π).
+#[derive(Clone, Copy, Debug)]
+pub struct Piece<const M: usize, const C: usize> {
+    pub g: [Polynomial<C>; M],
+    pub weight: Polynomial<C>,
+    /// D: the speed squared is D π.
+    pub speed: Polynomial<C>,
+    /// By axis: so much of g is rounding, of the control points or on the way from them.
+    pub noise: [f64; M],
+    /// Degree of the curve itself.
+    pub degree: usize,
+    /// All of g has one direction.
+    pub straight: bool,
+    /// D = |g|²: the axes are those of the tool.
+    pub own_speed: bool,
+    /// What the axes count in the feed, where that is not D.
+    pub share: Option<[f64; M]>,
+}
+
+/// Tangents are known to this part of the greatest one, and coordinates to this part of their size, which is not held
+/// against a piece as short as rounding.
+const TANGENT_NOISE: f64 = 1e-14;
+const POINT_NOISE: f64 = 1e-15;
+const MOST_NOISE: f64 = 1e-9;
+/// A tangent is off a straight line by no more than this part of the longest one, which is rounding, and of itself,
+/// or it is itself as short as rounding.
+const OFF_LINE: f64 = 2e-15;
+const OFF_ITSELF: f64 = 1e-9;
+const NO_TANGENT: f64 = 1e-13;
+
+impl<const M: usize, const C: usize> Piece<M, C> {
+    /// The piece with these control points, their weights (none: polynomial) and, where the path is one of joints,
+    /// the Bernstein coefficients of the tool's |C'|² with a factor.
+    pub fn new(control: &[[f64; M]], weights: &[f64], speed_sq: Option<(&[f64], f64)>) -> Self {
+        let degree = control.len() - 1;
+        let rational = weights.iter().any(|&weight| weight != weights[0]);
+        let (g, weight) = if rational {
+            let weight = Polynomial::from_bernstein(weights.iter().map(|&weight| weight / weights[0]));
+            let g = std::array::from_fn(|k| {
+                // About the first point, for the digits.
+                let numerator = Polynomial::from_bernstein(
+                    control
+                        .iter()
+                        .zip(weights)
+                        .map(|(point, &w)| (point[k] - control[0][k]) * (w / weights[0])),
+                );
+                numerator.wronskian(&weight)
+            });
+            (g, weight)
+        } else {
+            let scale = degree as f64;
+            let g = std::array::from_fn(|k| {
+                Polynomial::from_bernstein(control.windows(2).map(|pair| scale * (pair[1][k] - pair[0][k])))
+            });
+            (g, Polynomial::constant(1.0))
+        };
+        let along = straight_line(&g);
+        let g = along.unwrap_or(g);
+        let noise = std::array::from_fn(|k| {
+            let (low, high) = g[k].range();
+            let farthest = control.iter().fold(0.0_f64, |most, point| most.max(point[k].abs()));
+            let size = high.max(-low);
+            (POINT_NOISE * degree as f64 * farthest).clamp(TANGENT_NOISE * size, MOST_NOISE * size)
+        });
+        let speed = match speed_sq {
+            Some((values, factor)) => Polynomial::from_bernstein(values.iter().map(|value| factor * value)),
+            None => Polynomial::sum_of_squares(&g),
+        };
+        let own_speed = speed_sq.is_none();
+        Self { g, weight, speed, noise, degree, straight: along.is_some(), own_speed, share: None }
+    }
+
+    /// The same where the axes count in the feed by these shares.
+    pub fn with_share(self, share: Option<&[f64; M]>) -> Self {
+        Self { share: share.copied(), ..self }
+    }
+
+    /// The square of the speed that the feed limits over π, where it is not D.
+    pub fn feed_rate(&self) -> Option<Polynomial<C>> {
+        self.share.map(|share| counted(&self.g, &share))
+    }
+}
+
+/// The sum of squares of tangents, each by its share.
+pub fn counted<const M: usize, const C: usize>(g: &[Polynomial<C>; M], share: &[f64; M]) -> Polynomial<C> {
+    Polynomial::sum_of_squares(&std::array::from_fn::<_, M, _>(|k| g[k].scale(share[k])))
+}
+
+/// The same tangents with exactly one direction, if they have one but for rounding.
+fn straight_line<const M: usize, const C: usize>(g: &[Polynomial<C>; M]) -> Option<[Polynomial<C>; M]> {
+    let tangent = |i: usize| -> [f64; M] { std::array::from_fn(|k| g[k].bernstein(i)) };
+    let tangents = || (0..g[0].degree() + 1).map(tangent);
+    let longest = tangents().max_by(|a, b| dot(a, a).total_cmp(&dot(b, b)))?;
+    let length = norm(&longest);
+    let direction = longest.map(|x| x / length);
+    let on_line = tangents().all(|tangent| {
+        let along = dot(&tangent, &direction);
+        let off = norm(&std::array::from_fn::<f64, M, _>(|k| tangent[k] - along * direction[k]));
+        if off > OFF_LINE * length {
+            return false;
+        }
+        let own = norm(&tangent);
+        off <= OFF_ITSELF * own || own <= NO_TANGENT * length
+    });
+    if !on_line {
+        return None;
+    }
+    let rate = Polynomial::from_bernstein(tangents().map(|tangent| dot(&tangent, &direction)));
+    Some(direction.map(|x| rate.scale(x)))
+}

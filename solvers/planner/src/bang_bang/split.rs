@@ -1,0 +1,353 @@
+//! Cuts a piece where an axis turns round and where the lowest velocity cap changes.
+
+use super::chord::SpeedLine;
+use super::cusp::{cusps, Cusps, Nearly};
+use super::part::{Cap, End, Part, Remedy, SAME_TURN};
+use super::piece::Piece;
+use super::TIP_AXES;
+use crate::planning::ChordLimit;
+use feedplan_geometry::polynomial::Polynomial;
+
+/// Cuts closer than this part of the piece are one.
+const SAME_CUT: f64 = 1e-13;
+/// Closer than this to a turn where |C'|² is below this part of its greatest value, no velocity cap counts.
+const NEAR_CUSP: f64 = 1e-5;
+const SLOW: f64 = 1e-10;
+/// A weight may be so many times greater than those at the ends of a part.
+const UNEVEN: f64 = 100.0;
+/// A place nearly at rest asks for no cut of its own where there is one, or a cusp, within so many times its reach.
+const AROUND: f64 = 4.0;
+/// The value of a polynomial is rounding below this part of its terms.
+const NOISE: f64 = 1e-14;
+/// A tangent coefficient this small beside the greatest one is zero.
+const ZERO: f64 = 1e-14;
+
+/// Limits of the axes.
+pub struct Axes<const M: usize> {
+    pub acceleration: [f64; M],
+    pub velocity_sq: [f64; M],
+}
+
+/// What limits the speed on a piece.
+pub struct Limits<'a, const M: usize> {
+    pub axes: &'a Axes<M>,
+    pub feed_sq: f64,
+    pub chord: Option<&'a ChordLimit>,
+}
+
+/// A place that divides two parts.
+#[derive(Clone, Copy, Debug)]
+pub struct Cut {
+    t: f64,
+    end: End,
+}
+
+impl Cut {
+    fn plain(t: f64) -> Self {
+        Self { t, end: End::default() }
+    }
+
+    fn is_turn_or_end(&self) -> bool {
+        self.end.turns != 0 || self.t == 0.0 || self.t == 1.0
+    }
+
+    fn turn(t: f64, turns: u8) -> Self {
+        Self { t, end: End { turns, reach: SAME_TURN, ..End::default() } }
+    }
+
+    /// Takes over what another cut at the same place is for.
+    fn join(&mut self, other: &Self) {
+        self.end.turns |= other.end.turns;
+        self.end.order = self.end.order.max(other.end.order);
+        self.end.reach = self.end.reach.max(other.end.reach);
+        self.end.stops |= other.end.stops;
+    }
+}
+
+impl From<&Remedy> for Cut {
+    fn from(remedy: &Remedy) -> Self {
+        Self { t: remedy.t, end: End { reach: remedy.reach, stops: remedy.stops, ..End::default() } }
+    }
+}
+
+/// Appends the parts of the piece from left to right; `tip` is the tool's own piece where it is another one, `cuts`
+/// is space.
+pub fn split<const M: usize, const C: usize>(
+    piece: &Piece<M, C>,
+    tip: Option<&Piece<TIP_AXES, C>>,
+    limits: &Limits<M>,
+    remedies: impl Iterator<Item = Remedy>,
+    cuts: &mut Vec<Cut>,
+    out: &mut Vec<Part>,
+) {
+    let Limits { axes, feed_sq, chord } = *limits;
+    cuts.clear();
+    cuts.extend([Cut::plain(0.0), Cut::plain(1.0)]);
+    let moving = cut_at_turns(piece, cuts);
+    let feed = piece.feed_rate().map(|rate| (rate, feed_sq));
+    let most_sq = if feed.is_some() { f64::INFINITY } else { feed_sq };
+    let (whole, mut below_chord) = ([SpeedLine { from: 0.0, to: 1.0, speed_sq: [most_sq; 2] }], vec![]);
+    match (chord, tip) {
+        (Some(chord), Some(tip)) => chord.lines(tip, most_sq, &mut below_chord),
+        (Some(chord), None) if piece.own_speed => chord.lines(piece, most_sq, &mut below_chord),
+        _ => {}
+    }
+    let lines = if below_chord.is_empty() { &whole } else { below_chord.as_slice() };
+    // Where the axes are the tool's none is faster than the tool.
+    let can_cap = (0..M).fold(0u8, |bits, k| {
+        let slow = piece.own_speed && axes.velocity_sq[k] >= most_sq;
+        bits | u8::from(!slow && moving >> k & 1 == 1) << k
+    });
+    let mut fast = 0u8;
+    for line in lines {
+        if line.from > 0.0 {
+            cuts.push(Cut::plain(line.from));
+        }
+        if can_cap != 0 {
+            fast |= cut_by_cap(piece, axes, feed.as_ref(), line, can_cap, cuts);
+        }
+    }
+    merge_near_cusps(piece, cuts);
+    cut_by_weight(&piece.weight, (0.0, 1.0), cuts);
+    let remedies: Vec<Remedy> = remedies.collect();
+    cuts.extend(remedies.iter().filter(|remedy| remedy.reach == 0.0).map(Cut::from));
+    cut_at_cusps(piece, moving, cuts);
+    for remedy in remedies.iter().filter(|remedy| remedy.reach > 0.0) {
+        join_around(remedy, cuts);
+    }
+    put_in_order(cuts);
+    let mut lines = lines.iter().peekable();
+    for pair in cuts.windows(2) {
+        let (from, to) = (pair[0].t, pair[1].t);
+        while lines.peek().is_some_and(|line| line.to <= 0.5 * (from + to)) {
+            lines.next();
+        }
+        let Some(line) = lines.peek() else { break };
+        let middle = 0.5 * (from + to);
+        let g: [f64; M] = std::array::from_fn(|k| piece.g[k].value(middle));
+        let feed = feed.as_ref().map(|(rate, feed_sq)| (rate.value(middle), *feed_sq));
+        out.push(Part {
+            from,
+            to,
+            cap: lowest_cap(&g, piece.speed.value(middle), axes, feed, line, (from, to), fast),
+            left: pair[0].end,
+            right: pair[1].end,
+            negative: (0..M).fold(0, |bits, k| bits | u8::from(g[k] < 0.0) << k),
+            moving,
+        });
+    }
+}
+
+/// Cuts where an axis turns round; says which axes move at all.
+fn cut_at_turns<const M: usize, const C: usize>(piece: &Piece<M, C>, cuts: &mut Vec<Cut>) -> u8 {
+    let size = piece.g.each_ref().map(|g| g.padded().iter().fold(0.0, |most: f64, c| most.max(c.abs())));
+    let greatest = size.iter().copied().fold(0.0, f64::max);
+    let mut moving = 0u8;
+    for (k, g) in piece.g.iter().enumerate() {
+        if size[k] <= ZERO * greatest {
+            continue;
+        }
+        moving |= 1 << k;
+        for (end, t) in [(g.first(), 0.0), (g.last(), 1.0)] {
+            if end.abs() <= piece.noise[k] {
+                cuts.push(Cut::turn(t, 1 << k));
+            }
+        }
+        if !piece.straight {
+            g.sign_changes(&mut |t| cuts.push(Cut::turn(t, 1 << k)));
+        }
+    }
+    if piece.straight {
+        // All axes turn at once, in a cusp.
+        let greatest = (0..M).max_by(|&a, &b| size[a].total_cmp(&size[b])).unwrap_or(0);
+        piece.g[greatest].sign_changes(&mut |t| cuts.push(Cut::turn(t, moving)));
+    }
+    moving
+}
+
+/// Cuts where the tool is at rest, or nearly; all axes turn in a cusp, or nowhere near.
+fn cut_at_cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, moving: u8, cuts: &mut Vec<Cut>) {
+    let Cusps { cusps, nearly } = cusps(piece, moving);
+    for Nearly { t, reach } in nearly {
+        let reach = AROUND * reach.max(SAME_TURN);
+        let at_cusp = cusps.iter().any(|cusp| (t - cusp.t).abs() <= AROUND * cusp.reach + reach);
+        if !at_cusp && !cuts.iter().any(|cut| (t - cut.t).abs() <= reach) {
+            cuts.push(Cut::plain(t));
+        }
+    }
+    for cusp in cusps {
+        let mut all = Cut {
+            t: cusp.t,
+            end: End { turns: moving, order: cusp.order, reach: cusp.reach.max(SAME_TURN), stops: false },
+        };
+        let near = |t: f64| (t - cusp.t).abs() <= AROUND * all.end.reach;
+        let is_end = |t: f64| t == 0.0 || t == 1.0;
+        all.end.stops = cuts.iter().any(|cut| near(cut.t) && cut.end.stops);
+        all.t = [0.0, 1.0].into_iter().find(|&t| near(t)).unwrap_or(cusp.t);
+        cuts.retain(|cut| !near(cut.t) || is_end(cut.t));
+        cuts.push(all);
+    }
+}
+
+/// Makes one cut of all within the remedy's reach.
+fn join_around(remedy: &Remedy, cuts: &mut Vec<Cut>) {
+    let mut all = Cut::from(remedy);
+    cuts.retain(|cut| {
+        let near = (cut.t - remedy.t).abs() <= remedy.reach;
+        if near {
+            all.join(cut);
+            all.t = if cut.t == 0.0 || cut.t == 1.0 { cut.t } else { all.t };
+        }
+        !near
+    });
+    cuts.push(all);
+}
+
+/// Sorts the cuts and joins those at one place.
+fn put_in_order(cuts: &mut Vec<Cut>) {
+    if !cuts.is_sorted_by(|a, b| a.t <= b.t) {
+        cuts.sort_by(|a, b| a.t.total_cmp(&b.t));
+    }
+    cuts.dedup_by(|b, a| {
+        let both_turn = a.is_turn_or_end() && b.is_turn_or_end();
+        let same = b.t - a.t <= if both_turn { SAME_TURN } else { SAME_CUT };
+        if same {
+            a.join(b);
+        }
+        same
+    });
+    if let Some(last) = cuts.last_mut() {
+        last.t = 1.0;
+    }
+}
+
+/// Near a cusp the axes turn within what rounding can tell apart: there they turn at once, and no velocity cap counts,
+/// for the tool hardly moves.
+fn merge_near_cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, cuts: &mut Vec<Cut>) {
+    let (slowest, fastest) = piece.speed.range();
+    if cuts.len() == 2 || slowest > SLOW * fastest {
+        return;
+    }
+    let mut turns: Vec<Cut> = cuts.iter().copied().filter(Cut::is_turn_or_end).collect();
+    turns.sort_by(|a, b| a.t.total_cmp(&b.t));
+    turns.dedup_by(|b, a| {
+        let same = b.t - a.t <= SAME_TURN;
+        if same {
+            a.join(b);
+            // The ends of the piece stay where they are.
+            a.t = if b.t == 1.0 { 1.0 } else { a.t };
+        }
+        same
+    });
+    let slow = |t: f64| piece.speed.value(t) <= SLOW * fastest;
+    let near = |t: f64| turns.iter().any(|turn| (t - turn.t).abs() <= NEAR_CUSP && slow(turn.t));
+    cuts.retain(|cut| !cut.is_turn_or_end() && !near(cut.t));
+    cuts.extend(turns);
+}
+
+/// Halves until no weight is much greater than those at the ends, from which integrals are computed.
+fn cut_by_weight<const C: usize>(weight: &Polynomial<C>, (from, to): (f64, f64), cuts: &mut Vec<Cut>) {
+    if weight.range().1 <= UNEVEN * weight.first().min(weight.last()) {
+        return;
+    }
+    let middle = 0.5 * (from + to);
+    cuts.push(Cut::plain(middle));
+    let (left, right) = weight.split(0.5);
+    cut_by_weight(&left, (from, middle), cuts);
+    cut_by_weight(&right, (middle, to), cuts);
+}
+
+/// Cuts the places where the caps cross on a line; says which axes can be faster than their limits.
+fn cut_by_cap<const M: usize, const C: usize>(
+    piece: &Piece<M, C>,
+    axes: &Axes<M>,
+    feed: Option<&(Polynomial<C>, f64)>,
+    line: &SpeedLine,
+    can_cap: u8,
+    cuts: &mut Vec<Cut>,
+) -> u8 {
+    let mut fast = 0u8;
+    let mut cut = |t: f64| cuts.push(Cut::plain(line.from + t * (line.to - line.from)));
+    let whole = line.from == 0.0 && line.to == 1.0;
+    let on_line = |p: &Polynomial<C>| if whole { *p } else { p.part(line.from, line.to) };
+    let speed = on_line(&piece.speed);
+    let [f0, f1] = line.speed_sq;
+    // The tool is never faster than all of its axes at their limits.
+    let binds = !piece.own_speed || f0.min(f1) < axes.velocity_sq.iter().sum();
+    let bound =
+        if f0 == f1 { Polynomial::constant(f0) } else { Polynomial::from_bernstein([f0, f1].into_iter()) };
+    let finite = f0.is_finite() && f1.is_finite();
+    let feed = feed.map(|(rate, feed_sq)| (on_line(rate), *feed_sq));
+    for k in (0..M).filter(|&k| can_cap >> k & 1 == 1 && axes.velocity_sq[k] < f64::MAX) {
+        let square = || on_line(&piece.g[k].multiply(&piece.g[k]));
+        let mut excesses = [None, None];
+        if binds && finite {
+            excesses[0] = Some(square().multiply(&bound).combine(1.0, &speed, -axes.velocity_sq[k]));
+        }
+        if let Some((rate, feed_sq)) = &feed {
+            excesses[1] = Some(square().combine(*feed_sq, rate, -axes.velocity_sq[k]));
+        }
+        let is_slow = |excess: &Polynomial<C>| excess.coefficients().iter().all(|&value| value <= 0.0);
+        if excesses.iter().flatten().any(is_slow) {
+            continue;
+        }
+        excesses.iter().flatten().for_each(|excess| crossings(excess, &mut cut));
+        fast |= 1 << k;
+    }
+    if let Some((rate, feed_sq)) = feed.filter(|_| finite) {
+        crossings(&rate.multiply(&bound).combine(1.0, &speed, -feed_sq), &mut cut);
+    }
+    for j in (0..M).filter(|&j| fast >> j & 1 == 1) {
+        for k in (j + 1..M).filter(|&k| fast >> k & 1 == 1) {
+            let (v_j, v_k) = (axes.velocity_sq[j].sqrt(), axes.velocity_sq[k].sqrt());
+            for sign in [1.0, -1.0] {
+                crossings(&on_line(&piece.g[k].combine(v_j, &piece.g[j], sign * v_k)), &mut cut);
+            }
+        }
+    }
+    fast
+}
+
+/// Where a polynomial changes its sign by more than rounding: between two places that rounding alone keeps apart, as
+/// next to a double root, it does not.
+fn crossings<const C: usize>(p: &Polynomial<C>, cut: &mut impl FnMut(f64)) {
+    let mut places: Vec<f64> = vec![];
+    p.sign_changes(&mut |t| {
+        if let Some(&last) = places.last() {
+            let middle = 0.5 * (last + t);
+            if p.value(middle).abs() <= NOISE * p.magnitude().value(middle) {
+                places.pop();
+                return;
+            }
+        }
+        places.push(t);
+    });
+    places.into_iter().for_each(cut);
+}
+
+/// The lowest cap in the middle of a part, where it is so everywhere; g and D are those of the middle.
+fn lowest_cap<const M: usize>(
+    g: &[f64; M],
+    speed: f64,
+    axes: &Axes<M>,
+    feed: Option<(f64, f64)>,
+    line: &SpeedLine,
+    (from, to): (f64, f64),
+    fast: u8,
+) -> Cap {
+    let [f0, f1] = line.speed_sq;
+    let at = |t: f64| if f0 == f1 { f0 } else { f0 + (f1 - f0) * ((t - line.from) / (line.to - line.from)) };
+    let ends = [at(from), at(to)];
+    let mut lowest = 0.5 * (ends[0] + ends[1]) / speed;
+    let mut cap = Cap::Speed(ends);
+    if let Some((rate, feed_sq)) = feed.filter(|(rate, feed_sq)| rate * lowest > *feed_sq) {
+        (lowest, cap) = (feed_sq / rate, Cap::Feed(feed_sq));
+    }
+    for k in (0..M).filter(|&k| fast >> k & 1 == 1) {
+        if g[k] * g[k] * lowest > axes.velocity_sq[k] {
+            lowest = axes.velocity_sq[k] / (g[k] * g[k]);
+            cap = Cap::Axis(k, axes.velocity_sq[k]);
+        }
+    }
+    cap
+}

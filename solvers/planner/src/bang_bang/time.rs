@@ -1,0 +1,65 @@
+//! The time along the tool's speed cap: length over speed, by quadrature.
+
+use super::part::SubPiece;
+use feedplan_geometry::quadratic::norm;
+
+/// Places of the rule.
+const NODES: usize = 6;
+/// Halvings for one arc; some twenty are usual.
+const MOST_HALVINGS: u32 = 1000;
+
+/// ∫ √D/(ω² √f) dx from x0 to x1: length over speed, by Gauss's rule of order 12, halved where it does not agree.
+pub fn time_at_speed<const M: usize, const C: usize>(
+    sub: &SubPiece<M, C>,
+    (f0, f1): (f64, f64),
+    x0: f64,
+    x1: f64,
+) -> f64 {
+    let rate = |x: [f64; NODES]| {
+        let weight = sub.weight.values(x);
+        // Next to a cusp the sum of squares has lost the digits that the tangents still have.
+        let speed = if sub.own_speed {
+            let g = sub.g.each_ref().map(|g| g.values(x));
+            std::array::from_fn(|i| norm(&g.map(|g| g[i])))
+        } else {
+            sub.speed.values(x).map(|speed| speed.max(0.0).sqrt())
+        };
+        std::array::from_fn(|i| speed[i] / ((f0 + x[i] * (f1 - f0)).sqrt() * weight[i] * weight[i]))
+    };
+    let whole = rule(&rate, x0, x1);
+    gauss(&rate, (x0, x1), whole, 1e-14 * whole, &mut { MOST_HALVINGS })
+}
+
+/// To an error that does not shrink with the stretches, and in no more than so many halvings: where the rate is rounding
+/// throughout, as it may be next to a cusp, more would gain nothing.
+fn gauss(
+    rate: &impl Fn([f64; NODES]) -> [f64; NODES],
+    (a, b): (f64, f64),
+    whole: f64,
+    error: f64,
+    left: &mut u32,
+) -> f64 {
+    let middle = 0.5 * (a + b);
+    let halves = (rule(rate, a, middle), rule(rate, middle, b));
+    if (halves.0 + halves.1 - whole).abs() <= error || *left == 0 {
+        return halves.0 + halves.1;
+    }
+    *left -= 1;
+    gauss(rate, (a, middle), halves.0, error, left) + gauss(rate, (middle, b), halves.1, error, left)
+}
+
+/// Gauss's rule.
+fn rule(rate: &impl Fn([f64; NODES]) -> [f64; NODES], a: f64, b: f64) -> f64 {
+    const HALF: [(f64, f64); NODES / 2] = [
+        (0.238_619_186_083_196_9, 0.467_913_934_572_691_04),
+        (0.661_209_386_466_264_5, 0.360_761_573_048_138_6),
+        (0.932_469_514_203_152, 0.171_324_492_379_170_35),
+    ];
+    let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
+    let node = |i: usize| {
+        let (x, weight) = HALF[i / 2];
+        (if i.is_multiple_of(2) { -x } else { x }, weight)
+    };
+    let rates = rate(std::array::from_fn(|i| middle + half * node(i).0));
+    half * rates.iter().enumerate().map(|(i, rate)| node(i).1 * rate).sum::<f64>()
+}

@@ -1,0 +1,110 @@
+//! numpy arrays to and from the types of the kernels, each length checked once here.
+
+use numpy::{
+    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
+};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use feedplan_geometry::quadratic::Quadratic;
+
+/// `feedplan.curves.composite.CompositeCurve`.
+#[derive(FromPyObject)]
+pub struct CurveArrays<'py> {
+    pub control_points: PyReadonlyArray2<'py, f64>,
+    pub weights: Option<PyReadonlyArray1<'py, f64>>,
+    pub offsets: PyReadonlyArray1<'py, i64>,
+    pub width: PyReadonlyArray1<'py, f64>,
+}
+
+impl CurveArrays<'_> {
+    pub fn axes(&self) -> usize {
+        self.control_points.shape()[1]
+    }
+
+    /// Empty where all pieces are polynomial.
+    pub fn weights(&self) -> PyResult<&[f64]> {
+        Ok(match &self.weights {
+            Some(weights) => weights.as_slice()?,
+            None => &[],
+        })
+    }
+}
+
+/// Offsets; a negative one becomes one that fits nowhere.
+pub fn indices(array: &PyReadonlyArray1<i64>) -> Vec<usize> {
+    array.as_array().iter().map(|&value| usize::try_from(value).unwrap_or(usize::MAX)).collect()
+}
+
+/// (n, m) array to rows of M ≥ m axes; the axes beyond m rest at 0.
+pub fn rows<const M: usize>(array: &PyReadonlyArray2<f64>) -> PyResult<Vec<[f64; M]>> {
+    rows_with(array, 0.0)
+}
+
+/// The same with `rest` for the axes beyond m.
+pub fn rows_with<const M: usize>(array: &PyReadonlyArray2<f64>, rest: f64) -> PyResult<Vec<[f64; M]>> {
+    let flat = array.as_slice().map_err(|_| contiguous())?;
+    let axes = array.shape()[1];
+    Ok(flat.chunks_exact(axes).map(|row| padded(row, rest)).collect())
+}
+
+/// (m,) array to one row of M ≥ m axes; the axes beyond m get `rest`.
+pub fn row<const M: usize>(array: &PyReadonlyArray1<f64>, rest: f64) -> PyResult<[f64; M]> {
+    let flat = array.as_slice().map_err(|_| contiguous())?;
+    if flat.len() > M {
+        return Err(PyValueError::new_err(format!("{} values where {M} axes are", flat.len())));
+    }
+    Ok(padded(flat, rest))
+}
+
+fn padded<const M: usize>(values: &[f64], rest: f64) -> [f64; M] {
+    std::array::from_fn(|k| values.get(k).copied().unwrap_or(rest))
+}
+
+/// Control points (3 n, m) and widths (n,) of quadratic pieces in M ≥ m axes; the axes beyond m rest at 0.
+pub fn quadratics<const M: usize>(
+    control: &PyReadonlyArray2<f64>,
+    width: &PyReadonlyArray1<f64>,
+) -> PyResult<Vec<Quadratic<M>>> {
+    let flat = control.as_slice().map_err(|_| contiguous())?;
+    let width = width.as_slice().map_err(|_| contiguous())?;
+    let axes = control.shape()[1];
+    Ok(flat
+        .chunks_exact(3 * axes)
+        .zip(width)
+        .map(|(c, &width)| Quadratic {
+            control: std::array::from_fn(|i| padded(&c[i * axes..(i + 1) * axes], 0.0)),
+            width,
+        })
+        .collect())
+}
+
+/// The first `axes` columns of rows to an (n, axes) array.
+pub fn to_array2<'py, T: numpy::Element + Copy, const M: usize>(
+    py: Python<'py>,
+    rows: Vec<[T; M]>,
+    axes: usize,
+) -> Bound<'py, PyArray2<T>> {
+    let count = rows.len();
+    let flat = if axes == M {
+        rows.into_flattened()
+    } else {
+        rows.iter().flat_map(|row| &row[..axes]).copied().collect()
+    };
+    PyArray1::from_vec(py, flat).reshape([count, axes]).expect("n × axes values")
+}
+
+/// Control points of pieces, the first `axes` columns of them, to an (n, 3, axes) array.
+pub fn to_array3<'py, const M: usize>(
+    py: Python<'py>,
+    pieces: &[Quadratic<M>],
+    axes: usize,
+) -> Bound<'py, PyArray3<f64>> {
+    let flat: Vec<f64> =
+        pieces.iter().flat_map(|piece| &piece.control).flat_map(|point| &point[..axes]).copied().collect();
+    PyArray1::from_vec(py, flat).reshape([pieces.len(), 3, axes]).expect("n × 3 × axes values")
+}
+
+fn contiguous() -> PyErr {
+    PyValueError::new_err("arrays must be C-contiguous float64")
+}

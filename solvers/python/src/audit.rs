@@ -1,0 +1,535 @@
+//! The audit of plans and setpoints: the package's own types in, findings out.
+
+use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use super::arrays::{to_array2, CurveArrays};
+use super::work::run;
+use super::{with_padded_axes, with_path_axes};
+use feedplan_audit::arcs::Arcs;
+use feedplan_audit::curve::{Curve, Followed, Pieces};
+use feedplan_audit::deviation::{audit_deviation, audit_path};
+use feedplan_audit::follow::Plan;
+use feedplan_audit::moves::Programmed;
+use feedplan_audit::polygon::MOST;
+use feedplan_audit::profile::audit_profile;
+use feedplan_audit::setpoints::{Chunk, Stream};
+use feedplan_audit::timed::Timed;
+use feedplan_audit::{Check, Limits, Tally, FEEDS};
+use feedplan_geometry::watch::Watch;
+
+/// Name, axis (−1: none), worst value, limit, ratio, time, source line of one limit.
+type Finding = (&'static str, i64, f64, f64, f64, f64, i32);
+
+/// The findings, and how many samples were looked at.
+type Findings = (Vec<Finding>, u64);
+
+fn findings<const M: usize>(tally: &Tally<M>, axes: usize) -> Findings {
+    let mut found = Vec::new();
+    for check in Check::ALL {
+        for axis in 0..if check.per_axis() { axes } else { 1 } {
+            let worst = tally.get(check, axis);
+            if worst.ratio >= 0.0 {
+                let axis = if check.per_axis() { axis as i64 } else { -1 };
+                let name = check.name();
+                found.push((name, axis, worst.value, worst.limit, worst.ratio, worst.time, worst.line));
+            }
+        }
+    }
+    (found, tally.samples)
+}
+
+fn require(good: bool, what: &str) -> PyResult<()> {
+    if good {
+        Ok(())
+    } else {
+        Err(PyValueError::new_err(format!("the arrays of the {what} differ in length")))
+    }
+}
+
+impl CurveArrays<'_> {
+    fn pieces(&self, whose: &str) -> PyResult<Pieces<'_>> {
+        let pieces = Pieces {
+            axes: self.axes(),
+            control: self.control_points.as_slice()?,
+            weights: self.weights()?,
+            offsets: self.offsets.as_slice()?,
+            width: self.width.as_slice()?,
+        };
+        let points = self.control_points.shape()[0];
+        let offsets = pieces.offsets;
+        let good = offsets.len() == pieces.len() + 1
+            && offsets.first() == Some(&0)
+            && offsets.last() == Some(&(points as i64))
+            && offsets.windows(2).all(|pair| (2..=MOST as i64 + 1).contains(&(pair[1] - pair[0])))
+            && (pieces.weights.is_empty() || pieces.weights.len() == points);
+        require(good, whose)?;
+        Ok(pieces)
+    }
+}
+
+/// `feedplan.Path`.
+#[derive(FromPyObject)]
+struct PathArrays<'py> {
+    curve: CurveArrays<'py>,
+    line: PyReadonlyArray1<'py, i32>,
+    #[pyo3(attribute("move"))]
+    moves: PyReadonlyArray2<'py, i64>,
+    tolerance: PyReadonlyArray1<'py, f64>,
+    runs: PyReadonlyArray1<'py, i64>,
+    new_words: PyReadonlyArray1<'py, bool>,
+    start_dwell: f64,
+    dwell: PyReadonlyArray1<'py, f64>,
+}
+
+/// `feedplan.constraints.problem.Problem`; its other limits come in `LimitArrays`.
+#[derive(FromPyObject)]
+struct ProblemArrays<'py> {
+    path: PathArrays<'py>,
+    feed_share: Option<PyReadonlyArray2<'py, f64>>,
+    junction_speed: PyReadonlyArray1<'py, f64>,
+}
+
+impl ProblemArrays<'_> {
+    fn axes(&self) -> usize {
+        self.path.curve.axes()
+    }
+
+    /// What the axes count in the feed, one row a piece or none.
+    fn share(&self) -> PyResult<&[f64]> {
+        Ok(self.feed_share.as_ref().map_or(Ok(&[][..]), |share| share.as_slice())?)
+    }
+
+    /// `feed` are the greatest speeds of each piece.
+    fn followed<'a>(&'a self, feed: &'a PyReadonlyArray2<'_, f64>) -> PyResult<Followed<'a>> {
+        let path = &self.path;
+        let followed = Followed {
+            pieces: path.curve.pieces("path")?,
+            feed: feed.as_slice()?,
+            line: path.line.as_slice()?,
+            moves: path.moves.as_slice()?,
+            tolerance: path.tolerance.as_slice()?,
+            runs: path.runs.as_slice()?,
+            new_words: path.new_words.as_slice()?,
+            start_dwell: path.start_dwell,
+            dwell: path.dwell.as_slice()?,
+        };
+        let pieces = followed.len();
+        let runs = followed.runs;
+        let ordered = runs.windows(2).all(|pair| pair[0] <= pair[1]);
+        let spanned = runs.first() == Some(&0) && runs.last() == Some(&(pieces as i64));
+        let good = [followed.line.len(), followed.tolerance.len()] == [pieces; 2]
+            && followed.feed.len() == FEEDS * pieces
+            && self.share()?.len() % (self.axes() * pieces).max(1) == 0
+            && followed.moves.len() == 2 * pieces
+            && followed.dwell.len() + 1 == runs.len()
+            && self.junction_speed.as_slice()?.len() == pieces + 1
+            && ordered
+            && spanned;
+        require(good, "path")?;
+        Ok(followed)
+    }
+}
+
+/// `feedplan.profile.SpeedProfile`.
+#[derive(FromPyObject)]
+struct ProfileArrays<'py> {
+    piece: PyReadonlyArray1<'py, u32>,
+    kind: PyReadonlyArray1<'py, u8>,
+    axis: PyReadonlyArray1<'py, u8>,
+    value: PyReadonlyArray1<'py, f64>,
+    u0: PyReadonlyArray1<'py, f64>,
+    u1: PyReadonlyArray1<'py, f64>,
+    p0: PyReadonlyArray1<'py, f64>,
+    p1: PyReadonlyArray1<'py, f64>,
+    duration: PyReadonlyArray1<'py, f64>,
+    a0: PyReadonlyArray1<'py, f64>,
+    a1: PyReadonlyArray1<'py, f64>,
+    runs: PyReadonlyArray1<'py, i64>,
+}
+
+impl ProfileArrays<'_> {
+    fn arcs<'a>(&'a self, problem: &'a ProblemArrays<'_>) -> PyResult<Arcs<'a>> {
+        let arcs = Arcs {
+            piece: self.piece.as_slice()?,
+            kind: self.kind.as_slice()?,
+            axis: self.axis.as_slice()?,
+            value: self.value.as_slice()?,
+            u0: self.u0.as_slice()?,
+            u1: self.u1.as_slice()?,
+            p0: self.p0.as_slice()?,
+            p1: self.p1.as_slice()?,
+            duration: self.duration.as_slice()?,
+            a0: self.a0.as_slice()?,
+            a1: self.a1.as_slice()?,
+            share: problem.share()?,
+            pieces: problem.path.line.len(),
+            runs: self.runs.as_slice()?,
+        };
+        let [a0, a1] = [arcs.a0, arcs.a1];
+        let numbers = [arcs.u0, arcs.u1, arcs.p0, arcs.p1, arcs.value, arcs.duration, a0, a1];
+        let good = numbers.iter().all(|array| array.len() == arcs.len())
+            && [arcs.kind.len(), arcs.axis.len()] == [arcs.len(); 2];
+        require(good, "profile")?;
+        Ok(arcs)
+    }
+}
+
+/// `feedplan.Program`.
+#[derive(FromPyObject)]
+struct ProgramArrays<'py> {
+    axes: Vec<String>,
+    start: PyReadonlyArray1<'py, f64>,
+    target: PyReadonlyArray2<'py, f64>,
+    line: PyReadonlyArray1<'py, i32>,
+    arc_move: PyReadonlyArray1<'py, i64>,
+    arc_centre: PyReadonlyArray2<'py, f64>,
+    arc_normal: PyReadonlyArray1<'py, u8>,
+    arc_angle: PyReadonlyArray1<'py, f64>,
+    spline_move: PyReadonlyArray1<'py, i64>,
+    spline_pieces: PyReadonlyArray1<'py, i64>,
+    splines: Option<CurveArrays<'py>>,
+    change_move: PyReadonlyArray1<'py, i64>,
+    change_start: PyReadonlyArray2<'py, f64>,
+}
+
+impl ProgramArrays<'_> {
+    fn programmed(&self, axes: usize) -> PyResult<Programmed<'_>> {
+        let none = Pieces { axes, control: &[], weights: &[], offsets: &[0], width: &[] };
+        let program = Programmed {
+            axes,
+            start: self.start.as_slice()?,
+            target: self.target.as_slice()?,
+            line: self.line.as_slice()?,
+            arc_move: self.arc_move.as_slice()?,
+            arc_centre: self.arc_centre.as_slice()?,
+            arc_normal: self.arc_normal.as_slice()?,
+            arc_angle: self.arc_angle.as_slice()?,
+            spline_move: self.spline_move.as_slice()?,
+            spline_pieces: self.spline_pieces.as_slice()?,
+            splines: self.splines.as_ref().map_or(Ok(none), |splines| splines.pieces("program"))?,
+            change_move: self.change_move.as_slice()?,
+            change_start: self.change_start.as_slice()?,
+            xyz: ["X", "Y", "Z"].map(|letter| self.axes.iter().position(|axis| axis == letter)),
+        };
+        let arcs = program.arc_move.len();
+        let good = program.start.len() == axes
+            && self.axes.len() == axes
+            && program.target.len() == axes * program.len()
+            && program.arc_centre.len() == 3 * arcs
+            && [program.arc_normal.len(), program.arc_angle.len()] == [arcs; 2]
+            && program.arc_normal.iter().all(|&normal| normal < 3)
+            && program.splines.axes == axes
+            && program.change_start.len() == axes * program.change_move.len()
+            && program.spline_pieces.len() == program.spline_move.len() + 1
+            && program.spline_pieces.windows(2).all(|pair| 0 <= pair[0] && pair[0] <= pair[1])
+            && program.spline_pieces.last().is_some_and(|&last| last <= program.splines.len() as i64);
+        require(good, "program")?;
+        Ok(program)
+    }
+}
+
+/// `feedplan.audit.Limits`: what holds everywhere, one number an axis.
+#[derive(FromPyObject)]
+struct LimitArrays {
+    max_velocity: Vec<f64>,
+    max_acceleration: Vec<f64>,
+    max_jerk: Vec<f64>,
+    judges_jerk: bool,
+    max_velocity_jump: Vec<f64>,
+    jump_beyond: Vec<f64>,
+    travel: Vec<[f64; 2]>,
+    feed_axes: Vec<Vec<f64>>,
+    chord_tolerance: f64,
+    period: f64,
+    end_speeds: [f64; 2],
+}
+
+impl LimitArrays {
+    /// For `axes` axes, those beyond at rest.
+    fn limits<const M: usize>(&self, axes: usize) -> PyResult<Limits<M>> {
+        let jumps = [&self.max_velocity_jump, &self.jump_beyond];
+        let lengths = [&self.max_velocity, &self.max_acceleration, &self.max_jerk, jumps[0], jumps[1]];
+        let good = axes <= M
+            && self.feed_axes.len() == FEEDS
+            && self.feed_axes.iter().all(|row| row.len() == axes)
+            && lengths.iter().all(|row| row.len() == axes)
+            && self.travel.len() == axes;
+        require(good, "limits")?;
+        fn padded<const M: usize>(values: &[f64]) -> [f64; M] {
+            std::array::from_fn(|k| values.get(k).copied().unwrap_or(0.0))
+        }
+        let anywhere = [f64::NEG_INFINITY, f64::INFINITY];
+        Ok(Limits {
+            axes,
+            velocity: padded(&self.max_velocity),
+            acceleration: padded(&self.max_acceleration),
+            jerk: padded(&self.max_jerk),
+            judges_jerk: self.judges_jerk,
+            jump: padded(&self.max_velocity_jump),
+            jump_beyond: padded(&self.jump_beyond),
+            travel: std::array::from_fn(|k| self.travel.get(k).copied().unwrap_or(anywhere)),
+            feed_axes: std::array::from_fn(|feed| padded(&self.feed_axes[feed])),
+            chord_tolerance: self.chord_tolerance,
+            period: self.period,
+            end_speeds: self.end_speeds,
+        })
+    }
+}
+
+/// Audits path and profile, and the path against the program.
+#[pyfunction]
+#[pyo3(signature = (problem, limits, feed, profile=None, program=None, progress=None))]
+fn audit_plan(
+    py: Python<'_>,
+    problem: ProblemArrays<'_>,
+    limits: LimitArrays,
+    feed: PyReadonlyArray2<'_, f64>,
+    profile: Option<ProfileArrays<'_>>,
+    program: Option<ProgramArrays<'_>>,
+    progress: Option<Bound<'_, PyAny>>,
+) -> PyResult<Findings> {
+    let path = problem.followed(&feed)?;
+    let junction_speed = problem.junction_speed.as_slice()?;
+    let arcs = profile.as_ref().map(|profile| profile.arcs(&problem)).transpose()?;
+    let program = program.as_ref().map(|program| program.programmed(problem.axes())).transpose()?;
+    with_path_axes!(problem.axes(), M, {
+        let limits = limits.limits::<M>(path.axes)?;
+        run(py, progress.as_ref(), |watch| {
+            let pieces = path.len();
+            // About what each takes of the time.
+            let [of_path, of_profile, of_deviation] = [0.05, 0.45, 0.5].map(|share| watch.part(share));
+            let seen = |count| of_path.each(pieces).advance(count);
+            let mut tally = audit_path(&path, arcs.as_ref(), &limits, &seen);
+            if let Some(arcs) = &arcs {
+                let seen = |count| of_profile.each(arcs.len()).advance(count);
+                tally = tally.merge(audit_profile(&path, junction_speed, arcs, &limits, &seen));
+            }
+            if let Some(program) = &program {
+                let seen = |count| of_deviation.each(pieces + program.len()).advance(count);
+                tally = tally.merge(audit_deviation(&path, program, arcs.as_ref(), &seen));
+            }
+            findings(&tally, path.axes)
+        })
+    })
+}
+
+/// Two (n, axes) arrays.
+type Tables<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
+
+/// C and C' (n, axes) at places of a curve, for what Python measures itself.
+#[pyfunction]
+#[pyo3(signature = (curve, piece, u))]
+fn audit_places<'py>(
+    py: Python<'py>,
+    curve: CurveArrays<'py>,
+    piece: PyReadonlyArray1<'py, i64>,
+    u: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Tables<'py>> {
+    let pieces = curve.pieces("path")?;
+    let (piece, u) = (piece.as_slice()?, u.as_slice()?);
+    let inside = piece.iter().all(|&piece| usize::try_from(piece).is_ok_and(|piece| piece < pieces.len()));
+    require(piece.len() == u.len() && inside, "places")?;
+    let axes = pieces.axes;
+    with_path_axes!(axes, M, {
+        let (points, slopes) = run(py, None, |watch| {
+            let (mut points, mut slopes) = (Vec::new(), Vec::new());
+            let mut last: Option<(i64, Curve<M>)> = None;
+            for (i, (&number, &u)) in piece.iter().zip(u).enumerate() {
+                watch.check_at(i);
+                let curve = match last.take() {
+                    Some((known, curve)) if known == number => curve,
+                    _ => pieces.curve::<M>(number as usize),
+                };
+                points.push(curve.at(u));
+                slopes.push(curve.derivative(u));
+                last = Some((number, curve));
+            }
+            (points, slopes)
+        })?;
+        Ok((to_array2(py, points, axes), to_array2(py, slopes, axes)))
+    })
+}
+
+/// A stream whatever its number of axes.
+trait AnyStream: Send + Sync {
+    fn push(&mut self, plan: Option<&Plan>, chunk: &Chunk, watch: Watch);
+    fn finish(self: Box<Self>, plan: Option<&Plan>) -> Findings;
+}
+
+impl<const M: usize> AnyStream for Stream<M> {
+    fn push(&mut self, plan: Option<&Plan>, chunk: &Chunk, watch: Watch) {
+        // Places are found, then judged.
+        let each = watch.each(2 * chunk.t.len());
+        Stream::push(self, plan, chunk, &|count| each.advance(count));
+    }
+
+    fn finish(self: Box<Self>, plan: Option<&Plan>) -> Findings {
+        let axes = self.axes();
+        findings(&Stream::finish(*self, plan), axes)
+    }
+}
+
+/// What a stream of setpoints is compared with, kept as Python holds it.
+struct Compared {
+    problem: Py<PyAny>,
+    feed: Py<PyAny>,
+    profile: Option<Py<PyAny>>,
+    program: Option<Py<PyAny>>,
+    /// When every arc of the profile begins.
+    starts: Vec<f64>,
+}
+
+impl Compared {
+    /// Calls `work` with the plan, free of Python's lock.
+    fn with_plan<T: Send>(
+        &self,
+        py: Python<'_>,
+        progress: Option<&Bound<'_, PyAny>>,
+        work: impl FnOnce(&Plan, Watch) -> T + Send,
+    ) -> PyResult<T> {
+        let problem: ProblemArrays = self.problem.bind(py).extract()?;
+        let feed: PyReadonlyArray2<f64> = self.feed.bind(py).extract()?;
+        let profile: Option<ProfileArrays> =
+            self.profile.as_ref().map(|profile| profile.bind(py).extract()).transpose()?;
+        let program: Option<ProgramArrays> =
+            self.program.as_ref().map(|program| program.bind(py).extract()).transpose()?;
+        let path = problem.followed(&feed)?;
+        let arcs = profile.as_ref().map(|profile| profile.arcs(&problem)).transpose()?;
+        let program = program.as_ref().map(|program| program.programmed(problem.axes())).transpose()?;
+        let profile = arcs.map(|arcs| Timed { arcs, starts: &self.starts, clock: &[] });
+        let plan = Plan { path, profile, program };
+        run(py, progress, |watch| work(&plan, watch))
+    }
+}
+
+/// Audits setpoints chunk by chunk; with a problem also their places on its path.
+#[pyclass]
+struct SetpointAudit {
+    axes: usize,
+    stream: Option<Box<dyn AnyStream>>,
+    compared: Option<Compared>,
+}
+
+#[pymethods]
+impl SetpointAudit {
+    #[new]
+    #[pyo3(signature = (limits, resolution=0.0, problem=None, feed=None, profile=None, program=None))]
+    fn new(
+        limits: LimitArrays,
+        resolution: f64,
+        problem: Option<Bound<'_, PyAny>>,
+        feed: Option<Bound<'_, PyAny>>,
+        profile: Option<Bound<'_, PyAny>>,
+        program: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let axes = limits.max_velocity.len();
+        let stream: Box<dyn AnyStream> = with_padded_axes!(
+            axes,
+            M,
+            Ok(Box::new(Stream::new(limits.limits::<M>(axes)?, resolution)) as _)
+        )?;
+        let compared = problem
+            .zip(feed)
+            .map(|(problem, feed)| compare(axes, problem, feed, profile, program))
+            .transpose()?;
+        Ok(Self { axes, stream: Some(stream), compared: compared.flatten() })
+    }
+
+    /// The next setpoints.
+    #[pyo3(signature = (t, position, velocity=None, acceleration=None, line=None, progress=None))]
+    #[allow(clippy::too_many_arguments)]
+    fn push(
+        &mut self,
+        py: Python<'_>,
+        t: PyReadonlyArray1<'_, f64>,
+        position: PyReadonlyArray2<'_, f64>,
+        velocity: Option<PyReadonlyArray2<'_, f64>>,
+        acceleration: Option<PyReadonlyArray2<'_, f64>>,
+        line: Option<PyReadonlyArray1<'_, i32>>,
+        progress: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let chunk = Chunk {
+            axes: self.axes,
+            t: t.as_slice()?,
+            position: position.as_slice()?,
+            velocity: velocity.as_ref().map(|array| array.as_slice()).transpose()?,
+            acceleration: acceleration.as_ref().map(|array| array.as_slice()).transpose()?,
+            line: line.as_ref().map(|array| array.as_slice()).transpose()?,
+        };
+        let count = chunk.t.len();
+        let rows = self.axes * count;
+        let good = chunk.position.len() == rows
+            && chunk.velocity.is_none_or(|flat| flat.len() == rows)
+            && chunk.acceleration.is_none_or(|flat| flat.len() == rows)
+            && chunk.line.is_none_or(|flat| flat.len() == count);
+        require(good, "setpoints")?;
+        // An audit that is interrupted is finished.
+        let mut stream = self.stream.take().ok_or_else(finished)?;
+        let (pushed, progress) = (&mut stream, progress.as_ref());
+        match &self.compared {
+            Some(compared) => {
+                compared.with_plan(py, progress, |plan, watch| pushed.push(Some(plan), &chunk, watch))?;
+            }
+            None => run(py, progress, |watch| pushed.push(None, &chunk, watch))?,
+        }
+        self.stream = Some(stream);
+        Ok(())
+    }
+
+    /// What was found; nothing can be pushed afterwards.
+    fn finish(&mut self, py: Python<'_>) -> PyResult<Findings> {
+        let stream = self.stream.take().ok_or_else(finished)?;
+        match &self.compared {
+            Some(compared) => compared.with_plan(py, None, |plan, _| stream.finish(Some(plan))),
+            None => Ok(stream.finish(None)),
+        }
+    }
+}
+
+/// A plan to compare with, if the path has pieces; the profile only where its numbers can be used.
+fn compare(
+    axes: usize,
+    problem: Bound<'_, PyAny>,
+    feed: Bound<'_, PyAny>,
+    profile: Option<Bound<'_, PyAny>>,
+    program: Option<Bound<'_, PyAny>>,
+) -> PyResult<Option<Compared>> {
+    let arrays: ProblemArrays = problem.extract()?;
+    let feeds: PyReadonlyArray2<f64> = feed.extract()?;
+    let path = arrays.followed(&feeds)?;
+    require(arrays.axes() == axes, "limits and the path")?;
+    if path.is_empty() {
+        return Ok(None);
+    }
+    let mut starts = Vec::new();
+    let mut usable = None;
+    if let Some(profile) = profile {
+        let extracted: ProfileArrays = profile.extract()?;
+        let arcs = extracted.arcs(&arrays)?;
+        let runs = arcs.runs;
+        let good = !arcs.is_empty()
+            && runs.len() == path.runs.len()
+            && runs.first() == Some(&0)
+            && runs.last() == Some(&(arcs.len() as i64))
+            && runs.windows(2).all(|pair| pair[0] <= pair[1])
+            && (0..arcs.len()).all(|i| !arcs.has_bad_numbers(i, &path));
+        if good {
+            starts = arcs.starts(&path);
+            usable = Some(profile.unbind());
+        }
+    }
+    let program = program.map(Bound::unbind);
+    Ok(Some(Compared { problem: problem.unbind(), feed: feed.unbind(), profile: usable, program, starts }))
+}
+
+fn finished() -> PyErr {
+    PyValueError::new_err("this audit is finished")
+}
+
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(audit_plan, module)?)?;
+    module.add_function(wrap_pyfunction!(audit_places, module)?)?;
+    module.add_class::<SetpointAudit>()
+}

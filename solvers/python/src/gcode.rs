@@ -1,0 +1,145 @@
+//! `read_gcode`: the bytes of a program to the arrays of `Program`.
+
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use super::arrays;
+use super::work::run;
+use feedplan_gcode::{read, Meaning, Options, Place, Point, TipControl};
+use feedplan_geometry::watch::Watch;
+
+pyo3::import_exception!(feedplan.errors, ProgramError);
+
+/// A `feedplan.program.tip.TipControl`.
+struct PyTipControl(Py<PyAny>);
+
+impl PyTipControl {
+    /// Calls a method; what it raises is a sentence.
+    fn call<T, A>(&self, method: &str, arguments: A) -> Result<T, String>
+    where
+        T: for<'a, 'py> FromPyObject<'a, 'py>,
+        A: for<'py> pyo3::call::PyCallArgs<'py>,
+    {
+        Python::attach(|py| {
+            let result = self.0.bind(py).call_method1(method, arguments);
+            match result {
+                Ok(value) => {
+                    value.extract().map_err(|_| format!("{method} of the machine returns no numbers"))
+                }
+                Err(error) => Err(error.value(py).to_string()),
+            }
+        })
+    }
+}
+
+impl TipControl for PyTipControl {
+    fn check(&self, meaning: Meaning) -> Result<(), String> {
+        self.call::<Option<bool>, _>("check", (meaning as u8,)).map(|_| ())
+    }
+
+    fn joints(
+        &self,
+        meaning: Meaning,
+        tool_length: f64,
+        entry: &Point,
+        places: &[Place],
+    ) -> Result<Point, String> {
+        let places: Vec<Vec<f64>> =
+            places.iter().map(|(point, direction)| [&point[..], &direction[..]].concat()).collect();
+        self.call("joints", (meaning as u8, tool_length, entry.to_vec(), places))
+    }
+
+    fn place(&self, meaning: Meaning, tool_length: f64, joints: &Point) -> Result<Place, String> {
+        self.call("place", (meaning as u8, tool_length, joints.to_vec()))
+    }
+}
+
+/// Reads a G-code program; see `feedplan.program.gcode`.
+///
+/// `places` (11, 9): the work offsets G54 to G59.3, the home position, where the program begins, in X Y Z A B C U V W;
+/// `machine_axes` empty where there is no machine; `tip_control` None likewise. Returns the fields of `Program` but its name, and
+/// `spline_columns` in place of `splines`.
+#[pyfunction]
+#[allow(clippy::too_many_arguments)]
+#[pyo3(signature = (
+    source, name, places, machine_axes, tip_control, block_delete, max_moves, progress=None
+))]
+fn read_gcode<'py>(
+    py: Python<'py>,
+    source: &[u8],
+    name: &str,
+    places: PyReadonlyArray2<f64>,
+    machine_axes: &str,
+    tip_control: Option<Py<PyAny>>,
+    block_delete: bool,
+    max_moves: usize,
+    progress: Option<Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let places = arrays::rows::<9>(&places)?;
+    let Ok(places) = <[[f64; 9]; 11]>::try_from(places) else {
+        return Err(pyo3::exceptions::PyValueError::new_err(
+            "nine work offsets, home and start are eleven rows",
+        ));
+    };
+    let options = Options {
+        offsets: std::array::from_fn(|system| places[system]),
+        home: places[9],
+        start: places[10],
+        machine_axes: machine_axes.as_bytes().to_vec(),
+        tip_control: tip_control.map(|control| Box::new(PyTipControl(control)) as _),
+        block_delete,
+        max_moves,
+    };
+    let lines = source.iter().filter(|&&byte| byte == b'\n').count();
+    let read = |watch: Watch| read(source, &options, &|more| watch.each(lines).advance(more));
+    let columns = run(py, progress.as_ref(), read)?.map_err(|error| {
+        let place = error.line.map_or(name.to_string(), |line| format!("{name} line {line}"));
+        ProgramError::new_err((format!("{place}: {}", error.message), error.line))
+    })?;
+
+    let axes: Vec<String> = columns.axes.iter().map(|&letter| char::from(letter).to_string()).collect();
+    let (count, arcs) = (columns.kind.len(), columns.arc_move.len());
+    let fields = PyDict::new(py);
+    fields.set_item("start", PyArray1::from_vec(py, columns.start))?;
+    fields.set_item("kind", PyArray1::from_vec(py, columns.kind))?;
+    fields.set_item("target", PyArray1::from_vec(py, columns.target).reshape([count, axes.len()])?)?;
+    fields.set_item("feed", PyArray1::from_vec(py, columns.feed))?;
+    fields.set_item("line", PyArray1::from_vec(py, columns.line))?;
+    fields.set_item("control", PyArray1::from_vec(py, columns.control))?;
+    fields.set_item("blend_tolerance", PyArray1::from_vec(py, columns.blend_tolerance))?;
+    fields.set_item("fit_tolerance", PyArray1::from_vec(py, columns.fit_tolerance))?;
+    fields.set_item("stop", PyArray1::from_vec(py, columns.stop))?;
+    fields.set_item("stop_cause", PyArray1::from_vec(py, columns.stop_cause))?;
+    fields.set_item("dwell", PyArray1::from_vec(py, columns.dwell))?;
+    fields.set_item("arc_move", PyArray1::from_vec(py, columns.arc_move))?;
+    let centres = columns.arc_centre.into_flattened();
+    fields.set_item("arc_centre", PyArray1::from_vec(py, centres).reshape([arcs, 3])?)?;
+    fields.set_item("arc_normal", PyArray1::from_vec(py, columns.arc_normal))?;
+    fields.set_item("arc_angle", PyArray1::from_vec(py, columns.arc_angle))?;
+    fields.set_item("spline_move", PyArray1::from_vec(py, columns.spline_move))?;
+    fields.set_item("spline_pieces", PyArray1::from_vec(py, columns.spline_pieces))?;
+    let points = columns.spline_control.len() / axes.len();
+    let spline_columns = (
+        PyArray1::from_vec(py, columns.spline_control).reshape([points, axes.len()])?,
+        (!columns.spline_weights.is_empty()).then(|| PyArray1::from_vec(py, columns.spline_weights)),
+        PyArray1::from_vec(py, columns.spline_offsets),
+        PyArray1::from_vec(py, columns.spline_width),
+    );
+    fields.set_item("spline_columns", spline_columns)?;
+    fields.set_item("meaning", PyArray1::from_vec(py, columns.meaning))?;
+    fields.set_item("tool_length", PyArray1::from_vec(py, columns.tool_length))?;
+    let changes = columns.change_move.len();
+    fields.set_item("change_move", PyArray1::from_vec(py, columns.change_move))?;
+    let starts = PyArray1::from_vec(py, columns.change_start).reshape([changes, axes.len()])?;
+    fields.set_item("change_start", starts)?;
+    fields.set_item("start_dwell", columns.start_dwell)?;
+    fields.set_item("warnings", pyo3::types::PyTuple::new(py, columns.warnings)?)?;
+    fields.set_item("axes", pyo3::types::PyTuple::new(py, axes)?)?;
+    Ok(fields)
+}
+
+/// Adds the functions of this file to the module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(read_gcode, module)?)
+}

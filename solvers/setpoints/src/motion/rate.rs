@@ -1,0 +1,204 @@
+//! What is integrated along an arc of a general piece: the speed |C'| of the path itself or √D of the tool tip,
+//! over the square root of a v² that is linear in u. Constant 1, it makes the length; otherwise the time.
+
+use feedplan_geometry::arc_length::{Disc, Integrand};
+use feedplan_geometry::polynomial::Polynomial;
+use feedplan_geometry::spline::speed::{greatest_ratio, to_taylor, Speed};
+
+/// Most coefficients of a tip speed.
+pub const MAX_TIP: usize = 37;
+
+/// D(u), the square of the tip's speed per parameter on one piece, by its Bernstein coefficients.
+#[derive(Clone, Copy, Debug)]
+pub struct TipSpeed<'a> {
+    pub coefficients: &'a [f64],
+    pub width: f64,
+}
+
+impl TipSpeed<'_> {
+    /// D, D' and D'' over t = u / width.
+    pub fn derivatives(&self) -> [Polynomial<MAX_TIP>; 3] {
+        let square = Polynomial::from_bernstein(self.coefficients.iter().copied());
+        let slope = square.derivative().scale(1.0 / self.width);
+        [square, slope, slope.derivative().scale(1.0 / self.width)]
+    }
+}
+
+/// √D as an integrand.
+#[derive(Clone, Copy, Debug)]
+pub struct Tip<'a> {
+    pub square: &'a Polynomial<MAX_TIP>,
+    pub width: f64,
+}
+
+impl Tip<'_> {
+    #[inline(always)]
+    fn at(&self, u: f64) -> f64 {
+        // A D that touches 0 may be a rounding error below it.
+        self.square.value(u / self.width).max(0.0).sqrt()
+    }
+
+    // As for |C'|: no zero of D within the disc.
+    fn disc(&self, a: f64, b: f64) -> Disc {
+        let (middle, half) = (0.5 * (a + b) / self.width, 0.5 * (b - a) / self.width);
+        let n = self.square.degree();
+        let mut taylor = [[0.0]; MAX_TIP];
+        for i in 0..=n {
+            taylor[i] = [self.square.bernstein(i)];
+        }
+        to_taylor(&mut taylor[..=n], middle, half);
+        let least = taylor[0][0];
+        if least <= 0.0 {
+            // Below rounding: taken for 0, whose integral has no error.
+            return Disc { radius: f64::INFINITY, bound: 0.0 };
+        }
+        let ratio = greatest_ratio(|rho| {
+            taylor[1..=n].iter().rev().fold(0.0, |sum, [s]| (sum + s.abs()) * rho) <= least
+        });
+        Disc { radius: (ratio - 1.0) * half * self.width, bound: (2.0 * least).sqrt() }
+    }
+
+    fn greatest(&self) -> f64 {
+        self.square.range().1.max(0.0).sqrt()
+    }
+}
+
+/// Whose speed.
+#[derive(Clone, Copy, Debug)]
+pub enum Source<'a, const M: usize> {
+    Own(Speed<'a, M>),
+    Tip(Tip<'a>),
+}
+
+impl<const M: usize> Source<'_, M> {
+    #[inline(always)]
+    fn at(&self, u: f64) -> f64 {
+        match self {
+            Self::Own(speed) => speed.at(u),
+            Self::Tip(tip) => tip.at(u),
+        }
+    }
+
+    fn disc(&self, a: f64, b: f64) -> Disc {
+        match self {
+            Self::Own(speed) => speed.disc(a, b),
+            Self::Tip(tip) => tip.disc(a, b),
+        }
+    }
+
+    fn foot_error(&self, width: f64) -> f64 {
+        match self {
+            Self::Own(speed) => speed.foot_error(width),
+            Self::Tip(tip) => tip.greatest() * width,
+        }
+    }
+}
+
+/// v² = `start` + `slope` (u − u0).
+#[derive(Clone, Copy, Debug)]
+pub struct Line {
+    pub start: f64,
+    pub slope: f64,
+    pub u0: f64,
+}
+
+impl Line {
+    /// 1 everywhere: what is integrated is the length.
+    pub const ONE: Self = Self { start: 1.0, slope: 0.0, u0: 0.0 };
+
+    #[inline(always)]
+    pub fn at(&self, u: f64) -> f64 {
+        (self.start + self.slope * (u - self.u0)).max(0.0)
+    }
+}
+
+/// From rest at `place`, v² grows by `slope` with the way of u: by y, the root of that way, the time is the integral of
+/// 2 √D / √slope, which is smooth there.
+#[derive(Clone, Copy, Debug)]
+pub struct FromRest<'a, const M: usize> {
+    pub source: Source<'a, M>,
+    pub place: f64,
+    /// 1 from the start of an arc, −1 back from its end.
+    pub sign: f64,
+    pub slope: f64,
+}
+
+impl<const M: usize> FromRest<'_, M> {
+    /// The parameter of the piece.
+    pub fn u(&self, y: f64) -> f64 {
+        self.place + self.sign * y * y
+    }
+}
+
+impl<const M: usize> Integrand for FromRest<'_, M> {
+    #[inline(always)]
+    fn at(&self, y: f64) -> f64 {
+        2.0 * self.source.at(self.u(y)) / self.slope.sqrt()
+    }
+
+    // About y a disc of this radius goes into one of the other radius about u: r (2 b + r) = R.
+    fn disc(&self, a: f64, b: f64) -> Disc {
+        let (from, to) = (self.u(a), self.u(b));
+        let disc = self.source.disc(from.min(to), from.max(to));
+        Disc {
+            radius: disc.radius / ((b * b + disc.radius).sqrt() + b),
+            bound: 2.0 * disc.bound / self.slope.sqrt(),
+        }
+    }
+
+    fn foot(&self) -> f64 {
+        f64::NAN
+    }
+
+    fn foot_error(&self, width: f64) -> f64 {
+        2.0 * self.source.foot_error(width) / self.slope.sqrt()
+    }
+}
+
+/// √D / √v².
+#[derive(Clone, Copy, Debug)]
+pub struct Rate<'a, const M: usize> {
+    pub source: Source<'a, M>,
+    pub line: Line,
+    /// Where D or v² is 0; not a number where neither is.
+    pub foot: f64,
+}
+
+impl<const M: usize> Integrand for Rate<'_, M> {
+    #[inline(always)]
+    fn at(&self, u: f64) -> f64 {
+        let speed = self.source.at(u);
+        if self.line.slope == 0.0 {
+            speed / self.line.start.sqrt()
+        } else {
+            speed / self.line.at(u).sqrt()
+        }
+    }
+
+    // v² loses at most half of its least value within the disc.
+    fn disc(&self, a: f64, b: f64) -> Disc {
+        let disc = self.source.disc(a, b);
+        let least = self.line.at(a).min(self.line.at(b));
+        if self.line.slope == 0.0 {
+            return Disc { bound: disc.bound / least.sqrt(), ..disc };
+        }
+        Disc {
+            radius: disc.radius.min(0.5 * least / self.line.slope.abs()),
+            bound: disc.bound * (2.0 / least).sqrt(),
+        }
+    }
+
+    fn foot(&self) -> f64 {
+        self.foot
+    }
+
+    // The speed's bound over √v²: at worst v² is `slope` times the distance from the foot.
+    fn foot_error(&self, width: f64) -> f64 {
+        let speed = self.source.foot_error(width);
+        if self.line.slope == 0.0 {
+            speed / self.line.start.sqrt()
+        } else {
+            2.0 * speed / (self.line.slope.abs() * width).sqrt()
+        }
+    }
+}
