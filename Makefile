@@ -23,7 +23,7 @@ lint: $(VENV)/built
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	cargo fmt --check --manifest-path solvers/Cargo.toml
+	cargo fmt --all --check --manifest-path solvers/Cargo.toml
 	cargo clippy --release --quiet --workspace --all-targets --manifest-path solvers/Cargo.toml -- -D warnings
 
 bench: $(VENV)/built

@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 use criterion::{criterion_group, criterion_main, BenchmarkId, Criterion, Throughput};
-use feedplan_planner::bang_bang_quadratic::{plan, Problem};
 use feedplan_geometry::quadratic::{norm, sub, Quadratic};
 use feedplan_geometry::watch::Watch;
+use feedplan_planner::bang_bang_quadratic::{plan, Problem};
 
 /// A random number generator that is the same everywhere (splitmix64).
 struct Random(u64);

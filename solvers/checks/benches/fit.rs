@@ -2,8 +2,8 @@
 //! points on one thread and on all, and two chains that need much refinement.
 
 use criterion::{criterion_group, criterion_main, BenchmarkId, Criterion, Throughput};
-use feedplan_path::fit::{fit_points, FitOptions};
 use feedplan_geometry::watch::Watch;
+use feedplan_path::fit::{fit_points, FitOptions};
 
 const OPTIONS: FitOptions = FitOptions {
     tolerance: 0.01,

@@ -5,13 +5,13 @@
 //! feed, or X speeding up and slowing down piece by piece.
 
 use criterion::{criterion_group, criterion_main, BenchmarkId, Criterion, Throughput};
-use feedplan_planner::arc_kind::ArcKind;
-use feedplan_setpoints::motion::ProfileArc;
-use feedplan_setpoints::sampling::{Interpolator, PathData, Sampler};
 use feedplan_geometry::spline::bezier::elevate;
 use feedplan_geometry::spline::length::CurveLength;
 use feedplan_geometry::spline::CompositeCurve;
 use feedplan_geometry::watch::Watch;
+use feedplan_planner::arc_kind::ArcKind;
+use feedplan_setpoints::motion::ProfileArc;
+use feedplan_setpoints::sampling::{Interpolator, PathData, Sampler};
 
 const PIECES: usize = 1000;
 const SETPOINTS: usize = 100_000;

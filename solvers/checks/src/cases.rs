@@ -1,8 +1,8 @@
 //! Random planning problems: paths as CAM systems write them, and paths made to break a planner.
 
-use feedplan_planner::bang_bang_quadratic::{plan, Fault, Problem, Profile};
 use feedplan_geometry::quadratic::Quadratic;
 use feedplan_geometry::watch::Watch;
+use feedplan_planner::bang_bang_quadratic::{plan, Fault, Problem, Profile};
 
 /// A random number generator that is the same everywhere (splitmix64).
 pub struct Random(pub u64);

@@ -1,8 +1,8 @@
 //! Random problems on curves of any degree, polynomial and rational, most of them made to break a planner.
 
+use feedplan_geometry::watch::Watch;
 use feedplan_planner::bang_bang::{plan, plan_each, Problem};
 use feedplan_planner::bang_bang_quadratic::{Fault, Profile};
-use feedplan_geometry::watch::Watch;
 
 use super::cases::Random;
 use super::{padded, PADDED};

@@ -1,7 +1,7 @@
 //! A case of quadratic pieces for the planner of curves, and for the bound: as it is, or with its degree elevated.
 
-use feedplan_planner::bang_bang::Problem;
 use feedplan_geometry::watch::Watch;
+use feedplan_planner::bang_bang::Problem;
 
 use super::cases::Case;
 use super::{padded, PADDED};

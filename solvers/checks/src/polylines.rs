@@ -1,8 +1,8 @@
 //! Random polylines, and measures of a fitted curve that know nothing of the fit.
 
+use feedplan_geometry::spline::Piece;
 use feedplan_path::smooth_fit::polyline::Polyline;
 use feedplan_path::smooth_fit::Smooth;
-use feedplan_geometry::spline::Piece;
 
 /// C and its derivatives to the fourth by u at t in [0, 1].
 pub fn derivatives<const D: usize>(piece: &Piece<D>, t: f64) -> [[f64; D]; 5] {
@@ -80,7 +80,7 @@ pub struct Random(pub u64);
 
 impl Random {
     /// In [0, 1).
-    pub fn next(&mut self) -> f64 {
+    pub fn draw(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         let mut x = self.0;
         x ^= x >> 33;
@@ -90,7 +90,7 @@ impl Random {
     }
 
     fn either_way(&mut self) -> f64 {
-        2.0 * self.next() - 1.0
+        2.0 * self.draw() - 1.0
     }
 }
 
@@ -102,7 +102,7 @@ pub fn walk<const D: usize>(random: &mut Random, chords: usize, step: f64) -> Ve
         let free: [f64; D] = std::array::from_fn(|_| random.either_way());
         let next = free.map(|x| x / length(&free));
         if (0..D).map(|k| way[k] * next[k]).sum::<f64>() > -0.7 {
-            let (last, size) = (points[points.len() - 1], step * (0.05 + random.next()));
+            let (last, size) = (points[points.len() - 1], step * (0.05 + random.draw()));
             points.push(std::array::from_fn(|k| last[k] + size * next[k]));
             way = next;
         }
@@ -112,20 +112,20 @@ pub fn walk<const D: usize>(random: &mut Random, chords: usize, step: f64) -> Ve
 
 /// A random polyline that nowhere turns back: a walk, a zig-zag, noise on a curve, dense points, or all of them.
 pub fn random_polyline<const D: usize>(random: &mut Random) -> Vec<[f64; D]> {
-    let chords = 2 + (150.0 * random.next().powi(2)) as usize;
-    let step = 10f64.powf(3.5 * random.next() - 2.5);
-    let kind = (5.0 * random.next()) as usize;
-    let noise = [0.0, 0.003, 0.3][(3.0 * random.next()) as usize] * step;
-    let phase: [f64; D] = std::array::from_fn(|_| random.next());
+    let chords = 2 + (150.0 * random.draw().powi(2)) as usize;
+    let step = 10f64.powf(3.5 * random.draw() - 2.5);
+    let kind = (5.0 * random.draw()) as usize;
+    let noise = [0.0, 0.003, 0.3][(3.0 * random.draw()) as usize] * step;
+    let phase: [f64; D] = std::array::from_fn(|_| random.draw());
     let points: Vec<[f64; D]> = match kind {
         0 | 1 => walk(random, chords, step),
         2 => {
-            let slope = 2.0 * random.next();
+            let slope = 2.0 * random.draw();
             let zig = |i: usize, k: usize| if k == 0 { i as f64 } else { slope * phase[k] * (i % 2) as f64 };
             (0..=chords).map(|i| std::array::from_fn(|k| step * zig(i, k))).collect()
         }
         _ => {
-            let turn = 0.3 * random.next().powi(2);
+            let turn = 0.3 * random.draw().powi(2);
             let at = |i: usize, k: usize| {
                 (1.0 + phase[k]) * (turn * i as f64 + 6.0 * phase[k]).sin() / turn
                     + if k == 0 { i as f64 } else { 0.0 }

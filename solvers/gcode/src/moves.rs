@@ -7,8 +7,8 @@ mod columns;
 use super::block::rotary;
 use super::fault::{fault, Outcome};
 use super::tip::Meaning;
-use feedplan_geometry::spline::CompositeCurve;
 pub use columns::Columns;
+use feedplan_geometry::spline::CompositeCurve;
 
 /// A point of the machine: X Y Z A B C U V W in mm and degrees.
 pub type Point = [f64; 9];

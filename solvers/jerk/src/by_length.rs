@@ -11,17 +11,17 @@
 
 use rayon::prelude::*;
 
-use feedplan_geometry::arc_length::{W, X};
-use feedplan_planner::bang_bang::Problem;
 use crate::curvature_jumps::{passages, Jump, Passage};
 use crate::jerk_limited::{Geometry, Place, SpeedCap};
-use feedplan_geometry::lanes::Lanes;
 use crate::path_dynamics::chord_speed;
+use feedplan_geometry::arc_length::{W, X};
+use feedplan_geometry::lanes::Lanes;
 use feedplan_geometry::quadratic::{dot, norm};
 use feedplan_geometry::spline::bezier::{self, derivatives};
 use feedplan_geometry::spline::cusps::CUSP;
 use feedplan_geometry::spline::rational::Hodograph;
 use feedplan_geometry::spline::Piece;
+use feedplan_planner::bang_bang::Problem;
 
 /// What the quadrature of a panel may be off, as a part of its length …
 const QUADRATURE: f64 = 1e-12;

@@ -1,11 +1,11 @@
 //! The speed that a feed limits where axes count in it by shares, |(share_k q_k')| u̇: beside that of all axes.
 
-use feedplan_planner::bang_bang::Problem;
 use crate::by_length::{piece, MAX_RATE};
 use feedplan_geometry::polynomial::Polynomial;
 use feedplan_geometry::spline::bezier::split;
 use feedplan_geometry::spline::rational::Hodograph;
 use feedplan_geometry::spline::{CompositeCurve, Piece};
+use feedplan_planner::bang_bang::Problem;
 
 /// A bound of the share is above the greatest one that is seen by this part at most …
 const ACCURACY: f64 = 1e-3;

@@ -5,12 +5,12 @@
 
 use std::ops::Range;
 
-use feedplan_planner::arc_kind::ArcKind;
-use feedplan_geometry::arc_length::{W, X};
-use feedplan_planner::bang_bang::Problem;
 use crate::by_length::{speed_sq, ByLength};
 use crate::jerk_limited::{Geometry, Profile};
 use crate::s_curve::Section;
+use feedplan_geometry::arc_length::{W, X};
+use feedplan_planner::arc_kind::ArcKind;
+use feedplan_planner::bang_bang::Problem;
 
 const PATH_JERK: u8 = ArcKind::PathJerk as u8;
 pub const SPEED_CUBIC: u8 = ArcKind::SpeedCubic as u8;

@@ -24,8 +24,8 @@ mod chain;
 mod interval;
 mod shape;
 
-use feedplan_planner::bang_bang_quadratic::Fault;
 use crate::s_curve::Limits;
+use feedplan_planner::bang_bang_quadratic::Fault;
 pub use shape::{bounded, sampled, Curve, Shape};
 
 /// Golden-section steps: the bracket shrinks to 1e-5 of itself; the minimum is flat.

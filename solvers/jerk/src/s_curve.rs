@@ -38,9 +38,9 @@ mod transition;
 
 use std::collections::VecDeque;
 
-use feedplan_planner::bang_bang_quadratic::Fault;
-use feedplan_geometry::watch::Watch;
 use buffer::Buffer;
+use feedplan_geometry::watch::Watch;
+use feedplan_planner::bang_bang_quadratic::Fault;
 pub use section::{Section, SectionKind};
 pub use segment::Segment;
 pub use transition::Limits;

@@ -6,8 +6,6 @@
 //! the path hold all of it. What is little, and how much of the limits turning may take, is tried in some ways, of which
 //! each stretch takes the quickest.
 
-use feedplan_planner::bang_bang::Problem;
-use feedplan_planner::bang_bang_quadratic::Fault;
 use crate::by_length::{piece, ByLength, Joint};
 use crate::curvature_jumps::HALF;
 use crate::feed;
@@ -16,10 +14,12 @@ use crate::jerk_limited::{Effort, Geometry, Limits, Place, SpeedCap};
 use crate::jerk_limited_path::Task;
 use crate::path_dynamics::{allowable, bounded, greatest, Allowable, AxisLimits, Curve, Shape};
 use crate::s_curve::{self, Section, Segment};
+use crate::stretches::{checked, over_stretches, stretches, Stretch, CREEP};
 use feedplan_geometry::spline::bezier::split;
 use feedplan_geometry::spline::CompositeCurve;
-use crate::stretches::{checked, over_stretches, stretches, Stretch, CREEP};
 use feedplan_geometry::watch::Watch;
+use feedplan_planner::bang_bang::Problem;
+use feedplan_planner::bang_bang_quadratic::Fault;
 
 /// Bounds of derivatives are greater than these by this part.
 const ACCURACY: f64 = 0.05;

@@ -2,18 +2,18 @@
 
 use rayon::prelude::*;
 
-use feedplan_planner::bang_bang::{check_pieces, Problem};
-use feedplan_planner::bang_bang_quadratic::Fault;
 use crate::by_length::{per_feed, piece, place, speed_sq, straight, tool_curvature, Part, MAX_RATE};
 use crate::jerk_arcs::Arcs;
 use crate::jerk_limited::Limits;
-use feedplan_planner::planning;
 use feedplan_geometry::polynomial::Polynomial;
 use feedplan_geometry::quadratic::dot;
 use feedplan_geometry::spline::bezier::derivatives;
 use feedplan_geometry::spline::cusps::{piece_cusps, CUSP};
 use feedplan_geometry::spline::rational::Hodograph;
 use feedplan_geometry::watch::Watch;
+use feedplan_planner::bang_bang::{check_pieces, Problem};
+use feedplan_planner::bang_bang_quadratic::Fault;
+use feedplan_planner::planning;
 
 /// Cusps closer to the end of a piece than this part of it are at the end.
 const AT_END: f64 = 1e-9;

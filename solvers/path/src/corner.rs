@@ -38,8 +38,8 @@ mod share;
 pub use jump::Jump;
 pub use share::share_lengths;
 
-use feedplan_geometry::conic::Conic;
 use crate::follow::{Followed, Shape};
+use feedplan_geometry::conic::Conic;
 use feedplan_geometry::quadratic::{norm, sub};
 use feedplan_geometry::spline::CompositeCurve;
 

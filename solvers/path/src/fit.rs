@@ -19,9 +19,9 @@ mod spline;
 
 use rayon::prelude::*;
 
+use breaking::{turn_cosine, Break};
 use feedplan_geometry::quadratic::{dot, norm, sub, Quadratic};
 use feedplan_geometry::watch::Watch;
-use breaking::{turn_cosine, Break};
 use refine::Block;
 use spline::End;
 

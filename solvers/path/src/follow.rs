@@ -12,14 +12,14 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::arc::{arc_extent, arc_pieces, Arc, ArcError};
-use feedplan_geometry::conic::Conic;
 use crate::corner::Rounding;
 use crate::fit::{fit_points, FitOptions};
+pub use chords::{Chord, Chords};
+use feed_cuts::cut_at_feeds;
+use feedplan_geometry::conic::Conic;
 use feedplan_geometry::quadratic::{norm, sub};
 use feedplan_geometry::spline::CompositeCurve;
 use feedplan_geometry::watch::Watch;
-pub use chords::{Chord, Chords};
-use feed_cuts::cut_at_feeds;
 pub use shape::{Shape, Spline};
 
 /// What a move is, in the numbers of the Python `MoveKind`.

@@ -107,9 +107,9 @@ fn deviation<const M: usize>(parts: &[Part<M>]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use feedplan_geometry::conic::Conic;
     use crate::corner::{Jump, Rounding};
     use crate::follow::{Followed, Shape, LINE, SPLINE};
+    use feedplan_geometry::conic::Conic;
     use feedplan_geometry::quadratic::{norm, sub};
     use feedplan_geometry::spline::CompositeCurve;
     use proptest::prelude::*;

@@ -31,12 +31,12 @@ mod size;
 mod spline;
 mod windows;
 
-use feedplan_geometry::quadratic::{dot, norm, sub};
-use feedplan_geometry::spline::CompositeCurve;
-use feedplan_geometry::watch::Watch;
 use bezier::split;
 use certificate::Certificate;
 use corner::append_corners;
+use feedplan_geometry::quadratic::{dot, norm, sub};
+use feedplan_geometry::spline::CompositeCurve;
+use feedplan_geometry::watch::Watch;
 pub use offsets::Offsets;
 use polyline::Polyline;
 use spline::DEGREE;

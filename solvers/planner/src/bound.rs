@@ -41,8 +41,8 @@ use rayon::prelude::*;
 use crate::bang_bang::{check_pieces, Problem};
 use crate::bang_bang_quadratic::Fault;
 use crate::planning::{groups, ChordLimit, Limits};
-use feedplan_geometry::quadratic::norm;
 use cells::Cells;
+use feedplan_geometry::quadratic::norm;
 
 /// More and less than the rounding of sixteen operations.
 const UP: f64 = 1.0 + 16.0 * f64::EPSILON;

@@ -10,15 +10,15 @@ use super::plan::{to_exception, Columns};
 use super::problem::{ProblemArrays, ProblemRows};
 use super::with_padded_axes;
 use super::work::run;
-use feedplan_planner::bang_bang::Problem;
-use feedplan_planner::bang_bang_quadratic::NO_AXIS;
+use feedplan_geometry::watch::Watch;
 use feedplan_jerk::jerk_arcs::Arcs;
 use feedplan_jerk::jerk_limited::Effort;
 use feedplan_jerk::jerk_limited_path;
 use feedplan_jerk::s_curve::{Section, SectionKind, Segment};
 use feedplan_jerk::s_curve_path::Cutting;
 use feedplan_jerk::JerkLimited as _;
-use feedplan_geometry::watch::Watch;
+use feedplan_planner::bang_bang::Problem;
+use feedplan_planner::bang_bang_quadratic::NO_AXIS;
 
 /// The accelerations at both ends of the arcs, and `kinked`.
 type Changes<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u32>>);
@@ -110,9 +110,7 @@ fn bound_jerk_limited(
     with_padded_axes!(problem.curve.axes(), M, {
         let rows = ProblemRows::<M>::new(&problem)?;
         let (problem, jerk) = (rows.problem()?, row::<M>(&jerk, 1.0)?);
-        let bound = |watch: Watch| {
-            Problem { watch, ..problem }.jerk_limited_bound(&jerk, &columns, &effort)
-        };
+        let bound = |watch: Watch| Problem { watch, ..problem }.jerk_limited_bound(&jerk, &columns, &effort);
         run(py, progress.as_ref(), bound)?.map_err(|fault| to_exception(&fault))
     })
 }
@@ -135,9 +133,7 @@ fn plan_s_curve<'py>(
     with_padded_axes!(problem.curve.axes(), M, {
         let rows = ProblemRows::<M>::new(&problem)?;
         let (problem, jerk) = (rows.problem()?, row::<M>(&jerk, 1.0)?);
-        let plan = |watch: Watch| {
-            Problem { watch, ..problem }.s_curve(&jerk, &cuttings, look_ahead, &effort)
-        };
+        let plan = |watch: Watch| Problem { watch, ..problem }.s_curve(&jerk, &cuttings, look_ahead, &effort);
         let arcs = run(py, progress.as_ref(), plan)?.map_err(|fault| to_exception(&fault))?;
         Ok(to_columns(py, arcs))
     })
@@ -157,8 +153,7 @@ fn path_segments<'py>(
     with_padded_axes!(problem.curve.axes(), M, {
         let rows = ProblemRows::<M>::new(&problem)?;
         let (problem, jerk) = (rows.problem()?, row::<M>(&jerk, 1.0)?);
-        let cut =
-            |watch: Watch| Problem { watch, ..problem }.segments(&jerk, &cuttings, look_ahead);
+        let cut = |watch: Watch| Problem { watch, ..problem }.segments(&jerk, &cuttings, look_ahead);
         let segmented = run(py, None, cut)?.map_err(|fault| to_exception(&fault))?;
         let column =
             |of: fn(&Segment) -> f64| PyArray1::from_vec(py, segmented.segments.iter().map(of).collect());
@@ -202,8 +197,7 @@ fn profile_of_sections<'py>(
     with_padded_axes!(problem.curve.axes(), M, {
         let rows = ProblemRows::<M>::new(&problem)?;
         let (problem, jerk) = (rows.problem()?, row::<M>(&jerk, 1.0)?);
-        let follow =
-            |watch: Watch| Problem { watch, ..problem }.of_sections(&jerk, &offsets, &sections);
+        let follow = |watch: Watch| Problem { watch, ..problem }.of_sections(&jerk, &offsets, &sections);
         let arcs = run(py, None, follow)?.map_err(|fault| to_exception(&fault))?;
         Ok(to_columns(py, arcs))
     })

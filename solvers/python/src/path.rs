@@ -11,14 +11,14 @@ use super::arrays::{row, rows};
 use super::spline::curve;
 use super::work::run;
 use super::{with_padded_axes, with_path_axes};
+use feedplan_geometry::spline::regular::{regular, Regular};
+use feedplan_geometry::spline::{CompositeCurve, Piece};
+use feedplan_geometry::watch::Watch;
 use feedplan_path::arc::ArcError;
 use feedplan_path::corner::Rounding;
 use feedplan_path::follow::{ArcShape, Fault, FollowOptions, Followed, Moves, Shape};
 use feedplan_path::path_builder::{Axes, BuiltPath, Part};
 use feedplan_path::Followed as _;
-use feedplan_geometry::spline::regular::{regular, Regular};
-use feedplan_geometry::spline::{CompositeCurve, Piece};
-use feedplan_geometry::watch::Watch;
 
 pyo3::import_exception!(feedplan.errors, ProgramError);
 

@@ -8,12 +8,12 @@ use super::arrays::{indices, quadratics, row, rows};
 use super::problem::{ProblemArrays, ProblemRows};
 use super::with_padded_axes;
 use super::work::run;
+use feedplan_geometry::watch::Watch;
+use feedplan_jerk::JerkLimited as _;
 use feedplan_planner::bang_bang;
 use feedplan_planner::bang_bang_quadratic::{self, Fault, Profile};
-use feedplan_jerk::JerkLimited as _;
 use feedplan_planner::look_ahead::Segments;
 use feedplan_planner::{Exact as _, ExactQuadratic as _};
-use feedplan_geometry::watch::Watch;
 
 pyo3::create_exception!(
     _solvers,
@@ -113,8 +113,7 @@ fn plan_quadratics<'py>(
             end_speed: arrays.end_speed,
             watch: Watch::default(),
         };
-        let plan =
-            |watch: Watch| bang_bang_quadratic::Problem { watch, ..problem }.fastest();
+        let plan = |watch: Watch| bang_bang_quadratic::Problem { watch, ..problem }.fastest();
         let profile = run(py, progress, plan)?.map_err(|fault| to_exception(&fault))?;
         Ok(to_columns(py, profile))
     })

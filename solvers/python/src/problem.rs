@@ -4,8 +4,8 @@ use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 use super::arrays::{indices, row, rows, rows_with, CurveArrays};
-use feedplan_planner::bang_bang::{Problem, SpeedSquare, Tip, TIP_AXES};
 use feedplan_geometry::watch::Watch;
+use feedplan_planner::bang_bang::{Problem, SpeedSquare, Tip, TIP_AXES};
 
 impl CurveArrays<'_> {
     /// Whether all pieces are polynomials of degree 2.

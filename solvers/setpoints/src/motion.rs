@@ -16,15 +16,15 @@ mod even;
 mod quadratic;
 mod rate;
 
-use feedplan_planner::arc_kind::ArcKind;
+use along::Along;
+pub use curve::flaw;
+use curve::CurveMotion;
 use feedplan_geometry::arc_length::{quadrature, tabulate};
 use feedplan_geometry::arc_length::{Integrand, Node, Table, TABLE_ERROR};
 use feedplan_geometry::quadratic::Quadratic;
 use feedplan_geometry::sarfraz::{self, Located};
 use feedplan_geometry::spline::Piece;
-use along::Along;
-pub use curve::flaw;
-use curve::CurveMotion;
+use feedplan_planner::arc_kind::ArcKind;
 use quadratic::QuadraticMotion;
 pub use rate::{TipSpeed, MAX_TIP};
 

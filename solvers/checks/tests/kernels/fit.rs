@@ -1,9 +1,9 @@
 //! The fit as a whole: every promise of `fit_points` on chains by hand, at random (proptest) and made to
 //! hurt, checked by dense sampling that shares nothing with the certificate.
 
-use feedplan_path::fit::{fit_points, FitOptions, FittedPiece};
 use feedplan_geometry::quadratic::{dot, lerp, norm, sub};
 use feedplan_geometry::watch::Watch;
+use feedplan_path::fit::{fit_points, FitOptions, FittedPiece};
 use proptest::prelude::*;
 
 const TOLERANCE: f64 = 0.01;

@@ -1,17 +1,16 @@
 //! The jerk-limited planner: lines by hand and by formula, known curves, random paths, windows, caps, moving ends,
 //! early stops, and its lower bound.
 
-
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::time::Instant;
 
 use feedplan_checks::bends::{Bend, Bends};
 use feedplan_checks::by_length::{ByLength, Lemniscate, Nurbs, Trefoil};
 use feedplan_checks::campaign::seeds;
+use feedplan_checks::wave::Wave;
 use feedplan_jerk::jerk_limited::{
     certify, plan, stream, Effort, End, Fault, Geometry, Limits, Place, Plan, Problem, Profile, SpeedCap,
 };
-use feedplan_checks::wave::Wave;
 
 /// What a dense check may find: the planner's own tolerance and a little more.
 const HELD: f64 = 1e-6;

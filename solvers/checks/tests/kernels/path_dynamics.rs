@@ -1,10 +1,10 @@
 //! From a curve to setpoints: path dynamics and profile together keep the limits of every axis, as third differences
 //! of the positions show. These share no formula with the kernels: the lengths come from quadrature.
 
+use feedplan_checks::{seeds, Random};
+use feedplan_geometry::watch::Watch;
 use feedplan_jerk::path_dynamics::{allowable, bounded, chord_speed, sampled, AxisLimits, Curve, Shape};
 use feedplan_jerk::s_curve::{plan, Limits, Section, Segment};
-use feedplan_geometry::watch::Watch;
-use feedplan_checks::{seeds, Random};
 
 const AXES: AxisLimits<2> =
     AxisLimits { velocity: [170.0, 180.0], acceleration: [400.0, 600.0], jerk: [4000.0, 6000.0] };

@@ -1,9 +1,9 @@
 //! The two-pass jerk-limited profiler: profiles worked out by hand, random sequences of segments, numbers of any size.
 
-use feedplan_jerk::s_curve::{plan, Limits, Profiler, Section, SectionKind, Segment};
-use feedplan_geometry::watch::Watch;
-use proptest::prelude::*;
 use feedplan_checks::{seeds, Random};
+use feedplan_geometry::watch::Watch;
+use feedplan_jerk::s_curve::{plan, Limits, Profiler, Section, SectionKind, Segment};
+use proptest::prelude::*;
 
 /// A segment of a machine with 100 mm/s, 500 mm/s², 50 000 mm/s³.
 fn segment(length: f64) -> Segment {

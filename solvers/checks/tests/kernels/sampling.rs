@@ -1,12 +1,12 @@
 //! Motion along arcs and the time grid, against hand calculation, their own derivatives and each other.
 
-use feedplan_planner::arc_kind::ArcKind;
-use feedplan_setpoints::motion::{Motion, ProfileArc, State};
 use feedplan_geometry::quadratic::{norm, sub, Quadratic};
-use feedplan_setpoints::sampling::{Interpolator, PathData, Sampler};
 use feedplan_geometry::spline::bezier::elevate;
 use feedplan_geometry::spline::{CompositeCurve, Piece};
 use feedplan_geometry::watch::Watch;
+use feedplan_planner::arc_kind::ArcKind;
+use feedplan_setpoints::motion::{Motion, ProfileArc, State};
+use feedplan_setpoints::sampling::{Interpolator, PathData, Sampler};
 use proptest::prelude::*;
 
 /// A curve of one piece, its degree raised: the same motion by the closed forms and by the general ones.

@@ -1,14 +1,15 @@
 //! The smooth fit: shapes known by hand, its certificate against dense samples, joints, random polylines in 2 to 6
 //! axes, and what it is for: times of jerk-limited plans.
 
-
 use feedplan_checks::by_length::{ByLength, Curve};
 use feedplan_checks::campaign::seeds;
+use feedplan_checks::polylines::{
+    dense, derivatives, distance, length, random_polyline, to_segment, walk, Random,
+};
+use feedplan_geometry::watch::Watch;
 use feedplan_jerk::jerk_limited::{plan, Effort, End, Limits, Problem};
 use feedplan_path::smooth_fit::polyline::Polyline;
 use feedplan_path::smooth_fit::{smooth_fit, Smooth, SmoothOptions};
-use feedplan_geometry::watch::Watch;
-use feedplan_checks::polylines::{dense, derivatives, distance, length, random_polyline, to_segment, walk, Random};
 
 const LONG: f64 = 5.0;
 
@@ -176,7 +177,7 @@ fn noise_on_a_circle_is_smoothed_and_leaves_the_radius() {
     let points: Vec<[f64; 2]> = (0..=800)
         .map(|i| {
             let (sin, cos) = (0.45 * i as f64).to_radians().sin_cos();
-            let radius = 8.0 + 0.01 * (random.next() - 0.5);
+            let radius = 8.0 + 0.01 * (random.draw() - 0.5);
             [radius * cos, radius * sin]
         })
         .collect();
@@ -226,7 +227,7 @@ fn random_polylines<const D: usize>(seed: u64, count: usize) -> usize {
         if points.len() < 2 {
             continue;
         }
-        let tolerance = 10f64.powf(3.0 * random.next() - 3.5);
+        let tolerance = 10f64.powf(3.0 * random.draw() - 3.5);
         let line = polyline(points, tolerance);
         let smooth = fit(&line);
         check(&line, &smooth, &format!("{D} axes, case {case}"));

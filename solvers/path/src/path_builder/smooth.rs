@@ -11,10 +11,10 @@ use rayon::prelude::*;
 use super::stretches::CURVE_JOINT;
 use super::travel::outside;
 use super::{deviation, Axes, BuiltPath, Part};
-use feedplan_geometry::conic::Conic;
 use crate::follow::{Chord, Chords, FollowError, FollowOptions, Followed, Moves, Shape, RAPID};
 use crate::smooth_fit::polyline::{angle, Polyline};
 use crate::smooth_fit::{smooth_fit, Offsets, SmoothOptions};
+use feedplan_geometry::conic::Conic;
 use feedplan_geometry::watch::Watch;
 
 /// A path that turns by more, in rad, stops: no curve is near both sides of the corner at any speed.

@@ -4,9 +4,9 @@
 use rayon::prelude::*;
 
 use super::Axes;
-use feedplan_geometry::conic::Conic;
 use crate::corner::{Jump, Rounding, Sides};
 use crate::follow::{Followed, Shape, Spline};
+use feedplan_geometry::conic::Conic;
 use feedplan_geometry::spline::{CompositeCurve, Piece};
 use feedplan_geometry::watch::Watch;
 

@@ -15,7 +15,6 @@ use super::axis::{AxisLaw, End};
 use super::even::EvenLaw;
 use super::rate::{FromRest, Line, Rate, Source, Tip, TipSpeed, MAX_TIP};
 use super::{fill, invert, parts, ProfileArc, Rates, State, JERK_STEP_ERROR};
-use feedplan_planner::arc_kind::ArcKind;
 use feedplan_geometry::arc_length::{quadrature, Node, Table};
 use feedplan_geometry::polynomial::Polynomial;
 use feedplan_geometry::quadratic::{dot, norm};
@@ -23,6 +22,7 @@ use feedplan_geometry::sarfraz;
 use feedplan_geometry::spline::bezier::derivatives;
 use feedplan_geometry::spline::speed::{Coefficients, Speed};
 use feedplan_geometry::spline::Piece;
+use feedplan_planner::arc_kind::ArcKind;
 
 /// How far from the end, in parts of the arc, where an axis turns round at a finite p. Continued from there s is
 /// off by the square of this part; s and s' lose as many digits as it and its square have.

@@ -7,9 +7,9 @@
 
 use super::even::EvenLaw;
 use super::{fill, invert, parts, ProfileArc, Rates, State};
-use feedplan_planner::arc_kind::ArcKind;
 use feedplan_geometry::arc_length::{ChordTime, Hodograph, Length, Node, Table};
 use feedplan_geometry::quadratic::{dot, Quadratic};
+use feedplan_planner::arc_kind::ArcKind;
 
 /// q'_k and the speed of the axis vanish at an end where they are this part of those at the other one.
 const TURN: f64 = 1e-10;

@@ -1,9 +1,9 @@
 //! Whether the arrays of a path and a profile fit together, before anything is computed from them.
 
 use super::PathData;
-use feedplan_planner::arc_kind::ArcKind;
 use crate::motion::{flaw, ProfileArc, MAX_TIP};
 use feedplan_geometry::watch::Watch;
+use feedplan_planner::arc_kind::ArcKind;
 
 /// The error is a sentence for the user.
 pub(super) fn check<const M: usize>(

@@ -4,9 +4,9 @@
 use rayon::prelude::*;
 
 use feedplan_checks::{audit, random_case, seeds, Case, Elevated, Random, FEW_AXES};
+use feedplan_geometry::quadratic::Quadratic;
 use feedplan_planner::bang_bang_quadratic::Profile;
 use feedplan_planner::bound::{lower_bound, Hint};
-use feedplan_geometry::quadratic::Quadratic;
 
 fn hint(profile: &Profile) -> Hint<'_> {
     Hint { piece: &profile.piece, axis: &profile.axis, u1: &profile.u1, duration: &profile.duration }
