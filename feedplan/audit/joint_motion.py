@@ -153,7 +153,7 @@ def motion(path: JointPath, profile: SpeedProfile, arcs: Numbers, u: Array | Non
         velocity = np.where(held & ~at_start[..., None], own_velocity, velocity)
         velocity_error = np.where(held & ~at_start[..., None], speed_error[..., None], velocity_error)
         time, time_error = _times(
-            path, piece, kind, value, u, g_way, g_unknown, speed, speed_error, root_p, p
+            path, piece, kind, value, u, g_way, g_unknown, speed, speed_error, root_p, relative, p
         )
         time = np.where(by_way[:, None], np.diff(pace.time, axis=1), time)
         # The rounding of a time, not only of a step.
@@ -193,6 +193,7 @@ def _times(
     speed: Array,
     speed_error: Array,
     root_p: Array,
+    relative: Array,
     p: Array,
 ) -> tuple[Array, Array]:
     """The time of every step, and the share of it that may be wrong."""
@@ -211,7 +212,8 @@ def _times(
     error = np.where(better, change_error, joint_error)
     # On arcs so short that no joint's way can be told from rounding: by the parameter.
     sides = root_p[:, :-1] + root_p[:, 1:]
-    by_place, place_error = 2.0 * step / sides, rounding + np.abs(np.diff(root_p, axis=1)) / sides
+    unknown = 0.5 * (relative[:, :-1] + relative[:, 1:])
+    by_place, place_error = 2.0 * step / sides, rounding + np.abs(np.diff(root_p, axis=1)) / sides + unknown
     better = ~(error <= HIDDEN) & ~(place_error >= error)
     time, error = np.where(better, by_place, time), np.where(better, place_error, error)
     linear = kind[:, None] == ArcKind.PARAMETER_ACCELERATION

@@ -58,6 +58,12 @@ PROGRAMS = {
         "G21 G90\nG0 X14 Y-31 Z384 A-50\nG43.5 H1\nG1 I-0.68 J0.004 K0.73 F520\nG43.4\nG43.5 H1\n"
         "G91 G0 Z45\nG90",
     ),
+    "a turn within some nanometres of a metre": (
+        "head-head",
+        "G21 G90 G94  F517\nG53 G0 Z1147.561\nG0 X-44 Y-58.136 Z868 A-58.872 C15\nG91 G30 Z0 C0\nG90\n"
+        "G0 X-59.790 Z1296 A-39\nG1 X11.704 Z1077.342\nG0 C124.033\nG91 G1 Z0.0070\nG90\nG0 X-12.069 Z880\n"
+        "G43.4 H1\nG0 Y-2.836",
+    ),
     "a feed before a turn": (
         "head-head",
         "G21 G90 G64 P0.5\nG0 Z900\nG1 C40 F800\nG43.4 H1\nG1 A-20\nG1 X9 A-22\nG49\nG0 Z1000",
