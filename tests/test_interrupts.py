@@ -163,7 +163,7 @@ def test_the_reader_is_ended_too(long_file: Path, machine: Machine) -> None:
 
 
 def spent(work: Callable[[], Any], until: float = 0.0) -> float:
-    """Seconds of processor time until the work ended; a signal comes after `until` of them, unless that is 0."""
+    """Seconds of processor time until the work ended; a signal comes after `until` of them, if not 0."""
     before = signal.signal(signal.SIGPROF, signal.default_int_handler)
     begun = time.process_time()
     signal.setitimer(signal.ITIMER_PROF, until)
