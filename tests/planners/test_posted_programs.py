@@ -58,6 +58,13 @@ def faults(seed: int, method: str, folder: Path) -> list[str]:
     ]
 
 
+# A table of lengths that was right half-way alone (241, 775, 823); a jerk that changes within half a
+# micrometre (1863).
+@pytest.mark.parametrize("seed", [241, 775, 823, 1863])
+def test_programs_that_broke_a_limit_of_jerk(seed: int, tmp_path: Path) -> None:
+    assert faults(seed, "jerk-limited", tmp_path) == []
+
+
 def test_the_checks_can_fail(tmp_path: Path) -> None:
     posted = posted_program(3)
     file = tmp_path / "part.ngc"

@@ -23,8 +23,9 @@ const QUADRATURE: f64 = 1e-12;
 const DEPTH: u32 = 12;
 /// On arcs shorter than this part of the servo period the rounding of v² may show in the jerk of a cubic …
 const BRIEF: f64 = 1e-2;
-/// … which is constant where it would by more than this part of its limit.
+/// … which is constant where it would by more than this part of its limit, and changes by no more than some roundings.
 const SHOWN: f64 = 1e-7;
+const NOISE: f64 = 8.0;
 /// Halvings for the time at which a section of constant jerk passes a place.
 const HALVINGS: usize = 200;
 
@@ -371,7 +372,7 @@ fn settled(profile: &Profile, nodes: Range<usize>, [from, to]: [f64; 2], lengths
 /// The arc between two states of a profile, so far apart on a part of the path.
 ///
 /// v² as a cubic is known by v² at its ends: their rounding is 3 ε v³/h² in its jerk, more than the limit on a piece of
-/// a nanometre. There the accelerations tell the jerk, which has no way to change.
+/// a nanometre. There the accelerations tell the jerk, which has no way to change: what changes is rounding.
 fn arc_between<const M: usize>(
     path: &ByLength<M>,
     jerk_limits: &[f64; M],
@@ -383,7 +384,12 @@ fn arc_between<const M: usize>(
     if duration < BRIEF * path.period() {
         let first = path.at(part, ends[0].s).first;
         let limit = (0..M).map(|k| jerk_limits[k] / first[k].abs()).fold(f64::INFINITY, f64::min);
-        if 3.0 * f64::EPSILON * ends[1].v.powi(3) > SHOWN * limit * h * h {
+        let rounding = 3.0 * f64::EPSILON * ends[1].v.powi(3) / (h * h);
+        let [start, end] = ends;
+        // Half of what the jerk changes, from w'' = 2 a' at both ends.
+        let slopes = 2.0 * (start.a + end.a) - 2.0 * (end.v - start.v) * (end.v + start.v) / h;
+        let change = 1.5 * (slopes / h * end.v).abs();
+        if rounding > SHOWN * limit && change <= NOISE * rounding {
             let value = (ends[1].a - ends[0].a) / duration;
             return Arc { kind: PATH_JERK, value, ends, duration };
         }
