@@ -24,15 +24,20 @@ instances! {
     /// Plans of a problem within `jerk` [mm/s³] of every axis.
     pub trait JerkLimited for [3, 6] Problem<'_, M> = {
         /// The fastest profile that the effort finds.
-        fn jerk_limited(&self, jerk: &[f64; M], effort: &Effort) -> Result<Arcs, Fault> = jerk_limited_path::plan;
+        fn jerk_limited(&self, jerk: &[f64; M], effort: &Effort) -> Result<Arcs, Fault>
+            = jerk_limited_path::plan;
         /// A time [s] that no profile is below, on the grid of a profile.
-        fn jerk_limited_bound(&self, jerk: &[f64; M], columns: &jerk_limited_path::Columns, effort: &Effort) -> Result<f64, Fault> = jerk_limited_path::certified;
+        fn jerk_limited_bound(&self, jerk: &[f64; M], columns: &jerk_limited_path::Columns, effort: &Effort)
+            -> Result<f64, Fault> = jerk_limited_path::certified;
         /// The two-pass profile of segments by the quickest cutting.
-        fn s_curve(&self, jerk: &[f64; M], cuttings: &[Cutting], look_ahead: usize, effort: &Effort) -> Result<Arcs, Fault> = s_curve_path::plan;
+        fn s_curve(&self, jerk: &[f64; M], cuttings: &[Cutting], look_ahead: usize, effort: &Effort)
+            -> Result<Arcs, Fault> = s_curve_path::plan;
         /// The segments of that.
-        fn segments(&self, jerk: &[f64; M], cuttings: &[Cutting], look_ahead: usize) -> Result<Segmented, Fault> = s_curve_path::cut;
+        fn segments(&self, jerk: &[f64; M], cuttings: &[Cutting], look_ahead: usize)
+            -> Result<Segmented, Fault> = s_curve_path::cut;
         /// The profile of sections of constant jerk; those of stretch i from `offsets[i]` on.
-        fn of_sections(&self, jerk: &[f64; M], offsets: &[usize], sections: &[Section]) -> Result<Arcs, Fault> = s_curve_path::follow;
+        fn of_sections(&self, jerk: &[f64; M], offsets: &[usize], sections: &[Section]) -> Result<Arcs, Fault>
+            = s_curve_path::follow;
         /// The greatest speed [mm/s] along a part of a piece that keeps the feed everywhere on it.
         fn feed_between(&self, piece: usize, part: [f64; 2]) -> f64 = feed::between;
     }

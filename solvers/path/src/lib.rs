@@ -18,9 +18,11 @@ instances! {
     /// The path of moves.
     pub trait Followed for [3, 6, 9] Moves<'_, M> = {
         /// Lines, arcs and fitted splines, with corners rounded within the tolerance.
-        fn path(&self, options: &FollowOptions, axes: &Axes<M>, watch: Watch) -> Result<BuiltPath<M>, FollowError> = path_builder::build_path;
+        fn path(&self, options: &FollowOptions, axes: &Axes<M>, watch: Watch)
+            -> Result<BuiltPath<M>, FollowError> = path_builder::build_path;
         /// One curve between two stops; `sized`: arcs and bends keep their size.
-        fn smooth_path(&self, options: &FollowOptions, axes: &Axes<M>, sized: bool, watch: Watch) -> Result<BuiltPath<M>, FollowError> = path_builder::build_smooth_path;
+        fn smooth_path(&self, options: &FollowOptions, axes: &Axes<M>, sized: bool, watch: Watch)
+            -> Result<BuiltPath<M>, FollowError> = path_builder::build_smooth_path;
     }
 }
 
