@@ -227,6 +227,8 @@ def test_the_bars_of_the_command_move_and_a_signal_ends_it(tmp_path: Path) -> No
             env=dict(os.environ, TERM="xterm", COLUMNS="100"),
             stdout=results,
             stderr=slave,
+            # Whoever runs the tests in the background has children that are deaf to this signal.
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         )
     os.close(slave)
     shown, sent = "", False
