@@ -282,8 +282,7 @@ impl<const M: usize> Builder<'_, M> {
             [(from.u, middle), (middle, b)].map(|(a, b)| panel(self.problem, self.piece, a, b));
         let half = Row::new(self.problem, self.piece, middle, from.s + left);
         let end = Row::new(self.problem, self.piece, b, from.s + left + right);
-        // What is odd about the middle, as on a symmetric piece, shows in the rate alone: the rest of the quintic is off by
-        // up to 0.12 of that over the panel.
+        // On a symmetric part the quintic is right half-way and wrong on both sides of it: only its rate shows that.
         let odd = ODD * (end.s - from.s) * (from.rate_between(&end, half.s) - half.rate);
         let mut miss = (from.between(&end, half.s) - middle).abs().max(odd.abs()) / half.rate;
         if !(from.rate.is_finite() && end.rate.is_finite() && miss.is_finite()) {

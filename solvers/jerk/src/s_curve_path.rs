@@ -32,9 +32,9 @@ const HELD: f64 = 0.998;
 /// around another one the path is cut.
 const LITTLE: f64 = 0.05;
 
-/// Halves of a part are parts of their own where one may be passed faster than both together by more than this part of
-/// the speed, at some places of them; and halvings of a piece. More of them where the bounds of one half allow so much
-/// more speed than those of both, which is next to a tight turn.
+/// A part is halved up to `DEPTH` times where, at some of its places, one half may be passed faster than both together by
+/// more than `WORTH` of the speed. Next to a tight turn the bounds of one half allow far more speed than those of both: by
+/// more than `WELL_WORTH` of it. There a part is halved up to `MOST_DEPTH` times.
 const WORTH: f64 = 0.05;
 const LOOKED: usize = 9;
 const DEPTH: u32 = 5;
