@@ -15,7 +15,7 @@ test: lint native
 	$(BIN)/python -m mypy.stubtest feedplan._solvers
 	$(BIN)/pytest --numprocesses auto
 
-native:
+native: $(VENV)/built
 	cargo test --release --quiet --manifest-path solvers/Cargo.toml
 
 lint: $(VENV)/built
@@ -24,7 +24,7 @@ lint: $(VENV)/built
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	cargo fmt --all --check --manifest-path solvers/Cargo.toml
-	cargo clippy --release --quiet --workspace --all-targets --manifest-path solvers/Cargo.toml -- -D warnings
+	CARGO_TARGET_DIR=$(CURDIR)/solvers/target/lint cargo clippy --release --quiet --workspace --all-targets --manifest-path solvers/Cargo.toml -- -D warnings
 
 bench: $(VENV)/built
 	cargo bench --manifest-path solvers/Cargo.toml
@@ -55,11 +55,11 @@ campaign: $(VENV)/built
 clean:
 	rm -rf $(VENV) out solvers/target
 
-# The native module is built once, and again only when its sources change. It has a folder of its own: it can be built
-# beside the tests of native code, each on one core.
+# The native module is built once, and again only when its sources change; the tests of native code link the same crates.
+# The linter has a folder of its own: it can check beside the tests, each on one core.
 $(VENV)/built: $(VENV)/maturin $(NATIVE)
 	@command -v cargo >/dev/null || { echo "cargo is missing: install the Rust toolchain"; exit 1; }
-	MAKEFLAGS= CARGO_TARGET_DIR=$(CURDIR)/solvers/target/module $(BIN)/pip install --quiet --constraint constraints.txt --no-build-isolation --editable ".[dev]"
+	MAKEFLAGS= CARGO_TARGET_DIR=$(CURDIR)/solvers/target $(BIN)/pip install --quiet --constraint constraints.txt --no-build-isolation --editable ".[dev]"
 	@touch $@
 
 $(VENV)/maturin: constraints.txt

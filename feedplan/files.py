@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 SUMMARY_FILE = "plan.json"
 COMPARISON_FILE = "comparison.json"
-_ROWS_AT_ONCE = 25_000
+_ROWS_AT_ONCE = 10_000
 # How far the writing is after the account, when the times of the setpoints are laid out, and after these.
 ACCOUNT, LAID_OUT, SETPOINTS = 0.08, 0.1, 0.75
 

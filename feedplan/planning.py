@@ -77,6 +77,8 @@ class Plan:
     options: Mapping[str, Any] = field(default_factory=dict)
     _verdict: list[Audit] = field(default_factory=list, init=False, repr=False, compare=False)
     _account: list[Account] = field(default_factory=list, init=False, repr=False, compare=False)
+    # Number and duration [s] of the plan's own setpoints, once they have been laid out.
+    _laid_out: list[tuple[int, float]] = field(default_factory=list, init=False, repr=False, compare=False)
 
     def __repr__(self) -> str:
         name = self.program.name if self.program else "a path"
@@ -134,13 +136,16 @@ class Plan:
         used.
         """
         callback(progress, "the part done")
-        return setpoints(
+        points = setpoints(
             self.problem,
             self.profile,
             self.machine.period if period is None else period,
             self.interpolator if interpolator is None else interpolator,
             progress,
         )
+        if points.period == self.machine.period and not self._laid_out:
+            self._laid_out.append((points.count, points.duration))
+        return points
 
     @cached_property
     def trajectory(self) -> Trajectory:
@@ -192,7 +197,8 @@ class Plan:
 
         `setpoints` are those of the machine's period. Hashes tell whether a text was changed.
         """
-        fit, program, points = self.path.fit, self.program, self.setpoints()
+        fit, program, verdict = self.path.fit, self.program, self.audit()
+        [(count, duration)] = self._laid_out
         machine_file = self.machine.to_toml()
         return {
             "format": FORMAT,
@@ -210,10 +216,10 @@ class Plan:
             "program": program.name if program else None,
             "program_sha256": program.sha256 if program else None,
             "setpoints": {
-                "axes": list(points.axes),
-                "period": points.period,
-                "count": points.count,
-                "duration": points.duration,
+                "axes": list(self.problem.axes),
+                "period": self.machine.period,
+                "count": count,
+                "duration": duration,
             },
             **self.account.to_json(),
             "pieces": len(self.path),
@@ -229,7 +235,7 @@ class Plan:
                 "outside": fit.outside,
             },
             "compute": dict(self.compute),
-            "audit": self.audit().to_json(),
+            "audit": verdict.to_json(),
             "warnings": list(self.warnings),
         }
 

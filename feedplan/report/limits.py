@@ -23,7 +23,7 @@ from feedplan.setpoints import sampler
 Floats = NDArray[np.float64]
 
 _SAMPLES = 400_000
-_SAMPLES_AT_ONCE = 25_000
+_SAMPLES_AT_ONCE = 10_000
 _SAMPLES_PER_ARC = 33
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 

@@ -127,6 +127,13 @@ def test_random_sequences_keep_every_limit(name: str, method: str) -> None:
     assert {seed: sentences for seed, sentences in found.items() if sentences} == {}
 
 
+# A cut of the path lies 1e-5 mm beside the end of its piece, where the way along the path has no digits for that.
+@pytest.mark.parametrize(("name", "seed"), [("head-head", 38), ("rotary-table", 45)])
+def test_programs_that_broke_a_limit_of_jerk(name: str, seed: int) -> None:
+    machine = Machine.load(name)
+    assert broken(random_tip_program(seed, machine), machine, "jerk-limited") == []
+
+
 @pytest.mark.parametrize("method", ["junction-deviation", "tangential", "arc-transition"])
 def test_methods_of_the_programs_axes_say_so(method: str) -> None:
     machine, text = PROGRAMS["a rapid that only turns"]

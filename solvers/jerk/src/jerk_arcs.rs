@@ -21,8 +21,8 @@ const TAKEN_BACK: f64 = 1e-10;
 /// What halves of an arc may differ from the whole in time, where the speed is not too near to none; and their halvings.
 const QUADRATURE: f64 = 1e-12;
 const DEPTH: u32 = 12;
-/// On arcs shorter than this part of the servo period the rounding of v² may show in the jerk of a cubic …
-const BRIEF: f64 = 1e-2;
+/// On arcs shorter than this part of the servo period rounding may show in the jerk of a cubic …
+const BRIEF: f64 = 0.1;
 /// … which is constant where it would by more than this part of its limit, and changes by no more than some roundings.
 const SHOWN: f64 = 1e-7;
 const NOISE: f64 = 8.0;
@@ -371,8 +371,9 @@ fn settled(profile: &Profile, nodes: Range<usize>, [from, to]: [f64; 2], lengths
 
 /// The arc between two states of a profile, so far apart on a part of the path.
 ///
-/// v² as a cubic is known by v² at its ends: their rounding is 3 ε v³/h² in its jerk, more than the limit on a piece of
-/// a nanometre. There the accelerations tell the jerk, which has no way to change: what changes is rounding.
+/// v² as a cubic is known by v² at its ends. Its rounding ε v², and the ε s of the place s where it holds, are
+/// 3 ε v (v² + 2 |a| s)/h² in the jerk: more than the limit on a piece of a nanometre, or on one of ten that begins a
+/// metre along the path. There the accelerations tell the jerk, which has no way to change: what changes is rounding.
 fn arc_between<const M: usize>(
     path: &ByLength<M>,
     jerk_limits: &[f64; M],
@@ -384,8 +385,8 @@ fn arc_between<const M: usize>(
     if duration < BRIEF * path.period() {
         let first = path.at(part, ends[0].s).first;
         let limit = (0..M).map(|k| jerk_limits[k] / first[k].abs()).fold(f64::INFINITY, f64::min);
-        let rounding = 3.0 * f64::EPSILON * ends[1].v.powi(3) / (h * h);
         let [start, end] = ends;
+        let rounding = 3.0 * f64::EPSILON * end.v * (end.v * end.v + 2.0 * end.a.abs() * end.s) / (h * h);
         // Half of what the jerk changes, from w'' = 2 a' at both ends.
         let slopes = 2.0 * (start.a + end.a) - 2.0 * (end.v - start.v) * (end.v + start.v) / h;
         let change = 1.5 * (slopes / h * end.v).abs();
