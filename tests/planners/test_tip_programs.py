@@ -127,7 +127,7 @@ def test_random_sequences_keep_every_limit(name: str, method: str) -> None:
     assert {seed: sentences for seed, sentences in found.items() if sentences} == {}
 
 
-# A cut of the path lies 1e-5 mm beside the end of its piece, where the way along the path has no digits for that.
+# The path is cut 1e-5 mm beside the end of a piece: the way along it has no digits for that.
 @pytest.mark.parametrize(("name", "seed"), [("head-head", 38), ("rotary-table", 45)])
 def test_programs_that_broke_a_limit_of_jerk(name: str, seed: int) -> None:
     machine = Machine.load(name)
