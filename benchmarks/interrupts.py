@@ -9,6 +9,7 @@ import tempfile
 import time
 import traceback
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -30,14 +31,14 @@ from feedplan.setpoints import setpoints
 NAME = "interrupts"
 METHODS = ("bang-bang", "s-curve", "jerk-limited")
 PART, MACHINE, BLOCKS, QUICK = "head", "mill", 1_000_000, 200
-# Where in a stage the signal comes, in parts of the time that it takes.
-MOMENTS = (0.1, 0.3, 0.5, 0.7, 0.9)
+# Seconds between signals in a stage, and where the one comes that ends it, as a part of the stage's time.
+EVERY, MOMENT = 0.1, 0.5
 
 Stage = Callable[[Listener], Any]
 
 
 def run(quick: bool = False) -> Result:
-    """Each stage once as a whole, with a listener, and in children that get the signal."""
+    """Each stage once as a whole, with a listener and many signals, and in a child that a signal ends."""
     blocks = BLOCKS // (QUICK if quick else 1)
     rows: list[dict[str, Cell]] = []
     with tempfile.TemporaryDirectory() as directory:
@@ -51,7 +52,8 @@ def run(quick: bool = False) -> Result:
         f"From Ctrl-C to the prompt in {blocks} blocks, {os.cpu_count()} cores",
         tuple(rows),
         (
-            f"Ctrl-C to end: of a process that does the stage, the worst of {len(MOMENTS)} moments in it.",
+            f"heard: from a signal to its handler, the worst of all, one every {EVERY} s.",
+            "to end: from a Ctrl-C in the middle of the stage to the end of the process.",
             "silence: the longest time between two times that progress is told; back: how often it falls.",
         ),
     )
@@ -91,21 +93,43 @@ def _stages(program: Path, machine: Machine, method: str, output: Path) -> Itera
 
 
 def _measured(stage: Stage) -> dict[str, Cell]:
-    """A stage as a whole in this process, and its ends in children of it that have all that came before."""
-    children = [_child(stage) for _ in MOMENTS]
+    """A stage as a whole in this process, and its end in a child of it that has all that came before."""
+    child = _child(stage)
     told: list[tuple[float, float]] = [(time.perf_counter(), 0.0)]
-    stage(lambda done: told.append((time.perf_counter(), done)))
+    with _signals() as late:
+        stage(lambda done: told.append((time.perf_counter(), done)))
     told.append((time.perf_counter(), 1.0))
     seconds = told[-1][0] - told[0][0]
-    ends = [_end(child, moment * seconds) for child, moment in zip(children, MOMENTS, strict=True)]
     pairs = list(pairwise(told))
     return {
         "stage [s]": seconds,
-        "Ctrl-C to end [s]": max(ends, default=0.0),
+        "heard [s]": max(late, default=0.0),
+        "to end [s]": _end(child, MOMENT * seconds),
         "told [1/s]": (len(told) - 2) / seconds,
         "silence [s]": max(after[0] - before[0] for before, after in pairs),
         "back": sum(after[1] < before[1] for before, after in pairs),
     }
+
+
+@contextmanager
+def _signals() -> Iterator[list[float]]:
+    """How late each of many signals is handled [s]; those that come while one waits count with it."""
+    late: list[float] = []
+    start, handled = time.perf_counter(), 0
+
+    def handle(*_: object) -> None:
+        nonlocal handled
+        now = time.perf_counter() - start
+        late.append(now - (handled + 1) * EVERY)
+        handled = int(now / EVERY)
+
+    before = signal.signal(signal.SIGALRM, handle)
+    signal.setitimer(signal.ITIMER_REAL, EVERY, EVERY)
+    try:
+        yield late
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
 
 
 def _child(stage: Stage) -> tuple[int, int]:

@@ -35,7 +35,7 @@ PLAN_SHARE = 0.25
 RECORDED_SHARE = 0.8
 
 # Chunk of setpoints that goes through the audit at once when they are all at hand.
-CHUNK = 50_000
+CHUNK = 20_000
 
 
 @dataclass(frozen=True)

@@ -77,8 +77,7 @@ def account(
     way = motion.lengths(part(progress, 0.0, 0.5))
     tell(progress, 0.5)
     time = np.bincount(profile.piece.astype(np.int64), profile.duration, len(path))
-    moments = activity(problem, profile, motion, jerk, part(progress, 0.5, 1.0))
-    tell(progress, 1.0)
+    moments = activity(problem, profile, motion, jerk, part(progress, 0.5, 0.95))
 
     def total(own: Any) -> Total:
         turns = own & motion.turns
@@ -89,10 +88,12 @@ def account(
 
     feed = np.isfinite(path.feed)
     tolerance = path.tolerance if len(path) else np.zeros(1)
+    limits, slow = time_per_limit(problem, moments), slowest_lines(problem, profile, motion, moments)
+    tell(progress, 1.0)
     return Account(
         motion=motion,
-        limits=tuple(time_per_limit(problem, moments)),
-        slow=tuple(slowest_lines(problem, profile, motion, moments)),
+        limits=tuple(limits),
+        slow=tuple(slow),
         stops=tuple(stops_by_cause(problem, program, moments)),
         feed=total(feed),
         rapid=total(~feed),

@@ -67,6 +67,7 @@ def activity(
     tell(progress, 0.8)
     _, _, velocity, acceleration, jerks, _, piece, u, *_ = states
     _, tangent, second = problem.curve.evaluate(piece, u, 2)
+    tell(progress, 0.85)
     with np.errstate(divide="ignore", invalid="ignore"):
         rate = parameter_speed(tangent, velocity)
         feed = np.where(np.isfinite(problem.path.feed[piece]), problem.feed[piece], np.inf)
@@ -77,12 +78,14 @@ def activity(
         if jerk:
             groups["jerk"] = np.abs(jerks) / problem.max_jerk
         speed = motion.slope(piece, u) * rate
+    tell(progress, 0.9)
     names = ("feed", "chord error", *(f"{axis} {name}" for name in groups for axis in problem.axes), NONE)
     use = np.nan_to_num(np.column_stack([at_feed, chord, *groups.values()]), posinf=0.0)
     # Limits that are used alike but for rounding: the first one counts.
     most = use.max(axis=1, initial=0.0)
     active = np.where(most >= ACTIVE, (use >= most[:, None] * (1.0 - 1e-6)).argmax(axis=1), len(names) - 1)
     pace = np.column_stack([at_feed, at_velocity]).max(axis=1, initial=0.0)
+    tell(progress, 1.0)
     return Activity(names, weight, piece, run, np.nan_to_num(speed), active, np.nan_to_num(pace))
 
 

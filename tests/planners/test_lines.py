@@ -42,6 +42,13 @@ def test_random_straight_curves_take_the_time_of_their_lines(part: int) -> None:
         assert audit.ok, (seed, audit)
 
 
+# The curve turns so near to a knot that both are one place but for rounding.
+@pytest.mark.parametrize("seed", [21692, 26825, 29391])
+def test_curves_that_turn_beside_a_knot_take_the_time_of_their_lines(seed: int) -> None:
+    case = straight_case(seed)
+    assert feedplan.plan(case.path, case.machine).time == pytest.approx(case.time, rel=1e-9)
+
+
 def test_with_a_limit_of_jerk_they_take_the_time_of_seven_sections() -> None:
     for seed in range(seeds(150) // 10):
         case = straight_case(seed)

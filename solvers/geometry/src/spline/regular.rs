@@ -250,7 +250,7 @@ fn rate<const M: usize>(
     }
 }
 
-/// Leaves out turns between which the way is rounding, the shortest first; the ends stay where they are.
+/// Leaves out places between which the way is rounding, the shortest first; the ends stay where they are.
 fn leave_out_rounding<T>(places: &mut Vec<T>, along: impl Fn(&T) -> f64, rounding: f64) {
     loop {
         let way = |i: usize| (along(&places[i + 1]) - along(&places[i])).abs();
@@ -259,9 +259,12 @@ fn leave_out_rounding<T>(places: &mut Vec<T>, along: impl Fn(&T) -> f64, roundin
             return;
         }
         let last = places.len() - 1;
+        let step = |i: usize| along(&places[i + 1]) - along(&places[i]);
         match shortest {
             // Two turns, of which one undoes the other.
-            i if i > 0 && i + 1 < last => drop(places.drain(i..i + 2)),
+            i if i > 0 && i + 1 < last && step(i - 1) * step(i + 1) > 0.0 => drop(places.drain(i..i + 2)),
+            // One turn, at both places.
+            i if i > 0 && i + 1 < last => drop(places.remove(i)),
             // From one end to the other and back.
             _ if last == 1 => drop(places.drain(..)),
             0 => drop(places.remove(1)),
@@ -477,6 +480,18 @@ mod tests {
         assert!((made.curve.width.iter().sum::<f64>() - 4.000001).abs() < 1e-15);
         // What is a line already stays one; each is one of its own where they belong to different moves.
         assert_eq!(regular(&curve, &[0..1, 1..2, 2..5], Watch::default()).ranges, [0..1, 1..2, 2..5]);
+    }
+
+    #[test]
+    fn a_turn_beside_the_end_of_a_piece_stays_a_turn() {
+        // To 1, beyond it by a rounding and back to it; then to 0 in two pieces.
+        let mut curve = CompositeCurve::default();
+        curve.push(&[[0.0], [1.0 + 2e-15], [1.0]], &[], 1.0);
+        curve.push(&[[1.0], [0.8], [0.6]], &[], 1.0);
+        curve.push(&[[0.6], [0.3], [0.0]], &[], 1.0);
+        let made = whole(&curve);
+        assert_eq!(made.curve.len(), 2);
+        assert!((made.curve.control[1][0] - 1.0).abs() < 1e-14, "{:?}", made.curve.control);
     }
 
     #[test]
