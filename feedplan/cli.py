@@ -409,7 +409,8 @@ def machines(name: str | None) -> None:
 
 def _machine_row(machine: Machine) -> tuple[str, ...]:
     limits = (_by_unit(machine, limit) for limit in ("max_velocity", "max_acceleration"))
-    axes = "".join(machine.axis_names)
+    names = machine.axis_names
+    axes = ("" if max(map(len, names)) == 1 else " ").join(names)
     return (machine.name, axes, *limits, f"{1e3 * machine.period:g}", _or_none(machine.chord_tolerance))
 
 

@@ -14,7 +14,7 @@ from feedplan.constraints.problem import Problem
 from feedplan.program.program import Program
 
 # X, Y, Z; U, V, W; the other axes; all together, where no program says more.
-_LETTERS = ("XYZ", "UVW")
+_LETTERS = (("X", "Y", "Z"), ("U", "V", "W"))
 ALL = 3
 
 

@@ -79,7 +79,7 @@ class JointPath:
         curve = self.problem.path.curve
         first = np.repeat(curve.control_points[curve.offsets[:-1]], np.diff(curve.offsets), axis=0)
         moves = np.logical_or.reduceat(curve.control_points != first, curve.offsets[:-1], axis=0)
-        linear = np.array([name in "XYZ" for name in self.problem.path.axes])
+        linear = np.array([name in ("X", "Y", "Z") for name in self.problem.path.axes])
         return np.where((moves & linear).any(axis=1)[:, None], linear, ~linear)
 
     def tip(self, piece: Numbers, u: Array) -> tuple[Array, Array]:
@@ -94,7 +94,7 @@ class JointPath:
 
     def _of(self, letters: str) -> NDArray[np.bool_]:
         """The axes of the path with these letters (axes,)."""
-        return np.array([name in letters for name in self.problem.path.axes])
+        return np.array([name in tuple(letters) for name in self.problem.path.axes])
 
     def feed_slope(self, piece: Numbers, u: Array) -> Array:
         """Way that the feed is about, per u (n,), at places."""

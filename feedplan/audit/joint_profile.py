@@ -212,7 +212,7 @@ class _Auditor:
             reach = half * curvature
             with np.errstate(invalid="ignore"):
                 sagitta = np.where(reach < 1.0, half * reach / (1.0 + np.sqrt(1.0 - reach**2)), half)
-            linear = self.path.feed_axes[piece] & np.array([n in "XYZ" for n in problem.path.axes])
+            linear = self.path.feed_axes[piece] & np.array([n in ("X", "Y", "Z") for n in problem.path.axes])
             sagitta = np.where(linear.any(axis=1)[:, None], sagitta, 0.0)
             self.worst.offer("chord", sagitta, problem.chord_tolerance, clock, line)
 

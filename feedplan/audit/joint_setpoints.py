@@ -274,7 +274,8 @@ class JointSetpoints:
         ]
         error = np.zeros(len(t))
         for number, start, end, from_, to in chords:
-            linear = path.feed_axes[number] & np.array([name in "XYZ" for name in problem.path.axes])
+            named = [name in ("X", "Y", "Z") for name in problem.path.axes]
+            linear = path.feed_axes[number] & np.array(named)
             for share in (0.25, 0.5, 0.75, 1.0):
                 point = path.tip(number, start + share * (end - start))[0]
                 error = np.maximum(error, _from_chord(point * linear, from_ * linear, to * linear))

@@ -135,7 +135,7 @@ class _Task:
 
     def linear(self, curve: CompositeCurve) -> CompositeCurve:
         """The motion in X, Y and Z alone; at rest in X where the path has none of them."""
-        columns = [column for column, name in enumerate(self.path.axes) if name in "XYZ"]
+        columns = [column for column, name in enumerate(self.path.axes) if name in ("X", "Y", "Z")]
         points = curve.control_points[:, columns] if columns else np.zeros((len(curve.control_points), 1))
         return replace(curve, control_points=points)
 

@@ -170,7 +170,7 @@ class Problem:
             return None
         points = np.zeros((len(self.path.curve.control_points), 3))
         for column, name in enumerate(self.path.axes):
-            if name in "XYZ":
+            if name in ("X", "Y", "Z"):
                 points[:, "XYZ".index(name)] = self.path.curve.control_points[:, column]
         return replace(self.path.curve, control_points=points)
 

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from feedplan._solvers import build_path as native_build_path
 from feedplan._solvers import curve_regular
 from feedplan.arguments import instance, list_of_names, number
+from feedplan.arguments import refuse as refuse_value
 from feedplan.curves._arrays import points, refuse
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
@@ -20,7 +21,7 @@ from feedplan.geometry.corners import Corners
 from feedplan.geometry.feed_groups import group_feeds, moving_axes
 from feedplan.geometry.joints import tangent_jumps
 from feedplan.geometry.path import FitSummary, Path
-from feedplan.machine.machine import AXIS_LETTERS
+from feedplan.machine.machine import AXIS_NAME, NAME_REMEDY
 from feedplan.program.program import MoveKind
 
 DEFAULT_AXES = "XYZABC"
@@ -153,21 +154,20 @@ def _names(axes: Sequence[str] | None, count: int) -> tuple[str, ...]:
     if axes is None:
         if count > len(DEFAULT_AXES):
             raise InputError(
-                f"{count} coordinates and no names: name the axes, with the letters {AXIS_LETTERS} "
+                f"{count} coordinates and no names: name the axes, as by axes=('j1', 'j2', …) "
                 f"(without names there are the first of {DEFAULT_AXES})"
             )
         return tuple(DEFAULT_AXES[:count])
     names = list_of_names(
         tuple(axes) if isinstance(axes, str) else axes,
         "axes",
-        f"a list of letters, such as {tuple(DEFAULT_AXES[:count])}",
+        f"a list of names, such as {tuple(DEFAULT_AXES[:count])}",
     )
-    known = set(AXIS_LETTERS) | set("IJK")
-    if len(names) != count or len(set(names)) != count or not set(names) <= known:
-        raise InputError(
-            f"the axes are {' '.join(names)} for points of {count} coordinates: name each once, "
-            f"with the letters {AXIS_LETTERS} (or I, J, K of a direction)"
-        )
+    for name in names:
+        if name not in ("I", "J", "K") and not AXIS_NAME.fullmatch(name):
+            raise refuse_value("an axis name", name, f"{NAME_REMEDY} but for a direction")
+    if len(names) != count or len(set(names)) != count:
+        raise InputError(f"the axes are {' '.join(names)} for points of {count} coordinates: name each once")
     return names
 
 

@@ -1,4 +1,6 @@
-"""Along which axes a feed counts: X, Y, Z, else U, V, W, else the rotary axes, as RS-274 has it.
+"""Along which axes a feed counts: X, Y, Z, else U, V, W, else all others together, as RS-274 has it.
+
+The others are the rotary axes of a program, and the axes of any other name of a path that is none.
 
 A piece of a path keeps the feeds of the moves that it follows. Where it also moves axes that none of these
 moves, as a blend does, it keeps the feed of the next move on either side that counts along those axes. So
@@ -16,7 +18,7 @@ from feedplan.curves.composite import CompositeCurve
 
 GROUPS = 3
 
-_LETTERS = ("XYZ", "UVW")
+_LETTERS = (("X", "Y", "Z"), ("U", "V", "W"))
 
 
 def feed_groups(axes: tuple[str, ...]) -> NDArray[np.bool_]:

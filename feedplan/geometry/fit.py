@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import fit_points as native_fit_points
+from feedplan.curves._arrays import MAX_AXES
 from feedplan.errors import InputError
 
 CORNER_ANGLE = math.radians(30.0)
@@ -68,8 +69,8 @@ def fit_points(
     Raises InputError for points that are too few, repeated or not finite.
     """
     array = np.ascontiguousarray(points, dtype=np.float64)
-    if array.ndim != 2 or len(array) < 2 or not 1 <= array.shape[1] <= 6:
-        raise InputError(f"points of shape {array.shape}: at least two points of 1 to 6 axes are needed")
+    if array.ndim != 2 or len(array) < 2 or not 1 <= array.shape[1] <= MAX_AXES:
+        raise InputError(f"points of shape {array.shape}: give at least two points of 1 to {MAX_AXES} axes")
     bad = ~np.isfinite(array).all(axis=1)
     if bad.any():
         raise InputError(f"point {int(bad.argmax())} is not finite: correct its coordinates")

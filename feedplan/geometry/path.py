@@ -111,9 +111,10 @@ class Path:
     ) -> Path:
         """The path along a curve [mm, deg].
 
-        `axes` names them, by default the first of XYZABC. `feed` [mm/s] is the greatest speed along X, Y and
-        Z on pieces that move one of these, else along U, V and W, else of the rotary axes [deg/s], as in a
-        program; by default there is none, and the axes' limits alone hold. Gaps up to 1e-6 mm are closed.
+        `axes` names them, by default the first of XYZABC: up to nine names of a machine's axes (see `Axis`).
+        `feed` [mm/s] is the greatest speed along X, Y and Z on pieces that move one of these, else along U, V
+        and W, else of all other axes together [deg/s], as in a program; by default there is none, and the
+        axes' limits alone hold. Gaps up to 1e-6 mm are closed.
 
         Straight pieces, of any degree and with any weights, become lines of degree 1 from each place where
         they turn back to the next, neighbours on one line together but where both are of degree 1 already;

@@ -9,7 +9,9 @@ from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
 
+from feedplan.arguments import shown
 from feedplan.errors import MachineError
+from feedplan.machine.checks import require
 from feedplan.machine.machine import Axis, Machine
 
 if sys.version_info >= (3, 11):
@@ -79,14 +81,18 @@ def _value(value: Any) -> str:
 
 def _machine(table: dict[str, Any], name: str) -> Machine:
     _check_keys(table, _MACHINE_KEYS, "")
-    rows = table.get("axes")
-    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
-        raise MachineError(f"axes is {rows!r}: give an [[axes]] table for each axis")
+    rows: Any = table.get("axes")
+    remedy = "an [[axes]] table for each axis"
+    require(isinstance(rows, list), "axes", rows, remedy)
+    for number, row in enumerate(rows, 1):
+        require(isinstance(row, dict), f"axis {number}", row, remedy)
     given = {key: table[key] for key in ("period", "chord_tolerance", "home", "offsets") if key in table}
     kinematics = table.get("kinematics", "cartesian")
     parameters = {"type": kinematics} if isinstance(kinematics, str) else kinematics
     if not (isinstance(parameters, dict) and isinstance(parameters.get("type"), str)):
-        raise MachineError(f'kinematics is {kinematics!r}: give a name, or a table with type = "cartesian"')
+        raise MachineError(
+            f'kinematics is {shown(kinematics)}: give a name, or a table with type = "cartesian"'
+        )
     return Machine(
         name=str(table.get("name", Path(name).stem)),
         axes=tuple(_axis(row) for row in rows),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from importlib import resources
@@ -25,8 +26,13 @@ from feedplan.machine.checks import (
 if TYPE_CHECKING:
     from feedplan.machine.kinematics import Kinematics
 
-MAX_AXES = 6
+MAX_AXES = 9
+# The letters of programs, and which of them are rotary where an axis does not say.
 AXIS_LETTERS = "XYZABCUVW"
+ROTARY_LETTERS = ("A", "B", "C")
+# I, J and K are the tool's direction.
+AXIS_NAME = re.compile(r"(?![IJK]\Z)[A-Za-z_][A-Za-z0-9_]{0,31}", re.ASCII)
+NAME_REMEDY = "1 to 32 letters, digits and underscores, no digit first, other than I, J and K"
 AxisKind = Literal["linear", "rotary"]
 
 
@@ -34,6 +40,8 @@ AxisKind = Literal["linear", "rotary"]
 class Axis:
     """One axis, a joint of the machine, and its limits.
 
+    `name`: 1 to 32 letters, digits and underscores, the first no digit, other than I, J and K (a tool's
+    direction). Programs move axes named by one of the letters XYZABCUVW, paths from Python any axes.
     `max_velocity` [mm/s], `max_acceleration` [mm/s²], `max_jerk` [mm/s³] (infinite: not limited),
     `travel` (least, greatest) [mm], `max_velocity_jump` [mm/s] allowed at a corner (0: corners stop).
     On a rotary axis every mm is a degree. `kind` is "linear" or "rotary"; empty, the letter decides: A, B and
@@ -51,8 +59,8 @@ class Axis:
     kind: AxisKind | Literal[""] = ""
 
     def __post_init__(self) -> None:
-        letter = isinstance(self.name, str) and len(self.name) == 1 and self.name in AXIS_LETTERS
-        require(letter, "axis name", self.name, f"one of the letters {AXIS_LETTERS}")
+        named = isinstance(self.name, str) and AXIS_NAME.fullmatch(self.name) is not None
+        require(named, "axis name", self.name, NAME_REMEDY)
         place = f"axis {self.name}: "
         kind: object = self.kind
         require(
@@ -61,7 +69,7 @@ class Axis:
             kind,
             '"linear" or "rotary"',
         )
-        kind = kind or ("rotary" if self.name in "ABC" else "linear")
+        kind = kind or ("rotary" if self.name in ROTARY_LETTERS else "linear")
         object.__setattr__(self, "kind", kind)
         units = {"max_velocity": "/s", "max_acceleration": "/s²", "max_jerk": "/s³"}
         for key, unit in units.items():
@@ -106,13 +114,7 @@ class Machine:
     def __post_init__(self) -> None:
         require_text(self.name, "name")
         require_text(self.kinematics, "kinematics")
-        remedy = f"1 to {MAX_AXES} axes"
-        axes = one_by_one(self.axes, "axes", remedy)
-        good = 0 < len(axes) <= MAX_AXES and all(isinstance(axis, Axis) for axis in axes)
-        require(good, "axes", self.axes, remedy)
-        object.__setattr__(self, "axes", axes)
-        names = list(self.axis_names)
-        require(len(set(names)) == len(names), "axes", names, "each axis letter once")
+        object.__setattr__(self, "axes", _axes(self.axes))
         set_positive(self, "period", "", "s")
         set_positive(self, "chord_tolerance", "", "mm", infinite=True)
         remedy = "a table of its keys, other than type, as in a machine file"
@@ -133,11 +135,11 @@ class Machine:
 
     @property
     def axis_names(self) -> tuple[str, ...]:
-        """The axis letters in order."""
+        """The names of the axes in order."""
         return tuple(axis.name for axis in self.axes)
 
     def axis(self, name: str) -> Axis:
-        """The axis of that letter; raises MachineError where there is none."""
+        """The axis of that name; raises MachineError where there is none."""
         for axis in self.axes:
             if isinstance(name, str) and axis.name == name:
                 return axis
@@ -212,6 +214,24 @@ def bundled_machines() -> tuple[str, ...]:
     """The names of the machines that come with feedplan."""
     models = resources.files(__package__).joinpath("models")
     return tuple(sorted(entry.name[:-5] for entry in models.iterdir() if entry.name.endswith(".toml")))
+
+
+def _axes(given: Any) -> tuple[Axis, ...]:
+    """Axes of different names; raises MachineError that names the first which cannot be used."""
+    remedy = f"a list of 1 to {MAX_AXES} axes"
+    if isinstance(given, Axis):
+        raise MachineError(f"axes is the axis {given.name} alone: give {remedy}")
+    axes = one_by_one(given, "axes", remedy)
+    for number, axis in enumerate(axes, 1):
+        require(isinstance(axis, Axis), f"axis {number}", axis, 'an Axis, as Axis("X", 100, 1000)')
+    if not 0 < len(axes) <= MAX_AXES:
+        raise MachineError(f"the machine has {len(axes)} axes: give {remedy}")
+    seen: set[str] = set()
+    for axis in axes:
+        if axis.name in seen:
+            raise MachineError(f"axis {axis.name} comes twice: give each axis another name")
+        seen.add(axis.name)
+    return axes
 
 
 def _pairs(offsets: Any) -> tuple[tuple[str, Any], ...]:

@@ -112,13 +112,15 @@ def _places(machine: Machine | None) -> NDArray[np.float64]:
     places = np.zeros((len(WORK_OFFSETS) + 2, len(AXIS_LETTERS)))
     if machine is None:
         return places
-    columns = [AXIS_LETTERS.index(letter) for letter in machine.program_letters]
+    # A machine's other axes are none of a program's.
+    own = [k for k, letter in enumerate(machine.program_letters) if letter in tuple(AXIS_LETTERS)]
+    columns = [AXIS_LETTERS.index(machine.program_letters[k]) for k in own]
     for key, row in machine.offsets:
         if key not in WORK_OFFSETS:
             raise MachineError(f"machine {machine.name}: offsets has {key!r}: use {', '.join(WORK_OFFSETS)}")
-        places[WORK_OFFSETS.index(key), columns] = row
+        places[WORK_OFFSETS.index(key), columns] = np.array(row)[own]
     if machine.home:
-        places[-2, columns] = machine.home
+        places[-2, columns] = np.array(machine.home)[own]
     if not machine.words_are_joints:
         # Zero may be a place that the tip cannot reach, as the axis of a turning column.
         places[-1] = places[-2]

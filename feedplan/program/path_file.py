@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from feedplan.curves.composite import MAX_DEGREE, CompositeCurve
 from feedplan.errors import InputError, ProgramError
-from feedplan.machine.machine import AXIS_LETTERS, Machine
+from feedplan.machine.machine import AXIS_LETTERS, ROTARY_LETTERS, Machine
 from feedplan.program.moves import NO_FEED, TOUCHING, Moves, program_axes
 from feedplan.program.program import Program
 from feedplan.units import MM_PER_INCH
@@ -69,8 +69,8 @@ class _PathFile:
         letters = self._letters(table, curves)
         axes = program_axes(letters)
         columns = [axes.index(letter) for letter in letters]
-        scales = np.array([1.0 if letter in "ABC" else scale for letter in letters])
-        reach = np.array([_FARTHEST_TURN if letter in "ABC" else _FARTHEST for letter in letters])
+        scales = np.array([1.0 if letter in ROTARY_LETTERS else scale for letter in letters])
+        reach = np.array([_FARTHEST_TURN if letter in ROTARY_LETTERS else _FARTHEST for letter in letters])
 
         moves = Moves(axes)
         count, unlimited = 0, 0

@@ -10,7 +10,7 @@ const charts = (() => {
   });
   const element = (id) => document.getElementById(id);
   const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-  const axisColour = (k) => style(`--axis-${k % 6}`);
+  const axisColour = (k) => style(`--axis-${k % 9}`);
   const speedColours = () => style("--speed-scale").match(/#[0-9a-f]{6}/gi);
   const config = { displaylogo: false, responsive: true };
   const flatTools = { modeBarButtons: [["zoom2d", "pan2d", "resetScale2d", "toImage"]] };

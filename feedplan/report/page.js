@@ -74,7 +74,7 @@
         let top = 0;
         data.time[name].forEach((curve, k) => {
           const more = { name: data.axes[k], legendgroup: data.axes[k], yaxis: id, showlegend: name === "velocity" };
-          const colour = `--axis-${k % 6}`;
+          const colour = `--axis-${k % 9}`;
           traces.push(...curveTraces(curve, from, to, { colour, scale: scale[k], pixels, more, unit: percent ? "%" : unit }));
           top = Math.max(top, (data.judged.includes(name) ? tops : usual)[name][k] * scale[k]);
         });
@@ -133,7 +133,7 @@
         const limit = data.limits[name][k];
         if (!limit) return;
         const more = { name: data.axes[k], legendgroup: data.axes[k], yaxis: id, showlegend: name === "velocity" };
-        traces.push(...curveTraces(curve, from, to, { colour: `--axis-${k % 6}`, scale: 1 / limit, pixels, more, unit: "of its limit" }));
+        traces.push(...curveTraces(curve, from, to, { colour: `--axis-${k % 9}`, scale: 1 / limit, pixels, more, unit: "of its limit" }));
       });
       for (const y of [1, -1]) {
         shapes.push({ type: "line", xref: "paper", x0: 0, x1: 1, yref: id, y0: y, y1: y, line: { color: style("--soft"), width: 1, dash: "dash" } });

@@ -20,7 +20,7 @@ from feedplan.progress import Listener
 Floats = NDArray[np.float64]
 
 # In this order the first group that moves counts. I, J, K are the tool's direction, a unit vector.
-_GROUPS = ("XYZ", "UVW", "ABCIJK")
+_GROUPS = (("X", "Y", "Z"), ("U", "V", "W"))
 _DEGREES = {name: math.degrees(1.0) for name in "IJK"}
 
 # Roundings of a control point, in units of the last digit of the greatest: they are no motion.
@@ -64,10 +64,11 @@ def tool_motion(problem: Problem) -> ToolMotion:
     points, first = curve.control_points, curve.offsets[:-1]
     extent = np.maximum.reduceat(points, first) - np.minimum.reduceat(points, first)
     rounding = _ROUNDINGS * np.finfo(float).eps * np.abs(points).max(axis=0, initial=0.0)
-    member = np.array([[name in group for name in axes] for group in _GROUPS])
+    lead = np.array([[name in group for name in axes] for group in _GROUPS])
+    member = np.vstack([lead, ~lead.any(axis=0)])
     moves = ((extent > rounding)[:, None, :] & member).any(axis=2)
-    counts = np.where(moves.any(axis=1), moves.argmax(axis=1), len(_GROUPS) - 1)
+    counts = np.where(moves.any(axis=1), moves.argmax(axis=1), len(_GROUPS))
     scale = np.array([_DEGREES.get(name, 1.0) for name in axes])
     share = member[counts] * scale
     points = points * np.repeat(share, np.diff(curve.offsets), axis=0)
-    return ToolMotion(replace(curve, control_points=points), share, counts == len(_GROUPS) - 1)
+    return ToolMotion(replace(curve, control_points=points), share, counts == len(_GROUPS))

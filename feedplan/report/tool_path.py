@@ -34,7 +34,7 @@ class ToolPath:
         self._axes = problem.axes
         self._problem, self._motion = problem, motion
         self._linear = [self._axes.index(name) for name in "XYZ" if name in self._axes]
-        columns = [column for column, name in enumerate(problem.path.axes) if name in "XYZ"]
+        columns = [column for column, name in enumerate(problem.path.axes) if name in ("X", "Y", "Z")]
         low = problem.path.curve.control_points[:, columns]
         extent = float(np.linalg.norm(np.ptp(low, axis=0))) if low.size else 0.0
         tolerance = _TOLERANCE * extent if extent > 0 else 1.0

@@ -154,7 +154,9 @@ def test_what_cannot_be_used_is_refused_with_a_sentence() -> None:
     control = [[0, 0], [1, 1]]
     with pytest.raises(InputError, match="the axes are X for points of 2 coordinates"):
         Path.from_bezier(control, axes="X")
-    for axes in ("XX", "X?"):
+    with pytest.raises(InputError, match="an axis name is"):
+        Path.from_bezier(control, axes="X?")
+    for axes in ("XX", "XYZ"):
         with pytest.raises(InputError, match="name each once"):
             Path.from_bezier(control, axes=axes)
     for feed in (0.0, -1.0, math.nan):

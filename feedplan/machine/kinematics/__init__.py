@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from feedplan.errors import MachineError
 from feedplan.machine.checks import require, require_text
+from feedplan.machine.machine import ROTARY_LETTERS
 from feedplan.machine.numbers.elementary import Number
 from feedplan.machine.parameters import Parameters
 
@@ -40,7 +41,7 @@ class Kinematics(ABC):
     @property
     def rotary(self) -> tuple[bool, ...]:
         """Which joints are angles; those named A, B or C unless a subclass says otherwise."""
-        return tuple(name in "ABC" for name in self.joint_names)
+        return tuple(name in ROTARY_LETTERS for name in self.joint_names)
 
     @property
     def affine(self) -> bool:

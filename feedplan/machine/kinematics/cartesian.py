@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from feedplan.errors import MachineError
 from feedplan.machine.kinematics import Kinematics
-from feedplan.machine.machine import AXIS_LETTERS, Axis
+from feedplan.machine.machine import AXIS_LETTERS, ROTARY_LETTERS, Axis
 from feedplan.machine.numbers.elementary import Number
 from feedplan.machine.parameters import Parameters
 
@@ -56,7 +56,7 @@ def build(axes: tuple[Axis, ...], parameters: Parameters) -> Cartesian:
         for letter in table:
             parameters.require(letter in names, key, letter, f"one of the joints {', '.join(names)}")
     follows = [mapped.get(name, name) for name in names]
-    for letter in follows:
+    for letter in mapped.values():
         good = isinstance(letter, str) and len(letter) == 1 and letter in AXIS_LETTERS
         parameters.require(good, "map", letter, f"one of the letters {AXIS_LETTERS}")
     scale = [scales.get(name, 1.0) for name in names]
@@ -64,12 +64,15 @@ def build(axes: tuple[Axis, ...], parameters: Parameters) -> Cartesian:
         good = isinstance(value, (int, float)) and not isinstance(value, bool) and 0 < abs(value) < 1e6
         parameters.require(good, "scale", value, "a number other than 0")
     for axis, letter in zip(axes, follows, strict=True):
-        if (letter in "ABC") != (axis.kind == "rotary") and letter != axis.name:
+        if (letter in ROTARY_LETTERS) != (axis.kind == "rotary") and letter != axis.name:
             raise MachineError(
                 f"machine {parameters.machine}: the {axis.kind} joint {axis.name} follows {letter}: "
                 "map linear joints to X, Y, Z, U, V, W and rotary ones to A, B, C"
             )
-    tip_names = tuple(letter for letter in AXIS_LETTERS if letter in follows)
+    # Axes of other names follow themselves: no program moves them.
+    letters = tuple(AXIS_LETTERS)
+    tip_names = tuple(name for name in letters if name in follows)
+    tip_names += tuple(name for name in follows if name not in letters)
     return Cartesian(
         tip_names=tip_names,
         joint_names=names,

@@ -22,7 +22,7 @@ use s_curve_path::{Cutting, Segmented};
 
 instances! {
     /// Plans of a problem within `jerk` [mm/s³] of every axis.
-    pub trait JerkLimited for [3, 6] Problem<'_, M> = {
+    pub trait JerkLimited for [3, 6, 9] Problem<'_, M> = {
         /// The fastest profile that the effort finds.
         fn jerk_limited(&self, jerk: &[f64; M], effort: &Effort) -> Result<Arcs, Fault>
             = jerk_limited_path::plan;

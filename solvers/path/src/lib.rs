@@ -28,7 +28,7 @@ instances! {
 
 instances! {
     /// Splines near points.
-    pub trait Fitted for [3, 6] [[f64; M]] = {
+    pub trait Fitted for [3, 6, 9] [[f64; M]] = {
         /// Lines and quadratic B-splines within the tolerance; see `fit`.
         fn fitted(&self, options: &FitOptions, watch: Watch) -> Vec<FittedPiece<M>> = fit::fit_points;
     }

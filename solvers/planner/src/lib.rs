@@ -15,9 +15,12 @@ use feedplan_geometry::instances;
 use bang_bang_quadratic::{Fault, Profile};
 use bound::Hint;
 
+/// Bit k is about axis k; an instance has at most as many axes.
+type AxisBits = u16;
+
 instances! {
     /// What the exact planner says of a problem.
-    pub trait Exact for [3, 6] bang_bang::Problem<'_, M> = {
+    pub trait Exact for [3, 6, 9] bang_bang::Problem<'_, M> = {
         /// The fastest profile; lines and polynomial quadratics go to the planner made for them.
         fn fastest(&self) -> Result<Profile, Fault> = bang_bang::plan_each;
         /// The same by the planner for pieces of any degree alone.
@@ -29,7 +32,7 @@ instances! {
 
 instances! {
     /// The same of a path of polynomial quadratics.
-    pub trait ExactQuadratic for [3, 6] bang_bang_quadratic::Problem<'_, M> = {
+    pub trait ExactQuadratic for [3, 6, 9] bang_bang_quadratic::Problem<'_, M> = {
         /// The fastest profile.
         fn fastest(&self) -> Result<Profile, Fault> = bang_bang_quadratic::plan;
     }

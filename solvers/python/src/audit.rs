@@ -5,8 +5,8 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::arrays::{to_array2, CurveArrays};
+use super::with_padded_axes;
 use super::work::run;
-use super::{with_padded_axes, with_path_axes};
 use feedplan_audit::arcs::Arcs;
 use feedplan_audit::curve::{Curve, Followed, Pieces};
 use feedplan_audit::deviation::{audit_deviation, audit_path};
@@ -294,7 +294,7 @@ fn audit_plan(
     let junction_speed = problem.junction_speed.as_slice()?;
     let arcs = profile.as_ref().map(|profile| profile.arcs(&problem)).transpose()?;
     let program = program.as_ref().map(|program| program.programmed(problem.axes())).transpose()?;
-    with_path_axes!(problem.axes(), M, {
+    with_padded_axes!(problem.axes(), M, {
         let limits = limits.limits::<M>(path.axes)?;
         run(py, progress.as_ref(), |watch| {
             let pieces = path.len();
@@ -332,7 +332,7 @@ fn audit_places<'py>(
     let inside = piece.iter().all(|&piece| usize::try_from(piece).is_ok_and(|piece| piece < pieces.len()));
     require(piece.len() == u.len() && inside, "places")?;
     let axes = pieces.axes;
-    with_path_axes!(axes, M, {
+    with_padded_axes!(axes, M, {
         let (points, slopes) = run(py, None, |watch| {
             let (mut points, mut slopes) = (Vec::new(), Vec::new());
             let mut last: Option<(i64, Curve<M>)> = None;

@@ -16,8 +16,8 @@ mod work;
 
 use pyo3::prelude::*;
 
-/// Calls a generic kernel for at most 3 or at most 6 axes, those beyond `count` at rest: an axis that rests changes
-/// no result, and two instances of a kernel are built where six would be.
+/// Calls a generic kernel for at most 3, 6 or 9 axes, those beyond `count` at rest: an axis that rests changes no
+/// result, and three instances of a kernel are built where nine would be.
 macro_rules! with_padded_axes {
     ($count:expr, $m:ident, $call:expr) => {
         match $count {
@@ -29,30 +29,17 @@ macro_rules! with_padded_axes {
                 const $m: usize = 6;
                 $call
             }
+            7..=9 => {
+                const $m: usize = 9;
+                $call
+            }
             count => {
-                Err(pyo3::exceptions::PyValueError::new_err(format!("{count} axes: 1 to 6 are supported")))
+                Err(pyo3::exceptions::PyValueError::new_err(format!("{count} axes: 1 to 9 are supported")))
             }
         }
     };
 }
 pub(crate) use with_padded_axes;
-
-/// The same for paths and curves, of at most 9 axes: joints beside a tool direction.
-macro_rules! with_path_axes {
-    ($count:expr, $m:ident, $call:expr) => {
-        match $count {
-            7..=9 => {
-                const $m: usize = 9;
-                $call
-            }
-            0 | 10.. => {
-                Err(pyo3::exceptions::PyValueError::new_err(format!("{} axes: 1 to 9 are supported", $count)))
-            }
-            count => with_padded_axes!(count, $m, $call),
-        }
-    };
-}
-pub(crate) use with_path_axes;
 
 /// The native module of feedplan.
 #[pymodule]

@@ -9,8 +9,8 @@ use rayon::prelude::*;
 
 use super::arrays::{row, rows};
 use super::spline::curve;
+use super::with_padded_axes;
 use super::work::run;
-use super::{with_padded_axes, with_path_axes};
 use feedplan_geometry::spline::regular::{regular, Regular};
 use feedplan_geometry::spline::{CompositeCurve, Piece};
 use feedplan_geometry::watch::Watch;
@@ -148,7 +148,7 @@ fn build_path<'py>(
     let smooth = ["smooth", "fastest"].contains(&corners);
     let options =
         FollowOptions { exact_tolerance, max_chord, corner_acceleration, max_speed, corner_angle, rounding };
-    with_path_axes!(axes, M, {
+    with_padded_axes!(axes, M, {
         let target = rows::<M>(&target)?;
         let given = match &splines {
             Some((control, weights, offsets, width)) => {

@@ -8,8 +8,8 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 
 use super::arrays::{row, rows, to_array2};
+use super::with_padded_axes;
 use super::work::run;
-use super::{with_padded_axes, with_path_axes};
 use feedplan_geometry::spline::bezier::{derivatives, elevate, reverse, split};
 use feedplan_geometry::spline::circle::Turn;
 use feedplan_geometry::spline::cusps::cusps;
@@ -131,7 +131,7 @@ fn spline_pieces<'py>(
     periodic: bool,
 ) -> PyResult<Columns<'py>> {
     let axes = control_points.shape()[1];
-    with_path_axes!(axes, M, {
+    with_padded_axes!(axes, M, {
         let spline = spline::<M>(&control_points, weights.as_ref(), &knots, degree, periodic)?;
         let pieces = py.detach(|| extract(&spline)).map_err(input_error)?;
         Ok(columns(py, pieces, axes))
@@ -151,7 +151,7 @@ fn spline_insert<'py>(
     times: usize,
 ) -> PyResult<(Bound<'py, PyArray2<f64>>, Option<Bound<'py, PyArray1<f64>>>, Bound<'py, PyArray1<f64>>)> {
     let axes = control_points.shape()[1];
-    with_path_axes!(axes, M, {
+    with_padded_axes!(axes, M, {
         let mut spline = spline::<M>(&control_points, weights.as_ref(), &knots, degree, false)?;
         spline.insert(value, times).map_err(input_error)?;
         Ok((
@@ -179,7 +179,7 @@ fn turn_pieces<'py>(
     if plane.iter().any(|&axis| axis >= axes) {
         return Err(PyValueError::new_err("the plane is not one of these axes"));
     }
-    with_path_axes!(axes, M, {
+    with_padded_axes!(axes, M, {
         let turn = Turn { start: row::<M>(&start, 0.0)?, plane, centre, sweep };
         let (pieces, bound) = match travel {
             None => (turn.arc(), 0.0),
@@ -196,7 +196,7 @@ fn check_control_points(
     weights: Option<Array1<'_>>,
     degree: usize,
 ) -> PyResult<()> {
-    with_path_axes!(control_points.shape()[1], M, {
+    with_padded_axes!(control_points.shape()[1], M, {
         check_points(degree, &rows::<M>(&control_points)?, &weights_of(weights.as_ref())?)
             .map_err(input_error)
     })
@@ -216,7 +216,7 @@ fn curve_evaluate<'py>(
     order: usize,
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
     let axes = control_points.shape()[1];
-    with_path_axes!(axes, M, {
+    with_padded_axes!(axes, M, {
         let (piece, u, width) = (piece.as_slice()?, u.as_slice()?, width.as_slice()?);
         check_places(width, piece, u)?;
         // Only the pieces of these places are read: few places of a long curve take no long time.
@@ -304,7 +304,7 @@ fn curve_elevate<'py>(
     degree: usize,
 ) -> PyResult<Columns<'py>> {
     let axes = control_points.shape()[1];
-    with_path_axes!(axes, M, {
+    with_padded_axes!(axes, M, {
         let curve = curve::<M>(&control_points, weights.as_ref(), &offsets, &width)?;
         let mut raised = CompositeCurve::default();
         for piece in curve.pieces() {
@@ -326,7 +326,7 @@ fn curve_split<'py>(
     u: Array1<'py>,
 ) -> PyResult<Columns<'py>> {
     let axes = control_points.shape()[1];
-    with_path_axes!(axes, M, {
+    with_padded_axes!(axes, M, {
         let curve = curve::<M>(&control_points, weights.as_ref(), &offsets, &width)?;
         let (piece, u) = (piece.as_slice()?, u.as_slice()?);
         check_places(&curve.width, piece, u)?;
@@ -353,7 +353,7 @@ fn curve_reverse<'py>(
     width: Array1<'py>,
 ) -> PyResult<Columns<'py>> {
     let axes = control_points.shape()[1];
-    with_path_axes!(axes, M, {
+    with_padded_axes!(axes, M, {
         let curve = curve::<M>(&control_points, weights.as_ref(), &offsets, &width)?;
         let mut reversed = CompositeCurve::default();
         for i in (0..curve.len()).rev() {
@@ -377,7 +377,7 @@ fn curve_joints<'py>(
     angle: f64,
     derivative: f64,
 ) -> PyResult<JointColumns<'py>> {
-    with_path_axes!(control_points.shape()[1], M, {
+    with_padded_axes!(control_points.shape()[1], M, {
         let curve = curve::<M>(&control_points, weights.as_ref(), &offsets, &width)?;
         let found =
             run(py, None, |watch| joints(&curve, closed, &JointTolerance { gap, angle, derivative }, watch))?;
@@ -403,7 +403,7 @@ fn curve_regular<'py>(
     width: Array1<'py>,
 ) -> PyResult<(Columns<'py>, Bound<'py, PyArray2<i64>>, Bound<'py, PyArray2<bool>>)> {
     let axes = control_points.shape()[1];
-    with_path_axes!(axes, M, {
+    with_padded_axes!(axes, M, {
         let curve = curve::<M>(&control_points, weights.as_ref(), &offsets, &width)?;
         let whole = 0..curve.len();
         let made = run(py, None, |watch| regular(&curve, std::slice::from_ref(&whole), watch))?;
@@ -428,7 +428,7 @@ fn curve_cusps<'py>(
     width: Array1<'py>,
     tolerance: f64,
 ) -> PyResult<(Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f64>>)> {
-    with_path_axes!(control_points.shape()[1], M, {
+    with_padded_axes!(control_points.shape()[1], M, {
         let curve = curve::<M>(&control_points, weights.as_ref(), &offsets, &width)?;
         let found = run(py, None, |watch| cusps(&curve, tolerance, watch))?;
         Ok((

@@ -6,6 +6,7 @@
 //! for one place, where all axes have a zero of order r.
 
 use super::piece::Piece;
+use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
 
 /// Halving stops here; a cusp of order 1 is found some levels earlier.
@@ -31,7 +32,7 @@ pub struct Cusp {
 
 struct Search<'a, const M: usize> {
     noise: &'a [f64; M],
-    moving: u8,
+    moving: AxisBits,
     left: u32,
     found: Vec<(f64, f64)>,
     /// Short stretches in the end without a place where all axes rest, and how often each was halved.
@@ -55,7 +56,7 @@ pub struct Nearly {
 }
 
 /// The cusps of a piece on which these axes move, and the places that are nearly one, in order.
-pub fn cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, moving: u8) -> Cusps {
+pub fn cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, moving: AxisBits) -> Cusps {
     let (least, greatest) = piece.speed.range();
     if piece.own_speed && least > FAST * greatest {
         return Cusps::default();
@@ -123,7 +124,7 @@ impl<const M: usize> Search<'_, M> {
 /// Where in a stretch the cusp is, and its order: the power of the distance that the tangents grow with.
 fn locate<const M: usize, const C: usize>(
     piece: &Piece<M, C>,
-    moving: u8,
+    moving: AxisBits,
     (from, to): (f64, f64),
 ) -> Option<Cusp> {
     let degree = piece.g[0].degree();

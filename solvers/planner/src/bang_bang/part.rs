@@ -1,6 +1,7 @@
 //! A part of a piece on which no axis turns round and one velocity cap is the lowest, and that part as a pass travels it.
 
 use super::piece::{counted, Piece};
+use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
 
 /// Turns closer than this part of the piece are one.
@@ -30,15 +31,15 @@ pub struct Part {
     pub left: End,
     pub right: End,
     /// Bit k: axis k moves backward, moves at all.
-    pub negative: u8,
-    pub moving: u8,
+    pub negative: AxisBits,
+    pub moving: AxisBits,
 }
 
 /// An end of a part.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct End {
     /// Bit k: axis k turns round there.
-    pub turns: u8,
+    pub turns: AxisBits,
     /// All axes have a zero of this order.
     pub order: u8,
     /// As far as this from the end rounding may have moved the zeros.
@@ -75,7 +76,7 @@ pub struct SubPiece<const M: usize, const C: usize> {
     pub speed: Polynomial<C>,
     pub cap: Cap,
     /// Bit k: axis k moves at all.
-    pub moving: u8,
+    pub moving: AxisBits,
     /// Degree of the curve itself.
     pub degree: usize,
     pub straight: bool,

@@ -21,6 +21,7 @@ mod slide;
 use super::part::{Cap, SubPiece};
 use super::split::Axes;
 use super::window::{Bound, Window};
+use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
 use feedplan_geometry::quadratic::norm;
 
@@ -214,7 +215,7 @@ struct Pass<'a, const M: usize, const C: usize, const BACK: bool> {
     out: &'a mut Vec<Arc>,
     /// The axis that has just saturated, and bits of those that share its acceleration.
     control: Option<usize>,
-    tied: u8,
+    tied: AxisBits,
     /// The axis at −A, where the limit curve has just been left.
     low: Option<usize>,
     /// The bound or the limit curve has just been left along its tangent.

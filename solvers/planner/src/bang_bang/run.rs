@@ -10,6 +10,7 @@ use super::time::time_at_speed;
 use super::{Task, TIP_AXES};
 use crate::arc_kind::ArcKind;
 use crate::bang_bang_quadratic::{Fault, Profile, Row, Workspace as QuadraticWorkspace, NO_AXIS};
+use crate::AxisBits;
 use feedplan_geometry::polynomial::MOST;
 use feedplan_geometry::quadratic::norm;
 
@@ -157,11 +158,11 @@ struct PartEnd<const M: usize> {
     is_cusp: bool,
     /// The limit of its direction, of any length, with bits of the axes that move backward.
     lead: [f64; M],
-    negative: u8,
+    negative: AxisBits,
 }
 
 impl<const M: usize> PartEnd<M> {
-    fn of<const C: usize>(sub: &SubPiece<M, C>, negative: u8, at_end: bool) -> Self {
+    fn of<const C: usize>(sub: &SubPiece<M, C>, negative: AxisBits, at_end: bool) -> Self {
         Self { is_cusp: sub.cusp_order(at_end) > 0, lead: leading(sub, at_end), negative }
     }
 

@@ -6,6 +6,7 @@ use super::part::{Cap, End, Part, Remedy, SAME_TURN};
 use super::piece::Piece;
 use super::TIP_AXES;
 use crate::planning::ChordLimit;
+use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
 
 /// Cuts closer than this part of the piece are one.
@@ -51,7 +52,7 @@ impl Cut {
         self.end.turns != 0 || self.t == 0.0 || self.t == 1.0
     }
 
-    fn turn(t: f64, turns: u8) -> Self {
+    fn turn(t: f64, turns: AxisBits) -> Self {
         Self { t, end: End { turns, reach: SAME_TURN, ..End::default() } }
     }
 
@@ -94,11 +95,11 @@ pub fn split<const M: usize, const C: usize>(
     }
     let lines = if below_chord.is_empty() { &whole } else { below_chord.as_slice() };
     // Where the axes are the tool's none is faster than the tool.
-    let can_cap = (0..M).fold(0u8, |bits, k| {
+    let can_cap = (0..M).fold(0, |bits, k| {
         let slow = piece.own_speed && axes.velocity_sq[k] >= most_sq;
-        bits | u8::from(!slow && moving >> k & 1 == 1) << k
+        bits | AxisBits::from(!slow && moving >> k & 1 == 1) << k
     });
-    let mut fast = 0u8;
+    let mut fast = 0;
     for line in lines {
         if line.from > 0.0 {
             cuts.push(Cut::plain(line.from));
@@ -132,17 +133,17 @@ pub fn split<const M: usize, const C: usize>(
             cap: lowest_cap(&g, piece.speed.value(middle), axes, feed, line, (from, to), fast),
             left: pair[0].end,
             right: pair[1].end,
-            negative: (0..M).fold(0, |bits, k| bits | u8::from(g[k] < 0.0) << k),
+            negative: (0..M).fold(0, |bits, k| bits | AxisBits::from(g[k] < 0.0) << k),
             moving,
         });
     }
 }
 
 /// Cuts where an axis turns round; says which axes move at all.
-fn cut_at_turns<const M: usize, const C: usize>(piece: &Piece<M, C>, cuts: &mut Vec<Cut>) -> u8 {
+fn cut_at_turns<const M: usize, const C: usize>(piece: &Piece<M, C>, cuts: &mut Vec<Cut>) -> AxisBits {
     let size = piece.g.each_ref().map(|g| g.padded().iter().fold(0.0, |most: f64, c| most.max(c.abs())));
     let greatest = size.iter().copied().fold(0.0, f64::max);
-    let mut moving = 0u8;
+    let mut moving = 0;
     for (k, g) in piece.g.iter().enumerate() {
         if size[k] <= ZERO * greatest {
             continue;
@@ -166,7 +167,7 @@ fn cut_at_turns<const M: usize, const C: usize>(piece: &Piece<M, C>, cuts: &mut 
 }
 
 /// Cuts where the tool is at rest, or nearly; all axes turn in a cusp, or nowhere near.
-fn cut_at_cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, moving: u8, cuts: &mut Vec<Cut>) {
+fn cut_at_cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, moving: AxisBits, cuts: &mut Vec<Cut>) {
     let Cusps { cusps, nearly } = cusps(piece, moving);
     for Nearly { t, reach } in nearly {
         let reach = AROUND * reach.max(SAME_TURN);
@@ -263,10 +264,10 @@ fn cut_by_cap<const M: usize, const C: usize>(
     axes: &Axes<M>,
     feed: Option<&(Polynomial<C>, f64)>,
     line: &SpeedLine,
-    can_cap: u8,
+    can_cap: AxisBits,
     cuts: &mut Vec<Cut>,
-) -> u8 {
-    let mut fast = 0u8;
+) -> AxisBits {
+    let mut fast = 0;
     let mut cut = |t: f64| cuts.push(Cut::plain(line.from + t * (line.to - line.from)));
     let whole = line.from == 0.0 && line.to == 1.0;
     let on_line = |p: &Polynomial<C>| if whole { *p } else { p.part(line.from, line.to) };
@@ -333,7 +334,7 @@ fn lowest_cap<const M: usize>(
     feed: Option<(f64, f64)>,
     line: &SpeedLine,
     (from, to): (f64, f64),
-    fast: u8,
+    fast: AxisBits,
 ) -> Cap {
     let [f0, f1] = line.speed_sq;
     let at = |t: f64| if f0 == f1 { f0 } else { f0 + (f1 - f0) * ((t - line.from) / (line.to - line.from)) };

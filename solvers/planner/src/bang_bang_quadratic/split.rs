@@ -10,6 +10,7 @@ use super::subpiece::{Axes, Cap, Orientation, SubPiece};
 use super::turns::{Mark, EDGE};
 use crate::bernstein::{multiply, parabola_sign_changes, product, sign_changes};
 use crate::planning::ChordLimit;
+use crate::AxisBits;
 use feedplan_geometry::quadratic::dot;
 
 /// Cuts closer than this part of a stretch are one.
@@ -36,7 +37,7 @@ pub struct Part {
     to: f64,
     pub cap: Cap,
     /// Bit k: axis k moves backward.
-    pub negative: u8,
+    pub negative: AxisBits,
 }
 
 /// A part with its place on the piece.
@@ -95,7 +96,7 @@ struct Limits<'a, const M: usize> {
     feed_sq: f64,
     chord: Option<ChordLimit>,
     /// Bit k: axis k can be faster than its limit at the feed.
-    fast: u8,
+    fast: AxisBits,
 }
 
 impl Splitter {
@@ -110,7 +111,7 @@ impl Splitter {
     ) {
         let (left, right) = (&piece.left, &piece.right);
         self.parts.clear();
-        let (mut fast, mut negative) = (0u8, 0u8);
+        let (mut fast, mut negative) = (0, 0);
         let mut turns = false;
         for k in 0..M {
             if left[k] + right[k] < 0.0 {
@@ -144,7 +145,7 @@ impl Splitter {
                     None => self.cut_by_cap(&stretch.piece, limits, limits.feed_sq, None, (0.0, 1.0)),
                 }
                 let (left, right) = (&stretch.piece.left, &stretch.piece.right);
-                let negative = (0..M).fold(0, |bits, k| bits | u8::from(left[k] + right[k] < 0.0) << k);
+                let negative = (0..M).fold(0, |bits, k| bits | AxisBits::from(left[k] + right[k] < 0.0) << k);
                 for part in &mut self.parts[first..] {
                     part.marks = [from, to];
                     part.negative = negative;

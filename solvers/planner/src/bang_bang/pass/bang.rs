@@ -4,6 +4,7 @@ use super::{
     kept_until, Kind, Pass, Start, Stuck, AT_END, FLAT, MAX_HOPS, NEARLY_FLAT, NEARLY_ON_BOUND, NOISE, TIE,
 };
 use crate::bang_bang::window::Bound;
+use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
 
 /// What ends an arc.
@@ -16,9 +17,9 @@ enum Event {
 impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
     /// The control axis of greatest acceleration: the axis, s = π'/2, bits of the axes tied with it, and whether it
     /// turns here.
-    pub(super) fn least(&self, start: &Start<M>) -> Option<(usize, f64, u8, bool)> {
+    pub(super) fn least(&self, start: &Start<M>) -> Option<(usize, f64, AxisBits, bool)> {
         let (mut s, mut rests) = ([f64::INFINITY; M], [0.0; M]);
-        let mut turns = 0u8;
+        let mut turns = 0;
         for k in 0..M {
             let rest = start.limit[k] - start.c[k] * self.pi;
             rests[k] = rest;
@@ -72,12 +73,12 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
     }
 
     /// The control axis from a cusp: s is infinite, the tangents' leading coefficients decide.
-    fn least_from_cusp(&self) -> Option<(usize, u8)> {
+    fn least_from_cusp(&self) -> Option<(usize, AxisBits)> {
         let lead = |k: usize| self.window.g[k].coefficients()[self.order];
         let ratio = |k: usize| self.axes.acceleration[k] / lead(k);
         let least = self.moving().filter(|&k| lead(k) > 0.0).map(ratio).fold(f64::INFINITY, f64::min);
         let tied = |k: usize| lead(k) > 0.0 && ratio(k) <= least * (1.0 + TIE);
-        let bits = self.moving().filter(|&k| tied(k)).fold(0u8, |bits, k| bits | 1 << k);
+        let bits = self.moving().filter(|&k| tied(k)).fold(0, |bits, k| bits | 1 << k);
         // Among tied axes an event at once tells which it is.
         let j = self.control.filter(|&k| tied(k)).or_else(|| self.moving().find(|&k| tied(k)))?;
         Some((j, bits))
