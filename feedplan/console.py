@@ -120,14 +120,19 @@ def plan_rows(summary: Mapping[str, Any], audit: Audit, files: Sequence[FilePath
         by_itself = "" if own is None else f", by its own estimate {100.0 * float(own):.2g} %"
         bound = f"{summary['lower_bound']:.6f} s for this path"
         rows.append(("lower bound", f"{bound}, gap {gap:.3g} %{by_itself}"))
-    mean = float(summary["mean_speed"])
-    rows.append(
-        ("length", f"{summary['length']:.3f} mm, mean {mean:.4g} mm/s ({mm_per_min(mean):.5g} mm/min)")
-    )
-    if summary["turn"] > 0:
-        rows.append(("turning alone", f"{summary['turn']:.3f} deg"))
+    units, turn = summary["units"], f"{summary['turn']:.6g} {summary['units']['angle']}"
+    if summary["turn"] > 0 and summary["length"] == 0:
+        rows.append(("length", f"{turn}, mean {summary['mean_turn']:.4g} {units['angle']}/s"))
+    else:
+        mean, unit = float(summary["mean_speed"]), units["length"]
+        by_minute = f"({mm_per_min(mean):.5g} {unit}/min)"
+        rows.append(("length", f"{summary['length']:.3f} {unit}, mean {mean:.4g} {unit}/s {by_minute}"))
+        if summary["turn"] > 0:
+            rows.append(("turning alone", turn))
     totals = summary["totals"]
-    rows += [(name, _total_text(totals[name])) for name in ("feed", "rapid") if totals[name]["time"] > 0]
+    rows += [
+        (name, _total_text(totals[name], units)) for name in ("feed", "rapid") if totals[name]["time"] > 0
+    ]
     rows.append(("limits", _limits_text(summary["limits"])))
     rows.append(("stops", _stops_text(summary["stops_by_cause"])))
     rows.append(("tolerance", tolerance_text(**summary["tolerance"])))
@@ -142,10 +147,10 @@ def plan_rows(summary: Mapping[str, Any], audit: Audit, files: Sequence[FilePath
     return rows
 
 
-def _total_text(total: Mapping[str, float]) -> str:
+def _total_text(total: Mapping[str, float], units: Mapping[str, str]) -> str:
     """`1.2 s, 80 mm`, with degrees where rotary axes move alone."""
-    turn = f", {total['turn']:.4g} deg alone" if total["turn"] > 0 else ""
-    return f"{duration_text(total['time'])}, {total['length']:.6g} mm{turn}"
+    turn = f", {total['turn']:.4g} {units['angle']} alone" if total["turn"] > 0 else ""
+    return f"{duration_text(total['time'])}, {total['length']:.6g} {units['length']}{turn}"
 
 
 def _limits_text(limits: Mapping[str, Mapping[str, float]]) -> str:

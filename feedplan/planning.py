@@ -202,7 +202,7 @@ class Plan:
         machine_file = self.machine.to_toml()
         return {
             "format": FORMAT,
-            "units": {"length": "mm", "angle": "deg", "time": "s"},
+            "units": {**dict(zip(("length", "angle"), self.account.motion.units, strict=True)), "time": "s"},
             "time": self.time,
             "lower_bound": self.lower_bound,
             "gap": self.gap,
@@ -217,6 +217,7 @@ class Plan:
             "program_sha256": program.sha256 if program else None,
             "setpoints": {
                 "axes": list(self.problem.axes),
+                "units": list(self.problem.units),
                 "period": self.machine.period,
                 "count": count,
                 "duration": duration,

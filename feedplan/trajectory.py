@@ -36,13 +36,13 @@ class State:
 class Trajectory:
     """A profile on its path, by the plan's own clock: pauses are in it, waits for whole periods are not.
 
-    Lengths `s` are those of the tool's way from the start [mm].
+    Lengths `s` are those of the path from the start, in its `unit` (mm, or that of the joints).
     """
 
     def __init__(self, problem: Problem, profile: SpeedProfile) -> None:
         self._problem, self._profile = problem, profile
         self._sampler = sampler(problem, profile, problem.period)
-        self.axes = problem.axes
+        self.axes, self.unit = problem.axes, problem.unit
         self.duration = profile.time + problem.path.pauses
 
     def __repr__(self) -> str:
@@ -83,13 +83,13 @@ class Trajectory:
         """t(s): when the tool is at one length or at lengths (n,) [mm], before the pause at a stop [s].
 
         Raises InputError for a length that is not on the path."""
-        lengths = self._within(s, "length", self.length, "mm")
+        lengths = self._within(s, "length", self.length, self._problem.unit)
         places = self._lengths.locate(np.atleast_1d(lengths))
         return self._sampler.along(places.piece, places.u)[0].reshape(lengths.shape)
 
     def speed(self, s: ArrayLike) -> Array:
         """v(s): the speed of the tool [mm/s] at one length or at lengths (n,) [mm]. Raises as `time`."""
-        lengths = self._within(s, "length", self.length, "mm")
+        lengths = self._within(s, "length", self.length, self._problem.unit)
         places = self._lengths.locate(np.atleast_1d(lengths))
         velocity = self._sampler.along(places.piece, places.u)[2]
         speed = np.linalg.norm(velocity, axis=1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 MM_PER_INCH = 25.4
 SECONDS_PER_MINUTE = 60.0
 
@@ -9,6 +11,12 @@ SECONDS_PER_MINUTE = 60.0
 def mm_per_min(speed: float) -> float:
     """Speed [mm/s] as the mm/min of a part program."""
     return speed * SECONDS_PER_MINUTE
+
+
+def shared_unit(units: Iterable[str], otherwise: str) -> str:
+    """The unit of all, `otherwise` of none; `units` where they differ, as of robots with linear joints."""
+    different = set(units)
+    return "units" if len(different) > 1 else next(iter(different), otherwise)
 
 
 def counted(number: int, noun: str) -> str:

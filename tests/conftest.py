@@ -67,6 +67,7 @@ class SquarePlan:
             "method": "bang-bang",
             "machine": "router",
             "program": "square <1>.ngc",
+            "units": {"length": "mm", "angle": "deg", "time": "s"},
             **self.account.to_json(),
             "pieces": 4,
             "runs": 4,

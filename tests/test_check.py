@@ -85,6 +85,7 @@ def test_plan_json_says_what_was_planned_and_how(made: Path) -> None:
         assert (arrays["format"], arrays["period"], list(arrays["units"])) == (1, 0.002, ["mm"] * 3)
     assert summary["setpoints"] == {
         "axes": ["X", "Y", "Z"],
+        "units": ["mm", "mm", "mm"],
         "period": 0.002,
         "count": count,
         "duration": last,

@@ -26,6 +26,7 @@ from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 from feedplan.progress import Listener, part, tell
 from feedplan.setpoints import SetpointChunk, Setpoints
+from feedplan.units import shared_unit
 
 __all__ = ["PASS_MARK", "Audit", "LimitCheck", "audit", "audit_setpoints"]
 
@@ -79,7 +80,7 @@ def audit(
     that the machine file allows may exceed the limit there. Raises InputError where path, machine,
     program and setpoints do not belong together.
     """
-    axes = problem.axes
+    axes, problem_units, way_unit = problem.axes, problem.units, problem.unit
     program = None if program is None else program.along(problem.path.axes)
     machine_axes = _machine_axes(machine, axes)
     jump = [axis.max_velocity_jump for axis in machine_axes]
@@ -119,7 +120,7 @@ def audit(
         if error in raised:
             raise
         raise InputError(f"this plan cannot be audited: {error}") from None
-    return join(results, axes, jerk)
+    return join(results, axes, jerk, problem_units, way_unit)
 
 
 Results = list[Findings]
@@ -312,7 +313,8 @@ def audit_setpoints(
                 audit_recorded(check, times, of, by, np.array(limit), np.array(steps), lines, share)
             )
     tell(progress, 1.0)
-    return join(results, names, jerk)
+    units = tuple(axis.unit for axis in machine_axes)
+    return join(results, names, jerk, units, shared_unit(units, "mm"))
 
 
 def _with_shares(setpoints: Setpoints | Iterable[SetpointChunk], report: Listener | None) -> Chunks:

@@ -58,7 +58,7 @@ class LimitCheck:
     `worst` is the value measured there, less what rounding may have added, `limit` what is allowed, `ratio`
     their quotient; `time` [s] and source `line` say where (line 0: not known). `axis` is None where the check
     belongs to no axis. What is not `judged` is reported only. In `travel` the ratio is the share of half the
-    travel. The unit is in `unit`.
+    travel. `length` is the unit of positions or of the path, `unit` that of the values.
     """
 
     name: str
@@ -69,6 +69,7 @@ class LimitCheck:
     time: float
     line: int
     judged: bool
+    length: str = "mm"
 
     @property
     def ok(self) -> bool:
@@ -77,9 +78,8 @@ class LimitCheck:
 
     @property
     def unit(self) -> str:
-        """Unit of `worst` and `limit`: degrees in place of mm on the rotary axes A, B and C."""
-        unit = _KINDS[self.name].unit
-        return unit.replace("mm", "deg") if self.axis in ("A", "B", "C") else unit
+        """Unit of `worst` and `limit`."""
+        return _KINDS[self.name].unit.replace("mm", self.length)
 
     def sentence(self) -> str:
         """Place, value and limit in words."""
@@ -161,8 +161,13 @@ def join(
     results: Iterable[Findings],
     axes: tuple[str, ...],
     jerk: bool,
+    units: tuple[str, ...],
+    way_unit: str,
 ) -> Audit:
-    """The worst of all results for every check, in the order of `_KINDS`."""
+    """The worst of all results for every check, in the order of `_KINDS`.
+
+    `units` are those of the axes, `way_unit` that of lengths which belong to none of them.
+    """
     worst: dict[tuple[str, int], LimitCheck] = {}
     samples = 0
     for findings, count in results:
@@ -177,6 +182,7 @@ def join(
                 time=time,
                 line=line,
                 judged=jerk or name != "jerk",
+                length=units[axis] if axis >= 0 else way_unit,
             )
             known = worst.get((name, axis))
             if known is None or not check.ratio <= known.ratio:

@@ -14,9 +14,11 @@ from feedplan.constraints.junction import junction_limit
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.hodograph import speed_squares
 from feedplan.geometry.corners import Corners
+from feedplan.geometry.feed_groups import feed_groups
 from feedplan.geometry.path import Path
 from feedplan.lazy import cached_property
-from feedplan.machine.machine import Machine
+from feedplan.machine.machine import Machine, usual_units
+from feedplan.units import shared_unit
 
 if TYPE_CHECKING:
     from feedplan.machine.words import AxisWords
@@ -55,12 +57,13 @@ class Cut:
 class Problem:
     """Minimise the time along `path` under these limits.
 
-    Per joint (`axes` names them): `max_velocity` [mm/s], `max_acceleration` [mm/s²], `max_jerk` [mm/s³] (may
-    be infinite). Per piece: `feed` (n,) greatest speed [mm/s], finite, of |(share_k q'_k)| u̇, `feed_share`
-    (n, axes) being what each axis counts in it (None: all as they are). At piece ends: `junction_speed`
-    (n + 1,) greatest speed [mm/s]: 0 at a stop, infinite where nothing but the other limits holds.
-    `chord_tolerance` [mm] and `period` [s] limit the speed on a curve of radius ρ to (2/T)·√(2ρδ − δ²); an
-    infinite tolerance switches that off. `start_speed` and `end_speed` [mm/s] hold at the ends of the path.
+    Per joint (`axes` names them, `units` are in place of mm where they are others): `max_velocity` [mm/s],
+    `max_acceleration` [mm/s²], `max_jerk` [mm/s³] (may be infinite). Per piece: `feed` (n,) greatest speed
+    [mm/s], finite, of |(share_k q'_k)| u̇, `feed_share` (n, axes) being what each axis counts in it (None: all
+    as they are). At piece ends: `junction_speed` (n + 1,) greatest speed [mm/s]: 0 at a stop, infinite where
+    nothing but the other limits holds. `chord_tolerance` [mm] and `period` [s] limit the speed on a curve of
+    radius ρ to (2/T)·√(2ρδ − δ²); an infinite tolerance switches that off. `start_speed` and `end_speed`
+    [mm/s] hold at the ends of the path.
     `velocity_jump` [mm/s] is what each axis velocity may jump by at a corner; None for the machine's own.
     `request` is what the user asked for in place of the programmed feeds.
 
@@ -84,6 +87,7 @@ class Problem:
     end_speed: float = 0.0
     velocity_jump: NDArray[np.float64] | None = None
     joint_axes: tuple[str, ...] = ()
+    joint_units: tuple[str, ...] = ()
     joints: CompositeCurve | None = None
     joint_origin: NDArray[np.float64] | None = None
     tip_speed: TipSpeed | None = None
@@ -105,6 +109,31 @@ class Problem:
     def axes(self) -> tuple[str, ...]:
         """Names of the joints that the limits belong to."""
         return self.joint_axes or self.path.axes
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Units of the positions of `axes`."""
+        return self.joint_units or usual_units(self.axes)
+
+    @property
+    def path_units(self) -> tuple[str, ...]:
+        """Units of the axes of the path."""
+        return self.units if self.joints is None else usual_units(self.path.axes)
+
+    @property
+    def way_units(self) -> tuple[str, str]:
+        """Units of the tool's way where X, Y, Z, or U, V, W move, and where others do alone."""
+        leads = np.logical_or.reduce(feed_groups(self.path.axes)[:-1])
+        named = list(zip(self.path_units, leads.tolist(), strict=True))
+        return (
+            shared_unit((unit for unit, lead in named if lead), "mm"),
+            shared_unit((unit for unit, lead in named if not lead), "deg"),
+        )
+
+    @property
+    def unit(self) -> str:
+        """The unit of the length of the path."""
+        return self.way_units[0 if feed_groups(self.path.axes)[:-1].any() else 1]
 
     @property
     def curve(self) -> CompositeCurve:
@@ -223,6 +252,7 @@ def build_problem(
         start_speed=start_speed,
         end_speed=end_speed,
         velocity_jump=jump,
+        joint_units=tuple(axis.unit for axis in axes),
     )
 
 
@@ -271,6 +301,7 @@ def _joint_problem(path: Path, machine: Machine, request: FeedRequest, ends: tup
         start_speed=ends[0],
         end_speed=ends[1],
         joint_axes=machine.axis_names,
+        joint_units=tuple(axis.unit for axis in machine.axes),
         joints=motion.joints,
         joint_origin=motion.origin,
         tip_speed=motion.tip_speed,

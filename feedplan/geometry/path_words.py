@@ -62,6 +62,12 @@ def path_words(program: Program, machine: Machine) -> PathWords:
     names = tuple(name for name in known if name in program.axes)
     if not names:
         raise MachineError(f"{program.name} moves no axis of machine {machine.name}: choose another machine")
+    for axis in machine.axes if machine.is_plain else ():
+        if axis.name in names and axis.unit != axis.usual_unit:
+            raise MachineError(
+                f"{program.name} is in {axis.usual_unit} along {axis.name}, and axis {axis.name} of machine "
+                f"{machine.name} in {axis.unit}: convert its limits and leave out unit"
+            )
     changes = meaning[1:] != meaning[:-1]
     if program.tool_length is not None:
         before, after = program.tool_length[:-1], program.tool_length[1:]

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, Literal
 
-from feedplan.arguments import is_number, shown
+from feedplan.arguments import is_number, is_text, shown
 from feedplan.errors import MachineError
 from feedplan.lazy import cached_property
 from feedplan.machine.checks import (
@@ -32,6 +32,9 @@ AXIS_LETTERS = "XYZABCUVW"
 ROTARY_LETTERS = ("A", "B", "C")
 # I, J and K are the tool's direction.
 AXIS_NAME = re.compile(r"(?![IJK]\Z)[A-Za-z_][A-Za-z0-9_]{0,31}", re.ASCII)
+# The unit of an axis stands in tables, between brackets.
+_UNIT = re.compile(r"[^\s\[\]<>&\"'`\\,;]{1,12}")
+_ROTARY_UNITS = ("deg", "°", "rad")
 NAME_REMEDY = "1 to 32 letters, digits and underscores, no digit first, other than I, J and K"
 AxisKind = Literal["linear", "rotary"]
 
@@ -44,8 +47,12 @@ class Axis:
     direction). Programs move axes named by one of the letters XYZABCUVW, paths from Python any axes.
     `max_velocity` [mm/s], `max_acceleration` [mm/s²], `max_jerk` [mm/s³] (infinite: not limited),
     `travel` (least, greatest) [mm], `max_velocity_jump` [mm/s] allowed at a corner (0: corners stop).
-    On a rotary axis every mm is a degree. `kind` is "linear" or "rotary"; empty, the letter decides: A, B and
-    C are rotary.
+    On a rotary axis every mm is a degree. `kind` is "linear" or "rotary"; empty, the letter or the unit
+    decides: A, B and C are rotary, and axes in deg, ° or rad.
+
+    `unit` is that of its positions, 1 to 12 characters: empty, mm, or deg on a rotary axis. Another one, such
+    as rad or µm, takes the place of mm in all limits; programs, and kinematics with dimensions, need mm and
+    deg. Limits and positions are never converted.
 
     Raises MachineError for values that are none of these.
     """
@@ -57,6 +64,7 @@ class Axis:
     travel: tuple[float, float] = (-math.inf, math.inf)
     max_velocity_jump: float = 0.0
     kind: AxisKind | Literal[""] = ""
+    unit: str = ""
 
     def __post_init__(self) -> None:
         named = isinstance(self.name, str) and AXIS_NAME.fullmatch(self.name) is not None
@@ -69,8 +77,12 @@ class Axis:
             kind,
             '"linear" or "rotary"',
         )
-        kind = kind or ("rotary" if self.name in ROTARY_LETTERS else "linear")
+        turns = self.name in ROTARY_LETTERS or (is_text(self.unit) and self.unit in _ROTARY_UNITS)
+        kind = kind or ("rotary" if turns else "linear")
         object.__setattr__(self, "kind", kind)
+        object.__setattr__(self, "unit", self.unit if self.unit != "" else self.usual_unit)
+        good = is_text(self.unit) and self.unit.isprintable() and _UNIT.fullmatch(self.unit) is not None
+        require(good, f"{place}unit", self.unit, "1 to 12 characters, such as mm, deg or rad")
         units = {"max_velocity": "/s", "max_acceleration": "/s²", "max_jerk": "/s³"}
         for key, unit in units.items():
             set_positive(self, key, place, f"{self.unit}{unit}", infinite=key == "max_jerk")
@@ -84,8 +96,8 @@ class Axis:
         object.__setattr__(self, "travel", (least, greatest))
 
     @property
-    def unit(self) -> str:
-        """The unit its positions are in: mm or deg."""
+    def usual_unit(self) -> str:
+        """mm or deg, as programs have them."""
         return "deg" if self.kind == "rotary" else "mm"
 
 
@@ -208,6 +220,11 @@ class Machine:
     def with_period(self, period: float) -> Machine:
         """The same machine with another servo period [s]."""
         return replace(self, period=period)
+
+
+def usual_units(names: Iterable[str]) -> tuple[str, ...]:
+    """The units of axes and directions by their names alone: deg of A, B, C, I, J, K, else mm."""
+    return tuple("deg" if name in (*ROTARY_LETTERS, "I", "J", "K") else "mm" for name in names)
 
 
 def bundled_machines() -> tuple[str, ...]:

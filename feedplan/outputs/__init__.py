@@ -35,7 +35,7 @@ FORMAT = 1
 
 @dataclass(frozen=True)
 class Header:
-    """What all setpoints of a file have in common: names of the `axes`, their `units` (mm or deg), the servo
+    """What all setpoints of a file have in common: names of the `axes`, their `units` (mm, deg, …), the servo
     `period` [s]."""
 
     axes: tuple[str, ...]

@@ -11,8 +11,6 @@ import numpy as np
 from feedplan.errors import InputError
 from feedplan.outputs import FORMAT, QUANTITIES, SetpointFile, require_format
 
-_UNITS = ("mm", "deg")
-
 
 def chunk_of(arrays: Mapping[str, Any], file: FilePath) -> SetpointFile:
     """The chunk in these named arrays. Raises InputError naming the file and what is wrong with it.
@@ -28,8 +26,8 @@ def chunk_of(arrays: Mapping[str, Any], file: FilePath) -> SetpointFile:
     if twice is not None:
         raise InputError(f"{file}: the axis {twice} comes {axes.count(twice)} times: give each axis once")
     units = tuple(str(unit) for unit in np.asarray(arrays.get("units", ())).ravel())
-    if units and (len(units) != len(axes) or not set(units) <= set(_UNITS)):
-        raise InputError(f"{file}: units are {' '.join(units)}: give mm or deg for each of {' '.join(axes)}")
+    if units and (len(units) != len(axes) or not all(units)):
+        raise InputError(f"{file}: units are {' '.join(units)}: give one for each of {' '.join(axes)}")
     period = _single(arrays["period"]) if "period" in arrays else None
     if period is not None and not (isinstance(period, (int, float)) and 0 < period < np.inf):
         raise InputError(f"{file}: the period is {period!r}: give a positive number [s]")

@@ -55,7 +55,7 @@ def load(file: FilePath, progress: Listener | None = None) -> SetpointFile:
     try:
         with file.open(encoding="utf-8") as stream:
             first = stream.readline().strip()
-            found = re.findall(r"position (\S+) \[(mm|deg)\]", first)
+            found = re.findall(r"position (\S+) \[([^\s\[\]]+)\]", first)
             axes, units = zip(*found, strict=True) if found else (("X", "Y"), ("mm", "mm"))
             if first != (names := column_names(axes, units)):
                 raise InputError(f"{file}, line 1: the columns must be named {names}")

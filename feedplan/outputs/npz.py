@@ -1,5 +1,5 @@
 """Setpoints as numpy's npz: `t`, `position`, `velocity`, `acceleration`, `jerk`, `line`, `axes`, and single
-numbers `format` and `period` [s]; `units` are those of the axes, mm or deg.
+numbers `format` and `period` [s]; `units` are those of the axes, as mm or deg.
 
 Uncompressed: servo setpoints hardly shrink, and so they can be mapped into memory instead of read.
 """

@@ -15,15 +15,16 @@ def error_of(problem: Problem, fault: PlanError) -> InfeasibleError | InputError
     line = None if piece is None else int(problem.path.line[piece])
     place = "" if line is None else f"line {line}: "
     if reachable is not None:
-        shown = _rounded_down(reachable)
+        shown, unit = _rounded_down(reachable), f"{problem.unit}/s"
         if kind == "start":
             sentence = (
-                f"{place}no profile starts at {problem.start_speed:g} mm/s: "
-                f"the limits ahead allow at most {shown} mm/s"
+                f"{place}no profile starts at {problem.start_speed:g} {unit}: "
+                f"the limits ahead allow at most {shown} {unit}"
             )
         else:
             sentence = (
-                f"{place}no profile ends at {problem.end_speed:g} mm/s: at most {shown} mm/s can be reached"
+                f"{place}no profile ends at {problem.end_speed:g} {unit}: "
+                f"at most {shown} {unit} can be reached"
             )
         return InfeasibleError(sentence, line, reachable)
     if kind == "stuck":

@@ -88,8 +88,8 @@ def _check_ends(problem: Problem, speed: Array) -> None:
             line = int(problem.path.line[place])
             shown = math.floor(reached * 1e6) / 1e6
             raise InfeasibleError(
-                f"line {line}: no profile of this method {name} at {wanted:g} mm/s: "
-                f"at most {shown:.9g} mm/s is possible",
+                f"line {line}: no profile of this method {name} at {wanted:g} {problem.unit}/s: "
+                f"at most {shown:.9g} {problem.unit}/s is possible",
                 line,
                 reached,
             )

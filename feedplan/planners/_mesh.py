@@ -258,10 +258,12 @@ def end_error(
     """No profile has the speed that is asked for at the start (`side` 0) or the end."""
     line = int(problem.path.line[stretch.first if side == 0 else stretch.last - 1])
     speed = problem.start_speed if side == 0 else problem.end_speed
-    known = "" if reachable is None else f" at most {reachable:.6g} mm/s is allowed there:"
+    known = "" if reachable is None else f" at most {reachable:.6g} {problem.unit}/s is allowed there:"
     which = "starts" if side == 0 else "ends"
     return InfeasibleError(
-        f"line {line}: no profile {which} at {speed:g} mm/s:{known} give a lower speed", line, reachable
+        f"line {line}: no profile {which} at {speed:g} {problem.unit}/s:{known} give a lower speed",
+        line,
+        reachable,
     )
 
 

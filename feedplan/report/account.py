@@ -21,7 +21,7 @@ from feedplan.report.tool_motion import ToolMotion, tool_motion
 @dataclass(frozen=True)
 class Total:
     """`time` of motion [s], its `length` [mm], and what rotary axes `turn` while nothing else moves [deg];
-    `turn_time` [s] is that part of the time."""
+    `turn_time` [s] is that part of the time. The units may be others (`ToolMotion.units`)."""
 
     time: float
     length: float
@@ -33,6 +33,11 @@ class Total:
         """Mean speed of motion that has a length [mm/s]."""
         moving = self.time - self.turn_time
         return self.length / moving if moving > 0 and self.length > 0 else 0.0
+
+    @property
+    def mean_turn(self) -> float:
+        """Mean speed of turning alone [deg/s]."""
+        return self.turn / self.turn_time if self.turn_time > 0 else 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +60,7 @@ class Account:
             "length": self.all.length,
             "turn": self.all.turn,
             "mean_speed": self.all.mean,
+            "mean_turn": self.all.mean_turn,
             "totals": {"feed": asdict(self.feed), "rapid": asdict(self.rapid)},
             "limits": {share.limit: {"time": share.time, "part": share.part} for share in self.limits},
             "stops_by_cause": [asdict(stops) for stops in self.stops],

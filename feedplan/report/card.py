@@ -15,7 +15,7 @@ SAMPLES = 2 * WIDTH
 
 
 def card(figures: Mapping[str, str], trajectory: Trajectory) -> str:
-    """`figures` as rows of a table, and below them the tool's speed [mm/s] over the time [s]."""
+    """`figures` as rows of a table, and below them the tool's speed over the time [s]."""
     rows = "".join(
         f'<tr><th style="text-align:left">{escape(name)}</th>'
         f'<td style="text-align:left">{escape(value)}</td></tr>'
@@ -42,7 +42,8 @@ def _speed(trajectory: Trajectory) -> str:
         'aria-label="speed over time">'
         f'<path d="M{MARGIN},{base}H{WIDTH - MARGIN}" stroke="currentColor" stroke-width="0.5"/>'
         f'<polyline points="{points}" fill="none" stroke="#0072b2" stroke-width="1.5"/>'
-        f'<text x="{MARGIN}" y="{MARGIN - 8}" {text}>speed, up to {most:.4g} mm/s</text>'
+        f'<text x="{MARGIN}" y="{MARGIN - 8}" {text}>'
+        f"speed, up to {most:.4g} {escape(trajectory.unit)}/s</text>"
         f'<text x="{WIDTH - MARGIN}" y="{HEIGHT - 6}" text-anchor="end" {text}>'
         f"{trajectory.duration:.4g} s</text></svg>"
     )

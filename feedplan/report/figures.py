@@ -122,6 +122,7 @@ def chart_data(
     judged = {check.name for check in audit.checks if check.judged}
     return {
         "axes": list(problem.axes),
+        "units": list(problem.units),
         "limits": limits,
         "judged": sorted(judged),
         "feed": float(problem.feed.max()) if len(problem.feed) else None,

@@ -39,9 +39,9 @@
   }
 
   /* Axes over time ------------------------------------------------------------------------------- */
-  const turns = data.axes.some((name) => "ABC".includes(name));
+  const units = [...new Set(data.units)];
   const ROWS = [["speed", `${unit}/s`], ...[["velocity", "s"], ["acceleration", "s²"], ["jerk", "s³"]]
-    .map(([name, per]) => [name, turns ? `mm/${per}, deg/${per}` : `mm/${per}`])];
+    .map(([name, per]) => [name, units.map((own) => `${own}/${per}`).join(", ")])];
   const tops = Object.fromEntries(ROWS.slice(1).map(([name]) => [name, data.time[name].map((c) => greatest(c.y))]));
   /* What is no limit may have lone spikes; they run out of the chart rather than flatten it. */
   const usual = Object.fromEntries(ROWS.slice(1).map(([name]) => [name, data.time[name].map((c, k) => {

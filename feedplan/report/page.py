@@ -77,7 +77,7 @@ def write_report(
         totals=totals_table(account),
         stops=stops_table(account.stops),
         fit=fit_table(summary, account.tolerance),
-        slowest=slowest_table(account.slow, texts),
+        slowest=slowest_table(account.slow, texts, account.motion.units),
         audit=audit_table(audit),
     )
     about, sections = _about(summary, problem), pictures(charts) + tables

@@ -63,12 +63,18 @@ def verdict(audit: Audit) -> str:
 def numbers(summary: Mapping[str, Any], account: Account, setpoints: int) -> str:
     """The big numbers under the title."""
     time, whole = float(summary["time"]), account.all
-    turned = f"turns alone {whole.turn:.4g} deg" if whole.turn > 0 else ""
+    unit, turning = account.motion.units
+    turned = f"turns alone {whole.turn:.4g} {turning}" if whole.turn > 0 else ""
+    way, mean = _length(whole.length, unit), (f"{whole.mean:.4g}", f"{unit}/s")
+    by_minute = f"{mm_per_min(whole.mean):.5g} {unit}/min"
+    if account.motion.turns.all():
+        way, mean = (f"{whole.turn:.4g}", turning), (f"{whole.mean_turn:.4g}", f"{turning}/s")
+        turned, by_minute = "", ""
     bound, gap = summary.get("lower_bound"), summary.get("gap")
     cells = [
         ("Time", *_value_unit(duration_text(time)), f"{time:.6g} s" if time >= 60 else ""),
-        ("Length", *_length(whole.length), turned or f"{summary['pieces']} pieces"),
-        ("Mean speed", f"{whole.mean:.4g}", "mm/s", f"{mm_per_min(whole.mean):.5g} mm/min"),
+        ("Length", *way, turned or f"{summary['pieces']} pieces"),
+        ("Mean speed", *mean, by_minute),
         ("Stops on the way", str(summary["stops"]), "", _counted(summary["runs"], "run")),
         ("Setpoints", f"{setpoints:,}".replace(",", " "), "", ""),
     ]
@@ -103,15 +109,20 @@ def totals_table(account: Account) -> str:
     """Time and length at a feed and in rapids; what rotary axes turn alone stands apart."""
     head = '<th>Motion</th><th class="n">Time</th><th class="n">Length</th><th class="n">Mean speed</th>'
     kinds = (("at a feed", account.feed), ("rapid", account.rapid))
-    rows = "".join(_total_rows(name, total) for name, total in kinds if total.time > 0)
+    rows = "".join(_total_rows(name, total, account.motion.units) for name, total in kinds if total.time > 0)
     return f"<table><tr>{head}</tr>{rows}</table>"
 
 
-def _total_rows(name: str, total: Total) -> str:
-    turning = total.turn / total.turn_time if total.turn_time > 0 else 0.0
+def _total_rows(name: str, total: Total, units: tuple[str, str]) -> str:
+    unit, turning = units
     parts = [
-        (name, total.time - total.turn_time, f"{total.length:.6g} mm", f"{total.mean:.4g} mm/s"),
-        (f"{name}, turning alone", total.turn_time, f"{total.turn:.6g} deg", f"{turning:.4g} deg/s"),
+        (name, total.time - total.turn_time, f"{total.length:.6g} {unit}", f"{total.mean:.4g} {unit}/s"),
+        (
+            f"{name}, turning alone",
+            total.turn_time,
+            f"{total.turn:.6g} {turning}",
+            f"{total.mean_turn:.4g} {turning}/s",
+        ),
     ]
     return "".join(
         f'<tr><td>{label}</td><td class="n">{duration_text(time)}</td><td class="n">{way}</td>'
@@ -168,21 +179,21 @@ def fit_table(summary: Mapping[str, Any], tolerance: tuple[float, float]) -> str
     return f"<table>{body}</table>"
 
 
-def slowest_table(rows: Sequence[SlowLine], texts: Mapping[int, str]) -> str:
+def slowest_table(rows: Sequence[SlowLine], texts: Mapping[int, str], units: tuple[str, str]) -> str:
     """The lines that lose most time, with their text where it is known."""
     if not rows:
         return "<table><tr><td>No line is slower than its feed and its axes allow.</td></tr></table>"
     head = '<th class="n">Line</th>' + ("<th>Source</th>" if texts else "")
-    body = "".join(_slow_row(row, texts) for row in rows)
+    body = "".join(_slow_row(row, texts, units) for row in rows)
     return (
         f'<table><tr>{head}<th class="n">Lost</th><th class="n">Time</th><th class="n">Mean speed</th>'
         f'<th class="n">Wanted</th><th>Because of</th></tr>{body}</table>'
     )
 
 
-def _slow_row(row: SlowLine, texts: Mapping[int, str]) -> str:
+def _slow_row(row: SlowLine, texts: Mapping[int, str], units: tuple[str, str]) -> str:
     text = escape(texts.get(row.line, "").strip()[:120])
-    unit = "deg/s" if row.turns else "mm/s"
+    unit = f"{units[row.turns]}/s"
     cells = [
         f'<td class="n">{row.line}</td>',
         f'<td class="code"><code>{text}</code></td>' if texts else "",
@@ -276,7 +287,9 @@ def _counted(number: int, noun: str) -> str:
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
-def _length(length: float) -> tuple[str, str]:
+def _length(length: float, unit: str) -> tuple[str, str]:
+    if unit != "mm":
+        return f"{length:.6g}", unit
     return (f"{length:.1f}", "mm") if length < 10_000 else (f"{length / 1000:,.1f}".replace(",", " "), "m")
 
 

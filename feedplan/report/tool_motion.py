@@ -1,6 +1,8 @@
-"""The tool's way: X, Y, Z [mm] where a piece moves one of them, else U, V, W [mm], else what it turns [deg].
+"""The tool's way: X, Y, Z [mm] where a piece moves one of them, else U, V, W [mm], else all others [deg].
 
-So millimetres and degrees are never added. Feeds of part programs count along the same axes.
+The others are rotary axes, or the joints of an arm: the length is that of the path in their space, in their
+unit. So millimetres and degrees are never added, unless a path has joints of several units. Feeds of part
+programs count along the same axes.
 """
 
 from __future__ import annotations
@@ -30,16 +32,18 @@ _ROUNDINGS = 64.0
 @dataclass(frozen=True, eq=False)
 class ToolMotion:
     """`curve` has a path's pieces with the axes that count, the others at 0; `turns` (n,) are those pieces on
-    which nothing but rotary axes moves. `share` (n, axes) is what each axis counts, None where all do."""
+    which nothing but rotary axes and joints moves. `share` (n, axes) is what each axis counts, None where all
+    do. `units` are those of the way where a tool moves, and where it turns alone."""
 
     curve: CompositeCurve
     share: Floats | None
     turns: NDArray[np.bool_]
+    units: tuple[str, str] = ("mm", "deg")
 
     @property
     def unit(self) -> str:
-        """The unit of what is drawn: mm, or deg where nothing but rotary axes moves anywhere."""
-        return "deg" if self.turns.all() else "mm"
+        """The unit of what is drawn: that of turning where nothing else moves anywhere."""
+        return self.units[1 if self.turns.all() else 0]
 
     @cached_property
     def drawn(self) -> NDArray[np.bool_]:
@@ -60,7 +64,7 @@ def tool_motion(problem: Problem) -> ToolMotion:
     """The way of the tool along a problem's path."""
     curve, axes = problem.path.curve, problem.path.axes
     if set(axes) <= set(_GROUPS[0]):
-        return ToolMotion(curve, None, np.zeros(len(curve), dtype=bool))
+        return ToolMotion(curve, None, np.zeros(len(curve), dtype=bool), problem.way_units)
     points, first = curve.control_points, curve.offsets[:-1]
     extent = np.maximum.reduceat(points, first) - np.minimum.reduceat(points, first)
     rounding = _ROUNDINGS * np.finfo(float).eps * np.abs(points).max(axis=0, initial=0.0)
@@ -71,4 +75,4 @@ def tool_motion(problem: Problem) -> ToolMotion:
     scale = np.array([_DEGREES.get(name, 1.0) for name in axes])
     share = member[counts] * scale
     points = points * np.repeat(share, np.diff(curve.offsets), axis=0)
-    return ToolMotion(replace(curve, control_points=points), share, counts == len(_GROUPS))
+    return ToolMotion(replace(curve, control_points=points), share, counts == len(_GROUPS), problem.way_units)

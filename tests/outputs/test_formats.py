@@ -201,8 +201,8 @@ def test_csv_tells_angles_in_degrees(tmp_path: Path) -> None:
     [
         ({"format": 7}, r"has the format 7, this feedplan reads 1: use the feedplan that wrote it"),
         ({"axes": ["X", "X"]}, "the axis X comes 2 times: give each axis once"),
-        ({"units": ["mm"]}, "units are mm: give mm or deg for each of X Y"),
-        ({"units": ["mm", "ft"]}, "units are mm ft: give mm or deg"),
+        ({"units": ["mm"]}, "units are mm: give one for each of X Y"),
+        ({"units": ["mm", ""]}, "units are mm : give one for each of X Y"),
         ({"period": 0.0}, r"the period is 0.0: give a positive number \[s\]"),
         ({"period": [1.0, 2.0]}, r"the period is .*: give a positive number \[s\]"),
     ],

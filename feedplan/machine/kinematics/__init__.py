@@ -31,12 +31,14 @@ class Kinematics(ABC):
     letters in its file's order. `rotary` tells which joints are angles [deg]; the others are lengths [mm].
     `turning` tells which joints are known up to whole turns only, since they come from `atan2`: along a path
     they are followed continuously. `always` is true where a program's words always mean the tip, as X, Y, Z
-    on a cylindrical machine; false where they are joint positions until G43.4 or the like.
+    on a cylindrical machine; false where they are joint positions until G43.4 or the like. `any_unit`: joints
+    need not be in mm and degrees.
     """
 
     tip_names: tuple[str, ...]
     joint_names: tuple[str, ...]
     always: bool = True
+    any_unit: bool = False
 
     @property
     def rotary(self) -> tuple[bool, ...]:
@@ -117,6 +119,12 @@ def _check_axes(kinematics: Kinematics, axes: tuple[Axis, ...], parameters: Para
             f"machine {parameters.machine}: the axes are {', '.join(names)}: this kinematics needs "
             f"{', '.join(kinematics.joint_names)} in that order"
         )
+    for axis in () if kinematics.any_unit else axes:
+        if axis.unit != axis.usual_unit:
+            raise MachineError(
+                f"machine {parameters.machine}: axis {axis.name} is in {axis.unit}, but its kinematics needs "
+                f"{axis.usual_unit}: convert its limits and leave out unit"
+            )
     for axis, rotary in zip(axes, kinematics.rotary, strict=True):
         kind = "rotary" if rotary else "linear"
         if axis.kind != kind:

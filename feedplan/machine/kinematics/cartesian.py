@@ -27,6 +27,7 @@ class Cartesian(Kinematics):
     rotary_joints: tuple[bool, ...]
     source: tuple[int, ...]
     scale: tuple[float, ...]
+    any_unit = True
 
     @property
     def rotary(self) -> tuple[bool, ...]:

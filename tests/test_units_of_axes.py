@@ -1,0 +1,126 @@
+"""Axes in any unit: in every file and table, and without a scale of their own."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+import pytest
+
+import feedplan
+from feedplan.checking import check
+from feedplan.errors import InputError, MachineError
+from feedplan.geometry.path import Path
+from feedplan.machine.machine import Axis, Machine
+
+NAMES = ("j1", "j2", "j3", "j4")
+KNOTS = [0, 0, 0, 0, 1, 2, 3, 3, 3, 3]
+
+
+def arm(unit: str, scale: float = 1.0) -> Machine:
+    axes = tuple(
+        Axis(name, 2.0 * scale, (5.0 + k) * scale, 60.0 * scale, unit=unit) for k, name in enumerate(NAMES)
+    )
+    return Machine("arm", axes, period=0.002)
+
+
+def spline(scale: float = 1.0, names: tuple[str, ...] = NAMES, **changes: Any) -> Path:
+    points = scale * np.random.default_rng(4).standard_normal((6, len(names)))
+    return Path.from_bspline(points, KNOTS, 3, axes=names, **changes)
+
+
+def test_the_unit_of_an_axis_is_in_every_file(tmp_path: FilePath) -> None:
+    plan = feedplan.plan(spline(), arm("rad"))
+    feedplan.write_plan(plan, tmp_path, ("npz", "csv"))
+    summary = json.loads((tmp_path / "plan.json").read_text())
+    assert summary["setpoints"]["units"] == ["rad"] * 4
+    assert summary["units"] == {"length": "mm", "angle": "rad", "time": "s"}
+    assert summary["turn"] == pytest.approx(plan.trajectory.length)
+    assert 'unit = "rad"' in summary["machine_file"]
+    assert "velocity j1 [rad/s]" in (tmp_path / "setpoints.csv").read_text().split("\n", 1)[0]
+    assert np.load(tmp_path / "setpoints.npz")["units"].tolist() == ["rad"] * 4
+    report = (tmp_path / "report.html").read_text()
+    assert "rad/s²" in report
+    assert "mm/s" not in report.split("<script")[0]
+    for file in (tmp_path, tmp_path / "setpoints.csv", tmp_path / "setpoints.npz"):
+        assert check(file).check("velocity", "j1").unit == "rad/s"
+    with pytest.raises(InputError, match="axis j1 is in rad, on the machine arm in mm"):
+        check(tmp_path / "setpoints.npz", arm("mm"))
+
+
+def test_a_machine_file_keeps_the_unit() -> None:
+    for unit in ("rad", "µm", "°", "counts"):
+        machine = arm(unit)
+        from feedplan.machine.file import parse
+
+        assert parse(machine.to_toml(), "arm.toml") == machine
+
+
+@pytest.mark.parametrize(
+    ("axis", "unit", "kind"),
+    [
+        (Axis("X", 1, 1), "mm", "linear"),
+        (Axis("A", 1, 1), "deg", "rotary"),
+        (Axis("A", 1, 1, kind="linear"), "mm", "linear"),
+        (Axis("A", 1, 1, unit="rad"), "rad", "rotary"),
+        (Axis("j1", 1, 1), "mm", "linear"),
+        (Axis("j1", 1, 1, unit="rad"), "rad", "rotary"),
+        (Axis("j1", 1, 1, unit="deg"), "deg", "rotary"),
+        (Axis("j1", 1, 1, kind="rotary"), "deg", "rotary"),
+        (Axis("j1", 1, 1, unit="µm"), "µm", "linear"),
+    ],
+)
+def test_letter_unit_and_kind_follow_from_one_another(axis: Axis, unit: str, kind: str) -> None:
+    assert (axis.unit, axis.kind) == (unit, kind)
+
+
+@pytest.mark.parametrize("unit", ["m m", "a" * 13, "<b>", "[mm]", "\n", 3, None, "mm,"])
+def test_a_text_that_is_no_unit_is_refused(unit: Any) -> None:
+    with pytest.raises(MachineError, match=r"axis j1: unit is .*: give 1 to 12 characters"):
+        Axis("j1", 1.0, 1.0, unit=unit)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e3, 1e6])
+@pytest.mark.parametrize("method", ["bang-bang", "jerk-limited", "s-curve", "clarabel"])
+def test_the_plan_is_the_same_in_any_unit(method: Any, scale: float) -> None:
+    """Numbers from a thousandth to a million: no length has a scale."""
+    one, other = (feedplan.plan(spline(by), arm("rad", by), method) for by in (1.0, scale))
+    rel = {"bang-bang": 1e-9, "s-curve": 1e-6}.get(method, 2e-4)
+    assert other.time == pytest.approx(one.time, rel=rel)
+    assert other.audit().ok
+
+
+@pytest.mark.parametrize("unit", ["rad", "m"])
+def test_a_program_is_refused_where_an_axis_has_another_unit(unit: str) -> None:
+    machine = Machine("own", (Axis("X", 100, 1000), Axis("A", 10, 100, unit=unit)))
+    with pytest.raises(MachineError, match=f"in deg along A, and axis A of machine own in {unit}: convert"):
+        feedplan.plan("G21 G90 F600\nG1 X10 A90\n", machine)
+    assert feedplan.plan("G21 G90 F600\nG1 X10\n", machine).audit().ok
+
+
+def test_kinematics_with_dimensions_need_mm_and_degrees() -> None:
+    machine = Machine.load("trunnion-ac")
+    axes = [
+        Axis(a.name, a.max_velocity, a.max_acceleration, unit="rad" if a.name == "C" else "")
+        for a in machine.axes
+    ]
+    with pytest.raises(MachineError, match="axis C is in rad, but its kinematics needs deg"):
+        Machine("own", tuple(axes), kinematics="trunnion-ac", parameters=machine.parameters)
+
+
+def test_mixed_units_have_the_length_of_their_space() -> None:
+    axes = (Axis("slide", 100, 1000), Axis("elbow", 3, 30, unit="rad"))
+    path = Path.from_bezier([[0.0, 0.0], [3.0, 4.0]], axes=("slide", "elbow"))
+    plan = feedplan.plan(path, Machine("robot", axes))
+    assert plan.trajectory.length == pytest.approx(5.0)
+    assert plan.account.all.turn == pytest.approx(5.0)
+    assert plan.problem.unit == "units"
+    assert plan.audit().check("velocity", "elbow").unit == "rad/s"
+    assert plan.audit().check("velocity", "slide").unit == "mm/s"
+
+
+def test_a_speed_that_cannot_be_had_is_told_in_the_unit_of_the_path() -> None:
+    with pytest.raises(feedplan.InfeasibleError, match="no profile starts at 50 rad/s"):
+        feedplan.plan(spline(), arm("rad"), start_speed=50.0)
