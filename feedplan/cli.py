@@ -21,7 +21,7 @@ from feedplan import __version__, console, outputs, planners
 from feedplan.comparison import TIME_LIMIT
 from feedplan.errors import FeedplanError, InfeasibleError, SolverError
 from feedplan.geometry.corners import PATHS, FollowedPath
-from feedplan.machine.machine import Axis, Machine, bundled_machines
+from feedplan.machine.machine import Axis, Limit, Machine, bundled_machines
 from feedplan.setpoints import INTERPOLATORS, Interpolator
 
 if TYPE_CHECKING:
@@ -418,14 +418,19 @@ def _by_unit(machine: Machine, limit: str) -> str:
     """A limit of all axes, with a unit after the last of those that have it: `500 500 mm 150 deg`."""
     groups = groupby(machine.axes, key=lambda axis: axis.unit)
     return " ".join(
-        " ".join((*(f"{getattr(axis, limit):g}" for axis in axes), unit)) for unit, axes in groups
+        " ".join((*(_limit_text(getattr(axis, limit)) for axis in axes), unit)) for unit, axes in groups
     )
 
 
 def _axis_row(axis: Axis) -> tuple[str, ...]:
     limits = (axis.max_velocity, axis.max_acceleration, axis.max_jerk)
     travel = " to ".join(f"{end:g}" for end in axis.travel) if math.isfinite(axis.travel[0]) else "-"
-    return (axis.name, axis.unit, *(_or_none(limit) for limit in limits), travel)
+    return (axis.name, axis.unit, *(_limit_text(limit) for limit in limits), travel)
+
+
+def _limit_text(limit: Limit) -> str:
+    """`500`, or `-300..500` where it differs by direction."""
+    return "..".join(f"{end:g}" for end in limit) if isinstance(limit, tuple) else _or_none(limit)
 
 
 def _or_none(limit: float) -> str:

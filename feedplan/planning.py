@@ -20,6 +20,7 @@ from feedplan.arguments import callback, one_of, refuse
 from feedplan.audit import Audit, audit
 from feedplan.bound import lower_bound
 from feedplan.constraints.problem import Problem, build_problem, speed_square
+from feedplan.errors import SolverError
 from feedplan.geometry.build import build_path
 from feedplan.geometry.corners import PATHS, Corners, FollowedPath
 from feedplan.geometry.path import Path
@@ -33,8 +34,10 @@ from feedplan.planners import (
     given_options,
     grid_error,
     limits_jerk,
+    methods,
     options_of,
     planner,
+    takes_directions,
     tells_early,
     tells_progress,
 )
@@ -335,6 +338,12 @@ def plan(
             start_speed=start_speed,
             end_speed=end_speed,
         )
+        if problem.sided_axis is not None and not takes_directions(method):
+            others = ", ".join(name for name in methods() if takes_directions(name))
+            raise SolverError(
+                f"the limits of axis {problem.sided_axis} differ by direction, which {method} knows "
+                f"nothing of: give one number for both directions, or use one of {others}"
+            )
         report("plan", 0.0)
         if limit is not None:
             solve = partial(

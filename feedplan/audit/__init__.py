@@ -21,7 +21,7 @@ from feedplan.audit.worst import Findings
 from feedplan.constraints.problem import Problem
 from feedplan.curves._arrays import floats, whole_numbers
 from feedplan.errors import InputError
-from feedplan.machine.machine import Axis, Machine
+from feedplan.machine.machine import Axis, Machine, size_of
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 from feedplan.progress import Listener, part, tell
@@ -45,6 +45,8 @@ class _Limits:
 
     max_velocity: list[float]
     max_acceleration: list[float]
+    min_velocity: list[float]
+    min_acceleration: list[float]
     max_jerk: list[float]
     judges_jerk: bool
     max_velocity_jump: list[float]
@@ -87,6 +89,8 @@ def audit(
     limits = _Limits(
         max_velocity=_numbers(problem.max_velocity),
         max_acceleration=_numbers(problem.max_acceleration),
+        min_velocity=_numbers(problem.min_velocity),
+        min_acceleration=_numbers(problem.min_acceleration),
         max_jerk=_numbers(problem.max_jerk),
         judges_jerk=jerk,
         max_velocity_jump=jump if problem.velocity_jump is None else _numbers(problem.velocity_jump),
@@ -164,6 +168,8 @@ def _audit_joints(
         limits,
         max_velocity=[math.inf] * axes,
         max_acceleration=[math.inf] * axes,
+        min_velocity=[-math.inf] * axes,
+        min_acceleration=[-math.inf] * axes,
         max_jerk=[math.inf] * axes,
         judges_jerk=False,
         max_velocity_jump=[0.0] * axes,
@@ -275,10 +281,14 @@ def audit_setpoints(
         else number(period, "the period", "a positive number", positive, "s")
     )
     own_jump = [axis.max_velocity_jump for axis in machine_axes]
-    jump = [max(axis.max_velocity_jump, corners * period * axis.max_acceleration) for axis in machine_axes]
+    # What is no limit but a share of one is that of the smaller one of both directions.
+    least = [size_of(axis.max_acceleration) for axis in machine_axes]
+    jump = [max(own, corners * period * size) for own, size in zip(own_jump, least, strict=True)]
     limits = _Limits(
-        max_velocity=[axis.max_velocity for axis in machine_axes],
-        max_acceleration=[axis.max_acceleration for axis in machine_axes],
+        max_velocity=[axis.velocity_range[1] for axis in machine_axes],
+        max_acceleration=[axis.acceleration_range[1] for axis in machine_axes],
+        min_velocity=[axis.velocity_range[0] for axis in machine_axes],
+        min_acceleration=[axis.acceleration_range[0] for axis in machine_axes],
         max_jerk=[axis.max_jerk for axis in machine_axes],
         judges_jerk=jerk,
         max_velocity_jump=jump,
@@ -302,7 +312,7 @@ def audit_setpoints(
         )
     results = [stream.finish()]
     rest = part(progress, RECORDED_SHARE, 1.0)
-    pairs = [("recorded_change", "velocity", "acceleration", limits.max_acceleration, jump)]
+    pairs = [("recorded_change", "velocity", "acceleration", least, jump)]
     if jerk:
         pairs += [("recorded_jerk", "acceleration", "jerk", limits.max_jerk, [0.0] * len(names))]
     for i, (check, rate, change, limit, steps) in enumerate(pairs):

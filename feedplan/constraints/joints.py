@@ -28,7 +28,7 @@ from feedplan.errors import InputError
 from feedplan.geometry.path import Path
 from feedplan.lazy import cached_property
 from feedplan.machine.along import derivatives, positions
-from feedplan.machine.machine import Machine
+from feedplan.machine.machine import Machine, size_of
 from feedplan.machine.meaning import Meaning
 from feedplan.machine.proxies import Proxies, build_proxies
 from feedplan.machine.survey import JointPath, survey
@@ -79,8 +79,8 @@ def way_scale(axes: tuple[str, ...], machine: Machine) -> Array:
     A degree counts as the way that the slowest linear axis has while the rotary axis turns by it, both at
     full speed; a direction as the angle it turns by, on the slowest rotary axis.
     """
-    linear = [axis.max_velocity for axis in machine.axes if axis.kind == "linear"]
-    rotary = {axis.name: axis.max_velocity for axis in machine.axes if axis.kind == "rotary"}
+    linear = [size_of(axis.max_velocity) for axis in machine.axes if axis.kind == "linear"]
+    rotary = {axis.name: size_of(axis.max_velocity) for axis in machine.axes if axis.kind == "rotary"}
     speed = min(linear, default=1.0)
     direction = math.degrees(speed / min(rotary.values(), default=1.0))
     scale = [direction if name in DIRECTION else speed / rotary.get(name, speed) for name in axes]
@@ -312,7 +312,7 @@ class _Allowed:
     squares: list[_Interpolated]
 
     def __call__(self, piece: NDArray[np.int64], part: Array) -> Array:
-        acceleration = np.array([axis.max_acceleration for axis in self.task.machine.axes])
+        acceleration = np.array([size_of(axis.max_acceleration) for axis in self.task.machine.axes])
         length = self.tips.width[piece] * (part[:, 1] - part[:, 0])
         rate_sq, bend = self._rates(piece, part)
         allowed: Array = np.minimum(SHARE * acceleration / rate_sq[:, None], (POSITION / length**2)[:, None])
@@ -326,7 +326,7 @@ class _Allowed:
         weights = self.tips.weights_by_piece
         own = None if weights is None else weights[piece]
         control, width = self.tips.by_piece[piece], self.tips.width[piece]
-        limit = np.array([axis.max_velocity for axis in self.task.machine.axes])
+        limit = np.array([size_of(axis.max_velocity) for axis in self.task.machine.axes])
         greatest, bend = np.zeros(len(piece)), np.zeros((len(piece), len(limit)))
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             for t in np.linspace(0.0, 1.0, PLACES):

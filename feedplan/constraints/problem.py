@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from feedplan.constraints.feed import FeedRequest, feed_limit, feed_share
 from feedplan.constraints.junction import junction_limit
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.hodograph import speed_squares
+from feedplan.errors import MachineError
 from feedplan.geometry.corners import Corners
 from feedplan.geometry.feed_groups import feed_groups
 from feedplan.geometry.path import Path
@@ -23,6 +24,7 @@ from feedplan.units import shared_unit
 if TYPE_CHECKING:
     from feedplan.machine.words import AxisWords
 
+_BY_AXIS = ("max_velocity", "max_acceleration", "max_jerk", "least_velocity", "least_acceleration")
 # No tool is as fast [mm/s]: what a rapid has where joints set its speed.
 NO_FEED = 1e9
 
@@ -58,9 +60,10 @@ class Problem:
     """Minimise the time along `path` under these limits.
 
     Per joint (`axes` names them, `units` are in place of mm where they are others): `max_velocity` [mm/s],
-    `max_acceleration` [mm/s²], `max_jerk` [mm/s³] (may be infinite). Per piece: `feed` (n,) greatest speed
-    [mm/s], finite, of |(share_k q'_k)| u̇, `feed_share` (n, axes) being what each axis counts in it (None: all
-    as they are). At piece ends: `junction_speed` (n + 1,) greatest speed [mm/s]: 0 at a stop, infinite where
+    `max_acceleration` [mm/s²], `max_jerk` [mm/s³] (may be infinite), `least_velocity`, `least_acceleration`
+    the negative ones where those are others, else empty. Per piece: `feed` (n,) greatest speed [mm/s],
+    finite, of |(share_k q'_k)| u̇, `feed_share` (n, axes) being what each axis counts in it (None: all as they
+    are). At piece ends: `junction_speed` (n + 1,) greatest speed [mm/s]: 0 at a stop, infinite where
     nothing but the other limits holds. `chord_tolerance` [mm] and `period` [s] limit the speed on a curve of
     radius ρ to (2/T)·√(2ρδ − δ²); an infinite tolerance switches that off. `start_speed` and `end_speed`
     [mm/s] hold at the ends of the path.
@@ -88,6 +91,8 @@ class Problem:
     velocity_jump: NDArray[np.float64] | None = None
     joint_axes: tuple[str, ...] = ()
     joint_units: tuple[str, ...] = ()
+    least_velocity: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    least_acceleration: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     joints: CompositeCurve | None = None
     joint_origin: NDArray[np.float64] | None = None
     tip_speed: TipSpeed | None = None
@@ -98,12 +103,39 @@ class Problem:
     request: FeedRequest = field(default_factory=FeedRequest)
 
     def __post_init__(self) -> None:
-        for name in ("max_velocity", "max_acceleration", "max_jerk", "feed", "junction_speed"):
+        for name in ("velocity", "acceleration"):
+            if np.array_equal(getattr(self, f"least_{name}"), -np.asarray(getattr(self, f"max_{name}"))):
+                object.__setattr__(self, f"least_{name}", np.zeros(0))
+        for name in (*_BY_AXIS, "feed", "junction_speed"):
             column = np.ascontiguousarray(getattr(self, name), dtype=np.float64)
             object.__setattr__(self, name, column)
 
     def __repr__(self) -> str:
         return f"<Problem of the joints {' '.join(self.axes)} on {self.path!r}>"
+
+    @property
+    def min_velocity(self) -> NDArray[np.float64]:
+        """The least velocity of each axis (axes,) [mm/s]."""
+        return self.least_velocity if len(self.least_velocity) else -self.max_velocity
+
+    @property
+    def min_acceleration(self) -> NDArray[np.float64]:
+        """The least acceleration of each axis (axes,) [mm/s²]."""
+        return self.least_acceleration if len(self.least_acceleration) else -self.max_acceleration
+
+    def use(
+        self, name: Literal["velocity", "acceleration"], values: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """The part of their limits that values (…, axes) use, each that of its direction."""
+        least, most = getattr(self, f"min_{name}"), getattr(self, f"max_{name}")
+        return np.asarray(values / np.where(values < 0.0, least, most))
+
+    @property
+    def sided_axis(self) -> str | None:
+        """The first axis with limits that differ by direction."""
+        pairs = ((self.min_velocity, self.max_velocity), (self.min_acceleration, self.max_acceleration))
+        sided = np.logical_or.reduce([least != -most for least, most in pairs])
+        return self.axes[int(sided.argmax())] if sided.any() else None
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -232,12 +264,12 @@ def build_problem(
         if has_joints_of_its_own(path, machine):
             return _joint_problem(path, machine, request, (start_speed, end_speed))
     axes = [machine.axis(name) for name in path.axes]
-    max_velocity = np.array([axis.max_velocity for axis in axes])
-    max_acceleration = np.array([axis.max_acceleration for axis in axes])
-    greatest = 2.0 * float(np.linalg.norm(max_velocity))
+    min_velocity, max_velocity = np.array([axis.velocity_range for axis in axes]).T
+    min_acceleration, max_acceleration = np.array([axis.acceleration_range for axis in axes]).T
+    greatest = 2.0 * float(np.linalg.norm(np.maximum(max_velocity, -min_velocity)))
     jump = np.array([axis.max_velocity_jump for axis in axes])
     if path.corners is Corners.PROGRAMMED:
-        jump = np.maximum(jump, max_acceleration * machine.period)
+        jump = np.maximum(jump, np.minimum(max_acceleration, -min_acceleration) * machine.period)
     return Problem(
         path=path,
         max_velocity=max_velocity,
@@ -253,6 +285,8 @@ def build_problem(
         end_speed=end_speed,
         velocity_jump=jump,
         joint_units=tuple(axis.unit for axis in axes),
+        least_velocity=min_velocity,
+        least_acceleration=min_acceleration,
     )
 
 
@@ -285,6 +319,12 @@ def _joint_problem(path: Path, machine: Machine, request: FeedRequest, ends: tup
     """The problem where the joints move in another way than the path's axes; corners are stops."""
     from feedplan.constraints.joints import joint_motion, way_scale
 
+    for axis in machine.axes:
+        if isinstance(axis.max_velocity, tuple) or isinstance(axis.max_acceleration, tuple):
+            raise MachineError(
+                f"the limits of axis {axis.name} of machine {machine.name} differ by direction, and its "
+                "joints are not the axes of the path: give one number for both directions"
+            )
     limit = feed_limit(path, NO_FEED, request)
     motion = joint_motion(path, machine, limit)
     path = motion.path

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.errors import MachineError
-from feedplan.machine.machine import Machine
+from feedplan.machine.machine import Machine, size_of
 from feedplan.machine.meaning import Meaning
 from feedplan.program.program import Program
 
@@ -19,10 +19,10 @@ class PathWords:
 
     `names` are those of the machine that the program names, in the machine's order. `joints` (n,) tells of
     each move whether its words are joint positions, `changes` (n − 1,) whether the words of the next move
-    mean something else. `max_velocity`, `max_acceleration` (axes,) are for rounding
-    corners: those of the joint where all words are joints; otherwise the least of all linear joints, or of
-    the rotary axis itself. `travel` (axes, 2) counts where words are joints. `may_jump`: all words are
-    joints, and those that move allow a velocity jump at corners.
+    mean something else. `max_velocity`, `max_acceleration` (axes,) are for rounding corners, the smaller ones
+    of both directions: those of the joint where all words are joints; otherwise the least of all linear
+    joints, or of the rotary axis itself. `travel` (axes, 2) counts where words are joints. `may_jump`: all
+    words are joints, and those that move allow a velocity jump at corners.
     """
 
     names: tuple[str, ...]
@@ -103,11 +103,12 @@ def _letters(machine: Machine, meaning: Meaning) -> tuple[str, ...]:
 
 
 def _limits(machine: Machine, names: tuple[str, ...], joints: bool, limit: str) -> NDArray[np.float64]:
-    linear = [getattr(axis, limit) for axis in machine.axes if axis.kind == "linear"]
-    least = min(linear or [getattr(axis, limit) for axis in machine.axes])
+    size = {axis.name: size_of(getattr(axis, limit)) for axis in machine.axes}
+    linear = [size[axis.name] for axis in machine.axes if axis.kind == "linear"]
+    least = min(linear or size.values())
     return np.array(
         [
-            getattr(machine.axis(name), limit)
+            size[name]
             if name in machine.axis_names and (joints or machine.axis(name).kind == "rotary")
             else least
             for name in names

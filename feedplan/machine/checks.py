@@ -39,6 +39,19 @@ def set_positive(owner: object, key: str, place: str, unit: str, infinite: bool 
     object.__setattr__(owner, key, float(value))
 
 
+def set_limit(owner: object, key: str, place: str, unit: str) -> None:
+    """Makes a field a float, or two where a limit differs by direction; raises MachineError for no limit."""
+    value = getattr(owner, key)
+    if not isinstance(value, (list, tuple)):
+        return set_positive(owner, key, place, unit)
+    good = len(value) == 2 and all(is_number(end) and math.isfinite(end) for end in value)
+    remedy = f"a positive number [{unit}], or a negative and a positive one"
+    require(good and value[0] < 0 < value[1], place + key, value, remedy)
+    least, greatest = map(float, value)
+    object.__setattr__(owner, key, greatest if greatest == -least else (least, greatest))
+    return None
+
+
 def require_text(value: object, what: str) -> None:
     """Raises MachineError unless the value is text that is not empty and that a file can hold."""
     require(is_text(value) and value != "", what, value, "a text")

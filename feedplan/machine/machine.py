@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from feedplan.arguments import is_number, is_text, shown
 from feedplan.errors import MachineError
@@ -19,6 +19,7 @@ from feedplan.machine.checks import (
     one_by_one,
     require,
     require_text,
+    set_limit,
     set_positive,
     written,
 )
@@ -37,6 +38,8 @@ _UNIT = re.compile(r"[^\s\[\]<>&\"'`\\,;]{1,12}")
 _ROTARY_UNITS = ("deg", "°", "rad")
 NAME_REMEDY = "1 to 32 letters, digits and underscores, no digit first, other than I, J and K"
 AxisKind = Literal["linear", "rotary"]
+# The same in both directions, or the least and the greatest.
+Limit: TypeAlias = float | tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -45,7 +48,8 @@ class Axis:
 
     `name`: 1 to 32 letters, digits and underscores, the first no digit, other than I, J and K (a tool's
     direction). Programs move axes named by one of the letters XYZABCUVW, paths from Python any axes.
-    `max_velocity` [mm/s], `max_acceleration` [mm/s²], `max_jerk` [mm/s³] (infinite: not limited),
+    `max_velocity` [mm/s], `max_acceleration` [mm/s²], each one number or, where it differs by direction, two:
+    (-1.0, 2.0) is at most 1 backward and 2 forward. `max_jerk` [mm/s³] (infinite: not limited),
     `travel` (least, greatest) [mm], `max_velocity_jump` [mm/s] allowed at a corner (0: corners stop).
     On a rotary axis every mm is a degree. `kind` is "linear" or "rotary"; empty, the letter or the unit
     decides: A, B and C are rotary, and axes in deg, ° or rad.
@@ -58,8 +62,8 @@ class Axis:
     """
 
     name: str
-    max_velocity: float
-    max_acceleration: float
+    max_velocity: Limit
+    max_acceleration: Limit
     max_jerk: float = math.inf
     travel: tuple[float, float] = (-math.inf, math.inf)
     max_velocity_jump: float = 0.0
@@ -83,9 +87,9 @@ class Axis:
         object.__setattr__(self, "unit", self.unit if self.unit != "" else self.usual_unit)
         good = is_text(self.unit) and self.unit.isprintable() and _UNIT.fullmatch(self.unit) is not None
         require(good, f"{place}unit", self.unit, "1 to 12 characters, such as mm, deg or rad")
-        units = {"max_velocity": "/s", "max_acceleration": "/s²", "max_jerk": "/s³"}
-        for key, unit in units.items():
-            set_positive(self, key, place, f"{self.unit}{unit}", infinite=key == "max_jerk")
+        for key, unit in {"max_velocity": "/s", "max_acceleration": "/s²"}.items():
+            set_limit(self, key, place, f"{self.unit}{unit}")
+        set_positive(self, "max_jerk", place, f"{self.unit}/s³", infinite=True)
         jump = self.max_velocity_jump
         good = is_number(jump) and 0 <= jump < math.inf
         require(good, f"{place}max_velocity_jump", jump, f"a finite number ≥ 0 [{self.unit}/s]")
@@ -94,6 +98,16 @@ class Axis:
         least, greatest = numbers(self.travel, 2, f"{place}travel", remedy, infinite=True)
         require(least < greatest, f"{place}travel", self.travel, remedy)
         object.__setattr__(self, "travel", (least, greatest))
+
+    @property
+    def velocity_range(self) -> tuple[float, float]:
+        """The least and the greatest velocity."""
+        return range_of(self.max_velocity)
+
+    @property
+    def acceleration_range(self) -> tuple[float, float]:
+        """The least and the greatest acceleration."""
+        return range_of(self.max_acceleration)
 
     @property
     def usual_unit(self) -> str:
@@ -220,6 +234,16 @@ class Machine:
     def with_period(self, period: float) -> Machine:
         """The same machine with another servo period [s]."""
         return replace(self, period=period)
+
+
+def range_of(limit: Limit) -> tuple[float, float]:
+    """The least and the greatest value that a limit allows."""
+    return limit if isinstance(limit, tuple) else (-limit, limit)
+
+
+def size_of(limit: Limit) -> float:
+    """What a limit allows in both directions."""
+    return min(map(abs, range_of(limit)))
 
 
 def usual_units(names: Iterable[str]) -> tuple[str, ...]:

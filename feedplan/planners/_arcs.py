@@ -93,28 +93,30 @@ def arcs_between(problem: Problem, mesh: Mesh, p: Array, by_axis: bool) -> Arcs:
     ends = np.stack([start, end])
     if mesh.by_length.any():
         ends = _by_parameter(problem, mesh, ends, axis, value)
-    acceleration, speed = motion.acceleration(problem, mesh), motion.speed(mesh)
-    used = np.maximum(np.abs(acceleration).max(axis=2), speed.max(axis=2))
+    acceleration, speed = motion.acceleration(mesh), motion.speed(mesh)
+    used = np.maximum(problem.use("acceleration", acceleration).max(axis=2), speed.max(axis=2))
+    # Each direction on its own: where the sign changes the use of a limit has a kink.
+    peaks = [_peak(acceleration / limit) for limit in (problem.max_acceleration, problem.min_acceleration)]
     return Arcs(
         kind,
         axis,
         value,
         ends,
         duration,
-        _peak(acceleration),
+        np.maximum(*peaks),
         _peak(speed).max(axis=1),
         INTEGRATION[-1] @ np.minimum(used, 1.0),
     )
 
 
 def _peak(values: Array) -> Array:
-    """The greatest size (n, …) that values (places, n, …) have in the cells: of parabolas through even
+    """The greatest of what values (places, n, …) have in the cells: of parabolas through even
     places, and what the places do not resolve."""
     even = np.einsum("ij,jck->ick", EVEN, values)
     bent = np.abs(even[2:] - 2.0 * even[1:-1] + even[:-2]) / 8.0
-    inside = (np.abs(even[1:-1]) + bent).max(axis=0)
+    inside = (even[1:-1] + bent).max(axis=0)
     tail = np.abs(np.einsum("ij,jck->ick", TAIL, values)).sum(axis=0)
-    return np.asarray(np.maximum(inside, np.abs(values).max(axis=0)) + tail)
+    return np.asarray(np.maximum(inside, values.max(axis=0)) + tail)
 
 
 @dataclass(frozen=True)
@@ -124,9 +126,9 @@ class _Motion:
     p: Array
     s: Array
 
-    def acceleration(self, problem: Problem, mesh: Mesh) -> Array:
-        """The share of its limit that every joint uses, with its sign (places, n, joints)."""
-        return (mesh.slope * self.s[..., None] + mesh.bend * self.p[..., None]) / problem.max_acceleration
+    def acceleration(self, mesh: Mesh) -> Array:
+        """The acceleration of every joint (places, n, joints)."""
+        return mesh.slope * self.s[..., None] + mesh.bend * self.p[..., None]
 
     def speed(self, mesh: Mesh) -> Array:
         """The share of every limit of a speed, squared (places, n, limits)."""
@@ -134,7 +136,7 @@ class _Motion:
 
     def worst(self, problem: Problem, mesh: Mesh) -> Array:
         """The greatest of all at the places (n,)."""
-        acceleration = np.abs(self.acceleration(problem, mesh)).max(axis=(0, 2))
+        acceleration = problem.use("acceleration", self.acceleration(mesh)).max(axis=(0, 2))
         return np.asarray(np.maximum(acceleration, self.speed(mesh).max(axis=(0, 2))))
 
     def where(self, better: NDArray[np.bool_], other: _Motion) -> _Motion:

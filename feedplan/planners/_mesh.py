@@ -225,7 +225,7 @@ def mesh(problem: Problem, stretch: Stretch, cuts: Cuts) -> Mesh:
         way = _chords(problem)[piece[straight]]
         slope[:, straight] = way / np.linalg.norm(way, axis=1)[:, None]
         bend[:, straight], square[:, straight] = 0.0, 1.0
-    limits = [(slope / problem.max_velocity) ** 2]
+    limits = [problem.use("velocity", slope) ** 2]
     counted = square
     if problem.feed_share is not None:
         counted = ((problem.feed_share[piece] * slope) ** 2).sum(axis=2)

@@ -240,8 +240,8 @@ class _Planner:
 
     def _under(self, strict: _Strictness, grid: Mesh) -> tuple[Arcs, Rows]:
         """The arcs of the solution under stricter limits, and its rows."""
-        acceleration = self.problem.max_acceleration
-        rows = self.method.rows(grid, acceleration * strict.acceleration, strict.at_ends)
+        acceleration = np.array([-self.problem.min_acceleration, self.problem.max_acceleration])
+        rows = self.method.rows(grid, acceleration[:, None] * strict.acceleration, strict.at_ends)
         task = transcribe(grid, rows, acceleration, strict.speed, self.method.feasible)
         p = self._solve(task) * task.scale
         return arcs_between(self.problem, grid, p, self.method.by_axis), rows

@@ -28,7 +28,7 @@ _SLOW = 1e-6
 
 @dataclass(frozen=True)
 class Rows:
-    """Rows (r,) |`near`·p_start + `far`·p_end| ≤ 1 on the p of `cell` at its ends.
+    """Rows (r,) −`low` ≤ `near`·p_start + `far`·p_end ≤ 1 on the p of `cell` at its ends.
 
     `held` (n, joints) are the joints whose limit holds at both ends of cells, at the cost of an order.
     """
@@ -36,6 +36,7 @@ class Rows:
     cell: Numbers
     near: Array
     far: Array
+    low: Array
     held: NDArray[np.bool_]
 
 
@@ -85,7 +86,8 @@ class Transcription:
 def transcribe(
     mesh: Mesh, rows: Rows, acceleration: Array, share: Array, feasible: bool = True
 ) -> Transcription:
-    """The problem on a mesh; `share` (n + 1,) of the greatest p is allowed in the nodes.
+    """The problem on a mesh; `acceleration` (2, joints) are the limits backward and forward as sizes, `share`
+    (n + 1,) of the greatest p is allowed in the nodes.
 
     A `feasible` profile is nowhere faster in the nodes than some acceleration of the parameter allows on
     both sides.
@@ -122,20 +124,24 @@ def _reachable(mesh: Mesh, rows: Rows, greatest: Array) -> Array:
     first = np.searchsorted(rows.cell[bounds], np.arange(len(mesh) + 1)).tolist()
     near = np.abs(rows.near[bounds] * mesh.gain[rows.cell[bounds]]).tolist()
     far = np.abs(rows.far[bounds]).tolist()
+    # What a row leaves as p grows, and as it falls.
+    low = rows.low[bounds]
+    rise = np.where(rows.far[bounds] > 0.0, 1.0, low).tolist()
+    fall = np.where(rows.near[bounds] > 0.0, 1.0, low).tolist()
     p = greatest.tolist()
     for end, known in zip((0, -1), mesh.fixed, strict=True):
         p[end] = p[end] if known is None else known
     for cell in range(len(mesh)):
-        reach = [(1.0 + near[i] * p[cell]) / far[i] for i in range(first[cell], first[cell + 1])]
+        reach = [(rise[i] + near[i] * p[cell]) / far[i] for i in range(first[cell], first[cell + 1])]
         p[cell + 1] = min([p[cell + 1], *reach])
     for cell in reversed(range(len(mesh))):
-        reach = [(1.0 + far[i] * p[cell + 1]) / near[i] for i in range(first[cell], first[cell + 1])]
+        reach = [(fall[i] + far[i] * p[cell + 1]) / near[i] for i in range(first[cell], first[cell + 1])]
         p[cell] = min([p[cell], *reach])
     return np.array(p)
 
 
 def mean_rows(mesh: Mesh, limit: Array, at_ends: NDArray[np.bool_]) -> Rows:
-    """The mean acceleration of every joint over its way, at most `limit` (n, joints) [mm/s²].
+    """The mean acceleration of every joint over its way, within ∓`limit` (2, n, joints) [mm/s²].
 
     In the cells `at_ends` (n,), and where a joint does not keep its direction, that at both ends.
     """
@@ -144,7 +150,7 @@ def mean_rows(mesh: Mesh, limit: Array, at_ends: NDArray[np.bool_]) -> Rows:
     steady = (mesh.slope * sign >= 0.0).all(axis=0) & (np.abs(mesh.slope).max(axis=0) > _SLOW * size[:, None])
     steady &= ~at_ends[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
-        weight = 1.0 / (2.0 * mesh.way[-1] * limit)
+        weight = 1.0 / (2.0 * mesh.way[-1] * limit[1])
         near, far = -(mesh.slope[0] ** 2) * weight, mesh.slope[-1] ** 2 * weight
     cell, joint = np.nonzero(steady)
     moves = (mesh.slope != 0.0).any(axis=0)
@@ -153,6 +159,7 @@ def mean_rows(mesh: Mesh, limit: Array, at_ends: NDArray[np.bool_]) -> Rows:
         np.concatenate([cell, rest.cell]),
         np.concatenate([near[cell, joint], rest.near]),
         np.concatenate([far[cell, joint], rest.far]),
+        np.concatenate([(limit[0] / limit[1])[cell, joint], rest.low]),
         rest.held,
     )
 
@@ -160,32 +167,41 @@ def mean_rows(mesh: Mesh, limit: Array, at_ends: NDArray[np.bool_]) -> Rows:
 def end_rows(
     mesh: Mesh, limit: Array, chosen: NDArray[np.bool_] | None = None, ends: tuple[int, ...] = (0, -1)
 ) -> Rows:
-    """a_k at `ends` of the cells with p linear in between, at most `limit` (n, joints), of `chosen`
+    """a_k at `ends` of the cells with p linear in between, within ∓`limit` (2, n, joints), of `chosen`
     joints."""
     if chosen is None:
-        chosen = np.ones(limit.shape, dtype=bool)
+        chosen = np.ones(limit.shape[1:], dtype=bool)
     cell, joint = np.nonzero(chosen)
-    weight = 1.0 / limit[cell, joint]
+    weight = 1.0 / limit[1, cell, joint]
+    low = limit[0, cell, joint] * weight
     near, far = [], []
     for end in ends:
         slope = mesh.slope[end, cell, joint] * weight / (2.0 * mesh.width[cell])
         bend = mesh.bend[end, cell, joint] * weight
         near.append(-slope + (bend if end == 0 else 0.0))
         far.append(slope + (bend if end == -1 else 0.0))
-    return Rows(np.tile(cell, len(ends)), np.concatenate(near), np.concatenate(far), chosen)
+    return Rows(
+        np.tile(cell, len(ends)), np.concatenate(near), np.concatenate(far), np.tile(low, len(ends)), chosen
+    )
 
 
 def _limit_curve(mesh: Mesh, acceleration: Array, place: int) -> Array:
     """The greatest p that some acceleration of the parameter leaves within all limits, at one place of the
     cells."""
-    slope, bend = np.abs(mesh.slope[place]), mesh.bend[place]
-    tangent = mesh.slope[place]
+    bend, tangent = mesh.bend[place], mesh.slope[place]
     best = np.full(len(mesh), np.inf)
+
+    def most(k: int, factor: Array) -> Array:
+        """The greatest acceleration of a joint times a factor."""
+        return np.asarray(np.where(factor < 0.0, acceleration[0, k], acceleration[1, k]) * np.abs(factor))
+
     with np.errstate(divide="ignore", invalid="ignore"):
-        for j in range(len(acceleration)):
-            best = np.fmin(best, np.where(slope[:, j] == 0.0, acceleration[j] / np.abs(bend[:, j]), np.inf))
+        for j in range(acceleration.shape[1]):
+            alone = most(j, np.sign(bend[:, j])) / np.abs(bend[:, j])
+            best = np.fmin(best, np.where(tangent[:, j] == 0.0, alone, np.inf))
             for k in range(j):
-                turn = np.abs(bend[:, j] * tangent[:, k] - bend[:, k] * tangent[:, j])
-                room = acceleration[j] * slope[:, k] + acceleration[k] * slope[:, j]
-                best = np.fmin(best, np.where(turn > 0.0, room / turn, np.inf))
+                # Without s: turn · p = a_j q'_k − a_k q'_j.
+                turn = bend[:, j] * tangent[:, k] - bend[:, k] * tangent[:, j]
+                room = most(j, np.sign(turn) * tangent[:, k]) + most(k, -np.sign(turn) * tangent[:, j])
+                best = np.fmin(best, np.where(turn != 0.0, room / np.abs(turn), np.inf))
     return best

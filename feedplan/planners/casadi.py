@@ -26,6 +26,9 @@ _LEFT = 1e-8
 _SLOWEST = 1e-9
 _START = 0.5
 
+# Limits may differ by direction.
+DIRECTIONS = True
+
 
 def plan(
     problem: Problem,
@@ -72,7 +75,7 @@ def _solve(task: Transcription, seconds: float) -> Array:
         options["ipopt.max_wall_time"] = seconds
     solver = casadi.nlpsol("time_optimal", "ipopt", {"x": x, "f": time, "g": used}, options)
     start = np.minimum(_START, _START * task.most[free])
-    found = solver(x0=start, lbx=_SLOWEST, ubx=task.most[free], lbg=-1.0, ubg=1.0)
+    found = solver(x0=start, lbx=_SLOWEST, ubx=task.most[free], lbg=-task.rows.low, ubg=1.0)
     statistics = solver.stats()
     if not statistics["success"]:
         word = str(statistics["return_status"])

@@ -26,6 +26,9 @@ ACCURACY = 1e-4
 # end because p is scaled.
 GAP, ROWS = 1e-6, 1e-7
 
+# Limits may differ by direction.
+DIRECTIONS = True
+
 
 def plan(
     problem: Problem,
@@ -118,7 +121,7 @@ def _program(task: Transcription) -> tuple[Any, Array, list[Any], Array]:
     bound = np.concatenate(
         [
             1.0 - offset,
-            1.0 + offset,
+            rows.low + offset,
             task.most[bounded],
             np.tile([1.0, -1.0, 0.0], free),
             np.column_stack([known, known, np.full(n, 2.0)]).ravel(),

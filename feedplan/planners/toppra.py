@@ -31,6 +31,9 @@ _FASTEST = 1e6
 Scheme = Literal["one-sided", "collocation"]
 SCHEMES: tuple[Scheme, ...] = get_args(Scheme)
 
+# Limits may differ by direction.
+DIRECTIONS = True
+
 
 def plan(
     problem: Problem,
@@ -93,7 +96,7 @@ def _solve(task: Transcription, seconds: float) -> Array:
 
 
 def _constraint(task: Transcription, start: Array, end: Array, grid: Array, nodes: Array) -> Any:
-    """|(near + far) x + 2 Δ far u| ≤ 1 for the rows of each cell, as toppra has them, and 0 ≤ x ≤ most."""
+    """−low ≤ (near + far) x + 2 Δ far u ≤ 1 for the rows of each cell, as toppra has them; 0 ≤ x ≤ most."""
     from toppra.constraint import LinearConstraint
 
     rows, n = task.rows, task.cells
@@ -101,11 +104,13 @@ def _constraint(task: Transcription, start: Array, end: Array, grid: Array, node
     cell = rows.cell[order]
     place = np.arange(len(cell)) - np.searchsorted(cell, cell)
     count = int(place.max()) + 1
-    near, far = np.zeros((2, n + 1, count))
-    near[cell, place] = (rows.near * start[rows.cell])[order]
-    far[cell, place] = (rows.far * end[rows.cell])[order]
+    # Every row twice: at most 1, and over −low at most 1.
+    near, far = np.zeros((2, n + 1, 2 * count))
+    for side, scale in ((place, 1.0), (count + place, -1.0 / rows.low[order])):
+        near[cell, side] = (rows.near * start[rows.cell])[order] * scale
+        far[cell, side] = (rows.far * end[rows.cell])[order] * scale
     step = np.append(np.diff(grid), 0.0)[:, None]
-    identity = np.eye(count)
+    identity, ones = np.eye(2 * count), np.ones(2 * count)
     bound = np.column_stack([np.zeros(n + 1), np.minimum(task.most * nodes, _FASTEST * nodes)])
 
     class Cells(LinearConstraint):  # type: ignore[misc]
@@ -115,8 +120,7 @@ def _constraint(task: Transcription, start: Array, end: Array, grid: Array, node
             self.identical = True
 
         def compute_constraint_params(self, path: Any, gridpoints: Any, *args: Any) -> tuple[Any, ...]:
-            sides, ones = np.vstack([identity, -identity]), np.ones(2 * count)
-            return 2.0 * step * far, near + far, np.zeros_like(near), sides, ones, None, bound
+            return 2.0 * step * far, near + far, np.zeros_like(near), identity, ones, None, bound
 
     return Cells()
 

@@ -73,8 +73,8 @@ def activity(
         feed = np.where(np.isfinite(problem.path.feed[piece]), problem.feed[piece], np.inf)
         at_feed = np.sqrt(feed_square(problem, piece, u)) * rate / feed
         chord = np.linalg.norm(velocity, axis=1) / chord_speed(problem, tangent, second)
-        at_velocity = np.abs(velocity) / problem.max_velocity
-        groups = {"velocity": at_velocity, "acceleration": np.abs(acceleration) / problem.max_acceleration}
+        at_velocity = problem.use("velocity", velocity)
+        groups = {"velocity": at_velocity, "acceleration": problem.use("acceleration", acceleration)}
         if jerk:
             groups["jerk"] = np.abs(jerks) / problem.max_jerk
         speed = motion.slope(piece, u) * rate

@@ -119,11 +119,13 @@ def chart_data(
         name: [float(value) if np.isfinite(value) else None for value in getattr(problem, f"max_{name}")]
         for name in ("velocity", "acceleration", "jerk")
     }
+    least = {name: getattr(problem, f"min_{name}").tolist() for name in ("velocity", "acceleration")}
     judged = {check.name for check in audit.checks if check.judged}
     return {
         "axes": list(problem.axes),
         "units": list(problem.units),
         "limits": limits,
+        "least": least,
         "judged": sorted(judged),
         "feed": float(problem.feed.max()) if len(problem.feed) else None,
         "duration": figures.duration,

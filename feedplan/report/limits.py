@@ -116,9 +116,10 @@ def _sample(
         return LimitSamples(
             length=length.ravel(),
             speed=way * parameter_speed(tangent, velocity),
-            acceleration=way * np.sqrt(limit_curve(tangent, second, problem.max_acceleration)),
+            acceleration=way
+            * np.sqrt(limit_curve(tangent, second, problem.max_acceleration, problem.min_acceleration)),
             feed=way * feed,
-            velocity=way * np.min(_quotient(problem.max_velocity, np.abs(tangent)), axis=1),
+            velocity=way * np.min(_quotient(np.ones(1), problem.use("velocity", tangent)), axis=1),
             chord=way * _quotient(chord_speed(problem, tangent, second), joint),
             arc=arc,
         )
@@ -131,20 +132,23 @@ def parameter_speed(tangent: Floats, velocity: Floats) -> Floats:
     return np.asarray(np.abs(rate) / np.where(slope == 0.0, np.inf, np.abs(slope)))[:, 0]
 
 
-def limit_curve(tangent: Floats, second: Floats, max_acceleration: Floats) -> Floats:
-    """The greatest p that some acceleration within all axis limits allows, from C' and C'' (n, axes).
+def limit_curve(tangent: Floats, second: Floats, most: Floats, least: Floats) -> Floats:
+    """The greatest p that accelerations from `least` to `most` (axes,) allow, from C' and C'' (n, axes).
 
-    min over pairs of axes of (A_j |q'_k| + A_k |q'_j|) / |q''_j q'_k − q''_k q'_j|, infinite on straight
-    pieces (Zhang et al. 2010, eqs. 7–8, signs resolved).
+    With W = q''_j q'_k − q''_k q'_j two axes have W p = a_j q'_k − a_k q'_j: the least over all pairs of the
+    greatest right side over |W|, infinite on straight pieces (Zhang et al. 2010, eqs. 7–8).
     """
     best = np.full(len(tangent), np.inf)
     if tangent.shape[1] == 1:
         return best
     with np.errstate(divide="ignore", invalid="ignore"):
         for j, k in combinations(range(tangent.shape[1]), 2):
-            turn = np.abs(second[:, j] * tangent[:, k] - second[:, k] * tangent[:, j])
-            room = max_acceleration[j] * np.abs(tangent[:, k]) + max_acceleration[k] * np.abs(tangent[:, j])
-            best = np.fmin(best, _quotient(room, turn))
+            turn = second[:, j] * tangent[:, k] - second[:, k] * tangent[:, j]
+            sign = np.sign(turn)
+            by_j, by_k = sign * tangent[:, k], -sign * tangent[:, j]
+            room = np.where(by_j < 0.0, least[j], most[j]) * by_j
+            room = room + np.where(by_k < 0.0, least[k], most[k]) * by_k
+            best = np.fmin(best, _quotient(room, np.abs(turn)))
     return best
 
 

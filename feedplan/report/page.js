@@ -40,6 +40,11 @@
 
   /* Axes over time ------------------------------------------------------------------------------- */
   const units = [...new Set(data.units)];
+  /* 500, or -300..500 where a limit differs by direction. */
+  const sided = (name, k) => {
+    const [most, least] = [data.limits[name][k], (data.least[name] || [])[k]];
+    return [...(least && least !== -most ? [least] : []), most].map((limit) => Number(limit.toPrecision(6))).join("..");
+  };
   const ROWS = [["speed", `${unit}/s`], ...[["velocity", "s"], ["acceleration", "s²"], ["jerk", "s³"]]
     .map(([name, per]) => [name, units.map((own) => `${own}/${per}`).join(", ")])];
   const tops = Object.fromEntries(ROWS.slice(1).map(([name]) => [name, data.time[name].map((c) => greatest(c.y))]));
@@ -79,19 +84,19 @@
           top = Math.max(top, (data.judged.includes(name) ? tops : usual)[name][k] * scale[k]);
         });
         /* A limit far outside would squeeze the curves: it is named beside the chart and drawn only when near. */
-        const lines = [...new Set(limits.map((limit, k) => limit && limit * scale[k]))].filter((v) => v && v <= 2 * top);
-        const reach = Math.max(top, ...lines) * 1.08 || 1;
+        const least = data.least[name] || limits.map((limit) => limit && -limit);
+        const ends = [...limits, ...least].map((limit, k) => limit && limit * scale[k % limits.length]);
+        const lines = [...new Set(ends)].filter((v) => v && Math.abs(v) <= 2 * top);
+        const reach = Math.max(top, ...lines.map(Math.abs)) * 1.08 || 1;
         range = [-reach, reach];
         for (const value of lines) {
-          const owners = limits.map((limit, k) => (limit && limit * scale[k] === value ? k : -1)).filter((k) => k >= 0);
+          const owners = ends.map((end, k) => (end === value ? k % limits.length : -1)).filter((k) => k >= 0);
           const colour = owners.length > 1 ? style("--soft") : axisColour(owners[0]);
-          for (const y of [value, -value]) {
-            shapes.push({ type: "line", xref: "paper", x0: 0, x1: 1, yref: id, y0: y, y1: y, line: { color: colour, width: 1, dash: "dash" } });
-          }
+          shapes.push({ type: "line", xref: "paper", x0: 0, x1: 1, yref: id, y0: value, y1: value, line: { color: colour, width: 1, dash: "dash" } });
         }
       }
       const limits = data.limits[name];
-      const known = limits ? limits.map((limit, k) => (limit ? `${data.axes[k]} ${Number(limit.toPrecision(6))}` : null)).filter(Boolean) : [];
+      const known = limits ? limits.map((limit, k) => (limit ? `${data.axes[k]} ${sided(name, k)}` : null)).filter(Boolean) : [];
       const shownUnit = relative && limits && limits.every(Boolean) ? "% of limit" : unit;
       const rapids = name === "speed" && hidesRapids && !isNarrow ? `rapids up to ${Number(topSpeed.toPrecision(4))} ${data.path.unit}/s run out of the chart` : "";
       const note = rapids ? rapids : !known.length || isNarrow ? "" : data.judged.includes(name) ? `limits ${known.join(", ")} ${unit}` : `not limited by this method (machine: ${known.join(", ")} ${unit})`;

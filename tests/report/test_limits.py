@@ -25,14 +25,15 @@ def sampled(problem: Any, profile: SpeedProfile) -> LimitSamples:
 
 def test_on_a_bend_the_cross_axis_carries_all() -> None:
     # Along X with a curvature of 1/10 mm: Y carries v²/10, so 500 mm/s² allow v² = 5000.
-    p = limit_curve(np.array([[1.0, 0.0]]), np.array([[0.0, 0.1]]), np.array([300.0, 500.0]))
+    most = np.array([300.0, 500.0])
+    p = limit_curve(np.array([[1.0, 0.0]]), np.array([[0.0, 0.1]]), most, -most)
     assert p == pytest.approx([5000.0])
 
 
 def test_straight_pieces_and_one_axis_have_no_limit_curve() -> None:
     tangent = np.array([[0.6, 0.8], [1.0, 0.0]])
-    assert np.isinf(limit_curve(tangent, 0.3 * tangent, np.array([1.0, 1.0]))).all()
-    assert np.isinf(limit_curve(np.array([[1.0]]), np.array([[1.0]]), np.array([1.0]))).all()
+    assert np.isinf(limit_curve(tangent, 0.3 * tangent, np.ones(2), -np.ones(2))).all()
+    assert np.isinf(limit_curve(np.ones((1, 1)), np.ones((1, 1)), np.ones(1), -np.ones(1))).all()
 
 
 @pytest.mark.parametrize("axes", [2, 3, 6])
@@ -40,11 +41,11 @@ def test_the_limit_curve_is_the_optimum_of_the_linear_programme(axes: int) -> No
     random = np.random.default_rng(axes)
     tangent, second = random.normal(size=(2, 40, axes))
     tangent[::5, 0] = 0.0
-    limit = random.uniform(0.5, 3.0, axes)
-    best = limit_curve(tangent, second, limit)
+    most, least = random.uniform(0.5, 3.0, axes), -random.uniform(0.5, 3.0, axes)
+    best = limit_curve(tangent, second, most, least)
     for q, bend, p in zip(tangent, second, best, strict=True):
         rows = np.vstack([np.stack([q, bend], axis=1), -np.stack([q, bend], axis=1)])
-        found = linprog([0, -1], A_ub=rows, b_ub=np.tile(limit, 2), bounds=[(None, None), (0, None)])
+        found = linprog([0, -1], A_ub=rows, b_ub=np.append(most, -least), bounds=[(None, None), (0, None)])
         assert p == pytest.approx(found.x[1], rel=1e-9)
 
 

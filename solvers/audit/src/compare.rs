@@ -64,10 +64,10 @@ impl<'a, const M: usize> Comparison<'a, M> {
             let at_joint = spot.place.u.min(rest) <= PLACE_TOLERANCE;
             for k in 0..M {
                 // Over a way of `away`, to a turn and back from it, no velocity changes by more than this.
-                let unknown = 2.0 * (limits.acceleration[k] * away).sqrt();
+                let unknown = 2.0 * (limits.acceleration.greatest(k) * away).sqrt();
                 let off = (recorded[k] - velocity[k]).abs() - unknown;
                 let jump = if at_joint { limits.jump[k] } else { 0.0 };
-                let limit = VELOCITY_SHARE * limits.acceleration[k] * limits.period + jump;
+                let limit = VELOCITY_SHARE * limits.acceleration.least(k) * limits.period + jump;
                 tally.offer(Check::RecordedVelocity, k, off, limit, row.t, row.line);
             }
         }
@@ -75,13 +75,13 @@ impl<'a, const M: usize> Comparison<'a, M> {
             let range = profile.accelerations(here, row.t, limits.period);
             let mut off: [f64; M] =
                 std::array::from_fn(|k| (range[k][0] - recorded[k]).max(recorded[k] - range[k][1]));
-            if (0..M).any(|k| off[k] > ACCELERATION_SHARE * limits.acceleration[k]) {
+            if (0..M).any(|k| off[k] > ACCELERATION_SHARE * limits.acceleration.least(k)) {
                 if let Some(then) = profile.acceleration_at(row.t) {
                     off = std::array::from_fn(|k| off[k].min((recorded[k] - then[k]).abs()));
                 }
             }
             for k in 0..M {
-                let limit = ACCELERATION_SHARE * limits.acceleration[k];
+                let limit = ACCELERATION_SHARE * limits.acceleration.least(k);
                 tally.offer(Check::RecordedAcceleration, k, off[k], limit, row.t, row.line);
             }
         }
@@ -152,7 +152,7 @@ impl<'a, const M: usize> Comparison<'a, M> {
                 let size = length(&tangent);
                 let cos = inner(&tangent, &way) / (size * way_length);
                 let across = if cos > 0.0 { (1.0 - cos * cos).max(0.0).sqrt() } else { 1.0 };
-                let along: f64 = (0..M).map(|k| tangent[k].abs() * limits.acceleration[k]).sum();
+                let along: f64 = (0..M).map(|k| tangent[k].abs() * limits.acceleration.greatest(k)).sum();
                 most = most.max(across * along / size);
             }
         }

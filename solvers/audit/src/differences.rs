@@ -124,7 +124,7 @@ impl<const M: usize> Differences<'_, M> {
         });
         let speeds = [length(&before), length(&after)];
         let steps = (out - into) as f64;
-        let explained = length(&self.limits.acceleration) * steps * self.limits.period;
+        let explained = length(&self.limits.acceleration.greater()) * steps * self.limits.period;
         let turn = if speeds[0] * speeds[1] > 0.0 {
             (1.0 - inner(&before, &after) / (speeds[0] * speeds[1])).max(0.0)
         } else {
@@ -138,7 +138,8 @@ impl<const M: usize> Differences<'_, M> {
     fn excess(&self, i: usize) -> [f64; M] {
         let acceleration = self.acceleration(i);
         std::array::from_fn(|k| {
-            acceleration.value[k].abs() - acceleration.rounding[k] - self.limits.acceleration[k]
+            let value = acceleration.value[k];
+            value.abs() - acceleration.rounding[k] - self.limits.acceleration.of(k, value)
         })
     }
 }

@@ -146,7 +146,7 @@ struct Finder<'a, const M: usize> {
 impl<'a, const M: usize> Finder<'a, M> {
     fn new(plan: &'a Plan<'a>, limits: &'a Limits<M>) -> Self {
         let profile = plan.profile.as_ref().map(|profile| Reader::new(profile, &plan.path));
-        Self { plan, limits, profile, reach: 2.0 * limits.period * length(&limits.velocity) }
+        Self { plan, limits, profile, reach: 2.0 * limits.period * length(&limits.velocity.greater()) }
     }
 
     fn find(&mut self, previous: Option<&Row<M>>, row: &Row<M>) -> Spot {

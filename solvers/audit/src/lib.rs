@@ -235,14 +235,50 @@ impl<const M: usize> Tally<M> {
 /// Speeds that feeds are about: along X, Y, Z, along U, V, W, of all other axes, and of all together.
 pub const FEEDS: usize = 4;
 
+/// A limit of each axis in both directions, as sizes: of what is positive, of what is negative.
+#[derive(Clone, Copy, Debug)]
+pub struct Sided<const M: usize> {
+    pub positive: [f64; M],
+    pub negative: [f64; M],
+}
+
+impl<const M: usize> Sided<M> {
+    /// The limit that holds for a value, by its sign.
+    #[inline(always)]
+    pub fn of(&self, axis: usize, value: f64) -> f64 {
+        if value < 0.0 {
+            self.negative[axis]
+        } else {
+            self.positive[axis]
+        }
+    }
+
+    /// The smaller limit.
+    #[inline]
+    pub fn least(&self, axis: usize) -> f64 {
+        self.positive[axis].min(self.negative[axis])
+    }
+
+    /// The greater limit.
+    #[inline]
+    pub fn greatest(&self, axis: usize) -> f64 {
+        self.positive[axis].max(self.negative[axis])
+    }
+
+    /// The greater limit of each axis.
+    pub fn greater(&self) -> [f64; M] {
+        std::array::from_fn(|k| self.greatest(k))
+    }
+}
+
 /// The limits that hold everywhere.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits<const M: usize> {
     /// Those beyond are 0, and their travel is not limited.
     pub axes: usize,
     /// In mm/s, mm/s² and mm/s³.
-    pub velocity: [f64; M],
-    pub acceleration: [f64; M],
+    pub velocity: Sided<M>,
+    pub acceleration: Sided<M>,
     pub jerk: [f64; M],
     /// Whether jerk is judged; else it is only measured where that costs nothing.
     pub judges_jerk: bool,
@@ -274,7 +310,7 @@ impl<const M: usize> Limits<M> {
     /// to the acceleration.
     #[inline]
     pub fn negligible_jump(&self, axis: usize) -> f64 {
-        PASS_EXCESS * self.acceleration[axis] * self.period
+        PASS_EXCESS * self.acceleration.least(axis) * self.period
     }
 }
 

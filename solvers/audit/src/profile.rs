@@ -127,7 +127,7 @@ impl<const M: usize> Auditor<'_, M> {
             for k in 0..M {
                 let size = state.tangent[k].abs();
                 let [slow, fast] = [state.root_p.min(recorded), state.root_p.max(recorded)].map(|p| size * p);
-                let gained = 2.0 * self.limits.acceleration[k] * way * size;
+                let gained = 2.0 * self.limits.acceleration.greatest(k) * way * size;
                 let reached = (slow * slow + gained).sqrt().max(slow);
                 let jump = fast - reached - ROUNDINGS * EPS * state.magnitude[k];
                 tally.offer(Check::Jump, k, jump, self.limits.negligible_jump(k), time, line);
@@ -345,7 +345,7 @@ impl<'a, const M: usize> Probe<'a, M> {
         let mut time = 0.0_f64;
         for k in 0..M {
             let rounding = 2.0 * ROUNDINGS * EPS * end.magnitude[k];
-            time = time.max(rounding / (HIDDEN * self.limits.acceleration[k]));
+            time = time.max(rounding / (HIDDEN * self.limits.acceleration.least(k)));
         }
         (time / self.duration).max(SHORTEST)
     }
@@ -363,9 +363,11 @@ impl<'a, const M: usize> Probe<'a, M> {
         let in_time = ROUNDINGS * self.motion.width_rounding();
         for k in 0..M {
             let rounding = ROUNDINGS * EPS * (from.magnitude[k] + to.magnitude[k]) / time;
-            let mean = (to.velocity[k] - from.velocity[k]).abs() / time;
-            let acceleration = mean * (1.0 - in_time) - rounding;
-            let limit = self.limits.acceleration[k];
+            // An arc that is anchored at its end is walked against the time.
+            let [early, late] = if self.motion.anchored_at_end { [to, from] } else { [from, to] };
+            let change = late.velocity[k] - early.velocity[k];
+            let acceleration = change.abs() / time * (1.0 - in_time) - rounding;
+            let limit = self.limits.acceleration.of(k, change);
             self.tally.offer(Check::Acceleration, k, acceleration, limit, middle, self.line);
             if held != Some(k) {
                 self.nearest_limit = self.nearest_limit.max(acceleration / limit);
@@ -380,7 +382,8 @@ impl<'a, const M: usize> Probe<'a, M> {
         self.tally.samples += 1;
         for k in 0..M {
             let velocity = state.velocity[k].abs() - ROUNDINGS * EPS * state.magnitude[k];
-            self.tally.offer(Check::Velocity, k, velocity, self.limits.velocity[k], time, self.line);
+            let limit = self.limits.velocity.of(k, state.velocity[k]);
+            self.tally.offer(Check::Velocity, k, velocity, limit, time, self.line);
         }
         for (feed, limit) in self.feeds.into_iter().enumerate().filter(|(_, limit)| *limit != f64::INFINITY) {
             let speed = length(&self.limits.counted(feed, &state.velocity));

@@ -223,8 +223,9 @@ impl<const M: usize> View<'_, M> {
             let (before, step) = (&rows[n - 1], recent.steps[2]);
             self.grid(n, tally);
             for k in 0..M {
-                let velocity = ((row.q[k] - before.q[k]).abs() - 2.0 * rounding[k]) / step;
-                tally.offer(Check::Velocity, k, velocity, limits.velocity[k], time, line);
+                let way = row.q[k] - before.q[k];
+                let velocity = (way.abs() - 2.0 * rounding[k]) / step;
+                tally.offer(Check::Velocity, k, velocity, limits.velocity.of(k, way), time, line);
             }
             self.recorded(n, step, rounding, tally);
         }
@@ -269,13 +270,15 @@ impl<const M: usize> View<'_, M> {
             for k in 0..M {
                 let mean = (row.q[k] - before.q[k]) / step;
                 let off = (mean - 0.5 * (new[k] + old[k])).abs() - 2.0 * rounding[k] / step;
-                let limit = 0.25 * limits.acceleration[k] * step + 0.5 * limits.jump[k];
+                // An eighth of the way from the least acceleration to the greatest.
+                let span = limits.acceleration.positive[k] + limits.acceleration.negative[k];
+                let limit = 0.125 * span * step + 0.5 * limits.jump[k];
                 tally.offer(Check::RecordedVelocity, k, off, limit, row.t, row.line);
             }
         }
         if let Some(acceleration) = row.acceleration {
             for k in 0..M {
-                let (value, limit) = (acceleration[k].abs(), limits.acceleration[k]);
+                let (value, limit) = (acceleration[k].abs(), limits.acceleration.of(k, acceleration[k]));
                 tally.offer(Check::RecordedAcceleration, k, value, limit, row.t, row.line);
             }
         }
@@ -304,7 +307,7 @@ impl<const M: usize> View<'_, M> {
         let mut corners = None;
         for k in 0..M {
             let value = acceleration.value[k].abs() - acceleration.rounding[k];
-            let mut limit = limits.acceleration[k];
+            let mut limit = limits.acceleration.of(k, acceleration.value[k]);
             if value > limit && limits.jump_beyond[k] > 0.0 {
                 let corners = *corners.get_or_insert_with(|| match comparison {
                     Some(comparison) => comparison.corners([&rows[c - 1], &rows[c], &rows[c + 1]]),

@@ -147,7 +147,7 @@ impl<'a, const M: usize> Reader<'a, M> {
             return 0.0;
         }
         let speed = length(&self.motion.velocity(here.y));
-        let reach = |wait: f64| wait * (speed + 0.5 * wait * length(&limits.acceleration));
+        let reach = |wait: f64| wait * (speed + 0.5 * wait * length(&limits.acceleration.greater()));
         let most = reach(wait) - reach(rounding);
         // A profile that creeps through a turn gets nowhere near as far.
         if most > PLACE_TOLERANCE {

@@ -440,14 +440,15 @@ impl<'a, const M: usize> ByLength<'a, M> {
                 let mut speed = self.corner(i);
                 for place in [&before, &after] {
                     for k in 0..M {
-                        speed = speed.min(problem.max_velocity[k] / place.first[k].abs());
+                        speed = speed.min(problem.max_velocity[0][k] / place.first[k].abs());
                     }
-                    speed = speed.min(place.speed_cap).min(turning_speed(place, &problem.max_acceleration));
+                    speed =
+                        speed.min(place.speed_cap).min(turning_speed(place, &problem.max_acceleration[0]));
                 }
                 let mut acceleration = f64::INFINITY;
                 for Place { first, second, .. } in [&before, &after] {
                     for k in 0..M {
-                        let most = problem.max_acceleration[k] + second[k].abs() * speed * speed;
+                        let most = problem.max_acceleration[0][k] + second[k].abs() * speed * speed;
                         acceleration = acceleration.min(most / first[k].abs());
                     }
                 }
@@ -615,8 +616,8 @@ mod tests {
             runs: &[0, 1],
             feed: &[100.0],
             junction_speed: &[0.0, 0.0],
-            max_velocity: [100.0; 2],
-            max_acceleration: [1e4; 2],
+            max_velocity: [[100.0; 2]; 2],
+            max_acceleration: [[1e4; 2]; 2],
             chord_tolerance: f64::INFINITY,
             period: 0.001,
             start_speed: 0.0,

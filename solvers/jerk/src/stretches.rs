@@ -89,7 +89,12 @@ pub fn checked<const M: usize>(problem: &Problem<M>, jerk: &[f64; M]) -> Result<
             return Err(Fault::Input { piece: None, what });
         }
     }
-    Ok(Limits { velocity: problem.max_velocity, acceleration: problem.max_acceleration, jerk: *jerk })
+    let [velocity, acceleration] = [&problem.max_velocity, &problem.max_acceleration];
+    if velocity[0] != velocity[1] || acceleration[0] != acceleration[1] {
+        let what = "under limits of jerk those of velocity and acceleration are the same in both directions";
+        return Err(Fault::Input { piece: None, what: what.into() });
+    }
+    Ok(Limits { velocity: velocity[0], acceleration: acceleration[0], jerk: *jerk })
 }
 
 /// The stretches of all runs, in order.
@@ -259,7 +264,7 @@ fn chord_kinks<const M: usize>(problem: &Problem<M>, i: usize) -> Vec<f64> {
 fn turn_speed<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> f64 {
     let place = place(problem, i, u);
     let of_axis = |k: usize| {
-        let most = problem.max_acceleration[k];
+        let most = problem.max_acceleration[0][k];
         (most / place.second[k].abs()).sqrt() / (most * problem.period)
     };
     (0..M).map(of_axis).fold(f64::INFINITY, f64::min)

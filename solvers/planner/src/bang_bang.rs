@@ -32,7 +32,7 @@ mod window;
 use std::cell::RefCell;
 
 use crate::bang_bang_quadratic::{Fault, Profile, Task as QuadraticTask};
-use crate::planning::{ChordLimit, Limits};
+use crate::planning::{greater, Both, ChordLimit, Limits};
 use feedplan_geometry::quadratic::{norm, Quadratic};
 use feedplan_geometry::spline::Piece;
 use feedplan_geometry::watch::Watch;
@@ -103,8 +103,8 @@ pub struct Problem<'a, const M: usize> {
     pub runs: &'a [usize],
     pub feed: &'a [f64],
     pub junction_speed: &'a [f64],
-    pub max_velocity: [f64; M],
-    pub max_acceleration: [f64; M],
+    pub max_velocity: Both<M>,
+    pub max_acceleration: Both<M>,
     pub chord_tolerance: f64,
     pub period: f64,
     pub start_speed: f64,
@@ -149,7 +149,9 @@ pub fn plan<const M: usize>(problem: &Problem<M>) -> Result<Profile, Fault> {
 
 /// The same; lines and polynomial quadratics go to the planner made for them.
 pub fn plan_each<const M: usize>(problem: &Problem<M>) -> Result<Profile, Fault> {
-    if problem.tip.is_some() {
+    // That planner's limits are the same in both directions.
+    let sided = |limits: &Both<M>| limits[0] != limits[1];
+    if problem.tip.is_some() || sided(&problem.max_velocity) || sided(&problem.max_acceleration) {
         return plan(problem);
     }
     // Pieces of other kinds have no quadratic: what stands in their places is never looked at.
@@ -177,13 +179,13 @@ fn plan_with<const M: usize>(
         problem,
         axes: Axes {
             acceleration: problem.max_acceleration,
-            velocity_sq: problem.max_velocity.map(|v| v * v),
+            velocity_sq: problem.max_velocity.map(|side| side.map(|v| v * v)),
         },
         chord: ChordLimit::new(
             problem.chord_tolerance,
             problem.period,
             // What the joints' limits let the tool have is not known.
-            if problem.tip.is_some() { f64::INFINITY } else { norm(&problem.max_acceleration) },
+            if problem.tip.is_some() { f64::INFINITY } else { norm(&greater(&problem.max_acceleration)) },
         ),
         quadratic: quadratics.map(|pieces| QuadraticTask::new(pieces, &limits)),
         watch: problem.watch.each(problem.width.len()),

@@ -118,8 +118,8 @@ pub fn plan<const M: usize>(problem: &Problem<M>) -> Result<Profile, Fault> {
         runs: problem.runs,
         feed: problem.feed,
         junction_speed: problem.junction_speed,
-        max_velocity: problem.max_velocity,
-        max_acceleration: problem.max_acceleration,
+        max_velocity: [problem.max_velocity; 2],
+        max_acceleration: [problem.max_acceleration; 2],
         chord_tolerance: problem.chord_tolerance,
         period: problem.period,
         start_speed: problem.start_speed,
@@ -135,9 +135,9 @@ pub fn plan<const M: usize>(problem: &Problem<M>) -> Result<Profile, Fault> {
 }
 
 impl<'a, const M: usize> Task<'a, M> {
-    /// For pieces and limits that have been checked.
+    /// For pieces and limits that have been checked; those of both directions are the same.
     pub(crate) fn new(pieces: &'a [Quadratic<M>], limits: &Limits<'a, M>) -> Self {
-        let acceleration = limits.max_acceleration;
+        let [acceleration, _] = limits.max_acceleration;
         Self {
             pieces,
             feed: limits.feed,
@@ -146,7 +146,7 @@ impl<'a, const M: usize> Task<'a, M> {
                 acceleration,
                 inverse: acceleration.map(|a| 1.0 / a),
                 least: acceleration.iter().fold(f64::INFINITY, |least, &a| least.min(a)),
-                velocity_sq: limits.max_velocity.map(|v| v * v),
+                velocity_sq: limits.max_velocity[0].map(|v| v * v),
             },
             chord: ChordLimit::new(limits.chord_tolerance, limits.period, norm(&acceleration)),
             watch: limits.watch.each(limits.feed.len()),

@@ -40,7 +40,7 @@ use rayon::prelude::*;
 
 use crate::bang_bang::{check_pieces, Problem};
 use crate::bang_bang_quadratic::Fault;
-use crate::planning::{groups, ChordLimit, Limits};
+use crate::planning::{greater, groups, Both, ChordLimit, Limits};
 use cells::Cells;
 use feedplan_geometry::quadratic::norm;
 
@@ -87,8 +87,8 @@ pub struct Hint<'a> {
 /// The problem as the runs see it.
 struct Task<'a, const M: usize> {
     problem: &'a Problem<'a, M>,
-    acceleration: [f64; M],
-    velocity_sq: [f64; M],
+    acceleration: Both<M>,
+    velocity_sq: Both<M>,
     /// What speeds squared may exceed theirs by, as a factor.
     speed_share: f64,
     chord: Option<ChordLimit>,
@@ -111,12 +111,16 @@ pub fn lower_bound<const M: usize>(problem: &Problem<M>, hint: &Hint) -> Result<
     let share = if problem.tip.is_some() { 1.0 + STAND_IN } else { 1.0 };
     let task = Task {
         problem,
-        acceleration: problem.max_acceleration.map(|a| a * share),
-        velocity_sq: problem.max_velocity.map(|v| (v * share) * (v * share) * UP),
+        acceleration: problem.max_acceleration.map(|side| side.map(|a| a * share)),
+        velocity_sq: problem.max_velocity.map(|side| side.map(|v| (v * share) * (v * share) * UP)),
         speed_share: share * share * UP,
         // The chord error is that of the tool's path: where joints move in another way it is left out.
         chord: match problem.tip {
-            None => ChordLimit::new(problem.chord_tolerance, problem.period, norm(&problem.max_acceleration)),
+            None => ChordLimit::new(
+                problem.chord_tolerance,
+                problem.period,
+                norm(&greater(&problem.max_acceleration)),
+            ),
             Some(_) => None,
         },
     };

@@ -12,13 +12,21 @@ use feedplan_geometry::watch::Watch;
 /// Runs are planned in parallel in groups of about this many pieces.
 const GROUP: usize = 8192;
 
+/// Limits of the axes, as sizes: of what is positive, of what is negative.
+pub type Both<const M: usize> = [[f64; M]; 2];
+
+/// The greater limit of both directions.
+pub fn greater<const M: usize>(limits: &Both<M>) -> [f64; M] {
+    std::array::from_fn(|k| limits[0][k].max(limits[1][k]))
+}
+
 /// Runs and limits of a problem; see `bang_bang_quadratic::Problem`.
 pub struct Limits<'a, const M: usize> {
     pub runs: &'a [usize],
     pub feed: &'a [f64],
     pub junction_speed: &'a [f64],
-    pub max_velocity: [f64; M],
-    pub max_acceleration: [f64; M],
+    pub max_velocity: Both<M>,
+    pub max_acceleration: Both<M>,
     pub chord_tolerance: f64,
     pub period: f64,
     pub start_speed: f64,
@@ -64,8 +72,8 @@ impl<'a, const M: usize> Limits<'a, M> {
                 "the runs do not divide the {count} pieces: give rising offsets from 0 to {count}"
             ));
         }
-        for k in 0..M {
-            let (v, a) = (self.max_velocity[k], self.max_acceleration[k]);
+        for (side, k) in (0..2).flat_map(|side| (0..M).map(move |k| (side, k))) {
+            let (v, a) = (self.max_velocity[side][k], self.max_acceleration[side][k]);
             if !positive(v) {
                 return wrong(format!("the velocity limit of axis {k} is {v} mm/s: give a positive number"));
             }

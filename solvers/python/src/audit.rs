@@ -16,7 +16,7 @@ use feedplan_audit::polygon::MOST;
 use feedplan_audit::profile::audit_profile;
 use feedplan_audit::setpoints::{Chunk, Stream};
 use feedplan_audit::timed::Timed;
-use feedplan_audit::{Check, Limits, Tally, FEEDS};
+use feedplan_audit::{Check, Limits, Sided, Tally, FEEDS};
 use feedplan_geometry::watch::Watch;
 
 /// Name, axis (−1: none), worst value, limit, ratio, time, source line of one limit.
@@ -235,6 +235,8 @@ impl ProgramArrays<'_> {
 struct LimitArrays {
     max_velocity: Vec<f64>,
     max_acceleration: Vec<f64>,
+    min_velocity: Vec<f64>,
+    min_acceleration: Vec<f64>,
     max_jerk: Vec<f64>,
     judges_jerk: bool,
     max_velocity_jump: Vec<f64>,
@@ -250,21 +252,25 @@ impl LimitArrays {
     /// For `axes` axes, those beyond at rest.
     fn limits<const M: usize>(&self, axes: usize) -> PyResult<Limits<M>> {
         let jumps = [&self.max_velocity_jump, &self.jump_beyond];
-        let lengths = [&self.max_velocity, &self.max_acceleration, &self.max_jerk, jumps[0], jumps[1]];
+        let least = [&self.min_velocity, &self.min_acceleration];
+        let most = [&self.max_velocity, &self.max_acceleration, &self.max_jerk];
         let good = axes <= M
             && self.feed_axes.len() == FEEDS
             && self.feed_axes.iter().all(|row| row.len() == axes)
-            && lengths.iter().all(|row| row.len() == axes)
+            && most.into_iter().chain(least).chain(jumps).all(|row| row.len() == axes)
             && self.travel.len() == axes;
         require(good, "limits")?;
         fn padded<const M: usize>(values: &[f64]) -> [f64; M] {
             std::array::from_fn(|k| values.get(k).copied().unwrap_or(0.0))
         }
+        fn sided<const M: usize>(most: &[f64], least: &[f64]) -> Sided<M> {
+            Sided { positive: padded(most), negative: padded(least).map(|value: f64| -value) }
+        }
         let anywhere = [f64::NEG_INFINITY, f64::INFINITY];
         Ok(Limits {
             axes,
-            velocity: padded(&self.max_velocity),
-            acceleration: padded(&self.max_acceleration),
+            velocity: sided(&self.max_velocity, &self.min_velocity),
+            acceleration: sided(&self.max_acceleration, &self.min_acceleration),
             jerk: padded(&self.max_jerk),
             judges_jerk: self.judges_jerk,
             jump: padded(&self.max_velocity_jump),

@@ -71,6 +71,7 @@ fn plan<'py>(
     if matches!(by, Quadratics::Their)
         && arrays.tip_speed.is_none()
         && arrays.feed_share.is_none()
+        && !arrays.is_sided()
         && curve.is_quadratic()
     {
         return plan_quadratics(py, arrays, progress);

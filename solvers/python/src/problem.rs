@@ -6,6 +6,7 @@ use pyo3::prelude::*;
 use super::arrays::{indices, row, rows, rows_with, CurveArrays};
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::bang_bang::{Problem, SpeedSquare, Tip, TIP_AXES};
+use feedplan_planner::planning::Both;
 
 impl CurveArrays<'_> {
     /// Whether all pieces are polynomials of degree 2.
@@ -43,10 +44,27 @@ pub struct ProblemArrays<'py> {
     pub junction_speed: PyReadonlyArray1<'py, f64>,
     pub max_velocity: PyReadonlyArray1<'py, f64>,
     pub max_acceleration: PyReadonlyArray1<'py, f64>,
+    pub min_velocity: PyReadonlyArray1<'py, f64>,
+    pub min_acceleration: PyReadonlyArray1<'py, f64>,
     pub chord_tolerance: f64,
     pub period: f64,
     pub start_speed: f64,
     pub end_speed: f64,
+}
+
+impl ProblemArrays<'_> {
+    /// Whether a limit is another one in the other direction.
+    pub fn is_sided(&self) -> bool {
+        let sided = |most: &PyReadonlyArray1<f64>, least: &PyReadonlyArray1<f64>| {
+            most.as_array().iter().zip(least.as_array()).any(|(most, least)| *most != -least)
+        };
+        sided(&self.max_velocity, &self.min_velocity) || sided(&self.max_acceleration, &self.min_acceleration)
+    }
+}
+
+/// Limits of the axes as sizes, those at rest 1.
+fn both<const M: usize>(most: &PyReadonlyArray1<f64>, least: &PyReadonlyArray1<f64>) -> PyResult<Both<M>> {
+    Ok([row(most, 1.0)?, row::<M>(least, -1.0)?.map(|value| -value)])
 }
 
 /// Its rows in M axes, those beyond its own at rest.
@@ -119,8 +137,8 @@ impl<'a, 'py, const M: usize> ProblemRows<'a, 'py, M> {
             runs: &self.runs,
             feed: arrays.feed.as_slice()?,
             junction_speed: arrays.junction_speed.as_slice()?,
-            max_velocity: row(&arrays.max_velocity, 1.0)?,
-            max_acceleration: row(&arrays.max_acceleration, 1.0)?,
+            max_velocity: both(&arrays.max_velocity, &arrays.min_velocity)?,
+            max_acceleration: both(&arrays.max_acceleration, &arrays.min_acceleration)?,
             chord_tolerance: arrays.chord_tolerance,
             period: arrays.period,
             start_speed: arrays.start_speed,

@@ -2,7 +2,6 @@
 
 use super::part::SubPiece;
 use super::pass::{distance, Arc, Kind, Stuck};
-use super::split::Axes;
 use feedplan_geometry::polynomial::Polynomial;
 
 /// An arc may exceed a limit by this part …
@@ -17,11 +16,7 @@ const SLOW: f64 = 1e-4;
 const DECADES: [f64; 9] = [0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9];
 
 /// Whether every axis keeps its limits at some places of the arcs, else where it does not: a guard against rounding.
-pub fn keeps_limits<const M: usize, const C: usize>(
-    sub: &SubPiece<M, C>,
-    axes: &Axes<M>,
-    arcs: &[Arc],
-) -> Result<(), Stuck> {
+pub fn keeps_limits<const M: usize, const C: usize>(sub: &SubPiece<M, C>, arcs: &[Arc]) -> Result<(), Stuck> {
     // A test of the coefficients spares most sub-pieces that of places.
     let ranges = sub.g.each_ref().map(Polynomial::range);
     let fastest = ranges.iter().fold(0.0_f64, |most, range| most.max(range.1));
@@ -33,8 +28,8 @@ pub fn keeps_limits<const M: usize, const C: usize>(
             Kind::Braking(j) => (j, true),
             _ => return true,
         };
-        let signed = if braking { -axes.acceleration[j] } else { axes.acceleration[j] };
-        let at = Places { sub, axes, arc, j, signed, braking, slow_somewhere };
+        let signed = if braking { -sub.limits.down[j] } else { sub.limits.up[j] };
+        let at = Places { sub, arc, j, signed, braking, slow_somewhere };
         let (slowest, other) = if braking { (arc.x1, arc.x0) } else { (arc.x0, arc.x1) };
         at.keep_limits(PLACES, 1.0 + EXCESS)
             && (!slow(slowest) || at.keep_limits(DECADES, 1.0 + EXCESS_NEAR))
@@ -46,7 +41,6 @@ pub fn keeps_limits<const M: usize, const C: usize>(
 /// What the places of an arc share; they are counted from where it is slowest.
 struct Places<'a, const M: usize, const C: usize> {
     sub: &'a SubPiece<M, C>,
-    axes: &'a Axes<M>,
     arc: &'a Arc,
     /// The axis at its limit, which the arc has with this sign.
     j: usize,
@@ -58,23 +52,25 @@ struct Places<'a, const M: usize, const C: usize> {
 impl<const M: usize, const C: usize> Places<'_, M, C> {
     /// Whether each axis keeps its limits, but for a factor.
     fn keep_limits<const K: usize>(&self, places: [f64; K], factor: f64) -> bool {
-        let Self { sub, axes, arc, j, .. } = *self;
+        let Self { sub, arc, j, .. } = *self;
+        let limits = &sub.limits;
         let span = arc.x1 - arc.x0;
         let x = places.map(|place| if self.braking { arc.x1 - place * span } else { arc.x0 + place * span });
         let (weight, g) = (sub.weight.values(x), sub.g[j].values(x));
         let way = self.ways(x, &g);
         let pi: [f64; K] =
-            std::array::from_fn(|i| (arc.slow_sq + 2.0 * axes.acceleration[j] * way[i]) / (g[i] * g[i]));
+            std::array::from_fn(|i| (arc.slow_sq + 2.0 * self.signed.abs() * way[i]) / (g[i] * g[i]));
         let bend: [f64; K] = std::array::from_fn(|i| weight[i] * weight[i] * pi[i]);
         (0..M).all(|l| {
             let other = sub.g[l].values(x);
             // ω² (g_l s + g_l' π) with s from axis j, without the difference of large terms.
             let twist =
                 if sub.straight || l == j { [0.0; K] } else { sub.g[l].wronskian(&sub.g[j]).values(x) };
-            let (most, most_sq) = (axes.acceleration[l] * factor, axes.velocity_sq[l] * factor);
+            let [up, down, most_sq] =
+                [limits.up[l], limits.down[l], limits.velocity_sq[l]].map(|limit| limit * factor);
             (0..K).fold(true, |kept, i| {
-                kept & ((self.signed * other[i] + bend[i] * twist[i]).abs() <= most * g[i])
-                    & (other[i] * other[i] * pi[i] <= most_sq)
+                let need = self.signed * other[i] + bend[i] * twist[i];
+                kept & (need <= up * g[i]) & (-need <= down * g[i]) & (other[i] * other[i] * pi[i] <= most_sq)
             })
         })
     }

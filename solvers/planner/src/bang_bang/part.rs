@@ -1,6 +1,7 @@
 //! A part of a piece on which no axis turns round and one velocity cap is the lowest, and that part as a pass travels it.
 
 use super::piece::{counted, Piece};
+use super::split::Axes;
 use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
 
@@ -66,6 +67,28 @@ pub struct Remedy {
     pub stops: bool,
 }
 
+/// Limits of the axes on a part as a pass travels it, where every axis moves forward.
+#[derive(Clone, Copy, Debug)]
+pub struct Travelled<const M: usize> {
+    /// The greatest acceleration, and the greatest deceleration.
+    pub up: [f64; M],
+    pub down: [f64; M],
+    pub velocity_sq: [f64; M],
+}
+
+impl<const M: usize> Travelled<M> {
+    /// Those of a part on which the axes of these bits move backward, in the sense of the path.
+    #[inline(always)]
+    fn new(axes: &Axes<M>, negative: AxisBits) -> Self {
+        let side = |k: usize| usize::from(negative >> k & 1);
+        Self {
+            up: std::array::from_fn(|k| axes.acceleration[side(k)][k]),
+            down: std::array::from_fn(|k| axes.acceleration[1 - side(k)][k]),
+            velocity_sq: std::array::from_fn(|k| axes.velocity_sq[side(k)][k]),
+        }
+    }
+}
+
 /// A part as a pass travels it, its polynomials over x in [0, 1], every axis moving forward.
 ///
 /// Here g and π belong to x: π = (dx/dτ)²/ω⁴.
@@ -75,6 +98,7 @@ pub struct SubPiece<const M: usize, const C: usize> {
     pub weight: Polynomial<C>,
     pub speed: Polynomial<C>,
     pub cap: Cap,
+    pub limits: Travelled<M>,
     /// Bit k: axis k moves at all.
     pub moving: AxisBits,
     /// Degree of the curve itself.
@@ -101,8 +125,18 @@ impl Part {
         Remedy { piece, t, reach: if narrow { length } else { 0.0 }, stops: false }
     }
 
+    /// Limits of the axes as the part is travelled forward.
+    #[inline(always)]
+    pub fn limits<const M: usize>(&self, axes: &Axes<M>) -> Travelled<M> {
+        Travelled::new(axes, self.negative)
+    }
+
     /// The part as travelled forward.
-    pub fn sub_piece<const M: usize, const C: usize>(&self, piece: &Piece<M, C>) -> SubPiece<M, C> {
+    pub fn sub_piece<const M: usize, const C: usize>(
+        &self,
+        piece: &Piece<M, C>,
+        axes: &Axes<M>,
+    ) -> SubPiece<M, C> {
         let length = self.to - self.from;
         let mut whole = length == 1.0;
         let g: [Polynomial<C>; M] = std::array::from_fn(|k| {
@@ -149,6 +183,7 @@ impl Part {
             weight: piece.weight.part(self.from, self.to),
             speed,
             cap: self.cap,
+            limits: self.limits(axes),
             moving: self.moving,
             degree: piece.degree,
             straight: piece.straight,
@@ -204,6 +239,7 @@ impl<const M: usize, const C: usize> SubPiece<M, C> {
             weight: self.weight.reverse(),
             speed: self.speed.reverse(),
             cap,
+            limits: Travelled { up: self.limits.down, down: self.limits.up, ..self.limits },
             cusp_orders: [self.cusp_orders[1], self.cusp_orders[0]],
             ..*self
         }

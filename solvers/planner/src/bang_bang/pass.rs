@@ -4,13 +4,16 @@
 //! the velocity cap and the limit curve, then forward under what that left, are exact. Every event is the first root
 //! of a polynomial; with N, W, M of axes j, l and w = ω v_j²
 //!
+//! and A the limit of accelerations, A⁻ that of decelerations (an axis that moves backward on the path has them the other
+//! way round; the backward pass swaps them)
+//!
 //! | while | holds |
 //! |---|---|
 //! | on an arc of axis j, axis l stays below +A_l | A_l g_j³ − A_j g_l g_j² − ω w (g_l' g_j − g_l g_j') ≥ 0 |
-//! | and above −A_l (backward) | A_l g_j³ + A_j g_l g_j² + ω w (g_l' g_j − g_l g_j') ≥ 0 |
+//! | and above −A_l⁻ (backward) | A_l⁻ g_j³ + A_j g_l g_j² + ω w (g_l' g_j − g_l g_j') ≥ 0 |
 //! | under a bound π ≤ n/d | n ω g_j² − w d ≥ 0 |
-//! | on the limit curve π = N/(ω² W), N = A_j g_l + A_l g_j, W = g_j' g_l − g_j g_l' | ω (N W' − 3 N' W) + 2 ω' N W ≥ 0 |
-//! | and axis i within ±A_i | A_i W ± (g_i' N − g_i N') ≥ 0 |
+//! | on the limit curve π = N/(ω² W), N = A_j g_l + A_l⁻ g_j, W = g_j' g_l − g_j g_l' | ω (N W' − 3 N' W) + 2 ω' N W ≥ 0 |
+//! | and axis i from −A_i⁻ to A_i | A_i W − (g_i' N − g_i N') ≥ 0, A_i⁻ W + (g_i' N − g_i N') ≥ 0 |
 //! | along v² = f | A_l D² − ω² ((g_l' D − g_l D'/2) f + g_l D f'/2) ≥ 0 |
 //! | along v_k = V | A_l g_k³ − V² ω² (g_l' g_k − g_l g_k') ≥ 0 |
 
@@ -19,7 +22,6 @@ mod limit_curve;
 mod slide;
 
 use super::part::{Cap, SubPiece};
-use super::split::Axes;
 use super::window::{Bound, Window};
 use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
@@ -106,7 +108,6 @@ fn direction<const M: usize, const C: usize>(sub: &SubPiece<M, C>, at_end: bool)
 /// (forward: from its last to its first); appends the arcs and returns the state at the end.
 pub fn run<const M: usize, const C: usize, const BACK: bool>(
     sub: &SubPiece<M, C>,
-    axes: &Axes<M>,
     state: State,
     bounds: &[Arc],
     out: &mut Vec<Arc>,
@@ -117,7 +118,6 @@ pub fn run<const M: usize, const C: usize, const BACK: bool>(
     let first = out.len();
     let mut pass = Pass::<M, C, BACK> {
         sub,
-        axes,
         window: Window::new(sub),
         pi,
         order,
@@ -153,7 +153,7 @@ pub fn run<const M: usize, const C: usize, const BACK: bool>(
         pi * sub.rate_sq(true)
     } else if straight {
         let last = out[first..].last();
-        last.map_or(0.0, |arc| end_speed_sq(sub, axes, arc, &direction(sub, true)))
+        last.map_or(0.0, |arc| end_speed_sq(sub, arc, &direction(sub, true)))
     } else {
         0.0
     };
@@ -163,14 +163,13 @@ pub fn run<const M: usize, const C: usize, const BACK: bool>(
 /// The speed squared of the axes at the end of the last arc, where the sub-piece has no tangent.
 fn end_speed_sq<const M: usize, const C: usize>(
     sub: &SubPiece<M, C>,
-    axes: &Axes<M>,
     arc: &Arc,
     direction: &[f64; M],
 ) -> f64 {
     match arc.kind {
         Kind::Accelerating(k) => {
             let way = distance(sub, k, arc.x0, arc.x1);
-            (arc.slow_sq + 2.0 * axes.acceleration[k] * way) / direction[k].powi(2)
+            (arc.slow_sq + 2.0 * sub.limits.up[k] * way) / direction[k].powi(2)
         }
         Kind::Braking(k) => arc.slow_sq / direction[k].powi(2),
         Kind::Cap => match sub.cap {
@@ -196,14 +195,14 @@ pub fn distance<const M: usize, const C: usize>(sub: &SubPiece<M, C>, k: usize, 
 struct Start<const M: usize> {
     g: [f64; M],
     c: [f64; M],
-    /// A_k/ω² and its slope.
+    /// A_k/ω² and its slope, and the same of decelerations.
     limit: [f64; M],
     limit_slope: [f64; M],
+    low_limit: [f64; M],
 }
 
 struct Pass<'a, const M: usize, const C: usize, const BACK: bool> {
     sub: &'a SubPiece<M, C>,
-    axes: &'a Axes<M>,
     window: Window<M, C>,
     /// π of the window.
     pi: f64,
@@ -282,7 +281,8 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             Kind::Accelerating(k) | Kind::Braking(k) => {
                 let (g, weight) = (window.g[k].reverse(), window.weight.reverse());
                 let gain = g.antiderivative(&weight, self.sub.degree);
-                let w = weight.combine(arc.slow_sq, &gain, 2.0 * self.axes.acceleration[k]);
+                // In the sense of this pass the axis brakes.
+                let w = weight.combine(arc.slow_sq, &gain, 2.0 * self.sub.limits.down[k]);
                 window.bound = Bound::Arc(k, w.reverse());
             }
             Kind::Cap => {}
@@ -342,11 +342,12 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
     fn start(&self) -> Start<M> {
         let (w, slope) = (self.window.weight.first(), self.window.weight.first_slope());
         let g = &self.window.g;
-        let limit = self.axes.acceleration.map(|a| a / (w * w));
+        let limit = self.sub.limits.up.map(|a| a / (w * w));
         Start {
             g: std::array::from_fn(|k| g[k].first()),
             c: std::array::from_fn(|k| g[k].first_slope()),
             limit,
+            low_limit: self.sub.limits.down.map(|a| a / (w * w)),
             limit_slope: if slope == 0.0 { [0.0; M] } else { limit.map(|limit| -2.0 * limit * slope / w) },
         }
     }
@@ -359,7 +360,8 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         self.pi = self.pi.min(self.window.bound_at_start());
         for k in 0..M {
             if start.g[k] == 0.0 && start.c[k] != 0.0 {
-                self.pi = self.pi.min(start.limit[k] / start.c[k].abs());
+                let limit = if start.c[k] > 0.0 { start.limit[k] } else { start.low_limit[k] };
+                self.pi = self.pi.min(limit / start.c[k].abs());
             }
         }
         if !BACK || self.straight {
@@ -368,9 +370,11 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         let mut lowest = f64::INFINITY;
         for j in 0..M {
             for l in 0..j {
-                let w = (start.c[j] * start.g[l] - start.c[l] * start.g[j]).abs();
-                if start.g[j] > 0.0 && start.g[l] > 0.0 && w > 0.0 {
-                    lowest = lowest.min((start.limit[j] * start.g[l] + start.limit[l] * start.g[j]) / w);
+                let w = start.c[j] * start.g[l] - start.c[l] * start.g[j];
+                if start.g[j] > 0.0 && start.g[l] > 0.0 && w != 0.0 {
+                    let (high, low) = if w > 0.0 { (j, l) } else { (l, j) };
+                    let n = start.limit[high] * start.g[low] + start.low_limit[low] * start.g[high];
+                    lowest = lowest.min(n / w.abs());
                 }
             }
         }
@@ -381,7 +385,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         let Some((j, s)) = self.least(start).map(|(j, s, ..)| (j, s)) else { return };
         let mut low: Option<(usize, f64)> = None;
         for l in self.moving().filter(|&l| l != j && start.g[l] > 0.0) {
-            let needed = (-start.limit[l] - start.c[l] * self.pi) / start.g[l];
+            let needed = (-start.low_limit[l] - start.c[l] * self.pi) / start.g[l];
             if low.is_none_or(|(_, most)| needed > most) {
                 low = Some((l, needed));
             }
@@ -404,7 +408,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             pi_start = match kind {
                 Kind::Accelerating(j) if self.order == 1 && slow_sq == 0.0 => {
                     let lead = self.window.g[j].coefficients()[1];
-                    self.axes.acceleration[j] / (lead * self.window.weight.first().powi(2)) * scale
+                    self.sub.limits.up[j] / (lead * self.window.weight.first().powi(2)) * scale
                 }
                 _ => f64::INFINITY,
             };
@@ -438,7 +442,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
     /// π at the end of the window where axis j turns round: all others hold it there.
     fn at_turn(&self, j: usize) -> Option<f64> {
         let slope = self.window.g[j].reverse().first_slope();
-        (slope != 0.0).then(|| self.axes.acceleration[j] / (slope.abs() * self.window.weight.last().powi(2)))
+        (slope != 0.0).then(|| self.sub.limits.down[j] / (slope.abs() * self.window.weight.last().powi(2)))
     }
 }
 

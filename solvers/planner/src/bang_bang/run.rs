@@ -259,7 +259,7 @@ fn backward_over<const M: usize, const C: usize>(
     let mut limited = false;
     for number in (start..space.parts.len()).rev() {
         let part = space.parts[number];
-        let sub = part.sub_piece(&piece);
+        let sub = part.sub_piece(&piece, &task.axes);
         let end = PartEnd::of(&sub, part.negative, true);
         if !std::mem::replace(&mut limited, true) {
             at.state.speed_sq = at.state.speed_sq.min(of_axes(at.tip_sq, sub.tip_share(true)));
@@ -272,7 +272,7 @@ fn backward_over<const M: usize, const C: usize>(
         space.offsets.push(space.bounds.len());
         let reversed = sub.reversed();
         let arcs = space.bounds.len();
-        at.state = match pass::run::<M, C, true>(&reversed, &task.axes, at.state, &[], &mut space.bounds) {
+        at.state = match pass::run::<M, C, true>(&reversed, at.state, &[], &mut space.bounds) {
             Ok(next) if !part.starts_at_rest() => next,
             Ok(_) => State { speed_sq: 0.0 },
             Err(Stuck(x)) => {
@@ -331,7 +331,7 @@ fn forward_over<const M: usize, const C: usize>(
     for number in parts {
         *index -= 1;
         let part = space.parts[number];
-        let sub = space.subs.get::<M, C>(*index, &part);
+        let sub = space.subs.get::<M, C>(*index, &part, &task.axes);
         let start = PartEnd::of(&sub, part.negative, false);
         if !std::mem::replace(&mut limited, true) {
             at.state.speed_sq = at.state.speed_sq.min(of_axes(at.tip_sq, sub.tip_share(false)));
@@ -346,8 +346,8 @@ fn forward_over<const M: usize, const C: usize>(
         let end = space.offsets.get(*index + 1).copied().unwrap_or(space.bounds.len());
         let bounds = &space.bounds[space.offsets[*index]..end];
         space.arcs.clear();
-        let kept = pass::run::<M, C, false>(&sub, &task.axes, at.state, bounds, &mut space.arcs)
-            .and_then(|next| keeps_limits(&sub, &task.axes, &space.arcs).map(|()| next));
+        let kept = pass::run::<M, C, false>(&sub, at.state, bounds, &mut space.arcs)
+            .and_then(|next| keeps_limits(&sub, &space.arcs).map(|()| next));
         at.state = kept.unwrap_or_else(|Stuck(x)| {
             space.asked.push(part.remedy(i, x));
             State { speed_sq: 0.0 }
@@ -380,16 +380,9 @@ fn push<const M: usize, const C: usize>(
             }
         };
         let way = |k: usize| distance(sub, k, arc.x0, arc.x1);
-        let signed = |k: usize| {
-            let a = task.axes.acceleration[k];
-            if part.negative >> k & 1 == 1 {
-                -a
-            } else {
-                a
-            }
-        };
+        let sign = |k: usize| if part.negative >> k & 1 == 1 { -1.0 } else { 1.0 };
         let mut joins = true;
-        let mut by_acceleration = |k: usize| {
+        let mut by_acceleration = |k: usize, a: f64| {
             // Way over mean speed, the faster speed from the way.
             let way = way(k);
             // Not with what comes before its axis turns, not even where arcs too short to be kept lie in between.
@@ -397,11 +390,16 @@ fn push<const M: usize, const C: usize>(
             if way <= 0.0 {
                 return 0.0;
             }
-            2.0 * way / (arc.slow_sq.sqrt() + (arc.slow_sq + 2.0 * task.axes.acceleration[k] * way).sqrt())
+            2.0 * way / (arc.slow_sq.sqrt() + (arc.slow_sq + 2.0 * a * way).sqrt())
         };
+        let (up, down) = (&sub.limits.up, &sub.limits.down);
         let (kind, axis, value, duration) = match arc.kind {
-            Kind::Accelerating(k) => (ArcKind::AxisAcceleration, k as u8, signed(k), by_acceleration(k)),
-            Kind::Braking(k) => (ArcKind::AxisAcceleration, k as u8, -signed(k), by_acceleration(k)),
+            Kind::Accelerating(k) => {
+                (ArcKind::AxisAcceleration, k as u8, sign(k) * up[k], by_acceleration(k, up[k]))
+            }
+            Kind::Braking(k) => {
+                (ArcKind::AxisAcceleration, k as u8, -sign(k) * down[k], by_acceleration(k, down[k]))
+            }
             Kind::LimitCurve => continue,
             Kind::Cap => match sub.cap {
                 Cap::Axis(k, v_sq) => (ArcKind::AxisVelocity, k as u8, v_sq, way(k) / v_sq.sqrt()),

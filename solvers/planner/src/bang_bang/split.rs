@@ -6,6 +6,7 @@ use super::part::{Cap, End, Part, Remedy, SAME_TURN};
 use super::piece::Piece;
 use super::TIP_AXES;
 use crate::planning::ChordLimit;
+use crate::planning::{greater, Both};
 use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
 
@@ -23,10 +24,18 @@ const NOISE: f64 = 1e-14;
 /// A tangent coefficient this small beside the greatest one is zero.
 const ZERO: f64 = 1e-14;
 
-/// Limits of the axes.
+/// Limits of the axes in both directions.
 pub struct Axes<const M: usize> {
-    pub acceleration: [f64; M],
-    pub velocity_sq: [f64; M],
+    pub acceleration: Both<M>,
+    pub velocity_sq: Both<M>,
+}
+
+impl<const M: usize> Axes<M> {
+    /// The squares of the different velocity limits of axis k.
+    fn velocities_sq(&self, k: usize) -> impl Iterator<Item = f64> + Clone + '_ {
+        let count = if self.velocity_sq[0][k] == self.velocity_sq[1][k] { 1 } else { 2 };
+        self.velocity_sq[..count].iter().map(move |side| side[k])
+    }
 }
 
 /// What limits the speed on a piece.
@@ -96,7 +105,7 @@ pub fn split<const M: usize, const C: usize>(
     let lines = if below_chord.is_empty() { &whole } else { below_chord.as_slice() };
     // Where the axes are the tool's none is faster than the tool.
     let can_cap = (0..M).fold(0, |bits, k| {
-        let slow = piece.own_speed && axes.velocity_sq[k] >= most_sq;
+        let slow = piece.own_speed && axes.velocities_sq(k).all(|v_sq| v_sq >= most_sq);
         bits | AxisBits::from(!slow && moving >> k & 1 == 1) << k
     });
     let mut fast = 0;
@@ -274,35 +283,41 @@ fn cut_by_cap<const M: usize, const C: usize>(
     let speed = on_line(&piece.speed);
     let [f0, f1] = line.speed_sq;
     // The tool is never faster than all of its axes at their limits.
-    let binds = !piece.own_speed || f0.min(f1) < axes.velocity_sq.iter().sum();
+    let binds = !piece.own_speed || f0.min(f1) < greater(&axes.velocity_sq).iter().sum();
     let bound =
         if f0 == f1 { Polynomial::constant(f0) } else { Polynomial::from_bernstein([f0, f1].into_iter()) };
     let finite = f0.is_finite() && f1.is_finite();
     let feed = feed.map(|(rate, feed_sq)| (on_line(rate), *feed_sq));
-    for k in (0..M).filter(|&k| can_cap >> k & 1 == 1 && axes.velocity_sq[k] < f64::MAX) {
-        let square = || on_line(&piece.g[k].multiply(&piece.g[k]));
-        let mut excesses = [None, None];
-        if binds && finite {
-            excesses[0] = Some(square().multiply(&bound).combine(1.0, &speed, -axes.velocity_sq[k]));
+    // Which of its limits holds for an axis is told part by part: the cuts are those of both.
+    for k in (0..M).filter(|&k| can_cap >> k & 1 == 1) {
+        for v_sq in axes.velocities_sq(k).filter(|&v_sq| v_sq < f64::MAX) {
+            let square = || on_line(&piece.g[k].multiply(&piece.g[k]));
+            let mut excesses = [None, None];
+            if binds && finite {
+                excesses[0] = Some(square().multiply(&bound).combine(1.0, &speed, -v_sq));
+            }
+            if let Some((rate, feed_sq)) = &feed {
+                excesses[1] = Some(square().combine(*feed_sq, rate, -v_sq));
+            }
+            let is_slow = |excess: &Polynomial<C>| excess.coefficients().iter().all(|&value| value <= 0.0);
+            if excesses.iter().flatten().any(is_slow) {
+                continue;
+            }
+            excesses.iter().flatten().for_each(|excess| crossings(excess, &mut cut));
+            fast |= 1 << k;
         }
-        if let Some((rate, feed_sq)) = &feed {
-            excesses[1] = Some(square().combine(*feed_sq, rate, -axes.velocity_sq[k]));
-        }
-        let is_slow = |excess: &Polynomial<C>| excess.coefficients().iter().all(|&value| value <= 0.0);
-        if excesses.iter().flatten().any(is_slow) {
-            continue;
-        }
-        excesses.iter().flatten().for_each(|excess| crossings(excess, &mut cut));
-        fast |= 1 << k;
     }
     if let Some((rate, feed_sq)) = feed.filter(|_| finite) {
         crossings(&rate.multiply(&bound).combine(1.0, &speed, -feed_sq), &mut cut);
     }
     for j in (0..M).filter(|&j| fast >> j & 1 == 1) {
         for k in (j + 1..M).filter(|&k| fast >> k & 1 == 1) {
-            let (v_j, v_k) = (axes.velocity_sq[j].sqrt(), axes.velocity_sq[k].sqrt());
-            for sign in [1.0, -1.0] {
-                crossings(&on_line(&piece.g[k].combine(v_j, &piece.g[j], sign * v_k)), &mut cut);
+            for v_j in axes.velocities_sq(j).map(f64::sqrt) {
+                for v_k in axes.velocities_sq(k).map(f64::sqrt) {
+                    for sign in [1.0, -1.0] {
+                        crossings(&on_line(&piece.g[k].combine(v_j, &piece.g[j], sign * v_k)), &mut cut);
+                    }
+                }
             }
         }
     }
@@ -345,9 +360,10 @@ fn lowest_cap<const M: usize>(
         (lowest, cap) = (feed_sq / rate, Cap::Feed(feed_sq));
     }
     for k in (0..M).filter(|&k| fast >> k & 1 == 1) {
-        if g[k] * g[k] * lowest > axes.velocity_sq[k] {
-            lowest = axes.velocity_sq[k] / (g[k] * g[k]);
-            cap = Cap::Axis(k, axes.velocity_sq[k]);
+        let v_sq = axes.velocity_sq[usize::from(g[k] < 0.0)][k];
+        if g[k] * g[k] * lowest > v_sq {
+            lowest = v_sq / (g[k] * g[k]);
+            cap = Cap::Axis(k, v_sq);
         }
     }
     cap

@@ -2,6 +2,7 @@
 //! degree, or of the capacity where that is small.
 
 use super::part::{Part, SubPiece};
+use super::split::Axes;
 use feedplan_geometry::polynomial::Polynomial;
 
 /// Sub-pieces of any degree, in the order of the backward pass.
@@ -42,7 +43,12 @@ impl Store {
     }
 
     /// The sub-piece that was pushed as this one; `part` is its part of the piece.
-    pub fn get<const M: usize, const C: usize>(&self, number: usize, part: &Part) -> SubPiece<M, C> {
+    pub fn get<const M: usize, const C: usize>(
+        &self,
+        number: usize,
+        part: &Part,
+        axes: &Axes<M>,
+    ) -> SubPiece<M, C> {
         let kept = &self.kept[number];
         let [tangent, weight, speed, degree] = kept.degrees.map(usize::from);
         let mut rest = &self.coefficients[kept.start..];
@@ -56,6 +62,7 @@ impl Store {
             weight: next(weight),
             speed: next(speed),
             cap: part.cap,
+            limits: part.limits(axes),
             moving: part.moving,
             degree,
             straight: kept.straight,

@@ -48,6 +48,8 @@ pub struct Node<const M: usize> {
 pub struct Ways<const M: usize> {
     pub least: [f64; M],
     pub most: [f64; M],
+    /// 0 of an axis that gets forward from one to the other, 1 of one that gets backward, where it moves at least.
+    pub side: [usize; M],
 }
 
 impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
@@ -209,16 +211,18 @@ impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
             n => self.part(a.t, b.t)[..=n].iter().for_each(add),
         }
         let share = 1.0 / (self.degree + 1) as f64;
-        let mut ways = Ways { least: [0.0; M], most: [0.0; M] };
+        let mut ways = Ways { least: [0.0; M], most: [0.0; M], side: [0; M] };
         for k in 0..M {
             let noise = self.noise[k];
             if R > 0 && self.count > 0 {
                 let way = (b.q[k] - a.q[k]).abs();
+                ways.side[k] = usize::from(b.q[k] < a.q[k]);
                 // No more to and fro than the smaller of what is positive and what is negative, twice.
                 let back = h * (share * (sizes[k] - sum[k].abs()) + 2.0 * noise) / self.weights[0].powi(2);
                 ways.least[k] = (way - 2.0 * self.point_noise[k]).max(0.0) * super::DOWN;
                 ways.most[k] = (way + 2.0 * self.point_noise[k] + back) * super::UP;
             } else {
+                ways.side[k] = usize::from(sum[k] < 0.0);
                 ways.least[k] = h * (share * sum[k].abs() - noise).max(0.0) * super::DOWN;
                 ways.most[k] = h * (share * sizes[k] + noise) * super::UP;
             }
@@ -272,7 +276,8 @@ impl<const M: usize, const C: usize, const R: usize> Hodograph<M, C, R> {
             + (ck.abs() + n * nk) * nj
             + n * (gk.abs() * nj + gj.abs() * nk)
             + 2.0 * f64::EPSILON * ((cj * gk).abs() + (ck * gj).abs());
-        ((cj * gk - ck * gj).abs() - error * super::UP).max(0.0)
+        let twist = cj * gk - ck * gj;
+        (twist.abs() - error * super::UP).max(0.0).copysign(twist)
     }
 
     pub fn least_weight(&self) -> f64 {

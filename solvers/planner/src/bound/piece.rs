@@ -111,17 +111,23 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
         let mut most = self.feed_sq / self.feed_rate(node, speed);
         for k in 0..M {
             let least = (node.rate[k].abs() - noise[k]).max(0.0);
-            most = most.min(task.velocity_sq[k] / (least * least));
+            // At a cusp the rate may have the sign of what comes before.
+            let v_sq = match node.order {
+                0 => task.velocity_sq[usize::from(node.rate[k] < 0.0)][k],
+                _ => task.velocity_sq[0][k].max(task.velocity_sq[1][k]),
+            };
+            most = most.min(v_sq / (least * least));
         }
         if node.order == 0 {
             for j in 0..M {
                 for k in j + 1..M {
-                    // |g_j s + g_j' π| ≤ A_j/ω², the same of k, without s.
+                    // ω² (g_j s + g_j' π) = a_j within its limits, the same of k, without s: ω² W π = a_j g_k − a_k g_j.
                     let twist = self.curve.twist(node, j, k);
-                    if twist > 0.0 {
-                        let both = task.acceleration[j] * (node.g[k].abs() + noise[k])
-                            + task.acceleration[k] * (node.g[j].abs() + noise[j]);
-                        most = most.min(both / (twist * node.weight_sq));
+                    if twist != 0.0 {
+                        let sign = 1.0_f64.copysign(twist);
+                        let both = self.most_times(j, sign * node.g[k], noise[k])
+                            + self.most_times(k, -sign * node.g[j], noise[j]);
+                        most = most.min(both / (twist.abs() * node.weight_sq));
                     }
                 }
             }
@@ -133,6 +139,14 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
             }
         }
         most * UP
+    }
+
+    /// Not below the acceleration of axis k times `factor`, which may be off by `noise`.
+    #[inline(always)]
+    fn most_times(&self, k: usize, factor: f64, noise: f64) -> f64 {
+        let [forward, backward] = self.task.acceleration.each_ref().map(|side| side[k]);
+        let (size, own) = (factor.abs(), if factor < 0.0 { backward } else { forward });
+        (if size > noise { own } else { forward.max(backward) }) * (size + noise)
     }
 
     /// Not below the greatest v² that the chord error allows at a node.
@@ -179,7 +193,24 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
             return f64::INFINITY;
         }
         let weight = (node.weight_sq.sqrt() - curve.weight_change(d)) * DOWN;
-        self.task.acceleration[k] * (c + change) / ((c - change).powi(2) * weight * weight)
+        self.task.acceleration[usize::from(node.c[k] < 0.0)][k] * (c + change)
+            / ((c - change).powi(2) * weight * weight)
+    }
+
+    /// Not below what the square of the velocity of axis k over 2 grows by between two nodes, in the order of time or
+    /// against it.
+    ///
+    /// In the sense in which the axis gets on it goes `most` at most, and back (most − least)/2.
+    #[inline(always)]
+    fn gain(&self, k: usize, in_time: bool, ways: &Ways<M>) -> f64 {
+        let side = if in_time { ways.side[k] } else { 1 - ways.side[k] };
+        let (on, back) = (self.task.acceleration[side][k], self.task.acceleration[1 - side][k]);
+        let (least, most) = (ways.least[k], ways.most[k]);
+        if least > 0.0 {
+            on * most + (back - on).max(0.0) * 0.5 * (most - least)
+        } else {
+            on.max(back) * most
+        }
     }
 
     /// Not below x at `to` where it is at most `x` at `from`, on either side of it.
@@ -190,7 +221,7 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
             let noise = self.curve.noise[k];
             let rate = from.rate[k].abs() + noise;
             let kept = if self.curve.turns(k, from, to) { 0.0 } else { rate * rate * x };
-            let reached = kept + 2.0 * self.task.acceleration[k] * ways.most[k];
+            let reached = kept + 2.0 * self.gain(k, from.t < to.t, ways);
             let rate = (to.rate[k].abs() - noise).max(0.0);
             most = most.min(reached / (rate * rate));
         }
@@ -212,7 +243,9 @@ impl<'a, const M: usize, const C: usize, const R: usize> Piece<'a, M, C, R> {
             let noise = self.curve.noise[k];
             let (first, last) = (a.rate[k].abs() + noise, b.rate[k].abs() + noise);
             let (first_sq, last_sq) = (first * first * x[0] * UP, last * last * x[1] * UP);
-            least_time(ways.least[k], first_sq, last_sq, self.task.acceleration[k], self.task.velocity_sq[k])
+            let (task, side) = (self.task, ways.side[k]);
+            let ramps = [task.acceleration[side][k], task.acceleration[1 - side][k]];
+            least_time(ways.least[k], first_sq, last_sq, ramps, task.velocity_sq[side][k])
         };
         let mut time = if axis < M { of_axis(axis) } else { 0.0 };
         if time < wanted {

@@ -75,7 +75,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
     /// The control axis from a cusp: s is infinite, the tangents' leading coefficients decide.
     fn least_from_cusp(&self) -> Option<(usize, AxisBits)> {
         let lead = |k: usize| self.window.g[k].coefficients()[self.order];
-        let ratio = |k: usize| self.axes.acceleration[k] / lead(k);
+        let ratio = |k: usize| self.sub.limits.up[k] / lead(k);
         let least = self.moving().filter(|&k| lead(k) > 0.0).map(ratio).fold(f64::INFINITY, f64::min);
         let tied = |k: usize| lead(k) > 0.0 && ratio(k) <= least * (1.0 + TIE);
         let bits = self.moving().filter(|&k| tied(k)).fold(0, |bits, k| bits | 1 << k);
@@ -96,7 +96,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         };
         tied = (tied | self.tied) & !(1 << j);
         let window = &self.window;
-        let a = &self.axes.acceleration;
+        let (a, low) = (&self.sub.limits.up, &self.sub.limits.down);
         let g = &window.g[j];
         let slow_sq = match (order, turns) {
             (0, false) => self.pi * g.first() * g.first(),
@@ -132,17 +132,18 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                 let twist = weighted.multiply(&twist);
                 let along = window.g[l].multiply(&square);
                 let need = along.combine(a[j], &twist, 1.0);
-                let size = || {
+                let size = |most: f64| {
                     let twist = weighted.magnitude().multiply(&window.g[l].wronskian_magnitude(g));
-                    cube.combine(a[l], &along, a[j]).combine(NOISE, &twist, NOISE)
+                    cube.combine(most, &along, a[j]).combine(NOISE, &twist, NOISE)
                 };
                 let roots = known + usize::from(tied >> l & 1 == 1);
                 if !below_limit {
                     let above = cube.combine(a[l], &need, -1.0);
-                    found(kept_until(&above, size, roots, 1e-9 * a[l] * cube.first()), Event::Transition(l));
+                    let slack = 1e-9 * a[l] * cube.first();
+                    found(kept_until(&above, || size(a[l]), roots, slack), Event::Transition(l));
                 }
                 if !above_limit {
-                    let below = cube.combine(a[l], &need, 1.0);
+                    let below = cube.combine(low[l], &need, 1.0);
                     let contact = if self.low != Some(l) {
                         0
                     } else if self.tangent {
@@ -150,7 +151,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                     } else {
                         1
                     };
-                    found(kept_until(&below, size, known + contact, 0.0), Event::Low(l));
+                    found(kept_until(&below, || size(low[l]), known + contact, 0.0), Event::Low(l));
                 }
             }
         }
@@ -182,14 +183,14 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         Ok(())
     }
 
-    /// Whether axis l stays below +A and above −A while axis j is at +A with w = v_j², told without a polynomial of its
-    /// own; forward nothing goes below −A.
+    /// Whether axis l stays below +A and above −A⁻ while axis j is at +A with w = v_j², told without a polynomial of its
+    /// own; forward nothing goes below −A⁻.
     ///
     /// Axis l has the acceleration (A_j g_l + π W)/g_j with W = g_l' g_j − g_l g_j', and its slope is
     /// 3 W (A_j g_j² − w g_j')/g_j⁴ + w W'/g_j³. On a quadratic W and the bracket are constant: the ends tell. On other
     /// polynomial pieces the Bernstein coefficients enclose the terms, with the greatest π that w allows.
     fn has_to_spare(&self, l: usize, j: usize, w: &Polynomial<C>) -> [bool; 2] {
-        let (a, window) = (&self.axes.acceleration, &self.window);
+        let (a, low, window) = (&self.sub.limits.up, &self.sub.limits.down, &self.window);
         let (g, other) = (&window.g[j], &window.g[l]);
         if window.weight.degree() > 0 {
             return [false, !BACK];
@@ -197,9 +198,9 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         if g.degree() == 1 {
             let twist = other.last() * g.first() - other.first() * g.last();
             let keeps = |g: f64, other: f64, w: f64| {
-                let (most, turn) = (a[l] * g * g * g, w * twist);
+                let (cube, turn) = (g * g * g, w * twist);
                 let need = a[j] * other * g * g + turn;
-                [most >= need, !BACK || most >= -need]
+                [a[l] * cube >= need, !BACK || low[l] * cube >= -need]
             };
             let start = keeps(g.first(), other.first(), w.first());
             let end = keeps(g.last(), other.last(), w.last());
@@ -211,14 +212,14 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         }
         let (least, greatest) = other.wronskian(g).range();
         let (up, down) = (highest * greatest.max(0.0), -highest * least.min(0.0));
-        [g.combine(a[l], other, -a[j]).is_above(up), !BACK || g.combine(a[l], other, a[j]).is_above(down)]
+        [g.combine(a[l], other, -a[j]).is_above(up), !BACK || g.combine(low[l], other, a[j]).is_above(down)]
     }
 
     /// Whether no motion within the limits of the axes can reach the velocity cap: each axis gains no more speed on
     /// its way than its acceleration limit allows.
     pub(super) fn cap_is_far(&self) -> bool {
         let window = &self.window;
-        let gain = |k: usize| 2.0 * self.axes.acceleration[k] * window.g[k].mean();
+        let gain = |k: usize| 2.0 * self.sub.limits.up[k] * window.g[k].mean();
         if self.order > 0 || window.weight.degree() > 0 {
             return false;
         }
@@ -256,7 +257,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                 // An axis that turns here cannot show it while π grows to what it allows at once.
                 let g = &self.window.g[l];
                 let weight = self.window.weight.first();
-                let flat = self.axes.acceleration[l] / (g.first_slope() * weight * weight);
+                let flat = self.sub.limits.up[l] / (g.first_slope() * weight * weight);
                 if self.order == 0 && g.first() == 0.0 && (1.0 - NEARLY_FLAT..1.0).contains(&(self.pi / flat))
                 {
                     self.pi = flat;

@@ -12,16 +12,16 @@ enum Leave {
 }
 
 impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
-    /// N and W of the limit curve π = N/(ω² W) with axis j at +A and axis l at −A.
+    /// N and W of the limit curve π = N/(ω² W) with axis j at +A and axis l at −A⁻.
     pub(super) fn limit_quotient(&self, j: usize, l: usize) -> (Polynomial<C>, Polynomial<C>) {
-        let (g, a) = (&self.window.g, &self.axes.acceleration);
-        (g[l].combine(a[j], &g[j], a[l]), g[j].wronskian(&g[l]))
+        let (g, limits) = (&self.window.g, &self.sub.limits);
+        (g[l].combine(limits.up[j], &g[j], limits.down[l]), g[j].wronskian(&g[l]))
     }
 
     /// Along the limit curve while no arc would leave it downward; says whether it moved.
     pub(super) fn follow_limit_curve(&mut self, (j, l): (usize, usize)) -> bool {
         let window = &self.window;
-        let a = &self.axes.acceleration;
+        let (up, down) = (&self.sub.limits.up, &self.sub.limits.down);
         let (n, w) = self.limit_quotient(j, l);
         let (n_slope, w_slope) = (n.derivative(), w.derivative());
         let size = window.g[j].wronskian_magnitude(&window.g[l]);
@@ -48,16 +48,17 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         for i in self.moving().filter(|&i| i != j && i != l) {
             let g = &window.g[i];
             let need = g.derivative().multiply(&n).combine(1.0, &g.multiply(&n_slope), -1.0);
-            let terms = || {
+            let terms = |most: f64| {
                 let parts = g.derivative().magnitude().multiply(&n.magnitude());
                 size.combine(
-                    NOISE * a[i],
+                    NOISE * most,
                     &parts.combine(1.0, &g.magnitude().multiply(&n_slope.magnitude()), 1.0),
                     NOISE,
                 )
             };
-            for (sign, what) in [(-1.0, Leave::Pair(i, l)), (1.0, Leave::Pair(j, i))] {
-                if let Some(t) = kept_until(&w.combine(a[i], &need, sign), terms, 0, 0.0) {
+            for (most, sign, what) in [(up[i], -1.0, Leave::Pair(i, l)), (down[i], 1.0, Leave::Pair(j, i))] {
+                let inside = w.combine(most, &need, sign);
+                if let Some(t) = kept_until(&inside, || terms(most), 0, 0.0) {
                     if t < first {
                         (first, event) = (t, Some(what));
                     }
@@ -90,7 +91,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                 for k in self.moving() {
                     let (g, slope) = (self.window.g[k].last(), -self.window.g[k].reverse().first_slope());
                     if g == 0.0 && slope != 0.0 {
-                        end = end.min(a[k] / (slope.abs() * weight1 * weight1) * scale);
+                        end = end.min(down[k] / (slope.abs() * weight1 * weight1) * scale);
                     }
                 }
             }

@@ -92,7 +92,8 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             }
         }
         let least = self.window.speed.range().0.max(0.0);
-        let limit = self.axes.acceleration.iter().fold(f64::INFINITY, |least, &a| least.min(a));
+        let limits = &self.sub.limits;
+        let limit = limits.up.iter().chain(&limits.down).fold(f64::INFINITY, |least, &a| least.min(a));
         speed_sq * twist_sq.sqrt() <= limit * least * least.sqrt()
     }
 
@@ -122,14 +123,14 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         }
         for l in self.moving() {
             let y = need(l);
-            let a = self.axes.acceleration[l];
+            let (a, low_limit) = (self.sub.limits.up[l], self.sub.limits.down[l]);
             let inside = x.combine(a, &y, -1.0);
             if let Some(t) = kept_until(&inside, || x.combine(NOISE * a, &size(l), NOISE), 0, 0.0) {
                 if t < end {
                     (end, saturated) = (t, Some(l));
                 }
             }
-            low |= BACK && !x.combine(a, &y, 1.0).is_positive();
+            low |= BACK && !x.combine(low_limit, &y, 1.0).is_positive();
         }
         let mut pair = None;
         if low && !self.straight {
