@@ -24,7 +24,10 @@ _LONGEST = 60
 
 def shown(value: object) -> str:
     """A value as one short line, whatever it is."""
-    text = " ".join(_SHOWN.repr(value).split())
+    try:
+        text = " ".join(_SHOWN.repr(value).split())
+    except ValueError:  # Python writes no integer of more than 4300 digits
+        return "a number of thousands of digits"
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
 
 

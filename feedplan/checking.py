@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
-from feedplan.arguments import callback, flag, not_negative, number
+from feedplan.arguments import callback, flag, is_number, not_negative, number, shown
 from feedplan.audit import Audit, audit_setpoints
 from feedplan.errors import InputError
 from feedplan.files import SUMMARY_FILE
@@ -148,16 +148,16 @@ class _Entries:
         """An entry of that type. Raises InputError where it is missing or something else."""
         value = self._table.get(name)
         if not isinstance(value, kind) or isinstance(value, bool):
-            what = "missing" if value is None else repr(value)
+            what = "missing" if value is None else shown(value)
             raise InputError(f"{self._file}: {self._place}{name} is {what}: plan again")
         return value
 
     def number(self, name: str) -> float:
         """A finite number that is not negative."""
         value = self._table.get(name)
-        good = isinstance(value, (int, float)) and not isinstance(value, bool) and 0 <= value < math.inf
+        good = is_number(value) and 0 <= value < math.inf  # type: ignore[operator]
         if not good:
-            raise InputError(f"{self._file}: {self._place}{name} is {value!r}: plan again")
+            raise InputError(f"{self._file}: {self._place}{name} is {shown(value)}: plan again")
         return float(value)  # type: ignore[arg-type]
 
 

@@ -22,7 +22,7 @@ from feedplan.comparison import TIME_LIMIT
 from feedplan.errors import FeedplanError, InfeasibleError, SolverError
 from feedplan.geometry.corners import PATHS, FollowedPath
 from feedplan.machine.machine import Axis, Limit, Machine, bundled_machines
-from feedplan.setpoints import INTERPOLATORS, Interpolator
+from feedplan.setpoints import INTERPOLATORS, MAX_SETPOINTS, Interpolator
 
 if TYPE_CHECKING:
     NumberType = click.ParamType[float]
@@ -47,13 +47,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except click.ClickException as error:
         return _fail(_usage(error), BAD_INPUT)
     except BrokenPipeError:
-        # The reader has gone; without this the interpreter complains while closing.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _close_output()
         return PIPE_CLOSED
+    except OSError as error:
+        # Files tell their own errors: this one is of the standard output, a full disk for instance.
+        _close_output()
+        return _fail(
+            f"the standard output cannot be written: {(error.strerror or str(error)).lower()}", BAD_INPUT
+        )
     except Exception as error:
         if os.environ.get(_TRACEBACK):
             raise
         return _fail(*_explained(error))
+
+
+def _close_output() -> None:
+    """Nothing more is written: what is left would make the interpreter complain while closing."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _explained(error: Exception) -> tuple[str, int]:
@@ -70,7 +80,7 @@ def _explained(error: Exception) -> tuple[str, int]:
 
 
 def _fail(sentence: str, code: int) -> int:
-    print(f"error: {' '.join(sentence.split())}", file=sys.stderr)
+    print(f"error: {FeedplanError(' '.join(sentence.split()))}", file=sys.stderr)
     return code
 
 
@@ -171,6 +181,14 @@ def cli(context: click.Context) -> int:
 @click.option("--feed-override", type=_Number(), default=1.0, metavar="FACTOR", help="Factor on the feed.")
 @click.option("--period", type=_Number(), metavar="S", help="Servo period in place of the machine's.")
 @click.option("--interpolator", type=click.Choice(INTERPOLATORS), default="sarfraz", show_default=True)
+@click.option(
+    "--max-setpoints",
+    type=click.IntRange(min=1),
+    default=MAX_SETPOINTS,
+    show_default=True,
+    metavar="N",
+    help="A plan of more setpoints is refused.",
+)
 @click.option("--start-speed", type=_ZERO_OR_MORE, default=0.0, metavar="MM/S", help="Speed at the start.")
 @click.option("--end-speed", type=_ZERO_OR_MORE, default=0.0, metavar="MM/S", help="Speed at the end.")
 @click.option("--output", "-o", metavar="DIR", help="Write plan.json, setpoints and report.html there.")
@@ -195,6 +213,7 @@ def plan(
     feed_override: float,
     period: float | None,
     interpolator: Interpolator,
+    max_setpoints: int,
     start_speed: float,
     end_speed: float,
     output: str | None,
@@ -230,6 +249,7 @@ def plan(
             start_speed=start_speed,
             end_speed=end_speed,
             interpolator=interpolator,
+            max_setpoints=max_setpoints,
             progress=progress,
             **_given(accuracy=accuracy, time_limit=time_limit),
         )

@@ -10,6 +10,7 @@ from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdo
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
+from feedplan.errors import LONGEST
 from feedplan.units import counted, duration_text, mm_per_min, ratio_text, tolerance_text
 
 if TYPE_CHECKING:
@@ -207,10 +208,14 @@ def nearest_limit(audit: Audit) -> LimitCheck | None:
 
 def failure_sentence(audit: Audit) -> str:
     """What is broken, in one sentence."""
-    shown = audit.failures[:_FAILURES_SHOWN]
-    more = len(audit.failures) - len(shown)
-    rest = f"; and {counted(more, 'limit')} more" if more else ""
-    return f"the audit failed: {'; '.join(shown) or 'nothing was checked'}{rest}"
+    failures = audit.failures
+    for count in range(_FAILURES_SHOWN, 0, -1):
+        more = len(failures) - count
+        rest = f"; and {counted(more, 'limit')} more" if more > 0 else ""
+        sentence = f"the audit failed: {'; '.join(failures[:count]) or 'nothing was checked'}{rest}"
+        if len(sentence) <= LONGEST:
+            break
+    return sentence
 
 
 _FAILURES_SHOWN = 3

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from feedplan.accuracy import estimate, shortfalls
-from feedplan.arguments import callback, one_of, refuse
+from feedplan.arguments import callback, one_of, refuse, whole
 from feedplan.audit import Audit, audit
 from feedplan.bound import lower_bound
 from feedplan.constraints.problem import Problem, build_problem, speed_square
@@ -47,7 +47,7 @@ from feedplan.program.read import read_program
 from feedplan.program.source import Source
 from feedplan.progress import Listener, Progress, of_stage, part
 from feedplan.report.account import Account, account
-from feedplan.setpoints import INTERPOLATORS, Interpolator, Setpoints, setpoints
+from feedplan.setpoints import INTERPOLATORS, MAX_SETPOINTS, Interpolator, Setpoints, setpoints
 from feedplan.time_limit import TimeLimit
 from feedplan.trajectory import State, Trajectory
 from feedplan.units import counted
@@ -76,6 +76,7 @@ class Plan:
     lower_bound: float
     compute: dict[str, float]
     interpolator: Interpolator = "sarfraz"
+    max_setpoints: int = MAX_SETPOINTS
     warnings: tuple[str, ...] = field(default=())
     options: Mapping[str, Any] = field(default_factory=dict)
     _verdict: list[Audit] = field(default_factory=list, init=False, repr=False, compare=False)
@@ -144,6 +145,7 @@ class Plan:
             self.profile,
             self.machine.period if period is None else period,
             self.interpolator if interpolator is None else interpolator,
+            self.max_setpoints,
             progress,
         )
         if points.period == self.machine.period and not self._laid_out:
@@ -256,6 +258,7 @@ def plan(
     start_speed: float = 0.0,
     end_speed: float = 0.0,
     interpolator: Interpolator = "sarfraz",
+    max_setpoints: int = MAX_SETPOINTS,
     path: FollowedPath = "as-fitted",
     progress: Progress | None = None,
     **options: Any,
@@ -270,6 +273,8 @@ def plan(
     bends, "fastest" cuts them as far as the tolerance allows. `feed` [mm/s] replaces the programmed feeds,
     `feed_override` multiplies them. `period` [s] replaces the machine's servo period; `start_speed` and
     `end_speed` [mm/s] hold at the ends. `interpolator` makes the setpoints: "sarfraz" or "newton".
+    A plan of more than `max_setpoints` gives none, and is not audited, before it is asked for so many or a
+    longer period.
     `progress(stage, done)` is called some times a second as the work goes on, with `read`, `fit`, then
     `plan`, and the part of that stage that is done, which never falls; what it raises ends the work and is
     raised here.
@@ -305,6 +310,7 @@ def plan(
     if period is not None:
         machine = machine.with_period(period)
     one_of(interpolator, "interpolator", INTERPOLATORS)
+    whole(max_setpoints, "max_setpoints", "a whole number from 1")
     callback(progress)
     report = progress or (lambda stage, done: None)
     compute: dict[str, float] = {}
@@ -312,6 +318,8 @@ def plan(
     if isinstance(source, Path):
         if tolerance is not None:
             raise refuse("the tolerance", tolerance, "it where the path is made: a Path has its own")
+        if path != "as-fitted":
+            raise refuse("path", path, "it where the path is made: a Path has its own")
         followed = source
     else:
         report("read", 0.0)
@@ -347,11 +355,18 @@ def plan(
         report("plan", 0.0)
         if limit is not None:
             solve = partial(
-                solve, time_limit=limit.left, reserve=_following(limit, problem, machine, interpolator)
+                solve,
+                time_limit=limit.left,
+                # How long what follows will take is known from setpoints of a first plan.
+                reserve=lambda first: limit.keep_for(
+                    setpoints(problem, first, machine.period, interpolator, max_setpoints)
+                ),
             )
         if tells_progress(method):
             solve = partial(solve, progress=part(share, 0.0, PLANNING))
         profile = solve(problem)
+        if not math.isfinite(profile.time):
+            raise SolverError(f"{method} loses its digits on this path: take another method or machine")
     with _timed(compute, "bound"):
         share_of_all = part(share, PLANNING, 1.0 if bound_of(method) is None else BOUND)
         least = lower_bound(problem, profile, share_of_all)
@@ -382,6 +397,7 @@ def plan(
         lower_bound=least,
         compute=compute,
         interpolator=interpolator,
+        max_setpoints=max_setpoints,
         warnings=(program.warnings if program else ())
         + followed.warnings
         + short
@@ -403,13 +419,6 @@ def plan(
 
 # What every method takes.
 OF_ALL_METHODS: tuple[str, ...] = tuple(plan.__kwdefaults__ or ())
-
-
-def _following(
-    limit: TimeLimit, problem: Problem, machine: Machine, interpolator: Interpolator
-) -> Callable[[SpeedProfile], float]:
-    """Keeps of a limit what will follow a plan, by a first one of the problem; returns that [s]."""
-    return lambda first: limit.keep_for(setpoints(problem, first, machine.period, interpolator))
 
 
 def rounding_stops(problem: Problem, profile: SpeedProfile) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import Sampler
-from feedplan.arguments import is_whole, number, one_of, positive, shown
+from feedplan.arguments import is_whole, number, one_of, positive, shown, whole
 from feedplan.constraints.problem import Problem, TipSpeed
 from feedplan.curves.length import INTERPOLATORS as INTERPOLATORS
 from feedplan.curves.length import Interpolator as Interpolator
@@ -23,6 +23,8 @@ Scalar = TypeVar("Scalar", bound=np.generic)
 
 # Six axes of it take 5 GB; a stream of any length goes through in smaller chunks.
 MAX_CHUNK = 20_000_000
+# What more than so many setpoints need is asked for: a day at 1 kHz.
+MAX_SETPOINTS = 100_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,12 +79,19 @@ class Setpoints:
         profile: SpeedProfile,
         period: float,
         interpolator: Interpolator,
+        max_setpoints: int = MAX_SETPOINTS,
         progress: Listener | None = None,
     ) -> None:
         one_of(interpolator, "interpolator", INTERPOLATORS)
         period = number(period, "the period", "a positive number", positive, "s")
+        most = whole(max_setpoints, "max_setpoints", "a whole number from 1")
         self._sampler = sampler(problem, profile, period, interpolator, progress)
-        self._source = (problem, profile, period, interpolator)
+        self._source = (problem, profile, period, interpolator, most)
+        if self.count > most:
+            raise InputError(
+                f"{self.count} setpoints, one every {period:g} s, are more than {most}: "
+                "choose a longer period, or ask for so many by max_setpoints"
+            )
         self.period = float(period)
         self.axes = problem.axes
         self.interpolator: Interpolator = interpolator
@@ -108,7 +117,7 @@ class Setpoints:
     def __repr__(self) -> str:
         return f"<Setpoints: {self.count} of {' '.join(self.axes)}, one every {self.period:g} s>"
 
-    def __reduce__(self) -> tuple[type[Setpoints], tuple[Problem, SpeedProfile, float, Interpolator]]:
+    def __reduce__(self) -> tuple[type[Setpoints], tuple[Problem, SpeedProfile, float, Interpolator, int]]:
         return Setpoints, self._source
 
     def chunks(self, size: int = 100_000) -> Iterator[SetpointChunk]:
@@ -143,6 +152,7 @@ def setpoints(
     profile: SpeedProfile,
     period: float,
     interpolator: Interpolator = "sarfraz",
+    max_setpoints: int = MAX_SETPOINTS,
     progress: Listener | None = None,
 ) -> Setpoints:
     """Setpoints every `period` [s] of the joints along a problem's path, by the profile planned for it.
@@ -152,9 +162,10 @@ def setpoints(
     time in closed form where the jerk along the path is constant. `newton`: steps
     of speed times period, to third order, and Newton–Raphson. Pieces may have any degree, polynomial or
     rational; arcs of kind CHORD are for quadratic ones. `progress` is told how far the laying out is.
-    Raises InputError for a period or an interpolator that cannot be used, or a profile of another path.
+    Raises InputError for a period or an interpolator that cannot be used, a profile of another path, or more
+    setpoints than `max_setpoints`.
     """
-    return Setpoints(problem, profile, period, interpolator, progress)
+    return Setpoints(problem, profile, period, interpolator, max_setpoints, progress)
 
 
 def sampler(

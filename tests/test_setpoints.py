@@ -392,7 +392,9 @@ def test_what_does_not_fit_is_refused_with_a_sentence() -> None:
     with pytest.raises(InputError, match="give a size from 1"):
         sampled(path, profile, 0.001).chunks(0)
     with pytest.raises(InputError, match="by chunks"):
-        sampled(path, profile, 1e-9).all()
+        sampled(path, profile, 1e-8).all()
+    with pytest.raises(InputError, match="are more than 100000000: choose a longer period, or ask"):
+        sampled(path, profile, 1e-9)
     with pytest.raises(InputError, match="does not belong to this path"):
         sampled(path, line_case()[1], 0.001)
     first = profile_of(line_arcs(0, 10.0, 1000.0, 50.0), [0, 3, 3])

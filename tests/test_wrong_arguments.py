@@ -102,7 +102,7 @@ def cases(tmp_path: FilePath) -> dict[str, tuple[Callable[..., Any], dict[str, A
     limits = {"max_velocity": 100.0, "max_acceleration": 1000.0, "max_jerk": 1e4}
     axis = Axis("X", **limits)
     found: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
-        "plan": (feedplan.plan, {**common, "method": "bang-bang"}),
+        "plan": (feedplan.plan, {**common, "method": "bang-bang", "max_setpoints": 100_000}),
         "plan of a path": (feedplan.plan, {"source": plan.path, "machine": machine, "feed": 50.0}),
         "compare": (
             feedplan.compare,
@@ -309,8 +309,10 @@ def test_a_period_of_zero_is_refused_and_not_the_machines() -> None:
         feedplan.plan(PROGRAM, "mill").setpoints(0)
 
 
-def test_a_path_has_its_own_tolerance() -> None:
+def test_a_path_has_its_own_tolerance_and_size() -> None:
     path = Path.from_points(POINTS, 0.01)
+    with pytest.raises(feedplan.InputError, match=r"path is 'fastest': give it where the path is made"):
+        feedplan.plan(path, "mill", path="fastest")
     with pytest.raises(feedplan.InputError, match=r"the tolerance is 0\.1: give it where the path is made"):
         feedplan.plan(path, "mill", tolerance=0.1)
 

@@ -131,15 +131,13 @@ class JointSetpoints:
             def stands(row: int, piece: Numbers = piece, stop: Array = stop) -> bool:
                 return bool(self._off(piece, rows.position[row : row + 1], stop)[0] <= 1e-9)
 
-            on_time = abs(rows.t[n] - due) <= slack
-            if not stands(n):
-                self.clock.append(due)
-            elif left == 1 and on_time and not last:
+            on_time = rows.t[n] <= due + slack
+            if left == 1 and on_time and not last:
                 break
-            elif left > 1 and on_time and stands(n + 1):
+            if left > 1 and on_time and stands(n + 1):
                 self.clock.append(float(rows.t[n + 1]))
             else:
-                self.clock.append(float(rows.t[n]))
+                self.clock.append(float(rows.t[n]) if stands(n) else due)
 
     def _arcs(self, t: Array) -> tuple[Numbers, Array]:
         """The arc that each time falls into, and the time since the arc began."""

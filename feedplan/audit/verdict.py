@@ -14,6 +14,10 @@ from feedplan.audit.worst import Findings
 PASS_MARK = 1.0 + 1e-6
 
 
+# Longer times [s] are told by their first digits.
+_LONGEST = 1e12
+
+
 @dataclass(frozen=True)
 class _Kind:
     """How a check is called in a sentence, and its unit."""
@@ -83,7 +87,8 @@ class LimitCheck:
 
     def sentence(self) -> str:
         """Place, value and limit in words."""
-        place = f"line {self.line}, {self.time:.6f} s" if self.line else f"{self.time:.6f} s"
+        time = f"{self.time:.6f} s" if abs(self.time) < _LONGEST else f"{self.time:.9g} s"
+        place = f"line {self.line}, {time}" if self.line else time
         kind = _KINDS[self.name]
         what = f"{self.axis} {kind.quantity}" if self.axis else kind.quantity
         if self.name == "numbers":

@@ -250,7 +250,8 @@ def build_problem(
     `feed` [mm/s] replaces the programmed feeds, `feed_override` multiplies them (rapids keep the axes'
     limits), `start_speed` and `end_speed` [mm/s] hold at the ends of the whole path. Corners of a path that
     keeps those of the program are passed with the jump that the machine allows, or that its accelerations
-    give in one servo period if that is more.
+    give in one servo period if that is more. A jump that the machine allows is no more than the chord
+    tolerance in a period, on linear axes: the line between two setpoints cuts the corner by less.
     Raises InputError for a value out of range.
     """
     remedy = "a finite speed of 0 or more"
@@ -267,7 +268,9 @@ def build_problem(
     min_velocity, max_velocity = np.array([axis.velocity_range for axis in axes]).T
     min_acceleration, max_acceleration = np.array([axis.acceleration_range for axis in axes]).T
     greatest = 2.0 * float(np.linalg.norm(np.maximum(max_velocity, -min_velocity)))
-    jump = np.array([axis.max_velocity_jump for axis in axes])
+    cut = machine.chord_tolerance / machine.period
+    most = [cut if axis.kind == "linear" else np.inf for axis in axes]
+    jump = np.minimum([axis.max_velocity_jump for axis in axes], most)
     if path.corners is Corners.PROGRAMMED:
         jump = np.maximum(jump, np.minimum(max_acceleration, -min_acceleration) * machine.period)
     return Problem(

@@ -10,6 +10,9 @@ from typing import Any
 from feedplan.arguments import is_number, is_text, shown
 from feedplan.errors import MachineError
 
+# Ends of ranges are quotients and products: by this part of them numbers may be beyond.
+ROUNDING = 1e-12
+
 
 def require(condition: bool, what: str, value: object, remedy: str) -> None:
     """Raises MachineError unless the condition holds."""
@@ -31,25 +34,35 @@ def numbers(values: Any, count: int, what: str, remedy: str, infinite: bool = Fa
     return tuple(map(float, given))
 
 
-def set_positive(owner: object, key: str, place: str, unit: str, infinite: bool = False) -> None:
-    """Makes a field a float; raises MachineError unless it is positive, and where it has to be, finite."""
+def set_within(
+    owner: object, key: str, place: str, unit: str, ends: tuple[float, float], infinite: bool = False
+) -> None:
+    """Makes a field a float; raises MachineError unless it is between the ends, or infinite if it may be."""
     value = getattr(owner, key)
-    good = is_number(value) and value > 0 and (infinite or value < math.inf)
-    require(good, place + key, value, f"a positive number [{unit}]")
+    good = is_number(value) and (_within(value, ends) or (infinite and value == math.inf))
+    remedy = f"a number from {ends[0]:g} to {ends[1]:g} [{unit}]{', or inf' if infinite else ''}"
+    require(good, place + key, value, remedy)
     object.__setattr__(owner, key, float(value))
 
 
-def set_limit(owner: object, key: str, place: str, unit: str) -> None:
-    """Makes a field a float, or two where a limit differs by direction; raises MachineError for no limit."""
+def set_limit(owner: object, key: str, place: str, unit: str, ends: tuple[float, float]) -> None:
+    """Makes a field a float between the ends, or two, negative and positive, where directions differ."""
     value = getattr(owner, key)
     if not isinstance(value, (list, tuple)):
-        return set_positive(owner, key, place, unit)
-    good = len(value) == 2 and all(is_number(end) and math.isfinite(end) for end in value)
-    remedy = f"a positive number [{unit}], or a negative and a positive one"
-    require(good and value[0] < 0 < value[1], place + key, value, remedy)
+        return set_within(owner, key, place, unit, ends)
+    good = len(value) == 2 and all(map(is_number, value))
+    good = good and all(_within(size, ends) for size in (-value[0], value[1]))
+    remedy = (
+        f"a number from {ends[0]:g} to {ends[1]:g} [{unit}], or a negative and a positive one of such size"
+    )
+    require(good, place + key, value, remedy)
     least, greatest = map(float, value)
     object.__setattr__(owner, key, greatest if greatest == -least else (least, greatest))
     return None
+
+
+def _within(value: float, ends: tuple[float, float]) -> bool:
+    return (1.0 - ROUNDING) * ends[0] <= value <= (1.0 + ROUNDING) * ends[1]
 
 
 def require_text(value: object, what: str) -> None:

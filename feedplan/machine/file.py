@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from collections.abc import Mapping
 from dataclasses import MISSING, fields
@@ -19,6 +20,11 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
+# The greatest machine file. Keys in keys are few: reading takes as long as the square of their number.
+MAX_LETTERS = 1 << 17
+MAX_LEVELS = 20
+_NOT_OF_KEYS = re.compile(r"[^\w\-\"'. \t]+")
+
 _AXIS_KEYS = {own.name for own in fields(Axis)}
 _NEEDED = [own.name for own in fields(Axis) if own.default is MISSING]
 _OF_KINEMATICS = {"kinematics", "home", "offsets"}
@@ -32,14 +38,19 @@ def parse(text: str, name: str, joints_only: bool = False) -> Machine:
     checked where a kinematics that a user registered is not known.
     """
     try:
+        if len(text) > MAX_LETTERS:
+            raise MachineError(f"it has more than {MAX_LETTERS} letters: give fewer")
+        for part in _NOT_OF_KEYS.split(text):
+            if sum(bool(key.strip()) for key in part.split(".")) > MAX_LEVELS:
+                raise MachineError(f"{shown(part)} has more than {MAX_LEVELS} levels: give fewer")
         table = tomllib.loads(text)
         if joints_only:
             table = {key: value for key, value in table.items() if key not in _OF_KINEMATICS}
         return _machine(table, name)
-    except tomllib.TOMLDecodeError as error:
-        raise MachineError(f"machine file {name} is not valid TOML: {error}") from None
     except MachineError as error:
         raise MachineError(f"machine file {name}: {error}") from None
+    except (ValueError, RecursionError) as error:  # ValueError also for integers of thousands of digits
+        raise MachineError(f"machine file {name} is not valid TOML: {error}") from None
 
 
 def text_of(machine: Machine) -> str:
@@ -90,9 +101,8 @@ def _machine(table: dict[str, Any], name: str) -> Machine:
     kinematics = table.get("kinematics", "cartesian")
     parameters = {"type": kinematics} if isinstance(kinematics, str) else kinematics
     if not (isinstance(parameters, dict) and isinstance(parameters.get("type"), str)):
-        raise MachineError(
-            f'kinematics is {shown(kinematics)}: give a name, or a table with type = "cartesian"'
-        )
+        remedy = 'give a name, or a table with type = "cartesian"'
+        raise MachineError(f"kinematics is {shown(kinematics)}: {remedy}")
     return Machine(
         name=str(table.get("name", Path(name).stem)),
         axes=tuple(_axis(row) for row in rows),
@@ -114,4 +124,5 @@ def _axis(row: dict[str, Any]) -> Axis:
 def _check_keys(table: dict[str, Any], known: set[str], place: str) -> None:
     unknown = sorted(set(table) - known)
     if unknown:
-        raise MachineError(f"{place}the keys {unknown} are not known: give only {', '.join(sorted(known))}")
+        remedy = f"give only {', '.join(sorted(known))}"
+        raise MachineError(f"{place}the keys {shown(unknown)} are not known: {remedy}")

@@ -11,7 +11,7 @@ from importlib import resources
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-from feedplan.arguments import is_number, is_text, shown
+from feedplan.arguments import is_text, shown
 from feedplan.errors import MachineError
 from feedplan.lazy import cached_property
 from feedplan.machine.checks import (
@@ -20,7 +20,7 @@ from feedplan.machine.checks import (
     require,
     require_text,
     set_limit,
-    set_positive,
+    set_within,
     written,
 )
 
@@ -41,6 +41,27 @@ AxisKind = Literal["linear", "rotary"]
 # The same in both directions, or the least and the greatest.
 Limit: TypeAlias = float | tuple[float, float]
 
+# What numbers of machines can be, in mm or degrees and seconds. Beyond, a number is a mistake: ramps would be
+# shorter than places are known, or plans longer than a year.
+VELOCITIES = 1e-5, 1e7
+GREATEST_ACCELERATION = 1e10
+# The times [s] after which an axis has its velocity, and its acceleration.
+RISE_TIMES = 1e-5, 1e2
+JERK_TIMES = 1e-7, 1e2
+# The time to full acceleration is this part of the time to full velocity, or more.
+LEAST_JERK_SHARE = 1e-7
+# The least way [mm] in which an axis has its velocity v²/a, and its acceleration a³/j².
+LEAST_WAY = 1e-11
+# The fastest axis is so many times as fast as the slowest one, or less.
+MOST_TIMES = 1e6
+PERIODS = 1e-6, 10.0
+# A period is this part of the longest time to full velocity, or more.
+LEAST_PERIOD_SHARE = 1e-7
+CHORD_TOLERANCES = 1e-7, 1e6
+# Chord tolerance e and period T limit the acceleration on arcs to 8 e/T²: to this part of an axis's, or more.
+LEAST_CHORD_SHARE = 1e-9
+FARTHEST = 1e9
+
 
 @dataclass(frozen=True)
 class Axis:
@@ -57,6 +78,10 @@ class Axis:
     `unit` is that of its positions, 1 to 12 characters: empty, mm, or deg on a rotary axis. Another one, such
     as rad or µm, takes the place of mm in all limits; programs, and kinematics with dimensions, need mm and
     deg. Limits and positions are never converted.
+
+    Velocities v are from 1e-5 to 1e7, accelerations a at most 1e10; an axis has its velocity after v/a from
+    1e-5 to 100 s, and its acceleration after a/j from 1e-7 to 100 s and 1e-7 of that time or more, in ways
+    v²/a and a³/j² of 1e-11 or more. Travel is within 1e9.
 
     Raises MachineError for values that are none of these.
     """
@@ -87,16 +112,21 @@ class Axis:
         object.__setattr__(self, "unit", self.unit if self.unit != "" else self.usual_unit)
         good = is_text(self.unit) and self.unit.isprintable() and _UNIT.fullmatch(self.unit) is not None
         require(good, f"{place}unit", self.unit, "1 to 12 characters, such as mm, deg or rad")
-        for key, unit in {"max_velocity": "/s", "max_acceleration": "/s²"}.items():
-            set_limit(self, key, place, f"{self.unit}{unit}")
-        set_positive(self, "max_jerk", place, f"{self.unit}/s³", infinite=True)
-        jump = self.max_velocity_jump
-        good = is_number(jump) and 0 <= jump < math.inf
-        require(good, f"{place}max_velocity_jump", jump, f"a finite number ≥ 0 [{self.unit}/s]")
-        object.__setattr__(self, "max_velocity_jump", float(jump))
-        remedy = "the least position and a greater one"
+        set_limit(self, "max_velocity", place, f"{self.unit}/s", VELOCITIES)
+        slow, fast = sizes_of(self.max_velocity)
+        fastest, slowest = RISE_TIMES
+        most = min(slow / fastest, slow**2 / LEAST_WAY, GREATEST_ACCELERATION)
+        set_limit(self, "max_acceleration", place, f"{self.unit}/s²", (fast / slowest, most))
+        weak, strong = sizes_of(self.max_acceleration)
+        fastest, slowest = JERK_TIMES
+        fastest = max(fastest, LEAST_JERK_SHARE * fast / weak)
+        ends = strong / slowest, min(weak / fastest, math.sqrt(weak**3 / LEAST_WAY))
+        set_within(self, "max_jerk", place, f"{self.unit}/s³", ends, infinite=True)
+        set_within(self, "max_velocity_jump", place, f"{self.unit}/s", (0.0, VELOCITIES[1]))
+        remedy = f"the least position and a greater one, within {FARTHEST:g} {self.unit} or infinite"
         least, greatest = numbers(self.travel, 2, f"{place}travel", remedy, infinite=True)
-        require(least < greatest, f"{place}travel", self.travel, remedy)
+        good = least < greatest and all(abs(end) <= FARTHEST or math.isinf(end) for end in (least, greatest))
+        require(good, f"{place}travel", self.travel, remedy)
         object.__setattr__(self, "travel", (least, greatest))
 
     @property
@@ -123,7 +153,10 @@ class Machine:
     straight line from one setpoint to the next (infinite: not limited), `home` the position [mm] that G28
     and G30 go to (and where programs begin if their words always are the tool's tip; empty: 0), `offsets` the
     work offsets by name (`"G54"`) [mm]; both have one number for each of `program_letters`. `kinematics` is
-    the type that turns the tool tip into joint positions, `parameters` its keys in the machine file.
+    the type that turns the tool tip into joint positions, `parameters` its keys in the machine file. Periods
+    T are from 1e-6 to 10 s and 1e-7 of the longest time to a full velocity or more, chord tolerances e from
+    1e-7 to 1e6 mm; the acceleration 8 e/T² to which they limit arcs is at least 1e-9 of the greatest of an
+    axis, and no axis is more than 1e6 times as fast as another one.
 
     Raises MachineError for values that are none of these.
     """
@@ -141,8 +174,23 @@ class Machine:
         require_text(self.name, "name")
         require_text(self.kinematics, "kinematics")
         object.__setattr__(self, "axes", _axes(self.axes))
-        set_positive(self, "period", "", "s")
-        set_positive(self, "chord_tolerance", "", "mm", infinite=True)
+        speeds = {axis: sizes_of(axis.max_velocity) for axis in self.axes}
+        fastest = max(self.axes, key=lambda axis: speeds[axis][1])
+        for axis in self.axes:
+            least, what = speeds[fastest][1] / MOST_TIMES, f"axis {axis.name}: max_velocity"
+            remedy = f"{least:g} {axis.unit}/s or more, beside {speeds[fastest][1]:g} of axis {fastest.name}"
+            require(speeds[axis][0] >= least, what, axis.max_velocity, remedy)
+        rise = max(speeds[axis][1] / size_of(axis.max_acceleration) for axis in self.axes)
+        set_within(self, "period", "", "s", (max(PERIODS[0], LEAST_PERIOD_SHARE * rise), PERIODS[1]))
+        set_within(self, "chord_tolerance", "", "mm", CHORD_TOLERANCES, infinite=True)
+        strongest = max(sizes_of(axis.max_acceleration)[1] for axis in self.axes)
+        least = LEAST_CHORD_SHARE / 8.0 * strongest * self.period**2
+        require(
+            self.chord_tolerance >= least,
+            f"with a period of {self.period:g} s the chord_tolerance",
+            self.chord_tolerance,
+            f"{least:.3g} mm or more, or a shorter period",
+        )
         remedy = "a table of its keys, other than type, as in a machine file"
         keyed = isinstance(self.parameters, Mapping) and "type" not in self.parameters
         require(keyed, "kinematics", self.parameters, remedy)
@@ -200,7 +248,7 @@ class Machine:
 
         Raises MachineError naming the file, the key and the remedy.
         """
-        from feedplan.machine.file import parse
+        from feedplan.machine.file import MAX_LETTERS, parse
 
         remedy = "the name of a bundled machine, or the path of a .toml file"
         require(isinstance(source, (str, os.PathLike)), "the machine", source, remedy)
@@ -209,7 +257,8 @@ class Machine:
         if text.endswith(".toml") or "/" in text or "\\" in text:
             path = FilePath(text)
             try:
-                content = path.read_text(encoding="utf-8")
+                with path.open(encoding="utf-8") as file:
+                    content = file.read(MAX_LETTERS + 1)
             except (OSError, ValueError) as error:
                 raise MachineError(f"machine file {text} cannot be read: {error}") from None
             return parse(content, text)
@@ -241,9 +290,15 @@ def range_of(limit: Limit) -> tuple[float, float]:
     return limit if isinstance(limit, tuple) else (-limit, limit)
 
 
+def sizes_of(limit: Limit) -> tuple[float, float]:
+    """What a limit allows in both directions, and in one of them."""
+    least, greatest = sorted(map(abs, range_of(limit)))
+    return least, greatest
+
+
 def size_of(limit: Limit) -> float:
     """What a limit allows in both directions."""
-    return min(map(abs, range_of(limit)))
+    return sizes_of(limit)[0]
 
 
 def usual_units(names: Iterable[str]) -> tuple[str, ...]:

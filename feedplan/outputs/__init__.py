@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Literal, Protocol, cast
 
-from feedplan.arguments import callback, file_path, one_of
+from feedplan.arguments import callback, file_path, one_of, shown
 from feedplan.errors import InputError
 from feedplan.progress import Listener
 from feedplan.setpoints import SetpointChunk
@@ -83,7 +83,8 @@ def require_format(version: object, what: str) -> None:
     """Raises InputError for a file of a version that this feedplan does not read."""
     if version != FORMAT or isinstance(version, bool):
         raise InputError(
-            f"{what} has the format {version!r}, this feedplan reads {FORMAT}: use the feedplan that wrote it"
+            f"{what} has the format {shown(version)}, this feedplan reads {FORMAT}: "
+            "use the feedplan that wrote it"
         )
 
 

@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from feedplan.arguments import shown
 from feedplan.errors import InputError
+from feedplan.machine.machine import AXIS_LETTERS
 from feedplan.outputs import FORMAT, QUANTITIES, SetpointFile, require_format
 
 
@@ -22,6 +24,8 @@ def chunk_of(arrays: Mapping[str, Any], file: FilePath) -> SetpointFile:
         raise InputError(f"{file} is not a file of setpoints: {', '.join(missing)} is missing")
     require_format(_single(arrays.get("format", FORMAT)), str(file))
     axes = tuple(str(name) for name in np.asarray(arrays["axes"]).ravel())
+    if len(axes) > len(AXIS_LETTERS):
+        raise InputError(f"{file} has {len(axes)} axes: give at most {len(AXIS_LETTERS)}")
     twice = next((name for name in axes if axes.count(name) > 1), None)
     if twice is not None:
         raise InputError(f"{file}: the axis {twice} comes {axes.count(twice)} times: give each axis once")
@@ -30,7 +34,7 @@ def chunk_of(arrays: Mapping[str, Any], file: FilePath) -> SetpointFile:
         raise InputError(f"{file}: units are {' '.join(units)}: give one for each of {' '.join(axes)}")
     period = _single(arrays["period"]) if "period" in arrays else None
     if period is not None and not (isinstance(period, (int, float)) and 0 < period < np.inf):
-        raise InputError(f"{file}: the period is {period!r}: give a positive number [s]")
+        raise InputError(f"{file}: the period is {shown(period)}: give a positive number [s]")
     t = np.asanyarray(arrays["t"])
     if t.ndim != 1 or len(t) == 0:
         raise InputError(f"{file} holds no setpoints: t has the shape {t.shape}, (n,) is needed")

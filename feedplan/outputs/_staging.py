@@ -16,7 +16,11 @@ from feedplan.errors import InputError
 def require_folder(folder: FilePath) -> None:
     """Raises InputError where `folder` or a part of its path is something else than a folder."""
     for place in (folder, *folder.parents):
-        if place.exists() and not place.is_dir():
+        try:
+            is_file = place.exists() and not place.is_dir()
+        except (OSError, ValueError) as error:  # a name that no file can have
+            raise InputError(_sentence(folder, error)) from None
+        if is_file:
             raise InputError(f"{place} is a file, not a folder: choose another folder with -o")
 
 
@@ -53,9 +57,9 @@ def _move(stage: FilePath, folder: FilePath, last: str) -> None:
         os.replace(file, folder / file.name)
 
 
-def _sentence(folder: FilePath, error: OSError) -> str:
-    reason = (error.strerror or str(error)).lower()
+def _sentence(folder: FilePath, error: OSError | ValueError) -> str:
+    reason = (getattr(error, "strerror", None) or str(error)).lower()
     remedy = "choose another folder with -o"
-    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+    if getattr(error, "errno", None) in (errno.ENOSPC, errno.EDQUOT):
         remedy = f"free some space or {remedy}"
     return f"{folder} cannot be written ({reason}): {remedy}"

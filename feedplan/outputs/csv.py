@@ -70,8 +70,8 @@ def load(file: FilePath, progress: Listener | None = None) -> SetpointFile:
     table = np.concatenate(parts) if parts else np.empty((0, width))
     groups = np.split(table[:, 1:-1], len(QUANTITIES), axis=1)
     arrays = dict(zip(QUANTITIES, groups, strict=True))
-    line = table[:, -1].astype(np.int32)
-    return chunk_of({"t": table[:, 0], **arrays, "line": line, "axes": axes, "units": units}, file)
+    columns = {"t": table[:, 0], **arrays, "line": table[:, -1]}
+    return chunk_of({**columns, "axes": axes, "units": units}, file)
 
 
 def _rows(lines: list[str], width: int, file: FilePath, done: int) -> NDArray[np.float64]:

@@ -67,7 +67,7 @@ def load(file: FilePath, progress: Listener | None = None) -> SetpointFile:
     """The setpoints of a json file."""
     try:
         table = json.loads(file.read_text(encoding="utf-8"))
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{file} is not valid JSON: {error}") from None
     if not isinstance(table, dict):
         raise InputError(f"{file} is not a file of setpoints: an object with t, position, … is needed")

@@ -6,6 +6,7 @@ Uncompressed: servo setpoints hardly shrink, and so they can be mapped into memo
 
 from __future__ import annotations
 
+import math
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -23,6 +24,10 @@ from feedplan.progress import Listener, tell
 from feedplan.setpoints import SetpointChunk
 
 FILE = "setpoints.npz"
+
+# A file that claims to hold so many times its own bytes [-], and more than some [bytes], was made to fill the
+# memory: compressed setpoints are a third of their size.
+_DENSEST, _SMALL = 100, 1 << 28
 
 
 @contextmanager
@@ -58,12 +63,14 @@ def load(file: FilePath, progress: Listener | None = None) -> SetpointFile:
     """The setpoints of an npz file; arrays that are not compressed stay on disk until they are used."""
     try:
         with zipfile.ZipFile(file) as archive:
-            arrays = {
-                info.filename.removesuffix(".npy"): _member(archive, info, file)
-                for info in archive.infolist()
-                if info.filename.endswith(".npy")
-            }
-    except (zipfile.BadZipFile, ValueError, EOFError, zipfile.LargeZipFile) as error:
+            members = [info for info in archive.infolist() if info.filename.endswith(".npy")]
+            size, packed = sum(info.file_size for info in members), file.stat().st_size
+            if size > max(_SMALL, _DENSEST * packed):
+                raise ValueError(f"its {packed} bytes claim to hold {size}")
+            arrays = {info.filename.removesuffix(".npy"): _member(archive, info, file) for info in members}
+    except (OSError, InputError):
+        raise
+    except Exception as error:  # zipfile and numpy raise whatever a damaged file leads them to
         raise InputError(f"{file} is not a whole npz file: {error}") from None
     tell(progress, 1.0)
     return chunk_of(arrays, file)
@@ -79,14 +86,17 @@ def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo, file: FilePath) -> 
         head = stream.tell()
         if dtype.hasobject or fortran_order:
             raise ValueError(f"{info.filename} holds {dtype}, not plain rows of numbers")
+        count = math.prod(shape)
+        if count * dtype.itemsize != info.file_size - head:
+            raise ValueError(
+                f"{info.filename} has {info.file_size - head} bytes for {count} values of {dtype}"
+            )
         if info.compress_type != zipfile.ZIP_STORED or dtype.kind not in "fiu":
-            with archive.open(info) as again:
-                return np.lib.format.read_array(again, allow_pickle=False)
+            return np.frombuffer(stream.read(), dtype).reshape(shape)
     with file.open("rb") as stored:
         stored.seek(info.header_offset + 26)
         lengths = np.frombuffer(stored.read(4), dtype="<u2")
     start = info.header_offset + 30 + int(lengths.sum()) + head
-    count = int(np.prod(shape))
     if count == 0 or start % dtype.itemsize:  # what other writers left unaligned cannot be mapped
         return np.fromfile(file, dtype, count, offset=start).reshape(shape)
     return np.memmap(file, dtype=dtype, mode="r", offset=start, shape=shape)

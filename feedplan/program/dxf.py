@@ -37,12 +37,19 @@ Point = NDArray[np.float64]
 MAX_ENTITIES = 5_000_000
 _FARTHEST = 1e6  # [mm]; beyond is a mistake
 _QUARTER = math.pi / 2.0
+# What the package raises for an entity with entries that are missing or of another type.
+_DAMAGED = (ValueError, ArithmeticError, TypeError, LookupError, AttributeError)
 
 
 @dataclass(frozen=True)
 class _Line:
     start: Point
     end: Point
+
+    @property
+    def reach(self) -> float:
+        """No coordinate of a place on it is greater [mm]."""
+        return float(np.abs([self.start, self.end]).max())
 
     def reversed(self) -> _Line:
         return _Line(self.end, self.start)
@@ -59,6 +66,12 @@ class _Arc:
     end: Point
     centre: Point
     angle: float
+
+    @property
+    def reach(self) -> float:
+        """No coordinate of a place on it is greater [mm]."""
+        chord = 2.0 * math.sin(0.5 * min(abs(self.angle), math.pi))
+        return float(np.abs(self.start).max()) + chord * math.dist(self.start, self.centre)
 
     def reversed(self) -> _Arc:
         return _Arc(self.end, self.start, self.centre, -self.angle)
@@ -78,6 +91,11 @@ class _Curve:
     @property
     def end(self) -> Point:
         return np.asarray(self.curve.control_points[-1])
+
+    @property
+    def reach(self) -> float:
+        """No coordinate of a place on it is greater [mm]."""
+        return float(np.abs(self.curve.control_points).max())
 
     def reversed(self) -> _Curve:
         return _Curve(self.curve.reversed())
@@ -129,7 +147,7 @@ def read_dxf(content: bytes, name: str = "drawing.dxf") -> Program:
             continue
         try:
             segments = _segments(entity, scale)
-        except (_UnsupportedError, InputError, ValueError, ArithmeticError) as error:
+        except (_UnsupportedError, InputError, *_DAMAGED) as error:
             skipped[f"{entity.dxftype()} ({error})" if str(error) else str(entity.dxftype())] += 1
             continue
         _check_reach(segments, name, number)
@@ -164,8 +182,7 @@ def _hidden(document: Any, entity: Any) -> bool:
 
 def _check_reach(segments: Sequence[_Segment], name: str, number: int) -> None:
     for segment in segments:
-        points = segment.curve.control_points if isinstance(segment, _Curve) else segment.end[None, :]
-        if not (np.abs(points) <= _FARTHEST).all():
+        if not segment.reach <= _FARTHEST:
             raise ProgramError(
                 f"{name} entity {number} goes farther than {_FARTHEST:g} mm: check the units of the drawing",
                 number,

@@ -125,7 +125,7 @@ def test_whole_numbers_are_numbers(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("fields", "word"),
     [
-        ({"max_velocity": 0}, "axis X: max_velocity is 0: give a positive number \\[mm/s\\]"),
+        ({"max_velocity": 0}, "axis X: max_velocity is 0: give a number from 1e-05 to 1e\\+07 \\[mm/s\\]"),
         ({"max_velocity": "fast"}, "max_velocity is 'fast'"),
         ({"max_acceleration": math.inf}, "max_acceleration is inf"),
         ({"max_jerk": math.nan}, "max_jerk is nan"),
@@ -148,7 +148,7 @@ def test_wrong_limits_are_refused_where_they_are_given(fields: dict[str, Any], w
         ({"axes": ()}, "1 to 9 axes"),
         ({"axes": "XYZ"}, "axis 1 is 'X': give an Axis"),
         ({"axes": 2 * (Axis("X", 1, 1),)}, "axis X comes twice: give each axis another name"),
-        ({"period": -1}, "period is -1: give a positive number \\[s\\]"),
+        ({"period": -1}, "period is -1: give a number from 1e-06 to 10 \\[s\\]"),
         ({"axes": Axis("X", 1, 1)}, "1 to 9 axes"),
         ({"home": (math.inf,)}, "home is .*: give 1 finite numbers"),
         ({"home": 2}, "home is 2: give 1 finite numbers"),
@@ -162,3 +162,38 @@ def test_wrong_limits_are_refused_where_they_are_given(fields: dict[str, Any], w
 def test_a_wrong_machine_is_refused_where_it_is_made(fields: dict[str, Any], word: str) -> None:
     with pytest.raises(MachineError, match=word):
         Machine(**{"name": "own", "axes": (Axis("X", 1, 1),), **fields})
+
+
+# v, a, j of one axis and the period, in any unit of length.
+REASONABLE = {
+    "mill": (200.0, 2000.0, 40_000.0, 1e-3),
+    "mill in metres": (0.2, 2.0, 40.0, 1e-3),
+    "mill in micrometres": (2e5, 2e6, 4e7, 1e-3),
+    "controller of 24 ms": (200.0, 2000.0, 40_000.0, 0.024),
+    "jerk as good as unlimited": (200.0, 2000.0, 1e8, 1e-3),
+    "linear motor": (5000.0, 50_000.0, 1e7, 5e-5),
+    "micrometre stage": (1.0, 10.0, 1000.0, 1e-4),
+    "micrometre stage in metres": (1e-3, 1e-2, 1.0, 1e-4),
+    "huge gantry": (500.0, 50.0, 50.0, 0.01),
+    "slow gantry in metres": (0.5, 0.02, 0.02, 0.05),
+    "joint in radians": (2.0, 8.0, 100.0, 4e-3),
+    "rotary table in degrees": (0.1, 0.05, 0.1, 1e-3),
+    "rotary table in radians": (2e-3, 1e-3, 2e-3, 1e-3),
+    "galvanometer in radians": (1000.0, 1e7, 1e11, 1e-5),
+    "telescope in degrees": (4.0, 0.05, 0.01, 0.01),
+    "log of one row a second": (200.0, 2000.0, 40_000.0, 1.0),
+}
+
+
+@pytest.mark.parametrize("name", REASONABLE)
+def test_reasonable_machines_are_in_the_ranges(name: str) -> None:
+    *limits, period = REASONABLE[name]
+    machine = Machine(name, (Axis("X", *limits), Axis("Y", *limits)), period=period)
+    assert machine.period == period
+
+
+def test_axes_of_very_different_speeds_are_refused() -> None:
+    with pytest.raises(
+        MachineError, match=r"axis Y: max_velocity is 0.0001: give 0.001 mm/s or more, beside 1000"
+    ):
+        Machine("own", (Axis("X", 1000.0, 1e4), Axis("Y", 1e-4, 1e-3)))

@@ -13,10 +13,15 @@ from hypothesis import strategies as st
 from feedplan import Axis, Machine, MachineError
 from feedplan.machine.file import parse
 from feedplan.machine.kinematics import Kinematics, _registered, register
-from feedplan.machine.machine import AXIS_LETTERS, bundled_machines
+from feedplan.machine.machine import (
+    AXIS_LETTERS,
+    CHORD_TOLERANCES,
+    FARTHEST,
+    PERIODS,
+    bundled_machines,
+)
 
-POSITIVE = st.floats(min_value=5e-324, max_value=1.7e308)
-FINITE = st.floats(allow_nan=False, allow_infinity=False)
+FINITE = st.floats(-FARTHEST, FARTHEST)
 NAMES = st.text(min_size=1)
 LEAVES = st.one_of(
     NAMES, st.just(""), st.booleans(), st.integers(-(2**63), 2**63 - 1), st.floats(allow_nan=False)
@@ -36,14 +41,17 @@ def axes(draw: st.DrawFn) -> tuple[Axis, ...]:
 
 @st.composite
 def axis(draw: st.DrawFn, name: str) -> Axis:
-    travel = sorted(draw(st.lists(st.floats(allow_nan=False), min_size=2, max_size=2, unique=True)))
+    ends = FINITE | st.sampled_from([-math.inf, math.inf])
+    travel = sorted(draw(st.lists(ends, min_size=2, max_size=2, unique=True)))
+    velocity = draw(st.floats(1.0, 1e6))
+    acceleration = velocity / draw(st.floats(2e-4, 50.0))
     return Axis(
         name,
-        draw(POSITIVE),
-        draw(POSITIVE),
-        draw(POSITIVE | st.just(math.inf)),
+        velocity,
+        acceleration,
+        acceleration / draw(st.floats(0.02, 5.0)) if draw(st.booleans()) else math.inf,
         (travel[0], travel[1]),
-        draw(st.floats(0.0, 1e300)),
+        draw(st.floats(0.0, 1.0)),
         draw(st.sampled_from(["", "linear", "rotary"])),
     )
 
@@ -55,8 +63,8 @@ def machines(draw: st.DrawFn) -> Machine:
     return Machine(
         name=draw(NAMES),
         axes=own,
-        period=draw(POSITIVE),
-        chord_tolerance=draw(POSITIVE | st.just(math.inf)),
+        period=draw(st.floats(1e-5, PERIODS[1])),
+        chord_tolerance=draw(st.floats(1e3, CHORD_TOLERANCES[1]) | st.just(math.inf)),
         home=draw(row | st.just(())),
         offsets=draw(st.dictionaries(NAMES, row, max_size=3)),  # type: ignore[arg-type]
     )

@@ -1,10 +1,11 @@
-"""No planner has a length of its own: scaled with its machine, a path takes the same time."""
+"""No planner has a length or a time of its own: what is scaled with its machine takes the same time."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from feedplan import plan
 from feedplan.constraints.problem import Problem, build_problem
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import Axis, Machine
@@ -53,3 +54,14 @@ def test_scaling_all_lengths_changes_no_time_of_random_curves(method: str) -> No
         if max(times) > (1 + CLOSE) * min(times):
             found[seed] = times
     assert found == {}
+
+
+@pytest.mark.parametrize("method", ["bang-bang", "jerk-limited", "ruckig", "s-curve"])
+def test_the_servo_period_shapes_no_profile_of_a_smooth_path(method: str) -> None:
+    if method == "ruckig":
+        pytest.importorskip("ruckig")
+    path = Path.from_nurbs(SPLINE, KNOTS, 3, feed=FEED)
+    axes = tuple(Axis(axis, *row[:2], max_jerk=row[2]) for axis, row in zip("XYZ", LIMITS, strict=True))
+    machine = Machine("of any period", axes)
+    times = [plan(path, machine.with_period(period), method).time for period in (1e-3, 1e-5, 0.024, 10.0)]
+    assert times == pytest.approx(times[:1] * 4, rel=CLOSE)

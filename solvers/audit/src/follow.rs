@@ -91,13 +91,16 @@ impl Plan<'_> {
             let magnitude = stop.iter().fold(0.0_f64, |most, q| most.max(q.abs()));
             let stands =
                 |row: &Row<M>| distance(&row.q, &stop) <= GAP_TOLERANCE + ROUNDINGS * EPS * magnitude;
-            let on_time = |row: &Row<M>| (row.t - due).abs() <= slack;
+            let on_time = |row: &Row<M>| row.t <= due + slack;
+            let waits = |row: &Row<M>, later: &Row<M>| {
+                stands(later) && distance(&later.q, &stop) <= distance(&row.q, &stop)
+            };
             match &rows[next..] {
                 [] => break,
                 // On the very end of the pause: the next row tells whether the stream goes on or waits.
-                [row] if stands(row) && on_time(row) => break,
-                // A run may begin at a crawl: one that waits does not move at all.
-                [row, later, ..] if stands(row) && on_time(row) && later.q == row.q => clock.push(later.t),
+                [row] if on_time(row) => break,
+                // A run may begin at a crawl: one that waits, or has not quite arrived, does not move away at all.
+                [row, later, ..] if on_time(row) && waits(row, later) => clock.push(later.t),
                 [row, ..] if stands(row) => clock.push(row.t),
                 _ => clock.push(due),
             }

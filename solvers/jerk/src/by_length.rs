@@ -223,6 +223,11 @@ fn panel<const M: usize>(problem: &Problem<M>, i: usize, a: f64, b: f64) -> f64 
     half * (Lanes::new(W) * speeds).sum()
 }
 
+/// The length of piece `i`, by one panel.
+pub fn way<const M: usize>(problem: &Problem<M>, i: usize) -> f64 {
+    panel(problem, i, 0.0, problem.width[i])
+}
+
 impl Row {
     fn new<const M: usize>(problem: &Problem<M>, i: usize, u: f64, s: f64) -> Self {
         let [d, d1, _] = rate(problem, i, u, &derivatives(&piece(problem, i), u));
@@ -504,11 +509,6 @@ impl<'a, const M: usize> ByLength<'a, M> {
     /// The direction of motion on a part where it does not change.
     pub fn direction(&self, part: usize) -> Option<[f64; M]> {
         self.tables[part].straight.map(|(direction, _)| direction)
-    }
-
-    /// The servo period, in s.
-    pub fn period(&self) -> f64 {
-        self.problem.period
     }
 
     /// The greatest speed by the chord error on a curvature.

@@ -14,16 +14,15 @@ use feedplan_planner::bang_bang::Problem;
 
 const PATH_JERK: u8 = ArcKind::PathJerk as u8;
 pub const SPEED_CUBIC: u8 = ArcKind::SpeedCubic as u8;
-/// A section that takes no longer than this part of the servo period is rounding.
-const SHORTEST: f64 = 1e-7;
+/// Parameters that differ by no more than so many of their roundings are one place.
+const SHORTEST: f64 = 2.0 * f64::EPSILON;
 /// What states have been moved by is taken back by this part of each arc: there its length shows nothing of it.
 const TAKEN_BACK: f64 = 1e-10;
 /// What halves of an arc may differ from the whole in time, where the speed is not too near to none; and their halvings.
 const QUADRATURE: f64 = 1e-12;
 const DEPTH: u32 = 12;
-/// On arcs shorter than this part of the servo period rounding may show in the jerk of a cubic …
-const BRIEF: f64 = 0.1;
-/// … which is constant where it would by more than this part of its limit, and changes by no more than some roundings.
+/// The jerk of a cubic is constant where the rounding of v² would show in it by more than this part of its limit, and it
+/// changes by no more than some roundings.
 const SHOWN: f64 = 1e-7;
 const NOISE: f64 = 8.0;
 /// Halvings for the time at which a section of constant jerk passes a place.
@@ -174,7 +173,7 @@ impl Arcs {
         let last = self.len().wrapping_sub(1);
         let goes_on = last < self.len() && self.piece[last] as usize == piece && self.u1[last] == u0;
         let speed = |u: f64, v: f64| if v == 0.0 { 0.0 } else { v * v / speed_sq(problem, piece, u) };
-        if u1 <= u0 || arc.duration <= SHORTEST * problem.period {
+        if u1 - u0 <= SHORTEST * u1 {
             let u1 = u1.max(u0);
             if goes_on {
                 self.duration[last] += arc.duration;
@@ -290,6 +289,7 @@ impl Arcs {
             let lengths: Vec<f64> = u.windows(2).map(|u| path.between(part, u[0], u[1])).collect();
             let mut states = settled(profile, first..end + 1, [knots[part], knots[part + 1]], &lengths);
             let count = states.len();
+            let meeting = moved_from_start(&s[first..=end], [knots[part], knots[part + 1]]);
             if first == 0 && s[0] > ends[0] {
                 let rest = State { s: ends[0], v: 0.0, a: 0.0 };
                 let within = part == 0;
@@ -311,7 +311,9 @@ impl Arcs {
                 states[count - 1].a = -jerk * duration;
             }
             for n in 1..count {
-                let arc = arc_between(path, jerk_limits, part, lengths[n], [states[n - 1], states[n]]);
+                // What moves from both ends leave is in the length of the arc between them.
+                let off = if n == meeting.clamp(1, count - 1) { f64::EPSILON * s[first + n] } else { 0.0 };
+                let arc = arc_between(path, jerk_limits, part, (lengths[n], off), [states[n - 1], states[n]]);
                 self.push(problem, at.piece, [u[n], u[n + 1]], &arc);
             }
             if stops {
@@ -336,18 +338,24 @@ fn ramp(length: f64, v: f64) -> (f64, f64) {
     (2.0 * v / (t * t), t)
 }
 
+/// How many of these nodes between two knots are moved as the way from the first knot says; the others as that to the last.
+fn moved_from_start(nodes: &[f64], [from, to]: [f64; 2]) -> usize {
+    nodes.partition_point(|&s| s < 0.5 * (from + to))
+}
+
 /// The states at some nodes of a part between two knots, moved to where `lengths`, from knot to knot, say they are.
 fn settled(profile: &Profile, nodes: Range<usize>, [from, to]: [f64; 2], lengths: &[f64]) -> Vec<State> {
     let s = &profile.s[nodes.clone()];
     let count = s.len();
     let mut moved = vec![0.0; count];
+    let first = moved_from_start(s, [from, to]);
     // What the quadratures of long arcs are off must not move states in turns that are shorter than that.
     let settle = |miss: f64, length: f64| miss - miss.clamp(-TAKEN_BACK * length, TAKEN_BACK * length);
     let mut miss = 0.0;
     for n in 0..count {
         miss += lengths[n] - (s[n] - if n == 0 { from } else { s[n - 1] });
         miss = settle(miss, lengths[n]);
-        if s[n] < 0.5 * (from + to) && s[n] > from {
+        if n < first && s[n] > from {
             moved[n] = miss;
         }
     }
@@ -355,7 +363,7 @@ fn settled(profile: &Profile, nodes: Range<usize>, [from, to]: [f64; 2], lengths
     for n in (0..count).rev() {
         miss += if n + 1 == count { to } else { s[n + 1] } - s[n] - lengths[n + 1];
         miss = settle(miss, lengths[n + 1]);
-        if s[n] >= 0.5 * (from + to) && s[n] < to {
+        if n >= first && s[n] < to {
             moved[n] = miss;
         }
     }
@@ -369,29 +377,29 @@ fn settled(profile: &Profile, nodes: Range<usize>, [from, to]: [f64; 2], lengths
     (0..count).map(state).collect()
 }
 
-/// The arc between two states of a profile, so far apart on a part of the path.
+/// The arc between two states of a profile, so far apart on a part of the path, and so far off that.
 ///
-/// v² as a cubic is known by v² at its ends. Its rounding ε v², and the ε s of the place s where it holds, are
-/// 3 ε v (v² + 2 |a| s)/h² in the jerk: more than the limit on a piece of a nanometre, or on one of ten that begins a
+/// v² as a cubic is known by v² at its ends. Its rounding ε v² and what its length is off by, e, are
+/// 3 v (ε v² + 2 |a| e)/h² in the jerk: more than the limit on a piece of a nanometre, or on one of ten that begins a
 /// metre along the path. There the accelerations tell the jerk, which has no way to change: what changes is rounding.
 fn arc_between<const M: usize>(
     path: &ByLength<M>,
     jerk_limits: &[f64; M],
     part: usize,
-    h: f64,
+    (h, off): (f64, f64),
     ends: [State; 2],
 ) -> Arc {
     let duration = cubic_time(h, &ends);
-    if duration < BRIEF * path.period() {
-        let first = path.at(part, ends[0].s).first;
+    let [start, end] = ends;
+    let rounding = 3.0 * end.v * (f64::EPSILON * end.v * end.v + 2.0 * end.a.abs() * off) / (h * h);
+    // Half of what the jerk changes, from w'' = 2 a' at both ends.
+    let slopes = 2.0 * (start.a + end.a) - 2.0 * (end.v - start.v) * (end.v + start.v) / h;
+    let change = 1.5 * (slopes / h * end.v).abs();
+    if change <= NOISE * rounding {
+        let first = path.at(part, start.s).first;
         let limit = (0..M).map(|k| jerk_limits[k] / first[k].abs()).fold(f64::INFINITY, f64::min);
-        let [start, end] = ends;
-        let rounding = 3.0 * f64::EPSILON * end.v * (end.v * end.v + 2.0 * end.a.abs() * end.s) / (h * h);
-        // Half of what the jerk changes, from w'' = 2 a' at both ends.
-        let slopes = 2.0 * (start.a + end.a) - 2.0 * (end.v - start.v) * (end.v + start.v) / h;
-        let change = 1.5 * (slopes / h * end.v).abs();
-        if rounding > SHOWN * limit && change <= NOISE * rounding {
-            let value = (ends[1].a - ends[0].a) / duration;
+        if rounding > SHOWN * limit {
+            let value = (end.a - start.a) / duration;
             return Arc { kind: PATH_JERK, value, ends, duration };
         }
     }

@@ -56,7 +56,7 @@ pub fn certified<const M: usize>(
     effort: &Effort,
 ) -> Result<f64, Fault> {
     let limits = checked(problem, jerk)?;
-    let stretches = stretches(problem);
+    let stretches = stretches(problem, &limits);
     let place = |arc: usize| (columns.piece[arc] as usize, columns.u0[arc]);
     let count = columns.piece.len();
     let mut offsets = vec![];
@@ -167,6 +167,9 @@ impl<const M: usize> Task<'_, M> {
             while path.parts[part].piece != piece || path.parts[part].u[1] <= u[0] {
                 part += 1;
                 path.parts.get(part)?;
+            }
+            if path.parts[part].u[1] < u[1] {
+                return None;
             }
             let speed_sq = |u: f64, p: f64| p * speed_sq(self.problem, piece, u);
             if arc == first {

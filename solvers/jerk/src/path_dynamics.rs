@@ -46,6 +46,11 @@ impl<const M: usize> AxisLimits<M> {
     pub fn with_jerk_less(&self, part: f64) -> Self {
         Self { jerk: self.jerk.map(|jerk| (1.0 - part) * jerk), ..*self }
     }
+
+    /// The greatest speed along a segment by the limits of velocity alone.
+    pub fn fastest(&self, shape: &Shape<M>) -> f64 {
+        (0..M).map(|k| self.velocity[k] / shape.first[k]).fold(f64::INFINITY, f64::min)
+    }
 }
 
 /// What is allowed along a segment.
