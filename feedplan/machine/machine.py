@@ -43,20 +43,20 @@ Limit: TypeAlias = float | tuple[float, float]
 
 # What numbers of machines can be, in mm or degrees and seconds. Beyond, a number is a mistake: ramps would be
 # shorter than places are known, or plans longer than a year.
-VELOCITIES = 1e-5, 1e7
+VELOCITIES = 1e-5, 1e9
 GREATEST_ACCELERATION = 1e10
 # The times [s] after which an axis has its velocity, and its acceleration.
-RISE_TIMES = 1e-5, 1e2
+RISE_TIMES = 1e-5, 1e7
 JERK_TIMES = 1e-7, 1e2
 # The time to full acceleration is this part of the time to full velocity, or more.
 LEAST_JERK_SHARE = 1e-7
 # The least way [mm] in which an axis has its velocity v²/a, and its acceleration a³/j².
 LEAST_WAY = 1e-11
 # The fastest axis is so many times as fast as the slowest one, or less.
-MOST_TIMES = 1e6
+MOST_TIMES = 1e8
 PERIODS = 1e-6, 10.0
-# A period is this part of the longest time to full velocity, or more.
-LEAST_PERIOD_SHARE = 1e-7
+# A period is this part of the longest time to full velocity, or of this time [s], or more.
+LEAST_PERIOD_SHARE, LONG = 1e-7, 1e2
 CHORD_TOLERANCES = 1e-7, 1e6
 # Chord tolerance e and period T limit the acceleration on arcs to 8 e/T²: to this part of an axis's, or more.
 LEAST_CHORD_SHARE = 1e-9
@@ -79,8 +79,8 @@ class Axis:
     as rad or µm, takes the place of mm in all limits; programs, and kinematics with dimensions, need mm and
     deg. Limits and positions are never converted.
 
-    Velocities v are from 1e-5 to 1e7, accelerations a at most 1e10; an axis has its velocity after v/a from
-    1e-5 to 100 s, and its acceleration after a/j from 1e-7 to 100 s and 1e-7 of that time or more, in ways
+    Velocities v are from 1e-5 to 1e9, accelerations a at most 1e10; an axis has its velocity after v/a from
+    1e-5 to 1e7 s, and its acceleration after a/j from 1e-7 to 100 s and 1e-7 of that time or more, in ways
     v²/a and a³/j² of 1e-11 or more. Travel is within 1e9.
 
     Raises MachineError for values that are none of these.
@@ -154,9 +154,9 @@ class Machine:
     and G30 go to (and where programs begin if their words always are the tool's tip; empty: 0), `offsets` the
     work offsets by name (`"G54"`) [mm]; both have one number for each of `program_letters`. `kinematics` is
     the type that turns the tool tip into joint positions, `parameters` its keys in the machine file. Periods
-    T are from 1e-6 to 10 s and 1e-7 of the longest time to a full velocity or more, chord tolerances e from
-    1e-7 to 1e6 mm; the acceleration 8 e/T² to which they limit arcs is at least 1e-9 of the greatest of an
-    axis, and no axis is more than 1e6 times as fast as another one.
+    T are from 1e-6 to 10 s and 1e-7 of the longest time to a full velocity, or of 100 s, or more, chord
+    tolerances e from 1e-7 to 1e6 mm; the acceleration 8 e/T² to which they limit arcs is at least 1e-9 of the
+    greatest of an axis, and no axis is more than 1e8 times as fast as another one.
 
     Raises MachineError for values that are none of these.
     """
@@ -181,7 +181,9 @@ class Machine:
             remedy = f"{least:g} {axis.unit}/s or more, beside {speeds[fastest][1]:g} of axis {fastest.name}"
             require(speeds[axis][0] >= least, what, axis.max_velocity, remedy)
         rise = max(speeds[axis][1] / size_of(axis.max_acceleration) for axis in self.axes)
-        set_within(self, "period", "", "s", (max(PERIODS[0], LEAST_PERIOD_SHARE * rise), PERIODS[1]))
+        set_within(
+            self, "period", "", "s", (max(PERIODS[0], LEAST_PERIOD_SHARE * min(rise, LONG)), PERIODS[1])
+        )
         set_within(self, "chord_tolerance", "", "mm", CHORD_TOLERANCES, infinite=True)
         strongest = max(sizes_of(axis.max_acceleration)[1] for axis in self.axes)
         least = LEAST_CHORD_SHARE / 8.0 * strongest * self.period**2

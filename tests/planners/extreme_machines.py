@@ -9,17 +9,14 @@ from feedplan import Axis, Machine
 from feedplan.machine.machine import (
     CHORD_TOLERANCES,
     GREATEST_ACCELERATION,
-    JERK_TIMES,
     LEAST_CHORD_SHARE,
-    LEAST_JERK_SHARE,
     LEAST_PERIOD_SHARE,
-    LEAST_WAY,
-    MOST_TIMES,
     PERIODS,
-    RISE_TIMES,
-    VELOCITIES,
 )
 
+# Corners of the ranges of machines that exist; feedplan takes some more, where a limit never matters.
+VELOCITIES, MOST_TIMES = (1e-5, 1e7), 1e6
+RISE_TIMES, JERK_TIMES, LEAST_JERK_SHARE, LEAST_WAY = (1e-5, 1e2), (1e-5, 1e2), 1e-5, 1e-9
 # Within the ends, so that the products of rounded numbers are.
 _INSIDE = 1.0 + 1e-9
 

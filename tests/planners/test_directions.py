@@ -216,9 +216,8 @@ def test_joints_of_a_kinematics_are_refused() -> None:
 def test_limits_that_are_none_are_refused(limit: Any) -> None:
     for key in ("max_velocity", "max_acceleration"):
         given = {"max_velocity": 1.0, "max_acceleration": 1.0, key: limit}
-        with pytest.raises(
-            MachineError, match=rf"axis X: {key} is .*: give a positive number \[mm/s²?\], or a"
-        ):
+        remedy = r"give a number from \S+ to \S+ \[mm/s²?\], or a negative and a positive one"
+        with pytest.raises(MachineError, match=rf"axis X: {key} is .*: {remedy}"):
             Axis("X", **given)
 
 

@@ -223,11 +223,6 @@ fn panel<const M: usize>(problem: &Problem<M>, i: usize, a: f64, b: f64) -> f64 
     half * (Lanes::new(W) * speeds).sum()
 }
 
-/// The length of piece `i`, by one panel.
-pub fn way<const M: usize>(problem: &Problem<M>, i: usize) -> f64 {
-    panel(problem, i, 0.0, problem.width[i])
-}
-
 impl Row {
     fn new<const M: usize>(problem: &Problem<M>, i: usize, u: f64, s: f64) -> Self {
         let [d, d1, _] = rate(problem, i, u, &derivatives(&piece(problem, i), u));

@@ -14,8 +14,8 @@ use feedplan_planner::bang_bang::Problem;
 
 const PATH_JERK: u8 = ArcKind::PathJerk as u8;
 pub const SPEED_CUBIC: u8 = ArcKind::SpeedCubic as u8;
-/// Parameters that differ by no more than so many of their roundings are one place.
-const SHORTEST: f64 = 2.0 * f64::EPSILON;
+/// A section that takes no longer than this part of the time in which an axis has its greatest speed is rounding.
+const SHORTEST: f64 = 1e-9;
 /// What states have been moved by is taken back by this part of each arc: there its length shows nothing of it.
 const TAKEN_BACK: f64 = 1e-10;
 /// What halves of an arc may differ from the whole in time, where the speed is not too near to none; and their halvings.
@@ -173,7 +173,7 @@ impl Arcs {
         let last = self.len().wrapping_sub(1);
         let goes_on = last < self.len() && self.piece[last] as usize == piece && self.u1[last] == u0;
         let speed = |u: f64, v: f64| if v == 0.0 { 0.0 } else { v * v / speed_sq(problem, piece, u) };
-        if u1 - u0 <= SHORTEST * u1 {
+        if u1 <= u0 || arc.duration <= SHORTEST * rise_time(problem) {
             let u1 = u1.max(u0);
             if goes_on {
                 self.duration[last] += arc.duration;
@@ -329,6 +329,12 @@ impl Arcs {
             first = end;
         }
     }
+}
+
+/// The least time in which an axis has its greatest speed.
+fn rise_time<const M: usize>(problem: &Problem<M>) -> f64 {
+    let of_axis = |k: usize| problem.max_velocity[0][k] / problem.max_acceleration[0][k];
+    (0..M).map(of_axis).fold(f64::INFINITY, f64::min)
 }
 
 /// Jerk and duration of a ramp from rest to a speed: s = J t³/6 and v = J t²/2, so that t = 3 s/v. The acceleration

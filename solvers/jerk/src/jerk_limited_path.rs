@@ -56,7 +56,7 @@ pub fn certified<const M: usize>(
     effort: &Effort,
 ) -> Result<f64, Fault> {
     let limits = checked(problem, jerk)?;
-    let stretches = stretches(problem, &limits);
+    let stretches = stretches(problem);
     let place = |arc: usize| (columns.piece[arc] as usize, columns.u0[arc]);
     let count = columns.piece.len();
     let mut offsets = vec![];

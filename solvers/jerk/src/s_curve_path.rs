@@ -14,7 +14,7 @@ use crate::jerk_limited::{Effort, Geometry, Limits, Place, SpeedCap};
 use crate::jerk_limited_path::Task;
 use crate::path_dynamics::{allowable, bounded, greatest, Allowable, AxisLimits, Curve, Shape};
 use crate::s_curve::{self, Section, Segment};
-use crate::stretches::{checked, over_stretches, stretches, Stretch, CREEP};
+use crate::stretches::{checked, over_stretches, stretches, Stretch, CREEP, MOMENT};
 use feedplan_geometry::spline::bezier::split;
 use feedplan_geometry::spline::CompositeCurve;
 use feedplan_geometry::watch::Watch;
@@ -40,8 +40,6 @@ const LOOKED: usize = 9;
 const DEPTH: u32 = 5;
 const WELL_WORTH: f64 = 1.0;
 const MOST_DEPTH: u32 = 40;
-/// The axes creep at a segment below `CREEP` of what they reach on the stretch and this part of its feed.
-const SLOW: f64 = 0.02;
 
 /// A way to join parts to segments.
 #[derive(Clone, Copy, Debug)]
@@ -93,7 +91,7 @@ pub fn cut<const M: usize>(
     let limits = checked(problem, jerk)?;
     let mut all = Segmented { stretches: vec![0], ..Segmented::default() };
     let each = problem.watch.each(problem.width.len());
-    for stretch in stretches(problem, &limits) {
+    for stretch in stretches(problem) {
         let path = ByLength::new(problem, &stretch.parts);
         let watch = each.part(stretch.parts.len() as f64);
         let own = quickest(problem, &path, &stretch, &limits, (cuttings, look_ahead), watch)?;
@@ -362,8 +360,9 @@ impl<'a, const M: usize> Parts<'a, M> {
             let most = greatest(&cut.shape, &axes, cut.cap);
             let stretch = cutting.lengths * most.speed * most.limits.duration(most.speed);
             let allowed = allowable(&cut.shape, &axes, cut.cap, stretch).ok()?;
-            let reached = most.limits.highest(0.0, self.path.total()).min(axes.fastest(&cut.shape));
-            if allowed.speed < CREEP * reached && allowed.speed < SLOW * cut.cap {
+            let gained = allowed.limits.acceleration * self.problem.period;
+            let crept = CREEP * gained.min(MOMENT * axes.fastest(&cut.shape));
+            if allowed.speed < crept && allowed.speed < CREEP * cut.cap {
                 return None;
             }
             // The cap has no end where the feed is about axes that stand still.

@@ -1,13 +1,10 @@
 //! Stretches of a path between places of rest: stops, and cusps, whose curvature has no bound.
 
-use std::cell::LazyCell;
-
 use rayon::prelude::*;
 
-use crate::by_length::{per_feed, piece, place, speed_sq, straight, tool_curvature, way, Part, MAX_RATE};
+use crate::by_length::{per_feed, piece, place, speed_sq, straight, tool_curvature, Part, MAX_RATE};
 use crate::jerk_arcs::Arcs;
 use crate::jerk_limited::Limits;
-use crate::s_curve;
 use feedplan_geometry::polynomial::Polynomial;
 use feedplan_geometry::quadratic::dot;
 use feedplan_geometry::spline::bezier::derivatives;
@@ -20,11 +17,12 @@ use feedplan_planner::planning;
 
 /// Cusps closer to the end of a piece than this part of it are at the end.
 const AT_END: f64 = 1e-9;
-/// Speeds of turns are in parts of what an axis reaches from rest, over the length of the whole run. The tool creeps where
-/// the axes turn it only below this part, and there it rests: that takes a small part of the run's time. Below the other
-/// part a turn is tight.
-pub const CREEP: f64 = 2e-4;
-const TIGHT_TURN: f64 = 0.1;
+/// The tool creeps where the axes turn it only below this part of what they gain in a moment, and a turn is tight below so
+/// many times that.
+pub const CREEP: f64 = 0.02;
+const TIGHT_TURN: f64 = 10.0;
+/// A moment is a servo period, and no longer than this part of the time to full speed.
+pub const MOMENT: f64 = 0.1;
 /// Places are slow where the square of the speed is below this part of the greatest on their piece.
 const SLOW: f64 = 0.25;
 /// Beside a slow place a turn is sought at so many distances, each half the one before, then between two of them so often
@@ -62,7 +60,7 @@ pub fn over_stretches<const M: usize>(
     plan: impl Fn(&Stretch, &Limits<M>, Watch) -> Result<Arcs, Fault> + Sync,
 ) -> Result<Arcs, Fault> {
     let limits = checked(problem, jerk)?;
-    let stretches = stretches(problem, &limits);
+    let stretches = stretches(problem);
     let watch = problem.watch.part(1.0 - CUTTING).each(problem.width.len());
     let planned: Result<Vec<Arcs>, Fault> = stretches
         .par_iter()
@@ -102,20 +100,18 @@ pub fn checked<const M: usize>(problem: &Problem<M>, jerk: &[f64; M]) -> Result<
 }
 
 /// The stretches of all runs, in order.
-pub fn stretches<const M: usize>(problem: &Problem<M>, limits: &Limits<M>) -> Vec<Stretch> {
+pub fn stretches<const M: usize>(problem: &Problem<M>) -> Vec<Stretch> {
     let mut out: Vec<Stretch> = vec![];
     for (run, pair) in problem.runs.windows(2).enumerate() {
         let mut rests = true;
-        let reached = LazyCell::new(|| reached(limits, (pair[0]..pair[1]).map(|i| way(problem, i)).sum()));
         for i in pair[0]..pair[1] {
             problem.watch.part(CUTTING).each(problem.width.len()).count(i);
             let (cuts, cusped) = cusps(problem, i);
             let mut cuts: Vec<(f64, bool)> = cuts.into_iter().map(|u| (u, true)).collect();
             let at_cusp = |u: f64| cusped[0] && u == 0.0 || cusped[1] && u == problem.width[i];
             for u in slow_places(problem, i).into_iter().filter(|&u| !at_cusp(u)) {
-                let speed = |u: f64| turn_speed(problem, &reached, i, u);
-                cuts.push((u, speed(u) < CREEP));
-                let turns = turns_beside(problem, i, u).into_iter().map(|u| (u, speed(u)));
+                cuts.push((u, turn_speed(problem, i, u) < CREEP));
+                let turns = turns_beside(problem, i, u).into_iter().map(|u| (u, turn_speed(problem, i, u)));
                 cuts.extend(turns.filter(|turn| turn.1 < TIGHT_TURN).map(|(u, speed)| (u, speed < CREEP)));
             }
             cuts.extend(chord_kinks(problem, i).into_iter().map(|u| (u, false)));
@@ -265,17 +261,14 @@ fn chord_kinks<const M: usize>(problem: &Problem<M>, i: usize) -> Vec<f64> {
     kinks.filter(|&u| u > AT_END * width && u < (1.0 - AT_END) * width).collect()
 }
 
-/// The speeds that axes reach from rest on a line of their own so long.
-fn reached<const M: usize>(limits: &Limits<M>, length: f64) -> [f64; M] {
-    std::array::from_fn(|k| {
-        let own = s_curve::Limits { acceleration: limits.acceleration[k], jerk: limits.jerk[k] };
-        own.highest(0.0, length).min(limits.velocity[k])
-    })
-}
-
-/// The greatest speed at a place on piece `i` that turns with it, in parts of these of the axes.
-fn turn_speed<const M: usize>(problem: &Problem<M>, reached: &[f64; M], i: usize, u: f64) -> f64 {
+/// The greatest speed at a place on piece `i` that turns with it, in parts of what the axes gain in a moment. Where the
+/// tool would creep, a rest takes no longer that setpoints could tell.
+fn turn_speed<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> f64 {
     let place = place(problem, i, u);
-    let of_axis = |k: usize| (problem.max_acceleration[0][k] / place.second[k].abs()).sqrt() / reached[k];
+    let of_axis = |k: usize| {
+        let most = problem.max_acceleration[0][k];
+        let gained = (most * problem.period).min(MOMENT * problem.max_velocity[0][k]);
+        (most / place.second[k].abs()).sqrt() / gained
+    };
     (0..M).map(of_axis).fold(f64::INFINITY, f64::min)
 }
