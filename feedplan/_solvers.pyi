@@ -185,9 +185,14 @@ def read_gcode(
     name: str,
     places: NDArray[np.float64],
     machine_axes: str,
+    machines_with: Callable[[str], str] | None,
     tip_control: object | None,
     block_delete: bool,
     max_moves: int,
+    tools: Sequence[tuple[int, int, Sequence[float], float, int]] | None,
+    subprograms: Callable[[str], tuple[str, bytes] | None] | None,
+    feed: float | None,
+    whole_step: float,
     progress: _Progress | None = None,
 ) -> dict[str, Any]: ...
 def fit_points(

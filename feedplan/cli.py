@@ -22,6 +22,8 @@ from feedplan.comparison import TIME_LIMIT
 from feedplan.errors import FeedplanError, InfeasibleError, SolverError
 from feedplan.geometry.corners import PATHS, FollowedPath
 from feedplan.machine.machine import Axis, Limit, Machine, bundled_machines
+from feedplan.program.read import Reading
+from feedplan.reading_options import machine_for, reading_options
 from feedplan.setpoints import INTERPOLATORS, MAX_SETPOINTS, Interpolator
 
 if TYPE_CHECKING:
@@ -107,7 +109,7 @@ class _Number(NumberType):
         self.fail(f"{value}: give a number {'≥ 0' if self._or_zero else '> 0'}", param, ctx)
 
 
-_MACHINE_HELP = "A bundled machine or a TOML file."
+_MACHINE_HELP = "A bundled machine, a TOML file, or auto: the smallest bundled one that the program fits."
 _MACHINE = click.option(
     "--machine", "-m", default="mill", show_default=True, metavar="NAME|FILE", help=_MACHINE_HELP
 )
@@ -172,6 +174,7 @@ def cli(context: click.Context) -> int:
 @cli.command()
 @_PROGRAM
 @_MACHINE
+@reading_options
 @click.option("--method", type=click.Choice(planners.methods()), default="bang-bang", show_default=True)
 @_ACCURACY
 @click.option("--time-limit", type=_ZERO_OR_MORE, metavar="S", help=_WHOLE_LIMIT_HELP)
@@ -220,6 +223,7 @@ def plan(
     formats: tuple[Any, ...],
     as_json: bool,
     quiet: bool,
+    reading: Reading,
 ) -> int:
     """Plan PROGRAM: G-code, a path file (.json) or a drawing (.dxf); - is standard input.
 
@@ -237,9 +241,10 @@ def plan(
     if output:
         require_folder(FilePath(output))
     with console.progress_bar(quiet) as progress, console.without_others():
+        known, source = machine_for(machine, program, reading, feed)
         result = make_plan(
-            program,
-            Machine.load(machine),
+            source,
+            known,
             method=method,
             tolerance=tolerance,
             path=path,
@@ -250,6 +255,7 @@ def plan(
             end_speed=end_speed,
             interpolator=interpolator,
             max_setpoints=max_setpoints,
+            reading=reading,
             progress=progress,
             **_given(accuracy=accuracy, time_limit=time_limit),
         )
@@ -280,6 +286,7 @@ def plan(
 @cli.command()
 @_PROGRAM
 @_MACHINE
+@reading_options
 @click.option("--methods", metavar="A,B,…", help="Methods to compare.  [default: all]")
 @_ACCURACY
 @click.option(
@@ -305,6 +312,7 @@ def compare(
     output: str | None,
     as_json: bool,
     quiet: bool,
+    reading: Reading,
 ) -> int:
     """Plan PROGRAM by several methods: time, proven gap, computing time, and what the audit says of each.
 
@@ -321,11 +329,13 @@ def compare(
         require_folder(FilePath(output))
     names: Any = None if methods is None else [name.strip() for name in methods.split(",")]
     with console.progress_bar(quiet) as progress, console.without_others():
+        known, source = machine_for(machine, program, reading, feed)
         rows = make_comparison(
-            program,
-            machine,
+            source,
+            known,
             names,
             time_limit=time_limit,
+            reading=reading,
             progress=progress,
             tolerance=tolerance,
             path=path,
@@ -335,7 +345,7 @@ def compare(
         )
         summary = {
             "program": _name(program),
-            "machine": Machine.load(machine).name,
+            "machine": known.name,
             "methods": [row.to_json() for row in rows],
         }
         files = write_comparison(rows, output, summary, progress) if output else ()
@@ -357,23 +367,34 @@ def compare(
 @cli.command()
 @_PROGRAM
 @_MACHINE
+@reading_options
 @_TOLERANCE
 @click.option("--smooth", is_flag=True, help="Fit all moves by curves fit for limits of jerk.")
 @_JSON
-def fit(program: str | IO[bytes], machine: str, tolerance: float | None, smooth: bool, as_json: bool) -> None:
+def fit(
+    program: str | IO[bytes],
+    machine: str,
+    tolerance: float | None,
+    smooth: bool,
+    as_json: bool,
+    reading: Reading,
+) -> None:
     """Fit PROGRAM's points by splines, without planning; PROGRAM is as for plan."""
     from dataclasses import asdict
 
     from feedplan.files import summary_text
     from feedplan.geometry.build import build_path
     from feedplan.geometry.corners import Corners
+    from feedplan.program.program import Program
     from feedplan.program.read import read_program
     from feedplan.progress import of_stage
 
-    known = Machine.load(machine)
+    known, source = machine_for(machine, program, reading)
     choice = Corners.SMOOTH if smooth else Corners.ROUNDED
     with console.progress_bar(quiet=False) as progress:
-        moves = read_program(program, known, progress=of_stage(progress, "read"))
+        moves = source
+        if not isinstance(moves, Program):
+            moves = read_program(moves, known, progress=of_stage(progress, "read"), **reading)
         path = build_path(moves, known, tolerance, corners=choice, progress=of_stage(progress, "fit"))
     for warning in path.warnings:
         print(f"warning: {warning}", file=sys.stderr)
@@ -388,7 +409,12 @@ def fit(program: str | IO[bytes], machine: str, tolerance: float | None, smooth:
 
 @cli.command()
 @click.argument("place", metavar="DIR|SETPOINTS")
-@click.option("--machine", "-m", metavar="NAME|FILE", help=f"{_MACHINE_HELP}  [default: the plan's own]")
+@click.option(
+    "--machine",
+    "-m",
+    metavar="NAME|FILE",
+    help="A bundled machine or a TOML file.  [default: the plan's own]",
+)
 @click.option(
     "--resolution", type=_ZERO_OR_MORE, default=0.0, metavar="MM", help="Last digit of rounded positions."
 )

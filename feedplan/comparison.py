@@ -23,7 +23,7 @@ from feedplan.planners import MethodName, limits_jerk, options_of
 from feedplan.planners import methods as all_methods
 from feedplan.planning import OF_ALL_METHODS, Plan, plan
 from feedplan.program.program import Program
-from feedplan.program.read import read_program
+from feedplan.program.read import checked_reading, read_program
 from feedplan.program.source import Source
 from feedplan.progress import Progress
 
@@ -119,7 +119,8 @@ def compare(
     callback(progress)
     machine = Machine.of(machine)
     if not isinstance(source, (Program, Path)):
-        source = read_program(source, machine)
+        reading = checked_reading(options.pop("reading", None))
+        source = read_program(source, machine, feed=options.get("feed"), **reading)
     plans: list[tuple[MethodName, Plan | None, str | None]] = []
     for method, takes in has.items():
         shown = partial(_show, progress, method)

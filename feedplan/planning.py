@@ -43,7 +43,7 @@ from feedplan.planners import (
 )
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
-from feedplan.program.read import read_program
+from feedplan.program.read import Reading, checked_reading, read_program
 from feedplan.program.source import Source
 from feedplan.progress import Listener, Progress, of_stage, part
 from feedplan.report.account import Account, account
@@ -260,6 +260,7 @@ def plan(
     interpolator: Interpolator = "sarfraz",
     max_setpoints: int = MAX_SETPOINTS,
     path: FollowedPath = "as-fitted",
+    reading: Reading | None = None,
     progress: Progress | None = None,
     **options: Any,
 ) -> Plan:
@@ -271,8 +272,9 @@ def plan(
     it (default: the program's own, else 0.01; a Path has its own); how the path follows the program within it
     is the method's choice. Where the method takes smooth paths, `path` "as-fitted" keeps the size of arcs and
     bends, "fastest" cuts them as far as the tolerance allows. `feed` [mm/s] replaces the programmed feeds,
-    `feed_override` multiplies them. `period` [s] replaces the machine's servo period; `start_speed` and
-    `end_speed` [mm/s] hold at the ends. `interpolator` makes the setpoints: "sarfraz" or "newton".
+    `feed_override` multiplies them. `reading` are keywords of `read_program`, such as a tool table. `period`
+    [s] replaces the machine's servo period; `start_speed` and `end_speed` [mm/s] hold at the ends.
+    `interpolator` makes the setpoints: "sarfraz" or "newton".
     A plan of more than `max_setpoints` gives none, and is not audited, before it is asked for so many or a
     longer period.
     `progress(stage, done)` is called some times a second as the work goes on, with `read`, `fit`, then
@@ -327,7 +329,13 @@ def plan(
             if isinstance(source, Program):
                 program = source
             else:
-                program = read_program(source, machine, progress=of_stage(progress, "read"))
+                program = read_program(
+                    source,
+                    machine,
+                    feed=feed,
+                    progress=of_stage(progress, "read"),
+                    **checked_reading(reading),
+                )
         report("read", 1.0)
         report("fit", 0.0)
         with _timed(compute, "fit"):

@@ -79,6 +79,8 @@ def cases(tmp_path: FilePath) -> dict[str, tuple[Callable[..., Any], dict[str, A
     """Functions by name, with arguments that they take; positional ones by the names in the signature."""
     file = tmp_path / "part.ngc"
     file.write_text(PROGRAM)
+    table = tmp_path / "tool.tbl"
+    table.write_text("T1 D6\n")
     machine = Machine.load("mill")
     plan = feedplan.plan(file, machine)
     points = plan.setpoints()
@@ -95,6 +97,7 @@ def cases(tmp_path: FilePath) -> dict[str, tuple[Callable[..., Any], dict[str, A
         "end_speed": 0.0,
         "interpolator": "newton",
         "path": "as-fitted",
+        "reading": {"whole_step": 1.0},
         "progress": None,
     }
     spline = {"control_points": POINTS, "knots": KNOTS, "degree": 2}
@@ -125,6 +128,10 @@ def cases(tmp_path: FilePath) -> dict[str, tuple[Callable[..., Any], dict[str, A
                 "machine": machine,
                 "name": "a",
                 "block_delete": True,
+                "tool_table": table,
+                "subprograms": [tmp_path],
+                "feed": 50.0,
+                "whole_step": 1.0,
                 "max_bytes": 1000,
                 "progress": None,
             },

@@ -1,4 +1,4 @@
-"""Reads G-code (RS-274/NGC, as CAM systems post it) into a Program.
+"""Reads G-code (RS-274/NGC, as CAM systems post it) into a Program: as LinuxCNC's interpreter reads it.
 
 | words | meaning |
 |---|---|
@@ -8,30 +8,63 @@
 | G5.2 X Y P L … G5.3 | NURBS in X and Y, weights P, order L from 3, knots clamped and uniform; G17 |
 | G6.2 P K X… R, then K X… R, then K | Fanuc's NURBS: order P (4), knots K, weights R, any axes |
 | G4 P, G4 X | dwell [s] |
+| G7 G8 | X words are diameters, radii |
+| G10 L2 L20, L1 L10 L11 | work offsets and their rotation R, tools of the table |
+| G15 G16, @ ^ | polar coordinates of Fanuc; radius and angle as LinuxCNC writes them |
 | G20 G21 | inch, mm (mm without either, with a warning) |
-| G28 G30 | rapid by the place named to the machine's home: the axes named, or all |
-| G43 H, G43.1, G43.2, G49 | tool length; lengths by H are not known and count as 0, with a warning |
+| G28 G30, G28.1 G30.1 | rapid by the place named to home: the axes named, or all; this place is home |
+| G28.2 to G28.4 | finding the machine's zero: rapid to home |
+| G33, G33.1, G76 | moves that follow the spindle (S and M3 before): one pass, a tap, a whole thread |
+| G40, G41 G42 D, G41.1 G42.1 D | the tool beside the path by its radius, from the table or D; G17, G18 |
+| G43 H, G43.1, G43.2, G49 | tool length; without a tool table lengths by H count as 0, with a warning |
 | G43.4, G43.5, G49 | X Y Z are the tool's tip on the part, with rotary words or with I J K, its direction |
-| G52, G92 to G92.3, G10 L2 L20 | offsets |
+| G52, G92 to G92.3 | shifts of all work offsets |
 | G53, G54 to G59.3 | machine coordinates, work offsets (from the machine file, else 0) |
+| G60 | alone exact stop; with a place a rapid that ends with one |
 | G61.1, G61, G64 P Q | exact stop, exact path, blending within P, fitting within Q |
-| G73 G74 G81 to G86 G89, G80, G98 G99 | canned cycles with R Z Q P L D, written out as moves |
+| G73 G74 G81 to G86 G89, G80, G98 G99 | canned cycles with R Z Q P L D, as moves; G99 unless G98 is given |
 | G90 G91 | absolute, incremental |
 | G93 G94 G95 | F is 1/min, units/min, units a turn (with a known spindle speed) |
 | G96 G97 S | surface or spindle speed |
-| G8 G15 G40 G69 | what they cancel is never on: no effect |
+| G69 | what it cancels is never on: no effect |
 | G5 P, G5.1 Q alone in a block | Fanuc's look-ahead, with a warning: no effect |
-| M0 M1 M2 M30 M60, M3 to M9, M19, M100 to M199 | full stop; M2 and M30 end the program |
-| M48 M49, S T D | no effect on the path |
+| M0 M1 M2 M30 M60 | full stop; M2 and M30 end the program |
+| M3 to M9, M19, M62 to M68 | spindle, coolant, outputs: a stop (none for M62, M63, M67) |
+| T, M6, M61 Q | tool of the table, if one is given |
+| M48 to M53 | overrides: no effect on the path |
+| M70 to M73 | save and restore modes |
+| M97 M98 M99 | Fanuc's subprograms by P, L times; without parameters of their own |
+| other M codes | a stop of no duration, with a warning; the words after it are its own |
+| E | an extruder: left out, with a warning |
+| O… sub, call, if, while, do, repeat | subroutines, branches and loops, also with names and in files |
+| #1 = [...], #<name>, + - * / ** MOD, EQ to XOR, ABS to TAN | parameters and arithmetic, in any word |
 | F, N, O1234 or :1234 at the start, %, ( ) and ; comments | as usual |
 | / at the start of a block | left out, with a warning, unless `block_delete=False` |
-| #1 = [...], #<name>, + - * / ** MOD, EQ to XOR, ABS to TAN | arithmetic, in any word |
 
-Everything else is an error that names the line and the word: cutter radius compensation (G41 G42), threading,
-probing, subprograms and flow control (O words, M97 to M99), words that no code of their block uses. Within a
-block the order is LinuxCNC's, with differences that posts count on: F is in the units of its own block, G80
-gives way to another motion code beside it, and G0 beside G28 only stays in force. All axes start at
-zero, or at home where words always are the tip; a change of offsets moves nothing. A stop or dwell belongs
+Parameters: #1 to #30 and #<name> belong to their call, #31 to #5602 and #<_name> to all; #5161 to #5390
+hold home and offsets, #5400 to #5428 tell tool and position, #<_x>, #<_metric> and their kin the modes. What
+is not set is 0, with a warning; names must be set. Loops and calls are bounded: by `max_moves`, four lines a
+move beside the text, and 100 calls deep. Subprograms in files are looked for beside the program, then in
+`subprograms`; their moves have the line of the call.
+
+What is refused, by name, line and remedy:
+
+| words | reason |
+|---|---|
+| G38.2 to G38.5 | probing depends on the part |
+| G68, G50 G51, G54.1 | turned, scaled and further coordinates: post them as they are cut |
+| G65 to G67, GOTO, IF[ ] | macros of Fanuc |
+| G70 to G72, G87 G88 | these cycles depend on a contour or an operator |
+| G17.1 to G19.1 | planes of U, V, W |
+| ,C ,R | chamfers and roundings between blocks |
+| G41 G42 in G19, with splines, cycles, G28, G53, G92 | there the tool has no offset |
+| #<_ini[…]>, #<_hal[…]> | values of one machine's configuration |
+| a word that no code of its block uses | it would mean something else than is planned |
+| Heidenhain, Siemens, other languages | another language, named |
+
+Within a block the order is LinuxCNC's, with differences that posts count on: F is in the units of its own
+block, G80 gives way to another motion code beside it, and G0 beside G28 only stays in force. All axes start
+at zero, or at home where words always are the tip; a change of offsets moves nothing. A stop or dwell belongs
 to the move before it, and a dwell before the first move is kept as `start_dwell`.
 
 A spline of several blocks is one move, in the line and at the feed of its first block; nothing else may stand
@@ -50,6 +83,9 @@ elsewhere.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -57,8 +93,12 @@ from feedplan._solvers import read_gcode as read_native
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import MachineError
 from feedplan.machine.machine import AXIS_LETTERS, Machine
+from feedplan.program.events import Events
+from feedplan.program.machine_for import names_of_machines_with
 from feedplan.program.program import Program
 from feedplan.program.source import MAX_BYTES, Source, content_of
+from feedplan.program.subprograms import finder
+from feedplan.program.tools import Tool
 from feedplan.progress import Listener
 
 WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
@@ -72,6 +112,10 @@ def read_gcode(
     name: str | None = None,
     *,
     block_delete: bool = True,
+    tools: Sequence[Tool] | None = None,
+    subprograms: Sequence[Path] = (),
+    feed: float | None = None,
+    whole_step: float = 1.0,
     max_bytes: int = MAX_BYTES,
     max_moves: int = MAX_MOVES,
     progress: Listener | None = None,
@@ -81,10 +125,15 @@ def read_gcode(
     `source` is a path, a stream, or the program itself: bytes, or a str with a line break. `machine` gives
     the work offsets, the home position and the axes there are; without it offsets and home are 0. `name`
     stands in messages, instead of the file's name. `block_delete` leaves out blocks that start with `/`, as
-    LinuxCNC does; `max_bytes` and `max_moves` bound what is read. `progress` is told how far it is.
+    LinuxCNC does. `tools` is the tool table; without one lengths by H are 0. `subprograms` are folders of the
+    files that the program calls, after its own. `feed` [mm/s, deg/s] is that of moves before the first F.
+    `whole_step` is what lengths and angles without a decimal point count, in units of the program: 0.001 on
+    controls that are set so. `max_bytes` and `max_moves` bound what is read. `progress` is told how far it
+    is.
     Raises ProgramError naming file, line, word and remedy, MachineError where an offset's name is unknown.
     """
-    content, name, _ = content_of(source, name, max_bytes)
+    content, name, text = content_of(source, name, max_bytes)
+    folders = [*([text.parent] if isinstance(text, Path) else []), *subprograms]
     # Kinematics are loaded where a program is read, not where feedplan is imported.
     from feedplan.program.tip import TipControl
 
@@ -94,11 +143,17 @@ def read_gcode(
         name,
         _places(machine),
         "" if machine is None else "".join(machine.program_letters),
+        names_of_machines_with,
         control,
         block_delete,
         max_moves,
+        None if tools is None else [tool.row() for tool in tools],
+        finder(folders, max_bytes) if folders else None,
+        feed,
+        whole_step,
         progress,
     )
+    columns["events"] = Events(*columns.pop("event_columns"))
     splines = columns.pop("spline_columns")
     if len(columns["spline_move"]):
         columns["splines"] = CompositeCurve(*splines)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
+from feedplan.program.events import Events
 from feedplan.units import counted
 
 LINEAR_AXES = "XYZ"
@@ -70,6 +71,7 @@ class Program:
     in deg/s of the tool's turning; columns that a meaning does not use stay as they are. A change of meaning
     is a full stop and moves no joint: `change_move` (c,) are the first moves in a new meaning, and
     `change_start` (c, axes) where they start in the new words, `starts` takes both into account.
+    `events` are what happens between the moves: spindle, coolant, tools, outputs, dwells, stops, messages.
     `warnings` are sentences for the user. If it was read, `text` is the file it was read from, or the bytes
     themselves, and `sha256` the hash of these.
     """
@@ -102,6 +104,7 @@ class Program:
     sha256: str | None = None
     text: FilePath | bytes | None = None
     stop_cause: NDArray[np.uint8] | None = None
+    events: Events = field(default_factory=Events.none)
 
     def __len__(self) -> int:
         return len(self.kind)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TypedDict, cast
 
-from feedplan.arguments import callback, flag, is_text, refuse, whole
+from feedplan.arguments import callback, file_path, flag, is_text, number, positive, refuse, whole
 from feedplan.machine.machine import Machine
 from feedplan.program import path_file
 from feedplan.program.dxf import read_dxf
@@ -17,7 +18,28 @@ from feedplan.program.gcode import read_gcode
 from feedplan.program.path_file import read_path_file
 from feedplan.program.program import Program
 from feedplan.program.source import MAX_BYTES, Source, content_of
+from feedplan.program.tools import read_tools
 from feedplan.progress import Listener
+
+
+class Reading(TypedDict, total=False):
+    """How a program is read: keywords of `read_program`."""
+
+    block_delete: bool
+    tool_table: str | os.PathLike[str] | None
+    subprograms: Sequence[str | os.PathLike[str]]
+    whole_step: float
+
+
+def checked_reading(reading: object) -> Reading:
+    """Keywords of `read_program`; raises InputError for anything else."""
+    known = Reading.__annotations__
+    if reading is None:
+        return Reading()
+    if isinstance(reading, Mapping) and all(isinstance(name, str) and name in known for name in reading):
+        return cast(Reading, dict(reading))
+    raise refuse("reading", reading, f"a dictionary with {', '.join(known)}")
+
 
 Reader = Callable[[bytes, Machine | None, str], Program]
 
@@ -27,6 +49,8 @@ READERS: dict[str, tuple[Reader, int]] = {
     ".dxf": (lambda content, machine, name: read_dxf(content, name), path_file.MAX_BYTES),
 }
 # How programs without an ending begin; no G-code does.
+_FOLDER = "the path of a folder"
+_TABLE = "the path of a tool table (.tbl)"
 _BEGINNINGS = {
     ".json": re.compile(rb"(\xef\xbb\xbf)?\s*\{"),
     ".dxf": re.compile(rb"\s*(0\s+SECTION|999\s|AutoCAD Binary DXF)"),
@@ -39,6 +63,10 @@ def read_program(
     *,
     name: str | None = None,
     block_delete: bool = True,
+    tool_table: str | os.PathLike[str] | None = None,
+    subprograms: Sequence[str | os.PathLike[str]] = (),
+    feed: float | None = None,
+    whole_step: float = 1.0,
     max_bytes: int = MAX_BYTES,
     progress: Listener | None = None,
 ) -> Program:
@@ -48,7 +76,10 @@ def read_program(
     file or another stream. `name` stands in messages instead of the file's name, and its ending tells the
     language; where there is none the first characters do. `machine`, or the name or file of one, gives work
     offsets and home, see `feedplan.program.gcode.read_gcode`, and the axes there are. `block_delete` leaves
-    out blocks that start with `/`. `progress` is told how far it is.
+    out blocks that start with `/`. `tool_table` is a file of LinuxCNC (.tbl) with lengths and diameters of
+    tools; `subprograms` are folders of files that the program calls, after its own; `feed` [mm/s, deg/s] is
+    that of moves before the first F; `whole_step` is what lengths without a decimal point count, in units of
+    the program. `progress` is told how far it is.
     Raises ProgramError in one sentence where the program is missing, a directory, empty, binary, larger than
     `max_bytes` or not understood, MissingPackageError where a drawing needs a package, MachineError,
     InputError for other arguments that cannot be used.
@@ -62,7 +93,21 @@ def read_program(
     content, name, text = content_of(source, name, max_bytes)
     reader, most = READERS.get(_language(content, name), (None, max_bytes))
     if reader is None:
-        program = read_gcode(content, known, name, block_delete=block_delete, progress=progress)
+        if isinstance(subprograms, (str, bytes)) or not isinstance(subprograms, Iterable):
+            raise refuse("subprograms", subprograms, "a list of folders")
+        folders = [file_path(folder, "a folder of subprograms", _FOLDER) for folder in subprograms]
+        program = read_gcode(
+            content,
+            known,
+            name,
+            block_delete=block_delete,
+            tools=None if tool_table is None else read_tools(file_path(tool_table, "the tool table", _TABLE)),
+            subprograms=[*([text.parent] if isinstance(text, Path) else []), *folders],
+            feed=None if feed is None else number(feed, "the feed", "a positive number", positive, "mm/s"),
+            whole_step=number(whole_step, "whole_step", "a positive number", positive),
+            max_bytes=max_bytes,
+            progress=progress,
+        )
     else:
         content_of(content, name, min(max_bytes, most))
         program = reader(content, known, name)

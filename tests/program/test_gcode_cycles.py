@@ -67,7 +67,7 @@ def test_g73_breaks_chips_and_g83_clears_them() -> None:
 
 def test_boring_and_tapping_cycles_differ_in_their_way_up() -> None:
     def way_up(code: str) -> list[tuple[float, bool, float]]:
-        program = read(f"G0 Z5\n{code} X0 Z-5 R1")
+        program = read(f"G98 G0 Z5\n{code} X0 Z-5 R1")
         assert program.target[2].tolist() == [0, 0, -5]
         feeds = [math.isfinite(feed) for feed in program.feed]
         return list(zip(program.target[2:, 2].tolist(), feeds[2:], program.dwell[2:].tolist(), strict=True))
@@ -97,8 +97,21 @@ def test_the_path_is_exact_within_cycles() -> None:
 
 
 def test_the_height_before_a_series_is_forgotten_after_it() -> None:
-    text = "G0 Z20\nG81 X1 Z-1 R2\nX2\nG80\nG0 Z5\nG81 X3 Z-1 R2"
+    text = "G98 G0 Z20\nG81 X1 Z-1 R2\nX2\nG80\nG0 Z5\nG81 X3 Z-1 R2"
     assert rows(text)[-1] == (3, 0, 5, False)
+
+
+def test_without_g98_and_g99_cycles_go_back_to_r_with_a_warning() -> None:
+    program = read("G0 Z5\nG81 X1 Z-1 R2\nX2")
+    assert program.target[-1].tolist() == [2, 0, 2]
+    assert program.warnings[0].startswith("line 3: neither G98 nor G99 is given: cycles go back to R (G99)")
+    assert not any("G98" in warning for warning in read("G99 G0 Z5\nG81 X1 Z-1 R2\nX2").warnings)
+
+
+def test_a_dwell_that_a_cycle_has_not_is_left_out_with_a_warning() -> None:
+    program = read("G0 Z1\nG83 X1 Z-1 R1 Q1 P500\nX2 P500")
+    assert not program.dwell.any()
+    assert sum("the dwell P500 of G83 is left out" in warning for warning in program.warnings) == 1
 
 
 def test_a_cycle_from_below_r_rises_before_it_crosses() -> None:
@@ -111,7 +124,7 @@ def test_a_cycle_from_below_r_rises_before_it_crosses() -> None:
 
 
 def test_g80_gives_way_to_another_motion_in_its_block() -> None:
-    assert rows("G0 Z5\nG81 X1 Z-1 R1\nG80 G0 X9", skip=-1) == [(9, 0, 5, False)]
+    assert rows("G0 Z5\nG98 G81 X1 Z-1 R1\nG80 G0 X9", skip=-1) == [(9, 0, 5, False)]
     assert rows("G0 Z5\nG0 G17 G40 G49 G80 G90 X9") == [(9, 0, 5, False)]
 
 
@@ -132,8 +145,6 @@ def test_g80_gives_way_to_another_motion_in_its_block() -> None:
         ("G81 X1 Z-1 R1 L1.5", "word L1.5"),
         ("G81 X1 Z-1 R1 L2000000", "word L2000000"),
         ("G81 X1 Z-1 R1 K3", "word K3 has no meaning here: repetitions are counted by L"),
-        ("G81 X1 Z-1 R1 P2", "word P2 has no meaning here"),
-        ("G83 X1 Z-1 R1 Q1 P500", "word P500 has no meaning here: this cycle has no dwell"),
         ("G81 X1 Z-1 R1 A2", "word A2"),
         ("G81 X1 Z-1 R1 U2", "word U2"),
         ("G81 R1", "G81 has no axis words"),

@@ -21,8 +21,8 @@ def error(text: str | bytes) -> ProgramError:
 
 
 def test_the_sentence_names_file_line_and_word() -> None:
-    found = error("G21\nG1 X1 F60\nG1 X2 E1.1\nM2\n")
-    assert str(found).startswith("part.ngc line 3: word E1.1 is not understood: ")
+    found = error("G21\nG1 X1 F60\nG1 X2 Q1.1\nM2\n")
+    assert str(found).startswith("part.ngc line 3: word Q1.1 has no meaning here: ")
     assert found.line == 3
 
 
@@ -49,11 +49,12 @@ def test_the_sentence_names_file_line_and_word() -> None:
         ("A200000000", "A would go to 200000000 degrees"),
         ("X[1/0]", "1 is divided by 0"),
         ("X[10**400]", "not a finite number"),
-        ("X#5", "parameter #5 is used and the program has not set it"),
         ("X#<depth>", "parameter #<depth>"),
         ("X[1", "bracket ] is missing"),
         ("#5", "#5 stands alone"),
-        ("#5221=1", "#5221 belongs to the machine"),
+        ("#5420=1", "#5420 is told by the machine"),
+        ("#6000=1", "#6000 is no parameter: parameters are #1 to #5602"),
+        ("X#<_ini[a]b>", "configuration, which is not known here"),
         # Words.
         ("X1 X2", "word X2 is the second X"),
         ("G0 G1 X1", "words G0 and G1 belong to one modal group"),
@@ -63,18 +64,20 @@ def test_the_sentence_names_file_line_and_word() -> None:
         ("G1234567", "word G1234567 is not understood"),
         ("G-1", "word G-1 is not understood"),
         ("G1.05", "word G1.05 is not understood"),
-        ("M20", "word M20 is not understood"),
         ("M3.5", "word M3.5 is not understood"),
         ("M-3", "word M-3 is not understood"),
-        ("M200", "word M200 is not understood"),
-        ("M428 ;TCP", "word M428 is not understood"),
+        ("M70000", "word M70000 is not understood"),
         ("HELLO", "word HELLO is not understood"),
         ("G1 X1 N10", "word N10 is not the first of its block"),
         ("N-1 X1", "word N-1 is no block number"),
         ("X1 / Y2", "'/ Y2' is not understood"),
         ("X1 = 2", "'= 2' is not understood"),
-        ("X1 % 2", "'% 2' is not understood: % stands alone"),
-        ("@1 ^90", "'@1 ^90' is not understood"),
+        ("X1 % 2", "'% 2' is not understood: % begins its line"),
+        ("G91 @1 @2", "'@2' is not understood: polar words stand once"),
+        ("@1 X2", "polar words @ and ^ stand beside X or Y"),
+        ("@5", "the place before is the origin"),
+        ("G53 G0 @1 ^90", "G53 takes machine coordinates and no polar words"),
+        ("G16 G91 X1 Y2", "G16 and G91 stand together"),
         ("X1 \u00e4", "'ä' is not understood"),
         ("S-100", "word S-100 is negative"),
         ("T-1", "word T-1 is negative"),
@@ -124,22 +127,42 @@ def test_the_sentence_names_file_line_and_word() -> None:
         ("G3 X2 I1 P20000 F60", "word P20000 is more than 10000 turns"),
         ("G3 I2000000000 F60", "the centre of an arc is more than 1e9 mm away"),
         # Codes.
-        ("G41 D1", "word G41 is not read: cutter radius compensation is not computed here: post with"),
-        ("G42.1", "word G42.1 is not read: cutter radius"),
+        ("G41 D1", "G41 takes a diameter from the tool table: give one (--tool-table)"),
+        ("G42.1", "G42.1 has no diameter: give it as D"),
+        ("G41.1 D2\nG42.1 D2", "the compensation is on already: give G40 before"),
+        ("G41.1 D2\nX0.9", "the first move after G41.1 is 0.9000 mm long and the tool's radius is 1.0000 mm"),
+        ("G41.1 D2 L9\nG28 X0", "G28 stands where G41.1 is on"),
+        ("G41.1 D2 L3", "takes a tool of the side 3: lathe tools have 1 to 9 and work in G18"),
+        ("G19 G41.1 D2", "G41.1 is read in the planes G17 and G18"),
+        ("F60 G41.1 D2\nG1 X5\nY3\nX4.5\nY0", "does not fit into the corner"),
+        (
+            "F60 G41.1 D2\nG1 X5\nG3 X5.5 Y0.5 I0 J0.5",
+            "the radius 0.5000 mm of the arc is not larger than the tool's",
+        ),
+        ("F60 G41.1 D2\nG1 X5\nG40\nG3 X6 Y1 J1", "the first move after G40 is an arc"),
         ("G6 X1", "word G6 is not read: these splines are not read: post lines and arcs, or G5 to G5.3"),
         ("G17.1", "word G17.1 is not read"),
-        ("G28.1", "word G28.1 is not read: the home position"),
-        ("G30.1", "word G30.1 is not read: the home position"),
-        ("G33 Z-1 K1", "word G33 is not read: threading"),
+        ("G33 Z-1", "G33 has no pitch: give a positive K"),
+        ("G33 Z-1 K1", "G33 follows the spindle and its speed is not known"),
+        ("S100 M3 G76 Z-1 P1 I-1 J1 K0.5", "a K above J"),
+        ("S100 M3 G76 Z-1 P1 I-1 J1", "G76 takes I, J and K"),
+        ("G65 P9010", "macros of Fanuc are not read"),
         ("G38.2 Z-1", "word G38.2 is not read: probing"),
         ("G68 X0 Y0 R45", "word G68 is not read: rotated"),
         ("G54.1 P3", "word G54.1 is not read: only the work offsets"),
-        ("M98 P1000", "word M98 is not read: subprograms"),
-        ("M99", "word M99 is not read: subprograms"),
-        ("M66 P0", "word M66 is not read: inputs"),
-        ("O100 sub", "word 'O100 sub' controls the flow of the program"),
-        ("o<x> call", "word 'o<x> call' controls the flow of the program"),
-        ("N5 O100 WHILE [1]", "controls the flow of the program"),
+        ("M98", "M98 calls no subprogram: give its number as P"),
+        ("M98 P1000", "the subprogram 1000 is neither in the program nor in a file 1000.ngc"),
+        ("M97 P1000", "M97 calls line N1000, which the program does not have"),
+        ("M99 P10", "word P10 sends M99 to another line"),
+        ("M61", "M61 names no tool"),
+        ("O100 sub", "word o<100> sub is not ended"),
+        ("o<x> call", "the subprogram x is neither in the program nor in a file x.ngc"),
+        ("o1 if [1]\nX1", "word o<1> if is not ended: the file may be truncated"),
+        ("o1 endif", "word o<1> endif ends no block that is open"),
+        ("o1 while\no1 endwhile", "an O word has no [condition]"),
+        ("X1 o1 if [1]", "is not the first of its block"),
+        ("o1 return", "return stands outside of subroutines"),
+        ("o1 if [1] X2\no1 endif", "'X2' is not understood behind an O word"),
         ("X1\nO0002", "word O0002 opens a second program"),
         ("G4", "G4 has no time"),
         ("G4 U2", "G4 has no time"),
@@ -148,11 +171,12 @@ def test_the_sentence_names_file_line_and_word() -> None:
         ("G4 P9999999", "word P9999999 is no dwell time"),
         ("G2 X1 I1 G4 P1 F60", "G4 and an arc both use P"),
         ("G64 P-1", "word P-1 is no tolerance"),
-        ("G10 L1 P1 Z1", "only G10 L2 and G10 L20 are read"),
-        ("G10 P1 Z1", "only G10 L2 and G10 L20 are read"),
+        ("G10 L3 P1 Z1", "G10 L3 is not read"),
+        ("G10 P1 Z1", "G10 does not say what it sets"),
+        ("G10 L1 Z1", "G10 sets no tool: give its number as P"),
         ("G10 L2 P10 Z1", "G10 needs P0 to P9"),
         ("G10 L2 P1.5 Z1", "word P1.5 is no work offset"),
-        ("G10 L2 P1 R45", "word R45 turns the work coordinates"),
+        ("F60 G10 L2 P1 R45\nG18 G2 X1 K1", "work coordinates that are turned about Z"),
         ("G92", "G52 and G92 need the axes they set"),
         ("G0 G92 X0", "words G92 and G0 both take axis words"),
         ("G43.1", "G43.1 sets nothing"),
@@ -179,7 +203,7 @@ def test_axis_words_need_a_motion_code() -> None:
         ("%_N_PART_MPF\n;$PATH=/_N_MPF_DIR\nG0 X1\n", 1, "Siemens Sinumerik"),
         ("G0 X1\nDEF REAL WIDTH=12\n", 2, "Siemens Sinumerik"),
         ("G0 X1\nIF[#1 GT 2] GOTO 10\n", 2, "Fanuc macro"),
-        ("G21\nG92 E0\nM82\nG1 X1 E2\n", 2, "3-D printer"),
+        ("M82\nM109 S200\nG29\n", 3, "3-D printer"),
         ("<?xml version='1.0'?>\n", 1, "no machine"),
     ],
 )
@@ -211,3 +235,14 @@ def test_a_program_cut_within_a_word_is_an_error() -> None:
 
 def test_deep_nesting_is_an_error() -> None:
     assert "nested" in str(error("G0 X" + "[" * 100_000))
+
+
+def test_loops_and_calls_are_bounded() -> None:
+    endless = "G21 G0 X1\no1 while [1]\nG4 P0\no1 endwhile\nM2\n"
+    with pytest.raises(ProgramError, match="run more lines than 1000 moves take: check their conditions"):
+        read_gcode(endless, max_moves=1000)
+    moving = "G21 G91\no1 while [1]\nG0 X1\no1 endwhile\nM2\n"
+    with pytest.raises(ProgramError, match="more than 1000 moves"):
+        read_gcode(moving, max_moves=1000)
+    deep = "o1 sub\no1 call\no1 endsub\no1 call\nG0 X1\nM2\n"
+    assert "subroutines call each other more than 100 deep" in str(error(deep))

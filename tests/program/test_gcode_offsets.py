@@ -74,7 +74,8 @@ def test_unknown_tool_lengths_count_as_nothing_with_one_warning() -> None:
     program = read_gcode(b"G21\nG43 H1 G0 Z10\nG43 H2 Z20\nG43.2 H3\nZ30\nM2\n")
     assert program.target[:, 2].tolist() == [10, 20, 30]
     assert program.warnings == (
-        "line 2: the tool lengths that G43 calls for are not known: 0 is taken for each (G43.1 Z gives one)",
+        "line 2: the tool lengths that G43 calls for are not known: 0 is taken for each (a tool table, or "
+        "G43.1 Z, gives them)",
     )
 
 

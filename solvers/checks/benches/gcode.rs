@@ -1,4 +1,4 @@
-//! Blocks read a second: straight moves, arcs and words of several kinds.
+//! Blocks read a second: straight moves, arcs, calls and expressions; a line counts each time that it is run.
 
 use std::fmt::Write;
 use std::hint::black_box;
@@ -42,11 +42,35 @@ fn arcs() -> String {
     text + "M30\n"
 }
 
+/// Calls in a loop: seven lines for each of their moves.
+fn calls() -> String {
+    let calls = BLOCKS / 7;
+    format!(
+        "G21 F1000\no100 sub\n#3=[#1*2+sin[#2]]\nG1 X[#3+1.5] Y#1\no100 endsub\n#<i>=0\n\
+         o1 while [#<i> lt {calls}]\no100 call [#<i>*0.001] [30]\n#<i>=[#<i>+1]\no1 endwhile\nM2\n"
+    )
+}
+
+/// Expressions in a loop: three lines for each of their moves.
+fn expressions() -> String {
+    let times = BLOCKS / 3;
+    format!(
+        "G21 F1000\n#<i>=0\no1 repeat [{times}]\nG1 X[#<i>*0.001+1.5*sin[#<i>]] Y[#<i>/2000-#<i>*0.01]\n\
+         #<i>=[#<i>+1]\no1 endrepeat\nM2\n"
+    )
+}
+
 fn bench(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("read G-code");
     group.throughput(Throughput::Elements(BLOCKS as u64)).sample_size(20);
     let options = Options::default();
-    for (name, text) in [("lines", lines()), ("short lines", short_lines()), ("arcs", arcs())] {
+    for (name, text) in [
+        ("lines", lines()),
+        ("short lines", short_lines()),
+        ("arcs", arcs()),
+        ("calls", calls()),
+        ("expressions", expressions()),
+    ] {
         if let Err(error) = read(text.as_bytes(), &options, &|_| ()) {
             panic!("{name}: {error:?}");
         }

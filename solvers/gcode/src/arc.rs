@@ -95,7 +95,11 @@ fn centre_of(start: Point2, end: Point2, radius: f64, clockwise: bool) -> Outcom
             radius.abs()
         ));
     }
-    let height = ((radius.abs() - half) * (radius.abs() + half)).max(0.0).sqrt();
+    // Within the rounding of coordinates the chord is a diameter; the root would make much of it.
+    let largest = [start[0], start[1], end[0], end[1]].iter().fold(half, |most, value| most.max(value.abs()));
+    let rounding = 8.0 * f64::EPSILON * largest;
+    let excess = if radius.abs() - half > rounding { radius.abs() - half } else { 0.0 };
+    let height = (excess * (radius.abs() + half)).sqrt();
     // The centre is left of the chord for a short counter-clockwise or a long clockwise arc.
     let side = if clockwise == (radius > 0.0) { -height } else { height };
     Ok([

@@ -72,24 +72,28 @@ pub enum Operator {
     Power,
 }
 
-/// Operators by name, with how tightly they bind. `**` stands before `*`: the first that fits is taken.
-pub const OPERATORS: [(&str, Operator, u8); 15] = [
-    ("**", Operator::Power, 5),
-    ("*", Operator::Times, 4),
-    ("/", Operator::Over, 4),
-    ("MOD", Operator::Mod, 4),
-    ("+", Operator::Plus, 3),
-    ("-", Operator::Minus, 3),
-    ("EQ", Operator::Eq, 2),
-    ("NE", Operator::Ne, 2),
-    ("GT", Operator::Gt, 2),
-    ("GE", Operator::Ge, 2),
-    ("LT", Operator::Lt, 2),
-    ("LE", Operator::Le, 2),
-    ("AND", Operator::And, 1),
-    ("OR", Operator::Or, 1),
-    ("XOR", Operator::Xor, 1),
-];
+/// The operator that a text starts with, by name, with how tightly it binds.
+pub fn operator(text: &[u8]) -> Option<(&'static str, Operator, u8)> {
+    let letter = |place: usize| text.get(place).map_or(0, u8::to_ascii_uppercase);
+    Some(match [letter(0), letter(1), letter(2)] {
+        [b'*', b'*', _] => ("**", Operator::Power, 5),
+        [b'*', ..] => ("*", Operator::Times, 4),
+        [b'/', ..] => ("/", Operator::Over, 4),
+        [b'M', b'O', b'D'] => ("MOD", Operator::Mod, 4),
+        [b'+', ..] => ("+", Operator::Plus, 3),
+        [b'-', ..] => ("-", Operator::Minus, 3),
+        [b'E', b'Q', _] => ("EQ", Operator::Eq, 2),
+        [b'N', b'E', _] => ("NE", Operator::Ne, 2),
+        [b'G', b'T', _] => ("GT", Operator::Gt, 2),
+        [b'G', b'E', _] => ("GE", Operator::Ge, 2),
+        [b'L', b'T', _] => ("LT", Operator::Lt, 2),
+        [b'L', b'E', _] => ("LE", Operator::Le, 2),
+        [b'A', b'N', b'D'] => ("AND", Operator::And, 1),
+        [b'O', b'R', _] => ("OR", Operator::Or, 1),
+        [b'X', b'O', b'R'] => ("XOR", Operator::Xor, 1),
+        _ => return None,
+    })
+}
 
 /// The function of that name at x; ATAN also takes what x stands over.
 pub fn call(function: Function, name: &str, x: f64, over: f64) -> Outcome<f64> {

@@ -62,6 +62,7 @@ pub enum Group {
     SpindleMode = 14,
     Lathe = 15,
     Shift = 16,
+    Polar = 9,
     Off = 17,
 }
 
@@ -69,26 +70,30 @@ const GROUPS: usize = 18;
 const NO_GROUP: u8 = 255;
 
 const GROUP_OF: [u8; 1000] = {
-    let members: [(Group, &[u16]); 16] = [
-        (Group::Once, &[40, 100, 280, 300, 520, 530, 920]),
+    let members: [(Group, &[u16]); 17] = [
+        (Group::Once, &[40, 100, 280, 281, 282, 283, 284, 300, 301, 520, 530, 600, 920]),
         (
             Group::Motion,
-            &[0, 10, 20, 30, 50, 51, 52, 53, 62, 730, 740, 800, 810, 820, 830, 840, 850, 860, 890],
+            &[
+                0, 10, 20, 30, 50, 51, 52, 53, 62, 330, 331, 730, 740, 760, 800, 810, 820, 830, 840, 850,
+                860, 890,
+            ],
         ),
         (Group::Plane, &[170, 180, 190]),
         (Group::Distance, &[900, 910]),
         (Group::ArcDistance, &[901, 911]),
         (Group::FeedMode, &[930, 940, 950]),
         (Group::Units, &[200, 210]),
-        (Group::Compensation, &[400]),
+        (Group::Compensation, &[400, 410, 411, 420, 421]),
         (Group::ToolLength, &[430, 431, 432, 434, 435, 490]),
         (Group::Retract, &[980, 990]),
         (Group::System, &[540, 550, 560, 570, 580, 590, 591, 592, 593]),
         (Group::Control, &[610, 611, 640]),
         (Group::SpindleMode, &[960, 970]),
-        (Group::Lathe, &[80]),
+        (Group::Lathe, &[70, 80]),
+        (Group::Polar, &[150, 160]),
         (Group::Shift, &[921, 922, 923]),
-        (Group::Off, &[150, 690]),
+        (Group::Off, &[690]),
     ];
     let mut table = [NO_GROUP; 1000];
     let mut i = 0;
@@ -103,11 +108,16 @@ const GROUP_OF: [u8; 1000] = {
     table
 };
 
-/// Modal groups of M codes, numbered as in the standard.
+/// Modal groups of M codes, numbered as in the standard from `Stop` to `Override`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum MGroup {
+    /// Known to some machine alone; a block may have several.
+    Other = 0,
+    Call = 1,
+    Saved = 2,
     Stop = 4,
+    Output = 5,
     ToolChange = 6,
     Spindle = 7,
     Coolant = 8,
@@ -117,18 +127,24 @@ pub enum MGroup {
 
 const M_GROUPS: usize = 11;
 
-/// The group of an M code; None where it is not read.
+/// M codes of unknown meaning that a block may have.
+const MOST_OTHERS: usize = 4;
+
+/// The group of an M code.
 #[inline]
-pub fn m_group(code: u16) -> Option<MGroup> {
-    Some(match code {
+pub fn m_group(code: u16) -> MGroup {
+    match code {
         0 | 1 | 2 | 30 | 60 => MGroup::Stop,
-        6 => MGroup::ToolChange,
+        6 | 61 => MGroup::ToolChange,
         3 | 4 | 5 | 19 => MGroup::Spindle,
         7..=9 => MGroup::Coolant,
-        48 | 49 => MGroup::Override,
+        48..=53 => MGroup::Override,
+        62..=68 => MGroup::Output,
+        70..=73 => MGroup::Saved,
+        97..=99 => MGroup::Call,
         100..=199 => MGroup::User,
-        _ => return None,
-    })
+        _ => MGroup::Other,
+    }
 }
 
 /// The words of a block.
@@ -140,6 +156,13 @@ pub struct Block {
     codes: [u16; GROUPS],
     m_groups: u32,
     m_codes: [u16; M_GROUPS],
+    others: [u16; MOST_OTHERS],
+    other_count: usize,
+    /// Polar words: `@` and `^`.
+    pub radius: Option<f64>,
+    pub angle: Option<f64>,
+    /// `,C` or `,R`.
+    pub corner: Option<(u8, f64)>,
 }
 
 impl Block {
@@ -151,6 +174,11 @@ impl Block {
             codes: [0; GROUPS],
             m_groups: 0,
             m_codes: [0; M_GROUPS],
+            others: [0; MOST_OTHERS],
+            other_count: 0,
+            radius: None,
+            angle: None,
+            corner: None,
         }
     }
 
@@ -160,10 +188,37 @@ impl Block {
         self.words = 0;
         self.groups = 0;
         self.m_groups = 0;
+        self.other_count = 0;
+        self.radius = None;
+        self.angle = None;
+        self.corner = None;
     }
 
     pub fn is_empty(&self) -> bool {
-        self.words == 0 && self.groups == 0 && self.m_groups == 0
+        self.words == 0 && self.groups == 0 && self.m_groups == 0 && !self.is_polar()
+    }
+
+    #[inline(always)]
+    pub fn is_polar(&self) -> bool {
+        self.radius.is_some() || self.angle.is_some()
+    }
+
+    /// Takes a polar word.
+    pub fn set_polar(&mut self, sign: u8, value: f64) {
+        *(if sign == b'@' { &mut self.radius } else { &mut self.angle }) = Some(value);
+    }
+
+    /// Leaves the words of a block without G codes to the M code that begins it, which no controller of machine tools
+    /// has; those below M100 leave it F, S and T.
+    pub fn leave_to(&mut self, code: u16) {
+        if self.groups == 0 {
+            self.words &= if code < 100 { bits(b"FST") } else { 0 };
+        }
+    }
+
+    /// M codes of unknown meaning.
+    pub fn others(&self) -> &[u16] {
+        &self.others[..self.other_count]
     }
 
     /// Takes a word with a letter A to Z; false where the block has that letter already.
@@ -226,11 +281,21 @@ impl Block {
     /// True where the block has no G code but one of motion, and no M code.
     #[inline(always)]
     pub fn only_motion(&self) -> bool {
-        self.groups & !(1 << Group::Motion as u8) == 0 && self.m_groups == 0
+        self.groups & !(1 << Group::Motion as u8) == 0
+            && self.m_groups == 0
+            && !self.is_polar()
+            && self.corner.is_none()
     }
 
     /// Takes an M code of a group; Err with what stands in that group already.
     pub fn set_m_code(&mut self, code: u16, group: MGroup) -> Result<(), u16> {
+        if group == MGroup::Other {
+            self.m_groups |= 1;
+            let Some(place) = self.others.get_mut(self.other_count) else { return Err(self.others[0]) };
+            *place = code;
+            self.other_count += 1;
+            return Ok(());
+        }
         if self.m_groups & (1 << group as u8) != 0 {
             return Err(self.m_codes[group as usize]);
         }
@@ -257,29 +322,13 @@ pub fn g_name(code: u16) -> String {
 pub fn g_remedy(code: u16) -> Option<&'static str> {
     Some(match code {
         54..=69 => "these splines are not read: post lines and arcs, or G5 to G5.3 or G6.2",
-        70 => "diameters are not read: post radii (G8)",
-        160 => "polar coordinates are not read: post X and Y",
         171 | 181 | 191 => "arcs and cycles in the planes of U, V and W are not read: use G17, G18 or G19",
-        281 | 301 => "the home position comes from the machine file: set home there and remove this block",
-        330..=339 | 760 => "threading follows the spindle and has no feed of its own: remove it or post it as G1",
         380..=389 => "probing depends on the part: remove it",
-        410 | 411 | 420 | 421 => {
-            "cutter radius compensation is not computed here: post with the compensation computed by the CAM system"
-        }
         500..=519 => "scaling is not read: post the coordinates at full size",
         541 => "only the work offsets G54 to G59.3 are read: post with one of them",
         680..=689 => "rotated coordinates are not read: post the coordinates as they are cut",
+        650..=669 => "macros of Fanuc are not read: post the moves that they make",
         700..=729 | 870 | 880 => "this cycle is not read: post it as single moves",
-        _ => return None,
-    })
-}
-
-/// What to do about an M code that is understood and not read; None where it is not understood.
-pub fn m_remedy(code: u16) -> Option<&'static str> {
-    Some(match code {
-        62..=68 => "inputs and outputs are not read: remove it, or make it a user code M100 to M199",
-        82 | 83 | 84 | 104 | 109 | 140 => "it belongs to 3-D printers: remove it",
-        97..=99 => "subprograms are not read: post one program without them",
         _ => return None,
     })
 }

@@ -1,6 +1,6 @@
 //! Canned drilling and boring cycles, G73 and G81 to G89, written out as moves.
 //!
-//! As LinuxCNC: rapid up to R where the tool is below it, across to the hole, down to R, the cycle's own moves, and
+//! As LinuxCNC: rapid to R where the series begins below it, across to the hole, down to R, the cycle's own moves, and
 //! back to R (G99) or to where the series began, where that is higher (G98). Between holes the path is exact.
 
 use super::block::{g_name, Block, AXES};
@@ -19,6 +19,9 @@ const MOST_REPEATS: u32 = 1_000_000;
 /// One hole: its cycle and heights along the tool axis, in machine coordinates.
 struct Hole {
     motion: u16,
+    initial: f64,
+    /// Retract height and bottom in the numbers of the program, and so is `peck`.
+    own: [f64; 2],
     retract: f64,
     bottom: f64,
     clear: f64,
@@ -51,34 +54,55 @@ impl Interpreter<'_> {
                 block.word(b'L')
             ));
         }
+        self.check_beside(&g_name(motion))?;
         let hole = self.hole(block, motion)?;
+        if block.has(b'P') && matches!(motion, 730 | 810 | 830 | 850) && !self.warned_cycle_dwell {
+            self.warned_cycle_dwell = true;
+            self.warn(format!(
+                "the dwell {} of {} is left out: this cycle has none",
+                block.word(b'P'),
+                g_name(motion)
+            ));
+        }
 
         let (u, v) = self.state.plane();
         let normal = self.state.normal;
+        if !self.state.retract_given && hole.clear < self.position()[normal] && !self.warned_retract {
+            self.warned_retract = true;
+            self.warn("neither G98 nor G99 is given: cycles go back to R (G99), as LinuxCNC does".into());
+        }
         // In absolute mode the axis words are the place, in incremental mode a step before each repetition.
-        let mut place = self.moves.position;
-        let mut step = [0.0; 9];
-        let zero = *self.state.offsets.sum();
+        let here = self.position();
+        let mut place = here;
+        let goal = self.target(block, false)?;
+        let step = [goal[u] - here[u], goal[v] - here[v]];
         let absolute = self.state.absolute;
-        self.places(block, |axis, value| match absolute {
-            true => place[axis] = value + zero[axis],
-            false => step[axis] = value,
-        })?;
-        place[normal] = self.moves.position[normal].max(hole.retract);
-
+        if absolute {
+            (place[u], place[v]) = (goal[u], goal[v]);
+        }
         let before = self.state.control;
         if before.mode != Mode::ExactStop {
             self.state.control = Control::new(Mode::ExactPath);
         }
-        let mut up = self.moves.position;
+        let mut up = here;
+        // A series that begins below R rises to it before it crosses.
+        if hole.initial < hole.retract {
+            up[normal] = hole.retract;
+        }
+        place[normal] = if up[normal] > hole.retract { up[normal] } else { hole.clear };
         for height in [hole.bottom, hole.clear, place[normal]] {
-            up[normal] = height;
-            self.check_reach(&up)?;
+            let mut reached = up;
+            reached[normal] = height;
+            self.check_reach(&reached)?;
         }
         self.rapid(&up)?;
         for _ in 0..repeats {
-            place[u] += step[u];
-            place[v] += step[v];
+            if !absolute && block.is_polar() {
+                let next = self.turned_target(block, false, &place)?;
+                (place[u], place[v]) = (next[u], next[v]);
+            } else if !absolute {
+                (place[u], place[v]) = (place[u] + step[0], place[v] + step[1]);
+            }
             self.check_reach(&place)?;
             self.rapid(&place)?;
             self.drill(block, &hole, place, normal, feed)?;
@@ -93,13 +117,13 @@ impl Interpreter<'_> {
         let normal = self.state.normal;
         let unit = self.state.unit();
         let again = self.state.motion == motion;
-        let current = self.moves.position[normal];
+        let current = self.position()[normal];
         let zero = self.state.offsets.sum()[normal];
         let absolute = self.state.absolute;
         let sticky = &mut self.state.sticky;
         for (letter, kept) in [(b'R', &mut sticky.retract), (AXES[normal], &mut sticky.bottom)] {
             match block.get(letter) {
-                Some(value) => *kept = value * unit,
+                Some(value) => *kept = value,
                 None if again => {}
                 None => {
                     return fault(format!(
@@ -111,14 +135,19 @@ impl Interpreter<'_> {
                 }
             }
         }
-        for (letter, scale, kept) in [(b'P', 1.0, &mut sticky.dwell), (b'Q', unit, &mut sticky.peck)] {
-            *kept = block.get(letter).map(|value| value * scale).or(kept.filter(|_| again));
+        for (letter, kept) in [(b'P', &mut sticky.dwell), (b'Q', &mut sticky.peck)] {
+            *kept = block.get(letter).or(kept.filter(|_| again));
         }
         let initial = *sticky.initial.get_or_insert(current);
-        let (retract, bottom) = match absolute {
-            true => (sticky.retract + zero, sticky.bottom + zero),
-            false => (sticky.retract + initial, sticky.retract + initial + sticky.bottom),
+        // As the program counts heights, and as the machine does.
+        let own = match absolute {
+            true => [sticky.retract, sticky.bottom],
+            false => {
+                let retract = sticky.retract + (initial - zero) / unit;
+                [retract, retract + sticky.bottom]
+            }
         };
+        let [retract, bottom] = own.map(|height| height * unit + zero);
         if bottom > retract {
             return fault(format!(
                 "the cycle {} has its bottom {:.4} mm above its retract height R: check R and {}",
@@ -148,7 +177,7 @@ impl Interpreter<'_> {
             _ => f64::INFINITY,
         };
         let clear = if self.state.retract_to_initial { retract.max(initial) } else { retract };
-        Ok(Hole { motion, retract, bottom, clear, dwell, peck, clearance })
+        Ok(Hole { motion, initial, own, retract, bottom, clear, dwell, peck, clearance })
     }
 
     /// From above the hole, down to R, through the cycle and up.
@@ -162,17 +191,22 @@ impl Interpreter<'_> {
     ) -> Outcome<()> {
         place[normal] = hole.retract;
         self.rapid(&place)?;
-        let pecks = ((hole.retract - hole.bottom) / hole.peck).ceil();
+        let pecks = ((hole.own[0] - hole.own[1]) / hole.peck).ceil();
         if pecks > f64::from(MOST_REPEATS) {
             return fault(format!("the cycle {} takes {pecks} pecks: check Q", g_name(hole.motion)));
         }
-        for i in 1..pecks as u32 {
-            let depth = hole.retract - f64::from(i) * hole.peck;
+        // Depths are counted in the program's own numbers, so that they end as on the control.
+        let (unit, zero) = (self.state.unit(), self.state.offsets.sum()[normal]);
+        let [retract, bottom] = hole.own;
+        let mut reached = retract - hole.peck;
+        while reached > bottom {
+            let depth = reached * unit + zero;
             self.feed_to(&mut place, normal, depth, feed)?;
             if hole.motion == 830 {
                 self.rapid_to(&mut place, normal, hole.retract)?;
             }
             self.rapid_to(&mut place, normal, (depth + hole.clearance).min(hole.retract))?;
+            reached -= hole.peck;
         }
         self.feed_to(&mut place, normal, hole.bottom, feed)?;
         match hole.motion {
@@ -196,7 +230,7 @@ impl Interpreter<'_> {
 
     fn feed_to(&mut self, place: &mut Point, normal: usize, height: f64, feed: f64) -> Outcome<()> {
         place[normal] = height;
-        self.moves.straight(Kind::Line, place, feed, &self.state.control, self.line)
+        self.go(Kind::Line, place, feed)
     }
 
     fn rapid_to(&mut self, place: &mut Point, normal: usize, height: f64) -> Outcome<()> {

@@ -19,6 +19,9 @@ const SIGNS: [(&[&str], &str); 5] = [
             "TRAORI",
             "SUPA",
             "WORKPIECE(",
+            "CR=",
+            "=AC(",
+            "=IC(",
         ],
         "Siemens Sinumerik",
     ),
@@ -44,6 +47,7 @@ mod tests {
         for (text, language) in [
             ("0 BEGIN PGM 12 MM\n1 L X+5 FMAX\n", Some("Heidenhain conversational")),
             ("%_N_PART_MPF\nDEF REAL A=1\n", Some("Siemens Sinumerik")),
+            ("G2 X5 CR=10\n", Some("Siemens Sinumerik")),
             ("N10 #1=2\nif [#1 gt 2] goto 10\n", Some("Fanuc macro")),
             ("M82\nG1 E5\n", Some("3-D printer")),
             ("G0 X1\nG1 Y2 F100\nM2\n", None),

@@ -6,17 +6,21 @@
 //! One difference: F counts in the units of its own block (`G20 F10` is 10 inch/min), as most controls and all posts
 //! have it; LinuxCNC reads it before the units change.
 
-use super::block::{bit, bits, rotary, Block, Group, MGroup, AXES, AXIS_OF_LETTER, AXIS_WORDS};
+use super::block::{bit, bits, g_name, rotary, Block, Group, MGroup, AXES, AXIS_OF_LETTER, AXIS_WORDS};
+use super::compensate::Compensation;
+use super::corner::Corner;
 use super::fault::{fault, Outcome};
 use super::intent::{axis_words, check_use, is_cycle, motion_of, ARC_WORDS, FREE_WORDS};
 use super::modal::{Feed, FeedMode, State};
 use super::moves::{Control, Kind, Mode, Moves, Point, Stop};
+use super::parameters::{Parameters, FIRST_SYSTEM, HOME, SECOND_HOME, SYSTEM, SYSTEM_STEP};
 use super::spline::Nurbs;
 use super::tip::{takes_direction, Meaning};
+use super::tools::Tool;
 use super::Options;
 
 /// Farther than this from the machine's zero is a mistake, in mm;
-const FARTHEST: f64 = 1e6;
+pub(super) const FARTHEST: f64 = 1e6;
 
 /// rotary axes may wind up, in degrees.
 const FARTHEST_TURN: f64 = 1e8;
@@ -40,17 +44,41 @@ pub struct Interpreter<'a> {
     pub(super) warned_tool: bool,
     pub(super) warned_length: bool,
     warned_dwell: bool,
+    warned_extruder: bool,
+    pub(super) warned_cycle_dwell: bool,
+    pub(super) warned_retract: bool,
     pub(super) warned_look_ahead: bool,
     /// The NURBS that is being read.
     pub(super) open: Option<Box<Nurbs>>,
     /// Where a G5 may go on without I and J: the row after the G5 before, and the offset in mm.
     pub(super) mirror: Option<(usize, [f64; 2])>,
+    pub parameters: Parameters,
+    pub(super) tools: Option<Vec<Tool>>,
+    /// The tool in the spindle as the table has it, its number, and the one that T has called.
+    pub(super) tool: Option<Tool>,
+    pub(super) loaded: Option<u32>,
+    pub(super) selected: Option<u32>,
+    /// The corner that the next straight move makes.
+    pub(super) corner: Option<Corner>,
+    /// The offset from the programmed path, while G41 or G42 is on.
+    pub(super) compensation: Option<Box<Compensation>>,
+    /// Modes that M70 and M73 have saved: at which depth of calls, and whether the end of the call restores them.
+    pub(super) saved: Vec<(usize, bool, State)>,
 }
 
 impl<'a> Interpreter<'a> {
     pub fn new(options: &'a Options, expected: usize) -> Self {
+        let mut parameters = Parameters::default();
+        for (system, offset) in options.offsets.iter().enumerate() {
+            parameters.set_row(FIRST_SYSTEM + SYSTEM_STEP * system, offset);
+        }
+        parameters.set_number(SYSTEM, 1.0);
+        parameters.set_row(HOME, &options.home);
+        parameters.set_row(SECOND_HOME, &options.home);
+        let mut state = State::new(options.offsets[0]);
+        state.feed = options.feed.map(|feed| Feed { linear: feed, angular: feed });
         Self {
-            state: State::new(options.offsets),
+            state,
             moves: Moves::new(expected, options.max_moves, options.start),
             line: 0,
             options,
@@ -60,9 +88,20 @@ impl<'a> Interpreter<'a> {
             warned_tool: false,
             warned_length: false,
             warned_dwell: false,
+            warned_extruder: false,
+            warned_cycle_dwell: false,
+            warned_retract: false,
             warned_look_ahead: false,
             open: None,
             mirror: None,
+            parameters,
+            tools: options.tools.clone(),
+            tool: None,
+            loaded: None,
+            selected: None,
+            corner: None,
+            compensation: None,
+            saved: Vec::new(),
         }
     }
 
@@ -70,7 +109,28 @@ impl<'a> Interpreter<'a> {
         if !self.state.units_given {
             self.warnings.push("the program gives no units (G20 or G21): millimetres are assumed".into());
         }
+        self.warnings.extend(self.parameters.warning());
         (self.moves, self.warnings)
+    }
+
+    /// Where the programmed path is; the tool is beside it while G41 or G42 is on.
+    #[inline(always)]
+    pub(super) fn position(&self) -> Point {
+        match &self.compensation {
+            None => self.moves.position,
+            Some(compensation) => compensation.programmed,
+        }
+    }
+
+    /// The feed in force as an F word would give it.
+    pub(super) fn feed_word(&self) -> f64 {
+        let per = if self.state.feed_mode == FeedMode::PerTurn { 1.0 } else { 60.0 };
+        self.state.feed.map_or(0.0, |feed| feed.angular * per)
+    }
+
+    /// A message to the operator.
+    pub fn message(&mut self, line: u32, text: String) {
+        self.moves.message(line, text);
     }
 
     /// Runs a block of the given line; true where it ends the program.
@@ -82,7 +142,7 @@ impl<'a> Interpreter<'a> {
         }
         // Nearly all blocks are a straight move or an arc and nothing else.
         let axes = block.words & AXIS_WORDS;
-        let rest = block.words & !(AXIS_WORDS | FREE_WORDS);
+        let rest = block.words & !(AXIS_WORDS | FREE_WORDS) | block.words & bit(b'T');
         match motion_of(block, axes, self.state.motion, false)? {
             Some(motion @ (0 | 10)) if rest == 0 => {
                 self.set_feed_and_speed(block)?;
@@ -115,16 +175,25 @@ impl<'a> Interpreter<'a> {
         self.check_meaning(block, motion)?;
         let motion = motion.filter(|_| !self.switches_look_ahead(block, motion));
 
+        if block.corner.is_some() && motion != Some(10) {
+            return fault("a corner ,C or ,R stands behind no straight move: give G1 and its place");
+        }
         self.set_feed_and_speed(block)?;
         self.switch(block)?;
         if block.code(Group::Once) == Some(40) {
             self.pause(block, axes)?;
         }
         self.set_modes(block)?;
+        if let Some(code) = block.code(Group::Compensation) {
+            self.set_compensation(block, code)?;
+        }
         self.set_offsets(block)?;
+        if let Some(code) = block.code(Group::Once).filter(|code| !matches!(code, 40 | 600)) {
+            self.check_beside(&g_name(code))?;
+        }
         match block.code(Group::Once) {
-            Some(280 | 300) => self.go_home(block)?,
-            Some(100) => self.set_work_offset(block)?,
+            Some(code @ (280..=284 | 300 | 301)) => self.go_home(block, code)?,
+            Some(100) => self.set_data(block)?,
             Some(code @ (520 | 920)) => self.shift(block, code)?,
             _ => {}
         }
@@ -136,18 +205,25 @@ impl<'a> Interpreter<'a> {
                 self.state.sticky.initial = None;
             }
             match motion {
-                _ if matches!(block.code(Group::Once), Some(280 | 300)) => {}
+                _ if matches!(block.code(Group::Once), Some(280..=301)) => {}
+                0 | 10 if block.code(Group::Once) == Some(600) => self.approach(block, motion)?,
                 0 | 10 => self.straight(block, motion == 0, block.code(Group::Once) == Some(530))?,
                 20 | 30 => self.arc(block, motion == 20)?,
                 50..=62 => self.spline(block, motion)?,
+                330 | 331 => self.thread_once(block, motion)?,
+                760 => self.thread(block)?,
                 800 => {}
                 _ => self.cycle(block, motion)?,
             }
             self.state.motion = motion;
         }
+        if let Some(code) = block.m_code(MGroup::Saved) {
+            self.save_modes(code);
+        }
         match block.m_code(MGroup::Stop) {
             Some(code) => {
                 let ends = matches!(code, 2 | 30);
+                self.moves.event(self.line, b'M', f64::from(code), None, None);
                 self.moves.stop(if ends { Stop::End } else { Stop::Pause });
                 Ok(ends)
             }
@@ -177,6 +253,7 @@ impl<'a> Interpreter<'a> {
             self.state.spindle_speed = None;
         }
         if let Some(speed) = block.get(b'S') {
+            self.moves.event(self.line, b'S', speed, None, None);
             self.state.spindle_speed = (!self.state.constant_surface_speed).then_some(speed);
         }
         if block.words & bits(b"SHTD") != 0 {
@@ -207,15 +284,40 @@ impl<'a> Interpreter<'a> {
         Ok(())
     }
 
-    /// M codes that switch something: the tool stands still for them.
+    /// T, and M codes that switch something: the tool stands still for them.
     fn switch(&mut self, block: &Block) -> Outcome<()> {
-        let codes = [MGroup::ToolChange, MGroup::Spindle, MGroup::Coolant, MGroup::User];
-        for code in codes.into_iter().filter_map(|group| block.m_code(group)) {
-            self.moves.stop(if code == 6 { Stop::Tool } else { Stop::Switch });
+        let change = block.m_code(MGroup::ToolChange);
+        if change.is_some() || block.has(b'T') {
+            self.set_tool(block, change)?;
+        }
+        if block.has(b'E') && block.m_code(MGroup::Output).is_none() && !self.warned_extruder {
+            self.warned_extruder = true;
+            self.warn("the words E are left out: they move an extruder, which is not planned".into());
+        }
+        let known = [MGroup::ToolChange, MGroup::Spindle, MGroup::Coolant, MGroup::Output, MGroup::User];
+        let codes = known.into_iter().filter_map(|group| block.m_code(group));
+        for code in codes.chain(block.others().iter().copied()) {
+            // M62, M63, M67 switch while the tool moves.
+            if !matches!(code, 61..=63 | 67) {
+                self.moves.stop(if code == 6 { Stop::Tool } else { Stop::Switch });
+            }
+            let output = block.get(b'E').filter(|_| matches!(code, 66..=68));
+            let tool = (code == 6).then(|| self.tool_number());
+            self.moves.event(
+                self.line,
+                b'M',
+                f64::from(code),
+                tool.or(block.get(b'P')).or(output),
+                block.get(b'Q'),
+            );
             match code {
-                3 | 4 => self.state.spindle_on = true,
+                3 | 4 => (self.state.spindle_on, self.state.spindle_back) = (true, code == 4),
                 5 => self.state.spindle_on = false,
-                19 | 100.. if !self.warned_codes.contains(&code) => {
+                7 => self.state.mist = true,
+                8 => self.state.flood = true,
+                9 => (self.state.mist, self.state.flood) = (false, false),
+                6 | 61..=68 => {}
+                _ if !self.warned_codes.contains(&code) => {
                     self.warned_codes.push(code);
                     self.warn(format!(
                         "what M{code} does is not known: a stop is planned for it, of no duration"
@@ -247,52 +349,8 @@ impl<'a> Interpreter<'a> {
             self.warned_dwell = true;
             self.warn(format!("a dwell takes {seconds} s: dwells are read in seconds, not in milliseconds"));
         }
+        self.moves.event(self.line, b'G', 4.0, Some(seconds), None);
         self.moves.dwell(seconds);
-        Ok(())
-    }
-
-    /// Plane, units, path control, distance modes and retract mode.
-    fn set_modes(&mut self, block: &Block) -> Outcome<()> {
-        let state = &mut self.state;
-        match block.code(Group::Plane) {
-            Some(170) => state.normal = 2,
-            Some(180) => state.normal = 1,
-            Some(190) => state.normal = 0,
-            _ => {}
-        }
-        if let Some(code) = block.code(Group::Units) {
-            state.inches = code == 200;
-            state.units_given = true;
-        }
-        match block.code(Group::Control) {
-            Some(610) => state.control = Control::new(Mode::ExactPath),
-            Some(611) => state.control = Control::new(Mode::ExactStop),
-            Some(640) => {
-                let mut control = Control::new(Mode::Tolerance);
-                for (letter, place) in [(b'P', &mut control.blend), (b'Q', &mut control.fit)] {
-                    if let Some(value) = block.get(letter) {
-                        if !(0.0..=FARTHEST).contains(&value) {
-                            return fault(format!(
-                                "word {} is no tolerance: give one from 0",
-                                block.word(letter)
-                            ));
-                        }
-                        *place = value * state.unit();
-                    }
-                }
-                state.control = control;
-            }
-            _ => {}
-        }
-        if let Some(code) = block.code(Group::Distance) {
-            state.absolute = code == 900;
-        }
-        if let Some(code) = block.code(Group::ArcDistance) {
-            state.absolute_centres = code == 901;
-        }
-        if let Some(code) = block.code(Group::Retract) {
-            state.retract_to_initial = code == 980;
-        }
         Ok(())
     }
 
@@ -304,12 +362,19 @@ impl<'a> Interpreter<'a> {
             self.meet(words)?;
         }
         let unit = self.state.unit();
+        let diameters = self.state.diameters;
         while words != 0 {
             let place = words.trailing_zeros() as usize;
             words &= words - 1;
             let axis = AXIS_OF_LETTER[place] as usize;
-            let value = block.value(b'A' + place as u8);
-            each(axis, if rotary(axis) { value } else { value * unit });
+            let mut value = block.value(b'A' + place as u8);
+            if !rotary(axis) {
+                value *= unit;
+            }
+            if diameters && axis == 0 {
+                value *= 0.5;
+            }
+            each(axis, value);
         }
         Ok(())
     }
@@ -320,9 +385,11 @@ impl<'a> Interpreter<'a> {
         for (axis, &letter) in AXES.iter().enumerate().filter(|(_, &letter)| words & bit(letter) != 0) {
             if !self.options.machine_axes.is_empty() && !self.options.machine_axes.contains(&letter) {
                 let letter = letter as char;
+                let others =
+                    self.options.machines_with.as_ref().map(|names| names(letter)).unwrap_or_default();
                 return fault(format!(
-                    "word {letter} moves an axis that the machine does not have: use a machine with {letter}, or post \
-                     without it"
+                    "word {letter} moves an axis that the machine does not have: use a machine with {letter}{others}, \
+                     or post without it"
                 ));
             }
             self.moves.add_axis(axis);
@@ -334,7 +401,10 @@ impl<'a> Interpreter<'a> {
     /// The end of a move to the block's axis words.
     #[inline(always)]
     pub(super) fn target(&mut self, block: &Block, machine: bool) -> Outcome<Point> {
-        let mut target = self.moves.position;
+        if self.state.offsets.rotation != 0.0 || self.state.polar || block.is_polar() {
+            return self.turned_target(block, machine, &self.position());
+        }
+        let mut target = self.position();
         let zero = if machine { [0.0; 9] } else { *self.state.offsets.sum() };
         let absolute = self.state.absolute;
         self.places(block, |axis, value| {
@@ -355,7 +425,28 @@ impl<'a> Interpreter<'a> {
     }
 
     pub(super) fn rapid(&mut self, target: &Point) -> Outcome<()> {
-        self.moves.straight(Kind::Rapid, target, f64::INFINITY, &self.state.control, self.line)
+        self.go(Kind::Rapid, target, f64::INFINITY)
+    }
+
+    /// A straight move to a place of the programmed path.
+    #[inline(always)]
+    pub(super) fn go(&mut self, kind: Kind, target: &Point, feed: f64) -> Outcome<()> {
+        if self.compensation.is_some() {
+            return self.go_beside(kind, target, feed);
+        }
+        if self.corner.is_some() {
+            self.cut_corner(kind, target)?;
+        }
+        self.moves.straight(kind, target, feed, &self.state.control, self.line)
+    }
+
+    /// G60: a rapid that ends with an exact stop.
+    fn approach(&mut self, block: &Block, motion: u16) -> Outcome<()> {
+        let before = self.state.control;
+        self.state.control = Control::new(Mode::ExactStop);
+        let done = self.straight(block, motion == 0, false);
+        self.state.control = before;
+        done
     }
 
     pub(super) fn warn(&mut self, text: String) {

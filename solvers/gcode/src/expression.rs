@@ -3,11 +3,10 @@
 //! Operators in rising order of binding: AND OR XOR; EQ NE GT GE LT LE; + -; * / MOD; **. Those of one order go
 //! from left to right, powers too. Angles are degrees; EQ and its kin take numbers closer than 1e-6 as equal.
 
-use std::collections::HashMap;
-
-use super::arithmetic::{apply, call, Function, OPERATORS};
+use super::arithmetic::{apply, call, operator, Function};
 use super::fault::{fault, foreign, Outcome};
 use super::number::{decimal, spaces};
+use super::parameters::{Name, NUMBERS, READINGS};
 
 /// How far a decimal number may be from the integer it stands for.
 const NEAR_INTEGER: f64 = 1e-4;
@@ -15,86 +14,74 @@ const NEAR_INTEGER: f64 = 1e-4;
 /// Brackets may be nested so deep.
 const MAX_DEPTH: usize = 64;
 
-/// Parameters from here on belong to the machine: offsets, positions, tool data.
-const FIRST_MACHINE_PARAMETER: u32 = 5001;
+/// What parameters are worth: those of the program, and those that the machine tells.
+pub trait Values {
+    fn number(&self, number: usize) -> f64;
 
-/// What `#` names.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
-enum Name {
-    Number(u32),
-    Text(String),
+    /// None where there is no such name; a fault where it cannot be known here.
+    fn named(&self, name: &[u8]) -> Outcome<Option<f64>>;
 }
 
-impl std::fmt::Display for Name {
-    fn fmt(&self, out: &mut std::fmt::Formatter) -> std::fmt::Result {
-        match self {
-            Name::Number(number) => write!(out, "#{number}"),
-            Name::Text(text) => write!(out, "#<{text}>"),
-        }
+/// Reads `#1 = value` from its `#` on; what it assigns, and the place after it.
+pub fn assignment(source: &[u8], at: usize, values: &dyn Values) -> Outcome<(Name, f64, usize)> {
+    let mut formula = Formula { source, at, values, depth: 0 };
+    let name = formula.name()?;
+    if formula.peek() != b'=' {
+        return foreign(format!("{name} stands alone: write {name} = value, or a letter before it"));
     }
+    formula.at += 1;
+    let value = formula.value()?;
+    if matches!(name, Name::Number(number) if READINGS.contains(&number)) {
+        return fault(format!("{name} is told by the machine and cannot be set: use another parameter"));
+    }
+    Ok((name, value, formula.at))
 }
 
-/// The parameters that the program has set; those set in a block count from the next block on.
-#[derive(Default)]
-pub struct Parameters {
-    set: HashMap<Name, f64>,
-    pending: Vec<(Name, f64)>,
+/// The value at `at` that is not a plain number: an expression, a parameter, a function, or one of these
+/// with a sign; with the place after it. None where none of these starts.
+pub fn expression(source: &[u8], at: usize, values: &dyn Values) -> Outcome<Option<(f64, usize)>> {
+    let mut formula = Formula { source, at, values, depth: 0 };
+    let after_sign = match formula.peek() {
+        b'+' | b'-' => spaces(source, formula.at + 1),
+        _ => formula.at,
+    };
+    let starts = match source.get(after_sign) {
+        Some(b'[' | b'#') => true,
+        Some(letter) if letter.is_ascii_alphabetic() => Function::at(source, after_sign).is_some(),
+        _ => false,
+    };
+    if !starts {
+        return Ok(None);
+    }
+    let value = formula.value()?;
+    Ok(Some((value, formula.at)))
 }
 
-impl Parameters {
-    /// Lets the assignments of the block that ends take effect.
-    #[inline]
-    pub fn commit(&mut self) {
-        if !self.pending.is_empty() {
-            self.set.extend(self.pending.drain(..));
-        }
+/// The bracket at `at`, and the place after it; None where none starts there.
+pub fn bracket(source: &[u8], at: usize, values: &dyn Values) -> Outcome<Option<(f64, usize)>> {
+    let mut formula = Formula { source, at, values, depth: 0 };
+    if formula.peek() != b'[' {
+        return Ok(None);
     }
+    let value = formula.bracket()?;
+    Ok(Some((value, formula.at)))
+}
 
-    /// Reads `#1 = value` from its `#` on; returns the place after it.
-    pub fn assign(&mut self, source: &[u8], at: usize) -> Outcome<usize> {
-        let mut formula = Formula { source, at, parameters: self, depth: 0 };
-        let name = formula.name()?;
-        if formula.peek() != b'=' {
-            return foreign(format!("{name} stands alone: write {name} = value, or a letter before it"));
-        }
-        formula.at += 1;
-        let value = formula.value()?;
-        let at = formula.at;
-        if matches!(name, Name::Number(number) if number >= FIRST_MACHINE_PARAMETER) {
-            return fault(format!(
-                "{name} belongs to the machine and is not set here: use G10 L2 for work offsets"
-            ));
-        }
-        self.pending.push((name, value));
-        Ok(at)
-    }
-
-    /// The value at `at` that is not a plain number: an expression, a parameter, a function, or one of these
-    /// with a sign; with the place after it. None where none of these starts.
-    #[cold]
-    pub fn value(&self, source: &[u8], at: usize) -> Outcome<Option<(f64, usize)>> {
-        let mut formula = Formula { source, at, parameters: self, depth: 0 };
-        let after_sign = match formula.peek() {
-            b'+' | b'-' => spaces(source, formula.at + 1),
-            _ => formula.at,
-        };
-        let starts = match source.get(after_sign) {
-            Some(b'[' | b'#') => true,
-            Some(letter) if letter.is_ascii_alphabetic() => Function::at(source, after_sign).is_some(),
-            _ => false,
-        };
-        if !starts {
-            return Ok(None);
-        }
-        let value = formula.value()?;
-        Ok(Some((value, formula.at)))
-    }
+/// The name between `<` at `at` and `>`, in lower case and without blanks, and the place after it.
+pub fn name_in_brackets(source: &[u8], at: usize) -> Outcome<(Vec<u8>, usize)> {
+    let first = at + 1;
+    let end = (first..source.len()).find(|&at| matches!(source[at], b'>' | b'\n' | b'\r'));
+    let Some(end) = end.filter(|&end| source[end] == b'>') else {
+        return foreign(format!("the name {} has no closing >", excerpt(source, at)));
+    };
+    let letters = source[first..end].iter().filter(|byte| !matches!(byte, b' ' | b'\t'));
+    Ok((letters.map(u8::to_ascii_lowercase).collect(), end + 1))
 }
 
 struct Formula<'a> {
     source: &'a [u8],
     at: usize,
-    parameters: &'a Parameters,
+    values: &'a dyn Values,
     depth: usize,
 }
 
@@ -116,14 +103,7 @@ impl Formula<'_> {
             b'[' => self.bracket()?,
             b'#' => {
                 let name = self.name()?;
-                match self.parameters.set.get(&name) {
-                    Some(&value) => value,
-                    None => {
-                        return fault(format!(
-                            "parameter {name} is used and the program has not set it: set it before, such as {name} = 1"
-                        ))
-                    }
-                }
+                self.look_up(&name)?
             }
             letter if letter.is_ascii_alphabetic() => self.function()?,
             sign => match (decimal(self.source, self.at), sign) {
@@ -146,6 +126,19 @@ impl Formula<'_> {
         Ok(value)
     }
 
+    fn look_up(&self, name: &Name) -> Outcome<f64> {
+        let text = match name {
+            Name::Number(number) => return Ok(self.values.number(*number)),
+            Name::Text(text) => text,
+        };
+        match self.values.named(text)? {
+            Some(value) => Ok(value),
+            None => fault(format!(
+                "parameter {name} is used and the program has not set it: set it before, such as {name} = 1"
+            )),
+        }
+    }
+
     /// From `[` to its `]`.
     fn bracket(&mut self) -> Outcome<f64> {
         if self.peek() != b'[' {
@@ -166,11 +159,8 @@ impl Formula<'_> {
         loop {
             self.peek();
             let rest = &self.source[self.at.min(self.source.len())..];
-            let found = OPERATORS.iter().find(|(name, _, _)| {
-                rest.get(..name.len()).is_some_and(|text| text.eq_ignore_ascii_case(name.as_bytes()))
-            });
-            match found {
-                Some(&(name, operator, order)) if order >= least => {
+            match operator(rest) {
+                Some((name, operator, order)) if order >= least => {
                     self.at += name.len();
                     let right = self.chain(order + 1)?;
                     left = apply(operator, name, left, right)?;
@@ -213,7 +203,10 @@ impl Formula<'_> {
             return foreign("EXISTS takes one parameter: write EXISTS[#<name>]");
         }
         self.at += 1;
-        Ok(f64::from(self.parameters.set.contains_key(&name)))
+        Ok(match name {
+            Name::Number(_) => 1.0,
+            Name::Text(text) => f64::from(self.values.named(&text)?.is_some()),
+        })
     }
 
     /// `#5`, `##2`, `#[1 + 2]` or `#<name>`, from the `#` on.
@@ -221,20 +214,16 @@ impl Formula<'_> {
         self.peek();
         self.at += 1;
         if self.peek() == b'<' {
-            let first = self.at + 1;
-            let end = (first..self.source.len()).find(|&at| matches!(self.source[at], b'>' | b'\n' | b'\r'));
-            let Some(end) = end.filter(|&end| self.source[end] == b'>') else {
-                return foreign(format!("the parameter name {} has no closing >", self.rest()));
-            };
-            self.at = end + 1;
-            let letters = self.source[first..end].iter().filter(|byte| !matches!(byte, b' ' | b'\t'));
-            let text: Vec<u8> = letters.map(u8::to_ascii_lowercase).collect();
-            return Ok(Name::Text(String::from_utf8_lossy(&text).into_owned()));
+            let (text, end) = name_in_brackets(self.source, self.at)?;
+            self.at = end;
+            return Ok(Name::Text(text));
         }
         let number = self.value()?;
         match integer(number) {
-            Some(index) if (1..=1_000_000).contains(&index) => Ok(Name::Number(index as u32)),
-            _ => fault(format!("#{number} is no parameter: parameters are #1, #2, ... or #<name>")),
+            Some(index) if (1..NUMBERS as i64).contains(&index) => Ok(Name::Number(index as usize)),
+            _ => {
+                fault(format!("#{number} is no parameter: parameters are #1 to #{} or #<name>", NUMBERS - 1))
+            }
         }
     }
 
@@ -267,12 +256,24 @@ pub fn excerpt(source: &[u8], at: usize) -> String {
 mod tests {
     use super::*;
 
-    fn value(text: &str) -> Result<f64, String> {
-        value_with(&mut Parameters::default(), text)
+    use crate::parameters::Parameters;
+
+    impl Values for Parameters {
+        fn number(&self, number: usize) -> f64 {
+            Parameters::number(self, number)
+        }
+
+        fn named(&self, name: &[u8]) -> Outcome<Option<f64>> {
+            Ok(Parameters::named(self, name))
+        }
     }
 
-    fn value_with(parameters: &mut Parameters, text: &str) -> Result<f64, String> {
-        match parameters.value(text.as_bytes(), 0) {
+    fn value(text: &str) -> Result<f64, String> {
+        value_with(&Parameters::default(), text)
+    }
+
+    fn value_with(parameters: &Parameters, text: &str) -> Result<f64, String> {
+        match expression(text.as_bytes(), 0, parameters) {
             Ok(Some((value, end))) if end == text.len() => Ok(value),
             Ok(found) => Err(format!("{found:?}")),
             Err(fault) => Err(fault.message),
@@ -323,28 +324,24 @@ mod tests {
     }
 
     #[test]
-    fn parameters_keep_what_the_block_before_set() {
+    fn parameters_have_numbers_and_names() {
         let mut parameters = Parameters::default();
         for text in ["#1=2.5", "#<Tool Width> = [#1 * 2]", "#2=#1", "#3=2"] {
-            assert_eq!(parameters.assign(text.as_bytes(), 0).unwrap(), text.len());
-            parameters.commit();
+            let (name, value, end) = assignment(text.as_bytes(), 0, &parameters).unwrap();
+            assert_eq!(end, text.len());
+            parameters.set(&name, value);
         }
-        assert_eq!(value_with(&mut parameters, "#<toolwidth>"), Ok(5.0));
-        assert_eq!(value_with(&mut parameters, "##3"), Ok(2.5));
-        assert_eq!(value_with(&mut parameters, "#[1 + 1]"), Ok(2.5));
-        assert_eq!(value_with(&mut parameters, "exists[#<toolwidth>]"), Ok(1.0));
-        assert_eq!(value_with(&mut parameters, "exists[#<other>]"), Ok(0.0));
-
-        parameters.assign(b"#1=7", 0).unwrap();
-        assert_eq!(value_with(&mut parameters, "#1"), Ok(2.5));
-        parameters.commit();
-        assert_eq!(value_with(&mut parameters, "#1"), Ok(7.0));
+        assert_eq!(value_with(&parameters, "#<toolwidth>"), Ok(5.0));
+        assert_eq!(value_with(&parameters, "##3"), Ok(2.5));
+        assert_eq!(value_with(&parameters, "#[1 + 1]"), Ok(2.5));
+        assert_eq!(value_with(&parameters, "exists[#<toolwidth>]"), Ok(1.0));
+        assert_eq!(value_with(&parameters, "exists[#<other>]"), Ok(0.0));
+        assert_eq!(value_with(&parameters, "#7"), Ok(0.0));
     }
 
     #[test]
     fn what_has_no_value_says_why() {
         for (text, word) in [
-            ("#5", "#5"),
             ("#<depth>", "#<depth>"),
             ("[1 / 0]", "divided by 0"),
             ("[1 mod 0]", "divided by 0"),
@@ -372,8 +369,8 @@ mod tests {
     }
 
     #[test]
-    fn parameters_of_the_machine_are_not_set() {
-        let fault = Parameters::default().assign(b"#5221=10", 0).unwrap_err();
-        assert!(fault.message.contains("#5221"), "{}", fault.message);
+    fn what_the_machine_tells_is_not_set() {
+        let fault = assignment(b"#5420=10", 0, &Parameters::default()).unwrap_err();
+        assert!(fault.message.contains("#5420"), "{}", fault.message);
     }
 }

@@ -6,6 +6,8 @@
 pub struct Fault {
     pub message: String,
     pub foreign: bool,
+    /// The 1-based line it is about; None for the one that is read.
+    pub line: Option<u32>,
 }
 
 /// Boxed, so that the outcome of the hot functions fits a register.
@@ -14,11 +16,17 @@ pub type Outcome<T> = Result<T, Box<Fault>>;
 /// The program is understood and cannot be followed.
 #[cold]
 pub fn fault<T>(message: impl Into<String>) -> Outcome<T> {
-    Err(Box::new(Fault { message: message.into(), foreign: false }))
+    Err(Box::new(Fault { message: message.into(), foreign: false, line: None }))
 }
 
 /// The text is not understood.
 #[cold]
 pub fn foreign<T>(message: impl Into<String>) -> Outcome<T> {
-    Err(Box::new(Fault { message: message.into(), foreign: true }))
+    Err(Box::new(Fault { message: message.into(), foreign: true, line: None }))
+}
+
+/// The program is understood and cannot be followed, because of another line than the one that is read.
+#[cold]
+pub fn fault_in<T>(line: u32, message: impl Into<String>) -> Outcome<T> {
+    Err(Box::new(Fault { message: message.into(), foreign: false, line: Some(line) }))
 }

@@ -10,11 +10,11 @@ pub const FREE_WORDS: u32 = bits(b"FSTD");
 pub const ARC_WORDS: u32 = bits(b"IJKRP");
 
 /// Codes that name no motion but take the axis words of their block.
-const TAKES_AXES: [u16; 5] = [100, 280, 300, 520, 920];
+const TAKES_AXES: [u16; 10] = [100, 280, 281, 282, 283, 284, 300, 301, 520, 920];
 
 /// The axis words of the block that are places; with G4 a lone X is a time.
 pub fn axis_words(block: &Block) -> u32 {
-    let axes = block.words & AXIS_WORDS;
+    let axes = block.words & AXIS_WORDS | if block.is_polar() { bits(b"XY") } else { 0 };
     let timed = axes == bit(b'X') && block.code(Group::Once) == Some(40) && !block.has(b'P');
     if timed && block.code(Group::Motion).is_none() {
         0
@@ -44,7 +44,9 @@ fn motion_beside_others(
     let tool = block.code(Group::ToolLength).filter(|code| matches!(code, 431 | 432));
     match (motion, once.or(tool)) {
         // `G0 G28 Z0` is common: G28 has the axis words, G0 stays in force.
-        (Some(code @ (0 | 800)), Some(280 | 300)) | (Some(code @ 800), Some(_)) => Ok(Some(code)),
+        (Some(code @ (0 | 10 | 800)), Some(280..=284 | 300 | 301)) | (Some(code @ 800), Some(_)) => {
+            Ok(Some(code))
+        }
         (Some(code), Some(other)) => fault(format!(
             "words {} and {} both take axis words: put them in two blocks",
             g_name(other),
@@ -58,6 +60,8 @@ fn motion_beside_others(
         }
         (Some(code), None) => Ok(Some(code)),
         (None, Some(_)) if once.is_some() || axes != 0 => Ok(None),
+        // Fanuc's G60 goes to its place from one side.
+        (None, None) if axes != 0 && block.code(Group::Once) == Some(600) => Ok(Some(0)),
         (None, _) if axes != 0 && modal == 800 => {
             let letter = AXES.into_iter().find(|&letter| axes & bit(letter) != 0).unwrap_or(b'X');
             fault(format!("word {} has no motion code in force: give G0 or G1 before it", block.word(letter)))
@@ -81,17 +85,19 @@ pub fn check_use(
     let mut used = FREE_WORDS | axes | if directed { bits(b"IJK") } else { 0 };
     used |= match motion {
         Some(20 | 30) => ARC_WORDS,
-        Some(730 | 830) => bits(b"RLQ"),
+        Some(730 | 830) => bits(b"RLQP"),
         Some(820 | 740 | 840 | 860 | 890) => bits(b"RLP"),
-        Some(810 | 850) => bits(b"RL"),
+        Some(810 | 850) => bits(b"RLP"),
+        Some(330 | 331) => bits(b"K"),
+        Some(760) => bits(b"PIJKRQHELD"),
         Some(50 | 51) => bits(b"IJPQ"),
         Some(52) => bits(b"PL"),
-        Some(62) => bits(b"PKR"),
+        Some(62) => bits(b"PKRQ"),
         _ => 0,
     };
     used |= match block.code(Group::Once) {
         Some(40) => bits(b"PX"),
-        Some(100) => bits(b"PLR"),
+        Some(100) => bits(b"PLRQIJ"),
         _ => 0,
     };
     if block.code(Group::Control) == Some(640) {
@@ -100,16 +106,34 @@ pub fn check_use(
     if matches!(block.code(Group::ToolLength), Some(430 | 432 | 434 | 435 | 490)) {
         used |= bit(b'H');
     }
-    if block.m_code(MGroup::User).is_some() || block.m_code(MGroup::Spindle) == Some(19) {
-        used |= bits(b"PQR");
+    used |= match block.code(Group::Compensation) {
+        Some(411 | 421) => bit(b'L'),
+        // Older controls of Fanuc have one number for lengths and radii.
+        Some(410 | 420) => bit(b'H'),
+        _ => 0,
+    };
+    if block.m_code(MGroup::User).is_some()
+        || block.m_code(MGroup::Spindle) == Some(19)
+        || !block.others().is_empty()
+    {
+        used |= bits(b"PQRL");
     }
-    let unused = block.words & !used;
+    used |= match (block.m_code(MGroup::Output), block.m_code(MGroup::Call), block.m_code(MGroup::ToolChange))
+    {
+        (Some(_), ..) => bits(b"PQLE"),
+        (_, Some(_), _) => bits(b"PL"),
+        (.., Some(61)) => bit(b'Q'),
+        _ => 0,
+    };
+    if block.m_code(MGroup::Override).is_some() {
+        used |= bit(b'P');
+    }
+    let unused = block.words & !used & !bit(b'E');
     if unused == 0 {
         return check_together(block, motion, absolute);
     }
     let letter = b'A' + unused.trailing_zeros() as u8;
     let remedy = match (letter, motion) {
-        (b'P', Some(730 | 830)) => "this cycle has no dwell: remove it, or use G82",
         (b'H', _) => "put it beside G43",
         (b'K', Some(motion)) if is_cycle(motion) => "repetitions are counted by L",
         _ => "no code of the block uses it; remove it",
@@ -121,6 +145,9 @@ pub fn check_use(
 fn check_together(block: &Block, motion: Option<u16>, absolute: bool) -> Outcome<()> {
     match (block.code(Group::Once), motion) {
         (Some(40), Some(20 | 30)) => fault("G4 and an arc both use P: put them in two blocks"),
+        (Some(530), Some(0 | 10)) if block.is_polar() => {
+            fault("G53 takes machine coordinates and no polar words: give X and Y")
+        }
         (Some(530), Some(0 | 10)) => {
             let absolute = block.code(Group::Distance).map_or(absolute, |code| code == 900);
             if absolute {
@@ -131,7 +158,7 @@ fn check_together(block: &Block, motion: Option<u16>, absolute: bool) -> Outcome
         (Some(530), _) => {
             fault("G53 goes with straight moves only: give G0 or G1 and axis words in its block")
         }
-        (Some(520 | 920), _) if block.words & AXIS_WORDS == 0 => {
+        (Some(520 | 920), _) if block.words & (AXIS_WORDS | bit(b'E')) == 0 => {
             fault("G52 and G92 need the axes they set: give axis words")
         }
         _ => Ok(()),
@@ -140,5 +167,5 @@ fn check_together(block: &Block, motion: Option<u16>, absolute: bool) -> Outcome
 
 /// Canned cycles are 730, 740 and 810 to 890.
 pub fn is_cycle(motion: u16) -> bool {
-    matches!(motion, 730 | 740 | 810..=890)
+    matches!(motion, 730 | 740 | 810..=899)
 }

@@ -1,38 +1,53 @@
 //! G-code (RS-274/NGC) to moves in machine coordinates.
 //!
-//! `words` cuts lines into blocks, `intent` says what a block asks for, `execute` runs it in LinuxCNC's order with the
-//! modes of `modal` and the offsets of `places`; `motion`, `arc`, `spline` and `cycle` make moves, `tip` says what their
-//! words mean, `moves` holds them as columns. What is not understood is an error with its line
+//! `run` takes lines in the order that `flow` and `steps` say; `words` cuts them into blocks, with the arithmetic of
+//! `expression` on `parameters` and `readings`. `intent` says what a block asks for, `execute` runs it in LinuxCNC's
+//! order with the modes of `modal` and the offsets of `places`; `motion`, `arc`, `spline`, `cycle` and `thread` make
+//! moves, `compensate` puts the tool beside them, `tip` says what their words mean, `moves` holds them as columns. What is not understood is an error with its line
 //! and word; nothing is skipped silently.
 
 mod arc;
 mod arithmetic;
 mod block;
+mod compensate;
+mod corner;
 mod cycle;
 mod dialect;
 mod execute;
 mod expression;
 mod fault;
+mod flow;
 mod intent;
 mod modal;
+mod modes;
 mod motion;
 mod moves;
 mod number;
+mod offset;
+mod parameters;
 mod places;
+mod readings;
+mod run;
 mod spline;
+mod steps;
+mod thread;
 mod tip;
+mod tools;
+mod turned;
 mod words;
 
 pub use moves::{Columns, Direction, Point};
 pub use tip::{Meaning, Place, TipControl};
 
-use block::Block;
-use execute::Interpreter;
 use fault::Fault;
-use words::{Lexer, Line};
+use run::Runner;
+pub use tools::Tool;
 
-/// Rows that room is made for at once, at most; beyond, the columns grow.
-const MOST_EXPECTED: usize = 1 << 24;
+/// Finds a subprogram by its name: the file and its bytes, None where there is none, or why it cannot be read.
+pub type Subprograms = dyn Fn(&str) -> Result<Option<(String, Vec<u8>)>, String> + Send + Sync;
+
+/// Names the machines that have the axis of a letter.
+pub type MachinesWith = dyn Fn(char) -> String + Send + Sync;
 
 /// What the reader must know about the machine and the user's choices.
 pub struct Options {
@@ -44,8 +59,18 @@ pub struct Options {
     pub start: Point,
     /// Letters of the machine's axes; empty where no machine is given.
     pub machine_axes: Vec<u8>,
+    /// Which machines have the axis of a letter, as a part of a sentence.
+    pub machines_with: Option<Box<MachinesWith>>,
     /// What the machine makes of G43.4 and G43.5; None where there is no machine.
     pub tip_control: Option<Box<dyn TipControl + Send + Sync>>,
+    /// Finds subprograms in files; None where there are none.
+    pub subprograms: Option<Box<Subprograms>>,
+    /// The tool table; None where it is not known.
+    pub tools: Option<Vec<Tool>>,
+    /// The feed [mm/s] of moves before the first F; None where there is none.
+    pub feed: Option<f64>,
+    /// What axis words without a decimal point count, in units of the program: 1, or 0.001 on controls set so.
+    pub whole_step: f64,
     /// Leave out blocks after `/`.
     pub block_delete: bool,
     /// A program with more moves is an error.
@@ -59,7 +84,12 @@ impl Default for Options {
             home: [0.0; 9],
             start: [0.0; 9],
             machine_axes: Vec::new(),
+            machines_with: None,
             tip_control: None,
+            subprograms: None,
+            tools: None,
+            feed: None,
+            whole_step: 1.0,
             block_delete: true,
             max_moves: 50_000_000,
         }
@@ -73,9 +103,6 @@ pub struct ReadError {
     pub message: String,
 }
 
-/// Lines between two times that the reader tells how far it is.
-const TOLD: u32 = 1024;
-
 /// The moves of a program. `seen` is told every so often of how many more lines have been read; it may unwind.
 pub fn read(source: &[u8], options: &Options, seen: &dyn Fn(usize)) -> Result<Columns, ReadError> {
     let whole = |message: &str| ReadError { line: None, message: message.into() };
@@ -86,11 +113,18 @@ pub fn read(source: &[u8], options: &Options, seen: &dyn Fn(usize)) -> Result<Co
         return Err(whole("the program is larger than 2 GiB: split it"));
     }
     let lines = source.iter().filter(|&&byte| byte == b'\n').count() + 1;
-    let mut lexer = Lexer::new(source, options.block_delete);
-    let mut interpreter = Interpreter::new(options, lines.min(MOST_EXPECTED));
-    let ended =
-        run(&mut lexer, &mut interpreter, seen).map_err(|fault| locate(*fault, lexer.line, source))?;
-    let (moves, mut warnings) = interpreter.into_parts();
+    let mut runner = Runner::new(source, options, lines, seen);
+    let ended = match runner.run() {
+        Ok(ended) => ended,
+        Err(fault) => return Err(locate(&runner, &fault, source)),
+    };
+    let defines = runner.defines;
+    let (moves, mut warnings) = runner.interpreter.into_parts();
+    if moves.is_empty() && defines {
+        return Err(whole(
+            "the program defines subroutines and moves nothing: give the program that calls them",
+        ));
+    }
     if moves.is_empty() {
         return Err(whole("the program moves nothing: give one with G0, G1, G2 or G3 and axis words"));
     }
@@ -98,55 +132,9 @@ pub fn read(source: &[u8], options: &Options, seen: &dyn Fn(usize)) -> Result<Co
     Ok(moves.finish(warnings))
 }
 
-/// Runs the program to its end; sentences about how it ends, and what was left out.
-fn run(
-    lexer: &mut Lexer,
-    interpreter: &mut Interpreter,
-    seen: &dyn Fn(usize),
-) -> Result<Vec<String>, Box<Fault>> {
-    let mut block = Block::new();
-    let mut warnings = Vec::new();
-    let mut deleted = 0u32;
-    let mut opened = false;
-    let mut told = 0;
-    let end = loop {
-        if lexer.line - told >= TOLD {
-            seen((lexer.line - told) as usize);
-            told = lexer.line;
-        }
-        match lexer.next_line(&mut block)? {
-            Some(Line::Block) => {
-                if interpreter.run(&block, lexer.line)? {
-                    break Some("M2 or M30");
-                }
-            }
-            Some(Line::Deleted) => deleted += 1,
-            // The first % opens the program, unless blocks stand before it.
-            Some(Line::Percent) if !opened && !lexer.begun => opened = true,
-            Some(Line::Percent) => break Some("%"),
-            None => break None,
-        }
-    };
-    interpreter.check_end()?;
-    if deleted > 0 {
-        warnings.push(format!("{deleted} blocks that start with / are left out (block delete)"));
-    }
-    match end {
-        Some(word) if !lexer.is_spent() => {
-            warnings.push(format!("line {}: {word} ends the program: what follows is not read", lexer.line));
-        }
-        None if lexer.ends_within_a_line() => warnings.push(
-            "the program does not end with M2, M30 or %, and its last line has no line end: it may be truncated".into(),
-        ),
-        None => warnings.push("the program does not end with M2, M30 or %: it may be truncated".into()),
-        _ => {}
-    }
-    Ok(warnings)
-}
-
 #[cold]
-fn locate(fault: Fault, line: u32, source: &[u8]) -> ReadError {
-    let mut message = fault.message;
+fn locate(runner: &Runner, fault: &Fault, source: &[u8]) -> ReadError {
+    let (line, mut message) = runner.place(fault);
     if fault.foreign {
         if let Some(language) = dialect::guess(source) {
             message += &format!("; the file looks like {language} code, and only RS-274 (G-code) is read");

@@ -25,7 +25,7 @@ pub struct Feed {
     pub angular: f64,
 }
 
-/// The words that a canned cycle keeps while it is repeated, in mm and seconds as they were written.
+/// The words that a canned cycle keeps while it is repeated, as they were written.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sticky {
     pub retract: f64,
@@ -39,13 +39,12 @@ pub struct Sticky {
 /// Where the numbers of the program are, in machine coordinates.
 #[derive(Clone, Debug)]
 pub struct Offsets {
-    /// Work offsets G54 to G59.3.
-    pub work: [Point; 9],
-    /// Place in `work` of the one in force.
+    /// Which of G54 to G59.3 is in force, from 0, its offset and its turn about Z in degrees.
     pub system: usize,
-    /// G92 and G52: in force, and as G92.3 brings it back.
+    pub work: Point,
+    pub rotation: f64,
+    /// G92 and G52.
     pub shift: Point,
-    pub saved_shift: Point,
     /// Tool length, G43.
     pub tool: Point,
     /// Their sum.
@@ -53,14 +52,14 @@ pub struct Offsets {
 }
 
 impl Offsets {
-    pub fn new(work: [Point; 9]) -> Self {
+    pub fn new(work: Point) -> Self {
         let zero = [0.0; 9];
-        let mut offsets = Self { work, system: 0, shift: zero, saved_shift: zero, tool: zero, sum: zero };
+        let mut offsets = Self { system: 0, work, rotation: 0.0, shift: zero, tool: zero, sum: zero };
         offsets.update();
         offsets
     }
 
-    /// Machine coordinates of the program's zero.
+    /// Machine coordinates of the program's zero, where nothing is turned.
     #[inline(always)]
     pub fn sum(&self) -> &Point {
         &self.sum
@@ -68,11 +67,38 @@ impl Offsets {
 
     /// To be called after a change.
     pub fn update(&mut self) {
-        self.sum = std::array::from_fn(|k| self.work[self.system][k] + self.shift[k] + self.tool[k]);
+        self.sum = std::array::from_fn(|k| self.work[k] + self.shift[k] + self.tool[k]);
+    }
+
+    /// A place of the program in machine coordinates.
+    pub fn to_machine(&self, place: &Point) -> Point {
+        if self.rotation == 0.0 {
+            return std::array::from_fn(|k| place[k] + self.sum[k]);
+        }
+        let mut shifted: Point = std::array::from_fn(|k| place[k] + self.shift[k]);
+        turn(&mut shifted, self.rotation);
+        std::array::from_fn(|k| shifted[k] + self.work[k] + self.tool[k])
+    }
+
+    /// A place in machine coordinates as the program writes it, in mm and degrees.
+    pub fn to_program(&self, place: &Point) -> Point {
+        if self.rotation == 0.0 {
+            return std::array::from_fn(|k| place[k] - self.sum[k]);
+        }
+        let mut shifted: Point = std::array::from_fn(|k| place[k] - self.work[k] - self.tool[k]);
+        turn(&mut shifted, -self.rotation);
+        std::array::from_fn(|k| shifted[k] - self.shift[k])
     }
 }
 
+/// Turns X and Y about 0 by an angle in degrees.
+pub fn turn(place: &mut Point, angle: f64) {
+    let (sin, cos) = angle.to_radians().sin_cos();
+    (place[0], place[1]) = (place[0] * cos - place[1] * sin, place[0] * sin + place[1] * cos);
+}
+
 /// Everything modal.
+#[derive(Clone, Debug)]
 pub struct State {
     pub offsets: Offsets,
     /// The motion code in tenths; 800 (G80) where there is none.
@@ -82,6 +108,10 @@ pub struct State {
     pub absolute: bool,
     pub absolute_centres: bool,
     pub inches: bool,
+    /// G7: X words are diameters.
+    pub diameters: bool,
+    /// G16: the words of the plane are a radius and an angle.
+    pub polar: bool,
     /// G20 or G21 was given.
     pub units_given: bool,
     pub feed_mode: FeedMode,
@@ -89,7 +119,13 @@ pub struct State {
     pub control: Control,
     /// G98: cycles go back to where they came from, not only to R.
     pub retract_to_initial: bool,
+    /// G98 or G99 was given.
+    pub retract_given: bool,
     pub spindle_on: bool,
+    /// M4.
+    pub spindle_back: bool,
+    pub mist: bool,
+    pub flood: bool,
     /// Turns a minute; None where they are not known (G96, or no S yet).
     pub spindle_speed: Option<f64>,
     pub constant_surface_speed: bool,
@@ -101,8 +137,8 @@ pub struct State {
 }
 
 impl State {
-    /// As LinuxCNC starts: no motion code, G17 G21 G90 G91.1 G94 G54 G64 G98.
-    pub fn new(work: [Point; 9]) -> Self {
+    /// As LinuxCNC starts: no motion code, G17 G21 G90 G91.1 G94 G54 G64 G99.
+    pub fn new(work: Point) -> Self {
         Self {
             offsets: Offsets::new(work),
             motion: 800,
@@ -110,12 +146,18 @@ impl State {
             absolute: true,
             absolute_centres: false,
             inches: false,
+            diameters: false,
+            polar: false,
             units_given: false,
             feed_mode: FeedMode::PerMinute,
             feed: None,
             control: Control::new(Mode::Tolerance),
-            retract_to_initial: true,
+            retract_to_initial: false,
+            retract_given: false,
             spindle_on: false,
+            spindle_back: false,
+            mist: false,
+            flood: false,
             spindle_speed: None,
             constant_surface_speed: false,
             sticky: Sticky::default(),

@@ -30,24 +30,29 @@ impl Interpreter<'_> {
             return self.rapid(&target);
         }
         // A G1 alone only selects the motion; its feed may follow.
-        if block.words & AXIS_WORDS == 0 {
+        if block.words & AXIS_WORDS == 0 && !block.is_polar() {
             return Ok(());
         }
         let feed = match self.state.feed_mode {
             FeedMode::Inverse => {
-                let length = straight_length(&self.moves.position, &target);
+                let length = straight_length(&self.position(), &target);
                 self.inverse_feed(block, length)?
             }
             _ => {
                 let feed = self.feed()?;
-                if block.words & bits(b"ABC") != 0 && only_turns(&self.moves.position, &target) {
+                if block.words & bits(b"ABC") != 0 && only_turns(&self.position(), &target) {
                     feed.angular
                 } else {
                     feed.linear
                 }
             }
         };
-        self.moves.straight(Kind::Line, &target, feed, &self.state.control, self.line)
+        let start = self.moves.position;
+        self.go(Kind::Line, &target, feed)?;
+        if block.corner.is_some() {
+            self.set_corner(block, &start, feed)?;
+        }
+        Ok(())
     }
 
     /// G0 and G1 to a tip and a tool direction (G43.5).
@@ -75,7 +80,9 @@ impl Interpreter<'_> {
     #[inline(always)]
     pub(super) fn feed(&self) -> Outcome<Feed> {
         let Some(feed) = self.state.feed else {
-            return fault("a feed move has no feed: give F before or in this block");
+            return fault(
+                "a feed move has no feed: give F before or in this block, or a feed for such moves (--feed)",
+            );
         };
         if feed.angular == 0.0 {
             return fault("a feed move has the feed F0: give a positive F before or in this block");
@@ -113,7 +120,13 @@ impl Interpreter<'_> {
         let target = self.target(block, false)?;
         let normal = self.state.normal;
         let (u, v) = self.state.plane();
-        let position = self.moves.position;
+        self.check_corner()?;
+        let position = self.position();
+        if self.state.offsets.rotation != 0.0 && normal != 2 {
+            return fault(
+                "an arc in G18 or G19 stands in work coordinates that are turned about Z: post lines",
+            );
+        }
         let form = self.arc_form(block, &position, u, v)?;
         let turns = count(block, b'P', 1, "number of turns")?.unwrap_or(1);
         if turns > MOST_TURNS {
@@ -128,6 +141,9 @@ impl Interpreter<'_> {
             }
             _ => self.feed()?.linear,
         };
+        if self.compensation.is_some() {
+            return self.arc_beside(&target, centre, angle, feed);
+        }
         let mut place = [position[0], position[1], position[2]];
         place[u] = centre[0];
         place[v] = centre[1];
@@ -165,7 +181,6 @@ impl Interpreter<'_> {
         }
         let words = [CENTRE[u], CENTRE[v]].map(|letter| block.get(letter).map(|value| value * unit));
         let missing = words.iter().filter(|word| word.is_none()).count();
-        let zero = self.state.offsets.sum();
         if missing == 2 || (missing == 1 && self.state.absolute_centres) {
             let both = if self.state.absolute_centres { "both " } else { "" };
             return fault(format!(
@@ -173,8 +188,22 @@ impl Interpreter<'_> {
                 CENTRE[u] as char, CENTRE[v] as char
             ));
         }
-        let zero = if self.state.absolute_centres { zero } else { position };
-        let centre = [zero[u] + words[0].unwrap_or(0.0), zero[v] + words[1].unwrap_or(0.0)];
+        let offsets = &self.state.offsets;
+        let mut place = if self.state.absolute_centres { [0.0; 9] } else { offsets.to_program(position) };
+        for (axis, word) in [u, v].into_iter().zip(words) {
+            place[axis] += word.unwrap_or(0.0);
+        }
+        // Where nothing is turned, the way there and back would round.
+        let plain = |axis: usize, word: Option<f64>| {
+            word.unwrap_or(0.0)
+                + if self.state.absolute_centres { offsets.sum()[axis] } else { position[axis] }
+        };
+        let centre = if offsets.rotation == 0.0 {
+            [plain(u, words[0]), plain(v, words[1])]
+        } else {
+            let place = offsets.to_machine(&place);
+            [place[u], place[v]]
+        };
         if !centre.iter().all(|value| value.abs() <= FARTHEST_CENTRE) {
             return fault(format!(
                 "the centre of an arc is more than {FARTHEST_CENTRE:e} mm away: check I, J, K"

@@ -3,11 +3,15 @@
 //! What changes seldom (path control, stops, dwells) is kept as changes, for `columns` to spread over the rows.
 
 mod columns;
+mod events;
+
+use std::f64::consts::TAU;
 
 use super::block::rotary;
 use super::fault::{fault, Outcome};
 use super::tip::Meaning;
 pub use columns::Columns;
+pub use events::Events;
 use feedplan_geometry::spline::CompositeCurve;
 
 /// A point of the machine: X Y Z A B C U V W in mm and degrees.
@@ -125,6 +129,7 @@ pub struct Moves {
     changes: Vec<Change>,
     /// Rows from which on the tool has another direction.
     directions: Vec<(usize, Direction)>,
+    events: Events,
 }
 
 impl Moves {
@@ -150,6 +155,7 @@ impl Moves {
             spline_rows: Vec::new(),
             changes: Vec::new(),
             directions: Vec::new(),
+            events: Events::default(),
         }
     }
 
@@ -311,6 +317,36 @@ impl Moves {
         self.line.push(line as i32);
         self.position = *target;
         Ok(())
+    }
+
+    /// Moves the end along two of X, Y and Z of the row `first` and of those after it, which stand there; where it is
+    /// an arc, its sweep by `turned`. False where nothing of the arc would be left.
+    pub fn bend(&mut self, first: usize, plane: (usize, usize), end: &Point, turned: f64) -> bool {
+        let width = self.axes.len();
+        for row in self.target[first * width..].chunks_exact_mut(width) {
+            (row[plane.0], row[plane.1]) = (end[plane.0], end[plane.1]);
+        }
+        (self.position[plane.0], self.position[plane.1]) = (end[plane.0], end[plane.1]);
+        match self.arcs.iter_mut().rev().take_while(|(row, _)| *row >= first).find(|(row, _)| *row == first) {
+            Some((_, arc)) => {
+                let before = arc.angle;
+                arc.angle += turned;
+                arc.angle * before > 0.0
+            }
+            None => true,
+        }
+    }
+
+    /// Takes a turn from the arc of a row that has more than so many; true where it had.
+    pub fn drop_turn(&mut self, row: usize, turns: f64) -> bool {
+        let found = self.arcs.iter_mut().rev().take(2).find(|(arc, _)| *arc == row);
+        match found.filter(|(_, arc)| arc.angle.abs() > turns * TAU * (1.0 + 1e-12)) {
+            Some((_, arc)) => {
+                arc.angle -= arc.angle.signum() * TAU;
+                true
+            }
+            None => false,
+        }
     }
 
     /// A full stop where the program is now; of several causes the last one of `Stop` is kept.

@@ -3,61 +3,152 @@
 use super::block::{bit, g_name, Block, Group, AXES, AXIS_WORDS};
 use super::execute::Interpreter;
 use super::fault::{fault, Outcome};
+use super::modal::turn;
+use super::moves::Point;
+use super::parameters::{
+    FIRST_SYSTEM, HOME, ROTATION, SECOND_HOME, SHIFT, SHIFT_IN_FORCE, SYSTEM, SYSTEM_STEP,
+};
 use super::tip::Meaning;
+use super::tools::Tool;
 use super::words::count;
 
 impl Interpreter<'_> {
-    /// Work offset of G10 L2 and L20.
-    pub(super) fn set_work_offset(&mut self, block: &Block) -> Outcome<()> {
-        let from_here = match block.get(b'L') {
-            Some(2.0) => false,
-            Some(20.0) => true,
-            _ => return fault("G10 sets something else than work offsets: only G10 L2 and G10 L20 are read"),
-        };
-        if block.get(b'R').is_some_and(|angle| angle != 0.0) {
-            return fault(format!(
-                "word {} turns the work coordinates, which is not read: post the coordinates as they are cut",
-                block.word(b'R')
-            ));
+    /// G10: L1, L10 and L11 set a tool of the table, L2 and L20 a work offset.
+    pub(super) fn set_data(&mut self, block: &Block) -> Outcome<()> {
+        match block.get(b'L') {
+            Some(level) if [1.0, 10.0, 11.0].contains(&level) => self.set_tool_data(block, level),
+            Some(level) if [2.0, 20.0].contains(&level) => self.set_work_offset(block, level == 20.0),
+            Some(_) => fault(format!(
+                "G10 {} is not read: G10 sets work offsets by L2 and L20 and tools by L1, L10 and L11",
+                block.word(b'L')
+            )),
+            None => fault(
+                "G10 does not say what it sets: give L2 or L20 for work offsets, L1, L10 or L11 for tools",
+            ),
         }
+    }
+
+    fn set_work_offset(&mut self, block: &Block, from_here: bool) -> Outcome<()> {
         let system = match count(block, b'P', 0, "work offset")? {
             Some(0) => self.state.offsets.system,
             Some(number @ 1..=9) => number as usize - 1,
             _ => return fault("G10 needs P0 to P9: P0 is the offset in force, P1 is G54, P9 is G59.3"),
         };
-        let position = self.moves.position;
-        let (shift, tool) = (self.state.offsets.shift, self.state.offsets.tool);
-        let mut work = self.state.offsets.work[system];
+        let first = FIRST_SYSTEM + SYSTEM_STEP * system;
+        let mut work = self.parameters.row(first);
+        let rotation = block.get(b'R').unwrap_or_else(|| self.parameters.number(first + ROTATION));
+        // What the program would read here if that offset's own place were 0.
+        let mut reading = self.position();
+        for axis in 0..9 {
+            reading[axis] -= self.state.offsets.tool[axis];
+        }
+        let shift = self.state.offsets.shift;
+        let mut wanted = shift;
+        let mut named = [false; 9];
         self.places(block, |axis, value| {
-            work[axis] = if from_here { position[axis] - shift[axis] - tool[axis] - value } else { value };
+            named[axis] = true;
+            wanted[axis] += value;
+            if !from_here {
+                work[axis] = value;
+            }
         })?;
-        self.state.offsets.work[system] = work;
-        self.state.offsets.update();
+        if from_here {
+            if rotation != 0.0 && named[0] != named[1] {
+                // The axis that is not named keeps its reading.
+                let mut offsets = self.state.offsets.clone();
+                (offsets.work, offsets.rotation) = (work, rotation);
+                let now = offsets.to_program(&self.position());
+                for axis in [0, 1] {
+                    if !named[axis] {
+                        wanted[axis] = now[axis] + shift[axis];
+                        named[axis] = true;
+                    }
+                }
+            }
+            turn(&mut wanted, rotation);
+            for axis in (0..9).filter(|&axis| named[axis]) {
+                work[axis] = reading[axis] - wanted[axis];
+            }
+        }
+        self.parameters.set_row(first, &work);
+        self.parameters.set_number(first + ROTATION, rotation);
+        if system == self.state.offsets.system {
+            self.select_system(system);
+        }
+        Ok(())
+    }
+
+    fn set_tool_data(&mut self, block: &Block, level: f64) -> Outcome<()> {
+        let Some(number) = count(block, b'P', 1, "tool number")? else {
+            return fault("G10 sets no tool: give its number as P");
+        };
+        let mut tool = self.tool_of(number).unwrap_or(Tool {
+            number,
+            pocket: number,
+            offset: [0.0; 9],
+            diameter: 0.0,
+            orientation: 0,
+        });
+        let position = self.position();
+        // L10: in the offsets in force, this place reads as the words say. L11: in G59.3 without a shift.
+        let zero = if level == 10.0 {
+            let offsets = &self.state.offsets;
+            std::array::from_fn(|k| offsets.sum()[k] - offsets.tool[k])
+        } else {
+            self.parameters.row(FIRST_SYSTEM + 8 * SYSTEM_STEP)
+        };
+        self.places(block, |axis, value| {
+            tool.offset[axis] = if level == 1.0 { value } else { position[axis] - zero[axis] - value };
+        })?;
+        if let Some(radius) = block.get(b'R') {
+            tool.diameter = 2.0 * radius * self.state.unit();
+        }
+        if let Some(orientation) = count(block, b'Q', 0, "orientation of a tool")? {
+            tool.orientation = orientation;
+        }
+        let tools = self.tools.get_or_insert_with(Vec::new);
+        match tools.iter_mut().find(|known| known.number == number) {
+            Some(place) => *place = tool,
+            None => tools.push(tool),
+        }
+        if self.loaded == Some(number) {
+            self.tool = Some(tool);
+        }
         Ok(())
     }
 
     /// G52 sets the shift, G92 lets the axes named stand at the values given; both share one offset.
     pub(super) fn shift(&mut self, block: &Block, code: u16) -> Outcome<()> {
-        let position = self.moves.position;
-        let sum = *self.state.offsets.sum();
+        let reading = self.state.offsets.to_program(&self.position());
         let mut shift = self.state.offsets.shift;
         self.places(block, |axis, value| {
-            shift[axis] =
-                if code == 520 { value } else { position[axis] - (sum[axis] - shift[axis]) - value };
+            shift[axis] = if code == 520 { value } else { shift[axis] + reading[axis] - value };
         })?;
         self.state.offsets.shift = shift;
-        self.state.offsets.saved_shift = shift;
+        self.parameters.set_number(SHIFT_IN_FORCE, 1.0);
+        self.parameters.set_row(SHIFT, &shift);
         self.state.offsets.update();
         Ok(())
     }
 
     /// G92.1 forgets the shift, G92.2 suspends it, G92.3 brings it back.
     pub(super) fn reset_shift(&mut self, code: u16) {
-        let offsets = &mut self.state.offsets;
-        offsets.shift = if code == 923 { offsets.saved_shift } else { [0.0; 9] };
+        self.state.offsets.shift = if code == 923 { self.parameters.row(SHIFT) } else { [0.0; 9] };
+        self.parameters.set_number(SHIFT_IN_FORCE, f64::from(code == 923));
         if code == 921 {
-            offsets.saved_shift = [0.0; 9];
+            self.parameters.set_row(SHIFT, &[0.0; 9]);
         }
+        self.state.offsets.update();
+    }
+
+    /// Takes a work offset, from 0, as its parameters say.
+    pub(super) fn select_system(&mut self, system: usize) {
+        let first = FIRST_SYSTEM + SYSTEM_STEP * system;
+        let offsets = &mut self.state.offsets;
+        offsets.system = system;
+        self.parameters.set_number(SYSTEM, system as f64 + 1.0);
+        offsets.work = self.parameters.row(first);
+        offsets.rotation = self.parameters.number(first + ROTATION);
         offsets.update();
     }
 
@@ -72,10 +163,11 @@ impl Interpreter<'_> {
                 if code == 432 && !block.has(b'H') {
                     return fault("G43.2 adds nothing: give it H or axis words");
                 }
-                if code == 430 {
-                    self.state.offsets.tool = [0.0; 9];
+                let length = self.length_of_tool(block)?;
+                for axis in 0..9 {
+                    let before = if code == 432 { self.state.offsets.tool[axis] } else { 0.0 };
+                    self.state.offsets.tool[axis] = before + length[axis];
                 }
-                self.warn_of_tool();
             }
             Some(code @ (431 | 432)) => {
                 if block.has(b'H') {
@@ -136,31 +228,48 @@ impl Interpreter<'_> {
     }
 
     fn set_system(&mut self, block: &Block) {
-        match block.code(Group::System) {
-            Some(code @ 591..=593) => self.state.offsets.system = usize::from(code - 591) + 6,
-            Some(code) => self.state.offsets.system = usize::from(code - 540) / 10,
-            None => {}
+        let wanted = block.code(Group::System).map(|code| match code {
+            591..=593 => usize::from(code - 591) + 6,
+            _ => usize::from(code - 540) / 10,
+        });
+        match wanted.filter(|system| *system != self.state.offsets.system) {
+            Some(system) => self.select_system(system),
+            None => self.state.offsets.update(),
         }
-        self.state.offsets.update();
     }
 
-    fn warn_of_tool(&mut self) {
-        if !self.warned_tool {
+    /// The offset of the tool that H names, or of the one in the spindle; 0 where no table tells it.
+    fn length_of_tool(&mut self, block: &Block) -> Outcome<Point> {
+        let number = count(block, b'H', 0, "tool number")?;
+        let tool = match number {
+            Some(0) => None,
+            Some(number) => self.needed_tool(number)?,
+            None => self.tool,
+        };
+        if self.tools.is_none() && number != Some(0) && !self.warned_tool {
             self.warned_tool = true;
             self.warn(
-                "the tool lengths that G43 calls for are not known: 0 is taken for each (G43.1 Z gives one)"
+                "the tool lengths that G43 calls for are not known: 0 is taken for each (a tool table, or G43.1 Z, \
+                 gives them)"
                     .into(),
             );
         }
+        Ok(tool.map_or([0.0; 9], |tool| tool.offset))
     }
 
     /// G28 and G30: rapid to the place that the block names, then the axes named to the machine's home; all axes
-    /// where none is named.
-    pub(super) fn go_home(&mut self, block: &Block) -> Outcome<()> {
-        let via = self.target(block, false)?;
+    /// where none is named. G28.1 and G30.1 make this place their home; G28.2 to G28.4 only find the machine's zero.
+    pub(super) fn go_home(&mut self, block: &Block, code: u16) -> Outcome<()> {
+        let first = if code < 300 { HOME } else { SECOND_HOME };
+        if matches!(code, 281 | 301) {
+            let position = self.position();
+            self.parameters.set_row(first, &position);
+            return Ok(());
+        }
+        let via = if matches!(code, 280 | 300) { self.target(block, false)? } else { self.position() };
         self.rapid(&via)?;
         let mut target = via;
-        let home = &self.options.home;
+        let home = self.parameters.row(first);
         if block.words & AXIS_WORDS != 0 {
             self.places(block, |axis, _| target[axis] = home[axis])?;
         } else {

@@ -37,6 +37,8 @@ impl Interpreter<'_> {
         if motion == 53 {
             return fault("word G5.3 ends a NURBS that no G5.2 began: remove it");
         }
+        self.check_beside(&g_name(motion))?;
+        self.check_corner()?;
         if motion != 62 {
             self.check_plane(block, motion)?;
         }
@@ -173,7 +175,7 @@ impl Interpreter<'_> {
         let code = nurbs.code;
         let motion = block.code(Group::Motion);
         let ends = code == 52 && motion == Some(53);
-        let own = if code == 62 { AXIS_WORDS | bits(b"KR") } else { bits(b"XYPL") };
+        let own = if code == 62 { AXIS_WORDS | bits(b"KRQ") } else { bits(b"XYPL") };
         let own = if ends { 0 } else { own };
         if !block.only_motion()
             || !(ends || motion.is_none_or(|motion| motion == code))
@@ -303,7 +305,7 @@ impl Interpreter<'_> {
     /// Refuses a program that ends inside a spline.
     pub fn check_end(&self) -> Outcome<()> {
         match &self.open {
-            None => Ok(()),
+            None => self.check_corner(),
             Some(nurbs) => fault(format!(
                 "the program ends inside the spline {} of line {}: it may be truncated",
                 g_name(nurbs.code),

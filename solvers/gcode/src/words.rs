@@ -3,10 +3,12 @@
 //! One pass, byte by byte, without allocation: letters with their numbers go straight into a `Block`. Line ends
 //! are LF, CR LF or CR. Blanks may stand between words, before a number and after its sign.
 
-use super::block::{g_name, g_remedy, m_group, m_remedy, Block};
-use super::expression::{excerpt, integer, Parameters};
+use super::block::{g_name, g_remedy, m_group, Block, MGroup};
+use super::expression::{assignment, excerpt, expression, integer, Values};
 use super::fault::{fault, foreign, Outcome};
+use super::flow::{after_line, end_of_line, keyword};
 use super::number::{decimal, spaces};
+use super::parameters::Name;
 
 /// What a line holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,16 +19,23 @@ pub enum Line {
     Percent,
     /// A block after `/`, left out.
     Deleted,
+    /// A line of program flow, whose O is at that place.
+    Flow(usize),
 }
 
-/// Where the reader stands in the program.
+/// Where the reader stands in a text.
 pub struct Lexer<'a> {
     source: &'a [u8],
-    at: usize,
+    pub at: usize,
     /// 1-based line of the block that was read last.
     pub line: u32,
-    parameters: Parameters,
+    /// What the block that was read last assigns.
+    pub assigned: Vec<(Name, f64)>,
+    /// Messages of that block.
+    pub messages: Vec<String>,
     delete: bool,
+    /// What lengths and angles without a decimal point count.
+    whole_step: f64,
     /// Set once a block with words was read: what opens a program may not stand after it.
     pub begun: bool,
 }
@@ -34,17 +43,29 @@ pub struct Lexer<'a> {
 /// Some old editors end a file with this byte.
 const END_OF_FILE: u8 = 0x1a;
 
-/// Words of program flow after an O number.
-const FLOW: [&str; 14] = [
-    "SUB", "ENDSUB", "RETURN", "CALL", "DO", "WHILE", "ENDWHILE", "IF", "ELSEIF", "ELSE", "ENDIF", "REPEAT",
-    "BREAK", "CONTINUE",
-];
+/// M codes whose rest of the line is a text for the operator, on 3-D printers.
+const TEXT_CODES: [f64; 2] = [117.0, 118.0];
 
 impl<'a> Lexer<'a> {
-    /// `delete`: blocks after `/` are left out.
-    pub fn new(source: &'a [u8], delete: bool) -> Self {
+    /// At the start of a text; `delete`: blocks after `/` are left out; `whole_step`: what lengths and angles without
+    /// a decimal point count.
+    pub fn new(source: &'a [u8], delete: bool, whole_step: f64) -> Self {
         let at = if source.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
-        Self { source, at, line: 0, parameters: Parameters::default(), delete, begun: false }
+        Self {
+            source,
+            at,
+            line: 0,
+            assigned: Vec::new(),
+            messages: Vec::new(),
+            delete,
+            whole_step,
+            begun: false,
+        }
+    }
+
+    /// Goes on at a place, which is in the line after `line`.
+    pub fn jump(&mut self, at: usize, line: u32) {
+        (self.at, self.line, self.begun) = (at, line, true);
     }
 
     /// True where nothing but blanks, comments and `%` is left.
@@ -56,7 +77,7 @@ impl<'a> Lexer<'a> {
                     Ok(end) => at = end,
                     Err(_) => return false,
                 },
-                b';' => at = self.end_of_line(at),
+                b';' => at = end_of_line(self.source, at),
                 b' ' | b'\t' | b'\r' | b'\n' | b'%' | END_OF_FILE => at += 1,
                 _ => return false,
             }
@@ -71,7 +92,7 @@ impl<'a> Lexer<'a> {
 
     /// Reads the next line into `block`; None at the end of the source.
     #[inline]
-    pub fn next_line(&mut self, block: &mut Block) -> Outcome<Option<Line>> {
+    pub fn next_line(&mut self, block: &mut Block, values: &dyn Values) -> Outcome<Option<Line>> {
         if self.at >= self.source.len() {
             return Ok(None);
         }
@@ -79,21 +100,35 @@ impl<'a> Lexer<'a> {
         block.clear();
         let mut at = self.at;
         let mut first = true;
+        // Set by an M code that begins a block and is not known: the words after it are its own.
+        let mut owner = 0;
         loop {
             let byte = self.byte(at);
             let upper = byte & 0xdf;
             if upper.wrapping_sub(b'A') < 26 {
                 let (value, end) = match decimal(self.source, at + 1) {
+                    Some((value, end)) if self.whole_step != 1.0 => (self.stepped(value, at, end), end),
                     Some(number) => number,
-                    None if upper == b'O' => return self.flow(at),
-                    None => self.value(at)?,
+                    None if upper == b'O' => return self.flow(at, first),
+                    None => self.value(at, values)?,
                 };
                 match upper {
                     b'G' => self.g_word(value, at, end, block)?,
-                    b'M' => self.m_word(value, at, end, block)?,
+                    b'M' => {
+                        self.m_word(value, at, end, block)?;
+                        if first && m_group(value as u16) == MGroup::Other {
+                            owner = value as u16;
+                        }
+                        if TEXT_CODES.contains(&value) {
+                            at = end_of_line(self.source, end);
+                            self.messages.push(text_of(&self.source[end..at]));
+                            continue;
+                        }
+                    }
                     b'N' => self.number_word(value, at, end, first)?,
+                    b'O' if keyword(self.source, end).is_some() => return self.flow(at, first),
                     b'O' => self.program_number(at, end, first)?,
-                    b'E' => return self.e_word(at, end),
+                    b'E' if self.is_exponent(at) => return self.exponent(at, end),
                     _ if block.set(upper, value) => {}
                     _ => return self.twice(at, end),
                 }
@@ -111,18 +146,25 @@ impl<'a> Lexer<'a> {
                     at += 1 + usize::from(self.byte(at + 1) == b'\n' && at + 1 < self.source.len());
                     break;
                 }
-                b'(' => at = self.comment(at)?,
-                b';' => at = self.end_of_line(at),
+                b'(' => {
+                    let end = self.comment(at)?;
+                    if let Some(message) = message(&self.source[at + 1..end - 1]) {
+                        self.messages.push(message);
+                    }
+                    at = end;
+                }
+                b';' => at = end_of_line(self.source, at),
                 b'#' => {
-                    at = self.parameters.assign(self.source, at)?;
+                    let (name, value, end) = assignment(self.source, at, values)?;
+                    self.assigned.push((name, value));
+                    at = end;
                     first = false;
                     self.begun = true;
                 }
                 b'/' if first => {
                     at += 1;
                     if self.delete {
-                        self.at = self.end_of_line(at);
-                        self.skip_line_end();
+                        self.at = after_line(self.source, end_of_line(self.source, at));
                         return Ok(Some(Line::Deleted));
                     }
                     // Controls number their switches /1 to /9.
@@ -134,6 +176,16 @@ impl<'a> Lexer<'a> {
                     self.percent(at)?;
                     return Ok(Some(Line::Percent));
                 }
+                b'@' | b'^' if polar_word(byte, block) => {
+                    let Some((value, end)) = self.number(at + 1, values)? else { return self.stray(at) };
+                    block.set_polar(byte, value);
+                    (at, first) = (end, false);
+                }
+                b',' if block.corner.is_none() && matches!(self.byte(at + 1) & 0xdf, b'C' | b'R') => {
+                    let Some((value, end)) = self.number(at + 2, values)? else { return self.stray(at) };
+                    block.corner = Some((self.byte(at + 1) & 0xdf, value));
+                    (at, first) = (end, false);
+                }
                 b':' if first && !self.begun => match decimal(self.source, at + 1) {
                     Some((_, end)) => at = end,
                     None => return self.stray(at),
@@ -142,9 +194,19 @@ impl<'a> Lexer<'a> {
             }
         }
         self.at = at;
-        self.parameters.commit();
+        if owner != 0 {
+            block.leave_to(owner);
+        }
         self.begun |= !block.is_empty();
         Ok(Some(Line::Block))
+    }
+
+    /// The value of a word from `at` to `end`, on a control where a number without a point counts its own steps.
+    #[cold]
+    fn stepped(&self, value: f64, at: usize, end: usize) -> f64 {
+        let whole = !self.source[at..end].contains(&b'.');
+        let length = b"XYZABCUVWIJKRQ".contains(&self.source[at].to_ascii_uppercase());
+        value * if whole && length { self.whole_step } else { 1.0 }
     }
 
     /// The byte at `at`; past the end, a line end.
@@ -174,13 +236,12 @@ impl<'a> Lexer<'a> {
 
     fn m_word(&self, value: f64, at: usize, end: usize, block: &mut Block) -> Outcome<()> {
         let code = value as u16;
-        if f64::from(code) != value {
+        if f64::from(code) != value || code == u16::MAX {
             return self.unknown_word(at, end, None);
         }
-        match m_group(code).map(|group| block.set_m_code(code, group)) {
-            Some(Ok(())) => Ok(()),
-            None => self.unknown_word(at, end, m_remedy(code)),
-            Some(Err(other)) => fault(format!(
+        match block.set_m_code(code, m_group(code)) {
+            Ok(()) => Ok(()),
+            Err(other) => fault(format!(
                 "words M{other} and M{code} belong to one modal group and exclude each other: put them in two blocks"
             )),
         }
@@ -202,38 +263,35 @@ impl<'a> Lexer<'a> {
         Ok(())
     }
 
-    /// `O1234` opens a program; with a word of program flow after it, it is something else.
+    /// `O1234` opens a program.
     #[cold]
     fn program_number(&self, at: usize, end: usize, first: bool) -> Outcome<()> {
-        let next = spaces(self.source, end);
-        let letters =
-            self.source[next.min(self.source.len())..].iter().take_while(|byte| byte.is_ascii_alphabetic());
-        let word: Vec<u8> = letters.take(9).map(u8::to_ascii_uppercase).collect();
-        if FLOW.iter().any(|flow| word.starts_with(flow.as_bytes())) {
-            return self.flow(at).map(|_: Option<Line>| ());
-        }
         if self.begun || !first {
             return fault(format!(
-                "word {} opens a second program: give each program its own file",
+                "word {} opens a second program: end the one before with M2, M30 or M99, or give each its own file",
                 self.text(at, end)
             ));
         }
         Ok(())
     }
 
+    /// A line of program flow begins at `at`.
     #[cold]
-    fn flow<T>(&self, at: usize) -> Outcome<T> {
-        fault(format!(
-            "word {} controls the flow of the program (subroutine, loop or branch), which is not read: post one \
-             program of single moves",
-            excerpt(self.source, at)
-        ))
+    fn flow(&mut self, at: usize, first: bool) -> Outcome<Option<Line>> {
+        if !first {
+            return fault(format!(
+                "word {} is not the first of its block: put program flow in lines of its own",
+                excerpt(self.source, at)
+            ));
+        }
+        self.begun = true;
+        Ok(Some(Line::Flow(at)))
     }
 
     /// The value of a word that has no plain number.
     #[cold]
-    fn value(&self, at: usize) -> Outcome<(f64, usize)> {
-        if let Some(value) = self.parameters.value(self.source, at + 1)? {
+    fn value(&self, at: usize, values: &dyn Values) -> Outcome<(f64, usize)> {
+        if let Some(value) = expression(self.source, at + 1, values)? {
             return Ok(value);
         }
         let rest = &self.source[at..];
@@ -259,10 +317,22 @@ impl<'a> Lexer<'a> {
         }
     }
 
+    /// A number at `at`, plain or computed.
     #[cold]
-    fn e_word<T>(&self, at: usize, end: usize) -> Outcome<T> {
+    fn number(&self, at: usize, values: &dyn Values) -> Outcome<Option<(f64, usize)>> {
+        decimal(self.source, at)
+            .map_or_else(|| expression(self.source, at, values), |number| Ok(Some(number)))
+    }
+
+    /// True where the E at `at` stands right behind a digit; extruders' words stand behind a blank.
+    fn is_exponent(&self, at: usize) -> bool {
+        at > 0 && self.source[at - 1].is_ascii_digit()
+    }
+
+    #[cold]
+    fn exponent<T>(&self, at: usize, end: usize) -> Outcome<T> {
         foreign(format!(
-            "word {} is not understood: E moves an extruder, and numbers have no exponents; remove it",
+            "word {} is not understood: numbers have no exponents, and an extruder's word stands behind a blank",
             self.text(at, end)
         ))
     }
@@ -281,11 +351,12 @@ impl<'a> Lexer<'a> {
     fn stray<T>(&self, at: usize) -> Outcome<T> {
         let remedy = match self.byte(at) {
             b')' => "the comment that it ends does not begin in this line",
-            b',' => "numbers have a decimal point, and roundings and chamfers (,R ,C) are not read",
+            b',' => "numbers have a decimal point, and a block has one ,C or ,R",
             b'=' => "only parameters are assigned, such as #1 = 2",
             b'0'..=b'9' | b'.' | b'+' | b'-' => "a letter is missing before it",
             b'/' => "a block is deleted by / at its start",
-            b'%' => "% stands alone in its line",
+            b'@' | b'^' => "polar words stand once in a block, @ for the radius and ^ for the angle",
+            b'%' => "% begins its line",
             _ => "remove it",
         };
         foreign(format!("{} is not understood: {remedy}", excerpt(self.source, at)))
@@ -308,37 +379,45 @@ impl<'a> Lexer<'a> {
         }
     }
 
-    /// The place of the line end at or after `at`.
-    fn end_of_line(&self, at: usize) -> usize {
-        let rest = self.source.get(at..).unwrap_or_default();
-        at + rest.iter().position(|byte| matches!(byte, b'\n' | b'\r')).unwrap_or(rest.len())
-    }
-
-    fn skip_line_end(&mut self) {
-        self.at += if self.source[self.at.min(self.source.len())..].starts_with(b"\r\n") { 2 } else { 1 };
-    }
-
-    /// A line of its own with `%`, blanks and comments.
+    /// A line of its own with `%`; controls take what stands behind it as a comment.
     #[cold]
     fn percent(&mut self, start: usize) -> Outcome<()> {
-        let mut at = start + 1;
-        loop {
-            match self.byte(at) {
-                b' ' | b'\t' | b'%' => at += 1,
-                b'(' => at = self.comment(at)?,
-                b';' => at = self.end_of_line(at),
-                b'\n' | b'\r' => break,
-                _ => return self.stray(start),
-            }
+        if self.source[start..].starts_with(b"%_N_") {
+            return self.stray(start);
         }
-        self.at = at;
-        self.skip_line_end();
+        self.at = after_line(self.source, end_of_line(self.source, start));
         Ok(())
     }
 
     fn text(&self, at: usize, end: usize) -> String {
         String::from_utf8_lossy(&self.source[at..end.min(at + 24)]).into_owned()
     }
+}
+
+/// True where the block does not have that polar word yet.
+fn polar_word(byte: u8, block: &Block) -> bool {
+    if byte == b'@' {
+        block.radius.is_none()
+    } else {
+        block.angle.is_none()
+    }
+}
+
+/// What begins a comment that is a message, in LinuxCNC.
+const MESSAGES: [&[u8]; 4] = [b"MSG", b"DEBUG", b"PRINT", b"LOG"];
+
+/// The text of a comment that is a message.
+fn message(comment: &[u8]) -> Option<String> {
+    let rest = &comment[spaces(comment, 0)..];
+    let name = MESSAGES.iter().find(|name| {
+        rest.get(..name.len()).is_some_and(|start| start.eq_ignore_ascii_case(name))
+            && rest.get(spaces(rest, name.len())) == Some(&b',')
+    })?;
+    Some(text_of(&rest[spaces(rest, name.len()) + 1..]))
+}
+
+fn text_of(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).trim().to_string()
 }
 
 /// The integer of a word that counts something, from `least` on.

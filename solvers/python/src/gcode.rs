@@ -6,7 +6,7 @@ use pyo3::types::PyDict;
 
 use super::arrays;
 use super::work::run;
-use feedplan_gcode::{read, Meaning, Options, Place, Point, TipControl};
+use feedplan_gcode::{read, Meaning, Options, Place, Point, TipControl, Tool};
 use feedplan_geometry::watch::Watch;
 
 pyo3::import_exception!(feedplan.errors, ProgramError);
@@ -55,15 +55,35 @@ impl TipControl for PyTipControl {
     }
 }
 
+/// A row of the tool table: number, pocket, offset X to W, diameter, orientation.
+type ToolRow = (u32, u32, [f64; 9], f64, u32);
+
+/// What the function of Python finds for the name of a subprogram: the file's name and its bytes, or None.
+fn find(finder: &Py<PyAny>, name: &str) -> Result<Option<(String, Vec<u8>)>, String> {
+    Python::attach(|py| {
+        let found = finder.bind(py).call1((name,)).map_err(|error| error.value(py).to_string())?;
+        found.extract().map_err(|_| format!("the subprogram {name} is not found as a name and bytes"))
+    })
+}
+
+/// What the function of Python says of the machines that have an axis; nothing where it fails.
+fn names_of(names: &Py<PyAny>, letter: char) -> String {
+    Python::attach(|py| names.bind(py).call1((letter,)).and_then(|text| text.extract()).unwrap_or_default())
+}
+
 /// Reads a G-code program; see `feedplan.program.gcode`.
 ///
 /// `places` (11, 9): the work offsets G54 to G59.3, the home position, where the program begins, in X Y Z A B C U V W;
-/// `machine_axes` empty where there is no machine; `tip_control` None likewise. Returns the fields of `Program` but its name, and
-/// `spline_columns` in place of `splines`.
+/// `machine_axes` empty where there is no machine; `tip_control` None likewise; `machines_with` names the machines that
+/// have the axis of a letter. `tools` are rows of the tool table, None
+/// where it is not known; `subprograms` gives for a name the file's name and bytes, or None; `feed` [mm/s] is that of
+/// moves before the first F; `whole_step` is what lengths without a decimal point count. Returns the fields of `Program`
+/// but its name, with `spline_columns` and `event_columns` in place of `splines` and `events`.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
 #[pyo3(signature = (
-    source, name, places, machine_axes, tip_control, block_delete, max_moves, progress=None
+    source, name, places, machine_axes, machines_with, tip_control, block_delete, max_moves, tools, subprograms, feed, whole_step,
+    progress=None
 ))]
 fn read_gcode<'py>(
     py: Python<'py>,
@@ -71,9 +91,14 @@ fn read_gcode<'py>(
     name: &str,
     places: PyReadonlyArray2<f64>,
     machine_axes: &str,
+    machines_with: Option<Py<PyAny>>,
     tip_control: Option<Py<PyAny>>,
     block_delete: bool,
     max_moves: usize,
+    tools: Option<Vec<ToolRow>>,
+    subprograms: Option<Py<PyAny>>,
+    feed: Option<f64>,
+    whole_step: f64,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let places = arrays::rows::<9>(&places)?;
@@ -87,7 +112,21 @@ fn read_gcode<'py>(
         home: places[9],
         start: places[10],
         machine_axes: machine_axes.as_bytes().to_vec(),
+        machines_with: machines_with.map(|names| Box::new(move |letter| names_of(&names, letter)) as _),
         tip_control: tip_control.map(|control| Box::new(PyTipControl(control)) as _),
+        subprograms: subprograms.map(|finder| Box::new(move |name: &str| find(&finder, name)) as _),
+        tools: tools.map(|rows| {
+            let tool = |(number, pocket, offset, diameter, orientation)| Tool {
+                number,
+                pocket,
+                offset,
+                diameter,
+                orientation,
+            };
+            rows.into_iter().map(tool).collect()
+        }),
+        feed,
+        whole_step,
         block_delete,
         max_moves,
     };
@@ -133,6 +172,17 @@ fn read_gcode<'py>(
     fields.set_item("change_move", PyArray1::from_vec(py, columns.change_move))?;
     let starts = PyArray1::from_vec(py, columns.change_start).reshape([changes, axes.len()])?;
     fields.set_item("change_start", starts)?;
+    let events = columns.events;
+    let event_columns = (
+        PyArray1::from_vec(py, events.moves),
+        PyArray1::from_vec(py, events.line),
+        PyArray1::from_vec(py, events.letter),
+        PyArray1::from_vec(py, events.number),
+        PyArray1::from_vec(py, events.p),
+        PyArray1::from_vec(py, events.q),
+        pyo3::types::PyTuple::new(py, events.texts)?,
+    );
+    fields.set_item("event_columns", event_columns)?;
     fields.set_item("start_dwell", columns.start_dwell)?;
     fields.set_item("warnings", pyo3::types::PyTuple::new(py, columns.warnings)?)?;
     fields.set_item("axes", pyo3::types::PyTuple::new(py, axes)?)?;

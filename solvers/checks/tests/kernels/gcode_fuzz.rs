@@ -57,8 +57,7 @@ fn check_columns(source: &[u8], columns: &Columns) -> Result<(), TestCaseError> 
         .all(|(&kind, &feed)| (kind == 0) == feed.is_infinite()));
     prop_assert!(columns.feed.iter().all(|&feed| feed > 0.0));
     prop_assert!(columns.dwell.iter().all(|&dwell| dwell >= 0.0 && dwell.is_finite()));
-    prop_assert!(columns.line.windows(2).all(|pair| 0 < pair[0] && pair[0] <= pair[1]));
-    prop_assert!(columns.line[count - 1] as usize <= lines(source));
+    prop_assert!(columns.line.iter().all(|&line| 0 < line && line as usize <= lines(source)));
     prop_assert_eq!(columns.stop[count - 1], true);
     let arcs: Vec<i64> = (0..count).filter(|&row| columns.kind[row] == 2).map(|row| row as i64).collect();
     prop_assert_eq!(&columns.arc_move, &arcs);
@@ -161,8 +160,63 @@ const SPLINES: [&str; 20] = [
     "G1 X5 A5",
 ];
 
+/// Flow, compensation, cycles, corners, tools.
+const FLOW: [&str; 40] = [
+    "o1 sub",
+    "o1 endsub [#1]",
+    "o1 call [1] [#2]",
+    "o1 return",
+    "o2 if [#1 LT 3]",
+    "o2 elseif [#<a>]",
+    "o2 else",
+    "o2 endif",
+    "o3 while [#3 LT 4]",
+    "o3 endwhile",
+    "o3 break",
+    "o3 continue",
+    "o4 repeat [3]",
+    "o4 endrepeat",
+    "o5 do",
+    "o5 while [0]",
+    "#1=[#1+1] #3=[#3+1]",
+    "#<a>=[#5420+1]",
+    "#5221=5 #5230=30",
+    "M98 P7 L2",
+    "O7",
+    "M99",
+    "M97 P5",
+    "N5 G0 X[#3]",
+    "G41.1 D2",
+    "G42.1 D-1",
+    "G40 G0 X0",
+    "G1 X[5*#1] Y3",
+    "G3 X9 Y9 R20",
+    "G2 I5 J5",
+    "G1 X5 Y5 ,R1",
+    "G1 Y9 ,C1",
+    "G10 L2 P1 X1 R30",
+    "G92 X3",
+    "G0 @5 ^[30*#1]",
+    "G91 G81 X1 Z-1 R2 L3",
+    "M70",
+    "M72",
+    "G18 G76 P1 Z-9 I-1 J.1 K.5 L3 E1",
+    "G10 L1 P1 R3 Z5",
+];
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    /// Lines of flow and of compensated paths in any order, of which few make a program.
+    #[test]
+    fn any_blocks_of_flow(blocks in proptest::collection::vec(0..FLOW.len(), 1..40)) {
+        let mut source = String::from("G21 G90 F100 S100 M3 G0 X1 Y2 Z5\n");
+        for block in blocks {
+            source += FLOW[block];
+            source.push('\n');
+        }
+        check(source.as_bytes())?;
+    }
 
     #[test]
     fn any_bytes(source in proptest::collection::vec(any::<u8>(), 0..200)) {

@@ -1,6 +1,6 @@
 //! The columns that the moves of a whole program become.
 
-use super::{Direction, Meaning, Moves, Point, Stop, UPRIGHT};
+use super::{Direction, Events, Meaning, Moves, Point, Stop, UPRIGHT};
 use crate::block::AXES;
 
 /// The letters of a tool direction's columns, after those of the axes.
@@ -41,6 +41,7 @@ pub struct Columns {
     pub change_move: Vec<i64>,
     pub change_start: Vec<f64>,
     pub start_dwell: f64,
+    pub events: Events,
     pub warnings: Vec<String>,
 }
 
@@ -124,6 +125,7 @@ impl Moves {
             arc_centre: self.arcs.iter().map(|(_, arc)| arc.centre).collect(),
             arc_normal: self.arcs.iter().map(|(_, arc)| arc.normal as u8).collect(),
             arc_angle: self.arcs.iter().map(|(_, arc)| arc.angle).collect(),
+            events: self.events,
             start_dwell: self.start_dwell,
             warnings,
         }

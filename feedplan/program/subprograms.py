@@ -1,0 +1,44 @@
+"""Finds the files of subprograms, which programs call by name (O<name> call) or number (M98 P100)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from feedplan.program.source import MAX_BYTES
+
+Finder = Callable[[str], tuple[str, bytes] | None]
+
+# The endings of subprograms, in the order that they are tried.
+ENDINGS = (".ngc", ".nc", "")
+
+
+def finder(folders: Iterable[Path], max_bytes: int = MAX_BYTES) -> Finder:
+    """A function that gives for a name the file's name and its bytes, or None where no folder has it.
+
+    Names are looked up in the order of `folders`, whatever the case of their letters. The function raises
+    OSError where a file cannot be read, ValueError where it is larger than `max_bytes`.
+    """
+    known = tuple(folders)
+
+    def find(name: str) -> tuple[str, bytes] | None:
+        # A number may be written with zeros before it, and with the O of its program.
+        wanted = [name, *(f"{letter}{name:0>4}" for letter in ("", "o") if name.isdigit())]
+        names = [base + ending for base in wanted for ending in ENDINGS]
+        for folder in known:
+            files = {file.name.lower(): file for file in _files(folder)}
+            found = next((files[each] for each in names if each in files), None)
+            if found is not None:
+                if found.stat().st_size > max_bytes:
+                    raise ValueError(f"{found} has more than {max_bytes} bytes: split it")
+                return found.name, found.read_bytes()
+        return None
+
+    return find
+
+
+def _files(folder: Path) -> list[Path]:
+    try:
+        return sorted(file for file in folder.iterdir() if file.is_file())
+    except OSError:
+        return []

@@ -1,0 +1,87 @@
+"""Tool tables of LinuxCNC (.tbl): lengths for G43, diameters for G41 and G42.
+
+A line is a tool: `T1 P2 Z50.3 D6 ;6 mm end mill`. T is its number, P its pocket, X to W its offset [mm, deg],
+D its diameter [mm], I and J the angles of a lathe tool, which no path needs, Q the side of its tip that cuts.
+What stands behind `;` is a comment.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from feedplan.errors import InputError
+from feedplan.machine.machine import AXIS_LETTERS
+
+MAX_BYTES = 1 << 20
+
+_WORD = re.compile(r"\s*([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))", re.IGNORECASE)
+_KNOWN = frozenset("TPDQIJ").union(AXIS_LETTERS)
+_INCH = 25.4
+
+
+@dataclass(frozen=True)
+class Tool:
+    """A tool: `number`, `pocket`, `offset` (9,) along XYZABCUVW [mm, deg], `diameter` [mm] (negative where it
+    is smaller than the tool that a path was made for), `orientation` (1 to 9 for lathe tools, else 0)."""
+
+    number: int
+    pocket: int
+    offset: tuple[float, ...]
+    diameter: float
+    orientation: int
+
+    def row(self) -> tuple[int, int, tuple[float, ...], float, int]:
+        """As the native reader takes it."""
+        return self.number, self.pocket, self.offset, self.diameter, self.orientation
+
+
+def read_tools(file: Path, *, inches: bool = False) -> tuple[Tool, ...]:
+    """The tools of a table, whose lengths are in inches where `inches` says so.
+
+    Raises InputError naming file, line and word where it cannot be read.
+    """
+    try:
+        if file.stat().st_size > MAX_BYTES:
+            raise InputError(f"{file} has more than {MAX_BYTES} bytes: give a tool table")
+        lines = file.read_bytes().decode("utf-8", "replace").splitlines()
+    except OSError as error:
+        raise InputError(f"the tool table {file} cannot be read: {error.strerror or error}") from None
+    tools: dict[int, Tool] = {}
+    for number, line in enumerate(lines, 1):
+        words = _words(line, f"{file.name} line {number}")
+        if words:
+            tool = _tool(words, _INCH if inches else 1.0, f"{file.name} line {number}")
+            tools[tool.number] = tool
+    return tuple(tools.values())
+
+
+def _words(line: str, place: str) -> dict[str, float]:
+    text = line.split(";", 1)[0].rstrip()
+    words: dict[str, float] = {}
+    at = 0
+    while at < len(text):
+        match = _WORD.match(text, at)
+        if match is None or match[1].upper() not in _KNOWN:
+            raise InputError(
+                f"{place}: {text[at:].strip()[:24]!r} is no word of a tool table: give lines such as "
+                "T1 P1 Z50.3 D6 ;comment"
+            )
+        words[match[1].upper()] = float(match[2])
+        at = match.end()
+    return words
+
+
+def _tool(words: dict[str, float], unit: float, place: str) -> Tool:
+    number = words.get("T", -1.0)
+    if number < 0 or number != int(number):
+        raise InputError(f"{place}: the tool has no number: give a whole T from 0")
+    offset = tuple(words.get(letter, 0.0) * (1.0 if letter in "ABC" else unit) for letter in AXIS_LETTERS)
+    return Tool(
+        number=int(number),
+        pocket=max(int(words.get("P", 0.0)), 0),
+        offset=offset,
+        diameter=words.get("D", 0.0) * unit,
+        orientation=max(int(words.get("Q", 0.0)), 0),
+    )

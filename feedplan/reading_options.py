@@ -1,0 +1,69 @@
+"""Options of the command line that say how a program is read, and for which machine."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import IO, Any, TypeVar
+
+import click
+
+from feedplan.machine.machine import Machine
+from feedplan.program.machine_for import AUTO, smallest_machine
+from feedplan.program.program import Program
+from feedplan.program.read import Reading, read_program
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+_OPTIONS = (
+    click.option("--tool-table", metavar="FILE", help="LinuxCNC's tool table (.tbl), for G43, G41 and G42."),
+    click.option(
+        "--subprograms",
+        multiple=True,
+        metavar="DIR",
+        help="Folder of files that the program calls, after its own; may be given several times.",
+    ),
+    click.option(
+        "--whole-step",
+        type=float,
+        metavar="UNITS",
+        help="What lengths without a decimal point count, such as 0.001.  [default: 1]",
+    ),
+)
+
+
+def reading_options(command: Command) -> Command:
+    """Adds the options; the command gets them as one argument, `reading`."""
+
+    @functools.wraps(command)
+    def packed(
+        *args: Any,
+        tool_table: str | None,
+        subprograms: tuple[str, ...],
+        whole_step: float | None,
+        **others: Any,
+    ) -> Any:
+        reading = Reading()
+        if tool_table is not None:
+            reading["tool_table"] = tool_table
+        if subprograms:
+            reading["subprograms"] = subprograms
+        if whole_step is not None:
+            reading["whole_step"] = whole_step
+        return command(*args, reading=reading, **others)
+
+    for option in reversed(_OPTIONS):
+        packed = option(packed)
+    return packed  # type: ignore[return-value]
+
+
+def machine_for(
+    name: str, source: str | IO[bytes], reading: Reading, feed: float | None = None
+) -> tuple[Machine, str | IO[bytes] | Program]:
+    """The machine of a name or file, and the source; for `auto` the smallest one that the program fits, and
+    the program, which is read."""
+    if name != AUTO:
+        return Machine.load(name), source
+    given = source if isinstance(source, str) else source.read()
+    title = None if isinstance(source, str) else source.name
+    return smallest_machine(lambda machine: read_program(given, machine, name=title, feed=feed, **reading))

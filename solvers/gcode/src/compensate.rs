@@ -1,0 +1,458 @@
+//! Cutter radius compensation, G41 and G42: the tool goes beside the programmed path, at its radius.
+//!
+//! As LinuxCNC: the first move ends beside its end. At corners that turn away from the tool an arc about the
+//! programmed corner joins the offsets; at corners towards it each ends where it meets the other. Corners of less
+//! than `STRAIGHT_ON` join as they are. After G40 the tool stays beside the path, and the next straight move, which
+//! counts from the programmed place, brings it back.
+
+use std::f64::consts::{PI, TAU};
+
+use super::block::{g_name, Block};
+use super::execute::Interpreter;
+use super::fault::{fault, Outcome};
+use super::moves::{Arc, Kind, Point};
+use super::offset::{crossing, direction, distance, minus, sweep_between, wrapped, Point2, Shape};
+use super::words::count;
+
+/// Smaller corners [rad] are none.
+const STRAIGHT_ON: f64 = 0.05;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Phase {
+    /// G41 or G42 is on, and no move has followed.
+    Entering,
+    Following,
+    /// G40 has followed, and no move since.
+    Leaving,
+}
+
+/// The last element of the tool's path in the plane: its first row, and where it begins.
+#[derive(Clone, Copy, Debug)]
+struct Last {
+    row: usize,
+    start: Point2,
+    shape: Shape,
+    /// It brings the tool to the path, so that it has no direction to keep.
+    entry: bool,
+    /// So many turns, begun ones among them, the program gives an arc.
+    turns: f64,
+}
+
+/// The tool beside the path.
+#[derive(Clone, Debug)]
+pub struct Compensation {
+    code: u16,
+    /// 1 for left, -1 for right.
+    side: f64,
+    radius: f64,
+    phase: Phase,
+    /// The axes of the plane, and the one that arcs turn about.
+    plane: (usize, usize),
+    normal: usize,
+    /// From the centre of a lathe tool's tip to the point that is programmed without compensation; 0 for mills.
+    origin: Point2,
+    /// Where the programmed path is.
+    pub programmed: Point,
+    last: Last,
+}
+
+impl Compensation {
+    /// A place in the plane.
+    fn flat(&self, place: &Point) -> Point2 {
+        [place[self.plane.0], place[self.plane.1]]
+    }
+
+    /// Where the tool's centre is, from where the machine is.
+    fn centre(&self, machine: &Point) -> Point2 {
+        match self.phase {
+            Phase::Following => minus(self.flat(machine), self.origin),
+            _ => self.flat(machine),
+        }
+    }
+
+    /// Puts the machine where the tool's centre is at a place of the plane.
+    fn put(&self, machine: &mut Point, centre: Point2) {
+        machine[self.plane.0] = centre[0] + self.origin[0];
+        machine[self.plane.1] = centre[1] + self.origin[1];
+    }
+
+    /// An arc of the machine whose centre is at a place of the plane, at the height of another place.
+    fn arc(&self, centre: Point2, angle: f64, at: &Point) -> Arc {
+        let mut place = *at;
+        self.put(&mut place, centre);
+        Arc { centre: [place[0], place[1], place[2]], normal: self.normal, angle }
+    }
+}
+
+/// From the centre of a lathe tool's tip to its programmed point, in radii along Z and X, for the sides 0 to 9 that cut.
+const ORIGINS: [Point2; 10] = [
+    [0.0, 0.0],
+    [1.0, -1.0],
+    [-1.0, -1.0],
+    [-1.0, 1.0],
+    [1.0, 1.0],
+    [1.0, 0.0],
+    [0.0, -1.0],
+    [-1.0, 0.0],
+    [0.0, 1.0],
+    [0.0, 0.0],
+];
+
+/// How the next element leaves a corner.
+struct Corner {
+    /// Where the tool's path begins beside it.
+    start: Point2,
+    /// An arc about the corner comes before.
+    rounded: bool,
+}
+
+impl Interpreter<'_> {
+    /// G40, G41 or G42 in tenths.
+    pub(super) fn compensation_code(&self) -> u16 {
+        match &self.compensation {
+            Some(compensation) if compensation.phase != Phase::Leaving => {
+                415 - (5.0 * compensation.side) as u16
+            }
+            _ => 400,
+        }
+    }
+
+    /// G40 to G42.1.
+    pub(super) fn set_compensation(&mut self, block: &Block, code: u16) -> Outcome<()> {
+        if code == 400 {
+            if let Some(on) = self.compensation.take_if(|on| on.phase == Phase::Following) {
+                self.settle(&on);
+                self.compensation = Some(on);
+            }
+            self.compensation = self.compensation.take().and_then(|mut compensation| {
+                let followed = compensation.phase != Phase::Entering;
+                compensation.phase = Phase::Leaving;
+                followed.then_some(compensation)
+            });
+            return Ok(());
+        }
+        let name = g_name(code);
+        if self.compensation.as_ref().is_some_and(|on| on.phase != Phase::Leaving) {
+            return fault(format!("{name} stands where the compensation is on already: give G40 before"));
+        }
+        let normal = self.state.normal;
+        if normal == 0 {
+            return fault(format!("{name} is read in the planes G17 and G18: post the compensated path"));
+        }
+        let (diameter, orientation) = match (code % 10, block.get(b'D')) {
+            (1, Some(diameter)) => {
+                (diameter * self.state.unit(), count(block, b'L', 0, "side of a lathe tool")?.unwrap_or(0))
+            }
+            (1, None) => return fault(format!("{name} has no diameter: give it as D")),
+            _ => self.tip_of_tool(block, &name)?,
+        };
+        let orientation = orientation as usize;
+        if orientation >= ORIGINS.len() || (normal == 2 && ORIGINS[orientation] != [0.0; 2]) {
+            return fault(format!(
+                "{name} in the plane G{} takes a tool of the side {orientation}: lathe tools have 1 to 9 and work in G18",
+                19 - normal
+            ));
+        }
+        let left = if code < 420 { 1.0 } else { -1.0 };
+        // A negative diameter is that of a tool smaller than the one which the path is made for.
+        let (side, radius) = (left * diameter.signum(), 0.5 * diameter.abs());
+        if radius == 0.0 {
+            self.compensation = None;
+            return Ok(());
+        }
+        let origin = ORIGINS[orientation].map(|share| share * radius);
+        let plane = self.state.plane();
+        let programmed = self.position();
+        let last = Last { row: 0, start: [0.0; 2], shape: Shape::Line([0.0; 2]), entry: true, turns: 0.0 };
+        self.compensation = Some(Box::new(Compensation {
+            code,
+            side,
+            radius,
+            phase: Phase::Entering,
+            plane,
+            normal,
+            origin,
+            programmed,
+            last,
+        }));
+        Ok(())
+    }
+
+    /// A tool change takes the machine as it is: it is beside the path no more.
+    pub(super) fn forget_compensation(&mut self) {
+        if self.compensation.as_ref().is_some_and(|on| on.phase == Phase::Leaving) {
+            self.compensation = None;
+        }
+    }
+
+    /// The diameter in mm, and the side that cuts, of the tool that D or H names, or of the one in the spindle.
+    fn tip_of_tool(&mut self, block: &Block, name: &str) -> Outcome<(f64, u32)> {
+        let letter = if block.has(b'D') { b'D' } else { b'H' };
+        let number = count(block, letter, 0, "tool number")?;
+        if self.tools.is_none() {
+            return fault(format!(
+                "{name} takes a diameter from the tool table: give one (--tool-table), or G41.1 and G42.1 with D"
+            ));
+        }
+        let tool = match number {
+            Some(number @ 1..) => self.needed_tool(number)?,
+            _ => self.tool,
+        };
+        Ok(tool.map_or((0.0, 0), |tool| (tool.diameter, tool.orientation)))
+    }
+
+    /// Refuses what has no offset.
+    pub(super) fn check_beside(&self, what: &str) -> Outcome<()> {
+        match &self.compensation {
+            Some(on) if on.phase != Phase::Leaving => {
+                fault(format!("{what} stands where {} is on: give G40 before", g_name(on.code)))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// A straight move of the programmed path.
+    #[cold]
+    pub(super) fn go_beside(&mut self, kind: Kind, target: &Point, feed: f64) -> Outcome<()> {
+        let Some(mut on) = self.compensation.take() else { return Ok(()) };
+        let (control, line) = (self.state.control, self.line);
+        if on.phase == Phase::Leaving {
+            return self.moves.straight(kind, target, feed, &control, line);
+        }
+        let here = on.centre(&self.moves.position);
+        let end = on.flat(target);
+        let entering = on.phase == Phase::Entering;
+        let from = if entering { here } else { on.flat(&on.programmed) };
+        let mut beside = *target;
+        let way = minus(end, from);
+        let length = way[0].hypot(way[1]);
+        if entering && length <= on.radius {
+            return fault(format!(
+                "the first move after {} is {length:.4} mm long and the tool's radius is {:.4} mm: begin farther away",
+                g_name(on.code),
+                on.radius
+            ));
+        }
+        if length == 0.0 {
+            on.put(&mut beside, here);
+        } else {
+            let along = [way[0] / length, way[1] / length];
+            let mut start = here;
+            if !entering {
+                let corner = self.corner(&on, from, along, Shape::Line(along))?;
+                self.turn_corner(&on, &corner, kind, target, feed)?;
+                start = corner.start;
+            }
+            let offset = [-on.side * on.radius * along[1], on.side * on.radius * along[0]];
+            let centre = [end[0] + offset[0], end[1] + offset[1]];
+            let moved = minus(centre, start);
+            if !entering && moved[0] * along[0] + moved[1] * along[1] < 0.0 {
+                return no_room(&on);
+            }
+            on.put(&mut beside, centre);
+            on.last =
+                Last { row: self.moves.len(), start, shape: Shape::Line(along), entry: entering, turns: 0.0 };
+        }
+        self.check_reach(&beside)?;
+        self.moves.straight(kind, &beside, feed, &control, line)?;
+        on.phase = Phase::Following;
+        on.programmed = *target;
+        self.compensation = Some(on);
+        Ok(())
+    }
+
+    /// An arc of the programmed path about `centre`, by its signed sweep.
+    pub(super) fn arc_beside(
+        &mut self,
+        target: &Point,
+        centre: Point2,
+        angle: f64,
+        feed: f64,
+    ) -> Outcome<()> {
+        let Some(mut on) = self.compensation.take() else { return Ok(()) };
+        if on.phase == Phase::Leaving {
+            return fault("the first move after G40 is an arc: give a straight move before");
+        }
+        let (control, line) = (self.state.control, self.line);
+        let turn = angle.signum();
+        let inside = turn == on.side;
+        let end = on.flat(target);
+        let nominal = distance(end, centre);
+        if inside && nominal <= on.radius {
+            return fault(format!(
+                "the radius {nominal:.4} mm of the arc is not larger than the tool's, {:.4} mm: take a smaller tool",
+                on.radius
+            ));
+        }
+        let outward = if inside { -on.radius } else { on.radius };
+        let out = [(end[0] - centre[0]) / nominal, (end[1] - centre[1]) / nominal];
+        let new_end = [end[0] + outward * out[0], end[1] + outward * out[1]];
+        let here = on.centre(&self.moves.position);
+        let entering = on.phase == Phase::Entering;
+        let (start, middle, sweep) = if entering {
+            let middle = self.entry_centre(&on, here, end, new_end, out)?;
+            if on.origin != [0.0; 2] {
+                // A lathe tool first brings its centre to where its point was.
+                let mut place = self.moves.position;
+                on.put(&mut place, here);
+                self.moves.straight(Kind::Line, &place, feed, &control, line)?;
+            }
+            (here, middle, sweep_between(here, new_end, middle, turn, angle))
+        } else {
+            let from = on.flat(&on.programmed);
+            let first = distance(from, centre);
+            let along = [-turn * (from[1] - centre[1]) / first, turn * (from[0] - centre[0]) / first];
+            let radius = nominal + outward;
+            let corner = self.corner(&on, from, along, Shape::Arc { centre, radius, turn })?;
+            self.turn_corner(&on, &corner, Kind::Line, target, feed)?;
+            // The nominal sweep, less what the corner takes.
+            let taken = wrapped(direction(centre, corner.start) - direction(centre, from));
+            let sweep = angle - taken;
+            if sweep * turn <= 0.0 {
+                return no_room(&on);
+            }
+            (corner.start, centre, sweep)
+        };
+        let mut beside = *target;
+        on.put(&mut beside, new_end);
+        self.check_reach(&beside)?;
+        let shape = Shape::Arc { centre: middle, radius: distance(new_end, middle), turn };
+        let turns = (angle.abs() / TAU - 1e-9).ceil();
+        on.last = Last { row: self.moves.len(), start, shape, entry: entering, turns };
+        let arc = on.arc(middle, sweep, &self.moves.position);
+        self.moves.arc(arc, &beside, feed, &control, line)?;
+        on.phase = Phase::Following;
+        on.programmed = *target;
+        self.compensation = Some(on);
+        Ok(())
+    }
+
+    /// The centre of an entry arc: on the programmed end's radius, as far from the new end as from the start.
+    fn entry_centre(
+        &self,
+        on: &Compensation,
+        here: Point2,
+        end: Point2,
+        new_end: Point2,
+        out: Point2,
+    ) -> Outcome<Point2> {
+        if distance(here, end) <= on.radius {
+            return fault(format!(
+                "the arc after {} is not longer than the tool's radius {:.4} mm: begin farther away",
+                g_name(on.code),
+                on.radius
+            ));
+        }
+        let chord = minus(here, new_end);
+        let along = -(chord[0] * out[0] + chord[1] * out[1]);
+        if along.abs() < 1e-4 * chord[0].hypot(chord[1]) {
+            return fault(format!(
+                "the arc after {} has no centre that brings the tool beside its end: begin with a line",
+                g_name(on.code)
+            ));
+        }
+        let radius = 0.5 * (chord[0] * chord[0] + chord[1] * chord[1]) / along;
+        Ok([new_end[0] - radius * out[0], new_end[1] - radius * out[1]])
+    }
+
+    /// How the path goes on at the programmed place `from` along a unit vector, with an offset of that shape.
+    fn corner(&self, on: &Compensation, from: Point2, along: Point2, next: Shape) -> Outcome<Corner> {
+        let here = on.centre(&self.moves.position);
+        let after = [-on.side * along[1], on.side * along[0]];
+        let mut bend = on.side * wrapped(direction(from, here) - after[1].atan2(after[0]));
+        if bend < STRAIGHT_ON - PI {
+            bend += TAU;
+        }
+        // A half turn may go round the corner or cut across it: it cuts across where an arc has the tool outside.
+        let outside = |shape: &Shape| matches!(shape, Shape::Arc { turn, .. } if *turn != on.side);
+        let back = (bend - PI).abs() < STRAIGHT_ON
+            && match next {
+                Shape::Line(_) => bend > PI - STRAIGHT_ON && outside(&on.last.shape),
+                Shape::Arc { .. } => outside(&next),
+            };
+        if !(-STRAIGHT_ON..=PI + STRAIGHT_ON).contains(&bend) || back {
+            let beside = [from[0] + on.radius * after[0], from[1] + on.radius * after[1]];
+            return match crossing(on.side, here, &on.last.shape, beside, &next) {
+                Some(start) => Ok(Corner { start, rounded: false }),
+                None => no_room(on),
+            };
+        }
+        if bend > STRAIGHT_ON {
+            let start = [from[0] + on.radius * after[0], from[1] + on.radius * after[1]];
+            return Ok(Corner { start, rounded: true });
+        }
+        Ok(Corner { start: here, rounded: false })
+    }
+
+    /// Ends the last element where the next begins, or goes round the corner; a rapid goes straight.
+    fn turn_corner(
+        &mut self,
+        on: &Compensation,
+        corner: &Corner,
+        kind: Kind,
+        target: &Point,
+        feed: f64,
+    ) -> Outcome<()> {
+        let (control, line) = (self.state.control, self.line);
+        let here = on.centre(&self.moves.position);
+        if !corner.rounded {
+            if corner.start != here {
+                self.shorten(on, here, corner.start)?;
+            }
+            self.settle(on);
+            return Ok(());
+        }
+        self.settle(on);
+        let mut place = self.moves.position;
+        // Axes outside of X, Y and Z move on the arc.
+        place[3..].copy_from_slice(&target[3..]);
+        on.put(&mut place, corner.start);
+        if kind == Kind::Rapid {
+            return self.moves.straight(kind, &place, feed, &control, line);
+        }
+        let about = on.flat(&on.programmed);
+        let sweep = sweep_between(here, corner.start, about, -on.side, 0.0);
+        let arc = on.arc(about, sweep, &self.moves.position);
+        self.moves.arc(arc, &place, feed, &control, line)
+    }
+
+    /// Where full circles begin before their end, LinuxCNC makes the last turn no more.
+    fn settle(&mut self, on: &Compensation) {
+        if self.moves.drop_turn(on.last.row, on.last.turns) {
+            self.warn(
+                "the circle before begins beside its end: its last turn is not made, as in LinuxCNC".into(),
+            );
+        }
+    }
+
+    /// Moves the end of the last element.
+    fn shorten(&mut self, on: &Compensation, here: Point2, end: Point2) -> Outcome<()> {
+        let last = on.last;
+        let turned = match last.shape {
+            Shape::Line(along) => {
+                let left = minus(end, last.start);
+                if left[0] * along[0] + left[1] * along[1] < 0.0 && !last.entry {
+                    return no_room(on);
+                }
+                0.0
+            }
+            Shape::Arc { centre, .. } => wrapped(direction(centre, end) - direction(centre, here)),
+        };
+        let mut place = self.moves.position;
+        on.put(&mut place, end);
+        if self.moves.bend(last.row, on.plane, &place, turned) {
+            Ok(())
+        } else {
+            no_room(on)
+        }
+    }
+}
+
+#[cold]
+fn no_room<T>(on: &Compensation) -> Outcome<T> {
+    fault(format!(
+        "the tool of radius {:.4} mm does not fit into the corner before this move: take a smaller one, or remove {}",
+        on.radius,
+        g_name(on.code)
+    ))
+}

@@ -1,0 +1,373 @@
+//! The lines of a program that say which line is next: O words (sub, call, if, while, do, repeat) and Fanuc's program
+//! numbers. They are found in one pass over the text, the first time that one is met, and tied to their partners.
+
+use std::collections::HashMap;
+
+use super::expression::{excerpt, integer, name_in_brackets};
+use super::fault::{fault, fault_in, Outcome};
+use super::number::{decimal, spaces};
+
+/// What a line of program flow does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    Sub,
+    EndSub,
+    Return,
+    Call,
+    If,
+    ElseIf,
+    Else,
+    EndIf,
+    While,
+    EndWhile,
+    Do,
+    /// The `while` that ends a `do`.
+    DoWhile,
+    Repeat,
+    EndRepeat,
+    Break,
+    Continue,
+    /// An O number alone, which begins a program or subprogram.
+    Number,
+}
+
+/// Keywords, longest first where one begins another.
+const KEYWORDS: [(&str, Kind); 15] = [
+    ("ENDSUB", Kind::EndSub),
+    ("ENDIF", Kind::EndIf),
+    ("ENDWHILE", Kind::EndWhile),
+    ("ENDREPEAT", Kind::EndRepeat),
+    ("ELSEIF", Kind::ElseIf),
+    ("ELSE", Kind::Else),
+    ("SUB", Kind::Sub),
+    ("RETURN", Kind::Return),
+    ("CALL", Kind::Call),
+    ("IF", Kind::If),
+    ("WHILE", Kind::While),
+    ("DO", Kind::Do),
+    ("REPEAT", Kind::Repeat),
+    ("BREAK", Kind::Break),
+    ("CONTINUE", Kind::Continue),
+];
+
+/// The name of a line's block; None where it is computed when the line is run.
+pub type Label = Option<Vec<u8>>;
+
+/// A line of program flow.
+#[derive(Clone, Debug)]
+pub struct Step {
+    /// Where its O is, where its arguments begin, and where the next line does.
+    pub at: usize,
+    pub arguments: usize,
+    pub next: usize,
+    /// 1-based.
+    pub line: u32,
+    pub kind: Kind,
+    pub label: Label,
+    /// The step that this one goes to: `if` to the next branch, `while`, `repeat`, `do` and `sub` to their ends and
+    /// these back, `break` and `continue` to the loop.
+    pub partner: usize,
+    /// Of `if` and its branches, the `endif`.
+    pub end: usize,
+}
+
+/// The steps of one text in order.
+#[derive(Debug)]
+pub struct Flow {
+    pub steps: Vec<Step>,
+    /// Steps where subroutines begin, by label.
+    subs: HashMap<Vec<u8>, usize>,
+}
+
+impl Flow {
+    /// The steps of a text; lines after `/` count unless `delete`.
+    pub fn new(source: &[u8], delete: bool) -> Outcome<Self> {
+        let mut flow = Self { steps: Vec::new(), subs: HashMap::new() };
+        let (mut at, mut line) = (0, 0);
+        while at < source.len() {
+            line += 1;
+            let end = end_of_line(source, at);
+            let next = after_line(source, end);
+            if let Some(o) = place_of_o(source, at, delete) {
+                if let Some(step) = step_at(source, o, next, line)? {
+                    flow.steps.push(step);
+                }
+            }
+            at = next;
+        }
+        flow.tie()?;
+        Ok(flow)
+    }
+
+    /// The step whose O is at a place.
+    pub fn at(&self, at: usize) -> Option<usize> {
+        self.steps.binary_search_by_key(&at, |step| step.at).ok()
+    }
+
+    /// The step where a subroutine begins.
+    pub fn sub(&self, label: &[u8]) -> Option<usize> {
+        self.subs.get(label).copied()
+    }
+
+    /// Ties steps to their partners; each must have one.
+    fn tie(&mut self) -> Outcome<()> {
+        // Steps that are open: of an `if`, its branches so far.
+        let mut open: Vec<Vec<usize>> = Vec::new();
+        for i in 0..self.steps.len() {
+            let kind = self.steps[i].kind;
+            match kind {
+                Kind::While if open.last().is_some_and(|top| self.closes_do(top, i)) => {
+                    self.steps[i].kind = Kind::DoWhile;
+                    self.close(&mut open, i, Kind::Do)?;
+                }
+                Kind::Sub if !open.is_empty() => {
+                    let outer = &self.steps[open[0][0]];
+                    return self.refuse(i, &format!(
+                        "stands inside the block that begins in line {}: define subroutines outside of others",
+                        outer.line
+                    ));
+                }
+                Kind::Sub | Kind::If | Kind::While | Kind::Do | Kind::Repeat => open.push(vec![i]),
+                Kind::ElseIf | Kind::Else => match open.last_mut() {
+                    Some(top)
+                        if self.steps[top[0]].kind == Kind::If
+                            && self.steps[top[0]].label == self.steps[i].label =>
+                    {
+                        let before = top[top.len() - 1];
+                        if self.steps[before].kind == Kind::Else {
+                            return self.refuse(i, "follows the else of its block: put it before");
+                        }
+                        self.steps[before].partner = i;
+                        top.push(i);
+                    }
+                    _ => return self.refuse(i, "has no if before it that is open"),
+                },
+                Kind::EndSub => self.close(&mut open, i, Kind::Sub)?,
+                Kind::EndIf => self.close(&mut open, i, Kind::If)?,
+                Kind::EndWhile => self.close(&mut open, i, Kind::While)?,
+                Kind::EndRepeat => self.close(&mut open, i, Kind::Repeat)?,
+                Kind::Break | Kind::Continue => {
+                    let looped = |top: &&Vec<usize>| {
+                        let step = &self.steps[top[0]];
+                        matches!(step.kind, Kind::While | Kind::Do | Kind::Repeat)
+                            && step.label == self.steps[i].label
+                    };
+                    match open.iter().rev().find(looped).map(|top| top[0]) {
+                        Some(start) => self.steps[i].partner = start,
+                        None => return self.refuse(i, "stands in no loop of that label"),
+                    }
+                }
+                Kind::Return | Kind::Call | Kind::DoWhile => {}
+                Kind::Number => self.begin_sub(i)?,
+            }
+            if kind == Kind::Sub {
+                self.begin_sub(i)?;
+            }
+        }
+        match open.last() {
+            Some(top) => self.refuse(top[0], "is not ended: the file may be truncated"),
+            None => Ok(()),
+        }
+    }
+
+    fn begin_sub(&mut self, i: usize) -> Outcome<()> {
+        let Some(label) = self.steps[i].label.clone() else {
+            return self.refuse(i, "has a label that is computed: name subroutines by numbers or <names>");
+        };
+        if let Some(first) = self.subs.insert(label, i) {
+            let line = self.steps[first].line;
+            return self
+                .refuse(i, &format!("begins a subroutine that begins in line {line} too: rename one"));
+        }
+        Ok(())
+    }
+
+    fn closes_do(&self, top: &[usize], i: usize) -> bool {
+        let start = &self.steps[top[0]];
+        start.kind == Kind::Do && start.label == self.steps[i].label
+    }
+
+    fn close(&mut self, open: &mut Vec<Vec<usize>>, i: usize, kind: Kind) -> Outcome<()> {
+        match open.pop() {
+            Some(top)
+                if self.steps[top[0]].kind == kind && self.steps[top[0]].label == self.steps[i].label =>
+            {
+                self.steps[top[top.len() - 1]].partner = i;
+                for step in &top {
+                    self.steps[*step].end = i;
+                }
+                self.steps[i].partner = top[0];
+                self.steps[i].end = i;
+                Ok(())
+            }
+            Some(top) => {
+                let line = self.steps[top[0]].line;
+                self.refuse(i, &format!("ends another block than the one of line {line}, which is open"))
+            }
+            None => self.refuse(i, "ends no block that is open"),
+        }
+    }
+
+    fn refuse<T>(&self, i: usize, why: &str) -> Outcome<T> {
+        let step = &self.steps[i];
+        let label = step.label.as_deref().map(String::from_utf8_lossy).unwrap_or_default();
+        let name = KEYWORDS.iter().find(|(_, kind)| *kind == step.kind).map_or("", |(name, _)| name);
+        fault_in(step.line, format!("word o<{label}> {} {why}", name.to_lowercase()))
+    }
+}
+
+/// The place of the O that begins a line, after blanks, `/` and a block number.
+fn place_of_o(source: &[u8], at: usize, delete: bool) -> Option<usize> {
+    let mut at = spaces(source, at);
+    if source.get(at) == Some(&b'/') {
+        if delete {
+            return None;
+        }
+        at = spaces(source, at + 1);
+    }
+    if matches!(source.get(at), Some(b'N' | b'n')) {
+        at = spaces(source, decimal(source, at + 1)?.1);
+    }
+    matches!(source.get(at), Some(b'O' | b'o' | b':')).then_some(at)
+}
+
+/// The step whose O is at a place; None where what follows it is no label.
+fn step_at(source: &[u8], at: usize, next: usize, line: u32) -> Outcome<Option<Step>> {
+    let Some((label, end)) = label(source, at + 1)? else { return Ok(None) };
+    let step = |kind, arguments| {
+        Some(Step { at, arguments, next, line, kind, label: label.clone(), partner: 0, end: 0 })
+    };
+    Ok(match keyword(source, end) {
+        Some((kind, arguments)) => step(kind, arguments),
+        None if label.is_some() => step(Kind::Number, end),
+        None => None,
+    })
+}
+
+/// The label at a place, and where it ends: a number or a `<name>`; one that is computed is skipped.
+fn label(source: &[u8], at: usize) -> Outcome<Option<(Label, usize)>> {
+    let at = spaces(source, at);
+    if source.get(at) == Some(&b'<') {
+        let (name, end) = name_in_brackets(source, at)?;
+        return Ok(Some((Some(name), end)));
+    }
+    if let Some((value, end)) = decimal(source, at) {
+        return Ok(number_label(value).map(|label| (Some(label), end)));
+    }
+    if !matches!(source.get(at), Some(b'#' | b'[')) {
+        return Ok(None);
+    }
+    // Computed: its keyword is the first one outside of brackets.
+    let (mut depth, mut place) = (0usize, at);
+    while let Some(&byte) = source.get(place).filter(|byte| !matches!(byte, b'\n' | b'\r')) {
+        match byte {
+            b'[' | b'<' => depth += 1,
+            b']' | b'>' => depth = depth.saturating_sub(1),
+            _ if depth == 0 && keyword(source, place).is_some() => return Ok(Some((None, place))),
+            _ => {}
+        }
+        place += 1;
+    }
+    Ok(None)
+}
+
+/// A number as a label: O0100 is O100.
+pub fn number_label(value: f64) -> Option<Vec<u8>> {
+    integer(value).filter(|number| *number >= 0).map(|number| number.to_string().into_bytes())
+}
+
+/// The keyword at a place, and where it ends.
+pub fn keyword(source: &[u8], at: usize) -> Option<(Kind, usize)> {
+    let at = spaces(source, at);
+    let rest = source.get(at..)?;
+    KEYWORDS.iter().find_map(|(name, kind)| {
+        rest.get(..name.len())
+            .is_some_and(|text| text.eq_ignore_ascii_case(name.as_bytes()))
+            .then_some((*kind, at + name.len()))
+    })
+}
+
+/// The place of the line end at or after a place.
+pub fn end_of_line(source: &[u8], at: usize) -> usize {
+    let rest = source.get(at..).unwrap_or_default();
+    at + rest.iter().position(|byte| matches!(byte, b'\n' | b'\r')).unwrap_or(rest.len())
+}
+
+/// The place after the line end at `end`.
+pub fn after_line(source: &[u8], end: usize) -> usize {
+    end + if source.get(end..).is_some_and(|rest| rest.starts_with(b"\r\n")) { 2 } else { 1 }
+}
+
+/// The start of the line whose block number is a label, and the number of the line before.
+pub fn numbered_line(source: &[u8], label: &[u8]) -> Option<(usize, u32)> {
+    let (mut at, mut line) = (0, 0);
+    while at < source.len() {
+        let word = spaces(source, at);
+        if matches!(source.get(word), Some(b'N' | b'n')) {
+            let number = decimal(source, word + 1).and_then(|(value, _)| number_label(value));
+            if number.as_deref() == Some(label) {
+                return Some((at, line));
+            }
+        }
+        at = after_line(source, end_of_line(source, at));
+        line += 1;
+    }
+    None
+}
+
+/// Refuses what stands behind the arguments of a step.
+pub fn check_rest(source: &[u8], at: usize) -> Outcome<()> {
+    let at = spaces(source, at);
+    match source.get(at) {
+        None | Some(b'\n' | b'\r' | b';' | b'(' | 0x1a) => Ok(()),
+        _ => fault(format!(
+            "{} is not understood behind an O word: put it in a line of its own",
+            excerpt(source, at)
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn kinds(text: &str) -> Vec<(Kind, usize)> {
+        Flow::new(text.as_bytes(), true).unwrap().steps.iter().map(|step| (step.kind, step.partner)).collect()
+    }
+
+    #[test]
+    fn steps_know_their_partners() {
+        use Kind::*;
+        assert_eq!(
+            kinds("o1 if [1]\nG0\n o1 elseif [2]\nN5 O1 else\no1endif\n"),
+            [(If, 1), (ElseIf, 2), (Else, 3), (EndIf, 0)]
+        );
+        assert_eq!(
+            kinds("o<a b> do\no2 while [1]\no<ab> break\no2 endwhile\nO<AB> while [0]"),
+            [(Do, 4), (While, 3), (Break, 0), (EndWhile, 1), (DoWhile, 0)]
+        );
+        assert_eq!(
+            kinds("o1 sub\no1 return\no1 endsub\no#1 call [2]\n(o3 if)\n; o3 if\n/o4 if"),
+            [(Sub, 2), (Return, 0), (EndSub, 0), (Call, 0)]
+        );
+        assert_eq!(kinds("O0100 (name)\nM98 P100\n"), [(Number, 0)]);
+    }
+
+    #[test]
+    fn steps_without_partner_are_refused_with_their_line() {
+        for (text, part) in [
+            ("G0\no1 if [1]\n", "o<1> if is not ended"),
+            ("o1 endif\n", "ends no block"),
+            ("o1 if [1]\no2 endif\n", "another block than the one of line 1"),
+            ("o1 else\n", "no if before"),
+            ("o1 if [1]\no1 else\no1 else\no1 endif", "follows the else"),
+            ("o1 break\n", "in no loop"),
+            ("o1 sub\no2 sub\n", "inside the block that begins in line 1"),
+            ("o1 sub\no1 endsub\no1 sub\no1 endsub\n", "begins in line 1 too"),
+            ("o<open sub\n", "no closing >"),
+        ] {
+            let message = Flow::new(text.as_bytes(), true).unwrap_err().message;
+            assert!(message.contains(part), "{text}: {message}");
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! What parameters tell of the machine: where it is, its tool and its modes; and what setting one does.
+
+use super::block::{rotary, AXES, AXIS_OF_LETTER};
+use super::execute::Interpreter;
+use super::expression::Values;
+use super::fault::{fault, Outcome};
+use super::modal::{FeedMode, State};
+use super::parameters::{Name, READINGS};
+
+/// The tool in the spindle, its offset, its diameter, and where the program is.
+const TOOL: usize = 5400;
+const TOOL_OFFSET: std::ops::RangeInclusive<usize> = 5401..=5409;
+const TOOL_DIAMETER: usize = 5410;
+const POSITION: std::ops::RangeInclusive<usize> = 5420..=5428;
+
+impl Values for Interpreter<'_> {
+    fn number(&self, number: usize) -> f64 {
+        if !READINGS.contains(&number) {
+            return self.parameters.number(number);
+        }
+        match number {
+            TOOL => self.tool_number(),
+            TOOL_DIAMETER => self.tool.map_or(0.0, |tool| tool.diameter),
+            _ if TOOL_OFFSET.contains(&number) => self.state.offsets.tool[number - TOOL_OFFSET.start()],
+            _ if POSITION.contains(&number) => self.reading_of_axis(number - POSITION.start()),
+            _ => 0.0,
+        }
+    }
+
+    fn named(&self, name: &[u8]) -> Outcome<Option<f64>> {
+        if let Some(value) = self.parameters.named(name) {
+            return Ok(Some(value));
+        }
+        if name.starts_with(b"_ini[") || name.starts_with(b"_hal[") {
+            return fault(format!(
+                "#<{}> is a value of one machine's configuration, which is not known here: set a parameter instead",
+                String::from_utf8_lossy(name)
+            ));
+        }
+        Ok(match name.strip_prefix(b"_") {
+            Some(name) => self.reading(name),
+            None => None,
+        })
+    }
+}
+
+impl Interpreter<'_> {
+    /// Where the program is along an axis, in its own units and offsets.
+    fn reading_of_axis(&self, axis: usize) -> f64 {
+        let place = self.state.offsets.to_program(&self.position())[axis];
+        if rotary(axis) {
+            place
+        } else {
+            place / self.state.unit()
+        }
+    }
+
+    fn reading(&self, name: &[u8]) -> Option<f64> {
+        if let Some(value) = self.parameters_of_place(name) {
+            return Some(value);
+        }
+        let state = &self.state;
+        let is = |held: bool| f64::from(held);
+        Some(match name {
+            b"vmajor" => 2.9,
+            b"vminor" => 0.0,
+            b"line" => f64::from(self.line),
+            b"motion_mode" => f64::from(state.motion),
+            b"plane" => [190.0, 180.0, 170.0][state.normal],
+            b"ccomp" => f64::from(self.compensation_code()),
+            b"metric" => is(!state.inches),
+            b"imperial" => is(state.inches),
+            b"absolute" => is(state.absolute),
+            b"incremental" => is(!state.absolute),
+            b"inverse_time" => is(state.feed_mode == FeedMode::Inverse),
+            b"units_per_minute" => is(state.feed_mode == FeedMode::PerMinute),
+            b"units_per_rev" => is(state.feed_mode == FeedMode::PerTurn),
+            b"coord_system" => system_code(state),
+            b"tool_offset" => is(state.offsets.tool.iter().any(|value| *value != 0.0)),
+            b"retract_r_plane" => is(!state.retract_to_initial),
+            b"retract_old_z" => is(state.retract_to_initial),
+            b"spindle_rpm_mode" => is(!state.constant_surface_speed),
+            b"spindle_css_mode" => is(state.constant_surface_speed),
+            b"ijk_absolute_mode" => is(state.absolute_centres),
+            b"lathe_diameter_mode" => is(state.diameters),
+            b"lathe_radius_mode" => is(!state.diameters),
+            b"spindle_on" => is(state.spindle_on),
+            b"spindle_cw" => is(state.spindle_on && !state.spindle_back),
+            b"mist" => is(state.mist),
+            b"flood" => is(state.flood),
+            b"speed_override" | b"feed_override" => 1.0,
+            b"adaptive_feed" | b"feed_hold" | b"remap_level" | b"task" => 0.0,
+            b"feed" => self.feed_word(),
+            b"rpm" => state.spindle_speed.unwrap_or(0.0),
+            b"current_tool" => self.tool_number(),
+            b"current_pocket" => self.tool.map_or(0.0, |tool| f64::from(tool.pocket)),
+            b"selected_tool" => f64::from(self.selected.unwrap_or(0)),
+            b"selected_pocket" => self
+                .selected
+                .and_then(|number| self.tool_of(number))
+                .map_or(-1.0, |tool| f64::from(tool.pocket)),
+            b"value" | b"value_returned" => 0.0,
+            b"call_level" => self.parameters.depth() as f64,
+            _ => return None,
+        })
+    }
+
+    /// `_x` to `_w`, and `_abs_x` to `_abs_w`.
+    fn parameters_of_place(&self, name: &[u8]) -> Option<f64> {
+        let axis = |letter: u8| {
+            let letter = letter.to_ascii_uppercase();
+            AXES.contains(&letter).then(|| AXIS_OF_LETTER[(letter - b'A') as usize] as usize)
+        };
+        match name {
+            [letter] => axis(*letter).map(|axis| self.reading_of_axis(axis)),
+            [b'a', b'b', b's', b'_', letter] => axis(*letter).map(|axis| {
+                let place = self.position()[axis];
+                if rotary(axis) {
+                    place
+                } else {
+                    place / self.state.unit()
+                }
+            }),
+            _ => None,
+        }
+    }
+
+    /// Sets the parameters that a block assigns.
+    pub fn assign(&mut self, assigned: &mut Vec<(Name, f64)>) {
+        for (name, value) in assigned.drain(..) {
+            self.parameters.set(&name, value);
+        }
+    }
+}
+
+/// G54 to G59.3 in tenths.
+fn system_code(state: &State) -> f64 {
+    match state.offsets.system {
+        system @ 0..=5 => 540.0 + 10.0 * system as f64,
+        system => 585.0 + system as f64,
+    }
+}

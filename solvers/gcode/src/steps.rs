@@ -1,0 +1,148 @@
+//! What lines of program flow do: conditions, loops, calls and returns.
+
+use super::expression::{bracket, expression, integer};
+use super::fault::{fault, Outcome};
+use super::flow::{check_rest, number_label, Flow, Kind, Step};
+use super::parameters::LOCALS;
+use super::run::{Exit, Frame, Runner};
+use super::words::{count, Lexer};
+
+impl Runner<'_> {
+    /// A line of program flow; what leaves the text by it.
+    pub(super) fn step(
+        &mut self,
+        lexer: &mut Lexer,
+        source: &[u8],
+        flow: &Flow,
+        i: usize,
+        frame: &mut Frame,
+    ) -> Outcome<Option<Exit>> {
+        let step = &flow.steps[i];
+        let steps = &flow.steps;
+        let past = |lexer: &mut Lexer, step: &Step| lexer.jump(step.next, step.line);
+        let onto = |lexer: &mut Lexer, step: &Step| lexer.jump(step.at, step.line - 1);
+        past(lexer, step);
+        match step.kind {
+            Kind::Sub => {
+                self.defines = true;
+                past(lexer, &steps[step.partner]);
+            }
+            Kind::EndSub | Kind::Return => {
+                let value = self.value(source, step)?;
+                if self.frames.is_empty() {
+                    return fault("return stands outside of subroutines: remove it");
+                }
+                return Ok(Some(Exit::Return(value)));
+            }
+            Kind::Call => return self.arguments(source, step).map(Some),
+            Kind::If => {
+                let mut branch = i;
+                while !matches!(steps[branch].kind, Kind::Else | Kind::EndIf)
+                    && !self.holds(source, &steps[branch])?
+                {
+                    branch = steps[branch].partner;
+                }
+                past(lexer, &steps[branch]);
+            }
+            Kind::ElseIf | Kind::Else => past(lexer, &steps[step.end]),
+            Kind::While if !self.holds(source, step)? => past(lexer, &steps[step.partner]),
+            Kind::DoWhile if self.holds(source, step)? => past(lexer, &steps[step.partner]),
+            Kind::EndWhile => onto(lexer, &steps[step.partner]),
+            Kind::Repeat => {
+                let times = self.needed(source, step)?;
+                match integer(times.round()) {
+                    Some(times @ 1..) => frame.repeats.push((i, times as u64 - 1)),
+                    _ => past(lexer, &steps[step.partner]),
+                }
+            }
+            Kind::EndRepeat => match frame.repeats.last_mut() {
+                Some((_, left)) if *left > 0 => {
+                    *left -= 1;
+                    past(lexer, &steps[step.partner]);
+                }
+                _ => {
+                    frame.repeats.pop();
+                }
+            },
+            Kind::Break | Kind::Continue => {
+                let start = step.partner;
+                let stays = step.kind == Kind::Continue;
+                frame.repeats.retain(|&(open, _)| open < start || (stays && open == start));
+                let (first, end) = (&steps[start], &steps[steps[start].end]);
+                match (stays, first.kind) {
+                    (false, _) => past(lexer, end),
+                    (true, Kind::While) => onto(lexer, first),
+                    (true, _) => onto(lexer, end),
+                }
+            }
+            Kind::EndIf | Kind::Do | Kind::DoWhile | Kind::While => {}
+            Kind::Number => return fault("an O number stands where the program goes on: end it before"),
+        }
+        Ok(None)
+    }
+
+    /// The value of a step's bracket, if it has one.
+    fn value(&self, source: &[u8], step: &Step) -> Outcome<Option<f64>> {
+        let found = bracket(source, step.arguments, &self.interpreter)?;
+        check_rest(source, found.map_or(step.arguments, |(_, end)| end))?;
+        Ok(found.map(|(value, _)| value))
+    }
+
+    fn needed(&self, source: &[u8], step: &Step) -> Outcome<f64> {
+        match self.value(source, step)? {
+            Some(value) => Ok(value),
+            None => fault("an O word has no [condition]: give one in brackets"),
+        }
+    }
+
+    fn holds(&self, source: &[u8], step: &Step) -> Outcome<bool> {
+        Ok(self.needed(source, step)? != 0.0)
+    }
+
+    /// The label and the arguments of a call.
+    fn arguments(&self, source: &[u8], step: &Step) -> Outcome<Exit> {
+        let label = match &step.label {
+            Some(label) => label.clone(),
+            None => {
+                let value = expression(source, step.at + 1, &self.interpreter)?.map(|(value, _)| value);
+                match value.and_then(number_label) {
+                    Some(label) => label,
+                    None => {
+                        return fault("the label of a call is no whole number from 0: check the parameters")
+                    }
+                }
+            }
+        };
+        let mut arguments = Vec::new();
+        let mut at = step.arguments;
+        while let Some((value, end)) = bracket(source, at, &self.interpreter)? {
+            if arguments.len() == LOCALS {
+                return fault(format!(
+                    "a call has more than {LOCALS} arguments: set parameters from #31 on instead"
+                ));
+            }
+            arguments.push(value);
+            at = end;
+        }
+        check_rest(source, at)?;
+        Ok(Exit::Call { label, arguments })
+    }
+
+    /// M97, M98 and M99 of the block.
+    pub(super) fn fanuc(&self, code: u16) -> Outcome<Exit> {
+        if code == 99 {
+            return match self.block.get(b'P') {
+                Some(_) => fault(format!(
+                    "word {} sends M99 to another line: that is not read; end the subprogram with M99 alone",
+                    self.block.word(b'P')
+                )),
+                None => Ok(Exit::Return(None)),
+            };
+        }
+        let Some(label) = self.block.get(b'P').and_then(number_label) else {
+            return fault(format!("M{code} calls no subprogram: give its number as P"));
+        };
+        let times = count(&self.block, b'L', 0, "number of calls")?.unwrap_or(1);
+        Ok(Exit::Fanuc { label, local: code == 97, times })
+    }
+}

@@ -1,0 +1,150 @@
+//! Moves that follow the spindle: G33 (one pass of a thread), G33.1 (tapping) and G76 (a whole thread).
+
+use super::block::Block;
+use super::execute::{Interpreter, RATES};
+use super::fault::{fault, Outcome};
+use super::moves::{Kind, Point, Stop};
+use super::words::count;
+
+/// More passes of one thread are a mistake.
+const MOST_PASSES: u32 = 10_000;
+
+/// A thread's heights along X and ends along Z, in mm; depths count from the drive line towards the part.
+struct Thread {
+    /// Where passes begin and end.
+    start: Point,
+    /// 1 for an inner thread, whose part lies at larger X; -1 for an outer one.
+    inward: f64,
+    full: f64,
+    end_depth: f64,
+    target: f64,
+    compound: f64,
+    taper: f64,
+    at_entry: bool,
+    at_exit: bool,
+    feed: f64,
+    taper_feed: f64,
+}
+
+impl Interpreter<'_> {
+    /// The feed [mm/s] that advances by a pitch [mm] with each turn of the spindle.
+    fn feed_of_pitch(&self, pitch: f64, code: &str) -> Outcome<f64> {
+        match self.state.spindle_speed.filter(|speed| self.state.spindle_on && RATES.contains(speed)) {
+            Some(speed) => Ok(pitch * speed / 60.0),
+            None => {
+                fault(format!("{code} follows the spindle and its speed is not known: give S and M3 before"))
+            }
+        }
+    }
+
+    fn pitch(&self, block: &Block, letter: u8, code: &str) -> Outcome<f64> {
+        match block.get(letter) {
+            Some(pitch) if pitch > 0.0 => Ok(pitch * self.state.unit()),
+            _ => fault(format!("{code} has no pitch: give a positive {}", letter as char)),
+        }
+    }
+
+    /// G33, and G33.1, which comes back with the spindle turning backwards.
+    pub(super) fn thread_once(&mut self, block: &Block, motion: u16) -> Outcome<()> {
+        let code = if motion == 330 { "G33" } else { "G33.1" };
+        self.check_beside(code)?;
+        let pitch = self.pitch(block, b'K', code)?;
+        let feed = self.feed_of_pitch(pitch, code)?;
+        let start = self.position();
+        let target = self.target(block, false)?;
+        self.go(Kind::Line, &target, feed)?;
+        if motion == 331 {
+            self.moves.stop(Stop::Switch);
+            self.go(Kind::Line, &start, feed)?;
+            self.moves.stop(Stop::Switch);
+        }
+        Ok(())
+    }
+
+    /// G76: passes that go deeper until the thread has its depth, and spring passes at that depth.
+    pub(super) fn thread(&mut self, block: &Block) -> Outcome<()> {
+        self.check_beside("G76")?;
+        if let Some(letter) = b"XYABCUVW".iter().find(|&&letter| block.has(letter)) {
+            return fault(format!(
+                "word {} stands in G76, which goes along Z: remove it",
+                block.word(*letter)
+            ));
+        }
+        let pitch = self.pitch(block, b'P', "G76")?;
+        let feed = self.feed_of_pitch(pitch, "G76")?;
+        let unit = self.state.unit() * if self.state.diameters { 0.5 } else { 1.0 };
+        let word = |letter: u8| block.get(letter).map(|value| value * unit);
+        let [Some(peak), Some(first), Some(height)] = [word(b'I'), word(b'J'), word(b'K')] else {
+            return fault("G76 takes I, J and K (thread peak, first depth, full depth): give all three");
+        };
+        if peak == 0.0 || first <= 0.0 || height <= first {
+            return fault("G76 takes an I that is not 0, and a K above J, which is above 0: check them");
+        }
+        let springs = count(block, b'H', 0, "number of spring passes")?.unwrap_or(0);
+        let tapers = count(block, b'L', 0, "choice of tapers")?.unwrap_or(0);
+        let degression = block.get(b'R').filter(|value| *value >= 1.0).unwrap_or(1.0);
+        let start = self.position();
+        let end = self.target(block, false)?;
+        let rising = end[2] > start[2];
+        let compound = block.get(b'Q').unwrap_or(0.0).to_radians() * if rising { -1.0 } else { 1.0 };
+        let length = block.get(b'E').map_or(0.0, |value| (value * self.state.unit()).max(0.0));
+        let taper_feed = if length > 0.0 { feed * length.hypot(height) / length } else { feed };
+        let thread = Thread {
+            start,
+            inward: peak.signum(),
+            full: height,
+            end_depth: height + peak.abs(),
+            target: end[2] + height * compound.tan(),
+            compound,
+            taper: if rising { -length } else { length },
+            at_entry: tapers & 1 != 0,
+            at_exit: tapers & 2 != 0,
+            feed,
+            taper_feed,
+        };
+        let mut passes = 1;
+        let mut depth = peak.abs() + first;
+        while depth < thread.end_depth {
+            self.pass(&thread, depth)?;
+            passes += 1;
+            depth = peak.abs() + first * f64::from(passes).powf(1.0 / degression);
+            if passes > MOST_PASSES {
+                return fault(format!("G76 takes more than {MOST_PASSES} passes: check J, K and R"));
+            }
+        }
+        if springs > MOST_PASSES {
+            return fault(format!("word {} is more than {MOST_PASSES} passes: check H", block.word(b'H')));
+        }
+        for _ in 0..=springs {
+            self.pass(&thread, thread.end_depth)?;
+        }
+        self.rapid(&end)
+    }
+
+    /// One pass at a depth from the drive line.
+    fn pass(&mut self, thread: &Thread, depth: f64) -> Outcome<()> {
+        let shift = (depth - (thread.end_depth - thread.full)) * thread.compound.tan();
+        let (begin, end) = (thread.start[2] - shift, thread.target - shift);
+        let at = |depth: f64, z: f64| {
+            let mut place = thread.start;
+            (place[0], place[2]) = (place[0] + thread.inward * depth, z);
+            place
+        };
+        let clear = depth - thread.end_depth;
+        self.rapid(&at(clear, begin))?;
+        let tapered = thread.taper != 0.0;
+        if tapered && thread.at_entry {
+            self.go(Kind::Line, &at(depth - thread.full, begin), thread.taper_feed)?;
+            self.go(Kind::Line, &at(depth, begin - thread.taper), thread.taper_feed)?;
+        } else {
+            self.rapid(&at(depth, begin))?;
+        }
+        if tapered && thread.at_exit {
+            self.go(Kind::Line, &at(depth, end + thread.taper), thread.feed)?;
+            self.go(Kind::Line, &at(depth - thread.full, end), thread.taper_feed)?;
+        } else {
+            self.go(Kind::Line, &at(depth, end), thread.feed)?;
+        }
+        self.rapid(&at(clear, end))
+    }
+}

@@ -1,0 +1,65 @@
+//! The tool table, and what T, M6, M61 and G43 take from it.
+
+use super::block::Block;
+use super::execute::Interpreter;
+use super::fault::{fault, Outcome};
+use super::moves::Point;
+use super::words::count;
+
+/// A tool of the table: its number, its pocket, its offset [mm, deg], its diameter [mm], and the side of a lathe tool's
+/// tip that cuts (1 to 9; 0 for mills).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tool {
+    pub number: u32,
+    pub pocket: u32,
+    pub offset: Point,
+    pub diameter: f64,
+    pub orientation: u32,
+}
+
+impl Interpreter<'_> {
+    /// The tool of a number; None where the table lacks it or there is no table.
+    pub(super) fn tool_of(&self, number: u32) -> Option<Tool> {
+        self.tools.as_ref()?.iter().find(|tool| tool.number == number).copied()
+    }
+
+    /// The tool of a number that the program needs; None where there is no table.
+    pub(super) fn needed_tool(&self, number: u32) -> Outcome<Option<Tool>> {
+        match (&self.tools, self.tool_of(number)) {
+            (None, _) => Ok(None),
+            (Some(_), Some(tool)) => Ok(Some(tool)),
+            (Some(_), None) => {
+                fault(format!("the tool table has no tool {number}: add it there, or call another tool"))
+            }
+        }
+    }
+
+    pub(super) fn tool_number(&self) -> f64 {
+        f64::from(self.loaded.unwrap_or(0))
+    }
+
+    /// T, M6 and M61.
+    pub(super) fn set_tool(&mut self, block: &Block, change: Option<u16>) -> Outcome<()> {
+        if let Some(number) = count(block, b'T', 0, "tool number")? {
+            self.selected = Some(number);
+            self.moves.event(self.line, b'T', f64::from(number), None, None);
+        }
+        let number = match change {
+            Some(6) => {
+                self.forget_compensation();
+                self.selected
+            }
+            Some(_) => match count(block, b'Q', 0, "tool number")? {
+                Some(number) => Some(number),
+                None => return fault("M61 names no tool: give its number as Q"),
+            },
+            None => return Ok(()),
+        };
+        self.tool = match number {
+            Some(number) if number > 0 => self.needed_tool(number)?,
+            _ => None,
+        };
+        self.loaded = number;
+        Ok(())
+    }
+}

@@ -1,0 +1,46 @@
+"""Tool tables of LinuxCNC, and what programs take from them."""
+
+from pathlib import Path
+
+import pytest
+
+from feedplan.errors import InputError, ProgramError
+from feedplan.program.read import read_program
+from feedplan.program.tools import Tool, read_tools
+
+TABLE = "; tools of the shop\nT1 P2 X+1.5 Z-50.25 A90 D6 Q9 ;6 mm T9\n\nt12 d.5 i45 j-10\n"
+
+
+def test_a_line_is_a_tool(tmp_path: Path) -> None:
+    file = tmp_path / "tool.tbl"
+    file.write_text(TABLE)
+    offset = (1.5, 0.0, -50.25, 90.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    assert read_tools(file) == (Tool(1, 2, offset, 6.0, 9), Tool(12, 0, (0.0,) * 9, 0.5, 0))
+    assert read_tools(file, inches=True)[0].offset[2:4] == (-50.25 * 25.4, 90.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("T1 Z", "tool.tbl line 1: 'Z' is no word of a tool table"),
+        ("Z5", "line 1: the tool has no number"),
+        ("T1.5", "line 1: the tool has no number"),
+        ("T1\nT2 K5", "line 2: 'K5' is no word"),
+    ],
+)
+def test_what_is_no_tool_is_refused(text: str, words: str, tmp_path: Path) -> None:
+    file = tmp_path / "tool.tbl"
+    file.write_text(text)
+    with pytest.raises(InputError, match=words):
+        read_tools(file)
+    with pytest.raises(InputError, match="cannot be read"):
+        read_tools(tmp_path / "none.tbl")
+
+
+def test_programs_take_lengths_and_radii(tmp_path: Path) -> None:
+    (tmp_path / "tool.tbl").write_text("T1 Z50 D2\n")
+    text = "G21 F600\nT1 M6 G43\nG0 Z1\nG41\nG1 X5\nY8\nG40\nM2\n"
+    program = read_program(text, tool_table=tmp_path / "tool.tbl")
+    assert program.target.tolist() == [[0, 0, 51], [4, 1, 51], [4, 8, 51]]
+    with pytest.raises(ProgramError, match="the tool table has no tool 7: add it there"):
+        read_program("G21 G43 H7\nG0 X1\nM2\n", tool_table=tmp_path / "tool.tbl")
