@@ -11,12 +11,12 @@ use feedplan_geometry::instances;
 use feedplan_geometry::watch::Watch;
 
 use fit::{FitOptions, FittedPiece};
-use follow::{FollowError, FollowOptions, Moves};
+use follow::{FollowError, FollowOptions};
 use path_builder::{Axes, BuiltPath};
 
 instances! {
     /// The path of moves.
-    pub trait Followed for [3, 6, 9] Moves<'_, M> = {
+    pub trait Followed for [3, 6, 9] follow::Moves<'_, M> = {
         /// Lines, arcs and fitted splines, with corners rounded within the tolerance.
         fn path(&self, options: &FollowOptions, axes: &Axes<M>, watch: Watch)
             -> Result<BuiltPath<M>, FollowError> = path_builder::build_path;
