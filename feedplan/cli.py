@@ -109,9 +109,13 @@ class _Number(NumberType):
         self.fail(f"{value}: give a number {'≥ 0' if self._or_zero else '> 0'}", param, ctx)
 
 
-_MACHINE_HELP = "A bundled machine, a TOML file, or auto: the smallest bundled one that the program fits."
 _MACHINE = click.option(
-    "--machine", "-m", default="mill", show_default=True, metavar="NAME|FILE", help=_MACHINE_HELP
+    "--machine",
+    "-m",
+    default="mill",
+    show_default=True,
+    metavar="NAME|FILE",
+    help="A bundled machine, a TOML file, or auto: the smallest bundled one that the program fits.",
 )
 _TOLERANCE = click.option(
     "--tolerance", type=_Number(), metavar="MM", help="Allowed distance from the programmed path."

@@ -48,9 +48,9 @@ READERS: dict[str, tuple[Reader, int]] = {
     ".json": (read_path_file, path_file.MAX_BYTES),
     ".dxf": (lambda content, machine, name: read_dxf(content, name), path_file.MAX_BYTES),
 }
-# How programs without an ending begin; no G-code does.
 _FOLDER = "the path of a folder"
 _TABLE = "the path of a tool table (.tbl)"
+# How programs without an ending begin; no G-code does.
 _BEGINNINGS = {
     ".json": re.compile(rb"(\xef\xbb\xbf)?\s*\{"),
     ".dxf": re.compile(rb"\s*(0\s+SECTION|999\s|AutoCAD Binary DXF)"),

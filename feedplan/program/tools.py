@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from feedplan.errors import InputError
-from feedplan.machine.machine import AXIS_LETTERS
+from feedplan.machine.machine import AXIS_LETTERS, ROTARY_LETTERS
 
 MAX_BYTES = 1 << 20
 
@@ -77,7 +77,9 @@ def _tool(words: dict[str, float], unit: float, place: str) -> Tool:
     number = words.get("T", -1.0)
     if number < 0 or number != int(number):
         raise InputError(f"{place}: the tool has no number: give a whole T from 0")
-    offset = tuple(words.get(letter, 0.0) * (1.0 if letter in "ABC" else unit) for letter in AXIS_LETTERS)
+    offset = tuple(
+        words.get(letter, 0.0) * (1.0 if letter in ROTARY_LETTERS else unit) for letter in AXIS_LETTERS
+    )
     return Tool(
         number=int(number),
         pocket=max(int(words.get("P", 0.0)), 0),

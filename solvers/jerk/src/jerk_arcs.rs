@@ -254,7 +254,9 @@ impl Arcs {
             for (i, span) in spans.iter().enumerate() {
                 let (u, way) = ([u[i], u[i + 1]], span.way());
                 let moved = path.between(part, u[0], u[1]) - way;
-                let duration = if way > 0.0 { span.duration * (1.0 + moved / way) } else { span.duration };
+                // The faster end is the one that moves: next to rest a small part of the way is much of the time.
+                let fastest = span.ends[0].v.max(span.ends[1].v);
+                let duration = span.duration + if fastest > 0.0 { moved / fastest } else { 0.0 };
                 let arc = Arc { kind: PATH_JERK, value: span.jerk, ends: span.ends, duration };
                 self.push(problem, path.parts[part].piece, u, &arc);
             }
@@ -287,9 +289,10 @@ impl Arcs {
             u.extend(s[first..=end].iter().map(|&s| path.locate(part, s)));
             u.push(at.u[1]);
             let lengths: Vec<f64> = u.windows(2).map(|u| path.between(part, u[0], u[1])).collect();
-            let mut states = settled(profile, first..end + 1, [knots[part], knots[part + 1]], &lengths);
+            let ends_of_part = [knots[part], knots[part + 1]];
+            let meeting = moved_from_start(&s[first..=end], ends_of_part);
+            let mut states = settled(profile, first..end + 1, ends_of_part, meeting, &lengths);
             let count = states.len();
-            let meeting = moved_from_start(&s[first..=end], [knots[part], knots[part + 1]]);
             if first == 0 && s[0] > ends[0] {
                 let rest = State { s: ends[0], v: 0.0, a: 0.0 };
                 let within = part == 0;
@@ -311,7 +314,7 @@ impl Arcs {
                 states[count - 1].a = -jerk * duration;
             }
             for n in 1..count {
-                // What moves from both ends leave is in the length of the arc between them.
+                // States are moved as the ways from both knots say. The arc where both meet is off by the rounding of s.
                 let off = if n == meeting.clamp(1, count - 1) { f64::EPSILON * s[first + n] } else { 0.0 };
                 let arc = arc_between(path, jerk_limits, part, (lengths[n], off), [states[n - 1], states[n]]);
                 self.push(problem, at.piece, [u[n], u[n + 1]], &arc);
@@ -349,19 +352,25 @@ fn moved_from_start(nodes: &[f64], [from, to]: [f64; 2]) -> usize {
     nodes.partition_point(|&s| s < 0.5 * (from + to))
 }
 
-/// The states at some nodes of a part between two knots, moved to where `lengths`, from knot to knot, say they are.
-fn settled(profile: &Profile, nodes: Range<usize>, [from, to]: [f64; 2], lengths: &[f64]) -> Vec<State> {
+/// The states at some nodes of a part between two knots, moved to where `lengths`, from knot to knot, say they are; those
+/// before `meeting` as the way from the first knot says.
+fn settled(
+    profile: &Profile,
+    nodes: Range<usize>,
+    [from, to]: [f64; 2],
+    meeting: usize,
+    lengths: &[f64],
+) -> Vec<State> {
     let s = &profile.s[nodes.clone()];
     let count = s.len();
     let mut moved = vec![0.0; count];
-    let first = moved_from_start(s, [from, to]);
     // What the quadratures of long arcs are off must not move states in turns that are shorter than that.
     let settle = |miss: f64, length: f64| miss - miss.clamp(-TAKEN_BACK * length, TAKEN_BACK * length);
     let mut miss = 0.0;
     for n in 0..count {
         miss += lengths[n] - (s[n] - if n == 0 { from } else { s[n - 1] });
         miss = settle(miss, lengths[n]);
-        if n < first && s[n] > from {
+        if n < meeting && s[n] > from {
             moved[n] = miss;
         }
     }
@@ -369,7 +378,7 @@ fn settled(profile: &Profile, nodes: Range<usize>, [from, to]: [f64; 2], lengths
     for n in (0..count).rev() {
         miss += if n + 1 == count { to } else { s[n + 1] } - s[n] - lengths[n + 1];
         miss = settle(miss, lengths[n + 1]);
-        if n >= first && s[n] < to {
+        if n >= meeting && s[n] < to {
             moved[n] = miss;
         }
     }

@@ -2,20 +2,9 @@
 
 use super::Moves;
 
-/// A word that switches something: how many moves come before it, its line, its letter and number, and the words P and
-/// Q that go with it, NaN where there is none. M6 has its tool's number as P, G4 its seconds. A message is `(` with the
-/// place of its text.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Event {
-    pub moves: usize,
-    pub line: u32,
-    pub letter: u8,
-    pub number: f64,
-    pub p: f64,
-    pub q: f64,
-}
-
-/// Events in order, as columns.
+/// Words that switch something, in order, as columns: how many moves come before each, its line, its letter and number,
+/// and the words P and Q that go with it, NaN where there is none. M6 has its tool's number as P, G4 its seconds. A message
+/// is `(` with the place of its text in `texts`.
 #[derive(Clone, Debug, Default)]
 pub struct Events {
     pub moves: Vec<i64>,
@@ -24,26 +13,19 @@ pub struct Events {
     pub number: Vec<f64>,
     pub p: Vec<f64>,
     pub q: Vec<f64>,
-    /// Texts of messages.
     pub texts: Vec<String>,
-}
-
-impl Events {
-    fn push(&mut self, event: Event) {
-        self.moves.push(event.moves as i64);
-        self.line.push(event.line as i32);
-        self.letter.push(event.letter);
-        self.number.push(event.number);
-        self.p.push(event.p);
-        self.q.push(event.q);
-    }
 }
 
 impl Moves {
     /// Something happens after the moves so far.
     pub fn event(&mut self, line: u32, letter: u8, number: f64, p: Option<f64>, q: Option<f64>) {
-        let [p, q] = [p, q].map(|word| word.unwrap_or(f64::NAN));
-        self.events.push(Event { moves: self.kind.len(), line, letter, number, p, q });
+        let events = &mut self.events;
+        events.moves.push(self.kind.len() as i64);
+        events.line.push(line as i32);
+        events.letter.push(letter);
+        events.number.push(number);
+        events.p.push(p.unwrap_or(f64::NAN));
+        events.q.push(q.unwrap_or(f64::NAN));
     }
 
     /// A message to the operator.
