@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 NATIVE := $(wildcard $(foreach below,src src/* src/*/*,solvers/*/$(below)/*.rs) solvers/*/Cargo.toml) solvers/Cargo.toml pyproject.toml
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: demo test native lint bench campaign clean
+.PHONY: demo test native lint clippy bench campaign clean
 
 demo: $(VENV)/built
 	@$(BIN)/python examples/vase.py --blocks 2000 --output out/vase.ngc
@@ -18,16 +18,19 @@ test: lint native
 native: $(VENV)/built
 	cargo test --release --quiet --manifest-path solvers/Cargo.toml
 
-lint: $(VENV)/built
+lint: clippy $(VENV)/built
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	cargo fmt --all --check --manifest-path solvers/Cargo.toml
+
+# It generates no code and waits for none: it runs beside the module's build, in a folder of its own.
+clippy:
 	CARGO_TARGET_DIR=$(CURDIR)/solvers/target/lint cargo clippy --release --quiet --workspace --all-targets --manifest-path solvers/Cargo.toml -- -D warnings
 
 bench: $(VENV)/built
-	cargo bench --manifest-path solvers/Cargo.toml
+	cargo run --release --package feedplan-benches --manifest-path solvers/Cargo.toml -- --bench
 	$(BIN)/python -m benchmarks
 
 # Random paths by the million, on every machine by the thousand, and property tests on cases never drawn before. What is
@@ -60,7 +63,6 @@ clean:
 	rm -rf $(VENV) out solvers/target
 
 # The native module is built once, and again only when its sources change; the tests of native code link the same crates.
-# The linter has a folder of its own: it can check beside the tests, each on one core.
 $(VENV)/built: $(VENV)/maturin $(NATIVE)
 	@command -v cargo >/dev/null || { echo "cargo is missing: install the Rust toolchain"; exit 1; }
 	MAKEFLAGS= CARGO_TARGET_DIR=$(CURDIR)/solvers/target $(BIN)/pip install --quiet --constraint constraints.txt --no-build-isolation --editable ".[dev]"

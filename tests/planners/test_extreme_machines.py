@@ -14,7 +14,7 @@ from feedplan.planners import limits_jerk
 from tests.campaign import seeds
 from tests.planners.extreme_machines import PROGRAMS, extreme_machine
 
-SEEDS = seeds(2)
+SEEDS = seeds(1)
 MOST = 20_000
 # What states between segments may be improved for: their first ones are a plan [s].
 TIME_LIMITS = {"ruckig": 0.2}

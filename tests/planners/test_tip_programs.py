@@ -14,7 +14,7 @@ from tests.campaign import seeds
 from tests.planners.audited import audited
 from tests.planners.tip_programs import random_tip_program
 
-SEEDS = seeds(2)
+SEEDS = seeds(1)
 MACHINES = ["trunnion-ac", "trunnion-bc", "head-table", "head-head", "rotary-table"]
 METHODS = ["bang-bang", "jerk-limited", "s-curve", "ruckig"]
 # What states between segments may be improved for: their first ones are a plan [s].

@@ -60,10 +60,22 @@ pub fn run<T: Send>(
     progress: Option<&Bound<'_, PyAny>>,
     work: impl FnOnce(Watch<'_>) -> T + Send,
 ) -> PyResult<T> {
+    let (mut work, mut value) = (Some(work), None);
+    let mut once = |watch: Watch<'_>| value = work.take().map(|work| work(watch));
+    run_once(py, progress, &mut once)?;
+    Ok(value.expect("the work is done"))
+}
+
+/// The same for work of one type: it is compiled once.
+fn run_once(
+    py: Python<'_>,
+    progress: Option<&Bound<'_, PyAny>>,
+    work: &mut (dyn FnMut(Watch<'_>) + Send),
+) -> PyResult<()> {
     let pool = take(py)?;
     let progress = progress.map(|progress| progress.clone().unbind());
     let state = Work::default();
-    let outcome: Mutex<Option<std::thread::Result<T>>> = Mutex::new(None);
+    let outcome: Mutex<Option<std::thread::Result<()>>> = Mutex::new(None);
     let finished = Condvar::new();
     let raised = py.detach(|| {
         pool.in_place_scope(|scope| {
@@ -79,16 +91,16 @@ pub fn run<T: Send>(
     let result = outcome.into_inner().unwrap_or_else(PoisonError::into_inner);
     match (raised, result.expect("the scope ends after its work")) {
         (Some(raised), _) => Err(raised),
-        (None, Ok(value)) => Ok(value),
+        (None, Ok(())) => Ok(()),
         (None, Err(panic)) => resume_unwind(panic),
     }
 }
 
 /// Waits for the end of the work, which is told as well; what was raised meanwhile, which cancels it.
-fn serve<T>(
+fn serve(
     work: &Work,
     progress: Option<&Py<PyAny>>,
-    outcome: &Mutex<Option<T>>,
+    outcome: &Mutex<Option<std::thread::Result<()>>>,
     finished: &Condvar,
 ) -> Option<PyErr> {
     let mut raised = None;

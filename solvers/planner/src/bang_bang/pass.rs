@@ -304,14 +304,14 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             if std::mem::take(&mut self.entering) {
                 self.enter(&start);
             }
-            if let Some(pair) = self.limit_curve.take() {
-                if self.follow_limit_curve(pair) {
+            // The constant comes first: nothing of the limit curve is compiled for the forward pass.
+            if BACK {
+                if let Some(pair) = self.limit_curve.take() {
+                    if !self.follow_limit_curve(pair) && self.hops > MAX_HOPS {
+                        return Err(self.stuck());
+                    }
                     continue;
                 }
-                if self.hops > MAX_HOPS {
-                    return Err(self.stuck());
-                }
-                continue;
             }
             let on_bound = self.is_on_bound();
             if on_bound {

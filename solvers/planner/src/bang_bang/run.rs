@@ -96,16 +96,21 @@ pub fn plan_run<const M: usize>(
 }
 
 /// Calls a function with the capacity of polynomials that a piece needs: that of quadratics, of cubics and conics, of
-/// other polynomial pieces, of all.
+/// other polynomial pieces, of all. For many axes fewer are compiled: each costs the compiler seconds, and a piece of low
+/// degree some time.
 macro_rules! with_capacity {
-    ($task:expr, $i:expr, $function:ident($($argument:expr),*)) => {
-        match $task.coefficients($i) {
-            ..=6 => $function::<M, 6>($($argument),*),
-            ..=11 => $function::<M, 11>($($argument),*),
-            ..=36 => $function::<M, 36>($($argument),*),
-            _ => $function::<M, MOST>($($argument),*),
+    ($task:expr, $i:expr, $function:ident($($argument:expr),*)) => {{
+        let needed = $task.coefficients($i);
+        if const { M <= 3 } && needed <= 6 {
+            $function::<M, 6>($($argument),*)
+        } else if const { M <= 6 } && needed <= 11 {
+            $function::<M, 11>($($argument),*)
+        } else if needed <= 36 {
+            $function::<M, 36>($($argument),*)
+        } else {
+            $function::<M, MOST>($($argument),*)
         }
-    };
+    }};
 }
 
 impl<const M: usize> Task<'_, M> {

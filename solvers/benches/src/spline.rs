@@ -1,7 +1,7 @@
 //! Time per place on a curve: derivatives to the third, lengths and places at lengths; and per piece: extraction,
 //! length table, cusps. Cubics in three axes, polynomial and rational.
 
-use criterion::{criterion_group, criterion_main, Criterion, Throughput};
+use criterion::{criterion_group, Criterion, Throughput};
 use feedplan_geometry::spline::bezier::derivatives;
 use feedplan_geometry::spline::cusps::{cusps, CUSP};
 use feedplan_geometry::spline::extract::extract;
@@ -70,4 +70,3 @@ fn spline(criterion: &mut Criterion) {
 }
 
 criterion_group!(benches, spline);
-criterion_main!(benches);

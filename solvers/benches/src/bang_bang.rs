@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use criterion::{criterion_group, criterion_main, BenchmarkId, Criterion, Throughput};
+use criterion::{criterion_group, BenchmarkId, Criterion, Throughput};
 use feedplan_geometry::quadratic::{norm, sub, Quadratic};
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::bang_bang_quadratic::{plan, Problem};
@@ -95,4 +95,3 @@ fn pieces(criterion: &mut Criterion) {
 }
 
 criterion_group!(benches, pieces);
-criterion_main!(benches);

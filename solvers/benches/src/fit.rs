@@ -1,7 +1,7 @@
 //! Time of the fit per chain: a smooth finishing pass as a CAM system posts it, sizes from 500 to 500 000
 //! points on one thread and on all, and two chains that need much refinement.
 
-use criterion::{criterion_group, criterion_main, BenchmarkId, Criterion, Throughput};
+use criterion::{criterion_group, BenchmarkId, Criterion, Throughput};
 use feedplan_geometry::watch::Watch;
 use feedplan_path::fit::{fit_points, FitOptions};
 
@@ -77,4 +77,3 @@ fn fit(criterion: &mut Criterion) {
 }
 
 criterion_group!(benches, fit);
-criterion_main!(benches);

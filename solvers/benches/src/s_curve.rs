@@ -4,7 +4,7 @@
 use std::hint::black_box;
 use std::time::Duration;
 
-use criterion::{criterion_group, criterion_main, BenchmarkId, Criterion, Throughput};
+use criterion::{criterion_group, BenchmarkId, Criterion, Throughput};
 use feedplan_jerk::path_dynamics::{allowable, bounded, sampled, AxisLimits, Curve};
 use feedplan_jerk::s_curve::{Limits, Profiler, Segment};
 
@@ -67,4 +67,3 @@ fn dynamics(criterion: &mut Criterion) {
 }
 
 criterion_group!(benches, profile, dynamics);
-criterion_main!(benches);

@@ -4,7 +4,7 @@
 //! raised, and with weights that change the parameter; its profile is synthetic (no planner takes part): constant
 //! feed, or X speeding up and slowing down piece by piece.
 
-use criterion::{criterion_group, criterion_main, BenchmarkId, Criterion, Throughput};
+use criterion::{criterion_group, BenchmarkId, Criterion, Throughput};
 use feedplan_geometry::spline::bezier::elevate;
 use feedplan_geometry::spline::length::CurveLength;
 use feedplan_geometry::spline::CompositeCurve;
@@ -136,4 +136,3 @@ fn lengths(c: &mut Criterion) {
 }
 
 criterion_group!(benches, setpoints, lengths);
-criterion_main!(benches);

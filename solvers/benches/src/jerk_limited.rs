@@ -3,7 +3,7 @@
 
 use std::time::{Duration, Instant};
 
-use criterion::{criterion_group, criterion_main, BenchmarkId, Criterion, Throughput};
+use criterion::{criterion_group, BenchmarkId, Criterion, Throughput};
 use feedplan_jerk::jerk_limited::{plan, Effort, End, Geometry, Limits, Place, Problem};
 
 /// A space curve that winds to both sides and up and down, its derivatives known by the length.
@@ -80,4 +80,3 @@ fn jerk_limited(criterion: &mut Criterion) {
 }
 
 criterion_group!(benches, jerk_limited);
-criterion_main!(benches);
