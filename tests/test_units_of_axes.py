@@ -124,3 +124,18 @@ def test_mixed_units_have_the_length_of_their_space() -> None:
 def test_a_speed_that_cannot_be_had_is_told_in_the_unit_of_the_path() -> None:
     with pytest.raises(feedplan.InfeasibleError, match="no profile starts at 50 rad/s"):
         feedplan.plan(spline(), arm("rad"), start_speed=50.0)
+
+
+def test_a_path_file_has_the_machines_own_axes_and_units(tmp_path: FilePath) -> None:
+    points = np.random.default_rng(4).standard_normal((6, len(NAMES)))
+    curve = {"degree": 3, "control_points": points[:, ::-1].tolist(), "knots": KNOTS}
+    file = tmp_path / "reach.json"
+    file.write_text(json.dumps({"axes": NAMES[::-1], "curves": [curve]}))
+    for method, accuracy in (("bang-bang", 1e-9), ("jerk-limited", 1e-3)):
+        plan = feedplan.plan(file, arm("rad"), method=method)
+        assert plan.audit().ok
+        same = feedplan.plan(spline(), arm("rad"), method=method)
+        assert plan.time == pytest.approx(same.time, rel=accuracy)
+        assert plan.path.axes == NAMES
+    with pytest.raises(InputError, match="axes has j4 and the machine does not: use X, Y, Z"):
+        feedplan.plan(file, "mill")

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.errors import MachineError
-from feedplan.machine.machine import Machine, size_of
+from feedplan.machine.machine import AXIS_LETTERS, Machine, size_of
 from feedplan.machine.meaning import Meaning
 from feedplan.program.program import Program
 
@@ -63,7 +63,7 @@ def path_words(program: Program, machine: Machine) -> PathWords:
     if not names:
         raise MachineError(f"{program.name} moves no axis of machine {machine.name}: choose another machine")
     for axis in machine.axes if machine.is_plain else ():
-        if axis.name in names and axis.unit != axis.usual_unit:
+        if axis.name in names and axis.name in tuple(AXIS_LETTERS) and axis.unit != axis.usual_unit:
             raise MachineError(
                 f"{program.name} is in {axis.usual_unit} along {axis.name}, and axis {axis.name} of machine "
                 f"{machine.name} in {axis.unit}: convert its limits and leave out unit"

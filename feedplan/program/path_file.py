@@ -4,11 +4,13 @@
      "curves": [{"degree": 3, "control_points": [[0, 0, 0], …], "knots": […], "weights": […], "feed": 60.0}]}
 
 Only "curves" is required. "unit" is "mm" (default) or "inch", for linear axes and feeds; rotary ones are in
-degrees. "axes" names the columns, X, Y, Z, A, B, C as many as there are by default. "feed" is in units per
-second and may be given for each curve. Without "knots" degree + 1 control points are a Bézier curve, and more
-of them a B-spline with clamped uniform knots; with knots there are points + degree + 1. Each curve starts
-where the one before ends, or with "rapid": true a rapid goes there. The program starts where its first curve
-does. Places are machine coordinates; on a five-axis machine they are joint positions, as without G43.4.
+degrees. "axes" names the columns, X, Y, Z, A, B, C as many as there are by default. Where one of them is no
+letter of a program, as "j1", all are the machine's own axes in the machine's own units, and there is no
+"unit". "feed" is in units per second and may be given for each curve. Without "knots" degree + 1 control
+points are a Bézier curve, and more of them a B-spline with clamped uniform knots; with knots there are
+points + degree + 1. Each curve starts where the one before ends, or with "rapid": true a rapid goes there.
+The program starts where its first curve does. Places are machine coordinates; on a five-axis machine they are
+joint positions, as without G43.4.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ from numpy.typing import NDArray
 
 from feedplan.curves.composite import MAX_DEGREE, CompositeCurve
 from feedplan.errors import InputError, ProgramError
-from feedplan.machine.machine import AXIS_LETTERS, ROTARY_LETTERS, Machine
+from feedplan.machine.machine import AXIS_LETTERS, AXIS_NAME, ROTARY_LETTERS, Machine
 from feedplan.program.moves import NO_FEED, TOUCHING, Moves, program_axes
 from feedplan.program.program import Program
 from feedplan.units import MM_PER_INCH
@@ -66,11 +68,15 @@ class _PathFile:
         self._require(isinstance(rapid, bool), "rapid", rapid, "true or false")
         curves = table.get("curves", _ABSENT)
         self._require(isinstance(curves, list) and bool(curves), "curves", curves, "a list of curves")
-        letters = self._letters(table, curves)
-        axes = program_axes(letters)
-        columns = [axes.index(letter) for letter in letters]
-        scales = np.array([1.0 if letter in ROTARY_LETTERS else scale for letter in letters])
-        reach = np.array([_FARTHEST_TURN if letter in ROTARY_LETTERS else _FARTHEST for letter in letters])
+        names = self._names(table, curves)
+        lettered = set(names) <= set(AXIS_LETTERS)
+        self._require(
+            lettered or "unit" not in table, "unit", unit, "none: axes of these names have their own"
+        )
+        axes = program_axes(names) if lettered else names
+        columns = [axes.index(name) for name in names]
+        linear = np.array([lettered and name not in ROTARY_LETTERS for name in names])
+        scales, reach = np.where(linear, scale, 1.0), np.where(linear, _FARTHEST, _FARTHEST_TURN)
 
         moves = Moves(axes)
         count, unlimited = 0, 0
@@ -79,10 +85,11 @@ class _PathFile:
             place = f"curves[{i}]"
             self._require(isinstance(row, dict), place, row, "a table with degree and control_points")
             self._known(row, _CURVE_KEYS, f"{place}.")
-            points = self._points(row, f"{place}.control_points", len(letters)) * scales
+            points = self._points(row, f"{place}.control_points", len(names)) * scales
             if not (np.abs(points) <= reach).all():
-                k = int(np.argmax((np.abs(points) > reach).any(axis=1)))
-                self._fail(f"{place}.control_points[{k}] is farther than {_FARTHEST:g} mm: check the unit")
+                k, column = (int(place) for place in np.argwhere(np.abs(points) > reach)[0])
+                far = f"{reach[column]:g} {'mm' if linear[column] else 'deg' if lettered else 'of its unit'}"
+                self._fail(f"{place}.control_points[{k}] is farther than {far}: check the unit")
             count += len(points)
             if count > self.max_points:
                 self._fail(f"there are more than {self.max_points} control points: split the file")
@@ -145,7 +152,7 @@ class _PathFile:
             self._fail('it holds no table: give {"unit": "mm", "curves": […]}')
         return table
 
-    def _letters(self, table: dict[str, Any], curves: list[Any]) -> tuple[str, ...]:
+    def _names(self, table: dict[str, Any], curves: list[Any]) -> tuple[str, ...]:
         """The names of the columns."""
         given = table.get("axes")
         if given is None:
@@ -154,19 +161,22 @@ class _PathFile:
             good = isinstance(row, list) and 2 <= len(row) <= len(_DEFAULT_AXES)
             remedy = f"2 to {len(_DEFAULT_AXES)} numbers, or name the columns by axes"
             self._require(good, "curves[0].control_points[0]", row, remedy)
-            letters = tuple(_DEFAULT_AXES[: len(row or [])])
+            names = tuple(_DEFAULT_AXES[: len(row or [])])
         else:
-            good = isinstance(given, list) and all(isinstance(v, str) and len(v) == 1 for v in given)
-            good = good and set(given) <= set(AXIS_LETTERS) and 0 < len(set(given)) == len(given)
-            self._require(good, "axes", given, f"different letters out of {AXIS_LETTERS}")
-            letters = tuple(given)
-        for letter in letters if self.machine else ():
+            good = isinstance(given, list) and all(
+                isinstance(v, str) and AXIS_NAME.fullmatch(v) for v in given
+            )
+            good = good and 0 < len(set(given)) == len(given) <= len(AXIS_LETTERS)
+            remedy = f"up to {len(AXIS_LETTERS)} different names of axes, such as X or j1"
+            self._require(good, "axes", given, remedy)
+            names = tuple(given)
+        for name in names if self.machine else ():
             known = self.machine.program_letters if self.machine else ()
-            if letter not in known:
+            if name not in known:
                 self._fail(
-                    f"axes has {letter} and the machine does not: use {', '.join(known)}, or another machine"
+                    f"axes has {name} and the machine does not: use {', '.join(known)}, or another machine"
                 )
-        return letters
+        return names
 
     def _points(self, row: dict[str, Any], place: str, width: int) -> NDArray[np.float64]:
         rows = row.get("control_points", _ABSENT)

@@ -119,9 +119,19 @@ def test_curves_without_a_feed_are_warned_about() -> None:
         ({"curves": [LINE], "speed": 8}, '"speed" is not understood: use axes, curves, feed, rapid, unit'),
         ({"curves": [LINE | {"knot": []}]}, 'curves[0]."knot" is not understood: use control_points'),
         ({"curves": [LINE | {"feed": -1}]}, "curves[0].feed is -1"),
-        ({"curves": [LINE], "axes": ["X", "X", "Y"]}, 'axes is ["X", "X", "Y"]: give different letters'),
-        ({"curves": [LINE], "axes": ["X", "Q", "Y"]}, "give different letters out of XYZABCUVW"),
-        ({"curves": [LINE], "axes": [[], "Q", "Y"]}, "give different letters"),
+        (
+            {"curves": [LINE], "axes": ["X", "X", "Y"]},
+            'axes is ["X", "X", "Y"]: give up to 9',
+        ),
+        (
+            {"curves": [LINE], "axes": ["X", "1", "Y"]},
+            "up to 9 different names of axes, such as X or j1",
+        ),
+        ({"curves": [LINE], "axes": [[], "Q", "Y"]}, "give up to 9 different names"),
+        (
+            {"curves": [LINE], "axes": ["j1", "j2", "j3"], "unit": "mm"},
+            'unit is "mm": give none: these axes',
+        ),
         ({"curves": [LINE], "axes": ["X", "Y"]}, "curves[0].control_points[0] is [0, 0, 0]: give 2 finite"),
         ({"curves": [{"control_points": [[0, 0], [1, 0]]}]}, "curves[0].degree is missing: give an integer"),
         ({"curves": [LINE | {"degree": 10}]}, "curves[0].degree is 10: give an integer from 1 to 9"),
