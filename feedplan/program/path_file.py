@@ -70,9 +70,7 @@ class _PathFile:
         self._require(isinstance(curves, list) and bool(curves), "curves", curves, "a list of curves")
         names = self._names(table, curves)
         lettered = set(names) <= set(AXIS_LETTERS)
-        self._require(
-            lettered or "unit" not in table, "unit", unit, "none: axes of these names have their own"
-        )
+        self._require(lettered or "unit" not in table, "unit", unit, "none: these axes have their own")
         axes = program_axes(names) if lettered else names
         columns = [axes.index(name) for name in names]
         linear = np.array([lettered and name not in ROTARY_LETTERS for name in names])
