@@ -10,13 +10,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feedplan.audit.joint_path import Array, JointPath, Numbers
+from feedplan.audit.joint_path import EPS, Array, JointPath, Numbers
 from feedplan.profile import ArcKind, SpeedProfile
 
 GAUSS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
 
-# Steps of Newton's method and halvings: a bracket of doubles is closed by then.
+# Steps of Newton's method and halvings: a bracket of doubles is closed by then. A step by so small a share of
+# the time is rounding.
 ROUNDS = 100
+SETTLED = 4.0 * EPS
 
 
 @dataclass(frozen=True)
@@ -85,9 +87,10 @@ def constant_jerk(
         low, high = np.where(miss > 0.0, low, t), np.where(miss > 0.0, t, high)
         new = t - miss / (v + t * (a + t * j / 2.0))
         new = np.where((low <= new) & (new <= high), new, 0.5 * (low + high))
-        if not (new != t).any():
-            break
+        settled = np.abs(new - t) <= SETTLED * new
         t = new
+        if settled.all():
+            break
     # A way beyond the arc's own at its mean speed.
     t = np.where(wanted >= whole, most * wanted / whole, t)
     pull = a + t * j

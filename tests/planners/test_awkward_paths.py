@@ -57,7 +57,7 @@ def test_curves_that_broke_the_exact_planner_or_its_audit(seed: int) -> None:
     assert faults(seed, "bang-bang") == []
 
 
-# A turn finer than any grid (71), a rest whose place is that of the way to it (194), recorded durations of arcs that
+# A turn finer than any grid (71), a rest whose place is that of the way to it (194), durations of arcs that
 # begin at rest (21, 275).
 @pytest.mark.parametrize("method", ["jerk-limited", "s-curve"])
 @pytest.mark.parametrize("seed", [21, 71, 194, 275])
