@@ -30,7 +30,7 @@ from feedplan.setpoints import setpoints
 
 NAME = "interrupts"
 METHODS = ("bang-bang", "s-curve", "jerk-limited")
-PART, MACHINE, BLOCKS, QUICK = "head", "mill", 1_000_000, 200
+PART, MACHINE, BLOCKS, QUICK = "head", "mill", 1_000_000, 1000
 # Seconds between signals in a stage, and where the one comes that ends it, as a part of the stage's time.
 EVERY, MOMENT = 0.1, 0.5
 

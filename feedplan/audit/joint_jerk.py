@@ -104,26 +104,30 @@ def slopes(
 
 
 def _differences(path: JointPath, piece: Numbers, u: Array, share: float) -> tuple[Array, Array]:
-    """Derivatives (3, n, joints + 1) by places a share of the piece apart, and what may be rounding."""
-    count = len(piece)
+    """Derivatives (3, n, joints + 1) by places a share of the piece apart, and what may be rounding.
+
+    The places are whole steps from the start of the piece: many rows have them in common.
+    """
+    count, steps = len(piece), round(1.0 / share)
     width = path.problem.path.width[piece]
     step = share * width
-    centre = np.clip(u, 3.0 * step, width - 3.0 * step)
-    places = np.clip(centre[:, None] + step[:, None] * NODES, 0.0, width[:, None])
-    many = np.repeat(piece, len(NODES))
-    tip, slope = path.tip(many, places.ravel())
-    q = path.joints(many, tip).reshape(count, len(NODES), -1)
-    speed = path.way_of(slope).reshape(count, len(NODES), 1)
+    centre = np.clip(np.rint(u / step).astype(np.int64), 3, steps - 3)
+    numbers = (piece * (steps + 1) + centre)[:, None] + NODES.astype(np.int64)
+    places, again = np.unique(numbers, return_inverse=True)
+    many, number = np.divmod(places, steps + 1)
+    tip, slope = path.tip(many, path.problem.path.width[many] * (share * number))
+    again = again.reshape(count, len(NODES))
+    q, speed = path.joints(many, tip)[again], path.way_of(slope)[again][:, :, None]
     change = path.between(piece, q[:, 3:4], q)
     values = np.concatenate([change, speed - speed[:, 3:4]], axis=2)
     # A joint feels the rounding of the tip as much as it moves with it.
-    size = np.abs(tip).max(axis=1).reshape(count, len(NODES)).max(axis=1)
-    fast = np.linalg.norm(slope, axis=1).reshape(count, len(NODES)).max(axis=1)
+    size = np.abs(tip).max(axis=1)[again].max(axis=1)
+    fast = np.linalg.norm(slope, axis=1)[again].max(axis=1)
     moved = np.abs(change).max(axis=1) / (3.0 * step)[:, None]
     with np.errstate(all="ignore"):
         felt = np.nan_to_num(moved * (size / fast)[:, None], posinf=0.0)
     rounding = ROUNDINGS * EPS * np.concatenate([np.abs(q).max(axis=1) + felt, speed.max(axis=1)], axis=1)
-    x = (u - centre) / step
+    x = u / step - centre
     found, doubt = [], []
     for order, stencil in enumerate(STENCILS, start=1):
         weights = x[:, None] ** np.arange(stencil.shape[1]) @ stencil.T

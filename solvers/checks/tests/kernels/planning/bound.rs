@@ -121,7 +121,7 @@ fn whole_pieces<const M: usize>(profile: &Profile, case: &Case<M>) -> Profile {
 
 #[test]
 fn the_bound_is_never_above_the_time_and_near_it() {
-    let found = gaps(seeds(100_000), true);
+    let found = gaps(seeds(30_000), true);
     println!(
         "gaps from {:.1e}, {:.1e} in the middle, 9 of 10 below {:.1e}, all below {:.1e}",
         found.least, found.shares[0], found.shares[1], found.shares[2]
@@ -133,7 +133,7 @@ fn the_bound_is_never_above_the_time_and_near_it() {
 
 #[test]
 fn any_cells_give_a_bound_and_are_refined() {
-    let found = gaps(0..2000, false);
+    let found = gaps(0..600, false);
     println!(
         "one cell a piece: gaps from {:.1e}, {:.1e} in the middle, 9 of 10 below {:.1e}, all below {:.1e}",
         found.least, found.shares[0], found.shares[1], found.shares[2]
