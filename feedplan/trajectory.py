@@ -7,11 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from feedplan.arguments import refuse
 from feedplan.constraints.problem import Problem, speed_square
-from feedplan.curves._arrays import floats
+from feedplan.curves._arrays import within
 from feedplan.curves.length import CurveLength
-from feedplan.errors import InputError
 from feedplan.lazy import cached_property
 from feedplan.profile import SpeedProfile
 from feedplan.setpoints import sampler
@@ -66,7 +64,7 @@ class Trajectory:
         At the moment of a stop the tool rests; where the acceleration jumps, the values after the jump hold.
         Raises InputError for a time that is not within the plan.
         """
-        times = self._within(t, "time", self.duration, "s")
+        times = within(t, "time", self.duration, "s")
         _, position, velocity, acceleration, jerk, line, piece, *_ = self._sampler.at(np.atleast_1d(times))
         if self._problem.joint_origin is not None:
             position += self._problem.joint_origin[piece]
@@ -75,7 +73,7 @@ class Trajectory:
 
     def distance(self, t: ArrayLike) -> Array:
         """s(t): the length of the way [mm] at one time or at times (n,) [s]. Raises as `at`."""
-        times = self._within(t, "time", self.duration, "s")
+        times = within(t, "time", self.duration, "s")
         piece, u = self._sampler.at(np.atleast_1d(times))[6:8]
         return self._lengths.length(piece, u).reshape(times.shape)
 
@@ -83,13 +81,13 @@ class Trajectory:
         """t(s): when the tool is at one length or at lengths (n,) [mm], before the pause at a stop [s].
 
         Raises InputError for a length that is not on the path."""
-        lengths = self._within(s, "length", self.length, self._problem.unit)
+        lengths = within(s, "length", self.length, self._problem.unit)
         places = self._lengths.locate(np.atleast_1d(lengths))
         return self._sampler.along(places.piece, places.u)[0].reshape(lengths.shape)
 
     def speed(self, s: ArrayLike) -> Array:
         """v(s): the speed of the tool [mm/s] at one length or at lengths (n,) [mm]. Raises as `time`."""
-        lengths = self._within(s, "length", self.length, self._problem.unit)
+        lengths = within(s, "length", self.length, self._problem.unit)
         places = self._lengths.locate(np.atleast_1d(lengths))
         velocity = self._sampler.along(places.piece, places.u)[2]
         speed = np.linalg.norm(velocity, axis=1)
@@ -99,17 +97,3 @@ class Trajectory:
             ratio = speed_square(self._problem, places.piece, places.u) / (joints**2).sum(axis=1)
             speed = speed * np.sqrt(ratio)
         return np.asarray(speed.reshape(lengths.shape))
-
-    def _within(self, given: ArrayLike, name: str, end: float, unit: str) -> Array:
-        try:
-            values = floats(given, name).reshape(np.shape(given))
-        except InputError:
-            raise refuse(f"the {name}", given, "a number or a list of numbers") from None
-        if values.ndim > 1:
-            raise InputError(f"the {name}s have {values.ndim} dimensions: give a number or a list of numbers")
-        # The end of the plan, summed up in another order, is the end.
-        outside = ~((values >= 0.0) & (values <= end * (1.0 + 1e-12)))
-        if outside.any():
-            worst = float(values[outside].flat[0])
-            raise InputError(f"the {name} is {worst:g} {unit}: give one from 0 to {end:g} {unit}")
-        return values

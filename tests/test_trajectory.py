@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import pickle
 from pathlib import Path as FilePath
 
 import numpy as np
 import pytest
 
 from feedplan import Axis, InputError, Machine, Path, Plan, plan
+from feedplan.curves.composite import CompositeCurve
 
 LINE = Machine("line", (Axis("X", 100.0, 1000.0, max_jerk=20_000.0),))
 
@@ -87,3 +89,26 @@ def test_a_time_that_is_not_within_the_plan_is_refused(t: object, sentence: str)
         _line().at(t)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="the length is 101 mm: give one from 0 to 100 mm"):
         _line().trajectory.speed(101.0)
+
+
+def test_a_path_is_told_by_its_length() -> None:
+    # A quarter of a circle of radius 20 mm about (0, 0), then a line along −X.
+    root = 0.5**0.5
+    arc = CompositeCurve.from_bezier([[20, 0], [20, 20], [0, 20]], [1, root, 1])
+    line = CompositeCurve.from_bezier([[0, 20], [-7, 20]])
+    path = Path.from_curve(CompositeCurve.joined([arc, line]))
+    quarter = 10.0 * np.pi
+    assert path.length == pytest.approx(quarter + 7.0, rel=1e-13)
+    places = path.evaluate([0.0, 0.5 * quarter, quarter + 4.0, path.length])
+    assert places == pytest.approx(np.array([[20, 0], [20 * root, 20 * root], [-4, 20], [-7, 20]]), abs=1e-11)
+    assert path.evaluate(0.5 * quarter, 1) == pytest.approx([-root, root], abs=1e-12)
+    assert path.evaluate(0.5 * quarter, 2) == pytest.approx([-root / 20, -root / 20], abs=1e-12)
+    assert path.evaluate(quarter + 1.0, 2) == pytest.approx([0, 0], abs=1e-15)
+    again = pickle.loads(pickle.dumps(path))
+    assert again.length == path.length
+    planned = plan(path, "mill")
+    assert planned.path.length == planned.trajectory.length
+    with pytest.raises(InputError, match="the length is 40 mm: give one from 0 to 38"):
+        path.evaluate(40.0)
+    with pytest.raises(InputError, match="of order 3: give 0, 1 or 2"):
+        path.evaluate(1.0, 3)

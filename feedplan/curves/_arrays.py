@@ -76,6 +76,22 @@ def floats(values: ArrayLike, name: str, dimensions: int | None = None) -> NDArr
     return array
 
 
+def within(given: ArrayLike, name: str, end: float, unit: str) -> NDArray[np.float64]:
+    """A number or numbers (n,) from 0 to `end`, each a time or a length as `name` says."""
+    try:
+        values = floats(given, name).reshape(np.shape(given))
+    except InputError:
+        raise InputError(f"the {name} is {shown(given)}: give a number or a list of numbers") from None
+    if values.ndim > 1:
+        raise InputError(f"the {name}s have {values.ndim} dimensions: give a number or a list of numbers")
+    # The end of a plan or path, summed up in another order, is the end.
+    outside = ~((values >= 0.0) & (values <= end * (1.0 + 1e-12)))
+    if outside.any():
+        worst = float(values[outside].flat[0])
+        raise InputError(f"the {name} is {worst:g} {unit}: give one from 0 to {end:g} {unit}")
+    return values
+
+
 def refuse(bad: NDArray[np.bool_], sentence: Callable[[int], str]) -> None:
     """Raises the sentence for the first index that is bad."""
     if bad.any():

@@ -10,8 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from feedplan.arguments import is_whole, shown
+from feedplan.curves._arrays import within
 from feedplan.curves.composite import CompositeCurve
+from feedplan.curves.length import CurveLength
+from feedplan.errors import InputError
 from feedplan.geometry.corners import Corners
+from feedplan.lazy import cached_property
 from feedplan.units import counted
 
 if TYPE_CHECKING:
@@ -227,6 +232,41 @@ class Path:
     def width(self) -> NDArray[np.float64]:
         """The parameter interval of each piece (n,) [mm: about the length]."""
         return self.curve.width
+
+    def __getstate__(self) -> dict[str, Any]:
+        # The table of lengths is made anew where it is needed.
+        return {name: value for name, value in vars(self).items() if name != "_lengths"}
+
+    @property
+    def length(self) -> float:
+        """Length along all axes [mm; of joints their unit]."""
+        return self._lengths.total
+
+    def evaluate(self, s: ArrayLike, order: int = 0) -> NDArray[np.float64]:
+        """The place at one length or at lengths (n,) from the start: (axes,) or (n, axes) [mm, deg].
+
+        `order` 1 gives the unit tangent there, 2 the curvature vector [1/mm]; NaN where the path has neither.
+        Raises InputError for a length that is not on the path, and for another order.
+        """
+        if not is_whole(order, 0, 2):
+            raise InputError(f"the derivative by length is of order {shown(order)}: give 0, 1 or 2")
+        lengths = within(s, "length", self.length, "mm")
+        places = self._lengths.locate(np.atleast_1d(lengths))
+        values = self.curve.evaluate(places.piece, places.u, order)
+        row = 0 if lengths.ndim == 0 else slice(None)
+        if order == 0:
+            return np.asarray(values[0][row])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            speed = np.linalg.norm(values[1], axis=1)[:, None]
+            tangent = values[1] / speed
+            if order == 1:
+                return np.asarray(tangent[row])
+            along = (values[2] * tangent).sum(axis=1)[:, None]
+            return np.asarray(((values[2] - along * tangent) / speed**2)[row])
+
+    @cached_property
+    def _lengths(self) -> CurveLength:
+        return CurveLength(self.curve)
 
     def cut(self, curve: CompositeCurve, piece: NDArray[np.int64]) -> Path:
         """The same path with pieces cut: `curve` are the parts in order, `piece` (m,) what they are of."""
