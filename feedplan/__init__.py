@@ -24,6 +24,7 @@ from feedplan.errors import (
 )
 from feedplan.files import write_plan
 from feedplan.geometry.path import Path
+from feedplan.machine.importers import import_machine
 from feedplan.machine.machine import Axis, Machine
 from feedplan.machine.machine import bundled_machines as machines
 from feedplan.planners import methods
@@ -57,6 +58,7 @@ __all__ = [
     "Trajectory",
     "check",
     "compare",
+    "import_machine",
     "machines",
     "methods",
     "plan",

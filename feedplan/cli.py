@@ -7,32 +7,41 @@ What is slow to import is imported by the command that needs it.
 from __future__ import annotations
 
 import io
-import math
 import os
 import sys
 from collections.abc import Sequence
-from itertools import groupby
 from pathlib import Path as FilePath
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 
 import click
 
 from feedplan import __version__, console, outputs, planners
+from feedplan.command_options import (
+    ACCURACY,
+    JSON,
+    MACHINE,
+    PATH,
+    PROGRAM,
+    QUIET,
+    TIME_LIMIT_HELP,
+    TOLERANCE,
+    WHOLE_LIMIT_HELP,
+    ZERO_OR_MORE,
+    Number,
+    given_only,
+    name_of,
+)
 from feedplan.comparison import TIME_LIMIT
 from feedplan.errors import FeedplanError, InfeasibleError, SolverError
-from feedplan.geometry.corners import PATHS, FollowedPath
-from feedplan.machine.machine import Axis, Limit, Machine, bundled_machines
+from feedplan.geometry.corners import FollowedPath
+from feedplan.machine_commands import machines
 from feedplan.program.read import Reading
 from feedplan.reading_options import machine_for, reading_options
 from feedplan.setpoints import INTERPOLATORS, MAX_SETPOINTS, Interpolator
 
-if TYPE_CHECKING:
-    NumberType = click.ParamType[float]
-else:
-    NumberType = click.ParamType  # generic only in the newest click
-
 DONE, BROKEN, BAD_INPUT, DEFECT, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 70, 130, 141
 _TRACEBACK = "FEEDPLAN_TRACEBACK"
+_NO_SETPOINTS = "none"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -91,76 +100,6 @@ def _usage(error: click.ClickException) -> str:
     return f"{error.format_message().rstrip('.')} (`{command} --help` shows the usage)"
 
 
-class _Number(NumberType):
-    """A finite number greater than 0, or also 0."""
-
-    name = "number"
-
-    def __init__(self, or_zero: bool = False) -> None:
-        self._or_zero = or_zero
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        try:
-            number = float(value)
-        except ValueError:
-            self.fail(f"'{value}' is not a number", param, ctx)
-        if math.isfinite(number) and (number > 0 or (self._or_zero and number == 0)):
-            return number
-        self.fail(f"{value}: give a number {'≥ 0' if self._or_zero else '> 0'}", param, ctx)
-
-
-_MACHINE = click.option(
-    "--machine",
-    "-m",
-    default="mill",
-    show_default=True,
-    metavar="NAME|FILE",
-    help="A bundled machine, a TOML file, or auto: the smallest bundled one that the program fits.",
-)
-_TOLERANCE = click.option(
-    "--tolerance", type=_Number(), metavar="MM", help="Allowed distance from the programmed path."
-)
-_PATH = click.option(
-    "--path",
-    type=click.Choice(PATHS),
-    default="as-fitted",
-    show_default=True,
-    help="Smooth paths keep the size of arcs, or cut them up to the tolerance.",
-)
-_ACCURACY = click.option(
-    "--accuracy", type=_Number(), metavar="PART", help="Relative error of the time, of methods with a mesh."
-)
-_TIME_LIMIT_HELP = "Time that a method with a mesh may take."
-_WHOLE_LIMIT_HELP = (
-    "Time that a method with a mesh may take. With jerk-limited it is for the whole command: reading, "
-    "fitting, a first plan, the audit and the files are never left out, 0 ends after them; what is left "
-    "improves the plan and its bound."
-)
-_JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-_QUIET = click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
-_NO_SETPOINTS = "none"
-_PROGRAM = click.argument("program", callback=lambda context, parameter, given: _source(given))
-_ZERO_OR_MORE = _Number(or_zero=True)
-
-
-def _source(given: str) -> str | IO[bytes]:
-    """The file of that name, or standard input for `-`."""
-    if given != "-":
-        return given
-    if sys.stdin is None:
-        raise click.UsageError("standard input is closed: give the path of a program")
-    return sys.stdin.buffer
-
-
-def _name(program: str | IO[bytes]) -> str:
-    return program if isinstance(program, str) else program.name
-
-
-def _given(**options: Any) -> dict[str, Any]:
-    """The options that were given: which of them a method takes is for the method to say."""
-    return {name: value for name, value in options.items() if value is not None}
-
-
 @click.group(
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     invoke_without_command=True,
@@ -176,17 +115,17 @@ def cli(context: click.Context) -> int:
 
 
 @cli.command()
-@_PROGRAM
-@_MACHINE
+@PROGRAM
+@MACHINE
 @reading_options
 @click.option("--method", type=click.Choice(planners.methods()), default="bang-bang", show_default=True)
-@_ACCURACY
-@click.option("--time-limit", type=_ZERO_OR_MORE, metavar="S", help=_WHOLE_LIMIT_HELP)
-@_TOLERANCE
-@_PATH
-@click.option("--feed", type=_Number(), metavar="MM/S", help="Feed in place of the programmed one.")
-@click.option("--feed-override", type=_Number(), default=1.0, metavar="FACTOR", help="Factor on the feed.")
-@click.option("--period", type=_Number(), metavar="S", help="Servo period in place of the machine's.")
+@ACCURACY
+@click.option("--time-limit", type=ZERO_OR_MORE, metavar="S", help=WHOLE_LIMIT_HELP)
+@TOLERANCE
+@PATH
+@click.option("--feed", type=Number(), metavar="MM/S", help="Feed in place of the programmed one.")
+@click.option("--feed-override", type=Number(), default=1.0, metavar="FACTOR", help="Factor on the feed.")
+@click.option("--period", type=Number(), metavar="S", help="Servo period in place of the machine's.")
 @click.option("--interpolator", type=click.Choice(INTERPOLATORS), default="sarfraz", show_default=True)
 @click.option(
     "--max-setpoints",
@@ -196,8 +135,8 @@ def cli(context: click.Context) -> int:
     metavar="N",
     help="A plan of more setpoints is refused.",
 )
-@click.option("--start-speed", type=_ZERO_OR_MORE, default=0.0, metavar="MM/S", help="Speed at the start.")
-@click.option("--end-speed", type=_ZERO_OR_MORE, default=0.0, metavar="MM/S", help="Speed at the end.")
+@click.option("--start-speed", type=ZERO_OR_MORE, default=0.0, metavar="MM/S", help="Speed at the start.")
+@click.option("--end-speed", type=ZERO_OR_MORE, default=0.0, metavar="MM/S", help="Speed at the end.")
 @click.option("--output", "-o", metavar="DIR", help="Write plan.json, setpoints and report.html there.")
 @click.option(
     "--format",
@@ -206,8 +145,8 @@ def cli(context: click.Context) -> int:
     multiple=True,
     help="Format of the setpoints, npz by default; may be given several times. none: a report without them.",
 )
-@_JSON
-@_QUIET
+@JSON
+@QUIET
 def plan(
     program: str | IO[bytes],
     machine: str,
@@ -261,7 +200,7 @@ def plan(
             max_setpoints=max_setpoints,
             reading=reading,
             progress=progress,
-            **_given(accuracy=accuracy, time_limit=time_limit),
+            **given_only(accuracy=accuracy, time_limit=time_limit),
         )
         audit = result.audit(progress)
         files: tuple[FilePath, ...] = ()
@@ -288,21 +227,21 @@ def plan(
 
 
 @cli.command()
-@_PROGRAM
-@_MACHINE
+@PROGRAM
+@MACHINE
 @reading_options
 @click.option("--methods", metavar="A,B,…", help="Methods to compare.  [default: all]")
-@_ACCURACY
+@ACCURACY
 @click.option(
-    "--time-limit", type=_Number(), default=TIME_LIMIT, show_default=True, metavar="S", help=_TIME_LIMIT_HELP
+    "--time-limit", type=Number(), default=TIME_LIMIT, show_default=True, metavar="S", help=TIME_LIMIT_HELP
 )
-@_TOLERANCE
-@_PATH
-@click.option("--feed", type=_Number(), metavar="MM/S", help="Feed in place of the programmed one.")
-@click.option("--period", type=_Number(), metavar="S", help="Servo period in place of the machine's.")
+@TOLERANCE
+@PATH
+@click.option("--feed", type=Number(), metavar="MM/S", help="Feed in place of the programmed one.")
+@click.option("--period", type=Number(), metavar="S", help="Servo period in place of the machine's.")
 @click.option("--output", "-o", metavar="DIR", help="Write comparison.json and comparison.html there.")
-@_JSON
-@_QUIET
+@JSON
+@QUIET
 def compare(
     program: str | IO[bytes],
     machine: str,
@@ -345,10 +284,10 @@ def compare(
             path=path,
             feed=feed,
             period=period,
-            **_given(accuracy=accuracy),
+            **given_only(accuracy=accuracy),
         )
         summary = {
-            "program": _name(program),
+            "program": name_of(program),
             "machine": known.name,
             "methods": [row.to_json() for row in rows],
         }
@@ -369,12 +308,12 @@ def compare(
 
 
 @cli.command()
-@_PROGRAM
-@_MACHINE
+@PROGRAM
+@MACHINE
 @reading_options
-@_TOLERANCE
+@TOLERANCE
 @click.option("--smooth", is_flag=True, help="Fit all moves by curves fit for limits of jerk.")
-@_JSON
+@JSON
 def fit(
     program: str | IO[bytes],
     machine: str,
@@ -408,7 +347,7 @@ def fit(
         sys.stdout.write(summary_text(summary))
     else:
         path_row = ("path", console.pieces_text(summary))
-        console.print_rows([("program", _name(program)), *console.fit_rows(summary), path_row])
+        console.print_rows([("program", name_of(program)), *console.fit_rows(summary), path_row])
 
 
 @cli.command()
@@ -420,10 +359,10 @@ def fit(
     help="A bundled machine or a TOML file.  [default: the plan's own]",
 )
 @click.option(
-    "--resolution", type=_ZERO_OR_MORE, default=0.0, metavar="MM", help="Last digit of rounded positions."
+    "--resolution", type=ZERO_OR_MORE, default=0.0, metavar="MM", help="Last digit of rounded positions."
 )
 @click.option("--jerk", is_flag=True, help="Judge jerk whatever the method.")
-@_JSON
+@JSON
 def check(place: str, machine: str | None, resolution: float, jerk: bool, as_json: bool) -> int:
     """Audit setpoints from files alone, against the limits of the machine that plan.json holds.
 
@@ -442,46 +381,4 @@ def check(place: str, machine: str | None, resolution: float, jerk: bool, as_jso
     return DONE if audit.ok else _fail(console.failure_sentence(audit), BROKEN)
 
 
-@cli.command()
-@click.argument("name", required=False)
-def machines(name: str | None) -> None:
-    """Show the bundled machines, or the limits of one.
-
-    NAME is a bundled machine or a TOML file. Limits are in mm on linear and in degrees on rotary axes.
-    """
-    if name is None:
-        names = ["machine", "axes", "velocity /s", "acceleration /s²", "period ms", "chord mm"]
-        console.print_table(names, [_machine_row(Machine.load(known)) for known in bundled_machines()])
-    else:
-        names = ["axis", "unit", "velocity /s", "acceleration /s²", "jerk /s³", "travel"]
-        console.print_table(names, [_axis_row(axis) for axis in Machine.load(name).axes])
-
-
-def _machine_row(machine: Machine) -> tuple[str, ...]:
-    limits = (_by_unit(machine, limit) for limit in ("max_velocity", "max_acceleration"))
-    names = machine.axis_names
-    axes = ("" if max(map(len, names)) == 1 else " ").join(names)
-    return (machine.name, axes, *limits, f"{1e3 * machine.period:g}", _or_none(machine.chord_tolerance))
-
-
-def _by_unit(machine: Machine, limit: str) -> str:
-    """A limit of all axes, with a unit after the last of those that have it: `500 500 mm 150 deg`."""
-    groups = groupby(machine.axes, key=lambda axis: axis.unit)
-    return " ".join(
-        " ".join((*(_limit_text(getattr(axis, limit)) for axis in axes), unit)) for unit, axes in groups
-    )
-
-
-def _axis_row(axis: Axis) -> tuple[str, ...]:
-    limits = (axis.max_velocity, axis.max_acceleration, axis.max_jerk)
-    travel = " to ".join(f"{end:g}" for end in axis.travel) if math.isfinite(axis.travel[0]) else "-"
-    return (axis.name, axis.unit, *(_limit_text(limit) for limit in limits), travel)
-
-
-def _limit_text(limit: Limit) -> str:
-    """`500`, or `-300..500` where it differs by direction."""
-    return "..".join(f"{end:g}" for end in limit) if isinstance(limit, tuple) else _or_none(limit)
-
-
-def _or_none(limit: float) -> str:
-    return f"{limit:g}" if math.isfinite(limit) else "-"
+cli.add_command(machines)

@@ -168,6 +168,80 @@ max_velocity = 100.0
 max_acceleration = 1000.0
 """
 
+# Machines in files of controllers, by the names of these.
+OF_CONTROLLERS = {
+    "mill.ini": b"""[EMC]
+MACHINE = mill
+[EMCMOT]
+SERVO_PERIOD = 1000000
+[KINS]
+KINEMATICS = trivkins coordinates=XYYZ \\
+  kinstype=BOTH
+[TRAJ]
+COORDINATES = X Y Z
+LINEAR_UNITS = inch
+MAX_LINEAR_VELOCITY = 4
+MAX_LINEAR_JERK = 400
+#INCLUDE more.inc
+[AXIS_X]
+MIN_LIMIT = -10 # to the left
+MAX_LIMIT = 10
+[JOINT_0]
+MAX_VELOCITY = 5
+MAX_ACCELERATION = 20
+[AXIS_Y]
+OFFSET_AV_RATIO = 0.2
+MAX_ACCELERATION = 20
+[AXIS_Z]
+MAX_ACCELERATION = 20
+""",
+    "grbl.txt": b"""Grbl 1.1h ['$' for help]
+$11=0.010
+$20=1
+$22=9
+$23=2
+$110=6000.000 (x max rate, mm/min)
+$111=6000.000
+$112=600.000
+$120=250.000
+$121=200
+$122=50.0
+$130=300.000
+$376=1
+$800=3000
+ok
+""",
+    "printer.cfg": b"""[include more/*.cfg]
+[stepper_x]
+position_min: -5 # behind
+position_max: 235
+[printer]
+kinematics: corexy
+max_velocity = 300
+max_accel: 3000 ; fast
+max_z_velocity: 15
+[gcode_macro PARK]
+gcode:
+    G1 X0
+""",
+    "joint_limits.yaml": b"""# of a robot
+joint_limits:
+  shoulder:
+    has_velocity_limits: true
+    max_velocity: !degrees 180.0
+    has_acceleration_limits: true
+    max_acceleration: 5.0
+  'wrist':
+    has_velocity_limits: true
+    max_velocity: 3.15 # [rad/s]
+    has_acceleration_limits: true
+    max_acceleration: 8
+    has_position_limits: true
+    min_position: -1.5
+    max_position: 1.5
+""",
+}
+
 PATH_FILE = b"""{"unit": "mm", "axes": ["X", "Y", "Z"], "feed": 80.0, "rapid": true, "curves": [
 {"degree": 3, "control_points": [[0, 0, 0], [5, 2, 0], [8, 8, 1], [12, 8, 0], [20, 0, 0]], "feed": 60.0},
 {"degree": 2, "control_points": [[20, 0, 0], [25, 0, 0], [25, 5, 0]], "weights": [1, 0.7071, 1]},

@@ -15,7 +15,6 @@ import pytest
 
 from feedplan.cli import main
 from feedplan.errors import InfeasibleError, MissingPackageError, ProgramError, SolverError
-from feedplan.machine.machine import bundled_machines
 from feedplan.outputs import format_named, formats
 
 
@@ -151,7 +150,7 @@ def test_a_defect_is_named_as_one_and_the_traceback_is_there_for_the_asking(
         (["plan", "a", "--format", "csv"], "--format needs a folder"),
         (["plan", "a", "--machine", "toaster"], "there is no bundled machine 'toaster'"),
         (["plan", "a", "-o", __file__], "test_cli.py is a file, not a folder"),
-        (["machines", "toaster"], "there is no bundled machine 'toaster'"),
+        (["machines", "show", "toaster"], "there is no bundled machine 'toaster'"),
         (["plna"], "No such command 'plna'"),
     ],
 )
@@ -334,28 +333,6 @@ def test_the_package_runs_as_a_module() -> None:
         check=False,
     )
     assert (done.returncode, done.stdout.split()[0]) == (0, "feedplan")
-
-
-def test_machines_lists_every_one_and_shows_each(capsys: Any) -> None:
-    assert main(["machines"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines[1:]] == list(bundled_machines())
-    assert main(["machines", "tarus"]) == 0
-    rows = [line.split() for line in capsys.readouterr().out.splitlines()[1:]]
-    assert rows == [
-        ["X", "mm", "170", "400", "4000", "-"],
-        ["Y", "mm", "180", "600", "6000", "-"],
-        ["Z", "mm", "240", "2000", "20000", "-"],
-    ]
-    assert main(["machines", "cylindrical"]) == 0
-    assert [line.split()[1] for line in capsys.readouterr().out.splitlines()[1:]] == ["deg", "mm", "mm"]
-
-
-def test_limits_in_a_row_have_the_units_of_their_axes(capsys: Any) -> None:
-    assert main(["machines"]) == 0
-    rows = {line.split()[0]: " ".join(line.split()) for line in capsys.readouterr().out.splitlines()}
-    assert rows["cylindrical"].startswith("cylindrical CXZ 170 deg 250 200 mm 1150 deg 2000 1000 mm")
-    assert rows["mill"].startswith("mill XYZ 500 500 400 mm 3000")
 
 
 MAIN = "import sys; from feedplan.cli import main; sys.exit(main())"

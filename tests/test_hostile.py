@@ -20,7 +20,7 @@ import pytest
 from feedplan import cli
 from feedplan.errors import LONGEST
 from tests.campaign import seeds
-from tests.hostile import DRAWING, MACHINE, PATH_FILE, PROGRAM, mutated, mutated_archive
+from tests.hostile import DRAWING, MACHINE, OF_CONTROLLERS, PATH_FILE, PROGRAM, mutated, mutated_archive
 
 SEEDS = seeds(200)
 SMALL = "G21 G90\nF1200\nG1 X1 Y0.5\nX2\nM2\n"
@@ -80,6 +80,12 @@ def test_mutated_machines(tmp_path: Path) -> None:
     program, file = tmp_path / "part.ngc", tmp_path / "mine.toml"
     program.write_text(SMALL)
     of_all(MACHINE, file, planned(program, "--machine", str(file)), mutated)
+
+
+@pytest.mark.parametrize("name", OF_CONTROLLERS)
+def test_mutated_files_of_controllers(name: str, tmp_path: Path) -> None:
+    file = tmp_path / name
+    of_all(OF_CONTROLLERS[name], file, lambda: outcome("machines", "import", str(file)), mutated)
 
 
 @pytest.fixture
@@ -161,6 +167,55 @@ def test_numbers_of_machines_have_ranges(limits: str, tmp_path: Path) -> None:
     assert code == cli.BAD_INPUT, error
     _is_a_sentence(error)
     assert "give a number from" in error
+
+
+INI = "[TRAJ]\nLINEAR_UNITS = mm\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("a.ini", INI + "#INCLUDE a.ini\n", "a.ini includes itself"),
+        ("a.cfg", "[printer]\n[include *.cfg]\n", "a.cfg includes itself"),
+        ("a.ini", INI + "#INCLUDE b.inc\n" * 200, "includes more than 100 files"),
+        ("a.ini", INI + "#INCLUDE pipe\n", "no velocity or acceleration"),
+        ("a.ini", INI + "#INCLUDE ~nobody_at_all/none\n", "cannot be included"),
+        ("a.ini", INI + "#INCLUDE " + "a" * 4000 + "\n", "cannot be included"),
+        ("a.ini", INI + "\n" * 2_000_000, "more than 1048576 bytes"),
+        ("a.ini", INI + "\n" * 1_000_000, "no velocity or acceleration"),
+        ("a.ini", INI + f"[AXIS_X]\nMAX_VELOCITY = {'9' * 4000}\n", "no velocity"),
+        ("a.ini", INI + (" " * 4000 + "x\n") * 250, "no velocity or acceleration"),
+        ("a.ini", INI + "A = \\\n" * 150_000, "no velocity or acceleration"),
+        ("a.cfg", "[printer]\n" + ("a" + " " * 4000 + "\n") * 250, "names no [printer] kinematics"),
+        ("a.txt", "$110=1\n" + "> \n" * 300_000, "no acceleration of X"),
+        ("a.txt", "".join(f"$1{k}0=1\n" for k in "123") + f"$20={'9' * 400}\n", "give a whole number"),
+        (
+            "a.yaml",
+            "joint_limits:\n" + "".join(" " * k + "a:\n" for k in range(1, 1000)),
+            "more than 20 levels",
+        ),
+        ("a.yaml", "joint_limits:\n" + "".join(f"  j{k}:\n" for k in range(50_000)), "no velocity"),
+        ("a.yaml", "joint_limits: &a\n  b: [*a]\n", "no joints below joint_limits"),
+    ],
+)
+def test_files_of_controllers(name: str, text: str, words: str, tmp_path: Path) -> None:
+    file = tmp_path / name
+    file.write_text(text)
+    (tmp_path / "b.inc").write_text("[AXIS_Q]\n")
+    os.mkfifo(tmp_path / "pipe")
+    code, error = _alone("machines", "import", str(file))
+    assert code == cli.BAD_INPUT, error
+    _is_a_sentence(error)
+    assert words in error
+
+
+def test_files_that_include_each_other_deep_down(tmp_path: Path) -> None:
+    for k in range(40):
+        (tmp_path / f"{k}.ini").write_text(f"[EMC]\n#INCLUDE {k + 1}.ini\n")
+    code, error = _alone("machines", "import", str(tmp_path / "0.ini"))
+    assert code == cli.BAD_INPUT, error
+    _is_a_sentence(error)
+    assert "15.ini line 2: files include each other more than 16 deep" in error
 
 
 @pytest.mark.parametrize("content", ["[" * DEEP, '{"format":' * DEEP, f'{{"format": {"1" * 5000}}}'])

@@ -81,6 +81,8 @@ def cases(tmp_path: FilePath) -> dict[str, tuple[Callable[..., Any], dict[str, A
     file.write_text(PROGRAM)
     table = tmp_path / "tool.tbl"
     table.write_text("T1 D6\n")
+    dump = tmp_path / "grbl.txt"
+    dump.write_text("$110=600\n$120=200\n")
     machine = Machine.load("mill")
     plan = feedplan.plan(file, machine)
     points = plan.setpoints()
@@ -120,6 +122,10 @@ def cases(tmp_path: FilePath) -> dict[str, tuple[Callable[..., Any], dict[str, A
                 "jerk": False,
                 "progress": None,
             },
+        ),
+        "import_machine": (
+            feedplan.import_machine,
+            {"file": dump, "limits": {"X.jerk": 5000.0}, "name": "mine"},
         ),
         "read_program": (
             feedplan.read_program,

@@ -60,7 +60,7 @@ def text_of(machine: Machine) -> str:
     rows |= {"chord_tolerance": machine.chord_tolerance, "home": list(machine.home)}
     if not machine.home:
         del rows["home"]
-    lines = [f"{key} = {_value(value)}" for key, value in rows.items()]
+    lines = [f"{key} = {toml_value(value)}" for key, value in rows.items()]
     lines += _table("[kinematics]", {"type": machine.kinematics, **machine.parameters})
     lines += _table("[offsets]", dict(machine.offsets)) if machine.offsets else []
     for axis in machine.axes:
@@ -71,22 +71,22 @@ def text_of(machine: Machine) -> str:
 
 
 def _table(head: str, rows: Mapping[str, Any]) -> list[str]:
-    return [head, *(f"{_key(key)} = {_value(value)}" for key, value in rows.items())]
+    return [head, *(f"{_key(key)} = {toml_value(value)}" for key, value in rows.items())]
 
 
 def _key(key: str) -> str:
     plain = key.isascii() and key.replace("_", "").replace("-", "").isalnum()
-    return key if plain else _value(key)
+    return key if plain else toml_value(key)
 
 
-def _value(value: Any) -> str:
+def toml_value(value: Any) -> str:
     """A value in TOML; JSON has the same texts, but for one control character."""
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, Mapping):
-        return f"{{{', '.join(f'{_key(key)} = {_value(entry)}' for key, entry in value.items())}}}"
+        return f"{{{', '.join(f'{_key(key)} = {toml_value(entry)}' for key, entry in value.items())}}}"
     if isinstance(value, (list, tuple)):
-        return f"[{', '.join(map(_value, value))}]"
+        return f"[{', '.join(map(toml_value, value))}]"
     return str(value).lower() if isinstance(value, bool) else repr(value)
 
 

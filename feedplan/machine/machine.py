@@ -264,12 +264,7 @@ class Machine:
             except (OSError, ValueError) as error:
                 raise MachineError(f"machine file {text} cannot be read: {error}") from None
             return parse(content, text)
-        if text not in bundled_machines():
-            known = ", ".join(bundled_machines())
-            raise MachineError(
-                f"there is no bundled machine {shown(text)}: use one of {known}, or the path of a .toml file"
-            )
-        return parse(resources.files(__package__).joinpath("models", f"{text}.toml").read_text("utf-8"), text)
+        return parse(bundled_text(text), text)
 
     @classmethod
     def of(cls, given: Machine | str | os.PathLike[str]) -> Machine:
@@ -312,6 +307,21 @@ def bundled_machines() -> tuple[str, ...]:
     """The names of the machines that come with feedplan."""
     models = resources.files(__package__).joinpath("models")
     return tuple(sorted(entry.name[:-5] for entry in models.iterdir() if entry.name.endswith(".toml")))
+
+
+def bundled_text(name: str) -> str:
+    """The machine file of a bundled machine; raises MachineError where there is none of that name."""
+    if name not in bundled_machines():
+        known = ", ".join(bundled_machines())
+        raise MachineError(
+            f"there is no bundled machine {shown(name)}: use one of {known}, or the path of a .toml file"
+        )
+    return resources.files(__package__).joinpath("models", f"{name}.toml").read_text("utf-8")
+
+
+def template() -> str:
+    """The text of a machine file with comments, to begin with."""
+    return resources.files(__package__).joinpath("template.toml").read_text("utf-8")
 
 
 def _axes(given: Any) -> tuple[Axis, ...]:

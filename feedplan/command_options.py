@@ -1,0 +1,85 @@
+"""Arguments and options that several commands take."""
+
+from __future__ import annotations
+
+import math
+import sys
+from typing import IO, TYPE_CHECKING, Any
+
+import click
+
+from feedplan.geometry.corners import PATHS
+
+if TYPE_CHECKING:
+    NumberType = click.ParamType[float]
+else:
+    NumberType = click.ParamType  # generic only in the newest click
+
+
+class Number(NumberType):
+    """A finite number greater than 0, or also 0."""
+
+    name = "number"
+
+    def __init__(self, or_zero: bool = False) -> None:
+        self._or_zero = or_zero
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        try:
+            number = float(value)
+        except ValueError:
+            self.fail(f"'{value}' is not a number", param, ctx)
+        if math.isfinite(number) and (number > 0 or (self._or_zero and number == 0)):
+            return number
+        self.fail(f"{value}: give a number {'≥ 0' if self._or_zero else '> 0'}", param, ctx)
+
+
+MACHINE = click.option(
+    "--machine",
+    "-m",
+    default="mill",
+    show_default=True,
+    metavar="NAME|FILE",
+    help="A bundled machine, a TOML file, or auto: the smallest bundled one that the program fits.",
+)
+TOLERANCE = click.option(
+    "--tolerance", type=Number(), metavar="MM", help="Allowed distance from the programmed path."
+)
+PATH = click.option(
+    "--path",
+    type=click.Choice(PATHS),
+    default="as-fitted",
+    show_default=True,
+    help="Smooth paths keep the size of arcs, or cut them up to the tolerance.",
+)
+ACCURACY = click.option(
+    "--accuracy", type=Number(), metavar="PART", help="Relative error of the time, of methods with a mesh."
+)
+TIME_LIMIT_HELP = "Time that a method with a mesh may take."
+WHOLE_LIMIT_HELP = (
+    "Time that a method with a mesh may take. With jerk-limited it is for the whole command: reading, "
+    "fitting, a first plan, the audit and the files are never left out, 0 ends after them; what is left "
+    "improves the plan and its bound."
+)
+JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+QUIET = click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
+PROGRAM = click.argument("program", callback=lambda context, parameter, given: _source(given))
+ZERO_OR_MORE = Number(or_zero=True)
+
+
+def _source(given: str) -> str | IO[bytes]:
+    """The file of that name, or standard input for `-`."""
+    if given != "-":
+        return given
+    if sys.stdin is None:
+        raise click.UsageError("standard input is closed: give the path of a program")
+    return sys.stdin.buffer
+
+
+def name_of(program: str | IO[bytes]) -> str:
+    return program if isinstance(program, str) else program.name
+
+
+def given_only(**options: Any) -> dict[str, Any]:
+    """The options that were given: which of them a method takes is for the method to say."""
+    return {name: value for name, value in options.items() if value is not None}

@@ -1,0 +1,61 @@
+"""Machines from files of controllers: LinuxCNC's INI, grbl's $$, Klipper's printer.cfg, ROS's joint limits.
+
+A format is a module with `CONTROLLER`, its name, `RECOGNISED`, a pattern of what only its files hold, and
+`read(path, files)`, which finds the numbers with their sources. What a file lacks is asked for, not guessed.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+
+from feedplan.arguments import file_path, shown
+from feedplan.errors import InputError, MachineError
+from feedplan.machine.checks import require_text
+from feedplan.machine.file import parse
+from feedplan.machine.importers import grbl, klipper, linuxcnc, ros
+from feedplan.machine.importers.description import FoundMachine
+from feedplan.machine.importers.text_files import TextFiles
+from feedplan.machine.machine import Machine
+
+FORMATS = (linuxcnc, klipper, grbl, ros)
+_REMEDY = "LinuxCNC's INI file, what grbl prints for $$, Klipper's printer.cfg or a joint_limits.yaml"
+
+
+def import_machine(
+    file: str | os.PathLike[str], limits: Mapping[str, float] | None = None, *, name: str | None = None
+) -> Machine:
+    """The machine of a controller's own file: LinuxCNC's INI, grbl's $$, Klipper's printer.cfg, ROS's
+    joint_limits.yaml.
+
+    `limits` are given in place of the file's, by axis and limit: `{"X.jerk": 50_000}`, also velocity and
+    acceleration, in mm, degrees (or the axis's unit) and seconds. `name` is the machine's, in place of the
+    file's. `Machine.to_toml` gives the text of a machine file.
+    Raises MachineError where the file cannot be read or used, and where it lacks a velocity or acceleration:
+    it names all that are missing.
+    """
+    found = find_machine(file, limits, name=name)
+    return parse(found.to_toml(), found.origin)
+
+
+def find_machine(
+    file: str | os.PathLike[str], limits: Mapping[str, float] | None = None, *, name: str | None = None
+) -> FoundMachine:
+    """What `import_machine` makes the machine of: its numbers with their sources. Raises as it does, but for
+    numbers that no machine can have."""
+    if not (limits is None or isinstance(limits, Mapping)):
+        raise MachineError(f"limits is {shown(limits)}: give a dictionary such as {{'X.jerk': 50000}}")
+    if name is not None:
+        require_text(name, "the name")
+    try:
+        path = file_path(file, "the file of a machine", _REMEDY)
+    except InputError as error:
+        raise MachineError(str(error)) from None
+    # Which format it is, the file itself must tell: it may be one that includes all others.
+    text = "\n".join(line for line, _ in TextFiles(path).lines(path))
+    form = next((each for each in FORMATS if each.RECOGNISED.search(text)), None)
+    if form is None:
+        raise MachineError(f"{path.name} is no file of a machine that is known: give {_REMEDY}")
+    files = TextFiles(path)
+    found: FoundMachine = form.read(path, files)
+    return found.with_name(name).with_missing_files(files.missing).with_limits(limits or {})

@@ -1,0 +1,107 @@
+"""Text files that include each other, read with bounds on their size, number and depth."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+from feedplan.arguments import shown
+from feedplan.errors import MachineError
+
+# Of all files together [bytes], and how many they are, each inside the one before it so many times.
+MAX_BYTES = 1 << 20
+MAX_FILES = 100
+MAX_DEPTH = 16
+# A line that is longer holds no setting.
+LONGEST_LINE = 4096
+
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?=[\s#;]|\Z)", re.ASCII)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A value as a file has it: `label` says what it is, `place` its file and line."""
+
+    label: str
+    text: str
+    place: str
+
+    @property
+    def number(self) -> float:
+        """The number that the text begins with; raises MachineError where there is none."""
+        match = _NUMBER.match(self.text)
+        if match is None:
+            raise MachineError(f"{self.place}: {self.label} is {shown(self.text)}: give a number")
+        return float(match[0])
+
+    @property
+    def source(self) -> str:
+        """`[AXIS_X] MAX_VELOCITY = 5, mill.ini line 12`."""
+        return f"{self.label} = {self.text}, {self.place}"
+
+
+@dataclass
+class TextFiles:
+    """The file that is imported, and those that it includes; `missing` are those that there are not."""
+
+    main: Path
+    missing: list[str] = field(default_factory=list)
+    _bytes: int = 0
+    _files: int = 0
+
+    def lines(self, path: Path) -> Iterator[tuple[str, str]]:
+        """The lines of a file, without their ends, each with its place for messages.
+
+        Raises MachineError where it cannot be read, is binary, or more than the bounds.
+        """
+        self._files += 1
+        if self._files > MAX_FILES:
+            raise MachineError(
+                f"{self.main} includes more than {MAX_FILES} files: give the one with the limits"
+            )
+        try:
+            if path.is_dir():
+                raise MachineError(f"{path} is a directory: give the file in it")
+            with path.open("rb") as stream:
+                content = stream.read(MAX_BYTES + 1 - self._bytes)
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise MachineError(f"{path} cannot be read: {reason}") from None
+        self._bytes += len(content)
+        if self._bytes > MAX_BYTES:
+            raise MachineError(f"{path} has more than {MAX_BYTES} bytes: give the part with the limits")
+        if b"\0" in content:
+            raise MachineError(f"{path} is binary: give a text in UTF-8")
+        text = content.decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n")
+        for number, line in enumerate(text.split("\n"), 1):
+            if len(line) <= LONGEST_LINE:
+                yield line, f"{path.name} line {number}"
+
+    def included(self, name: str, inside: tuple[Path, ...], place: str) -> list[Path]:
+        """The files that the last of `inside` includes by `name`, in order; `*` and `?` may stand in a name.
+
+        Raises MachineError where a file would include itself, or they are too deep. One that does not exist
+        is kept in `missing`.
+        """
+        if len(inside) >= MAX_DEPTH:
+            raise MachineError(f"{place}: files include each other more than {MAX_DEPTH} deep: give fewer")
+        path = Path(name)
+        try:
+            path = inside[-1].parent / path.expanduser()
+            pattern = path.name
+            if any(letter in pattern for letter in "*?["):
+                entries = sorted(path.parent.iterdir()) if path.parent.is_dir() else []
+                found = [entry for entry in entries if fnmatchcase(entry.name, pattern) and entry.is_file()]
+            else:
+                found = [path] if path.is_file() else []
+                self.missing += [] if found else [name]
+            known = [own.resolve() for own in inside]
+            again = next((entry for entry in found if entry.resolve() in known), None)
+        except (OSError, ValueError, RuntimeError) as error:  # no path, no such home
+            raise MachineError(f"{place}: {shown(name)} cannot be included: {error}") from None
+        if again is not None:
+            raise MachineError(f"{place}: {again.name} includes itself: take this line out")
+        return found
