@@ -38,6 +38,7 @@ from feedplan.machine_commands import machines
 from feedplan.program.read import Reading
 from feedplan.reading_options import machine_for, reading_options
 from feedplan.setpoints import INTERPOLATORS, MAX_SETPOINTS, Interpolator
+from feedplan.time_command import time
 
 DONE, BROKEN, BAD_INPUT, DEFECT, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 70, 130, 141
 _TRACEBACK = "FEEDPLAN_TRACEBACK"
@@ -382,3 +383,4 @@ def check(place: str, machine: str | None, resolution: float, jerk: bool, as_jso
 
 
 cli.add_command(machines)
+cli.add_command(time)

@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from feedplan.accuracy import estimate, shortfalls
-from feedplan.arguments import callback, one_of, refuse, whole
+from feedplan.arguments import callback, not_negative, number, one_of, refuse, whole
 from feedplan.audit import Audit, audit
 from feedplan.bound import lower_bound
 from feedplan.constraints.problem import Problem, build_problem, speed_square
-from feedplan.errors import SolverError
+from feedplan.errors import InputError, SolverError
 from feedplan.geometry.build import build_path
 from feedplan.geometry.corners import PATHS, Corners, FollowedPath
 from feedplan.geometry.path import Path
@@ -47,6 +47,7 @@ from feedplan.program.read import Reading, checked_reading, read_program
 from feedplan.program.source import Source
 from feedplan.progress import Listener, Progress, of_stage, part
 from feedplan.report.account import Account, account
+from feedplan.report.operations import OperationTime, operation_times
 from feedplan.setpoints import INTERPOLATORS, MAX_SETPOINTS, Interpolator, Setpoints, setpoints
 from feedplan.time_limit import TimeLimit
 from feedplan.trajectory import State, Trajectory
@@ -169,6 +170,16 @@ class Plan:
             jerk = limits_jerk(self.method)
             self._account.append(account(self.problem, self.profile, self.program, jerk, progress))
         return self._account[0]
+
+    def operations(self, tool_change: float = 0.0) -> tuple[OperationTime, ...]:
+        """The time of each tool and operation of the program; a tool change counts `tool_change` [s].
+
+        Raises InputError for a path, which has none, and for a time that is none.
+        """
+        if self.program is None:
+            raise InputError("a path has no operations: give a program")
+        seconds = number(tool_change, "the time of a tool change", "a time [s] from 0", not_negative, "s")
+        return operation_times(self.problem, self.profile, self.program, seconds)
 
     def at(self, t: ArrayLike) -> State:
         """Position, velocity, acceleration, jerk and source line at one time or at times (n,) [s]; exact.

@@ -204,6 +204,7 @@ def cases(tmp_path: FilePath) -> dict[str, tuple[Callable[..., Any], dict[str, A
         ),
         "Plan.setpoints": (plan.setpoints, {"period": 0.001, "interpolator": "newton", "progress": None}),
         "Plan.at": (plan.at, {"t": 0.5}),
+        "Plan.operations": (plan.operations, {"tool_change": 5.0}),
         "Plan.make_account": (plan.make_account, {"progress": None}),
         "Plan.audit": (replace(plan).audit, {"progress": None}),
         "Setpoints.chunks": (lambda size: list(points.chunks(size)), {"size": 1000}),

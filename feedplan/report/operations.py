@@ -1,0 +1,212 @@
+"""Where the time of a program goes: by tool and operation, in feed motion, rapids and dwells.
+
+An operation is what follows a comment that is alone in its line, as CAM systems name what they post; of
+several such lines one after the other the first names it. It goes on in subprograms without such comments.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.constraints.problem import Problem
+from feedplan.profile import SpeedProfile
+from feedplan.program.program import Program
+from feedplan.program.source import content_of
+
+# A block of lines that hold nothing but a comment; only the first of them counts.
+_COMMENTS = re.compile(
+    rb"^(?:[ \t]*(?:N\d+[ \t]*)?(?:\([^)\r\n]*\)|;[^\r\n]*)[ \t]*\r?\n)+", re.MULTILINE | re.IGNORECASE
+)
+_TITLE = re.compile(rb"(?:N\d+[ \t]*)?[(;][ \t;]*([^)\r\n]*)", re.IGNORECASE)
+# Comments that do something, and those that end an operation, name none.
+_NO_TITLE = re.compile(
+    rb"(?:MSG|DEBUG|PRINT|LOG\w*|PROBE\w*|ABORT)\s*,|(?:FINISH|END)\w*\s+(?:OF\s+)?OPERATION\b|\W*\Z",
+    re.IGNORECASE,
+)
+# Where a subprogram begins or ends.
+_SUBPROGRAM = re.compile(
+    rb"^[ \t]*(?:N\d+[ \t]*)?(?:[O:]\d+[ \t]*(?=[(;\r\n])|O(?:\d+|<[^>\r\n]*>)[ \t]*(?:END)?SUB\b)",
+    re.MULTILINE | re.IGNORECASE,
+)
+# What the time of an operation is made of.
+PARTS = ("feed", "rapid", "dwell", "change")
+_LONGEST = 48
+# Sums of dwells differ by this part of them, or less.
+_ROUNDING = 1e-9
+_TOOL_CHANGE = ord("M"), 6
+_TOOL = ord("T")
+_DWELL = ord("G"), 4
+
+
+@dataclass(frozen=True)
+class OperationTime:
+    """The time of one operation with one tool [s]: motion at a `feed`, `rapid` motion, `dwell`s, and tool
+    `change`s where their duration is told. `tool` is the number, None before the first; `name` is the
+    comment, empty without one, and `line` its line, 0 without one."""
+
+    tool: int | None
+    name: str
+    line: int
+    feed: float = 0.0
+    rapid: float = 0.0
+    dwell: float = 0.0
+    change: float = 0.0
+
+    @property
+    def time(self) -> float:
+        """All of it [s]."""
+        return self.feed + self.rapid + self.dwell + self.change
+
+    def to_json(self) -> dict[str, Any]:
+        """The numbers by name."""
+        return {**asdict(self), "time": self.time}
+
+
+def operation_times(
+    problem: Problem, profile: SpeedProfile, program: Program, tool_change: float = 0.0
+) -> tuple[OperationTime, ...]:
+    """The operations of a program in the order in which they begin; their times add up to the whole.
+
+    `tool_change` [s] is the duration of each tool change, which the axes know nothing of.
+    """
+    path, events = problem.path, program.events
+    changes = (events.letter == _TOOL_CHANGE[0]) & (events.number == _TOOL_CHANGE[1])
+    numbers = events.p
+    if not changes.any():
+        # On lathes T changes the tool.
+        changes, numbers = events.letter == _TOOL, events.number
+    of_move, of_event, lines, names = _operations(program)
+    _begin_with_changes(of_move, of_event, program, np.flatnonzero(changes))
+    # Tool and operation as one number.
+    before = np.searchsorted(events.move[changes], np.arange(len(program)), "right")
+    of_move += before * (len(lines) + 1)
+    of_event += np.cumsum(changes) * (len(lines) + 1)
+    dwells = (events.letter == _DWELL[0]) & (events.number == _DWELL[1]) & np.isfinite(events.p)
+    # What a dwell of its own line takes is no part of the operation before it.
+    pauses = np.concatenate(([program.start_dwell], program.dwell))
+    rest = pauses.copy()
+    np.subtract.at(rest, events.move[dwells], events.p[dwells])
+    rest[np.abs(rest) <= _ROUNDING * pauses] = 0.0
+    of_rest = np.concatenate((of_move[:1] if len(of_move) else of_event[:1], of_move))
+    duration = np.bincount(profile.piece.astype(np.int64), profile.duration, len(path))
+    rapid = ~np.isfinite(path.feed)
+    of_piece = of_move[path.move[:, 0]] if len(path) else np.empty(0, np.int64)
+    parts = (
+        ("feed", of_piece[~rapid], duration[~rapid]),
+        ("rapid", of_piece[rapid], duration[rapid]),
+        ("dwell", of_event[dwells], events.p[dwells]),
+        ("dwell", of_rest, rest),
+        ("change", of_event[changes], np.full(int(changes.sum()), tool_change)),
+    )
+    own = np.concatenate([of_part for _, of_part, _ in parts])
+    keys, place = np.unique(own, return_inverse=True)
+    spent = {name: np.zeros(len(keys)) for name in PARTS}
+    ends = np.cumsum([len(of_part) for _, of_part, _ in parts])
+    for (name, _, time), each in zip(parts, np.split(place, ends[:-1]), strict=True):
+        spent[name] += np.bincount(each, time, len(keys))
+    # When each begins: before so many moves.
+    begin = np.concatenate([np.arange(len(program)), events.move])
+    first = np.full(len(keys), len(program))
+    known = np.concatenate([of_move, of_event])
+    at = np.minimum(np.searchsorted(keys, known), len(keys) - 1)
+    np.minimum.at(first, at[keys[at] == known], begin[keys[at] == known])
+    tools = [None, *(int(number) if np.isfinite(number) else None for number in numbers[changes])]
+    rows: dict[tuple[int | None, int], OperationTime] = {}
+    for k in np.lexsort((keys, first)):
+        changed, title = divmod(int(keys[k]), len(lines) + 1)
+        tool, line = tools[changed], int(lines[title - 1]) if title else 0
+        row = OperationTime(
+            tool, names[title - 1] if title else "", line, *(float(spent[n][k]) for n in PARTS)
+        )
+        if row.time > 0.0:
+            rows[tool, line] = _sum(rows[tool, line], row) if (tool, line) in rows else row
+    return tuple(rows.values())
+
+
+def _begin_with_changes(
+    of_move: NDArray[np.int64], of_event: NDArray[np.int64], program: Program, changes: NDArray[np.int64]
+) -> None:
+    """Makes what follows a tool change the begin of the next operation with that tool, if it goes on from one
+    with the tool before; of none where no other comes."""
+    count, at = len(program), program.events.move
+    ends = np.flatnonzero((np.diff(of_move) != 0) | (np.diff(program.line) < 0)) + 1
+    for k, row in enumerate(changes):
+        first, earlier = at[row], at[changes[k - 1]] if k else 0
+        later = at[changes[k + 1]] if k + 1 < len(changes) else count
+        own = of_event[row]
+        if first == earlier or of_move[first - 1] != own:
+            continue
+        last = first
+        if first < count and of_move[first] == own:
+            place = np.searchsorted(ends, first, "right")
+            last = min(ends[place] if place < len(ends) else count, later)
+        name = of_move[last] if last < later else 0
+        of_move[first:last] = name
+        following = np.arange(row, len(at)) if k + 1 == len(changes) else np.arange(row, changes[k + 1])
+        of_event[following[(of_event[following] == own) & (at[following] <= last)]] = name
+
+
+def _sum(one: OperationTime, other: OperationTime) -> OperationTime:
+    return replace(one, **{name: getattr(one, name) + getattr(other, name) for name in PARTS})
+
+
+def by_tool(operations: Iterable[OperationTime]) -> tuple[OperationTime, ...]:
+    """The times of each tool, in the order in which they are used; the rows have no names."""
+    tools: dict[int | None, OperationTime] = {}
+    for own in operations:
+        tools[own.tool] = _sum(tools.get(own.tool, OperationTime(own.tool, "", 0)), own)
+    return tuple(tools.values())
+
+
+def _operations(
+    program: Program,
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], list[str]]:
+    """The operation of each move and of each event, by their numbers from 1 (0 for none); the lines of the
+    comments that name them, and their names."""
+    content = b"" if program.text is None else content_of(program.text, program.name).content
+    lines, names = _titles(content)
+    ends = _line_numbers(content, [match.start() for match in _SUBPROGRAM.finditer(content)])
+    # In the order in which they happen: an event after so many moves comes before the next one.
+    order = np.argsort(
+        np.concatenate([2 * np.arange(len(program)) + 1, 2 * program.events.move]), kind="stable"
+    )
+    line = np.concatenate([program.line, program.events.line])[order].astype(np.int64)
+    number = np.searchsorted(lines, line, "right")
+    subprogram = np.searchsorted(ends, line, "right")
+    # A comment of another subprogram says nothing: what is in force goes on.
+    named = np.append(0, np.searchsorted(ends, lines, "right"))[number] == subprogram
+    named[number == 0] = False
+    latest = np.maximum.accumulate(np.where(named, np.arange(len(order)), -1))
+    result = np.zeros(len(order), dtype=np.int64)
+    result[order] = np.where(latest >= 0, number[latest], 0)
+    return result[: len(program)], result[len(program) :], lines, names
+
+
+def _titles(content: bytes) -> tuple[NDArray[np.int64], list[str]]:
+    """The lines of the comments that name operations, and their texts."""
+    places: list[int] = []
+    names: list[str] = []
+    for block in _COMMENTS.finditer(content):
+        place = block.start()
+        for comment in block[0].splitlines(keepends=True):
+            title = _TITLE.match(comment.strip())
+            if title and not _NO_TITLE.match(title[1]):
+                text = title[1].decode("utf-8", "replace")
+                printable = "".join(letter if letter.isprintable() else " " for letter in text)
+                names.append(" ".join(printable.split())[:_LONGEST])
+                places.append(place)
+                break
+            place += len(comment)
+    return _line_numbers(content, places), names
+
+
+def _line_numbers(content: bytes, places: list[int]) -> NDArray[np.int64]:
+    """The lines, from 1, in which places in a text are."""
+    breaks = np.flatnonzero(np.frombuffer(content, np.uint8) == ord("\n"))
+    return np.asarray(np.searchsorted(breaks, places, "left") + 1, dtype=np.int64)

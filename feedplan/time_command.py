@@ -1,0 +1,135 @@
+"""`feedplan time`: machining time per tool and operation, by the machine's limits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import IO
+
+import click
+
+from feedplan import console, planners
+from feedplan.command_options import (
+    ACCURACY,
+    JSON,
+    MACHINE,
+    PATH,
+    PROGRAM,
+    TIME_LIMIT_HELP,
+    TOLERANCE,
+    ZERO_OR_MORE,
+    Number,
+    given_only,
+    name_of,
+)
+from feedplan.errors import InfeasibleError
+from feedplan.geometry.corners import FollowedPath
+from feedplan.program.read import Reading
+from feedplan.reading_options import machine_for, reading_options
+from feedplan.report.operations import PARTS, OperationTime, by_tool
+from feedplan.units import duration_text
+
+# Of more operations the table has the longest.
+_SHOWN = 60
+
+
+@click.command()
+@PROGRAM
+@MACHINE
+@reading_options
+@click.option("--method", type=click.Choice(planners.methods()), default="bang-bang", show_default=True)
+@ACCURACY
+@click.option("--time-limit", type=ZERO_OR_MORE, metavar="S", help=TIME_LIMIT_HELP)
+@TOLERANCE
+@PATH
+@click.option("--feed", type=Number(), metavar="MM/S", help="Feed in place of the programmed one.")
+@click.option("--feed-override", type=Number(), default=1.0, metavar="FACTOR", help="Factor on the feed.")
+@click.option(
+    "--tool-change",
+    type=ZERO_OR_MORE,
+    default=0.0,
+    show_default=True,
+    metavar="S",
+    help="Time of a tool change.",
+)
+@JSON
+def time(
+    program: str | IO[bytes],
+    machine: str,
+    method: planners.MethodName,
+    accuracy: float | None,
+    time_limit: float | None,
+    tolerance: float | None,
+    path: FollowedPath,
+    feed: float | None,
+    feed_override: float,
+    tool_change: float,
+    as_json: bool,
+    reading: Reading,
+) -> None:
+    """Machining time of PROGRAM per tool and operation, by the machine's limits.
+
+    Rapids and dwells count. An operation is what follows a comment that is alone in its line. PROGRAM is as
+    for plan. Exit code 1: a limit is broken, or no plan is feasible.
+    """
+    from feedplan.files import summary_text
+    from feedplan.planning import plan
+
+    with console.progress_bar(quiet=False) as progress, console.without_others():
+        known, source = machine_for(machine, program, reading, feed)
+        result = plan(
+            source,
+            known,
+            method=method,
+            tolerance=tolerance,
+            path=path,
+            feed=feed,
+            feed_override=feed_override,
+            reading=reading,
+            progress=progress,
+            **given_only(accuracy=accuracy, time_limit=time_limit),
+        )
+        audit = result.audit(progress)
+        operations = result.operations(tool_change)
+    tools = by_tool(operations)
+    whole = sum(own.time for own in tools)
+    for warning in result.warnings:
+        click.echo(f"warning: {warning}", err=True)
+    if as_json:
+        summary = {
+            "program": name_of(program),
+            "machine": known.name,
+            "method": method,
+            "time": whole,
+            "audit": audit.ok,
+            "tools": [own.to_json() for own in tools],
+            "operations": [own.to_json() for own in operations],
+        }
+        click.echo(summary_text(summary), nl=False)
+    else:
+        console.print_table(*_table(tools, operations, whole))
+    if not audit.ok:
+        raise InfeasibleError(console.failure_sentence(audit))
+
+
+def _table(
+    tools: Sequence[OperationTime], operations: Sequence[OperationTime], whole: float
+) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Header and rows: each tool, its operations below it, and the sum. The longest operations are shown."""
+    parts = [part for part in PARTS if part != "change" or any(own.change for own in tools)]
+
+    def row(name: str, rows: Sequence[OperationTime], line: int = 0) -> tuple[str, ...]:
+        times = [sum(getattr(own, part) for own in rows) for part in (*parts, "time")]
+        share = f"{100 * times[-1] / whole:.1f} %" if whole else "-"
+        return (name, str(line or "-"), *(duration_text(time) if time else "-" for time in times), share)
+
+    longest = set(sorted(operations, key=lambda own: -own.time)[:_SHOWN])
+    rows = []
+    for tool in tools:
+        rows.append(row("no tool" if tool.tool is None else f"T{tool.tool}", [tool]))
+        own = [each for each in operations if each.tool == tool.tool]
+        if any(each.name for each in own):
+            rows += [row(f"  {each.name or 'begin'}", [each], each.line) for each in own if each in longest]
+    rest = [each for each in operations if each not in longest]
+    rows += [row(f"{len(rest)} shorter operations", rest)] if rest else []
+    rows.append(row("whole program", tools))
+    return ("operation", "line", *parts, "time", "part"), rows
