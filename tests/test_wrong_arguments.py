@@ -208,6 +208,7 @@ def cases(tmp_path: FilePath) -> dict[str, tuple[Callable[..., Any], dict[str, A
         "Plan.make_account": (plan.make_account, {"progress": None}),
         "Plan.audit": (replace(plan).audit, {"progress": None}),
         "Setpoints.chunks": (lambda size: list(points.chunks(size)), {"size": 1000}),
+        "Path.evaluate": (plan.path.evaluate, {"s": [1.0], "order": 1}),
         "Trajectory.at": (plan.trajectory.at, {"t": [0.1, 0.2]}),
         "Trajectory.distance": (plan.trajectory.distance, {"t": 0.5}),
         "Trajectory.time": (plan.trajectory.time, {"s": 1.0}),
