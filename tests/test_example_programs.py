@@ -38,8 +38,9 @@ def test_every_program_is_here() -> None:
     assert found == set(PROGRAMS)
 
 
-@pytest.mark.parametrize("name", PROGRAMS)
-@pytest.mark.parametrize("method", ["bang-bang", "jerk-limited"])
+@pytest.mark.parametrize(
+    ("name", "method"), [*((name, "bang-bang") for name in PROGRAMS), ("bar.ngc", "jerk-limited")]
+)
 def test_a_program_is_planned_within_all_limits(name: str, method: Any) -> None:
     options = {"time_limit": 0.0} if method == "jerk-limited" else {}
     plan = feedplan.plan(EXAMPLES / name, PROGRAMS[name][0], method, **options)
