@@ -39,6 +39,8 @@ Array = NDArray[np.float64]
 SHARE = 1e-9
 # How far positions may be off [mm, deg]: far below what any scale reads.
 POSITION = 1e-9
+# Joints that differ by no more than this are in the same place [mm, deg].
+MEETING = 1e-6
 # What rounding leaves of q'', as a part of itself.
 ROUNDING = 1e-13
 # Chebyshev points of q'': the joints' pieces then have the greatest degree that a curve may have.
@@ -101,6 +103,8 @@ def joint_motion(path: Path, machine: Machine, feed: Array) -> JointMotion:
         words += group
         pieces = np.arange(path.runs[first], path.runs[len(words)])
         stretch = _posed(_Task(path, machine, own, pieces, feed, start))
+        if start is not None:
+            _require_meeting(machine, int(path.line[pieces[0]]), start, stretch)
         words[first:] = [stretch.words] * (len(words) - first)
         stretches.append(stretch)
         start = stretch.origin[-1] + stretch.joints.control_points[-1]
@@ -116,6 +120,20 @@ def joint_motion(path: Path, machine: Machine, feed: Array) -> JointMotion:
     origin = np.concatenate([stretch.origin for stretch in stretches])
     cut = Cut(path.curve, piece, np.concatenate([stretch.part for stretch in stretches]))
     return JointMotion(path.cut(tool, piece), cut, joints, origin, tip_speed, tuple(words))
+
+
+def _require_meeting(machine: Machine, line: int, start: Array, stretch: _Stretch) -> None:
+    """The joints begin where those before end: new words for a position move none of them."""
+    begin = stretch.origin[0] + stretch.joints.control_points[0]
+    apart = np.abs(begin - start)
+    k = int(apart.argmax())
+    if apart[k] > MEETING:
+        axis = machine.axes[k]
+        raise InputError(
+            f"line {line}: {axis.name} is to begin at {begin[k]:.6g} {axis.unit}, and the path before ends "
+            f"at {start[k]:.6g}: its rounded corners pass a singular position on another side than the blocks "
+            "do; lower the tolerance there, or stop between these blocks (G61)"
+        )
 
 
 @dataclass(frozen=True)

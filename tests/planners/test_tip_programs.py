@@ -25,6 +25,7 @@ REASONS = (
     r"the tool is at a tool axis parallel to",
     r"the tool passes so near a singular position",
     r"the tool turns over by 180 degrees",
+    r"rounded corners pass a singular position on another side than the blocks do",
     r"goes to machine positions and G43\.[45] is in force: cancel it by G49 before",
 )
 
@@ -132,6 +133,18 @@ def test_random_sequences_keep_every_limit(name: str, method: str) -> None:
 def test_programs_that_broke_a_limit_of_jerk(name: str, seed: int) -> None:
     machine = Machine.load(name)
     assert broken(random_tip_program(seed, machine), machine, "jerk-limited") == []
+
+
+def test_a_corner_rounded_past_the_pole_on_the_other_side_is_refused() -> None:
+    program = (
+        "G21 G90 G64 P0.05 F15384\nG0 A-39.889 C179\nG0 C-149\nG43.5 H1\nG0 I-0.076517 J0.171635 K0.982185\n"
+        "G0 I0.306540 J0.409663 K0.859191\nG49\nG53 G0 Z495.564\nM30\n"
+    )
+    machine = Machine.load("trunnion-ac")
+    moves = read_gcode(program, machine, name="part.ngc")
+    with pytest.raises(InputError, match="line 8: C is to begin at -36"):
+        plan(moves, machine, method="jerk-limited")
+    assert plan(moves, machine, tolerance=0.001).audit().ok
 
 
 @pytest.mark.parametrize("method", ["junction-deviation", "tangential", "arc-transition"])
