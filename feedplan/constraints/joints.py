@@ -131,8 +131,8 @@ def _require_meeting(machine: Machine, line: int, start: Array, stretch: _Stretc
         axis = machine.axes[k]
         raise InputError(
             f"line {line}: {axis.name} is to begin at {begin[k]:.6g} {axis.unit}, and the path before ends "
-            f"at {start[k]:.6g}: its rounded corners pass a singular position on another side than the blocks "
-            "do; lower the tolerance there, or stop between these blocks (G61)"
+            f"at {start[k]:.6g}: its rounded corners pass a singular position on another side than the "
+            "blocks do; lower the tolerance there, or stop between these blocks (G61)"
         )
 
 
