@@ -123,7 +123,7 @@ def feed_between(
     problem: Problem, piece: NDArray[np.int64], u0: NDArray[np.float64], u1: NDArray[np.float64]
 ) -> NDArray[np.float64]: ...
 def look_ahead(
-    speed: NDArray[np.float64], gain: NDArray[np.float64], hold: NDArray[np.float64]
+    speed: NDArray[np.float64], up: NDArray[np.float64], down: NDArray[np.float64]
 ) -> NDArray[np.float64]: ...
 
 # t, position, velocity, acceleration, jerk, line, piece, u, rounds of the interpolator, length error.

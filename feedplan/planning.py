@@ -34,10 +34,8 @@ from feedplan.planners import (
     given_options,
     grid_error,
     limits_jerk,
-    methods,
     options_of,
     planner,
-    takes_directions,
     tells_early,
     tells_progress,
 )
@@ -365,12 +363,6 @@ def plan(
             start_speed=start_speed,
             end_speed=end_speed,
         )
-        if problem.sided_axis is not None and not takes_directions(method):
-            others = ", ".join(name for name in methods() if takes_directions(name))
-            raise SolverError(
-                f"the limits of axis {problem.sided_axis} differ by direction, which {method} knows "
-                f"nothing of: give one number for both directions, or use one of {others}"
-            )
         report("plan", 0.0)
         if limit is not None:
             solve = partial(

@@ -162,7 +162,7 @@ class _Auditor:
     def negligible(self, time: Array) -> Array:
         """Jumps of velocity that mean nothing (n, joints): what the pass mark adds in that time."""
         longest = np.maximum(time, self.problem.period)
-        return np.asarray(EXCESS * self.problem.max_acceleration * longest[:, None])
+        return np.asarray(EXCESS * self.problem.limits("acceleration").min(axis=0) * longest[:, None])
 
     def arcs(self, arcs: Numbers) -> None:
         """Offers what some arcs show."""
@@ -177,21 +177,22 @@ class _Auditor:
         middle = 0.5 * (clock[:, 1:] + clock[:, :-1])
         velocity, error = state.velocity, state.velocity_error
         with np.errstate(all="ignore"):
-            change = np.abs(np.diff(velocity, axis=1)) - error[:, 1:] - error[:, :-1]
-            acceleration = change / state.time[..., None]
+            change, moved = np.diff(velocity, axis=1), np.diff(state.way, axis=1)
+            acceleration = (np.abs(change) - error[:, 1:] - error[:, :-1]) / state.time[..., None]
             acceleration -= np.abs(acceleration) * state.time_error[..., None]
-            mean = np.abs(np.diff(state.way, axis=1)) / state.time[..., None]
+            mean = np.abs(moved) / state.time[..., None]
             unknown = 2.0 * ROUNDINGS * EPS * np.abs(state.position).max(axis=(1, 2))[:, None, None]
             mean -= unknown / state.time[..., None] + mean * state.time_error[..., None]
         # Places that rounding has put together have nothing between them.
         together = np.diff(state.u, axis=1) == 0.0
         acceleration[together] = mean[together] = 0.0
+        limits = problem.limit("velocity", velocity), problem.limit("velocity", moved)
+        strength = problem.limit("acceleration", change)
         for k in range(self.names):
-            limit = problem.max_velocity[k]
-            worst.offer("velocity", np.abs(velocity[:, :, k]) - error[:, :, k], limit, clock, line, k)
-            worst.offer("velocity", mean[:, :, k], limit, middle, line, k)
-            limit = problem.max_acceleration[k]
-            worst.offer("acceleration", acceleration[:, :, k], limit, middle, line, k)
+            size = np.abs(velocity[:, :, k]) - error[:, :, k]
+            worst.offer("velocity", size, limits[0][:, :, k], clock, line, k)
+            worst.offer("velocity", mean[:, :, k], limits[1][:, :, k], middle, line, k)
+            worst.offer("acceleration", acceleration[:, :, k], strength[:, :, k], middle, line, k)
         self._tip(state, piece, clock, line)
         self._durations(state, line[:, 0])
         self._ends(state, piece, line[:, 0])
@@ -292,7 +293,7 @@ class _Auditor:
         with np.errstate(all="ignore"):
             shares = self.negligible(duration) / np.abs(slope) * tip[:, None]
         least = np.min(np.where(np.isfinite(shares), shares, np.inf), axis=1)
-        period = EXCESS * float(self.problem.max_acceleration.min()) * self.problem.period
+        period = EXCESS * float(self.problem.limits("acceleration").min()) * self.problem.period
         return np.asarray(np.where(np.isfinite(least), np.maximum(least, period), period))
 
     def _run_ends(self, arcs: Numbers, speeds: list[Array], slack: Array, line: NDArray[np.int32]) -> None:

@@ -41,6 +41,9 @@ class JointSetpoints:
     def __init__(self, problem: Problem, profile: SpeedProfile, jump: Array, period: float) -> None:
         self.problem, self.profile, self.jump, self.period = problem, profile, jump, period
         self.path = JointPath(problem)
+        # What accelerations are at most in one direction, and in both (joints,).
+        self.strongest = problem.limits("acceleration").max(axis=0)
+        self.both_ways = problem.limits("acceleration").min(axis=0)
         self.worst = Worst()
         self.starts = arc_starts(problem, profile)
         runs = problem.path.runs
@@ -167,7 +170,7 @@ class JointSetpoints:
             wait -= np.nan_to_num(state.time[:, 0] * state.time_error[:, 0])
             wait -= EPS * np.abs(rows.t) * (arc + ROUNDINGS)
             wait = np.maximum(wait, 0.0)
-            acceleration = float(np.linalg.norm(problem.max_acceleration))
+            acceleration = float(np.linalg.norm(self.strongest))
             late = wait * (np.linalg.norm(velocity, axis=1) + 0.5 * wait * acceleration)
         tip = self.path.tip(piece, u)[0]
         before = (rows.t[0], rows.position[0], piece[0], u[0], tip[0]) if self.last is None else self.last
@@ -228,11 +231,11 @@ class JointSetpoints:
         at_joint = np.minimum(u, rest) <= PLACE
         away = np.maximum(off, 0.0) + late + ROUNDINGS * EPS * np.abs(rows.position).max(axis=1)
         good = (off <= PLACE) & np.isfinite(velocity).all(axis=1)
-        for k, most in enumerate(problem.max_acceleration):
+        for k, (most, both) in enumerate(zip(self.strongest, self.both_ways, strict=True)):
             # From rest, a place known to `away` is passed at a speed known to this.
             unknown = np.sqrt(2.0 * most * away) + error[:, k]
             value = np.where(good, np.abs(rows.velocity[:, k] - velocity[:, k]) - unknown, 0.0)
-            limit = VELOCITY_SHARE * most * self.period + np.where(at_joint, self.jump[k], 0.0)
+            limit = VELOCITY_SHARE * both * self.period + np.where(at_joint, self.jump[k], 0.0)
             self.worst.offer("recorded_velocity", value, limit, rows.t, problem.path.line[piece], k)
 
     def _steps(self, t: Array, before: Row, piece: Numbers, u: Array, tip: Array, off: Array) -> None:

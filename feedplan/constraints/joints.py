@@ -344,8 +344,8 @@ class _Allowed:
         weights = self.tips.weights_by_piece
         own = None if weights is None else weights[piece]
         control, width = self.tips.by_piece[piece], self.tips.width[piece]
-        limit = np.array([size_of(axis.max_velocity) for axis in self.task.machine.axes])
-        greatest, bend = np.zeros(len(piece)), np.zeros((len(piece), len(limit)))
+        slowest, fastest = np.array([axis.velocity_range for axis in self.task.machine.axes]).T
+        greatest, bend = np.zeros(len(piece)), np.zeros((len(piece), len(fastest)))
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             for t in np.linspace(0.0, 1.0, PLACES):
                 fraction = part[:, 0] + t * (part[:, 1] - part[:, 0])
@@ -353,6 +353,7 @@ class _Allowed:
                 bend = np.fmax(bend, np.abs(second))
                 tangent = self.linear.evaluate(piece, fraction * width, 1)[1]
                 along = self.task.feed[self.task.pieces[piece]] ** 2 / (tangent**2).sum(axis=1)
+                limit = np.where(slope < 0.0, -slowest, fastest)
                 at_velocity = (limit / np.abs(slope)).min(axis=1) ** 2
                 here = np.minimum(at_velocity, np.where(self.moves[piece], along, np.inf))
                 greatest = np.fmax(greatest, np.where(np.isfinite(here), here, 0.0))

@@ -13,7 +13,6 @@ from feedplan.constraints.feed import FeedRequest, feed_limit, feed_share
 from feedplan.constraints.junction import junction_limit
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.hodograph import speed_squares
-from feedplan.errors import MachineError
 from feedplan.geometry.corners import Corners
 from feedplan.geometry.feed_groups import feed_groups
 from feedplan.geometry.path import Path
@@ -24,6 +23,7 @@ from feedplan.units import shared_unit
 if TYPE_CHECKING:
     from feedplan.machine.words import AxisWords
 
+Limited = Literal["velocity", "acceleration"]
 _BY_AXIS = ("max_velocity", "max_acceleration", "max_jerk", "least_velocity", "least_acceleration")
 # No tool is as fast [mm/s]: what a rapid has where joints set its speed.
 NO_FEED = 1e9
@@ -123,19 +123,32 @@ class Problem:
         """The least acceleration of each axis (axes,) [mm/s²]."""
         return self.least_acceleration if len(self.least_acceleration) else -self.max_acceleration
 
-    def use(
-        self, name: Literal["velocity", "acceleration"], values: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def limits(self, name: Limited) -> NDArray[np.float64]:
+        """The sizes of the limits upward and downward (2, axes)."""
+        return np.stack([getattr(self, f"max_{name}"), -getattr(self, f"min_{name}")])
+
+    def limit(self, name: Limited, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The sizes of the limits of values (…, axes), each that of its direction."""
+        up, down = self.limits(name)
+        return np.asarray(np.where(values < 0.0, down, up))
+
+    def use(self, name: Limited, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """The part of their limits that values (…, axes) use, each that of its direction."""
         least, most = getattr(self, f"min_{name}"), getattr(self, f"max_{name}")
         return np.asarray(values / np.where(values < 0.0, least, most))
 
     @property
-    def sided_axis(self) -> str | None:
-        """The first axis with limits that differ by direction."""
-        pairs = ((self.min_velocity, self.max_velocity), (self.min_acceleration, self.max_acceleration))
-        sided = np.logical_or.reduce([least != -most for least, most in pairs])
-        return self.axes[int(sided.argmax())] if sided.any() else None
+    def even(self) -> Problem:
+        """The problem with the lesser limits of both directions; itself where none differs by direction."""
+        if not len(self.least_velocity) and not len(self.least_acceleration):
+            return self
+        return replace(
+            self,
+            max_velocity=self.limits("velocity").min(axis=0),
+            max_acceleration=self.limits("acceleration").min(axis=0),
+            least_velocity=np.zeros(0),
+            least_acceleration=np.zeros(0),
+        )
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -322,19 +335,15 @@ def _joint_problem(path: Path, machine: Machine, request: FeedRequest, ends: tup
     """The problem where the joints move in another way than the path's axes; corners are stops."""
     from feedplan.constraints.joints import joint_motion, way_scale
 
-    for axis in machine.axes:
-        if isinstance(axis.max_velocity, tuple) or isinstance(axis.max_acceleration, tuple):
-            raise MachineError(
-                f"the limits of axis {axis.name} of machine {machine.name} differ by direction, and its "
-                "joints are not the axes of the path: give one number for both directions"
-            )
+    min_velocity, max_velocity = np.array([axis.velocity_range for axis in machine.axes]).T
+    min_acceleration, max_acceleration = np.array([axis.acceleration_range for axis in machine.axes]).T
     limit = feed_limit(path, NO_FEED, request)
     motion = joint_motion(path, machine, limit)
     path = motion.path
     return Problem(
         path=path,
-        max_velocity=np.array([axis.max_velocity for axis in machine.axes]),
-        max_acceleration=np.array([axis.max_acceleration for axis in machine.axes]),
+        max_velocity=max_velocity,
+        max_acceleration=max_acceleration,
         max_jerk=np.array([axis.max_jerk for axis in machine.axes]),
         feed=feed_limit(path, NO_FEED, request),
         request=request,
@@ -345,6 +354,8 @@ def _joint_problem(path: Path, machine: Machine, request: FeedRequest, ends: tup
         end_speed=ends[1],
         joint_axes=machine.axis_names,
         joint_units=tuple(axis.unit for axis in machine.axes),
+        least_velocity=min_velocity,
+        least_acceleration=min_acceleration,
         joints=motion.joints,
         joint_origin=motion.origin,
         tip_speed=motion.tip_speed,

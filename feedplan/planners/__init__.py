@@ -113,11 +113,6 @@ def corners(method: str) -> Corners:
     return choice
 
 
-def takes_directions(method: str) -> bool:
-    """Whether a method plans under limits that differ by direction; raises as `planner`."""
-    return getattr(_module(method), "DIRECTIONS", False)
-
-
 def limits_jerk(method: str | None) -> bool:
     """Whether a method claims to keep the axes' jerk limits, which are judged then; an unknown one: no."""
     return method in methods() and getattr(_module(str(method)), "LIMITS_JERK", False)

@@ -1,9 +1,10 @@
 """Trapezoids with look-ahead over whole runs: what the methods of controllers share.
 
-A method says how fast corners are passed and which accelerations it allows; speed rises and falls at one
-tangential acceleration on each segment (`_segments`). On a line that is the greatest of its direction,
-min over the axes of A_k/|t_k|, and the profile is exact. On a part of a curved piece v² is linear in the
-parameter, with the greatest slope that keeps the tangential acceleration all over the part.
+A method says how fast corners are passed and which accelerations it allows; speed rises at one tangential
+acceleration on each segment (`_segments`) and falls at one. On a line that is the greatest of its direction,
+min over the axes of A_k/|t_k|, with the limit A_k of the way that axis k is pulled, and the profile is exact.
+On a part of a curved piece v² is linear in the parameter, with the greatest slope that keeps the tangential
+acceleration all over the part.
 """
 
 from __future__ import annotations
@@ -27,9 +28,9 @@ ROUNDING = 1e-12
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(6)
 
-# What happens between two of the six places of a segment.
+# What happens between two of the six places of a segment, and whether it slows down there.
 _CONSTANT = np.array([True, False, True, False, True])
-_SIGN = np.array([0.0, 1.0, 0.0, -1.0, 0.0])
+_SLOWS = np.array([0, 0, 0, 1, 0])
 
 
 def look_ahead(
@@ -46,8 +47,10 @@ def look_ahead(
     at_end, held = _speed_at_ends(problem, parts, corner_speed, hold)
     room = np.stack([held[:-1], held[1:]], axis=1)
     acceleration = 0.5 * parts.slope / parts.rate
-    holds = np.where(room > 0.0, acceleration[:, None] * room, 0.0)
-    speed = native_look_ahead(at_end, parts.slope * (parts.u1 - parts.u0), np.ascontiguousarray(holds))
+    holds = np.where(room > 0.0, acceleration[..., None] * room, 0.0)
+    gain = parts.slope * (parts.u1 - parts.u0)
+    changes = np.ascontiguousarray(np.concatenate([gain[..., None], holds], axis=2))
+    speed = native_look_ahead(at_end, changes[0], changes[1])
     _check_ends(problem, speed)
     return _profile(problem, parts, speed, room)
 
@@ -102,17 +105,19 @@ def _profile(problem: Problem, parts: Segments, speed: Array, room: Array) -> Sp
     still = np.where(room > 0.0, room * np.stack([speed[:-1], speed[1:]], axis=1) / parts.rate[:, None], 0.0)
     left = np.maximum(whole - still.sum(axis=1), 0.0)
     least = np.maximum(start_sq, end_sq)
-    meet = 0.5 * (start_sq + end_sq + parts.slope * left)
+    faster, slower = parts.slope
+    share = np.divide(slower, faster + slower, out=np.full(len(parts), 0.5), where=faster + slower > 0.0)
+    meet = share * start_sq + (1.0 - share) * end_sq + share * faster * left
     triangle = meet < parts.speed**2
     peak_sq = np.maximum(np.minimum(meet, parts.speed**2), least)
 
     # Held, speeding up, cruising, slowing down, held.
-    rise, fall = (peak_sq - start_sq) / parts.slope, (peak_sq - end_sq) / parts.slope
+    rise, fall = (peak_sq - start_sq) / faster, (peak_sq - end_sq) / slower
     top, end = still[:, 0] + rise, whole - still[:, 1]
     down = np.where(triangle, top, end - fall)
     place = np.stack([np.zeros(len(parts)), still[:, 0], top, down, end, whole], axis=1)
     place = np.maximum.accumulate(np.clip(place, 0.0, whole[:, None]), axis=1)
-    digits = parts.u1 + (start_sq + end_sq) / parts.slope
+    digits = parts.u1 + (start_sq + end_sq) / np.minimum(faster, slower)
     none = ROUNDINGS * np.finfo(float).eps * digits
     for i in range(1, 5):
         place[:, i] = np.where(place[:, i] - place[:, i - 1] <= none, place[:, i - 1], place[:, i])
@@ -149,11 +154,11 @@ def _profile(problem: Problem, parts: Segments, speed: Array, room: Array) -> Sp
     return SpeedProfile(
         piece=piece.astype(np.uint32),
         kind=np.where(constant, even, ramp_kind).astype(np.uint8),
-        axis=np.where(constant, NO_AXIS, parts.axis[segment]).astype(np.uint8),
+        axis=np.where(constant, NO_AXIS, parts.axis[_SLOWS[phase], segment]).astype(np.uint8),
         value=np.where(
             constant,
             np.where(even == ArcKind.FEED, counted * from_sq, 0.0),
-            _SIGN[phase] * parts.value[segment],
+            parts.value[_SLOWS[phase], segment],
         ),
         u0=u0,
         u1=u1,
@@ -187,13 +192,13 @@ def _weighted_length(
     return np.asarray(total * (u1 - u0))
 
 
-def shared_acceleration(tangent: Array, normal: Array, limit: Array) -> tuple[Array, Array]:
+def shared_acceleration(tangent: Array, normal: Array, limits: Array) -> tuple[Array, Array]:
     """Half along the path, √3/2 across it, of what every direction in the plane of both allows.
 
     No sum of the two exceeds an axis's limit. The split is that of LinuxCNC's blend arcs (`blendmath.h`: a
     tangential ratio of 0.5, the normal one its complement in the circle); the whole is min over the axes of
-    A_k/√(t_k² + n_k²).
+    A_k/√(t_k² + n_k²). Among all directions are an axis's both ones: A_k is the lesser of its two limits.
     """
     with np.errstate(divide="ignore"):
-        whole = (limit / np.hypot(tangent, normal)).min(axis=1)
-    return 0.5 * whole, 0.5 * math.sqrt(3.0) * whole
+        whole = (limits.min(axis=0) / np.hypot(tangent, normal)).min(axis=1)
+    return np.stack([0.5 * whole, 0.5 * whole]), 0.5 * math.sqrt(3.0) * whole

@@ -1,18 +1,37 @@
-"""Several profiles of one problem: of each run the fastest."""
+"""Several profiles of one path: of each run the fastest."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.constraints.problem import Problem
+from feedplan.errors import InfeasibleError
 from feedplan.profile import SpeedProfile
+from feedplan.progress import Listener, part
 
 _OF_ARCS = ("piece", "kind", "axis", "value", "u0", "u1", "p0", "p1", "duration", "a0", "a1")
 _OF_PIECES = ("slowed", "kinked")
+
+
+def within_both(
+    problem: Problem, plan: Callable[[Problem, Listener | None], SpeedProfile], progress: Listener | None
+) -> SpeedProfile:
+    """The profile of a plan; where limits differ by direction also of one within the lesser of both, of each
+    run the faster: what a heuristic makes of wider limits may be slower."""
+    if problem.even is problem:
+        return plan(problem, progress)
+    profile = plan(problem, part(progress, 0.0, 0.5))
+    try:
+        even = plan(problem.even, part(progress, 0.5, 1.0))
+    except InfeasibleError:
+        # Only the wider limits let it begin or end at its speed.
+        return profile
+    return fastest_runs([profile, even])
 
 
 def fastest_runs(profiles: Sequence[SpeedProfile]) -> SpeedProfile:

@@ -1,9 +1,11 @@
-"""Paths in segments as controllers see them: one greatest speed and one tangential acceleration each."""
+"""Paths in segments as controllers see them: one greatest speed each, and what it can speed up and slow down
+by."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +18,9 @@ from feedplan.profile import NO_AXIS
 
 Array = NDArray[np.float64]
 
-# From unit tangents and unit normals (m, axes; a normal is 0 where the path is straight) and the limits
-# of the axes [mm/s²]: the greatest accelerations along and across the path (m,) [mm/s²].
+# From unit tangents and unit normals (m, axes; a normal is 0 where the path is straight) and the limits of
+# the axes (2, axes) [mm/s²], upward and downward as sizes: the greatest accelerations along the path, of
+# speeding up and of slowing down (2, m), and across it (m,) [mm/s²].
 Rule = Callable[[Array, Array, Array], tuple[Array, Array]]
 
 # A curved piece is cut into parts on which it turns, and ln |C'| changes, by about this at most.
@@ -45,9 +48,9 @@ class Segments:
     """Lines, and parts of curved pieces, in the order of the path.
 
     `piece`, `u0`, `u1` (m,) say which; `rate` (m,) is |C'|, constant on lines, NaN on curves. `speed`
-    (m,) [mm/s] is the greatest; `slope` (m,) the greatest change of v² by u [mm/s²·|C'|]. On lines
-    `axis` is the one whose acceleration limit that is, `value` [mm/s²] its acceleration when the path
-    speeds up; NO_AXIS and 0 on curves.
+    (m,) [mm/s] is the greatest; `slope` (2, m) the greatest change of v² by u [mm/s²·|C'|] where the path
+    speeds up and where it slows down. On lines `axis` (2, m) is the one whose acceleration limit that is,
+    `value` (2, m) [mm/s²] its acceleration then; NO_AXIS and 0 on curves.
     """
 
     piece: NDArray[np.int64]
@@ -80,9 +83,10 @@ def segments(problem: Problem, rule: Rule) -> Segments:
     parts = [_lines(problem, lines)]
     if len(curves):
         parts.append(_curves(problem, curves, rule))
-    columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in parts[0].__dict__}
+    names = parts[0].__dict__
+    columns = {name: np.concatenate([getattr(part, name) for part in parts], axis=-1) for name in names}
     order = np.lexsort((columns["u0"], columns["piece"]))
-    return Segments(**{name: column[order] for name, column in columns.items()})
+    return Segments(**{name: column[..., order] for name, column in columns.items()})
 
 
 def is_line(curve: CompositeCurve) -> NDArray[np.bool_]:
@@ -105,9 +109,11 @@ def _lines(problem: Problem, piece: NDArray[np.int64]) -> Segments:
     length = np.linalg.norm(way, axis=1)
     _refuse(problem, piece[length == 0.0], "the piece has no length: leave it out")
     tangent = way / length[:, None]
-    by_axis = _over(problem.max_acceleration, np.abs(tangent))
-    axis = by_axis.argmin(axis=1)
-    rows = np.arange(len(piece))
+    # Speeding up and slowing down.
+    change = np.stack([tangent, -tangent])
+    by_axis = _over(problem.limit("acceleration", change), np.abs(change))
+    axis = by_axis.argmin(axis=2)[..., None]
+    value = np.where(change < 0.0, problem.min_acceleration, problem.max_acceleration)
     rate = length / curve.width[piece]
     return Segments(
         piece=piece,
@@ -115,9 +121,9 @@ def _lines(problem: Problem, piece: NDArray[np.int64]) -> Segments:
         u1=curve.width[piece],
         rate=rate,
         speed=_speed(problem, piece, tangent),
-        slope=2.0 * by_axis[rows, axis] * rate,
-        axis=axis.astype(np.uint8),
-        value=np.copysign(problem.max_acceleration[axis], tangent[rows, axis]),
+        slope=2.0 * np.take_along_axis(by_axis, axis, 2)[..., 0] * rate,
+        axis=axis[..., 0].astype(np.uint8),
+        value=np.take_along_axis(value, axis, 2)[..., 0],
     )
 
 
@@ -136,13 +142,13 @@ def _curves(problem: Problem, pieces: NDArray[np.int64], rule: Rule) -> Segments
     bend = second - (second * tangent).sum(axis=1)[:, None] * tangent
     size = np.linalg.norm(bend, axis=1)
     curvature = size / rate**2
-    along, across = rule(tangent, _over(bend, size[:, None], 0.0), problem.max_acceleration)
+    along, across = rule(tangent, _over(bend, size[:, None], 0.0), problem.limits("acceleration"))
     with np.errstate(divide="ignore", over="ignore"):
         radius = 1.0 / curvature
         speed = np.minimum(_speed(problem, rows, tangent), np.sqrt(across * radius))
     speed = np.minimum(speed, _chord_speed(problem, radius))
     shape = (-1, len(PLACES))
-    speed = speed.reshape(shape).min(axis=1)
+    speed = _least(speed.reshape(shape))
     if problem.feed_share is not None:
         # Between the places the axes that the feed counts along may have more of the speed.
         speed = np.minimum(speed, feed_between(problem, piece, u0, u1))
@@ -155,10 +161,30 @@ def _curves(problem: Problem, pieces: NDArray[np.int64], rule: Rule) -> Segments
         u1=u1,
         rate=np.full(len(piece), np.nan),
         speed=speed,
-        slope=(2.0 * along * rate).reshape(shape).min(axis=1),
-        axis=np.full(len(piece), NO_AXIS, dtype=np.uint8),
-        value=np.zeros(len(piece)),
+        slope=_least((2.0 * along * rate).reshape(2, *shape)),
+        axis=np.full((2, len(piece)), NO_AXIS, dtype=np.uint8),
+        value=np.zeros((2, len(piece))),
     )
+
+
+def in_direction(limits: Array, direction: Array) -> Array:
+    """The greatest multiples (m,) of directions (m, axes) that the limits (2, axes) allow."""
+    with np.errstate(divide="ignore"):
+        by_axis = np.where(direction < 0.0, limits[1], limits[0]) / np.abs(direction)
+    return _least(by_axis)
+
+
+def both_ways(limits: Array, direction: Array) -> Array:
+    """The greatest multiples (2, m) that the limits allow of directions (m, axes), and of their opposites."""
+    size, back = np.abs(direction), direction < 0.0
+    with np.errstate(divide="ignore"):
+        high, low = limits[0] / size, limits[1] / size
+    return np.stack([_least(np.where(back, low, high)), _least(np.where(back, high, low))])
+
+
+def _least(values: Array) -> Array:
+    """The least along the last axis, which is short: faster one by one."""
+    return reduce(np.minimum, np.moveaxis(values, -1, 0))
 
 
 def _part_counts(problem: Problem, piece: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -177,11 +203,11 @@ def _part_counts(problem: Problem, piece: NDArray[np.int64]) -> NDArray[np.int64
 
 def _speed(problem: Problem, piece: NDArray[np.int64], tangent: Array) -> Array:
     """The least of feed and what the axis velocities allow in a direction."""
-    by_axis = _over(problem.max_velocity, np.abs(tangent))
+    by_axis = in_direction(problem.limits("velocity"), tangent)
     feed = problem.feed[piece]
     if problem.feed_share is not None:
         feed = _over(feed, np.linalg.norm(problem.feed_share[piece] * tangent, axis=1))
-    return np.asarray(np.minimum(feed, by_axis.min(axis=1)))
+    return np.asarray(np.minimum(feed, by_axis))
 
 
 def _chord_speed(problem: Problem, radius: Array) -> Array:

@@ -4,8 +4,8 @@ Source: Lv, Zhang, Yang & Ye, Study on the method of increasing turning velocity
 machining, Manufacturing Technology & Machine Tool 2008(7), 79–83, known here by what Zhang et al. 2010
 say of it (sections 1 and 5). With the turn θ and the tolerance d the radius is d/(1/cos(θ/2) − 1), less
 where the lines are too short. On the arc the centripetal acceleration v²/r limits the speed, so that the
-axes keep their limits in every direction and some tangential acceleration remains
-(`shared_acceleration`).
+axes keep their limits in every direction, the lesser ones of both where they differ by direction, and some
+tangential acceleration remains (`shared_acceleration`).
 
 The arcs belong to the path (`Corners.ARCS`): other curves of a path are planned by the same rule.
 """

@@ -8,9 +8,6 @@ from feedplan.planners._faults import error_of
 from feedplan.profile import SpeedProfile
 from feedplan.progress import Listener
 
-# Limits may differ by direction.
-DIRECTIONS = True
-
 
 def plan(problem: Problem, *, progress: Listener | None = None) -> SpeedProfile:
     """The fastest profile; its time is the least that the limits allow, to rounding.

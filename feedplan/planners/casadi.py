@@ -26,9 +26,6 @@ _LEFT = 1e-8
 _SLOWEST = 1e-9
 _START = 0.5
 
-# Limits may differ by direction.
-DIRECTIONS = True
-
 
 def plan(
     problem: Problem,

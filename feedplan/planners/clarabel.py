@@ -26,9 +26,6 @@ ACCURACY = 1e-4
 # end because p is scaled.
 GAP, ROWS = 1e-6, 1e-7
 
-# Limits may differ by direction.
-DIRECTIONS = True
-
 
 def plan(
     problem: Problem,

@@ -3,7 +3,8 @@
 Source: Ye & Zhao, Study on control algorithm for micro-line continuous interpolation, China Mechanical
 Engineering 15(15), 1354–1356, known here by what Zhang et al. 2010 say of it (sections 1 and 5). From one
 interpolation period T to the next a velocity may change by A_k T, so a corner where the unit tangent jumps by
-ΔT is passed at min over the axes of A_k T/|ΔT_k|.
+ΔT is passed at min over the axes of A_k T/|ΔT_k|; where the limits of an axis differ by direction A_k is the
+lesser of both.
 
 The speed is constant for a period before and after the corner, so that no other acceleration adds to the
 jump; a line between two corners takes two periods at least. The second differences of setpoints at the
@@ -37,4 +38,4 @@ def plan(problem: Problem) -> SpeedProfile:
 
 def transition_speed(problem: Problem) -> NDArray[np.float64]:
     """Speed (n + 1,) [mm/s] at the ends of the pieces: 0 between runs, infinite where no corner is."""
-    return junction_limit(problem.path, problem.max_acceleration * problem.period)
+    return junction_limit(problem.path, problem.limits("acceleration").min(axis=0) * problem.period)

@@ -2,7 +2,8 @@
 
 Source: grbl 1.1, `planner.c` (S. K. Jeon). A corner is passed at the speed of a circle that touches both
 lines and comes within δ of the corner, though the tool follows the lines: v² = a δ s/(1 − s), s =
-cos(turn/2), with a = min over the axes of A_k/|j_k| in the direction j of the jump. δ is grbl's setting
+cos(turn/2), with a = min over the axes of A_k/|j_k| in the direction j of the jump, A_k being the limit of
+axis k towards j_k. δ is grbl's setting
 $11, 0.010 mm by default. Klipper's `square_corner_velocity` is the same formula by the speed v₉₀ at
 right angles: a δ = v₉₀² (√2 − 1).
 
@@ -22,7 +23,7 @@ from feedplan.constraints.problem import Problem
 from feedplan.geometry.corners import Corners
 from feedplan.geometry.joints import end_edges, tangent_jumps
 from feedplan.planners._look_ahead import look_ahead
-from feedplan.planners._segments import Array
+from feedplan.planners._segments import Array, both_ways, in_direction
 from feedplan.profile import SpeedProfile
 
 CORNERS = Corners.PROGRAMMED
@@ -57,8 +58,7 @@ def corner_speed(problem: Problem, deviation: float, square_corner_velocity: flo
     jump = out / np.linalg.norm(out, axis=1)[:, None] - into / np.linalg.norm(into, axis=1)[:, None]
     size = np.linalg.norm(jump, axis=1)
     if square_corner_velocity is None:
-        with np.errstate(divide="ignore"):
-            factor = deviation * (problem.max_acceleration / np.abs(jump / size[:, None])).min(axis=1)
+        factor = deviation * in_direction(problem.limits("acceleration"), jump / size[:, None])
     else:
         factor = np.full(len(corner), square_corner_velocity**2 * (math.sqrt(2.0) - 1.0))
     # |jump| = 2 sin(turn/2), and 1 − s = sin²(turn/2)/(1 + s) keeps its digits at small turns.
@@ -68,8 +68,6 @@ def corner_speed(problem: Problem, deviation: float, square_corner_velocity: flo
     return speed
 
 
-def each_direction(tangent: Array, normal: Array, limit: Array) -> tuple[Array, Array]:
+def each_direction(tangent: Array, normal: Array, limits: Array) -> tuple[Array, Array]:
     """The greatest acceleration along the tangent alone, and along the normal alone."""
-    with np.errstate(divide="ignore"):
-        along, across = ((limit / np.abs(direction)).min(axis=1) for direction in (tangent, normal))
-    return along, across
+    return both_ways(limits, tangent), in_direction(limits, normal)

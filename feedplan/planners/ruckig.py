@@ -1,6 +1,7 @@
 """State-to-state profiles along the path: states where segments meet, and the quickest motions between them.
 
-The segments are those of the S-curve, with its limits along the path. At first they meet without
+The segments are those of the S-curve, with its limits along the path: one acceleration for speeding up and
+slowing down, by the lesser limit where those of an axis differ by direction. At first they meet without
 acceleration, as fast as looking ahead over the whole of a stretch allows. Then speed and acceleration are
 improved joint after joint, forward and backward, each time with the quickest motions to both neighbours,
 which the package ruckig finds: Berscheid and Kröger, "Jerk-limited real-time trajectory generation with
@@ -26,7 +27,7 @@ from feedplan.lazy import cached_property
 from feedplan.planners import s_curve
 from feedplan.planners._faults import error_of
 from feedplan.planners._jerk import jerk_limits
-from feedplan.planners._runs import fastest_runs
+from feedplan.planners._runs import fastest_runs, within_both
 from feedplan.profile import SpeedProfile
 
 Array = NDArray[np.float64]
@@ -190,18 +191,26 @@ def plan(problem: Problem, *, time_limit: float | None = None) -> SpeedProfile:
 
     Raises SolverError for an axis without a limit of jerk, MissingPackageError.
     """
-    return fastest_runs([_planned(problem, time_limit, None), s_curve.plan(problem)])
+    time_limit = _checked(time_limit)
+    if time_limit is not None and problem.even is not problem:
+        time_limit *= 0.5
+    own = within_both(problem, lambda problem, _: _planned(problem, time_limit, None), None)
+    return fastest_runs([own, s_curve.plan(problem)])
 
 
 def repaired(problem: Problem, profile: SpeedProfile, *, time_limit: float | None = None) -> SpeedProfile:
     """A profile without limits of jerk made one that keeps them: where segments meet it is no faster, and
     between no faster than the faster end, except to leave a stop and come to it."""
-    return _planned(problem, time_limit, profile)
+    return _planned(problem, _checked(time_limit), profile)
+
+
+def _checked(time_limit: float | None) -> float | None:
+    if time_limit is None:
+        return None
+    return number(time_limit, "the time limit", "0 or more", lambda limit: limit >= 0, "s")
 
 
 def _planned(problem: Problem, time_limit: float | None, guide: SpeedProfile | None) -> SpeedProfile:
-    if time_limit is not None:
-        time_limit = number(time_limit, "the time limit", "0 or more", lambda limit: limit >= 0, "s")
     motions = Motions()
     limits = jerk_limits(problem)
     deadline = math.inf if time_limit is None else time.perf_counter() + time_limit

@@ -1,4 +1,9 @@
-"""The two-pass profile of constant jerk, no acceleration where segments meet (Cheatham 2007, chapter 4)."""
+"""The two-pass profile of constant jerk, no acceleration where segments meet (Cheatham 2007, chapter 4).
+
+Where the limits of an axis differ by direction, speeds and what turning takes of accelerations have those of
+the directions that a segment has. Its acceleration along the path is one for speeding up and slowing down, as
+in the thesis: by the lesser of both limits.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +12,7 @@ from feedplan.constraints.problem import Problem
 from feedplan.geometry.corners import Corners
 from feedplan.planners._faults import error_of
 from feedplan.planners._jerk import jerk_limits
+from feedplan.planners._runs import within_both
 from feedplan.profile import SpeedProfile
 from feedplan.progress import Listener
 
@@ -36,10 +42,14 @@ def plan_by_itself(problem: Problem, progress: Listener | None = None) -> SpeedP
 
 def _planned(problem: Problem, time_limit: float | None, progress: Listener | None) -> SpeedProfile:
     """`time_limit` [s] is for what is left to jerk-limited."""
-    try:
-        columns, changes = plan_s_curve(
-            problem, jerk_limits(problem), CUTTINGS, LOOK_AHEAD, time_limit, progress
-        )
-    except PlanError as fault:
-        raise error_of(problem, fault) from None
-    return SpeedProfile(*columns, *changes)
+
+    def solved(problem: Problem, progress: Listener | None) -> SpeedProfile:
+        try:
+            columns, changes = plan_s_curve(
+                problem, jerk_limits(problem), CUTTINGS, LOOK_AHEAD, time_limit, progress
+            )
+        except PlanError as fault:
+            raise error_of(problem, fault) from None
+        return SpeedProfile(*columns, *changes)
+
+    return within_both(problem, solved, progress)

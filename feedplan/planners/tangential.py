@@ -3,7 +3,8 @@
 The methods that Zhang et al. 2010 (section 1) argue against: trapezoids, S-curves and the like with a
 tangential acceleration. Here it is the greatest that the direction of motion allows, min over the axes
 of A_k/|t_k|, so that the axes keep their limits on lines and break them on curves, where v²/ρ comes on
-top of it. The audit says where.
+top of it. The audit says where. Speeding up and slowing down pull an axis to opposite sides: each has the
+limits A_k of those.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import numpy as np
 
 from feedplan.constraints.problem import Problem
 from feedplan.planners._look_ahead import look_ahead
-from feedplan.planners._segments import Array
+from feedplan.planners._segments import Array, both_ways
 from feedplan.profile import SpeedProfile
 
 
@@ -21,8 +22,6 @@ def plan(problem: Problem) -> SpeedProfile:
     return look_ahead(problem, problem.junction_speed, along_only)
 
 
-def along_only(tangent: Array, normal: Array, limit: Array) -> tuple[Array, Array]:
+def along_only(tangent: Array, normal: Array, limits: Array) -> tuple[Array, Array]:
     """No limit across the path."""
-    with np.errstate(divide="ignore"):
-        along = (limit / np.abs(tangent)).min(axis=1)
-    return along, np.full(len(along), np.inf)
+    return both_ways(limits, tangent), np.full(len(tangent), np.inf)

@@ -31,9 +31,6 @@ _FASTEST = 1e6
 Scheme = Literal["one-sided", "collocation"]
 SCHEMES: tuple[Scheme, ...] = get_args(Scheme)
 
-# Limits may differ by direction.
-DIRECTIONS = True
-
 
 def plan(
     problem: Problem,

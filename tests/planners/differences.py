@@ -19,7 +19,8 @@ NAMES = {1: "velocity", 2: "acceleration", 3: "jerk"}
 
 
 def exceeded(points: SetpointChunk, machine: Machine, period: float, jerk: bool) -> list[str]:
-    """A sentence for each axis whose first, second or (`jerk`) third differences exceed its limits.
+    """A sentence for each direction of an axis whose limits its first, second or (`jerk`) third differences
+    exceed.
 
     Setpoints are a period apart; what positions of their size are rounded by is allowed.
     """
@@ -28,13 +29,14 @@ def exceeded(points: SetpointChunk, machine: Machine, period: float, jerk: bool)
         axis = machine.axis(name)
         x = points.position[:, column]
         last_place = ROUNDING * float(np.spacing(np.abs(x).max(initial=0.0)))
-        limits = {1: axis.max_velocity, 2: axis.max_acceleration, 3: axis.max_jerk}
-        for order, limit in limits.items():
+        limits = {1: axis.velocity_range, 2: axis.acceleration_range, 3: (-axis.max_jerk, axis.max_jerk)}
+        for order, ends in limits.items():
             if (order == 3 and not jerk) or len(x) <= order:
                 continue
-            worst = float(np.abs(np.diff(x, order)).max()) / period**order
-            if worst > limit * (1 + SHARE) + 2**order * last_place / period**order:
-                found.append(f"{NAMES[order]} of {name}: {worst:.6g} of {limit:.6g}")
+            change = np.diff(x, order) / period**order
+            for worst, limit in ((-float(change.min()), -ends[0]), (float(change.max()), ends[1])):
+                if worst > limit * (1 + SHARE) + 2**order * last_place / period**order:
+                    found.append(f"{NAMES[order]} of {name}: {worst:.6g} of {limit:.6g}")
     return found
 
 

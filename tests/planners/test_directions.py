@@ -1,9 +1,10 @@
-"""Limits that differ by direction: exact in the planners that take them, refused by name in the others."""
+"""Limits that differ by direction: by hand, exact in the planners of the optimum, kept by every method."""
 
 from __future__ import annotations
 
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -12,56 +13,26 @@ import pytest
 
 import feedplan
 from feedplan.checking import check
-from feedplan.errors import MachineError, SolverError
+from feedplan.errors import MachineError
 from feedplan.geometry.path import Path
 from feedplan.machine.file import parse
 from feedplan.machine.machine import Axis, Machine
 from tests.campaign import seeds
+from tests.planners.differences import exceeded
+from tests.planners.sided import KNOTS, Pair, arm, even, names_of, pairs, random_path, swapped
 
-Pair = tuple[float, float]
-KNOTS = [0, 0, 0, 0, 1, 2, 3, 4, 4, 4, 4]
 ONE = Machine("one", (Axis("X", (-1.0, 2.0), (-4.0, 1.0)),))
+BY_HAND = [
+    # Forward 2 s to 2 mm/s over 2 mm, 0.5 s from it over 0.5 mm, 7.5 mm at 2 mm/s.
+    (0.0, 10.0, 2.0 + 0.5 + 3.75),
+    # Backward 0.25 s to 1 mm/s over 0.125 mm, 1 s from it over 0.5 mm, 9.375 mm at 1 mm/s.
+    (10.0, 0.0, 0.25 + 1.0 + 9.375),
+    # A triangle: 0.8 mm up at 1 mm/s² to √1.6 mm/s, 0.2 mm down at 4 mm/s².
+    (0.0, 1.0, 1.25 * math.sqrt(1.6)),
+]
 
 
-def names_of(count: int) -> tuple[str, ...]:
-    return tuple(f"j{k + 1}" for k in range(count))
-
-
-def arm(velocity: list[Pair], acceleration: list[Pair]) -> Machine:
-    rows = zip(names_of(len(velocity)), velocity, acceleration, strict=True)
-    return Machine("arm", tuple(Axis(*row) for row in rows), period=0.002)
-
-
-def pairs(rng: np.random.Generator, count: int, most: float) -> list[Pair]:
-    """Limits of which some differ by direction, by up to ten times."""
-    sides = most * 10.0 ** rng.uniform(-1.0, 0.0, (count, 2))
-    even = rng.random(count) < 0.2
-    return [(-float(a), float(a if same else b)) for (a, b), same in zip(sides, even, strict=True)]
-
-
-def random_path(rng: np.random.Generator, count: int, kind: str) -> Path:
-    points = rng.standard_normal((7, count))
-    if kind == "lines":
-        return Path.from_points(points, 0.0, axes=names_of(count))
-    if kind == "rounded":
-        return Path.from_points(points, 0.05, axes=names_of(count))
-    if kind == "rational":
-        weights = rng.uniform(0.4, 2.0, 7)
-        return Path.from_nurbs(points, KNOTS, 3, weights, axes=names_of(count))
-    return Path.from_bspline(points, KNOTS, 3, axes=names_of(count))
-
-
-@pytest.mark.parametrize(
-    ("start", "end", "time"),
-    [
-        # Forward 2 s to 2 mm/s over 2 mm, 0.5 s from it over 0.5 mm, 7.5 mm at 2 mm/s.
-        (0.0, 10.0, 2.0 + 0.5 + 3.75),
-        # Backward 0.25 s to 1 mm/s over 0.125 mm, 1 s from it over 0.5 mm, 9.375 mm at 1 mm/s.
-        (10.0, 0.0, 0.25 + 1.0 + 9.375),
-        # A triangle: 0.8 mm up at 1 mm/s² to √1.6 mm/s, 0.2 mm down at 4 mm/s².
-        (0.0, 1.0, 1.25 * math.sqrt(1.6)),
-    ],
-)
+@pytest.mark.parametrize(("start", "end", "time"), BY_HAND)
 def test_one_axis_by_hand(start: float, end: float, time: float) -> None:
     plan = feedplan.plan(Path.from_bezier([[start], [end]]), ONE)
     assert plan.time == pytest.approx(time, rel=1e-12)
@@ -195,18 +166,103 @@ def test_the_audit_judges_each_direction(tmp_path: FilePath) -> None:
         assert weak.check("acceleration", "X").ratio == pytest.approx(4.0 / 3.0, rel=1e-6)
 
 
-@pytest.mark.parametrize("method", ["jerk-limited", "s-curve", "ruckig", "tangential", "junction-deviation"])
-def test_other_methods_refuse_by_name(method: Any) -> None:
-    machine = Machine("one", (Axis("X", (-1.0, 2.0), 4.0, 50.0), Axis("Y", 1.0, 4.0, 50.0)))
-    sentence = f"the limits of axis X differ by direction, which {method} knows nothing of: .* bang-bang"
-    with pytest.raises(SolverError, match=sentence):
-        feedplan.plan(Path.from_bezier([[0.0, 0.0], [10.0, 1.0]]), machine, method)
+# Those with a limit of jerk keep all limits on every path, those of controllers on lines.
+SMOOTH = ("jerk-limited", "s-curve", "ruckig")
+CONTROLLERS = ("tangential", "junction-deviation", "arc-transition", "constant-velocity-transition")
+KINDS = ("curves", "lines", "rounded", "rational")
+CASES = [(method, kind) for method in SMOOTH for kind in KINDS] + [
+    (method, "lines") for method in CONTROLLERS
+]
+# How far a time may be from another one, as a part of it: what the accuracy of jerk-limited leaves to both.
+CLOSE = {"jerk-limited": 3e-4}
 
 
-def test_joints_of_a_kinematics_are_refused() -> None:
-    axes = (Axis("U", (-1.0, 2.0), 9.0), Axis("V", 1.0, 9.0))
-    with pytest.raises(MachineError, match="the limits of axis U of machine own differ by direction"):
-        feedplan.plan("G21 F60\nG1 X5\n", Machine("own", axes, kinematics="corexy"))
+def random_case(seed: int, kind: str) -> tuple[Path, Machine]:
+    rng = np.random.default_rng([seed, len(kind)])
+    count = int(rng.integers(1, 6))
+    return random_path(rng, count, kind), arm(pairs(rng, count, 2.0), pairs(rng, count, 9.0))
+
+
+@pytest.mark.parametrize(("method", "kind"), CASES)
+@pytest.mark.parametrize("seed", range(seeds(2)))
+def test_every_method_keeps_each_side_and_gains_by_the_wider_ones(method: Any, kind: str, seed: int) -> None:
+    path, machine = random_case(seed, kind)
+    plan = feedplan.plan(path, machine, method)
+    assert plan.audit().ok, plan.audit().failures
+    assert exceeded(plan.setpoints().all(), machine, machine.period, method in SMOOTH) == []
+    assert plan.lower_bound <= plan.time * (1.0 + 1e-9)
+    if method == "jerk-limited":
+        assert plan.gap < 1e-3
+    assert plan.time <= feedplan.plan(path, even(machine), method).time * (1.0 + CLOSE.get(method, 1e-9))
+
+
+@pytest.mark.parametrize(("method", "kind"), CASES)
+def test_mirrored_with_its_sides_swapped_a_path_takes_the_same_time(method: Any, kind: str) -> None:
+    path, machine = random_case(3, kind)
+    curve = path.curve
+    mirrored = replace(path, curve=replace(curve, control_points=-curve.control_points))
+    time, other = (
+        feedplan.plan(*case, method).time for case in ((path, machine), (mirrored, swapped(machine)))
+    )
+    assert other == pytest.approx(time, rel=CLOSE.get(method, 1e-9))
+
+
+@pytest.mark.parametrize(("method", "kind"), CASES)
+def test_sides_that_differ_by_nearly_nothing_give_the_same_plan(method: Any, kind: str) -> None:
+    """To rounding; lines of jerk-limited are by a closed formula where both sides are one."""
+    path, machine = random_case(1, kind)
+    one = even(machine)
+    axes = (
+        replace(
+            axis,
+            max_velocity=(-float(axis.max_velocity), float(axis.max_velocity) * (1.0 + 1e-14)),
+            max_acceleration=(-float(axis.max_acceleration) * (1.0 + 1e-14), float(axis.max_acceleration)),
+        )
+        for axis in one.axes
+    )
+    nearly = feedplan.plan(path, replace(one, axes=tuple(axes)), method)
+    rounding = 2e-5 if method == "jerk-limited" else 1e-9
+    assert nearly.time == pytest.approx(feedplan.plan(path, one, method).time, rel=rounding)
+
+
+@pytest.mark.parametrize("method", CONTROLLERS)
+@pytest.mark.parametrize(("start", "end", "time"), BY_HAND)
+def test_controllers_run_one_axis_by_hand(method: Any, start: float, end: float, time: float) -> None:
+    assert feedplan.plan(Path.from_bezier([[start], [end]]), ONE, method).time == pytest.approx(
+        time, rel=1e-12
+    )
+
+
+@pytest.mark.parametrize(("up", "down", "end"), [(1.0, 4.0, 10.0), (4.0, 1.0, -10.0)])
+def test_jerk_limited_runs_one_axis_by_hand(up: float, down: float, end: float) -> None:
+    """From 0 to V and back takes V/A + A/J, on half of the way at V."""
+    speed, jerk = (2.0 if end > 0.0 else 1.0), 20.0
+    machine = Machine("one", (Axis("X", (-1.0, 2.0), (-4.0, 1.0), jerk),))
+    ramps = sum(
+        speed / a + a / jerk if speed * jerk >= a * a else 2.0 * math.sqrt(speed / jerk) for a in (up, down)
+    )
+    plan = feedplan.plan(Path.from_bezier([[0.0], [end]]), machine, "jerk-limited")
+    assert plan.time == pytest.approx(ramps + (abs(end) - 0.5 * speed * ramps) / speed, rel=1e-4)
+    assert plan.gap < 1e-3
+    assert plan.audit().ok
+
+
+@pytest.mark.parametrize(
+    "method", ["jerk-limited", "s-curve", "arc-transition", "constant-velocity-transition"]
+)
+def test_programs_of_an_axis_that_lifts_slower_than_it_falls(method: Any) -> None:
+    axes = (
+        Axis("X", (-150.0, 200.0), 2000.0, 40000.0),
+        Axis("Y", 200.0, (-700.0, 2000.0), 40000.0),
+        Axis("Z", (-80.0, 40.0), (-900.0, 400.0), 9000.0),
+    )
+    corners = [(30, 0, 10), (50, 20, 10), (50, 20, 0), (30, 45, 5), (-10, 40, 8), (0, 0, 0)]
+    lines = "\n".join("G1 X{} Y{} Z{}".format(*place) for place in corners)
+    machine = Machine("router", axes)
+    plan = feedplan.plan(f"G21 G90 G64 P0.01 F9000\n{lines}\n", machine, method)
+    assert plan.audit().ok, plan.audit().failures
+    assert exceeded(plan.setpoints().all(), machine, machine.period, method in SMOOTH) == []
+    assert plan.time <= feedplan.plan(plan.path, even(machine), method).time * (1.0 + CLOSE.get(method, 1e-9))
 
 
 @pytest.mark.parametrize(

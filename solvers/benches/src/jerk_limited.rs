@@ -42,7 +42,7 @@ const ITERATIONS: [usize; 2] = [3, 12];
 fn jerk_limited(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("jerk_limited");
     group.sample_size(10).warm_up_time(Duration::from_millis(300)).measurement_time(Duration::from_secs(2));
-    let limits = Limits { velocity: [250.0; 3], acceleration: [3000.0; 3], jerk: [50_000.0; 3] };
+    let limits = Limits { velocity: [[250.0; 3]; 2], acceleration: [[3000.0; 3]; 2], jerk: [50_000.0; 3] };
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
     for length in [100.0, 1_000.0, 10_000.0] {
         let geometry = Winding([0.0, length]);

@@ -59,7 +59,7 @@ fn dynamics(criterion: &mut Criterion) {
     group.bench_function("bounded_5_percent", |bencher| bencher.iter(|| bounded(black_box(&curve), 0.05)));
     group.bench_function("bounded_rational", |bencher| bencher.iter(|| bounded(black_box(&rational), 0.05)));
     let shape = bounded(&curve, 0.05);
-    let axes = AxisLimits { velocity: [250.0; 3], acceleration: [3000.0; 3], jerk: [50_000.0; 3] };
+    let axes = AxisLimits { velocity: [[250.0; 3]; 2], acceleration: [[3000.0; 3]; 2], jerk: [50_000.0; 3] };
     group.bench_function("allowable", |bencher| {
         bencher.iter(|| allowable(black_box(&shape), &axes, 100.0, 10.0));
     });

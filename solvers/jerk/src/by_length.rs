@@ -22,6 +22,7 @@ use feedplan_geometry::spline::cusps::CUSP;
 use feedplan_geometry::spline::rational::Hodograph;
 use feedplan_geometry::spline::Piece;
 use feedplan_planner::bang_bang::Problem;
+use feedplan_planner::planning::{self, Both};
 
 /// What the quadrature of a panel may be off, as a part of its length …
 const QUADRATURE: f64 = 1e-12;
@@ -173,11 +174,12 @@ fn polynomial(coefficients: &[f64], width: f64, u: f64) -> [f64; 3] {
 
 /// The greatest speed at a place where the accelerations of turning and of speeding up together keep the limits of every
 /// axis, or more: what turning has across the direction of motion nothing can take back. NaN where it has nothing there.
-fn turning_speed<const M: usize>(place: &Place<M>, limits: &[f64; M]) -> f64 {
+fn turning_speed<const M: usize>(place: &Place<M>, limits: &Both<M>) -> f64 {
     let Place { first, second, .. } = place;
     let along = dot(second, first) / dot(first, first);
     let across: [f64; M] = std::array::from_fn(|k| second[k] - along * first[k]);
-    let most = (0..M).map(|k| across[k].abs() * limits[k]).sum::<f64>();
+    let limit = |k: usize| limits[usize::from(across[k] < 0.0)][k];
+    let most = (0..M).map(|k| across[k].abs() * limit(k)).sum::<f64>();
     (most / dot(&across, &across)).sqrt()
 }
 
@@ -439,19 +441,21 @@ impl<'a, const M: usize> ByLength<'a, M> {
                 let jump = |k: usize| (after.second[k] - before.second[k]).abs() / jerk[k];
                 let mut speed = self.corner(i);
                 for place in [&before, &after] {
-                    for k in 0..M {
-                        speed = speed.min(problem.max_velocity[0][k] / place.first[k].abs());
-                    }
-                    speed =
-                        speed.min(place.speed_cap).min(turning_speed(place, &problem.max_acceleration[0]));
+                    speed = speed
+                        .min(planning::along(&problem.max_velocity, &place.first))
+                        .min(place.speed_cap)
+                        .min(turning_speed(place, &problem.max_acceleration));
                 }
-                let mut acceleration = f64::INFINITY;
+                // Up and down.
+                let mut changes = [f64::INFINITY; 2];
                 for Place { first, second, .. } in [&before, &after] {
-                    for k in 0..M {
-                        let most = problem.max_acceleration[0][k] + second[k].abs() * speed * speed;
-                        acceleration = acceleration.min(most / first[k].abs());
-                    }
+                    let room = problem
+                        .max_acceleration
+                        .map(|most| std::array::from_fn(|k| most[k] + second[k].abs() * speed * speed));
+                    changes[0] = changes[0].min(planning::along(&room, first));
+                    changes[1] = changes[1].min(planning::along(&room, &first.map(|first| -first)));
                 }
+                let acceleration = changes[0].max(changes[1]);
                 let change = std::array::from_fn(|k| if smooth { 0.0 } else { jump(k) });
                 Jump { s, change, speed, acceleration }
             })

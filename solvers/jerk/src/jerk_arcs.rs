@@ -11,6 +11,7 @@ use crate::s_curve::Section;
 use feedplan_geometry::arc_length::{W, X};
 use feedplan_planner::arc_kind::ArcKind;
 use feedplan_planner::bang_bang::Problem;
+use feedplan_planner::planning::{greater, lesser};
 
 const PATH_JERK: u8 = ArcKind::PathJerk as u8;
 pub const SPEED_CUBIC: u8 = ArcKind::SpeedCubic as u8;
@@ -336,7 +337,8 @@ impl Arcs {
 
 /// The least time in which an axis has its greatest speed.
 fn rise_time<const M: usize>(problem: &Problem<M>) -> f64 {
-    let of_axis = |k: usize| problem.max_velocity[0][k] / problem.max_acceleration[0][k];
+    let (velocity, acceleration) = (lesser(&problem.max_velocity), greater(&problem.max_acceleration));
+    let of_axis = |k: usize| velocity[k] / acceleration[k];
     (0..M).map(of_axis).fold(f64::INFINITY, f64::min)
 }
 

@@ -27,6 +27,7 @@ mod profile;
 mod relaxed;
 mod rest;
 mod rows;
+mod sides;
 mod stretch;
 mod survey;
 mod windows;
@@ -34,6 +35,7 @@ mod windows;
 use std::time::Instant;
 
 use feedplan_geometry::watch::Watch;
+use feedplan_planner::planning::Both;
 
 pub use bound::{certify, Certificate};
 pub use profile::Profile;
@@ -59,11 +61,11 @@ pub trait Geometry<const M: usize>: Sync {
     fn at(&self, piece: usize, s: f64) -> Place<M>;
 }
 
-/// Greatest magnitudes for each axis, in mm/s, mm/s² and mm/s³.
+/// Greatest magnitudes for each axis, in mm/s, mm/s² and mm/s³: of what is positive and of what is negative, but for jerk.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits<const M: usize> {
-    pub velocity: [f64; M],
-    pub acceleration: [f64; M],
+    pub velocity: Both<M>,
+    pub acceleration: Both<M>,
     pub jerk: [f64; M],
 }
 

@@ -15,6 +15,7 @@ use crate::s_curve;
 use crate::stretches::{checked, over_stretches, stretches, Stretch};
 use feedplan_planner::bang_bang::Problem;
 use feedplan_planner::bang_bang_quadratic::Fault;
+use feedplan_planner::planning::along;
 
 /// A joint holds the speed where the plan is within this part of its cap.
 const HELD: f64 = 0.998;
@@ -198,7 +199,8 @@ impl<const M: usize> Task<'_, M> {
         Some(jerk_limited::certify(&problem, &profile, self.effort).least_time)
     }
 
-    /// The quickest sections of a line with one feed between speeds at its ends; None where it does not join them.
+    /// The quickest sections of a line with one feed between speeds at its ends; None where it does not join them, or
+    /// where it may speed up and slow down by accelerations that differ.
     fn cross(
         &self,
         length: f64,
@@ -206,16 +208,16 @@ impl<const M: usize> Task<'_, M> {
         feed: f64,
         speeds: [f64; 2],
     ) -> Result<Option<Vec<s_curve::Section>>, Fault> {
-        let most =
-            |limit: &[f64; M]| (0..M).map(|k| limit[k] / direction[k].abs()).fold(f64::INFINITY, f64::min);
+        let Limits { velocity, acceleration, jerk } = &self.limits;
+        let up = along(acceleration, direction);
+        if up != along(acceleration, &direction.map(|direction| -direction)) {
+            return Ok(None);
+        }
         let segment = s_curve::Segment {
             length,
-            allowable: most(&self.limits.velocity),
+            allowable: along(velocity, direction),
             desired: feed,
-            limits: s_curve::Limits {
-                acceleration: most(&self.limits.acceleration),
-                jerk: most(&self.limits.jerk),
-            },
+            limits: s_curve::Limits { acceleration: up, jerk: along(&[*jerk; 2], direction) },
             junction: 0.0,
         };
         s_curve::cross(&segment, speeds)

@@ -8,7 +8,8 @@
 //! |q_S| V ≤ v_max,   |q_SS| V² + |q_S| A ≤ a_max,   |q_SSS| V³ + 3 |q_SS| V A + |q_S| J ≤ j_max
 //! ```
 //!
-//! with bounds of the derivatives over the segment. The thesis's 5.21–5.26 solve the same rows for V, A and J one after
+//! with bounds of the derivatives over the segment. Where the limits of an axis differ by direction so do the bounds of q_S
+//! and q_SS; A stays one for speeding up and slowing down, the lesser of both. The thesis's 5.21–5.26 solve the same rows for V, A and J one after
 //! the other, which leaves nothing to A where V takes all, and divide by q_S, which may be 0. Here the three are chosen
 //! together: they minimise the time from rest to rest over a length L that reaches V, L/V + V/A + A/J. So where an axis has
 //! to share its acceleration between turning and speeding up, long stretches give more to speed, short ones to
@@ -26,6 +27,7 @@ mod shape;
 
 use crate::s_curve::Limits;
 use feedplan_planner::bang_bang_quadratic::Fault;
+use feedplan_planner::planning::{greater, Both};
 pub use shape::{bounded, sampled, Curve, Shape};
 
 /// Golden-section steps: the bracket shrinks to 1e-5 of itself; the minimum is flat.
@@ -33,11 +35,11 @@ const STEPS: usize = 24;
 /// Parts of the greatest V and A that are tried: none leaves nothing to what comes after.
 const RANGE: (f64, f64) = (1e-3, 1.0 - 1e-6);
 
-/// Limits of every axis, in mm (or degrees) and seconds.
+/// Limits of every axis as sizes, in mm (or degrees) and seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxisLimits<const M: usize> {
-    pub velocity: [f64; M],
-    pub acceleration: [f64; M],
+    pub velocity: Both<M>,
+    pub acceleration: Both<M>,
     pub jerk: [f64; M],
 }
 
@@ -49,7 +51,7 @@ impl<const M: usize> AxisLimits<M> {
 
     /// The greatest speed along a segment by the limits of velocity alone.
     pub fn fastest(&self, shape: &Shape<M>) -> f64 {
-        (0..M).map(|k| self.velocity[k] / shape.first[k]).fold(f64::INFINITY, f64::min)
+        of_both::<M>(|sign, k| self.velocity[sign][k] / shape.first[sign][k])
     }
 }
 
@@ -82,7 +84,7 @@ pub fn allowable<const M: usize>(
     speed: f64,
     stretch: f64,
 ) -> Result<Allowable, Fault> {
-    let rows = Rows { shape, axes };
+    let rows = Rows::new(shape, axes);
     let Allowable { speed: most_speed, limits: most } = greatest(shape, axes, speed);
     if !(most_speed > 0.0 && most_speed.is_finite()) {
         return Err(Fault::Input {
@@ -120,38 +122,47 @@ pub fn allowable<const M: usize>(
 
 /// The greatest V, at most a `speed`, and the greatest A and J, each where the others take nothing: on lines V, A, J.
 pub fn greatest<const M: usize>(shape: &Shape<M>, axes: &AxisLimits<M>, speed: f64) -> Allowable {
-    let rows = Rows { shape, axes };
+    let rows = Rows::new(shape, axes);
     let limits = Limits { acceleration: rows.most_acceleration(0.0), jerk: rows.most_jerk(0.0, 0.0) };
     Allowable { speed: rows.most_speed().min(speed), limits }
+}
+
+/// The least of a quantity of both signs of all axes.
+fn of_both<const M: usize>(of: impl Fn(usize, usize) -> f64) -> f64 {
+    (0..2 * M).map(|i| of(i / M, i % M)).fold(f64::INFINITY, f64::min)
 }
 
 /// The inequalities at the head.
 struct Rows<'a, const M: usize> {
     shape: &'a Shape<M>,
     axes: &'a AxisLimits<M>,
+    /// |q_S| and |q_SS|.
+    first: [f64; M],
+    second: [f64; M],
 }
 
-impl<const M: usize> Rows<'_, M> {
+impl<'a, const M: usize> Rows<'a, M> {
+    fn new(shape: &'a Shape<M>, axes: &'a AxisLimits<M>) -> Self {
+        Self { shape, axes, first: greater(&shape.first), second: greater(&shape.second) }
+    }
+
     /// The V that leaves nothing to A and J.
     fn most_speed(&self) -> f64 {
-        let Shape { first, second, third, .. } = self.shape;
-        let AxisLimits { velocity, acceleration, jerk } = self.axes;
-        (0..M)
-            .map(|k| {
-                (velocity[k] / first[k])
-                    .min((acceleration[k] / second[k]).sqrt())
-                    .min((jerk[k] / third[k]).cbrt())
-            })
-            .fold(f64::INFINITY, f64::min)
+        let AxisLimits { acceleration, jerk, .. } = self.axes;
+        let by_acceleration =
+            of_both::<M>(|sign, k| (acceleration[sign][k] / self.shape.second[sign][k]).sqrt());
+        let by_jerk = (0..M).map(|k| (jerk[k] / self.shape.third[k]).cbrt()).fold(f64::INFINITY, f64::min);
+        self.axes.fastest(self.shape).min(by_acceleration).min(by_jerk)
     }
 
     /// The A that leaves nothing to J.
     fn most_acceleration(&self, speed: f64) -> f64 {
-        let Shape { first, second, third, .. } = self.shape;
+        let Self { shape, axes, first, second } = self;
         (0..M)
             .map(|k| {
-                let by_acceleration = (self.axes.acceleration[k] - second[k] * speed.powi(2)) / first[k];
-                let by_jerk = (self.axes.jerk[k] - third[k] * speed.powi(3)) / (3.0 * second[k] * speed);
+                let left = |sign: usize| axes.acceleration[sign][k] - shape.second[sign][k] * speed.powi(2);
+                let by_acceleration = left(0).min(left(1)) / first[k];
+                let by_jerk = (axes.jerk[k] - shape.third[k] * speed.powi(3)) / (3.0 * second[k] * speed);
                 by_acceleration.min(by_jerk)
             })
             .fold(f64::INFINITY, f64::min)
@@ -159,9 +170,9 @@ impl<const M: usize> Rows<'_, M> {
 
     /// J.
     fn most_jerk(&self, speed: f64, acceleration: f64) -> f64 {
-        let Shape { first, second, third, .. } = self.shape;
-        let taken = |k: usize| third[k] * speed.powi(3) + 3.0 * second[k] * speed * acceleration;
-        (0..M).map(|k| (self.axes.jerk[k] - taken(k)) / first[k]).fold(f64::INFINITY, f64::min)
+        let Self { shape, axes, first, second } = self;
+        let taken = |k: usize| shape.third[k] * speed.powi(3) + 3.0 * second[k] * speed * acceleration;
+        (0..M).map(|k| (axes.jerk[k] - taken(k)) / first[k]).fold(f64::INFINITY, f64::min)
     }
 }
 
@@ -196,13 +207,13 @@ mod tests {
     use proptest::prelude::*;
 
     const AXES: AxisLimits<2> =
-        AxisLimits { velocity: [250.0, 200.0], acceleration: [3000.0; 2], jerk: [50_000.0; 2] };
+        AxisLimits { velocity: [[250.0, 200.0]; 2], acceleration: [[3000.0; 2]; 2], jerk: [50_000.0; 2] };
 
     /// A circle of a radius, in every direction.
     fn circle(radius: f64) -> Shape<2> {
-        let all = |value: f64| [value; 2];
+        let all = |value: f64| [[value; 2]; 2];
         let curvature = 1.0 / radius;
-        Shape { first: all(1.0), second: all(curvature), third: all(curvature * curvature), curvature }
+        Shape { first: all(1.0), second: all(curvature), third: [curvature * curvature; 2], curvature }
     }
 
     fn time(stretch: f64, found: &Allowable) -> f64 {
@@ -212,13 +223,33 @@ mod tests {
     #[test]
     fn a_straight_line_takes_the_limits_of_its_slowest_axis() {
         // Along (3, 4)/5: 200/0.8 and 3000/0.8.
-        let line = Shape { first: [0.6, 0.8], second: [0.0; 2], third: [0.0; 2], curvature: 0.0 };
+        let line = Shape::of(&[0.6, -0.8], &[0.0; 2], &[0.0; 2]);
         let found = allowable(&line, &AXES, f64::INFINITY, 1000.0).unwrap();
         assert_eq!(found.speed, 250.0);
         assert_eq!(found.limits, Limits { acceleration: 3750.0, jerk: 62_500.0 });
         // Over any length: neither takes of the other.
         let slow = allowable(&line, &AXES, 80.0, 1e-6).unwrap();
         assert_eq!(slow, Allowable { speed: 80.0, ..found });
+    }
+
+    #[test]
+    fn a_straight_line_takes_the_limits_of_its_direction() {
+        // 80/0.8 back along y; of accelerations the lesser one of both directions, 1500/0.8.
+        let line = Shape::of(&[0.6, -0.8], &[0.0; 2], &[0.0; 2]);
+        let velocity = [[250.0, 200.0], [1.0, 80.0]];
+        let axes = AxisLimits { velocity, acceleration: [[3000.0; 2], [3000.0, 1500.0]], ..AXES };
+        let found = allowable(&line, &axes, f64::INFINITY, 1000.0).unwrap();
+        assert_eq!((found.speed, found.limits.acceleration), (100.0, 1875.0));
+    }
+
+    #[test]
+    fn a_bend_takes_the_limit_of_the_side_that_it_turns_to() {
+        let bend = Shape { second: [[0.2, 0.0], [0.0, 0.0]], ..circle(5.0) };
+        let acceleration = [[500.0, 3000.0], [100.0, 3000.0]];
+        let axes = AxisLimits { velocity: [[1e9; 2]; 2], acceleration, jerk: [1e12; 2] };
+        assert!((greatest(&bend, &axes, f64::INFINITY).speed - 2500f64.sqrt()).abs() < 1e-9);
+        let rows = Rows::new(&bend, &axes);
+        assert_eq!((rows.most_acceleration(0.0), rows.most_acceleration(45.0)), (100.0, 95.0));
     }
 
     #[test]
@@ -239,7 +270,7 @@ mod tests {
 
     #[test]
     fn a_cusp_leaves_no_speed() {
-        let cusp = Shape { second: [f64::INFINITY; 2], curvature: f64::INFINITY, ..circle(1.0) };
+        let cusp = Shape { second: [[f64::INFINITY; 2]; 2], curvature: f64::INFINITY, ..circle(1.0) };
         let message = allowable(&cusp, &AXES, 100.0, 1.0).unwrap_err().to_string();
         assert!(message.contains("cusp"), "{message}");
     }
@@ -261,15 +292,20 @@ mod tests {
             stretch in (-2.0..3.0f64).prop_map(|e| 10f64.powf(e)),
         ) {
             let [a, b, c, d, e, f] = bounds;
-            let shape = Shape { first: [a.min(1.0), b.min(1.0)], second: [c, d], third: [e, f], curvature: c.hypot(d) };
+            let shape = Shape {
+                first: [[a.min(1.0), b.min(1.0)]; 2],
+                second: [[c, d]; 2],
+                third: [e, f],
+                curvature: c.hypot(d),
+            };
             let found = allowable(&shape, &AXES, 400.0, stretch).unwrap();
-            let rows = Rows { shape: &shape, axes: &AXES };
+            let rows = Rows::new(&shape, &AXES);
             let (v, Limits { acceleration, jerk }) = (found.speed, found.limits);
             prop_assert!(v > 0.0 && acceleration > 0.0 && jerk > 0.0, "{found:?} {shape:?}");
             for k in 0..2 {
-                let (q1, q2, q3) = (shape.first[k], shape.second[k], shape.third[k]);
-                prop_assert!(q1 * v <= AXES.velocity[k] * (1.0 + 1e-12));
-                prop_assert!(q2 * v * v + q1 * acceleration <= AXES.acceleration[k] * (1.0 + 1e-12));
+                let (q1, q2, q3) = (shape.first[0][k], shape.second[0][k], shape.third[k]);
+                prop_assert!(q1 * v <= AXES.velocity[0][k] * (1.0 + 1e-12));
+                prop_assert!(q2 * v * v + q1 * acceleration <= AXES.acceleration[0][k] * (1.0 + 1e-12));
                 prop_assert!(q3 * v.powi(3) + 3.0 * q2 * v * acceleration + q1 * jerk <= AXES.jerk[k] * (1.0 + 1e-12));
             }
             // A scan of V and A.

@@ -20,6 +20,7 @@ use feedplan_geometry::spline::CompositeCurve;
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::bang_bang::Problem;
 use feedplan_planner::bang_bang_quadratic::Fault;
+use feedplan_planner::planning::greater;
 
 /// Bounds of derivatives are greater than these by this part.
 const ACCURACY: f64 = 0.05;
@@ -272,8 +273,7 @@ impl<'a, const M: usize> Parts<'a, M> {
         let path = self.path;
         match path.direction(part) {
             Some(direction) => {
-                let (first, none) = (direction.map(f64::abs), [0.0; M]);
-                let line = Shape { first, second: none, third: none, curvature: 0.0 };
+                let line = Shape::of(&direction, &[0.0; M], &[0.0; M]);
                 self.push(ends, (line, around.speed.min(path.at(part, ends[0]).speed_cap)), around.share);
             }
             None => {
@@ -333,12 +333,8 @@ impl<'a, const M: usize> Parts<'a, M> {
         let axes = self.axes.with_jerk_less(around.share);
         let looked: [Allowable; LOOKED] = std::array::from_fn(|i| {
             let place = self.path.at(part, from + (to - from) * i as f64 / (LOOKED - 1) as f64);
-            let [first, second, third] = [place.first, place.second, place.third].map(|q| q.map(f64::abs));
-            greatest(
-                &Shape { first, second, third, curvature: 0.0 },
-                &axes,
-                around.speed.min(place.speed_cap),
-            )
+            let shape = Shape::of(&place.first, &place.second, &place.third);
+            greatest(&shape, &axes, around.speed.min(place.speed_cap))
         });
         let least = |places: &[Allowable], of: fn(&Allowable) -> f64| {
             places.iter().map(of).fold(f64::INFINITY, f64::min)
@@ -420,18 +416,22 @@ fn shape<const M: usize>(
     let length = |i: usize| from + (to - from) * i as f64 / (PLACES - 1) as f64;
     let places: Vec<Place<M>> = (0..PLACES).map(|i| path.at(part, length(i))).collect();
     let most = |of: &dyn Fn(&Place<M>) -> f64| {
-        let mut greatest: f64 = places.iter().map(|place| of(place).abs()).fold(0.0, f64::max);
+        let mut greatest: f64 = places.iter().map(of).fold(0.0, f64::max);
         // A peak between places is above them by no more than an eighth of the second difference there.
         for three in places.windows(3) {
             let bend = (of(&three[0]) - 2.0 * of(&three[1]) + of(&three[2])).abs();
-            greatest = greatest.max(of(&three[1]).abs() + bend);
+            greatest = greatest.max(of(&three[1]) + bend);
         }
         greatest
     };
+    let both = |of: fn(&Place<M>) -> &[f64; M]| {
+        [1.0, -1.0].map(|sign| std::array::from_fn(|k| most(&|place| sign * of(place)[k])))
+    };
+    let third = both(|place| &place.third);
     let shape = Shape {
-        first: std::array::from_fn(|k| most(&|place| place.first[k])),
-        second: std::array::from_fn(|k| most(&|place| place.second[k])),
-        third: std::array::from_fn(|k| most(&|place| place.third[k])),
+        first: both(|place| &place.first),
+        second: both(|place| &place.second),
+        third: greater(&third),
         curvature: 0.0,
     };
     (shape, 1.0 / most(&|place| 1.0 / place.speed_cap))

@@ -91,12 +91,7 @@ pub fn checked<const M: usize>(problem: &Problem<M>, jerk: &[f64; M]) -> Result<
             return Err(Fault::Input { piece: None, what });
         }
     }
-    let [velocity, acceleration] = [&problem.max_velocity, &problem.max_acceleration];
-    if velocity[0] != velocity[1] || acceleration[0] != acceleration[1] {
-        let what = "under limits of jerk those of velocity and acceleration are the same in both directions";
-        return Err(Fault::Input { piece: None, what: what.into() });
-    }
-    Ok(Limits { velocity: velocity[0], acceleration: acceleration[0], jerk: *jerk })
+    Ok(Limits { velocity: problem.max_velocity, acceleration: problem.max_acceleration, jerk: *jerk })
 }
 
 /// The stretches of all runs, in order.
@@ -265,10 +260,10 @@ fn chord_kinks<const M: usize>(problem: &Problem<M>, i: usize) -> Vec<f64> {
 /// tool would creep, a rest takes no longer that setpoints could tell.
 fn turn_speed<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> f64 {
     let place = place(problem, i, u);
+    let [velocity, acceleration] = [&problem.max_velocity, &problem.max_acceleration].map(planning::lesser);
     let of_axis = |k: usize| {
-        let most = problem.max_acceleration[0][k];
-        let gained = (most * problem.period).min(MOMENT * problem.max_velocity[0][k]);
-        (most / place.second[k].abs()).sqrt() / gained
+        let gained = (acceleration[k] * problem.period).min(MOMENT * velocity[k]);
+        (acceleration[k] / place.second[k].abs()).sqrt() / gained
     };
     (0..M).map(of_axis).fold(f64::INFINITY, f64::min)
 }

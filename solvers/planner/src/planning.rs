@@ -20,6 +20,17 @@ pub fn greater<const M: usize>(limits: &Both<M>) -> [f64; M] {
     std::array::from_fn(|k| limits[0][k].max(limits[1][k]))
 }
 
+/// The lesser limit of both directions.
+pub fn lesser<const M: usize>(limits: &Both<M>) -> [f64; M] {
+    std::array::from_fn(|k| limits[0][k].min(limits[1][k]))
+}
+
+/// The greatest multiple of a direction that the limits allow; infinite where all axes stand.
+pub fn along<const M: usize>(limits: &Both<M>, direction: &[f64; M]) -> f64 {
+    let of_axis = |k: usize| limits[usize::from(direction[k] < 0.0)][k] / direction[k].abs();
+    (0..M).map(of_axis).fold(f64::INFINITY, f64::min)
+}
+
 /// Runs and limits of a problem; see `bang_bang_quadratic::Problem`.
 pub struct Limits<'a, const M: usize> {
     pub runs: &'a [usize],

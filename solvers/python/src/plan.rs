@@ -12,7 +12,7 @@ use feedplan_geometry::watch::Watch;
 use feedplan_jerk::JerkLimited as _;
 use feedplan_planner::bang_bang;
 use feedplan_planner::bang_bang_quadratic::{self, Fault, Profile};
-use feedplan_planner::look_ahead::Segments;
+use feedplan_planner::look_ahead::{Change, Segments};
 use feedplan_planner::{Exact as _, ExactQuadratic as _};
 
 pyo3::create_exception!(
@@ -175,19 +175,25 @@ fn feed_between<'py>(
     })
 }
 
-/// The greatest speeds at the ends of segments, lowered to those that the segments between lead to.
+/// The greatest speeds at the ends of segments, lowered to those that the segments between lead to; `up` and `down`
+/// (n, 3) are gain and holds of speeding up and of slowing down.
 #[pyfunction]
 fn look_ahead<'py>(
     py: Python<'py>,
     speed: PyReadonlyArray1<'py, f64>,
-    gain: PyReadonlyArray1<'py, f64>,
-    hold: PyReadonlyArray2<'py, f64>,
+    up: PyReadonlyArray2<'py, f64>,
+    down: PyReadonlyArray2<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let (mut speed, gain, hold) = (speed.as_slice()?.to_vec(), gain.as_slice()?, rows::<2>(&hold)?);
-    if speed.len() != gain.len() + 1 || hold.len() != gain.len() {
+    let mut speed = speed.as_slice()?.to_vec();
+    let change = |[gain, start, end]: [f64; 3]| Change { gain, hold: [start, end] };
+    let changes = |of: &PyReadonlyArray2<'py, f64>| -> PyResult<Vec<Change>> {
+        Ok(rows::<3>(of)?.into_iter().map(change).collect())
+    };
+    let (up, down) = (changes(&up)?, changes(&down)?);
+    if speed.len() != up.len() + 1 || down.len() != up.len() {
         return Err(PyValueError::new_err("the arrays of the segments differ in length"));
     }
-    py.detach(|| Segments { gain, hold: &hold }.lower(&mut speed));
+    py.detach(|| Segments { up: &up, down: &down }.lower(&mut speed));
     Ok(PyArray1::from_vec(py, speed))
 }
 

@@ -39,7 +39,7 @@ impl Geometry<1> for Line {
 
 /// From rest to rest, the same limits for all axes.
 fn problem<G: Geometry<M>, const M: usize>(geometry: &G, [v, a, j]: [f64; 3]) -> Problem<'_, G, M> {
-    let limits = Limits { velocity: [v; M], acceleration: [a; M], jerk: [j; M] };
+    let limits = Limits { velocity: [[v; M]; 2], acceleration: [[a; M]; 2], jerk: [j; M] };
     Problem { geometry, limits, caps: &[], ends: [End::Rest; 2] }
 }
 
@@ -73,8 +73,9 @@ fn excess<G: Geometry<M>, const M: usize>(
                 let (q1, q2, q3) = (place.first[k], place.second[k], place.third[k]);
                 let a = q2 * w + 0.5 * q1 * w1;
                 let j = v * (q3 * w + 1.5 * q2 * w1 + 0.5 * q1 * w2);
-                worst[0] = worst[0].max((q1 * v).abs() / limits.velocity[k] - 1.0);
-                worst[1] = worst[1].max(a.abs() / limits.acceleration[k] - 1.0);
+                let used = |value: f64, most: &[[f64; M]; 2]| value.abs() / most[usize::from(value < 0.0)][k];
+                worst[0] = worst[0].max(used(q1 * v, &limits.velocity) - 1.0);
+                worst[1] = worst[1].max(used(a, &limits.acceleration) - 1.0);
                 worst[2] = worst[2].max(j.abs() / limits.jerk[k] - 1.0);
             }
         }
@@ -127,6 +128,34 @@ fn lines_take_as_long_as_seven_sections() {
         assert!((-1e-9..1e-5).contains(&part), "{length} mm: {part:e} above the formula");
         assert!(plan.converged);
         assert_held(&problem, &plan.profile);
+    }
+}
+
+/// An axis that slows down by another limit than it speeds up by.
+#[test]
+fn a_line_with_a_limit_for_each_direction_takes_as_long_as_its_sections() {
+    let path = Line::new(100.0);
+    for [up, down] in [[3000.0, 400.0], [500.0, 4000.0]] {
+        let mut problem = problem(&path, FAST);
+        problem.limits.acceleration = [[up], [down]];
+        problem.limits.velocity[1] = [1.0];
+        let plan = planned(&problem);
+        assert_held(&problem, &plan.profile);
+        // Lines of an even limit rise to the peak, and fall from it, in half of their ways.
+        let [_, _, j] = FAST;
+        let rise = |v: f64, a: f64| if v * j <= a * a { 2.0 * (v / j).sqrt() } else { v / a + a / j };
+        let (mut low, mut high) = (0.0, FAST[0]);
+        for _ in 0..200 {
+            let middle = 0.5 * (low + high);
+            let way = 0.5 * middle * (rise(middle, up) + rise(middle, down));
+            (low, high) = if way < path.knots[1] { (middle, high) } else { (low, middle) };
+        }
+        let ramps = rise(low, up) + rise(low, down);
+        let time = ramps + (path.knots[1] - 0.5 * low * ramps) / low;
+        let error = plan.time / time - 1.0;
+        assert!((-1e-6..2e-4).contains(&error), "{error:e} with {up} and {down}");
+        let least = certify(&problem, &plan.profile, &Effort::default()).least_time;
+        assert!(least <= plan.time && least > 0.999 * time, "{least} of {time}");
     }
 }
 
@@ -234,6 +263,30 @@ fn random_paths_hold_all_limits() {
         stopped += usize::from(!plan.converged);
     }
     assert!(stopped <= 3, "{stopped} paths did not converge");
+}
+
+/// All of them, and no plan is slower than with the lesser limits of both directions.
+#[test]
+fn random_paths_hold_limits_that_differ_by_direction() {
+    for seed in seeds(4) {
+        let (path, limits) = random_case(seed);
+        let mut problem = problem(&path, limits);
+        for k in 0..2 {
+            let part = 0.3 + 0.1 * ((seed + k as u64) % 7) as f64;
+            problem.limits.acceleration[(seed as usize + k) % 2][k] *= part;
+            problem.limits.velocity[(seed as usize / 2 + k) % 2][k] *= part;
+        }
+        let plan = planned(&problem);
+        assert_held(&problem, &plan.profile);
+        let least = certify(&problem, &plan.profile, &Effort::default()).least_time;
+        assert!(least <= plan.time * (1.0 + 1e-9) && least > 0.8 * plan.time, "seed {seed}: {least}");
+        for which in [&mut problem.limits.velocity, &mut problem.limits.acceleration] {
+            let less = std::array::from_fn(|k| which[0][k].min(which[1][k]));
+            *which = [less; 2];
+        }
+        let slow = planned(&problem).time;
+        assert!(plan.time <= slow * (1.0 + 2e-4), "seed {seed}: {} and {slow}", plan.time);
+    }
 }
 
 #[test]

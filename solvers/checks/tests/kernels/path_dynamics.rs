@@ -7,7 +7,7 @@ use feedplan_jerk::path_dynamics::{allowable, bounded, chord_speed, sampled, Axi
 use feedplan_jerk::s_curve::{plan, Limits, Section, Segment};
 
 const AXES: AxisLimits<2> =
-    AxisLimits { velocity: [170.0, 180.0], acceleration: [400.0, 600.0], jerk: [4000.0, 6000.0] };
+    AxisLimits { velocity: [[170.0, 180.0]; 2], acceleration: [[400.0, 600.0]; 2], jerk: [4000.0, 6000.0] };
 /// Servo period in s; differences over it are averages of the derivatives.
 const PERIOD: f64 = 0.002;
 
@@ -133,7 +133,7 @@ fn uses(control: &Control, weight: &[f64], shape: impl Fn(&Curve<2>) -> Shape<2>
         for p in places.windows(4) {
             let [a, b, c, d] = [p[0][k], p[1][k], p[2][k], p[3][k]];
             let found = [b - a, c - 2.0 * b + a, d - 3.0 * (c - b) - a];
-            let limits = [AXES.velocity[k], AXES.acceleration[k], AXES.jerk[k]];
+            let limits = [AXES.velocity[0][k], AXES.acceleration[0][k], AXES.jerk[k]];
             for order in 0..3 {
                 worst[order] =
                     worst[order].max(found[order].abs() / PERIOD.powi(order as i32 + 1) / limits[order]);

@@ -288,7 +288,7 @@ fn jerk_limited_time(line: &Polyline<2>) -> f64 {
         knots.push(knots[knots.len() - 1] + width);
     }
     let geometry = ByLength::new(Fitted(smooth, knots.clone()), &knots, 8);
-    let limits = Limits { velocity: [100.0; 2], acceleration: [500.0; 2], jerk: [5e4; 2] };
+    let limits = Limits { velocity: [[100.0; 2]; 2], acceleration: [[500.0; 2]; 2], jerk: [5e4; 2] };
     let problem = Problem { geometry: &geometry, limits, caps: &[], ends: [End::Rest; 2] };
     plan(&problem, &Effort::default()).expect("the path can be travelled").time
 }

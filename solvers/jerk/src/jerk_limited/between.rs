@@ -3,6 +3,7 @@
 
 use super::hermite::{self, combine, local, Basis};
 use super::rows::Rows;
+use super::sides::Sides;
 use super::{Geometry, Limits};
 use feedplan_geometry::lanes::Lanes;
 
@@ -43,6 +44,9 @@ struct Sample<const M: usize> {
 /// The limits of a stretch at all places.
 #[derive(Clone, Debug)]
 pub struct Between<const M: usize> {
+    velocity: Sides<M>,
+    acceleration: Sides<M>,
+    jerk: [f64; M],
     samples: Vec<[Sample<M>; GROUPS]>,
     /// 1/w_max at the nodes on both sides of each interval.
     at_nodes: Vec<[f64; 2]>,
@@ -52,7 +56,13 @@ pub struct Between<const M: usize> {
 
 impl<const M: usize> Between<M> {
     /// Samples between `nodes`, where the greatest speeds and how tight the limits of jerk are is as in `rows`.
-    pub fn sample(geometry: &impl Geometry<M>, nodes: &[f64], pieces: &[u32], rows: &Rows<M>) -> Self {
+    pub fn sample(
+        geometry: &impl Geometry<M>,
+        limits: &Limits<M>,
+        nodes: &[f64],
+        pieces: &[u32],
+        rows: &Rows<M>,
+    ) -> Self {
         let mut samples = Vec::with_capacity(pieces.len());
         let mut at_nodes = Vec::with_capacity(pieces.len());
         for (n, interval) in rows.intervals.iter().enumerate() {
@@ -72,17 +82,19 @@ impl<const M: usize> Between<M> {
             at_nodes.push([0, 3].map(|lane| interval.speed.values()[lane]));
         }
         let calm = rows.intervals.iter().map(|interval| interval.jerk).collect();
-        Self { samples, at_nodes, calm }
+        let [velocity, acceleration] = [&limits.velocity, &limits.acceleration].map(Sides::new);
+        Self { velocity, acceleration, jerk: limits.jerk, samples, at_nodes, calm }
     }
 
     /// The greatest uses of speed, acceleration and jerk on interval n by the spline x.
     ///
     /// Peaks are sought of each axis for itself: of several together they are no peaks of a smooth function.
-    pub fn utilisation(&self, limits: &Limits<M>, x: &[f64], n: usize, h: f64) -> [f64; 3] {
+    pub fn utilisation(&self, x: &[f64], n: usize, h: f64) -> [f64; 3] {
         let u = local(x, n, h);
         let per_h = 1.0 / h;
         let mut cap = [0.0; PLACES];
         let mut axes = [[[0.0; PLACES]; 3]; M];
+        let Self { velocity, acceleration, jerk, .. } = self;
         for (group, (sample, basis)) in self.samples[n].iter().zip(&BASES).enumerate() {
             let w = combine(&basis[0], &u);
             let (w1, w2) = (combine(&basis[1], &u) * per_h, combine(&basis[2], &u) * (per_h * per_h));
@@ -93,17 +105,18 @@ impl<const M: usize> Between<M> {
                 let [q1, q2, q3] = sample.q[k];
                 let a = q2 * w + q1 * w1 * 0.5;
                 let j = (q3 * w + q2 * w1 * 1.5 + q1 * w2 * 0.5) * v;
-                axes[k][0][at.clone()].copy_from_slice((q1 * v * (1.0 / limits.velocity[k])).values());
-                axes[k][1][at.clone()].copy_from_slice((a * (1.0 / limits.acceleration[k])).values());
-                axes[k][2][at.clone()].copy_from_slice((j * (self.calm[n] / limits.jerk[k])).values());
+                axes[k][0][at.clone()].copy_from_slice((q1 * v * velocity.per_mean[k]).values());
+                axes[k][1][at.clone()].copy_from_slice((a * acceleration.per_mean[k]).values());
+                axes[k][2][at.clone()].copy_from_slice((j * (self.calm[n] / jerk[k])).values());
             }
         }
         let [from, to] = self.at_nodes[n];
-        let speed_sq = peak(&cap).max(x[2 * n] * from).max(x[2 * n + 2] * to);
+        let speed_sq = peak(&cap, [1.0; 2]).max(x[2 * n] * from).max(x[2 * n + 2] * to);
         let mut worst = [speed_sq.max(0.0).sqrt(), 0.0, 0.0];
-        for uses in &axes {
-            for (worst, values) in worst.iter_mut().zip(uses) {
-                *worst = f64::max(*worst, peak(values));
+        for (k, uses) in axes.iter().enumerate() {
+            let per_most = [velocity.per_most[k], acceleration.per_most[k], [1.0; 2]];
+            for ((worst, values), per_most) in worst.iter_mut().zip(uses).zip(per_most) {
+                *worst = f64::max(*worst, peak(values, per_most));
             }
         }
         worst
@@ -140,10 +153,13 @@ const fn halfway() -> [([f64; STENCIL], usize); PLACES - 1] {
     out
 }
 
-/// The greatest |f| of a smooth function with these values at the places: of them, of those interpolated half-way
-/// between, and of the parabolas through each three.
-fn peak(f: &[f64; PLACES]) -> f64 {
-    let greatest = f.iter().fold(0.0f64, |worst, value| worst.max(value.abs()));
+/// The greatest part of its limits that a smooth function with these values at the places uses, with one over the limits
+/// of what is positive and of what is negative: of the values, of those interpolated half-way between, and of the
+/// parabolas through each three.
+fn peak(f: &[f64; PLACES], [per_high, per_low]: [f64; 2]) -> f64 {
+    let (low, high) =
+        f.iter().fold((0.0f64, 0.0f64), |(low, high), &value| (low.min(value), high.max(value)));
+    let greatest = (high * per_high).max(-low * per_low);
     if greatest <= NEAR {
         return greatest;
     }
@@ -160,7 +176,8 @@ fn peak(f: &[f64; PLACES]) -> f64 {
         let bend = sign * (2.0 * fine[i] - fine[i - 1] - fine[i + 1]);
         let rise = fine[i + 1] - fine[i - 1];
         if rise.abs() < 2.0 * bend {
-            worst = worst.max(fine[i].abs() + rise * rise / (8.0 * bend));
+            let per_limit = if sign > 0.0 { per_high } else { per_low };
+            worst = worst.max((fine[i].abs() + rise * rise / (8.0 * bend)) * per_limit);
         }
     }
     worst
@@ -179,14 +196,20 @@ mod tests {
         // 1 − (t − c)²/2 + (t − c)³/10 peaks at c with 1, wherever that lies.
         for i in 0..100 {
             let c = 0.01 * i as f64;
-            let found = peak(&values(|t| 1.0 - 0.5 * (t - c).powi(2) + 0.1 * (t - c).powi(3)));
+            let bump = values(|t| 1.0 - 0.5 * (t - c).powi(2) + 0.1 * (t - c).powi(3));
+            let found = peak(&bump, [1.0; 2]);
             assert!((found - 1.0).abs() < 5e-6, "{found} for a peak at {c}");
-            assert_eq!(peak(&values(|t| -(1.0 - 0.5 * (t - c).powi(2) + 0.1 * (t - c).powi(3)))), found);
+            assert_eq!(peak(&bump.map(|value| -value), [1.0; 2]), found);
+            assert_eq!(peak(&bump, [2.0, 0.5]), 2.0 * found);
+            assert_eq!(
+                peak(&bump.map(|value| -value), [2.0, 0.5]),
+                bump.iter().fold(0.0, |a, b| b.max(a)) * 0.5
+            );
         }
     }
 
     #[test]
     fn values_far_from_a_limit_are_taken_as_they_are() {
-        assert_eq!(peak(&values(|t| 0.5 * t)), 0.5);
+        assert_eq!(peak(&values(|t| 0.5 * t), [1.0; 2]), 0.5);
     }
 }

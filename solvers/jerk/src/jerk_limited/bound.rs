@@ -89,8 +89,8 @@ struct Part {
     x: Vec<f64>,
     slope: Vec<f64>,
     boxes: Vec<[f64; 2]>,
-    /// By how much w can change on each interval.
-    rise: Vec<f64>,
+    /// By how much w can rise and fall on each interval.
+    change: Vec<[f64; 2]>,
     /// Multipliers of the ramps' limits.
     ends: [f64; 2],
 }
@@ -122,7 +122,7 @@ fn part<const M: usize>(
         value: 0.0,
         x: x[2 * core.start..2 * core.end + 2].to_vec(),
         slope: vec![0.0; nodes],
-        rise: vec![],
+        change: vec![],
         boxes: [[0.0, f64::INFINITY], [f64::NEG_INFINITY, f64::INFINITY]].repeat(core.len() + 1),
         ends: [0, 1].map(|end| space.ends[end].filter(|_| known).map_or(0.0, |row| row.dual)),
     };
@@ -140,18 +140,19 @@ fn part<const M: usize>(
         for (k, scale) in [1.0, h, 1.0, h].into_iter().enumerate() {
             out.slope[2 * (n - core.start) + k] += slope[k] * scale;
         }
-        let mut rise = 0.0;
+        let mut change = [0.0; 2];
         for lane in 0..4 {
-            let [w, w1] = limits_at(rows, n, lane);
+            let [w, rise, fall] = limits_at(rows, n, lane);
             // The 3/8 rule is exact for w', a quadratic.
-            rise += MASS.values()[lane] * w1 * h;
+            change[0] += MASS.values()[lane] * rise * h;
+            change[1] += MASS.values()[lane] * fall * h;
             if lane == 0 || lane == 3 {
                 let at = 2 * (n - core.start + lane / 3);
                 out.boxes[at][1] = out.boxes[at][1].min(w);
-                out.boxes[at + 1] = [out.boxes[at + 1][0].max(-w1), out.boxes[at + 1][1].min(w1)];
+                out.boxes[at + 1] = [out.boxes[at + 1][0].max(-fall), out.boxes[at + 1][1].min(rise)];
             }
         }
-        out.rise.push(rise);
+        out.change.push(change);
     }
     out
 }
@@ -175,7 +176,8 @@ fn lagrangian<const M: usize>(
     let mut fixed = -dual[Order::<M>::SPEED];
     for k in 0..M {
         let (at, to) = (Order::<M>::acceleration(k), Order::<M>::jerk(k));
-        fixed += -(dual[at] + dual[at + 1]);
+        let [up, down] = rows.acceleration.most[k];
+        fixed += -(dual[at] * up + dual[at + 1] * down);
         dual[to] *= fit;
         dual[to + 1] *= fit;
     }
@@ -188,16 +190,19 @@ fn lagrangian<const M: usize>(
     (value, slope)
 }
 
-/// The greatest w and |w'| that the limits of speed and acceleration allow at a lane of interval n.
-fn limits_at<const M: usize>(rows: &Rows<M>, n: usize, lane: usize) -> [f64; 2] {
+/// The greatest w, w' and −w' that the limits of speed and acceleration allow at a lane of interval n.
+fn limits_at<const M: usize>(rows: &Rows<M>, n: usize, lane: usize) -> [f64; 3] {
     let interval = &rows.intervals[n];
     let w = 1.0 / interval.speed.values()[lane];
-    let mut w1 = f64::INFINITY;
+    let (mut rise, mut fall) = (f64::INFINITY, f64::INFINITY);
     for k in 0..M {
-        let [q1, q2, _] = interval.q[k].map(|q| q.values()[lane].abs());
-        w1 = w1.min(2.0 * (1.0 / rows.per_acceleration[k] + q2 * w) / q1);
+        let [q1, q2, _] = interval.q[k].map(|q| q.values()[lane]);
+        let most = rows.acceleration.most[k].map(|most| most / rows.acceleration.per_mean[k]);
+        let against = usize::from(q1 < 0.0);
+        rise = rise.min(2.0 * (most[against] + q2.abs() * w) / q1.abs());
+        fall = fall.min(2.0 * (most[1 - against] + q2.abs() * w) / q1.abs());
     }
-    [w, w1]
+    [w, rise, fall]
 }
 
 /// The bound of all cores together.
@@ -254,11 +259,11 @@ fn join(parts: &[Part], cores: &[Range<usize>], bounds: &[Bound; 2], unknowns: u
 
 /// Narrows the boxes of w to what can be reached from one node to the next, forward and backward.
 fn narrow(parts: &[Part], boxes: &mut [[f64; 2]]) {
-    let rise: Vec<f64> = parts.iter().flat_map(|part| part.rise.iter().copied()).collect();
-    for n in 0..rise.len() {
-        boxes[2 * n + 2][1] = boxes[2 * n + 2][1].min(boxes[2 * n][1] + rise[n]);
+    let change: Vec<[f64; 2]> = parts.iter().flat_map(|part| part.change.iter().copied()).collect();
+    for n in 0..change.len() {
+        boxes[2 * n + 2][1] = boxes[2 * n + 2][1].min(boxes[2 * n][1] + change[n][0]);
     }
-    for n in (0..rise.len()).rev() {
-        boxes[2 * n][1] = boxes[2 * n][1].min(boxes[2 * n + 2][1] + rise[n]);
+    for n in (0..change.len()).rev() {
+        boxes[2 * n][1] = boxes[2 * n][1].min(boxes[2 * n + 2][1] + change[n][1]);
     }
 }

@@ -1,7 +1,7 @@
 //! The nodes of the spline: about equal in travel time where the speed changes, finer where the path turns, wide
 //! where neither happens, and on every knot of the path.
 
-use super::survey::{Slopes, Station};
+use super::survey::{Change, Slopes, Station};
 use std::ops::Range;
 
 use super::interior_point::Bound;
@@ -148,7 +148,8 @@ fn density(stations: &[Station], slopes: Slopes, bounds: &[Bound; 2], resolution
     let last = s.len() - 1;
     let changing = |i: usize| {
         let h = s[i + 1] - s[i];
-        (r[i + 1] - r[i]).abs() > CHANGING * (slopes.reach(r[i], h) - r[i])
+        let change = if r[i + 1] < r[i] { Change::Fall } else { Change::Rise };
+        (r[i + 1] - r[i]).abs() > CHANGING * (slopes.reach(r[i], h, change) - r[i])
     };
     let mut length: Vec<f64> = (0..=last)
         .map(|i| {
@@ -201,7 +202,7 @@ mod tests {
 
     #[test]
     fn knots_and_capped_places_are_nodes() {
-        let limits = Limits { velocity: [250.0], acceleration: [3000.0], jerk: [50_000.0] };
+        let limits = Limits { velocity: [[250.0]; 2], acceleration: [[3000.0]; 2], jerk: [50_000.0] };
         let caps = [SpeedCap::new(3.0, 20.0), SpeedCap::new(30.0, 5.0)];
         let bounds = [Bound::Rest { ramp: 0.01, greatest: 1.0 }; 2];
         let (stations, slopes) =

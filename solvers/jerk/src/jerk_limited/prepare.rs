@@ -10,7 +10,7 @@ use super::rest;
 use super::rows::Rows;
 use super::stretch::Stretch;
 use super::survey::{survey, Slopes};
-use super::{Effort, End, Fault, Geometry, Problem};
+use super::{Effort, End, Fault, Geometry, Limits, Problem};
 use feedplan_geometry::watch::Watch;
 
 /// Intervals sampled at a time.
@@ -104,7 +104,7 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         let rows = self.grid.rows(self.problem, range.clone());
         let nodes = &self.grid.nodes[range.start..=range.end];
         let pieces = &self.grid.pieces[range];
-        let between = Between::sample(self.problem.geometry, nodes, pieces, &rows);
+        let between = Between::sample(self.problem.geometry, &self.problem.limits, nodes, pieces, &rows);
         Stretch { rows, between }
     }
 }
@@ -138,10 +138,13 @@ fn check<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>) -> Result<(), 
         return wrong("the knots of the path do not rise from 0".into());
     }
     let limits = &problem.limits;
+    let Limits { velocity, acceleration, jerk } = limits;
     for (name, unit, values) in [
-        ("velocity", "mm/s", &limits.velocity),
-        ("acceleration", "mm/s²", &limits.acceleration),
-        ("jerk", "mm/s³", &limits.jerk),
+        ("velocity", "mm/s", &velocity[0]),
+        ("velocity", "mm/s", &velocity[1]),
+        ("acceleration", "mm/s²", &acceleration[0]),
+        ("acceleration", "mm/s²", &acceleration[1]),
+        ("jerk", "mm/s³", jerk),
     ] {
         for (axis, &value) in values.iter().enumerate() {
             if !(value > 0.0 && value.is_finite()) {

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::{Geometry, Limits, Place, SpeedCap};
+use feedplan_planner::planning::lesser;
 
 /// Ramps are this part of the length on which constant jerk reaches the acceleration or the speed …
 const RAMP: f64 = 1.0 / 90.0;
@@ -30,8 +31,8 @@ pub fn length<const M: usize>(limits: &Limits<M>, place: &Place<M>, path: f64) -
     let along = |limit: &[f64; M]| {
         (0..M).map(|k| limit[k] / place.first[k].abs().max(f64::MIN_POSITIVE)).fold(f64::INFINITY, f64::min)
     };
-    let (v, a, j) =
-        (along(&limits.velocity).min(place.speed_cap), along(&limits.acceleration), along(&limits.jerk));
+    let [v, a] = [&limits.velocity, &limits.acceleration].map(|limit| along(&lesser(limit)));
+    let (v, j) = (v.min(place.speed_cap), along(&limits.jerk));
     let by_acceleration = a * a * a / (6.0 * j * j);
     let by_speed = (8.0 * v * v * v / j).sqrt() / 6.0;
     let ramp = most.min(RAMP * by_acceleration.min(by_speed));
@@ -72,9 +73,10 @@ pub fn greatest<const M: usize>(
             let mut c = 1.0 / (limits.per_speed_sq(&place) * w);
             for k in 0..M {
                 let (q1, q2, q3) = (place.first[k], place.second[k], place.third[k]);
-                let a = (q2 * w + 0.5 * q1 * w1).abs();
+                let a = q2 * w + 0.5 * q1 * w1;
+                let most = limits.acceleration[usize::from(a < 0.0)][k];
                 let j = (q3 * cubed + 1.5 * q2 * crossed + 0.5 * q1 * bend).abs();
-                c = c.min(limits.acceleration[k] / a).min((calm * limits.jerk[k] / j).cbrt().powi(2));
+                c = c.min(most / a.abs()).min((calm * limits.jerk[k] / j).cbrt().powi(2));
             }
             (t, c)
         };
@@ -137,7 +139,8 @@ mod tests {
         }
     }
 
-    const LIMITS: Limits<2> = Limits { velocity: [100.0; 2], acceleration: [1000.0; 2], jerk: [50_000.0; 2] };
+    const LIMITS: Limits<2> =
+        Limits { velocity: [[100.0; 2]; 2], acceleration: [[1000.0; 2]; 2], jerk: [50_000.0; 2] };
 
     #[test]
     fn on_a_line_jerk_is_used_fully() {

@@ -1,8 +1,8 @@
 //! The limits of a stretch at its collocation points, as slacks of w = v².
 //!
-//! With q', q'', q''' of an axis along the path, in parts of its limits,
+//! With q', q'', q''' of an axis along the path and its limits, of which the acceleration has A⁺ and A⁻, A their mean,
 //!
-//!   acceleration   1 ∓ (q'' w + q' w'/2)/A ≥ 0
+//!   acceleration   A^±/A ∓ (q'' w + q' w'/2)/A ≥ 0
 //!   jerk           w^(−1/2) ∓ (q''' w + 3/2 q'' w' + 1/2 q' w'')/J ≥ 0
 //!   speed          1 − w/w_max ≥ 0,   w ≥ 0
 //!
@@ -14,6 +14,7 @@
 use super::hermite::{self, combine, local, BEND, SLOPE, VALUE};
 use super::interior_point::Bound;
 use super::model::Form;
+use super::sides::Sides;
 use super::{Geometry, Limits, Place};
 use feedplan_geometry::lanes::Lanes;
 
@@ -38,8 +39,8 @@ pub struct Interval<const M: usize> {
 #[derive(Clone, Debug)]
 pub struct Rows<const M: usize> {
     pub intervals: Vec<Interval<M>>,
-    /// 1/A and 1/J of each axis.
-    pub per_acceleration: [f64; M],
+    pub acceleration: Sides<M>,
+    /// 1/J of each axis.
     pub per_jerk: [f64; M],
 }
 
@@ -148,12 +149,12 @@ impl<const M: usize> Rows<M> {
         }
         Self {
             intervals,
-            per_acceleration: limits.acceleration.map(|a| 1.0 / a),
+            acceleration: Sides::new(&limits.acceleration),
             per_jerk: limits.jerk.map(|j| 1.0 / j),
         }
     }
 
-    /// Acceleration and jerk/√w of each axis in parts of the limits.
+    /// Acceleration and jerk/√w of each axis in parts of A and J.
     #[inline(always)]
     pub fn axes(&self, interval: &Interval<M>, [w, w1, w2]: [Lanes; 3]) -> [[Lanes; 2]; M] {
         let (half, bend, more) = (w1 * 0.5, w2 * 0.5, w1 * 1.5);
@@ -161,7 +162,7 @@ impl<const M: usize> Rows<M> {
         for k in 0..M {
             let [q1, q2, q3] = interval.q[k];
             out[k] = [
-                (q2 * w + q1 * half) * self.per_acceleration[k] * interval.acceleration,
+                (q2 * w + q1 * half) * self.acceleration.per_mean[k] * interval.acceleration,
                 (q3 * w + q2 * more + q1 * bend) * (self.per_jerk[k] * interval.jerk),
             ];
         }
@@ -178,7 +179,8 @@ impl<const M: usize> Rows<M> {
         for k in 0..M {
             let [a, j] = axes[k];
             let (at, to) = (Order::<M>::acceleration(k), Order::<M>::jerk(k));
-            (out[at], out[at + 1]) = (Lanes::ONE - a, Lanes::ONE + a);
+            let [up, down] = self.acceleration.most[k].map(Lanes::all);
+            (out[at], out[at + 1]) = (up - a, down + a);
             (out[to], out[to + 1]) = (pace - j, pace + j);
         }
         out[Order::<M>::SPEED] = Lanes::ONE - motion[0] * interval.speed;
@@ -214,8 +216,7 @@ impl<const M: usize> Rows<M> {
             let [q1, q2, q3] = interval.q[k];
             let (half, more) = (q1 * 0.5, q2 * 1.5);
             let at = Order::<M>::acceleration(k);
-            let both =
-                (weight[at] + weight[at + 1]) * tight * (self.per_acceleration[k] * self.per_acceleration[k]);
+            let both = (weight[at] + weight[at + 1]) * tight * self.acceleration.per_mean[k].powi(2);
             let (b2, b1) = (both * q2, both * half);
             m[0] += b2 * q2;
             m[1] += b2 * half;
@@ -243,7 +244,7 @@ impl<const M: usize> Rows<M> {
         for k in 0..M {
             let [q1, q2, q3] = interval.q[k];
             let at = Order::<M>::acceleration(k);
-            let a = (aim[at + 1] - aim[at]) * interval.acceleration * self.per_acceleration[k];
+            let a = (aim[at + 1] - aim[at]) * interval.acceleration * self.acceleration.per_mean[k];
             let at = Order::<M>::jerk(k);
             let j = (aim[at + 1] - aim[at]) * (self.per_jerk[k] * interval.jerk);
             g[0] += a * q2 + j * q3;
@@ -260,8 +261,9 @@ impl<const M: usize> Rows<M> {
         let motion = interval.motion(&local(x, n, interval.h));
         let v = motion[0].max(Lanes::ZERO).sqrt();
         let mut worst = [(motion[0] * interval.speed).greatest().max(0.0).sqrt(), 0.0, 0.0];
-        for [a, j] in self.axes(interval, motion) {
-            worst[1] = f64::max(worst[1], a.abs().greatest());
+        for (k, [a, j]) in self.axes(interval, motion).into_iter().enumerate() {
+            let [per_up, per_down] = self.acceleration.per_most[k];
+            worst[1] = worst[1].max(a.greatest() * per_up).max(-a.least() * per_down);
             worst[2] = f64::max(worst[2], (j * v).abs().greatest());
         }
         worst

@@ -6,7 +6,6 @@ use super::exact::Exact;
 use super::hermite::duration;
 use super::interior_point::{Bound, Effort, InteriorPoint, Outcome, Report};
 use super::rows::Rows;
-use super::Limits;
 
 /// Uses up to this hold the limits: rounding, and what peaks between the checked places are off.
 pub const HELD: f64 = 1.0 + 4e-7;
@@ -54,7 +53,6 @@ impl<const M: usize> Stretch<M> {
     /// Improves the valid plan x in place.
     pub fn improve(
         &mut self,
-        limits: &Limits<M>,
         bounds: [Bound; 2],
         x: &mut [f64],
         effort: &Effort,
@@ -70,7 +68,7 @@ impl<const M: usize> Stretch<M> {
             let Some((y, report)) = self.attempt(bounds, attempts, space, &mut verdict.iterations) else {
                 break;
             };
-            let holds = self.tighten(limits, &y, &mut times, round == 0);
+            let holds = self.tighten(&y, &mut times, round == 0);
             let stopped = report.outcome == Outcome::Stopped;
             if holds && (round > 0 || stopped) {
                 if report.time < best {
@@ -81,7 +79,7 @@ impl<const M: usize> Stretch<M> {
                 break;
             }
             // Should nothing better come: as far towards this plan as the limits allow.
-            if let Some((z, time)) = self.retreat(limits, &bounds, x, &y) {
+            if let Some((z, time)) = self.retreat(&bounds, x, &y) {
                 if time < best {
                     best = time;
                     improved.copy_from_slice(&z);
@@ -143,39 +141,32 @@ impl<const M: usize> Stretch<M> {
     }
 
     /// The spline nearest to y on a way back that holds all limits, and its time.
-    fn retreat(
-        &self,
-        limits: &Limits<M>,
-        bounds: &[Bound; 2],
-        x: &[f64],
-        y: &[f64],
-    ) -> Option<(Vec<f64>, f64)> {
+    fn retreat(&self, bounds: &[Bound; 2], x: &[f64], y: &[f64]) -> Option<(Vec<f64>, f64)> {
         if !bounds.iter().zip([0, x.len() - 2]).all(|(bound, at)| bound.is_met(x[at], x[at + 1])) {
             return None;
         }
         let ways = ways_back(bounds, x);
-        let held =
-            |part: f64| ways.iter().map(|way| blend(way, y, part)).find(|z| self.holds(limits, z, HELD));
+        let held = |part: f64| ways.iter().map(|way| blend(way, y, part)).find(|z| self.holds(z, HELD));
         let z = RETREATS.into_iter().find_map(held)?;
         let time = self.time(bounds, &z);
         Some((z, time))
     }
 
     /// Whether x uses no limit of the machine by more than a part.
-    pub fn holds(&self, limits: &Limits<M>, x: &[f64], most: f64) -> bool {
+    pub fn holds(&self, x: &[f64], most: f64) -> bool {
         (0..self.rows.intervals.len()).all(|n| {
-            let worst = self.between.utilisation(limits, x, n, self.rows.intervals[n].h);
+            let worst = self.between.utilisation(x, n, self.rows.intervals[n].h);
             worst.iter().all(|&part| part <= most)
         })
     }
 
     /// Tightens the limits where x exceeds them between the points, and counts how often; false if it does somewhere.
     /// A rough x stays inside its limits: there they are tightened by how far peaks stand out over the points.
-    fn tighten(&mut self, limits: &Limits<M>, x: &[f64], times: &mut [i32], rough: bool) -> bool {
+    fn tighten(&mut self, x: &[f64], times: &mut [i32], rough: bool) -> bool {
         let mut holds = true;
         for (n, times) in times.iter_mut().enumerate() {
             let margin = MARGIN.map(|least| least * RISE.powi(*times));
-            let mut used = self.between.utilisation(limits, x, n, self.rows.intervals[n].h);
+            let mut used = self.between.utilisation(x, n, self.rows.intervals[n].h);
             holds &= used.iter().all(|&used| used <= HELD);
             if rough {
                 let at = self.rows.utilisation(x, n);

@@ -4,6 +4,7 @@
 use super::interior_point::Bound;
 use super::{rest, Fault, Geometry, Limits, Place, SpeedCap};
 use feedplan_geometry::watch::Watch;
+use feedplan_planner::planning::{greater, lesser, Both};
 
 /// Parts of the limits that the caps of the envelope leave to a plan through them.
 const SPEED: f64 = 0.9;
@@ -20,13 +21,21 @@ const DEPTH: std::ops::Range<u32> = 2..30;
 /// Stations are at most this part of r/K apart.
 const SPACING: f64 = 0.25;
 
-/// The slopes of the envelope: r' ≤ min(k, acceleration · r^(−1/3), r/shortest).
+/// The slopes of the envelope: |r'| ≤ min(k, acceleration · r^(−1/3), r/shortest).
 #[derive(Clone, Copy, Debug)]
 pub struct Slopes {
     pub k: f64,
-    acceleration: f64,
+    /// Where it rises along the path, and where it falls.
+    acceleration: [f64; 2],
     /// The least length over which r changes to its like, in mm: places on the path have no digits for shorter ones.
     shortest: f64,
+}
+
+/// Which way the envelope goes along the path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Change {
+    Rise,
+    Fall,
 }
 
 /// A place of the survey.
@@ -45,7 +54,8 @@ impl<const M: usize> Limits<M> {
     pub(super) fn per_speed_sq(&self, place: &Place<M>) -> f64 {
         let mut worst = 1.0 / (place.speed_cap * place.speed_cap);
         for k in 0..M {
-            worst = worst.max((place.first[k] / self.velocity[k]).powi(2));
+            let first = place.first[k];
+            worst = worst.max((first / self.velocity[usize::from(first < 0.0)][k]).powi(2));
         }
         worst
     }
@@ -57,8 +67,9 @@ impl<const M: usize> Limits<M> {
         for axis in 0..M {
             let (second, third) = (place.second[axis].abs().max(tiny), place.third[axis].abs().max(tiny));
             let jerk = JERK * self.jerk[axis];
+            let acceleration = self.acceleration[usize::from(place.second[axis] < 0.0)][axis];
             cap = cap
-                .min((ACCELERATION * self.acceleration[axis] / second).powf(0.75))
+                .min((ACCELERATION * acceleration / second).powf(0.75))
                 .min((jerk / third).sqrt())
                 .min(jerk / (2.0 * second * k));
         }
@@ -67,14 +78,19 @@ impl<const M: usize> Limits<M> {
 }
 
 impl Slopes {
-    /// From the greatest |q'| of each axis and the length of the path.
-    pub fn new<const M: usize>(limits: &Limits<M>, greatest: &[f64; M], path: f64) -> Self {
-        let least = |limit: &[f64; M]| {
+    /// From the greatest q' and −q' of each axis and the length of the path.
+    pub fn new<const M: usize>(limits: &Limits<M>, greatest: &Both<M>, path: f64) -> Self {
+        let least = |limit: &[f64; M], greatest: &[f64; M]| {
             (0..M).map(|k| limit[k] / greatest[k].max(f64::MIN_POSITIVE)).fold(f64::INFINITY, f64::min)
         };
+        let [up, down] = &limits.acceleration;
+        let [ahead, back] = greatest;
         Self {
-            k: SLOPE * least(&limits.jerk).sqrt(),
-            acceleration: RISE * least(&limits.acceleration),
+            k: SLOPE * least(&limits.jerk, &greater(greatest)).sqrt(),
+            acceleration: [
+                RISE * least(up, ahead).min(least(down, back)),
+                RISE * least(up, back).min(least(down, ahead)),
+            ],
             shortest: rest::SHORTEST * path,
         }
     }
@@ -85,15 +101,16 @@ impl Slopes {
         (r / self.k).max(self.shortest)
     }
 
-    /// The greatest r a distance h further.
+    /// The greatest r a distance h further, up the envelope.
     #[inline]
-    pub fn reach(&self, r: f64, h: f64) -> f64 {
-        r + h * self.k.min(self.acceleration / r.cbrt()).min(r / self.shortest)
+    pub fn reach(&self, r: f64, h: f64, change: Change) -> f64 {
+        r + h * self.k.min(self.acceleration[change as usize] / r.cbrt()).min(r / self.shortest)
     }
 
-    /// The time of a stop from a speed.
+    /// The time to a speed from rest, or to rest from it if that is longer.
     pub fn stop_time(&self, speed: f64) -> f64 {
-        let (a, j) = (self.acceleration / RISE, (self.k / SLOPE).powi(2));
+        let [rise, fall] = self.acceleration;
+        let (a, j) = (rise.min(fall) / RISE, (self.k / SLOPE).powi(2));
         if speed * j > a * a {
             speed / a + a / j
         } else {
@@ -124,10 +141,10 @@ impl Slopes {
     pub fn limit(&self, s: &[f64], r: &mut [f64]) {
         // Forward, then backward.
         for i in 1..s.len() {
-            r[i] = r[i].min(self.reach(r[i - 1], s[i] - s[i - 1]));
+            r[i] = r[i].min(self.reach(r[i - 1], s[i] - s[i - 1], Change::Rise));
         }
         for i in (1..s.len()).rev() {
-            r[i - 1] = r[i - 1].min(self.reach(r[i], s[i] - s[i - 1]));
+            r[i - 1] = r[i - 1].min(self.reach(r[i], s[i] - s[i - 1], Change::Fall));
         }
     }
 }
@@ -146,13 +163,14 @@ pub fn survey<const M: usize>(
         .map(|piece| (piece as u32, knots[piece].max(from), knots[piece + 1].min(to)))
         .filter(|(_, start, end)| end > start)
         .collect();
-    let mut greatest = [0.0f64; M];
+    let mut greatest = [[0.0f64; M]; 2];
     for &(piece, start, end) in &pieces {
         watch.check_at(piece as usize);
         for part in [0.0, 0.25, 0.5, 0.75, 1.0] {
             let place = geometry.at(piece as usize, start + part * (end - start));
             for k in 0..M {
-                greatest[k] = greatest[k].max(place.first[k].abs());
+                greatest[0][k] = greatest[0][k].max(place.first[k]);
+                greatest[1][k] = greatest[1][k].max(-place.first[k]);
             }
         }
     }
@@ -249,7 +267,8 @@ fn densify(stations: &[Station], slopes: Slopes, bounds: &[Bound; 2], watch: Wat
 
 /// |q''|/|q'| and √(|q'''|/|q'|), axes in parts of their velocities.
 fn turning<const M: usize>(limits: &Limits<M>, place: &Place<M>) -> f64 {
-    let norm = |q: &[f64; M]| (0..M).map(|k| (q[k] / limits.velocity[k]).powi(2)).sum::<f64>().sqrt();
+    let velocity = lesser(&limits.velocity);
+    let norm = |q: &[f64; M]| (0..M).map(|k| (q[k] / velocity[k]).powi(2)).sum::<f64>().sqrt();
     let first = norm(&place.first).max(f64::MIN_POSITIVE);
     0.3 * norm(&place.second) / first + 0.2 * (norm(&place.third) / first).sqrt()
 }

@@ -184,9 +184,8 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
             warm: false,
             watch: self.effort.watch,
         };
-        let limits = &self.prepared.problem.limits;
         let mut stretch = self.prepared.stretch(range.clone());
-        let verdict = stretch.improve(limits, bounds, &mut y, &effort, space);
+        let verdict = stretch.improve(bounds, &mut y, &effort, space);
         (y, verdict)
     }
 
@@ -223,7 +222,7 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
                 z[1] += weight * slope + rate * w;
             }
             let stretch = self.prepared.stretch(nodes.clone());
-            if stretch.holds(&self.prepared.problem.limits, &blend, BLENDED) {
+            if stretch.holds(&blend, BLENDED) {
                 x[2 * nodes.start..2 * nodes.end + 2].copy_from_slice(&blend);
                 x[2 * nodes.end..2 * window.end + 2].copy_from_slice(y_from(nodes.end));
                 return true;

@@ -10,8 +10,13 @@ pub trait Number: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = 
     fn reciprocal(self) -> Self;
     /// √x of a number that is not negative.
     fn root(self) -> Self;
+    /// x at least and at most.
+    fn ends(self) -> [f64; 2];
     /// |x| at most.
-    fn most(self) -> f64;
+    fn most(self) -> f64 {
+        let [least, greatest] = self.ends();
+        least.abs().max(greatest.abs())
+    }
 }
 
 impl Number for f64 {
@@ -31,8 +36,8 @@ impl Number for f64 {
     fn root(self) -> Self {
         self.max(0.0).sqrt()
     }
-    fn most(self) -> f64 {
-        self.abs()
+    fn ends(self) -> [f64; 2] {
+        [self, self]
     }
 }
 
@@ -111,8 +116,8 @@ impl Number for Interval {
         let root = Self::outward(self.low.max(0.0).sqrt(), self.high.max(0.0).sqrt());
         Self { low: root.low.max(0.0), ..root }
     }
-    fn most(self) -> f64 {
-        self.low.abs().max(self.high.abs())
+    fn ends(self) -> [f64; 2] {
+        [self.low, self.high]
     }
 }
 

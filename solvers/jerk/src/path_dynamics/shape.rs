@@ -8,6 +8,7 @@
 use super::chain::{Shared, Terms};
 use super::interval::{Interval, Number};
 use feedplan_geometry::polynomial::Polynomial;
+use feedplan_planner::planning::{greater, Both};
 
 /// Most coefficients: N of a rational segment of degree 9 has degree 46.
 const MOST: usize = 48;
@@ -31,13 +32,14 @@ pub struct Curve<'a, const M: usize> {
     pub weight: &'a [f64],
 }
 
-/// Bounds of the derivatives of the joints by arc length over a segment.
+/// Bounds of the derivatives of the joints by arc length over a segment, where it matters those of both signs: of what is
+/// positive, of what is negative as a size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shape<const M: usize> {
-    /// |q_S|, in 1 or degrees/mm.
-    pub first: [f64; M],
-    /// |q_SS|, per mm more.
-    pub second: [f64; M],
+    /// q_S, in 1 or degrees/mm.
+    pub first: Both<M>,
+    /// q_SS, per mm more.
+    pub second: Both<M>,
     /// |q_SSS|, per mm² more.
     pub third: [f64; M],
     /// Curvature of the tool's path, in 1/mm.
@@ -68,7 +70,19 @@ pub fn bounded<const M: usize>(curve: &Curve<M>, accuracy: f64) -> Shape<M> {
 
 impl<const M: usize> Shape<M> {
     fn nothing() -> Self {
-        Self { first: [0.0; M], second: [0.0; M], third: [0.0; M], curvature: 0.0 }
+        Self { first: [[0.0; M]; 2], second: [[0.0; M]; 2], third: [0.0; M], curvature: 0.0 }
+    }
+
+    /// That of one place, without the curvature.
+    pub fn of(first: &[f64; M], second: &[f64; M], third: &[f64; M]) -> Self {
+        let [first, second] = [first, second].map(|q| {
+            let (mut high, mut low) = ([0.0; M], [0.0; M]);
+            for k in 0..M {
+                [high[k], low[k]] = sizes([q[k], q[k]]);
+            }
+            [high, low]
+        });
+        Self { first, second, third: third.map(f64::abs), curvature: 0.0 }
     }
 
     /// Bounds over both segments.
@@ -79,8 +93,10 @@ impl<const M: usize> Shape<M> {
 
     fn include(&mut self, other: &Self) {
         for k in 0..M {
-            self.first[k] = self.first[k].max(other.first[k]);
-            self.second[k] = self.second[k].max(other.second[k]);
+            for sign in 0..2 {
+                self.first[sign][k] = self.first[sign][k].max(other.first[sign][k]);
+                self.second[sign][k] = self.second[sign][k].max(other.second[sign][k]);
+            }
             self.third[k] = self.third[k].max(other.third[k]);
         }
         self.curvature = self.curvature.max(other.curvature);
@@ -89,13 +105,20 @@ impl<const M: usize> Shape<M> {
     /// Whether it is above another by no more than a part; `scale` is what a curvature is small beside.
     fn close(&self, other: &Self, accuracy: f64, scale: f64) -> bool {
         let near = |a: f64, b: f64, unit: f64| a <= b + accuracy * (b + FLAT * unit);
+        let [first, second] = [&self.first, &self.second].map(greater);
+        let [other_first, other_second] = [&other.first, &other.second].map(greater);
         near(self.curvature, other.curvature, scale)
             && (0..M).all(|k| {
-                near(self.first[k], other.first[k], 1.0)
-                    && near(self.second[k], other.second[k], scale)
+                near(first[k], other_first[k], 1.0)
+                    && near(second[k], other_second[k], scale)
                     && near(self.third[k], other.third[k], scale * scale)
             })
     }
+}
+
+/// The sizes of what is positive and of what is negative between a least and a greatest value.
+fn sizes([least, greatest]: [f64; 2]) -> [f64; 2] {
+    [greatest, -least].map(|size| if size > 0.0 { size } else { 0.0 })
 }
 
 /// A polynomial, and how far its coefficients may be off.
@@ -164,13 +187,16 @@ impl<const M: usize> Part<M> {
         let mut shape = Shape::nothing();
         for (k, axis) in self.joints.iter().enumerate() {
             let terms = Terms { x: of(&axis.x), n: of(&axis.n), n_rate: of(&axis.n_rate) };
-            [shape.first[k], shape.second[k], shape.third[k]] = shared.by_length(&terms).map(Number::most);
+            let [first, second, third] = shared.by_length(&terms);
+            [shape.first[0][k], shape.first[1][k]] = sizes(first.ends());
+            [shape.second[0][k], shape.second[1][k]] = sizes(second.ends());
+            shape.third[k] = third.most();
         }
         let bends = match &self.tip {
             // No part of a path is longer along an axis of the tool than along itself.
             None => {
-                shape.first = shape.first.map(|first| first.min(1.0));
-                shape.second.iter().map(|bend| bend * bend).sum::<f64>()
+                shape.first = shape.first.map(|first| first.map(|first| first.min(1.0)));
+                greater(&shape.second).iter().map(|bend| bend * bend).sum::<f64>()
             }
             Some(tip) => {
                 let bend = |n: &Rounded| {
@@ -279,10 +305,11 @@ mod tests {
         // Along (3, 4), at a speed that changes threefold.
         let line = [[0.0, 0.0], [3.0, 4.0], [12.0, 16.0]];
         let shape = bounded(&plain(&line), 0.01);
-        assert!((shape.first[0] - 0.6).abs() < 0.01 && (shape.first[1] - 0.8).abs() < 0.01);
+        let [first, none] = shape.first;
+        assert!((first[0] - 0.6).abs() < 0.01 && (first[1] - 0.8).abs() < 0.01 && none == [0.0; 2]);
         assert!(shape.curvature < 1e-3 && shape.third[0] < 1e-3, "{shape:?}");
         let uniform = bounded(&plain(&[[1e3, 2.0], [1003.0, 6.0]]), 0.01);
-        assert!((uniform.first[0] - 0.6).abs() < 1e-12 && uniform.curvature < 1e-12);
+        assert!((uniform.first[0][0] - 0.6).abs() < 1e-12 && uniform.curvature < 1e-12);
     }
 
     #[test]
@@ -290,10 +317,13 @@ mod tests {
         // x = R cos(S/R): at most 1, 1/R, 1/R².
         let curve = Curve { joints: &QUARTER.0, tip: None, weight: &QUARTER.1 };
         let shape = bounded(&curve, 0.01);
+        let (first, second) = (greater(&shape.first), greater(&shape.second));
         for k in 0..2 {
-            assert!(shape.first[k] >= 1.0 - 1e-15 && shape.first[k] <= 1.0);
-            assert!(shape.second[k] >= 0.5 && shape.second[k] < 0.505);
+            assert!(first[k] >= 1.0 - 1e-15 && first[k] <= 1.0);
+            assert!(second[k] >= 0.5 && second[k] < 0.505);
             assert!(shape.third[k] >= 0.25 && shape.third[k] < 0.2526);
+            // Back along x, ahead along y, about the origin.
+            assert!(shape.first[k][k] < 0.05 && shape.second[0][k] < 0.05, "{shape:?}");
         }
         assert!(shape.curvature >= 0.5 && shape.curvature < 0.506);
         let seen = sampled(&curve, 11);
@@ -326,7 +356,7 @@ mod tests {
         let (c, r) = (0.551_915_024_494, 2.0);
         let tip = [[r, 0.0, 0.0], [r, c * r, 0.0], [c * r, r, 0.0], [0.0, r, 0.0]];
         let shape = bounded(&Curve { joints: &joints, tip: Some(&tip), weight: &[] }, 0.01);
-        assert!((shape.first[0] / (90.0 / std::f64::consts::PI) - 1.0).abs() < 0.03, "{shape:?}");
+        assert!((shape.first[0][0] / (90.0 / std::f64::consts::PI) - 1.0).abs() < 0.03, "{shape:?}");
         assert!((shape.curvature / 0.5 - 1.0).abs() < 0.05);
     }
 
@@ -349,8 +379,10 @@ mod tests {
             let curve = Curve { joints: &control, tip: None, weight };
             let (bound, seen) = (bounded(&curve, 0.1), sampled(&curve, 2001));
             for k in 0..3 {
-                prop_assert!(seen.first[k] <= bound.first[k] * (1.0 + 1e-12));
-                prop_assert!(seen.second[k] <= bound.second[k] * (1.0 + 1e-9));
+                for sign in 0..2 {
+                    prop_assert!(seen.first[sign][k] <= bound.first[sign][k] * (1.0 + 1e-12));
+                    prop_assert!(seen.second[sign][k] <= bound.second[sign][k] * (1.0 + 1e-9));
+                }
                 prop_assert!(seen.third[k] <= bound.third[k] * (1.0 + 1e-9));
             }
             prop_assert!(seen.curvature <= bound.curvature * (1.0 + 1e-9));
