@@ -28,7 +28,6 @@ NOT_PLAIN = [name for name in bundled_machines() if not Machine.load(name).is_pl
 CASES = [("bang-bang", name) for name in NOT_PLAIN] + [
     ("jerk-limited", "corexy"),
     ("jerk-limited", "polar"),
-    ("jerk-limited", "trunnion-bc"),
     ("s-curve", "cylindrical"),
     ("s-curve", "rotary-table"),
     ("ruckig", "trunnion-ac"),
@@ -82,7 +81,7 @@ def test_every_joint_keeps_each_side_and_gains_by_the_wider_ones(method: Any, na
     assert made.time <= plan(text, even(machine), method).time * (1.0 + rounding)
 
 
-@pytest.mark.parametrize("name", ["polar", "trunnion-bc"])
+@pytest.mark.parametrize("name", ["polar", "trunnion-ac"])
 def test_sides_that_differ_by_nearly_nothing_give_the_same_plan(name: str) -> None:
     machine = even(with_sides(Machine.load(name), np.random.default_rng(5)))
     text = random_tip_program(FIRST[name], machine) if name in FIRST else PLANE
