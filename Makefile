@@ -51,6 +51,7 @@ campaign: $(VENV)/built
 	FEEDPLAN_EXAMPLES=5000 $(BIN)/pytest --numprocesses auto tests/test_setpoints_curves.py -k planned
 	FEEDPLAN_SEEDS=1000 $(BIN)/pytest --numprocesses auto tests/planners/test_extreme_machines.py
 	FEEDPLAN_SEEDS=10000 $(BIN)/pytest --numprocesses auto tests/test_hostile.py
+	FEEDPLAN_SEEDS=1000 $(BIN)/pytest --numprocesses auto tests/planned_feeds/test_linuxcnc_reads.py
 	cargo fuzz --version >/dev/null 2>&1 || cargo install --locked cargo-fuzz
 	cd solvers && cargo fuzz run --sanitizer none gcode -- -dict=fuzz/gcode.dict -max_total_time=300 -timeout=10 -max_len=4096
 	for i in 1 2 3 4 5 6 7 8 9 10; do \

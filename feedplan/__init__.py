@@ -27,6 +27,7 @@ from feedplan.geometry.path import Path
 from feedplan.machine.importers import import_machine
 from feedplan.machine.machine import Axis, Machine
 from feedplan.machine.machine import bundled_machines as machines
+from feedplan.planned_feeds import PlannedProgram, planned_program, write_program
 from feedplan.planners import methods
 from feedplan.planning import Plan, plan
 from feedplan.profile import SpeedProfile
@@ -47,6 +48,7 @@ __all__ = [
     "MissingPackageError",
     "Path",
     "Plan",
+    "PlannedProgram",
     "Program",
     "ProgramError",
     "Row",
@@ -62,8 +64,10 @@ __all__ = [
     "machines",
     "methods",
     "plan",
+    "planned_program",
     "read_program",
     "write_plan",
+    "write_program",
 ]
 
 

@@ -18,7 +18,7 @@ from typing import Any
 from feedplan.arguments import callback, flag, is_number, not_negative, number, shown
 from feedplan.audit import Audit, audit_setpoints
 from feedplan.errors import InputError
-from feedplan.files import SUMMARY_FILE
+from feedplan.files import PROGRAM_FILE, SUMMARY_FILE
 from feedplan.geometry.corners import Corners
 from feedplan.machine.file import parse
 from feedplan.machine.machine import Machine
@@ -111,6 +111,7 @@ def _read(file: FilePath) -> _Plan:
         "machine_file_sha256", str
     ):
         raise InputError(f"{file}: machine_file was changed: plan again, or give the machine with --machine")
+    _require_program(file, entries, summary)
     method = entries.take("method", str)
     if method not in methods():
         raise InputError(f"{file}: the method '{method}' is unknown: use the feedplan that wrote it")
@@ -132,6 +133,24 @@ def _read(file: FilePath) -> _Plan:
             "one of them was changed, plan again"
         )
     return plan
+
+
+def _require_program(file: FilePath, entries: _Entries, summary: Mapping[str, Any]) -> None:
+    """Raises InputError where the program with planned feeds is not the one of the plan."""
+    if summary.get("planned_program") is None:
+        return
+    told = _Entries(file, entries.take("planned_program", dict), "planned_program ")
+    wanted = told.take("sha256", str)
+    program = file.parent / PROGRAM_FILE
+    try:
+        content = program.read_bytes()
+    except OSError as error:
+        raise InputError(
+            f"{program} cannot be read ({(error.strerror or str(error)).lower()}), and {file} tells of it: "
+            "plan again"
+        ) from None
+    if hashlib.sha256(content).hexdigest() != wanted:
+        raise InputError(f"{program} was changed, it is not the one of {file}: plan again")
 
 
 class _Entries:

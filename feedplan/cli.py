@@ -36,6 +36,7 @@ from feedplan.errors import FeedplanError, InfeasibleError, SolverError
 from feedplan.geometry.corners import FollowedPath
 from feedplan.machine_commands import machines
 from feedplan.program.read import Reading
+from feedplan.program_options import ProgramWanted, program_options
 from feedplan.reading_options import machine_for, reading_options
 from feedplan.setpoints import INTERPOLATORS, MAX_SETPOINTS, Interpolator
 from feedplan.time_command import time
@@ -146,6 +147,7 @@ def cli(context: click.Context) -> int:
     multiple=True,
     help="Format of the setpoints, npz by default; may be given several times. none: a report without them.",
 )
+@program_options
 @JSON
 @QUIET
 def plan(
@@ -168,12 +170,13 @@ def plan(
     as_json: bool,
     quiet: bool,
     reading: Reading,
+    wanted: ProgramWanted,
 ) -> int:
     """Plan PROGRAM: G-code, a path file (.json) or a drawing (.dxf); - is standard input.
 
     Exit code 1: a limit is broken, or no plan is feasible.
     """
-    from feedplan.files import summary_text, write_plan
+    from feedplan.files import files_of_plan, summary_text, write_plan
     from feedplan.outputs._staging import require_folder
     from feedplan.planning import plan as make_plan
     from feedplan.report.page import missing_pictures
@@ -204,26 +207,31 @@ def plan(
             **given_only(accuracy=accuracy, time_limit=time_limit),
         )
         audit = result.audit(progress)
+        planned = wanted.make(result)
         files: tuple[FilePath, ...] = ()
         if output:
             files = write_plan(
                 result,
                 output,
                 () if _NO_SETPOINTS in formats else formats or ("npz",),
+                program=planned if wanted.in_folder else None,
                 progress=progress,
             )
     warnings = list(result.warnings)
     if output:
-        earlier = (file for file in outputs.files_in(FilePath(output)) if file not in files)
+        earlier = (file for file in files_of_plan(FilePath(output)) if file not in files)
         warnings += [f"{file} is of an earlier plan" for file in earlier]
         warnings += filter(None, [missing_pictures()])
     if not quiet:
         for warning in warnings:
             print(f"warning: {warning}", file=sys.stderr)
         if as_json:
-            sys.stdout.write(summary_text(result.summary()))
+            told = {} if planned is None else {"planned_program": planned.to_json()}
+            sys.stdout.write(summary_text({**result.summary(), **told}))
         else:
             console.print_rows(console.plan_rows(result.summary(), audit, files))
+            if planned is not None:
+                print(planned.summary())
     return DONE if audit.ok else _fail(console.failure_sentence(audit), BROKEN)
 
 

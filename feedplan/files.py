@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 from feedplan.arguments import callback, file_path, list_of_names, refuse
 from feedplan.errors import InputError
-from feedplan.outputs import FormatName, Header, format_named
+from feedplan.outputs import FormatName, Header, files_in, format_named
 from feedplan.outputs._staging import require_folder, staged
+from feedplan.planned_feeds import PlannedProgram
 from feedplan.progress import Progress, of_stage, part, tell
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from feedplan.setpoints import SetpointChunk
 
 SUMMARY_FILE = "plan.json"
+PROGRAM_FILE = "program.ngc"
 COMPARISON_FILE = "comparison.json"
 _ROWS_AT_ONCE = 10_000
 # How far the writing is after the account, when the times of the setpoints are laid out, and after these.
@@ -35,9 +37,12 @@ def write_plan(
     folder: str | os.PathLike[str],
     formats: Sequence[FormatName] = ("npz",),
     *,
+    program: PlannedProgram | None = None,
     progress: Progress | None = None,
 ) -> tuple[FilePath, ...]:
     """Writes the plan, its setpoints in these formats (none for ()), and its report; returns the files.
+
+    `program`, as `feedplan.planned_program` returns it, is written as program.ngc.
 
     All is written beside and renamed at the end, so `folder` never holds half a plan; other files in it stay.
     `progress` is called with a stage and 0 to 1. Without the package plotly the report has no pictures and
@@ -57,6 +62,8 @@ def write_plan(
     for name, output in outputs.items():
         if (other := by_file[output.FILE]) != name:
             raise InputError(f"{name} and {other} are both {output.FILE}: ask for one of them")
+    if program is not None and not isinstance(program, PlannedProgram):
+        raise refuse("the program", program, "what feedplan.planned_program returns")
     audit = plan.audit(progress)
     share = of_stage(progress, "write")
     tell(share, 0.0)
@@ -81,6 +88,9 @@ def write_plan(
                     sink(chunk)
                 tell(report, figures.count / max(setpoints.count, 1))
         summary = plan.summary()
+        if program is not None:
+            (stage / PROGRAM_FILE).write_bytes(program.content)
+            summary["planned_program"] = {"file": PROGRAM_FILE, **program.to_json()}
         tell(share, SETPOINTS)
         write_report(
             stage / REPORT_FILE,
@@ -97,6 +107,12 @@ def write_plan(
         names = sorted(file.name for file in stage.iterdir())
     tell(share, 1.0)
     return tuple(folder / name for name in names)
+
+
+def files_of_plan(folder: FilePath) -> list[FilePath]:
+    """The files in a folder that belong to the plan in it: setpoints, and its program."""
+    program = folder / PROGRAM_FILE
+    return [*files_in(folder), *([program] if program.exists() else [])]
 
 
 def write_comparison(

@@ -88,6 +88,7 @@ def cases(tmp_path: FilePath) -> dict[str, tuple[Callable[..., Any], dict[str, A
     points = plan.setpoints()
     feedplan.write_plan(plan, tmp_path / "part")
     curve = CompositeCurve.from_nurbs(POINTS, KNOTS, 2)
+    planned = {"feed_step": 5.0, "inverse_time": True, "dialect": "grbl", "expand": True}
     common = {
         "source": PROGRAM,
         "machine": machine,
@@ -144,7 +145,18 @@ def cases(tmp_path: FilePath) -> dict[str, tuple[Callable[..., Any], dict[str, A
         ),
         "write_plan": (
             feedplan.write_plan,
-            {"plan": plan, "folder": tmp_path / "again", "formats": ("csv",), "progress": None},
+            {
+                "plan": plan,
+                "folder": tmp_path / "again",
+                "formats": ("csv",),
+                "program": feedplan.planned_program(plan),
+                "progress": None,
+            },
+        ),
+        "planned_program": (feedplan.planned_program, {"plan": plan, **planned}),
+        "write_program": (
+            feedplan.write_program,
+            {"plan": plan, "file": tmp_path / "planned.ngc", **planned},
         ),
         "Axis": (
             Axis,

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from pathlib import Path as FilePath
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,7 +75,8 @@ class Program:
     `change_start` (c, axes) where they start in the new words, `starts` takes both into account.
     `events` are what happens between the moves: spindle, coolant, tools, outputs, dwells, stops, messages.
     `warnings` are sentences for the user. If it was read, `text` is the file it was read from, or the bytes
-    themselves, and `sha256` the hash of these.
+    themselves, and `sha256` the hash of these; `reading` are the arguments of `read_program` that it was read
+    with as G-code, to read it again.
     """
 
     name: str
@@ -105,6 +108,7 @@ class Program:
     text: FilePath | bytes | None = None
     stop_cause: NDArray[np.uint8] | None = None
     events: Events = field(default_factory=Events.none)
+    reading: Mapping[str, Any] | None = field(default=None, repr=False)
 
     def __len__(self) -> int:
         return len(self.kind)

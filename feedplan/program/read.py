@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TypedDict, cast
+from typing import Any, TypedDict, cast
 
 from feedplan.arguments import callback, file_path, flag, is_text, number, positive, refuse, whole
 from feedplan.machine.machine import Machine
@@ -96,18 +96,29 @@ def read_program(
         if isinstance(subprograms, (str, bytes)) or not isinstance(subprograms, Iterable):
             raise refuse("subprograms", subprograms, "a list of folders")
         folders = [file_path(folder, "a folder of subprograms", _FOLDER) for folder in subprograms]
+        folders = [*([text.parent] if isinstance(text, Path) else []), *folders]
+        again: Mapping[str, Any] = {
+            "machine": known,
+            "block_delete": block_delete,
+            "tool_table": tool_table,
+            "subprograms": tuple(folders),
+            "feed": feed,
+            "whole_step": whole_step,
+            "max_bytes": max_bytes,
+        }
         program = read_gcode(
             content,
             known,
             name,
             block_delete=block_delete,
             tools=None if tool_table is None else read_tools(file_path(tool_table, "the tool table", _TABLE)),
-            subprograms=[*([text.parent] if isinstance(text, Path) else []), *folders],
+            subprograms=folders,
             feed=None if feed is None else number(feed, "the feed", "a positive number", positive, "mm/s"),
             whole_step=number(whole_step, "whole_step", "a positive number", positive),
             max_bytes=max_bytes,
             progress=progress,
         )
+        program = replace(program, reading=again)
     else:
         content_of(content, name, min(max_bytes, most))
         program = reader(content, known, name)

@@ -1,0 +1,271 @@
+"""What the text of a program says about feeds, line by line: F words, the modes that give them a meaning, and
+the lines that do not run once, in the order in which they stand."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import IntEnum
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+_NUMBER = rb"[-+]?[ \t]*(?:\d+\.?\d*|\.\d+)"
+# Brackets, three deep; parameters by number or name; functions.
+_INNER = rb"\[(?:[^\[\]\r\n]|\[[^\[\]\r\n]*\])*\]"
+_BRACKETS = rb"\[(?:[^\[\]\r\n]|" + _INNER + rb")*\]"
+_COMPUTED = (
+    rb"[-+]?[ \t]*(?:\#[\# \t]*(?:<[^>\r\n]*>|\d+|"
+    + _BRACKETS
+    + rb")|[A-Za-z]*[ \t]*"
+    + _BRACKETS
+    + rb"(?:[ \t]*/[ \t]*"
+    + _BRACKETS
+    + rb")?)"
+)
+# Comments, texts for the operator and names of parameters have no words in them.
+_NO_WORDS = rb"\([^()\r\n]*\)?|;[^\r\n]*|[Mm][ \t]*0*11[78](?![\d.])[^\r\n]*|\#?<[^>\r\n]*>"
+_LINE = rb"(?<![^\r\n])[ \t]*(?:[Nn][ \t]*\d+[ \t]*)?"
+_CODES = rb"93|94|95|20|21|90\.1|91\.1|90|91|40|41\.1|42\.1|41|42|15|16|7|8|33\.1|33|76|74|84|43\.5|49"
+_TOKENS = (
+    _NO_WORDS
+    + rb"|"
+    + _LINE
+    + rb"(?:%[^\r\n]*|(?P<deleted>/)|[Oo](?P<flow>[^\r\n]*))"
+    + rb"|[Ff][ \t]*(?:(?P<feed>"
+    + _NUMBER
+    + rb")|(?P<computed>"
+    + _COMPUTED
+    + rb"))"
+    + rb"|[Gg][ \t]*0*(?P<code>"
+    + _CODES
+    + rb")(?![\d.])"
+    + rb"|[Mm][ \t]*0*(?P<switch>2|30|7[0-3]|9[789])(?![\d.])"
+)
+_TOKEN = re.compile(_TOKENS)
+_KEYWORD = re.compile(
+    rb"[ \t]*(?:<[^>\r\n]*>|\[[^\r\n]*?\]|\d+|\#[ \t]*(?:<[^>\r\n]*>|\d+))[ \t]*(?P<word>[A-Za-z]+)"
+)
+_MOTION = re.compile(rb"[Gg][ \t]*0*(?:[0-3]|5(?:\.[12])?|6\.2|33(?:\.1)?|7[346]|8[0-9])(?![\d.])")
+_AT_ONCE = 1 << 16
+_OPENS = (b"SUB", b"WHILE", b"DO", b"REPEAT", b"IF")
+_CLOSES = (b"ENDSUB", b"ENDWHILE", b"ENDREPEAT", b"ENDIF")
+
+
+class Aside(IntEnum):
+    """Why a line cannot have an F of its own, or another one."""
+
+    NO = 0
+    FLOW = 1  # inside a subroutine, loop or branch, a call of one, or behind the end of the program
+    THREAD = 2  # G33, G76 and tapping: the feed follows the spindle
+    MODES = 3  # M70 to M73 save and restore the feed
+    DELETED = 4  # after /
+    REPEATED = 5  # runs more than once, or in another order
+
+
+REASONS = {
+    Aside.FLOW: "in a subroutine, loop or branch, or calls one",
+    Aside.THREAD: "feed of a thread or a tap, which follows the spindle",
+    Aside.MODES: "M70 to M73 save and restore the feed",
+    Aside.DELETED: "after /, left out",
+    Aside.REPEATED: "runs more than once, or out of order",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """The lines of a text, of which there are n.
+
+    `start` (n + 1,) is where each line begins; `aside` (n,) an Aside; `feed_at` (n, 2) where the number of
+    its F begins and ends, −1 without one; `feed` (n,) that number, NaN without one and where it is computed;
+    `inverse` and `per_minute` (n,) whether G93, G94 is in force; `voids` (n,) whether a change of units or of
+    the feed mode makes an F before it mean something else; `modes` (n, 2) where the number of a code G93 to
+    G95 begins and ends, −1 without one. `absolute`, `absolute_centres`, `inches` (n,) are what is in force on
+    the line; `plain` (n,) whether words of axes are places of the tool, without compensation, polar words and
+    diameters. `calls_set_feed`: after a line of FLOW or MODES the feed in force is not known.
+    """
+
+    content: bytes
+    start: NDArray[np.int64]
+    aside: NDArray[np.uint8]
+    feed_at: NDArray[np.int64]
+    feed: NDArray[np.float64]
+    inverse: NDArray[np.bool_]
+    per_minute: NDArray[np.bool_]
+    voids: NDArray[np.bool_]
+    modes: NDArray[np.int64]
+    absolute: NDArray[np.bool_]
+    absolute_centres: NDArray[np.bool_]
+    inches: NDArray[np.bool_]
+    plain: NDArray[np.bool_]
+    calls_set_feed: bool
+
+    def __len__(self) -> int:
+        return len(self.start) - 1
+
+    def line(self, index: int) -> bytes:
+        """A line by its index from 0, with its end."""
+        return self.content[self.start[index] : self.start[index + 1]]
+
+
+def line_starts(content: bytes) -> NDArray[np.int64]:
+    """Where lines begin (n + 1,), the last one is the end; lines end with LF, CR LF or CR."""
+    data = np.frombuffer(content, dtype=np.uint8)
+    ends = data == ord("\n")
+    returns = np.flatnonzero(data == ord("\r"))
+    lone = returns[data[np.minimum(returns + 1, len(data) - 1)] != ord("\n")]
+    ends[lone] = True
+    starts = np.concatenate([[0], np.flatnonzero(ends) + 1])
+    return starts if starts[-1] == len(data) else np.append(starts, len(data))
+
+
+class _Modes:
+    """What is in force, and from which line on each of it is."""
+
+    def __init__(self) -> None:
+        self.now = {
+            "inverse": False,
+            "per_minute": True,
+            "absolute": True,
+            "absolute_centres": False,
+            "inches": False,
+        }
+        self.beside: set[bytes] = set()
+        self.given: list[tuple[int, dict[str, bool]]] = []
+        self.units = self.feed_mode = b""
+
+    def take(self, line: int, code: bytes) -> bool:
+        """Takes a code in; True where it makes an F before it mean something else."""
+        voids = False
+        if code in (b"93", b"94", b"95"):
+            voids = code != (self.feed_mode or b"94")
+            self.feed_mode = code
+            self.now["inverse"], self.now["per_minute"] = code == b"93", code == b"94"
+        elif code in (b"20", b"21"):
+            voids, self.units = code != self.units, code
+            self.now["inches"] = code == b"20"
+        elif code in (b"90", b"91"):
+            self.now["absolute"] = code == b"90"
+        elif code in (b"90.1", b"91.1"):
+            self.now["absolute_centres"] = code == b"90.1"
+        elif code in (b"41", b"42", b"41.1", b"42.1"):
+            self.beside.add(b"40")
+        elif code in (b"16", b"7", b"43.5"):
+            self.beside.add({b"16": b"15", b"7": b"8", b"43.5": b"49"}[code])
+        else:
+            self.beside.discard(code)
+        self.given.append((line, {**self.now, "plain": not self.beside}))
+        return voids
+
+    def column(self, name: str, count: int, first: bool) -> NDArray[np.bool_]:
+        """What is in force on each line (count,)."""
+        column = np.full(count, first)
+        for k, (line, given) in enumerate(self.given):
+            end = self.given[k + 1][0] if k + 1 < len(self.given) else count
+            column[line:end] = given[name]
+        return column
+
+
+def blocks_of(content: bytes, block_delete: bool = True) -> Blocks:
+    """The lines of a program; those after `/` are left out with `block_delete`."""
+    start = line_starts(content)
+    count = len(start) - 1
+    aside = np.zeros(count, dtype=np.uint8)
+    feed_at, modes = np.full((count, 2), -1, dtype=np.int64), np.full((count, 2), -1, dtype=np.int64)
+    feed, voids = np.full(count, np.nan), np.zeros(count, dtype=np.bool_)
+    now, depth, opened, calls, subs, ended = _Modes(), 0, 0, False, False, False
+    dos = 0
+    for token, line in _tokens(content, start):
+        kind = token.lastgroup
+        if kind is None or aside[line] == Aside.DELETED:
+            continue
+        if kind == "feed":
+            feed_at[line] = token.span("feed")
+            feed[line] = float(re.sub(rb"[ \t]", b"", token["feed"]))
+        elif kind == "code":
+            code = token["code"]
+            if code in (b"33", b"33.1", b"76", b"74", b"84"):
+                aside[line] = Aside.THREAD
+                continue
+            voids[line] |= now.take(line, code)
+            if code in (b"93", b"94", b"95"):
+                modes[line] = token.span("code")
+        elif kind == "computed":
+            feed_at[line] = token.span("computed")
+        elif kind == "deleted":
+            if block_delete:
+                aside[line] = Aside.DELETED
+        elif kind == "switch":
+            number = int(token["switch"])
+            if number in (2, 30):
+                if not ended and depth == 0:
+                    ended = True
+                    aside[line + 1 :] = Aside.FLOW
+            elif number < 90:
+                aside[line] = Aside.MODES
+            else:
+                calls = True
+                aside[line] = Aside.FLOW
+        else:
+            keyword = _KEYWORD.match(token["flow"])
+            word = keyword["word"].upper() if keyword else b""
+            # The `while` that ends a `do` stands alone: it closes, where another one opens.
+            closes_do = word == b"WHILE" and dos > 0
+            if word in _CLOSES or closes_do:
+                depth, dos = max(depth - 1, 0), dos - int(closes_do)
+                if depth == 0:
+                    aside[opened : line + 1] = Aside.FLOW
+            elif word in _OPENS:
+                opened = line if depth == 0 else opened
+                depth, dos = depth + 1, dos + int(word == b"DO")
+                subs |= word == b"SUB"
+            elif word:
+                aside[line] = Aside.FLOW
+                calls |= word == b"CALL"
+            elif token["flow"].strip():
+                subs |= ended
+    if depth:
+        aside[opened:] = Aside.FLOW
+    if (aside == Aside.THREAD).any():
+        _follow_threads(content, start, aside)
+    away = (aside == Aside.FLOW) | (aside == Aside.MODES)
+    return Blocks(
+        content=content,
+        start=start,
+        aside=aside,
+        feed_at=feed_at,
+        feed=feed,
+        inverse=now.column("inverse", count, False),
+        per_minute=now.column("per_minute", count, True),
+        voids=voids,
+        modes=modes,
+        absolute=now.column("absolute", count, True),
+        absolute_centres=now.column("absolute_centres", count, False),
+        inches=now.column("inches", count, False),
+        plain=now.column("plain", count, True),
+        calls_set_feed=bool((feed_at[away, 0] >= 0).any() or (calls and not subs)),
+    )
+
+
+def _tokens(content: bytes, start: NDArray[np.int64]) -> Iterator[tuple[re.Match[bytes], int]]:
+    """What is looked for in a text, with its line by index; some at a time, as a text may have millions."""
+    found = _TOKEN.finditer(content)
+    while tokens := list(islice(found, _AT_ONCE)):
+        at = np.searchsorted(start, [token.start() for token in tokens], side="right") - 1
+        yield from zip(tokens, at.tolist(), strict=True)
+
+
+def _follow_threads(content: bytes, start: NDArray[np.int64], aside: NDArray[np.uint8]) -> None:
+    """Lines after a thread's are threads too, until another motion code."""
+    threading = False
+    for line in range(len(aside)):
+        if aside[line] == Aside.THREAD:
+            threading = True
+        elif threading:
+            text = re.sub(_NO_WORDS, b"", content[start[line] : start[line + 1]])
+            if _MOTION.search(text):
+                threading = False
+            elif aside[line] == Aside.NO:
+                aside[line] = Aside.THREAD

@@ -1,0 +1,113 @@
+"""Controls that a program may be for, and which of its words each of them lacks."""
+
+from __future__ import annotations
+
+import re
+from typing import Literal, get_args
+
+DialectName = Literal["linuxcnc", "grbl", "fanuc"]
+DIALECTS: tuple[DialectName, ...] = get_args(DialectName)
+
+
+def _g(codes: str) -> bytes:
+    return rb"[Gg][ \t]*0*(?:" + codes.encode() + rb")(?![\d.])"
+
+
+def _m(codes: str) -> bytes:
+    return rb"[Mm][ \t]*0*(?:" + codes.encode() + rb")(?![\d.])"
+
+
+# What is looked for in the words of a line, without comments, and what is said of it.
+_SPLINES = (_g(r"5|5\.1|5\.2|5\.3"), "splines by G5, G5.1 and G5.2")
+_NURBS = (_g(r"6\.2"), "NURBS by G6.2")
+_FLOW = (rb"[Oo][ \t]*(?:<|\[|\d+[ \t]*[A-Za-z])", "O words of subroutines, loops and branches")
+_NAMES = (rb"#[ \t]*<", "parameters with names")
+_PARAMETERS = (rb"[#\[]", "parameters and expressions")
+_TURNS = (_g("[23]") + rb"[^\r\n]*[Pp][ \t]*\d", "turns of an arc by P")
+_BLEND = (_g("64") + rb"[^\r\n]*[Pp]", "a tolerance by G64 P")
+_LACKS: dict[DialectName, tuple[tuple[bytes, str], ...]] = {
+    "linuxcnc": (
+        (_NURBS[0], "NURBS by G6.2, before its version 2.9"),
+        (_g(r"6[5-8]|12|13|50|51|54\.1"), "macros, scaling and turned coordinates by these codes"),
+        (rb",[ \t]*[CcRr]", "chamfers and roundings by ,C and ,R"),
+        (_g(r"60|28\.2|28\.3|28\.4"), "these reference codes"),
+    ),
+    "grbl": (
+        _SPLINES,
+        _NURBS,
+        _FLOW,
+        _PARAMETERS,
+        _TURNS,
+        (_g(r"7[346]|8[1-9]|98|99|33|33\.1"), "canned cycles and threads"),
+        (_g(r"41|42|41\.1|42\.1"), "cutter compensation"),
+        (_g(r"95|96"), "feed per turn and constant surface speed"),
+        (_g(r"64|61\.1"), "G64 and G61.1"),
+        (_g(r"43|43\.2|43\.4|43\.5|52|15|16|7|8|10[^\r\n]*[Ll][ \t]*1\d?(?!\d)"), "these offsets and modes"),
+        (_m(r"6|19|6[0-8]|7\d|9[789]|1\d\d"), "these M codes"),
+        (rb"[ABCUVWabcuvw][ \t]*[-+.\d]", "axes beside X, Y and Z (grblHAL has some)"),
+        (rb"(?<![^\r\n])[ \t]*/", "blocks after /"),
+    ),
+    "fanuc": (
+        _SPLINES,
+        _FLOW,
+        _NAMES,
+        _TURNS,
+        _BLEND,
+        (_g(r"61\.1|38\.\d|33\.1|43\.1|59\.\d|17\.1|18\.1|19\.1"), "these codes"),
+        (_m(r"6[2-8]|7\d"), "digital outputs and saved modes by these M codes"),
+        (rb"[@^]", "polar words by @ and ^"),
+        (rb"[a-z]", "lower-case words"),
+        (
+            rb"[XYZABCUVWIJKR][ \t]*[-+]?\d+(?![\d.])",
+            "lengths without a decimal point, unless a setting makes them whole units",
+        ),
+    ),
+}
+# The most characters of a line, without blanks and comments where these are not stored.
+_LONGEST: dict[DialectName, int] = {"linuxcnc": 255, "grbl": 70, "fanuc": 250}
+_NAMES_OF: dict[DialectName, str] = {"linuxcnc": "LinuxCNC", "grbl": "grbl", "fanuc": "Fanuc"}
+_COMMENT = re.compile(rb"\([^()\r\n]*\)?|;[^\r\n]*")
+
+
+def writes_points(dialect: DialectName) -> bool:
+    """Whether an F needs a decimal point."""
+    return dialect == "fanuc"
+
+
+def lacks(dialect: DialectName, content: bytes) -> tuple[str, ...]:
+    """Sentences on what a program has that the control lacks, each with its first line."""
+    # Comments become blanks, so that places stay.
+    code = _COMMENT.sub(lambda found: b" " * len(found[0]), content)
+    sentences = []
+    for pattern, what in _LACKS[dialect]:
+        first = None
+        count = 0
+        for found in re.finditer(pattern, code):
+            first = first or found
+            count += 1
+        if first is not None:
+            line = _line_of(code, first.start())
+            word = " ".join(first[0].decode("ascii", "replace").split())[:20]
+            sentences.append(f"line {line}: {_NAMES_OF[dialect]} lacks {what} ({word}, {count} in all)")
+    sentences += _long_lines(dialect, content if dialect != "grbl" else code)
+    if dialect == "fanuc" and b";" in content:
+        line = _line_of(content, content.index(b";"))
+        sentences.append(f"line {line}: Fanuc ends a block at ;: write comments in ( )")
+    return tuple(sentences)
+
+
+def _long_lines(dialect: DialectName, code: bytes) -> list[str]:
+    most = _LONGEST[dialect]
+    long = [
+        number
+        for number, line in enumerate(re.split(rb"\r\n|\n|\r", code), start=1)
+        if len(line) > most and len(re.sub(rb"[ \t]", b"", line) if dialect == "grbl" else line) > most
+    ]
+    if not long:
+        return []
+    return [f"line {long[0]}: {_NAMES_OF[dialect]} takes {most} characters a line ({len(long)} are longer)"]
+
+
+def _line_of(content: bytes, at: int) -> int:
+    """The 1-based line of a place."""
+    return len(re.findall(rb"\r\n|\n|\r", content[:at])) + 1

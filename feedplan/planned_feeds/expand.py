@@ -1,0 +1,218 @@
+"""A program written anew: its moves in the order in which they run, one plain block each.
+
+Loops, calls, cycles and compensation become the lines and arcs that they make, and drawings and path files
+G-code. Places are those of the machine in millimetres, less the work offset G54 of the machine file. Splines
+become one a polynomial or rational piece: G1 of a line, else G5.2 in X and Y, which LinuxCNC reads, or G6.2,
+which Fanuc's controls read. Spindle, coolant, tools, outputs, dwells, stops and messages stand where they
+were; other comments are lost.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.errors import InputError
+from feedplan.machine.machine import Machine
+from feedplan.planned_feeds.dialects import DialectName
+from feedplan.planned_feeds.number import place_text
+from feedplan.program.events import MESSAGE, Events
+from feedplan.program.program import PathControl, Program
+
+Array = NDArray[np.float64]
+
+_HEADER = b"G21 G90 G17 G94 G40 G49 G80 G54"
+_PLANES = {2: b"G17", 1: b"G18", 0: b"G19"}
+_CONTROL = {PathControl.EXACT_STOP: b"G61.1", PathControl.EXACT_PATH: b"G61"}
+
+
+class _Blocks:
+    """Blocks with what is in force, so that codes stand where they change."""
+
+    def __init__(self) -> None:
+        self.lines: list[bytes] = []
+        self._force: dict[str, bytes] = {}
+
+    def add(self, *words: bytes) -> None:
+        text = b" ".join(word for word in words if word)
+        if text:
+            self.lines.append(text)
+
+    def changed(self, group: str, word: bytes) -> bytes:
+        """The word where it is not in force."""
+        if self._force.get(group) == word:
+            return b""
+        self._force[group] = word
+        return word
+
+
+def expanded(
+    program: Program, machine: Machine | None, dialect: DialectName
+) -> tuple[bytes, NDArray[np.int64]]:
+    """The program as plain blocks, and which of its moves each block with a move is (k,).
+
+    Raises InputError for what plain blocks cannot say: the tool's tip (G43.4, G43.5), splines that the
+    dialect lacks.
+    """
+    if len(program.change_move) and program.meaning is not None and program.meaning.any():
+        raise InputError(
+            f"{program.name}: words of the tool's tip (G43.4, G43.5) are not expanded: leave out --expand"
+        )
+    zero = _zero(program, machine)
+    out = _Blocks()
+    out.add(b"(" + _plain(program.name) + b", expanded)")
+    out.add(_HEADER)
+    starts = program.starts() - zero
+    ends = program.target - zero
+    arcs = {int(m): row for row, m in enumerate(program.arc_move)}
+    splines = {int(m): row for row, m in enumerate(program.spline_move)}
+    told = _events(program.events)
+    of: list[int] = []
+    if program.start_dwell and 0 not in told:
+        out.add(b"G4 P" + place_text(program.start_dwell))
+    for m in range(len(program)):
+        out.lines += told.pop(m, [])
+        out.add(out.changed("control", _control(program, m)))
+        rapid = not np.isfinite(program.feed[m])
+        # A feed is read as the number that it was.
+        feed = b"" if rapid else out.changed("F", b"F" + place_text(60.0 * float(program.feed[m])))
+        if m in splines:
+            of += [m] * _spline(out, program, splines[m], zero, dialect, feed)
+        else:
+            moved = [
+                name.encode() + place_text(float(ends[m, column]))
+                for column, name in enumerate(program.axes)
+                if ends[m, column] != starts[m, column] or (m in arcs and name in "XYZ")
+            ]
+            if m in arcs:
+                code = _arc(out, program, m, arcs[m], starts[m] + zero)
+            else:
+                code = [out.changed("motion", b"G0" if rapid else b"G1")]
+            out.add(*code[:2], *moved, *code[2:], feed)
+            of.append(m)
+        if program.stop[m] and m + 1 < len(program) and m + 1 not in told:
+            # Stops without a word of their own, as changes of the tool length have.
+            out.add(b"G4 P" + place_text(float(program.dwell[m])))
+    for lines in told.values():
+        out.lines += lines
+    if not out.lines[-1].startswith((b"M2", b"M30")):
+        out.add(b"M2")
+    return b"\n".join(out.lines) + b"\n", np.array(of, dtype=np.int64)
+
+
+def _zero(program: Program, machine: Machine | None) -> Array:
+    """G54 of the machine file in the program's axes (axes,)."""
+    offsets = dict(machine.offsets).get("G54") if machine is not None else None
+    if machine is None or offsets is None:
+        return np.zeros(len(program.axes))
+    known = dict(zip(machine.program_letters, offsets, strict=False))
+    return np.array([float(known.get(name, 0.0)) for name in program.axes])
+
+
+def _control(program: Program, m: int) -> bytes:
+    if program.control[m] != PathControl.TOLERANCE:
+        return _CONTROL[PathControl(program.control[m])]
+    words = [b"G64"]
+    for letter, value in ((b"P", program.blend_tolerance[m]), (b"Q", program.fit_tolerance[m])):
+        if not math.isnan(value):
+            words.append(letter + place_text(float(value)))
+    return b" ".join(words)
+
+
+def _arc(out: _Blocks, program: Program, m: int, row: int, start: Array) -> list[bytes]:
+    """Plane, code, centre and turns of an arc."""
+    normal, angle = int(program.arc_normal[row]), float(program.arc_angle[row])
+    words = [out.changed("plane", _PLANES[normal]), out.changed("motion", b"G2" if angle < 0.0 else b"G3")]
+    for axis in range(3):
+        if axis != normal:
+            here = start[program.axes.index("XYZ"[axis])]
+            words.append(b"IJK"[axis : axis + 1] + place_text(float(program.arc_centre[row, axis] - here)))
+    turns = math.ceil(abs(angle) / math.tau - 1e-9)
+    return words if turns <= 1 else [*words, b"P%d" % turns]
+
+
+def _spline(out: _Blocks, program: Program, row: int, zero: Array, dialect: DialectName, feed: bytes) -> int:
+    """Writes the pieces of a spline; returns how many."""
+    curve = program.splines
+    assert curve is not None
+    m = int(program.spline_move[row])
+    line = int(program.line[m])
+    first, last = program.spline_pieces[row : row + 2].tolist()
+    for piece in range(first, last):
+        span = slice(curve.offsets[piece], curve.offsets[piece + 1])
+        points = curve.control_points[span] - zero
+        weights = np.ones(len(points)) if curve.weights is None else curve.weights[span]
+        moved = [column for column in range(points.shape[1]) if np.ptp(points[:, column]) > 0.0]
+        names = [program.axes[column] for column in moved]
+        own = feed if piece == first else b""
+        if len(points) == 2:
+            ends = [
+                name.encode() + place_text(float(points[1, c])) for name, c in zip(names, moved, strict=True)
+            ]
+            out.add(out.changed("motion", b"G1"), *ends, own)
+            continue
+        if dialect == "grbl":
+            raise InputError(f"{program.name} line {line}: grbl has no splines: take another dialect")
+        if dialect == "linuxcnc" and set(names) - {"X", "Y"}:
+            raise InputError(
+                f"{program.name} line {line}: LinuxCNC's G5.2 is for X and Y alone: take the dialect fanuc"
+            )
+        if dialect == "linuxcnc":
+            _g52(out, points, weights, program.axes, own)
+        else:
+            _g62(out, points, weights, program.axes, moved, own)
+    return int(last - first)
+
+
+def _g52(out: _Blocks, points: Array, weights: Array, axes: tuple[str, ...], feed: bytes) -> None:
+    """A rational Bézier curve is a NURBS whose order is the number of its points; the first one is where the
+    tool is, with the weight 1."""
+    out.add(out.changed("plane", b"G17"))
+    columns = [axes.index(name) for name in "XY"]
+    for k in range(1, len(points)):
+        place = [b"XY"[i : i + 1] + place_text(float(points[k, c])) for i, c in enumerate(columns)]
+        code = [b"G5.2"] if k == 1 else []
+        order = [b"L%d" % len(points), feed] if k == 1 else []
+        out.add(*code, *place, b"P" + place_text(float(weights[k] / weights[0])), *order)
+    out.add(b"G5.3")
+    out.changed("motion", b"G5.2")
+
+
+def _g62(
+    out: _Blocks, points: Array, weights: Array, axes: tuple[str, ...], moved: list[int], feed: bytes
+) -> None:
+    """G6.2: the order P, a knot K and a weight R a point, and the last knots in blocks of their own."""
+    count = len(points)
+    knots = [b"0."] * count + [b"1."] * count
+    for k in range(count):
+        place = [axes[c].encode() + place_text(float(points[k, c])) for c in moved]
+        code = [b"G6.2", b"P%d" % count] if k == 0 else []
+        out.add(*code, b"K" + knots[k], *place, b"R" + place_text(float(weights[k])), feed if k == 0 else b"")
+    for knot in knots[count:]:
+        out.add(b"K" + knot)
+    out.changed("motion", b"G6.2")
+
+
+def _events(events: Events) -> dict[int, list[bytes]]:
+    """The blocks before each move, by its number."""
+    told: dict[int, list[bytes]] = {}
+    words = events.words()
+    for row in range(len(events)):
+        letter, number = chr(events.letter[row]), float(events.number[row])
+        if letter == MESSAGE:
+            text = b"(MSG," + _plain(events.texts[int(number)]) + b")"
+        elif letter == "M" and number == 6.0:
+            text = b"M6"
+        elif letter == "M" and number in (67.0, 68.0):
+            text = b"M%d E%d Q" % (number, events.p[row]) + place_text(float(events.q[row]))
+        else:
+            text = words[row].encode()
+        told.setdefault(int(events.move[row]), []).append(text)
+    return told
+
+
+def _plain(text: str) -> bytes:
+    """Text for a comment."""
+    return text.replace("(", "[").replace(")", "]").encode("ascii", "replace")

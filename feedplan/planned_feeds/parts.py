@@ -1,0 +1,175 @@
+"""Splits lines and arcs where the planned speed varies by more than a step: each part has an F near it.
+
+A cut lies on the path where this follows one move alone, and as far again from the ends of the move as the
+blends of its corners reach: they keep their room. The parts are lines, or arcs about the same centre, whose
+ends are on the move, so that the geometry is the same.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.constraints.problem import Problem
+from feedplan.planned_feeds.speeds import SpeedsAlong, speeds_at
+from feedplan.profile import SpeedProfile
+from feedplan.program.program import Program
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+# A control takes its time for each block: no part takes less than so many servo periods.
+_LEAST_PERIODS = 10
+# The speed is looked at so many times in a step.
+_WITHIN_STEP = 4
+# Arcs that turn by less [rad] could be read as full turns, and no part of one turns by more.
+_LEAST_TURN, _GREATEST_TURN = 1e-4, math.pi
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """Parts of a move: `ends` (k, axes) [mm, deg] in the program's axes, the last one is the move's own;
+    `shares` (k,) of the move up to each end; `speed` (k,) the greatest planned one in each [mm/s, deg/s]."""
+
+    ends: Array
+    shares: Array
+    speed: Array
+
+    def __len__(self) -> int:
+        return len(self.ends)
+
+
+def parts_of(
+    problem: Problem,
+    profile: SpeedProfile,
+    program: Program,
+    along: SpeedsAlong,
+    candidates: Indices,
+    step: float,
+) -> dict[int, Parts]:
+    """The parts of those `candidates` (moves) whose planned speed varies by more than `step` [mm/s]."""
+    moves = [
+        m
+        for m in candidates.tolist()
+        if along.group[m] >= 0 and along.first[m] < along.last[m] and np.ptp(along.of(m)) > step
+    ]
+    if not moves:
+        return {}
+    samples = _samples(problem, profile, along, moves, step)
+    arcs = {int(m): row for row, m in enumerate(program.arc_move)}
+    starts = program.starts()
+    columns = [program.axes.index(name) for name in problem.path.axes]
+    found: dict[int, Parts] = {}
+    for m, (point, speed, time, free) in zip(moves, samples, strict=True):
+        motion = Motion(program, m, starts[m], arcs.get(m))
+        there = np.tile(starts[m], (len(point), 1))
+        there[:, columns] = point
+        share = motion.shares(there)
+        if not free.any():
+            continue
+        near, far = share[free].min(), share[free].max()
+        free &= (share >= 2.0 * near) & (share <= 2.0 * far - 1.0) & (share > 0.0) & (share < 1.0)
+        cuts = _cuts(speed, time, free, step, _LEAST_PERIODS * problem.period)
+        edges = [0.0, *share[cuts], 1.0]
+        turns = np.abs(np.diff(edges) * motion.turn)
+        if not cuts or (np.diff(edges) <= 0.0).any() or (motion.turn and turns.min() < _LEAST_TURN):
+            continue
+        # A place of a cut belongs to both parts.
+        bounds = [0, *cuts, len(speed) - 1]
+        tops = [float(speed[a : b + 1].max()) for a, b in pairwise(bounds)]
+        # An arc of more than half a turn is cut evenly.
+        counts = np.maximum(np.ceil(turns / _GREATEST_TURN), 1).astype(int)
+        shares = np.concatenate(
+            [np.linspace(a, b, n + 1)[1:] for a, b, n in zip(edges[:-1], edges[1:], counts, strict=True)]
+        )
+        ends = np.array([*(motion.at(value) for value in shares[:-1]), program.target[m]])
+        found[m] = Parts(ends, shares, np.repeat(tops, counts))
+    return found
+
+
+def _cuts(speed: Array, time: Array, free: NDArray[np.bool_], step: float, least: float) -> list[int]:
+    """Samples between which the speed varies by a step at most, where parts may end and take `least` [s]."""
+    cuts: list[int] = []
+    values, clock, may = speed.tolist(), time.tolist(), free.tolist()
+    low = high = values[0]
+    begin = clock[0]
+    for k in range(1, len(values)):
+        low, high = min(low, values[k]), max(high, values[k])
+        late = clock[k - 1] - begin >= least and clock[-1] - clock[k - 1] >= least
+        if high - low > step and may[k - 1] and late:
+            cuts.append(k - 1)
+            begin = clock[k - 1]
+            low, high = min(values[k - 1], values[k]), max(values[k - 1], values[k])
+    return cuts
+
+
+def _samples(
+    problem: Problem, profile: SpeedProfile, along: SpeedsAlong, moves: list[int], step: float
+) -> list[tuple[Array, Array, Array, NDArray[np.bool_]]]:
+    """Of each move places in order: points, speeds, times, and whether the path follows it alone there."""
+    pieces, parameters, sizes = [], [], []
+    for m in moves:
+        places = slice(int(along.first[m]), int(along.last[m]) + 1)
+        piece, u, speed = along.piece[places], along.u[places], along.of(m)
+        # So many between two samples that the speed steps by less; its square goes about with the place.
+        counts = np.where(piece[1:] == piece[:-1], np.ceil(_WITHIN_STEP * np.abs(np.diff(speed)) / step), 1)
+        counts = np.maximum(counts, 1).astype(np.int64)
+        owner = np.repeat(np.arange(len(counts)), counts)
+        level = (np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[owner]
+        first, last = speed[owner], speed[owner + 1]
+        wanted = first + level * (last - first)
+        apart = last**2 - first**2
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = np.where(apart == 0.0, level, (wanted**2 - first**2) / apart)
+        pieces.append(np.append(piece[owner], piece[-1]))
+        parameters.append(np.append(u[owner] + share * np.where(counts > 1, np.diff(u), 0.0)[owner], u[-1]))
+        sizes.append(len(owner) + 1)
+    piece, u = np.concatenate(pieces), np.concatenate(parameters)
+    speed, time = speeds_at(problem, profile, piece, u)
+    point = problem.path.curve.evaluate(piece, u)[0]
+    alone = (problem.path.move[:, 0] == problem.path.move[:, 1])[piece]
+    group = np.repeat(along.group[moves], sizes)
+    own = np.take_along_axis(speed, group[:, None], axis=1)[:, 0]
+    ends = np.cumsum(sizes)[:-1]
+    return list(zip(*(np.split(column, ends) for column in (point, own, time, alone)), strict=True))
+
+
+class Motion:
+    """A line or an arc of a program: its places by the share of it that is done."""
+
+    def __init__(self, program: Program, move: int, start: Array, arc: int | None) -> None:
+        self._start, self._way = start, program.target[move] - start
+        self.turn = 0.0
+        if arc is None:
+            return
+        self.turn = float(program.arc_angle[arc])
+        normal = int(program.arc_normal[arc])
+        letters = ["XYZ"[(normal + 1) % 3], "XYZ"[(normal + 2) % 3]]
+        self.plane = [program.axes.index(letter) for letter in letters]
+        self.normal = program.axes.index("XYZ"[normal])
+        self.centre = program.arc_centre[arc][[(normal + 1) % 3, (normal + 2) % 3]]
+        spoke, last = start[self.plane] - self.centre, program.target[move][self.plane] - self.centre
+        self._angle = math.atan2(spoke[1], spoke[0])
+        self._radii = math.hypot(*spoke), math.hypot(*last)
+
+    def at(self, share: float) -> Array:
+        """The place (axes,) where that share is done."""
+        place = self._start + share * self._way
+        if self.turn:
+            angle, (first, last) = self._angle + share * self.turn, self._radii
+            radius = first + share * (last - first)
+            place[self.plane] = self.centre + radius * np.array([math.cos(angle), math.sin(angle)])
+        return np.asarray(place)
+
+    def shares(self, points: Array) -> Array:
+        """The shares (n,) that are nearest to places (n, axes) in the order of the motion."""
+        if not self.turn:
+            return np.asarray((points - self._start) @ self._way / (self._way @ self._way))
+        spokes = points[:, self.plane] - self.centre
+        angles = np.unwrap(np.arctan2(spokes[:, 1], spokes[:, 0]))
+        begin = self._angle + math.tau * round((angles[0] - self._angle) / math.tau)
+        return np.asarray((angles - begin) / self.turn)

@@ -1,0 +1,324 @@
+"""From a plan to its program with planned feeds, and to the file of it."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import secrets
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.arguments import file_path, flag, number, one_of, positive, refuse
+from feedplan.errors import InputError
+from feedplan.planned_feeds.again import SAME, require_same
+from feedplan.planned_feeds.blocks import Aside, Blocks, blocks_of
+from feedplan.planned_feeds.dialects import DIALECTS, DialectName, lacks, writes_points
+from feedplan.planned_feeds.expand import expanded
+from feedplan.planned_feeds.feeds import Changes, Feeds, LineSpeeds, asides_of, line_speeds, planned_feeds
+from feedplan.planned_feeds.inverse_time import inverse_feeds
+from feedplan.planned_feeds.part_lines import Sense, Word, moved_axes_are_named, part_lines, words_of
+from feedplan.planned_feeds.parts import Parts, parts_of
+from feedplan.planned_feeds.speeds import SpeedsAlong, speeds_along
+from feedplan.planned_feeds.text import rewritten, usual_blank
+from feedplan.planning import Plan
+from feedplan.program.program import MoveKind, PathControl, Program
+from feedplan.program.read import read_program
+from feedplan.program.source import MAX_BYTES, content_of
+from feedplan.units import counted, duration_text
+
+Array = NDArray[np.float64]
+
+# Lines of a summary that are shown one by one.
+_SHOWN = 20
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedProgram:
+    """A program with planned feeds.
+
+    `content` is its text; `lines` how many lines the program has; `changes` those with another F; `split` how
+    many became several; `left` (line, reason) those whose F could not be changed; `notes` what the control of
+    the `dialect` lacks; `time` [s] the plan's.
+    """
+
+    name: str
+    content: bytes
+    lines: int
+    changes: Changes
+    split: int
+    left: tuple[tuple[int, str], ...]
+    notes: tuple[str, ...]
+    dialect: DialectName
+    time: float
+
+    def __repr__(self) -> str:
+        return f"<PlannedProgram {self.name}: {counted(self.changed, 'line')} of {self.lines} changed>"
+
+    @property
+    def changed(self) -> int:
+        """How many lines have another F."""
+        return len(np.unique(self.changes.line))
+
+    @property
+    def sha256(self) -> str:
+        """The hash of the text."""
+        return hashlib.sha256(self.content).hexdigest()
+
+    def write(self, file: str | os.PathLike[str]) -> None:
+        """Writes the text to a file, whole or not at all. Raises InputError where it cannot be written."""
+        place = file_path(file, "the file", "the path of a file")
+        try:
+            beside = place.with_name(f".feedplan-{secrets.token_hex(6)}")
+            try:
+                beside.write_bytes(self.content)
+                os.replace(beside, place)
+            finally:
+                beside.unlink(missing_ok=True)
+        except (OSError, ValueError) as error:  # a name that no file can have
+            reason = (getattr(error, "strerror", None) or str(error)).lower()
+            raise InputError(f"{place} cannot be written ({reason}): choose another file") from error
+
+    def to_json(self) -> dict[str, Any]:
+        """What plan.json tells of it."""
+        return {
+            "sha256": self.sha256,
+            "dialect": self.dialect,
+            "lines": self.lines,
+            "changed": self.changed,
+            "split": self.split,
+            "left": len(self.left),
+            "notes": list(self.notes),
+        }
+
+    def summary(self, shown: int = _SHOWN) -> str:
+        """What was changed, in words: at most `shown` lines of each kind one by one."""
+        rows = [
+            f"{self.name}: {counted(self.changed, 'line')} of {self.lines} with another F, "
+            f"{self.split} split, {len(self.left)} left as they were; "
+            f"the plan takes {duration_text(self.time)}"
+        ]
+        lines, first = np.unique(self.changes.line, return_index=True)
+        for line, row in zip(lines[:shown].tolist(), first.tolist(), strict=False):
+            after = self.changes.after[self.changes.line == line]
+            text = " ".join(f"{feed:g}" for feed in after[:6]) + (" ..." if len(after) > 6 else "")
+            rows.append(f"  line {line}: F{self.changes.before[row]:g} -> F{text}")
+        if len(lines) > shown:
+            rows.append(f"  and {len(lines) - shown} more")
+        reasons: dict[str, list[int]] = {}
+        for line, reason in self.left:
+            reasons.setdefault(reason, []).append(line)
+        for reason, own in reasons.items():
+            where = ", ".join(map(str, own[:shown])) + (" ..." if len(own) > shown else "")
+            rows.append(f"  left: {reason}: line {where}")
+        rows += [f"  {note}" for note in self.notes]
+        return "\n".join(rows)
+
+
+def planned_program(
+    plan: Plan,
+    *,
+    feed_step: float | None = None,
+    inverse_time: bool = False,
+    dialect: DialectName = "linuxcnc",
+    expand: bool = False,
+) -> PlannedProgram:
+    """The program of a plan, in which no block asks for more than the plan's greatest speed in it.
+
+    `feed_step` [mm/s, deg/s]: lines and arcs are split where the planned speed varies by more. `inverse_time`
+    gives every block an F in 1/min (G93). `dialect` is the control it is for: `linuxcnc`, `grbl` or `fanuc`;
+    what that lacks is in `notes`. `expand` writes the moves as plain blocks in the order in which they run.
+    What was written is read back: the moves are the same bit for bit, or within 1e-9 mm where lines are
+    split. Raises InputError for a plan without a program, a program that was changed since, and what cannot
+    be done.
+    """
+    program = plan.program if isinstance(plan, Plan) else None
+    if feed_step is not None:
+        feed_step = number(feed_step, "feed_step", "a positive number", positive, "mm/s")
+    inverse_time, expand = flag(inverse_time, "inverse_time"), flag(expand, "expand")
+    dialect = one_of(dialect, "dialect", DIALECTS)
+    if not isinstance(program, Program):
+        raise refuse("the plan", plan, "the plan of a program, as feedplan.plan returns it")
+    along = speeds_along(plan.problem, plan.profile, program)
+    if expand:
+        content, program, along = _expanded(program, along, dialect)
+    else:
+        content = _text_of(program)
+    blocks = blocks_of(content, bool((program.reading or {}).get("block_delete", True)))
+    # By rounding alone a plan is faster than it was asked to be.
+    greatest = np.fmin(along.greatest(), plan.problem.request.of(program.feed))
+    speeds, aside = line_speeds(program, greatest, along.group), asides_of(blocks, program)
+    words: dict[int, list[Word]] = {}
+    parts: dict[int, Parts] = {}
+    if feed_step is not None:
+        candidates = _candidates(blocks, program, aside)
+        parts = parts_of(plan.problem, plan.profile, program, along, candidates, feed_step)
+        parts, words = _writable(blocks, program, parts)
+    point = writes_points(dialect)
+    if inverse_time:
+        feeds = inverse_feeds(blocks, program, aside, greatest, parts, point)
+    else:
+        by_line = {
+            int(program.line[m]) - 1: (own.speed / program.feed[m]).tolist() for m, own in parts.items()
+        }
+        feeds = planned_feeds(blocks, speeds, aside, by_line, point)
+        # A line whose F could not be changed is not split.
+        parts = {m: own for m, own in parts.items() if int(program.line[m]) - 1 not in feeds.left}
+    result = rewritten(blocks, feeds, _split(blocks, program, parts, words, feeds))
+    if result != content:
+        require_same(result, program, parts, _most(blocks, program, feeds, speeds))
+    return PlannedProgram(
+        name=program.name,
+        content=result,
+        lines=len(blocks),
+        changes=feeds.changes,
+        split=len(parts),
+        left=tuple((line + 1, why) for line, why in sorted(feeds.left.items())),
+        notes=lacks(dialect, result),
+        dialect=dialect,
+        time=plan.time,
+    )
+
+
+def write_program(
+    plan: Plan,
+    file: str | os.PathLike[str],
+    *,
+    feed_step: float | None = None,
+    inverse_time: bool = False,
+    dialect: DialectName = "linuxcnc",
+    expand: bool = False,
+) -> PlannedProgram:
+    """Writes the program of a plan with planned feeds to a file, whole or not at all; see `planned_program`.
+
+    Raises InputError also where the file cannot be written.
+    """
+    place = file_path(file, "the file", "the path of a file")
+    planned = planned_program(
+        plan, feed_step=feed_step, inverse_time=inverse_time, dialect=dialect, expand=expand
+    )
+    planned.write(place)
+    return planned
+
+
+def _text_of(program: Program) -> bytes:
+    """The text that a program was read from. Raises InputError where there is none, or another by now."""
+    if program.reading is None or program.text is None:
+        raise InputError(
+            f"{program.name} is no G-code that was read from a text: "
+            "--expand (expand=True) writes its moves anew"
+        )
+    content = content_of(program.text, program.name, MAX_BYTES).content
+    if hashlib.sha256(content).hexdigest() != program.sha256:
+        raise InputError(f"{program.name} was changed since it was planned: plan it again")
+    return content
+
+
+def _expanded(
+    program: Program, along: SpeedsAlong, dialect: DialectName
+) -> tuple[bytes, Program, SpeedsAlong]:
+    """The program written anew, read back, and the speeds of its moves. Raises InputError as `expanded`."""
+    machine = (program.reading or {}).get("machine")
+    content, of = expanded(program, machine, dialect)
+    again = read_program(content, machine, name=program.name)
+    again = replace(again, reading={"machine": machine})
+    if len(again) != len(of):
+        raise InputError(
+            f"{program.name} is not the same when its moves are written anew ({len(again)} moves, "
+            f"not {len(of)}): leave out --expand"
+        )
+    last = np.append(of[1:] != of[:-1], True)
+    columns = [program.axes.index(name) for name in again.axes if name in program.axes]
+    # A straight piece of a spline is a line.
+    kind = np.where(again.kind == MoveKind.LINE, MoveKind.LINE, program.kind[of])
+    pairs = (
+        (again.kind, kind),
+        (again.target[last], program.target[:, columns]),
+        (again.arc_angle, program.arc_angle),
+        (again.arc_centre, program.arc_centre),
+        (_curved(again), _curved(program)[:, columns]),
+        (again.stop[last], program.stop),
+        (again.dwell[last], program.dwell),
+    )
+    if len(columns) != len(again.axes) or not all(
+        own.shape == other.shape and np.allclose(own, other, rtol=0.0, atol=SAME) for own, other in pairs
+    ):
+        raise InputError(
+            f"{program.name} is not the same when its moves are written anew: leave out --expand"
+        )
+    taken = replace(along, first=along.first[of], last=along.last[of], group=along.group[of])
+    return content, again, taken
+
+
+def _curved(program: Program) -> Array:
+    """The control points (k, axes) of the curved pieces of splines."""
+    if program.splines is None:
+        return np.empty((0, len(program.axes)))
+    counts = np.diff(program.splines.offsets)
+    return program.splines.control_points[np.repeat(counts > 2, counts)]
+
+
+def _candidates(blocks: Blocks, program: Program, aside: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """Moves that may be split: lines and arcs at a feed, each alone in a line that runs once."""
+    line = program.line.astype(np.int64) - 1
+    alone = np.bincount(line, minlength=len(blocks))[line] == 1
+    plain = (aside == Aside.NO) & blocks.plain & ~blocks.inverse
+    kinds = (program.kind == MoveKind.LINE) | (program.kind == MoveKind.ARC)
+    return np.flatnonzero(alone & plain[line] & kinds & (program.control != PathControl.EXACT_STOP))
+
+
+def _writable(
+    blocks: Blocks, program: Program, parts: Mapping[int, Parts]
+) -> tuple[dict[int, Parts], dict[int, list[Word]]]:
+    """Those moves whose lines can be written in parts, and the words of these lines."""
+    moving = program.moving()
+    kept: dict[int, Parts] = {}
+    words: dict[int, list[Word]] = {}
+    for m, own in parts.items():
+        found = words_of(blocks.line(int(program.line[m]) - 1))
+        if found is not None and moved_axes_are_named(found, program.axes, moving[m]):
+            kept[m], words[m] = own, found
+    return kept, words
+
+
+def _split(
+    blocks: Blocks,
+    program: Program,
+    parts: Mapping[int, Parts],
+    words: Mapping[int, list[Word]],
+    feeds: Feeds,
+) -> dict[int, bytes]:
+    """The lines that are split, by index, written anew."""
+    starts, arcs = program.starts(), {int(m): row for row, m in enumerate(program.arc_move)}
+    replaced: dict[int, bytes] = {}
+    usual = usual_blank(blocks.content)
+    for m, own in parts.items():
+        line = int(program.line[m]) - 1
+        centre = None
+        if m in arcs:
+            row = arcs[m]
+            normal = int(program.arc_normal[row])
+            centre = {
+                "XYZ"[axis]: float(program.arc_centre[row, axis]) for axis in range(3) if axis != normal
+            }
+        sense = Sense(
+            bool(blocks.absolute[line]), bool(blocks.absolute_centres[line]), bool(blocks.inches[line])
+        )
+        texts = feeds.parts.get(line, [None] * len(own))
+        replaced[line] = part_lines(
+            blocks.line(line), words[m], sense, program.axes, starts[m], own, centre, texts, usual
+        )
+    return replaced
+
+
+def _most(blocks: Blocks, program: Program, feeds: Feeds, speeds: LineSpeeds) -> Array:
+    """The greatest feed that each move may ask for (m,): that of the plan in its line, else its own."""
+    ratio = np.ones(len(blocks))
+    changed = feeds.changes.line - 1
+    by_line = np.ones(len(blocks))
+    by_line[speeds.line] = np.where(np.isnan(speeds.ratio), 1.0, speeds.ratio)
+    ratio[changed] = by_line[changed]
+    return np.asarray(program.feed * ratio[program.line.astype(np.int64) - 1])

@@ -1,0 +1,150 @@
+"""The greatest planned speed in each move of a program, along the axes that its feed counts along.
+
+A move has the part of the path that is nearest to it. Where a piece follows two moves, as the blend of a
+corner does, all of it belongs to both, since the feeds of both hold on all of it; where it follows more, as a
+fitted piece does, it is cut at the places nearest to the ends of the moves, where a change of feed would cut
+it too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.constraints.problem import Problem
+from feedplan.geometry.feed_groups import GROUPS, feed_groups, leading_group
+from feedplan.profile import SpeedProfile
+from feedplan.program.program import Program
+from feedplan.setpoints import sampler
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+# Columns of a program that point the tool.
+DIRECTION = ("I", "J", "K")
+# Places within each phase of the profile at which the speed is taken, beside both ends.
+_WITHIN = (0.25, 0.5, 0.75)
+# Steps of the search for the nearest place: samples, then sections of the interval around the best one.
+_SAMPLES, _SECTIONS = 8, 9
+
+
+@dataclass(frozen=True, eq=False)
+class SpeedsAlong:
+    """Speeds at places in the order of the path: `piece` (k,), `u` (k,), `speed` (k, 3) along X, Y, Z, along
+    U, V, W [mm/s] and of all other axes [deg/s]. Those in move m are `first[m]` to `last[m]`, both included;
+    `first` > `last` where no piece follows it. `group` (m,) is which of the three its feed counts along, −1
+    where it moves nothing."""
+
+    piece: Indices
+    u: Array
+    speed: Array
+    first: Indices
+    last: Indices
+    group: Indices
+
+    def of(self, move: int) -> Array:
+        """The speeds in a move."""
+        return self.speed[self.first[move] : self.last[move] + 1, self.group[move]]
+
+    def greatest(self) -> Array:
+        """The greatest planned speed in each move (m,); NaN where nothing follows it."""
+        greatest = np.full(len(self.first), np.nan)
+        own = np.flatnonzero((self.first <= self.last) & (self.group >= 0))
+        for group in np.unique(self.group[own]):
+            moves = own[self.group[own] == group]
+            ends = np.stack([self.first[moves], self.last[moves] + 1], axis=1).ravel()
+            speed = np.append(self.speed[:, group], -np.inf)
+            greatest[moves] = np.maximum.reduceat(speed, ends)[::2]
+        return greatest
+
+
+def speeds_along(problem: Problem, profile: SpeedProfile, program: Program) -> SpeedsAlong:
+    """The planned speeds at the ends of all phases and moves, and at places between them."""
+    path = problem.path
+    program = program.along(path.axes)
+    begins, ends = _ends_of_moves(problem, program)
+    within = [profile.u0 + share * (profile.u1 - profile.u0) for share in _WITHIN]
+    columns = [profile.u0, *within, profile.u1]
+    piece = np.concatenate([np.repeat(profile.piece, len(columns)), begins[0], ends[0]]).astype(np.int64)
+    u = np.concatenate([np.stack(columns, axis=1).ravel(), begins[1], ends[1]])
+    order = np.lexsort((u, piece))
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    count = len(program)
+    # What has the same place as an end of a move is in the move.
+    first, last = rank[len(piece) - 2 * count : len(piece) - count], rank[len(piece) - count :]
+    piece, u = piece[order], u[order]
+    return SpeedsAlong(
+        piece,
+        u,
+        speeds_at(problem, profile, piece, u)[0],
+        first,
+        np.where(begins[0] > ends[0], first - 1, last),
+        leading_group(path.axes, program.moving()),
+    )
+
+
+def _ends_of_moves(problem: Problem, program: Program) -> tuple[tuple[Indices, Array], tuple[Indices, Array]]:
+    """Where the path of each move begins and ends: pieces (m,) and parameters (m,)."""
+    path = problem.path
+    first, last = np.maximum.accumulate(path.move[:, 0]), np.maximum.accumulate(path.move[:, 1])
+    moves = np.arange(len(program))
+    begin = np.minimum(np.searchsorted(last, moves, side="left"), len(path) - 1)
+    end = np.maximum(np.searchsorted(first, moves, side="right") - 1, 0)
+    shared = last - first > 1
+    u_begin, u_end = np.zeros(len(moves)), path.width[end].copy()
+    ends = shared[end] & (last[end] > moves)
+    u_end[ends] = _nearest(problem, end[ends], program.target[ends])
+    begins = shared[begin] & (first[begin] < moves)
+    # Mostly the move before ends there, on the same piece.
+    same = begins & np.append(False, ends[:-1] & (end[:-1] == begin[1:]))
+    u_begin[same] = u_end[:-1][same[1:]]
+    begins &= ~same
+    u_begin[begins] = _nearest(problem, begin[begins], program.starts()[begins])
+    return (begin, u_begin), (end, np.where((begin == end) & (u_end < u_begin), u_begin, u_end))
+
+
+def _nearest(problem: Problem, piece: Indices, point: Array) -> Array:
+    """The parameters (n,) at which pieces (n,) come nearest to points (n, axes)."""
+    curve, width = problem.path.curve, problem.path.width[piece]
+    if not len(piece):
+        return np.empty(0)
+    shares = np.linspace(0.0, 1.0, _SAMPLES + 1)
+    places = curve.evaluate(np.repeat(piece, len(shares)), np.outer(width, shares).ravel())[0]
+    away = ((places.reshape(len(piece), len(shares), -1) - point[:, None]) ** 2).sum(axis=2)
+    best = away.argmin(axis=1)
+    low = width * shares[np.maximum(best - 1, 0)]
+    high = width * shares[np.minimum(best + 1, _SAMPLES)]
+    for _ in range(_SECTIONS):
+        middle = 0.5 * (low + high)
+        place, slope = curve.evaluate(piece, middle, 1)
+        beyond = ((place - point) * slope).sum(axis=1) > 0.0
+        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+    return np.asarray(0.5 * (low + high))
+
+
+def speeds_at(problem: Problem, profile: SpeedProfile, piece: Indices, u: Array) -> tuple[Array, Array]:
+    """The planned speed along each group of axes (k, 3) at places (k,), and when the tool is there (k,) [s].
+
+    Speeds are 0 where the curve stands still."""
+    path = problem.path
+    time, _, velocity, *_ = sampler(problem, profile, problem.period).along(piece.astype(np.uint32), u)
+    slope = problem.curve.evaluate(piece, u, 1)[1]
+    square = (slope**2).sum(axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rate = np.sqrt((velocity**2).sum(axis=1) / square)
+    rate = np.where(np.isfinite(rate), rate, 0.0)
+    if problem.joints is None:
+        return np.sqrt((slope**2) @ feed_groups(path.axes).T) * rate[:, None], time
+    place, words = path.curve.evaluate(piece, u, 1)
+    squares = (words**2) @ (feed_groups(path.axes) & ~np.isin(path.axes, DIRECTION)).T
+    if set(DIRECTION) <= set(path.axes):
+        columns = [path.axes.index(name) for name in DIRECTION]
+        vector, change = place[:, columns], words[:, columns]
+        length = np.linalg.norm(vector, axis=1)
+        # A direction turns by its change across it, whatever its length.
+        across = np.linalg.norm(np.cross(vector, change), axis=1) / np.where(length > 0.0, length, 1.0) ** 2
+        squares[:, GROUPS - 1] += np.degrees(across) ** 2
+    return np.sqrt(squares) * rate[:, None], time

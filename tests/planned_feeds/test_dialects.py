@@ -1,0 +1,110 @@
+"""What controls lack is told with its line, and what is written anew is in their words."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import feedplan
+from feedplan.errors import InputError
+from feedplan.planned_feeds.dialects import lacks
+from tests.planned_feeds.programs import SQUARE, planned
+
+NURBS = "G21 G17\nG1 X1 F600\nG5.2 X3 Y4 P1 L3\nX8 Y5 P2\nX12 Y1 P1\nX15 Y3 P0.7\nG5.3\nG1 X20\nM2\n"
+
+
+def test_each_control_lacks_something() -> None:
+    program = b"G21\n(G5 in a comment)\no1 sub\nG5 X1 Y1 I1 J1 P1 Q1\nG6.2 P4 K0 X1\nG64 P0.1\nG2 X1 I1 P3\n"
+    assert lacks("linuxcnc", program) == (
+        "line 5: LinuxCNC lacks NURBS by G6.2, before its version 2.9 (G6.2, 1 in all)",
+    )
+    grbl = lacks("grbl", program)
+    assert "line 4: grbl lacks splines by G5, G5.1 and G5.2 (G5, 1 in all)" in grbl
+    assert "line 3: grbl lacks O words of subroutines, loops and branches (o1 s, 1 in all)" in grbl
+    assert any("turns of an arc by P" in sentence for sentence in lacks("fanuc", program))
+    assert any("without a decimal point" in sentence for sentence in lacks("fanuc", program))
+
+
+def test_long_lines_are_told() -> None:
+    line = b"G1 " + b" ".join(b"X%d.123456789012" % k for k in range(5))
+    assert lacks("grbl", line) == ("line 1: grbl takes 70 characters a line (1 are longer)",)
+    assert lacks("grbl", b"G1 X1" + b" " * 90 + b"(a long note)") == ()
+
+
+def test_a_program_of_lines_lacks_nothing() -> None:
+    for dialect in ("linuxcnc", "grbl"):
+        assert feedplan.planned_program(planned(SQUARE), dialect=dialect).notes == ()  # type: ignore[arg-type]
+
+
+def test_fanuc_gets_decimal_points() -> None:
+    plan = planned("G21 G61.1\nG1 X5. F60000.\nX300.\nM2\n")
+    assert b"F7348.4" in feedplan.planned_program(plan, dialect="fanuc").content
+    plan = planned("G21 G61.1\nG1 X30. F60000.\nX300.\nM2\n")
+    assert b"G1 X30. F18000.\n" in feedplan.planned_program(plan, dialect="fanuc").content
+
+
+@pytest.mark.parametrize("dialect", ["linuxcnc", "fanuc"])
+def test_splines_are_written_as_nurbs(dialect: str) -> None:
+    plan = planned(NURBS)
+    result = feedplan.planned_program(plan, expand=True, dialect=dialect)  # type: ignore[arg-type]
+    code = b"G5.2" if dialect == "linuxcnc" else b"G6.2"
+    assert result.content.count(code) == 3
+    program, own = feedplan.read_program(result.content, "mill"), plan.program
+    assert own is not None
+    assert own.splines is not None
+    assert program.splines is not None
+    assert program.splines.control_points == pytest.approx(own.splines.control_points, abs=1e-11)
+    assert program.splines.weights is not None
+    assert own.splines.weights is not None
+    # Weights of a piece count by their ratios.
+    for first, last in zip(own.splines.offsets[:-1], own.splines.offsets[1:], strict=True):
+        ratio = program.splines.weights[first:last] / own.splines.weights[first:last]
+        assert np.ptp(ratio) < 1e-9
+
+
+def test_grbl_has_no_splines() -> None:
+    with pytest.raises(InputError, match="line 3: grbl has no splines: take another dialect"):
+        feedplan.planned_program(planned(NURBS), expand=True, dialect="grbl")
+
+
+def test_loops_calls_and_cycles_become_plain_blocks() -> None:
+    text = (
+        "G21 (plate)\nT1\nM3 S1000\no1 sub\nG1 X5 F3000\nX0 F60000\no1 endsub\nG0 Z5\no1 call\n"
+        "G4 P0.5\no1 call\n(MSG, now)\nG99 G81 X9 Y9 Z-5 R1 F300\nG80 M5\nM2\n"
+    )
+    plan = planned(text)
+    result = feedplan.planned_program(plan, expand=True)
+    lines = result.content.decode().splitlines()
+    assert not any("o1" in line or "G81" in line for line in lines)
+    assert [line for line in lines if line.startswith(("M3", "S", "T", "M5", "G4", "(MSG"))] == [
+        "T1",
+        "S1000",
+        "M3",
+        "G4 P0.5",
+        "(MSG,now)",
+        "M5",
+    ]
+    program = feedplan.read_program(result.content, "mill")
+    assert plan.program is not None
+    assert np.array_equal(program.target, plan.program.target)
+    assert program.events.words() == plan.program.events.words()
+    assert result.left == ()
+    assert feedplan.plan(program, "mill").time == pytest.approx(plan.time, rel=1e-4)
+
+
+def test_a_drawn_path_becomes_a_program() -> None:
+    drawn = (
+        b'{"unit": "mm", "feed": 80.0, "curves": ['
+        b'{"degree": 2, "control_points": [[0, 0], [10, 0], [10, 10]], "weights": [1, 0.7, 1]}, '
+        b'{"degree": 1, "control_points": [[10, 10], [10, 30]]}]}'
+    )
+    plan = feedplan.plan(drawn, "mill")
+    result = feedplan.planned_program(plan, expand=True)
+    program = feedplan.read_program(result.content, "mill")
+    assert feedplan.plan(program, "mill").time == pytest.approx(plan.time, rel=1e-4)
+
+
+def test_the_tip_is_not_expanded() -> None:
+    plan = planned("G21 G43.1 Z80\nG0 X0 Y0 Z100\nG43.4\nG1 X20 A-20 F600\nG49\nM2\n", "trunnion-ac")
+    with pytest.raises(InputError, match=r"words of the tool's tip \(G43.4, G43.5\) are not expanded"):
+        feedplan.planned_program(plan, expand=True)

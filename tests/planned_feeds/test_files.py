@@ -1,0 +1,85 @@
+"""The program with planned feeds in a file, in the folder of a plan, and on the command line."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import feedplan
+from feedplan.cli import main
+from feedplan.errors import InputError
+from tests.planned_feeds.programs import SQUARE, planned
+
+
+@pytest.fixture
+def part(tmp_path: Path) -> Path:
+    file = tmp_path / "part.ngc"
+    file.write_text(SQUARE)
+    return file
+
+
+def test_the_file_is_written_whole(part: Path, tmp_path: Path) -> None:
+    result = feedplan.write_program(planned(SQUARE), tmp_path / "out.ngc")
+    assert (tmp_path / "out.ngc").read_bytes() == result.content
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["out.ngc", "part.ngc"]
+    with pytest.raises(InputError, match=r"cannot be written .*: choose another file"):
+        feedplan.write_program(planned(SQUARE), tmp_path / "none" / "out.ngc")
+
+
+def test_a_folder_tells_the_hash_of_its_program(part: Path, tmp_path: Path, capsys: Any) -> None:
+    out = tmp_path / "out"
+    assert main(["plan", str(part), "-o", str(out), "--program"]) == 0
+    summary = json.loads((out / "plan.json").read_text())
+    content = (out / "program.ngc").read_bytes()
+    told = summary["planned_program"]
+    assert told["file"] == "program.ngc"
+    assert told["sha256"] == hashlib.sha256(content).hexdigest()
+    assert told["changed"] == 4
+    text = capsys.readouterr().out
+    assert "4 lines of 12 with another F, 0 split, 0 left as they were" in text
+    assert "line 6: F60000 -> F" in text
+    assert main(["check", str(out)]) == 0
+    (out / "program.ngc").write_bytes(content + b"\n")
+    assert main(["check", str(out)]) == 2
+    assert "program.ngc was changed" in capsys.readouterr().err
+    (out / "program.ngc").unlink()
+    assert main(["check", str(out)]) == 2
+    assert "program.ngc cannot be read" in capsys.readouterr().err
+
+
+def test_a_program_of_an_earlier_plan_is_told(part: Path, tmp_path: Path, capsys: Any) -> None:
+    out = tmp_path / "out"
+    assert main(["plan", str(part), "-o", str(out), "--program", "--format", "none", "-q"]) == 0
+    assert main(["plan", str(part), "-o", str(out), "--format", "none"]) == 0
+    assert "program.ngc is of an earlier plan" in capsys.readouterr().err
+
+
+def test_the_command_writes_a_file_and_says_what_a_control_lacks(
+    part: Path, tmp_path: Path, capsys: Any
+) -> None:
+    part.write_text(SQUARE.replace("G21", "G21 G64 P0.01"))
+    file = tmp_path / "planned.nc"
+    options = ["--program-out", str(file), "--dialect", "grbl", "--feed-step", "100", "--json"]
+    assert main(["plan", str(part), *options]) == 0
+    told = json.loads(capsys.readouterr().out)["planned_program"]
+    assert told["split"] == 4
+    assert told["notes"] == ["line 3: grbl lacks G64 and G61.1 (G64, 1 in all)"]
+    assert feedplan.read_program(file, "mill").target[-1].tolist() == [0.0, 0.0, 5.0]
+
+
+def test_options_that_belong_together_are_asked_for(part: Path, capsys: Any) -> None:
+    assert main(["plan", str(part), "--program"]) == 2
+    assert "--program needs a folder to write to" in capsys.readouterr().err
+    assert main(["plan", str(part), "--feed-step", "10"]) == 2
+    assert "give --program-out FILE as well" in capsys.readouterr().err
+    assert main(["plan", str(part), "--program-out", "x", "--feed-step", "-1"]) == 2
+    assert "feed_step is -1 mm/s" in capsys.readouterr().err
+
+
+def test_only_a_planned_program_is_written_beside_a_plan(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"the program is 'x': give what feedplan.planned_program returns"):
+        feedplan.write_plan(planned(SQUARE), tmp_path / "out", (), program="x")  # type: ignore[arg-type]
