@@ -33,6 +33,7 @@ from feedplan.command_options import (
 )
 from feedplan.comparison import TIME_LIMIT
 from feedplan.errors import FeedplanError, InfeasibleError, SolverError
+from feedplan.filter_command import filter_
 from feedplan.geometry.corners import FollowedPath
 from feedplan.machine_commands import machines
 from feedplan.program.read import Reading
@@ -390,5 +391,6 @@ def check(place: str, machine: str | None, resolution: float, jerk: bool, as_jso
     return DONE if audit.ok else _fail(console.failure_sentence(audit), BROKEN)
 
 
+cli.add_command(filter_)
 cli.add_command(machines)
 cli.add_command(time)

@@ -1,0 +1,90 @@
+"""`feedplan filter`: a program filter of LinuxCNC's [FILTER] section, with the planned program as its output.
+
+In the INI file: `[FILTER] PROGRAM_EXTENSION = .ngc G-code` and `ngc = feedplan filter --machine FILE`.
+LinuxCNC runs that with the file's path, shows `FILTER_PROGRESS=n` (0 to 100) as a bar, and the rest of the
+standard error where the exit code is not 0.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from typing import IO
+
+import click
+
+from feedplan import console, planners
+from feedplan.command_options import PROGRAM, TOLERANCE
+from feedplan.errors import InfeasibleError
+from feedplan.machine.importers import import_machine
+from feedplan.machine.machine import Machine
+from feedplan.program.program import Program
+from feedplan.program.read import Reading
+from feedplan.program.source import Source
+from feedplan.reading_options import machine_for, reading_options
+
+# How far all is when a stage begins, and its share.
+_STAGES = {"read": (0, 10), "fit": (10, 20), "plan": (30, 40), "audit": (70, 20)}
+
+
+def filter_progress(write: Callable[[str], object]) -> Callable[[str, float], None]:
+    """Tells how far all stages are, each whole per cent once, as LinuxCNC reads it."""
+    told = -1
+
+    def tell(stage: str, done: float) -> None:
+        nonlocal told
+        start, share = _STAGES.get(stage, (90, 10))
+        now = int(start + share * min(max(done, 0.0), 1.0))
+        if now > told:
+            told = now
+            write(f"FILTER_PROGRESS={now}\n")
+
+    return tell
+
+
+@click.command(name="filter")
+@PROGRAM
+@click.option("--machine", "-m", metavar="NAME|FILE", help="As for plan.  [default: LinuxCNC's INI file]")
+@reading_options
+@click.option("--method", type=click.Choice(planners.methods()), default="bang-bang", show_default=True)
+@TOLERANCE
+def filter_(
+    program: str | IO[bytes],
+    machine: str | None,
+    method: planners.MethodName,
+    tolerance: float | None,
+    reading: Reading,
+) -> None:
+    """Write PROGRAM with planned feeds to standard output, as a program filter of LinuxCNC."""
+    from feedplan.planned_feeds import planned_program
+    from feedplan.planning import plan
+
+    def write(text: str) -> None:
+        sys.stderr.write(text)
+        sys.stderr.flush()
+
+    tell = filter_progress(write)
+    known: Machine
+    source: Source | Program
+    # LinuxCNC tells its programs where its INI file is.
+    own = os.environ.get("INI_FILE_NAME")
+    if machine is None and own:
+        known, source = _without_travel(import_machine(own)), program
+    else:
+        known, source = machine_for(machine or "mill", program, reading)
+    result = plan(source, known, method=method, tolerance=tolerance, reading=reading, progress=tell)
+    audit = result.audit(tell)
+    if not audit.ok:
+        raise InfeasibleError(console.failure_sentence(audit))
+    content = planned_program(result, dialect="linuxcnc").content
+    tell("write", 1.0)
+    sys.stdout.buffer.write(content)
+
+
+def _without_travel(machine: Machine) -> Machine:
+    """The same machine without ends of travel: LinuxCNC alone knows where the work is."""
+    free = tuple(replace(axis, travel=(-math.inf, math.inf)) for axis in machine.axes)
+    return replace(machine, axes=free)
