@@ -32,6 +32,7 @@ from feedplan.command_options import (
     name_of,
 )
 from feedplan.comparison import TIME_LIMIT
+from feedplan.controller_options import Choice, controller_options
 from feedplan.errors import FeedplanError, InfeasibleError, SolverError
 from feedplan.filter_command import filter_
 from feedplan.geometry.corners import FollowedPath
@@ -41,6 +42,7 @@ from feedplan.program_options import ProgramWanted, program_options
 from feedplan.reading_options import machine_for, reading_options
 from feedplan.setpoints import INTERPOLATORS, MAX_SETPOINTS, Interpolator
 from feedplan.time_command import time
+from feedplan.units import duration_text
 
 DONE, BROKEN, BAD_INPUT, DEFECT, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 70, 130, 141
 _TRACEBACK = "FEEDPLAN_TRACEBACK"
@@ -120,6 +122,7 @@ def cli(context: click.Context) -> int:
 @cli.command()
 @PROGRAM
 @MACHINE
+@controller_options
 @reading_options
 @click.option("--method", type=click.Choice(planners.methods()), default="bang-bang", show_default=True)
 @ACCURACY
@@ -140,6 +143,7 @@ def cli(context: click.Context) -> int:
 )
 @click.option("--start-speed", type=ZERO_OR_MORE, default=0.0, metavar="MM/S", help="Speed at the start.")
 @click.option("--end-speed", type=ZERO_OR_MORE, default=0.0, metavar="MM/S", help="Speed at the end.")
+@click.option("--one-step-more", is_flag=True, help="Plan again with each limit raised, and tell the gain.")
 @click.option("--output", "-o", metavar="DIR", help="Write plan.json, setpoints and report.html there.")
 @click.option(
     "--format",
@@ -166,10 +170,12 @@ def plan(
     max_setpoints: int,
     start_speed: float,
     end_speed: float,
+    one_step_more: bool,
     output: str | None,
     formats: tuple[Any, ...],
     as_json: bool,
     quiet: bool,
+    controller: Choice,
     reading: Reading,
     wanted: ProgramWanted,
 ) -> int:
@@ -178,6 +184,7 @@ def plan(
     Exit code 1: a limit is broken, or no plan is feasible.
     """
     from feedplan.files import files_of_plan, summary_text, write_plan
+    from feedplan.one_step_more import one_step_more as raised
     from feedplan.outputs._staging import require_folder
     from feedplan.planning import plan as make_plan
     from feedplan.report.page import missing_pictures
@@ -204,11 +211,13 @@ def plan(
             interpolator=interpolator,
             max_setpoints=max_setpoints,
             reading=reading,
+            controller=controller(known),
             progress=progress,
             **given_only(accuracy=accuracy, time_limit=time_limit),
         )
         audit = result.audit(progress)
         planned = wanted.make(result)
+        steps = [step.to_json() for step in raised(result)] if one_step_more else []
         files: tuple[FilePath, ...] = ()
         if output:
             files = write_plan(
@@ -226,11 +235,12 @@ def plan(
     if not quiet:
         for warning in warnings:
             print(f"warning: {warning}", file=sys.stderr)
+        summary = {**result.summary(), **({"one_step_more": steps} if one_step_more else {})}
         if as_json:
             told = {} if planned is None else {"planned_program": planned.to_json()}
-            sys.stdout.write(summary_text({**result.summary(), **told}))
+            sys.stdout.write(summary_text({**summary, **told}))
         else:
-            console.print_rows(console.plan_rows(result.summary(), audit, files))
+            console.print_rows(console.plan_rows(summary, audit, files))
             if planned is not None:
                 print(planned.summary())
     return DONE if audit.ok else _fail(console.failure_sentence(audit), BROKEN)
@@ -239,6 +249,7 @@ def plan(
 @cli.command()
 @PROGRAM
 @MACHINE
+@controller_options
 @reading_options
 @click.option("--methods", metavar="A,B,…", help="Methods to compare.  [default: all]")
 @ACCURACY
@@ -265,6 +276,7 @@ def compare(
     output: str | None,
     as_json: bool,
     quiet: bool,
+    controller: Choice,
     reading: Reading,
 ) -> int:
     """Plan PROGRAM by several methods: time, proven gap, computing time, and what the audit says of each.
@@ -289,6 +301,7 @@ def compare(
             names,
             time_limit=time_limit,
             reading=reading,
+            controller=controller(known),
             progress=progress,
             tolerance=tolerance,
             path=path,
@@ -296,9 +309,11 @@ def compare(
             period=period,
             **given_only(accuracy=accuracy),
         )
+        today = next((row.plan.today for row in rows if row.plan and row.plan.today), None)
         summary = {
             "program": name_of(program),
             "machine": known.name,
+            "today": today and today.of_controller(),
             "methods": [row.to_json() for row in rows],
         }
         files = write_comparison(rows, output, summary, progress) if output else ()
@@ -312,6 +327,8 @@ def compare(
             sys.stdout.write(summary_text(summary))
         else:
             console.print_table(*console.comparison_table(rows, LIMITS))
+            if today:
+                print(f"today: {duration_text(today.time)} by {today.controller.name}")
             for file in files:
                 print(file)
     return DONE if any(row.plan for row in rows) else BROKEN

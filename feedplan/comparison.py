@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
 from typing import Any
@@ -18,6 +18,7 @@ from feedplan.arguments import callback, list_of_names, number, one_of
 from feedplan.audit import Audit, LimitCheck
 from feedplan.errors import InfeasibleError, InputError, MissingPackageError, SolverError
 from feedplan.geometry.path import Path
+from feedplan.machine.controller import Controller
 from feedplan.machine.machine import Machine
 from feedplan.planners import MethodName, limits_jerk, options_of
 from feedplan.planners import methods as all_methods
@@ -26,6 +27,7 @@ from feedplan.program.program import Program
 from feedplan.program.read import checked_reading, read_program
 from feedplan.program.source import Source
 from feedplan.progress import Progress
+from feedplan.today import Today
 
 # What the limits of machine and program are called in an audit.
 LIMITS = ("feed", "velocity", "acceleration", "jerk", "chord", "deviation")
@@ -55,6 +57,11 @@ class Row:
         return None if self.plan is None else self.plan.time
 
     @property
+    def saved(self) -> float | None:
+        """By how much the plan is faster than the controller of today [s], None where none was named."""
+        return self.plan.today.saved if self.plan and self.plan.today else None
+
+    @property
     def gap(self) -> float | None:
         """How much of the time may be lost at most: (time − lower_bound) / time.
 
@@ -81,6 +88,7 @@ class Row:
             "time": self.time,
             "lower_bound": self.lower_bound if self.plan else None,
             "gap": self.gap,
+            "saved": self.saved,
             "compute": dict(self.plan.compute) if self.plan else None,
             "audit": self.audit.to_json() if self.audit else None,
             "error": self.error,
@@ -121,13 +129,19 @@ def compare(
     if not isinstance(source, (Program, Path)):
         reading = checked_reading(options.pop("reading", None))
         source = read_program(source, machine, feed=options.get("feed"), **reading)
+    given = options.pop("controller", None)
+    rival = machine.controller if given is None else Controller.of(given)
+    alone = replace(machine, controller=None)
+    today: Today | None = None
     plans: list[tuple[MethodName, Plan | None, str | None]] = []
     for method, takes in has.items():
         shown = partial(_show, progress, method)
         shown("fit", 0.0)
         try:
             own = {name: value for name, value in options.items() if name in takes or name in OF_ALL_METHODS}
-            made = plan(source, machine, method, **own, progress=shown)
+            made = plan(source, alone, method, **own, controller=None if today else rival, progress=shown)
+            today = today or made.today
+            made = replace(made, machine=machine, today=today and replace(today, planned=made.time))
             made.audit(shown)
             plans.append((method, made, None))
         except (InfeasibleError, MissingPackageError, SolverError) as error:

@@ -18,6 +18,7 @@ from feedplan.outputs import FormatName, Header, files_in, format_named
 from feedplan.outputs._staging import require_folder, staged
 from feedplan.planned_feeds import PlannedProgram
 from feedplan.progress import Progress, of_stage, part, tell
+from feedplan.units import duration_text
 
 if TYPE_CHECKING:
     from feedplan.comparison import Row
@@ -149,6 +150,8 @@ def write_comparison(
         if progress:
             progress("write", (number + 1) / len(rows))
     about = {name: str(summary[name]) for name in ("machine", "program") if summary.get(name)}
+    if today := summary.get("today"):
+        about["today"] = f"{duration_text(today['time'])} by {today['controller']}"
     with staged(folder, last=COMPARISON_FILE) as stage:
         write_page(
             stage / PAGE_FILE,

@@ -25,6 +25,7 @@ from feedplan.geometry.build import build_path
 from feedplan.geometry.corners import PATHS, Corners, FollowedPath
 from feedplan.geometry.path import Path
 from feedplan.lazy import cached_property
+from feedplan.machine.controller import Controller
 from feedplan.machine.machine import Machine
 from feedplan.outputs import FORMAT
 from feedplan.planners import (
@@ -48,6 +49,7 @@ from feedplan.report.account import Account, account
 from feedplan.report.operations import OperationTime, operation_times
 from feedplan.setpoints import INTERPOLATORS, MAX_SETPOINTS, Interpolator, Setpoints, setpoints
 from feedplan.time_limit import TimeLimit
+from feedplan.today import Today, beside_plan
 from feedplan.trajectory import State, Trajectory
 from feedplan.units import counted
 
@@ -64,7 +66,8 @@ class Plan:
     `profile` is the speed along `problem.path`; `lower_bound` [s] is proven: no feasible profile of this path
     is faster, though one of another path within the tolerance may be (a method with a bound of its own, as
     jerk-limited, may prove its on a grid and say so); `compute` is the computing time of each stage [s];
-    `options` those that the plan was made with.
+    `options` those that the plan was made with; `today` what a controller takes for the same program, where
+    one was named.
     """
 
     program: Program | None
@@ -78,6 +81,7 @@ class Plan:
     max_setpoints: int = MAX_SETPOINTS
     warnings: tuple[str, ...] = field(default=())
     options: Mapping[str, Any] = field(default_factory=dict)
+    today: Today | None = None
     _verdict: list[Audit] = field(default_factory=list, init=False, repr=False, compare=False)
     _account: list[Account] = field(default_factory=list, init=False, repr=False, compare=False)
     # Number and duration [s] of the plan's own setpoints, once they have been laid out.
@@ -220,6 +224,7 @@ class Plan:
             "time": self.time,
             "lower_bound": self.lower_bound,
             "gap": self.gap,
+            "today": self.today and self.today.to_json(),
             "estimated_gap": estimate(self.profile),
             "stopped": self.profile.stopped,
             "method": self.method,
@@ -270,6 +275,7 @@ def plan(
     max_setpoints: int = MAX_SETPOINTS,
     path: FollowedPath = "as-fitted",
     reading: Reading | None = None,
+    controller: Controller | Mapping[str, Any] | str | None = None,
     progress: Progress | None = None,
     **options: Any,
 ) -> Plan:
@@ -284,6 +290,8 @@ def plan(
     `feed_override` multiplies them. `reading` are keywords of `read_program`, such as a tool table. `period`
     [s] replaces the machine's servo period; `start_speed` and `end_speed` [mm/s] hold at the ends.
     `interpolator` makes the setpoints: "sarfraz" or "newton".
+    `controller`: what `Plan.today` compares with, the machine file's unless given: "linuxcnc", "grbl",
+    "grblhal", "klipper" or "marlin", or a table as in a machine file.
     A plan of more than `max_setpoints` gives none, and is not audited, before it is asked for so many or a
     longer period.
     `progress(stage, done)` is called some times a second as the work goes on, with `read`, `fit`, then
@@ -296,7 +304,10 @@ def plan(
         casadi, clarabel    accuracy=1e-4, cells=None, time_limit=None
         toppra              accuracy=1e-3, cells=None, time_limit=None, scheme="one-sided"
         ruckig              time_limit=None
-        junction-deviation  deviation=0.01, square_corner_velocity=None
+        junction-deviation  deviation=0.01, square_corner_velocity=None, axis_jumps=None, blocks=None,
+                            arc_tolerance=None, arc_segment=None, short_lines="free", cruise_ratio=0.0,
+                            max_velocity=None, max_acceleration=None
+        linuxcnc            depth=50, max_velocity=None, max_acceleration=None
 
     `accuracy` is relative, of the time: grids are refined to it, or have so many `cells` a piece. After
     `time_limit` [s] ruckig and jerk-limited return the best plan so far, the others raise. With jerk-limited
@@ -304,7 +315,8 @@ def plan(
     report are never left out (how long the last three will take is known from some setpoints of the first
     plan), the rest of the time is for a better plan and its bound. `scheme` "collocation" keeps the limits at
     the nodes alone and shows how toppra's usual profiles break them. `deviation` [mm] is grbl's setting $11,
-    `square_corner_velocity` [mm/s] Klipper's in its place.
+    `square_corner_velocity` [mm/s] Klipper's and `axis_jumps` [mm/s] Marlin's in its place; the others are
+    told in `planners.junction_deviation` and `planners.linuxcnc`.
 
     Raises ProgramError, MachineError, InputError, InfeasibleError, SolverError or MissingPackageError, each a
     sentence with place and remedy.
@@ -315,6 +327,7 @@ def plan(
     # The limit of a method that can tell early what follows its plan is one for all of it.
     limit = TimeLimit(time_limit) if time_limit is not None and tells_early(method) else None
     machine = Machine.of(machine)
+    rival = machine.controller if controller is None else Controller.of(controller)
     choice = corners(method)
     if one_of(path, "path", PATHS) == "fastest" and choice is Corners.SMOOTH:
         choice = Corners.FASTEST
@@ -398,6 +411,20 @@ def plan(
             left_to_grids=wanted * grid_error(method),
         )
         least += followed.pauses
+    beside: Today | None = None
+    unknown: tuple[str, ...] = ()
+    if rival is not None:
+        settings_of_all = {
+            "tolerance": tolerance,
+            "feed": feed,
+            "feed_override": feed_override,
+            "start_speed": start_speed,
+            "end_speed": end_speed,
+        }
+        with _timed(compute, "today"):
+            beside, unknown = beside_plan(
+                rival, profile.time + followed.pauses, program or followed, machine, settings_of_all
+            )
     report("plan", 1.0)
     return Plan(
         program=program,
@@ -412,6 +439,7 @@ def plan(
         warnings=(program.warnings if program else ())
         + followed.warnings
         + short
+        + unknown
         + rounding_stops(problem, profile)
         + curvature_jumps(problem, profile),
         options={
@@ -425,6 +453,7 @@ def plan(
             "interpolator": interpolator,
             "path": path,
         },
+        today=beside,
     )
 
 

@@ -101,6 +101,7 @@ def cases(tmp_path: FilePath) -> dict[str, tuple[Callable[..., Any], dict[str, A
         "interpolator": "newton",
         "path": "as-fitted",
         "reading": {"whole_step": 1.0},
+        "controller": "grbl",
         "progress": None,
     }
     spline = {"control_points": POINTS, "knots": KNOTS, "degree": 2}

@@ -14,6 +14,7 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError, ProgramError
 from feedplan.geometry.corners import Corners
 from feedplan.geometry.feed_groups import group_feeds, leading_feed, leading_group, told_apart
+from feedplan.geometry.joined import joined
 from feedplan.geometry.path import FitSummary, Path
 from feedplan.geometry.path_words import path_words
 from feedplan.machine.machine import Machine
@@ -89,7 +90,8 @@ def build_path(
     left out; only at corners are their ends cut and bent as those of lines and arcs are.
 
     With `corners` ARCS nothing is fitted, and corners of two lines become true arcs within the tolerance;
-    with PROGRAMMED nothing is rounded either, and corners lie within runs. With SMOOTH all moves between two
+    with JOINED the same, after points within Q (without one, the tolerance) of lines are left out. With
+    PROGRAMMED nothing is rounded either, and corners lie within runs. With SMOOTH all moves between two
     stops are one curve of continuous fourth derivative within the tolerance (Q does not count), arcs and
     splines too; where the program asks for the exact path, those are followed within `exact_tolerance` with
     the lines that they touch. Lines longer than `max_chord` are straight in the middle. Arcs, splines and
@@ -126,6 +128,13 @@ def build_path(
     if not words.joints.all():
         halt[:-1] |= _changes_of_group(names, moving)
 
+    taken, left_out, joints = np.arange(len(program)), np.zeros(len(program)), words.joints
+    if corners is Corners.JOINED:
+        program, taken = joined(program, fit_limit, halt)
+        limit, halt, joints = limit[taken], halt[taken], joints[taken]
+        left_out, fit_limit = fit_limit[taken], np.zeros(len(taken))
+        moving = program.moving()
+
     tell(progress, 0.0)
     (curve, feed, move, allowed, runs), summary, outside, rough = native_build_path(
         program.name,
@@ -146,7 +155,7 @@ def build_path(
         splines,
         np.ascontiguousarray(program.change_move, dtype=np.int64),
         program.change_start,
-        words.joints,
+        joints,
         words.max_velocity,
         words.max_acceleration,
         words.travel,
@@ -156,7 +165,7 @@ def build_path(
         settings.alpha * float(np.linalg.norm(words.max_acceleration)),
         float(np.linalg.norm(words.max_velocity)),
         math.radians(settings.corner_angle),
-        corners.value,
+        (Corners.ARCS if corners is Corners.JOINED else corners).value,
         part(progress, 0.0, _BUILT),
     )
     tell(progress, 1.0)
@@ -176,11 +185,11 @@ def build_path(
         curve=followed,
         feed=feed if by_group is None else leading_feed(by_group, feed),
         group_feed=by_group,
-        move=move,
+        move=np.stack([(np.append(0, taken[:-1] + 1))[move[:, 0]], taken[move[:, 1]]], axis=1),
         line=program.line[move[:, 0]],
         runs=runs,
         dwell=program.dwell[move[runs[1:] - 1, 1]],
-        tolerance=allowed,
+        tolerance=allowed + left_out[move].max(axis=1, initial=0.0),
         fit=FitSummary.of(*summary),
         start_dwell=program.start_dwell,
         meaning=None if program.meaning is None else program.meaning[first],
@@ -293,6 +302,8 @@ def _tolerances(
         fit_limit = np.full(len(program), np.inf)
     may_leave = (program.control == PathControl.TOLERANCE) & (corners is not Corners.PROGRAMMED)
     limit = np.where(may_leave, limit, 0.0)
+    if corners is Corners.JOINED:
+        return limit, np.where(np.isinf(fit_limit), limit, np.where(may_leave, fit_limit, 0.0))
     if corners is not Corners.ROUNDED:  # only that fits a part of the program by itself
         return limit, np.zeros(len(program))
     return limit, np.minimum(fit_limit, settings.fit_share * limit)

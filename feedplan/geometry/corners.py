@@ -19,7 +19,8 @@ class Corners(Enum):
     in one servo period. `SMOOTH`: all moves between two stops, arcs and splines too, are one curve of
     continuous fourth derivative, in which long lines are straight; its curvature has no jumps, which is what
     limits of jerk ask for. Away from their ends arcs and bends of G1 moves (each turning by less than 30°)
-    keep their size. `FASTEST`: as SMOOTH, but bends are cut like corners, up to the tolerance.
+    keep their size. `FASTEST`: as SMOOTH, but bends are cut like corners, up to the tolerance. `JOINED`: as
+    ARCS, after points of G1 moves within the fit's tolerance (G64 Q, else P) of a line have been left out.
     """
 
     ROUNDED = "rounded"
@@ -27,3 +28,4 @@ class Corners(Enum):
     PROGRAMMED = "programmed"
     SMOOTH = "smooth"
     FASTEST = "fastest"
+    JOINED = "joined"

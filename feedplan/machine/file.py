@@ -27,7 +27,7 @@ _NOT_OF_KEYS = re.compile(r"[^\w\-\"'. \t]+")
 
 _AXIS_KEYS = {own.name for own in fields(Axis)}
 _NEEDED = [own.name for own in fields(Axis) if own.default is MISSING]
-_OF_KINEMATICS = {"kinematics", "home", "offsets"}
+_OF_KINEMATICS = {"kinematics", "home", "offsets", "controller"}
 _MACHINE_KEYS = {own.name for own in fields(Machine)} - {"parameters"} | {"description"}
 
 
@@ -63,6 +63,9 @@ def text_of(machine: Machine) -> str:
     lines = [f"{key} = {toml_value(value)}" for key, value in rows.items()]
     lines += _table("[kinematics]", {"type": machine.kinematics, **machine.parameters})
     lines += _table("[offsets]", dict(machine.offsets)) if machine.offsets else []
+    if machine.controller:
+        driver = machine.controller
+        lines += _table("[controller]", {"type": driver.name, **driver.parameters})
     for axis in machine.axes:
         given = {key: getattr(axis, key) for key in defaults}
         own = {key: value for key, value in given.items() if value != defaults[key]}
@@ -97,7 +100,8 @@ def _machine(table: dict[str, Any], name: str) -> Machine:
     require(isinstance(rows, list), "axes", rows, remedy)
     for number, row in enumerate(rows, 1):
         require(isinstance(row, dict), f"axis {number}", row, remedy)
-    given = {key: table[key] for key in ("period", "chord_tolerance", "home", "offsets") if key in table}
+    plain = ("period", "chord_tolerance", "home", "offsets", "controller")
+    given = {key: table[key] for key in plain if key in table}
     kinematics = table.get("kinematics", "cartesian")
     parameters = {"type": kinematics} if isinstance(kinematics, str) else kinematics
     if not (isinstance(parameters, dict) and isinstance(parameters.get("type"), str)):

@@ -23,6 +23,7 @@ from feedplan.machine.checks import (
     set_within,
     written,
 )
+from feedplan.machine.controller import Controller
 
 if TYPE_CHECKING:
     from feedplan.machine.kinematics import Kinematics
@@ -153,7 +154,8 @@ class Machine:
     straight line from one setpoint to the next (infinite: not limited), `home` the position [mm] that G28
     and G30 go to (and where programs begin if their words always are the tool's tip; empty: 0), `offsets` the
     work offsets by name (`"G54"`) [mm]; both have one number for each of `program_letters`. `kinematics` is
-    the type that turns the tool tip into joint positions, `parameters` its keys in the machine file. Periods
+    the type that turns the tool tip into joint positions, `parameters` its keys in the machine file,
+    `controller` what drives the machine today (or its name; None: not known). Periods
     T are from 1e-6 to 10 s and 1e-7 of the longest time to a full velocity, or of 100 s, or more, chord
     tolerances e from 1e-7 to 1e6 mm; the acceleration 8 e/T² to which they limit arcs is at least 1e-9 of the
     greatest of an axis, and no axis is more than 1e8 times as fast as another one.
@@ -169,6 +171,7 @@ class Machine:
     home: tuple[float, ...] = ()
     offsets: tuple[tuple[str, tuple[float, ...]], ...] = ()
     parameters: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    controller: Controller | None = None
 
     def __post_init__(self) -> None:
         require_text(self.name, "name")
@@ -197,6 +200,8 @@ class Machine:
         keyed = isinstance(self.parameters, Mapping) and "type" not in self.parameters
         require(keyed, "kinematics", self.parameters, remedy)
         object.__setattr__(self, "parameters", written(self.parameters, "kinematics"))
+        if self.controller is not None:
+            object.__setattr__(self, "controller", Controller.of(self.controller))
         letters = self.program_letters
         remedy = f"{len(letters)} finite numbers, for the program's axes {', '.join(letters)}"
         home = one_by_one(self.home, "home", remedy)

@@ -36,6 +36,7 @@ MethodName = Literal[
     "constant-velocity-transition",
     "jerk-limited",
     "junction-deviation",
+    "linuxcnc",
     "ruckig",
     "s-curve",
     "tangential",

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from feedplan._solvers import look_ahead as native_look_ahead
 from feedplan.constraints.problem import Problem, feed_square, speed_square
 from feedplan.errors import InfeasibleError
+from feedplan.planners._queue import Queue
 from feedplan.planners._segments import Array, Rule, Segments, segments
 from feedplan.profile import NO_AXIS, ArcKind, SpeedProfile
 
@@ -34,17 +35,25 @@ _SLOWS = np.array([0, 0, 0, 1, 0])
 
 
 def look_ahead(
-    problem: Problem, corner_speed: Array, rule: Rule, hold: NDArray[np.float64] | None = None
+    problem: Problem,
+    corner_speed: Array,
+    rule: Rule,
+    hold: NDArray[np.float64] | None = None,
+    queue: Queue | None = None,
 ) -> SpeedProfile:
     """The fastest trapezoids.
 
     `corner_speed` (n + 1,) [mm/s] limits the speed at the ends of the pieces; runs end at rest, the path at
     the problem's speeds. `hold` (n + 1,) [s]: so long before and after the end of a piece the speed stays as
-    it is there; beside a curve the tool stops instead.
+    it is there; beside a curve the tool stops instead. `queue` is what the controller knows of the path, and
+    its limits along it; by default it knows all, and has none.
     Raises SolverError (see `segments`) and InfeasibleError where start or end speed cannot be had.
     """
-    parts = segments(problem, rule)
+    queue = queue or Queue()
+    parts = segments(problem, rule, queue.velocity, queue.acceleration)
+    parts = queue.limited(parts, problem.path.move[:, 1])
     at_end, held = _speed_at_ends(problem, parts, corner_speed, hold)
+    parts, at_end = queue.known(parts, at_end)
     room = np.stack([held[:-1], held[1:]], axis=1)
     acceleration = 0.5 * parts.slope / parts.rate
     holds = np.where(room > 0.0, acceleration[..., None] * room, 0.0)
@@ -192,13 +201,16 @@ def _weighted_length(
     return np.asarray(total * (u1 - u0))
 
 
-def shared_acceleration(tangent: Array, normal: Array, limits: Array) -> tuple[Array, Array]:
+def shared_acceleration(
+    tangent: Array, normal: Array, limits: Array, radius: Array, speed: Array
+) -> tuple[Array, Array]:
     """Half along the path, √3/2 across it, of what every direction in the plane of both allows.
 
     No sum of the two exceeds an axis's limit. The split is that of LinuxCNC's blend arcs (`blendmath.h`: a
     tangential ratio of 0.5, the normal one its complement in the circle); the whole is min over the axes of
     A_k/√(t_k² + n_k²). Among all directions are an axis's both ones: A_k is the lesser of its two limits.
     """
+    del radius, speed
     with np.errstate(divide="ignore"):
         whole = (limits.min(axis=0) / np.hypot(tangent, normal)).min(axis=1)
     return np.stack([0.5 * whole, 0.5 * whole]), 0.5 * math.sqrt(3.0) * whole

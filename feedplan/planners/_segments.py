@@ -3,6 +3,7 @@ by."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import reduce
@@ -18,10 +19,11 @@ from feedplan.profile import NO_AXIS
 
 Array = NDArray[np.float64]
 
-# From unit tangents and unit normals (m, axes; a normal is 0 where the path is straight) and the limits of
-# the axes (2, axes) [mm/s²], upward and downward as sizes: the greatest accelerations along the path, of
-# speeding up and of slowing down (2, m), and across it (m,) [mm/s²].
-Rule = Callable[[Array, Array, Array], tuple[Array, Array]]
+# From unit tangents and unit normals (m, axes; a normal is 0 where the path is straight), the limits of the
+# axes (2, axes) [mm/s²], upward and downward as sizes, the radius of the path (m,) [mm], infinite where it is
+# straight, and the speed that feed and axis velocities allow (m,) [mm/s]: the greatest accelerations along
+# the path, of speeding up and of slowing down (2, m), and across it (m,) [mm/s²].
+Rule = Callable[[Array, Array, Array, Array, Array], tuple[Array, Array]]
 
 # A curved piece is cut into parts on which it turns, and ln |C'| changes, by about this at most.
 STEP = 0.1
@@ -29,6 +31,8 @@ STEP = 0.1
 # Places of a part at which its limits are taken, as shares of it. On a circle they are exact; elsewhere the
 # limits between two places differ from theirs by the order of STEP²/16 of themselves.
 PLACES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
+# Those of Boole's rule, for a mean over a part.
+WEIGHTS = np.array([7.0, 32.0, 12.0, 32.0, 7.0]) / 90.0
 
 # Places that tell how much a whole piece turns.
 SURVEY = np.linspace(0.0, 1.0, 9)
@@ -50,7 +54,8 @@ class Segments:
     `piece`, `u0`, `u1` (m,) say which; `rate` (m,) is |C'|, constant on lines, NaN on curves. `speed`
     (m,) [mm/s] is the greatest; `slope` (2, m) the greatest change of v² by u [mm/s²·|C'|] where the path
     speeds up and where it slows down. On lines `axis` (2, m) is the one whose acceleration limit that is,
-    `value` (2, m) [mm/s²] its acceleration then; NO_AXIS and 0 on curves.
+    `value` (2, m) [mm/s²] its acceleration then; NO_AXIS and 0 on curves. `length` (m,) [mm], of curves to
+    some digits, and `radius` (m,) [mm] the least, infinite on lines.
     """
 
     piece: NDArray[np.int64]
@@ -61,14 +66,19 @@ class Segments:
     slope: Array
     axis: NDArray[np.uint8]
     value: Array
+    length: Array
+    radius: Array
 
     def __len__(self) -> int:
         return len(self.piece)
 
 
-def segments(problem: Problem, rule: Rule) -> Segments:
+def segments(
+    problem: Problem, rule: Rule, velocity: float = math.inf, acceleration: float = math.inf
+) -> Segments:
     """The path of a problem in segments, accelerations by `rule`.
 
+    `velocity` [mm/s] and `acceleration` [mm/s²] are the greatest along the path, whatever the axes allow.
     Speeds are limited by feed, axis velocities and, on curves, chord error and the acceleration across.
     Raises SolverError at cusps, and where the joints move in another way than the path's axes.
     """
@@ -80,12 +90,13 @@ def segments(problem: Problem, rule: Rule) -> Segments:
     curve = problem.curve
     straight = is_line(curve)
     lines, curves = np.flatnonzero(straight), np.flatnonzero(~straight)
-    parts = [_lines(problem, lines)]
+    parts = [_lines(problem, lines, acceleration)]
     if len(curves):
-        parts.append(_curves(problem, curves, rule))
+        parts.append(_curves(problem, curves, rule, acceleration))
     names = parts[0].__dict__
     columns = {name: np.concatenate([getattr(part, name) for part in parts], axis=-1) for name in names}
     order = np.lexsort((columns["u0"], columns["piece"]))
+    columns["speed"] = np.minimum(columns["speed"], velocity)
     return Segments(**{name: column[..., order] for name, column in columns.items()})
 
 
@@ -103,7 +114,7 @@ def is_line(curve: CompositeCurve) -> NDArray[np.bool_]:
     return np.asarray(line & ~curve.rational)
 
 
-def _lines(problem: Problem, piece: NDArray[np.int64]) -> Segments:
+def _lines(problem: Problem, piece: NDArray[np.int64], acceleration: float) -> Segments:
     curve = problem.curve
     way = curve.control_points[curve.offsets[piece + 1] - 1] - curve.control_points[curve.offsets[piece]]
     length = np.linalg.norm(way, axis=1)
@@ -115,19 +126,23 @@ def _lines(problem: Problem, piece: NDArray[np.int64]) -> Segments:
     axis = by_axis.argmin(axis=2)[..., None]
     value = np.where(change < 0.0, problem.min_acceleration, problem.max_acceleration)
     rate = length / curve.width[piece]
+    most = np.take_along_axis(by_axis, axis, 2)[..., 0]
+    along = np.minimum(most, acceleration)
     return Segments(
         piece=piece,
         u0=np.zeros(len(piece)),
         u1=curve.width[piece],
         rate=rate,
         speed=_speed(problem, piece, tangent),
-        slope=2.0 * np.take_along_axis(by_axis, axis, 2)[..., 0] * rate,
+        slope=2.0 * along * rate,
         axis=axis[..., 0].astype(np.uint8),
-        value=np.take_along_axis(value, axis, 2)[..., 0],
+        value=np.take_along_axis(value, axis, 2)[..., 0] * (along / most),
+        length=length,
+        radius=np.full(len(piece), np.inf),
     )
 
 
-def _curves(problem: Problem, pieces: NDArray[np.int64], rule: Rule) -> Segments:
+def _curves(problem: Problem, pieces: NDArray[np.int64], rule: Rule, acceleration: float) -> Segments:
     count = _part_counts(problem, pieces)
     piece = np.repeat(pieces, count)
     number = np.arange(len(piece)) - np.repeat(np.cumsum(count) - count, count)
@@ -142,10 +157,11 @@ def _curves(problem: Problem, pieces: NDArray[np.int64], rule: Rule) -> Segments
     bend = second - (second * tangent).sum(axis=1)[:, None] * tangent
     size = np.linalg.norm(bend, axis=1)
     curvature = size / rate**2
-    along, across = rule(tangent, _over(bend, size[:, None], 0.0), problem.limits("acceleration"))
     with np.errstate(divide="ignore", over="ignore"):
         radius = 1.0 / curvature
-        speed = np.minimum(_speed(problem, rows, tangent), np.sqrt(across * radius))
+        normal, speed = _over(bend, size[:, None], 0.0), _speed(problem, rows, tangent)
+        along, across = rule(tangent, normal, problem.limits("acceleration"), radius, speed)
+        speed = np.minimum(speed, np.sqrt(across * radius))
     speed = np.minimum(speed, _chord_speed(problem, radius))
     shape = (-1, len(PLACES))
     speed = _least(speed.reshape(shape))
@@ -161,9 +177,11 @@ def _curves(problem: Problem, pieces: NDArray[np.int64], rule: Rule) -> Segments
         u1=u1,
         rate=np.full(len(piece), np.nan),
         speed=speed,
-        slope=_least((2.0 * along * rate).reshape(2, *shape)),
+        slope=_least((2.0 * np.minimum(along, acceleration) * rate).reshape(2, *shape)),
         axis=np.full((2, len(piece)), NO_AXIS, dtype=np.uint8),
         value=np.zeros((2, len(piece))),
+        length=rate.reshape(shape) @ WEIGHTS * (u1 - u0),
+        radius=_least(radius.reshape(shape)),
     )
 
 

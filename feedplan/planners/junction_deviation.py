@@ -1,29 +1,40 @@
-"""Trapezoids with look-ahead and junction deviation, as grbl plans.
+"""Trapezoids with look-ahead and junction deviation, as grbl, Klipper and Marlin plan.
 
-Source: grbl 1.1, `planner.c` (S. K. Jeon). A corner is passed at the speed of a circle that touches both
-lines and comes within δ of the corner, though the tool follows the lines: v² = a δ s/(1 − s), s =
-cos(turn/2), with a = min over the axes of A_k/|j_k| in the direction j of the jump, A_k being the limit of
-axis k towards j_k. δ is grbl's setting
-$11, 0.010 mm by default. Klipper's `square_corner_velocity` is the same formula by the speed v₉₀ at
-right angles: a δ = v₉₀² (√2 − 1).
+Sources: grbl 1.1, `planner.c` (S. K. Jeon); Klipper, `toolhead.py` (K. O'Connor); Marlin 2.1, `planner.cpp`.
+A corner is passed at the speed of a circle that touches both lines and comes within δ of the corner, though
+the tool follows the lines: v² = a δ s/(1 − s), s = cos(turn/2), with a = min over the axes of A_k/|j_k| in
+the direction j of the jump, A_k being the limit of axis k towards j_k. δ is grbl's setting $11, 0.010 mm by
+default. Klipper's `square_corner_velocity` is the same formula by the speed v₉₀ at right angles:
+a δ = v₉₀² (√2 − 1). By Marlin's classic jerk no axis jumps by more than `axis_jumps`; one that turns back
+counts by the greater of its speeds before and after.
+
+Klipper's circle touches lines of the length L no further than in their middle, v² ≤ a L cot(turn/2)/2; in
+Marlin lines shorter than 1 mm that turn by less than 45° are chords of an arc, v² ≤ a L/turn.
+
+Controllers chop arcs into lines, and pass from line to line by the same formula. Without an `arc_tolerance`
+or `arc_segment` the speed on curves is √(a/κ), with the acceleration in the direction of the normal. The
+tangential one comes on top of it. They know some blocks ahead (`_queue`).
 
 The velocity jumps at the corner. No period enters, so the jump can be more than the axes do in one: the audit
-says at which lines. On curves, which these controllers follow by short lines, the speed is √(a/κ) with the
-acceleration in the direction of the normal, and the tangential one comes on top of it.
+says at which lines.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import get_args
 
 import numpy as np
 
-from feedplan.arguments import number, positive
+from feedplan.arguments import number, one_of, positive, refuse, whole
 from feedplan.constraints.problem import Problem
 from feedplan.geometry.corners import Corners
 from feedplan.geometry.joints import end_edges, tangent_jumps
+from feedplan.planners._junctions import Junctions, ShortLines
 from feedplan.planners._look_ahead import look_ahead
-from feedplan.planners._segments import Array, both_ways, in_direction
+from feedplan.planners._queue import Chords, Queue, along_path
+from feedplan.planners._segments import Array, Rule, both_ways, in_direction
 from feedplan.profile import SpeedProfile
 
 CORNERS = Corners.PROGRAMMED
@@ -32,42 +43,101 @@ GRBL_DEVIATION = 0.01
 
 
 def plan(
-    problem: Problem, deviation: float = GRBL_DEVIATION, square_corner_velocity: float | None = None
+    problem: Problem,
+    deviation: float = GRBL_DEVIATION,
+    square_corner_velocity: float | None = None,
+    axis_jumps: Sequence[float] | None = None,
+    blocks: int | None = None,
+    arc_tolerance: float | None = None,
+    arc_segment: float | None = None,
+    short_lines: ShortLines = "free",
+    cruise_ratio: float = 0.0,
+    max_velocity: float | None = None,
+    max_acceleration: float | None = None,
 ) -> SpeedProfile:
-    """The fastest trapezoids with corners by `deviation` [mm], or by `square_corner_velocity` [mm/s].
+    """The fastest trapezoids with corners by `deviation` [mm], or by `square_corner_velocity` [mm/s], or by
+    `axis_jumps` [mm/s] of X, Y and Z.
+
+    `blocks` are held at once, the one in motion among them (None: all). Arcs are chopped into lines within
+    `arc_tolerance` [mm], or of the length `arc_segment` [mm]. `short_lines` tells what keeps the speed
+    between these: nothing ("free"), "half" of each line as in Klipper, the "arc" of which they are chords as
+    in Marlin. `cruise_ratio` is the part of the way between speeding up and slowing down that has one speed.
+    `max_velocity` [mm/s] and `max_acceleration` [mm/s²] are those along the path.
 
     Raises InputError for those, SolverError and InfeasibleError, all as sentences.
     """
     for name, value, unit in (
         ("junction deviation", deviation, "mm"),
         ("square corner velocity", square_corner_velocity, "mm/s"),
+        ("arc tolerance", arc_tolerance, "mm"),
+        ("arc segment", arc_segment, "mm"),
     ):
         if value is not None:
             number(value, f"the {name}", f"a positive number [{unit}]", positive, unit)
-    return look_ahead(problem, corner_speed(problem, deviation, square_corner_velocity), each_direction)
+    if blocks is not None:
+        whole(blocks, "the number of blocks", "a whole number from 2", 2)
+    one_of(short_lines, "rule for short_lines", get_args(ShortLines))
+    number(cruise_ratio, "the cruise ratio", "a number from 0 to less than 1", lambda given: 0 <= given < 1)
+    chopped = arc_tolerance is not None or arc_segment is not None
+    queue = Queue(
+        ahead=None if blocks is None else blocks - 1,
+        chords=Chords(arc_tolerance, arc_segment) if chopped else None,
+        cruise=cruise_ratio,
+    )
+    queue = along_path(queue, max_velocity, max_acceleration)
+    jumps = None if axis_jumps is None else _of_axes(problem, axis_jumps)
+    junctions = Junctions(deviation, square_corner_velocity, jumps, short_lines, queue.acceleration)
+    rule = each_direction if queue.chords is None else _from_chord_to_chord(junctions, queue.chords)
+    return look_ahead(problem, corner_speed(problem, junctions), rule, queue=queue)
 
 
-def corner_speed(problem: Problem, deviation: float, square_corner_velocity: float | None = None) -> Array:
+def corner_speed(problem: Problem, junctions: Junctions) -> Array:
     """Speed (n + 1,) [mm/s] at the ends of the pieces, infinite where no corner is."""
     speed = np.full(len(problem.path) + 1, np.inf)
     if len(problem.path) < 2:
         return speed
-    corner = np.flatnonzero((tangent_jumps(problem.curve) > 0.0).any(axis=1))
-    start, end = end_edges(problem.curve)
-    into, out = end[corner], start[corner + 1]
-    jump = out / np.linalg.norm(out, axis=1)[:, None] - into / np.linalg.norm(into, axis=1)[:, None]
-    size = np.linalg.norm(jump, axis=1)
-    if square_corner_velocity is None:
-        factor = deviation * in_direction(problem.limits("acceleration"), jump / size[:, None])
-    else:
-        factor = np.full(len(corner), square_corner_velocity**2 * (math.sqrt(2.0) - 1.0))
-    # |jump| = 2 sin(turn/2), and 1 − s = sin²(turn/2)/(1 + s) keeps its digits at small turns.
-    sine_sq = np.minimum(0.25 * size**2, 1.0)
-    s = np.sqrt(1.0 - sine_sq)
-    speed[corner + 1] = np.sqrt(factor * s * (1.0 + s) / sine_sq)
+    curve = problem.curve
+    corner = np.flatnonzero((tangent_jumps(curve) > 0.0).any(axis=1))
+    start, end = end_edges(curve)
+    into, out = (edge / np.linalg.norm(edge, axis=1)[:, None] for edge in (end[corner], start[corner + 1]))
+    control, offsets = curve.control_points, curve.offsets
+    length = np.linalg.norm(control[offsets[1:] - 1] - control[offsets[:-1]], axis=1)
+    square = junctions.square(into, out, length[corner], length[corner + 1], problem.limits("acceleration"))
+    speed[corner + 1] = np.sqrt(square)
     return speed
 
 
-def each_direction(tangent: Array, normal: Array, limits: Array) -> tuple[Array, Array]:
+def each_direction(
+    tangent: Array, normal: Array, limits: Array, radius: Array, speed: Array
+) -> tuple[Array, Array]:
     """The greatest acceleration along the tangent alone, and along the normal alone."""
+    del radius, speed
     return both_ways(limits, tangent), in_direction(limits, normal)
+
+
+def _from_chord_to_chord(junctions: Junctions, chords: Chords) -> Rule:
+    """The rule on curves that are chopped: the speed from chord to chord, as an acceleration across."""
+
+    def rule(
+        tangent: Array, normal: Array, limits: Array, radius: Array, speed: Array
+    ) -> tuple[Array, Array]:
+        del speed
+        half = chords.half_turn(radius)
+        ahead, aside = np.cos(half)[:, None] * tangent, np.sin(half)[:, None] * normal
+        with np.errstate(invalid="ignore"):
+            chord = 2.0 * radius * np.sin(half)
+            square = junctions.square(ahead - aside, ahead + aside, chord, chord, limits)
+            return both_ways(limits, tangent), np.where(np.isinf(radius), np.inf, square / radius)
+
+    return rule
+
+
+def _of_axes(problem: Problem, jumps: Sequence[float]) -> list[float]:
+    """The jumps of X, Y and Z for the axes of the problem, no limit for others."""
+    good = isinstance(jumps, (list, tuple)) and len(jumps) == 3
+    if not good:
+        raise refuse("axis_jumps", jumps, "three positive numbers [mm/s], for X, Y and Z")
+    given = [
+        number(jump, "a jump of axis_jumps", "a positive number [mm/s]", positive, "mm/s") for jump in jumps
+    ]
+    return [given["XYZ".index(axis)] if axis in ("X", "Y", "Z") else math.inf for axis in problem.axes]

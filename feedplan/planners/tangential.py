@@ -22,6 +22,9 @@ def plan(problem: Problem) -> SpeedProfile:
     return look_ahead(problem, problem.junction_speed, along_only)
 
 
-def along_only(tangent: Array, normal: Array, limits: Array) -> tuple[Array, Array]:
+def along_only(
+    tangent: Array, normal: Array, limits: Array, radius: Array, speed: Array
+) -> tuple[Array, Array]:
     """No limit across the path."""
+    del normal, radius, speed
     return both_ways(limits, tangent), np.full(len(tangent), np.inf)

@@ -22,7 +22,9 @@ from feedplan.geometry.build import build_path
 from feedplan.geometry.corners import Corners
 from feedplan.geometry.path import Path
 from feedplan.planners import corners, junction_deviation, methods, planner
+from feedplan.planners._junctions import Junctions
 from feedplan.planners._segments import is_line
+from feedplan.planners.junction_deviation import corner_speed
 from feedplan.profile import ArcKind
 from feedplan.program.read import read_program
 from feedplan.setpoints import setpoints
@@ -149,11 +151,11 @@ def test_corner_speeds_follow_grbl_and_klipper(turn: float, write: Write) -> Non
     problem = _problem(file, PLANE, JUNCTION)
     sine = math.sin(0.5 * (math.pi - turn))
     grbl = math.sqrt(A * 0.02 * sine / (1.0 - sine))
-    assert junction_deviation.corner_speed(problem, 0.02)[1] == pytest.approx(grbl, rel=1e-5)
+    assert corner_speed(problem, Junctions(0.02))[1] == pytest.approx(grbl, rel=1e-5)
     # Klipper: the deviation is v₉₀² (√2 − 1)/a, and at a right angle the speed is v₉₀.
     deviation = 5.0**2 * (math.sqrt(2.0) - 1.0) / A
-    klipper = junction_deviation.corner_speed(problem, 0.02, 5.0)[1]
-    assert klipper == pytest.approx(junction_deviation.corner_speed(problem, deviation)[1], rel=1e-9)
+    klipper = corner_speed(problem, Junctions(0.02, 5.0))[1]
+    assert klipper == pytest.approx(corner_speed(problem, Junctions(deviation))[1], rel=1e-9)
     if turn == math.pi / 2:
         assert klipper == pytest.approx(5.0, rel=1e-9)
     by_speed = junction_deviation.plan(problem, square_corner_velocity=5.0)

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from feedplan.arguments import is_number, shown
 from feedplan.errors import MachineError
+from feedplan.machine.controller import MODELS
 from feedplan.machine.file import toml_value
+from feedplan.machine.importers.text_files import Setting
 from feedplan.machine.machine import FARTHEST, GREATEST_ACCELERATION, JERK_TIMES, ROTARY_LETTERS, VELOCITIES
 
 # The limits of an axis that can be given, and their keys in a machine file.
@@ -70,6 +73,8 @@ class FoundMachine:
     """A machine of a controller's file: `origin` names file and controller, `period` [s] with its source.
 
     `remarks` are sentences for the head of the machine file; `warnings` those that its user must see.
+    `controller` is the model of the controller (`feedplan.machine.controller`), if there is one, and
+    `parameters` what the file says of its parameters.
     """
 
     name: str
@@ -79,6 +84,8 @@ class FoundMachine:
     kinematics: str = "cartesian"
     remarks: tuple[str, ...] = ()
     warnings: tuple[str, ...] = field(default=())
+    controller: str = ""
+    parameters: Mapping[str, Found] = field(default_factory=dict)
 
     def with_name(self, name: str | None) -> FoundMachine:
         """The same by another name, if one is given."""
@@ -129,6 +136,8 @@ class FoundMachine:
         lines += [_comment(remark) for remark in (*self.remarks, *self.warnings)]
         lines += [f"name = {toml_value(self.name)}", _row("period", self.period)]
         lines += [] if self.kinematics == "cartesian" else [f"kinematics = {toml_value(self.kinematics)}"]
+        lines += ["", "[controller]", f"type = {toml_value(self.controller)}"] if self.controller else []
+        lines += [_row(key, own) for key, own in self.parameters.items()]
         for axis in self.axes:
             own: dict[str, Any] = {"name": axis.name, "kind": axis.kind, "unit": axis.unit}
             lines += ["", "[[axes]]", *(f"{key} = {toml_value(text)}" for key, text in own.items() if text)]
@@ -162,6 +171,16 @@ def limits_of(found: Mapping[str, Found | None]) -> dict[str, Found]:
         for limit, own in found.items()
         if own is not None and own.value < _NONE_FROM[limit] and not (limit == "jerk" and own.value == 0.0)
     }
+
+
+def parameters_of(controller: str, settings: Mapping[str, Setting]) -> dict[str, Found]:
+    """What a controller's settings say of the parameters of its model: those that it can have."""
+    parameters = MODELS[controller].parameters
+    found: dict[str, Found] = {}
+    for key, setting in settings.items():
+        with suppress(MachineError):
+            found[key] = Found(parameters[key].checked(key, setting.number), setting.source)
+    return found
 
 
 def travel_of(low: Found | None, high: Found | None) -> tuple[Found, Found] | None:

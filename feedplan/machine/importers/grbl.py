@@ -8,7 +8,7 @@
 | $130 + k [mm] | travel from −$130 to 0, a comment where soft limits ($20) are off |
 | $22 bit 3, $23 | travel from 0 on, where homing sets 0 at the low end (grblHAL) |
 | $376 | which of A, B, C, U, V are rotary (grblHAL) |
-| $11 [mm] | a remark: the method junction-deviation takes it |
+| $11, $12 [mm], $398 | junction_deviation, arc_tolerance, planner_blocks of [controller]; grblHAL has $398 |
 
 The last value of a setting counts. All else in the file, such as a log of the session, is passed over.
 """
@@ -19,7 +19,7 @@ import re
 from pathlib import Path
 
 from feedplan.errors import MachineError
-from feedplan.machine.importers.description import Found, FoundAxis, FoundMachine, limits_of
+from feedplan.machine.importers.description import Found, FoundAxis, FoundMachine, limits_of, parameters_of
 from feedplan.machine.importers.text_files import Setting, TextFiles
 from feedplan.machine.machine import AXIS_LETTERS
 from feedplan.units import SECONDS_PER_MINUTE
@@ -28,7 +28,9 @@ CONTROLLER = "grbl"
 _SETTING = re.compile(r"^[ \t>]*\$(\d{1,5})\s*=\s*(.*)$", re.ASCII)
 RECOGNISED = re.compile(r"^[ \t>]*\$\d{1,5}[ \t]*=", re.MULTILINE | re.ASCII)
 
-_DEVIATION, _SOFT_LIMITS, _HOMING, _TO_LOW_END, _ROTARY = 11, 20, 22, 23, 376
+_SOFT_LIMITS, _HOMING, _TO_LOW_END, _ROTARY = 20, 22, 23, 376
+_BLOCKS = 398
+_OF_CONTROLLER = {"junction_deviation": 11, "arc_tolerance": 12, "planner_blocks": _BLOCKS}
 _VELOCITY, _ACCELERATION, _TRAVEL, _JERK = 110, 120, 130, 800
 _ZERO_AT_HOME = 8
 _MAY_TURN = "ABCUV"
@@ -47,8 +49,8 @@ def read(path: Path, files: TextFiles) -> FoundMachine:
         raise MachineError(f"{path.name} has no $110 to $138, the limits of axes: give all that $$ prints")
     axes = tuple(_axis(settings, k) for k in numbers)
     remarks = []
-    if _DEVIATION in settings:
-        remarks.append(f"Junction deviation [mm]: {settings[_DEVIATION].source}.")
+    controller = "grblhal" if _BLOCKS in settings else "grbl"
+    known = {key: settings[own] for key, own in _OF_CONTROLLER.items() if own in settings}
     if any(axis.travel for axis in axes):
         remarks.append("Travel is in machine coordinates: give where the work is, as [offsets] G54 = [...].")
     return FoundMachine(
@@ -57,6 +59,8 @@ def read(path: Path, files: TextFiles) -> FoundMachine:
         axes=axes,
         period=Found(0.001, "grbl has none: that of the setpoints [s]"),
         remarks=tuple(remarks),
+        controller=controller,
+        parameters=parameters_of(controller, known),
     )
 
 

@@ -5,7 +5,7 @@
 | [printer] max_velocity, max_accel | velocity and acceleration of each axis, or of both motors of a corexy |
 | [printer] max_z_velocity, max_z_accel | those of Z; without them the two above, as Klipper does |
 | [stepper_x] position_min (0 without it), position_max | travel; of Z alone on a corexy |
-| [printer] square_corner_velocity | a remark: the method junction-deviation takes it |
+| these, square_corner_velocity, minimum_cruise_ratio, [gcode_arcs] resolution | [controller], not of corexy |
 | [printer] kinematics | cartesian, corexy |
 
 The last value of an option counts; `[include file]` may have `*` in the file's name. Klipper's limits hold
@@ -20,7 +20,15 @@ from pathlib import Path
 
 from feedplan.arguments import shown
 from feedplan.errors import MachineError
-from feedplan.machine.importers.description import Found, FoundAxis, FoundMachine, limits_of, travel_of
+from feedplan.machine.controller import MODELS
+from feedplan.machine.importers.description import (
+    Found,
+    FoundAxis,
+    FoundMachine,
+    limits_of,
+    parameters_of,
+    travel_of,
+)
 from feedplan.machine.importers.text_files import Setting, TextFiles
 
 CONTROLLER = "Klipper"
@@ -52,8 +60,18 @@ def read(path: Path, files: TextFiles) -> FoundMachine:
         axes=tuple(axes),
         period=Found(0.001, "Klipper has none: that of the setpoints [s]"),
         kinematics=kinematics.text,
-        remarks=tuple(_remarks(options, corexy)),
+        remarks=tuple(_remarks(corexy)),
+        # The model of Klipper knows axes that are the program's.
+        controller="" if corexy else "klipper",
+        parameters={} if corexy else parameters_of("klipper", _of_controller(options)),
     )
+
+
+def _of_controller(options: Options) -> dict[str, Setting]:
+    sections = {"resolution": "gcode_arcs"}
+    keys = MODELS["klipper"].parameters
+    places = {key: (sections.get(key, "printer"), key) for key in keys}
+    return {key: options[place] for key, place in places.items() if place in options}
 
 
 def _axis(options: Options, name: str, moves_tool: bool) -> FoundAxis:
@@ -77,19 +95,14 @@ def _axis(options: Options, name: str, moves_tool: bool) -> FoundAxis:
     return FoundAxis(name, limits, travel_of(low, high))
 
 
-def _remarks(options: Options, corexy: bool) -> list[str]:
+def _remarks(corexy: bool) -> list[str]:
     if corexy:
-        remarks = [
+        return [
             "U and V are the motors, in mm of belt: the tool keeps max_velocity and max_accel in every "
             "direction; on diagonals Klipper allows 1.41 times as much.",
             "Travel of X and Y cannot be told by motors: it is left out.",
         ]
-    else:
-        remarks = [
-            "max_velocity, max_accel: along the path there, of each axis here, diagonals may be faster."
-        ]
-    corner = options.get(("printer", "square_corner_velocity"))
-    return remarks + ([f"Speed at corners of 90 degrees [mm/s]: {corner.source}."] if corner else [])
+    return ["max_velocity, max_accel: along the path there, of each axis here, diagonals may be faster."]
 
 
 def _read(path: Path, inside: tuple[Path, ...], files: TextFiles, options: Options) -> None:

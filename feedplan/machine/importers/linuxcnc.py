@@ -121,6 +121,8 @@ def read(path: Path, files: TextFiles) -> FoundMachine:
         kinematics=kinematics,
         remarks=tuple(_remarks(ini)),
         warnings=tuple(warnings),
+        # The model of LinuxCNC knows axes that are the program's.
+        controller="linuxcnc" if kinematics == "cartesian" else "",
     )
 
 

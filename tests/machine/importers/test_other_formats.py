@@ -92,7 +92,25 @@ def test_grbl_tells_rates_a_minute(tmp_path: Path) -> None:
     assert machine.name == "router"
     text = find_machine(tmp_path / "router.txt").to_toml()
     assert "# $110 = 6000.000 (x max rate, mm/min), router.txt line 7" in text
-    assert "# Junction deviation [mm]: $11 = 0.010, router.txt line 3." in text
+    assert "$11 = 0.010, router.txt line 3" in text
+
+
+def test_controllers_bring_the_parameters_of_their_models(tmp_path: Path) -> None:
+    grbl = import_machine(file(GRBL, tmp_path, "router.txt"))
+    assert grbl.controller is not None
+    assert (grbl.controller.name, grbl.controller.options["deviation"]) == ("grbl", 0.01)
+    hal = import_machine(file(GRBL + "\n$12=0.004\n$398=60\n", tmp_path, "hal.txt"))
+    parameters = {"junction_deviation": 0.01, "arc_tolerance": 0.004, "planner_blocks": 60}
+    assert hal.controller is not None
+    assert (hal.controller.name, hal.controller.parameters) == ("grblhal", parameters)
+    # A deviation of 0, an exact stop, is none that the model knows.
+    stops = import_machine(file(GRBL + "\n$11=0\n", tmp_path, "stops.txt"))
+    assert stops.controller is not None
+    assert "junction_deviation" not in stops.controller.parameters
+    klipper = import_machine(file(KLIPPER, tmp_path, "printer.cfg"))
+    assert klipper.controller is not None
+    parameters = {"max_velocity": 300, "max_accel": 3000, "square_corner_velocity": 5.0}
+    assert (klipper.controller.name, klipper.controller.parameters) == ("klipper", parameters)
 
 
 def test_grbl_has_no_travel_without_soft_limits(tmp_path: Path) -> None:

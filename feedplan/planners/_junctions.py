@@ -1,0 +1,75 @@
+"""How fast controllers pass from one line to the next."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import reduce
+from typing import Literal
+
+import numpy as np
+
+from feedplan.planners._segments import Array, both_ways, in_direction
+
+# What keeps the speed between short lines: nothing, half of each line (Klipper), the arc that they stand for
+# (Marlin).
+ShortLines = Literal["free", "half", "arc"]
+# Marlin takes lines shorter than this [mm], with a cosine of the turn above that, for chords of an arc.
+ARC_LENGTH, ARC_COSINE = 1.0, math.sqrt(0.5)
+
+
+@dataclass(frozen=True)
+class Junctions:
+    """The rule of a controller, by `deviation` [mm], by `square_corner_velocity` [mm/s] or by `axis_jumps`
+    [mm/s] of each axis; `acceleration` [mm/s²] is the greatest along the path.
+    """
+
+    deviation: float
+    square_corner_velocity: float | None = None
+    axis_jumps: Sequence[float] | None = None
+    short_lines: ShortLines = "free"
+    acceleration: float = math.inf
+
+    def square(self, into: Array, out: Array, before: Array, after: Array, limits: Array) -> Array:
+        """v² (m,) [mm²/s²] from lines along `into` to lines along `out`, unit vectors (m, axes).
+
+        `before` and `after` (m,) are the lengths of the lines [mm], `limits` (2, axes) the accelerations
+        of the axes upward and downward. It is infinite where the direction stays.
+        """
+        jump = out - into
+        size = np.linalg.norm(jump, axis=1)
+        # |jump| = 2 sin(turn/2), and 1 − s = sin²(turn/2)/(1 + s) keeps its digits at small turns.
+        sine = np.minimum(0.5 * size, 1.0)
+        along = np.minimum(
+            reduce(np.minimum, [*both_ways(limits, into), *both_ways(limits, out)]), self.acceleration
+        )
+        with np.errstate(divide="ignore", invalid="ignore"):
+            across = np.minimum(in_direction(limits, jump / size[:, None]), self.acceleration)
+            square = self._by_rule(sine, along, across, into, out)
+            square = np.minimum(square, self._between_short_lines(sine, along, across, before, after))
+        return np.where(size > 0.0, square, np.inf)
+
+    def _by_rule(self, sine: Array, along: Array, across: Array, into: Array, out: Array) -> Array:
+        if self.axis_jumps is not None:
+            # An axis that turns back counts by the greater of its speeds.
+            same = into * out > 0.0
+            jumped = np.where(same, np.abs(out - into), np.maximum(np.abs(into), np.abs(out)))
+            return np.asarray((np.array(self.axis_jumps) / jumped).min(axis=1) ** 2)
+        factor = self.deviation * across
+        if self.square_corner_velocity is not None:
+            # Klipper makes a deviation of it by the acceleration along the path, and takes a line's own then.
+            part = along / self.acceleration if math.isfinite(self.acceleration) else np.ones(len(along))
+            factor = self.square_corner_velocity**2 * (math.sqrt(2.0) - 1.0) * part
+        s = np.sqrt(1.0 - sine**2)
+        return np.asarray(factor * s * (1.0 + s) / sine**2)
+
+    def _between_short_lines(
+        self, sine: Array, along: Array, across: Array, before: Array, after: Array
+    ) -> Array:
+        if self.short_lines == "half":
+            return np.asarray(0.5 * along * np.minimum(before, after) * np.sqrt(1.0 - sine**2) / sine)
+        if self.short_lines == "arc":
+            bend = (after < ARC_LENGTH) & (1.0 - 2.0 * sine**2 > ARC_COSINE)
+            return np.where(bend, 0.5 * across * after / np.arcsin(sine), np.inf)
+        return np.full(len(sine), np.inf)

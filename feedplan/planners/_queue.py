@@ -1,0 +1,129 @@
+"""What a controller knows of the path ahead of the tool, and its own limits along the path.
+
+Controllers hold some blocks, lines that arcs are chopped into as well, and can stop at the end of the last
+one. With the blocks behind the one in motion, of lengths L and accelerations a, that is v² ≤ Σ 2 a L at its
+end (grbl, `planner.c`: the last block is planned to a stop; LinuxCNC, `tp.c`: `tpRunOptimization` goes back
+so many segments as ARC_BLEND_OPTIMIZATION_DEPTH says).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan._solvers import look_ahead as native_look_ahead
+from feedplan.arguments import number, positive
+from feedplan.planners._segments import Array, Segments
+
+
+@dataclass(frozen=True)
+class Chords:
+    """How arcs are chopped into lines: `tolerance` [mm] off the arc, or of `length` [mm]."""
+
+    tolerance: float | None = None
+    length: float | None = None
+
+    # The largest turn from chord to chord is a right angle.
+    _HALF_TURN = 0.25 * math.pi
+
+    def half_turn(self, radius: Array) -> Array:
+        """Half the angle that a chord takes of a circle of `radius` (m,) [mm]."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            if self.tolerance is not None:
+                half = 2.0 * np.arcsin(np.minimum(np.sqrt(0.5 * self.tolerance / radius), 1.0))
+            else:
+                half = 0.5 * float(self.length or 0.0) / radius
+        return np.minimum(half, self._HALF_TURN)
+
+    def count(self, parts: Segments) -> Array:
+        """How many chords each part has (m,), 1 on a line."""
+        bent = np.isfinite(parts.radius)
+        each = np.full(len(parts), np.inf)
+        each[bent] = 2.0 * parts.radius[bent] * self.half_turn(parts.radius[bent])
+        return np.where(bent, parts.length / each, np.where(np.isnan(parts.rate), 0.0, 1.0))
+
+
+@dataclass(frozen=True)
+class Queue:
+    """The path as one controller has it.
+
+    `ahead`: blocks known behind the one in motion (None: all). `chords` tell what blocks are on curves; a
+    whole piece is one without. `velocity` [mm/s] and `acceleration` [mm/s²] are the greatest along the path.
+    `least_time` [s]: no block of the program takes less. `cruise`: the part of the way between speeding up
+    and slowing down that has one speed (Klipper's minimum_cruise_ratio).
+    """
+
+    ahead: int | None = None
+    chords: Chords | None = None
+    velocity: float = math.inf
+    acceleration: float = math.inf
+    least_time: float = 0.0
+    cruise: float = 0.0
+
+    def limited(self, parts: Segments, block: NDArray[np.int64]) -> Segments:
+        """The segments with the speeds that `least_time` leaves; `block` (pieces,) are a piece's own."""
+        if self.least_time == 0.0:
+            return parts
+        own = block[parts.piece]
+        length = np.bincount(own, parts.length)[own]
+        return replace(parts, speed=np.minimum(parts.speed, length / self.least_time))
+
+    def known(self, parts: Segments, at_end: Array) -> tuple[Segments, Array]:
+        """Segments and speeds at their ends (m + 1,) [mm/s] that let the tool stop in what is known."""
+        gain = parts.slope * (parts.u1 - parts.u0)
+        braking = gain[1]
+        if self.ahead is not None:
+            block = np.concatenate([[0.0], np.cumsum(self._blocks(parts))])
+            reach = np.concatenate([[0.0], np.cumsum(braking)])
+            seen = block + min(self.ahead, math.ceil(block[-1]))
+            room = np.where(seen < block[-1], np.interp(seen, block, reach) - reach, np.inf)
+            at_end = np.minimum(at_end, np.sqrt(room))
+        if self.cruise > 0.0:
+            parts = replace(parts, speed=np.minimum(parts.speed, self._smoothed(gain, at_end)))
+            at_end = at_end.copy()
+            at_end[:-1] = np.minimum(at_end[:-1], parts.speed)
+            at_end[1:] = np.minimum(at_end[1:], parts.speed)
+        return parts, at_end
+
+    def _blocks(self, parts: Segments) -> Array:
+        """How many blocks each part is (m,): whole numbers for whole pieces."""
+        share = 1.0 / np.bincount(parts.piece)[parts.piece]
+        if self.chords is None:
+            return share
+        count = self.chords.count(parts)
+        whole = np.bincount(parts.piece, count)
+        wanted = np.maximum(np.ceil(whole * (1.0 - 1e-9)), 1.0)
+        with np.errstate(invalid="ignore"):
+            scaled = count * (wanted / whole)[parts.piece]
+        return np.where((whole > 0.0)[parts.piece], scaled, share)
+
+    def _smoothed(self, gain: Array, at_end: Array) -> Array:
+        """The greatest speed of each part (m,) where less acceleration leaves room for an even speed.
+
+        Klipper (`toolhead.py`): with accelerations of (1 − cruise) of the real ones, each hill between two
+        least speeds has a peak, and nothing in the hill is faster.
+        """
+        up, down = (1.0 - self.cruise) * gain
+        columns = (np.stack([way, 0.0 * way, 0.0 * way], axis=1) for way in (up, down))
+        square = native_look_ahead(at_end, *columns) ** 2
+        start, end = square[:-1], square[1:]
+        rounding = 1e-9 * np.maximum(start, end)
+        rises, falls = end >= start + up - rounding, start >= end + down - rounding
+        phase = np.where(rises, 0, np.where(falls, 2, 1))
+        before, after = phase[:-1], phase[1:]
+        hill = np.flatnonzero(np.concatenate([[True], (after < before) | ((after == 1) & (before == 1))]))
+        peak = np.maximum.reduceat((down * start + up * end + up * down) / (up + down), hill)
+        return np.asarray(np.sqrt(np.repeat(peak, np.diff(np.append(hill, len(up))))))
+
+
+def along_path(queue: Queue, max_velocity: float | None, max_acceleration: float | None) -> Queue:
+    """The queue with limits along the path, where they are given; raises InputError unless positive."""
+    given = {"velocity": (max_velocity, "mm/s"), "acceleration": (max_acceleration, "mm/s²")}
+    for name, (value, unit) in given.items():
+        if value is not None:
+            what, remedy = f"the greatest {name} along the path", f"a positive number [{unit}]"
+            queue = replace(queue, **{name: number(value, what, remedy, positive, unit)})  # type: ignore[arg-type]
+    return queue

@@ -1,0 +1,58 @@
+"""LinuxCNC's trajectory planner: points on lines joined, arcs at corners, one acceleration along the path.
+
+Source: LinuxCNC 2.9, `emccanon.cc` (points of G1 moves that are within G64's Q of a line are left out: the
+naive CAM detector), `tp.c`, `tc.c` and `blendmath.c` (R. W. Ellenberg). Each corner of lines within G64's P
+becomes an arc that touches both and takes half of each at most. It has half of the acceleration along it and
+√3/2 across it, and so have the program's arcs (`on_arcs`). Speeds let the tool stop in the
+`depth` segments behind the one in motion ([TRAJ] ARC_BLEND_OPTIMIZATION_DEPTH), and no block takes less than
+1.02 servo periods. `max_velocity` and `max_acceleration` are those along the path ([TRAJ]
+MAX_LINEAR_VELOCITY, MAX_LINEAR_ACCELERATION).
+
+Not as there: corners of arcs and splines are rounded as the path's builder does it, others are stops where
+LinuxCNC overlaps segments (parabolic blends), as it does on rotary axes; G64 without P keeps to the tolerance
+of the plan, where LinuxCNC leaves the path by up to a quarter of a line.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from feedplan.arguments import whole
+from feedplan.constraints.problem import Problem
+from feedplan.geometry.corners import Corners
+from feedplan.planners._look_ahead import look_ahead, shared_acceleration
+from feedplan.planners._queue import Queue, along_path
+from feedplan.planners._segments import Array
+from feedplan.profile import SpeedProfile
+
+CORNERS = Corners.JOINED
+DEPTH = 50
+PERIODS = 1.02
+
+
+def plan(
+    problem: Problem,
+    depth: int = DEPTH,
+    max_velocity: float | None = None,
+    max_acceleration: float | None = None,
+) -> SpeedProfile:
+    """Trapezoids over lines and arcs, `depth` segments known ahead, limits along the path [mm/s], [mm/s²].
+
+    Raises InputError for those, SolverError and InfeasibleError, all as sentences.
+    """
+    whole(depth, "the depth", "a whole number from 1")
+    queue = Queue(ahead=depth, least_time=PERIODS * problem.period)
+    queue = along_path(queue, max_velocity, max_acceleration)
+    return look_ahead(problem, problem.junction_speed, on_arcs, queue=queue)
+
+
+def on_arcs(tangent: Array, normal: Array, limits: Array, radius: Array, speed: Array) -> tuple[Array, Array]:
+    """√3/2 across the path of what every direction allows, along it what the greatest speed leaves.
+
+    That is half of it (`shared_acceleration`) where the bend holds the speed, more where the feed does
+    (`tc.c`: `tcUpdateCircleAccRatio`).
+    """
+    along, across = shared_acceleration(tangent, normal, limits, radius, speed)
+    with np.errstate(divide="ignore"):
+        used = np.minimum(speed**2 / radius, across) / (2.0 * along[0])
+    return 2.0 * along * np.sqrt(1.0 - used**2), across
