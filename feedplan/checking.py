@@ -15,14 +15,19 @@ from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from feedplan.arguments import callback, flag, is_number, not_negative, number, shown
 from feedplan.audit import Audit, audit_setpoints
+from feedplan.audit.events import require_events
+from feedplan.audit.knots import audit_knots
 from feedplan.errors import InputError
 from feedplan.files import PROGRAM_FILE, SUMMARY_FILE
 from feedplan.geometry.corners import Corners
 from feedplan.machine.file import parse
 from feedplan.machine.machine import Machine
-from feedplan.outputs import SetpointFile, load_setpoints, require_format
+from feedplan.outputs import KNOTS, SETPOINTS, SetpointFile, load_setpoints, require_format
 from feedplan.planners import corners, limits_jerk, methods
 from feedplan.progress import Progress, of_stage, tell
 
@@ -44,7 +49,8 @@ def check(
     file of one, replaces that of the plan. `resolution` [mm] is the last digit of rounded positions. Jerk is
     judged where the plan's method limits it, or where `jerk` says so. `progress(stage, done)` is called with
     `read`, then `audit`, and the part of that stage that is done; what it raises ends the work and is raised
-    here. Raises InputError for files that cannot be read, contradict each other or were changed.
+    here. Events of the program are checked as well: in order, within the time, the tool at rest where they
+    stop it. Raises InputError for files that cannot be read, contradict each other or were changed.
     """
     resolution = number(resolution, "the resolution", "0 or more", not_negative, "mm")
     jerk = flag(jerk, "jerk")
@@ -66,26 +72,52 @@ def check(
         known = Machine.of(machine)
     _require_units(points, known)
     tell(reading, 1.0)
-    return audit_setpoints(
-        points.t,
-        points.position,
-        known,
-        axes=points.axes,
-        velocity=points.velocity,
-        acceleration=points.acceleration,
-        recorded_jerk=points.jerk,
-        line=points.line,
-        resolution=resolution,
-        jerk=jerk or (plan is not None and limits_jerk(plan.method)),
-        corners=plan is not None and corners(plan.method) is Corners.PROGRAMMED,
-        period=plan.period if plan else points.period or known.period,
-        progress=auditing,
-    )
+    period = plan.period if plan else points.period or known.period
+    limits_of_method = {
+        "jerk": jerk or (plan is not None and limits_jerk(plan.method)),
+        "corners": plan is not None and corners(plan.method) is Corners.PROGRAMMED,
+    }
+    if points.rows == KNOTS:
+        audit = audit_knots(
+            points.t,
+            points.position,
+            points.velocity,
+            points.line,
+            known,
+            points.axes,
+            resolution=resolution,
+            progress=auditing,
+            **limits_of_method,
+        )
+    else:
+        audit = audit_setpoints(
+            points.t,
+            points.position,
+            known,
+            axes=points.axes,
+            velocity=_recorded(points.velocity),
+            acceleration=_recorded(points.acceleration),
+            recorded_jerk=_recorded(points.jerk),
+            line=points.line,
+            resolution=resolution,
+            period=period,
+            progress=auditing,
+            **limits_of_method,
+        )
+    if audit.ok:  # setpoints that are not fail by themselves, and tell nothing of events
+        require_events(points.file, points.events, points, resolution, ROUNDING * period)
+    return audit
+
+
+def _recorded(values: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """The values; None of a format that has none."""
+    return values if len(values) else None
 
 
 @dataclass(frozen=True)
 class _Plan:
-    """What plan.json says of its setpoints: the `count`, from 0 to `duration` [s] every `period` [s]."""
+    """What plan.json says of its setpoints: the `count`, from 0 to `duration` [s] every `period` [s]; number,
+    last time and longest step of its `knots`, None where it has none; hashes of the `events` by rows."""
 
     file: FilePath
     machine: Machine
@@ -94,6 +126,12 @@ class _Plan:
     count: int
     duration: float
     period: float
+    knots: tuple[int, float, float] | None
+    events: dict[str, str]
+
+    def rows(self, kind: str) -> tuple[int, float, float] | None:
+        """Number, last time and period of rows of a kind; None where the plan has none."""
+        return self.knots if kind == KNOTS else (self.count, self.duration, self.period)
 
 
 def _read(file: FilePath) -> _Plan:
@@ -116,6 +154,11 @@ def _read(file: FilePath) -> _Plan:
     if method not in methods():
         raise InputError(f"{file}: the method '{method}' is unknown: use the feedplan that wrote it")
     points = _Entries(file, entries.take("setpoints", dict), "setpoints ")
+    events = _Entries(file, entries.take("events", dict), "events ")
+    knots = None
+    if KNOTS in summary:
+        own = _Entries(file, entries.take(KNOTS, dict), "knots ")
+        knots = own.take("count", int), entries.number("time"), own.number("step")
     plan = _Plan(
         file=file,
         machine=parse(text, f"in {file}", joints_only=True),
@@ -124,6 +167,8 @@ def _read(file: FilePath) -> _Plan:
         count=points.take("count", int),
         duration=points.number("duration"),
         period=points.number("period"),
+        knots=knots,
+        events={name: events.take(f"sha256_of_{name}", str) for name in (SETPOINTS, KNOTS)},
     )
     # Each run, and the pause before the first, takes less than one period more than in the plan.
     time, waits = entries.number("time"), (entries.take("runs", int) + 1) * plan.period
@@ -182,18 +227,27 @@ class _Entries:
 
 def _require_same(plan: _Plan, points: SetpointFile) -> None:
     """Raises InputError unless the setpoints are those that the plan tells of."""
+    known = plan.rows(points.rows)
+    if known is None:
+        raise _other(points, plan, "table", f"one of {points.rows}", "nothing of it")
+    count, duration, period = known
     rows: list[tuple[str, Any, Any, str]] = [
         ("axes", " ".join(points.axes), " ".join(plan.axes), ""),
-        ("number of setpoints", len(points), plan.count, ""),
-        ("period", points.period or plan.period, plan.period, " s"),
+        (f"number of {points.rows}", len(points), count, ""),
+        ("period", points.period or period, period, " s"),
     ]
     for what, own, planned, unit in rows:
         if own != planned:
             raise _other(points, plan, what, f"{own}{unit}", f"{planned}{unit}")
     last = float(points.t[-1])
     # What is not a number the audit tells, with its place.
-    if math.isfinite(last) and abs(last - plan.duration) > ROUNDING * max(plan.duration, plan.period):
-        raise _other(points, plan, "last time", f"{last:.9g} s", f"{plan.duration:.9g} s")
+    if math.isfinite(last) and abs(last - duration) > ROUNDING * max(duration, period):
+        raise _other(points, plan, "last time", f"{last:.9g} s", f"{duration:.9g} s")
+    if points.events.sha256() != plan.events[points.rows]:
+        raise InputError(
+            f"{points.file}: its events are not those that {plan.file} tells of: one of them was changed, "
+            "plan again"
+        )
 
 
 def _other(points: SetpointFile, plan: _Plan, what: str, own: str, planned: str) -> InputError:

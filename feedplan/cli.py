@@ -152,6 +152,7 @@ def cli(context: click.Context) -> int:
     multiple=True,
     help="Format of the setpoints, npz by default; may be given several times. none: a report without them.",
 )
+@click.option("--step", type=Number(), metavar="S", help="Longest step of a pvt table, which needs it.")
 @program_options
 @JSON
 @QUIET
@@ -173,6 +174,7 @@ def plan(
     one_step_more: bool,
     output: str | None,
     formats: tuple[Any, ...],
+    step: float | None,
     as_json: bool,
     quiet: bool,
     controller: Choice,
@@ -225,6 +227,7 @@ def plan(
                 output,
                 () if _NO_SETPOINTS in formats else formats or ("npz",),
                 program=planned if wanted.in_folder else None,
+                step=step,
                 progress=progress,
             )
     warnings = list(result.warnings)

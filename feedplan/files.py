@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from feedplan.arguments import callback, file_path, list_of_names, refuse
 from feedplan.errors import InputError
-from feedplan.outputs import FormatName, Header, files_in, format_named
+from feedplan.outputs import KNOTS, SETPOINTS, FormatName, Header, files_in, format_named
 from feedplan.outputs._staging import require_folder, staged
 from feedplan.planned_feeds import PlannedProgram
 from feedplan.progress import Progress, of_stage, part, tell
@@ -22,6 +22,7 @@ from feedplan.units import duration_text
 
 if TYPE_CHECKING:
     from feedplan.comparison import Row
+    from feedplan.knots import Knots
     from feedplan.planning import Plan
     from feedplan.setpoints import SetpointChunk
 
@@ -30,7 +31,7 @@ PROGRAM_FILE = "program.ngc"
 COMPARISON_FILE = "comparison.json"
 _ROWS_AT_ONCE = 10_000
 # How far the writing is after the account, when the times of the setpoints are laid out, and after these.
-ACCOUNT, LAID_OUT, SETPOINTS = 0.08, 0.1, 0.75
+ACCOUNT, LAID_OUT, SAMPLED = 0.08, 0.1, 0.75
 
 
 def write_plan(
@@ -39,12 +40,14 @@ def write_plan(
     formats: Sequence[FormatName] = ("npz",),
     *,
     program: PlannedProgram | None = None,
+    step: float | None = None,
     progress: Progress | None = None,
 ) -> tuple[FilePath, ...]:
     """Writes the plan, its setpoints in these formats (none for ()), and its report; returns the files.
 
     `program`, as `feedplan.planned_program` returns it, is written as program.ngc.
 
+    `step` [s] is the longest one of a pvt table, which needs it.
     All is written beside and renamed at the end, so `folder` never holds half a plan; other files in it stay.
     `progress` is called with a stage and 0 to 1. Without the package plotly the report has no pictures and
     says so. Raises InputError where the folder or the file system refuses.
@@ -65,6 +68,7 @@ def write_plan(
             raise InputError(f"{name} and {other} are both {output.FILE}: ask for one of them")
     if program is not None and not isinstance(program, PlannedProgram):
         raise refuse("the program", program, "what feedplan.planned_program returns")
+    knots = _knots(plan, [name for name, output in outputs.items() if output.ROWS == KNOTS], step)
     audit = plan.audit(progress)
     share = of_stage(progress, "write")
     tell(share, 0.0)
@@ -72,9 +76,9 @@ def write_plan(
     tell(share, ACCOUNT)
     setpoints = plan.setpoints(progress=part(share, ACCOUNT, LAID_OUT))
     tell(share, LAID_OUT)
-    report = part(share, LAID_OUT, SETPOINTS)
+    report = part(share, LAID_OUT, SAMPLED)
     units = tuple(plan.machine.axis(name).unit for name in setpoints.axes)
-    header = Header(setpoints.axes, units, setpoints.period)
+    header = Header(setpoints.axes, units, setpoints.period, setpoints.events)
     figures = SetpointFigures(
         plan.problem, account.motion, setpoints.count, [check.time for check in audit.broken]
     )
@@ -83,6 +87,7 @@ def write_plan(
             sinks = [
                 stack.enter_context(output.writer(stage / output.FILE, header, setpoints.count))
                 for output in outputs.values()
+                if output.ROWS == SETPOINTS
             ]
             for chunk in _timed(setpoints.chunks(_ROWS_AT_ONCE), plan.compute):
                 for sink in (*sinks, figures.add):
@@ -92,7 +97,15 @@ def write_plan(
         if program is not None:
             (stage / PROGRAM_FILE).write_bytes(program.content)
             summary["planned_program"] = {"file": PROGRAM_FILE, **program.to_json()}
-        tell(share, SETPOINTS)
+        if knots is not None:
+            summary[KNOTS] = {"count": knots.count, "step": knots.step}
+            header = Header(knots.axes, units, knots.step, plan.events)
+            for output in outputs.values():
+                if output.ROWS == KNOTS:
+                    with output.writer(stage / output.FILE, header, knots.count) as add:
+                        for chunk in knots.chunks(_ROWS_AT_ONCE):
+                            add(chunk)
+        tell(share, SAMPLED)
         write_report(
             stage / REPORT_FILE,
             summary=summary,
@@ -102,7 +115,7 @@ def write_plan(
             audit=audit,
             figures=figures,
             text=plan.program.text if plan.program else None,
-            progress=part(share, SETPOINTS, 1.0),
+            progress=part(share, SAMPLED, 1.0),
         )
         (stage / SUMMARY_FILE).write_text(summary_text(summary), encoding="utf-8")
         names = sorted(file.name for file in stage.iterdir())
@@ -114,6 +127,17 @@ def files_of_plan(folder: FilePath) -> list[FilePath]:
     """The files in a folder that belong to the plan in it: setpoints, and its program."""
     program = folder / PROGRAM_FILE
     return [*files_in(folder), *([program] if program.exists() else [])]
+
+
+def _knots(plan: Plan, names: list[str], step: float | None) -> Knots | None:
+    """The knots that formats of these names write, if there is one."""
+    if step is None and names:
+        raise InputError(f"{names[0]} has no step: give its longest one [s], --step on the command line")
+    if step is None:
+        return None
+    if not names:
+        raise refuse("the step", step, "it with the format pvt alone")
+    return plan.knots(step)
 
 
 def write_comparison(

@@ -13,7 +13,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from feedplan.accuracy import estimate, shortfalls
 from feedplan.arguments import callback, not_negative, number, one_of, refuse, whole
@@ -21,9 +21,12 @@ from feedplan.audit import Audit, audit
 from feedplan.bound import lower_bound
 from feedplan.constraints.problem import Problem, build_problem, speed_square
 from feedplan.errors import InputError, SolverError
+from feedplan.event_places import PlannedEvents
+from feedplan.events import TimedEvents
 from feedplan.geometry.build import build_path
 from feedplan.geometry.corners import PATHS, Corners, FollowedPath
 from feedplan.geometry.path import Path
+from feedplan.knots import Knots
 from feedplan.lazy import cached_property
 from feedplan.machine.controller import Controller
 from feedplan.machine.machine import Machine
@@ -84,8 +87,10 @@ class Plan:
     today: Today | None = None
     _verdict: list[Audit] = field(default_factory=list, init=False, repr=False, compare=False)
     _account: list[Account] = field(default_factory=list, init=False, repr=False, compare=False)
-    # Number and duration [s] of the plan's own setpoints, once they have been laid out.
-    _laid_out: list[tuple[int, float]] = field(default_factory=list, init=False, repr=False, compare=False)
+    # Number, duration [s] and starts of the runs of the plan's own setpoints, once they have been laid out.
+    _laid_out: list[tuple[int, float, NDArray[np.float64]]] = field(
+        default_factory=list, init=False, repr=False, compare=False
+    )
 
     def __repr__(self) -> str:
         name = self.program.name if self.program else "a path"
@@ -150,10 +155,32 @@ class Plan:
             self.interpolator if interpolator is None else interpolator,
             self.max_setpoints,
             progress,
+            self._events,
         )
         if points.period == self.machine.period and not self._laid_out:
-            self._laid_out.append((points.count, points.duration))
+            self._laid_out.append((points.count, points.duration, points.run_starts))
         return points
+
+    def knots(self, step: float) -> Knots:
+        """States at equal steps between stops, none longer than `step` [s], by the plan's own clock.
+
+        Raises InputError for a step that cannot be used, or one that makes more than `max_setpoints` knots.
+        """
+        return Knots(self.problem, self.profile, step, self.max_setpoints)
+
+    @cached_property
+    def _events(self) -> PlannedEvents | None:
+        return None if self.program is None else PlannedEvents(self.program, self.problem, self.profile)
+
+    @cached_property
+    def events(self) -> TimedEvents:
+        """What the program does besides moving, in its order, by the plan's own clock.
+
+        Spindle, coolant, tools, dwells, stops, outputs, messages and comments: `feedplan.program.actions` has
+        the table, with which of them stop the tool. What does not happens as the path passes the end of the
+        move before it.
+        """
+        return TimedEvents.none() if self._events is None else self._events.placed.timed()
 
     @cached_property
     def trajectory(self) -> Trajectory:
@@ -216,7 +243,8 @@ class Plan:
         `setpoints` are those of the machine's period. Hashes tell whether a text was changed.
         """
         fit, program, verdict = self.path.fit, self.program, self.audit()
-        [(count, duration)] = self._laid_out
+        [(count, duration, starts)] = self._laid_out
+        of_setpoints = self._events.on(starts) if self._events else TimedEvents.none()
         machine_file = self.machine.to_toml()
         return {
             "format": FORMAT,
@@ -240,6 +268,11 @@ class Plan:
                 "period": self.machine.period,
                 "count": count,
                 "duration": duration,
+            },
+            "events": {
+                **self.events.counts(),
+                "sha256_of_setpoints": of_setpoints.sha256(),
+                "sha256_of_knots": self.events.sha256(),
             },
             **self.account.to_json(),
             "pieces": len(self.path),

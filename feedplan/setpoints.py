@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -15,6 +15,7 @@ from feedplan.constraints.problem import Problem, TipSpeed
 from feedplan.curves.length import INTERPOLATORS as INTERPOLATORS
 from feedplan.curves.length import Interpolator as Interpolator
 from feedplan.errors import InputError
+from feedplan.events import Events, TimedEvents
 from feedplan.profile import SpeedProfile
 from feedplan.progress import Listener
 from feedplan.units import counted
@@ -81,12 +82,14 @@ class Setpoints:
         interpolator: Interpolator,
         max_setpoints: int = MAX_SETPOINTS,
         progress: Listener | None = None,
+        events: Events | None = None,
     ) -> None:
         one_of(interpolator, "interpolator", INTERPOLATORS)
         period = number(period, "the period", "a positive number", positive, "s")
         most = whole(max_setpoints, "max_setpoints", "a whole number from 1")
         self._sampler = sampler(problem, profile, period, interpolator, progress)
-        self._source = (problem, profile, period, interpolator, most)
+        self._source = (problem, profile, period, interpolator, most, None, events)
+        self._events = events
         if self.count > most:
             raise InputError(
                 f"{self.count} setpoints, one every {period:g} s, are more than {most}: "
@@ -108,6 +111,20 @@ class Setpoints:
         """Time of the last setpoint [s]."""
         return self._sampler.duration
 
+    @property
+    def events(self) -> TimedEvents:
+        """What happens besides the motion, by the clock of these setpoints.
+
+        An event at a stop comes before the wait for a whole period: the first setpoint at or after its time
+        rests in the place of the stop, both to rounding.
+        """
+        return self._events.on(self.run_starts) if self._events else TimedEvents.none()
+
+    @property
+    def run_starts(self) -> NDArray[np.float64]:
+        """When each run between stops starts (runs,) [s]."""
+        return self._sampler.runs[:, 1]
+
     def __len__(self) -> int:
         return self.count
 
@@ -117,7 +134,7 @@ class Setpoints:
     def __repr__(self) -> str:
         return f"<Setpoints: {self.count} of {' '.join(self.axes)}, one every {self.period:g} s>"
 
-    def __reduce__(self) -> tuple[type[Setpoints], tuple[Problem, SpeedProfile, float, Interpolator, int]]:
+    def __reduce__(self) -> tuple[type[Setpoints], tuple[object, ...]]:
         return Setpoints, self._source
 
     def chunks(self, size: int = 100_000) -> Iterator[SetpointChunk]:
@@ -125,9 +142,7 @@ class Setpoints:
 
         The numbers do not depend on the size. Raises InputError for a size out of range.
         """
-        if not is_whole(size, most=MAX_CHUNK):
-            raise InputError(f"chunks of {shown(size)} setpoints: give a size from 1 to {MAX_CHUNK}")
-        return (self._chunk(start, min(start + size, self.count)) for start in range(0, self.count, size))
+        return chunks(self._chunk, self.count, size)
 
     def all(self) -> SetpointChunk:
         """The whole stream at once. Raises InputError where it is too long for that."""
@@ -147,6 +162,15 @@ class Setpoints:
         return SetpointChunk(t, position, velocity, acceleration, jerk, line, self.axes, piece, u)
 
 
+def chunks(chunk: Callable[[int, int], SetpointChunk], count: int, size: int) -> Iterator[SetpointChunk]:
+    """`count` rows in chunks of `size`, each made from its first row and the end of it.
+
+    Raises InputError for a size out of range."""
+    if not is_whole(size, most=MAX_CHUNK):
+        raise InputError(f"chunks of {shown(size)} setpoints: give a size from 1 to {MAX_CHUNK}")
+    return (chunk(start, min(start + size, count)) for start in range(0, count, size))
+
+
 def setpoints(
     problem: Problem,
     profile: SpeedProfile,
@@ -154,6 +178,7 @@ def setpoints(
     interpolator: Interpolator = "sarfraz",
     max_setpoints: int = MAX_SETPOINTS,
     progress: Listener | None = None,
+    events: Events | None = None,
 ) -> Setpoints:
     """Setpoints every `period` [s] of the joints along a problem's path, by the profile planned for it.
 
@@ -161,11 +186,12 @@ def setpoints(
     on quadratic pieces; table of length or time with Sarfraz predictor-corrector elsewhere, the length at a
     time in closed form where the jerk along the path is constant. `newton`: steps
     of speed times period, to third order, and Newton–Raphson. Pieces may have any degree, polynomial or
-    rational; arcs of kind CHORD are for quadratic ones. `progress` is told how far the laying out is.
+    rational; arcs of kind CHORD are for quadratic ones. `progress` is told how far the laying out is;
+    `events` are those of the plan (`feedplan.event_places`).
     Raises InputError for a period or an interpolator that cannot be used, a profile of another path, or more
     setpoints than `max_setpoints`.
     """
-    return Setpoints(problem, profile, period, interpolator, max_setpoints, progress)
+    return Setpoints(problem, profile, period, interpolator, max_setpoints, progress, events)
 
 
 def sampler(

@@ -13,7 +13,9 @@ from hypothesis import settings
 from feedplan.audit import Audit, LimitCheck
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
+from feedplan.events import TimedEvents
 from feedplan.geometry.path import Path
+from feedplan.knots import Knots
 from feedplan.machine.machine import Machine
 from feedplan.profile import ArcKind, SpeedProfile
 from feedplan.report.account import Account, account
@@ -56,6 +58,13 @@ class SquarePlan:
     def setpoints(self, progress: object = None) -> Any:
         return _Stream(self.chunk)
 
+    def knots(self, step: float) -> Knots:
+        return Knots(self.problem, self.profile, step)
+
+    @property
+    def events(self) -> TimedEvents:
+        return TimedEvents.none()
+
     def audit(self, progress: object = None) -> Audit:
         return self.verdict
 
@@ -85,6 +94,7 @@ class _Stream:
         self.axes = chunk.axes
         self.period = 0.001
         self.count = len(chunk.t)
+        self.events = TimedEvents.none()
 
     def chunks(self, size: int) -> Iterator[SetpointChunk]:
         for first in range(0, self.count, 300):

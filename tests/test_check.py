@@ -18,7 +18,7 @@ from feedplan.cli import main
 from feedplan.errors import InputError
 from feedplan.files import write_plan
 from feedplan.machine.kinematics import Kinematics, _registered, register
-from feedplan.outputs import formats
+from tests.outputs.parquet import FORMATS
 
 PROGRAM = "G21 G90 G64 P0.05\nF3000\nG1 X20 Y5\nG3 X10 Y15 I-5 J5\nG1 X0 Y10\nG1 Y0\nM2\n"
 
@@ -288,13 +288,13 @@ def test_the_plan_of_other_setpoints_is_refused(folder: Any, capsys: Any) -> Non
     assert_one_sentence(capsys.readouterr().err, "these are not the setpoints of this plan")
 
 
-@pytest.mark.parametrize("name", formats())
+@pytest.mark.parametrize("name", FORMATS)
 @pytest.mark.parametrize("method", sorted(set(planners.methods()) - {"casadi", "clarabel", "toppra"}))
 def test_what_each_method_plans_is_judged_alike_from_every_format(
     method: str, name: str, tmp_path: Path
 ) -> None:
     made = planned(method)
-    write_plan(made, tmp_path, [name])
+    write_plan(made, tmp_path, [name], step=made.machine.period if name == "pvt" else None)
     audit = check(tmp_path)
     # Two heuristics break limits; setpoints alone show no feed, no chord error and no path.
     expected = {(c.name, c.axis) for c in made.audit().broken} & {(c.name, c.axis) for c in audit.checks}

@@ -149,7 +149,8 @@ def cases(tmp_path: FilePath) -> dict[str, tuple[Callable[..., Any], dict[str, A
             {
                 "plan": plan,
                 "folder": tmp_path / "again",
-                "formats": ("csv",),
+                "formats": ("csv", "pvt"),
+                "step": 0.01,
                 "program": feedplan.planned_program(plan),
                 "progress": None,
             },
@@ -216,6 +217,8 @@ def cases(tmp_path: FilePath) -> dict[str, tuple[Callable[..., Any], dict[str, A
             {**spline, "weights": [1.0, 2.0, 1.0], "periodic": False, **named},
         ),
         "Plan.setpoints": (plan.setpoints, {"period": 0.001, "interpolator": "newton", "progress": None}),
+        "Plan.knots": (plan.knots, {"step": 0.01}),
+        "Knots.chunks": (lambda size: list(plan.knots(0.01).chunks(size)), {"size": 1000}),
         "Plan.at": (plan.at, {"t": 0.5}),
         "Plan.operations": (plan.operations, {"tool_change": 5.0}),
         "Plan.make_account": (plan.make_account, {"progress": None}),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -48,8 +48,12 @@ _KINDS = {
     "recorded_acceleration": _Kind("error of the recorded acceleration", "mm/s²"),
     "recorded_change": _Kind("change of the recorded velocity beyond the recorded acceleration", "mm/s²"),
     "recorded_jerk": _Kind("change of the recorded acceleration beyond the recorded jerk", "mm/s³"),
+    "cubic_acceleration": _Kind("acceleration of cubics from knot to knot", "mm/s²"),
     "numbers": _Kind("number that is not finite or out of its range", ""),
 }
+
+# What is told and never judged: it is no part of a plan.
+_TOLD = ("cubic_acceleration",)
 
 # Where these fail, the differences over those times and numbers mean nothing.
 _EXPLAINING = ("numbers", "grid")
@@ -173,12 +177,11 @@ def join(
 
     `units` are those of the axes, `way_unit` that of lengths which belong to none of them.
     """
-    worst: dict[tuple[str, int], LimitCheck] = {}
-    samples = 0
+    checks, samples = [], 0
     for findings, count in results:
         samples += count
-        for name, axis, value, limit, ratio, time, line in findings:
-            check = LimitCheck(
+        checks += [
+            LimitCheck(
                 name=name,
                 axis=axes[axis] if axis >= 0 else None,
                 worst=value,
@@ -186,15 +189,30 @@ def join(
                 ratio=ratio,
                 time=time,
                 line=line,
-                judged=jerk or name != "jerk",
+                judged=(jerk or name != "jerk") and name not in _TOLD,
                 length=units[axis] if axis >= 0 else way_unit,
             )
-            known = worst.get((name, axis))
-            if known is None or not check.ratio <= known.ratio:
-                worst[name, axis] = check
-    order = list(_KINDS)
-    keys = sorted(worst, key=lambda key: (order.index(key[0]), key[1]))
-    return Audit(tuple(worst[key] for key in keys), samples)
+            for name, axis, value, limit, ratio, time, line in findings
+        ]
+    return Audit(_worst(checks, axes), samples)
+
+
+def worst_of(audits: Sequence[Audit], axes: tuple[str, ...]) -> Audit:
+    """One verdict from those of several parts: the worst of each check."""
+    checks = (check for audit in audits for check in audit.checks)
+    return Audit(_worst(checks, axes), sum(audit.checked_samples for audit in audits))
+
+
+def _worst(checks: Iterable[LimitCheck], axes: tuple[str, ...]) -> tuple[LimitCheck, ...]:
+    """The worst of each name and axis, in the order of `_KINDS`, then of the axes."""
+    worst: dict[tuple[str, str | None], LimitCheck] = {}
+    for check in checks:
+        known = worst.get((check.name, check.axis))
+        if known is None or not check.ratio <= known.ratio:
+            worst[check.name, check.axis] = check
+    order, of_axis = list(_KINDS), (None, *axes)
+    keys = sorted(worst, key=lambda key: (order.index(key[0]), of_axis.index(key[1])))
+    return tuple(worst[key] for key in keys)
 
 
 def _finite(value: float) -> float | None:

@@ -3,9 +3,14 @@
 A format is a module here whose name does not begin with an underscore, and `FormatName` has its name. It has
 
 - `FILE`, the name of the file it writes;
-- `writer(file, header, count)`, a context that writes `count` setpoints: it gives a function that takes them
+- `ROWS`, which rows it has: `SETPOINTS`, one a servo period, or `KNOTS`, equal steps between stops;
+- `writer(file, header, count)`, a context that writes `count` rows: it gives a function that takes them
   chunk by chunk in the order of time, and completes the file at its end;
 - `load(file)`, which reads them back as one chunk, a SetpointFile.
+
+Each file tells its version, axes, units, period (or longest step) and the events of the program, each
+with its time, line, kind, channel, value, whether the tool stops for it, and its text
+(`feedplan.events`).
 """
 
 from __future__ import annotations
@@ -15,19 +20,23 @@ import os
 import pkgutil
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from typing import Literal, Protocol, cast
 
 from feedplan.arguments import callback, file_path, one_of, shown
 from feedplan.errors import InputError
+from feedplan.events import TimedEvents
 from feedplan.progress import Listener
 from feedplan.setpoints import SetpointChunk
 
 # The columns of a setpoint that have one value an axis, with what follows the unit of the axis in theirs.
 QUANTITIES = {"position": "", "velocity": "/s", "acceleration": "/s^2", "jerk": "/s^3"}
 
-FormatName = Literal["csv", "json", "npz", "npz-compressed"]
+FormatName = Literal["csv", "halstreamer", "json", "npz", "npz-compressed", "parquet", "pvt"]
+
+# Which rows a format has.
+SETPOINTS, KNOTS = "setpoints", "knots"
 
 # The version of all files of a plan. Files without one come from elsewhere and are read as this one.
 FORMAT = 1
@@ -35,22 +44,27 @@ FORMAT = 1
 
 @dataclass(frozen=True)
 class Header:
-    """What all setpoints of a file have in common: names of the `axes`, their `units` (mm, deg, …), the servo
-    `period` [s]."""
+    """What all rows of a file have in common: names of the `axes`, their `units` (mm, deg, …), the servo
+    `period` [s], or of knots the longest step; and the `events` by the clock of the rows."""
 
     axes: tuple[str, ...]
     units: tuple[str, ...]
     period: float
+    events: TimedEvents = field(default_factory=TimedEvents.none)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SetpointFile(SetpointChunk):
     """Setpoints read from a `file`; `units` are those of the axes, empty where the file tells none; `period`
-    [s], None where it tells none."""
+    [s], None where it tells none, of knots the longest step; `rows` as the format's `ROWS`. Velocities,
+    accelerations, jerks and lines have no rows where the format has none. `events` are in the order of the
+    file."""
 
     file: FilePath = FilePath()
     units: tuple[str, ...] = ()
     period: float | None = None
+    rows: str = SETPOINTS
+    events: TimedEvents = field(default_factory=TimedEvents.none)
 
 
 Add = Callable[[SetpointChunk], None]
@@ -60,6 +74,7 @@ class Format(Protocol):
     """What a module of this package offers."""
 
     FILE: str
+    ROWS: str
 
     def writer(self, file: FilePath, header: Header, count: int) -> AbstractContextManager[Add]: ...
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -10,16 +10,22 @@ import numpy as np
 
 from feedplan.arguments import shown
 from feedplan.errors import InputError
+from feedplan.events import TimedEvents
 from feedplan.machine.machine import AXIS_LETTERS
-from feedplan.outputs import FORMAT, QUANTITIES, SetpointFile, require_format
+from feedplan.outputs import FORMAT, QUANTITIES, SETPOINTS, SetpointFile, require_format
+
+COLUMNS = ("t", *QUANTITIES, "line")
 
 
-def chunk_of(arrays: Mapping[str, Any], file: FilePath) -> SetpointFile:
+def chunk_of(
+    arrays: Mapping[str, Any], file: FilePath, columns: Sequence[str] = COLUMNS, rows: str = SETPOINTS
+) -> SetpointFile:
     """The chunk in these named arrays. Raises InputError naming the file and what is wrong with it.
 
-    `format`, `units` and `period` may be missing, as in files from elsewhere.
+    `columns` are those that the format has. `format`, `units`, `period` and `events` may be missing, as in
+    files from elsewhere.
     """
-    missing = [name for name in ("t", *QUANTITIES, "line", "axes") if name not in arrays]
+    missing = [name for name in (*columns, "axes") if name not in arrays]
     if missing:
         raise InputError(f"{file} is not a file of setpoints: {', '.join(missing)} is missing")
     require_format(_single(arrays.get("format", FORMAT)), str(file))
@@ -39,18 +45,23 @@ def chunk_of(arrays: Mapping[str, Any], file: FilePath) -> SetpointFile:
     if t.ndim != 1 or len(t) == 0:
         raise InputError(f"{file} holds no setpoints: t has the shape {t.shape}, (n,) is needed")
     shapes = {"t": (len(t),), "line": (len(t),)} | {name: (len(t), len(axes)) for name in QUANTITIES}
-    for name, shape in shapes.items():
-        array = np.asanyarray(arrays[name])
+    known = {name: arrays[name] for name in columns}
+    for name in columns:
+        shape, array = shapes[name], np.asanyarray(known[name])
         if array.shape != shape or array.dtype.kind not in "fiu":
             raise InputError(f"{file}: {name} has the shape {array.shape}: give numbers of shape {shape}")
+    none = {name: np.empty((0, *shape[1:])) for name, shape in shapes.items() if name not in columns}
+    known |= none
     t, position, velocity, acceleration, jerk = (
-        np.asanyarray(arrays[name], dtype=np.float64) for name in ("t", *QUANTITIES)
+        np.asanyarray(known[name], dtype=np.float64) for name in ("t", *QUANTITIES)
     )
     with np.errstate(invalid="ignore"):
-        line = np.asanyarray(arrays["line"]).astype(np.int32, copy=False)
+        line = np.asanyarray(known["line"]).astype(np.int32, copy=False)
+    events = arrays.get("events", TimedEvents.none())
     return SetpointFile(
-        t, position, velocity, acceleration, jerk, line, axes, file=file, units=units, period=period
-    )
+        t, position, velocity, acceleration, jerk, line, axes,
+        file=file, units=units, period=period, rows=rows, events=events,
+    )  # fmt: skip
 
 
 def _single(value: Any) -> Any:

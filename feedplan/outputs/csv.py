@@ -1,6 +1,9 @@
 """Setpoints as text: a line of names with units, then a line for every setpoint.
 
-Every number is the shortest that reads back the same, so checking the text checks the plan itself.
+Before the names a comment `# feedplan {…}` tells version and period, and a comment `# event {…}` stands
+before the first setpoint at or after an event of the program: `pandas.read_csv(file, comment="#")` leaves
+both out. Every number is the shortest that reads back the same, so checking the text checks the plan
+itself.
 """
 
 from __future__ import annotations
@@ -9,19 +12,20 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path as FilePath
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from feedplan._solvers import csv_rows
 from feedplan.errors import InputError
-from feedplan.outputs import QUANTITIES, Add, Header, SetpointFile
+from feedplan.outputs import QUANTITIES, SETPOINTS, Add, Header, SetpointFile
 from feedplan.outputs._arrays import chunk_of
-from feedplan.progress import Listener, tell
+from feedplan.outputs._text import Rows, RowWriter, read_rows
+from feedplan.progress import Listener
 from feedplan.setpoints import SetpointChunk
 
 FILE = "setpoints.csv"
-_BYTES_AT_ONCE = 1_000_000
+ROWS = SETPOINTS
+_NAMED = re.compile(r"position (\S+) \[([^\s\[\]]+)\]")
 
 
 def column_names(axes: Sequence[str], units: Sequence[str]) -> str:
@@ -38,63 +42,31 @@ def column_names(axes: Sequence[str], units: Sequence[str]) -> str:
 def writer(file: FilePath, header: Header, count: int) -> Iterator[Add]:
     """Writes the header, then a line for every setpoint."""
     with file.open("wb") as stream:
-        stream.write(f"{column_names(header.axes, header.units)}\n".encode())
+        rows = RowWriter(stream, SETPOINTS, header, f"{column_names(header.axes, header.units)}\n")
 
         def add(chunk: SetpointChunk) -> None:
             values = np.column_stack([chunk.t, *(getattr(chunk, name) for name in QUANTITIES)])
-            line = np.ascontiguousarray(chunk.line, dtype=np.int32)
-            stream.write(csv_rows(np.ascontiguousarray(values, dtype=np.float64), line))
+            rows.add(chunk.t, values, chunk.line)
 
         yield add
+        rows.close()
 
 
 def load(file: FilePath, progress: Listener | None = None) -> SetpointFile:
-    """The setpoints of a csv file with the header that this format writes."""
-    parts: list[NDArray[np.float64]] = []
-    done, read, size = 1, 0, max(file.stat().st_size, 1)
-    try:
-        with file.open(encoding="utf-8") as stream:
-            first = stream.readline().strip()
-            found = re.findall(r"position (\S+) \[([^\s\[\]]+)\]", first)
-            axes, units = zip(*found, strict=True) if found else (("X", "Y"), ("mm", "mm"))
-            if first != (names := column_names(axes, units)):
-                raise InputError(f"{file}, line 1: the columns must be named {names}")
-            width = 2 + len(QUANTITIES) * len(axes)
-            while lines := stream.readlines(_BYTES_AT_ONCE):
-                parts.append(_rows(lines, width, file, done))
-                done += len(lines)
-                read += sum(map(len, lines))
-                tell(progress, min(read / size, 1.0))
-    except UnicodeDecodeError:
-        raise InputError(f"{file} is not text: give a csv file of setpoints") from None
-    table = np.concatenate(parts) if parts else np.empty((0, width))
-    groups = np.split(table[:, 1:-1], len(QUANTITIES), axis=1)
-    arrays = dict(zip(QUANTITIES, groups, strict=True))
-    columns = {"t": table[:, 0], **arrays, "line": table[:, -1]}
-    return chunk_of({**columns, "axes": axes, "units": units}, file)
+    """The setpoints of a csv file with the names that this format writes."""
+    axes: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
 
+    def width_of(rows: Rows) -> int:
+        nonlocal axes, units
+        found = _NAMED.findall(rows.names)
+        axes, units = zip(*found, strict=True) if found else (("X", "Y"), ("mm", "mm"))
+        if rows.names != (names := column_names(axes, units)):
+            raise InputError(f"{file}: the columns must be named {names}")
+        return 2 + len(QUANTITIES) * len(axes)
 
-def _rows(lines: list[str], width: int, file: FilePath, done: int) -> NDArray[np.float64]:
-    """These lines as numbers; `done` lines went before them."""
-    try:
-        table = np.loadtxt(lines, delimiter=",", ndmin=2, comments=None, dtype=np.float64)
-        if table.shape == (len(lines), width):
-            return table
-    except ValueError:
-        pass
-    for number, text in enumerate(lines, start=done + 1):
-        fields = text.rstrip("\r\n").split(",")
-        if len(fields) != width:
-            raise InputError(f"{file}, line {number}: {len(fields)} values where {width} are needed")
-        wrong = next((field for field in fields if not _is_number(field)), None)
-        if wrong is not None:
-            raise InputError(f"{file}, line {number}: '{wrong}' is not a number")
-    raise InputError(f"{file}: the rows cannot be read: give one line of {width} numbers a setpoint")
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+    rows = read_rows(file, width_of, progress=progress)
+    groups = np.split(rows.table[:, 1:-1], len(QUANTITIES), axis=1)
+    columns = {"t": rows.table[:, 0], **dict(zip(QUANTITIES, groups, strict=True)), "line": rows.table[:, -1]}
+    told: dict[str, Any] = {name: rows.header[name] for name in ("format", "period") if name in rows.header}
+    return chunk_of({**columns, **told, "axes": axes, "units": units, "events": rows.events}, file)

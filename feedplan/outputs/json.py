@@ -1,5 +1,7 @@
 """Setpoints as one JSON object with the names of the npz arrays; meant for small plans and other languages.
 
+`events` are objects, one each, with their text.
+
 JSON has no infinities: a number that is not finite becomes null.
 """
 
@@ -17,12 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.errors import InputError
-from feedplan.outputs import FORMAT, QUANTITIES, Add, Header, SetpointFile
+from feedplan.events import to_json
+from feedplan.outputs import FORMAT, QUANTITIES, SETPOINTS, Add, Header, SetpointFile
 from feedplan.outputs._arrays import chunk_of
+from feedplan.outputs._events import from_objects
 from feedplan.progress import Listener, tell
 from feedplan.setpoints import SetpointChunk
 
 FILE = "setpoints.json"
+ROWS = SETPOINTS
 _ROWS_AT_ONCE = 10_000
 
 
@@ -52,7 +57,10 @@ def writer(file: FilePath, header: Header, count: int) -> Iterator[Add]:
             part.seek(0)
             shutil.copyfileobj(part, stream)
             stream.write("]")
-        stream.write("}\n")
+        stream.write(',\n"events":[')
+        for number, event in enumerate(header.events):
+            stream.write(("," if number else "") + json.dumps(to_json(event)))
+        stream.write("]}\n")
 
 
 def _text(rows: NDArray[Any]) -> str:
@@ -79,5 +87,8 @@ def load(file: FilePath, progress: Listener | None = None) -> SetpointFile:
     except (TypeError, ValueError, OverflowError):
         raise InputError(f"{file}: t, position, … must be arrays of numbers, one row a setpoint") from None
     arrays |= {name: table[name] for name in ("format", "period", "axes", "units") if name in table}
+    if "events" in table:
+        objects = table["events"] if isinstance(table["events"], list) else [table["events"]]
+        arrays["events"] = from_objects(objects, file)
     tell(progress, 1.0)
     return chunk_of(arrays, file)

@@ -1,6 +1,9 @@
 """Setpoints as numpy's npz: `t`, `position`, `velocity`, `acceleration`, `jerk`, `line`, `axes`, and single
 numbers `format` and `period` [s]; `units` are those of the axes, as mm or deg.
 
+`events` are records of `time` [s], `line`, `kind`, `channel`, `value`, `stops` and `text`, the place of
+the text in `bytes(event_texts).decode().split("\n")`.
+
 Uncompressed: servo setpoints hardly shrink, and so they can be mapped into memory instead of read.
 """
 
@@ -17,13 +20,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.errors import InputError
-from feedplan.outputs import FORMAT, QUANTITIES, Add, Header, SetpointFile
+from feedplan.outputs import FORMAT, QUANTITIES, SETPOINTS, Add, Header, SetpointFile
 from feedplan.outputs._arrays import chunk_of
+from feedplan.outputs._events import from_records, to_records
 from feedplan.outputs._zip import NpyArchive
 from feedplan.progress import Listener, tell
 from feedplan.setpoints import SetpointChunk
 
 FILE = "setpoints.npz"
+ROWS = SETPOINTS
 
 # A file that claims to hold so many times its own bytes [-], and more than some [bytes], was made to fill the
 # memory: compressed setpoints are a third of their size.
@@ -34,11 +39,14 @@ _DENSEST, _SMALL = 100, 1 << 28
 def writer(file: FilePath, header: Header, count: int) -> Iterator[Add]:
     """Writes `count` setpoints in one pass; only the chunk at hand is in memory."""
     double, integer = np.dtype("<f8"), np.dtype("<i4")
+    records, texts = to_records(header.events)
     common: dict[str, NDArray[Any]] = {
         "format": np.array(FORMAT, integer),
         "period": np.array(header.period, double),
         "axes": np.array(header.axes, np.str_),
         "units": np.array(header.units, np.str_),
+        "events": records,
+        "event_texts": texts,
     }
     arrays: dict[str, tuple[tuple[int, ...], np.dtype[Any]]] = {
         "t": ((count,), double),
@@ -72,6 +80,9 @@ def load(file: FilePath, progress: Listener | None = None) -> SetpointFile:
         raise
     except Exception as error:  # zipfile and numpy raise whatever a damaged file leads them to
         raise InputError(f"{file} is not a whole npz file: {error}") from None
+    if "events" in arrays:
+        texts = arrays.get("event_texts", np.empty(0, np.uint8))
+        arrays["events"] = from_records(arrays["events"], texts, file)
     tell(progress, 1.0)
     return chunk_of(arrays, file)
 

@@ -12,6 +12,7 @@ from pathlib import Path as FilePath
 from feedplan.outputs import Add, Header, npz
 
 FILE = npz.FILE
+ROWS = npz.ROWS
 load = npz.load
 
 _BYTES_AT_ONCE = 1 << 20

@@ -1,13 +1,16 @@
-"""What happens between the moves of a program: spindle, coolant, tools, outputs, dwells, stops, messages."""
+"""What stands between the moves of a program: spindle, coolant, tools, outputs, dwells, stops, remarks."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-MESSAGE = "("
+MESSAGE, COMMENT = "(", ";"
+# The M codes whose output has the letter E.
+_ANALOG = (67, 68)
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,8 +20,8 @@ class Events:
     `move` (m,) is how many moves come before it, `line` (m,) its 1-based source line, `letter` (m,) and
     `number` (m,) the word: M3, S1000, T5, M62, M0, G4. `p` and `q` (m,) are the words that go with it, NaN
     where there is none: of M6 `p` is the tool's number, of G4 the seconds, of M66 to M68 the word E. A
-    message (MSG, DEBUG, PRINT and LOG of LinuxCNC, M117) has the letter `(` and as its number the place of
-    its text in `texts`.
+    message (MSG, DEBUG, PRINT and LOG of LinuxCNC, M117) has the letter `(`, a comment `;`, and as its number
+    the place of its text in `texts`.
     """
 
     move: NDArray[np.int64]
@@ -41,13 +44,26 @@ class Events:
         return len(self.move)
 
     def words(self) -> tuple[str, ...]:
-        """Each event as it would be written, such as `M62 P3`; messages as their text in brackets."""
-        return tuple(self._word(row) for row in range(len(self)))
+        """Each event as it would be written, such as `M62 P3`; messages and comments as their text in
+        brackets."""
+        return tuple(f"({text})" if said else text for text, said in zip(*self.said(), strict=True))
 
-    def _word(self, row: int) -> str:
-        letter = chr(self.letter[row])
-        if letter == MESSAGE:
-            return f"({self.texts[int(self.number[row])]})"
-        with_it = ((name, column[row]) for name, column in (("P", self.p), ("Q", self.q)))
-        others = "".join(f" {name}{value:g}" for name, value in with_it if not np.isnan(value))
-        return f"{letter}{self.number[row]:g}{others}"
+    def said(self) -> tuple[list[str], list[bool]]:
+        """The text of each event, and whether it is that of a message or a comment."""
+        is_text = np.isin(self.letter, [ord(MESSAGE), ord(COMMENT)])
+        rows = np.stack([self.letter, self.number, self.p, self.q], axis=1)
+        different, place = np.unique(rows[~is_text], axis=0, return_inverse=True)
+        words = [_word(*row) for row in different.tolist()]
+        texts = [""] * len(self)
+        for row, own in zip(np.flatnonzero(~is_text).tolist(), place.ravel().tolist(), strict=True):
+            texts[row] = words[own]
+        for row in np.flatnonzero(is_text).tolist():
+            texts[row] = self.texts[int(self.number[row])]
+        return texts, is_text.tolist()
+
+
+def _word(letter: float, number: float, p: float, q: float) -> str:
+    """A word with those that go with it."""
+    first = "E" if letter == ord("M") and number in _ANALOG else "P"
+    others = "".join(f" {name}{value:g}" for name, value in ((first, p), ("Q", q)) if not math.isnan(value))
+    return f"{chr(int(letter))}{number:g}{others}"

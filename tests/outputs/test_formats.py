@@ -11,60 +11,29 @@ import numpy as np
 import pytest
 
 from feedplan.errors import InputError
-from feedplan.outputs import FORMAT, Header, format_named, formats, load_setpoints
+from feedplan.outputs import FORMAT, KNOTS, SETPOINTS, format_named, formats, load_setpoints
 from feedplan.outputs.csv import column_names
 from feedplan.setpoints import SetpointChunk
-
-NAMES = ("t", "position", "velocity", "acceleration", "jerk", "line")
-
-
-def chunk(count: int, axes: str = "XYZ", seed: int = 1) -> SetpointChunk:
-    random = np.random.default_rng(seed)
-    tables = (random.normal(size=(count, len(axes))) * 10.0 ** random.integers(-9, 9) for _ in range(4))
-    line = random.integers(1, 2**31 - 1, count).astype(np.int32)
-    return SetpointChunk(np.arange(count) * 1e-3, *tables, line, tuple(axes))
+from tests.outputs.parquet import FORMATS
+from tests.outputs.written import EVENTS, NAMES, chunk, ending, header, same, written
 
 
-def part_of(whole: SetpointChunk, first: int, last: int) -> SetpointChunk:
-    return SetpointChunk(**{name: getattr(whole, name)[first:last] for name in NAMES}, axes=whole.axes)
+def test_the_formats_are_found() -> None:
+    assert formats() == ("csv", "halstreamer", "json", "npz", "npz-compressed", "parquet", "pvt")
 
 
-def written(name: str, folder: Path, whole: SetpointChunk, cuts: tuple[int, ...] = ()) -> Path:
-    output = format_named(name)
-    with output.writer(folder / output.FILE, header(whole.axes), len(whole.t)) as add:
-        for first, last in zip((0, *cuts), (*cuts, len(whole.t)), strict=True):
-            add(part_of(whole, first, last))
-    return folder / output.FILE
-
-
-def ending(name: str) -> str:
-    return Path(format_named(name).FILE).suffix
-
-
-def header(axes: tuple[str, ...]) -> Header:
-    return Header(axes, tuple("deg" if axis in "ABC" else "mm" for axis in axes), 0.001)
-
-
-def same(a: SetpointChunk, b: SetpointChunk) -> bool:
-    return a.axes == b.axes and all(np.array_equal(getattr(a, name), getattr(b, name)) for name in NAMES)
-
-
-def test_the_three_formats_are_found() -> None:
-    assert set(formats()) >= {"npz", "npz-compressed", "csv", "json"}
-
-
-@pytest.mark.parametrize("name", formats())
+@pytest.mark.parametrize("name", FORMATS)
 @pytest.mark.parametrize("axes", ["X", "XYZ", "XYZABC"])
 def test_what_is_read_is_what_was_written(name: str, axes: str, tmp_path: Path) -> None:
     whole = chunk(1000, axes)
     file = written(name, tmp_path, whole)
     read = load_setpoints(file)
     assert same(read, whole)
-    assert (read.file, read.units) == (file, header(whole.axes).units)
-    assert read.period == (None if name == "csv" else 0.001)
+    assert (read.file, read.units, read.period) == (file, header(whole.axes).units, 0.001)
+    assert read.rows == (KNOTS if name == "pvt" else SETPOINTS)
 
 
-@pytest.mark.parametrize("name", formats())
+@pytest.mark.parametrize("name", FORMATS)
 def test_the_cuts_into_chunks_leave_no_trace(name: str, tmp_path: Path) -> None:
     (tmp_path / "cut").mkdir()
     whole = chunk(1000)
@@ -73,22 +42,22 @@ def test_the_cuts_into_chunks_leave_no_trace(name: str, tmp_path: Path) -> None:
     assert in_one.read_bytes() == in_parts.read_bytes()
 
 
-@pytest.mark.parametrize("name", formats())
+@pytest.mark.parametrize("name", FORMATS)
 def test_a_folder_gives_its_newest_setpoints(name: str, tmp_path: Path) -> None:
-    for other in formats():
+    for other in ("csv", "json", "pvt", "halstreamer", name):
         written(other, tmp_path, chunk(5))
     whole = chunk(7, seed=2)
     written(name, tmp_path, whole)
     assert same(load_setpoints(tmp_path), whole)
 
 
-@pytest.mark.parametrize("name", formats())
+@pytest.mark.parametrize("name", FORMATS)
 def test_a_single_setpoint_is_enough(name: str, tmp_path: Path) -> None:
     whole = chunk(1)
     assert same(load_setpoints(written(name, tmp_path, whole)), whole)
 
 
-@pytest.mark.parametrize("name", formats())
+@pytest.mark.parametrize("name", FORMATS)
 @pytest.mark.parametrize("content", [b"", b"\x00\xff\x80 not text", b"[1, 2]", b"a,b\n1,2\n", b"PK\x03\x04"])
 def test_a_file_of_something_else_is_refused_in_one_sentence(
     name: str, content: bytes, tmp_path: Path
@@ -100,7 +69,7 @@ def test_a_file_of_something_else_is_refused_in_one_sentence(
     assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize("name", formats())
+@pytest.mark.parametrize("name", FORMATS)
 def test_a_truncated_file_is_refused(name: str, tmp_path: Path) -> None:
     file = written(name, tmp_path, chunk(100))
     file.write_bytes(file.read_bytes()[:-50])
@@ -108,13 +77,13 @@ def test_a_truncated_file_is_refused(name: str, tmp_path: Path) -> None:
         load_setpoints(file)
 
 
-@pytest.mark.parametrize("name", formats())
+@pytest.mark.parametrize("name", FORMATS)
 def test_a_missing_file_is_named(name: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"none\.\w+ does not exist"):
         load_setpoints(tmp_path / f"none{ending(name)}")
 
 
-@pytest.mark.parametrize("name", formats())
+@pytest.mark.parametrize("name", FORMATS)
 def test_an_interrupted_write_raises_what_interrupted_it(name: str, tmp_path: Path) -> None:
     def write() -> None:
         output = format_named(name)
@@ -127,19 +96,29 @@ def test_an_interrupted_write_raises_what_interrupted_it(name: str, tmp_path: Pa
 
 
 def test_an_unknown_ending_and_an_empty_folder_name_the_remedy(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"give a file in \.csv, \.json, \.npz"):
+    with pytest.raises(
+        InputError, match=r"give a file in \.csv, \.halstream, \.json, \.npz, \.parquet, \.pvt"
+    ):
         load_setpoints(tmp_path / "setpoints.txt")
     with pytest.raises(InputError, match="feedplan plan PROGRAM -o"):
         load_setpoints(tmp_path)
-    with pytest.raises(InputError, match="use one of csv, json, npz, npz-compressed"):
-        format_named("parquet")
+    with pytest.raises(
+        InputError, match="use one of csv, halstreamer, json, npz, npz-compressed, parquet, pvt"
+    ):
+        format_named("xls")
 
 
 def test_npz_is_what_numpy_reads_and_maps_instead_of_loading(tmp_path: Path) -> None:
     whole = chunk(50)
     file = written("npz", tmp_path, whole)
     with np.load(file) as arrays:
-        assert sorted(arrays) == sorted((*NAMES, "axes", "format", "period", "units"))
+        assert sorted(arrays) == sorted(
+            (*NAMES, "axes", "format", "period", "units", "events", "event_texts")
+        )
+        assert arrays["events"]["kind"].tolist() == EVENTS.kind.tolist()
+        assert arrays["events"]["value"][1] == -8000.0
+        texts = bytes(arrays["event_texts"]).decode().split("\n")
+        assert [texts[place] for place in arrays["events"]["text"]] == list(EVENTS.text)
         assert arrays["axes"].tolist() == ["X", "Y", "Z"]
         assert arrays["units"].tolist() == ["mm", "mm", "mm"]
         assert (arrays["format"], arrays["period"]) == (FORMAT, 0.001)
@@ -184,14 +163,17 @@ def test_csv_has_a_header_with_units_and_exact_numbers(tmp_path: Path) -> None:
     values = (np.array([[value]]) for value in (0.1, -2.0, 1e-9, 0.0))
     whole = SetpointChunk(np.array([1e-3]), *values, np.array([7], np.int32), ("X",))
     file = written("csv", tmp_path, whole)
-    assert file.read_text().splitlines() == [
+    assert file.read_text().splitlines()[0] == (
+        '# feedplan {"kind": "setpoints", "format": 1, "period": 0.001, "axes": ["X"], "units": ["mm"]}'
+    )
+    assert [line for line in file.read_text().splitlines() if line[0] != "#"] == [
         "t [s],position X [mm],velocity X [mm/s],acceleration X [mm/s^2],jerk X [mm/s^3],line",
         "0.001,0.1,-2.0,1e-9,0,7",
     ]
 
 
 def test_csv_tells_angles_in_degrees(tmp_path: Path) -> None:
-    first = written("csv", tmp_path, chunk(1, "XA")).read_text().splitlines()[0]
+    first = written("csv", tmp_path, chunk(1, "XA")).read_text().splitlines()[1]
     assert first.startswith("t [s],position X [mm],position A [deg],velocity X [mm/s],velocity A [deg/s],")
 
 
@@ -230,7 +212,7 @@ def test_npz_is_smaller_where_it_is_compressed(tmp_path: Path) -> None:
     assert [entry.name for entry in packed.parent.iterdir()] == ["setpoints.npz"]
     with np.load(plain) as one, np.load(packed) as other:
         assert set(one) == set(other)
-        assert all(np.array_equal(one[name], other[name]) for name in one)
+        assert all(one[name].tobytes() == other[name].tobytes() for name in one)
 
 
 def test_csv_errors_name_the_line(tmp_path: Path) -> None:

@@ -21,10 +21,11 @@ def test_events_keep_their_place_and_order() -> None:
         (0, 4, "(begin)"),
         (0, 4, "M8"),
         (1, 5, "M62 P1"),
-        (2, 6, "M67 P0 Q0.5"),
+        (2, 6, "M67 E0 Q0.5"),
         (2, 7, "G4 P0.5"),
         (3, 9, "(mid #1)"),
         (3, 10, "M428"),
+        (3, 11, "(no message)"),
         (3, 12, "M0"),
         (3, 13, "S9000"),
         (4, 14, "(done)"),
@@ -45,3 +46,10 @@ def test_a_program_without_events_has_none() -> None:
     program = read_gcode("G21 G0 X1\n")
     assert len(program.events) == 0
     assert program.events.number.dtype == np.float64
+
+
+def test_comments_of_loops_come_each_time_and_their_texts_do_not_grow() -> None:
+    program = read_gcode("G21 G91 ; start\no1 repeat [1000]\n(again)\nG0 X1 ; at #1 \no1 endrepeat\nM2 ()\n")
+    assert program.events.words() == ("(start)", *["(again)", "(at #1)"] * 1000, "M2")
+    assert program.events.move.tolist()[:5] == [0, 0, 0, 1, 1]
+    assert len(program.events.texts) <= 5

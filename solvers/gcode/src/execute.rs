@@ -128,9 +128,9 @@ impl<'a> Interpreter<'a> {
         self.state.feed.map_or(0.0, |feed| feed.angular * per)
     }
 
-    /// A message to the operator.
-    pub fn message(&mut self, line: u32, text: String) {
-        self.moves.message(line, text);
+    /// A message to the operator, or a comment.
+    pub fn remark(&mut self, line: u32, letter: u8, text: String) {
+        self.moves.remark(line, letter, text);
     }
 
     /// Runs a block of the given line; true where it ends the program.

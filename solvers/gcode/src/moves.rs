@@ -11,7 +11,7 @@ use super::block::rotary;
 use super::fault::{fault, Outcome};
 use super::tip::Meaning;
 pub use columns::Columns;
-pub use events::Events;
+pub use events::{Events, COMMENT, MESSAGE};
 use feedplan_geometry::spline::CompositeCurve;
 
 /// A point of the machine: X Y Z A B C U V W in mm and degrees.

@@ -175,8 +175,8 @@ impl<'a> Runner<'a> {
                         self.interpreter.assign(&mut lexer.assigned);
                     }
                     let line = frame.shown.unwrap_or(lexer.line);
-                    for text in lexer.messages.drain(..) {
-                        self.interpreter.message(line, text);
+                    for (letter, text) in lexer.remarks.drain(..) {
+                        self.interpreter.remark(line, letter, text);
                     }
                     if self.interpreter.run(&self.block, line)? {
                         return Ok(Exit::End(Some("M2 or M30")));

@@ -7,6 +7,7 @@ use super::block::{g_name, g_remedy, m_group, Block, MGroup};
 use super::expression::{assignment, excerpt, expression, integer, Values};
 use super::fault::{fault, foreign, Outcome};
 use super::flow::{after_line, end_of_line, keyword};
+use super::moves::{COMMENT, MESSAGE};
 use super::number::{decimal, spaces};
 use super::parameters::Name;
 
@@ -31,8 +32,8 @@ pub struct Lexer<'a> {
     pub line: u32,
     /// What the block that was read last assigns.
     pub assigned: Vec<(Name, f64)>,
-    /// Messages of that block.
-    pub messages: Vec<String>,
+    /// Messages and comments of that block, by letters.
+    pub remarks: Vec<(u8, String)>,
     delete: bool,
     /// What lengths and angles without a decimal point count.
     whole_step: f64,
@@ -56,7 +57,7 @@ impl<'a> Lexer<'a> {
             at,
             line: 0,
             assigned: Vec::new(),
-            messages: Vec::new(),
+            remarks: Vec::new(),
             delete,
             whole_step,
             begun: false,
@@ -121,7 +122,7 @@ impl<'a> Lexer<'a> {
                         }
                         if TEXT_CODES.contains(&value) {
                             at = end_of_line(self.source, end);
-                            self.messages.push(text_of(&self.source[end..at]));
+                            self.remarks.push((MESSAGE, text_of(&self.source[end..at])));
                             continue;
                         }
                     }
@@ -148,12 +149,18 @@ impl<'a> Lexer<'a> {
                 }
                 b'(' => {
                     let end = self.comment(at)?;
-                    if let Some(message) = message(&self.source[at + 1..end - 1]) {
-                        self.messages.push(message);
+                    let text = &self.source[at + 1..end - 1];
+                    match message(text) {
+                        Some(message) => self.remarks.push((MESSAGE, message)),
+                        None => self.remark(text),
                     }
                     at = end;
                 }
-                b';' => at = end_of_line(self.source, at),
+                b';' => {
+                    let end = end_of_line(self.source, at);
+                    self.remark(&self.source[at + 1..end]);
+                    at = end;
+                }
                 b'#' => {
                     let (name, value, end) = assignment(self.source, at, values)?;
                     self.assigned.push((name, value));
@@ -199,6 +206,15 @@ impl<'a> Lexer<'a> {
         }
         self.begun |= !block.is_empty();
         Ok(Some(Line::Block))
+    }
+
+    /// A comment; none where it is empty.
+    #[cold]
+    fn remark(&mut self, text: &[u8]) {
+        let text = text_of(text);
+        if !text.is_empty() {
+            self.remarks.push((COMMENT, text));
+        }
     }
 
     /// The value of a word from `at` to `end`, on a control where a number without a point counts its own steps.

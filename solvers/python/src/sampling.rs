@@ -45,6 +45,7 @@ fn speed(arrays: &Option<SpeedArrays>) -> PyResult<Option<(Vec<f64>, Vec<usize>)
 trait Stream: Send + Sync {
     fn count(&self) -> usize;
     fn duration(&self) -> f64;
+    fn runs(&self) -> Vec<[f64; 3]>;
     fn chunk<'py>(
         &self,
         py: Python<'py>,
@@ -69,6 +70,10 @@ impl<const M: usize> Stream for Sampler<M> {
 
     fn duration(&self) -> f64 {
         self.duration()
+    }
+
+    fn runs(&self) -> Vec<[f64; 3]> {
+        self.runs().collect()
     }
 
     fn chunk<'py>(
@@ -238,6 +243,12 @@ impl PySampler {
     #[getter]
     fn duration(&self) -> f64 {
         self.stream.duration()
+    }
+
+    /// (runs, 3) when each starts on the plan's own clock, when on that of the setpoints, and its time in motion.
+    #[getter]
+    fn runs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        to_array2(py, self.stream.runs(), 3)
     }
 
     /// The setpoints from `start` up to `stop`.

@@ -208,6 +208,11 @@ impl<const M: usize> Sampler<M> {
         self.time(self.count - 1)
     }
 
+    /// Each run: when it starts on the plan's own clock, when on that of the setpoints, and its time in motion.
+    pub fn runs(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
+        self.runs.iter().map(|run| [run.begin, run.first as f64 * self.period, run.time])
+    }
+
     /// Time of a setpoint in seconds.
     fn time(&self, index: usize) -> f64 {
         match self.runs.last() {

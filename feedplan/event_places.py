@@ -1,0 +1,144 @@
+"""Where events of a program are on the path that is followed, and when a profile takes the tool there.
+
+An event belongs to the end of the move before it. Where the program stops there, that is the end of a
+run, and events follow each other there, each dwell taking its time. Elsewhere it is where the path goes
+from one move to the next or, where one piece follows both as at a rounded corner or along fitted points,
+the place of it that is nearest to the programmed point.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.constraints.problem import Problem
+from feedplan.events import PlacedEvents, TimedEvents
+from feedplan.geometry.path import Path
+from feedplan.lazy import cached_property
+from feedplan.profile import SpeedProfile
+from feedplan.program.actions import actions
+from feedplan.program.program import Program
+from feedplan.setpoints import sampler
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+# Places of a piece that are tried, and steps from the nearest of them to the nearest place.
+_TRIED, _STEPS = 9, 8
+# A step of this part of a piece leads nowhere else.
+_FOUND = 1e-9
+# Pairs of a programmed point and a piece that are looked at together.
+_AT_ONCE = 100_000
+
+
+class PlannedEvents:
+    """The events of a plan, placed on its path when they are first asked for."""
+
+    def __init__(self, program: Program, problem: Problem, profile: SpeedProfile) -> None:
+        self._plan = (program, problem, profile)
+
+    @cached_property
+    def placed(self) -> PlacedEvents:
+        """By the runs of the path."""
+        return place_events(*self._plan)
+
+    def on(self, starts: Floats) -> TimedEvents:
+        """See `PlacedEvents.on`."""
+        return self.placed.on(starts)
+
+
+def place_events(program: Program, problem: Problem, profile: SpeedProfile) -> PlacedEvents:
+    """The events of a program on the path of a problem, by the profile planned for it."""
+    path, events = problem.path, program.events
+    motion = sampler(problem, profile, problem.period)
+    starts, _, times = motion.runs.T
+    moves, of_move = np.unique(events.move, return_inverse=True)
+    run, piece, u = _places(program, path, moves)
+    at_stop = piece < 0
+    after = np.where(at_stop & (run >= 0), times[run], 0.0)
+    passing = ~at_stop
+    if passing.any():
+        reached = motion.along(piece[passing].astype(np.uint32), u[passing])[0]
+        after[passing] = reached - starts[run[passing]]
+    done = actions(events)
+    # Dwells belong to stops; those before an event of the same stop have passed.
+    waits = np.where(done.kind == "dwell", done.value, 0.0)
+    passed = np.cumsum(waits) - waits
+    passed -= passed[np.searchsorted(events.move, moves)][of_move]
+    run, after = run[of_move], after[of_move] + passed
+    # Nearest places may go back by a little where the path is close to itself: no event comes before another.
+    time = np.concatenate(([0.0], starts))[run + 1] + after
+    is_latest = time == np.maximum.accumulate(time)
+    source = np.maximum.accumulate(np.where(is_latest, np.arange(len(time)), 0))
+    texts, _ = events.said()
+    placed = TimedEvents(
+        np.zeros(len(events)), events.line, done.kind, done.channel, done.value, done.stops, tuple(texts)
+    )
+    return PlacedEvents(placed, run[source], after[source], starts)
+
+
+def _places(program: Program, path: Path, moves: Indices) -> tuple[Indices, Indices, Floats]:
+    """Run, piece and parameter where the path has followed so many `moves` (k,), sorted, and no more.
+
+    The piece is −1 where that is a stop, at the end of the run, or at the start of the path for run −1.
+    """
+    first, last = path.move[:, 0], path.move[:, 1]
+    # The pieces from `low` on follow later moves too, those from `high` on later moves alone.
+    low = np.searchsorted(last, moves - 1, side="right")
+    high = np.searchsorted(first, moves - 1, side="right")
+    shared = (low < high) & (moves > 0)
+    # Where no piece is shared, the place is the end of the piece before.
+    run = np.searchsorted(path.runs[1:], np.maximum(low - 1, 0), side="right")
+    ends = ~shared & ((moves == 0) | (low == path.runs[1:][np.minimum(run, len(path.runs) - 2)]))
+    piece = np.where(ends, -1, low - 1)
+    u = np.where(ends, 0.0, path.width[np.maximum(low - 1, 0)])
+    run = np.where(moves == 0, -1, run)
+    if shared.any():
+        columns = [program.axes.index(name) for name in path.axes]
+        points = program.target[moves[shared] - 1][:, columns]
+        piece[shared], u[shared] = _nearest(path, points, low[shared], high[shared])
+        run[shared] = np.searchsorted(path.runs[1:], piece[shared], side="right")
+    return run, piece, u
+
+
+def _nearest(path: Path, points: Floats, low: Indices, high: Indices) -> tuple[Indices, Floats]:
+    """The nearest places to points (k, axes), each on the pieces from `low` up to `high` (k,)."""
+    piece, u = np.empty(len(points), np.int64), np.empty(len(points))
+    offsets = np.concatenate(([0], np.cumsum(high - low)))
+    start = 0
+    while start < len(points):
+        stop = max(start + 1, int(np.searchsorted(offsets, offsets[start] + _AT_ONCE, side="right")) - 1)
+        own = slice(start, stop)
+        piece[own], u[own] = _nearest_of(path, points[own], low[own], (high - low)[own])
+        start = stop
+    return piece, u
+
+
+def _nearest_of(path: Path, points: Floats, low: Indices, count: Indices) -> tuple[Indices, Floats]:
+    owner = np.repeat(np.arange(len(points)), count)
+    begins = np.concatenate(([0], np.cumsum(count)[:-1]))
+    pieces = low[owner] + np.arange(len(owner)) - begins[owner]
+    shares = np.linspace(0.0, 1.0, _TRIED)
+    tried = (path.width[pieces][:, None] * shares).ravel()
+    places = path.curve.evaluate(np.repeat(pieces, _TRIED), tried)[0]
+    away = np.linalg.norm(places - np.repeat(points[owner], _TRIED, axis=0), axis=1).reshape(-1, _TRIED)
+    nearest = away.argmin(axis=1)
+    away = away.min(axis=1)
+    # The first of each owner's pieces that are nearest.
+    least = np.minimum.reduceat(away, begins)
+    leading = np.flatnonzero(away == least[owner])
+    best = leading[np.searchsorted(owner[leading], np.arange(len(points)))]
+    piece, u = pieces[best], tried[best * _TRIED + nearest[best]]
+    width, found = path.width[piece], u
+    for _ in range(_STEPS):
+        place, tangent = path.curve.evaluate(piece, u, 1)
+        square = (tangent**2).sum(axis=1)
+        step = np.divide(
+            ((points - place) * tangent).sum(axis=1), square, out=np.zeros_like(u), where=square > 0
+        )
+        if (np.abs(step) <= _FOUND * width).all():
+            break
+        u = np.clip(u + step, 0.0, width)
+        away = np.linalg.norm(path.curve.evaluate(piece, u)[0] - points, axis=1)
+        found, least = np.where(away < least, u, found), np.minimum(away, least)
+    return piece, found

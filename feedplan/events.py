@@ -1,0 +1,146 @@
+"""Events in time: what a machine does besides moving, when, and by which line of the program."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.program.actions import KINDS
+from feedplan.units import counted
+
+
+class Event(NamedTuple):
+    """One event; see `TimedEvents`."""
+
+    time: float
+    line: int
+    kind: str
+    channel: float
+    value: float
+    stops: bool
+    text: str
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TimedEvents:
+    """Events in the order in which they happen, one row each.
+
+    `time` (m,) [s], by the clock of whoever hands them out; `line` (m,) source line; `kind`, `channel` and
+    `value` (m,) say what happens (`feedplan.program.actions`, NaN where there is none); `stops` (m,) whether
+    the program stops the tool for it; `text` (m,) the word of the program, such as `M62 P3`, or what a
+    message or a comment says. The value of a dwell is its time [s], which begins at `time`.
+    """
+
+    time: NDArray[np.float64]
+    line: NDArray[np.int32]
+    kind: NDArray[np.str_]
+    channel: NDArray[np.float64]
+    value: NDArray[np.float64]
+    stops: NDArray[np.bool_]
+    text: tuple[str, ...]
+
+    @classmethod
+    def of(cls, rows: Iterable[Event]) -> TimedEvents:
+        """From rows."""
+        columns = list(zip(*rows, strict=True)) or [()] * len(Event._fields)
+        time, line, kind, channel, value, stops, text = columns
+        return cls(
+            time=np.array(time, np.float64),
+            line=np.array(line, np.int32),
+            kind=np.array(kind, np.str_),
+            channel=np.array(channel, np.float64),
+            value=np.array(value, np.float64),
+            stops=np.array(stops, np.bool_),
+            text=tuple(text),
+        )
+
+    @classmethod
+    def none(cls) -> TimedEvents:
+        """No events."""
+        return cls.of(())
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __iter__(self) -> Iterator[Event]:
+        columns = (self.time, self.line, self.kind, self.channel, self.value, self.stops)
+        rows = zip(*(column.tolist() for column in columns), self.text, strict=True)
+        return (Event(*row) for row in rows)
+
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{count} {kind}" for kind, count in self.counts().items())
+        return f"<{counted(len(self), 'event')}{': ' if counts else ''}{counts}>"
+
+    def counts(self) -> dict[str, int]:
+        """How many of each kind there are."""
+        kinds, counts = np.unique(self.kind, return_counts=True)
+        found = dict(zip(kinds.tolist(), counts.tolist(), strict=True))
+        return {kind: found[kind] for kind in KINDS if kind in found}
+
+    def sha256(self) -> str:
+        """A hash of all that they say, to the last digit."""
+        digest = hashlib.sha256()
+        for numbers in (self.time, self.line, self.channel, self.value, self.stops):
+            values = numbers.astype("<f8")
+            digest.update(np.where(np.isnan(values), np.nan, values).tobytes())
+        digest.update(json.dumps([self.kind.tolist(), self.text]).encode())
+        return digest.hexdigest()
+
+
+class Events(Protocol):
+    """Events that know where they are in the runs of a plan."""
+
+    def on(self, starts: NDArray[np.float64]) -> TimedEvents: ...
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PlacedEvents:
+    """The events of a plan by the runs between its stops: `run` (m,) is the one in which each happens, −1
+    before the first, and `after` (m,) [s] how long after its start; `starts` (runs,) [s] are those of the
+    plan's own clock. The times of `events` are none yet."""
+
+    events: TimedEvents
+    run: NDArray[np.int64]
+    after: NDArray[np.float64]
+    starts: NDArray[np.float64]
+
+    def on(self, starts: NDArray[np.float64]) -> TimedEvents:
+        """The events by a clock on which the runs start at other times (runs,) [s]."""
+        time = np.concatenate(([0.0], starts))[self.run + 1] + self.after
+        # A run may start by a rounding before the one before it has ended.
+        return replace(self.events, time=np.maximum.accumulate(time))
+
+    def timed(self) -> TimedEvents:
+        """The events by the plan's own clock."""
+        return self.on(self.starts)
+
+
+def to_json(event: Event) -> dict[str, Any]:
+    """An event by names; a channel or value that it has not is None."""
+    return {name: None if value != value else value for name, value in event._asdict().items()}
+
+
+def of_json(row: object) -> Event:
+    """The reverse of `to_json`. Raises ValueError or TypeError for anything else."""
+    if not isinstance(row, dict) or set(row) != set(Event._fields):
+        raise ValueError(f"the names {', '.join(Event._fields)} are needed")
+    if not (isinstance(row["kind"], str) and isinstance(row["text"], str)):
+        raise TypeError("kind and text are texts")
+    if not isinstance(row["stops"], bool):
+        raise TypeError("stops is true or false")
+    number = {name: math.nan if row[name] is None else float(row[name]) for name in ("channel", "value")}
+    return Event(
+        time=float(row["time"]),
+        line=int(row["line"]),
+        kind=row["kind"],
+        stops=row["stops"],
+        text=row["text"],
+        **number,
+    )

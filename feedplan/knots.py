@@ -1,0 +1,87 @@
+"""Knots of a plan: its states at equal steps between stops, and at every stop exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.arguments import number, positive
+from feedplan.constraints.problem import Problem
+from feedplan.errors import InputError
+from feedplan.profile import SpeedProfile
+from feedplan.setpoints import MAX_SETPOINTS, SetpointChunk, chunks, sampler
+
+# A run has so many steps at least, so that it shows how fast it goes.
+LEAST_STEPS = 2
+
+
+class Knots:
+    """The states by the plan's own clock, computed as they are read.
+
+    A run is divided into equal steps, none longer than `step` [s] and two at least, and a pause is a step of
+    its own: the last of `count` knots is at the plan's time, `duration` [s]. At a stop velocity, acceleration
+    and jerk are 0.
+    Raises InputError for a step that cannot be used, or one that makes more than `most` knots.
+    """
+
+    def __init__(
+        self, problem: Problem, profile: SpeedProfile, step: float, most: int = MAX_SETPOINTS
+    ) -> None:
+        self.step = number(step, "the step", "a positive number", positive, "s")
+        self.axes = problem.axes
+        self._sampler = sampler(problem, profile, problem.period)
+        self._origin = problem.joint_origin
+        self._ends_at_rest = problem.end_speed == 0.0
+        begins, _, times = self._sampler.runs.T
+        # Pauses and runs in turn; a pause of no time has no step.
+        pauses = np.concatenate(([problem.path.start_dwell], problem.path.dwell))
+        self._begin = np.zeros(2 * len(times) + 1)
+        self._begin[1::2], self._begin[2::2] = begins, begins + times
+        self._time = np.zeros(2 * len(times) + 1)
+        self._time[0::2], self._time[1::2] = pauses, times
+        steps = np.where(pauses > 0.0, 1.0, 0.0)
+        moving = np.where(times > 0.0, np.maximum(np.ceil(times / self.step), LEAST_STEPS), 0.0)
+        if not 1.0 + steps.sum() + moving.sum() <= most:
+            raise InputError(
+                f"a step of {step:g} s makes more than {most} knots: choose a longer one, or ask for so many "
+                "by max_setpoints"
+            )
+        self._steps = np.zeros(2 * len(times) + 1, np.int64)
+        self._steps[0::2], self._steps[1::2] = steps, moving
+        self._ends = np.cumsum(self._steps)
+        self.count = 1 + int(self._ends[-1])
+        self.duration = float(self._begin[-1] + self._time[-1])
+
+    def __repr__(self) -> str:
+        return f"<Knots: {self.count} of {' '.join(self.axes)}, one every {self.step:g} s at most>"
+
+    def chunks(self, size: int = 100_000) -> Iterator[SetpointChunk]:
+        """The knots in chunks of `size`, the last one shorter: memory does not grow with their number."""
+        return chunks(self._chunk, self.count, size)
+
+    def _chunk(self, start: int, stop: int) -> SetpointChunk:
+        index = np.arange(start, stop)
+        # A knot ends a step of this part; the very first one begins the first.
+        part = np.searchsorted(self._ends, np.maximum(index, 1), side="left")
+        left, steps = self._ends[part] - index, self._steps[part]
+        begin, time = self._begin[part], self._time[part]
+        t = begin + time * ((steps - left) / steps)
+        # Through a pause the place is that in which it begins.
+        pausing = part % 2 == 0
+        states = self._sampler.at(np.where(pausing, begin, t))
+        _, position, velocity, acceleration, jerk, line, piece, u, *_ = states
+        if self._origin is not None:
+            position += self._origin[piece]
+        chunk = SetpointChunk(t, position, velocity, acceleration, jerk, line, self.axes, piece, u)
+        stops = (left == 0) & (self._ends_at_rest | (index < self.count - 1))
+        return _resting(chunk, pausing | stops)
+
+
+def _resting(chunk: SetpointChunk, rests: NDArray[np.bool_]) -> SetpointChunk:
+    """The same without motion at some rows."""
+    moving = ~rests[:, None]
+    rates = {name: getattr(chunk, name) * moving for name in ("velocity", "acceleration", "jerk")}
+    return replace(chunk, **rates)

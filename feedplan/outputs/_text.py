@@ -1,0 +1,197 @@
+"""Rows of numbers as text, with what all of them have in common, and the events, in comments between them.
+
+A comment is `# name {JSON}`, and `#+` goes on with the one before where that would be too long for other
+readers. An event stands before the first row at or after its time.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path as FilePath
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan._solvers import csv_rows
+from feedplan.arguments import shown
+from feedplan.errors import InputError
+from feedplan.events import TimedEvents, to_json
+from feedplan.outputs import FORMAT, Header
+from feedplan.outputs._events import from_objects
+from feedplan.progress import Listener, tell
+
+HEADER, EVENT, _MORE = "feedplan", "event", "#+"
+# LinuxCNC's halstreamer reads lines of 4000 bytes.
+_LONGEST = 1000
+_BYTES_AT_ONCE = 1_000_000
+
+
+def _comment(name: str, data: object) -> bytes:
+    """The lines of one comment, in ASCII."""
+    text = f"# {name} {json.dumps(data)}"
+    width = _LONGEST - len(_MORE)
+    first, rest = text[:_LONGEST], text[_LONGEST:]
+    parts = (_MORE + rest[at : at + width] for at in range(0, len(rest), width))
+    return "".join(f"{line}\n" for line in (first, *parts)).encode()
+
+
+class RowWriter:
+    """Writes rows of numbers, each closed by an integer, and the events between them."""
+
+    def __init__(
+        self,
+        stream: BinaryIO,
+        kind: str,
+        header: Header,
+        names: str = "",
+        separator: bytes = b",",
+        extra: dict[str, Any] | None = None,
+    ) -> None:
+        self._stream, self._separator = stream, separator
+        self._events, self._time, self._done = iter(header.events), header.events.time, 0
+        common = {"kind": kind, "format": FORMAT, "period": header.period}
+        common |= {"axes": header.axes, "units": header.units}
+        stream.write(_comment(HEADER, common | (extra or {})))
+        stream.write(names.encode())
+
+    def add(self, t: NDArray[np.float64], values: NDArray[np.float64], last: NDArray[np.int32]) -> None:
+        """Rows (n, k) at the times `t` (n,), and their integers (n,)."""
+        due = int(np.searchsorted(self._time, t[-1], side="right")) if len(t) else self._done
+        first = 0
+        for row in np.searchsorted(t, self._time[self._done : due], side="left").tolist():
+            self._rows(values[first:row], last[first:row])
+            self._event()
+            first = row
+        self._rows(values[first:], last[first:])
+        self._done = max(due, self._done)
+
+    def close(self) -> None:
+        """Writes the events after the last row, which rounding may have put there."""
+        for _ in range(self._done, len(self._time)):
+            self._event()
+
+    def _event(self) -> None:
+        self._stream.write(_comment(EVENT, to_json(next(self._events))))
+
+    def _rows(self, values: NDArray[np.float64], last: NDArray[np.int32]) -> None:
+        if len(last):
+            rows = np.ascontiguousarray(values, np.float64), np.ascontiguousarray(last, np.int32)
+            self._stream.write(csv_rows(*rows).replace(b",", self._separator))
+
+
+@dataclass
+class Rows:
+    """What a file of rows holds: `header` as written, empty where there is none; the line with the `names`,
+    if the format has one; the `table` (n, k) and the `events`."""
+
+    header: dict[str, Any] = field(default_factory=dict)
+    names: str = ""
+    table: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0)))
+    events: TimedEvents = field(default_factory=TimedEvents.none)
+
+    def of_header(self, name: str, kind: type, file: FilePath) -> Any:
+        """An entry of the header. Raises InputError where it is missing or of another type."""
+        value = self.header.get(name)
+        if not isinstance(value, kind):
+            what = "missing" if value is None else shown(value)
+            raise InputError(
+                f"{file}: {name} is {what} in its comment # {HEADER} {{…}}: give a file that feedplan wrote"
+            )
+        return value
+
+
+def read_rows(
+    file: FilePath,
+    width_of: Callable[[Rows], int],
+    *,
+    has_names: bool = True,
+    separator: str | None = ",",
+    progress: Listener | None = None,
+) -> Rows:
+    """The rows of a file. `width_of` tells how many numbers a row has, from what stands before them.
+
+    Raises InputError naming file, line and what is wrong.
+    """
+    rows, size = Rows(), max(file.stat().st_size, 1)
+    parts: list[NDArray[np.float64]] = []
+    comments: list[str] = []
+    done, read, width, waits_for_names = 0, 0, 0, has_names
+    try:
+        with file.open(encoding="utf-8", newline="\n") as stream:
+            while lines := stream.readlines(_BYTES_AT_ONCE):
+                numbers = []
+                for number, line in enumerate(lines, start=done + 1):
+                    if line.startswith(_MORE) and comments:
+                        comments[-1] += line[len(_MORE) :].rstrip("\r\n")
+                    elif line.startswith("#"):
+                        comments.append(line.rstrip("\r\n"))
+                    elif waits_for_names:
+                        rows.names, waits_for_names = line.strip(), False
+                    else:
+                        numbers.append((number, line))
+                if not width and not waits_for_names:
+                    rows.header = _header(comments, file)
+                    width = width_of(rows)
+                if numbers:
+                    parts.append(_table(numbers, width, separator, file))
+                done += len(lines)
+                read += sum(map(len, lines))
+                tell(progress, min(read / size, 1.0))
+    except UnicodeDecodeError:
+        raise InputError(f"{file} is not text: give a file of setpoints") from None
+    if not width:
+        width = width_of(rows)
+    rows.table = np.concatenate(parts) if parts else np.empty((0, width))
+    rows.events = from_objects(_named(EVENT, comments, file), file)
+    return rows
+
+
+def _header(comments: list[str], file: FilePath) -> dict[str, Any]:
+    """What the first comment of that name says; nothing where there is none."""
+    header: object = next(_named(HEADER, comments, file), {})
+    if not isinstance(header, dict):
+        raise InputError(f"{file}: the comment # {HEADER} is {shown(header)}: give a JSON object")
+    return header
+
+
+def _named(name: str, comments: list[str], file: FilePath) -> Iterator[Any]:
+    """What the comments of a name hold."""
+    begin = f"# {name} "
+    for text in comments:
+        if text.startswith(begin):
+            try:
+                yield json.loads(text[len(begin) :])
+            except (ValueError, RecursionError) as error:
+                raise InputError(f"{file}: the comment {begin}… is not JSON ({error}): plan again") from None
+
+
+def _table(
+    numbered: list[tuple[int, str]], width: int, separator: str | None, file: FilePath
+) -> NDArray[np.float64]:
+    """Lines as numbers, each with its own number in the file."""
+    lines = [line for _, line in numbered]
+    try:
+        table = np.loadtxt(lines, delimiter=separator, ndmin=2, comments=None, dtype=np.float64)
+        if table.shape == (len(lines), width):
+            return table
+    except ValueError:
+        pass
+    for number, text in numbered:
+        fields = text.rstrip("\r\n").split(separator)
+        if len(fields) != width:
+            raise InputError(f"{file}, line {number}: {len(fields)} values where {width} are needed")
+        wrong = next((given for given in fields if not _is_number(given)), None)
+        if wrong is not None:
+            raise InputError(f"{file}, line {number}: '{wrong}' is not a number")
+    raise InputError(f"{file}: the rows cannot be read: give one line of {width} numbers a setpoint")
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,95 @@
+"""A table of position, velocity and time, for drives that interpolate between its knots.
+
+A line has the time of a knot by the plan's own clock, the time since the knot before, position and
+velocity of each axis, and the source line: `time [s],step [s],position X [mm],velocity X [mm/s],…,line`.
+Between two stops all steps are equal, none longer than the step that was asked for; knots at stops have
+the plan's own times and no velocity, and a pause is one step. Comments tell the rest, as in csv. Every
+number is the shortest that reads back the same.
+
+A drive goes from knot to knot on cubic polynomials, which have the plan's positions and velocities at the
+knots. Where an acceleration jumps between two of them, that of the cubic overshoots, whatever the step:
+plans of limited jerk suit such drives, and `feedplan check` tells the greatest acceleration of the
+cubics.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path as FilePath
+
+import numpy as np
+
+from feedplan.errors import InputError
+from feedplan.outputs import KNOTS, QUANTITIES, Add, Header, SetpointFile
+from feedplan.outputs._arrays import chunk_of
+from feedplan.outputs._text import Rows, RowWriter, read_rows
+from feedplan.progress import Listener
+from feedplan.setpoints import SetpointChunk
+
+FILE = "setpoints.pvt"
+ROWS = KNOTS
+_NAMED = re.compile(r"position (\S+) \[([^\s\[\]]+)\]")
+_PAIR = ("position", "velocity")
+
+
+def column_names(axes: Sequence[str], units: Sequence[str]) -> str:
+    """The names of the columns."""
+    pairs = [
+        f"{name} {axis} [{unit}{QUANTITIES[name]}]"
+        for axis, unit in zip(axes, units, strict=True)
+        for name in _PAIR
+    ]
+    return ",".join(["time [s]", "step [s]", *pairs, "line"])
+
+
+@contextmanager
+def writer(file: FilePath, header: Header, count: int) -> Iterator[Add]:
+    """Writes the header, then a line for every knot."""
+    before = 0.0
+    with file.open("wb") as stream:
+        rows = RowWriter(stream, "pvt", header, f"{column_names(header.axes, header.units)}\n")
+
+        def add(chunk: SetpointChunk) -> None:
+            nonlocal before
+            steps = np.diff(chunk.t, prepend=before)
+            pairs = np.stack([chunk.position, chunk.velocity], axis=2).reshape(
+                len(chunk), 2 * len(chunk.axes)
+            )
+            rows.add(chunk.t, np.column_stack([chunk.t, steps, pairs]), chunk.line)
+            before = chunk.t[-1] if len(chunk) else before
+
+        yield add
+        rows.close()
+
+
+def load(file: FilePath, progress: Listener | None = None) -> SetpointFile:
+    """The knots of a table with the names that this format writes."""
+    axes: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
+
+    def width_of(rows: Rows) -> int:
+        nonlocal axes, units
+        found = _NAMED.findall(rows.names)
+        axes, units = zip(*found, strict=True) if found else (("X", "Y"), ("mm", "mm"))
+        if rows.names != (names := column_names(axes, units)):
+            raise InputError(f"{file}: the columns must be named {names}")
+        return 3 + len(_PAIR) * len(axes)
+
+    rows = read_rows(file, width_of, progress=progress)
+    period = rows.of_header("period", float, file)
+    t, steps = rows.table[:, 0], rows.table[:, 1]
+    if (wrong := np.diff(t, prepend=0.0) != steps).any():
+        raise InputError(
+            f"{file}: the step to {t[wrong][0]:.9g} s is {steps[wrong][0]:.9g} s, not the difference of the "
+            "times: one of them was changed, plan again"
+        )
+    columns = {
+        "t": t,
+        "position": rows.table[:, 2:-1:2],
+        "velocity": rows.table[:, 3:-1:2],
+        "line": rows.table[:, -1],
+    }
+    told = {"format": rows.header.get("format"), "period": period, "events": rows.events}
+    return chunk_of({**columns, **told, "axes": axes, "units": units}, file, tuple(columns), KNOTS)
