@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -164,6 +164,30 @@ class Audit:
             else:
                 result.setdefault(check.name, {})[check.axis] = check.to_json()
         return result
+
+    @classmethod
+    def from_json(cls, table: Mapping[str, Any], units: Mapping[str, str], length: str) -> Audit:
+        """The audit that `to_json` tells; `units` are those of the axes, `length` that of the path."""
+        checks = []
+        for name, entry in table.items():
+            if name not in _KINDS:
+                continue
+            by_axis = {None: entry} if "ratio" in entry else entry
+            for axis, row in by_axis.items():
+                numbers = {
+                    key: missing if row[key] is None else row[key]
+                    for key, missing in (
+                        ("worst", math.nan),
+                        ("limit", math.inf),
+                        ("ratio", math.nan),
+                        ("time", math.nan),
+                    )
+                }
+                unit = length if axis is None else units[axis]
+                checks.append(
+                    LimitCheck(name, axis, **numbers, line=row["line"], judged=row["judged"], length=unit)
+                )
+        return cls(tuple(checks), table["checked_samples"])
 
 
 def join(

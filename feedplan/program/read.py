@@ -14,7 +14,7 @@ from feedplan.arguments import callback, file_path, flag, is_text, number, posit
 from feedplan.machine.machine import Machine
 from feedplan.program import path_file
 from feedplan.program.dxf import read_dxf
-from feedplan.program.gcode import read_gcode
+from feedplan.program.gcode import MAX_MOVES, read_gcode
 from feedplan.program.path_file import read_path_file
 from feedplan.program.program import Program
 from feedplan.program.source import MAX_BYTES, Source, content_of
@@ -29,6 +29,7 @@ class Reading(TypedDict, total=False):
     tool_table: str | os.PathLike[str] | None
     subprograms: Sequence[str | os.PathLike[str]]
     whole_step: float
+    max_moves: int
 
 
 def checked_reading(reading: object) -> Reading:
@@ -68,6 +69,7 @@ def read_program(
     feed: float | None = None,
     whole_step: float = 1.0,
     max_bytes: int = MAX_BYTES,
+    max_moves: int = MAX_MOVES,
     progress: Listener | None = None,
 ) -> Program:
     """The moves of a part program: a path file (.json), a drawing (.dxf), else G-code.
@@ -79,7 +81,8 @@ def read_program(
     out blocks that start with `/`. `tool_table` is a file of LinuxCNC (.tbl) with lengths and diameters of
     tools; `subprograms` are folders of files that the program calls, after its own; `feed` [mm/s, deg/s] is
     that of moves before the first F; `whole_step` is what lengths without a decimal point count, in units of
-    the program. `progress` is told how far it is.
+    the program; G-code of more than `max_moves`, its loops and calls run, is refused. `progress` is told how
+    far it is.
     Raises ProgramError in one sentence where the program is missing, a directory, empty, binary, larger than
     `max_bytes` or not understood, MissingPackageError where a drawing needs a package, MachineError,
     InputError for other arguments that cannot be used.
@@ -89,6 +92,7 @@ def read_program(
         raise refuse("the name", name, "a text")
     block_delete = flag(block_delete, "block_delete")
     max_bytes = whole(max_bytes, "max_bytes", "a whole number from 1")
+    max_moves = whole(max_moves, "max_moves", f"a whole number from 1 to {MAX_MOVES}", most=MAX_MOVES)
     callback(progress, "the part done")
     content, name, text = content_of(source, name, max_bytes)
     reader, most = READERS.get(_language(content, name), (None, max_bytes))
@@ -116,6 +120,7 @@ def read_program(
             feed=None if feed is None else number(feed, "the feed", "a positive number", positive, "mm/s"),
             whole_step=number(whole_step, "whole_step", "a positive number", positive),
             max_bytes=max_bytes,
+            max_moves=max_moves,
             progress=progress,
         )
         program = replace(program, reading=again)
