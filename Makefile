@@ -52,6 +52,10 @@ campaign: $(VENV)/built
 	FEEDPLAN_SEEDS=1000 $(BIN)/pytest --numprocesses auto tests/planners/test_extreme_machines.py
 	FEEDPLAN_SEEDS=10000 $(BIN)/pytest --numprocesses auto tests/test_hostile.py
 	FEEDPLAN_SEEDS=1000 $(BIN)/pytest --numprocesses auto tests/planned_feeds/test_linuxcnc_reads.py
+	FEEDPLAN_SEEDS=10000 $(BIN)/pytest tests/service/test_hostile_uploads.py
+	FEEDPLAN_SEEDS=200 $(BIN)/pytest tests/service/test_kills.py
+	$(BIN)/pip install --quiet schemathesis
+	FEEDPLAN_EXAMPLES=100 $(BIN)/pytest tests/service/test_documentation.py
 	cargo fuzz --version >/dev/null 2>&1 || cargo install --locked cargo-fuzz
 	cd solvers && cargo fuzz run --sanitizer none gcode -- -dict=fuzz/gcode.dict -max_total_time=300 -timeout=10 -max_len=4096
 	for i in 1 2 3 4 5 6 7 8 9 10; do \

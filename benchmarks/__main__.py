@@ -21,6 +21,7 @@ from benchmarks import (
     methods,
     planner_cost,
     results,
+    service,
     size,
     time_limit,
     zhang_comparison,
@@ -42,6 +43,7 @@ BENCHMARKS = {
         time_limit,
         size,
         interrupts,
+        service,
     )
 }
 

@@ -4,7 +4,8 @@
     plan.time, plan.lower_bound, plan.audit().ok
     feedplan.write_plan(plan, "part")
 
-`plan` plans a program on a machine, `compare` by several methods, `check` audits setpoints in files.
+`plan` plans a program on a machine, `compare` by several methods, `check` audits setpoints in files; `Client`
+has the same on a service.
 Millimetres, degrees and seconds throughout. Whatever is wrong with what is given raises a `FeedplanError`,
 one sentence with the remedy.
 """
@@ -12,6 +13,7 @@ one sentence with the remedy.
 from feedplan._solvers import __version__ as __version__
 from feedplan.audit import Audit, LimitCheck
 from feedplan.checking import check
+from feedplan.client.client import Client
 from feedplan.comparison import Row, compare
 from feedplan.errors import (
     FeedplanError,
@@ -39,6 +41,7 @@ from feedplan.trajectory import State, Trajectory
 __all__ = [
     "Audit",
     "Axis",
+    "Client",
     "FeedplanError",
     "InfeasibleError",
     "InputError",

@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path as FilePath
 from typing import IO, Any
 
@@ -40,6 +40,7 @@ from feedplan.machine_commands import machines
 from feedplan.program.read import Reading
 from feedplan.program_options import ProgramWanted, program_options
 from feedplan.reading_options import machine_for, reading_options
+from feedplan.service.command import TOKEN_FILE, serve
 from feedplan.setpoints import INTERPOLATORS, MAX_SETPOINTS, Interpolator
 from feedplan.time_command import time
 from feedplan.units import duration_text
@@ -154,6 +155,8 @@ def cli(context: click.Context) -> int:
 )
 @click.option("--step", type=Number(), metavar="S", help="Longest step of a pvt table, which needs it.")
 @program_options
+@click.option("--server", metavar="URL", help="Have a service plan, such as http://127.0.0.1:8000.")
+@TOKEN_FILE
 @JSON
 @QUIET
 def plan(
@@ -175,6 +178,8 @@ def plan(
     output: str | None,
     formats: tuple[Any, ...],
     step: float | None,
+    server: str | None,
+    token_file: str | None,
     as_json: bool,
     quiet: bool,
     controller: Choice,
@@ -185,20 +190,25 @@ def plan(
 
     Exit code 1: a limit is broken, or no plan is feasible.
     """
-    from feedplan.files import files_of_plan, summary_text, write_plan
+    from feedplan.files import files_of_plan, summary_text
     from feedplan.one_step_more import one_step_more as raised
     from feedplan.outputs._staging import require_folder
-    from feedplan.planning import plan as make_plan
     from feedplan.report.page import missing_pictures
 
     if formats and not output:
         raise click.UsageError("--format needs a folder to write to: give -o DIR as well")
     if _NO_SETPOINTS in formats and len(formats) > 1:
         raise click.UsageError(f"--format {_NO_SETPOINTS} excludes other formats: leave one of them out")
+    if server and (one_step_more or step is not None or wanted.file is not None or wanted.in_folder):
+        raise click.UsageError(
+            "a service gives no program with planned feeds, no pvt table and nothing of --one-step-more: "
+            "leave them out, or --server"
+        )
     if output:
         require_folder(FilePath(output))
     with console.progress_bar(quiet) as progress, console.without_others():
         known, source = machine_for(machine, program, reading, feed)
+        make_plan, write = _place(server, token_file)
         result = make_plan(
             source,
             known,
@@ -222,19 +232,19 @@ def plan(
         steps = [step.to_json() for step in raised(result)] if one_step_more else []
         files: tuple[FilePath, ...] = ()
         if output:
-            files = write_plan(
+            here = {} if server else {"program": planned if wanted.in_folder else None, "step": step}
+            files = write(
                 result,
                 output,
                 () if _NO_SETPOINTS in formats else formats or ("npz",),
-                program=planned if wanted.in_folder else None,
-                step=step,
                 progress=progress,
+                **here,
             )
     warnings = list(result.warnings)
     if output:
         earlier = (file for file in files_of_plan(FilePath(output)) if file not in files)
         warnings += [f"{file} is of an earlier plan" for file in earlier]
-        warnings += filter(None, [missing_pictures()])
+        warnings += filter(None, [missing_pictures()]) if server is None else ()
     if not quiet:
         for warning in warnings:
             print(f"warning: {warning}", file=sys.stderr)
@@ -247,6 +257,20 @@ def plan(
             if planned is not None:
                 print(planned.summary())
     return DONE if audit.ok else _fail(console.failure_sentence(audit), BROKEN)
+
+
+def _place(server: str | None, token_file: str | None) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    """What plans and what writes plans: here, or on a service."""
+    if server is None:
+        from feedplan.files import write_plan
+        from feedplan.planning import plan
+
+        return plan, write_plan
+    from feedplan.client.client import Client
+    from feedplan.client.token import read_token
+
+    client = Client(server, None if token_file is None else read_token(FilePath(token_file)))
+    return client.plan, client.write_plan
 
 
 @cli.command()
@@ -413,4 +437,5 @@ def check(place: str, machine: str | None, resolution: float, jerk: bool, as_jso
 
 cli.add_command(filter_)
 cli.add_command(machines)
+cli.add_command(serve)
 cli.add_command(time)

@@ -120,6 +120,19 @@ def test_one_missing_package_ends_the_command_with_its_sentence(python: Path, pa
     assert done.stderr.endswith(": pip install feedplan[dxf]\n")
 
 
+def test_the_service_says_what_it_needs_and_its_client_needs_nothing(python: Path, part: Path) -> None:
+    done = run(python, "-m", "feedplan", "serve", folder=part.parent)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert re.fullmatch(
+        r"error: the service needs the package \w+: `pip install feedplan\[serve\]`\n", done.stderr
+    )
+    done = run(
+        python, "-m", "feedplan", "plan", "part.ngc", "--server", "http://127.0.0.1:9", folder=part.parent
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("error: the service at http://127.0.0.1:9 cannot be reached")
+
+
 def test_a_notebook_and_path_files_work(python: Path, part: Path) -> None:
     code = """
 import feedplan

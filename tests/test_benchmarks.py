@@ -45,6 +45,7 @@ def test_every_benchmark_runs_and_stores_its_table(tmp_path: Path) -> None:
         "time-limit",
         "size",
         "interrupts",
+        "service",
     }
     assert all(row["off [%]"] <= (10 if "chords" in row["shape"] else 2) for row in tables["size"]["rows"])
     assert all(row["error [steps]"] <= 1.001e-6 for row in tables["interpolators"]["rows"])

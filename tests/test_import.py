@@ -55,8 +55,24 @@ def test_nothing_that_is_slow_is_imported_with_the_package() -> None:
         "ruckig",
         "clarabel",
         "importlib.metadata",
+        "http.client",
+        "sqlite3",
+        "fastapi",
+        "pydantic",
     }
     code = f"import sys, feedplan; feedplan.__version__; print(sorted({slow} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+
+
+def test_packages_of_the_service_stay_in_the_service() -> None:
+    code = """
+import importlib, pkgutil, sys, feedplan
+for module in pkgutil.walk_packages(feedplan.__path__, "feedplan."):
+    if not module.name.startswith("feedplan.service."):
+        importlib.import_module(module.name)
+print(sorted({"fastapi", "pydantic", "sqlite3", "starlette", "uvicorn"} & set(sys.modules)))
+"""
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
 

@@ -1,0 +1,1 @@
+"""A feedplan service from Python, with the calls of the package itself."""

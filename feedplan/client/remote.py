@@ -1,0 +1,158 @@
+"""A plan that a service has made: its figures here, its setpoints and report when they are asked for."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+import weakref
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path as FilePath
+from typing import Any
+
+from feedplan.arguments import is_whole, refuse, shown
+from feedplan.audit import Audit
+from feedplan.client.transport import Transport
+from feedplan.errors import InputError
+from feedplan.files import SUMMARY_FILE, summary_text
+from feedplan.outputs import FormatName, format_named, npz
+from feedplan.outputs._staging import staged
+from feedplan.progress import Progress, of_stage, tell
+from feedplan.report.page import FILE as REPORT_FILE
+from feedplan.setpoints import MAX_CHUNK, SetpointChunk
+
+
+class RemotePlan:
+    """A plan on a service, the job `id` there. What it says is as in `feedplan.planning.Plan`; the exact
+    motion (`at`) stays where the plan is."""
+
+    def __init__(self, transport: Transport, job: Mapping[str, Any]) -> None:
+        self._transport = transport
+        self.id = str(job["id"])
+        self._address = f"/v1/jobs/{self.id}"
+        self._summary: dict[str, Any] = transport.json("GET", f"{self._address}/result")[1]
+
+    def __repr__(self) -> str:
+        return (
+            f"<RemotePlan of {self._summary['program']} on {self._summary['machine']} by {self.method}: "
+            f"{self.time:.6g} s, gap {100 * self.gap:.3g} %, at {self._transport.url}>"
+        )
+
+    @property
+    def time(self) -> float:
+        """Time of the whole program, dwells included [s]."""
+        return float(self._summary["time"])
+
+    @property
+    def lower_bound(self) -> float:
+        """No feasible profile of this path is faster [s]."""
+        return float(self._summary["lower_bound"])
+
+    @property
+    def gap(self) -> float:
+        """How far the time can be from the optimum at most: (time − lower_bound) / time."""
+        return float(self._summary["gap"])
+
+    @property
+    def method(self) -> str:
+        """The method that made it."""
+        return str(self._summary["method"])
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences for the user."""
+        return tuple(self._summary["warnings"])
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Those that the plan was made with."""
+        return dict(self._summary["options"])
+
+    @property
+    def compute(self) -> dict[str, float]:
+        """The computing time of each stage [s]."""
+        return dict(self._summary["compute"])
+
+    def summary(self) -> dict[str, Any]:
+        """What `plan.json` holds."""
+        return dict(self._summary)
+
+    def audit(self, progress: Progress | None = None) -> Audit:
+        """The independent check that the service has made."""
+        points = self._summary["setpoints"]
+        units = dict(zip(points["axes"], points["units"], strict=True))
+        return Audit.from_json(self._summary["audit"], units, self._summary["units"]["length"])
+
+    def setpoints(self, period: float | None = None) -> RemoteSetpoints:
+        """The setpoints, loaded to this computer when they are read.
+
+        Raises InputError for another period than that of the plan.
+        """
+        own = float(self._summary["setpoints"]["period"])
+        if period is not None and period != own:
+            raise refuse("the period", period, f"{own:g} s, that of the plan, or plan with another one")
+        return RemoteSetpoints(self._transport, self._address, self._summary["setpoints"])
+
+    def report(self) -> str:
+        """The report, a page of HTML."""
+        with self._transport.request("GET", f"{self._address}/report") as response:
+            return response.read().decode()
+
+    def write(
+        self,
+        folder: FilePath,
+        formats: Sequence[FormatName],
+        progress: Progress | None = None,
+    ) -> tuple[FilePath, ...]:
+        """Writes the folder that `feedplan.write_plan` writes; returns the files."""
+        share = of_stage(progress, "write")
+        files = {format_named(name).FILE: name for name in formats}
+        if len(files) < len(set(formats)):
+            raise InputError(f"two of {', '.join(formats)} are one file: ask for one of them")
+        tell(share, 0.0)
+        with staged(folder, last=SUMMARY_FILE) as stage:
+            for number, (file, name) in enumerate(files.items()):
+                self._transport.download(f"{self._address}/setpoints", stage / file, {"format": name})
+                tell(share, (number + 1) / (len(files) + 1))
+            self._transport.download(f"{self._address}/report", stage / REPORT_FILE)
+            (stage / SUMMARY_FILE).write_text(summary_text(self._summary), encoding="utf-8")
+            names = sorted(file.name for file in stage.iterdir())
+        tell(share, 1.0)
+        return tuple(folder / name for name in names)
+
+
+class RemoteSetpoints:
+    """The setpoints of a plan on a service, as `feedplan.Setpoints`: iterating gives chunks."""
+
+    def __init__(self, transport: Transport, address: str, about: Mapping[str, Any]) -> None:
+        self._transport, self._address = transport, address
+        self.axes = tuple(about["axes"])
+        self.period, self.count, self.duration = about["period"], int(about["count"]), about["duration"]
+        self._chunk: SetpointChunk | None = None
+
+    def __len__(self) -> int:
+        return self.count
+
+    def __repr__(self) -> str:
+        return f"<RemoteSetpoints: {self.count} of {' '.join(self.axes)}, one every {self.period:g} s>"
+
+    def __iter__(self) -> Iterator[SetpointChunk]:
+        return self.chunks()
+
+    def all(self) -> SetpointChunk:
+        """The whole stream at once, in a file that is mapped into memory."""
+        if self._chunk is None:
+            folder = FilePath(tempfile.mkdtemp(prefix="feedplan-"))
+            weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+            self._transport.download(f"{self._address}/setpoints", folder / npz.FILE)
+            self._chunk = npz.load(folder / npz.FILE)
+        return self._chunk
+
+    def chunks(self, size: int = 100_000) -> Iterator[SetpointChunk]:
+        """The stream in chunks of `size` setpoints, the last one shorter."""
+        if not is_whole(size, most=MAX_CHUNK):
+            raise InputError(f"chunks of {shown(size)} setpoints: give a size from 1 to {MAX_CHUNK}")
+        whole = self.all()
+        names = ("t", "position", "velocity", "acceleration", "jerk", "line")
+        for first in range(0, self.count, size):
+            rows = slice(first, first + size)
+            yield SetpointChunk(**{name: getattr(whole, name)[rows] for name in names}, axes=self.axes)

@@ -1,0 +1,349 @@
+"""The addresses of the service."""
+
+from __future__ import annotations
+
+import asyncio
+import shutil
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path as FilePath
+from typing import Annotated, Any
+
+from fastapi import FastAPI, Header, Query
+from fastapi.responses import (
+    FileResponse,
+    HTMLResponse,
+    JSONResponse,
+    RedirectResponse,
+    Response,
+    StreamingResponse,
+)
+from starlette.background import BackgroundTask
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+
+from feedplan import __version__, outputs, planners
+from feedplan.files import SUMMARY_FILE
+from feedplan.machine.machine import Machine, bundled_machines
+from feedplan.report.page import FILE as REPORT_FILE
+from feedplan.service import answers, events, exports, openapi, page, problems, uploads, views
+from feedplan.service.limits import Limits
+from feedplan.service.refusals import UNKNOWN, Refusal
+from feedplan.service.requests import order_of
+from feedplan.service.runner import Runner
+from feedplan.service.store import ENDED, Store
+
+# Requests whose programs are received at a time; each may take some memory.
+RECEIVED_AT_ONCE = 4
+MOST_COMPARED = 20
+# A report has scripts of its own and no other; it is not trusted with the service.
+_REPORT_POLICY = (
+    "sandbox allow-scripts allow-downloads; default-src 'none'; style-src 'unsafe-inline'; "
+    "script-src 'unsafe-inline' 'unsafe-eval'; img-src data: blob:"
+)
+_PAGE_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
+
+Key = Annotated[
+    str | None,
+    Header(
+        alias="Idempotency-Key",
+        max_length=200,
+        description="The same key always gives the same job, however often a request is sent",
+    ),
+]
+Time = Annotated[float | None, Query(allow_inf_nan=False)]
+
+
+class Service:
+    """What all addresses share."""
+
+    def __init__(self, folder: FilePath, limits: Limits) -> None:
+        self.limits = limits
+        self.bell = events.Bell()
+        self.store = Store(folder, limits, self.bell.ring)
+        self.runner = Runner(self.store, limits)
+        self.receiving = asyncio.Semaphore(RECEIVED_AT_ONCE)
+
+    @asynccontextmanager
+    async def lifespan(self, _: FastAPI) -> AsyncIterator[None]:
+        """Jobs run while the application does."""
+        self.bell.attach(asyncio.get_running_loop())
+        self.runner.start()
+        try:
+            yield
+        finally:
+            self.bell.attach(None)
+            await run_in_threadpool(self.runner.stop)
+            self.store.close()
+
+
+def create(folder: FilePath, limits: Limits) -> FastAPI:
+    """The application on a store, without its guard. Raises InputError where the store cannot be used."""
+    service = Service(folder, limits)
+    app = FastAPI(
+        title="feedplan",
+        version=__version__,
+        description=openapi.DESCRIPTION,
+        docs_url=None,
+        redoc_url=None,
+        openapi_url="/v1/openapi.json",
+        lifespan=service.lifespan,
+    )
+    problems.add_handlers(app)
+    _add_jobs(app, service)
+    _add_results(app, service)
+    _add_knowledge(app, service)
+    openapi.complete(app)
+    return app
+
+
+def _file(place: FilePath, **more: Any) -> FileResponse:
+    """A file as an answer; raises FileNotFoundError where it is gone."""
+    return FileResponse(place, stat_result=place.stat(), **more)
+
+
+def _add_jobs(app: FastAPI, service: Service) -> None:
+    store, runner, limits = service.store, service.runner, service.limits
+    tags: Any = ["jobs"]
+
+    @app.post(
+        "/v1/jobs",
+        status_code=202,
+        response_model=answers.Job,
+        tags=tags,
+        summary="Have a program planned",
+        responses={
+            200: {"model": answers.Job, "description": "The job that an equal request has already"},
+            **openapi.problems(400, 415, 422, 429, 507),
+        },
+        openapi_extra=openapi.SUBMISSION,
+    )
+    async def submit(request: Request, key: Key = None) -> Response:
+        """Accepts a program and how it is to be planned, as JSON or as a form; the job runs when its turn
+        comes. A request equal to one that waits, runs or is done gives that job (200), so that nothing is
+        planned twice."""
+
+        def accepted() -> tuple[dict[str, Any], bool]:
+            order = order_of(asked, limits)
+            record, is_new = store.accept(
+                upload,
+                order.fingerprint(upload.sha256),
+                name=order.name or "program",
+                machine=order.machine,
+                machine_name=order.machine_name,
+                method=order.method,
+                options=order.options,
+                tool_table=order.tool_table,
+                key=key,
+            )
+            return views.job(record), is_new
+
+        async with service.receiving:
+            upload, asked = await uploads.received(request, store.new, limits)
+            try:
+                job, is_new = await run_in_threadpool(accepted)
+            finally:
+                upload.file.unlink(missing_ok=True)
+        if is_new:
+            await run_in_threadpool(runner.wake)
+        headers = {"Location": job["links"]["self"]}
+        return JSONResponse(job, 202 if is_new else 200, headers)
+
+    @app.get(
+        "/v1/jobs",
+        response_model=answers.Jobs,
+        tags=tags,
+        summary="List jobs, the newest first",
+        responses=openapi.problems(422),
+    )
+    def listed(
+        state: answers.State | None = None,
+        before: Annotated[int | None, Query(ge=0, lt=1 << 62)] = None,
+        count: Annotated[int, Query(ge=1, le=200)] = 50,
+    ) -> dict[str, Any]:
+        records = store.jobs(state, before, count)
+        more = records[-1]["number"] if len(records) == count else None
+        return {"jobs": [views.job(record) for record in records], "before": more}
+
+    @app.get(
+        "/v1/jobs/{job}",
+        response_model=answers.Job,
+        tags=tags,
+        summary="How far a job is, and what became of it",
+        responses=openapi.problems(404),
+    )
+    def one(job: str) -> dict[str, Any]:
+        return views.job(store.job(job))
+
+    @app.delete(
+        "/v1/jobs/{job}",
+        status_code=204,
+        tags=tags,
+        summary="Forget a job and its files; it is stopped if it runs",
+        responses=openapi.problems(404),
+    )
+    def delete(job: str) -> Response:
+        runner.delete(job)
+        return Response(status_code=204)
+
+    @app.post(
+        "/v1/jobs/{job}/cancel",
+        status_code=202,
+        response_model=answers.Job,
+        tags=tags,
+        summary="Stop a job that waits or runs",
+        responses=openapi.problems(404),
+    )
+    def cancel(job: str) -> dict[str, Any]:
+        """A job that runs stops within a tenth of a second or so; one that has ended stays as it is."""
+        runner.cancel(job)
+        return views.job(store.job(job))
+
+    @app.get(
+        "/v1/jobs/{job}/events",
+        tags=tags,
+        summary="Progress as server-sent events",
+        response_class=StreamingResponse,
+        responses={
+            200: openapi.content(events.MEDIA_TYPE, openapi.EVENTS, "Events until the job has ended"),
+            204: {"description": "The job has ended and all of its events are known"},
+            **openapi.problems(404),
+        },
+    )
+    def progress(
+        job: str, last: Annotated[str | None, Header(alias="Last-Event-ID", max_length=40)] = None
+    ) -> Response:
+        """Goes on after the event whose number the client sends as `Last-Event-ID`."""
+        after = int(last) if last and last.isascii() and last.isdigit() and len(last) < 18 else 0
+        record = store.job(job)
+        if record["state"] in ENDED and after and not store.events(job, after):
+            return Response(status_code=204)
+        return StreamingResponse(events.stream(store, service.bell, job, after), media_type=events.MEDIA_TYPE)
+
+
+def _add_results(app: FastAPI, service: Service) -> None:
+    store = service.store
+    tags: Any = ["results"]
+    missing = openapi.problems(404, 409)
+
+    @app.get(
+        "/v1/jobs/{job}/result",
+        tags=tags,
+        summary="All of plan.json",
+        response_class=FileResponse,
+        responses={200: openapi.content("application/json", {"type": "object"}, "plan.json"), **missing},
+    )
+    def result(job: str) -> Response:
+        return _file(views.done(store, job) / SUMMARY_FILE, media_type="application/json")
+
+    @app.get("/v1/jobs/{job}/audit", tags=tags, summary="The audit of the plan", responses=missing)
+    def audit(job: str) -> dict[str, Any]:
+        verdict: dict[str, Any] = views.summary(views.done(store, job))["audit"]
+        return verdict
+
+    @app.get(
+        "/v1/jobs/{job}/setpoints",
+        tags=tags,
+        summary="Setpoints, by time and axis",
+        response_class=FileResponse,
+        responses={
+            200: openapi.contents({exports.media_type(name) for name in exports.formats()}),
+            **openapi.problems(404, 409, 422, 501),
+        },
+    )
+    def setpoints(
+        job: str,
+        start: Annotated[Time, Query(alias="from", description="First time [s]")] = None,
+        end: Annotated[Time, Query(alias="to", description="Last time [s]")] = None,
+        axes: Annotated[str, Query(max_length=400, description="Names with commas; all unless given")] = "",
+        format: outputs.FormatName = "npz",
+    ) -> Response:
+        names = [name.strip() for name in axes.split(",")] if axes.strip() else []
+        file, is_new = exports.setpoints_file(views.done(store, job), store.new, format, names, start, end)
+        after = BackgroundTask(shutil.rmtree, file.parent, ignore_errors=True) if is_new else None
+        return _file(file, media_type=exports.media_type(format), filename=file.name, background=after)
+
+    @app.get(
+        "/v1/jobs/{job}/program",
+        tags=tags,
+        summary="The program as it was sent",
+        response_class=FileResponse,
+        responses={
+            200: openapi.content("application/octet-stream", openapi.BINARY, "The program"),
+            **openapi.problems(404),
+        },
+    )
+    def program(job: str) -> Response:
+        record = store.job(job)
+        return _file(
+            store.folder(record) / "program", media_type="application/octet-stream", filename=record["name"]
+        )
+
+    @app.get(
+        "/v1/jobs/{job}/report",
+        tags=tags,
+        summary="The report, one page that needs no network",
+        response_class=HTMLResponse,
+        responses=missing,
+    )
+    def report(job: str) -> Response:
+        headers = {"Content-Security-Policy": _REPORT_POLICY}
+        return _file(views.done(store, job) / REPORT_FILE, media_type="text/html", headers=headers)
+
+    @app.get(
+        "/v1/compare",
+        response_model=answers.Comparison,
+        tags=tags,
+        summary="Jobs side by side",
+        responses=openapi.problems(404, 422),
+    )
+    def compare(
+        job: Annotated[list[str], Query(min_length=1, max_length=MOST_COMPARED)],
+    ) -> dict[str, Any]:
+        """One row a job, in the order that they are named in: `?job=ID&job=ID`."""
+        return {"rows": views.compared(store, job)}
+
+
+def _add_knowledge(app: FastAPI, service: Service) -> None:
+    tags: Any = ["knowledge"]
+
+    @app.get("/v1/machines", response_model=answers.Machines, tags=tags, summary="The bundled machines")
+    def machines() -> dict[str, Any]:
+        return {"machines": [views.machine(Machine.load(name)) for name in bundled_machines()]}
+
+    @app.get(
+        "/v1/machines/{name}",
+        response_model=answers.MachineInfo,
+        tags=tags,
+        summary="One bundled machine",
+        responses=openapi.problems(404),
+    )
+    def machine(name: str) -> dict[str, Any]:
+        if name not in bundled_machines():
+            raise Refusal(UNKNOWN, f"there is no such machine: use one of {', '.join(bundled_machines())}")
+        return views.machine(Machine.load(name))
+
+    @app.get("/v1/methods", response_model=answers.Methods, tags=tags, summary="The planning methods")
+    def methods() -> dict[str, Any]:
+        known = planners.methods()
+        return {"methods": [{"name": name, "options": planners.options_of(name)} for name in known]}
+
+    @app.get("/v1/health", response_model=answers.Health, tags=tags, summary="Whether the service works")
+    def health() -> dict[str, Any]:
+        counts = service.store.counts()
+        return {
+            "status": "ok",
+            "version": __version__,
+            **{state: counts.get(state, 0) for state in ("queued", "running")},
+            "limits": service.limits.told(),
+        }
+
+    @app.get("/docs", include_in_schema=False)
+    def docs() -> Response:
+        return HTMLResponse(
+            page.documentation(app.openapi()), headers={"Content-Security-Policy": _PAGE_POLICY}
+        )
+
+    @app.get("/", include_in_schema=False)
+    def start() -> Response:
+        return RedirectResponse("/docs")

@@ -1,0 +1,79 @@
+"""The command `feedplan serve`: an option for each limit, by its name."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from dataclasses import fields
+from pathlib import Path as FilePath
+from typing import Any, TypeVar
+
+import click
+
+from feedplan.errors import MissingPackageError
+from feedplan.service.limits import Limits
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+TOKEN_FILE = click.option(
+    "--token-file",
+    metavar="FILE",
+    envvar="FEEDPLAN_TOKEN_FILE",
+    help="The service's token, a line in a file.",
+)
+
+
+def limit_options(command: Command) -> Command:
+    """Adds the options; the command gets them as one argument, `limits`."""
+    names = [own.name for own in fields(Limits)]
+
+    @functools.wraps(command)
+    def packed(*args: Any, **given: Any) -> Any:
+        limits = Limits(**{name: given.pop(name) for name in names})
+        return command(*args, limits=limits, **given)
+
+    for own in reversed(fields(Limits)):
+        kind = click.IntRange if isinstance(own.default, int) else click.FloatRange
+        packed = click.option(
+            f"--{own.name.replace('_', '-')}",
+            type=kind(min=own.metadata["least"]),
+            default=own.default,
+            show_default=True,
+            metavar=own.metadata["unit"].upper(),
+            help=own.metadata["told"],
+        )(packed)
+    return packed  # type: ignore[return-value]
+
+
+@click.command()
+@click.option("--host", default="127.0.0.1", show_default=True, metavar="ADDRESS", help="Where to listen.")
+@click.option(
+    "--port", type=click.IntRange(0, 65_535), default=8000, show_default=True, help="0: a free one."
+)
+@click.option(
+    "--store", default="feedplan-jobs", show_default=True, metavar="DIR", help="Where jobs are kept."
+)
+@TOKEN_FILE
+@click.option(
+    "--allow-host",
+    "allowed",
+    multiple=True,
+    metavar="NAME",
+    help="Another name that the service is known by.",
+)
+@limit_options
+def serve(
+    host: str, port: int, store: str, token_file: str | None, allowed: tuple[str, ...], limits: Limits
+) -> None:
+    """Plan for others over HTTP: jobs, progress, results; /docs of its address tells how.
+
+    Beyond this computer it needs --token-file. Prints its address when it can be reached.
+    """
+    try:
+        from feedplan.service.server import serve as run
+    except ModuleNotFoundError as error:
+        raise MissingPackageError(
+            f"the service needs the package {error.name}: `pip install feedplan[serve]`"
+        ) from None
+    token = None if token_file is None else FilePath(token_file)
+    run(host, port, FilePath(store), token, allowed, limits, lambda address: print(address, flush=True))

@@ -1,0 +1,82 @@
+"""Setpoints of a job by time and axis, in every format of `feedplan.outputs`."""
+
+from __future__ import annotations
+
+import mimetypes
+import secrets
+from collections.abc import Sequence
+from pathlib import Path as FilePath
+
+import numpy as np
+
+from feedplan import outputs
+from feedplan.events import TimedEvents
+from feedplan.outputs import QUANTITIES, SETPOINTS, FormatName, Header, format_named, npz
+from feedplan.service.refusals import INPUT, Refusal
+from feedplan.setpoints import SetpointChunk
+
+_ROWS_AT_ONCE = 10_000
+_MEDIA_TYPES = {".npz": "application/zip"}
+
+
+def formats() -> tuple[FormatName, ...]:
+    """The formats of setpoints: rows of others are laid out from the plan itself."""
+    return tuple(name for name in outputs.formats() if format_named(name).ROWS == SETPOINTS)
+
+
+def media_type(format_name: str) -> str:
+    """The media type of a format's files."""
+    ending = FilePath(format_named(format_name).FILE).suffix
+    return _MEDIA_TYPES.get(ending) or mimetypes.types_map.get(ending, "application/octet-stream")
+
+
+def setpoints_file(
+    result: FilePath,
+    new: FilePath,
+    format_name: str,
+    axes: Sequence[str],
+    start: float | None,
+    end: float | None,
+) -> tuple[FilePath, bool]:
+    """A file of the setpoints of a job from `start` to `end` [s] of some `axes` (none: all).
+
+    The flag says whether it was made for this, in a folder of its own below `new`, and is to be removed.
+    Raises Refusal where there are no such axes or times.
+    """
+    stored = result / npz.FILE
+    if format_name == "npz" and not axes and start is None and end is None:
+        return stored, False
+    points = npz.load(stored)
+    axes = axes or points.axes
+    for name in axes:
+        if name not in points.axes:
+            raise Refusal(INPUT, f"the plan has no axis {name[:32]}: give some of {', '.join(points.axes)}")
+    if len(set(axes)) < len(axes):
+        raise Refusal(INPUT, "axes has an axis twice: give each once")
+    columns = [points.axes.index(name) for name in axes]
+    first = 0 if start is None else int(np.searchsorted(points.t, start, "left"))
+    last = len(points) if end is None else int(np.searchsorted(points.t, end, "right"))
+    if first >= last:
+        span = f"{points.t[0]:g} to {points.t[-1]:g} s"
+        raise Refusal(INPUT, f"there are no setpoints from {start} to {end} s: give times within {span}")
+    if format_name not in formats():
+        raise Refusal(
+            INPUT, f"{format_name} has no rows at servo periods: give one of {', '.join(formats())}"
+        )
+    output = format_named(format_name)
+    within = TimedEvents.of(
+        event
+        for event in points.events
+        if (start is None or event.time >= start) and (end is None or event.time <= end)
+    )
+    folder = new / secrets.token_hex(8)
+    folder.mkdir()
+    file = folder / output.FILE
+    header = Header(tuple(axes), tuple(points.units[k] for k in columns), float(points.period or 0.0), within)
+    with output.writer(file, header, last - first) as add:
+        for row in range(first, last, _ROWS_AT_ONCE):
+            rows = slice(row, min(row + _ROWS_AT_ONCE, last))
+            columns_of = {name: np.asarray(getattr(points, name)[rows][:, columns]) for name in QUANTITIES}
+            t, line = np.asarray(points.t[rows]), np.asarray(points.line[rows])
+            add(SetpointChunk(t=t, **columns_of, line=line, axes=tuple(axes)))
+    return file, True

@@ -1,0 +1,45 @@
+"""What the service takes at most: every limit has the name that its errors and its option have."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any
+
+MB = 1_000_000
+
+
+def _limit(default: float, unit: str, told: str, least: float) -> Any:
+    return field(default=default, metadata={"unit": unit, "told": told, "least": least})
+
+
+@dataclass(frozen=True)
+class Limits:
+    """The limits of a service; each is of the type of its default."""
+
+    max_upload: float = _limit(256.0, "MB", "Size of a request, and so of a program.", 0.001)
+    max_upload_time: float = _limit(300.0, "s", "Time in which a request has arrived as a whole.", 0.01)
+    max_blocks: int = _limit(5_000_000, "lines", "Lines of a program.", 1)
+    max_moves: int = _limit(10_000_000, "moves", "Moves of a program, its loops and calls run.", 1)
+    max_setpoints: int = _limit(20_000_000, "setpoints", "Setpoints of a plan.", 1)
+    max_time: float = _limit(600.0, "s", "Time that a job may run.", 0.01)
+    max_memory: float = _limit(4000.0, "MB", "Memory of the process that a job runs in.", 1.0)
+    max_queue: int = _limit(100, "jobs", "Jobs that wait.", 1)
+    max_disk: float = _limit(20_000.0, "MB", "Size of all jobs that are kept.", 0.001)
+    keep_days: float = _limit(30.0, "days", "How long a job is kept after its end.", 0.0)
+    workers: int = _limit(min(4, os.cpu_count() or 1), "processes", "Jobs that run at a time.", 1)
+
+    def named_in(self, sentence: str) -> dict[str, Any] | None:
+        """The limit that a sentence names: its name, value and unit; None where there is none."""
+        for own in fields(self):
+            if re.search(rf"\b{own.name}\b", sentence):
+                return {"name": own.name, "value": getattr(self, own.name), "unit": own.metadata["unit"]}
+        return None
+
+    def told(self) -> dict[str, dict[str, Any]]:
+        """All limits with their values and units."""
+        return {
+            own.name: {"value": value, "unit": own.metadata["unit"]}
+            for own, value in zip(fields(self), asdict(self).values(), strict=True)
+        }

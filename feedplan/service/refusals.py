@@ -1,0 +1,106 @@
+"""What the service refuses, and how jobs fail: one sentence as a problem of RFC 9457.
+
+The sentence ends with the remedy, as all errors of feedplan do: `place: what is wrong: remedy`.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any
+
+from feedplan.errors import (
+    FeedplanError,
+    InfeasibleError,
+    MachineError,
+    MissingPackageError,
+    ProgramError,
+    SolverError,
+)
+
+MEDIA_TYPE = "application/problem+json"
+TYPE = "urn:feedplan:"
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of problem: the end of its type, its status and what it is in words."""
+
+    name: str
+    status: int
+    title: str
+
+
+PROGRAM = Kind("program", 422, "The program cannot be used")
+MACHINE = Kind("machine", 422, "The machine cannot be used")
+INPUT = Kind("input", 422, "The request cannot be used")
+INFEASIBLE = Kind("infeasible", 422, "No plan keeps the limits")
+SOLVER = Kind("solver", 422, "The method found no plan")
+PACKAGE = Kind("package", 501, "The service lacks a package")
+LIMIT = Kind("limit", 422, "A limit of the service is exceeded")
+TOO_LARGE = Kind("limit", 413, "The request is too large")
+TOO_SLOW = Kind("limit", 408, "The request took too long")
+MEDIA = Kind("input", 415, "The type of the request is not known")
+BUSY = Kind("limit", 429, "The queue is full")
+DISK = Kind("limit", 507, "The disk is full")
+UNKNOWN = Kind("unknown", 404, "There is no such thing")
+METHOD = Kind("method", 405, "The address does not take this method")
+STATE = Kind("state", 409, "The job has no such thing at this time")
+TOKEN = Kind("token", 401, "The token is missing or wrong")
+FOREIGN = Kind("foreign", 403, "The request comes from elsewhere")
+WORKER = Kind("worker", 500, "The process of the job ended")
+CANCELLED = Kind("cancelled", 409, "The job was cancelled")
+DEFECT = Kind("defect", 500, "A defect in feedplan")
+
+# By class; the first that an error is an instance of.
+_KINDS: tuple[tuple[type[FeedplanError], Kind], ...] = (
+    (ProgramError, PROGRAM),
+    (MachineError, MACHINE),
+    (MissingPackageError, PACKAGE),
+    (InfeasibleError, INFEASIBLE),
+    (SolverError, SOLVER),
+    (FeedplanError, INPUT),
+)
+
+
+class Refusal(Exception):  # noqa: N818 (it is an answer)
+    """A request that is refused, or the reason why a job has no plan.
+
+    `detail` is the sentence; `file` and `line` are the place in the program, `limit` the limit of the service
+    that it names, with value and unit.
+    """
+
+    def __init__(
+        self,
+        kind: Kind,
+        detail: str,
+        *,
+        file: str | None = None,
+        line: int | None = None,
+        limit: dict[str, Any] | None = None,
+    ) -> None:
+        super().__init__(detail)
+        self.kind, self.detail, self.file, self.line, self.limit = kind, detail, file, line, limit
+
+    def to_json(self) -> dict[str, Any]:
+        """The members of the problem; those that say nothing are None."""
+        what, _, remedy = self.detail.rpartition(": ")
+        return {
+            "type": TYPE + self.kind.name,
+            "title": self.kind.title,
+            "status": self.kind.status,
+            "detail": self.detail,
+            "file": self.file,
+            "line": self.line,
+            "limit": self.limit,
+            "remedy": remedy if what else None,
+        }
+
+    def text(self) -> str:
+        """The problem as JSON."""
+        return json.dumps(self.to_json(), ensure_ascii=False)
+
+
+def kind_of(error: FeedplanError) -> Kind:
+    """The kind of an error of feedplan."""
+    return next(kind for known, kind in _KINDS if isinstance(error, known))

@@ -1,0 +1,188 @@
+"""What a client sends to have a program planned, as JSON or as a form, and what makes two requests equal."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import PurePosixPath
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+
+from feedplan import __version__
+from feedplan.errors import FeedplanError
+from feedplan.geometry.corners import FollowedPath
+from feedplan.machine.controller import Controller
+from feedplan.machine.file import parse
+from feedplan.machine.machine import Machine, bundled_machines
+from feedplan.planners import MethodName, given_options, methods, options_of
+from feedplan.planning import OF_ALL_METHODS
+from feedplan.program.machine_for import AUTO
+from feedplan.service.limits import Limits
+from feedplan.service.refusals import INPUT, LIMIT, MACHINE, Refusal, kind_of
+from feedplan.setpoints import Interpolator
+
+# Names stand in messages and reports; no file is called by them.
+LONGEST_NAME = 120
+# Keywords of `read_program`; the others are of `plan`.
+READING = ("block_delete", "whole_step")
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+# What methods check themselves: numbers, names, lists of numbers.
+Value = (
+    bool | Annotated[float, Field(allow_inf_nan=False)] | Annotated[str, Field(max_length=40)] | list[float]
+)
+Model = TypeVar("Model", bound=BaseModel)
+_STRICT = ConfigDict(extra="forbid", strict=True)
+
+
+class CommonOptions(BaseModel):
+    """The options of `feedplan.plan`, and how the program is read; each method takes some more."""
+
+    model_config = _STRICT
+
+    tolerance: Positive | None = Field(default=None, description="Distance from the programmed path [mm]")
+    feed: Positive | None = Field(default=None, description="Feed in place of the programmed one [mm/s]")
+    feed_override: Positive | None = Field(default=None, description="Factor on the feed")
+    period: Positive | None = Field(default=None, description="Servo period in place of the machine's [s]")
+    start_speed: NotNegative | None = Field(default=None, description="[mm/s]")
+    end_speed: NotNegative | None = Field(default=None, description="[mm/s]")
+    interpolator: Interpolator | None = None
+    max_setpoints: int | None = Field(default=None, ge=1, description="A plan of more setpoints is refused")
+    path: FollowedPath | None = None
+    controller: str | dict[str, Value] | None = Field(
+        default=None, description="The controller of today: its name, or a table as in a machine file"
+    )
+    block_delete: bool | None = Field(default=None, description="Leave out blocks that start with /")
+    whole_step: Positive | None = Field(
+        default=None, description="What lengths without a decimal point count"
+    )
+
+
+def _of_methods() -> dict[str, Any]:
+    """A field for each option that only some methods take."""
+    takers: dict[str, list[str]] = {}
+    for method in methods():
+        for name in options_of(method):
+            takers.setdefault(name, []).append(method)
+    return {
+        name: (Value | None, Field(default=None, description=", ".join(some)))
+        for name, some in takers.items()
+    }
+
+
+if TYPE_CHECKING:
+    Options = CommonOptions
+else:
+    Options = create_model("Options", __base__=CommonOptions, __doc__=CommonOptions.__doc__, **_of_methods())
+
+
+class PlanRequest(BaseModel):
+    """How a program is to be planned."""
+
+    model_config = _STRICT
+
+    name: str = Field(
+        "", max_length=LONGEST_NAME, description="Name of the program; its ending tells the language"
+    )
+    machine: str = Field(
+        default="mill", description="A bundled machine, auto, or the text of a machine file (TOML)"
+    )
+    method: MethodName = "bang-bang"
+    options: Options = Field(default_factory=Options)
+    tool_table: str | None = Field(
+        default=None, max_length=1 << 20, description="LinuxCNC's tool table (.tbl)"
+    )
+
+
+class JobRequest(PlanRequest):
+    """A program and how it is to be planned."""
+
+    program: str | dict[str, Any] = Field(description="G-code, a drawing (DXF), or a path file as an object")
+
+
+@dataclass(frozen=True)
+class Order:
+    """A request that was found good: the `name` of the program, the whole text of the `machine`, or `auto`,
+    and its name, the `method`, the `options` that are given, the text of the `tool_table`."""
+
+    name: str
+    machine: str
+    machine_name: str
+    method: MethodName
+    options: dict[str, Any]
+    tool_table: str | None
+
+    def fingerprint(self, program_sha256: str) -> str:
+        """The same for requests with the same plan, by the same feedplan."""
+        parts = [
+            __version__,
+            program_sha256,
+            self.name,
+            self.machine,
+            self.method,
+            json.dumps(self.options, sort_keys=True),
+            self.tool_table,
+        ]
+        return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+
+def order_of(request: PlanRequest, limits: Limits) -> Order:
+    """The request, checked as far as it can be without reading its program. Raises Refusal."""
+    options = request.options.model_dump(exclude_none=True)
+    asked = options.get("max_setpoints", 1)
+    if asked > limits.max_setpoints:
+        raise over(limits, f"max_setpoints is {asked}, the service has {limits.max_setpoints}: ask for fewer")
+    own = {name: value for name, value in options.items() if name not in (*OF_ALL_METHODS, *READING)}
+    try:
+        given_options(request.method, own, OF_ALL_METHODS)
+        if "controller" in options:
+            Controller.of(options["controller"])
+        text, machine_name = _machine(request.machine)
+    except FeedplanError as error:
+        raise Refusal(kind_of(error), str(error)) from None
+    return Order(_title(request.name), text, machine_name, request.method, options, request.tool_table)
+
+
+def _machine(given: str) -> tuple[str, str]:
+    """The whole text of a machine, or `auto`, and its name. No file is read for what a client says."""
+    if given == AUTO:
+        return AUTO, AUTO
+    if given in bundled_machines():
+        machine = Machine.load(given)
+    elif "=" in given:
+        machine = parse(given, "of the request")
+    else:
+        known = ", ".join((AUTO, *bundled_machines()))
+        raise Refusal(
+            MACHINE, f"there is no machine of this name: use one of {known}, or the text of a machine file"
+        )
+    return machine.to_toml(), machine.name
+
+
+def _title(given: str) -> str:
+    """The last part of a name, of printable characters; empty where nothing is left."""
+    name = PurePosixPath(given.replace("\\", "/")).name
+    return "".join(letter for letter in name if letter.isprintable()).strip()
+
+
+def over(limits: Limits, sentence: str) -> Refusal:
+    """The refusal of what is more than a limit that the sentence names."""
+    return Refusal(LIMIT, sentence, limit=limits.named_in(sentence))
+
+
+def parsed(model: type[Model], text: bytes | str) -> Model:
+    """A model from JSON. Raises Refusal with the first place that is wrong."""
+    try:
+        return model.model_validate_json(text)
+    except ValidationError as error:
+        raise Refusal(INPUT, sentence_of(error.errors(include_url=False, include_input=False)[0])) from None
+
+
+def sentence_of(error: Any) -> str:
+    """What pydantic says of one place, as one sentence."""
+    place = ".".join(str(part)[:60] for part in error["loc"]) or "the request"
+    said = str(error["msg"])[:160]
+    return f"{place}: {said[:1].lower()}{said[1:]}: correct it as the documentation at /docs tells"

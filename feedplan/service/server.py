@@ -1,0 +1,95 @@
+"""Starts the service: looks at where it binds, who may use it, and hands over to uvicorn."""
+
+from __future__ import annotations
+
+import ipaddress
+import logging
+import socket
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path as FilePath
+
+import uvicorn
+
+from feedplan.client.token import read_token
+from feedplan.errors import InputError
+from feedplan.service.app import create
+from feedplan.service.guard import Guard
+from feedplan.service.limits import Limits
+
+# How long answers may go on when the service is told to end [s].
+ENDING = 3
+
+
+def serve(
+    host: str,
+    port: int,
+    store: FilePath,
+    token_file: FilePath | None,
+    allowed_hosts: Sequence[str],
+    limits: Limits,
+    ready: Callable[[str], None],
+) -> None:
+    """Runs the service until it is told to end by a signal.
+
+    `ready(address)` is called once it can be reached. Raises InputError where it may not bind there without a
+    token, or cannot, and where the token or the store cannot be used.
+    """
+    token = None if token_file is None else read_token(token_file)
+    if token is None and not is_loopback(host):
+        raise InputError(
+            f"{host} can be reached from other computers and the service has no token: "
+            "give --token-file FILE, or --host 127.0.0.1"
+        )
+    # What is wrong with a form is told to who sent it.
+    logging.getLogger("python_multipart").setLevel(logging.CRITICAL)
+    bound = _bound(host, port)
+    with bound:
+        app = create(store, limits)
+        names = {"localhost", socket.gethostname(), *allowed_hosts, *([] if is_address(host) else [host])}
+        config = uvicorn.Config(
+            Guard(app, limits, names, token),
+            loop="asyncio",
+            http="h11",
+            ws="none",
+            lifespan="on",
+            log_level="error",
+            access_log=False,
+            server_header=False,
+            proxy_headers=False,
+            timeout_graceful_shutdown=ENDING,
+        )
+        shown = f"[{host}]" if ":" in host else host
+        ready(f"http://{shown}:{bound.getsockname()[1]}")
+        with suppress(KeyboardInterrupt):  # Ctrl-C is how it ends
+            uvicorn.Server(config).run(sockets=[bound])
+
+
+def is_address(host: str) -> bool:
+    """Whether a host is given in numbers."""
+    try:
+        ipaddress.ip_address(host)
+    except ValueError:
+        return False
+    return True
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this computer can reach what binds there."""
+    return ipaddress.ip_address(host).is_loopback if is_address(host) else host == "localhost"
+
+
+def _bound(host: str, port: int) -> socket.socket:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        bound = socket.create_server((host, port), family=family)
+        # Lines inherit it. asyncio sets it for sockets that name their protocol alone; without it the second
+        # part of an answer on a line that is kept open waits 40 ms for the client's word of the first.
+        bound.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        return bound
+    except (OSError, UnicodeError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(
+            f"the service cannot listen on {host}, port {port} ({reason}): "
+            "choose others with --host and --port"
+        ) from None

@@ -1,0 +1,389 @@
+"""Where jobs are kept: records in SQLite, programs and results in one folder a job.
+
+    STORE/jobs.sqlite            the records; what they do not name does not exist
+    STORE/lock                   held by the server that works on the store
+    STORE/new/                   what is being received or cut; emptied at the start
+    STORE/jobs/ID/program        the program as it was sent
+    STORE/jobs/ID/tools.tbl      its tool table
+    STORE/jobs/ID/result-N/      what the N-th attempt has planned, as `feedplan plan -o` writes it
+
+A job is accepted by the transaction that adds its record, after its files are on the disk; it is done by the
+transaction that sets its state, after the result has its name. Whatever ends a server in between leaves files
+that no record names, which the next one removes. A running job of a server that ended waits again, and its
+next attempt has a folder of its own: a worker that was left over cannot touch it.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import secrets
+import shutil
+import sqlite3
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Any
+
+from feedplan.errors import InputError
+from feedplan.service.database import Database
+from feedplan.service.limits import MB, Limits
+from feedplan.service.refusals import BUSY, CANCELLED, DISK, INPUT, UNKNOWN, Refusal
+
+ENDED = ("done", "failed", "cancelled")
+# What a job takes besides its files [bytes]: its record and events.
+RECORD = 16_384
+
+
+@dataclass(frozen=True)
+class Upload:
+    """A program that was received: its `file` below `new`, `sha256`, `bytes` and `lines`."""
+
+    file: FilePath
+    sha256: str
+    bytes: int
+    lines: int
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened to a job: the `number`-th, from 1, of a `kind`, with `data` as JSON."""
+
+    number: int
+    kind: str
+    data: str
+
+
+Record = Mapping[str, Any]
+
+
+class Store:
+    """The jobs of a service; all methods may be called from any thread.
+
+    `changed(job)` is called after each change of a job. Raises InputError where the folder cannot be used or
+    another server has it.
+    """
+
+    def __init__(
+        self, folder: FilePath, limits: Limits, changed: Callable[[str], None] = lambda job: None
+    ) -> None:
+        self._folder, self._limits, self.changed = folder, limits, changed
+        self._jobs, self.new = folder / "jobs", folder / "new"
+        try:
+            for own in (folder, self._jobs, self.new):
+                own.mkdir(mode=0o700, parents=True, exist_ok=True)
+            self._lock = os.open(folder / "lock", os.O_CREAT | os.O_RDWR, 0o600)
+        except OSError as error:
+            raise InputError(
+                f"the store {folder} cannot be used ({error.strerror}): choose another folder with --store"
+            ) from None
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            os.close(self._lock)
+            raise InputError(
+                f"another server works on {folder}: choose another folder with --store"
+            ) from None
+        try:
+            self._database = Database(folder / "jobs.sqlite")
+        except InputError:
+            os.close(self._lock)
+            raise
+        self._tidy()
+
+    def close(self) -> None:
+        """Nothing is called any more."""
+        self._database.close()
+        os.close(self._lock)
+
+    def _tidy(self) -> None:
+        """Puts right what a server that ended has left."""
+        for left in self.new.iterdir():
+            _remove(left)
+        with self._database.change() as db:
+            running = [row["id"] for row in db.execute("SELECT id FROM jobs WHERE state = 'running'")]
+            for job in running:
+                self._wait_again(db, job)
+            rows = db.execute("SELECT id, state, attempt FROM jobs").fetchall()
+        results = {row["id"]: f"result-{row['attempt']}" if row["state"] == "done" else None for row in rows}
+        for folder in self._jobs.iterdir():
+            if folder.name not in results:
+                _remove(folder)
+                continue
+            for left in folder.iterdir():
+                if left.name not in ("program", "tools.tbl", results[folder.name]):
+                    _remove(left)
+
+    # What is asked for.
+
+    def job(self, job: str) -> Record:
+        """The record of a job. Raises Refusal where there is none."""
+        with self._database.read() as db:
+            row = db.execute("SELECT * FROM jobs WHERE id = ?", (job,)).fetchone()
+        if row is None:
+            raise Refusal(UNKNOWN, "there is no such job: GET /v1/jobs lists those there are")
+        return dict(row)
+
+    def jobs(self, state: str | None, before: int | None, count: int) -> list[Record]:
+        """Records of jobs, the newest first: those in a state, older than the one of the number `before`."""
+        where = "WHERE (? IS NULL OR state = ?) AND (? IS NULL OR number < ?)"
+        asked = (state, state, before, before, count)
+        with self._database.read() as db:
+            rows = db.execute(f"SELECT * FROM jobs {where} ORDER BY number DESC LIMIT ?", asked)
+            return [dict(row) for row in rows]
+
+    def counts(self) -> dict[str, int]:
+        """How many jobs are in each state."""
+        with self._database.read() as db:
+            rows = db.execute("SELECT state, COUNT(*) AS count FROM jobs GROUP BY state")
+            return {row["state"]: row["count"] for row in rows}
+
+    def events(self, job: str, after: int) -> list[Event]:
+        """What happened to a job after the event of that number."""
+        query = "SELECT number, kind, data FROM events WHERE job = ? AND number > ? ORDER BY number"
+        with self._database.read() as db:
+            return [Event(*row) for row in db.execute(query, (job, after))]
+
+    def folder(self, record: Record) -> FilePath:
+        """The folder of a job."""
+        return self._jobs / str(record["id"])
+
+    def result(self, record: Record) -> FilePath:
+        """The folder of what the last attempt of a job has planned."""
+        return self.folder(record) / f"result-{record['attempt']}"
+
+    # What happens to jobs.
+
+    def accept(
+        self,
+        upload: Upload,
+        fingerprint: str,
+        *,
+        name: str,
+        machine: str,
+        machine_name: str,
+        method: str,
+        options: Mapping[str, Any],
+        tool_table: str | None = None,
+        key: str | None = None,
+    ) -> tuple[Record, bool]:
+        """The record of a new job, or of the one with the same fingerprint that has not failed.
+
+        The flag says whether it is new. The same `key` always gives the same job.
+
+        Raises Refusal where the queue or the disk is full, or the key was used for something else.
+        """
+        if key is None:
+            with self._database.read() as db:
+                known = self._known(db, fingerprint, key)
+            if known is not None:
+                return self.job(known), False  # nothing is to be written
+        job = secrets.token_hex(16)
+        folder = self._jobs / job
+        folder.mkdir(mode=0o700)
+        accepted = False
+        try:
+            sync(upload.file)
+            os.replace(upload.file, folder / "program")
+            if tool_table is not None:
+                write_durably(folder / "tools.tbl", tool_table.encode())
+            sync(folder)
+            sync(self._jobs)
+            with self._database.change() as db:
+                known = self._known(db, fingerprint, key)
+                if known is None:
+                    self._require_room(db, upload.bytes)
+                    accepted = True
+                    known = job
+                    columns = {
+                        "id": job,
+                        "fingerprint": fingerprint,
+                        "state": "queued",
+                        "created": time.time(),
+                        "name": name,
+                        "sha256": upload.sha256,
+                        "bytes": upload.bytes,
+                        "lines": upload.lines,
+                        "machine_name": machine_name,
+                        "machine": machine,
+                        "method": method,
+                        "options": json.dumps(options),
+                        "has_tools": tool_table is not None,
+                        "size": upload.bytes + RECORD,
+                    }
+                    places = ", ".join("?" * len(columns))
+                    db.execute(
+                        f"INSERT INTO jobs ({', '.join(columns)}) VALUES ({places})", tuple(columns.values())
+                    )
+                    _add_event(db, job, "state", {"state": "queued"})
+                if key is not None:
+                    db.execute(
+                        "INSERT OR IGNORE INTO keys (key, job, fingerprint) VALUES (?, ?, ?)",
+                        (key, known, fingerprint),
+                    )
+        finally:
+            if not accepted:
+                _remove(folder)
+        return self.job(known), accepted
+
+    def _known(self, db: sqlite3.Connection, fingerprint: str, key: str | None) -> str | None:
+        """The job that a request has already."""
+        row = None if key is None else db.execute("SELECT * FROM keys WHERE key = ?", (key,)).fetchone()
+        if row is not None:
+            if row["fingerprint"] != fingerprint:
+                raise Refusal(
+                    INPUT, "this Idempotency-Key was used for another request: choose a new key for each"
+                )
+            return str(row["job"])
+        query = "SELECT id FROM jobs WHERE fingerprint = ? AND state IN ('queued', 'running', 'done')"
+        row = db.execute(query, (fingerprint,)).fetchone()
+        return None if row is None else str(row["id"])
+
+    def _require_room(self, db: sqlite3.Connection, size: int) -> None:
+        limits = self._limits
+        waiting = db.execute("SELECT COUNT(*) FROM jobs WHERE state = 'queued'").fetchone()[0]
+        if waiting >= limits.max_queue:
+            said = f"{waiting} jobs wait, as many as max_queue allows: send it again in a while"
+            raise Refusal(BUSY, said, limit=limits.named_in(said))
+        kept = db.execute("SELECT COALESCE(SUM(size), 0) FROM jobs").fetchone()[0]
+        if kept + size > limits.max_disk * MB:
+            said = (
+                f"the jobs that are kept take {kept / MB:.6g} MB of the {limits.max_disk:g} MB of max_disk: "
+                "delete some of them"
+            )
+            raise Refusal(DISK, said, limit=limits.named_in(said))
+
+    def claim(self) -> Record | None:
+        """The job that waits longest, which runs from now on; None where none waits."""
+        with self._database.change() as db:
+            row = db.execute("SELECT id FROM jobs WHERE state = 'queued' ORDER BY number LIMIT 1").fetchone()
+            if row is None:
+                return None
+            job = str(row["id"])
+            db.execute(
+                "UPDATE jobs SET state = 'running', started = ?, attempt = attempt + 1, stage = 'read', "
+                "done = 0 WHERE id = ?",
+                (time.time(), job),
+            )
+            _add_event(db, job, "state", {"state": "running"})
+        self.changed(job)
+        return self.job(job)
+
+    def progress(self, record: Record, stage: str, part: float, done: float) -> None:
+        """A running job is that far in a stage, and as a whole."""
+        with self._database.change() as db:
+            changed = db.execute(
+                "UPDATE jobs SET stage = ?, done = ? WHERE id = ? AND state = 'running' AND attempt = ?",
+                (stage, done, record["id"], record["attempt"]),
+            )
+            if changed.rowcount:
+                told = {"stage": stage, "part": round(part, 4), "done": round(done, 4)}
+                _add_event(db, record["id"], "progress", told)
+        self.changed(record["id"])
+
+    def finish(
+        self, record: Record, state: str, *, result: Mapping[str, Any] | None, problem: str | None
+    ) -> None:
+        """A running job has ended; without a result its folder has none."""
+        size = sum(file.stat().st_size for file in self.folder(record).rglob("*") if file.is_file())
+        if result is None:
+            _remove(self.result(record))
+        with self._database.change() as db:
+            changed = db.execute(
+                "UPDATE jobs SET state = ?, finished = ?, done = ?, result = ?, problem = ?, size = ? "
+                "WHERE id = ? AND state = 'running' AND attempt = ?",
+                (
+                    *(state, time.time(), 1.0 if state == "done" else record["done"]),
+                    *(None if result is None else json.dumps(result), problem, size + RECORD),
+                    *(record["id"], record["attempt"]),
+                ),
+            )
+            if changed.rowcount:
+                _add_event(db, record["id"], "state", {"state": state})
+        if not changed.rowcount:  # deleted meanwhile
+            _remove(self.folder(record))
+        self.changed(record["id"])
+
+    def wait_again(self, record: Record) -> None:
+        """A running job waits again, since the server ends."""
+        _remove(self.result(record))
+        with self._database.change() as db:
+            self._wait_again(db, record["id"])
+
+    @staticmethod
+    def _wait_again(db: sqlite3.Connection, job: str) -> None:
+        changed = db.execute(
+            "UPDATE jobs SET state = 'queued', started = NULL, stage = NULL, done = 0 "
+            "WHERE id = ? AND state = 'running'",
+            (job,),
+        )
+        if changed.rowcount:
+            _add_event(db, job, "state", {"state": "queued"})
+
+    def cancel_waiting(self, job: str) -> bool:
+        """Cancels a job that waits; False for all others. Raises Refusal where there is none."""
+        self.job(job)
+        told = Refusal(CANCELLED, "the job was cancelled before it ran: send it again").text()
+        with self._database.change() as db:
+            changed = db.execute(
+                "UPDATE jobs SET state = 'cancelled', finished = ?, problem = ? "
+                "WHERE id = ? AND state = 'queued'",
+                (time.time(), told, job),
+            )
+            if changed.rowcount:
+                _add_event(db, job, "state", {"state": "cancelled"})
+        self.changed(job)
+        return changed.rowcount > 0
+
+    def delete(self, job: str) -> None:
+        """Forgets a job; of one that runs the folder is removed when its process has ended. Raises Refusal
+        where there is none."""
+        record = self.job(job)
+        with self._database.change() as db:
+            row = db.execute("SELECT state FROM jobs WHERE id = ?", (job,)).fetchone()
+            db.execute("DELETE FROM jobs WHERE id = ?", (job,))
+        if row is not None and row["state"] != "running":
+            _remove(self.folder(record))
+        self.changed(job)
+
+    def delete_old(self) -> None:
+        """Forgets the jobs that ended longer ago than they are kept."""
+        last = time.time() - 86_400.0 * self._limits.keep_days
+        with self._database.read() as db:
+            rows = db.execute("SELECT id FROM jobs WHERE finished < ?", (last,)).fetchall()
+        for row in rows:
+            self.delete(str(row["id"]))
+
+
+def _add_event(db: sqlite3.Connection, job: str, kind: str, data: Mapping[str, Any]) -> None:
+    db.execute(
+        "INSERT INTO events (job, number, kind, data) "
+        "SELECT ?, COALESCE(MAX(number), 0) + 1, ?, ? FROM events WHERE job = ?",
+        (job, kind, json.dumps(data), job),
+    )
+
+
+def _remove(place: FilePath) -> None:
+    if place.is_dir():
+        shutil.rmtree(place, ignore_errors=True)
+    else:
+        place.unlink(missing_ok=True)
+
+
+def write_durably(file: FilePath, content: bytes) -> None:
+    """Writes a file that outlives a power failure once its folder is synced."""
+    with file.open("wb") as stream:
+        stream.write(content)
+        stream.flush()
+        os.fsync(stream.fileno())
+
+
+def sync(place: FilePath) -> None:
+    """A file, or the names in a folder, outlive a power failure from here on."""
+    number = os.open(place, os.O_RDONLY)
+    try:
+        os.fsync(number)
+    finally:
+        os.close(number)

@@ -1,0 +1,219 @@
+"""Servers as users start them, and requests that check every answer by the service's own OpenAPI text."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote, urlencode, urlsplit
+
+from feedplan.client.transport import form
+
+PART = b"G21 G90 G64 P0.01\nF1200\nG1 X10 Y5\nX20 Y0\nG2 X30 Y10 R10\nM2\n"
+# Takes a time that tests can wait for, and be sure that it is not over before they have done something.
+LONG = {"machine": "mill", "method": "jerk-limited", "options": '{"accuracy": 1e-5, "time_limit": 60}'}
+ENDED = ("done", "failed", "cancelled")
+
+
+def long_part(seed: int = 0) -> bytes:
+    """A program whose plan by `LONG` takes many seconds."""
+    rows = [
+        f"X{k % 97 + 0.37 * (k % 5) + 1e-3 * seed:.3f} Y{k * 7 % 89 + 0.1 * (k % 3):.3f}" for k in range(4000)
+    ]
+    return ("G21 G90 G64 P0.01\nF6000\nG1 X1 Y1\n" + "\n".join(rows) + "\nM2\n").encode()
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a server has answered."""
+
+    status: int
+    headers: Mapping[str, str]
+    content: bytes
+
+    @property
+    def json(self) -> Any:
+        return json.loads(self.content)
+
+    @property
+    def detail(self) -> str:
+        """The sentence of a problem, which is one."""
+        assert self.headers["content-type"] == "application/problem+json"
+        problem = self.json
+        assert problem["status"] == self.status
+        assert problem["type"].startswith("urn:feedplan:")
+        return str(problem["detail"])
+
+
+class Server:
+    """A process of `feedplan serve`."""
+
+    def __init__(self, store: Path, *options: str, token: str | None = None) -> None:
+        self._command = [
+            sys.executable,
+            "-m",
+            "feedplan",
+            "serve",
+            "--store",
+            str(store),
+            "--port",
+            "0",
+            *options,
+        ]
+        self.token, self.store = token, store
+        self.start()
+
+    def start(self) -> None:
+        """Starts it, again after an end; waits until it can be reached."""
+        self.process = subprocess.Popen(
+            self._command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True
+        )
+        assert self.process.stdout is not None
+        self.url = self.process.stdout.readline().decode().strip()
+        if not self.url:
+            said = self.process.communicate()[1].decode()
+            raise AssertionError(f"the server did not start: {said}")
+        self._document: dict[str, Any] | None = None
+
+    def end(self, how: signal.Signals = signal.SIGTERM) -> str:
+        """Ends it; returns what it has said of defects."""
+        self.process.send_signal(how)
+        _, said = self.process.communicate(timeout=30)
+        return said.decode()
+
+    def send(
+        self,
+        method: str,
+        address: str,
+        body: bytes | None = None,
+        headers: Mapping[str, str] | None = None,
+        query: Any = None,
+    ) -> Answer:
+        """A request and its answer, which must be one that the documentation knows."""
+        parts = urlsplit(self.url)
+        connection = http.client.HTTPConnection(parts.hostname or "", parts.port, timeout=60)
+        try:
+            own = {} if self.token is None else {"Authorization": f"Bearer {self.token}"}
+            target = address + (f"?{urlencode(query, doseq=True)}" if query else "")
+            connection.request(method, target, body, {**own, **(headers or {})})
+            response = connection.getresponse()
+            answer = Answer(
+                response.status,
+                {name.lower(): value for name, value in response.getheaders()},
+                response.read(),
+            )
+        finally:
+            connection.close()
+        self._require_documented(method, address, answer)
+        return answer
+
+    def get(self, address: str, **query: Any) -> Answer:
+        return self.send("GET", address, query=query)
+
+    def submit(
+        self, program: bytes = PART, file: str = "part.ngc", key: str | None = None, **fields: str
+    ) -> Answer:
+        """Has a program planned, sent as a form."""
+        body, kind = form({"machine": "mill", **fields}, program, file)
+        headers = {"Content-Type": kind} | ({} if key is None else {"Idempotency-Key": key})
+        return self.send("POST", "/v1/jobs", body, headers)
+
+    def submit_json(self, **request: Any) -> Answer:
+        body = json.dumps({"program": PART.decode(), "name": "part.ngc", **request}).encode()
+        return self.send("POST", "/v1/jobs", body, {"Content-Type": "application/json"})
+
+    def wait(self, job: str, *states: str, seconds: float = 60.0) -> dict[str, Any]:
+        """The job when it is in one of these states (none: has ended)."""
+        if not states:
+            self.send("GET", f"/v1/jobs/{job}/events")  # as long as it is not ended
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            found: dict[str, Any] = self.get(f"/v1/jobs/{job}").json
+            if found["state"] in (states or ENDED):
+                return found
+            time.sleep(0.02)
+        raise AssertionError(f"the job is still {found['state']}")
+
+    def planned(self, program: bytes = PART, **fields: str) -> dict[str, Any]:
+        """A job that has ended."""
+        answer = self.submit(program, **fields)
+        assert answer.status in (200, 202), answer.content
+        return self.wait(answer.json["id"])
+
+    @property
+    def fork_server(self) -> int:
+        """The process that the processes of jobs come from."""
+        [own] = [
+            child
+            for child in _children(self.process.pid)
+            if b"forkserver" in Path(f"/proc/{child}/cmdline").read_bytes()
+        ]
+        return own
+
+    @property
+    def workers(self) -> list[int]:
+        """The processes of the jobs that run."""
+        return _children(self.fork_server)
+
+    @property
+    def memory(self) -> int:
+        """What the process of the server has in memory [bytes]."""
+        pages = Path(f"/proc/{self.process.pid}/statm").read_text("ascii").split()[1]
+        return int(pages) * os.sysconf("SC_PAGE_SIZE")
+
+    def _require_documented(self, method: str, address: str, answer: Answer) -> None:
+        if not address.startswith("/v1/") or address == "/v1/openapi.json":
+            return
+        if self._document is None:
+            self._document = self.get("/v1/openapi.json").json
+        for known, operations in self._document["paths"].items():
+            if re.fullmatch(re.sub(r"\{\w+\}", "[^/]+", known), address) and method.lower() in operations:
+                told = operations[method.lower()]["responses"]
+                assert str(answer.status) in told, f"{method} {address}: {answer.status} is not documented"
+                types = told[str(answer.status)].get("content", {})
+                own = answer.headers.get("content-type", "").partition(";")[0]
+                assert not types or own in types, f"{method} {address}: {own} is not among {list(types)}"
+                return
+
+
+def _children(process: int) -> list[int]:
+    found = []
+    for task in Path(f"/proc/{process}/task").glob("*/children"):
+        try:
+            found += [int(own) for own in task.read_text("ascii").split()]
+        except OSError:  # noqa: PERF203 (it has ended)
+            continue
+    return found
+
+
+@contextmanager
+def running(store: Path, *options: str, token: str | None = None) -> Iterator[Server]:
+    """A server; what it says of defects fails the test."""
+    server = Server(store, *options, token=token)
+    try:
+        yield server
+    finally:
+        said = server.end() if server.process.poll() is None else ""
+    assert said == "", said
+
+
+def events_of(server: Server, job: str, last: int | None = None) -> list[tuple[int, str, dict[str, Any]]]:
+    """The number, kind and data of all events of a job, until its end."""
+    headers = {} if last is None else {"Last-Event-ID": str(last)}
+    text = server.send("GET", f"/v1/jobs/{quote(job)}/events", headers=headers).content.decode()
+    found = []
+    for block in text.split("\n\n"):
+        lines = dict(line.split(": ", 1) for line in block.splitlines() if not line.startswith(":"))
+        if "data" in lines:
+            found.append((int(lines["id"]), lines["event"], json.loads(lines["data"])))
+    return found
