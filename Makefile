@@ -27,7 +27,7 @@ lint: clippy $(VENV)/built
 
 # It generates no code and waits for none: it runs beside the module's build, in a folder of its own.
 clippy:
-	CARGO_TARGET_DIR=$(CURDIR)/solvers/target/lint cargo clippy --release --quiet --workspace --all-targets --manifest-path solvers/Cargo.toml -- -D warnings
+	MAKEFLAGS= CARGO_TARGET_DIR=$(CURDIR)/solvers/target/lint cargo clippy --release --quiet --workspace --all-targets --manifest-path solvers/Cargo.toml -- -D warnings
 
 bench: $(VENV)/built
 	cargo run --release --package feedplan-benches --manifest-path solvers/Cargo.toml -- --bench

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import settings
+from hypothesis.internal.conjecture import providers
 
 from feedplan.audit import Audit, LimitCheck
 from feedplan.constraints.problem import Problem
@@ -26,6 +27,8 @@ from tests.campaign import EXAMPLES, examples
 settings.register_profile("same", deadline=None, derandomize=True)
 settings.register_profile("campaign", deadline=None, database=None, max_examples=examples(100))
 settings.load_profile("campaign" if EXAMPLES else "same")
+# Hypothesis also draws constants of the modules that are loaded, which depend on the tests before.
+providers.is_local_module_file = lambda file: False
 
 SIDE, FEED, ACCELERATION = 20.0, 50.0, 500.0
 RAMP = ArcKind.AXIS_ACCELERATION
