@@ -16,7 +16,7 @@ test: lint native
 	$(BIN)/pytest --numprocesses auto
 
 native: $(VENV)/built
-	cargo test --release --quiet --manifest-path solvers/Cargo.toml
+	MAKEFLAGS= cargo test --release --quiet --manifest-path solvers/Cargo.toml
 
 lint: clippy $(VENV)/built
 	$(BIN)/ruff check .

@@ -141,6 +141,7 @@ def cases(tmp_path: FilePath) -> dict[str, tuple[Callable[..., Any], dict[str, A
                 "feed": 50.0,
                 "whole_step": 1.0,
                 "max_bytes": 1000,
+                "max_moves": 1000,
                 "progress": None,
             },
         ),
