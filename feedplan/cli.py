@@ -18,8 +18,11 @@ import click
 from feedplan import __version__, console, outputs, planners
 from feedplan.command_options import (
     ACCURACY,
+    FEED,
+    FEED_OVERRIDE,
     JSON,
     MACHINE,
+    METHOD,
     PATH,
     PROGRAM,
     QUIET,
@@ -125,13 +128,13 @@ def cli(context: click.Context) -> int:
 @MACHINE
 @controller_options
 @reading_options
-@click.option("--method", type=click.Choice(planners.methods()), default="bang-bang", show_default=True)
+@METHOD
 @ACCURACY
 @click.option("--time-limit", type=ZERO_OR_MORE, metavar="S", help=WHOLE_LIMIT_HELP)
 @TOLERANCE
 @PATH
-@click.option("--feed", type=Number(), metavar="MM/S", help="Feed in place of the programmed one.")
-@click.option("--feed-override", type=Number(), default=1.0, metavar="FACTOR", help="Factor on the feed.")
+@FEED
+@FEED_OVERRIDE
 @click.option("--period", type=Number(), metavar="S", help="Servo period in place of the machine's.")
 @click.option("--interpolator", type=click.Choice(INTERPOLATORS), default="sarfraz", show_default=True)
 @click.option(
@@ -285,7 +288,7 @@ def _place(server: str | None, token_file: str | None) -> tuple[Callable[..., An
 )
 @TOLERANCE
 @PATH
-@click.option("--feed", type=Number(), metavar="MM/S", help="Feed in place of the programmed one.")
+@FEED
 @click.option("--period", type=Number(), metavar="S", help="Servo period in place of the machine's.")
 @click.option("--output", "-o", metavar="DIR", help="Write comparison.json and comparison.html there.")
 @JSON

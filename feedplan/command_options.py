@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Callable, Sequence
 from typing import IO, TYPE_CHECKING, Any
 
 import click
 
+from feedplan import planners
 from feedplan.geometry.corners import PATHS
 
 if TYPE_CHECKING:
@@ -42,6 +44,13 @@ MACHINE = click.option(
     metavar="NAME|FILE",
     help="A bundled machine, a TOML file, or auto: the smallest bundled one that the program fits.",
 )
+METHOD = click.option(
+    "--method", type=click.Choice(planners.methods()), default="bang-bang", show_default=True
+)
+FEED = click.option("--feed", type=Number(), metavar="MM/S", help="Feed in place of the programmed one.")
+FEED_OVERRIDE = click.option(
+    "--feed-override", type=Number(), default=1.0, metavar="FACTOR", help="Factor on the feed."
+)
 TOLERANCE = click.option(
     "--tolerance", type=Number(), metavar="MM", help="Allowed distance from the programmed path."
 )
@@ -74,6 +83,13 @@ def _source(given: str) -> str | IO[bytes]:
     if sys.stdin is None:
         raise click.UsageError("standard input is closed: give the path of a program")
     return sys.stdin.buffer
+
+
+def with_options(command: Callable[..., Any], options: Sequence[Callable[..., Any]]) -> Any:
+    """The command with all of these options, in this order in its help."""
+    for option in reversed(options):
+        command = option(command)
+    return command
 
 
 def name_of(program: str | IO[bytes]) -> str:

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 import click
 
+from feedplan.command_options import with_options
 from feedplan.errors import MachineError
 from feedplan.machine.controller import MODELS, Controller
 from feedplan.machine.machine import Machine
@@ -40,9 +41,7 @@ def controller_options(command: Command) -> Command:
         given = dict(map(_pair, controller_options))
         return command(*args, controller=lambda machine: chosen(machine, controller, given), **others)
 
-    for option in reversed(_OPTIONS):
-        packed = option(packed)
-    return packed  # type: ignore[return-value]
+    return with_options(packed, _OPTIONS)  # type: ignore[no-any-return]
 
 
 def chosen(machine: Machine, name: str | None, parameters: dict[str, Any]) -> Controller | None:

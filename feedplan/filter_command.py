@@ -17,7 +17,7 @@ from typing import IO
 import click
 
 from feedplan import console, planners
-from feedplan.command_options import PROGRAM, TOLERANCE
+from feedplan.command_options import METHOD, PROGRAM, TOLERANCE
 from feedplan.errors import InfeasibleError
 from feedplan.machine.importers import import_machine
 from feedplan.machine.machine import Machine
@@ -49,7 +49,7 @@ def filter_progress(write: Callable[[str], object]) -> Callable[[str, float], No
 @PROGRAM
 @click.option("--machine", "-m", metavar="NAME|FILE", help="As for plan.  [default: LinuxCNC's INI file]")
 @reading_options
-@click.option("--method", type=click.Choice(planners.methods()), default="bang-bang", show_default=True)
+@METHOD
 @TOLERANCE
 def filter_(
     program: str | IO[bytes],

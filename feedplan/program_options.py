@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from feedplan.command_options import with_options
 from feedplan.planned_feeds.dialects import DIALECTS
 
 if TYPE_CHECKING:
@@ -90,6 +91,4 @@ def program_options(command: Command) -> Command:
             )
         return command(*args, output=output, wanted=ProgramWanted(program_out, in_folder, options), **others)
 
-    for option in reversed(_OPTIONS):
-        packed = option(packed)
-    return packed  # type: ignore[return-value]
+    return with_options(packed, _OPTIONS)  # type: ignore[no-any-return]

@@ -8,6 +8,7 @@ from typing import IO, Any, TypeVar
 
 import click
 
+from feedplan.command_options import with_options
 from feedplan.machine.machine import Machine
 from feedplan.program.machine_for import AUTO, smallest_machine
 from feedplan.program.program import Program
@@ -52,9 +53,7 @@ def reading_options(command: Command) -> Command:
             reading["whole_step"] = whole_step
         return command(*args, reading=reading, **others)
 
-    for option in reversed(_OPTIONS):
-        packed = option(packed)
-    return packed  # type: ignore[return-value]
+    return with_options(packed, _OPTIONS)  # type: ignore[no-any-return]
 
 
 def machine_for(

@@ -10,14 +10,16 @@ import click
 from feedplan import console, planners
 from feedplan.command_options import (
     ACCURACY,
+    FEED,
+    FEED_OVERRIDE,
     JSON,
     MACHINE,
+    METHOD,
     PATH,
     PROGRAM,
     TIME_LIMIT_HELP,
     TOLERANCE,
     ZERO_OR_MORE,
-    Number,
     given_only,
     name_of,
 )
@@ -36,13 +38,13 @@ _SHOWN = 60
 @PROGRAM
 @MACHINE
 @reading_options
-@click.option("--method", type=click.Choice(planners.methods()), default="bang-bang", show_default=True)
+@METHOD
 @ACCURACY
 @click.option("--time-limit", type=ZERO_OR_MORE, metavar="S", help=TIME_LIMIT_HELP)
 @TOLERANCE
 @PATH
-@click.option("--feed", type=Number(), metavar="MM/S", help="Feed in place of the programmed one.")
-@click.option("--feed-override", type=Number(), default=1.0, metavar="FACTOR", help="Factor on the feed.")
+@FEED
+@FEED_OVERRIDE
 @click.option(
     "--tool-change",
     type=ZERO_OR_MORE,

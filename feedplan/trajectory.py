@@ -51,7 +51,8 @@ class Trajectory:
 
     @cached_property
     def _lengths(self) -> CurveLength:
-        return CurveLength(self._problem.tip_curve or self._problem.path.curve)
+        curve = self._problem.tip_curve
+        return self._problem.path.lengths if curve is None else CurveLength(curve)
 
     @property
     def length(self) -> float:

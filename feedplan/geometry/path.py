@@ -235,12 +235,12 @@ class Path:
 
     def __getstate__(self) -> dict[str, Any]:
         # The table of lengths is made anew where it is needed.
-        return {name: value for name, value in vars(self).items() if name != "_lengths"}
+        return {name: value for name, value in vars(self).items() if name != "lengths"}
 
     @property
     def length(self) -> float:
         """Length along all axes [mm; of joints their unit]."""
-        return self._lengths.total
+        return self.lengths.total
 
     def evaluate(self, s: ArrayLike, order: int = 0) -> NDArray[np.float64]:
         """The place at one length or at lengths (n,) from the start: (axes,) or (n, axes) [mm, deg].
@@ -251,7 +251,7 @@ class Path:
         if not is_whole(order, 0, 2):
             raise InputError(f"the derivative by length is of order {shown(order)}: give 0, 1 or 2")
         lengths = within(s, "length", self.length, "mm")
-        places = self._lengths.locate(np.atleast_1d(lengths))
+        places = self.lengths.locate(np.atleast_1d(lengths))
         values = self.curve.evaluate(places.piece, places.u, order)
         row = 0 if lengths.ndim == 0 else slice(None)
         if order == 0:
@@ -265,7 +265,8 @@ class Path:
             return np.asarray(((values[2] - along * tangent) / speed**2)[row])
 
     @cached_property
-    def _lengths(self) -> CurveLength:
+    def lengths(self) -> CurveLength:
+        """The length along all axes as a function of the place."""
         return CurveLength(self.curve)
 
     def cut(self, curve: CompositeCurve, piece: NDArray[np.int64]) -> Path:

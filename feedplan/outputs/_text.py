@@ -7,7 +7,8 @@ readers. An event stands before the first row at or after its time.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+import re
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from typing import Any, BinaryIO
@@ -27,6 +28,7 @@ HEADER, EVENT, _MORE = "feedplan", "event", "#+"
 # LinuxCNC's halstreamer reads lines of 4000 bytes.
 _LONGEST = 1000
 _BYTES_AT_ONCE = 1_000_000
+_AXIS = re.compile(r"position (\S+) \[([^\s\[\]]+)\]")
 
 
 def _comment(name: str, data: object) -> bytes:
@@ -101,6 +103,24 @@ class Rows:
                 f"{file}: {name} is {what} in its comment # {HEADER} {{…}}: give a file that feedplan wrote"
             )
         return value
+
+
+def read_columns(
+    file: FilePath, column_names: Callable[[Sequence[str], Sequence[str]], str], progress: Listener | None
+) -> tuple[Rows, tuple[str, ...], tuple[str, ...]]:
+    """The rows of a file, its axes and their units, of which `column_names` makes its line of names."""
+    axes: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
+
+    def width_of(rows: Rows) -> int:
+        nonlocal axes, units
+        found = _AXIS.findall(rows.names)
+        axes, units = zip(*found, strict=True) if found else (("X", "Y"), ("mm", "mm"))
+        if rows.names != (names := column_names(axes, units)):
+            raise InputError(f"{file}: the columns must be named {names}")
+        return names.count(",") + 1
+
+    return read_rows(file, width_of, progress=progress), axes, units
 
 
 def read_rows(

@@ -8,7 +8,6 @@ itself.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path as FilePath
@@ -16,16 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from feedplan.errors import InputError
 from feedplan.outputs import QUANTITIES, SETPOINTS, Add, Header, SetpointFile
 from feedplan.outputs._arrays import chunk_of
-from feedplan.outputs._text import Rows, RowWriter, read_rows
+from feedplan.outputs._text import RowWriter, read_columns
 from feedplan.progress import Listener
 from feedplan.setpoints import SetpointChunk
 
 FILE = "setpoints.csv"
 ROWS = SETPOINTS
-_NAMED = re.compile(r"position (\S+) \[([^\s\[\]]+)\]")
 
 
 def column_names(axes: Sequence[str], units: Sequence[str]) -> str:
@@ -54,18 +51,7 @@ def writer(file: FilePath, header: Header, count: int) -> Iterator[Add]:
 
 def load(file: FilePath, progress: Listener | None = None) -> SetpointFile:
     """The setpoints of a csv file with the names that this format writes."""
-    axes: tuple[str, ...] = ()
-    units: tuple[str, ...] = ()
-
-    def width_of(rows: Rows) -> int:
-        nonlocal axes, units
-        found = _NAMED.findall(rows.names)
-        axes, units = zip(*found, strict=True) if found else (("X", "Y"), ("mm", "mm"))
-        if rows.names != (names := column_names(axes, units)):
-            raise InputError(f"{file}: the columns must be named {names}")
-        return 2 + len(QUANTITIES) * len(axes)
-
-    rows = read_rows(file, width_of, progress=progress)
+    rows, axes, units = read_columns(file, column_names, progress)
     groups = np.split(rows.table[:, 1:-1], len(QUANTITIES), axis=1)
     columns = {"t": rows.table[:, 0], **dict(zip(QUANTITIES, groups, strict=True)), "line": rows.table[:, -1]}
     told: dict[str, Any] = {name: rows.header[name] for name in ("format", "period") if name in rows.header}

@@ -14,7 +14,6 @@ cubics.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path as FilePath
@@ -24,13 +23,12 @@ import numpy as np
 from feedplan.errors import InputError
 from feedplan.outputs import KNOTS, QUANTITIES, Add, Header, SetpointFile
 from feedplan.outputs._arrays import chunk_of
-from feedplan.outputs._text import Rows, RowWriter, read_rows
+from feedplan.outputs._text import RowWriter, read_columns
 from feedplan.progress import Listener
 from feedplan.setpoints import SetpointChunk
 
 FILE = "setpoints.pvt"
 ROWS = KNOTS
-_NAMED = re.compile(r"position (\S+) \[([^\s\[\]]+)\]")
 _PAIR = ("position", "velocity")
 
 
@@ -66,18 +64,7 @@ def writer(file: FilePath, header: Header, count: int) -> Iterator[Add]:
 
 def load(file: FilePath, progress: Listener | None = None) -> SetpointFile:
     """The knots of a table with the names that this format writes."""
-    axes: tuple[str, ...] = ()
-    units: tuple[str, ...] = ()
-
-    def width_of(rows: Rows) -> int:
-        nonlocal axes, units
-        found = _NAMED.findall(rows.names)
-        axes, units = zip(*found, strict=True) if found else (("X", "Y"), ("mm", "mm"))
-        if rows.names != (names := column_names(axes, units)):
-            raise InputError(f"{file}: the columns must be named {names}")
-        return 3 + len(_PAIR) * len(axes)
-
-    rows = read_rows(file, width_of, progress=progress)
+    rows, axes, units = read_columns(file, column_names, progress)
     period = rows.of_header("period", float, file)
     t, steps = rows.table[:, 0], rows.table[:, 1]
     if (wrong := np.diff(t, prepend=0.0) != steps).any():

@@ -96,8 +96,8 @@ pub fn plan_run<const M: usize>(
 }
 
 /// Calls a function with the capacity of polynomials that a piece needs: that of quadratics, of cubics and conics, of
-/// other polynomial pieces, of all. For many axes fewer are compiled: each costs the compiler seconds, and a piece of low
-/// degree some time.
+/// other polynomial pieces, of all. For many axes fewer capacities are compiled, since each takes the compiler some seconds:
+/// there a piece of low degree has a greater capacity than it needs.
 macro_rules! with_capacity {
     ($task:expr, $i:expr, $function:ident($($argument:expr),*)) => {{
         let needed = $task.coefficients($i);
