@@ -4,19 +4,20 @@ BIN := $(VENV)/bin
 NATIVE := $(wildcard $(foreach below,src src/* src/*/*,solvers/*/$(below)/*.rs) solvers/*/Cargo.toml) solvers/Cargo.toml pyproject.toml
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: demo test native lint clippy bench campaign clean
+.PHONY: demo test native lint clippy bench campaign clean cargo
 
 demo: $(VENV)/built
 	@$(BIN)/python examples/vase.py --blocks 2000 --output out/vase.ngc
 	@$(BIN)/feedplan plan out/vase.ngc --machine vase -o out/vase
 	@echo "The report is out/vase/report.html"
 
-test: lint native
+test: native lint
 	$(BIN)/python -m mypy.stubtest feedplan._solvers
 	$(BIN)/pytest --numprocesses auto
 
-native: $(VENV)/built
-	MAKEFLAGS= cargo test --release --quiet --manifest-path solvers/Cargo.toml
+# They need no Python. They come first: the module links what has been compiled for them.
+native: cargo
+	MAKEFLAGS= CARGO_TARGET_DIR=$(CURDIR)/solvers/target cargo test --release --quiet --manifest-path solvers/Cargo.toml
 
 lint: clippy $(VENV)/built
 	$(BIN)/ruff check .
@@ -25,9 +26,9 @@ lint: clippy $(VENV)/built
 	$(BIN)/lint-imports
 	cargo fmt --all --check --manifest-path solvers/Cargo.toml
 
-# It generates no code and waits for none: it runs beside the module's build, in a folder of its own.
-clippy:
-	MAKEFLAGS= CARGO_TARGET_DIR=$(CURDIR)/solvers/target/lint cargo clippy --release --quiet --workspace --all-targets --manifest-path solvers/Cargo.toml -- -D warnings
+# It generates no code and waits for none: it runs beside the builds, in a folder of its own, at a lower priority.
+clippy: cargo
+	MAKEFLAGS= CARGO_TARGET_DIR=$(CURDIR)/solvers/target/lint nice cargo clippy --release --quiet --workspace --all-targets --manifest-path solvers/Cargo.toml -- -D warnings
 
 bench: $(VENV)/built
 	cargo run --release --package feedplan-benches --manifest-path solvers/Cargo.toml -- --bench
@@ -68,10 +69,12 @@ clean:
 	rm -rf $(VENV) out solvers/target
 
 # The native module is built once, and again only when its sources change; the tests of native code link the same crates.
-$(VENV)/built: $(VENV)/maturin $(NATIVE)
-	@command -v cargo >/dev/null || { echo "cargo is missing: install the Rust toolchain"; exit 1; }
+$(VENV)/built: $(VENV)/maturin $(NATIVE) | cargo
 	MAKEFLAGS= CARGO_TARGET_DIR=$(CURDIR)/solvers/target $(BIN)/pip install --quiet --constraint constraints.txt --no-build-isolation --editable ".[dev]"
 	@touch $@
+
+cargo:
+	@command -v cargo >/dev/null || { echo "cargo is missing: install the Rust toolchain"; exit 1; }
 
 $(VENV)/maturin: constraints.txt
 	@python3 -m venv $(VENV) || { echo "python3 lacks venv: install the package python3-venv"; exit 1; }
