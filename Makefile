@@ -2,16 +2,17 @@
 VENV := .venv
 BIN := $(VENV)/bin
 NATIVE := $(wildcard $(foreach below,src src/* src/*/*,solvers/*/$(below)/*.rs) solvers/*/Cargo.toml) solvers/Cargo.toml pyproject.toml
+PAGE := feedplan/report/bundle/page.js
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: demo test native lint clippy bench campaign clean cargo
+.PHONY: demo test native lint clippy page wheel bench campaign clean cargo
 
-demo: $(VENV)/built
+demo: $(VENV)/built $(PAGE)
 	@$(BIN)/python examples/vase.py --blocks 2000 --output out/vase.ngc
 	@$(BIN)/feedplan plan out/vase.ngc --machine vase -o out/vase
 	@echo "The report is out/vase/report.html"
 
-test: native lint
+test: native lint $(PAGE)
 	$(BIN)/python -m mypy.stubtest feedplan._solvers
 	$(BIN)/pytest --numprocesses auto
 
@@ -30,13 +31,19 @@ lint: clippy $(VENV)/built
 clippy: cargo
 	MAKEFLAGS= CARGO_TARGET_DIR=$(CURDIR)/solvers/target/lint nice cargo clippy --release --quiet --workspace --all-targets --manifest-path solvers/Cargo.toml -- -D warnings
 
-bench: $(VENV)/built
+page: $(PAGE)
+
+# For those who have neither cargo nor Node.js.
+wheel: $(VENV)/maturin $(PAGE)
+	CARGO_TARGET_DIR=$(CURDIR)/solvers/target $(BIN)/maturin build --release --out dist
+
+bench: $(VENV)/built $(PAGE)
 	cargo run --release --package feedplan-benches --manifest-path solvers/Cargo.toml -- --bench
 	$(BIN)/python -m benchmarks
 
 # Random paths by the million, on every machine by the thousand, and property tests on cases never drawn before. What is
 # found becomes a case of the test that found it; the figures stand in benchmarks/README.md.
-campaign: $(VENV)/built
+campaign: $(VENV)/built $(PAGE)
 	FEEDPLAN_SEEDS=1000000 cargo test --release --manifest-path solvers/Cargo.toml --test kernels planning::random:: -- --nocapture
 	FEEDPLAN_SEEDS=1000000 cargo test --release --manifest-path solvers/Cargo.toml --test kernels planning::bound:: -- --nocapture
 	FEEDPLAN_SEEDS=1250 $(BIN)/pytest --numprocesses auto tests/constraints/test_joints.py -k random
@@ -66,7 +73,7 @@ campaign: $(VENV)/built
 	FEEDPLAN_EXAMPLES=1000 $(BIN)/pytest --numprocesses auto -m hypothesis
 
 clean:
-	rm -rf $(VENV) out solvers/target
+	rm -rf $(VENV) out solvers/target page/node_modules $(dir $(PAGE))
 
 # The native module is built once, and again only when its sources change; the tests of native code link the same crates.
 $(VENV)/built: $(VENV)/maturin $(NATIVE) | cargo
@@ -75,6 +82,15 @@ $(VENV)/built: $(VENV)/maturin $(NATIVE) | cargo
 
 cargo:
 	@command -v cargo >/dev/null || { echo "cargo is missing: install the Rust toolchain"; exit 1; }
+
+# What draws report, comparison and the page of the service: one script and its style.
+$(PAGE): $(wildcard page/source/* page/source/*/*) page/build.mjs page/node_modules/installed
+	node page/build.mjs
+
+page/node_modules/installed: page/package.json page/package-lock.json
+	@command -v npm >/dev/null || { echo "npm is missing: install Node.js 20 or newer with npm"; exit 1; }
+	cd page && npm ci --ignore-scripts --no-audit --no-fund --silent
+	@touch $@
 
 $(VENV)/maturin: constraints.txt
 	@python3 -m venv $(VENV) || { echo "python3 lacks venv: install the package python3-venv"; exit 1; }

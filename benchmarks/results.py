@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import platform
 from dataclasses import dataclass
+from html import escape
 from importlib import metadata
 from pathlib import Path
 
 from rich import box
 from rich.console import Console
-from rich.markup import escape
+from rich.markup import escape as as_markup
 from rich.table import Table
 
 Cell = float | int | str
@@ -48,7 +50,7 @@ def show(result: Result, console: Console) -> None:
     for column in columns:
         words = isinstance(result.rows[0].get(column), str)
         # Sentences give way to numbers.
-        table.add_column(escape(column), justify="left" if words else "right", no_wrap=not words)
+        table.add_column(as_markup(column), justify="left" if words else "right", no_wrap=not words)
     for row in result.rows:
         table.add_row(*(_written(row[column]) if column in row else "" for column in columns))
     console.print(table)
@@ -77,31 +79,67 @@ def store(result: Result, directory: Path) -> Path:
 
 
 def draw(result: Result, directory: Path) -> Path | None:
-    """Write the chart as a page; its path, None where the table has none."""
+    """Write the chart as a picture (SVG); its path, None where the table has none."""
     if result.chart is None:
         return None
-    from plotly.graph_objects import Figure, Scatter
-
-    chart, figure = result.chart, Figure()
-    for series in dict.fromkeys(row[chart.series] for row in result.rows):
-        rows = [row for row in result.rows if row[chart.series] == series and _is_positive(row[chart.y])]
-        figure.add_trace(
-            Scatter(
-                x=[row[chart.x] for row in rows],
-                y=[row[chart.y] for row in rows],
-                text=[row[chart.label] for row in rows],
-                name=str(series),
-                mode="markers",
-                marker={"size": 10},
-                hovertemplate="%{text}: %{x:.3g}, %{y:.3g}",
-            )
-        )
-    figure.update_layout(title=result.title, template="plotly_white", hovermode="closest")
-    figure.update_xaxes(title=chart.x, type="log")
-    figure.update_yaxes(title=chart.y, type="log")
-    path = directory / f"{result.name}.html"
-    figure.write_html(path, include_plotlyjs="directory")
+    path = directory / f"{result.name}.svg"
+    path.write_text(_scatter(result, result.chart), encoding="utf-8")
     return path
+
+
+# Width and height of the picture, the room around its field, and colours told apart without red or green.
+_SIZE, _ROOM = (960, 600), (80, 220, 50, 60)  # left, right, above, below
+_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#332288", "#882255", "#666666")
+
+
+def _scatter(result: Result, chart: Chart) -> str:
+    """Points on logarithmic scales with lines at powers of ten; their labels show where the pointer is."""
+    rows = [row for row in result.rows if _is_positive(row[chart.x]) and _is_positive(row[chart.y])]
+    left, right, above, below = _ROOM
+    spans = []
+    for column in (chart.x, chart.y):
+        powers = [math.log10(float(row[column])) for row in rows] or [0.0]
+        spans.append((math.floor(min(powers)), max(math.ceil(max(powers)), math.floor(min(powers)) + 1)))
+
+    def place(axis: int, power: float) -> float:
+        low, high = spans[axis]
+        part = (power - low) / (high - low)
+        if axis == 0:
+            return left + part * (_SIZE[0] - left - right)
+        return _SIZE[1] - below - part * (_SIZE[1] - above - below)
+
+    bottom, top, end = _SIZE[1] - below, above, _SIZE[0] - right
+    parts = [f'<text x="{left}" y="28" font-size="16">{escape(result.title)}</text>']
+    for power in range(spans[0][0], spans[0][1] + 1):
+        x = place(0, power)
+        parts.append(f'<path d="M{x:.1f},{top}V{bottom}" stroke="#ddd"/>')
+        parts.append(f'<text x="{x:.1f}" y="{bottom + 18}" text-anchor="middle">{10.0**power:g}</text>')
+    for power in range(spans[1][0], spans[1][1] + 1):
+        y = place(1, power)
+        parts.append(f'<path d="M{left},{y:.1f}H{end}" stroke="#ddd"/>')
+        parts.append(f'<text x="{left - 8}" y="{y + 4:.1f}" text-anchor="end">{10.0**power:g}</text>')
+    parts.append(
+        f'<text x="{(left + end) / 2}" y="{bottom + 44}" text-anchor="middle">{escape(chart.x)}</text>'
+        f'<text x="20" y="{(top + bottom) / 2}" transform="rotate(-90 20 {(top + bottom) / 2})" '
+        f'text-anchor="middle">{escape(chart.y)}</text>'
+    )
+    for k, series in enumerate(dict.fromkeys(row[chart.series] for row in rows)):
+        colour, y = _COLOURS[k % len(_COLOURS)], above + 12 + 20 * k
+        parts.append(f'<circle cx="{end + 20}" cy="{y}" r="5" fill="{colour}"/>')
+        parts.append(f'<text x="{end + 32}" y="{y + 4}">{escape(str(series))}</text>')
+        for row in rows:
+            if row[chart.series] == series:
+                x, y_of = (place(n, math.log10(float(row[name]))) for n, name in ((0, chart.x), (1, chart.y)))
+                told = f"{row[chart.label]}: {float(row[chart.x]):.3g}, {float(row[chart.y]):.3g}"
+                parts.append(
+                    f'<circle cx="{x:.1f}" cy="{y_of:.1f}" r="5" fill="{colour}" fill-opacity="0.8">'
+                    f"<title>{escape(told)}</title></circle>"
+                )
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_SIZE[0]} {_SIZE[1]}" '
+        f'font-family="sans-serif" font-size="12"><rect width="100%" height="100%" fill="#fff"/>'
+        f"{''.join(parts)}</svg>\n"
+    )
 
 
 def _is_positive(cell: Cell) -> bool:

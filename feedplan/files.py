@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 SUMMARY_FILE = "plan.json"
 PROGRAM_FILE = "program.ngc"
+DRAWING_FILE = "drawing.bin"
 COMPARISON_FILE = "comparison.json"
 _ROWS_AT_ONCE = 10_000
 # How far the writing is after the account, when the times of the setpoints are laid out, and after these.
@@ -41,6 +42,7 @@ def write_plan(
     *,
     program: PlannedProgram | None = None,
     step: float | None = None,
+    drawing: bool = False,
     progress: Progress | None = None,
 ) -> tuple[FilePath, ...]:
     """Writes the plan, its setpoints in these formats (none for ()), and its report; returns the files.
@@ -49,12 +51,15 @@ def write_plan(
 
     `step` [s] is the longest one of a pvt table, which needs it.
     All is written beside and renamed at the end, so `folder` never holds half a plan; other files in it stay.
-    `progress` is called with a stage and 0 to 1. Without the package plotly the report has no pictures and
-    says so. Raises InputError where the folder or the file system refuses.
+    `progress` is called with a stage and 0 to 1. With `drawing` what a page draws is written as well, as
+    drawing.bin, with more points than the report has. Raises InputError where the folder or the file system
+    refuses.
     """
-    from feedplan.report.figures import SetpointFigures
+    from feedplan.report.container import contained
+    from feedplan.report.figures import SetpointFigures, chart_data
     from feedplan.report.page import FILE as REPORT_FILE
     from feedplan.report.page import write_report
+    from feedplan.report.tool_path import MANY_POINTS, POINTS
 
     formats = list_of_names(formats, "formats", "a list of names, such as ['npz', 'csv']")  # type: ignore[assignment]
     folder = _folder(folder)
@@ -79,9 +84,9 @@ def write_plan(
     report = part(share, LAID_OUT, SAMPLED)
     units = tuple(plan.machine.axis(name).unit for name in setpoints.axes)
     header = Header(setpoints.axes, units, setpoints.period, setpoints.events)
-    figures = SetpointFigures(
-        plan.problem, account.motion, setpoints.count, [check.time for check in audit.broken]
-    )
+    marks = [check.time for check in audit.broken]
+    points = MANY_POINTS if drawing else POINTS
+    figures = SetpointFigures(plan.problem, account.motion, setpoints.count, marks, points)
     with staged(folder, last=SUMMARY_FILE) as stage:
         with ExitStack() as stack:
             sinks = [
@@ -106,16 +111,20 @@ def write_plan(
                         for chunk in knots.chunks(_ROWS_AT_ONCE):
                             add(chunk)
         tell(share, SAMPLED)
+        drawn = part(share, SAMPLED, 0.95)
+        data = chart_data(plan.problem, plan.profile, account, figures, audit, drawn)
+        if drawing:
+            (stage / DRAWING_FILE).write_bytes(contained(data))
+            data["path"] = figures.tool_path(account.activity, POINTS)
         write_report(
             stage / REPORT_FILE,
             summary=summary,
             problem=plan.problem,
-            profile=plan.profile,
             account=account,
             audit=audit,
-            figures=figures,
+            data=data,
+            setpoints=figures.count,
             text=plan.program.text if plan.program else None,
-            progress=part(share, SAMPLED, 1.0),
         )
         (stage / SUMMARY_FILE).write_text(summary_text(summary), encoding="utf-8")
         names = sorted(file.name for file in stage.iterdir())
@@ -163,7 +172,7 @@ def write_comparison(
             tool = ToolPath(row.plan.problem, row.plan.account.motion)
             for chunk in row.plan.setpoints().chunks(_ROWS_AT_ONCE):
                 tool.add(chunk)
-            paths.append({"method": row.method, **tool.data()})
+            paths.append({"method": row.method, **tool.data(row.plan.account.activity)})
             entry |= {
                 "gap": row.gap,
                 "computing": row.plan.compute["plan"],

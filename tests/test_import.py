@@ -48,7 +48,6 @@ def test_nothing_that_is_slow_is_imported_with_the_package() -> None:
     slow = {
         "click",
         "rich",
-        "plotly",
         "scipy",
         "toppra",
         "casadi",

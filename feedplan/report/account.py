@@ -12,7 +12,7 @@ from feedplan.constraints.problem import Problem
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 from feedplan.progress import Listener, part, tell
-from feedplan.report.activity import activity
+from feedplan.report.activity import Activity, activity
 from feedplan.report.losses import Share, SlowLine, slowest_lines, time_per_limit
 from feedplan.report.stops import Stops, stops_by_cause
 from feedplan.report.tool_motion import ToolMotion, tool_motion
@@ -43,9 +43,11 @@ class Total:
 @dataclass(frozen=True, eq=False)
 class Account:
     """`limits` with their times, the longest first; the lines that lose most; `stops` by cause; totals of
-    motion at a `feed`, `rapid` motion and `all`; `tolerance` [mm] asked for, the least and the greatest."""
+    motion at a `feed`, `rapid` motion and `all`; `tolerance` [mm] asked for, the least and the greatest.
+    `activity` tells which limit is active when."""
 
     motion: ToolMotion
+    activity: Activity
     limits: tuple[Share, ...]
     slow: tuple[SlowLine, ...]
     stops: tuple[Stops, ...]
@@ -98,6 +100,7 @@ def account(
     tell(progress, 1.0)
     return Account(
         motion=motion,
+        activity=moments,
         limits=tuple(limits),
         slow=tuple(slow),
         stops=tuple(stops_by_cause(problem, program, moments)),

@@ -35,7 +35,8 @@ class Activity:
 
     `weight` is the time that each stands for [s], `piece` and `speed` of the tool [mm/s, deg/s where it only
     turns] are those of the moment, `active` the number in `names` of the active limit. `pace` is the part of
-    the speed that feed and axis velocities alone would allow. `run` is the run of the path.
+    the speed that feed and axis velocities alone would allow. `run` is the run of the path, `place` the
+    moment's place on it (`place_on`).
     """
 
     names: tuple[str, ...]
@@ -45,6 +46,11 @@ class Activity:
     speed: Floats
     active: NDArray[np.int64]
     pace: Floats
+    place: NDArray[np.int64]
+
+    def at(self, place: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Numbers of the moments nearest to these places before them; the first one where there is none."""
+        return np.maximum(np.searchsorted(self.place, place, "right") - 1, 0)
 
     @property
     def lost(self) -> Floats:
@@ -86,7 +92,14 @@ def activity(
     active = np.where(most >= ACTIVE, (use >= most[:, None] * (1.0 - 1e-6)).argmax(axis=1), len(names) - 1)
     pace = np.column_stack([at_feed, at_velocity]).max(axis=1, initial=0.0)
     tell(progress, 1.0)
-    return Activity(names, weight, piece, run, np.nan_to_num(speed), active, np.nan_to_num(pace))
+    place = place_on(problem, piece, u)
+    return Activity(names, weight, piece, run, np.nan_to_num(speed), active, np.nan_to_num(pace), place)
+
+
+def place_on(problem: Problem, piece: NDArray[np.integer], u: Floats) -> NDArray[np.int64]:
+    """Places on a path as integers that grow along it: a piece has 2^20 of them."""
+    part = u / problem.path.curve.width[piece]
+    return np.asarray((piece.astype(np.int64) << 20) + np.round(part * ((1 << 20) - 1)).astype(np.int64))
 
 
 def _moments(problem: Problem, profile: SpeedProfile) -> tuple[Floats, Floats, NDArray[np.int64]]:

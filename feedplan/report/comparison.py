@@ -37,7 +37,7 @@ def write_comparison(
     table = Template(asset("comparison.html")).substitute(table=_table(rows, limits))
     sections = table + pictures(asset("comparison_charts.html"))
     data = {"methods": list(paths)}
-    file.write_text(framed("comparison", title, told, "", sections, data, "comparison.js"), encoding="utf-8")
+    file.write_text(framed("comparison", title, told, "", sections, data), encoding="utf-8")
 
 
 def _table(rows: Sequence[Mapping[str, Any]], limits: Sequence[str]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -11,10 +12,12 @@ from feedplan.audit import Audit
 from feedplan.constraints.problem import Problem
 from feedplan.profile import SpeedProfile
 from feedplan.progress import Listener
+from feedplan.report.account import Account
+from feedplan.report.activity import Activity
 from feedplan.report.limits import drawn_arcs, limit_samples, samples_per_arc
-from feedplan.report.reduce import Envelope, packed
+from feedplan.report.reduce import Envelope
 from feedplan.report.tool_motion import ToolMotion
-from feedplan.report.tool_path import ToolPath
+from feedplan.report.tool_path import POINTS, ToolPath
 from feedplan.setpoints import SetpointChunk
 
 # Points kept. The page draws at most a few thousand of them at once and takes the finer ones on zooming in.
@@ -27,14 +30,22 @@ _MEAN_POINTS = 1_000  # of the mean of each curve, drawn where it oscillates too
 class SetpointFigures:
     """Takes all setpoints chunk by chunk; holds the curves over time and the tool path.
 
-    `count` setpoints will come; `marks` are times [s] whose place on the tool path is wanted.
+    `count` setpoints will come; `marks` are times [s] whose place on the tool path is wanted; at most
+    `points` of its points are kept.
     """
 
-    def __init__(self, problem: Problem, motion: ToolMotion, count: int, marks: Sequence[float] = ()) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        motion: ToolMotion,
+        count: int,
+        marks: Sequence[float] = (),
+        points: int = POINTS,
+    ) -> None:
         self._axes = problem.axes
         columns = 1 + 3 * len(self._axes)
         self._curves = Envelope(count, min(_TIME_POINTS_PER_CURVE, _TIME_POINTS // columns))
-        self._path = ToolPath(problem, motion, marks)
+        self._path = ToolPath(problem, motion, marks, points)
         self.count = 0
         self.duration = 0.0
 
@@ -56,9 +67,9 @@ class SetpointFigures:
             result[name] = [_curve(self._curves, 1 + group * axes + k) for k in range(axes)]
         return result
 
-    def tool_path(self) -> dict[str, Any]:
-        """The tool path with speed, source line and time."""
-        return self._path.data()
+    def tool_path(self, activity: Activity, points: int | None = None) -> dict[str, Any]:
+        """The tool path, of at most `points` points where that is given: `ToolPath.data`."""
+        return self._path.data(activity, points)
 
 
 def _curve(curves: Envelope, column: int, with_line: bool = False) -> dict[str, Any]:
@@ -66,11 +77,11 @@ def _curve(curves: Envelope, column: int, with_line: bool = False) -> dict[str, 
     x, y, line = curves.curve(column)
     mean_x, mean = curves.mean(column, _MEAN_POINTS)
     result: dict[str, Any] = {
-        "x": packed(x),
-        "y": packed(y),
-        "mean": {"x": packed(mean_x), "y": packed(mean)},
+        "x": x,
+        "y": y,
+        "mean": {"x": mean_x, "y": mean},
     }
-    return result | ({"line": packed(line)} if with_line else {})
+    return result | ({"line": line} if with_line else {})
 
 
 def over_length(
@@ -102,19 +113,19 @@ def over_length(
         if np.isfinite(value).any():
             # Far above everything else a limit says no more than "not here"; the chart ends before.
             value = np.minimum(value, 20.0 * top) if top > 0 else value
-            result[name] = {"x": packed(length), "y": packed(value)}
+            result[name] = {"x": length, "y": value}
     return result
 
 
 def chart_data(
     problem: Problem,
     profile: SpeedProfile,
-    motion: ToolMotion,
+    account: Account,
     figures: SetpointFigures,
     audit: Audit,
     progress: Listener | None = None,
 ) -> dict[str, Any]:
-    """Everything the page's script draws; `progress` is told how far it is."""
+    """Everything that a page draws, arrays as they are; `progress` is told how far it is."""
     limits = {
         name: [float(value) if np.isfinite(value) else None for value in getattr(problem, f"max_{name}")]
         for name in ("velocity", "acceleration", "jerk")
@@ -129,8 +140,9 @@ def chart_data(
         "judged": sorted(judged),
         "feed": float(problem.feed.max()) if len(problem.feed) else None,
         "duration": figures.duration,
-        "path": figures.tool_path(),
-        "length": over_length(problem, profile, motion, progress),
+        "path": figures.tool_path(account.activity),
+        "length": over_length(problem, profile, account.motion, progress),
         "time": figures.over_time(),
+        "slow": [asdict(line) for line in account.slow],
         "failures": [{"name": check.name, "axis": check.axis, "time": check.time} for check in audit.broken],
     }

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
 import io
-import json
 from collections.abc import Mapping, Sequence
 from html import escape
 from importlib import resources
@@ -14,11 +12,9 @@ from typing import Any
 
 from feedplan.audit import Audit
 from feedplan.constraints.problem import Problem
-from feedplan.profile import SpeedProfile
-from feedplan.progress import Listener, part, tell
 from feedplan.report.account import Account
 from feedplan.report.activity import ACTIVE
-from feedplan.report.figures import SetpointFigures, chart_data
+from feedplan.report.container import as_text, contained
 from feedplan.report.tables import (
     audit_table,
     fit_table,
@@ -31,6 +27,8 @@ from feedplan.report.tables import (
 )
 
 FILE = "report.html"
+# What draws all pages, as `make page` builds it from the folder page/ of the source.
+SCRIPT, STYLE = "bundle/page.js", "bundle/page.css"
 
 # What the chart of speed over length shows, by whether the method limits jerk.
 _SPEED = {
@@ -47,24 +45,19 @@ def write_report(
     *,
     summary: Mapping[str, Any],
     problem: Problem,
-    profile: SpeedProfile,
     account: Account,
     audit: Audit,
-    figures: SetpointFigures,
+    data: Mapping[str, Any],
+    setpoints: int,
     text: FilePath | bytes | None = None,
-    progress: Listener | None = None,
 ) -> None:
-    """Writes the page. `summary` is the content of plan.json, `text` the part program's, or its file.
-
-    `progress` is told how far it is."""
+    """Writes the page. `summary` is the content of plan.json, `data` what `chart_data` makes of `setpoints`,
+    `text` the part program's, or its file."""
     texts = {} if text is None else _lines(text, {row.line for row in account.slow})
-    tell(progress, 0.0)
-    data = chart_data(problem, profile, account.motion, figures, audit, part(progress, 0.0, 0.9))
-    tell(progress, 0.9)
     name = FilePath(str(summary.get("program") or "path")).name
     judged = (
         verdict(audit),
-        numbers(summary, account, figures.count),
+        numbers(summary, account, setpoints),
         _warnings(summary.get("warnings") or ()),
     )
     charts = Template(asset("page_charts.html")).substitute(
@@ -81,34 +74,32 @@ def write_report(
         audit=audit_table(audit),
     )
     about, sections = _about(summary, problem), pictures(charts) + tables
-    file.write_text(
-        framed("report", name, about, "\n".join(judged), sections, data, "page.js"), encoding="utf-8"
-    )
+    file.write_text(framed("report", name, about, "\n".join(judged), sections, data), encoding="utf-8")
 
 
-def framed(
-    kind: str, title: str, about: str, summary: str, sections: str, data: Mapping[str, Any], script: str
-) -> str:
-    """A whole page of HTML around its sections, with the data that its script draws, if it can."""
+def framed(kind: str, title: str, about: str, summary: str, sections: str, data: Mapping[str, Any]) -> str:
+    """A whole page of HTML around its sections, with the data that its script draws, if it is there."""
     drawn = not missing_pictures()
     return Template(asset("frame.html")).substitute(
         kind=kind,
         title=escape(title),
-        style=asset("page.css"),
+        style=asset("page.css") + (asset(STYLE) if drawn else ""),
         about=about,
         summary=summary,
         sections=sections,
-        data=_script_data(data if drawn else {}),
-        plotly=_plotly_script() if drawn else "",
-        script="".join(asset(name) for name in ("charts.js", "path.js", script)) if drawn else "",
+        data=as_text(contained(data)) if drawn else "",
+        script=asset(SCRIPT).replace("</script", "<\\/script") if drawn else "",
     )
 
 
 def missing_pictures() -> str:
     """Why a page has no pictures, in a sentence; empty where it has them."""
-    if importlib.util.find_spec("plotly") is not None:
+    if resources.files(__package__).joinpath(SCRIPT).is_file():
         return ""
-    return "the page has no pictures, which need the package plotly: `pip install plotly`"
+    return (
+        "the page has no pictures, for this feedplan was installed without the code that draws them: "
+        "run `make page` in its source, which needs Node.js, and install it again"
+    )
 
 
 def pictures(charts: str) -> str:
@@ -135,18 +126,6 @@ def _lines(text: FilePath | bytes, wanted: set[int]) -> dict[int, str]:
 def asset(name: str) -> str:
     """A file of this package as text."""
     return resources.files(__package__).joinpath(name).read_text("utf-8")
-
-
-def _script_data(data: Mapping[str, Any]) -> str:
-    """Data as JSON within a script, which ends at the first "</", whatever stands around it."""
-    return json.dumps(data, allow_nan=False, separators=(",", ":")).replace("</", "<\\/")
-
-
-def _plotly_script() -> str:
-    """The library that draws the charts."""
-    from plotly.offline import get_plotlyjs
-
-    return str(get_plotlyjs()).replace("</script", "<\\/script")
 
 
 def _about(summary: Mapping[str, Any], problem: Problem) -> str:

@@ -2,21 +2,12 @@
 
 from __future__ import annotations
 
-import base64
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-
-
-def packed(array: NDArray[Any]) -> dict[str, str]:
-    """An array as the page reads it: base64 of 32-bit numbers, little-endian."""
-    if array.dtype.kind == "f":
-        with np.errstate(over="ignore"):
-            return {"f4": base64.b64encode(array.astype("<f4").tobytes()).decode()}
-    return {"i4": base64.b64encode(array.astype("<i4").tobytes()).decode()}
+# Points, their tags, and what was spent between each point and the next.
+Kept = tuple[Floats, NDArray[np.int64], Floats]
 
 
 class Envelope:
@@ -105,7 +96,7 @@ class Polyline:
     def __init__(self, limit: int, tolerance: float) -> None:
         self._limit = limit
         self.tolerance = tolerance
-        self._kept: list[tuple[Floats, NDArray[np.int64], Floats]] = []
+        self._kept: list[Kept] = []
         self._pending: list[tuple[Floats, NDArray[np.int64]]] = []
         self._pending_count = 0
 
@@ -116,13 +107,19 @@ class Polyline:
         if self._pending_count >= 2 * self._limit:
             self._settle()
 
-    def result(self) -> tuple[Floats, NDArray[np.int64]]:
-        """The points kept and their tags."""
+    def result(
+        self, limit: int | None = None, tolerance: float = 0.0
+    ) -> tuple[Floats, NDArray[np.int64], float]:
+        """The points kept, their tags and the tolerance; of at most `limit` points, or with a greater
+        `tolerance`, where these are given."""
         self._settle()
         if not self._kept:
-            return np.empty((0, 0)), np.empty(0, np.int64)
-        points, tag, _ = self._kept[0]
-        return points, tag
+            return np.empty((0, 0)), np.empty(0, np.int64), self.tolerance
+        kept, own = self._kept[0], self.tolerance
+        if tolerance > own:
+            kept, own = _thin(*kept[:2], kept[2].copy(), tolerance), tolerance
+        kept, own = _limited(kept, own, self._limit if limit is None else limit)
+        return kept[0], kept[1], own
 
     def _settle(self) -> None:
         if self._pending:
@@ -135,15 +132,19 @@ class Polyline:
         points, tag, cost = (np.concatenate([part[i] for part in self._kept]) for i in range(3))
         if len(self._kept) > 1:
             points, tag, cost = _thin(points, tag, cost, self.tolerance)
-        while len(points) > self._limit:
-            self.tolerance *= 2
-            points, tag, cost = _thin(points, tag, cost, self.tolerance)
-        self._kept = [(points, tag, cost)]
+        kept, self.tolerance = _limited((points, tag, cost), self.tolerance, self._limit)
+        self._kept = [kept]
 
 
-def _thin(
-    points: Floats, tag: NDArray[np.int64], cost: Floats, tolerance: float
-) -> tuple[Floats, NDArray[np.int64], Floats]:
+def _limited(kept: Kept, tolerance: float, limit: int) -> tuple[Kept, float]:
+    """At most `limit` points, and the tolerance that this takes."""
+    while len(kept[0]) > limit:
+        tolerance *= 2
+        kept = _thin(*kept[:2], kept[2].copy(), tolerance)
+    return kept, tolerance
+
+
+def _thin(points: Floats, tag: NDArray[np.int64], cost: Floats, tolerance: float) -> Kept:
     """Removes points within `tolerance`; `cost` is what was spent between each point and the next."""
     idle = 0
     parity = 1

@@ -9,15 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
+from feedplan.report.activity import Activity, place_on
 from feedplan.report.limits import parameter_speed
-from feedplan.report.reduce import Polyline, packed
+from feedplan.report.reduce import Polyline
 from feedplan.report.tool_motion import ToolMotion
 from feedplan.setpoints import SetpointChunk
 
-_POINTS = 60_000
+# Points of the tool path in a file.
+POINTS = 60_000
+# … and where it is drawn by the service, which sends it as it is.
+MANY_POINTS = 500_000
 
 # The tool path may be drawn this far beside itself, as a part of its extent: a tenth of a pixel at first.
 _TOLERANCE = 1e-4
+# What is kept at most while the setpoints pass by, for those who zoom in.
+_FINEST = 1e-5
 # A difference in speed weighs like one of length: this part of the top speed like `_TOLERANCE`.
 _SPEED_TOLERANCE = 0.01
 
@@ -29,7 +35,7 @@ class ToolPath:
     """
 
     def __init__(
-        self, problem: Problem, motion: ToolMotion, marks: Sequence[float] = (), points: int = _POINTS
+        self, problem: Problem, motion: ToolMotion, marks: Sequence[float] = (), points: int = POINTS
     ) -> None:
         self._axes = problem.axes
         self._problem, self._motion = problem, motion
@@ -37,11 +43,14 @@ class ToolPath:
         columns = [column for column, name in enumerate(problem.path.axes) if name in ("X", "Y", "Z")]
         low = problem.path.curve.control_points[:, columns]
         extent = float(np.linalg.norm(np.ptp(low, axis=0))) if low.size else 0.0
-        tolerance = _TOLERANCE * extent if extent > 0 else 1.0
+        extent = extent if extent > 0 else 1.0
         cut = problem.feed[np.isfinite(problem.path.feed)]
         top = float((cut if len(cut) else problem.feed).max(initial=0.0)) or 1.0
-        self._speed_weight = tolerance / (_SPEED_TOLERANCE * top)
-        self._path = Polyline(points, tolerance)
+        self._speed_weight = _TOLERANCE * extent / (_SPEED_TOLERANCE * top)
+        self._tolerance = (_TOLERANCE if points <= POINTS else _FINEST) * extent
+        self._overview = _TOLERANCE * extent
+        self._path = Polyline(points, self._tolerance)
+        self._length, self._before = 0.0, (0.0, 0.0)
         self._marks = np.asarray(marks, dtype=np.float64)
         self._mark_places = np.full((len(self._marks), 3), np.nan)
         self._is_cut = np.isfinite(problem.path.feed)
@@ -52,8 +61,11 @@ class ToolPath:
         places, speed = self._tool(chunk)
         if len(chunk) == 0:
             return speed
-        tags = np.column_stack((chunk.line, np.round(1e6 * chunk.t))).astype(np.int64)
-        self._path.add(np.column_stack((places, self._speed_weight * speed)), tags)
+        place = place_on(self._problem, chunk.piece, chunk.u)
+        length = self._lengths(chunk.t, speed)
+        tags = (chunk.line, np.round(1e6 * chunk.t), np.round(1e6 * length), place)
+        table = np.column_stack([tag.astype(np.int64) for tag in tags])
+        self._path.add(np.column_stack((places, self._speed_weight * speed)), table)
         self._top = max(self._top, float(speed.max()))
         self._cutting = max(self._cutting, float(speed[self._is_cut[chunk.piece]].max(initial=0.0)))
         near = np.searchsorted(chunk.t, self._marks)
@@ -61,25 +73,46 @@ class ToolPath:
         self._mark_places[inside] = places[np.minimum(near[inside], len(places) - 1)]
         return speed
 
-    def data(self) -> dict[str, Any]:
-        """Points in X, Y, Z with speed, source line and time; the marks; how far off the line may be [mm].
+    def data(self, activity: Activity, points: int | None = None) -> dict[str, Any]:
+        """Points in X, Y, Z with what is known there, and the marks; at most `points` where that is given.
 
+        At each point `speed`, source `line`, `time` [s], `length` of the way, programmed `feed` (0: rapid),
+        the number of the `active` limit in `limits`, and `lost`: the part of the time, of 255, that feed and
+        axis velocities alone would not take. `tolerance` is how far off the line may be [mm].
         `cutting_speed` is the greatest speed on moves with a feed: rapids would flatten the colours. `unit`
         is that of the way, mm, or deg where nothing but rotary axes moves.
         """
-        points, tags = self._path.result()
-        points = points if points.size else np.empty((0, 4))
-        tags = tags if tags.size else np.empty((0, 2), np.int64)
+        kept, tags, tolerance = self._path.result(points, 0.0 if points is None else self._overview)
+        kept = kept if kept.size else np.empty((0, 4))
+        tags = tags if tags.size else np.empty((0, 4), np.int64)
+        feed = self._problem.path.feed[tags[:, 3] >> 20]
+        moment = activity.at(tags[:, 3])
+        known = len(activity.weight) > 0
         return {
-            **{name: packed(points[:, k]) for k, name in enumerate("xyz")},
-            "speed": packed(points[:, 3] / self._speed_weight),
-            "line": packed(tags[:, 0]),
-            "time": packed(1e-6 * tags[:, 1]),
+            **{name: kept[:, k] for k, name in enumerate("xyz")},
+            "speed": kept[:, 3] / self._speed_weight,
+            "line": tags[:, 0],
+            "time": 1e-6 * tags[:, 1],
+            "length": 1e-6 * tags[:, 2],
+            "feed": np.where(np.isfinite(feed), self._problem.feed[tags[:, 3] >> 20], 0.0),
+            "active": (activity.active[moment] if known else moment).astype(np.uint8),
+            "lost": np.round(
+                255.0 * np.clip(1.0 - activity.pace[moment] if known else 0.0 * moment, 0.0, 1.0)
+            ).astype(np.uint8),
+            "limits": list(activity.names),
             "unit": self._motion.unit,
             "cutting_speed": self._cutting or self._top,
             "marks": np.nan_to_num(self._mark_places).tolist(),
-            "tolerance": self._path.tolerance,
+            "tolerance": tolerance,
         }
+
+    def _lengths(self, t: NDArray[np.float64], speed: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The way up to each setpoint, by the trapezoid rule."""
+        before, last = self._before
+        steps = np.diff(t, prepend=before) * 0.5 * (speed + np.concatenate(([last], speed[:-1])))
+        length = self._length + np.cumsum(steps)
+        self._length, self._before = float(length[-1]), (float(t[-1]), float(speed[-1]))
+        return np.asarray(length)
 
     def _tool(self, chunk: SetpointChunk) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Where the tool is in X, Y, Z, and how fast it is in the unit drawn; 0 where it only turns."""

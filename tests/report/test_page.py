@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import json
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -13,9 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feedplan.report.figures import SetpointFigures
-from feedplan.report.page import write_report
-from feedplan.report.reduce import packed
+from feedplan.report.container import contained
+from feedplan.report.figures import SetpointFigures, chart_data
+from feedplan.report.page import SCRIPT, asset, missing_pictures, write_report
+from tests.report.drawn import data_of, unpacked
+
+pytestmark = pytest.mark.skipif(bool(missing_pictures()), reason="the drawing code is not built: make page")
 
 
 def page(plan: Any, file: Path, source: Path | None = None) -> str:
@@ -27,33 +28,20 @@ def page(plan: Any, file: Path, source: Path | None = None) -> str:
         file,
         summary=plan.summary(),
         problem=plan.problem,
-        profile=plan.profile,
         account=account,
         audit=plan.verdict,
-        figures=figures,
+        data=chart_data(plan.problem, plan.profile, account, figures, plan.verdict),
+        setpoints=figures.count,
         text=source,
     )
     return file.read_text(encoding="utf-8")
 
 
-def without_plotly(text: str) -> str:
+def without_script(text: str) -> str:
     scripts = list(re.finditer(r"<script[^>]*>.*?</script>", text, flags=re.S))
     longest = max(scripts, key=lambda match: match.end() - match.start())
-    assert longest.end() - longest.start() > 1_000_000
+    assert longest.end() - longest.start() > 300_000
     return text[: longest.start()] + text[longest.end() :]
-
-
-def data_of(text: str) -> dict[str, Any]:
-    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', text, flags=re.S)
-    assert found
-    data = json.loads(found.group(1))
-    assert isinstance(data, dict)
-    return data
-
-
-def numbers(entry: dict[str, str]) -> np.ndarray:
-    ((kind, text),) = entry.items()
-    return np.frombuffer(base64.b64decode(text), dtype={"f4": "<f4", "i4": "<i4"}[kind])
 
 
 class _Reader(HTMLParser):
@@ -70,19 +58,19 @@ class _Reader(HTMLParser):
 def test_the_page_loads_nothing_and_forbids_the_browser_to(square: Any, tmp_path: Path) -> None:
     text = page(square, tmp_path / "report.html")
     reader = _Reader()
-    reader.feed(without_plotly(text))
+    reader.feed(without_script(text))
     assert reader.loads == []
     assert not {"link", "iframe", "img", "object", "embed"} & set(reader.tags)
     assert "default-src 'none'" in text
-    assert "url(" not in without_plotly(text)
-    assert "://" not in without_plotly(text)
+    assert "url(" not in without_script(text)
+    assert "://" not in without_script(text)
 
 
 def test_a_name_with_markup_stays_text(square: Any, tmp_path: Path) -> None:
     square.warnings = ("line 3: </script><b>bold</b>",)
     program = tmp_path / "a.ngc"
     program.write_bytes(b"a\nb\nG1 X20 (<img src=x>) \xff\nG1 Y20\nG1 X0\nG1 Y0\n")
-    text = without_plotly(page(square, tmp_path / "report.html", program))
+    text = without_script(page(square, tmp_path / "report.html", program))
     assert "<title>square &lt;1&gt;.ngc" in text
     assert "&lt;/script&gt;&lt;b&gt;bold" in text
     assert "G1 X20 (&lt;img src=x&gt;) \N{REPLACEMENT CHARACTER}" in text
@@ -93,7 +81,7 @@ def test_a_passed_audit_says_so(square: Any, tmp_path: Path) -> None:
     text = page(square, tmp_path / "report.html")
     assert "Audit passed" in text
     assert "2 001 checked samples" in text
-    assert "FAILED" not in without_plotly(text)
+    assert "FAILED" not in without_script(text)
 
 
 def test_a_failed_audit_names_what_is_broken_where(broken_square: Any, tmp_path: Path) -> None:
@@ -107,7 +95,7 @@ def test_a_failed_audit_names_what_is_broken_where(broken_square: Any, tmp_path:
 
 
 def test_the_numbers_of_the_plan_are_there(square: Any, tmp_path: Path) -> None:
-    text = without_plotly(page(square, tmp_path / "report.html"))
+    text = without_script(page(square, tmp_path / "report.html"))
     for shown in (
         "2.000<small>s",
         "no plan of this path is faster",
@@ -124,26 +112,41 @@ def test_the_charts_hold_the_setpoints(square: Any, tmp_path: Path) -> None:
     assert data["axes"] == ["X", "Y", "Z"]
     assert data["limits"]["jerk"] == [50_000.0, 50_000.0, None]
     speed = data["time"]["speed"]
-    np.testing.assert_allclose(numbers(speed["x"]), square.chunk.t, rtol=1e-7)
-    assert numbers(speed["y"]).max() == 50.0
-    assert set(numbers(speed["line"])) == {3, 4, 5, 6}
-    assert numbers(data["time"]["acceleration"][0]["y"]).min() == -500.0
+    np.testing.assert_allclose(speed["x"], square.chunk.t, rtol=1e-7)
+    assert speed["y"].max() == 50.0
+    assert set(speed["line"]) == {3, 4, 5, 6}
+    assert data["time"]["acceleration"][0]["y"].min() == -500.0
     assert data["length"]["cutting_speed"] == pytest.approx(50.0)
     assert "acceleration" not in data["length"]
     path = data["path"]
-    corners = {
-        (round(float(x), 3), round(float(y), 3))
-        for x, y in zip(numbers(path["x"]), numbers(path["y"]), strict=True)
-    }
+    corners = {(round(float(x), 3), round(float(y), 3)) for x, y in zip(path["x"], path["y"], strict=True)}
     assert {(0, 0), (20, 0), (20, 20), (0, 20)} <= corners
-    assert len(numbers(path["x"])) < 400
+    assert len(path["x"]) < 400
 
 
-def test_the_data_cannot_end_its_script(broken_square: Any, tmp_path: Path) -> None:
+def test_data_keeps_any_text(broken_square: Any, tmp_path: Path) -> None:
     checks = [replace(check, axis="</script>") for check in broken_square.verdict.checks]
     broken_square.verdict = replace(broken_square.verdict, checks=tuple(checks))
     data = data_of(page(broken_square, tmp_path / "report.html"))
     assert data["failures"][0]["axis"] == "</script>"
+
+
+def test_a_page_says_so_where_the_code_that_draws_is_missing(
+    square: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("feedplan.report.page.SCRIPT", "bundle/none.js")
+    text = page(square, tmp_path / "report.html")
+    assert missing_pictures().endswith(
+        "run `make page` in its source, which needs Node.js, and install it again"
+    )
+    assert missing_pictures() in text
+    assert "Audit passed" in text
+    assert 'class="chart"' not in text
+
+
+def test_the_page_without_its_data_is_below_a_megabyte_and_a_half(square: Any, tmp_path: Path) -> None:
+    assert len(page(square, tmp_path / "report.html").encode()) < 1_500_000
+    assert "</script" not in asset(SCRIPT)
 
 
 def test_a_program_that_is_gone_costs_only_its_text(square: Any, tmp_path: Path) -> None:
@@ -157,14 +160,28 @@ def test_the_page_of_a_million_setpoints_stays_small(square: Any) -> None:
     for first in range(0, 1_000_000, 50_000):
         tables = [random.normal(size=(50_000, 3)) for _ in range(4)]
         t = (first + np.arange(50_000)) * 1e-3
-        figures.add(type(chunk)(t, *tables, np.full(50_000, 3, np.int32), chunk.axes))
-    assert len(json.dumps([figures.over_time(), figures.tool_path()])) < 5_000_000
-    assert len(numbers(figures.tool_path()["x"])) <= 60_000
+        piece, u = np.zeros(50_000, np.uint32), np.zeros(50_000)
+        figures.add(type(chunk)(t, *tables, np.full(50_000, 3, np.int32), chunk.axes, piece, u))
+    path = figures.tool_path(square.account.activity)
+    assert len(contained({"time": figures.over_time(), "path": path})) < 5_000_000
+    assert len(path["x"]) <= 60_000
 
 
-def test_numbers_are_packed_as_little_endian_32_bit() -> None:
-    assert numbers(packed(np.array([1.5, -2.0]))).tolist() == [1.5, -2.0]
-    assert numbers(packed(np.array([7, -8]))).tolist() == [7, -8]
+def test_arrays_are_numbers_of_32_or_8_bits_at_multiples_of_4_bytes() -> None:
+    given = {
+        "text": "ä</script>",
+        "a": [np.array([1.5, -2.0]), {"b": np.array([7, -8])}],
+        "c": np.array([255, 0, 3], np.uint8),
+        "d": np.array([1e300]),
+    }
+    content = contained(given)
+    data = unpacked(content)
+    assert data["text"] == given["text"]
+    assert (data["a"][0].dtype, data["a"][0].tolist()) == (np.float32, [1.5, -2.0])
+    assert (data["a"][1]["b"].dtype, data["a"][1]["b"].tolist()) == (np.int32, [7, -8])
+    assert (data["c"].dtype, data["c"].tolist()) == (np.uint8, [255, 0, 3])
+    assert data["d"].tolist() == [np.inf]
+    assert len(content) % 4 == 0
 
 
 def test_axes_that_turn_have_curves_but_no_place_on_the_tool_path(square: Any, tmp_path: Path) -> None:
@@ -172,8 +189,8 @@ def test_axes_that_turn_have_curves_but_no_place_on_the_tool_path(square: Any, t
     data = data_of(page(square, tmp_path / "report.html"))
     assert data["axes"] == ["A", "Z", "C"]
     assert len(data["time"]["velocity"]) == 3
-    assert numbers(data["path"]["x"]).max() == 0.0
-    assert numbers(data["path"]["z"]).max() == 20.0
+    assert data["path"]["x"].max() == 0.0
+    assert data["path"]["z"].max() == 20.0
 
 
 def test_the_use_of_all_limits_is_drawn_where_jerk_is_judged(square: Any, tmp_path: Path) -> None:

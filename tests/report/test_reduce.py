@@ -101,7 +101,7 @@ def polyline(
     result = Polyline(limit, tolerance)
     for first in range(0, len(points), size):
         result.add(points[first : first + size], np.arange(first, min(first + size, len(points))))
-    return *result.result(), result.tolerance
+    return result.result()
 
 
 def test_a_square_of_many_points_is_its_corners() -> None:

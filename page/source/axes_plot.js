@@ -1,0 +1,109 @@
+/* Speed, and velocity, acceleration and jerk of each axis over time with their limits: one chart a quantity. */
+
+import { greatest } from "./curve.js";
+import { shown } from "./numbers.js";
+import { Plot } from "./plot.js";
+import { axisColour, style } from "./theme.js";
+
+const PER = { velocity: "s", acceleration: "s²", jerk: "s³" };
+const HEIGHT = { speed: 120, others: 150 };
+
+export class AxesPlot {
+  /* `rows` are names of quantities; `relative`: in parts of the limits. */
+  constructor(container, data, run, cursor, { rows = ["speed", "velocity", "acceleration", "jerk"], relative = false } = {}) {
+    Object.assign(this, { data, run, rows, relative });
+    this.tops = {};
+    for (const name of Object.keys(PER)) this.tops[name] = data.time[name].map((curve, k) => this.#reach(name, curve, k));
+    this.plots = rows.map((name, k) => {
+      const box = container.appendChild(document.createElement("div"));
+      box.className = "row";
+      const head = box.appendChild(document.createElement("p"));
+      const plot = new Plot(box, {
+        height: name === "speed" ? HEIGHT.speed : HEIGHT.others,
+        label: k === rows.length - 1 ? "time [s]" : undefined,
+        onZoom: (range) => this.plots.forEach(({ plot: one }) => one.zoom(range)),
+        onPoint: (time) => cursor.set(time, this),
+      });
+      return { name, head, plot };
+    });
+    cursor.follow((time) => this.plots.forEach(({ plot }) => plot.point(time)));
+    this.show();
+  }
+
+  /* In units, or in parts of the limits. */
+  scale(relative) {
+    this.relative = relative;
+    this.show();
+  }
+
+  show() {
+    for (const row of this.plots) {
+      const shownRow = row.name === "speed" ? this.#speed() : this.#quantity(row.name);
+      row.head.replaceChildren(...shownRow.head);
+      row.plot.show({ ...shownRow, ends: [0, this.data.duration || 1] });
+    }
+  }
+
+  draw() {
+    this.show();
+  }
+
+  /* What is no limit of the method may have lone spikes; they run out of the chart rather than flatten it. */
+  #reach(name, curve, k) {
+    const top = greatest(curve.y);
+    if (this.data.judged.includes(name)) return top;
+    const sorted = Float32Array.from(curve.y, Math.abs).sort();
+    const common = 2 * (sorted[Math.floor(0.98 * sorted.length)] || 0);
+    return common > 0 ? Math.min(top, common) : top;
+  }
+
+  #speed() {
+    const { length, path, time, failures } = this.data;
+    const { top_speed: top, cutting_speed: cutting } = length;
+    const hides = top > 1.5 * cutting;
+    const unit = `${path.unit}/s`;
+    const note = hides ? `rapids up to ${shown(top)} ${unit} run out of the chart` : "";
+    const curves = [{ name: "speed", curve: time.speed, colour: "--accent", width: 1.6, fill: true }];
+    const marks = failures.filter((failure) => !PER[failure.name] && Number.isFinite(failure.time)).map(({ time: x }) => ({ x }));
+    return { curves, range: [0, (hides ? 1.25 * cutting : 1.1 * top) || 1], unit, marks, head: heading("speed", unit, note) };
+  }
+
+  #quantity(name) {
+    const { axes, units, limits: all, least: lows, judged, failures, time } = this.data;
+    const limits = all[name], least = lows[name] ?? limits.map((limit) => limit && -limit);
+    const inParts = this.relative && limits.some(Boolean);
+    const scales = limits.map((limit) => (inParts ? 100 / limit : 1));
+    const known = axes.map((_, k) => k).filter((k) => !inParts || limits[k]);
+    const unit = inParts ? "%" : [...new Set(units)].map((own) => `${own}/${PER[name]}`).join(", ");
+    const curves = known.map((k) => ({ name: axes[k], curve: time[name][k], colour: `--axis-${k % 9}`, scale: scales[k] }));
+    const top = Math.max(0, ...known.map((k) => this.tops[name][k] * scales[k]));
+    // A limit far outside would squeeze the curves: it is named beside the chart and drawn only when near.
+    const ends = [...limits, ...least].map((limit, n) => limit && limit * scales[n % limits.length]);
+    const near = [...new Set(ends)].filter((value) => value && Math.abs(value) <= 2 * top);
+    const lines = near.map((value) => {
+      const owners = new Set(ends.flatMap((end, n) => (end === value ? [n % limits.length] : [])));
+      return { value, colour: owners.size > 1 ? style("--soft") : axisColour([...owners][0]) };
+    });
+    const reach = 1.08 * Math.max(top, ...near.map(Math.abs)) || 1;
+    const marks = failures.filter((failure) => failure.name === name && Number.isFinite(failure.time)).map(({ time: x }) => ({ x }));
+    return { curves, range: [-reach, reach], unit, lines, marks, head: heading(name, inParts ? "% of limit" : unit, told(this.data, name, judged.includes(name))) };
+  }
+}
+
+/* The limits of a quantity in words. */
+function told({ axes, units, limits, least }, name, isJudged) {
+  const known = axes.flatMap((axis, k) => {
+    const most = limits[name][k], low = least[name]?.[k];
+    if (!most) return [];
+    return `${axis} ${low && low !== -most ? `${shown(low, 6)}…` : ""}${shown(most, 6)}`;
+  });
+  if (!known.length) return "";
+  const unit = [...new Set(units)].map((own) => `${own}/${PER[name]}`).join(", ");
+  return isJudged ? `limits ${known.join(", ")} ${unit}` : `not limited by this method (machine: ${known.join(", ")} ${unit})`;
+}
+
+function heading(name, unit, note) {
+  const bold = document.createElement("b");
+  bold.textContent = name;
+  return [bold, ` [${unit}]  ${note}`];
+}

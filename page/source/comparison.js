@@ -1,0 +1,65 @@
+/* The page of a comparison: the speed of every method, linked to the tool path of the chosen one. */
+
+import { Cursor } from "./cursor.js";
+import { choice } from "./parts.js";
+import { PathView } from "./path_view.js";
+import { Plot } from "./plot.js";
+import { Run } from "./run.js";
+import { onTheme } from "./theme.js";
+
+const ACROSS = { length: "over length", time: "over time" };
+const DASHES = [undefined, [2, 3], [8, 4]];
+
+export function comparison(data) {
+  const at = (id) => document.getElementById(id);
+  const { methods } = data;
+  if (!methods.length) return;
+  const runs = methods.map((method) => new Run(method));
+  const cursor = new Cursor();
+  let chosen = 0, across = "length";
+
+  const path = new PathView(at("path"), at("path-tools"), cursor);
+  const speed = new Plot(at("speed"), {
+    height: 330,
+    label: " ",
+    onZoom: (range) => speed.zoom(range),
+    onPoint: (x) => cursor.set(x === null ? null : across === "time" ? x : runs[chosen].timeAt(x), speed),
+  });
+  cursor.follow((time) => speed.point(time === null ? null : across === "time" ? time : runs[chosen].lengthAt(time)));
+
+  /* A rapid much faster than all cutting would flatten the rest: it runs out of the chart. */
+  const top = Math.max(...methods.map((method) => method.cutting_speed)) || 1;
+  function drawSpeed() {
+    const { unit } = methods[chosen];
+    speed.label = across === "length" ? `path length [${unit}]` : "time [s]";
+    const curves = methods.map((method, k) => ({
+      name: method.method,
+      curve: { x: method[across], y: method.speed },
+      colour: k === 0 ? "--accent" : `--axis-${(k - 1) % 6}`,
+      width: k === chosen ? 2.2 : 1.3,
+      dash: DASHES[Math.floor(Math.max(k - 1, 0) / 6) % 3],
+    }));
+    const ends = [0, Math.max(...runs.map((run) => (across === "length" ? run.length : run.duration))) || 1];
+    speed.show({ curves, ends, range: [0, 1.25 * top], unit: `${unit}/s` });
+  }
+
+  function choose(name) {
+    chosen = Number(name);
+    names.press(name);
+    path.show(runs[chosen]);
+    drawSpeed();
+  }
+
+  const names = choice(Object.fromEntries(methods.map((method, k) => [`${k}`, method.method])), "Method whose tool path is shown", choose);
+  at("methods").append(names.box);
+  const axis = choice(ACROSS, "Horizontal axis", (name) => {
+    across = name;
+    axis.press(name);
+    speed.shownRange = null;
+    drawSpeed();
+  });
+  axis.press(across);
+  at("across").append(axis.box);
+  choose("0");
+  onTheme(drawSpeed);
+}

@@ -1,0 +1,18 @@
+/* The one time [s] that all views of a run point at. */
+
+export class Cursor {
+  #listeners = new Set();
+  time = null;
+
+  /* Sets the time; `from` is the view that did it. */
+  set(time, from = null) {
+    if (time === this.time) return;
+    this.time = time;
+    for (const listener of this.#listeners) listener(time, from);
+  }
+
+  /* Calls `listener(time, from)` after each change. */
+  follow(listener) {
+    this.#listeners.add(listener);
+  }
+}

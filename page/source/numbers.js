@@ -1,0 +1,38 @@
+/* Numbers as they are read: four digits, thousands apart. */
+
+const NARROW_SPACE = "\u202f";
+
+export function shown(value, digits = 4) {
+  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
+  const [whole, rest] = String(Number(value.toPrecision(digits))).split(".");
+  if (whole.includes("e")) return whole;
+  const apart = whole.replace(/\B(?=(\d{3})+$)/g, NARROW_SPACE).replace("-", "−");
+  return rest ? `${apart}.${rest}` : apart;
+}
+
+/* A time [s] as a person says it. */
+export function duration(seconds) {
+  if (!Number.isFinite(seconds)) return "–";
+  if (Math.abs(seconds) < 1) return `${shown(seconds * 1e3)} ms`;
+  if (Math.abs(seconds) < 60) return `${seconds.toFixed(3)} s`;
+  const whole = Math.floor(seconds / 60);
+  const rest = `${(seconds - 60 * whole).toFixed(1)} s`;
+  return whole < 60 ? `${whole} min ${rest}` : `${Math.floor(whole / 60)} h ${whole % 60} min ${rest}`;
+}
+
+/* A time [s] as a clock: 1:02.345. */
+export function clock(seconds) {
+  const minutes = Math.floor(seconds / 60);
+  return `${minutes}:${(seconds - 60 * minutes).toFixed(3).padStart(6, "0")}`;
+}
+
+/* The last number of a growing list that is not beyond the value; 0 where there is none. */
+export function lastUpTo(list, value) {
+  let low = 0, high = list.length - 1;
+  while (low < high) {
+    const middle = (low + high + 1) >> 1;
+    if (list[middle] <= value) low = middle;
+    else high = middle - 1;
+  }
+  return Math.max(low, 0);
+}

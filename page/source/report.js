@@ -1,0 +1,33 @@
+/* The report of one plan. */
+
+import { AxesPlot } from "./axes_plot.js";
+import { Cursor } from "./cursor.js";
+import { choice } from "./parts.js";
+import { PathView } from "./path_view.js";
+import { Run } from "./run.js";
+import { SpeedPlot } from "./speed_plot.js";
+import { onTheme } from "./theme.js";
+
+const USED = ["velocity", "acceleration", "jerk"];
+
+export function report(data) {
+  const at = (id) => document.getElementById(id);
+  const run = new Run(data.path), cursor = new Cursor();
+  const path = new PathView(at("path"), at("path-tools"), cursor);
+  path.show(run);
+  const speed = new SpeedPlot(at("length"), data, run, cursor);
+  const axes = new AxesPlot(at("time"), data, run, cursor);
+  const parts = [speed, axes];
+  const scaling = choice({ units: "units", parts: "% of limit" }, "Scale", (name) => {
+    axes.scale(name === "parts");
+    scaling.press(name);
+  });
+  scaling.press("units");
+  at("time-tools").append(scaling.box);
+  // Use of the limits, where the method keeps them all.
+  if (data.judged.includes("jerk") && data.limits.jerk.some(Boolean)) {
+    at("use-section").hidden = false;
+    parts.push(new AxesPlot(at("use"), data, run, cursor, { rows: USED, relative: true }));
+  }
+  onTheme(() => parts.forEach((part) => part.draw()));
+}

@@ -1,0 +1,281 @@
+/* The tool path of a run in space: turned, moved and zoomed by hand, with the box around it and marks. */
+
+import { OrthographicCamera, Scene, Vector3, WebGLRenderer, MOUSE, TOUCH } from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+
+import { css, mixed } from "./colours.js";
+import { levels } from "./detail.js";
+import { drawFlat } from "./flat.js";
+import { drawFrame } from "./frame.js";
+import { COLOURS, Ribbon } from "./ribbon.js";
+import { channels, onTheme, style } from "./theme.js";
+
+/* Where the eye is, seen from the middle of the path. */
+export const VIEWS = { xyz: [-1.1, -1.5, 1.1], xy: [0, -1e-6, 1], xz: [0, -1, 0], yz: [1, 0, 0] };
+/* Off by so many pixels a level may be, at rest and while the view moves. */
+const AT_REST = 0.25, MOVING = 1;
+const REST = 160; // [ms]
+const ROOM = [75, 45]; // pixels beside the path, and above and below
+const NEAR = 14; // pixels between the pointer and the point that it means
+
+export class PathScene {
+  #renderer = null;
+  #scene = new Scene();
+  #camera = new OrthographicCamera();
+  #run = null;
+  #ribbon = null;
+  #mode = null;
+  #frame = 0;
+  #movedAt = -Infinity;
+  #time = null;
+  #hasTrail = false;
+
+  /* `onHover(i, event)` is told the number of the point under the pointer, -1 where there is none. */
+  constructor(container, { onHover, onMove } = {}) {
+    this.container = container;
+    container.classList.add("scene");
+    this.canvas = container.appendChild(document.createElement("canvas"));
+    this.over = container.appendChild(document.createElement("canvas"));
+    this.over.tabIndex = 0;
+    this.over.setAttribute("role", "img");
+    this.over.setAttribute("aria-label", "Tool path");
+    try {
+      this.#renderer = new WebGLRenderer({ canvas: this.canvas, antialias: true, alpha: true, preserveDrawingBuffer: true });
+      this.#renderer.setClearColor(0, 0);
+    } catch {
+      this.#renderer = null; // drawn flat
+    }
+    this.#camera.up.set(0, 0, 1);
+    this.controls = new OrbitControls(this.#camera, this.over);
+    this.controls.enableDamping = false;
+    this.controls.zoomToCursor = true;
+    this.controls.addEventListener("change", () => {
+      this.#movedAt = performance.now();
+      this.draw();
+      setTimeout(() => this.draw(), REST + 10);
+      onMove?.(this);
+    });
+    this.over.addEventListener("dblclick", () => this.look(this.view));
+    this.over.addEventListener("pointermove", (event) => event.buttons === 0 && onHover?.(this.#under(event), event));
+    this.over.addEventListener("pointerleave", (event) => onHover?.(-1, event));
+    this.over.addEventListener("click", (event) => onHover?.(this.#under(event), event));
+    new ResizeObserver(() => this.resize()).observe(container);
+    onTheme(() => {
+      this.resize();
+      this.paint();
+    });
+    this.look("xyz");
+  }
+
+  /* Shows a run, coloured by a mode of `modes.js`; `failures` are places [mm] to mark. */
+  show(run, mode, failures = run.path.marks ?? []) {
+    this.#ribbon && this.#scene.remove(this.#ribbon.group);
+    this.#ribbon?.dispose();
+    const isOther = this.#run !== run;
+    this.#run = run;
+    this.failures = failures;
+    const { path } = run;
+    const ends = ["x", "y", "z"].map((name) => path[name].reduce(([a, b], v) => [Math.min(a, v), Math.max(b, v)], [Infinity, -Infinity]));
+    this.low = ends.map(([low]) => (Number.isFinite(low) ? low : 0));
+    this.high = ends.map(([, high]) => (Number.isFinite(high) ? high : 0));
+    this.#ribbon = null;
+    this.levels = levels(path);
+    if (this.#renderer) {
+      this.#ribbon = new Ribbon(path, this.levels, this.#centre());
+      this.#scene.add(this.#ribbon.group);
+    }
+    this.colour(mode);
+    if (isOther) this.look(this.#firstView());
+  }
+
+  /* Colours by another mode. */
+  colour(mode) {
+    this.#mode = mode;
+    this.paint();
+  }
+
+  paint() {
+    if (!this.#run) return;
+    const { scale, colours: own } = this.#mode;
+    this.colours = own ?? Array.from({ length: COLOURS }, (_, i) => mixed(scale, i / (COLOURS - 1)));
+    this.#ribbon?.colour(this.#mode, this.colours, Boolean(own));
+    const bright = (name) => channels(style(name)).map((value) => value / 255);
+    this.#ribbon?.shade(bright("--rapid"), bright("--card"));
+    this.drawNow();
+  }
+
+  /* A view by its name, with the whole path in it. */
+  look(view) {
+    this.view = view;
+    const isFlat = view !== "xyz";
+    this.controls.enableRotate = !isFlat;
+    this.controls.mouseButtons = { LEFT: isFlat ? MOUSE.PAN : MOUSE.ROTATE, MIDDLE: MOUSE.DOLLY, RIGHT: MOUSE.PAN };
+    this.controls.touches = { ONE: isFlat ? TOUCH.PAN : TOUCH.ROTATE, TWO: TOUCH.DOLLY_PAN };
+    this.#camera.position.set(...VIEWS[view]).normalize().multiplyScalar(this.#far());
+    this.controls.target.set(0, 0, 0);
+    this.#camera.zoom = 1;
+    this.controls.update();
+    this.resize();
+  }
+
+  /* The same view as another scene. */
+  lookLike(other) {
+    if (this.view !== other.view) this.look(other.view);
+    this.#camera.position.copy(other.#camera.position).normalize().multiplyScalar(this.#far());
+    this.#camera.zoom = other.#camera.zoom;
+    this.controls.target.copy(other.controls.target);
+    this.#camera.position.add(this.controls.target);
+    this.#camera.lookAt(this.controls.target);
+    this.#camera.updateProjectionMatrix();
+    this.#movedAt = performance.now();
+    this.draw();
+    setTimeout(() => this.draw(), REST + 10);
+  }
+
+  /* Marks the place at a time [s]; with a trail, what comes after it fades. */
+  mark(time, hasTrail = false) {
+    this.#time = time;
+    this.#hasTrail = hasTrail;
+    this.draw();
+  }
+
+  zoomBy(factor) {
+    this.#camera.zoom *= factor;
+    this.#camera.updateProjectionMatrix();
+    this.#movedAt = performance.now();
+    this.draw();
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.container;
+    if (!width || !height) return;
+    const ratio = devicePixelRatio || 1;
+    for (const canvas of [this.canvas, this.over]) {
+      canvas.width = Math.round(width * ratio);
+      canvas.height = Math.round(height * ratio);
+    }
+    this.#renderer?.setSize(this.canvas.width, this.canvas.height, false);
+    this.#fit(width, height);
+    this.drawNow();
+  }
+
+  /* The part of space in view, so that the whole path has room at zoom 1. */
+  #fit(width, height) {
+    const camera = this.#camera;
+    camera.updateMatrixWorld();
+    const far = this.#far();
+    let across = 1e-9, up = 1e-9;
+    const corner = new Vector3();
+    for (let n = 0; n < 8; n += 1) {
+      [0, 1, 2].forEach((k) => corner.setComponent(k, (((n >> k) & 1) - 0.5) * ((this.high?.[k] ?? 1) - (this.low?.[k] ?? 0))));
+      corner.applyQuaternion(camera.quaternion.clone().invert());
+      across = Math.max(across, Math.abs(corner.x));
+      up = Math.max(up, Math.abs(corner.y));
+    }
+    const half = Math.max(across / Math.max(width / 2 - ROOM[0], 20), up / Math.max(height / 2 - ROOM[1], 20)) / 2; // [mm] of half a pixel
+    Object.assign(camera, { left: -half * width, right: half * width, top: half * height, bottom: -half * height, near: 0.01 * far, far: 4 * far });
+    camera.updateProjectionMatrix();
+  }
+
+  draw() {
+    if (!this.#frame) this.#frame = requestAnimationFrame(() => this.drawNow());
+  }
+
+  drawNow() {
+    cancelAnimationFrame(this.#frame);
+    this.#frame = 0;
+    const context = this.over.getContext("2d");
+    const ratio = devicePixelRatio || 1;
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.clearRect(0, 0, this.over.width, this.over.height);
+    if (!this.#run) return this.#renderer?.clear();
+    this.#camera.updateMatrixWorld();
+    const project = this.#projector();
+    const allowed = performance.now() - this.#movedAt < REST ? MOVING : AT_REST;
+    const tolerance = (allowed * this.#pixel()) / ratio;
+    if (this.#ribbon) {
+      this.#ribbon.now = this.#hasTrail ? this.#time : null;
+      this.level = this.#ribbon.show(tolerance, this.canvas.width, this.canvas.height, 2 * ratio);
+      this.#renderer.render(this.#scene, this.#camera);
+    } else {
+      this.level = this.levels.findLast((one) => one.tolerance <= tolerance) ?? this.levels[0];
+      const flat = this.canvas.getContext("2d");
+      flat.setTransform(ratio, 0, 0, ratio, 0, 0);
+      flat.clearRect(0, 0, this.canvas.width, this.canvas.height);
+      const mode = { values: this.#mode.values, isKind: Boolean(this.#mode.colours) };
+      drawFlat(flat, this.#run.path, this.level.index, project, mode, this.colours.map(css), style("--rapid"), 2);
+    }
+    drawFrame(context, project, this.low, this.high);
+    this.#marks(context, project);
+  }
+
+  #marks(context, project) {
+    const { path, count } = this.#run;
+    const dot = ([x, y], size, fill, stroke) => {
+      context.beginPath();
+      context.arc(x, y, size, 0, 2 * Math.PI);
+      context.fillStyle = fill;
+      context.fill();
+      context.lineWidth = 2;
+      context.strokeStyle = stroke;
+      context.stroke();
+    };
+    if (!count) return;
+    const start = project([path.x[0], path.y[0], path.z[0]]);
+    dot(start, 4, style("--card"), style("--ink"));
+    context.fillStyle = style("--ink");
+    context.textAlign = "left";
+    context.fillText("start", start[0] + 8, start[1] - 8);
+    for (const place of this.failures) dot(project(place), 6, style("--bad"), style("--card"));
+    if (this.#time !== null) dot(project(this.#run.place(this.#time)), 6, style("--accent"), style("--card"));
+  }
+
+  /* The number of the drawn point that is nearest to the pointer. */
+  #under(event) {
+    if (!this.#run?.count) return -1;
+    const project = this.#projector();
+    const { path } = this.#run;
+    const box = this.over.getBoundingClientRect();
+    const x = event.clientX - box.left, y = event.clientY - box.top;
+    let best = -1, least = NEAR * NEAR;
+    for (const point of this.level.index) {
+      const [px, py] = project([path.x[point], path.y[point], path.z[point]]);
+      const square = (px - x) ** 2 + (py - y) ** 2;
+      if (square < least) [best, least] = [point, square];
+    }
+    return best;
+  }
+
+  /* From places [mm] to pixels from the top left. */
+  #projector() {
+    const { clientWidth: width, clientHeight: height } = this.container;
+    const centre = this.#centre();
+    const m = this.#camera.projectionMatrix.clone().multiply(this.#camera.matrixWorldInverse).elements;
+    return ([x, y, z]) => {
+      const a = x - centre[0], b = y - centre[1], c = z - centre[2];
+      return [((m[0] * a + m[4] * b + m[8] * c + m[12] + 1) * width) / 2, ((1 - m[1] * a - m[5] * b - m[9] * c - m[13]) * height) / 2];
+    };
+  }
+
+  /* The width of a pixel [mm]. */
+  #pixel() {
+    return (this.#camera.right - this.#camera.left) / this.#camera.zoom / (this.container.clientWidth || 1);
+  }
+
+  #centre() {
+    return this.low ? this.low.map((low, k) => (low + this.high[k]) / 2) : [0, 0, 0];
+  }
+
+  #far() {
+    return 2 * (this.low ? Math.hypot(...this.high.map((high, k) => high - this.low[k])) || 1 : 1);
+  }
+
+  #firstView() {
+    const sizes = this.high.map((high, k) => high - this.low[k]);
+    const whole = sizes[0] + sizes[1] + sizes[2];
+    const flat = sizes.map((size) => size <= 1e-6 * whole);
+    if (flat[2]) return "xy";
+    if (flat[1]) return "xz";
+    return flat[0] ? "yz" : "xyz";
+  }
+}

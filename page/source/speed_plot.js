@@ -1,0 +1,49 @@
+/* The planned speed below its limits over the length of the path; beside it, that of another run. */
+
+import { Plot } from "./plot.js";
+
+const LIMITS = {
+  acceleration: ["axis accelerations (limit curve)", "--limit-0", undefined],
+  velocity: ["axis velocities", "--limit-1", [8, 4]],
+  feed: ["feed", "--limit-2", [8, 4]],
+  chord: ["chord error", "--limit-3", [2, 3]],
+};
+
+export class SpeedPlot {
+  /* `cursor` is a time; `run` tells where that is. */
+  constructor(container, data, run, cursor) {
+    this.run = run;
+    this.data = data;
+    const { unit } = data.path;
+    this.plot = new Plot(container, {
+      height: 330,
+      label: `path length [${unit}]`,
+      onZoom: (range) => this.plot.zoom(range),
+      onPoint: (length) => cursor.set(length === null ? null : run.timeAt(length), this),
+    });
+    cursor.follow((time) => this.plot.point(time === null ? null : run.lengthAt(time)));
+    this.show();
+  }
+
+  /* Draws; `other` is another run of the same program with its name. */
+  show(other = null) {
+    const { length, path } = this.data;
+    const { top_speed: top, cutting_speed: cutting } = length;
+    // Rapids much faster than cutting would flatten the rest: they run out of the chart.
+    const reach = 1.25 * ((top > 1.5 * cutting ? cutting : top) || 1);
+    const curves = Object.entries(LIMITS)
+      .filter(([name]) => length[name])
+      .map(([name, [label, colour, dash]]) => ({ name: label, curve: length[name], colour, dash, width: 1.2, isLimit: true }));
+    if (other) {
+      const scale = other.run.length > 0 ? this.run.length / other.run.length : 1;
+      const curve = { x: Float64Array.from(other.run.path.length, (value) => value * scale), y: other.run.path.speed };
+      curves.push({ name: other.name, curve, colour: "--other", width: 1.6, dash: [6, 3] });
+    }
+    curves.push({ name: "planned speed", curve: length.speed, colour: "--accent", width: 2, fill: true });
+    this.plot.show({ curves, ends: [0, this.run.length || 1], range: [0, reach], unit: `${path.unit}/s` });
+  }
+
+  draw() {
+    this.plot.draw();
+  }
+}

@@ -1,0 +1,32 @@
+"""The data in a page, read as `feedplan/report/container.py` describes it."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+import zlib
+from typing import Any
+
+import numpy as np
+
+
+def unpacked(content: bytes) -> dict[str, Any]:
+    """What `contained` made, read as its description says."""
+    end = 4 + int.from_bytes(content[:4], "little")
+    kinds = {"f4": "<f4", "i4": "<i4", "u1": "<u1"}
+
+    def read(entry: dict[str, Any]) -> Any:
+        if "array" not in entry:
+            return entry
+        return np.frombuffer(content, kinds[entry["array"]], entry["count"], end + entry["at"])
+
+    data = json.loads(content[4:end], object_hook=read)
+    assert isinstance(data, dict)
+    return data
+
+
+def data_of(text: str) -> dict[str, Any]:
+    found = re.search(r'<script type="text/plain" id="data">(.*?)</script>', text, flags=re.S)
+    assert found
+    return unpacked(zlib.decompress(base64.b64decode(found.group(1))))
