@@ -57,10 +57,10 @@ def test_curves_that_broke_the_exact_planner_or_its_audit(seed: int) -> None:
     assert faults(seed, "bang-bang") == []
 
 
-# A turn finer than any grid (71), a rest whose place is that of the way to it (194), durations of arcs that
-# begin at rest (21, 275).
+# Turns finer than any grid: one (71), one of a piece that is a line but for 3e-12 mm (255). A rest whose
+# place is that of the way to it (194), durations of arcs that begin at rest (21, 275).
 @pytest.mark.parametrize("method", ["jerk-limited", "s-curve"])
-@pytest.mark.parametrize("seed", [21, 71, 194, 275])
+@pytest.mark.parametrize("seed", [21, 71, 194, 255, 275])
 def test_curves_that_broke_planners_with_a_limit_of_jerk_or_their_audit(seed: int, method: str) -> None:
     assert faults(seed, method) == []
 

@@ -45,8 +45,10 @@ const PLACES: usize = 8;
 /// Steps to a place: the quintic is so near that one or two of Newton's do, but next to a cusp, where they stray, halving
 /// needs as many as u has bits.
 const STEPS: usize = 64;
-/// Tangents of a straight piece are off its direction by no more than this part of the longest.
+/// Tangents of a straight piece are off its direction by no more than this part of their own length, and the rounding of
+/// this many operations on the coordinates.
 const OFF_LINE: f64 = 1e-12;
+const ROUNDINGS: f64 = 16.0;
 /// Derivatives are asked for at least so far from a place where D vanishes, as a part of the length.
 const INSET: f64 = 1e-9;
 /// The most coefficients of D.
@@ -119,17 +121,22 @@ fn plain<'a, const M: usize>(
     Piece { control: &control[range], weights, width: width[i] }
 }
 
-/// The one direction of a piece, as it goes at u, if it has one.
+/// The one direction of a piece, as it goes at u, if it has one. A tangent that is short beside the longest may be off by a
+/// small part of that and still turn sharply.
 pub fn straight<const M: usize>(piece: &Piece<M>, u: f64) -> Option<[f64; M]> {
     let hodograph = Hodograph::new(piece);
     let tangents = hodograph.coefficients();
     let longest = tangents.iter().max_by(|a, b| norm(a).total_cmp(&norm(b)))?;
     let length = norm(longest);
     let mut direction = longest.map(|x| x / length);
+    let edge = |pair: &[[f64; M]]| norm::<M>(&std::array::from_fn(|k| pair[1][k] - pair[0][k]));
+    let edge = piece.control.windows(2).map(edge).fold(0.0, f64::max);
+    let coordinate = piece.control.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let rounding = ROUNDINGS * f64::EPSILON * coordinate / edge * length;
     let on_line = tangents.iter().all(|tangent| {
         let along = dot(tangent, &direction);
         let off: [f64; M] = std::array::from_fn(|k| tangent[k] - along * direction[k]);
-        norm(&off) <= OFF_LINE * length
+        norm(&off) <= (OFF_LINE * length).min(OFF_LINE * along.abs() + rounding)
     });
     if dot(&derivatives(piece, u)[1], &direction) < 0.0 {
         direction = direction.map(|x| -x);
@@ -588,6 +595,18 @@ impl<const M: usize> Geometry<M> for ByLength<'_, M> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_short_tangent_beside_a_long_one_turns_by_its_own_angle() {
+        // 1e-11 mm off a line is 1e-6 rad of an edge of 1e-5 mm, and nothing of one of half a metre.
+        let direction = |first: f64, off: f64| {
+            let control = [[0.0, 0.0], [first, off], [1e3, 0.0]];
+            straight(&Piece { control: &control, weights: &[], width: 1.0 }, 0.5)
+        };
+        assert_eq!(direction(1e-5, 0.0), Some([1.0, 0.0]));
+        assert!(direction(500.0, 1e-11).is_some() && direction(500.0, 1e-8).is_none());
+        assert!(direction(1e-5, 1e-13).is_some() && direction(1e-5, 1e-11).is_none());
+    }
 
     #[test]
     fn places_on_a_part_that_is_symmetric_about_its_middle() {

@@ -189,7 +189,7 @@ fn slow_places<const M: usize>(problem: &Problem<M>, i: usize) -> Vec<f64> {
 
 /// Parameters of piece `i` to either side of a slow place where the tool's way turns the most, if it turns more there
 /// than at the place itself: where the speed falls to no less than a rest of itself, the turn from its one direction to
-/// that of the rest is where both are alike.
+/// that of the rest is where both are alike. A way that turns the most at an end of the piece has none beside it.
 fn turns_beside<const M: usize>(problem: &Problem<M>, i: usize, slow: f64) -> Vec<f64> {
     let width = problem.width[i];
     let curvature = |u: f64| {
@@ -213,7 +213,7 @@ fn turns_beside<const M: usize>(problem: &Problem<M>, i: usize, slow: f64) -> Ve
             }
         }
         let u = 0.5 * (low + high);
-        (curvature(u) > SHARPER * curvature(slow)).then_some(u)
+        (curvature(u) > SHARPER * curvature(slow) && curvature(u) > curvature(at(0))).then_some(u)
     };
     let both = [-slow, width - slow].into_iter().filter(|reach| reach.abs() > AT_END * width);
     both.filter_map(sharpest).collect()
@@ -266,4 +266,37 @@ fn turn_speed<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> f64 {
         (acceleration[k] / place.second[k].abs()).sqrt() / gained
     };
     (0..M).map(of_axis).fold(f64::INFINITY, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_way_that_turns_the_most_at_its_end_is_not_cut_beside_it() {
+        // x = t + t², y = 0.03 t⁴: slow at t = 0 and straight there, its curvature rises to the end.
+        let control = [[0.0, 0.0], [0.25, 0.0], [2.0 / 3.0, 0.0], [1.25, 0.0], [2.0, 0.03]];
+        let problem = Problem {
+            control: &control,
+            weight: &[],
+            offset: &[0, 5],
+            width: &[1.0],
+            tip: None,
+            way: None,
+            feed_share: &[],
+            runs: &[0, 1],
+            feed: &[1e3],
+            junction_speed: &[0.0, 0.0],
+            max_velocity: [[1e3; 2]; 2],
+            max_acceleration: [[1e4; 2]; 2],
+            chord_tolerance: f64::INFINITY,
+            period: 0.01,
+            start_speed: 0.0,
+            end_speed: 0.0,
+            watch: Default::default(),
+        };
+        let found = stretches(&problem);
+        assert_eq!(found.len(), 1);
+        assert_eq!(found[0].parts, [Part { piece: 0, u: [0.0, 1.0] }]);
+    }
 }
