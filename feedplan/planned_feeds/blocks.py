@@ -28,12 +28,13 @@ _COMPUTED = (
 # Comments, texts for the operator and names of parameters have no words in them.
 _NO_WORDS = rb"\([^()\r\n]*\)?|;[^\r\n]*|[Mm][ \t]*0*11[78](?![\d.])[^\r\n]*|\#?<[^>\r\n]*>"
 _LINE = rb"(?<![^\r\n])[ \t]*(?:[Nn][ \t]*\d+[ \t]*)?"
-_CODES = rb"93|94|95|20|21|90\.1|91\.1|90|91|40|41\.1|42\.1|41|42|15|16|7|8|33\.1|33|76|74|84|43\.5|49"
+_CODES = rb"93|94|95|20|21|90\.1|91\.1|90|91|40|41\.1|42\.1|41|42|15|16|7|8|33\.1|33|76|74|84|43\.5|49|68|69"
 _TOKENS = (
     _NO_WORDS
     + rb"|"
     + _LINE
-    + rb"(?:%[^\r\n]*|(?P<deleted>/)|[Oo](?P<flow>[^\r\n]*))"
+    + rb"(?:%[^\r\n]*|(?P<deleted>/)|[Oo](?P<flow>[^\r\n]*)|(?P<jump>(?i:IF|GOTO|WHILE|END)[^\r\n]*))"
+    + rb"|(?P<macro>[Gg][ \t]*0*65(?![\d.])[^\r\n]*)"
     + rb"|[Ff][ \t]*(?:(?P<feed>"
     + _NUMBER
     + rb")|(?P<computed>"
@@ -152,8 +153,8 @@ class _Modes:
             self.now["absolute_centres"] = code == b"90.1"
         elif code in (b"41", b"42", b"41.1", b"42.1"):
             self.beside.add(b"40")
-        elif code in (b"16", b"7", b"43.5"):
-            self.beside.add({b"16": b"15", b"7": b"8", b"43.5": b"49"}[code])
+        elif code in (b"16", b"7", b"43.5", b"68"):
+            self.beside.add({b"16": b"15", b"7": b"8", b"43.5": b"49", b"68": b"69"}[code])
         else:
             self.beside.discard(code)
         self.given.append((line, {**self.now, "plain": not self.beside}))
@@ -176,7 +177,7 @@ def blocks_of(content: bytes, block_delete: bool = True) -> Blocks:
     feed_at, modes = np.full((count, 2), -1, dtype=np.int64), np.full((count, 2), -1, dtype=np.int64)
     feed, voids = np.full(count, np.nan), np.zeros(count, dtype=np.bool_)
     now, depth, opened, calls, subs, ended = _Modes(), 0, 0, False, False, False
-    dos = 0
+    dos, jumps = 0, False
     for token, line in _tokens(content, start):
         kind = token.lastgroup
         if kind is None or aside[line] == Aside.DELETED:
@@ -192,6 +193,11 @@ def blocks_of(content: bytes, block_delete: bool = True) -> Blocks:
             voids[line] |= now.take(line, code)
             if code in (b"93", b"94", b"95"):
                 modes[line] = token.span("code")
+        elif kind == "jump":
+            jumps = True
+        elif kind == "macro":
+            calls = True
+            aside[line] = Aside.FLOW
         elif kind == "computed":
             feed_at[line] = token.span("computed")
         elif kind == "deleted":
@@ -228,6 +234,9 @@ def blocks_of(content: bytes, block_delete: bool = True) -> Blocks:
                 subs |= ended
     if depth:
         aside[opened:] = Aside.FLOW
+    if jumps:
+        # Fanuc's GOTO goes to any line.
+        aside[aside != Aside.DELETED] = Aside.FLOW
     if (aside == Aside.THREAD).any():
         _follow_threads(content, start, aside)
     away = (aside == Aside.FLOW) | (aside == Aside.MODES)

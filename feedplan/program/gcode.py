@@ -20,20 +20,23 @@
 | G43.4, G43.5, G49 | X Y Z are the tool's tip on the part, with rotary words or with I J K, its direction |
 | G52, G92 to G92.3 | shifts of all work offsets |
 | G53, G54 to G59.3 | machine coordinates, work offsets (from the machine file, else 0) |
+| G54.1 P, G154 P | further work offsets 1 to 99 (`"G54.1 P1"` in the machine file, else 0); #7001, #7021 … |
 | G60 | alone exact stop; with a place a rapid that ends with one |
 | G61.1, G61, G64 P Q | exact stop, exact path, blending within P, fitting within Q |
 | G73 G74 G81 to G86 G89, G80, G98 G99 | canned cycles with R Z Q P L D, as moves; G99 unless G98 is given |
 | G90 G91 | absolute, incremental |
 | G93 G94 G95 | F is 1/min, units/min, units a turn (with a known spindle speed) |
 | G96 G97 S | surface or spindle speed |
-| G69 | what it cancels is never on: no effect |
+| G68 X Y R, G69 | coordinates turned by R degrees about a place, or about where the tool is; G17, G90 |
+| G65 P, letters, L | macros of Fanuc: A B C I J K D E F H are #1 to #6, #7 to #9, #11, Q to Z #17 to #26 |
 | G5 P, G5.1 Q alone in a block | Fanuc's look-ahead, with a warning: no effect |
 | M0 M1 M2 M30 M60 | full stop; M2 and M30 end the program |
 | M3 to M9, M19, M62 to M68 | spindle, coolant, outputs: a stop (none for M62, M63, M67) |
 | T, M6, M61 Q | tool of the table, if one is given |
 | M48 to M53 | overrides: no effect on the path |
 | M70 to M73 | save and restore modes |
-| M97 M98 M99 | Fanuc's subprograms by P, L times; without parameters of their own |
+| M97 M98 M99 | Fanuc's subprograms by P, L times; without parameters of their own; M99 P goes to a line |
+| IF[ ] GOTO, IF[ ] THEN, GOTO, WHILE[ ] DO1 … END1, EQ #0 | Fanuc's statements; GOTO by N in its program |
 | other M codes | a stop of no duration, with a warning; the words after it are its own |
 | E | an extruder: left out, with a warning |
 | O… sub, call, if, while, do, repeat | subroutines, branches and loops, also with names and in files |
@@ -41,26 +44,35 @@
 | F, N, O1234 or :1234 at the start, %, ( ) and ; comments | as usual |
 | / at the start of a block | left out, with a warning, unless `block_delete=False` |
 
-Parameters: #1 to #30 and #<name> belong to their call, #31 to #5602 and #<_name> to all; #5161 to #5390
-hold home and offsets, #5400 to #5428 tell tool and position, #<_x>, #<_metric> and their kin the modes. What
-is not set is 0, with a warning; names must be set. Loops and calls are bounded: by `max_moves`, four lines a
-move beside the text, and 100 calls deep. Subprograms in files are looked for beside the program, then in
-`subprograms`; their moves have the line of the call.
+Parameters: #1 to #30 and #<name> belong to their call, #31 to #5602, #7001 to #8980 and #<_name> to all;
+#5161 to #5390 hold home and offsets, #5400 to #5428 tell tool and position, #<_x>, #<_metric> and their kin
+the modes. What is not set is 0, with a warning; names must be set. In a macro of G65 words of arguments
+that are not given are left out; values of the control (#1000 to #5160) that nothing sets and alarms (#3000)
+are errors. Loops and calls are bounded: by `max_moves`, four lines a move beside the text, and 100 calls
+deep. Subprograms in files are looked for beside the program, then in `subprograms`; their moves have the
+line of the call.
 
 What is refused, by name, line and remedy:
 
 | words | reason |
 |---|---|
-| G38.2 to G38.5 | probing depends on the part |
-| G68, G50 G51, G54.1 | turned, scaled and further coordinates: post them as they are cut |
-| G65 to G67, GOTO, IF[ ] | macros of Fanuc |
-| G70 to G72, G87 G88 | these cycles depend on a contour or an operator |
-| G17.1 to G19.1 | planes of U, V, W |
-| ,C ,R | chamfers and roundings between blocks |
+| G38.2 to G38.5 | where a probe stops depends on the part |
+| G50 G51, G68.2 | scaling and tilted planes differ from control to control: post places as they are cut |
+| G66 G67 | macros that each move calls: call them by G65 |
+| G70 to G72 | each control cuts these lathe cycles in passes of its own: post the passes |
+| G87, G88 | the angle at which the spindle stops, and what the operator does by hand, are not known |
+| G17.1 to G19.1 | arcs and cycles of U, V, W |
 | G41 G42 in G19, with splines, cycles, G28, G53, G92 | there the tool has no offset |
-| #<_ini[…]>, #<_hal[…]> | values of one machine's configuration |
+| an arc in G18, G19 where coordinates are turned | it is no arc in a plane of the machine |
+| G10, G52, G92, G55 … under G68 | controls refuse these too: G69 comes first |
+| #<_ini[…]>, #<_hal[…]>, #4003 in a macro | values of one machine's configuration, or of one control |
+| a tool that a given tool table lacks | its length and diameter are not known |
+| a subprogram that is in no file | what it moves is not known |
 | a word that no code of its block uses | it would mean something else than is planned |
 | Heidenhain, Siemens, other languages | another language, named |
+
+Programs read beside LinuxCNC's interpreter: `python -m tests.program.readings FOLDER...` prints a table. Sums
+that differ by less than 1e-6 are equal to LE and GE, as in LinuxCNC 2.9, and not in interpreters before it.
 
 Within a block the order is LinuxCNC's, with differences that posts count on: F is in the units of its own
 block, G80 gives way to another motion code beside it, and G0 beside G28 only stays in force. All axes start
@@ -101,7 +113,10 @@ from feedplan.program.subprograms import finder
 from feedplan.program.tools import Tool
 from feedplan.progress import Listener
 
-WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
+WORK_OFFSETS = (
+    *("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"),
+    *(f"G54.1 P{number}" for number in range(1, 100)),
+)
 
 MAX_MOVES = 50_000_000
 
@@ -163,8 +178,8 @@ def read_gcode(
 
 
 def _places(machine: Machine | None) -> NDArray[np.float64]:
-    """Work offsets, home and the start of the program as rows (11, 9) over XYZABCUVW."""
-    places = np.zeros((len(WORK_OFFSETS) + 2, len(AXIS_LETTERS)))
+    """Home, the start of the program and the work offsets as rows (110, 9) over XYZABCUVW."""
+    places = np.zeros((2 + len(WORK_OFFSETS), len(AXIS_LETTERS)))
     if machine is None:
         return places
     # A machine's other axes are none of a program's.
@@ -172,11 +187,12 @@ def _places(machine: Machine | None) -> NDArray[np.float64]:
     columns = [AXIS_LETTERS.index(machine.program_letters[k]) for k in own]
     for key, row in machine.offsets:
         if key not in WORK_OFFSETS:
-            raise MachineError(f"machine {machine.name}: offsets has {key!r}: use {', '.join(WORK_OFFSETS)}")
-        places[WORK_OFFSETS.index(key), columns] = np.array(row)[own]
+            names = "G54 to G59, G59.1 to G59.3, G54.1 P1 to P99"
+            raise MachineError(f"machine {machine.name}: offsets has {key!r}: use {names}")
+        places[2 + WORK_OFFSETS.index(key), columns] = np.array(row)[own]
     if machine.home:
-        places[-2, columns] = np.array(machine.home)[own]
+        places[0, columns] = np.array(machine.home)[own]
     if not machine.words_are_joints:
         # Zero may be a place that the tip cannot reach, as the axis of a turning column.
-        places[-1] = places[-2]
+        places[1] = places[0]
     return places

@@ -117,6 +117,13 @@ def test_lines_behind_the_end_and_in_a_subprogram_are_left() -> None:
     assert result.content.decode().splitlines()[2:5] == ["F60000", "M98 P7 L2", "X0 F7348.4"]
 
 
+def test_lines_of_macros_are_left() -> None:
+    text = "G21 G61.1\nG1 X5 F60000\nG65 P7 X9 F8\nG1 X0\nM2\nO7\nG1 Y#24\nY0\nM99\n"
+    assert rewritten(text).splitlines()[1:5] == ["G1 X5 F7348.4", "F60000", "G65 P7 X9 F8", "G1 X0 F7348.4"]
+    text = "G21 G61.1\n#1=0\nN1 G1 X[5*#1] F60000\n#1=#1+1\nIF [#1 LE 3] GOTO 1\nM2\n"
+    assert rewritten(text) == text
+
+
 def test_threads_and_taps_keep_the_feed_of_their_spindle() -> None:
     text = "G21 G61.1 S1000 M3\nG1 X5 F60000\nG33 Z-5 K1\nZ-8 K1\nG1 X0\nM2\n"
     result = feedplan.planned_program(planned(text))

@@ -200,10 +200,15 @@ def _bezier(program: Program, piece: int, t: float) -> np.ndarray:
     return np.asarray(rows[0, :-1] / rows[0, -1])
 
 
-def difference(ours: Sequence[Move], theirs: Sequence[Move], tolerance: float = TOLERANCE) -> str | None:
-    """Where two lists of moves part, in a sentence; straight moves of no length do not count."""
+def difference(
+    ours: Sequence[Move], theirs: Sequence[Move], tolerance: float = TOLERANCE, so_far: bool = False
+) -> str | None:
+    """Where two lists of moves part, in a sentence; straight moves of no length do not count.
+
+    `so_far`: theirs end before ours.
+    """
     mine, others = _moving(ours), _moving(theirs)
-    for i in range(max(len(mine), len(others))):
+    for i in range(len(others) if so_far else max(len(mine), len(others))):
         a = mine[i] if i < len(mine) else None
         b = others[i] if i < len(others) else None
         if a is None or b is None or not _same(a, b, tolerance):

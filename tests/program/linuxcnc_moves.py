@@ -15,6 +15,7 @@ import json
 import math
 import os
 import re
+import signal
 import sys
 import tempfile
 from pathlib import Path
@@ -25,6 +26,9 @@ os.environ["HOME"] = tempfile.mkdtemp()
 import gcode
 
 INCH = 25.4
+
+# Some programs run for ever; longer ones are given up [s].
+PATIENCE = 60
 
 
 class Canon:
@@ -179,11 +183,14 @@ def main():
         # The interpreter keeps modes from program to program, and crashes on some.
         child = os.fork()
         if child == 0:
+            signal.alarm(PATIENCE)
             answer(json.loads(line), library)
             sys.stdout.flush()
             os._exit(0)
         if os.waitpid(child, 0)[1] != 0:
-            print(json.dumps({"moves": [], "error": ["the interpreter crashes", 0]}), flush=True)
+            print(
+                json.dumps({"moves": [], "error": ["the interpreter crashes or does not end", 0]}), flush=True
+            )
 
 
 def answer(request, library):

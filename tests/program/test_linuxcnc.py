@@ -13,7 +13,8 @@ import pytest
 from feedplan.errors import ProgramError
 from feedplan.program.gcode import read_gcode
 from feedplan.program.tools import read_tools
-from tests.program.linuxcnc import FOLDERS, Move, difference, moves_of, needs_linuxcnc, printed, reference
+from tests.program.linuxcnc import FOLDERS, difference, moves_of, needs_linuxcnc, reference
+from tests.program.readings import Verdict, programs_in, readings
 
 pytestmark = needs_linuxcnc
 
@@ -170,41 +171,29 @@ def test_random_programs_make_linuxcncs_moves(
 REFUSED = {
     "gridprobe.ngc": "probing depends on the part",
     "smartprobe.ngc": "probing depends on the part",
-    "x-trim.ngc": "probing depends on the part",
-    "lathe_g70_71_demo.ngc": "this cycle is not read",
-    "lathe_g7x_face_boring.ngc": "this cycle is not read",
-    "lathe_g7x_quadrants.ngc": "this cycle is not read",
+    "lathe_g70_71_demo.ngc": "each control cuts this cycle in passes of its own",
+    "lathe_g7x_face_boring.ngc": "each control cuts this cycle in passes of its own",
+    "lathe_g7x_quadrants.ngc": "each control cuts this cycle in passes of its own",
 }
 # Its loop ends by LE between equal sums, which the interpreter takes for equal from its version 2.9 on.
 ROUNDED = "threading.ngc"
 
 
 def test_the_samples_of_linuxcnc_make_its_moves(tmp_path: Path) -> None:
-    tools = tmp_path / "tools.tbl"
-    tools.write_text("".join(f"T{i} P{i} Z0 D1.5\n" for i in range(1, 100)))
-    table = read_tools(tools)
-    files = sorted(file for folder in FOLDERS for file in folder.rglob("*.ngc"))
+    """Each sample reads the same or is refused by name: `python -m tests.program.readings` prints which."""
+    files = programs_in(FOLDERS)
     library = [file for file in files if "ngcgui_lib" in file.parts]
-    folders = sorted({file.parent for file in library})
     files += [call for file in library if (call := call_of(file, tmp_path))]
-    ini = tmp_path / "samples.ini"
-    ini.write_text(f"[RS274NGC]\nSUBROUTINE_PATH={':'.join(map(str, folders))}\n")
-    wrong, same = [], 0
-    for file, (moves, error) in zip(files, reference(files, tools, ini), strict=True):
-        try:
-            program = read_gcode(file, tools=table, subprograms=folders)
-        except ProgramError as refused:
-            if error is None and moves_at_all(moves) and REFUSED.get(file.name, "\n") not in str(refused):
-                wrong.append(f"{file}: {refused}")
-            continue
-        if error is not None or file.name == ROUNDED:
-            continue
-        found = difference(moves_of(program), moves)
-        if found is not None and difference(moves_of(program), printed(file, tools), 0.004) is not None:
-            wrong.append(f"{file}: {found}")
-        same += 1
+    found = readings(files, sorted({file.parent for file in files}), tmp_path)
+    wrong = [
+        f"{reading.file}: {reading.reason}"
+        for reading in found
+        if (reading.verdict is Verdict.REFUSED and REFUSED.get(reading.file.name, "\n") not in reading.reason)
+        or (reading.verdict is Verdict.DIFFERENT and reading.file.name != ROUNDED)
+    ]
     assert not wrong, "\n".join(wrong)
-    assert same > 30
+    same = (Verdict.SAME, Verdict.SAME_AS_PRINTED, Verdict.SAME_SO_FAR)
+    assert sum(reading.verdict in same for reading in found) > 60
 
 
 def call_of(subroutine: Path, folder: Path) -> Path | None:
@@ -219,8 +208,3 @@ def call_of(subroutine: Path, folder: Path) -> Path | None:
     modes = "G20 G90 G17 G64 P.001 F100 S1000 M3"
     file.write_text(f"{modes}\nT1 M6\no<{subroutine.stem}> call {given}\nM2\n")
     return file
-
-
-def moves_at_all(moves: list[Move]) -> bool:
-    """Whether any move has a length."""
-    return difference([], [move for move in moves if move[0] != "dwell"]) is not None

@@ -43,7 +43,7 @@ pub fn rotary(axis: usize) -> bool {
     (3..6).contains(&axis)
 }
 
-/// Modal groups of G codes, numbered as in the standard; `OFF` holds cancellations of what is never on.
+/// Modal groups of G codes, numbered as in the standard up to 15.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Group {
@@ -63,14 +63,15 @@ pub enum Group {
     Lathe = 15,
     Shift = 16,
     Polar = 9,
-    Off = 17,
+    Turn = 17,
+    Macro = 18,
 }
 
-const GROUPS: usize = 18;
+const GROUPS: usize = 19;
 const NO_GROUP: u8 = 255;
 
-const GROUP_OF: [u8; 1000] = {
-    let members: [(Group, &[u16]); 17] = [
+const GROUP_OF: [u8; 1541] = {
+    let members: [(Group, &[u16]); 18] = [
         (Group::Once, &[40, 100, 280, 281, 282, 283, 284, 300, 301, 520, 530, 600, 920]),
         (
             Group::Motion,
@@ -87,15 +88,16 @@ const GROUP_OF: [u8; 1000] = {
         (Group::Compensation, &[400, 410, 411, 420, 421]),
         (Group::ToolLength, &[430, 431, 432, 434, 435, 490]),
         (Group::Retract, &[980, 990]),
-        (Group::System, &[540, 550, 560, 570, 580, 590, 591, 592, 593]),
+        (Group::System, &[540, 541, 550, 560, 570, 580, 590, 591, 592, 593, 1540]),
         (Group::Control, &[610, 611, 640]),
         (Group::SpindleMode, &[960, 970]),
         (Group::Lathe, &[70, 80]),
         (Group::Polar, &[150, 160]),
         (Group::Shift, &[921, 922, 923]),
-        (Group::Off, &[690]),
+        (Group::Turn, &[680, 690]),
+        (Group::Macro, &[650]),
     ];
-    let mut table = [NO_GROUP; 1000];
+    let mut table = [NO_GROUP; 1541];
     let mut i = 0;
     while i < members.len() {
         let mut j = 0;
@@ -287,6 +289,17 @@ impl Block {
             && self.corner.is_none()
     }
 
+    /// True where the block calls a subprogram or comes back from one: by G65, M97, M98 or M99.
+    #[inline(always)]
+    pub fn calls(&self) -> bool {
+        self.groups & (1 << Group::Macro as u8) | self.m_groups & (1 << MGroup::Call as u8) != 0
+    }
+
+    /// True where the block has no other code than that of a group.
+    pub fn is_alone(&self, group: Group) -> bool {
+        self.groups == 1 << group as u8 && self.m_groups == 0
+    }
+
     /// Takes an M code of a group; Err with what stands in that group already.
     pub fn set_m_code(&mut self, code: u16, group: MGroup) -> Result<(), u16> {
         if group == MGroup::Other {
@@ -325,10 +338,11 @@ pub fn g_remedy(code: u16) -> Option<&'static str> {
         171 | 181 | 191 => "arcs and cycles in the planes of U, V and W are not read: use G17, G18 or G19",
         380..=389 => "probing depends on the part: remove it",
         500..=519 => "scaling is not read: post the coordinates at full size",
-        541 => "only the work offsets G54 to G59.3 are read: post with one of them",
-        680..=689 => "rotated coordinates are not read: post the coordinates as they are cut",
-        650..=669 => "macros of Fanuc are not read: post the moves that they make",
-        700..=729 | 870 | 880 => "this cycle is not read: post it as single moves",
+        681..=689 => "tilted planes are each control's own: post the axes of the machine, or G43.4",
+        651..=669 => "macros that each move calls are not read: call them by G65",
+        700..=729 => "each control cuts this cycle in passes of its own: post the passes as single moves",
+        870 => "it needs the angle at which the spindle stops: post it as single moves",
+        880 => "the operator ends it by hand: post it as single moves",
         _ => return None,
     })
 }

@@ -135,8 +135,11 @@ impl Interpreter<'_> {
                 }
             }
         }
-        for (letter, kept) in [(b'P', &mut sticky.dwell), (b'Q', &mut sticky.peck)] {
-            *kept = block.get(letter).or(kept.filter(|_| again));
+        sticky.peck = block.get(b'Q').or(sticky.peck.filter(|_| again));
+        // Taps keep the dwell of the last cycle that had one, whichever it was.
+        let taps = matches!(motion, 740 | 840);
+        if taps || matches!(motion, 820 | 860 | 890) {
+            sticky.dwell = block.get(b'P').or(sticky.dwell.filter(|_| again || taps));
         }
         let initial = *sticky.initial.get_or_insert(current);
         // As the program counts heights, and as the machine does.

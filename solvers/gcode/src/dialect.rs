@@ -4,7 +4,7 @@
 const LOOK: usize = 1 << 16;
 
 /// Words in capitals, and the language they belong to; the first that is found decides.
-const SIGNS: [(&[&str], &str); 5] = [
+const SIGNS: [(&[&str], &str); 4] = [
     (&["BEGIN PGM", "TOOL CALL", "TOOL DEF", " FMAX", "CYCL DEF", "BLK FORM"], "Heidenhain conversational"),
     (
         &[
@@ -25,7 +25,6 @@ const SIGNS: [(&[&str], &str); 5] = [
         ],
         "Siemens Sinumerik",
     ),
-    (&["IF[", "IF [", "WHILE[", "WHILE [", "GOTO"], "Fanuc macro"),
     (&["M104 S", "M109 S", "M140 S", "M82\n", "M83\n", "M82\r", "M83\r", ";LAYER", "EXTRUD"], "3-D printer"),
     (&["<?XML", "<HTML", "<SVG", "SOLID ", "%!PS", "0\nSECTION", "0\r\nSECTION"], "no machine"),
 ];
@@ -48,7 +47,6 @@ mod tests {
             ("0 BEGIN PGM 12 MM\n1 L X+5 FMAX\n", Some("Heidenhain conversational")),
             ("%_N_PART_MPF\nDEF REAL A=1\n", Some("Siemens Sinumerik")),
             ("G2 X5 CR=10\n", Some("Siemens Sinumerik")),
-            ("N10 #1=2\nif [#1 gt 2] goto 10\n", Some("Fanuc macro")),
             ("M82\nG1 E5\n", Some("3-D printer")),
             ("G0 X1\nG1 Y2 F100\nM2\n", None),
             ("", None),

@@ -13,7 +13,7 @@ use super::fault::{fault, Outcome};
 use super::intent::{axis_words, check_use, is_cycle, motion_of, ARC_WORDS, FREE_WORDS};
 use super::modal::{Feed, FeedMode, State};
 use super::moves::{Control, Kind, Mode, Moves, Point, Stop};
-use super::parameters::{Parameters, FIRST_SYSTEM, HOME, SECOND_HOME, SYSTEM, SYSTEM_STEP};
+use super::parameters::{first_of_system, Parameters, HOME, SECOND_HOME, SYSTEM};
 use super::spline::Nurbs;
 use super::tip::{takes_direction, Meaning};
 use super::tools::Tool;
@@ -70,12 +70,12 @@ impl<'a> Interpreter<'a> {
     pub fn new(options: &'a Options, expected: usize) -> Self {
         let mut parameters = Parameters::default();
         for (system, offset) in options.offsets.iter().enumerate() {
-            parameters.set_row(FIRST_SYSTEM + SYSTEM_STEP * system, offset);
+            parameters.set_row(first_of_system(system), offset);
         }
         parameters.set_number(SYSTEM, 1.0);
         parameters.set_row(HOME, &options.home);
         parameters.set_row(SECOND_HOME, &options.home);
-        let mut state = State::new(options.offsets[0]);
+        let mut state = State::new(options.offsets.first().copied().unwrap_or_default());
         state.feed = options.feed.map(|feed| Feed { linear: feed, angular: feed });
         Self {
             state,
@@ -167,6 +167,10 @@ impl<'a> Interpreter<'a> {
         if let Some(nurbs) = self.open.take() {
             return self.continue_spline(block, nurbs).map(|()| false);
         }
+        // Its words are the macro's.
+        if block.code(Group::Macro).is_some() {
+            return Ok(false);
+        }
         let axes = axis_words(block);
         let vector = self.state.meaning == Meaning::Vector;
         let motion = motion_of(block, axes, self.state.motion, vector)?;
@@ -187,7 +191,14 @@ impl<'a> Interpreter<'a> {
         if let Some(code) = block.code(Group::Compensation) {
             self.set_compensation(block, code)?;
         }
+        if block.code(Group::Turn) == Some(690) {
+            self.end_turn();
+        }
+        self.check_turned(block)?;
         self.set_offsets(block)?;
+        if block.code(Group::Turn) == Some(680) {
+            self.begin_turn(block)?;
+        }
         if let Some(code) = block.code(Group::Once).filter(|code| !matches!(code, 40 | 600)) {
             self.check_beside(&g_name(code))?;
         }
@@ -257,8 +268,10 @@ impl<'a> Interpreter<'a> {
             self.state.spindle_speed = (!self.state.constant_surface_speed).then_some(speed);
         }
         if block.words & bits(b"SHTD") != 0 {
+            // A diameter may be negative: that of a tool that is smaller than the path was made for.
+            let diameter = matches!(block.code(Group::Compensation), Some(411 | 421));
             for letter in *b"SHTD" {
-                if block.get(letter).is_some_and(|value| value < 0.0) {
+                if !(diameter && letter == b'D') && block.get(letter).is_some_and(|value| value < 0.0) {
                     return fault(format!("word {} is negative: give a number from 0", block.word(letter)));
                 }
             }
@@ -418,10 +431,12 @@ impl<'a> Interpreter<'a> {
     #[inline(always)]
     pub(super) fn check_reach(&self, target: &Point) -> Outcome<()> {
         let reached = |axis: usize| target[axis].abs() <= if rotary(axis) { FARTHEST_TURN } else { FARTHEST };
-        match (0..9).find(|&axis| !reached(axis)) {
-            None => Ok(()),
-            Some(axis) => too_far(axis, target[axis]),
+        // All nine without a branch; which one it is matters afterwards.
+        if (0..9).fold(true, |all, axis| all & reached(axis)) {
+            return Ok(());
         }
+        let axis = (0..9).find(|&axis| !reached(axis)).unwrap_or(0);
+        too_far(axis, target[axis])
     }
 
     pub(super) fn rapid(&mut self, target: &Point) -> Outcome<()> {

@@ -6,7 +6,7 @@
 use super::arithmetic::{apply, call, operator, Function};
 use super::fault::{fault, foreign, Outcome};
 use super::number::{decimal, spaces};
-use super::parameters::{Name, NUMBERS, READINGS};
+use super::parameters::{is_number, Name, READINGS};
 
 /// How far a decimal number may be from the integer it stands for.
 const NEAR_INTEGER: f64 = 1e-4;
@@ -16,13 +16,22 @@ const MAX_DEPTH: usize = 64;
 
 /// What parameters are worth: those of the program, and those that the machine tells.
 pub trait Values {
-    fn number(&self, number: usize) -> f64;
+    /// 0 where it has none, as in LinuxCNC; a fault where it cannot be known here.
+    fn number(&self, number: usize) -> Outcome<f64>;
+
+    /// Whether a number has a value; a fault where it cannot be known here.
+    fn has_value(&self, number: usize) -> Outcome<bool>;
+
+    /// Whether words of parameters without value are left out, as in Fanuc's macros.
+    fn in_macro(&self) -> bool;
 
     /// None where there is no such name; a fault where it cannot be known here.
     fn named(&self, name: &[u8]) -> Outcome<Option<f64>>;
 }
 
-/// Reads `#1 = value` from its `#` on; what it assigns, and the place after it.
+/// Reads `#1 = value` from its `#` on; what it assigns (NaN by `#1 = #0`), and the place after it.
+///
+/// Fanuc writes sums without brackets.
 pub fn assignment(source: &[u8], at: usize, values: &dyn Values) -> Outcome<(Name, f64, usize)> {
     let mut formula = Formula { source, at, values, depth: 0 };
     let name = formula.name()?;
@@ -30,7 +39,7 @@ pub fn assignment(source: &[u8], at: usize, values: &dyn Values) -> Outcome<(Nam
         return foreign(format!("{name} stands alone: write {name} = value, or a letter before it"));
     }
     formula.at += 1;
-    let value = formula.value()?;
+    let value = if formula.nothing() { f64::NAN } else { formula.chain(1)? };
     if matches!(name, Name::Number(number) if READINGS.contains(&number)) {
         return fault(format!("{name} is told by the machine and cannot be set: use another parameter"));
     }
@@ -38,7 +47,7 @@ pub fn assignment(source: &[u8], at: usize, values: &dyn Values) -> Outcome<(Nam
 }
 
 /// The value at `at` that is not a plain number: an expression, a parameter, a function, or one of these
-/// with a sign; with the place after it. None where none of these starts.
+/// with a sign; with the place after it. None where none of these starts; NaN for a parameter without value in a macro.
 pub fn expression(source: &[u8], at: usize, values: &dyn Values) -> Outcome<Option<(f64, usize)>> {
     let mut formula = Formula { source, at, values, depth: 0 };
     let after_sign = match formula.peek() {
@@ -52,6 +61,20 @@ pub fn expression(source: &[u8], at: usize, values: &dyn Values) -> Outcome<Opti
     };
     if !starts {
         return Ok(None);
+    }
+    if values.in_macro() && formula.peek() == b'#' {
+        let start = formula.at;
+        let has_value = match formula.nothing() {
+            true => false,
+            false => match formula.name()? {
+                Name::Number(number) => values.has_value(number)?,
+                Name::Text(_) => true,
+            },
+        };
+        if !has_value {
+            return Ok(Some((f64::NAN, formula.at)));
+        }
+        formula.at = start;
     }
     let value = formula.value()?;
     Ok(Some((value, formula.at)))
@@ -103,7 +126,10 @@ impl Formula<'_> {
             b'[' => self.bracket()?,
             b'#' => {
                 let name = self.name()?;
-                self.look_up(&name)?
+                match self.beside_nothing(&name)? {
+                    Some(truth) => truth,
+                    None => self.look_up(&name)?,
+                }
             }
             letter if letter.is_ascii_alphabetic() => self.function()?,
             sign => match (decimal(self.source, self.at), sign) {
@@ -128,7 +154,7 @@ impl Formula<'_> {
 
     fn look_up(&self, name: &Name) -> Outcome<f64> {
         let text = match name {
-            Name::Number(number) => return Ok(self.values.number(*number)),
+            Name::Number(number) => return self.values.number(*number),
             Name::Text(text) => text,
         };
         match self.values.named(text)? {
@@ -209,6 +235,40 @@ impl Formula<'_> {
         })
     }
 
+    /// `EQ #0` or `NE #0` behind a parameter, in which #0 is what has no value.
+    fn beside_nothing(&mut self, name: &Name) -> Outcome<Option<f64>> {
+        let Name::Number(number) = name else { return Ok(None) };
+        let equal = match self.peek() {
+            b'E' | b'e' => true,
+            b'N' | b'n' => false,
+            _ => return Ok(None),
+        };
+        let start = self.at;
+        let word: &[u8] = if equal { b"EQ" } else { b"NE" };
+        if self.source.get(start..start + 2).is_some_and(|text| text.eq_ignore_ascii_case(word)) {
+            self.at += 2;
+            if self.nothing() {
+                return Ok(Some(f64::from(self.values.has_value(*number)? != equal)));
+            }
+        }
+        self.at = start;
+        Ok(None)
+    }
+
+    /// Takes `#0`, if it is next.
+    fn nothing(&mut self) -> bool {
+        if self.peek() != b'#' {
+            return false;
+        }
+        match decimal(self.source, self.at + 1) {
+            Some((0.0, end)) => {
+                self.at = end;
+                true
+            }
+            _ => false,
+        }
+    }
+
     /// `#5`, `##2`, `#[1 + 2]` or `#<name>`, from the `#` on.
     fn name(&mut self) -> Outcome<Name> {
         self.peek();
@@ -220,10 +280,10 @@ impl Formula<'_> {
         }
         let number = self.value()?;
         match integer(number) {
-            Some(index) if (1..NUMBERS as i64).contains(&index) => Ok(Name::Number(index as usize)),
-            _ => {
-                fault(format!("#{number} is no parameter: parameters are #1 to #{} or #<name>", NUMBERS - 1))
-            }
+            Some(index) if is_number(index) => Ok(Name::Number(index as usize)),
+            _ => fault(format!(
+                "#{number} is no parameter: parameters are #1 to #5602, #7001 to #8980 or #<name>"
+            )),
         }
     }
 
@@ -259,8 +319,16 @@ mod tests {
     use crate::parameters::Parameters;
 
     impl Values for Parameters {
-        fn number(&self, number: usize) -> f64 {
-            Parameters::number(self, number)
+        fn number(&self, number: usize) -> Outcome<f64> {
+            Ok(Parameters::number(self, number))
+        }
+
+        fn has_value(&self, number: usize) -> Outcome<bool> {
+            Ok(self.is_set(number))
+        }
+
+        fn in_macro(&self) -> bool {
+            Parameters::in_macro(self)
         }
 
         fn named(&self, name: &[u8]) -> Outcome<Option<f64>> {
@@ -337,6 +405,25 @@ mod tests {
         assert_eq!(value_with(&parameters, "exists[#<toolwidth>]"), Ok(1.0));
         assert_eq!(value_with(&parameters, "exists[#<other>]"), Ok(0.0));
         assert_eq!(value_with(&parameters, "#7"), Ok(0.0));
+    }
+
+    #[test]
+    fn parameters_without_value_are_nothing() {
+        let mut parameters = Parameters::default();
+        for text in ["#1=0", "#2=#1+2*3", "#3=4", "#3=#0"] {
+            let (name, value, end) = assignment(text.as_bytes(), 0, &parameters).unwrap();
+            assert_eq!(end, text.len());
+            parameters.set(&name, value);
+        }
+        for (text, expected) in [
+            ("[#1 EQ #0]", 0.0),
+            ("[#1NE#0]", 1.0),
+            ("[#3 eq #0]", 1.0),
+            ("[#9 NE #0 OR #2 EQ 6]", 1.0),
+            ("[#1 EQ #4]", 1.0),
+        ] {
+            assert_eq!(value_with(&parameters, text), Ok(expected), "{text}");
+        }
     }
 
     #[test]

@@ -1,10 +1,12 @@
-//! The lines of a program that say which line is next: O words (sub, call, if, while, do, repeat) and Fanuc's program
-//! numbers. They are found in one pass over the text, the first time that one is met, and tied to their partners.
+//! The lines of a program that say which line is next: O words (sub, call, if, while, do, repeat), Fanuc's program
+//! numbers and its statements (IF, WHILE, GOTO). They are found in one pass over the text, the first time that one is met, and tied to their partners.
 
+use std::cell::OnceCell;
 use std::collections::HashMap;
 
 use super::expression::{excerpt, integer, name_in_brackets};
 use super::fault::{fault, fault_in, Outcome};
+use super::macros::{loop_label, statement};
 use super::number::{decimal, spaces};
 
 /// What a line of program flow does.
@@ -27,6 +29,9 @@ pub enum Kind {
     EndRepeat,
     Break,
     Continue,
+    /// Fanuc's IF with GOTO or THEN.
+    When,
+    GoTo,
     /// An O number alone, which begins a program or subprogram.
     Number,
 }
@@ -56,7 +61,7 @@ pub type Label = Option<Vec<u8>>;
 /// A line of program flow.
 #[derive(Clone, Debug)]
 pub struct Step {
-    /// Where its O is, where its arguments begin, and where the next line does.
+    /// Where its first letter is, where its arguments begin, and where the next line does.
     pub at: usize,
     pub arguments: usize,
     pub next: usize,
@@ -77,19 +82,21 @@ pub struct Flow {
     pub steps: Vec<Step>,
     /// Steps where subroutines begin, by label.
     subs: HashMap<Vec<u8>, usize>,
+    /// Lines with block numbers, in order of these: the number, where the line begins, and the number of the line before.
+    numbered: OnceCell<Vec<(i64, usize, u32)>>,
 }
 
 impl Flow {
     /// The steps of a text; lines after `/` count unless `delete`.
     pub fn new(source: &[u8], delete: bool) -> Outcome<Self> {
-        let mut flow = Self { steps: Vec::new(), subs: HashMap::new() };
+        let mut flow = Self { steps: Vec::new(), subs: HashMap::new(), numbered: OnceCell::new() };
         let (mut at, mut line) = (0, 0);
         while at < source.len() {
             line += 1;
             let end = end_of_line(source, at);
             let next = after_line(source, end);
-            if let Some(o) = place_of_o(source, at, delete) {
-                if let Some(step) = step_at(source, o, next, line)? {
+            if let Some(first) = first_letter(source, at, delete) {
+                if let Some(step) = step_at(source, first, next, line)? {
                     flow.steps.push(step);
                 }
             }
@@ -99,7 +106,7 @@ impl Flow {
         Ok(flow)
     }
 
-    /// The step whose O is at a place.
+    /// The step whose first letter is at a place.
     pub fn at(&self, at: usize) -> Option<usize> {
         self.steps.binary_search_by_key(&at, |step| step.at).ok()
     }
@@ -107,6 +114,19 @@ impl Flow {
     /// The step where a subroutine begins.
     pub fn sub(&self, label: &[u8]) -> Option<usize> {
         self.subs.get(label).copied()
+    }
+
+    /// Where the line with a block number begins, and the number of the line before: the next one behind a place in the
+    /// program of that place, from its O number to the next, else the first one there.
+    pub fn numbered(&self, source: &[u8], number: i64, from: usize) -> Option<(usize, u32)> {
+        let lines = self.numbered.get_or_init(|| numbered_lines(source));
+        let programs = || self.steps.iter().filter(|step| step.kind == Kind::Number).map(|step| step.at);
+        let first = programs().take_while(|&at| at < from).last().unwrap_or(0);
+        let end = programs().find(|&at| at >= from).unwrap_or(source.len());
+        let start = lines.partition_point(|&(known, at, _)| (known, at) < (number, first));
+        let found = lines[start..].iter().take_while(|&&(known, at, _)| known == number && at < end);
+        let (_, at, line) = found.clone().find(|(_, at, _)| *at >= from).or(found.into_iter().next())?;
+        Some((*at, *line))
     }
 
     /// Ties steps to their partners; each must have one.
@@ -157,7 +177,7 @@ impl Flow {
                         None => return self.refuse(i, "stands in no loop of that label"),
                     }
                 }
-                Kind::Return | Kind::Call | Kind::DoWhile => {}
+                Kind::Return | Kind::Call | Kind::DoWhile | Kind::When | Kind::GoTo => {}
                 Kind::Number => self.begin_sub(i)?,
             }
             if kind == Kind::Sub {
@@ -216,8 +236,8 @@ impl Flow {
     }
 }
 
-/// The place of the O that begins a line, after blanks, `/` and a block number.
-fn place_of_o(source: &[u8], at: usize, delete: bool) -> Option<usize> {
+/// The place of the letter that begins a line of program flow, after blanks, `/` and a block number.
+fn first_letter(source: &[u8], at: usize, delete: bool) -> Option<usize> {
     let mut at = spaces(source, at);
     if source.get(at) == Some(&b'/') {
         if delete {
@@ -228,18 +248,20 @@ fn place_of_o(source: &[u8], at: usize, delete: bool) -> Option<usize> {
     if matches!(source.get(at), Some(b'N' | b'n')) {
         at = spaces(source, decimal(source, at + 1)?.1);
     }
-    matches!(source.get(at), Some(b'O' | b'o' | b':')).then_some(at)
+    (matches!(source.get(at), Some(b'O' | b'o' | b':')) || statement(source, at).is_some()).then_some(at)
 }
 
-/// The step whose O is at a place; None where what follows it is no label.
+/// The step whose first letter is at a place; None where it is an O and what follows it is no label.
 fn step_at(source: &[u8], at: usize, next: usize, line: u32) -> Outcome<Option<Step>> {
+    let step =
+        |kind, label, arguments| Some(Step { at, arguments, next, line, kind, label, partner: 0, end: 0 });
+    if let Some((kind, label, arguments)) = statement(source, at) {
+        return Ok(step(kind, label, arguments));
+    }
     let Some((label, end)) = label(source, at + 1)? else { return Ok(None) };
-    let step = |kind, arguments| {
-        Some(Step { at, arguments, next, line, kind, label: label.clone(), partner: 0, end: 0 })
-    };
     Ok(match keyword(source, end) {
-        Some((kind, arguments)) => step(kind, arguments),
-        None if label.is_some() => step(Kind::Number, end),
+        Some((kind, arguments)) => step(kind, label, arguments),
+        None if label.is_some() => step(Kind::Number, label, end),
         None => None,
     })
 }
@@ -298,26 +320,40 @@ pub fn after_line(source: &[u8], end: usize) -> usize {
     end + if source.get(end..).is_some_and(|rest| rest.starts_with(b"\r\n")) { 2 } else { 1 }
 }
 
-/// The start of the line whose block number is a label, and the number of the line before.
-pub fn numbered_line(source: &[u8], label: &[u8]) -> Option<(usize, u32)> {
+/// Lines with block numbers: the number, where the line begins, and the number of the line before; in that order.
+fn numbered_lines(source: &[u8]) -> Vec<(i64, usize, u32)> {
+    let mut lines = Vec::new();
     let (mut at, mut line) = (0, 0);
     while at < source.len() {
         let word = spaces(source, at);
         if matches!(source.get(word), Some(b'N' | b'n')) {
-            let number = decimal(source, word + 1).and_then(|(value, _)| number_label(value));
-            if number.as_deref() == Some(label) {
-                return Some((at, line));
+            if let Some(number) = decimal(source, word + 1).and_then(|(value, _)| integer(value)) {
+                lines.push((number, at, line));
             }
         }
         at = after_line(source, end_of_line(source, at));
         line += 1;
     }
-    None
+    lines.sort_unstable();
+    lines
 }
 
-/// Refuses what stands behind the arguments of a step.
+/// The place after blanks and comments.
+pub fn behind_comments(source: &[u8], at: usize) -> usize {
+    let mut at = spaces(source, at);
+    while source.get(at) == Some(&b'(') {
+        let Some(length) = source[at..].iter().position(|byte| matches!(byte, b')' | b'\n' | b'\r')) else {
+            break;
+        };
+        at = spaces(source, at + length + usize::from(source[at + length] == b')'));
+    }
+    at
+}
+
+/// Refuses what stands behind the arguments of a step, but for comments and the DO of Fanuc's WHILE.
 pub fn check_rest(source: &[u8], at: usize) -> Outcome<()> {
-    let at = spaces(source, at);
+    let at = loop_label(source, at).map_or(at, |(_, end)| end);
+    let at = behind_comments(source, at);
     match source.get(at) {
         None | Some(b'\n' | b'\r' | b';' | b'(' | 0x1a) => Ok(()),
         _ => fault(format!(

@@ -42,7 +42,8 @@ fn motion_beside_others(
 ) -> Outcome<Option<u16>> {
     let once = block.code(Group::Once).filter(|code| TAKES_AXES.contains(code));
     let tool = block.code(Group::ToolLength).filter(|code| matches!(code, 431 | 432));
-    match (motion, once.or(tool)) {
+    let turn = block.code(Group::Turn).filter(|code| *code == 680);
+    match (motion, once.or(tool).or(turn)) {
         // `G0 G28 Z0` is common: G28 has the axis words, G0 stays in force.
         (Some(code @ (0 | 10 | 800)), Some(280..=284 | 300 | 301)) | (Some(code @ 800), Some(_)) => {
             Ok(Some(code))
@@ -103,6 +104,12 @@ pub fn check_use(
     if block.code(Group::Control) == Some(640) {
         used |= bits(b"PQ");
     }
+    if block.code(Group::Turn) == Some(680) {
+        used |= bit(b'R');
+    }
+    if matches!(block.code(Group::System), Some(541 | 1540)) {
+        used |= bit(b'P');
+    }
     if matches!(block.code(Group::ToolLength), Some(430 | 432 | 434 | 435 | 490)) {
         used |= bit(b'H');
     }
@@ -143,6 +150,12 @@ pub fn check_use(
 
 /// Combinations that controls refuse.
 fn check_together(block: &Block, motion: Option<u16>, absolute: bool) -> Outcome<()> {
+    if let Some(code) = block.code(Group::System).filter(|code| matches!(code, 541 | 1540)) {
+        let alone = matches!(motion, None | Some(0 | 10 | 800)) && !block.calls();
+        if !alone || matches!(block.code(Group::Once), Some(40 | 100)) {
+            return fault(format!("{} takes the P of its block: put it in a block of its own", g_name(code)));
+        }
+    }
     match (block.code(Group::Once), motion) {
         (Some(40), Some(20 | 30)) => fault("G4 and an arc both use P: put them in two blocks"),
         (Some(530), Some(0 | 10)) if block.is_polar() => {

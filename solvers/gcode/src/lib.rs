@@ -2,9 +2,9 @@
 //!
 //! `run` takes lines in the order that `flow` and `steps` say; `words` cuts them into blocks, with the arithmetic of
 //! `expression` on `parameters` and `readings`. `intent` says what a block asks for, `execute` runs it in LinuxCNC's
-//! order with the modes of `modal` and the offsets of `places`; `motion`, `arc`, `spline`, `cycle` and `thread` make
-//! moves, `compensate` puts the tool beside them, `tip` says what their words mean, `moves` holds them as columns. What is not understood is an error with its line
-//! and word; nothing is skipped silently.
+//! order with the modes of `modal` and the offsets of `places`; `macros` is Fanuc's. `motion`, `arc`, `spline`, `cycle`
+//! and `thread` make moves, `compensate` puts the tool beside them, `tip` says what their words mean, `moves` holds them
+//! as columns. What is not understood is an error with its line and word; nothing is skipped silently.
 
 mod arc;
 mod arithmetic;
@@ -18,6 +18,7 @@ mod expression;
 mod fault;
 mod flow;
 mod intent;
+mod macros;
 mod modal;
 mod modes;
 mod motion;
@@ -51,8 +52,8 @@ pub type MachinesWith = dyn Fn(char) -> String + Send + Sync;
 
 /// What the reader must know about the machine and the user's choices.
 pub struct Options {
-    /// Work offsets G54 to G59.3, in mm and degrees.
-    pub offsets: [Point; 9],
+    /// Work offsets G54 to G59.3 and G54.1 P1 on, in mm and degrees; 0 where there are fewer.
+    pub offsets: Vec<Point>,
     /// Where G28 and G30 go, in mm and degrees.
     pub home: Point,
     /// Where the program begins, in mm and degrees.
@@ -80,7 +81,7 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self {
-            offsets: [[0.0; 9]; 9],
+            offsets: Vec::new(),
             home: [0.0; 9],
             start: [0.0; 9],
             machine_axes: Vec::new(),
@@ -112,7 +113,9 @@ pub fn read(source: &[u8], options: &Options, seen: &dyn Fn(usize)) -> Result<Co
     if source.len() > i32::MAX as usize {
         return Err(whole("the program is larger than 2 GiB: split it"));
     }
-    let lines = source.iter().filter(|&&byte| byte == b'\n').count() + 1;
+    // Sums of bytes, which do not overflow in 255 of them, are counted by vector instructions.
+    let ends = |part: &[u8]| part.iter().map(|&byte| u8::from(byte == b'\n')).sum::<u8>();
+    let lines = source.chunks(255).map(|part| usize::from(ends(part))).sum::<usize>() + 1;
     let mut runner = Runner::new(source, options, lines, seen);
     let ended = match runner.run() {
         Ok(ended) => ended,

@@ -39,12 +39,14 @@ pub struct Sticky {
 /// Where the numbers of the program are, in machine coordinates.
 #[derive(Clone, Debug)]
 pub struct Offsets {
-    /// Which of G54 to G59.3 is in force, from 0, its offset and its turn about Z in degrees.
+    /// Which of G54 to G59.3 and of the further ones is in force, from 0, its offset and its turn about Z in degrees.
     pub system: usize,
     pub work: Point,
     pub rotation: f64,
     /// G92 and G52.
     pub shift: Point,
+    /// The shift and the turn of before, while G68 turns about a place of its own.
+    pub unturned: Option<(Point, f64)>,
     /// Tool length, G43.
     pub tool: Point,
     /// Their sum.
@@ -54,7 +56,8 @@ pub struct Offsets {
 impl Offsets {
     pub fn new(work: Point) -> Self {
         let zero = [0.0; 9];
-        let mut offsets = Self { system: 0, work, rotation: 0.0, shift: zero, tool: zero, sum: zero };
+        let mut offsets =
+            Self { system: 0, work, rotation: 0.0, shift: zero, unturned: None, tool: zero, sum: zero };
         offsets.update();
         offsets
     }

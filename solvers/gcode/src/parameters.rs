@@ -1,4 +1,4 @@
-//! The parameters of a program: #1 to #30 of each call, #31 to #5602 of all, and names.
+//! The parameters of a program: #1 to #30 of each call, #31 to #5602 and #7001 to #8980 of all, and names.
 //!
 //! Numbers from 5001 on are the machine's: what is stored here holds its offsets and positions, as in LinuxCNC; what
 //! the machine only tells (where it is, its modes) is in `readings`.
@@ -11,8 +11,13 @@ use super::fault::{fault, Outcome};
 /// Numbers of one call alone.
 pub const LOCALS: usize = 30;
 
-/// Parameters have numbers below this.
-pub const NUMBERS: usize = 5603;
+/// Parameters have numbers below this; LinuxCNC's end at `LAST`, those of further work offsets begin at `FIRST_FURTHER`.
+const NUMBERS: usize = FIRST_FURTHER + SYSTEM_STEP * MOST_FURTHER as usize;
+const LAST: usize = 5602;
+const FIRST_FURTHER: usize = 7001;
+
+/// Work offsets G54.1 P1 to P99.
+pub const MOST_FURTHER: u32 = 99;
 
 /// Where offsets and positions are stored: each has nine numbers, X to W, from its first on.
 pub const HOME: usize = 5161;
@@ -20,11 +25,24 @@ pub const SECOND_HOME: usize = 5181;
 pub const SHIFT_IN_FORCE: usize = 5210;
 pub const SHIFT: usize = 5211;
 pub const SYSTEM: usize = 5220;
-pub const FIRST_SYSTEM: usize = 5221;
+const FIRST_SYSTEM: usize = 5221;
 
 /// Numbers from one work offset to the next; the tenth of each is its rotation in degrees.
-pub const SYSTEM_STEP: usize = 20;
+const SYSTEM_STEP: usize = 20;
 pub const ROTATION: usize = 9;
+
+/// The first number of a work offset: from 0 G54 to G59.3, from 9 G54.1 P1 on, where Fanuc has it.
+pub fn first_of_system(system: usize) -> usize {
+    match system.checked_sub(9) {
+        None => FIRST_SYSTEM + SYSTEM_STEP * system,
+        Some(further) => FIRST_FURTHER + SYSTEM_STEP * further,
+    }
+}
+
+/// Whether there is a parameter of that number.
+pub fn is_number(number: i64) -> bool {
+    (1..=LAST as i64).contains(&number) || (FIRST_FURTHER as i64..NUMBERS as i64).contains(&number)
+}
 
 /// What the machine tells and a program cannot set.
 pub const READINGS: std::ops::RangeInclusive<usize> = 5400..=5439;
@@ -48,13 +66,24 @@ impl std::fmt::Display for Name {
     }
 }
 
-/// One call's own parameters.
+/// What a call has of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scope {
+    /// Numbers and names, as in LinuxCNC; arguments that are not given are 0.
+    Own,
+    /// Fanuc's subprograms have the numbers of their caller.
+    Shared,
+    /// Fanuc's macros have numbers; arguments that are not given have no value.
+    Macro,
+}
+
+/// What the caller has while a call is open.
 #[derive(Clone)]
 struct Level {
     numbers: [f64; LOCALS],
     names: HashMap<Vec<u8>, f64>,
-    /// A subprogram of Fanuc's kind shares the numbers of its caller.
-    shares: bool,
+    opened: Scope,
+    in_macro: bool,
 }
 
 /// Values by number and by name; NaN where the program has set none.
@@ -63,6 +92,8 @@ pub struct Parameters {
     global: HashMap<Vec<u8>, f64>,
     names: HashMap<Vec<u8>, f64>,
     callers: Vec<Level>,
+    /// The lines that are run are those of a macro.
+    in_macro: bool,
     /// The first number that was read before it was set; 0 for none.
     unset: Cell<usize>,
 }
@@ -74,6 +105,7 @@ impl Default for Parameters {
             global: HashMap::new(),
             names: HashMap::new(),
             callers: Vec::new(),
+            in_macro: false,
             unset: Cell::new(0),
         }
     }
@@ -90,6 +122,15 @@ impl Parameters {
             self.unset.set(number);
         }
         0.0
+    }
+
+    /// Whether a number has a value.
+    pub fn is_set(&self, number: usize) -> bool {
+        !self.numbers[number].is_nan()
+    }
+
+    pub fn in_macro(&self) -> bool {
+        self.in_macro
     }
 
     pub fn set_number(&mut self, number: usize, value: f64) {
@@ -133,8 +174,8 @@ impl Parameters {
         self.callers.len()
     }
 
-    /// Opens a call with its arguments; `shares` where it has the caller's numbers.
-    pub fn enter(&mut self, arguments: &[f64], shares: bool) -> Outcome<()> {
+    /// Opens a call with its arguments.
+    pub fn enter(&mut self, arguments: &[f64], scope: Scope) -> Outcome<()> {
         if self.callers.len() >= MAX_CALLS {
             return fault(format!(
                 "subroutines call each other more than {MAX_CALLS} deep: end the recursion, or write it as a loop"
@@ -142,19 +183,27 @@ impl Parameters {
         }
         let numbers = std::array::from_fn(|k| self.numbers[1 + k]);
         let names = std::mem::take(&mut self.names);
-        self.callers.push(Level { numbers, names, shares });
-        if !shares {
-            for k in 0..LOCALS {
-                self.numbers[1 + k] = arguments.get(k).copied().unwrap_or(0.0);
-            }
+        self.callers.push(Level { numbers, names, opened: scope, in_macro: self.in_macro });
+        if scope != Scope::Shared {
+            self.in_macro = scope == Scope::Macro;
+            self.take(arguments);
         }
         Ok(())
+    }
+
+    /// The arguments of a call as its numbers.
+    pub fn take(&mut self, arguments: &[f64]) {
+        let none = if self.in_macro { f64::NAN } else { 0.0 };
+        for k in 0..LOCALS {
+            self.numbers[1 + k] = arguments.get(k).copied().unwrap_or(none);
+        }
     }
 
     /// Ends the last call.
     pub fn leave(&mut self) {
         if let Some(level) = self.callers.pop() {
-            if !level.shares {
+            self.in_macro = level.in_macro;
+            if level.opened != Scope::Shared {
                 self.numbers[1..=LOCALS].copy_from_slice(&level.numbers);
             }
             self.names = level.names;
@@ -183,7 +232,7 @@ mod tests {
         parameters.set_number(31, 8.0);
         parameters.set_named(b"a", 1.0);
         parameters.set_named(b"_a", 2.0);
-        parameters.enter(&[5.0], false).unwrap();
+        parameters.enter(&[5.0], Scope::Own).unwrap();
         assert_eq!((parameters.number(1), parameters.number(2), parameters.number(31)), (5.0, 0.0, 8.0));
         assert_eq!((parameters.named(b"a"), parameters.named(b"_a")), (None, Some(2.0)));
         parameters.set_named(b"a", 3.0);
@@ -199,18 +248,30 @@ mod tests {
     fn a_shared_call_keeps_the_numbers() {
         let mut parameters = Parameters::default();
         parameters.set_number(1, 7.0);
-        parameters.enter(&[], true).unwrap();
+        parameters.enter(&[], Scope::Shared).unwrap();
         parameters.set_number(1, 8.0);
         parameters.leave();
         assert_eq!(parameters.number(1), 8.0);
     }
 
     #[test]
+    fn arguments_of_a_macro_that_are_not_given_have_no_value() {
+        let mut parameters = Parameters::default();
+        parameters.enter(&[5.0, f64::NAN], Scope::Macro).unwrap();
+        assert_eq!((parameters.is_set(1), parameters.is_set(2), parameters.is_set(3)), (true, false, false));
+        parameters.enter(&[], Scope::Shared).unwrap();
+        assert!(parameters.in_macro() && parameters.is_set(1));
+        parameters.leave();
+        parameters.leave();
+        assert!(!parameters.in_macro());
+    }
+
+    #[test]
     fn calls_are_bounded() {
         let mut parameters = Parameters::default();
         for _ in 0..MAX_CALLS {
-            parameters.enter(&[], false).unwrap();
+            parameters.enter(&[], Scope::Own).unwrap();
         }
-        assert!(parameters.enter(&[], false).unwrap_err().message.contains("100 deep"));
+        assert!(parameters.enter(&[], Scope::Own).unwrap_err().message.contains("100 deep"));
     }
 }

@@ -6,7 +6,7 @@ use super::fault::{fault, Outcome};
 use super::modal::turn;
 use super::moves::Point;
 use super::parameters::{
-    FIRST_SYSTEM, HOME, ROTATION, SECOND_HOME, SHIFT, SHIFT_IN_FORCE, SYSTEM, SYSTEM_STEP,
+    first_of_system, HOME, MOST_FURTHER, ROTATION, SECOND_HOME, SHIFT, SHIFT_IN_FORCE, SYSTEM,
 };
 use super::tip::Meaning;
 use super::tools::Tool;
@@ -34,7 +34,7 @@ impl Interpreter<'_> {
             Some(number @ 1..=9) => number as usize - 1,
             _ => return fault("G10 needs P0 to P9: P0 is the offset in force, P1 is G54, P9 is G59.3"),
         };
-        let first = FIRST_SYSTEM + SYSTEM_STEP * system;
+        let first = first_of_system(system);
         let mut work = self.parameters.row(first);
         let rotation = block.get(b'R').unwrap_or_else(|| self.parameters.number(first + ROTATION));
         // What the program would read here if that offset's own place were 0.
@@ -95,7 +95,7 @@ impl Interpreter<'_> {
             let offsets = &self.state.offsets;
             std::array::from_fn(|k| offsets.sum()[k] - offsets.tool[k])
         } else {
-            self.parameters.row(FIRST_SYSTEM + 8 * SYSTEM_STEP)
+            self.parameters.row(first_of_system(8))
         };
         self.places(block, |axis, value| {
             tool.offset[axis] = if level == 1.0 { value } else { position[axis] - zero[axis] - value };
@@ -143,7 +143,8 @@ impl Interpreter<'_> {
 
     /// Takes a work offset, from 0, as its parameters say.
     pub(super) fn select_system(&mut self, system: usize) {
-        let first = FIRST_SYSTEM + SYSTEM_STEP * system;
+        let first = first_of_system(system);
+        self.end_turn();
         let offsets = &mut self.state.offsets;
         offsets.system = system;
         self.parameters.set_number(SYSTEM, system as f64 + 1.0);
@@ -188,8 +189,7 @@ impl Interpreter<'_> {
         if block.code(Group::ToolLength).is_some() {
             self.set_meaning(Meaning::Joints, f64::NAN)?;
         }
-        self.set_system(block);
-        Ok(())
+        self.set_system(block)
     }
 
     /// G43.4 and G43.5: words are the tip, so the tool's length is in none of them. It is the one in force, unless H
@@ -223,19 +223,29 @@ impl Interpreter<'_> {
         self.set_meaning(meaning, length)?;
         // The joints of a tool direction are axes of the program from here on.
         self.meet(machine)?;
-        self.set_system(block);
-        Ok(())
+        self.set_system(block)
     }
 
-    fn set_system(&mut self, block: &Block) {
-        let wanted = block.code(Group::System).map(|code| match code {
-            591..=593 => usize::from(code - 591) + 6,
-            _ => usize::from(code - 540) / 10,
-        });
+    fn set_system(&mut self, block: &Block) -> Outcome<()> {
+        let wanted = match block.code(Group::System) {
+            Some(code @ (541 | 1540)) => match count(block, b'P', 1, "further work offset")? {
+                Some(number) if number <= MOST_FURTHER => Some(number as usize + 8),
+                _ => {
+                    return fault(format!(
+                        "{} does not name its work offset: give P1 to P{MOST_FURTHER}",
+                        g_name(code)
+                    ))
+                }
+            },
+            Some(code @ 591..=593) => Some(usize::from(code - 591) + 6),
+            Some(code) => Some(usize::from(code - 540) / 10),
+            None => None,
+        };
         match wanted.filter(|system| *system != self.state.offsets.system) {
             Some(system) => self.select_system(system),
             None => self.state.offsets.update(),
         }
+        Ok(())
     }
 
     /// The offset of the tool that H names, or of the one in the spindle; 0 where no table tells it.

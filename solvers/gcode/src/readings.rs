@@ -13,18 +13,32 @@ const TOOL_OFFSET: std::ops::RangeInclusive<usize> = 5401..=5409;
 const TOOL_DIAMETER: usize = 5410;
 const POSITION: std::ops::RangeInclusive<usize> = 5420..=5428;
 
+/// Fanuc's number that raises an alarm, and those that tell of its control.
+const ALARM: usize = 3000;
+const CONTROL: std::ops::Range<usize> = 1000..5161;
+
 impl Values for Interpreter<'_> {
-    fn number(&self, number: usize) -> f64 {
+    fn number(&self, number: usize) -> Outcome<f64> {
         if !READINGS.contains(&number) {
-            return self.parameters.number(number);
+            self.check_known(number)?;
+            return Ok(self.parameters.number(number));
         }
-        match number {
+        Ok(match number {
             TOOL => self.tool_number(),
             TOOL_DIAMETER => self.tool.map_or(0.0, |tool| tool.diameter),
             _ if TOOL_OFFSET.contains(&number) => self.state.offsets.tool[number - TOOL_OFFSET.start()],
             _ if POSITION.contains(&number) => self.reading_of_axis(number - POSITION.start()),
             _ => 0.0,
-        }
+        })
+    }
+
+    fn has_value(&self, number: usize) -> Outcome<bool> {
+        self.check_known(number)?;
+        Ok(READINGS.contains(&number) || self.parameters.is_set(number))
+    }
+
+    fn in_macro(&self) -> bool {
+        self.parameters.in_macro()
     }
 
     fn named(&self, name: &[u8]) -> Outcome<Option<f64>> {
@@ -45,6 +59,17 @@ impl Values for Interpreter<'_> {
 }
 
 impl Interpreter<'_> {
+    /// Macros read modes and places of their control under numbers that nothing has set here.
+    #[inline(always)]
+    fn check_known(&self, number: usize) -> Outcome<()> {
+        if self.parameters.in_macro() && CONTROL.contains(&number) && !self.parameters.is_set(number) {
+            return fault(format!(
+                "#{number} is a value of one control, which is not known here: set it before, or post the moves"
+            ));
+        }
+        Ok(())
+    }
+
     /// Where the program is along an axis, in its own units and offsets.
     fn reading_of_axis(&self, axis: usize) -> f64 {
         let place = self.state.offsets.to_program(&self.position())[axis];
@@ -126,17 +151,22 @@ impl Interpreter<'_> {
     }
 
     /// Sets the parameters that a block assigns.
-    pub fn assign(&mut self, assigned: &mut Vec<(Name, f64)>) {
+    pub fn assign(&mut self, assigned: &mut Vec<(Name, f64)>) -> Outcome<()> {
         for (name, value) in assigned.drain(..) {
+            if name == Name::Number(ALARM) && self.parameters.in_macro() {
+                return fault(format!("the macro raises the alarm {value}: check the arguments of its G65"));
+            }
             self.parameters.set(&name, value);
         }
+        Ok(())
     }
 }
 
-/// G54 to G59.3 in tenths.
+/// G54 to G59.3 and G54.1 in tenths.
 fn system_code(state: &State) -> f64 {
     match state.offsets.system {
         system @ 0..=5 => 540.0 + 10.0 * system as f64,
-        system => 585.0 + system as f64,
+        system @ 6..=8 => 585.0 + system as f64,
+        _ => 541.0,
     }
 }

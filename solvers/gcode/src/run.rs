@@ -5,10 +5,11 @@ use std::borrow::Cow;
 use std::cell::OnceCell;
 use std::rc::Rc;
 
-use super::block::{Block, MGroup};
+use super::block::Block;
 use super::execute::Interpreter;
 use super::fault::{fault, Fault, Outcome};
 use super::flow::Flow;
+use super::parameters::Scope;
 use super::words::{Lexer, Line};
 use super::Options;
 
@@ -49,8 +50,16 @@ pub(super) struct Frame {
     shown: Option<u32>,
     /// Open repetitions: the step, and how often it is run again.
     pub(super) repeats: Vec<(usize, u64)>,
-    /// M98: where the subprogram begins, and how often it is run again.
-    again: Option<(usize, u32, u32)>,
+    /// M98 and G65: how it is run again.
+    again: Option<Again>,
+}
+
+/// Where a subprogram begins, the line before, how often it is run again, and the arguments of a macro.
+struct Again {
+    at: usize,
+    line: u32,
+    left: u32,
+    arguments: Option<Vec<f64>>,
 }
 
 /// What ends a stretch of lines in one text.
@@ -61,13 +70,16 @@ pub(super) enum Exit {
         label: Vec<u8>,
         arguments: Vec<f64>,
     },
-    /// M98 or M97, and how often.
+    /// M98, G65 with its arguments, or M97, which is local; and how often.
     Fanuc {
-        label: Vec<u8>,
+        number: i64,
         local: bool,
         times: u32,
+        arguments: Option<Vec<f64>>,
     },
     Return(Option<f64>),
+    /// M99 that goes back to a line of that block number.
+    Back(i64),
 }
 
 pub struct Runner<'a> {
@@ -131,7 +143,10 @@ impl<'a> Runner<'a> {
                     return fault("the subprogram does not end with M99 or endsub: it may be truncated")
                 }
                 Exit::Call { label, arguments } => self.call(&label, &arguments)?,
-                Exit::Fanuc { label, local, times } => self.call_fanuc(&label, local, times)?,
+                Exit::Fanuc { number, local, times, arguments } => {
+                    self.call_fanuc(number, local, times, arguments)?
+                }
+                Exit::Back(number) => self.go_back(number)?,
                 Exit::Return(_) if main => break Some(self.ending(&lexer, Some("M99"))),
                 Exit::Return(value) => self.leave(value),
             }
@@ -172,7 +187,7 @@ impl<'a> Runner<'a> {
             match line {
                 Some(Line::Block) => {
                     if !lexer.assigned.is_empty() {
-                        self.interpreter.assign(&mut lexer.assigned);
+                        self.interpreter.assign(&mut lexer.assigned)?;
                     }
                     let line = frame.shown.unwrap_or(lexer.line);
                     for (letter, text) in lexer.remarks.drain(..) {
@@ -181,8 +196,8 @@ impl<'a> Runner<'a> {
                     if self.interpreter.run(&self.block, line)? {
                         return Ok(Exit::End(Some("M2 or M30")));
                     }
-                    if let Some(code) = self.block.m_code(MGroup::Call) {
-                        return self.fanuc(code);
+                    if self.block.calls() {
+                        return self.fanuc();
                     }
                 }
                 Some(Line::Deleted) => self.deleted += 1,
@@ -227,22 +242,46 @@ impl<'a> Runner<'a> {
 
     fn call(&mut self, label: &[u8], arguments: &[f64]) -> Outcome<()> {
         let (text, at, line) = self.find(label)?;
-        self.interpreter.parameters.enter(arguments, false)?;
+        self.interpreter.parameters.enter(arguments, Scope::Own)?;
         self.push(text, at, line, None);
         Ok(())
     }
 
-    fn call_fanuc(&mut self, label: &[u8], local: bool, times: u32) -> Outcome<()> {
+    fn call_fanuc(
+        &mut self,
+        number: i64,
+        local: bool,
+        times: u32,
+        arguments: Option<Vec<f64>>,
+    ) -> Outcome<()> {
         if times == 0 {
             return Ok(());
         }
-        let (text, at, line) = if local { self.find_line(label)? } else { self.find(label)? };
-        self.interpreter.parameters.enter(&[], true)?;
-        self.push(text, at, line, Some((at, line, times - 1)));
+        let (text, at, line) = match local {
+            true => self.find_line(number, "M97 calls")?,
+            false => self.find(number.to_string().as_bytes())?,
+        };
+        let scope = if arguments.is_some() { Scope::Macro } else { Scope::Shared };
+        self.interpreter.parameters.enter(arguments.as_deref().unwrap_or_default(), scope)?;
+        self.push(text, at, line, Some(Again { at, line, left: times - 1, arguments }));
         Ok(())
     }
 
-    fn push(&mut self, text: usize, at: usize, line: u32, again: Option<(usize, u32, u32)>) {
+    /// Ends the last call, if there is one, and goes on in the line of that block number.
+    fn go_back(&mut self, number: i64) -> Outcome<()> {
+        if self.frames.len() > 1 {
+            self.frames.pop();
+            self.interpreter.leave_call();
+        }
+        let (_, at, line) = self.find_line(number, "M99 goes to")?;
+        if let Some(frame) = self.frames.last_mut() {
+            (frame.at, frame.line) = (at, line);
+            frame.repeats.clear();
+        }
+        Ok(())
+    }
+
+    fn push(&mut self, text: usize, at: usize, line: u32, again: Option<Again>) {
         let caller = &self.frames[self.frames.len() - 1];
         let shown = (text != 0).then(|| caller.shown.unwrap_or(caller.line));
         self.called = true;
@@ -252,9 +291,13 @@ impl<'a> Runner<'a> {
     /// Ends the last call, or runs its subprogram again.
     fn leave(&mut self, value: Option<f64>) {
         if let Some(frame) = self.frames.last_mut() {
-            if let Some((at, line, left @ 1..)) = frame.again {
-                (frame.at, frame.line, frame.again) = (at, line, Some((at, line, left - 1)));
+            if let Some(again) = frame.again.as_mut().filter(|again| again.left > 0) {
+                again.left -= 1;
+                (frame.at, frame.line) = (again.at, again.line);
                 frame.repeats.clear();
+                if let Some(arguments) = &again.arguments {
+                    self.interpreter.parameters.take(arguments);
+                }
                 return;
             }
             let by_number = frame.again.is_some();
@@ -308,15 +351,13 @@ impl<'a> Runner<'a> {
         Ok(flow.sub(label).map(|i| (text, flow.steps[i].next, flow.steps[i].line)))
     }
 
-    /// Where the line N begins that M97 calls.
-    fn find_line(&self, label: &[u8]) -> Outcome<(usize, usize, u32)> {
-        let here = self.frames.last().map_or(0, |frame| frame.text);
-        match super::flow::numbered_line(&self.texts[here].bytes, label) {
+    /// Where the line of a block number begins, in the program that runs.
+    fn find_line(&self, number: i64, what: &str) -> Outcome<(usize, usize, u32)> {
+        let (here, from) = self.frames.last().map_or((0, 0), |frame| (frame.text, frame.at));
+        let text = &self.texts[here];
+        match text.flow(self.options.block_delete)?.numbered(&text.bytes, number, from) {
             Some((at, line)) => Ok((here, at, line)),
-            None => fault(format!(
-                "M97 calls line N{}, which the program does not have",
-                String::from_utf8_lossy(label)
-            )),
+            None => fault(format!("{what} line N{number}, which the program does not have")),
         }
     }
 

@@ -2,10 +2,10 @@
 
 use super::expression::{bracket, expression, integer};
 use super::fault::{fault, Outcome};
-use super::flow::{check_rest, number_label, Flow, Kind, Step};
+use super::flow::{behind_comments, check_rest, number_label, Flow, Kind, Step};
 use super::parameters::LOCALS;
 use super::run::{Exit, Frame, Runner};
-use super::words::{count, Lexer};
+use super::words::Lexer;
 
 impl Runner<'_> {
     /// A line of program flow; what leaves the text by it.
@@ -75,6 +75,8 @@ impl Runner<'_> {
                     (true, _) => onto(lexer, end),
                 }
             }
+            Kind::When => self.when(lexer, source, flow, step, frame)?,
+            Kind::GoTo => self.go_to(lexer, source, flow, step.arguments, frame)?,
             Kind::EndIf | Kind::Do | Kind::DoWhile | Kind::While => {}
             Kind::Number => return fault("an O number stands where the program goes on: end it before"),
         }
@@ -122,27 +124,9 @@ impl Runner<'_> {
                 ));
             }
             arguments.push(value);
-            at = end;
+            at = behind_comments(source, end);
         }
         check_rest(source, at)?;
         Ok(Exit::Call { label, arguments })
-    }
-
-    /// M97, M98 and M99 of the block.
-    pub(super) fn fanuc(&self, code: u16) -> Outcome<Exit> {
-        if code == 99 {
-            return match self.block.get(b'P') {
-                Some(_) => fault(format!(
-                    "word {} sends M99 to another line: that is not read; end the subprogram with M99 alone",
-                    self.block.word(b'P')
-                )),
-                None => Ok(Exit::Return(None)),
-            };
-        }
-        let Some(label) = self.block.get(b'P').and_then(number_label) else {
-            return fault(format!("M{code} calls no subprogram: give its number as P"));
-        };
-        let times = count(&self.block, b'L', 0, "number of calls")?.unwrap_or(1);
-        Ok(Exit::Fanuc { label, local: code == 97, times })
     }
 }

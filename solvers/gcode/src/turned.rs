@@ -1,8 +1,10 @@
-//! Places that are not written along the machine's axes: polar words, and work coordinates that are turned about Z.
+//! Places that are not written along the machine's axes: polar words, and coordinates that are turned about Z, by their
+//! work offset or by G68.
 
-use super::block::{Block, Group};
+use super::block::{bits, g_name, Block, Group, AXIS_WORDS};
 use super::execute::Interpreter;
 use super::fault::{fault, Outcome};
+use super::modal::turn;
 use super::moves::Point;
 
 impl Interpreter<'_> {
@@ -68,5 +70,59 @@ impl Interpreter<'_> {
         }
         (place[0], place[1]) = (radius * angle.cos(), radius * angle.sin());
         Ok(())
+    }
+
+    /// G68: the program's places turn by R about the place of X and Y, or about where the tool is.
+    pub(super) fn begin_turn(&mut self, block: &Block) -> Outcome<()> {
+        if self.state.normal != 2 {
+            return fault("G68 is read in the plane G17: give G17, or post the coordinates as they are cut");
+        }
+        if !self.state.absolute {
+            return fault("G68 stands in G91, where controls differ in what it means: give G90 in its block");
+        }
+        let Some(angle) = block.get(b'R') else {
+            return fault("G68 has no angle: give it as R in degrees");
+        };
+        if block.words & AXIS_WORDS & !bits(b"XY") != 0 {
+            return fault("G68 turns about Z: give X and Y of its centre alone");
+        }
+        self.end_turn();
+        let mut centre = self.state.offsets.to_program(&self.position());
+        self.places(block, |axis, value| centre[axis] = value)?;
+        let offsets = &mut self.state.offsets;
+        offsets.unturned = Some((offsets.shift, offsets.rotation));
+        // c + turn(p - c) is turn(p + s) for the shift s = turn(c - turn(c), back).
+        let mut turned = centre;
+        turn(&mut turned, angle);
+        for axis in 0..2 {
+            offsets.shift[axis] += centre[axis] - turned[axis];
+        }
+        turn(&mut offsets.shift, -angle);
+        offsets.rotation += angle;
+        offsets.update();
+        Ok(())
+    }
+
+    /// G69.
+    pub(super) fn end_turn(&mut self) {
+        let offsets = &mut self.state.offsets;
+        if let Some(before) = offsets.unturned.take() {
+            (offsets.shift, offsets.rotation) = before;
+            offsets.update();
+        }
+    }
+
+    /// Refuses codes that change the offsets under G68, as controls do.
+    pub(super) fn check_turned(&self, block: &Block) -> Outcome<()> {
+        if self.state.offsets.unturned.is_none() {
+            return Ok(());
+        }
+        let once = block.code(Group::Once).filter(|code| matches!(code, 100 | 520 | 920));
+        match once.or(block.code(Group::Shift)).or(block.code(Group::System)) {
+            Some(code) => {
+                fault(format!("{} stands where G68 turns the coordinates: give G69 before", g_name(code)))
+            }
+            None => Ok(()),
+        }
     }
 }

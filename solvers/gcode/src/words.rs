@@ -7,6 +7,7 @@ use super::block::{g_name, g_remedy, m_group, Block, MGroup};
 use super::expression::{assignment, excerpt, expression, integer, Values};
 use super::fault::{fault, foreign, Outcome};
 use super::flow::{after_line, end_of_line, keyword};
+use super::macros::statement;
 use super::moves::{COMMENT, MESSAGE};
 use super::number::{decimal, spaces};
 use super::parameters::Name;
@@ -110,8 +111,16 @@ impl<'a> Lexer<'a> {
                 let (value, end) = match decimal(self.source, at + 1) {
                     Some((value, end)) if self.whole_step != 1.0 => (self.stepped(value, at, end), end),
                     Some(number) => number,
-                    None if upper == b'O' => return self.flow(at, first),
-                    None => self.value(at, values)?,
+                    None if upper == b'O' || statement(self.source, at).is_some() => {
+                        return self.flow(at, first)
+                    }
+                    None => match self.value(at, values)? {
+                        (value, end) if value.is_nan() => {
+                            (at, first) = (end, false);
+                            continue;
+                        }
+                        number => number,
+                    },
                 };
                 match upper {
                     b'G' => self.g_word(value, at, end, block)?,
@@ -336,8 +345,11 @@ impl<'a> Lexer<'a> {
     /// A number at `at`, plain or computed.
     #[cold]
     fn number(&self, at: usize, values: &dyn Values) -> Outcome<Option<(f64, usize)>> {
-        decimal(self.source, at)
-            .map_or_else(|| expression(self.source, at, values), |number| Ok(Some(number)))
+        let found = match decimal(self.source, at) {
+            Some(number) => Some(number),
+            None => expression(self.source, at, values)?,
+        };
+        Ok(found.filter(|(value, _)| !value.is_nan()))
     }
 
     /// True where the E at `at` stands right behind a digit; extruders' words stand behind a blank.

@@ -73,7 +73,8 @@ fn names_of(names: &Py<PyAny>, letter: char) -> String {
 
 /// Reads a G-code program; see `feedplan.program.gcode`.
 ///
-/// `places` (11, 9): the work offsets G54 to G59.3, the home position, where the program begins, in X Y Z A B C U V W;
+/// `places` (n, 9): the home position, where the program begins, the work offsets G54 to G59.3 and G54.1 P1 on, in
+/// X Y Z A B C U V W;
 /// `machine_axes` empty where there is no machine; `tip_control` None likewise; `machines_with` names the machines that
 /// have the axis of a letter. `tools` are rows of the tool table, None
 /// where it is not known; `subprograms` gives for a name the file's name and bytes, or None; `feed` [mm/s] is that of
@@ -102,15 +103,13 @@ fn read_gcode<'py>(
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let places = arrays::rows::<9>(&places)?;
-    let Ok(places) = <[[f64; 9]; 11]>::try_from(places) else {
-        return Err(pyo3::exceptions::PyValueError::new_err(
-            "nine work offsets, home and start are eleven rows",
-        ));
+    let [home, start, offsets @ ..] = &places[..] else {
+        return Err(pyo3::exceptions::PyValueError::new_err("home and start are two rows"));
     };
     let options = Options {
-        offsets: std::array::from_fn(|system| places[system]),
-        home: places[9],
-        start: places[10],
+        offsets: offsets.to_vec(),
+        home: *home,
+        start: *start,
         machine_axes: machine_axes.as_bytes().to_vec(),
         machines_with: machines_with.map(|names| Box::new(move |letter| names_of(&names, letter)) as _),
         tip_control: tip_control.map(|control| Box::new(PyTipControl(control)) as _),

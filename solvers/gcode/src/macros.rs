@@ -1,0 +1,176 @@
+//! Fanuc's macros: calls by G65 with arguments by letters, and the statements IF, WHILE, GOTO and END.
+
+use super::block::{g_name, Block, Group, MGroup};
+use super::expression::{bracket, expression, integer};
+use super::fault::{fault, Outcome};
+use super::flow::{number_label, Flow, Kind, Label, Step};
+use super::number::{decimal, spaces};
+use super::parameters::LOCALS;
+use super::run::{Exit, Frame, Runner};
+use super::words::{count, Lexer};
+
+/// The number that each letter gives its value to.
+const ARGUMENTS: [(u8, usize); 20] = [
+    (b'A', 1),
+    (b'B', 2),
+    (b'C', 3),
+    (b'D', 7),
+    (b'E', 8),
+    (b'F', 9),
+    (b'H', 11),
+    (b'I', 4),
+    (b'J', 5),
+    (b'K', 6),
+    (b'Q', 17),
+    (b'R', 18),
+    (b'S', 19),
+    (b'T', 20),
+    (b'U', 21),
+    (b'V', 22),
+    (b'W', 23),
+    (b'X', 24),
+    (b'Y', 25),
+    (b'Z', 26),
+];
+
+/// A statement whose first letter stands at a place: what it does, its label, and where its arguments begin.
+pub fn statement(source: &[u8], at: usize) -> Option<(Kind, Label, usize)> {
+    let rest = source.get(at..)?;
+    let begins = |word: &str| {
+        rest.get(..word.len())
+            .is_some_and(|text| text.eq_ignore_ascii_case(word.as_bytes()))
+            .then(|| spaces(source, at + word.len()))
+    };
+    let open = |place: &usize| source.get(*place) == Some(&b'[');
+    match rest.first()? {
+        b'I' | b'i' => begins("IF").filter(open).map(|place| (Kind::When, None, place)),
+        b'G' | b'g' => begins("GOTO").map(|place| (Kind::GoTo, None, place)),
+        b'W' | b'w' => {
+            let place = begins("WHILE").filter(open)?;
+            Some((Kind::While, loop_label(source, behind_bracket(source, place)?)?.0, place))
+        }
+        b'E' | b'e' => {
+            let (number, end) = decimal(source, begins("END")?)?;
+            Some((Kind::EndWhile, Some(number_label(number)?), end))
+        }
+        _ => None,
+    }
+}
+
+/// The label of `DO 1`, and where it ends.
+pub fn loop_label(source: &[u8], at: usize) -> Option<(Label, usize)> {
+    let at = spaces(source, at);
+    let (number, end) = source
+        .get(at..at + 2)
+        .filter(|text| text.eq_ignore_ascii_case(b"DO"))
+        .and_then(|_| decimal(source, at + 2))?;
+    Some((Some(number_label(number)?), end))
+}
+
+/// The place behind the bracket that opens at a place.
+fn behind_bracket(source: &[u8], at: usize) -> Option<usize> {
+    let mut depth = 0usize;
+    for (place, byte) in source.iter().enumerate().skip(at) {
+        match byte {
+            b'[' => depth += 1,
+            b']' if depth == 1 => return Some(place + 1),
+            b']' => depth -= 1,
+            b'\n' | b'\r' => return None,
+            _ => {}
+        }
+    }
+    None
+}
+
+impl Runner<'_> {
+    /// IF [condition] GOTO or THEN.
+    pub(super) fn when(
+        &mut self,
+        lexer: &mut Lexer,
+        source: &[u8],
+        flow: &Flow,
+        step: &Step,
+        frame: &mut Frame,
+    ) -> Outcome<()> {
+        let Some((value, end)) = bracket(source, step.arguments, &self.interpreter)? else {
+            return fault("IF has no [condition]: give one in brackets");
+        };
+        let at = spaces(source, end);
+        let word = source.get(at..at + 4).unwrap_or_default();
+        if word.eq_ignore_ascii_case(b"GOTO") {
+            if value != 0.0 {
+                self.go_to(lexer, source, flow, at + 4, frame)?;
+            }
+        } else if word.eq_ignore_ascii_case(b"THEN") {
+            // The rest of the line is a block.
+            if value != 0.0 {
+                lexer.jump(at + 4, step.line - 1);
+            }
+        } else {
+            return fault("IF says neither GOTO nor THEN behind its condition: give one of them");
+        }
+        Ok(())
+    }
+
+    /// GOTO with its number, from a place on.
+    pub(super) fn go_to(
+        &mut self,
+        lexer: &mut Lexer,
+        source: &[u8],
+        flow: &Flow,
+        at: usize,
+        frame: &mut Frame,
+    ) -> Outcome<()> {
+        let number = match decimal(source, at) {
+            Some((value, _)) => Some(value),
+            None => expression(source, spaces(source, at), &self.interpreter)?.map(|(value, _)| value),
+        };
+        let Some(number) = number.and_then(integer) else {
+            return fault("GOTO has no whole number: give that of a line, such as GOTO 10");
+        };
+        let Some((at, line)) = flow.numbered(source, number, lexer.at) else {
+            return fault(format!("GOTO {number} goes to line N{number}, which the program does not have"));
+        };
+        frame
+            .repeats
+            .retain(|&(open, _)| (flow.steps[open].at..flow.steps[flow.steps[open].end].at).contains(&at));
+        lexer.jump(at, line);
+        Ok(())
+    }
+
+    /// M97, M98, M99 and G65 of the block.
+    pub(super) fn fanuc(&self) -> Outcome<Exit> {
+        let block = &self.block;
+        let (name, arguments) = match block.code(Group::Macro) {
+            Some(code) => (g_name(code), Some(arguments_of(block)?)),
+            None => (format!("M{}", block.m_code(MGroup::Call).unwrap_or_default()), None),
+        };
+        let number = block.get(b'P').and_then(integer).filter(|number| *number >= 0);
+        if name == "M99" {
+            return match (block.has(b'P'), number) {
+                (false, _) => Ok(Exit::Return(None)),
+                (true, Some(number)) => Ok(Exit::Back(number)),
+                (true, None) => fault(format!("word {} is no number of a line: check P", block.word(b'P'))),
+            };
+        }
+        let Some(number) = number else {
+            return fault(format!("{name} calls no subprogram: give its number as P"));
+        };
+        let times = count(block, b'L', 0, "number of calls")?.unwrap_or(1);
+        Ok(Exit::Fanuc { number, local: name == "M97", times, arguments })
+    }
+}
+
+/// The arguments of G65 by their numbers; NaN where there is none.
+fn arguments_of(block: &Block) -> Outcome<Vec<f64>> {
+    if !block.is_alone(Group::Macro) {
+        return fault("G65 stands beside other codes: put it in a block of its own");
+    }
+    let mut numbers = vec![f64::NAN; LOCALS];
+    for (letter, number) in ARGUMENTS {
+        if let Some(value) = block.get(letter) {
+            numbers[number - 1] = value;
+        }
+    }
+    Ok(numbers)
+}
