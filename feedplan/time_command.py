@@ -23,6 +23,7 @@ from feedplan.command_options import (
     given_only,
     name_of,
 )
+from feedplan.controller_options import Choice, controller_options
 from feedplan.errors import InfeasibleError
 from feedplan.geometry.corners import FollowedPath
 from feedplan.program.read import Reading
@@ -53,6 +54,7 @@ _SHOWN = 60
     metavar="S",
     help="Time of a tool change.",
 )
+@controller_options
 @JSON
 def time(
     program: str | IO[bytes],
@@ -67,11 +69,13 @@ def time(
     tool_change: float,
     as_json: bool,
     reading: Reading,
+    controller: Choice,
 ) -> None:
     """Machining time of PROGRAM per tool and operation, by the machine's limits.
 
     Rapids and dwells count. An operation is what follows a comment that is alone in its line. PROGRAM is as
-    for plan. Exit code 1: a limit is broken, or no plan is feasible.
+    for plan. --controller tells today's time beside it, without tool changes. Exit code 1: a limit is broken,
+    or no plan is feasible.
     """
     from feedplan.files import summary_text
     from feedplan.planning import plan
@@ -87,6 +91,7 @@ def time(
             feed=feed,
             feed_override=feed_override,
             reading=reading,
+            controller=controller(known),
             progress=progress,
             **given_only(accuracy=accuracy, time_limit=time_limit),
         )
@@ -103,12 +108,15 @@ def time(
             "method": method,
             "time": whole,
             "audit": audit.ok,
+            "today": result.today and result.today.to_json(),
             "tools": [own.to_json() for own in tools],
             "operations": [own.to_json() for own in operations],
         }
         click.echo(summary_text(summary), nl=False)
     else:
         console.print_table(*_table(tools, operations, whole))
+        if result.today:
+            click.echo(f"today: {console.today_text(result.today.to_json())}")
     if not audit.ok:
         raise InfeasibleError(console.failure_sentence(audit))
 

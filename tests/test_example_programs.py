@@ -95,6 +95,17 @@ def test_time_prints_a_table_and_takes_standard_input(capsys: Any, monkeypatch: 
     assert any(line.startswith("  FOUR HOLES") for line in lines)
 
 
+def test_time_tells_todays_time_beside_it(capsys: Any) -> None:
+    command = ["time", str(EXAMPLES / "part.ngc"), "--controller", "grbl"]
+    assert main([*command, "--json"]) == 0
+    today = json.loads(capsys.readouterr().out)["today"]
+    plan = feedplan.plan(EXAMPLES / "part.ngc", "mill", controller="grbl")
+    assert plan.today is not None
+    assert (today["controller"], today["time"]) == ("grbl", pytest.approx(plan.today.time))
+    assert main(command) == 0
+    assert capsys.readouterr().out.splitlines()[-1].startswith("today: ")
+
+
 def test_time_tells_a_limit_that_is_broken(capsys: Any) -> None:
     assert main(["time", str(EXAMPLES / "part.ngc"), "--method", "junction-deviation"]) == 1
     out, error = capsys.readouterr()
