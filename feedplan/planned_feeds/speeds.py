@@ -3,7 +3,8 @@
 A move has the part of the path that is nearest to it. Where a piece follows two moves, as the blend of a
 corner does, all of it belongs to both, since the feeds of both hold on all of it; where it follows more, as a
 fitted piece does, it is cut at the places nearest to the ends of the moves, where a change of feed would cut
-it too.
+it too. Where a move is shorter than the tolerance leaves room, both its ends may be nearest to one place: the
+feed of such a move is cut off nowhere, and all pieces that follow it belong to it.
 """
 
 from __future__ import annotations
@@ -103,6 +104,9 @@ def _ends_of_moves(problem: Problem, program: Program) -> tuple[tuple[Indices, A
     u_begin[same] = u_end[:-1][same[1:]]
     begins &= ~same
     u_begin[begins] = _nearest(problem, begin[begins], program.starts()[begins])
+    length = np.linalg.norm(program.target - program.starts(), axis=1)
+    whole = shared[begin] & shared[end] & (length <= 2.0 * path.tolerance[begin])
+    u_begin, u_end = np.where(whole, 0.0, u_begin), np.where(whole, path.width[end], u_end)
     return (begin, u_begin), (end, np.where((begin == end) & (u_end < u_begin), u_begin, u_end))
 
 

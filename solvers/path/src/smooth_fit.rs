@@ -49,8 +49,10 @@ const REFINEMENTS: usize = 3;
 const PARTINGS: usize = 3;
 /// A run whose vertices are this close to a line, in tolerances, is one.
 const STRAIGHT: f64 = 1e-3;
-/// Parts of an interval that are shorter than this share of it are not cut off.
-const SLIVER: f64 = 1e-6;
+/// Rounding of its points by half a digit each is this in the third derivative of a quintic, times its width cubed.
+const ROUNDING: f64 = 240.0 * f64::EPSILON;
+/// That of a part of an interval is known to this share of one over the square of the interval's width.
+const KNOWN: f64 = 1e-3;
 
 /// How a run is fitted.
 #[derive(Clone, Copy, Debug)]
@@ -291,6 +293,7 @@ impl<const D: usize> Run<'_, D> {
             }
             let (end, width) = (knots[j + 1], knots[j + 1] - start);
             let (mut from, mut rest) = (start, pieces[j]);
+            let sliver = sliver(&rest, width);
             while chord < last && foot[chord + 1] <= from {
                 chord += 1;
             }
@@ -298,7 +301,7 @@ impl<const D: usize> Run<'_, D> {
             while chord < last && foot[chord + 1] < end {
                 let u = foot[chord + 1];
                 let cut = self.cut[chords.start + chord + 1];
-                if cut && u - from > SLIVER * width && end - u > SLIVER * width {
+                if cut && u - from > sliver && end - u > sliver {
                     let (part, after) = split(&rest, (u - from) / (end - from));
                     push(&part, u - from, [begun, chord], j);
                     (from, rest, begun) = (u, after, chord + 1);
@@ -310,6 +313,12 @@ impl<const D: usize> Run<'_, D> {
         }
         out.polynomials += polynomials;
     }
+}
+
+/// The width of parts of an interval that are not cut off: rounding of their points would be a jerk of its own.
+fn sliver<const D: usize>(control: &bezier::Control<D>, width: f64) -> f64 {
+    let coordinate = control.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
+    width * (ROUNDING * coordinate / (KNOWN * width)).cbrt()
 }
 
 /// The chords around the intervals that are not good, an interval more on each side.
