@@ -194,7 +194,6 @@ def plan(
     Exit code 1: a limit is broken, or no plan is feasible.
     """
     from feedplan.files import files_of_plan, summary_text
-    from feedplan.one_step_more import one_step_more as raised
     from feedplan.outputs._staging import require_folder
     from feedplan.report.page import missing_pictures
 
@@ -232,10 +231,11 @@ def plan(
         )
         audit = result.audit(progress)
         planned = wanted.make(result)
-        steps = [step.to_json() for step in raised(result)] if one_step_more else []
+        steps = _steps(result) if one_step_more else ()
         files: tuple[FilePath, ...] = ()
         if output:
-            here = {} if server else {"program": planned if wanted.in_folder else None, "step": step}
+            own = planned if wanted.in_folder else None
+            here = {} if server else {"program": own, "step": step, "one_step_more": steps}
             files = write(
                 result,
                 output,
@@ -251,7 +251,8 @@ def plan(
     if not quiet:
         for warning in warnings:
             print(f"warning: {warning}", file=sys.stderr)
-        summary = {**result.summary(), **({"one_step_more": steps} if one_step_more else {})}
+        more = {"one_step_more": [each.to_json() for each in steps]} if one_step_more else {}
+        summary = {**result.summary(), **more}
         if as_json:
             told = {} if planned is None else {"planned_program": planned.to_json()}
             sys.stdout.write(summary_text({**summary, **told}))
@@ -260,6 +261,13 @@ def plan(
             if planned is not None:
                 print(planned.summary())
     return DONE if audit.ok else _fail(console.failure_sentence(audit), BROKEN)
+
+
+def _steps(made: Any) -> tuple[Any, ...]:
+    """What one step more of each limit would bring."""
+    from feedplan.one_step_more import one_step_more
+
+    return one_step_more(made)
 
 
 def _place(server: str | None, token_file: str | None) -> tuple[Callable[..., Any], Callable[..., Any]]:

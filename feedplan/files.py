@@ -23,6 +23,7 @@ from feedplan.units import duration_text
 if TYPE_CHECKING:
     from feedplan.comparison import Row
     from feedplan.knots import Knots
+    from feedplan.one_step_more import Step
     from feedplan.planning import Plan
     from feedplan.setpoints import SetpointChunk
 
@@ -43,11 +44,13 @@ def write_plan(
     program: PlannedProgram | None = None,
     step: float | None = None,
     drawing: bool = False,
+    one_step_more: Sequence[Step] = (),
     progress: Progress | None = None,
 ) -> tuple[FilePath, ...]:
     """Writes the plan, its setpoints in these formats (none for ()), and its report; returns the files.
 
-    `program`, as `feedplan.planned_program` returns it, is written as program.ngc.
+    `program`, as `feedplan.planned_program` returns it, is written as program.ngc. `one_step_more`, as
+    `feedplan.one_step_more.one_step_more` returns it, stands in plan.json and in the report.
 
     `step` [s] is the longest one of a pvt table, which needs it.
     All is written beside and renamed at the end, so `folder` never holds half a plan; other files in it stay.
@@ -102,6 +105,8 @@ def write_plan(
         if program is not None:
             (stage / PROGRAM_FILE).write_bytes(program.content)
             summary["planned_program"] = {"file": PROGRAM_FILE, **program.to_json()}
+        if one_step_more:
+            summary["one_step_more"] = [more.to_json() for more in one_step_more]
         if knots is not None:
             summary[KNOTS] = {"count": knots.count, "step": knots.step}
             header = Header(knots.axes, units, knots.step, plan.events)

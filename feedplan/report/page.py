@@ -15,6 +15,7 @@ from feedplan.constraints.problem import Problem
 from feedplan.report.account import Account
 from feedplan.report.activity import ACTIVE
 from feedplan.report.container import as_text, contained
+from feedplan.report.gained import gained
 from feedplan.report.tables import (
     audit_table,
     fit_table,
@@ -73,7 +74,7 @@ def write_report(
         slowest=slowest_table(account.slow, texts, account.motion.units),
         audit=audit_table(audit),
     )
-    about, sections = _about(summary, problem), pictures(charts) + tables
+    about, sections = _about(summary, problem), gained(summary) + pictures(charts) + tables
     file.write_text(framed("report", name, about, "\n".join(judged), sections, data), encoding="utf-8")
 
 
