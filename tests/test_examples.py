@@ -24,7 +24,8 @@ from feedplan.program.gcode import read_gcode
 from feedplan.program.program import Program
 from tests.service.servers import running
 
-SCRIPTS = sorted(path.name for path in EXAMPLES.glob("*.py"))
+# Post-processors run in CAM systems (test_freecad.py).
+SCRIPTS = sorted(path.name for path in EXAMPLES.glob("*.py") if not path.stem.endswith("_post"))
 
 
 def moves(text: str, words: str) -> NDArray[np.float64]:

@@ -52,6 +52,7 @@ class Queue:
 
     `ahead`: blocks known behind the one in motion (None: all). `chords` tell what blocks are on curves; a
     whole piece is one without. `velocity` [mm/s] and `acceleration` [mm/s²] are the greatest along the path.
+    `part` (pieces,) is what each piece has of the acceleration along it (None: all).
     `least_time` [s]: no block of the program takes less. `cruise`: the part of the way between speeding up
     and slowing down that has one speed (Klipper's minimum_cruise_ratio).
     """
@@ -62,9 +63,14 @@ class Queue:
     acceleration: float = math.inf
     least_time: float = 0.0
     cruise: float = 0.0
+    part: Array | None = None
 
     def limited(self, parts: Segments, block: NDArray[np.int64]) -> Segments:
-        """The segments with the speeds that `least_time` leaves; `block` (pieces,) are a piece's own."""
+        """The segments with the speeds that `least_time` and the accelerations that `part` leave; `block`
+        (pieces,) are a piece's own."""
+        if self.part is not None:
+            share = self.part[parts.piece]
+            parts = replace(parts, slope=share * parts.slope, value=share * parts.value)
         if self.least_time == 0.0:
             return parts
         own = block[parts.piece]

@@ -8,8 +8,11 @@ becomes an arc that touches both and takes half of each at most. It has half of 
 1.02 servo periods. `max_velocity` and `max_acceleration` are those along the path ([TRAJ]
 MAX_LINEAR_VELOCITY, MAX_LINEAR_ACCELERATION).
 
+A segment that may overlap the next one has half of the acceleration, all along it (`tc.c`:
+`tcGetTangentialMaxAccel`): so has the last one before a stop, unless a rapid and another move meet there.
+
 Not as there: corners of arcs and splines are rounded as the path's builder does it, others are stops where
-LinuxCNC overlaps segments (parabolic blends), as it does on rotary axes; G64 without P keeps to the tolerance
+LinuxCNC overlaps segments, as it does on rotary axes; G64 without P keeps to the tolerance
 of the plan, where LinuxCNC leaves the path by up to a quarter of a line.
 """
 
@@ -41,9 +44,25 @@ def plan(
     Raises InputError for those, SolverError and InfeasibleError, all as sentences.
     """
     whole(depth, "the depth", "a whole number from 1")
-    queue = Queue(ahead=depth, least_time=PERIODS * problem.period)
+    queue = Queue(ahead=depth, least_time=PERIODS * problem.period, part=_part(problem))
     queue = along_path(queue, max_velocity, max_acceleration)
     return look_ahead(problem, problem.junction_speed, on_arcs, queue=queue)
+
+
+def _part(problem: Problem) -> Array:
+    """What each piece has of the acceleration along it: a half in the last segment before a stop."""
+    path = problem.path
+    part = np.ones(len(path))
+    rapid = np.isinf(path.feed)
+    for end, begin in zip(path.runs[1:] - 1, [*path.runs[1:-1], None], strict=True):
+        exact = path.tolerance[end] == 0.0
+        if exact or (begin is not None and rapid[begin] != rapid[end]):
+            continue
+        piece = end
+        while piece >= 0 and (path.move[piece] == path.move[end]).all():
+            part[piece] = 0.5
+            piece -= 1
+    return part
 
 
 def on_arcs(tangent: Array, normal: Array, limits: Array, radius: Array, speed: Array) -> tuple[Array, Array]:

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 import subprocess
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
-PYTHON = "/usr/bin/python3"
+from benchmarks.simulator.alone import PYTHON, alone, folder_and_environment
+
 # The longest stream that waits in HAL's memory before it is played, so that the test does not depend on how
 # busy the computer is.
 DEPTH = 16000
 # The key of sampler's shared memory.
 _SAMPLER = 0x48534130
-# A user without rights: HAL refuses to run as root without one.
-_NOBODY = "65534"
 _SECONDS = 60
 
 _RECORD = f"""
@@ -34,18 +28,6 @@ while len(rows) < wanted:
 with open(sys.argv[3], "w") as file:
     file.writelines(" ".join(map(repr, row)) + "\\n" for row in rows)
 """
-
-
-def missing() -> str | None:
-    """Why HAL cannot run here, in a sentence; None where it can."""
-    if shutil.which("halrun") is None:
-        return "LinuxCNC is not installed: apt-get install linuxcnc-uspace"
-    found = subprocess.run([PYTHON, "-c", "import hal; hal.stream"], env=_clean(), capture_output=True)
-    if found.returncode:
-        return f"{PYTHON} has no module hal with streams: apt-get install linuxcnc-uspace 2.9 or newer"
-    if not _apart() and subprocess.run(["pgrep", "-x", "rtapi_app"], capture_output=True).returncode == 0:
-        return "another program uses HAL on this computer, where HAL runs once: end it"
-    return None
 
 
 def played(file: Path, pins: str, count: int, folder: Path) -> list[str]:
@@ -68,9 +50,9 @@ def played(file: Path, pins: str, count: int, folder: Path) -> list[str]:
     ]
     commands = folder / "stream.hal"
     commands.write_text("\n".join(script) + "\n")
-    with _environment() as environment:
+    with folder_and_environment() as (_, environment):
         done = subprocess.run(
-            [*_apart(), "halrun", "-f", str(commands)],
+            [*alone(), "halrun", "-f", str(commands)],
             env=environment,
             stdin=subprocess.DEVNULL,
             capture_output=True,
@@ -82,27 +64,3 @@ def played(file: Path, pins: str, count: int, folder: Path) -> list[str]:
     assert done.returncode == 0, said
     assert "skipping the line" not in said, said
     return rows.read_text().splitlines()
-
-
-@contextmanager
-def _environment() -> Iterator[dict[str, str]]:
-    """With a socket of its own, in a folder that HAL's user may write to."""
-    with tempfile.TemporaryDirectory(prefix="hal") as place:
-        os.chmod(place, 0o777)
-        user = {"RTAPI_UID": _NOBODY} if os.getuid() == 0 else {}
-        yield _clean() | user | {"RTAPI_FIFO_PATH": f"{place}/socket"}
-
-
-def _clean() -> dict[str, str]:
-    """The environment without that of this Python."""
-    return {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
-
-
-def _apart() -> list[str]:
-    """What gives a command processes and shared memory of its own, which end with it; nothing where the
-    system does not allow that."""
-    command = ["unshare", "--pid", "--fork", "--kill-child", "--mount-proc", "--ipc"]
-    allowed = (
-        shutil.which("unshare") and subprocess.run([*command, "true"], capture_output=True).returncode == 0
-    )
-    return command if allowed else []

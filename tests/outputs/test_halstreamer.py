@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.simulator.alone import missing
 from feedplan import Machine, plan
 from feedplan.files import write_plan
 from feedplan.outputs import load_setpoints
@@ -29,7 +30,7 @@ M2
 
 
 def test_linuxcnc_plays_the_stream_to_the_last_bit(tmp_path: Path) -> None:
-    reason = hal.missing()
+    reason = missing()
     if reason is not None:
         pytest.skip(reason)
     text = PROGRAM.format(long=5000 * "x")

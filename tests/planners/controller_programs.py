@@ -1,4 +1,4 @@
-"""Programs of three kinds, and how long LinuxCNC's simulator takes for them."""
+"""Programs of some kinds, and how long LinuxCNC's simulator takes for them."""
 
 from __future__ import annotations
 
@@ -26,6 +26,12 @@ def zigzag(tolerance: float = 0.05) -> str:
         x, y = x + length * math.cos(way), y + length * math.sin(way)
         lines.append(f"G1 X{x:.4f} Y{y:.4f} Z{i % 4 * 0.5:.4f}")
     return "\n".join([*lines, "M2"]) + "\n"
+
+
+def pause() -> str:
+    """Twenty of these corners with a pause in the middle."""
+    lines = zigzag().splitlines()
+    return "\n".join([*lines[:12], "G4 P0.2", *lines[12:20], "M2"]) + "\n"
 
 
 def slots(tolerance: float = 0.02) -> str:

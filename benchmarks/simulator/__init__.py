@@ -1,0 +1,1 @@
+"""Runs programs and streams in LinuxCNC's simulator, without a display, and records every servo period."""

@@ -1,0 +1,108 @@
+"""A post-processor for FreeCAD's CAM workbench: G-code for LinuxCNC whose feeds feedplan has planned.
+
+FreeCAD finds it as `feedplan` where a copy lies in its folder of macros, which is where it looks for
+post-processors by itself. What stands in the job's field of arguments goes to `feedplan plan`:
+
+    --machine mine.toml --feed-step 20
+
+`--feedplan FILE` tells where the command feedplan is, if it is not on the path; `--unplanned` writes the
+program as it is posted. Lengths are in mm, feeds in mm/min, with six digits behind the point: fewer bend arcs
+and smooth surfaces.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shlex
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+TOOLTIP = __doc__
+TOOLTIP_ARGS = "--feedplan FILE, --unplanned, and all options of: feedplan plan"
+
+BEGIN = "G21 G90 G17 G94 G40 G49 G80 G54"
+END = "M5\nM9\nM2"
+DIGITS = 6
+# The order of words, of which each command has some; lengths and turns are numbers, these are whole.
+WORDS = "XYZABCIJKRQPLHDTSF"
+WHOLE = "LHDTS"
+RAPIDS = ("G0", "G00")
+COOLANT = {"Flood": "M8", "Mist": "M7"}
+
+
+def export(objects, filename: str, arguments: str = "") -> str:
+    """Writes the operations and tool changes in `objects`, in order, to a file; returns the text.
+
+    FreeCAD calls it. Raises RuntimeError with feedplan's sentence where it refuses the program, and writes
+    nothing then.
+    """
+    parser = argparse.ArgumentParser(add_help=False)
+    parser.add_argument("--feedplan", default="feedplan")
+    parser.add_argument("--unplanned", action="store_true")
+    own, options = parser.parse_known_args(shlex.split(arguments))
+    # What FreeCAD's dialog gives to all post-processors.
+    options = [option for option in options if option != "--no-show-editor"]
+    text = program(objects)
+    if not own.unplanned:
+        text = planned(text, shlex.split(own.feedplan), options)
+    if filename != "-":
+        Path(filename).write_text(text, encoding="utf-8", newline="\n")
+    return text
+
+
+def program(objects) -> str:
+    """The G-code of the objects with a path; those that are switched off are left out."""
+    lines = [BEGIN]
+    for item in objects:
+        base = getattr(item, "Base", None)
+        if not hasattr(item, "Path") or not getattr(item, "Active", getattr(base, "Active", True)):
+            continue
+        coolant = COOLANT.get(getattr(item, "CoolantMode", getattr(base, "CoolantMode", "None")))
+        commands = [line for line in map(block, item.Path.Commands) if line]
+        lines += [coolant, *commands, "M9"] if coolant else commands
+    return "\n".join([*lines, END]) + "\n"
+
+
+def block(command) -> str:
+    """A block of G-code; feeds, in mm/s inside of FreeCAD, become mm/min."""
+    if command.Name.startswith("("):
+        return comment(command.Name[1:-1])
+    words = [command.Name]
+    # K of arcs in the plane XY is none of their words.
+    given = {word: value for word, value in command.Parameters.items() if (word, value) != ("K", 0.0)}
+    for word in WORDS:
+        if word not in given or (word == "F" and (command.Name in RAPIDS or not given[word])):
+            continue
+        value = 60.0 * given[word] if word == "F" else given[word]
+        words.append(f"{word}{int(value)}" if word in WHOLE else f"{word}{number(value)}")
+    return " ".join(words)
+
+
+def number(value: float) -> str:
+    return f"{round(value, DIGITS) + 0.0:.{DIGITS}f}".rstrip("0").rstrip(".")
+
+
+def comment(text: str) -> str:
+    return "(" + text.replace("(", "[").replace(")", "]").replace("\n", " ") + ")"
+
+
+def planned(text: str, command: list[str], options: list[str]) -> str:
+    """The program with planned feeds. Raises RuntimeError with feedplan's sentence."""
+    # Those of FreeCAD's Python are not for feedplan's.
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+    with tempfile.TemporaryDirectory() as folder:
+        source, result = Path(folder, "program.ngc"), Path(folder, "planned.ngc")
+        source.write_text(text, encoding="utf-8", newline="\n")
+        done = subprocess.run(
+            [*command, "plan", str(source), *options, "--program-out", str(result)],
+            env=environment,
+            capture_output=True,
+            text=True,
+        )
+        if done.returncode:
+            raise RuntimeError(done.stderr.strip() or f"feedplan ended with {done.returncode}")
+        print(done.stdout, done.stderr, file=sys.stderr)
+        return result.read_text(encoding="utf-8")
