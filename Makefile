@@ -62,6 +62,7 @@ campaign: $(VENV)/built $(PAGE)
 	FEEDPLAN_SEEDS=1000 $(BIN)/pytest --numprocesses auto tests/planned_feeds/test_linuxcnc_reads.py
 	FEEDPLAN_SEEDS=10000 $(BIN)/pytest tests/service/test_hostile_uploads.py
 	FEEDPLAN_SEEDS=200 $(BIN)/pytest tests/service/test_kills.py
+	FEEDPLAN_PICTURES=out $(BIN)/pytest -rs tests/service/test_page.py
 	$(BIN)/pip install --quiet schemathesis
 	FEEDPLAN_EXAMPLES=100 $(BIN)/pytest tests/service/test_documentation.py
 	cargo fuzz --version >/dev/null 2>&1 || cargo install --locked cargo-fuzz

@@ -14,7 +14,6 @@ from fastapi.responses import (
     FileResponse,
     HTMLResponse,
     JSONResponse,
-    RedirectResponse,
     Response,
     StreamingResponse,
 )
@@ -23,10 +22,10 @@ from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 
 from feedplan import __version__, outputs, planners
-from feedplan.files import SUMMARY_FILE
+from feedplan.files import DRAWING_FILE, SUMMARY_FILE
 from feedplan.machine.machine import Machine, bundled_machines
 from feedplan.report.page import FILE as REPORT_FILE
-from feedplan.service import answers, events, exports, openapi, page, problems, uploads, views
+from feedplan.service import answers, events, exports, front, openapi, page, problems, uploads, views
 from feedplan.service.limits import Limits
 from feedplan.service.refusals import UNKNOWN, Refusal
 from feedplan.service.requests import order_of
@@ -39,7 +38,7 @@ MOST_COMPARED = 20
 # A report has scripts of its own and no other; it is not trusted with the service.
 _REPORT_POLICY = (
     "sandbox allow-scripts allow-downloads; default-src 'none'; style-src 'unsafe-inline'; "
-    "script-src 'unsafe-inline' 'unsafe-eval'; img-src data: blob:"
+    "script-src 'unsafe-inline'; img-src data: blob:"
 )
 _PAGE_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 
@@ -93,6 +92,7 @@ def create(folder: FilePath, limits: Limits) -> FastAPI:
     _add_jobs(app, service)
     _add_results(app, service)
     _add_knowledge(app, service)
+    front.add(app)
     openapi.complete(app)
     return app
 
@@ -291,6 +291,25 @@ def _add_results(app: FastAPI, service: Service) -> None:
         return _file(views.done(store, job) / REPORT_FILE, media_type="text/html", headers=headers)
 
     @app.get(
+        "/v1/jobs/{job}/drawing",
+        tags=tags,
+        summary="What the page draws: tool path, speed and axes, as arrays",
+        response_class=FileResponse,
+        responses={
+            200: openapi.content(
+                "application/octet-stream", openapi.BINARY, "A table in JSON, and its arrays after it"
+            ),
+            **missing,
+        },
+    )
+    def drawing(job: str) -> Response:
+        """4 bytes with the length of the JSON (little-endian), the JSON, then the arrays.
+
+        In the JSON an array is `{"array": "f4", "at": 0, "count": 3}`: little-endian numbers (f4, i4 or u1)
+        from byte `at` after the JSON."""
+        return _file(views.done(store, job) / DRAWING_FILE, media_type="application/octet-stream")
+
+    @app.get(
         "/v1/compare",
         response_model=answers.Comparison,
         tags=tags,
@@ -343,7 +362,3 @@ def _add_knowledge(app: FastAPI, service: Service) -> None:
         return HTMLResponse(
             page.documentation(app.openapi()), headers={"Content-Security-Policy": _PAGE_POLICY}
         )
-
-    @app.get("/", include_in_schema=False)
-    def start() -> Response:
-        return RedirectResponse("/docs")

@@ -18,6 +18,7 @@ import ipaddress
 from collections.abc import Awaitable, Callable, Collection, MutableMapping
 from typing import Any
 
+from feedplan.service import front
 from feedplan.service.limits import MB, Limits
 from feedplan.service.refusals import FOREIGN, MEDIA_TYPE, TOKEN, TOO_LARGE, TOO_SLOW, Refusal
 
@@ -26,8 +27,8 @@ Receive = Callable[[], Awaitable[Message]]
 Send = Callable[[Message], Awaitable[None]]
 App = Callable[[Message, Receive, Send], Awaitable[None]]
 
-# Whether the service works may be asked without a token.
-OPEN = ("/v1/health",)
+# Whether the service works may be asked without a token, and the page itself, which then asks for it.
+OPEN = ("/v1/health", *front.ADDRESSES)
 # No answer is kept by others, guessed at, or put into the page of somebody else.
 _HEADERS = (
     (b"cache-control", b"no-store"),

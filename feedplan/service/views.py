@@ -14,7 +14,7 @@ from feedplan.machine.machine import Axis, Machine
 from feedplan.service.refusals import STATE, Refusal
 from feedplan.service.store import Record, Store
 
-_PARTS = ("events", "result", "audit", "setpoints", "program", "report", "cancel")
+_PARTS = ("events", "result", "audit", "setpoints", "program", "report", "drawing", "cancel")
 
 
 def job(record: Record) -> dict[str, Any]:

@@ -159,7 +159,7 @@ def _planned(
         made = plan(source, machine, order["method"], reading=reading, progress=talk.progress, **options)
         made.audit(talk.progress)
         result = folder / f"result-{attempt}"
-        for file in write_plan(made, result, ("npz",), progress=talk.progress):
+        for file in write_plan(made, result, ("npz",), drawing=True, progress=talk.progress):
             sync(file)
         sync(result)
         sync(folder)

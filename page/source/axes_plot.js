@@ -26,7 +26,7 @@ export class AxesPlot {
       });
       return { name, head, plot };
     });
-    cursor.follow((time) => this.plots.forEach(({ plot }) => plot.point(time)));
+    this.end = cursor.follow((time) => this.plots.forEach(({ plot }) => plot.point(time)));
     this.show();
   }
 

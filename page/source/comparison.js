@@ -23,7 +23,7 @@ export function comparison(data) {
     height: 330,
     label: " ",
     onZoom: (range) => speed.zoom(range),
-    onPoint: (x) => cursor.set(x === null ? null : across === "time" ? x : runs[chosen].timeAt(x), speed),
+    onPoint: (x) => cursor.set(across === "time" ? x : runs[chosen].timeAt(x), speed),
   });
   cursor.follow((time) => speed.point(time === null ? null : across === "time" ? time : runs[chosen].lengthAt(time)));
 

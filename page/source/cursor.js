@@ -11,8 +11,9 @@ export class Cursor {
     for (const listener of this.#listeners) listener(time, from);
   }
 
-  /* Calls `listener(time, from)` after each change. */
+  /* Calls `listener(time, from)` after each change; the answer ends it. */
   follow(listener) {
     this.#listeners.add(listener);
+    return () => this.#listeners.delete(listener);
   }
 }

@@ -1,5 +1,7 @@
 /* Levels of detail of a tool path: each has fewer points than the one before and a wider tolerance [mm]. */
 
+import { extent } from "./numbers.js";
+
 const COARSER = 4; // tolerance of a level over that of the one before
 const FEWEST = 4000; // no level with fewer points is worth its memory
 
@@ -7,7 +9,7 @@ const FEWEST = 4000; // no level with fewer points is worth its memory
 export function levels(path) {
   const count = path.x.length;
   const speedWeight = weightOfSpeed(path);
-  let level = { tolerance: path.tolerance, index: Uint32Array.from({ length: count }, (_, i) => i) };
+  let level = { tolerance: path.tolerance, index: new Uint32Array(count).map((_, i) => i) };
   const found = [level];
   let cost = new Float32Array(count);
   while (level.index.length > FEWEST) {
@@ -29,12 +31,8 @@ export function levels(path) {
 function weightOfSpeed({ x, y, z, cutting_speed: top }) {
   let square = 0;
   for (const values of [x, y, z]) {
-    let low = Infinity, high = -Infinity;
-    for (const value of values) {
-      if (value < low) low = value;
-      if (value > high) high = value;
-    }
-    square += (high - low) ** 2 || 0;
+    const [low, high] = extent(values);
+    square += (high - low) ** 2;
   }
   return top > 0 ? (0.01 * Math.sqrt(square)) / top : 0;
 }

@@ -3,15 +3,18 @@
 import { shown } from "./numbers.js";
 import { style } from "./theme.js";
 
-const NEAREST = 70; // pixels between two ticks, about
+const NEAREST = 48; // pixels between two ticks, about
 const AXES = ["X", "Y", "Z"];
 
-/* `project` takes a place [mm] to pixels; `low` and `high` are opposite corners of the box. */
-export function drawFrame(context, project, low, high) {
+/* `project` takes a place [mm] to pixels; `low` and `high` are opposite corners of the box; `isNarrow`:
+   names without units. */
+export function drawFrame(context, project, low, high, isNarrow) {
   const ink = style("--soft"), faint = style("--faint");
   context.font = `12px ${getComputedStyle(document.body).fontFamily}`;
   context.lineWidth = 1;
   const corner = (bits) => [0, 1, 2].map((k) => (bits & (1 << k) ? high[k] : low[k]));
+  const nearest = Math.min(...[0, 1, 2, 3, 4, 5, 6, 7].map((bits) => project(corner(bits))[2]));
+  const centre = project(low.map((value, k) => (value + high[k]) / 2));
   for (let axis = 0; axis < 3; axis += 1) {
     const others = [0, 1, 2].filter((k) => k !== axis);
     const edges = [0, 1, 2, 3].map((n) => {
@@ -22,32 +25,42 @@ export function drawFrame(context, project, low, high) {
     const size = Math.hypot(to[0] - from[0], to[1] - from[1]);
     if (!(size > 24) || !(high[axis] > low[axis])) continue;
     context.strokeStyle = faint;
-    for (const [a, b] of edges) line(context, a, b);
+    // The edges at the corner nearest to the eye would cross the path.
+    for (const [a, b] of edges) if (Math.min(a[2], b[2]) > nearest + 1e-6) line(context, a, b);
     const isSteep = Math.abs(to[1] - from[1]) > 2 * Math.abs(to[0] - from[0]);
     const middle = ([a, b]) => (isSteep ? -(a[0] + b[0]) : a[1] + b[1]);
     const lowest = edges.reduce((best, edge) => (middle(edge) > middle(best) ? edge : best));
-    ticks(context, lowest, axis, low[axis], high[axis], size, isSteep, ink, project);
+    ticks(context, lowest, axis, low[axis], high[axis], size, away(lowest, centre), ink, project, isNarrow);
   }
 }
 
-function ticks(context, [a, b, start], axis, low, high, size, isSteep, ink, project) {
+function ticks(context, [a, b, start], axis, low, high, size, [ax, ay], ink, project, isNarrow) {
   const step = tidy(((high - low) * NEAREST) / size);
   context.fillStyle = context.strokeStyle = ink;
   line(context, a, b);
   context.textBaseline = "middle";
-  const away = isSteep ? [-1, 0] : [0, 1];
-  context.textAlign = isSteep ? "right" : "center";
-  const text = (words, [x, y], distance) => context.fillText(words, x + away[0] * distance, y + away[1] * (distance + 2));
+  context.textAlign = "center";
+  const text = (words, [x, y], distance) => {
+    const far = distance + (Math.abs(ax) * context.measureText(words).width) / 2;
+    context.fillText(words, x + ax * far, y + ay * far);
+  };
   for (let value = Math.ceil(low / step - 1e-9) * step; value <= high + 1e-9 * step; value += step) {
     const place = [...start];
     place[axis] = value;
     const at = project(place);
-    line(context, at, [at[0] + 5 * away[0], at[1] + 5 * away[1]]);
-    text(shown(Math.abs(value) < 1e-9 * step ? 0 : value), at, 10);
+    line(context, at, [at[0] + 5 * ax, at[1] + 5 * ay]);
+    text(shown(Math.abs(value) < 1e-9 * step ? 0 : value), at, 13);
   }
   context.font = context.font.replace(/^/, "bold ");
-  text(`${AXES[axis]} [mm]`, [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2], isSteep ? 44 : 28);
+  text(`${AXES[axis]}${isNarrow ? "" : " [mm]"}`, [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2], isNarrow ? 28 : 34);
   context.font = context.font.replace("bold ", "");
+}
+
+/* Across an edge, away from the middle of the box; one long. */
+function away([a, b], centre) {
+  const x = a[1] - b[1], y = b[0] - a[0], size = Math.hypot(x, y) || 1;
+  const side = x * (a[0] - centre[0]) + y * (a[1] - centre[1]) < 0 ? -1 : 1;
+  return [(side * x) / size, (side * y) / size];
 }
 
 /* The nearest of 1, 2, 5 times a power of ten that is not below. */

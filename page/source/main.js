@@ -6,8 +6,9 @@ import "./drawing.css";
 import { comparison } from "./comparison.js";
 import { embedded } from "./data.js";
 import { report } from "./report.js";
+import { service } from "./service/app.js";
 
-const PAGES = { report, comparison };
+const PAGES = { report, comparison, service };
 
-const { page } = document.body.dataset;
-PAGES[page](await embedded(document.getElementById("data")));
+const data = document.getElementById("data");
+PAGES[document.body.dataset.page](data && (await embedded(data)));

@@ -1,7 +1,7 @@
 /* What the colours of a tool path tell: for each mode a value at every point, and a legend. */
 
 import { css, kindColour } from "./colours.js";
-import { shown } from "./numbers.js";
+import { extent, shown } from "./numbers.js";
 
 export const NONE = -1; // no value here: drawn thin and grey
 
@@ -9,21 +9,15 @@ export const NONE = -1; // no value here: drawn thin and grey
    on the scale, the texts at its ends; or the number of the kind. */
 export const MODES = {
   speed: { label: "planned speed", of: (path) => scaled(path, path.speed, path.cutting_speed, "viridis") },
-  feed: { label: "programmed feed", of: (path) => scaled(path, path.feed, Math.max(0, greatest(path.feed)), "viridis") },
+  feed: { label: "programmed feed", of: (path) => scaled(path, path.feed, extent(path.feed)[1], "viridis") },
   active: { label: "active limit", of: activeLimit },
   lost: { label: "time lost", of: timeLost },
 };
 
-function greatest(values) {
-  let top = -Infinity;
-  for (const value of values) if (value > top) top = value;
-  return top;
-}
-
 /* Rapids have no feed and would flatten the scale: they have no value, unless there is nothing else. */
 function scaled(path, list, top, scale) {
   const { feed } = path;
-  const hasFeed = greatest(feed) > 0;
+  const hasFeed = extent(feed)[1] > 0;
   const values = Float32Array.from(list, (value, i) => (hasFeed && feed[i] === 0 ? NONE : Math.min(value / (top || 1), 1)));
   return { values, scale, ends: ["0", `${shown(top)} ${path.unit}/s`], note: hasFeed && values.includes(NONE) ? "rapids in grey" : "" };
 }

@@ -26,6 +26,16 @@ export function clock(seconds) {
   return `${minutes}:${(seconds - 60 * minutes).toFixed(3).padStart(6, "0")}`;
 }
 
+/* The least and the greatest value; 0 and 0 of none. */
+export function extent(values) {
+  let low = Infinity, high = -Infinity;
+  for (let i = 0; i < values.length; i += 1) {
+    if (values[i] < low) low = values[i];
+    if (values[i] > high) high = values[i];
+  }
+  return low <= high ? [low, high] : [0, 0];
+}
+
 /* The last number of a growing list that is not beyond the value; 0 where there is none. */
 export function lastUpTo(list, value) {
   let low = 0, high = list.length - 1;

@@ -9,9 +9,9 @@ import { onTheme } from "./theme.js";
 const VIEW_NAMES = { xyz: "3D", xy: "Top", xz: "Front", yz: "Side" };
 
 export class PathView {
-  /* Fills `container`; `tools` gets the buttons. */
-  constructor(container, tools, cursor, { onMove } = {}) {
-    this.cursor = cursor;
+  /* Fills `container`; `tools` gets the buttons; `onChoice` is told when a view or colours are chosen. */
+  constructor(container, tools, cursor, { onMove, onChoice } = {}) {
+    Object.assign(this, { cursor, onChoice });
     this.box = container.appendChild(element("div", "path"));
     this.legend = container.appendChild(element("div", "legend"));
     this.tip = this.box.appendChild(element("div", "tip"));
@@ -22,18 +22,18 @@ export class PathView {
       this.views = choice(VIEW_NAMES, "View of the tool path", (name) => this.look(name));
       tools.append(this.modes.box, this.views.box);
     }
-    cursor.follow((time, from) => this.scene.mark(time, from === "player"));
+    cursor.follow((time, from) => this.scene.mark(time, from === "player" && time > 0));
     onTheme(() => this.run && this.#showLegend());
   }
 
   /* Shows a run, with the view and the colours that are chosen. */
-  show(run, failures) {
+  show(run) {
     const isFirst = !this.run;
     const view = this.scene.view;
     this.run = run;
     this.mode = MODES[this.modeName].of(run.path);
-    this.scene.show(run, this.mode, run.path.marks);
-    this.failures = failures;
+    this.scene.mark(this.cursor.time);
+    this.scene.show(run, this.mode);
     if (!isFirst && view !== this.scene.view && view !== "xyz") this.scene.look(view);
     this.views?.press(this.scene.view);
     this.modes?.press(this.modeName);
@@ -43,6 +43,7 @@ export class PathView {
   look(name) {
     this.scene.look(name);
     this.views?.press(name);
+    this.onChoice?.();
   }
 
   colour(name) {
@@ -51,6 +52,7 @@ export class PathView {
     this.mode = MODES[name].of(this.run.path);
     this.scene.colour(this.mode);
     this.#showLegend();
+    this.onChoice?.();
   }
 
   /* The names of modes, for keys. */

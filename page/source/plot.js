@@ -14,9 +14,10 @@ export class Plot {
   #bands = [];
   #columns = 0;
   #place = null;
+  #isPointing = false;
 
-  /* `onZoom(range)` is told the range that is asked for, null for all; `onPoint(x)` where the pointer is, null
-     where it has left. Both are also of touch. */
+  /* `onZoom(range)` is told the range that is asked for, null for all; `onPoint(x)` where the pointer is. Both are
+     also of touch. */
   constructor(container, { height, label, onZoom, onPoint }) {
     this.container = container;
     Object.assign(this, { height, label, onZoom, onPoint });
@@ -24,7 +25,8 @@ export class Plot {
     new ResizeObserver(() => this.#hasNewWidth() && this.draw()).observe(container);
   }
 
-  /* What is drawn: `curves` of { name, curve, colour, width, dash, fill, isLimit, scale }, `ends` of the x axis,
+  /* What is drawn: `curves` of { name, curve, colour, width, dash, fill, isLimit, scale,
+     none (the value from which there is none) }, `ends` of the x axis,
      the `range` of the y axis, `lines` across of { value, colour } and `marks` of { x } down. */
   show({ curves, ends, range, unit, lines = [], marks = [] }) {
     Object.assign(this, { curves, ends, range, unit, lines, marks });
@@ -40,10 +42,9 @@ export class Plot {
   /* Points at a place of the x axis; null: nowhere. */
   point(x) {
     this.#place = x;
-    if (!this.#plot) return;
+    if (!this.#plot || this.#isPointing) return;
     const left = x === null ? -10 : this.#plot.valToPos(x, "x");
     this.#plot.setCursor({ left, top: x === null ? -10 : 0 }, false);
-    this.#plot.redraw(false, false);
   }
 
   draw() {
@@ -92,19 +93,38 @@ export class Plot {
           fill: one.fill && !found[k].low ? wash(one.colour, 0.12) : undefined,
           points: { show: false },
           show: !this.hidden.has(one.name),
-          value: (u, value) => (value === null || Number.isNaN(value) ? "" : `${shown(value)} ${this.unit}`),
+          value: (u, value) => this.#read(one, value),
         })),
       ],
       hooks: {
         drawAxes: [(u) => this.#drawLines(u)],
         drawSeries: [(u, k) => k > 0 && this.#drawBand(u, k)],
-        draw: [(u) => this.#drawPlace(u)],
         setSeries: [(u, k, { show }) => show !== undefined && k && this.hidden[show ? "delete" : "add"](this.curves[k - 1].name)],
-        setSelect: [(u) => u.select.width > 4 && this.onZoom([u.posToVal(u.select.left, "x"), u.posToVal(u.select.left + u.select.width, "x")])],
-        setCursor: [(u) => u.cursor.event && this.onPoint(u.cursor.left < 0 ? null : u.posToVal(u.cursor.left, "x"))],
+        setSelect: [(u) => this.#selected(u)],
+        setCursor: [(u) => u.cursor.event && this.#pointed(u)],
       },
       plugins: [touch((range) => this.onZoom(range), () => this.ends, (x) => this.onPoint(x))],
     };
+  }
+
+  /* A range was dragged over. uPlot ends its own work on that before the chart is drawn anew. */
+  #selected(u) {
+    const { left, width } = u.select;
+    if (width > 4) queueMicrotask(() => this.onZoom([u.posToVal(left, "x"), u.posToVal(left + width, "x")]));
+  }
+
+  /* The pointer has moved; where it has left, the place that it had stays. */
+  #pointed(u) {
+    if (u.cursor.left < 0) return queueMicrotask(() => this.point(this.#place));
+    this.#isPointing = true;
+    this.onPoint(u.posToVal(u.cursor.left, "x"));
+    this.#isPointing = false;
+  }
+
+  /* A value in the legend; nothing where the curve or the pointer is not. */
+  #read({ none = Infinity }, value) {
+    if (value === null || Number.isNaN(value)) return "";
+    return value < none ? `${shown(value)} ${this.unit}` : "none";
   }
 
   /* Straight lines across (limits) and down (where a limit is broken). */
@@ -142,19 +162,6 @@ export class Plot {
       const top = u.valToPos(high[i], "y", true);
       ctx.fillRect(u.valToPos(x[i], "x", true), top, step, u.valToPos(low[i], "y", true) - top);
     }
-    ctx.restore();
-  }
-
-  /* The place that is pointed at, also where the pointer is in another view. */
-  #drawPlace(u) {
-    if (this.#place === null) return;
-    const { ctx, bbox } = u;
-    const place = u.valToPos(this.#place, "x", true);
-    if (place < bbox.left || place > bbox.left + bbox.width) return;
-    ctx.save();
-    ctx.strokeStyle = style("--accent");
-    ctx.lineWidth = 1.5 * devicePixelRatio;
-    stroke(ctx, place, bbox.top, place, bbox.top + bbox.height);
     ctx.restore();
   }
 }

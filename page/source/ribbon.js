@@ -15,7 +15,7 @@ attribute vec3 from, to;
 attribute float valueFrom, valueTo, timeTo;
 uniform vec2 resolution;
 uniform float width, isKind;
-varying float value, time;
+varying float value, time, light;
 void main() {
   vec4 a = projectionMatrix * modelViewMatrix * vec4(from, 1.0);
   vec4 b = projectionMatrix * modelViewMatrix * vec4(to, 1.0);
@@ -30,6 +30,10 @@ void main() {
   place.z += isNone ? 1e-4 : 0.0;
   value = isNone || isKind > 0.5 ? valueTo : mix(max(valueFrom, 0.0), valueTo, position.x);
   time = timeTo;
+  // Light from above: what leans is a little darker, so that surfaces of many passes show their form.
+  vec3 run = to - from;
+  float rise = dot(run, run) > 0.0 ? run.z / length(run) : 0.0;
+  light = 1.0 - 0.3 * rise * rise;
   gl_Position = place;
 }`;
 
@@ -37,9 +41,9 @@ const FRAGMENT = `
 uniform sampler2D colours;
 uniform vec3 none, later;
 uniform float count, now;
-varying float value, time;
+varying float value, time, light;
 void main() {
-  vec3 colour = value < -0.5 ? none : texture2D(colours, vec2(count > 0.5 ? (value + 0.5) / count : value, 0.5)).rgb;
+  vec3 colour = value < -0.5 ? none : texture2D(colours, vec2(count > 0.5 ? (value + 0.5) / count : value, 0.5)).rgb * light;
   gl_FragColor = vec4(time > now ? mix(colour, later, 0.82) : colour, 1.0);
 }`;
 

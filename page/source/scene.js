@@ -7,6 +7,7 @@ import { css, mixed } from "./colours.js";
 import { levels } from "./detail.js";
 import { drawFlat } from "./flat.js";
 import { drawFrame } from "./frame.js";
+import { extent } from "./numbers.js";
 import { COLOURS, Ribbon } from "./ribbon.js";
 import { channels, onTheme, style } from "./theme.js";
 
@@ -15,7 +16,8 @@ export const VIEWS = { xyz: [-1.1, -1.5, 1.1], xy: [0, -1e-6, 1], xz: [0, -1, 0]
 /* Off by so many pixels a level may be, at rest and while the view moves. */
 const AT_REST = 0.25, MOVING = 1;
 const REST = 160; // [ms]
-const ROOM = [75, 45]; // pixels beside the path, and above and below
+const ROOM = [78, 45]; // pixels beside the path, and above and below
+const NARROW = 560; // pixels: names of axes are shorter
 const NEAR = 14; // pixels between the pointer and the point that it means
 
 export class PathScene {
@@ -26,6 +28,7 @@ export class PathScene {
   #ribbon = null;
   #mode = null;
   #frame = 0;
+  #isStale = true; // the picture below the marks
   #movedAt = -Infinity;
   #time = null;
   #hasTrail = false;
@@ -67,17 +70,16 @@ export class PathScene {
     this.look("xyz");
   }
 
-  /* Shows a run, coloured by a mode of `modes.js`; `failures` are places [mm] to mark. */
-  show(run, mode, failures = run.path.marks ?? []) {
+  /* Shows a run, coloured by a mode of `modes.js`. */
+  show(run, mode) {
     this.#ribbon && this.#scene.remove(this.#ribbon.group);
     this.#ribbon?.dispose();
     const isOther = this.#run !== run;
     this.#run = run;
-    this.failures = failures;
     const { path } = run;
-    const ends = ["x", "y", "z"].map((name) => path[name].reduce(([a, b], v) => [Math.min(a, v), Math.max(b, v)], [Infinity, -Infinity]));
-    this.low = ends.map(([low]) => (Number.isFinite(low) ? low : 0));
-    this.high = ends.map(([, high]) => (Number.isFinite(high) ? high : 0));
+    const ends = [path.x, path.y, path.z].map(extent);
+    this.low = ends.map(([low]) => low);
+    this.high = ends.map(([, high]) => high);
     this.#ribbon = null;
     this.levels = levels(path);
     if (this.#renderer) {
@@ -134,9 +136,10 @@ export class PathScene {
 
   /* Marks the place at a time [s]; with a trail, what comes after it fades. */
   mark(time, hasTrail = false) {
+    this.#isStale ||= hasTrail || this.#hasTrail;
     this.#time = time;
     this.#hasTrail = hasTrail;
-    this.draw();
+    this.#drawSoon();
   }
 
   zoomBy(factor) {
@@ -172,16 +175,27 @@ export class PathScene {
       across = Math.max(across, Math.abs(corner.x));
       up = Math.max(up, Math.abs(corner.y));
     }
-    const half = Math.max(across / Math.max(width / 2 - ROOM[0], 20), up / Math.max(height / 2 - ROOM[1], 20)) / 2; // [mm] of half a pixel
+    const beside = width < NARROW ? ROOM[0] / 2 : ROOM[0];
+    const half = Math.max(across / Math.max(width / 2 - beside, 20), up / Math.max(height / 2 - ROOM[1], 20)) / 2; // [mm] of half a pixel
     Object.assign(camera, { left: -half * width, right: half * width, top: half * height, bottom: -half * height, near: 0.01 * far, far: 4 * far });
     camera.updateProjectionMatrix();
   }
 
   draw() {
-    if (!this.#frame) this.#frame = requestAnimationFrame(() => this.drawNow());
+    this.#isStale = true;
+    this.#drawSoon();
+  }
+
+  #drawSoon() {
+    if (!this.#frame) this.#frame = requestAnimationFrame(() => this.#drawStale());
   }
 
   drawNow() {
+    this.#isStale = true;
+    this.#drawStale();
+  }
+
+  #drawStale() {
     cancelAnimationFrame(this.#frame);
     this.#frame = 0;
     const context = this.over.getContext("2d");
@@ -191,6 +205,13 @@ export class PathScene {
     if (!this.#run) return this.#renderer?.clear();
     this.#camera.updateMatrixWorld();
     const project = this.#projector();
+    if (this.#isStale) this.#drawPath(project, ratio);
+    this.#isStale = false;
+    drawFrame(context, project, this.low, this.high, this.container.clientWidth < NARROW);
+    this.#marks(context, project);
+  }
+
+  #drawPath(project, ratio) {
     const allowed = performance.now() - this.#movedAt < REST ? MOVING : AT_REST;
     const tolerance = (allowed * this.#pixel()) / ratio;
     if (this.#ribbon) {
@@ -205,8 +226,6 @@ export class PathScene {
       const mode = { values: this.#mode.values, isKind: Boolean(this.#mode.colours) };
       drawFlat(flat, this.#run.path, this.level.index, project, mode, this.colours.map(css), style("--rapid"), 2);
     }
-    drawFrame(context, project, this.low, this.high);
-    this.#marks(context, project);
   }
 
   #marks(context, project) {
@@ -226,7 +245,7 @@ export class PathScene {
     context.fillStyle = style("--ink");
     context.textAlign = "left";
     context.fillText("start", start[0] + 8, start[1] - 8);
-    for (const place of this.failures) dot(project(place), 6, style("--bad"), style("--card"));
+    for (const place of path.marks) dot(project(place), 6, style("--bad"), style("--card"));
     if (this.#time !== null) dot(project(this.#run.place(this.#time)), 6, style("--accent"), style("--card"));
   }
 
@@ -246,14 +265,14 @@ export class PathScene {
     return best;
   }
 
-  /* From places [mm] to pixels from the top left. */
+  /* From places [mm] to pixels from the top left, and how far behind they are. */
   #projector() {
     const { clientWidth: width, clientHeight: height } = this.container;
     const centre = this.#centre();
     const m = this.#camera.projectionMatrix.clone().multiply(this.#camera.matrixWorldInverse).elements;
     return ([x, y, z]) => {
       const a = x - centre[0], b = y - centre[1], c = z - centre[2];
-      return [((m[0] * a + m[4] * b + m[8] * c + m[12] + 1) * width) / 2, ((1 - m[1] * a - m[5] * b - m[9] * c - m[13]) * height) / 2];
+      return [((m[0] * a + m[4] * b + m[8] * c + m[12] + 1) * width) / 2, ((1 - m[1] * a - m[5] * b - m[9] * c - m[13]) * height) / 2, m[2] * a + m[6] * b + m[10] * c + m[14]];
     };
   }
 

@@ -19,9 +19,9 @@ export class SpeedPlot {
       height: 330,
       label: `path length [${unit}]`,
       onZoom: (range) => this.plot.zoom(range),
-      onPoint: (length) => cursor.set(length === null ? null : run.timeAt(length), this),
+      onPoint: (length) => cursor.set(run.timeAt(length), this),
     });
-    cursor.follow((time) => this.plot.point(time === null ? null : run.lengthAt(time)));
+    this.end = cursor.follow((time) => this.plot.point(time === null ? null : run.lengthAt(time)));
     this.show();
   }
 
@@ -33,7 +33,7 @@ export class SpeedPlot {
     const reach = 1.25 * ((top > 1.5 * cutting ? cutting : top) || 1);
     const curves = Object.entries(LIMITS)
       .filter(([name]) => length[name])
-      .map(([name, [label, colour, dash]]) => ({ name: label, curve: length[name], colour, dash, width: 1.2, isLimit: true }));
+      .map(([name, [label, colour, dash]]) => ({ name: label, curve: length[name], colour, dash, width: 1.2, isLimit: true, none: 19.9 * top || Infinity }));
     if (other) {
       const scale = other.run.length > 0 ? this.run.length / other.run.length : 1;
       const curve = { x: Float64Array.from(other.run.path.length, (value) => value * scale), y: other.run.path.speed };

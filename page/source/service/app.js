@@ -1,0 +1,158 @@
+/* The page of the service: a program is dropped, planned, looked at and compared. */
+
+import "./service.css";
+
+import { duration } from "../numbers.js";
+import { element } from "../parts.js";
+import { json } from "./api.js";
+import { opened, planned } from "./job.js";
+import { keys } from "./keys.js";
+import { MachineChoice } from "./machine.js";
+import { Result } from "./result.js";
+import { WhatIf } from "./what_if.js";
+
+/* Controllers of today by the method that models them. */
+const TODAY = {
+  "junction-deviation": "junction deviation (grbl, Marlin, Klipper)",
+  linuxcnc: "LinuxCNC",
+  "arc-transition": "arcs at corners",
+  "constant-velocity-transition": "constant speed through corners",
+  tangential: "stop at corners, tangents pass",
+};
+const RECENT = 12;
+
+export async function service() {
+  const at = (id) => document.getElementById(id);
+  const machine = new MachineChoice(at("machine"), at("axes-table"), at("machine-text"));
+  const result = new Result(at);
+  const whatIf = new WhatIf(at("what-if"), (plan, words) => {
+    at("today").value = "";
+    result.beside(plan, words);
+  });
+  let program = null, stop = null;
+
+  keys(result, at("help"));
+  at("show-help").addEventListener("click", () => at("help").showModal());
+  at("close-help").addEventListener("click", () => at("help").close());
+
+  function take(file) {
+    program = file;
+    at("program-name").textContent = `${file.name}, ${(file.size / 1e3).toFixed(file.size < 1e4 ? 1 : 0)} kB`;
+    at("plan").disabled = false;
+  }
+
+  /* The options that are given; others are the method's own. */
+  function options() {
+    const number = (id) => (at(id).value.trim() === "" ? undefined : Number(at(id).value));
+    const given = { tolerance: number("tolerance"), feed: number("feed") };
+    return Object.fromEntries(Object.entries(given).filter(([, value]) => value !== undefined));
+  }
+
+  /* Plans with the progress shown; null where it was stopped or refused, which is told. */
+  async function plan(order) {
+    stop?.abort();
+    const own = (stop = new AbortController());
+    at("failure").hidden = true;
+    at("progress").hidden = false;
+    tell("sends", 0);
+    try {
+      return await planned(order, { onProgress: tell, signal: own.signal });
+    } catch (error) {
+      if (!own.signal.aborted) fail(error);
+      return null;
+    } finally {
+      if (stop === own) at("progress").hidden = true;
+    }
+  }
+
+  function tell(stage, done) {
+    at("bar").value = done;
+    at("stage").textContent = `${stage} … ${Math.round(100 * done)} %`;
+  }
+
+  function fail(error) {
+    at("failure").hidden = false;
+    at("failure").textContent = error.message;
+  }
+
+  function show(made) {
+    at("hint").hidden = true;
+    result.show(made);
+    whatIf.show(made);
+    at("today").value = "";
+    document.title = `${made.order.name} – feedplan`;
+    recent();
+  }
+
+  async function start() {
+    const made = await plan({ program, name: program.name, machine: machine.order, method: at("method").value, options: options() });
+    if (made) show(made);
+  }
+
+  async function recent() {
+    const { jobs } = await json(`/v1/jobs?state=done&count=${RECENT}`);
+    at("recent").replaceChildren(...jobs.map((job) => {
+      const button = element("button");
+      button.type = "button";
+      button.append(element("b", "", job.program.name), element("span", "", `${job.method} · ${job.machine} · ${duration(job.result.time)}`));
+      button.addEventListener("click", async () => {
+        try {
+          const made = await opened(job.id);
+          take(new File([made.order.program], made.order.name));
+          at("method").value = made.order.method;
+          machine.take(made.order.machine);
+          show(made);
+        } catch (error) {
+          fail(error);
+        }
+      });
+      const item = element("li");
+      item.append(button);
+      return item;
+    }));
+  }
+
+  // A program comes by hand or by being dropped anywhere.
+  at("file").addEventListener("change", () => {
+    if (!at("file").files.length) return;
+    take(at("file").files[0]);
+    start();
+  });
+  addEventListener("dragover", (event) => {
+    event.preventDefault();
+    document.body.classList.add("dropping");
+  });
+  addEventListener("dragleave", (event) => event.relatedTarget === null && document.body.classList.remove("dropping"));
+  addEventListener("drop", (event) => {
+    event.preventDefault();
+    document.body.classList.remove("dropping");
+    if (!event.dataTransfer.files.length) return;
+    take(event.dataTransfer.files[0]);
+    start();
+  });
+  at("plan").addEventListener("click", start);
+  at("cancel").addEventListener("click", () => stop?.abort());
+  at("today").addEventListener("change", async () => {
+    const method = at("today").value;
+    whatIf.quiet();
+    if (!method) return result.beside(null);
+    const { order } = result.plan;
+    const { tolerance, feed, feed_override } = order.options;
+    const own = Object.fromEntries(Object.entries({ tolerance, feed, feed_override }).filter(([, value]) => value !== undefined));
+    const made = await plan({ ...order, method, options: own });
+    if (made) result.beside(made, TODAY[method]);
+    else at("today").value = "";
+  });
+
+  try {
+    await machine.load();
+    const { methods } = await json("/v1/methods");
+    for (const { name } of methods) at("method").append(new Option(name, name, false, name === "bang-bang"));
+    at("today").append(new Option("nothing", ""));
+    for (const { name } of methods) if (TODAY[name]) at("today").append(new Option(TODAY[name], name));
+    await recent();
+  } catch (error) {
+    fail(error);
+  }
+  document.body.dataset.ready = "yes";
+}

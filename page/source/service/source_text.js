@@ -1,0 +1,74 @@
+/* The source of the program, of any length: only the lines in view exist. */
+
+import { element } from "../parts.js";
+
+const ROW = 19; // pixels
+const MOST = 12_000_000; // pixels that a browser can scroll
+
+export class SourceText {
+  #bytes = new Uint8Array(0);
+  #starts = [0];
+  #chosen = 0;
+
+  /* `onLine(number)` is told the line that was clicked. */
+  constructor(container, onLine) {
+    this.container = container;
+    this.room = container.appendChild(element("div", "room"));
+    this.lines = this.room.appendChild(element("div", "lines"));
+    container.addEventListener("scroll", () => this.#draw());
+    this.lines.addEventListener("click", ({ target }) => {
+      const line = target.closest("[data-line]")?.dataset.line;
+      if (line) onLine(Number(line));
+    });
+    new ResizeObserver(() => this.#draw()).observe(container);
+  }
+
+  /* Shows a program (a Blob). */
+  async show(blob) {
+    this.#bytes = new Uint8Array(await blob.arrayBuffer());
+    const starts = [0];
+    for (let at = this.#bytes.indexOf(10); at >= 0; at = this.#bytes.indexOf(10, at + 1)) starts.push(at + 1);
+    this.#starts = starts;
+    this.room.style.height = `${Math.min(starts.length * ROW, MOST)}px`;
+    this.container.scrollTop = 0;
+    this.choose(0);
+  }
+
+  text(line) {
+    const end = this.#starts[line] ?? this.#bytes.length;
+    return new TextDecoder().decode(this.#bytes.subarray(this.#starts[line - 1], Math.min(end, this.#starts[line - 1] + 400))).trimEnd();
+  }
+
+  /* Marks a line, from 1, and brings it into view. */
+  choose(line) {
+    if (line === this.#chosen && line) return;
+    this.#chosen = line;
+    const first = this.#first(), shown = Math.floor(this.container.clientHeight / ROW);
+    if (line && (line < first + 2 || line > first + shown - 2)) {
+      this.container.scrollTop = Math.max(0, (line - shown / 3) * ROW * this.#scale());
+    }
+    this.#draw();
+  }
+
+  #scale() {
+    return Math.min(1, MOST / (this.#starts.length * ROW));
+  }
+
+  #first() {
+    return Math.floor(this.container.scrollTop / (ROW * this.#scale()));
+  }
+
+  #draw() {
+    const first = this.#first();
+    const last = Math.min(this.#starts.length, first + Math.ceil(this.container.clientHeight / ROW) + 2);
+    this.lines.style.transform = `translateY(${this.#scale() < 1 ? this.container.scrollTop : first * ROW}px)`;
+    const rows = [];
+    for (let line = first + 1; line <= last; line += 1) {
+      const row = element("div", line === this.#chosen ? "line chosen" : "line");
+      row.dataset.line = line;
+      row.append(element("i", "", `${line}`), this.text(line));
+      rows.push(row);
+    }
+    this.lines.replaceChildren(...rows);
+  }
+}

@@ -1,0 +1,130 @@
+/* What if the feed, the tolerance or a limit of an axis were another: sliders that have the program planned again. */
+
+import { duration, shown } from "../numbers.js";
+import { element } from "../parts.js";
+import { planned } from "./job.js";
+import { LIMITS, axesOf, scaled } from "./machine_text.js";
+
+const PAUSE = 250; // [ms] after the last change
+
+/* From the place of a slider to its value: 0 is as planned. Factors go from a quarter to four times. */
+const factorAt = (place) => 2 ** (place / 50);
+const SLIDERS = {
+  feed: { label: "Feed override", shown: (place) => `${shown(100 * factorAt(place), 3)} %` },
+  tolerance: { label: "Tolerance", shown: (place, what) => (place === 0 ? "as planned" : `${shown(what.tolerance * factorAt(2 * place), 2)} mm`) },
+  limit: { label: "Limit of", shown: (place) => `${shown(100 * factorAt(place), 3)} %` },
+};
+
+export class WhatIf {
+  #base = null;
+  #wait = 0;
+  #stop = null;
+
+  /* `onPlan(plan, words)` is told each new plan, null where all is as planned. */
+  constructor(container, onPlan) {
+    Object.assign(this, { onPlan });
+    this.sliders = {};
+    for (const [name, { label }] of Object.entries(SLIDERS)) {
+      const row = container.appendChild(element("label", "slider"));
+      const head = row.appendChild(element("span", "", label));
+      if (name === "limit") this.limit = head.appendChild(element("select"));
+      const value = row.appendChild(element("output"));
+      const input = row.appendChild(element("input"));
+      Object.assign(input, { type: "range", min: -100, max: 100, value: 0, step: 1, name });
+      input.addEventListener("input", () => this.#changed());
+      input.addEventListener("dblclick", () => this.#set(name, 0));
+      this.sliders[name] = { input, value };
+    }
+    this.limit.ariaLabel = "Limit of an axis";
+    this.limit.addEventListener("change", () => this.#changed());
+    const foot = container.appendChild(element("div", "foot"));
+    this.told = foot.appendChild(element("output", "told"));
+    this.back = foot.appendChild(element("button", "", "as planned"));
+    this.back.type = "button";
+    this.back.addEventListener("click", () => this.reset());
+  }
+
+  /* Starts from a plan. */
+  show(plan) {
+    this.#base = plan;
+    this.tolerance = plan.order.options.tolerance ?? plan.summary.tolerance?.greatest ?? 0.01;
+    const options = axesOf(plan.order.machine).flatMap((axis) => Object.entries(LIMITS).filter(([key]) => axis[key]).map(([key, name]) => {
+      const option = element("option", "", `${axis.name} ${name}`);
+      option.value = `${axis.name} ${key}`;
+      return option;
+    }));
+    const chosen = this.limit.value;
+    this.limit.replaceChildren(...options);
+    if (options.some((option) => option.value === chosen)) this.limit.value = chosen;
+    this.quiet();
+  }
+
+  reset() {
+    this.quiet();
+    this.onPlan(null);
+  }
+
+  /* All sliders as planned. */
+  quiet() {
+    this.#stop?.abort();
+    clearTimeout(this.#wait);
+    for (const { input } of Object.values(this.sliders)) input.value = 0;
+    this.told.textContent = "Move a slider: the program is planned again at once.";
+    this.#tell();
+  }
+
+  #set(name, place) {
+    this.sliders[name].input.value = place;
+    this.#changed();
+  }
+
+  #tell() {
+    for (const [name, { input, value }] of Object.entries(this.sliders)) value.textContent = SLIDERS[name].shown(Number(input.value), this);
+    this.back.disabled = Object.values(this.sliders).every(({ input }) => Number(input.value) === 0);
+  }
+
+  #changed() {
+    this.#tell();
+    if (!this.#base) return;
+    if (this.back.disabled) return this.reset();
+    clearTimeout(this.#wait);
+    this.#wait = setTimeout(() => this.#plan(), PAUSE);
+  }
+
+  async #plan() {
+    this.#stop?.abort();
+    const stop = (this.#stop = new AbortController());
+    this.told.textContent = "planning …";
+    try {
+      const { order, words } = this.#order();
+      const plan = await planned(order, { signal: stop.signal, onProgress: (stage, done) => (this.told.textContent = `${stage} … ${Math.round(100 * done)} %`) });
+      if (stop.signal.aborted) return;
+      const before = this.#base.summary.time, after = plan.summary.time;
+      this.told.textContent = `${duration(after)}, ${after <= before ? "−" : "+"}${shown((100 * Math.abs(after - before)) / before, 3)} %${plan.summary.audit.ok ? "" : " — audit FAILED"}`;
+      this.onPlan(plan, words);
+    } catch (error) {
+      if (!stop.signal.aborted) this.told.textContent = error.message;
+    }
+  }
+
+  #order() {
+    const { order } = this.#base;
+    const place = (name) => Number(this.sliders[name].input.value);
+    const options = { ...order.options }, words = [];
+    let { machine } = order;
+    if (place("feed")) {
+      options.feed_override = (options.feed_override ?? 1) * factorAt(place("feed"));
+      words.push(`feed ${SLIDERS.feed.shown(place("feed"))}`);
+    }
+    if (place("tolerance")) {
+      options.tolerance = Number((this.tolerance * factorAt(2 * place("tolerance"))).toPrecision(3));
+      words.push(`tolerance ${SLIDERS.tolerance.shown(place("tolerance"), this)}`);
+    }
+    if (place("limit")) {
+      const [axis, key] = this.limit.value.split(" ");
+      machine = scaled(machine, axis, key, factorAt(place("limit")));
+      words.push(`${axis} ${LIMITS[key]} ${SLIDERS.limit.shown(place("limit"))}`);
+    }
+    return { order: { ...order, machine, options }, words: words.join(", ") };
+  }
+}

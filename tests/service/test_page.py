@@ -1,0 +1,180 @@
+"""The page of the service in a browser: drop, progress, drawing, cursor, comparison, what-if and downloads.
+
+Pictures go into the folder that FEEDPLAN_PICTURES names, of the program that FEEDPLAN_PROGRAM names.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from feedplan.outputs import npz
+from feedplan.report.page import missing_pictures
+from tests.report.drawn import unpacked
+from tests.service.servers import Server, running
+
+ROOT = Path(__file__).parents[2]
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+PROGRAM = Path(os.environ.get("FEEDPLAN_PROGRAM", ROOT / "examples" / "part.ngc"))
+TOKEN = "t" * 40
+
+
+def _missing() -> str:
+    if missing_pictures():
+        return "the drawing code is not built: make page"
+    if CHROMIUM is None:
+        return "chromium is missing: apt-get install chromium"
+    if not (ROOT / "page" / "node_modules" / "playwright-core").is_dir():
+        return "playwright-core is missing: npm ci in the folder page"
+    return ""
+
+
+in_a_browser = pytest.mark.skipif(bool(_missing()), reason=_missing())
+
+
+def _with_token(folder: Path) -> tuple[str, str]:
+    """The options of a server with a token."""
+    file = folder / "token"
+    file.write_text(TOKEN, encoding="ascii")
+    return "--token-file", str(file)
+
+
+def _used(address: str, program: Path, folder: Path, *token: str) -> dict[str, Any]:
+    """What the page's user has seen."""
+    command = ["node", str(ROOT / "page" / "test" / "page.mjs"), address, str(program), str(folder), *token]
+    done = subprocess.run(
+        command, env={**os.environ, "CHROMIUM": str(CHROMIUM)}, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    facts: dict[str, Any] = json.loads((folder / "facts.json").read_text("utf-8"))
+    return facts
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    given = os.environ.get("FEEDPLAN_PICTURES")
+    place = Path(given).resolve() if given else tmp_path_factory.mktemp("page")
+    place.mkdir(parents=True, exist_ok=True)
+    return place
+
+
+@pytest.fixture(scope="module")
+def facts(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    place = tmp_path_factory.mktemp("store")
+    with running(place / "jobs", "--workers", "2", *_with_token(place), token=TOKEN) as server:
+        return {**_used(server.url, PROGRAM, folder, TOKEN), "address": server.url}
+
+
+@in_a_browser
+def test_it_asks_for_the_token_once_sends_it_as_a_header_and_asks_no_other_place(
+    facts: dict[str, Any],
+) -> None:
+    assert facts["errors"] == [] or all("401" in error for error in facts["errors"])
+    assert facts["machines"] > 10
+    addresses = [one for one in facts["requests"] if not one["url"].startswith(("data:", "blob:"))]
+    assert all(one["url"].startswith(facts["address"]) for one in addresses)
+    asked = [one for one in addresses if "/v1/" in one["url"]]
+    without = [one for one in asked if not one["hasToken"]]
+    assert len(asked) > 15
+    assert len(without) == 1
+
+
+@in_a_browser
+def test_a_dropped_program_is_planned_with_progress_and_drawn(facts: dict[str, Any]) -> None:
+    assert {"read", "plan", "audit", "write"} & set(facts["stages"])
+    assert "passed" in facts["figures"]
+    assert facts["path"]["count"] > 2000
+    assert facts["path"]["colours"] > 5
+
+
+@in_a_browser
+def test_colours_tell_feed_active_limit_and_time_lost(facts: dict[str, Any]) -> None:
+    assert "mm/s" in facts["feed"]["legend"]
+    assert "acceleration" in facts["active"]["legend"]
+    assert "of the time there" in facts["lost"]["legend"]
+    assert all(facts[mode]["count"] > 1000 for mode in ("feed", "active", "lost"))
+
+
+@in_a_browser
+def test_the_cursor_is_in_chart_path_and_source(facts: dict[str, Any]) -> None:
+    lines = PROGRAM.read_text("ascii").splitlines()
+    for seen in (facts["pointed"], facts["slowest"]):
+        number = int(seen["line"])
+        assert seen["told"].startswith(f"line {number} ") or seen is facts["slowest"]
+        assert seen["text"].startswith(f"{number}{lines[number - 1]}"[:40])
+    assert facts["slowest"]["row"].startswith(facts["slowest"]["line"])
+    assert "mm/s" in facts["axesTold"]
+    assert facts["found"]["tip"].startswith("line ")
+    assert facts["found"]["told"].startswith("line ")
+
+
+@in_a_browser
+def test_dragging_zooms_and_a_double_click_goes_back(facts: dict[str, Any]) -> None:
+    assert facts["zooms"]
+    assert facts["zoomsBack"]
+
+
+@in_a_browser
+def test_it_plays_and_stops_by_a_key(facts: dict[str, Any]) -> None:
+    one, other = facts["clock"]
+    assert one == other
+    assert not one.startswith("0:00.")
+
+
+@in_a_browser
+def test_the_controller_of_today_is_drawn_beside_the_optimum(facts: dict[str, Any]) -> None:
+    assert facts["today"]["name"].partition(" · ")[2].startswith("junction deviation")
+    assert "junction deviation" in facts["today"]["figures"]
+    assert facts["today"]["path"]["count"] > 1000
+    assert facts["today"]["first"]["count"] > 1000
+
+
+@in_a_browser
+def test_a_slider_plans_again_at_once_and_back(facts: dict[str, Any]) -> None:
+    assert "\N{MINUS SIGN}" in facts["whatIf"]["told"]
+    assert "feed 174 %" in facts["whatIf"]["figures"]
+    assert "feed 174 %" in facts["whatIf"]["legend"]
+    assert facts["asPlanned"]
+
+
+@in_a_browser
+def test_what_is_downloaded_is_whole(facts: dict[str, Any], folder: Path) -> None:
+    stem = PROGRAM.stem
+    assert facts["downloads"] == [f"{stem}-setpoints.npz", f"{stem}-report.html", PROGRAM.name]
+    assert len(npz.load(folder / facts["downloads"][0])) > 1000
+    assert "Audit passed" in (folder / facts["downloads"][1]).read_text("utf-8")
+    assert (folder / facts["downloads"][2]).read_bytes() == PROGRAM.read_bytes()
+
+
+@in_a_browser
+def test_it_fits_a_tablet(facts: dict[str, Any]) -> None:
+    assert facts["tooWide"] <= 0
+
+
+def test_the_page_needs_no_token_and_allows_no_other_place(tmp_path: Path) -> None:
+    with running(tmp_path / "store", *_with_token(tmp_path)) as server:
+        for address, kind in (("/", "text/html"), ("/page.js", "text/javascript"), ("/page.css", "text/css")):
+            if missing_pictures() and address != "/":
+                continue
+            answer = server.get(address)
+            assert (answer.status, answer.headers["content-type"].split(";")[0]) == (200, kind)
+        assert server.get("/docs").status == 401
+        if not missing_pictures():
+            policy = server.get("/").headers["content-security-policy"]
+            assert "default-src 'none'" in policy
+            assert "connect-src 'self'" in policy
+
+
+def test_what_is_drawn_comes_as_bytes(server: Server) -> None:
+    job = server.planned()
+    data = unpacked(server.get(f"/v1/jobs/{job['id']}/drawing").content)
+    assert data["axes"] == ["X", "Y", "Z"]
+    assert data["path"]["time"][-1] == pytest.approx(job["result"]["time"], abs=0.01)
+    assert data["path"]["length"][-1] == pytest.approx(data["length"]["speed"]["x"][-1], rel=1e-3)
+    assert set(data["path"]["line"]) == {3, 4, 5}
