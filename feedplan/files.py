@@ -12,7 +12,7 @@ from numbers import Real
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
-from feedplan.arguments import callback, file_path, list_of_names, refuse
+from feedplan.arguments import callback, file_path, flag, list_of_names, refuse
 from feedplan.errors import InputError
 from feedplan.outputs import KNOTS, SETPOINTS, FormatName, Header, files_in, format_named
 from feedplan.outputs._staging import require_folder, staged
@@ -76,6 +76,8 @@ def write_plan(
             raise InputError(f"{name} and {other} are both {output.FILE}: ask for one of them")
     if program is not None and not isinstance(program, PlannedProgram):
         raise refuse("the program", program, "what feedplan.planned_program returns")
+    flag(drawing, "the drawing")
+    steps = _steps(one_step_more)
     knots = _knots(plan, [name for name, output in outputs.items() if output.ROWS == KNOTS], step)
     audit = plan.audit(progress)
     share = of_stage(progress, "write")
@@ -105,8 +107,8 @@ def write_plan(
         if program is not None:
             (stage / PROGRAM_FILE).write_bytes(program.content)
             summary["planned_program"] = {"file": PROGRAM_FILE, **program.to_json()}
-        if one_step_more:
-            summary["one_step_more"] = [more.to_json() for more in one_step_more]
+        if steps:
+            summary["one_step_more"] = [more.to_json() for more in steps]
         if knots is not None:
             summary[KNOTS] = {"count": knots.count, "step": knots.step}
             header = Header(knots.axes, units, knots.step, plan.events)
@@ -208,6 +210,14 @@ def _folder(given: str | os.PathLike[str]) -> FilePath:
     folder = file_path(given, "the folder", "the path of a folder, as a text or a pathlib.Path")
     require_folder(folder)
     return folder
+
+
+def _steps(given: Sequence[Step]) -> tuple[Step, ...]:
+    from feedplan.one_step_more import Step
+
+    if isinstance(given, (list, tuple)) and all(isinstance(step, Step) for step in given):
+        return tuple(given)
+    raise refuse("one_step_more", given, "what feedplan.one_step_more.one_step_more returns")
 
 
 def _timed(chunks: Iterator[SetpointChunk], compute: dict[str, float]) -> Iterator[SetpointChunk]:

@@ -21,6 +21,7 @@ from feedplan.geometry.build import FitSettings
 from feedplan.geometry.corners import Corners
 from feedplan.machine import kinematics
 from feedplan.machine.kinematics import register
+from feedplan.one_step_more import Step
 from feedplan.outputs import load_setpoints
 from feedplan.planners import options_of
 
@@ -153,6 +154,8 @@ def cases(tmp_path: FilePath) -> dict[str, tuple[Callable[..., Any], dict[str, A
                 "formats": ("csv", "pvt"),
                 "step": 0.01,
                 "program": feedplan.planned_program(plan),
+                "drawing": True,
+                "one_step_more": (Step("feed", 1.2, 1.0, 0.5),),
                 "progress": None,
             },
         ),
