@@ -91,19 +91,26 @@ const chosen = () => page.evaluate(() => ({ told: document.getElementById("first
 facts.pointed = await chosen();
 facts.axesTold = await text("#axes .row:nth-child(2) .u-legend");
 
-// Dragging zooms, a double click goes back.
+// Dragging zooms, a double click goes back. The first picture is of a chart that was drawn anew, as the last one is.
 const drawn = () => page.evaluate(() => document.querySelector("#speed canvas").toDataURL());
-const whole = await drawn();
-await page.mouse.move(box.x + 0.4 * box.width, box.y + 60);
-await page.mouse.down();
-await page.mouse.move(box.x + 0.6 * box.width, box.y + 60, { steps: 4 });
-await page.mouse.up();
-await settled();
-const near = await drawn();
-await chart.dblclick();
-await settled();
+const zoom = async () => {
+  await page.mouse.move(box.x + 0.4 * box.width, box.y + 60);
+  await page.mouse.down();
+  await page.mouse.move(box.x + 0.6 * box.width, box.y + 60, { steps: 4 });
+  await page.mouse.up();
+  await settled();
+  return drawn();
+};
+const back = async () => {
+  await chart.dblclick();
+  await settled();
+  return drawn();
+};
+await zoom();
+const whole = await back();
+const near = await zoom();
 facts.zooms = near !== whole;
-facts.zoomsBack = (await drawn()) === whole;
+facts.zoomsBack = (await back()) === whole;
 await page.locator("#slow .go").first().click();
 facts.slowest = { ...(await chosen()), row: await text("#slow .go >> nth=0") };
 const scene = page.locator("#path .scene");
