@@ -146,7 +146,8 @@ def read_dxf(content: bytes, name: str = "drawing.dxf") -> Program:
             skipped["on layers that are off or frozen"] += 1
             continue
         try:
-            segments = _segments(entity, scale)
+            with np.errstate(all="ignore"):  # the reach of what is not finite is refused below
+                segments = _segments(entity, scale)
         except (_UnsupportedError, InputError, *_DAMAGED) as error:
             skipped[f"{entity.dxftype()} ({error})" if str(error) else str(entity.dxftype())] += 1
             continue

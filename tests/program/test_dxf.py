@@ -202,6 +202,8 @@ def test_what_is_no_drawing_is_one_sentence() -> None:
     with pytest.raises(ProgramError, match=r"part\.dxf entity 1 goes farther than 1e"):
         read(lambda space: space.add_line((0, 0), (2e6, 0)))
     # From far away, and on a circle that goes there between two near places.
+    with pytest.raises(ProgramError, match=r"part\.dxf entity 1 goes farther than 1e"):
+        read(lambda space: space.add_circle((0, 0), math.inf))
     for vertices in ([(1e30, 0), (0, 10, 0, 0, 0.5), (5, 5)], [(0, 0, 0, 0, 1e30), (0, 10)]):
         with pytest.raises(ProgramError, match=r"part\.dxf entity 1 goes farther than 1e"):
             read(lambda space, own=vertices: space.add_lwpolyline(own, format="xyseb"))
