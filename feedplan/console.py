@@ -11,7 +11,7 @@ from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 from feedplan.errors import LONGEST
-from feedplan.units import counted, duration_text, mm_per_min, ratio_text, tolerance_text
+from feedplan.units import counted, difference_text, duration_text, mm_per_min, ratio_text, tolerance_text
 
 if TYPE_CHECKING:
     from feedplan.audit import Audit, LimitCheck
@@ -157,9 +157,8 @@ def today_text(today: Mapping[str, Any], lower_bound: float | None = None) -> st
     A time below the path's bound is one that breaks limits, which is said.
     """
     time, saved = float(today["time"]), float(today["saved"])
-    part = 100.0 * abs(saved) / time if time > 0 else 0.0
     verb = "saves" if saved >= 0 else "takes longer by"
-    gain = f"the plan {verb} {duration_text(abs(saved))}, {part:.1f} %"
+    gain = f"the plan {verb} {difference_text(saved, time)}"
     text = f"{duration_text(time)} by {today['controller']}: {gain}"
     beyond = lower_bound is not None and time < lower_bound
     return f"{text} (no plan of this path within the limits is as fast)" if beyond else text

@@ -39,6 +39,16 @@ def duration_text(seconds: float) -> str:
     return f"{hours:.0f} h {minutes:02.0f} min {rest:02.0f} s"
 
 
+def difference_text(difference: float, of: float, word: str = "") -> str:
+    """`12.0 s, 7.0 %`: how far two times are apart [s] without its sign, and its part of a time [s].
+
+    A `word` such as `less` stands behind the seconds.
+    """
+    part = 100.0 * abs(difference) / of if of > 0.0 else 0.0
+    seconds = " ".join(filter(None, (duration_text(abs(difference)), word)))
+    return f"{seconds}, {part:.1f} %"
+
+
 def tolerance_text(least: float, greatest: float) -> str:
     """`0.01 mm`, or the least and the greatest tolerance [mm] of a path that has several."""
     return f"{greatest:g} mm" if least == greatest else f"{least:g} to {greatest:g} mm"

@@ -52,17 +52,12 @@ def plan(
 def _part(problem: Problem) -> Array:
     """What each piece has of the acceleration along it: a half in the last segment before a stop."""
     path = problem.path
-    part = np.ones(len(path))
-    rapid = np.isinf(path.feed)
-    for end, begin in zip(path.runs[1:] - 1, [*path.runs[1:-1], None], strict=True):
-        exact = path.tolerance[end] == 0.0
-        if exact or (begin is not None and rapid[begin] != rapid[end]):
-            continue
-        piece = end
-        while piece >= 0 and (path.move[piece] == path.move[end]).all():
-            part[piece] = 0.5
-            piece -= 1
-    return part
+    last, rapid = path.runs[1:] - 1, np.isinf(path.feed)
+    overlaps = path.tolerance[last] != 0.0
+    overlaps[:-1] &= rapid[last[:-1]] == rapid[path.runs[1:-1]]
+    # Pieces of the same moves are one segment.
+    segment = np.cumsum((np.diff(path.move, axis=0, prepend=path.move[:1]) != 0).any(axis=1))
+    return np.where(np.isin(segment, segment[last[overlaps]]), 0.5, 1.0)
 
 
 def on_arcs(tangent: Array, normal: Array, limits: Array, radius: Array, speed: Array) -> tuple[Array, Array]:

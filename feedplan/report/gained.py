@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
-from feedplan.units import counted, duration_text
+from feedplan.units import counted, difference_text, duration_text
 
 Rows = Sequence[tuple[str, str, float | None]]
 
@@ -37,12 +37,11 @@ def _today_note(summary: Mapping[str, Any]) -> str:
 
 def _today_rows(today: Mapping[str, Any], time: float) -> Rows:
     before, saved = float(today["time"]), float(today["saved"])
-    part = 100.0 * abs(saved) / before if before > 0.0 else 0.0
     verb = "Saved" if saved >= 0.0 else "Longer by"
     return [
         (f"Today, by {today['controller']}", duration_text(before), before),
         ("By the plan", duration_text(time), time),
-        (verb, f"{duration_text(abs(saved))}, {part:.1f} %", abs(saved)),
+        (verb, difference_text(saved, before), abs(saved)),
     ]
 
 
@@ -50,8 +49,7 @@ def _step_rows(steps: Sequence[Mapping[str, Any]], time: float) -> Rows:
     rows = []
     for step in steps:
         saved = float(step["saved"])
-        part = 100.0 * abs(saved) / time if time > 0.0 else 0.0
-        text = f"{duration_text(abs(saved))} {'less' if saved >= 0.0 else 'more'}, {part:.1f} %"
+        text = difference_text(saved, time, "less" if saved >= 0.0 else "more")
         rows.append((f"{step['limit']} × {step['factor']:g}", text, abs(saved)))
     return rows
 

@@ -2,6 +2,7 @@
 
 import { greatest } from "./curve.js";
 import { shown } from "./numbers.js";
+import { choice } from "./parts.js";
 import { Plot } from "./plot.js";
 import { axisColour, style } from "./theme.js";
 
@@ -30,10 +31,15 @@ export class AxesPlot {
     this.show();
   }
 
-  /* In units, or in parts of the limits. */
-  scale(relative) {
-    this.relative = relative;
-    this.show();
+  /* Buttons for units, and for parts of the limits. */
+  scaling() {
+    const buttons = choice({ units: "units", parts: "% of limit" }, "Scale", (name) => {
+      this.relative = name === "parts";
+      this.show();
+      buttons.press(name);
+    });
+    buttons.press("units");
+    return buttons.box;
   }
 
   show() {

@@ -2,7 +2,6 @@
 
 import { AxesPlot } from "./axes_plot.js";
 import { Cursor } from "./cursor.js";
-import { choice } from "./parts.js";
 import { PathView } from "./path_view.js";
 import { Run } from "./run.js";
 import { SpeedPlot } from "./speed_plot.js";
@@ -18,12 +17,7 @@ export function report(data) {
   const speed = new SpeedPlot(at("length"), data, run, cursor);
   const axes = new AxesPlot(at("time"), data, run, cursor);
   const parts = [speed, axes];
-  const scaling = choice({ units: "units", parts: "% of limit" }, "Scale", (name) => {
-    axes.scale(name === "parts");
-    scaling.press(name);
-  });
-  scaling.press("units");
-  at("time-tools").append(scaling.box);
+  at("time-tools").append(axes.scaling());
   // Use of the limits, where the method keeps them all.
   if (data.judged.includes("jerk") && data.limits.jerk.some(Boolean)) {
     at("use-section").hidden = false;

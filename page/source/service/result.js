@@ -3,7 +3,7 @@
 import { AxesPlot } from "../axes_plot.js";
 import { Cursor } from "../cursor.js";
 import { duration, shown } from "../numbers.js";
-import { choice, element } from "../parts.js";
+import { element } from "../parts.js";
 import { PathView } from "../path_view.js";
 import { SpeedPlot } from "../speed_plot.js";
 import { onTheme } from "../theme.js";
@@ -48,12 +48,7 @@ export class Result {
     this.player.show(run.duration);
     this.speed = new SpeedPlot(at("speed"), data, run, this.cursor);
     this.axes = new AxesPlot(at("axes"), data, run, this.cursor);
-    const scaling = choice({ units: "units", parts: "% of limit" }, "Scale", (name) => {
-      this.axes.scale(name === "parts");
-      scaling.press(name);
-    });
-    scaling.press("units");
-    at("axes-tools").replaceChildren(scaling.box);
+    at("axes-tools").replaceChildren(this.axes.scaling());
     this.#slow();
     this.#figures();
     this.source.show(plan.order.program);
