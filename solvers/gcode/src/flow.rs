@@ -82,8 +82,16 @@ pub struct Flow {
     pub steps: Vec<Step>,
     /// Steps where subroutines begin, by label.
     subs: HashMap<Vec<u8>, usize>,
+    numbered: OnceCell<Numbered>,
+}
+
+/// What GOTO looks for.
+#[derive(Debug)]
+struct Numbered {
     /// Lines with block numbers, in order of these: the number, where the line begins, and the number of the line before.
-    numbered: OnceCell<Vec<(i64, usize, u32)>>,
+    lines: Vec<(i64, usize, u32)>,
+    /// Where programs begin by their O number.
+    programs: Vec<usize>,
 }
 
 impl Flow {
@@ -119,13 +127,23 @@ impl Flow {
     /// Where the line with a block number begins, and the number of the line before: the next one behind a place in the
     /// program of that place, from its O number to the next, else the first one there.
     pub fn numbered(&self, source: &[u8], number: i64, from: usize) -> Option<(usize, u32)> {
-        let lines = self.numbered.get_or_init(|| numbered_lines(source));
-        let programs = || self.steps.iter().filter(|step| step.kind == Kind::Number).map(|step| step.at);
-        let first = programs().take_while(|&at| at < from).last().unwrap_or(0);
-        let end = programs().find(|&at| at >= from).unwrap_or(source.len());
-        let start = lines.partition_point(|&(known, at, _)| (known, at) < (number, first));
-        let found = lines[start..].iter().take_while(|&&(known, at, _)| known == number && at < end);
-        let (_, at, line) = found.clone().find(|(_, at, _)| *at >= from).or(found.into_iter().next())?;
+        let Numbered { lines, programs } = self.numbered.get_or_init(|| Numbered {
+            lines: numbered_lines(source),
+            programs: self
+                .steps
+                .iter()
+                .filter(|step| step.kind == Kind::Number)
+                .map(|step| step.at)
+                .collect(),
+        });
+        let next = programs.partition_point(|&at| at < from);
+        let first = next.checked_sub(1).map_or(0, |before| programs[before]);
+        let end = programs.get(next).copied().unwrap_or(source.len());
+        let first_from = |place: usize| {
+            let next = lines.partition_point(|&(known, at, _)| (known, at) < (number, place));
+            lines.get(next).filter(|(known, at, _)| *known == number && *at < end)
+        };
+        let (_, at, line) = first_from(from).or_else(|| first_from(first))?;
         Some((*at, *line))
     }
 
