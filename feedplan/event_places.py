@@ -8,17 +8,16 @@ the place of it that is nearest to the programmed point.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
-from feedplan.constraints.problem import Problem
+from feedplan._solvers import Sampler
 from feedplan.events import PlacedEvents, TimedEvents
 from feedplan.geometry.path import Path
-from feedplan.lazy import cached_property
-from feedplan.profile import SpeedProfile
 from feedplan.program.actions import actions
 from feedplan.program.program import Program
-from feedplan.setpoints import sampler
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -32,25 +31,22 @@ _AT_ONCE = 100_000
 
 
 class PlannedEvents:
-    """The events of a plan, placed on its path when they are first asked for."""
+    """The events of a program on the path of its plan."""
 
-    def __init__(self, program: Program, problem: Problem, profile: SpeedProfile) -> None:
-        self._plan = (program, problem, profile)
+    def __init__(self, program: Program, path: Path) -> None:
+        self._program, self._path = program, path
+        self._placed: list[PlacedEvents] = []
 
-    @cached_property
-    def placed(self) -> PlacedEvents:
-        """By the runs of the path."""
-        return place_events(*self._plan)
-
-    def on(self, starts: Floats) -> TimedEvents:
-        """See `PlacedEvents.on`."""
-        return self.placed.on(starts)
+    def placed(self, motion: Callable[[], Sampler]) -> PlacedEvents:
+        """By the runs of the path, found once; `motion` reads the plan's motion, whatever its period is."""
+        if not self._placed:
+            self._placed.append(place_events(self._program, self._path, motion()))
+        return self._placed[0]
 
 
-def place_events(program: Program, problem: Problem, profile: SpeedProfile) -> PlacedEvents:
-    """The events of a program on the path of a problem, by the profile planned for it."""
-    path, events = problem.path, program.events
-    motion = sampler(problem, profile, problem.period)
+def place_events(program: Program, path: Path, motion: Sampler) -> PlacedEvents:
+    """The events of a program on the path that follows it, by a reader of the motion planned for it."""
+    events = program.events
     starts, _, times = motion.runs.T
     moves, of_move = np.unique(events.move, return_inverse=True)
     run, piece, u = _places(program, path, moves)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan._solvers import Sampler
 from feedplan.program.actions import KINDS
 from feedplan.units import counted
 
@@ -95,9 +96,9 @@ class TimedEvents:
 
 
 class Events(Protocol):
-    """Events that know where they are in the runs of a plan."""
+    """Events of a plan, placed in its runs by a reader of its motion."""
 
-    def on(self, starts: NDArray[np.float64]) -> TimedEvents: ...
+    def placed(self, motion: Callable[[], Sampler]) -> PlacedEvents: ...
 
 
 @dataclass(frozen=True, eq=False, repr=False)

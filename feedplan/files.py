@@ -92,6 +92,7 @@ def write_plan(
     marks = [check.time for check in audit.broken]
     points = MANY_POINTS if drawing else POINTS
     figures = SetpointFigures(plan.problem, account.motion, setpoints.count, marks, points)
+    tell(report, 0.0)
     with staged(folder, last=SUMMARY_FILE) as stage:
         with ExitStack() as stack:
             sinks = [

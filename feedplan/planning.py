@@ -22,7 +22,7 @@ from feedplan.bound import lower_bound
 from feedplan.constraints.problem import Problem, build_problem, speed_square
 from feedplan.errors import InputError, SolverError
 from feedplan.event_places import PlannedEvents
-from feedplan.events import TimedEvents
+from feedplan.events import PlacedEvents, TimedEvents
 from feedplan.geometry.build import build_path
 from feedplan.geometry.corners import PATHS, Corners, FollowedPath
 from feedplan.geometry.path import Path
@@ -170,7 +170,7 @@ class Plan:
 
     @cached_property
     def _events(self) -> PlannedEvents | None:
-        return None if self.program is None else PlannedEvents(self.program, self.problem, self.profile)
+        return None if self.program is None else PlannedEvents(self.program, self.path)
 
     @cached_property
     def events(self) -> TimedEvents:
@@ -180,7 +180,11 @@ class Plan:
         the table, with which of them stop the tool. What does not happens as the path passes the end of the
         move before it.
         """
-        return TimedEvents.none() if self._events is None else self._events.placed.timed()
+        return TimedEvents.none() if self._placed is None else self._placed.timed()
+
+    @property
+    def _placed(self) -> PlacedEvents | None:
+        return None if self._events is None else self._events.placed(lambda: self.trajectory.sampler)
 
     @cached_property
     def trajectory(self) -> Trajectory:
@@ -244,7 +248,7 @@ class Plan:
         """
         fit, program, verdict = self.path.fit, self.program, self.audit()
         [(count, duration, starts)] = self._laid_out
-        of_setpoints = self._events.on(starts) if self._events else TimedEvents.none()
+        of_setpoints = TimedEvents.none() if self._placed is None else self._placed.on(starts)
         machine_file = self.machine.to_toml()
         return {
             "format": FORMAT,

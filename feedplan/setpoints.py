@@ -118,7 +118,9 @@ class Setpoints:
         An event at a stop comes before the wait for a whole period: the first setpoint at or after its time
         rests in the place of the stop, both to rounding.
         """
-        return self._events.on(self.run_starts) if self._events else TimedEvents.none()
+        if self._events is None:
+            return TimedEvents.none()
+        return self._events.placed(lambda: self._sampler).on(self.run_starts)
 
     @property
     def run_starts(self) -> NDArray[np.float64]:

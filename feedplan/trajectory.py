@@ -39,7 +39,7 @@ class Trajectory:
 
     def __init__(self, problem: Problem, profile: SpeedProfile) -> None:
         self._problem, self._profile = problem, profile
-        self._sampler = sampler(problem, profile, problem.period)
+        self.sampler = sampler(problem, profile, problem.period)
         self.axes, self.unit = problem.axes, problem.unit
         self.duration = profile.time + problem.path.pauses
 
@@ -66,7 +66,7 @@ class Trajectory:
         Raises InputError for a time that is not within the plan.
         """
         times = within(t, "time", self.duration, "s")
-        _, position, velocity, acceleration, jerk, line, piece, *_ = self._sampler.at(np.atleast_1d(times))
+        _, position, velocity, acceleration, jerk, line, piece, *_ = self.sampler.at(np.atleast_1d(times))
         if self._problem.joint_origin is not None:
             position += self._problem.joint_origin[piece]
         row = 0 if times.ndim == 0 else slice(None)
@@ -75,7 +75,7 @@ class Trajectory:
     def distance(self, t: ArrayLike) -> Array:
         """s(t): the length of the way [mm] at one time or at times (n,) [s]. Raises as `at`."""
         times = within(t, "time", self.duration, "s")
-        piece, u = self._sampler.at(np.atleast_1d(times))[6:8]
+        piece, u = self.sampler.at(np.atleast_1d(times))[6:8]
         return self._lengths.length(piece, u).reshape(times.shape)
 
     def time(self, s: ArrayLike) -> Array:
@@ -84,13 +84,13 @@ class Trajectory:
         Raises InputError for a length that is not on the path."""
         lengths = within(s, "length", self.length, self._problem.unit)
         places = self._lengths.locate(np.atleast_1d(lengths))
-        return self._sampler.along(places.piece, places.u)[0].reshape(lengths.shape)
+        return self.sampler.along(places.piece, places.u)[0].reshape(lengths.shape)
 
     def speed(self, s: ArrayLike) -> Array:
         """v(s): the speed of the tool [mm/s] at one length or at lengths (n,) [mm]. Raises as `time`."""
         lengths = within(s, "length", self.length, self._problem.unit)
         places = self._lengths.locate(np.atleast_1d(lengths))
-        velocity = self._sampler.along(places.piece, places.u)[2]
+        velocity = self.sampler.along(places.piece, places.u)[2]
         speed = np.linalg.norm(velocity, axis=1)
         if self._problem.joints is not None:
             # The joints' speed by that of the parameter, and so the tool's.

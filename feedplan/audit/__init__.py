@@ -32,6 +32,8 @@ __all__ = ["PASS_MARK", "Audit", "LimitCheck", "audit", "audit_setpoints"]
 
 # Share of the audit's time that path and profile take where setpoints follow, for the progress shown.
 PLAN_SHARE = 0.25
+# How far it is when the feeds of the blocks are known.
+FEED_SHARE = 0.004
 # How far the audit of setpoints from files is before what is recorded of them is compared.
 RECORDED_SHARE = 0.8
 
@@ -141,9 +143,10 @@ def _audit_axes(
 ) -> Results:
     """Where the path's axes are the joints."""
     plan_limits = replace(limits, period=float(problem.period))
-    feed = feed_limits(problem, program)
-    report(0.0)
-    whole = part(report, 0.0, 1.0 if setpoints is None else PLAN_SHARE)
+    end = 1.0 if setpoints is None else PLAN_SHARE
+    feed = feed_limits(problem, program, part(report, 0.0, FEED_SHARE))
+    report(FEED_SHARE)
+    whole = part(report, FEED_SHARE, end)
     results = [audit_plan(problem, plan_limits, feed, profile, program, whole)]
     if setpoints is not None:
         report(PLAN_SHARE)

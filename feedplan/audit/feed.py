@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
 from feedplan.program.program import Program
+from feedplan.progress import Listener, tell
 
 # X, Y, Z; U, V, W; the other axes; all together, where no program says more.
 _LETTERS = (("X", "Y", "Z"), ("U", "V", "W"))
@@ -29,11 +30,13 @@ def feed_axes(names: tuple[str, ...]) -> list[list[float]]:
     ]
 
 
-def feed_limits(problem: Problem, program: Program | None) -> NDArray[np.float64]:
+def feed_limits(
+    problem: Problem, program: Program | None, progress: Listener | None = None
+) -> NDArray[np.float64]:
     """The greatest of each speed on each piece (n, 4) [mm/s, deg/s]; infinite where it is not limited.
 
     Without a program the numbers are the problem's: along the axes that the piece moves if the problem counts
-    axes by shares, else in all axes together.
+    axes by shares, else in all axes together. `progress` is told when it is half done.
     """
     path = problem.path
     # Speed by speed, (4, n): much faster than four numbers for each of many pieces.
@@ -47,6 +50,7 @@ def feed_limits(problem: Problem, program: Program | None) -> NDArray[np.float64
         # The blocks before and after that move anything; beyond the last one stands for none.
         leads = np.append(np.flatnonzero(goes), len(program))
         count = np.concatenate([[0], np.cumsum(goes)])
+        tell(progress, 0.5)
         before, after = leads[count[first] - 1], leads[count[last + 1]]
         feeds, led = problem.request.of(program.feed), np.zeros(len(program), dtype=np.bool_)
         for group in np.flatnonzero(np.logical_or.reduce(moves, axis=1)):

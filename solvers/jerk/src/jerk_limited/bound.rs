@@ -57,6 +57,8 @@ pub fn certify<G: Geometry<M>, const M: usize>(
     let parts: Vec<Part> = cores
         .par_iter()
         .map(|core| {
+            // Windows that begin after the work was cancelled cost nothing.
+            effort.watch.check();
             let window = core.start.saturating_sub(HALO)..(core.end + HALO).min(count);
             let mut bounds = bounds;
             let x = &x[2 * window.start..2 * window.end + 2];
