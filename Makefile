@@ -66,7 +66,9 @@ campaign: $(VENV)/built $(PAGE)
 	$(BIN)/pip install --quiet schemathesis
 	FEEDPLAN_EXAMPLES=100 $(BIN)/pytest tests/service/test_documentation.py
 	cargo fuzz --version >/dev/null 2>&1 || cargo install --locked cargo-fuzz
-	cd solvers && cargo fuzz run --sanitizer none gcode -- -dict=fuzz/gcode.dict -max_total_time=300 -timeout=10 -max_len=4096
+	cd solvers && mkdir -p fuzz/corpus && tar -xf fuzz/corpus.tar.xz -C fuzz/corpus && \
+		cargo fuzz run --sanitizer none gcode -- -dict=fuzz/gcode.dict -max_total_time=300 -timeout=10 -max_len=4096 && \
+		cargo fuzz cmin --sanitizer none gcode && tar --sort=name --mtime=@0 -cJf fuzz/corpus.tar.xz -C fuzz/corpus gcode
 	for i in 1 2 3 4 5 6 7 8 9 10; do \
 		seed=$$(date +%s%N); echo "property tests of native code, PROPTEST_RNG_SEED=$$seed"; \
 		PROPTEST_RNG_SEED=$$seed PROPTEST_CASES=5000 cargo test --release --quiet --manifest-path solvers/Cargo.toml || exit 1; \

@@ -140,8 +140,8 @@ def main() -> None:
             time.sleep(0.05)
             simulator.pins["run"] = 0
             results.append(simulator.said)
-    except (RuntimeError, TimeoutError) as error:
-        failed = str(error)
+    except Exception as error:  # LinuxCNC's own are of no common type
+        failed = str(error) or type(error).__name__
     finally:
         simulator.recording = False
         simulator.recorder.join()

@@ -59,8 +59,10 @@ def check(plan: Plan) -> float:
     program, group = plan.program, leading(plan.program)
     speed, before, after = speeds(plan)
     most = np.zeros(3)
-    same = np.flatnonzero(before == after)
-    for row, piece in zip(speed[same], before[same].tolist(), strict=True):
+    same = before == after
+    pieces, starts = np.unique(before[same], return_index=True)
+    fastest = np.maximum.reduceat(speed[same], starts)
+    for row, piece in zip(fastest, pieces.tolist(), strict=True):
         own = np.arange(plan.path.move[piece, 0], plan.path.move[piece, 1] + 1)
         if np.isinf(program.feed[own]).any():
             continue

@@ -190,6 +190,8 @@ def test_what_cannot_be_read_names_the_word(block: str, words: str) -> None:
 
 def test_axis_words_need_a_motion_code() -> None:
     assert "word X1 has no motion code in force: give G0 or G1 before it" in str(error("X1\n"))
+    assert "word @5.3 has no motion code in force" in str(error("@5.30\n"))
+    assert "word ^45 has no motion code in force" in str(error("^45\n"))
 
 
 @pytest.mark.parametrize(

@@ -254,6 +254,13 @@ impl Block {
         format!("{}{}", letter as char, self.value(letter))
     }
 
+    /// The first polar word as a message names it.
+    pub fn polar_word(&self) -> String {
+        let [radius, angle] = [(b'@', self.radius), (b'^', self.angle)]
+            .map(|(sign, value)| value.map(|value| format!("{}{value}", sign as char)));
+        radius.or(angle).unwrap_or_default()
+    }
+
     /// Takes a G code in tenths; Err with what stands in its group already, None where it is in no group.
     #[inline(always)]
     pub fn set_code(&mut self, code: u16) -> Result<(), Option<u16>> {

@@ -64,8 +64,9 @@ fn motion_beside_others(
         // Fanuc's G60 goes to its place from one side.
         (None, None) if axes != 0 && block.code(Group::Once) == Some(600) => Ok(Some(0)),
         (None, _) if axes != 0 && modal == 800 => {
-            let letter = AXES.into_iter().find(|&letter| axes & bit(letter) != 0).unwrap_or(b'X');
-            fault(format!("word {} has no motion code in force: give G0 or G1 before it", block.word(letter)))
+            let word = AXES.into_iter().find(|&letter| block.has(letter)).map(|letter| block.word(letter));
+            let word = word.unwrap_or_else(|| block.polar_word());
+            fault(format!("word {word} has no motion code in force: give G0 or G1 before it"))
         }
         (None, _) if axes != 0 => Ok(Some(modal)),
         (None, _) if block.words & bits(b"IJK") != 0 && matches!(modal, 20 | 30) => Ok(Some(modal)),
