@@ -47,6 +47,13 @@ def test_machines_at_the_ends_of_their_ranges(method: str, name: str) -> None:
     assert found == []
 
 
+@pytest.mark.parametrize(("seed", "name"), [(13, "arcs"), (25, "short")])
+def test_accelerations_recorded_along_arcs_of_many_periods_have_the_digits_of_their_time(
+    seed: int, name: str
+) -> None:
+    assert faults(extreme_machine(seed), PROGRAMS[name], "s-curve") == ()
+
+
 # The last setpoint before a stop is some nanometres short of it, and the next run begins a period later.
 @pytest.mark.parametrize(
     ("velocity", "acceleration", "period"), [(1e7, 1e10, 0.05), (250.0, 2.5e6, 0.01), (0.01, 1e3, 10.0)]

@@ -48,7 +48,9 @@ impl<const M: usize> Jerks<'_, M> {
         let (arcs, limits) = (self.arcs, self.limits);
         let (start, duration) = (self.starts[i], arcs.duration[i]);
         let error = arcs.acceleration_error(i, motion.width_rounding());
-        tally.offer(Check::AccelerationContinuity, 0, error, self.negligible(), start, line);
+        // An error that builds up over the arc is that much jerk.
+        let negligible = self.negligible(duration);
+        tally.offer(Check::AccelerationContinuity, 0, error, negligible, start, line);
         let places = PLACES + ((duration / limits.period).min((MOST_PLACES - PLACES) as f64) as usize);
         for place in 0..=places {
             let y = place as f64 / places as f64;
@@ -75,7 +77,7 @@ impl<const M: usize> Jerks<'_, M> {
     pub fn rest(&self, i: usize, at_end: bool, line: i32, tally: &mut Tally<M>) {
         let a = self.arcs.end_acceleration(i, at_end).map_or(0.0, f64::abs);
         let time = self.starts[i] + if at_end { self.arcs.duration[i] } else { 0.0 };
-        tally.offer(Check::AccelerationContinuity, 0, a, self.negligible(), time, line);
+        tally.offer(Check::AccelerationContinuity, 0, a, self.negligible(0.0), time, line);
     }
 
     /// The step of the acceleration from arc `i` to arc `j`, the next one in its run.
@@ -86,7 +88,7 @@ impl<const M: usize> Jerks<'_, M> {
             return; // said of the arc itself
         };
         let change = (after - before).abs() - ROUNDINGS * EPS * (after.abs() + before.abs());
-        tally.offer(Check::AccelerationContinuity, 0, change, self.negligible(), time, line);
+        tally.offer(Check::AccelerationContinuity, 0, change, self.negligible(0.0), time, line);
         if let Some(step) = self.step(i, j) {
             for k in 0..self.limits.axes {
                 let limit = self.limits.jerk[k] * self.limits.period / MOST_SHOWN;
@@ -127,11 +129,11 @@ impl<const M: usize> Jerks<'_, M> {
         }))
     }
 
-    /// A jump of the acceleration that means nothing to any axis: in a servo period it adds no more than the pass mark
-    /// to the jerk.
-    pub fn negligible(&self) -> f64 {
+    /// A change of the acceleration over a time that means nothing to any axis: in that time, or in a servo period if that
+    /// is longer, it adds no more than the pass mark to the jerk.
+    pub fn negligible(&self, time: f64) -> f64 {
         let least = self.limits.jerk[..self.limits.axes].iter().fold(f64::INFINITY, |least, &j| least.min(j));
-        PASS_EXCESS * least * self.limits.period
+        PASS_EXCESS * least * time.max(self.limits.period)
     }
 }
 
