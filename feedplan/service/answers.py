@@ -113,14 +113,46 @@ class Axis(BaseModel):
     travel: list[float] | None
 
 
+class Parameter(BaseModel):
+    """A parameter of a controller: the `option` of the method that it becomes."""
+
+    option: str
+    default: float | None = Field(description="null: no limit")
+    unit: str
+
+
+class ControllerInfo(BaseModel):
+    """A controller that is modelled: the method that plans as it does, with options that are always the
+    same."""
+
+    name: str
+    method: str
+    options: dict[str, Any]
+    parameters: dict[str, Parameter]
+
+
+class Controllers(BaseModel):
+    """The controllers that are modelled."""
+
+    controllers: list[ControllerInfo]
+
+
+class OwnController(BaseModel):
+    """The controller in a machine file, with the parameters that are given there."""
+
+    name: str
+    parameters: dict[str, Any]
+
+
 class MachineInfo(BaseModel):
-    """A bundled machine."""
+    """A machine as it is understood: defaults, kinds and units are filled in."""
 
     name: str
     period: float
     chord_tolerance: float | None
     kinematics: str
     axes: list[Axis]
+    controller: OwnController | None = Field(description="What drives it today, where its file says so")
     file: str = Field(description="The text of its machine file (TOML)")
 
 

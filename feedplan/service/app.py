@@ -23,12 +23,13 @@ from starlette.requests import Request
 
 from feedplan import __version__, outputs, planners
 from feedplan.files import DRAWING_FILE, SUMMARY_FILE
+from feedplan.machine.controller import MODELS
 from feedplan.machine.machine import Machine, bundled_machines
 from feedplan.report.page import FILE as REPORT_FILE
 from feedplan.service import answers, events, exports, front, openapi, page, problems, uploads, views
 from feedplan.service.limits import Limits
 from feedplan.service.refusals import UNKNOWN, Refusal
-from feedplan.service.requests import order_of
+from feedplan.service.requests import MachineRequest, machine_of, order_of
 from feedplan.service.runner import Runner
 from feedplan.service.store import ENDED, Store
 
@@ -330,6 +331,18 @@ def _add_knowledge(app: FastAPI, service: Service) -> None:
     def machines() -> dict[str, Any]:
         return {"machines": [views.machine(Machine.load(name)) for name in bundled_machines()]}
 
+    @app.post(
+        "/v1/machines",
+        response_model=answers.MachineInfo,
+        tags=tags,
+        summary="What a machine file says, with other limits where these are given",
+        responses=openapi.problems(422),
+        openapi_extra=openapi.MACHINE,
+    )
+    def understood(asked: MachineRequest) -> dict[str, Any]:
+        """Nothing is kept; `file` of the answer is the text to plan with."""
+        return views.machine(machine_of(asked))
+
     @app.get(
         "/v1/machines/{name}",
         response_model=answers.MachineInfo,
@@ -341,6 +354,15 @@ def _add_knowledge(app: FastAPI, service: Service) -> None:
         if name not in bundled_machines():
             raise Refusal(UNKNOWN, f"there is no such machine: use one of {', '.join(bundled_machines())}")
         return views.machine(Machine.load(name))
+
+    @app.get(
+        "/v1/controllers",
+        response_model=answers.Controllers,
+        tags=tags,
+        summary="The controllers of today that are modelled",
+    )
+    def controllers() -> dict[str, Any]:
+        return {"controllers": [views.controller(name, model) for name, model in MODELS.items()]}
 
     @app.get("/v1/methods", response_model=answers.Methods, tags=tags, summary="The planning methods")
     def methods() -> dict[str, Any]:

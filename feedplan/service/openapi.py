@@ -78,6 +78,18 @@ SUBMISSION: dict[str, Any] = {
     }
 }
 
+MACHINE: dict[str, Any] = {
+    "requestBody": {
+        "content": {
+            "application/json": {
+                "examples": {
+                    "a limit": {"value": {"machine": "mill", "limits": {"X": {"max_velocity": 200.0}}}}
+                }
+            }
+        }
+    }
+}
+
 
 def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
     """Answers that are problems."""

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from feedplan import __version__
-from feedplan.errors import FeedplanError
+from feedplan.errors import FeedplanError, MachineError
 from feedplan.geometry.corners import FollowedPath
 from feedplan.machine.controller import Controller
 from feedplan.machine.file import parse
-from feedplan.machine.machine import Machine, bundled_machines
+from feedplan.machine.machine import Axis, Machine, bundled_machines
 from feedplan.planners import MethodName, given_options, methods, options_of
 from feedplan.planning import OF_ALL_METHODS
 from feedplan.program.machine_for import AUTO
@@ -32,7 +33,11 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 # What methods check themselves: numbers, names, lists of numbers.
 Value = (
-    bool | Annotated[float, Field(allow_inf_nan=False)] | Annotated[str, Field(max_length=40)] | list[float]
+    bool
+    | int
+    | Annotated[float, Field(allow_inf_nan=False)]
+    | Annotated[str, Field(max_length=40)]
+    | list[float]
 )
 Model = TypeVar("Model", bound=BaseModel)
 _STRICT = ConfigDict(extra="forbid", strict=True)
@@ -103,6 +108,52 @@ class JobRequest(PlanRequest):
     program: str | dict[str, Any] = Field(description="G-code, a drawing (DXF), or a path file as an object")
 
 
+class LimitChange(BaseModel):
+    """Limits of an axis that take the place of those in a machine file."""
+
+    model_config = _STRICT
+
+    max_velocity: float | list[float] | None = Field(
+        default=None, description="One number, or the least and the greatest"
+    )
+    max_acceleration: float | list[float] | None = None
+    max_jerk: float | None = Field(default=None, description="null: none")
+
+    def on(self, axis: Axis) -> Axis:
+        """The axis with these limits. Raises MachineError."""
+        given = {name: getattr(self, name) for name in self.model_fields_set}
+        if given.get("max_jerk", 0.0) is None:
+            given["max_jerk"] = math.inf
+        return replace(axis, **given)
+
+
+class MachineRequest(BaseModel):
+    """A machine to be understood, with other limits where these are given."""
+
+    model_config = _STRICT
+
+    machine: str = Field(description="A bundled machine, or the text of a machine file (TOML)")
+    limits: dict[str, LimitChange] = Field(default_factory=dict, description="By the name of the axis")
+
+
+def machine_of(request: MachineRequest) -> Machine:
+    """The machine with its limits. Raises Refusal."""
+    try:
+        known = _machine(request.machine)
+        names = [axis.name for axis in known.axes]
+        for name in request.limits:
+            if name not in names:
+                raise MachineError(
+                    f"the machine {known.name} has no axis {name[:32]}: give some of {', '.join(names)}"
+                )
+        axes = [
+            request.limits[axis.name].on(axis) if axis.name in request.limits else axis for axis in known.axes
+        ]
+        return replace(known, axes=tuple(axes))
+    except FeedplanError as error:
+        raise Refusal(kind_of(error), str(error)) from None
+
+
 @dataclass(frozen=True)
 class Order:
     """A request that was found good: the `name` of the program, the whole text of the `machine`, or `auto`,
@@ -140,26 +191,31 @@ def order_of(request: PlanRequest, limits: Limits) -> Order:
         given_options(request.method, own, OF_ALL_METHODS)
         if "controller" in options:
             Controller.of(options["controller"])
-        text, machine_name = _machine(request.machine)
+        text, machine_name = _text_of(request.machine)
     except FeedplanError as error:
         raise Refusal(kind_of(error), str(error)) from None
     return Order(_title(request.name), text, machine_name, request.method, options, request.tool_table)
 
 
-def _machine(given: str) -> tuple[str, str]:
-    """The whole text of a machine, or `auto`, and its name. No file is read for what a client says."""
+def _text_of(given: str) -> tuple[str, str]:
+    """The whole text of a machine, or `auto`, and its name."""
     if given == AUTO:
         return AUTO, AUTO
-    if given in bundled_machines():
-        machine = Machine.load(given)
-    elif "=" in given:
-        machine = parse(given, "of the request")
-    else:
-        known = ", ".join((AUTO, *bundled_machines()))
-        raise Refusal(
-            MACHINE, f"there is no machine of this name: use one of {known}, or the text of a machine file"
-        )
+    machine = _machine(given, AUTO)
     return machine.to_toml(), machine.name
+
+
+def _machine(given: str, *others: str) -> Machine:
+    """A bundled machine, or that of a text; `others` may be given in its place elsewhere. No file is read for
+    what a client says."""
+    if given in bundled_machines():
+        return Machine.load(given)
+    if "=" in given:
+        return parse(given, "of the request")
+    known = ", ".join((*others, *bundled_machines()))
+    raise Refusal(
+        MACHINE, f"there is no machine of this name: use one of {known}, or the text of a machine file"
+    )
 
 
 def _title(given: str) -> str:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path as FilePath
 from typing import Any
 
 from feedplan.comparison import LIMITS
 from feedplan.files import SUMMARY_FILE
+from feedplan.machine.controller import Model
 from feedplan.machine.machine import Axis, Machine
 from feedplan.service.refusals import STATE, Refusal
 from feedplan.service.store import Record, Store
@@ -89,8 +91,16 @@ def machine(known: Machine) -> dict[str, Any]:
         **{name: getattr(known, name) for name in ("name", "period", "kinematics")},
         "chord_tolerance": _finite(known.chord_tolerance),
         "axes": [_axis(axis) for axis in known.axes],
+        "controller": known.controller
+        and {"name": known.controller.name, "parameters": dict(known.controller.parameters)},
         "file": known.to_toml(),
     }
+
+
+def controller(name: str, model: Model) -> dict[str, Any]:
+    """A controller with the method and the parameters of its model."""
+    parameters = {key: asdict(own) for key, own in model.parameters.items()}
+    return {"name": name, "method": model.method, "options": dict(model.options), "parameters": parameters}
 
 
 def _axis(axis: Axis) -> dict[str, Any]:

@@ -1,54 +1,57 @@
-/* Levels of detail of a tool path: each has fewer points than the one before and a wider tolerance [mm]. */
+/* Levels of detail of a tool path. It is cut into chunks of consecutive points; each has levels, the finest first,
+   with fewer points than the one before and a wider tolerance [mm]. */
 
 import { extent } from "./numbers.js";
 
+const POINTS = 16384; // of a chunk
 const COARSER = 4; // tolerance of a level over that of the one before
-const FEWEST = 4000; // no level with fewer points is worth its memory
+const FEWEST = 128; // no level with fewer points is worth its memory
+const WIDEST = 0.02; // of the extent: no view is coarser
 
-/* The levels of a path, the finest first: { tolerance, index }, where `index` are numbers of points. */
-export function levels(path) {
+/* The chunks of a path one by one: { centre, radius, levels }, a level { tolerance, index }, where `index` are
+   numbers of points. The last point of a chunk is the first one of the next. */
+export function* chunks(path) {
+  const size = Math.hypot(...[path.x, path.y, path.z].map((values) => span(extent(values))));
+  // A hundredth of the top speed weighs like a ten-thousandth of the extent, as in `report/tool_path.py`.
+  const weight = path.cutting_speed > 0 ? (0.01 * size) / path.cutting_speed : 0;
   const count = path.x.length;
-  const speedWeight = weightOfSpeed(path);
-  let level = { tolerance: path.tolerance, index: new Uint32Array(count).map((_, i) => i) };
-  const found = [level];
-  let cost = new Float32Array(count);
-  while (level.index.length > FEWEST) {
-    const tolerance = (level.tolerance || 1e-6) * COARSER;
-    const thinned = thin(path, level.index, cost, tolerance, speedWeight);
-    if (thinned.index.length > 0.9 * level.index.length) {
-      if (tolerance > 1e6 * (path.tolerance || 1e-6)) break;
-      level = { tolerance, index: level.index };
-      continue;
-    }
-    level = { tolerance, index: thinned.index };
-    cost = thinned.cost;
-    found.push(level);
+  for (let first = 0; first + 1 < count; first += POINTS) {
+    const index = Uint32Array.from({ length: Math.min(POINTS, count - 1 - first) + 1 }, (_, i) => first + i);
+    yield { ...ball(path, index), levels: levels(path, index, weight, WIDEST * size) };
+  }
+}
+
+const span = ([low, high]) => high - low;
+
+/* A ball around the points from the first to the last one of `index`. */
+function ball({ x, y, z }, index) {
+  const ends = [x, y, z].map((values) => extent(values.subarray(index[0], index.at(-1) + 1)));
+  return { centre: ends.map(([low, high]) => (low + high) / 2), radius: Math.hypot(...ends.map(span)) / 2 };
+}
+
+function levels(path, index, weight, widest) {
+  const found = [{ tolerance: path.tolerance, index }];
+  let cost = new Float32Array(index.length);
+  for (let tolerance = COARSER * path.tolerance; tolerance < widest && index.length > FEWEST; tolerance *= COARSER) {
+    const thinned = thin(path, index, cost, tolerance, weight);
+    if (thinned.index.length > 0.9 * index.length) continue;
+    ({ index, cost } = thinned);
+    found.push({ tolerance, index });
   }
   return found;
 }
 
-/* A hundredth of the top speed weighs like a ten-thousandth of the extent, as in `report/tool_path.py`. */
-function weightOfSpeed({ x, y, z, cutting_speed: top }) {
-  let square = 0;
-  for (const values of [x, y, z]) {
-    const [low, high] = extent(values);
-    square += (high - low) ** 2;
-  }
-  return top > 0 ? (0.01 * Math.sqrt(square)) / top : 0;
-}
-
 /* Every second point is a candidate; it goes when it lies within the tolerance of the line between its
    neighbours, what earlier removals have cost added up. */
-function thin(path, index, cost, tolerance, speedWeight) {
+function thin(path, index, cost, tolerance, weight) {
   let gone = 1, parity = 1, idle = 0;
   while (idle < 2 && index.length > 2) {
     const kept = new Uint32Array(index.length), spent = new Float32Array(index.length);
     let size = 0;
     gone = 0;
     for (let i = 0; i < index.length; i += 1) {
-      const isCandidate = i % 2 === parity && i > 0 && i < index.length - 1;
-      if (isCandidate) {
-        const total = Math.max(cost[i - 1], cost[i]) + off(path, speedWeight, index[i], index[i - 1], index[i + 1]);
+      if (i % 2 === parity && i > 0 && i < index.length - 1) {
+        const total = Math.max(cost[i - 1], cost[i]) + off(path, weight, index[i], index[i - 1], index[i + 1]);
         if (total <= tolerance) {
           spent[size - 1] = total;
           gone += 1;
@@ -73,5 +76,6 @@ function off({ x, y, z, speed }, w, i, a, b) {
   const px = x[i] - x[a], py = y[i] - y[a], pz = z[i] - z[a], ps = w * (speed[i] - speed[a]);
   const square = bx * bx + by * by + bz * bz + bs * bs;
   const t = square > 0 ? Math.min(Math.max((px * bx + py * by + pz * bz + ps * bs) / square, 0), 1) : 0;
-  return Math.hypot(px - t * bx, py - t * by, pz - t * bz, ps - t * bs);
+  const dx = px - t * bx, dy = py - t * by, dz = pz - t * bz, ds = ps - t * bs;
+  return Math.sqrt(dx * dx + dy * dy + dz * dz + ds * ds);
 }

@@ -1,7 +1,7 @@
 /* The box around a tool path with ticks, drawn flat over the picture: three of its edges have numbers. */
 
 import { shown } from "./numbers.js";
-import { style } from "./theme.js";
+import { font, style } from "./theme.js";
 
 const NEAREST = 48; // pixels between two ticks, about
 const AXES = ["X", "Y", "Z"];
@@ -10,7 +10,7 @@ const AXES = ["X", "Y", "Z"];
    names without units. */
 export function drawFrame(context, project, low, high, isNarrow) {
   const ink = style("--soft"), faint = style("--faint");
-  context.font = `12px ${getComputedStyle(document.body).fontFamily}`;
+  context.font = font(12);
   context.lineWidth = 1;
   const corner = (bits) => [0, 1, 2].map((k) => (bits & (1 << k) ? high[k] : low[k]));
   const nearest = Math.min(...[0, 1, 2, 3, 4, 5, 6, 7].map((bits) => project(corner(bits))[2]));
@@ -51,9 +51,9 @@ function ticks(context, [a, b, start], axis, low, high, size, [ax, ay], ink, pro
     line(context, at, [at[0] + 5 * ax, at[1] + 5 * ay]);
     text(shown(Math.abs(value) < 1e-9 * step ? 0 : value), at, 13);
   }
-  context.font = context.font.replace(/^/, "bold ");
+  context.font = `bold ${font(12)}`;
   text(`${AXES[axis]}${isNarrow ? "" : " [mm]"}`, [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2], isNarrow ? 28 : 34);
-  context.font = context.font.replace("bold ", "");
+  context.font = font(12);
 }
 
 /* Across an edge, away from the middle of the box; one long. */

@@ -18,23 +18,22 @@ export const MODES = {
 function scaled(path, list, top, scale) {
   const { feed } = path;
   const hasFeed = extent(feed)[1] > 0;
-  const values = Float32Array.from(list, (value, i) => (hasFeed && feed[i] === 0 ? NONE : Math.min(value / (top || 1), 1)));
+  const values = list.map((value, i) => (hasFeed && feed[i] === 0 ? NONE : Math.min(value / (top || 1), 1)));
   return { values, scale, ends: ["0", `${shown(top)} ${path.unit}/s`], note: hasFeed && values.includes(NONE) ? "rapids in grey" : "" };
 }
 
 function activeLimit(path) {
   const count = path.limits.length;
-  const used = new Set(path.active);
   return {
-    values: Float32Array.from(path.active),
+    values: new Float32Array(path.active),
     colours: path.limits.map((_, k) => kindColour(k, count)),
-    kinds: path.limits.map((name, k) => ({ name, colour: css(kindColour(k, count)), isUsed: used.has(k) })).filter((kind) => kind.isUsed),
+    kinds: path.limits.map((name, k) => ({ name, colour: css(kindColour(k, count)), isUsed: path.active.includes(k) })).filter((kind) => kind.isUsed),
   };
 }
 
 function timeLost(path) {
   return {
-    values: Float32Array.from(path.lost, (part) => part / 255),
+    values: new Float32Array(path.lost).map((part) => part / 255),
     scale: "cividis",
     ends: ["0 %", "100 %"],
     note: "of the time there, against the feed and the axis velocities",

@@ -26,6 +26,13 @@ export function clock(seconds) {
   return `${minutes}:${(seconds - 60 * minutes).toFixed(3).padStart(6, "0")}`;
 }
 
+/* The number that a person has written, or several with commas between them; null of nothing. What is no number stays
+   as it is: the service says so. */
+export function numbersIn(text) {
+  const values = text.split(",").map((part) => part.trim()).filter(Boolean).map((part) => (Number.isNaN(Number(part)) ? part : Number(part)));
+  return values.length > 1 ? values : values[0] ?? null;
+}
+
 /* The least and the greatest value; 0 and 0 of none. */
 export function extent(values) {
   let low = Infinity, high = -Infinity;

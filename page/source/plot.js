@@ -4,10 +4,11 @@ import uPlot from "uplot";
 
 import { grid, sampled } from "./curve.js";
 import { shown } from "./numbers.js";
-import { style, wash } from "./theme.js";
+import { font, style, wash } from "./theme.js";
 import { touch } from "./touch.js";
 
 const AXIS = 64; // pixels of the numbers at the left
+const LATE = 200; // [ms]
 
 export class Plot {
   #plot = null;
@@ -58,6 +59,14 @@ export class Plot {
     const data = [grid(from, to, this.#columns), ...found.map((one) => one.y)];
     this.#plot = new uPlot(this.#options(width, from, to, found), data, this.container);
     if (this.#place !== null) this.point(this.#place);
+    this.#drawAgain();
+  }
+
+  /* The first texts on a canvas can be missing (Chromium without a graphics processor, under load): their glyphs
+     come late. All is there when it is drawn again. */
+  #drawAgain() {
+    const plot = this.#plot;
+    setTimeout(() => plot === this.#plot && plot.redraw(false, false), LATE);
   }
 
   #range() {
@@ -70,7 +79,7 @@ export class Plot {
   }
 
   #options(width, from, to, found) {
-    const axis = { stroke: style("--soft"), grid: { stroke: style("--grid"), width: 1 }, ticks: { show: false }, font: `12px ${getComputedStyle(document.body).fontFamily}` };
+    const axis = { stroke: style("--soft"), grid: { stroke: style("--grid"), width: 1 }, ticks: { show: false }, font: font(12) };
     const read = (u, values) => values.map((value) => shown(value, 6));
     return {
       width,

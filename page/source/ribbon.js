@@ -1,37 +1,42 @@
 /* A polyline for three.js: each segment is a rectangle of some pixels width, coloured by a value at its ends.
-   Segments come in chunks, so that those outside of the view cost nothing. */
+   What is drawn are levels of `detail.js`; one that was never in view has cost nothing.
 
-import {
-  Box3, BufferAttribute, DataTexture, Group, InstancedBufferGeometry, InstancedInterleavedBuffer,
-  InterleavedBufferAttribute, LinearFilter, Mesh, NearestFilter, ShaderMaterial, Sphere, Vector2, Vector3,
-} from "three";
+   The corners of the rectangles are found from the number of the vertex, and the points in textures. Instances of
+   one rectangle take as long as a draw call each where no graphics processor is. */
 
-const SEGMENTS = 8192; // of a chunk
+import { BufferGeometry, DataTexture, FloatType, Group, LinearFilter, Mesh, NearestFilter, RedFormat, RGBAFormat, ShaderMaterial, Vector2, Vector3 } from "three";
+
 const COLOURS = 256;
-const CORNERS = new Float32Array([0, -1, 0, 1, -1, 0, 1, 1, 0, 0, 1, 0]); // along the segment, and across it
+const WIDTH = 256; // of the textures that points are in
 
 const VERTEX = `
-attribute vec3 from, to;
-attribute float valueFrom, valueTo, timeTo;
+uniform highp sampler2D points, values;
 uniform vec2 resolution;
 uniform float width, isKind;
 varying float value, time, light;
+ivec2 at(int point) { return ivec2(point % ${WIDTH}, point / ${WIDTH}); }
 void main() {
-  vec4 a = projectionMatrix * modelViewMatrix * vec4(from, 1.0);
-  vec4 b = projectionMatrix * modelViewMatrix * vec4(to, 1.0);
+  // Two triangles: along the segment 0 or 1, across it -1 or 1.
+  int segment = gl_VertexID / 6, corner = gl_VertexID % 6;
+  float part = corner == 1 || corner == 2 || corner == 4 ? 1.0 : 0.0;
+  float side = corner == 2 || corner == 4 || corner == 5 ? 1.0 : -1.0;
+  vec4 from = texelFetch(points, at(segment), 0), to = texelFetch(points, at(segment + 1), 0);
+  float valueFrom = texelFetch(values, at(segment), 0).r, valueTo = texelFetch(values, at(segment + 1), 0).r;
+  vec4 a = projectionMatrix * modelViewMatrix * vec4(from.xyz, 1.0);
+  vec4 b = projectionMatrix * modelViewMatrix * vec4(to.xyz, 1.0);
   vec2 way = (b.xy - a.xy) * resolution;
   float length_ = length(way);
   vec2 along = length_ > 0.0 ? way / length_ : vec2(1.0, 0.0);
   vec2 across = vec2(-along.y, along.x);
   bool isNone = valueTo < -0.5;
-  vec4 place = mix(a, b, position.x);
+  vec4 place = mix(a, b, part);
   // Half a width beyond both ends: no gaps at corners.
-  place.xy += (across * position.y + along * (2.0 * position.x - 1.0)) * (isNone ? 0.5 : 1.0) * width / resolution;
+  place.xy += (across * side + along * (2.0 * part - 1.0)) * (isNone ? 0.5 : 1.0) * width / resolution;
   place.z += isNone ? 1e-4 : 0.0;
-  value = isNone || isKind > 0.5 ? valueTo : mix(max(valueFrom, 0.0), valueTo, position.x);
-  time = timeTo;
+  value = isNone || isKind > 0.5 ? valueTo : mix(max(valueFrom, 0.0), valueTo, part);
+  time = to.w;
   // Light from above: what leans is a little darker, so that surfaces of many passes show their form.
-  vec3 run = to - from;
+  vec3 run = to.xyz - from.xyz;
   float rise = dot(run, run) > 0.0 ? run.z / length(run) : 0.0;
   light = 1.0 - 0.3 * rise * rise;
   gl_Position = place;
@@ -49,71 +54,63 @@ void main() {
 
 export class Ribbon {
   group = new Group();
-  #levels = [];
-  #material = new ShaderMaterial({
-    vertexShader: VERTEX,
-    fragmentShader: FRAGMENT,
-    uniforms: {
-      resolution: { value: new Vector2(1, 1) },
-      width: { value: 2 },
-      colours: { value: null },
-      none: { value: new Vector3() },
-      later: { value: new Vector3() },
-      count: { value: 0 },
-      isKind: { value: 0 },
-      now: { value: Infinity },
-    },
-  });
+  #path;
+  #centre;
+  #meshes = new Map(); // by level
+  #values = null;
+  #uniforms = {
+    resolution: { value: new Vector2(1, 1) },
+    width: { value: 2 },
+    colours: { value: null },
+    none: { value: new Vector3() },
+    later: { value: new Vector3() },
+    count: { value: 0 },
+    isKind: { value: 0 },
+    now: { value: Infinity },
+  };
 
-  /* `levels` are those of `detail.js`; places are counted from `centre`. */
-  constructor(path, levels, centre) {
-    const corners = new BufferAttribute(CORNERS, 3);
-    const order = new BufferAttribute(new Uint16Array([0, 1, 2, 0, 2, 3]), 1);
-    for (const { tolerance, index } of levels) {
-      const level = { tolerance, index, group: new Group(), values: new Float32Array(index.length) };
-      const places = new Float32Array(3 * index.length), times = new Float32Array(index.length);
-      index.forEach((point, i) => {
-        places[3 * i] = path.x[point] - centre[0];
-        places[3 * i + 1] = path.y[point] - centre[1];
-        places[3 * i + 2] = path.z[point] - centre[2];
-        times[i] = path.time[point];
-      });
-      const shared = [new InstancedInterleavedBuffer(places, 3), new InstancedInterleavedBuffer(level.values, 1), new InstancedInterleavedBuffer(times, 1)];
-      level.buffer = shared[1];
-      for (let first = 0; first + 1 < index.length; first += SEGMENTS) {
-        const count = Math.min(SEGMENTS, index.length - 1 - first);
-        level.group.add(this.#chunk(corners, order, shared, places, first, count));
-      }
-      level.group.visible = false;
-      this.group.add(level.group);
-      this.#levels.push(level);
-    }
+  /* Places are counted from `centre`. */
+  constructor(path, centre) {
+    this.#path = path;
+    this.#centre = centre;
   }
 
-  #chunk(corners, order, [places, values, times], list, first, count) {
-    const geometry = new InstancedBufferGeometry();
-    const view = (buffer, size, offset) => new InterleavedBufferAttribute(buffer, size, offset);
-    geometry.setIndex(order);
-    geometry.setAttribute("position", corners);
-    geometry.setAttribute("from", view(places, 3, 3 * first));
-    geometry.setAttribute("to", view(places, 3, 3 * first + 3));
-    geometry.setAttribute("valueFrom", view(values, 1, first));
-    geometry.setAttribute("valueTo", view(values, 1, first + 1));
-    geometry.setAttribute("timeTo", view(times, 1, first + 1));
-    geometry.instanceCount = count;
-    const box = new Box3(), place = new Vector3();
-    for (let i = first; i <= first + count; i += 1) box.expandByPoint(place.fromArray(list, 3 * i));
-    geometry.boundingSphere = box.getBoundingSphere(new Sphere());
-    return new Mesh(geometry, this.#material);
+  #mesh({ index }) {
+    const { x, y, z, time } = this.#path, [cx, cy, cz] = this.#centre;
+    const height = Math.ceil(index.length / WIDTH);
+    const places = new Float32Array(4 * WIDTH * height);
+    for (let i = 0; i < index.length; i += 1) {
+      const point = index[i];
+      places[4 * i] = x[point] - cx;
+      places[4 * i + 1] = y[point] - cy;
+      places[4 * i + 2] = z[point] - cz;
+      places[4 * i + 3] = time[point];
+    }
+    const points = new DataTexture(places, WIDTH, height, RGBAFormat, FloatType);
+    const values = new DataTexture(new Float32Array(WIDTH * height), WIDTH, height, RedFormat, FloatType);
+    points.needsUpdate = true;
+    const geometry = new BufferGeometry();
+    geometry.setDrawRange(0, 6 * (index.length - 1));
+    const uniforms = { ...this.#uniforms, points: { value: points }, values: { value: values } };
+    const mesh = new Mesh(geometry, new ShaderMaterial({ vertexShader: VERTEX, fragmentShader: FRAGMENT, uniforms }));
+    mesh.frustumCulled = false; // what is shown was found to be in view
+    mesh.userData = { index, points, values, painted: null };
+    this.group.add(mesh);
+    return mesh;
+  }
+
+  #paint(mesh) {
+    const { index, values, painted } = mesh.userData, own = values.image.data, all = this.#values;
+    if (painted === all) return;
+    for (let i = 0; i < index.length; i += 1) own[i] = all[index[i]];
+    values.needsUpdate = true;
+    mesh.userData.painted = all;
   }
 
   /* Colours by a mode of `modes.js`; `colours` are red, green, blue for each step of its scale or kind. */
   colour({ values }, colours, isKind) {
-    for (const level of this.#levels) {
-      level.index.forEach((point, i) => (level.values[i] = values[point]));
-      level.buffer.needsUpdate = true;
-    }
-    const { uniforms } = this.#material;
+    this.#values = values;
+    const uniforms = this.#uniforms;
     uniforms.colours.value?.dispose();
     const texture = new DataTexture(Uint8Array.from(colours.flatMap((colour) => [...colour, 255])), colours.length, 1);
     texture.magFilter = texture.minFilter = isKind ? NearestFilter : LinearFilter;
@@ -125,27 +122,32 @@ export class Ribbon {
 
   /* The colours [0, 1] of what has no value, and of what fades after the time `now`. */
   shade(none, later) {
-    this.#material.uniforms.none.value.fromArray(none);
-    this.#material.uniforms.later.value.fromArray(later);
+    this.#uniforms.none.value.fromArray(none);
+    this.#uniforms.later.value.fromArray(later);
   }
 
   set now(time) {
-    this.#material.uniforms.now.value = time ?? Infinity;
+    this.#uniforms.now.value = time ?? Infinity;
   }
 
-  /* Shows the coarsest level within a tolerance [mm], on a canvas of this size, and answers with it. */
-  show(tolerance, width, height, pixels) {
-    const level = this.#levels.findLast((one) => one.tolerance <= tolerance) ?? this.#levels[0];
-    for (const one of this.#levels) one.group.visible = one === level;
-    this.#material.uniforms.resolution.value.set(width, height);
-    this.#material.uniforms.width.value = pixels;
-    return level;
+  /* Shows these levels, on a canvas of this size. */
+  show(levels, width, height, pixels) {
+    for (const mesh of this.#meshes.values()) mesh.visible = false;
+    for (const level of levels) {
+      if (!this.#meshes.has(level)) this.#meshes.set(level, this.#mesh(level));
+      const mesh = this.#meshes.get(level);
+      mesh.visible = true;
+      this.#paint(mesh);
+    }
+    this.#uniforms.resolution.value.set(width, height);
+    this.#uniforms.width.value = pixels;
   }
 
   dispose() {
-    for (const { group } of this.#levels) for (const mesh of group.children) mesh.geometry.dispose();
-    this.#material.uniforms.colours.value?.dispose();
-    this.#material.dispose();
+    for (const { geometry, material, userData } of this.#meshes.values()) {
+      for (const one of [geometry, material, userData.points, userData.values]) one.dispose();
+    }
+    this.#uniforms.colours.value?.dispose();
   }
 }
 

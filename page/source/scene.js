@@ -4,7 +4,7 @@ import { OrthographicCamera, Scene, Vector3, WebGLRenderer, MOUSE, TOUCH } from 
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
 import { css, mixed } from "./colours.js";
-import { levels } from "./detail.js";
+import { chunks } from "./detail.js";
 import { drawFlat } from "./flat.js";
 import { drawFrame } from "./frame.js";
 import { extent } from "./numbers.js";
@@ -15,7 +15,11 @@ import { channels, onTheme, style } from "./theme.js";
 export const VIEWS = { xyz: [-1.1, -1.5, 1.1], xy: [0, -1e-6, 1], xz: [0, -1, 0], yz: [1, 0, 0] };
 /* Off by so many pixels a level may be, at rest and while the view moves. */
 const AT_REST = 0.25, MOVING = 1;
-const REST = 160; // [ms]
+const REST = 160; // [ms], longer where pictures take long
+/* A view that moves is drawn coarser while its pictures take longer than SLOW, finer where they take less than
+   QUICK [ms]; MOST times as coarse at most. */
+const SLOW = 50, QUICK = 25, MOST = 16;
+const SLICE = 20; // [ms] of work between two answers to the user
 const ROOM = [78, 45]; // pixels beside the path, and above and below
 const NARROW = 560; // pixels: names of axes are shorter
 const NEAR = 14; // pixels between the pointer and the point that it means
@@ -25,11 +29,18 @@ export class PathScene {
   #scene = new Scene();
   #camera = new OrthographicCamera();
   #run = null;
+  shown = []; // levels
   #ribbon = null;
   #mode = null;
   #frame = 0;
   #isStale = true; // the picture below the marks
   #movedAt = -Infinity;
+  #coarse = 1;
+  #isBusy = false; // with a picture that is not finished
+  #chunks = [];
+  #cutting = 0;
+  #resting = 0;
+  #size = [0, 0];
   #time = null;
   #hasTrail = false;
 
@@ -53,9 +64,7 @@ export class PathScene {
     this.controls.enableDamping = false;
     this.controls.zoomToCursor = true;
     this.controls.addEventListener("change", () => {
-      this.#movedAt = performance.now();
-      this.draw();
-      setTimeout(() => this.draw(), REST + 10);
+      this.#moved();
       onMove?.(this);
     });
     this.over.addEventListener("dblclick", () => this.look(this.view));
@@ -81,13 +90,29 @@ export class PathScene {
     this.low = ends.map(([low]) => low);
     this.high = ends.map(([, high]) => high);
     this.#ribbon = null;
-    this.levels = levels(path);
+    this.#chunks = [];
+    this.container.setAttribute("aria-busy", "true");
     if (this.#renderer) {
-      this.#ribbon = new Ribbon(path, this.levels, this.#centre());
+      this.#ribbon = new Ribbon(path, this.#centre());
       this.#scene.add(this.#ribbon.group);
     }
+    clearTimeout(this.#cutting);
+    this.#cut(chunks(path));
     this.colour(mode);
     if (isOther) this.look(this.#firstView());
+  }
+
+  /* Takes chunks, as many at a time as the page can take without a pause; what is there is drawn. */
+  #cut(rest) {
+    const end = performance.now() + SLICE;
+    let next = rest.next();
+    for (; !next.done && performance.now() < end; next = rest.next()) this.#chunks.push(next.value);
+    if (next.done) this.container.removeAttribute("aria-busy");
+    else {
+      this.#chunks.push(next.value);
+      this.#cutting = setTimeout(() => this.#cut(rest));
+    }
+    this.draw();
   }
 
   /* Colours by another mode. */
@@ -129,29 +154,28 @@ export class PathScene {
     this.#camera.position.add(this.controls.target);
     this.#camera.lookAt(this.controls.target);
     this.#camera.updateProjectionMatrix();
-    this.#movedAt = performance.now();
-    this.draw();
-    setTimeout(() => this.draw(), REST + 10);
+    this.#moved();
   }
 
   /* Marks the place at a time [s]; with a trail, what comes after it fades. */
   mark(time, hasTrail = false) {
-    this.#isStale ||= hasTrail || this.#hasTrail;
+    const isNew = hasTrail || this.#hasTrail;
     this.#time = time;
     this.#hasTrail = hasTrail;
-    this.#drawSoon();
+    if (isNew) this.#moved();
+    else this.#drawSoon();
   }
 
   zoomBy(factor) {
     this.#camera.zoom *= factor;
     this.#camera.updateProjectionMatrix();
-    this.#movedAt = performance.now();
-    this.draw();
+    this.#moved();
   }
 
   resize() {
     const { clientWidth: width, clientHeight: height } = this.container;
     if (!width || !height) return;
+    this.#size = [width, height];
     const ratio = devicePixelRatio || 1;
     for (const canvas of [this.canvas, this.over]) {
       canvas.width = Math.round(width * ratio);
@@ -186,8 +210,16 @@ export class PathScene {
     this.#drawSoon();
   }
 
+  /* The view moves, or what it shows does: it is drawn now, and better when it rests. */
+  #moved() {
+    this.#movedAt = performance.now();
+    this.draw();
+    clearTimeout(this.#resting);
+    this.#resting = setTimeout(() => this.draw(), REST * this.#coarse);
+  }
+
   #drawSoon() {
-    if (!this.#frame) this.#frame = requestAnimationFrame(() => this.#drawStale());
+    if (!this.#frame && !this.#isBusy) this.#frame = requestAnimationFrame(() => this.#drawStale());
   }
 
   drawNow() {
@@ -207,25 +239,60 @@ export class PathScene {
     const project = this.#projector();
     if (this.#isStale) this.#drawPath(project, ratio);
     this.#isStale = false;
-    drawFrame(context, project, this.low, this.high, this.container.clientWidth < NARROW);
+    drawFrame(context, project, this.low, this.high, this.#size[0] < NARROW);
     this.#marks(context, project);
   }
 
   #drawPath(project, ratio) {
-    const allowed = performance.now() - this.#movedAt < REST ? MOVING : AT_REST;
-    const tolerance = (allowed * this.#pixel()) / ratio;
+    this.shown = this.#inView(project, (this.#detail() * this.#pixel()) / ratio);
     if (this.#ribbon) {
       this.#ribbon.now = this.#hasTrail ? this.#time : null;
-      this.level = this.#ribbon.show(tolerance, this.canvas.width, this.canvas.height, 2 * ratio);
+      this.#ribbon.show(this.shown, this.canvas.width, this.canvas.height, 2 * ratio);
       this.#renderer.render(this.#scene, this.#camera);
+      this.#watch(this.#isMoving());
     } else {
-      this.level = this.levels.findLast((one) => one.tolerance <= tolerance) ?? this.levels[0];
       const flat = this.canvas.getContext("2d");
       flat.setTransform(ratio, 0, 0, ratio, 0, 0);
       flat.clearRect(0, 0, this.canvas.width, this.canvas.height);
       const mode = { values: this.#mode.values, isKind: Boolean(this.#mode.colours) };
-      drawFlat(flat, this.#run.path, this.level.index, project, mode, this.colours.map(css), style("--rapid"), 2);
+      drawFlat(flat, this.#run.path, this.shown, project, mode, this.colours.map(css), style("--rapid"), 2);
     }
+  }
+
+  /* By how many pixels what is drawn now may be off: less at rest, more where pictures take long. */
+  #detail() {
+    return this.#isMoving() ? MOVING * this.#coarse : Math.min(AT_REST * this.#coarse, MOVING);
+  }
+
+  #isMoving() {
+    return performance.now() - this.#movedAt < REST * this.#coarse - 5;
+  }
+
+  /* Sees how long a picture takes that moves; the next one waits for its end. */
+  #watch(isMoving) {
+    const gl = this.#renderer.getContext(), start = performance.now();
+    const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
+    this.#isBusy = true;
+    const look = () => {
+      if (gl.getSyncParameter(fence, gl.SYNC_STATUS) === gl.UNSIGNALED) return setTimeout(look, 2);
+      gl.deleteSync(fence);
+      const took = performance.now() - start;
+      if (isMoving && took > SLOW) this.#coarse = Math.min(2 * this.#coarse, MOST);
+      if (isMoving && took < QUICK) this.#coarse = Math.max(0.9 * this.#coarse, 1);
+      this.#isBusy = false;
+      if (this.#isStale) this.#drawSoon();
+    };
+    setTimeout(look);
+  }
+
+  /* Of each chunk in view the coarsest level within a tolerance [mm]. */
+  #inView(project, tolerance) {
+    const [width, height] = this.#size, pixel = this.#pixel();
+    return this.#chunks.filter(({ centre, radius }) => {
+      const [x, y] = project(centre), reach = radius / pixel + 2;
+      return x + reach > 0 && x - reach < width && y + reach > 0 && y - reach < height;
+    }).map(({ levels }) => levels.findLast((level) => level.tolerance <= tolerance) ?? levels[0]);
   }
 
   #marks(context, project) {
@@ -252,33 +319,41 @@ export class PathScene {
   /* The number of the drawn point that is nearest to the pointer. */
   #under(event) {
     if (!this.#run?.count) return -1;
-    const project = this.#projector();
-    const { path } = this.#run;
+    const [[a, b, c, d], [e, f, g, h]] = this.#rows();
+    const { x, y, z } = this.#run.path;
     const box = this.over.getBoundingClientRect();
-    const x = event.clientX - box.left, y = event.clientY - box.top;
+    const left = event.clientX - box.left, top = event.clientY - box.top;
     let best = -1, least = NEAR * NEAR;
-    for (const point of this.level.index) {
-      const [px, py] = project([path.x[point], path.y[point], path.z[point]]);
-      const square = (px - x) ** 2 + (py - y) ** 2;
-      if (square < least) [best, least] = [point, square];
+    for (const { index } of this.shown) {
+      for (let i = 0; i < index.length; i += 1) {
+        const point = index[i], px = x[point], py = y[point], pz = z[point];
+        const across = a * px + b * py + c * pz + d - left, down = e * px + f * py + g * pz + h - top;
+        const square = across * across + down * down;
+        if (square < least) [best, least] = [point, square];
+      }
     }
     return best;
   }
 
   /* From places [mm] to pixels from the top left, and how far behind they are. */
   #projector() {
-    const { clientWidth: width, clientHeight: height } = this.container;
-    const centre = this.#centre();
+    const rows = this.#rows();
+    return ([x, y, z]) => rows.map(([a, b, c, d]) => a * x + b * y + c * z + d);
+  }
+
+  /* The same as numbers: a x + b y + c z + d for each of the three. */
+  #rows() {
+    const [width, height] = this.#size, centre = this.#centre();
     const m = this.#camera.projectionMatrix.clone().multiply(this.#camera.matrixWorldInverse).elements;
-    return ([x, y, z]) => {
-      const a = x - centre[0], b = y - centre[1], c = z - centre[2];
-      return [((m[0] * a + m[4] * b + m[8] * c + m[12] + 1) * width) / 2, ((1 - m[1] * a - m[5] * b - m[9] * c - m[13]) * height) / 2, m[2] * a + m[6] * b + m[10] * c + m[14]];
-    };
+    return [[width / 2, width / 2], [-height / 2, height / 2], [1, 0]].map(([factor, shift], k) => {
+      const [a, b, c] = [0, 4, 8].map((column) => factor * m[column + k]);
+      return [a, b, c, factor * m[12 + k] + shift - a * centre[0] - b * centre[1] - c * centre[2]];
+    });
   }
 
   /* The width of a pixel [mm]. */
   #pixel() {
-    return (this.#camera.right - this.#camera.left) / this.#camera.zoom / (this.container.clientWidth || 1);
+    return (this.#camera.right - this.#camera.left) / this.#camera.zoom / (this.#size[0] || 1);
   }
 
   #centre() {

@@ -25,7 +25,7 @@ export class SpeedPlot {
     this.show();
   }
 
-  /* Draws; `other` is another run of the same program with its name. */
+  /* Draws; `other` is another plan of the same program: its run, its data and its name. */
   show(other = null) {
     const { length, path } = this.data;
     const { top_speed: top, cutting_speed: cutting } = length;
@@ -36,7 +36,8 @@ export class SpeedPlot {
       .map(([name, [label, colour, dash]]) => ({ name: label, curve: length[name], colour, dash, width: 1.2, isLimit: true, none: 19.9 * top || Infinity }));
     if (other) {
       const scale = other.run.length > 0 ? this.run.length / other.run.length : 1;
-      const curve = { x: Float64Array.from(other.run.path.length, (value) => value * scale), y: other.run.path.speed };
+      const { x, y, mean } = other.data.length.speed;
+      const curve = { x: x.map((value) => value * scale), y, mean: { x: mean.x.map((value) => value * scale), y: mean.y } };
       curves.push({ name: other.name, curve, colour: "--other", width: 1.6, dash: [6, 3] });
     }
     curves.push({ name: "planned speed", curve: length.speed, colour: "--accent", width: 2, fill: true });

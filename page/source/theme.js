@@ -4,7 +4,16 @@ const root = document.documentElement;
 const dark = matchMedia("(prefers-color-scheme: dark)");
 const listeners = new Set();
 
-export const style = (name) => getComputedStyle(root).getPropertyValue(name).trim();
+// Asking the browser makes it lay out the page, so it is asked once for each name.
+const known = new Map();
+
+export function style(name) {
+  if (!known.has(name)) known.set(name, getComputedStyle(document.body).getPropertyValue(name).trim());
+  return known.get(name);
+}
+
+/* The font of drawn texts of so many pixels. */
+export const font = (pixels) => `${pixels}px ${style("font-family")}`;
 
 /* A colour of the style sheet, given as #rrggbb, with an opacity. */
 export function wash(name, alpha) {
@@ -24,6 +33,7 @@ export const onTheme = (listener) => listeners.add(listener);
 
 function tell(printing) {
   root.classList.toggle("printing", printing);
+  known.clear();
   for (const listener of listeners) listener(printing);
 }
 

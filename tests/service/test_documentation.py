@@ -28,7 +28,8 @@ ADDRESSES = {
         for part in ("events", "result", "audit", "setpoints", "program", "report", "drawing")
     },
     "/v1/jobs/{job}/cancel": {"post"},
-    **{f"/v1/{name}": {"get"} for name in ("compare", "machines", "machines/{name}", "methods", "health")},
+    "/v1/machines": {"get", "post"},
+    **{f"/v1/{name}": {"get"} for name in ("compare", "machines/{name}", "controllers", "methods", "health")},
 }
 
 
@@ -46,6 +47,11 @@ def test_every_address_is_documented_with_its_problems(server: Server) -> None:
     assert used <= set(schemas)
     submission = document["paths"]["/v1/jobs"]["post"]["requestBody"]["content"]
     assert set(submission) == {"application/json", "multipart/form-data"}
+    sent = document["paths"]["/v1/machines"]["post"]["requestBody"]["content"]["application/json"]
+    for example in sent["examples"].values():
+        body = json.dumps(example["value"]).encode()
+        answer = server.send("POST", "/v1/machines", body, {"Content-Type": "application/json"})
+        assert answer.json["axes"][0]["max_velocity"] == example["value"]["limits"]["X"]["max_velocity"]
     for example in submission["application/json"]["examples"].values():
         body = json.dumps(example["value"]).encode()
         answer = server.send("POST", "/v1/jobs", body, {"Content-Type": "application/json"})

@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import socket
 import threading
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
 
 import feedplan
+from feedplan.machine.controller import MODELS, Controller
+from feedplan.machine.file import parse
 from feedplan.outputs import format_named
 from feedplan.outputs.npz import load
 from feedplan.service import exports
-from tests.service.servers import ENDED, LONG, PART, Server, events_of, long_part
+from tests.service.servers import ENDED, LONG, PART, Answer, Server, events_of, long_part
 
 MINE = (Path(__file__).parents[2] / "examples" / "mine.toml").read_text("utf-8")
 NAMES = ("t", "position", "velocity", "acceleration", "jerk", "line")
@@ -317,6 +322,42 @@ def test_machines_methods_and_health(server: Server) -> None:
     health = server.get("/v1/health").json
     assert (health["status"], health["version"]) == ("ok", feedplan.__version__)
     assert health["limits"]["workers"] == {"value": 2, "unit": "processes"}
+
+
+def test_options_that_are_whole_numbers_stay_so(server: Server) -> None:
+    job = server.planned(method="junction-deviation", options='{"blocks": 15}')
+    assert (job["state"], job["options"]) == ("done", {"blocks": 15})
+
+
+def test_a_machine_file_is_told_with_other_limits(server: Server) -> None:
+    def told(machine: str, **limits: Any) -> Answer:
+        body = json.dumps({"machine": machine, "limits": limits}).encode()
+        return server.send("POST", "/v1/machines", body, {"Content-Type": "application/json"})
+
+    own = replace(feedplan.Machine.load("tarus"), controller=Controller("grbl", {"junction_deviation": 0.02}))
+    plain = told(own.to_toml()).json
+    assert plain == {**server.get("/v1/machines/tarus").json, "file": own.to_toml()} | {
+        "controller": {"name": "grbl", "parameters": {"junction_deviation": 0.02}}
+    }
+    other = told("tarus", X={"max_velocity": [-100.0, 120.0], "max_jerk": None}).json
+    assert other["axes"][0]["max_velocity"] == [-100.0, 120.0]
+    assert other["axes"][0]["max_jerk"] is None
+    assert other["axes"][1:] == plain["axes"][1:]
+    assert parse(other["file"], "other").axis("X").max_jerk == math.inf
+    for machine, limits, said in (
+        ("tarus", {"X": {"max_velocity": -1.0}}, "axis X: max_velocity is -1.0: give"),
+        ("tarus", {"X": {"max_velocity": None}}, "axis X: max_velocity is None: give"),
+        ("tarus", {"Q": {}}, "the machine tarus has no axis Q: give some of X, Y, Z"),
+        ("name = ", {}, "machine file of the request is not valid TOML"),
+        ("auto", {}, "there is no machine of this name: use one of "),
+    ):
+        assert told(machine, **limits).detail.startswith(said)
+    controllers = {row["name"]: row for row in server.get("/v1/controllers").json["controllers"]}
+    assert tuple(controllers) == tuple(MODELS)
+    for name, row in controllers.items():
+        defaults = {own["option"]: own["default"] for own in row["parameters"].values()}
+        given = {option: value for option, value in defaults.items() if value is not None}
+        assert {**row["options"], **given} == Controller(name).options
 
 
 def test_nothing_is_left_of_what_was_received_or_cut(server: Server) -> None:

@@ -5,6 +5,7 @@ Pictures go into the folder that FEEDPLAN_PICTURES names, of the program that FE
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import shutil
@@ -14,6 +15,8 @@ from typing import Any
 
 import pytest
 
+from feedplan.machine.controller import Controller
+from feedplan.machine.file import parse
 from feedplan.outputs import npz
 from feedplan.report.page import missing_pictures
 from tests.report.drawn import unpacked
@@ -75,7 +78,8 @@ def facts(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, A
 def test_it_asks_for_the_token_once_sends_it_as_a_header_and_asks_no_other_place(
     facts: dict[str, Any],
 ) -> None:
-    assert facts["errors"] == [] or all("401" in error for error in facts["errors"])
+    # The browser tells of what the service refuses: the missing token, and a limit that is none.
+    assert [error for error in facts["errors"] if "401" not in error and "422" not in error] == []
     assert facts["machines"] > 10
     addresses = [one for one in facts["requests"] if not one["url"].startswith(("data:", "blob:"))]
     assert all(one["url"].startswith(facts["address"]) for one in addresses)
@@ -115,7 +119,7 @@ def test_the_cursor_is_in_chart_path_and_source(facts: dict[str, Any]) -> None:
 
 
 @in_a_browser
-def test_dragging_zooms_and_a_double_click_goes_back(facts: dict[str, Any]) -> None:
+def test_dragging_zooms_and_a_double_click_goes_back_to_the_first_picture(facts: dict[str, Any]) -> None:
     assert facts["zooms"]
     assert facts["zoomsBack"]
 
@@ -129,10 +133,42 @@ def test_it_plays_and_stops_by_a_key(facts: dict[str, Any]) -> None:
 
 @in_a_browser
 def test_the_controller_of_today_is_drawn_beside_the_optimum(facts: dict[str, Any]) -> None:
-    assert facts["today"]["name"].partition(" · ")[2].startswith("junction deviation")
-    assert "junction deviation" in facts["today"]["figures"]
+    assert facts["today"]["name"].partition(" · ")[2] == "grbl (machine file)"
+    assert "grbl (machine file)" in facts["today"]["figures"]
     assert facts["today"]["path"]["count"] > 1000
     assert facts["today"]["first"]["count"] > 1000
+
+
+@in_a_browser
+def test_the_controller_has_the_settings_of_the_machine_file_and_others_where_they_are_given(
+    facts: dict[str, Any],
+) -> None:
+    assert facts["offered"][:2] == ["nothing", "grbl (machine file)"]
+    assert {"linuxcnc", "klipper", "marlin", "jerk-limited"} <= set(facts["offered"])
+    assert facts["today"]["settings"] == [
+        ["junction_deviation", "0.03", "machine file"],
+        ["arc_tolerance", "0.002", "default"],
+        ["block_buffer_size", "15", "default"],
+    ]
+    assert facts["today"]["options"] == {"deviation": 0.03, "arc_tolerance": 0.002, "blocks": 15}
+    assert facts["otherSettings"][0] == ["junction_deviation", "0.5", "given here"]
+    assert facts["otherOptions"]["deviation"] == 0.5
+
+
+@in_a_browser
+def test_a_machine_file_is_read_as_the_service_reads_it(facts: dict[str, Any]) -> None:
+    rest = [["Ymm", "-80, 90", "1000", ""], ["Zmm", "50", "500", ""]]
+    assert facts["limits"] == [["Xmm", "100", "1000", "20000"], *rest]
+    assert facts["refusedLimit"].startswith("axis X: max_velocity is -1")
+    assert facts["changedLimits"] == [["Xmm", "120", "1000", "20000"], *rest]
+    machine = parse(facts["changedText"], "changed")
+    assert machine.axis("X").max_velocity == 120.0
+    assert machine.controller == Controller("grbl", {"junction_deviation": 0.03})
+
+
+@in_a_browser
+def test_a_refused_program_is_told_with_place_and_remedy(facts: dict[str, Any]) -> None:
+    assert facts["refused"].startswith("wrong.ngc line 3: ")
 
 
 @in_a_browser
@@ -155,6 +191,23 @@ def test_what_is_downloaded_is_whole(facts: dict[str, Any], folder: Path) -> Non
 @in_a_browser
 def test_it_fits_a_tablet(facts: dict[str, Any]) -> None:
     assert facts["tooWide"] <= 0
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="node is missing: install Node.js 20 or newer")
+def test_levels_of_detail_join_and_are_within_their_tolerances() -> None:
+    command = ["node", str(ROOT / "page" / "test" / "detail.mjs")]
+    told = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    ends = [chunk["ends"] for chunk in told["chunks"]]
+    assert len(ends) > 2
+    assert [first for first, _ in ends] == [0, *(last for _, last in ends[:-1])]
+    assert ends[-1][1] == told["count"] - 1
+    for chunk in told["chunks"]:
+        assert chunk["outside"] < 1e-6
+        levels = chunk["levels"]
+        assert len(levels) > 1
+        assert all(level["ends"] == chunk["ends"] for level in levels)
+        assert all(a["points"] > b["points"] for a, b in itertools.pairwise(levels))
+        assert all(level["off"] <= level["tolerance"] for level in levels)
 
 
 def test_the_page_needs_no_token_and_allows_no_other_place(tmp_path: Path) -> None:

@@ -2,32 +2,33 @@
 
 import "./service.css";
 
-import { duration } from "../numbers.js";
+import { duration, numbersIn } from "../numbers.js";
 import { element } from "../parts.js";
 import { json } from "./api.js";
 import { opened, planned } from "./job.js";
 import { keys } from "./keys.js";
 import { MachineChoice } from "./machine.js";
 import { Result } from "./result.js";
+import { Today } from "./today.js";
 import { WhatIf } from "./what_if.js";
 
-/* Controllers of today by the method that models them. */
-const TODAY = {
-  "junction-deviation": "junction deviation (grbl, Marlin, Klipper)",
-  linuxcnc: "LinuxCNC",
-  "arc-transition": "arcs at corners",
-  "constant-velocity-transition": "constant speed through corners",
-  tangential: "stop at corners, tangents pass",
-};
 const RECENT = 12;
 
 export async function service() {
   const at = (id) => document.getElementById(id);
-  const machine = new MachineChoice(at("machine"), at("axes-table"), at("machine-text"));
+  const machine = new MachineChoice(at("machine"), at("axes-table"), at("machine-text"), at("machine-told"));
   const result = new Result(at);
   const whatIf = new WhatIf(at("what-if"), (plan, words) => {
-    at("today").value = "";
+    today.clear();
     result.beside(plan, words);
+  });
+  const today = new Today(at("today"), at("today-settings"), async () => {
+    whatIf.quiet();
+    const chosen = today.order;
+    if (!chosen) return result.beside(null);
+    const made = await plan(chosen.order);
+    if (made) result.beside(made, chosen.words);
+    else if (!at("failure").hidden) result.beside(null);
   });
   let program = null, stop = null;
 
@@ -43,9 +44,8 @@ export async function service() {
 
   /* The options that are given; others are the method's own. */
   function options() {
-    const number = (id) => (at(id).value.trim() === "" ? undefined : Number(at(id).value));
-    const given = { tolerance: number("tolerance"), feed: number("feed") };
-    return Object.fromEntries(Object.entries(given).filter(([, value]) => value !== undefined));
+    const given = ["tolerance", "feed"].map((name) => [name, numbersIn(at(name).value)]);
+    return Object.fromEntries(given.filter(([, value]) => value !== null));
   }
 
   /* Plans with the progress shown; null where it was stopped or refused, which is told. */
@@ -78,8 +78,7 @@ export async function service() {
   function show(made) {
     at("hint").hidden = true;
     result.show(made);
-    whatIf.show(made);
-    at("today").value = "";
+    for (const part of [whatIf, today]) part.show(made).catch(fail);
     document.title = `${made.order.name} – feedplan`;
     recent();
   }
@@ -89,9 +88,15 @@ export async function service() {
     if (made) show(made);
   }
 
-  async function recent() {
-    const { jobs } = await json(`/v1/jobs?state=done&count=${RECENT}`);
-    at("recent").replaceChildren(...jobs.map((job) => {
+  let older = null; // what to ask for the plans before those that are listed
+
+  /* Lists the newest plans, or adds those before the last one. */
+  async function recent(before = null) {
+    const { jobs, before: next } = await json(`/v1/jobs?state=done&count=${RECENT}${before === null ? "" : `&before=${before}`}`);
+    older = next;
+    at("older").hidden = next === null;
+    if (before === null) at("recent").replaceChildren();
+    at("recent").append(...jobs.map((job) => {
       const button = element("button");
       button.type = "button";
       button.append(element("b", "", job.program.name), element("span", "", `${job.method} · ${job.machine} · ${duration(job.result.time)}`));
@@ -131,25 +136,14 @@ export async function service() {
     start();
   });
   at("plan").addEventListener("click", start);
+  at("older").addEventListener("click", () => recent(older).catch(fail));
   at("cancel").addEventListener("click", () => stop?.abort());
-  at("today").addEventListener("change", async () => {
-    const method = at("today").value;
-    whatIf.quiet();
-    if (!method) return result.beside(null);
-    const { order } = result.plan;
-    const { tolerance, feed, feed_override } = order.options;
-    const own = Object.fromEntries(Object.entries({ tolerance, feed, feed_override }).filter(([, value]) => value !== undefined));
-    const made = await plan({ ...order, method, options: own });
-    if (made) result.beside(made, TODAY[method]);
-    else at("today").value = "";
-  });
 
   try {
     await machine.load();
     const { methods } = await json("/v1/methods");
     for (const { name } of methods) at("method").append(new Option(name, name, false, name === "bang-bang"));
-    at("today").append(new Option("nothing", ""));
-    for (const { name } of methods) if (TODAY[name]) at("today").append(new Option(TODAY[name], name));
+    await today.load();
     await recent();
   } catch (error) {
     fail(error);

@@ -12,8 +12,10 @@ export async function planned(order, { onProgress, signal } = {}) {
   form.append("machine", order.machine);
   form.append("method", order.method);
   form.append("options", JSON.stringify(order.options));
-  const job = await json("/v1/jobs", { method: "POST", body: form, signal });
+  // A request that is broken off may have been accepted: its job is known, and cancelled, after the answer alone.
+  const job = await json("/v1/jobs", { method: "POST", body: form });
   try {
+    signal?.throwIfAborted();
     onProgress?.("waits", 0, job);
     for await (const [kind, data] of events(job.links.events, signal)) {
       if (kind === "progress") onProgress?.(data.stage, data.done, job);

@@ -1,31 +1,36 @@
 /* The machine that a program is planned on: chosen by name, its limits edited in a table or as a whole file. */
 
+import { numbersIn } from "../numbers.js";
 import { element } from "../parts.js";
 import { json } from "./api.js";
-import { LIMITS, axesOf, withLimit } from "./machine_text.js";
+import { LIMITS, described, written } from "./machine_file.js";
 
-const AUTO = "auto";
+const AUTO = "auto", EDITED = "edited";
+const PAUSE = 300; // [ms] after the last letter
 
 export class MachineChoice {
   #known = {};
   #text = null; // of an edited machine
+  #info = null; // what the service says of the machine; null where it is still to be chosen
+  #wait = 0;
 
-  constructor(select, table, text) {
-    Object.assign(this, { select, table, text });
+  /* `told` is where it stands what is wrong with an edited machine. */
+  constructor(select, table, text, told) {
+    Object.assign(this, { select, table, text, told });
     select.addEventListener("change", () => this.#choose());
     text.addEventListener("input", () => {
-      this.#text = text.value;
-      this.#mark();
-      this.#fill();
+      this.#edited(text.value);
+      clearTimeout(this.#wait);
+      this.#wait = setTimeout(() => this.#ask(text.value), PAUSE);
     });
   }
 
   async load() {
     const { machines } = await json("/v1/machines");
-    this.select.replaceChildren(option(AUTO, "the smallest that the program fits"));
+    this.select.replaceChildren(new Option("the smallest that the program fits", AUTO));
     for (const machine of machines) {
-      this.#known[machine.name] = machine.file;
-      this.select.append(option(machine.name, machine.name));
+      this.#known[machine.name] = machine;
+      this.select.append(new Option(machine.name, machine.name));
     }
     this.select.value = "mill" in this.#known ? "mill" : AUTO;
     this.#choose();
@@ -36,47 +41,63 @@ export class MachineChoice {
     return this.#text ?? this.select.value;
   }
 
-  /* The whole text, empty for the one that is still to be chosen. */
-  get whole() {
-    return this.#text ?? this.#known[this.select.value] ?? "";
-  }
-
   /* Takes over the text of a machine, as of a job that was opened. */
   take(text) {
-    const name = Object.keys(this.#known).find((known) => this.#known[known] === text);
+    const name = Object.keys(this.#known).find((known) => this.#known[known].file === text);
     if (name) {
       this.select.value = name;
       this.#choose();
       return;
     }
-    this.#text = text;
-    this.#mark();
-    this.#fill();
+    this.#edited(text);
+    this.text.value = text;
+    this.#ask(text);
   }
 
   #choose() {
     this.#text = null;
-    this.select.querySelector("[value=edited]")?.remove();
+    this.#info = this.#known[this.select.value] ?? null;
+    this.select.querySelector(`[value=${EDITED}]`)?.remove();
+    this.told.textContent = "";
+    this.text.value = this.#info?.file ?? "";
     this.#fill();
   }
 
-  /* Says that the machine is none of those that are known. */
-  #mark() {
-    if (!this.select.querySelector("[value=edited]")) this.select.append(option("edited", "edited"));
-    this.select.value = "edited";
+  /* The machine is none of those that are known. */
+  #edited(text) {
+    this.#text = text;
+    if (!this.select.querySelector(`[value=${EDITED}]`)) this.select.append(new Option(EDITED, EDITED));
+    this.select.value = EDITED;
+  }
+
+  /* Asks what a machine with these limits is, and shows that; what is wrong is told. */
+  async #ask(machine, limits = {}) {
+    const before = this.order;
+    try {
+      const info = await described(machine, limits);
+      if (this.order !== before) return; // it was edited again meanwhile
+      this.#info = info;
+      this.told.textContent = "";
+      if (Object.keys(limits).length) {
+        this.#edited(info.file);
+        this.text.value = info.file;
+      }
+      this.#fill();
+    } catch (error) {
+      if (this.order === before) this.told.textContent = error.message;
+    }
   }
 
   #fill() {
-    if (document.activeElement !== this.text) this.text.value = this.whole;
-    const axes = axesOf(this.whole);
+    const axes = this.#info?.axes ?? [];
     this.table.hidden = !axes.length;
     const head = element("tr");
-    head.append(element("th", "", "Axis"), ...Object.values(LIMITS).map((name) => element("th", "n", name)), element("th", "", "unit"));
+    head.append(element("th", "", "Axis"), ...Object.values(LIMITS).map((name) => element("th", "n", name)));
     const rows = axes.map((axis) => {
       const row = element("tr");
-      row.append(element("td", "", axis.name));
+      const name = row.appendChild(element("td", "", axis.name));
+      name.append(element("small", "", axis.unit));
       for (const key of Object.keys(LIMITS)) row.append(this.#cell(axis, key));
-      row.append(element("td", "soft", `${axis.unit}, s`));
       return row;
     });
     this.table.replaceChildren(head, ...rows);
@@ -85,18 +106,8 @@ export class MachineChoice {
   #cell(axis, key) {
     const cell = element("td", "n");
     const input = cell.appendChild(element("input"));
-    Object.assign(input, { value: axis[key] ?? "", inputMode: "decimal", ariaLabel: `${axis.name} ${LIMITS[key]}` });
-    input.addEventListener("change", () => {
-      this.#text = withLimit(this.whole, axis.name, key, input.value.trim());
-      this.#mark();
-      this.#fill();
-    });
+    Object.assign(input, { value: written(axis[key]), inputMode: "decimal", placeholder: "none", ariaLabel: `${axis.name} ${LIMITS[key]}` });
+    input.addEventListener("change", () => this.#ask(this.order, { [axis.name]: { [key]: numbersIn(input.value) } }));
     return cell;
   }
-}
-
-function option(value, text) {
-  const made = element("option", "", text);
-  made.value = value;
-  return made;
 }

@@ -60,7 +60,7 @@ export class Result {
     const { at } = this;
     this.other = plan;
     at("second").hidden = !plan;
-    this.speed.show(plan && { run: plan.run, name });
+    this.speed.show(plan && { run: plan.run, data: plan.data, name });
     this.#figures(name);
     if (!plan) return this.path.scene.resize();
     plan.run.path.cutting_speed = this.plan.run.path.cutting_speed; // the same colours

@@ -3,6 +3,7 @@
 import { element } from "../parts.js";
 
 const ROW = 19; // pixels
+const LINES = 1 << 17; // counted at a time
 const MOST = 12_000_000; // pixels that a browser can scroll
 
 export class SourceText {
@@ -25,9 +26,13 @@ export class SourceText {
 
   /* Shows a program (a Blob). */
   async show(blob) {
-    this.#bytes = new Uint8Array(await blob.arrayBuffer());
-    const starts = [0];
-    for (let at = this.#bytes.indexOf(10); at >= 0; at = this.#bytes.indexOf(10, at + 1)) starts.push(at + 1);
+    const bytes = new Uint8Array(await blob.arrayBuffer()), starts = [0];
+    this.#bytes = bytes;
+    for (let at = bytes.indexOf(10); at >= 0; at = bytes.indexOf(10, at + 1)) {
+      starts.push(at + 1);
+      if (starts.length % LINES === 0) await new Promise((resolve) => setTimeout(resolve)); // the user comes first
+      if (this.#bytes !== bytes) return; // another program is shown
+    }
     this.#starts = starts;
     this.room.style.height = `${Math.min(starts.length * ROW, MOST)}px`;
     this.container.scrollTop = 0;

@@ -3,9 +3,9 @@
 import { duration, shown } from "../numbers.js";
 import { element } from "../parts.js";
 import { planned } from "./job.js";
-import { LIMITS, axesOf, scaled } from "./machine_text.js";
+import { LIMITS, described, scaled } from "./machine_file.js";
 
-const PAUSE = 250; // [ms] after the last change
+const PAUSE = 120; // [ms] in which a slider rests that is still held
 
 /* From the place of a slider to its value: 0 is as planned. Factors go from a quarter to four times. */
 const factorAt = (place) => 2 ** (place / 50);
@@ -17,7 +17,9 @@ const SLIDERS = {
 
 export class WhatIf {
   #base = null;
+  #axes = [];
   #wait = 0;
+  #isDue = false;
   #stop = null;
 
   /* `onPlan(plan, words)` is told each new plan, null where all is as planned. */
@@ -32,6 +34,7 @@ export class WhatIf {
       const input = row.appendChild(element("input"));
       Object.assign(input, { type: "range", min: -100, max: 100, value: 0, step: 1, name });
       input.addEventListener("input", () => this.#changed());
+      input.addEventListener("change", () => this.#soon(0));
       input.addEventListener("dblclick", () => this.#set(name, 0));
       this.sliders[name] = { input, value };
     }
@@ -45,18 +48,17 @@ export class WhatIf {
   }
 
   /* Starts from a plan. */
-  show(plan) {
+  async show(plan) {
     this.#base = plan;
+    this.quiet();
     this.tolerance = plan.order.options.tolerance ?? plan.summary.tolerance?.greatest ?? 0.01;
-    const options = axesOf(plan.order.machine).flatMap((axis) => Object.entries(LIMITS).filter(([key]) => axis[key]).map(([key, name]) => {
-      const option = element("option", "", `${axis.name} ${name}`);
-      option.value = `${axis.name} ${key}`;
-      return option;
-    }));
+    const { axes } = await described(plan.order.machine);
+    if (this.#base !== plan) return;
+    this.#axes = axes;
+    const options = axes.flatMap((axis) => Object.entries(LIMITS).filter(([key]) => axis[key] !== null).map(([key, name]) => new Option(`${axis.name} ${name}`, `${axis.name} ${key}`)));
     const chosen = this.limit.value;
     this.limit.replaceChildren(...options);
     if (options.some((option) => option.value === chosen)) this.limit.value = chosen;
-    this.quiet();
   }
 
   reset() {
@@ -68,6 +70,7 @@ export class WhatIf {
   quiet() {
     this.#stop?.abort();
     clearTimeout(this.#wait);
+    this.#isDue = false;
     for (const { input } of Object.values(this.sliders)) input.value = 0;
     this.told.textContent = "Move a slider: the program is planned again at once.";
     this.#tell();
@@ -87,16 +90,24 @@ export class WhatIf {
     this.#tell();
     if (!this.#base) return;
     if (this.back.disabled) return this.reset();
+    this.#stop?.abort();
+    this.#isDue = true;
+    this.#soon(PAUSE);
+  }
+
+  /* Plans after so many ms what has changed. */
+  #soon(pause) {
     clearTimeout(this.#wait);
-    this.#wait = setTimeout(() => this.#plan(), PAUSE);
+    if (this.#isDue) this.#wait = setTimeout(() => this.#plan(), pause);
   }
 
   async #plan() {
-    this.#stop?.abort();
+    this.#isDue = false;
     const stop = (this.#stop = new AbortController());
     this.told.textContent = "planning …";
     try {
-      const { order, words } = this.#order();
+      const { order, words } = await this.#order();
+      if (stop.signal.aborted) return;
       const plan = await planned(order, { signal: stop.signal, onProgress: (stage, done) => (this.told.textContent = `${stage} … ${Math.round(100 * done)} %`) });
       if (stop.signal.aborted) return;
       const before = this.#base.summary.time, after = plan.summary.time;
@@ -107,7 +118,7 @@ export class WhatIf {
     }
   }
 
-  #order() {
+  async #order() {
     const { order } = this.#base;
     const place = (name) => Number(this.sliders[name].input.value);
     const options = { ...order.options }, words = [];
@@ -122,7 +133,8 @@ export class WhatIf {
     }
     if (place("limit")) {
       const [axis, key] = this.limit.value.split(" ");
-      machine = scaled(machine, axis, key, factorAt(place("limit")));
+      const limit = this.#axes.find(({ name }) => name === axis)[key];
+      machine = (await described(machine, { [axis]: { [key]: scaled(limit, factorAt(place("limit"))) } })).file;
       words.push(`${axis} ${LIMITS[key]} ${SLIDERS.limit.shown(place("limit"))}`);
     }
     return { order: { ...order, machine, options }, words: words.join(", ") };
