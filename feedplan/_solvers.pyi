@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from feedplan.audit import _Limits
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
+from feedplan.planners._parts import Part, PartOfProfile
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 
@@ -75,20 +76,20 @@ _Progress = Callable[[float], None]
 def plan_bang_bang(problem: Problem, progress: _Progress | None = None) -> _Profile: ...
 def plan_curves(problem: Problem) -> _Profile: ...
 def plan_jerk_limited(
-    problem: Problem,
+    problem: Problem | Part,
     jerk: NDArray[np.float64],
     resolution: float,
     tolerance: float,
     time_limit: float | None = None,
     progress: _Progress | None = None,
-) -> tuple[_Profile, _Changes, tuple[bool, float]]: ...
+) -> tuple[_Profile, _Changes, tuple[bool, NDArray[np.float64]]]: ...
 def bound_jerk_limited(
-    problem: Problem,
+    problem: Problem | Part,
     jerk: NDArray[np.float64],
-    profile: SpeedProfile,
+    profile: SpeedProfile | PartOfProfile,
     time_limit: float | None = None,
     progress: _Progress | None = None,
-) -> float: ...
+) -> NDArray[np.float64]: ...
 def plan_s_curve(
     problem: Problem,
     jerk: NDArray[np.float64],

@@ -32,12 +32,15 @@ from feedplan.machine.controller import Controller
 from feedplan.machine.machine import Machine
 from feedplan.outputs import FORMAT
 from feedplan.planners import (
+    Elsewhere,
     MethodName,
     bound_of,
     corners,
     given_options,
+    goes_elsewhere,
     grid_error,
     limits_jerk,
+    methods,
     options_of,
     planner,
     tells_early,
@@ -314,6 +317,7 @@ def plan(
     reading: Reading | None = None,
     controller: Controller | Mapping[str, Any] | str | None = None,
     progress: Progress | None = None,
+    elsewhere: Elsewhere | None = None,
     **options: Any,
 ) -> Plan:
     """The plan of a part program on a machine, time-optimal unless another method is asked for.
@@ -334,6 +338,8 @@ def plan(
     `progress(stage, done)` is called some times a second as the work goes on, with `read`, `fit`, then
     `plan`, and the part of that stage that is done, which never falls; what it raises ends the work and is
     raised here.
+    `elsewhere`, a `feedplan.jobs.cluster_runs.ClusterRuns`, plans the runs between stops on the workers of a
+    cluster, with jerk-limited alone; the plan is the same bit for bit.
 
     What some methods take besides, by keyword, with what holds where it is not given:
 
@@ -373,6 +379,8 @@ def plan(
     one_of(interpolator, "interpolator", INTERPOLATORS)
     whole(max_setpoints, "max_setpoints", "a whole number from 1")
     callback(progress)
+    if elsewhere is not None:
+        _require_parts(elsewhere, method, time_limit)
     report = progress or (lambda stage, done: None)
     compute: dict[str, float] = {}
     program: Program | None = None
@@ -425,6 +433,8 @@ def plan(
             )
         if tells_progress(method):
             solve = partial(solve, progress=part(share, 0.0, PLANNING))
+        others = {} if elsewhere is None else {"elsewhere": elsewhere}
+        solve = partial(solve, **others)
         profile = solve(problem)
         if not math.isfinite(profile.time):
             raise SolverError(f"{method} loses its digits on this path: take another method or machine")
@@ -437,7 +447,7 @@ def plan(
             method, **{name: left if name == "time_limit" else own for name, own in given.items()}
         )
         if known is not None:
-            least = max(least, known(problem, profile, progress=part(share, BOUND, 1.0)))
+            least = max(least, known(problem, profile, progress=part(share, BOUND, 1.0), **others))
         wanted = settings.get("accuracy", 0.0)
         short = shortfalls(
             profile,
@@ -496,6 +506,20 @@ def plan(
 
 # What every method takes.
 OF_ALL_METHODS: tuple[str, ...] = tuple(plan.__kwdefaults__ or ())
+
+
+def _require_parts(elsewhere: Any, method: str, time_limit: float | None) -> None:
+    """Raises InputError where runs are not planned elsewhere."""
+    if not callable(getattr(elsewhere, "map", None)) or not callable(getattr(elsewhere, "count", None)):
+        raise refuse("elsewhere", elsewhere, "a feedplan.jobs.cluster_runs.ClusterRuns")
+    if not goes_elsewhere(method):
+        able = ", ".join(own for own in methods() if goes_elsewhere(own))
+        raise InputError(
+            f"the method {method} plans in less time than its runs take on the way to a cluster: leave the "
+            f"cluster out, or use {able}"
+        )
+    if time_limit is not None:
+        raise InputError("a plan with a time limit is made here: leave the time limit or the cluster out")
 
 
 def rounding_stops(problem: Problem, profile: SpeedProfile) -> tuple[str, ...]:

@@ -110,7 +110,10 @@ def cases(tmp_path: FilePath) -> dict[str, tuple[Callable[..., Any], dict[str, A
     limits = {"max_velocity": 100.0, "max_acceleration": 1000.0, "max_jerk": 1e4}
     axis = Axis("X", **limits)
     found: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
-        "plan": (feedplan.plan, {**common, "method": "bang-bang", "max_setpoints": 100_000}),
+        "plan": (
+            feedplan.plan,
+            {**common, "method": "bang-bang", "max_setpoints": 100_000, "elsewhere": None},
+        ),
         "plan of a path": (feedplan.plan, {"source": plan.path, "machine": machine, "feed": 50.0}),
         "compare": (
             feedplan.compare,

@@ -9,7 +9,7 @@ share. A method that is made for another path than the rounded one says so in `C
 `feedplan.bound` has a function `lower_bound(problem, profile)` with the same options, and `GRID_ERROR` if
 that leaves so many times the accuracy to finer grids. One that tells how far it is takes `PROGRESS`, and so
 does its bound; one that can tell what follows its plan before it is made (`planners.jerk_limited`) takes
-`RESERVE`.
+`RESERVE`, and one whose runs may be planned on other computers `ELSEWHERE`, as does its bound.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from feedplan.arguments import one_of
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InputError
 from feedplan.geometry.corners import Corners
+from feedplan.planners._parts import Elsewhere as Elsewhere
 from feedplan.profile import SpeedProfile
 
 MethodName = Literal[
@@ -47,6 +48,8 @@ MethodName = Literal[
 RESERVE = "reserve"
 # Is told how far the plan is; given by `feedplan.plan` too.
 PROGRESS = "progress"
+# Does parts of the work; given by `feedplan.plan` too.
+ELSEWHERE = "elsewhere"
 
 
 def methods() -> tuple[MethodName, ...]:
@@ -95,7 +98,8 @@ def grid_error(method: str) -> float:
 def options_of(method: str) -> dict[str, Any]:
     """A method's options by name, with their defaults; raises as `planner`."""
     parameters = inspect.signature(_module(method).plan).parameters.values()
-    return {own.name: own.default for own in parameters if own.name not in ("problem", RESERVE, PROGRESS)}
+    others = ("problem", RESERVE, PROGRESS, ELSEWHERE)
+    return {own.name: own.default for own in parameters if own.name not in others}
 
 
 def tells_early(method: str) -> bool:
@@ -106,6 +110,11 @@ def tells_early(method: str) -> bool:
 def tells_progress(method: str) -> bool:
     """Whether a method tells how far its plan is (`PROGRESS`); raises as `planner`."""
     return PROGRESS in inspect.signature(_module(method).plan).parameters
+
+
+def goes_elsewhere(method: str) -> bool:
+    """Whether runs of a method may be planned on other computers (`ELSEWHERE`); raises as `planner`."""
+    return ELSEWHERE in inspect.signature(_module(method).plan).parameters
 
 
 def corners(method: str) -> Corners:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,15 @@ from feedplan.geometry.corners import Corners
 from feedplan.planners import s_curve
 from feedplan.planners._faults import error_of
 from feedplan.planners._jerk import jerk_limits, lowered_limits
+from feedplan.planners._parts import (
+    Elsewhere,
+    Part,
+    PartOfProfile,
+    fault_of,
+    joined,
+    part_of_profile,
+    parts,
+)
 from feedplan.planners._runs import fastest_runs
 from feedplan.profile import SpeedProfile
 from feedplan.progress import Listener, part
@@ -50,6 +61,7 @@ def plan(
     time_limit: float | None = None,
     reserve: Callable[[SpeedProfile], float] | None = None,
     progress: Listener | None = None,
+    elsewhere: Elsewhere | None = None,
 ) -> SpeedProfile:
     """The fastest profile, its time within about `accuracy` of the least, as a part of it.
 
@@ -57,8 +69,9 @@ def plan(
     `time_limit` [s] there is a first plan, on a coarse grid, whatever the limit. `reserve` tells from it what
     is to be kept of the limit for other work [s]. If the rest does not suffice, each run takes the fastest of
     the first plan, of the one that was stopped, if that came to the run, and of the method s-curve; the
-    profile says `stopped`. It keeps all limits too. Raises SolverError for an axis without a limit of jerk,
-    InfeasibleError where the start or end speed cannot be had, with the speed that can.
+    profile says `stopped`. It keeps all limits too. Without a time limit runs are planned `elsewhere`, if
+    that is given. Raises SolverError for an axis without a limit of jerk, InfeasibleError where the start or
+    end speed cannot be had, with the speed that can.
     """
     accuracy = number(
         accuracy, "the accuracy", f"{FINEST:g} to {COARSEST:g}", lambda part: FINEST <= part <= COARSEST
@@ -67,12 +80,12 @@ def plan(
         time_limit = number(time_limit, "the time limit", "0 or more", lambda limit: limit >= 0, "s")
     limits = jerk_limits(problem)
     resolution = max(RESOLUTION * (1e-4 / accuracy) ** 0.5, LEAST_RESOLUTION)
-    whole = partial(_kept, problem, limits, resolution, GAP * accuracy)
+    whole = partial(_kept, problem, limits, resolution, GAP * accuracy, elsewhere)
     if time_limit is None:
         return whole(None, progress)
     end = time.perf_counter() + time_limit
     try:
-        first = _kept(problem, limits, FIRST_RESOLUTION, FIRST_GAP, None, part(progress, 0.0, FIRST))
+        first = _kept(problem, limits, FIRST_RESOLUTION, FIRST_GAP, None, None, part(progress, 0.0, FIRST))
     except InfeasibleError:
         # A coarse grid may miss a speed at an end that can just be had.
         return whole(None, part(progress, FIRST, 1.0))
@@ -97,6 +110,7 @@ def lower_bound(
     accuracy: float = 1e-4,
     time_limit: float | None = None,
     progress: Listener | None = None,
+    elsewhere: Elsewhere | None = None,
 ) -> float:
     """A bound [s] on the time of every profile, from one planned with the same accuracy, if that is of use.
 
@@ -106,8 +120,15 @@ def lower_bound(
     """
     if profile.stopped or time_limit == 0:
         return 0.0
-    found = bound_jerk_limited(problem, jerk_limits(problem), profile, time_limit, progress)
-    return (1.0 - GRID_ERROR * accuracy) * min(found, profile.time)
+    limits = jerk_limits(problem)
+    own = _parts_of(problem, elsewhere) if time_limit is None else []
+    if elsewhere is None or len(own) < 2:
+        bounds = bound_jerk_limited(problem, limits, profile, time_limit, progress)
+    else:
+        given = [(each, limits, part_of_profile(profile, each)) for each in own]
+        bounds = np.concatenate(elsewhere.map(bound_part, given, progress))
+    # The exact sum, whatever the parts.
+    return (1.0 - GRID_ERROR * accuracy) * min(math.fsum(bounds), profile.time)
 
 
 def _kept(
@@ -115,16 +136,17 @@ def _kept(
     limits: NDArray[np.float64],
     resolution: float,
     gap: float,
+    elsewhere: Elsewhere | None,
     end: float | None,
     progress: Listener | None,
 ) -> SpeedProfile:
     """The plan by a time of the clock; again with lower limits where the joints miss those of jerk."""
     once = 0.5 if problem.words else 1.0
-    profile = _planned(problem, limits, resolution, gap, end, part(progress, 0.0, once))
+    profile = _planned(problem, limits, resolution, gap, elsewhere, end, part(progress, 0.0, once))
     lowered = lowered_limits(problem, limits, profile)
     if lowered is None:
         return profile
-    return _planned(problem, lowered, resolution, gap, end, part(progress, once, 1.0))
+    return _planned(problem, lowered, resolution, gap, elsewhere, end, part(progress, once, 1.0))
 
 
 def _planned(
@@ -132,9 +154,18 @@ def _planned(
     limits: NDArray[np.float64],
     resolution: float,
     gap: float,
+    elsewhere: Elsewhere | None,
     end: float | None,
     progress: Listener | None,
 ) -> SpeedProfile:
+    own = _parts_of(problem, elsewhere) if end is None else []
+    if elsewhere is not None and len(own) > 1:
+        given = [(each, limits, resolution, gap) for each in own]
+        planned = elsewhere.map(plan_part, given, progress)
+        for each, (found, fault) in zip(own, planned, strict=True):
+            if found is None:
+                raise error_of(problem, fault_of(each, fault))
+        return joined(own, [found for found, _ in planned])
     left = None if end is None else max(end - time.perf_counter(), 0.0)
     try:
         columns, changes, (stopped, excess) = plan_jerk_limited(
@@ -142,4 +173,26 @@ def _planned(
         )
     except PlanError as fault:
         raise error_of(problem, fault) from None
-    return SpeedProfile(*columns, *changes, stopped=stopped, excess=excess)
+    return SpeedProfile(*columns, *changes, stopped=stopped, excess=math.fsum(excess))
+
+
+def _parts_of(problem: Problem, elsewhere: Elsewhere | None) -> list[Part]:
+    """The parts that are planned elsewhere; fewer than two: there is nothing to share."""
+    return [] if elsewhere is None else parts(problem, elsewhere.count())
+
+
+def plan_part(
+    part: Part, limits: NDArray[np.float64], resolution: float, gap: float, progress: Listener
+) -> tuple[Any, tuple[Any, ...]]:
+    """What the native planner returns for a part, or None and what its fault tells."""
+    try:
+        return plan_jerk_limited(part, limits, resolution, gap, None, progress), ()
+    except PlanError as fault:
+        return None, fault.args
+
+
+def bound_part(
+    part: Part, limits: NDArray[np.float64], profile: PartOfProfile, progress: Listener
+) -> NDArray[np.float64]:
+    """The bound of each stretch of a part."""
+    return bound_jerk_limited(part, limits, profile, None, progress)

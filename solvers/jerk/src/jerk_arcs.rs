@@ -46,8 +46,8 @@ pub struct Arcs {
     pub runs: Vec<i64>,
     /// Pieces at whose start a jump of curvature holds the speed.
     pub kinks: Vec<u32>,
-    /// How far the planner takes its time to be above the least, in s.
-    pub excess: f64,
+    /// How far the planner takes its time to be above the least, in s, of each part that it planned, in order.
+    pub excess: Vec<f64>,
     /// A deadline came before the planner's end.
     pub stopped: bool,
     left_out: f64,
@@ -163,7 +163,7 @@ impl Arcs {
         self.a0.append(&mut other.a0);
         self.a1.append(&mut other.a1);
         self.kinks.append(&mut other.kinks);
-        self.excess += other.excess;
+        self.excess.append(&mut other.excess);
         self.stopped |= other.stopped;
     }
 

@@ -48,14 +48,14 @@ pub struct Columns<'a> {
     pub duration: &'a [f64],
 }
 
-/// A bound in s of the time on the grids of a profile: see `jerk_limited::certify`. A stretch that this planner did not
-/// plan as one counts for nothing, and so do those that the deadline leaves no time for.
+/// A bound in s of the time of each stretch on the grids of a profile: see `jerk_limited::certify`. It is 0 for a stretch
+/// that this planner did not plan as one, and for those that the deadline leaves no time for.
 pub fn certified<const M: usize>(
     problem: &Problem<M>,
     jerk: &[f64; M],
     columns: &Columns,
     effort: &Effort,
-) -> Result<f64, Fault> {
+) -> Result<Vec<f64>, Fault> {
     let limits = checked(problem, jerk)?;
     let stretches = stretches(problem);
     let place = |arc: usize| (columns.piece[arc] as usize, columns.u0[arc]);
@@ -71,15 +71,15 @@ pub fn certified<const M: usize>(
     }
     offsets.push(count);
     let watch = problem.watch.each(problem.width.len());
-    let bounds = stretches.par_iter().enumerate().map(|(i, stretch)| {
+    let bound = |(i, stretch): (usize, &Stretch)| {
         if effort.expired() {
             return 0.0;
         }
         let effort = Effort { watch: watch.part(stretch.parts.len() as f64), ..*effort };
         let task = Task { problem, limits, effort: &effort };
         task.certified(stretch, columns, offsets[i]..offsets[i + 1]).unwrap_or(0.0)
-    });
-    Ok(bounds.sum())
+    };
+    Ok(stretches.par_iter().enumerate().map(bound).collect())
 }
 
 /// The planner of stretches.
@@ -122,7 +122,7 @@ impl<const M: usize> Task<'_, M> {
             Ok(plan) if plan.iterations == 0.0 && self.effort.expired() => Ok(Arcs::unplanned()),
             Ok(plan) => {
                 arcs.push_profile(self.problem, &path, &self.limits.jerk, &plan.profile);
-                arcs.excess = plan.excess;
+                arcs.excess.push(plan.excess);
                 arcs.stopped = !plan.converged && self.effort.expired();
                 for Joint { cap, jumps } in joints {
                     if jumps && plan.profile.at(cap.s)[0] >= HELD * cap.speed * cap.speed {

@@ -25,9 +25,9 @@ instances! {
         /// The fastest profile that the effort finds.
         fn jerk_limited(&self, jerk: &[f64; M], effort: &Effort) -> Result<Arcs, Fault>
             = jerk_limited_path::plan;
-        /// A time [s] that no profile is below, on the grid of a profile.
+        /// A time [s] that no profile is below, of each stretch, on the grid of a profile.
         fn jerk_limited_bound(&self, jerk: &[f64; M], columns: &jerk_limited_path::Columns, effort: &Effort)
-            -> Result<f64, Fault> = jerk_limited_path::certified;
+            -> Result<Vec<f64>, Fault> = jerk_limited_path::certified;
         /// The two-pass profile of segments by the quickest cutting.
         fn s_curve(&self, jerk: &[f64; M], cuttings: &[Cutting], look_ahead: usize, effort: &Effort)
             -> Result<Arcs, Fault> = s_curve_path::plan;

@@ -42,8 +42,8 @@ fn deadline(time_limit: Option<f64>) -> Option<Instant> {
 }
 
 /// The columns of all profiles, (a0, a1, kinked), and whether a time limit stopped the planner and how far it takes the
-/// time to be above the least, in s.
-type Planned<'py> = (Columns<'py>, Changes<'py>, (bool, f64));
+/// time of each part that it planned to be above the least, in s.
+type Planned<'py> = (Columns<'py>, Changes<'py>, (bool, Bound<'py, PyArray1<f64>>));
 
 /// The fastest profile within `jerk` [mm/s³] of every axis. Runs that are not planned when the time limit comes have no
 /// arcs.
@@ -64,7 +64,7 @@ fn plan_jerk_limited<'py>(
         let (problem, jerk) = (rows.problem()?, row::<M>(&jerk, 1.0)?);
         let plan = |watch: Watch| Problem { watch, ..problem }.jerk_limited(&jerk, &effort);
         let arcs = run(py, progress.as_ref(), plan)?.map_err(|fault| to_exception(&fault))?;
-        let end = (arcs.stopped, arcs.excess);
+        let end = (arcs.stopped, PyArray1::from_slice(py, &arcs.excess));
         let (columns, changes) = to_columns(py, arcs);
         Ok((columns, changes, end))
     })
@@ -84,17 +84,17 @@ struct ProfileArrays<'py> {
     duration: PyReadonlyArray1<'py, f64>,
 }
 
-/// A lower bound in s of the time on the grid of a profile of `plan_jerk_limited`.
+/// A lower bound in s of the time of each stretch on the grid of a profile of `plan_jerk_limited`.
 #[pyfunction]
 #[pyo3(signature = (problem, jerk, profile, time_limit=None, progress=None))]
-fn bound_jerk_limited(
-    py: Python<'_>,
-    problem: ProblemArrays<'_>,
-    jerk: PyReadonlyArray1<'_, f64>,
-    profile: ProfileArrays<'_>,
+fn bound_jerk_limited<'py>(
+    py: Python<'py>,
+    problem: ProblemArrays<'py>,
+    jerk: PyReadonlyArray1<'py, f64>,
+    profile: ProfileArrays<'py>,
     time_limit: Option<f64>,
-    progress: Option<Bound<'_, PyAny>>,
-) -> PyResult<f64> {
+    progress: Option<Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let columns = jerk_limited_path::Columns {
         piece: profile.piece.as_slice()?,
         kind: profile.kind.as_slice()?,
@@ -111,7 +111,8 @@ fn bound_jerk_limited(
         let rows = ProblemRows::<M>::new(&problem)?;
         let (problem, jerk) = (rows.problem()?, row::<M>(&jerk, 1.0)?);
         let bound = |watch: Watch| Problem { watch, ..problem }.jerk_limited_bound(&jerk, &columns, &effort);
-        run(py, progress.as_ref(), bound)?.map_err(|fault| to_exception(&fault))
+        let bounds = run(py, progress.as_ref(), bound)?.map_err(|fault| to_exception(&fault))?;
+        Ok(PyArray1::from_vec(py, bounds))
     })
 }
 
