@@ -11,6 +11,7 @@ from rich.console import Console
 
 from benchmarks import (
     against_toppra,
+    batch,
     certificate_cost,
     curve_cost,
     end_to_end,
@@ -44,6 +45,7 @@ BENCHMARKS = {
         size,
         interrupts,
         service,
+        batch,
     )
 }
 

@@ -10,12 +10,15 @@ import io
 import os
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path as FilePath
 from typing import IO, Any
 
 import click
 
 from feedplan import __version__, console, outputs, planners
+from feedplan.batch_command import batch
+from feedplan.cluster_options import cluster_options
 from feedplan.command_options import (
     ACCURACY,
     FEED,
@@ -39,6 +42,7 @@ from feedplan.controller_options import Choice, controller_options
 from feedplan.errors import FeedplanError, InfeasibleError, SolverError
 from feedplan.filter_command import filter_
 from feedplan.geometry.corners import FollowedPath
+from feedplan.jobs.address import ClusterAddress
 from feedplan.machine_commands import machines
 from feedplan.program.read import Reading
 from feedplan.program_options import ProgramWanted, program_options
@@ -160,6 +164,7 @@ def cli(context: click.Context) -> int:
 @program_options
 @click.option("--server", metavar="URL", help="Have a service plan, such as http://127.0.0.1:8000.")
 @TOKEN_FILE
+@cluster_options
 @JSON
 @QUIET
 def plan(
@@ -183,6 +188,7 @@ def plan(
     step: float | None,
     server: str | None,
     token_file: str | None,
+    cluster: ClusterAddress | None,
     as_json: bool,
     quiet: bool,
     controller: Choice,
@@ -190,6 +196,9 @@ def plan(
     wanted: ProgramWanted,
 ) -> int:
     """Plan PROGRAM: G-code, a path file (.json) or a drawing (.dxf); - is standard input.
+
+    With --cluster and jerk-limited the workers of a Dask cluster plan the runs between stops, bit for bit as
+    this computer would; reading, fitting, the audit and the files stay here.
 
     Exit code 1: a limit is broken, or no plan is feasible.
     """
@@ -206,9 +215,17 @@ def plan(
             "a service gives no program with planned feeds, no pvt table and nothing of --one-step-more: "
             "leave them out, or --server"
         )
+    if server and cluster:
+        raise click.UsageError(
+            "a service plans where its own --cluster says: leave --server or --cluster out"
+        )
     if output:
         require_folder(FilePath(output))
-    with console.progress_bar(quiet) as progress, console.without_others():
+    with (
+        _elsewhere(cluster) as elsewhere,
+        console.progress_bar(quiet) as progress,
+        console.without_others(),
+    ):
         known, source = machine_for(machine, program, reading, feed)
         make_plan, write = _place(server, token_file)
         result = make_plan(
@@ -227,7 +244,7 @@ def plan(
             reading=reading,
             controller=controller(known),
             progress=progress,
-            **given_only(accuracy=accuracy, time_limit=time_limit),
+            **given_only(accuracy=accuracy, time_limit=time_limit, elsewhere=elsewhere),
         )
         audit = result.audit(progress)
         planned = wanted.make(result)
@@ -268,6 +285,15 @@ def _steps(made: Any) -> tuple[Any, ...]:
     from feedplan.one_step_more import one_step_more
 
     return one_step_more(made)
+
+
+def _elsewhere(cluster: ClusterAddress | None) -> AbstractContextManager[Any]:
+    """Who plans runs in place of this computer, None for nobody."""
+    if cluster is None:
+        return nullcontext()
+    from feedplan.jobs.cluster_runs import ClusterRuns
+
+    return ClusterRuns(cluster)
 
 
 def _place(server: str | None, token_file: str | None) -> tuple[Callable[..., Any], Callable[..., Any]]:
@@ -446,6 +472,7 @@ def check(place: str, machine: str | None, resolution: float, jerk: bool, as_jso
     return DONE if audit.ok else _fail(console.failure_sentence(audit), BROKEN)
 
 
+cli.add_command(batch)
 cli.add_command(filter_)
 cli.add_command(machines)
 cli.add_command(serve)

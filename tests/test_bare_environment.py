@@ -131,6 +131,19 @@ def test_the_service_says_what_it_needs_and_its_client_needs_nothing(python: Pat
     assert done.stderr.startswith("error: the service at http://127.0.0.1:9 cannot be reached")
 
 
+def test_a_batch_needs_nothing_and_a_cluster_says_what_it_needs(python: Path, part: Path) -> None:
+    done = run(python, "-m", "feedplan", "batch", "part.ngc", "-o", "out", "-q", folder=part.parent)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert (part.parent / "out" / "part" / "plan.json").exists()
+    at = ["--cluster", "127.0.0.1:8786"]
+    for command in (["batch", "part.ngc", "-o", "out"], ["plan", "part.ngc", "--method", "jerk-limited"]):
+        done = run(python, "-m", "feedplan", *command, *at, folder=part.parent)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert re.fullmatch(
+            r"error: a cluster needs the package \w+: `pip install feedplan\[cluster\]`\n", done.stderr
+        )
+
+
 def test_a_notebook_and_path_files_work(python: Path, part: Path) -> None:
     code = """
 import feedplan

@@ -46,7 +46,9 @@ def test_every_benchmark_runs_and_stores_its_table(tmp_path: Path) -> None:
         "size",
         "interrupts",
         "service",
+        "batch",
     }
+    assert all(row["equal"] == "10 of 10" for row in tables["batch"]["rows"])
     assert all(row["off [%]"] <= (10 if "chords" in row["shape"] else 2) for row in tables["size"]["rows"])
     assert all(row["error [steps]"] <= 1.001e-6 for row in tables["interpolators"]["rows"])
     assert all(-1e-9 < row["gap"] < 1e-3 for row in tables["certificate-cost"]["rows"])

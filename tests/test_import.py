@@ -58,6 +58,8 @@ def test_nothing_that_is_slow_is_imported_with_the_package() -> None:
         "sqlite3",
         "fastapi",
         "pydantic",
+        "distributed",
+        "multiprocessing",
     }
     code = f"import sys, feedplan; feedplan.__version__; print(sorted({slow} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -71,6 +73,17 @@ for module in pkgutil.walk_packages(feedplan.__path__, "feedplan."):
     if not module.name.startswith("feedplan.service."):
         importlib.import_module(module.name)
 print(sorted({"fastapi", "pydantic", "sqlite3", "starlette", "uvicorn"} & set(sys.modules)))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+
+
+def test_the_package_of_clusters_is_imported_where_one_is_used() -> None:
+    code = """
+import importlib, pkgutil, sys, feedplan
+for module in pkgutil.walk_packages(feedplan.__path__, "feedplan."):
+    importlib.import_module(module.name)
+print(sorted({"dask", "distributed"} & set(sys.modules)))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"

@@ -37,6 +37,15 @@ def finder(folders: Iterable[Path], max_bytes: int = MAX_BYTES) -> Finder:
     return find
 
 
+def numbered_files(folders: Iterable[Path], max_bytes: int = MAX_BYTES) -> dict[str, bytes]:
+    """All files that a program may call by a number that it computes, by name; those of the first folder that
+    has one. Raises as what `finder` returns."""
+    find = finder(folders, max_bytes)
+    stems = {file.name.lower().partition(".")[0] for folder in folders for file in _files(folder)}
+    numbers = {stem.removeprefix("o").lstrip("0") for stem in stems if stem.removeprefix("o").isdigit()}
+    return dict(file for number in sorted(numbers) if (file := find(number)) is not None)
+
+
 def _files(folder: Path) -> list[Path]:
     try:
         return sorted(file for file in folder.iterdir() if file.is_file())

@@ -23,6 +23,7 @@ from starlette.requests import Request
 
 from feedplan import __version__, outputs, planners
 from feedplan.files import DRAWING_FILE, SUMMARY_FILE
+from feedplan.jobs.place import Place
 from feedplan.machine.controller import MODELS
 from feedplan.machine.machine import Machine, bundled_machines
 from feedplan.report.page import FILE as REPORT_FILE
@@ -57,11 +58,11 @@ Time = Annotated[float | None, Query(allow_inf_nan=False)]
 class Service:
     """What all addresses share."""
 
-    def __init__(self, folder: FilePath, limits: Limits) -> None:
+    def __init__(self, folder: FilePath, limits: Limits, place: Place) -> None:
         self.limits = limits
         self.bell = events.Bell()
         self.store = Store(folder, limits, self.bell.ring)
-        self.runner = Runner(self.store, limits)
+        self.runner = Runner(self.store, limits, place)
         self.receiving = asyncio.Semaphore(RECEIVED_AT_ONCE)
 
     @asynccontextmanager
@@ -77,9 +78,10 @@ class Service:
             self.store.close()
 
 
-def create(folder: FilePath, limits: Limits) -> FastAPI:
-    """The application on a store, without its guard. Raises InputError where the store cannot be used."""
-    service = Service(folder, limits)
+def create(folder: FilePath, limits: Limits, place: Place) -> FastAPI:
+    """The application on a store, without its guard; its jobs run in `place`. Raises InputError where the
+    store cannot be used."""
+    service = Service(folder, limits, place)
     app = FastAPI(
         title="feedplan",
         version=__version__,

@@ -10,7 +10,9 @@ from typing import Any, TypeVar
 
 import click
 
+from feedplan.cluster_options import cluster_options
 from feedplan.errors import MissingPackageError
+from feedplan.jobs.address import ClusterAddress
 from feedplan.service.limits import Limits
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -61,13 +63,21 @@ def limit_options(command: Command) -> Command:
     metavar="NAME",
     help="Another name that the service is known by.",
 )
+@cluster_options
 @limit_options
 def serve(
-    host: str, port: int, store: str, token_file: str | None, allowed: tuple[str, ...], limits: Limits
+    host: str,
+    port: int,
+    store: str,
+    token_file: str | None,
+    allowed: tuple[str, ...],
+    limits: Limits,
+    cluster: ClusterAddress | None,
 ) -> None:
     """Plan for others over HTTP: jobs, progress, results; /docs of its address tells how.
 
-    Beyond this computer it needs --token-file. Prints its address when it can be reached.
+    Beyond this computer it needs --token-file. Prints its address when it can be reached. With --cluster jobs
+    run on the workers of a Dask cluster, as many at a time as these have threads.
     """
     try:
         from feedplan.service.server import serve as run
@@ -76,4 +86,5 @@ def serve(
             f"the service needs the package {error.name}: `pip install feedplan[serve]`"
         ) from None
     token = None if token_file is None else FilePath(token_file)
-    run(host, port, FilePath(store), token, allowed, limits, lambda address: print(address, flush=True))
+    ready = functools.partial(print, flush=True)
+    run(host, port, FilePath(store), token, allowed, limits, cluster, ready)

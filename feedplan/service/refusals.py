@@ -9,14 +9,8 @@ import json
 from dataclasses import dataclass
 from typing import Any
 
-from feedplan.errors import (
-    FeedplanError,
-    InfeasibleError,
-    MachineError,
-    MissingPackageError,
-    ProgramError,
-    SolverError,
-)
+from feedplan.errors import FeedplanError
+from feedplan.jobs import outcome
 
 MEDIA_TYPE = "application/problem+json"
 TYPE = "urn:feedplan:"
@@ -52,15 +46,19 @@ WORKER = Kind("worker", 500, "The process of the job ended")
 CANCELLED = Kind("cancelled", 409, "The job was cancelled")
 DEFECT = Kind("defect", 500, "A defect in feedplan")
 
-# By class; the first that an error is an instance of.
-_KINDS: tuple[tuple[type[FeedplanError], Kind], ...] = (
-    (ProgramError, PROGRAM),
-    (MachineError, MACHINE),
-    (MissingPackageError, PACKAGE),
-    (InfeasibleError, INFEASIBLE),
-    (SolverError, SOLVER),
-    (FeedplanError, INPUT),
-)
+# By the kind of failure of a job.
+KINDS: dict[outcome.Kind, Kind] = {
+    "program": PROGRAM,
+    "machine": MACHINE,
+    "input": INPUT,
+    "infeasible": INFEASIBLE,
+    "solver": SOLVER,
+    "package": PACKAGE,
+    "limit": LIMIT,
+    "disk": DISK,
+    "worker": WORKER,
+    "defect": DEFECT,
+}
 
 
 class Refusal(Exception):  # noqa: N818 (it is an answer)
@@ -103,4 +101,4 @@ class Refusal(Exception):  # noqa: N818 (it is an answer)
 
 def kind_of(error: FeedplanError) -> Kind:
     """The kind of an error of feedplan."""
-    return next(kind for known, kind in _KINDS if isinstance(error, known))
+    return KINDS[outcome.kind_of(error)]

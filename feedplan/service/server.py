@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ipaddress
 import logging
 import socket
 from collections.abc import Callable, Sequence
@@ -13,6 +12,9 @@ import uvicorn
 
 from feedplan.client.token import read_token
 from feedplan.errors import InputError
+from feedplan.jobs.address import ClusterAddress, is_address, is_loopback
+from feedplan.jobs.place import JobLimits, Place
+from feedplan.jobs.processes import Processes
 from feedplan.service.app import create
 from feedplan.service.guard import Guard
 from feedplan.service.limits import Limits
@@ -28,12 +30,13 @@ def serve(
     token_file: FilePath | None,
     allowed_hosts: Sequence[str],
     limits: Limits,
+    cluster: ClusterAddress | None,
     ready: Callable[[str], None],
 ) -> None:
-    """Runs the service until it is told to end by a signal.
+    """Runs the service until it is told to end by a signal; its jobs run on a cluster, or in processes here.
 
     `ready(address)` is called once it can be reached. Raises InputError where it may not bind there without a
-    token, or cannot, and where the token or the store cannot be used.
+    token, or cannot, and where the token, the store or the cluster cannot be used.
     """
     token = None if token_file is None else read_token(token_file)
     if token is None and not is_loopback(host):
@@ -45,7 +48,7 @@ def serve(
     logging.getLogger("python_multipart").setLevel(logging.CRITICAL)
     bound = _bound(host, port)
     with bound:
-        app = create(store, limits)
+        app = create(store, limits, _place(cluster, limits))
         names = {"localhost", socket.gethostname(), *allowed_hosts, *([] if is_address(host) else [host])}
         config = uvicorn.Config(
             Guard(app, limits, names, token),
@@ -65,18 +68,13 @@ def serve(
             uvicorn.Server(config).run(sockets=[bound])
 
 
-def is_address(host: str) -> bool:
-    """Whether a host is given in numbers."""
-    try:
-        ipaddress.ip_address(host)
-    except ValueError:
-        return False
-    return True
+def _place(cluster: ClusterAddress | None, limits: Limits) -> Place:
+    of_jobs = JobLimits(limits.max_time, limits.max_memory)
+    if cluster is None:
+        return Processes(limits.workers, of_jobs)
+    from feedplan.jobs.cluster import Cluster
 
-
-def is_loopback(host: str) -> bool:
-    """Whether only this computer can reach what binds there."""
-    return ipaddress.ip_address(host).is_loopback if is_address(host) else host == "localhost"
+    return Cluster(cluster, of_jobs)
 
 
 def _bound(host: str, port: int) -> socket.socket:

@@ -307,13 +307,16 @@ class Store:
         self.changed(record["id"])
 
     def wait_again(self, record: Record) -> None:
-        """A running job waits again, since the server ends."""
+        """A running job waits again, since the server ends or the place it runs in is gone."""
         _remove(self.result(record))
         with self._database.change() as db:
-            self._wait_again(db, record["id"])
+            known = self._wait_again(db, record["id"])
+        if not known:  # deleted meanwhile
+            _remove(self.folder(record))
+        self.changed(record["id"])
 
     @staticmethod
-    def _wait_again(db: sqlite3.Connection, job: str) -> None:
+    def _wait_again(db: sqlite3.Connection, job: str) -> bool:
         changed = db.execute(
             "UPDATE jobs SET state = 'queued', started = NULL, stage = NULL, done = 0 "
             "WHERE id = ? AND state = 'running'",
@@ -321,6 +324,7 @@ class Store:
         )
         if changed.rowcount:
             _add_event(db, job, "state", {"state": "queued"})
+        return changed.rowcount > 0
 
     def cancel_waiting(self, job: str) -> bool:
         """Cancels a job that waits; False for all others. Raises Refusal where there is none."""

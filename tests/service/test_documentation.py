@@ -79,7 +79,7 @@ def test_the_page_has_everything_and_loads_nothing(server: Server) -> None:
 
 
 def test_the_options_are_those_that_a_plan_takes() -> None:
-    kept_here = {"reading", "progress"}
+    kept_here = {"reading", "progress", "elsewhere"}
     of_reading = set(Reading.__annotations__) - {"tool_table", "subprograms", "max_moves"}
     of_methods = {name for method in methods() for name in options_of(method)}
     assert set(Options.model_fields) == (set(OF_ALL_METHODS) - kept_here) | of_reading | of_methods

@@ -1,0 +1,83 @@
+"""The rows of plans that are done, one a line, as they come: what a batch that was stopped goes on from."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import shutil
+from contextlib import suppress
+from pathlib import Path as FilePath
+from typing import IO, Any
+
+from feedplan.batch.sweep import JOURNAL
+from feedplan.errors import InputError
+from feedplan.files import SUMMARY_FILE
+from feedplan.outputs._staging import require_folder
+
+
+class Journal:
+    """The journal in a folder, which no other batch has meanwhile.
+
+    Raises InputError where it cannot be used.
+    """
+
+    def __init__(self, folder: FilePath) -> None:
+        require_folder(folder)
+        self._folder = folder
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            self._file: IO[str] = (folder / JOURNAL).open("a+", encoding="utf-8")
+        except OSError as error:
+            reason = (error.strerror or str(error)).lower()
+            raise InputError(
+                f"{folder} cannot be written ({reason}): choose another folder with -o"
+            ) from None
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            self._file.close()
+            raise InputError(f"another batch works on {folder}: choose another folder with -o") from None
+        # What a batch that was killed has left beside.
+        for left in folder.glob(".feedplan-*"):
+            shutil.rmtree(left, ignore_errors=True)
+        self._known = self._read()
+
+    def _read(self) -> dict[str, dict[str, Any]]:
+        self._file.seek(0)
+        known: dict[str, dict[str, Any]] = {}
+        torn = False
+        for line in self._file:
+            torn = not line.endswith("\n")
+            with suppress(ValueError, KeyError, TypeError):  # torn by the end of a process
+                row = json.loads(line)
+                known[row["folder"]] = row
+        if torn:
+            self._file.write("\n")
+        return known
+
+    def close(self) -> None:
+        self._file.close()
+
+    def done(self, folder: str, fingerprint: str) -> dict[str, Any] | None:
+        """The row of a plan that is there already, in the folder of that name."""
+        row = self._known.get(folder)
+        if row is None or row.get("fingerprint") != fingerprint:
+            return None
+        return row if (self._folder / folder / SUMMARY_FILE).exists() else None
+
+    def remove(self, folder: str) -> None:
+        """Removes what an earlier plan has left in the folder of that name, if the journal has it."""
+        if self._known.pop(folder, None) is not None:
+            shutil.rmtree(self._folder / folder, ignore_errors=True)
+
+    def add(self, row: dict[str, Any]) -> None:
+        """Keeps the row of a plan that is done."""
+        try:
+            self._file.write(json.dumps(row, ensure_ascii=False) + "\n")
+            self._file.flush()
+        except OSError as error:
+            reason = os.strerror(error.errno or 0).lower()
+            raise InputError(
+                f"{self._folder / JOURNAL} cannot be written ({reason}): free some space, and start again"
+            ) from None

@@ -1,0 +1,43 @@
+"""Names of folders from the names of programs: readable, safe on every file system, and unlike each other."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterable
+from pathlib import PurePath
+
+# No name is longer: file systems allow 255 bytes, and paths are limited too.
+LONGEST = 100
+_OTHERS = re.compile(r"[^A-Za-z0-9._+-]+")
+# What no file is called on Windows.
+_DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\.|$)", re.IGNORECASE)
+
+
+def safe_name(program: str, parts: Iterable[str] = ()) -> str:
+    """A name of letters, digits and `._+-` for the folder of a program, the parts of a sweep after it."""
+    stem = PurePath(program.replace("\\", "/")).stem
+    plain = unicodedata.normalize("NFKD", stem).encode("ascii", "ignore").decode()
+    words = [_OTHERS.sub("_", word).strip("._-") for word in (plain, *parts)]
+    words[0] = words[0] or "program"
+    if _DEVICES.match(words[0]):
+        words[0] = f"program-{words[0]}"
+    tail = "".join(f"-{word}" for word in words[1:] if word)
+    return words[0][: max(LONGEST - len(tail), 10)].rstrip("._-") + tail[: LONGEST - 10]
+
+
+class Names:
+    """Gives each folder a name of its own, whatever the case of its letters."""
+
+    def __init__(self, taken: Iterable[str]) -> None:
+        self._count = {name.lower(): 1 for name in taken}
+
+    def own(self, name: str) -> str:
+        """The name, with a number after it where it was given before."""
+        while True:
+            count = self._count.get(name.lower(), 0) + 1
+            self._count[name.lower()] = count
+            found = name if count == 1 else f"{name}-{count}"
+            if count == 1 or found.lower() not in self._count:
+                self._count.setdefault(found.lower(), 1)
+                return found

@@ -1,0 +1,165 @@
+"""Plans a sweep in a place for jobs: a bounded number of jobs is under way, rows are kept as they come."""
+
+from __future__ import annotations
+
+import queue
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path as FilePath
+from typing import Any
+
+from feedplan.batch.journal import Journal
+from feedplan.batch.packing import Packing
+from feedplan.batch.sweep import Item, Sweep
+from feedplan.errors import InputError
+from feedplan.jobs.outcome import Outcome
+from feedplan.jobs.place import Place
+from feedplan.jobs.work import of_whole
+from feedplan.progress import Progress
+
+STAGE = "batch"
+# How often progress is shown and the room of a place is asked for [s].
+EVERY = 0.2
+# How long jobs may take to stop [s] before they are left to end by themselves.
+STOPPING = 0.4
+Row = dict[str, Any]
+
+
+def run_batch(
+    sweep: Sweep, folder: FilePath, place: Place, progress: Progress | None = None
+) -> tuple[list[Row], int]:
+    """Plans all of a sweep into `folder`; returns a row for each plan in its order, and how many of them were
+    there already.
+
+    `progress("batch", done)` is told how far it is. What ends it, as a KeyboardInterrupt, stops the jobs that
+    are under way; those that are done stay, and another run with the same folder goes on from there. Raises
+    InputError where the folder or the place cannot be used any more.
+    """
+    journal = Journal(folder)
+    try:
+        return _Batch(sweep, folder, place, journal).run(progress)
+    finally:
+        journal.close()
+
+
+class _Batch:
+    """A batch while it runs: threads take items and put outcomes, one thread keeps the rows."""
+
+    def __init__(self, sweep: Sweep, folder: FilePath, place: Place, journal: Journal) -> None:
+        self._items = enumerate(sweep.items(folder))
+        self._left, self._count = len(sweep), len(sweep)
+        self._place, self._journal = place, journal
+        self._lock = threading.Lock()
+        self._stop = threading.Event()
+        self._packing = Packing()
+        self._found: queue.SimpleQueue[tuple[int, Row, bool] | BaseException] = queue.SimpleQueue()
+        self._parts: dict[int, float] = {}
+        self._slots = 1
+
+    def run(self, progress: Progress | None) -> tuple[list[Row], int]:
+        rows: dict[int, Row] = {}
+        threads: list[threading.Thread] = []
+        kept, asked = 0, 0.0
+        try:
+            while len(rows) < self._count:
+                if time.monotonic() - asked > EVERY:
+                    asked = time.monotonic()
+                    self._slots = self._place.slots()
+                    threads = [thread for thread in threads if thread.is_alive()]
+                    while len(threads) < min(self._slots * self._place.depth, self._left):
+                        threads.append(threading.Thread(target=self._work, daemon=True))
+                        threads[-1].start()
+                    if progress is not None:
+                        progress(STAGE, (len(rows) + sum(list(self._parts.values()))) / self._count)
+                try:
+                    found = self._found.get(timeout=EVERY)
+                except queue.Empty:
+                    continue
+                if isinstance(found, BaseException):
+                    raise found
+                number, row, was_there = found
+                if row["error"] is not None:
+                    self._journal.remove(row["folder"])
+                elif not was_there:
+                    self._journal.add(row)
+                kept += was_there
+                rows[number] = row
+                self._parts.pop(number, None)
+        finally:
+            self._stop.set()
+            end = time.monotonic() + STOPPING
+            for thread in threads:
+                thread.join(max(end - time.monotonic(), 0.0))
+        return [rows[number] for number in sorted(rows)], kept
+
+    def _work(self) -> None:
+        try:
+            while not self._stop.is_set() and (chunk := self._next()):
+                self._run(chunk)
+        except BaseException as error:
+            self._found.put(error)
+
+    def _next(self) -> list[tuple[int, Item, str | None]]:
+        """Items that go together, with their fingerprints; those that are done already are told."""
+        chunk: list[tuple[int, Item, str | None]] = []
+        with self._lock:
+            size = self._packing.count(self._left, self._slots)
+            for number, item in self._take():
+                fingerprint = _fingerprint(item)
+                row = None if fingerprint is None else self._journal.done(item.folder, fingerprint)
+                if row is not None:
+                    self._found.put((number, row, True))
+                    continue
+                chunk.append((number, item, fingerprint))
+                if len(chunk) == size:
+                    break
+        return chunk
+
+    def _take(self) -> Iterator[tuple[int, Item]]:
+        for numbered in self._items:
+            self._left -= 1
+            yield numbered
+
+    def _run(self, chunk: list[tuple[int, Item, str | None]]) -> None:
+        def told(place: int, stage: str, part: float) -> None:
+            self._parts[chunk[place][0]] = of_whole(stage, part)
+
+        outcomes = self._place.run([item.job for _, item, _ in chunk], told, self._stop)
+        for (number, item, fingerprint), outcome in zip(chunk, outcomes, strict=True):
+            if outcome.state in ("lost", "stopped"):
+                if self._stop.is_set():
+                    return
+                raise InputError(
+                    "the cluster has gone: start it, and the same batch again, which goes on where it was"
+                )
+            self._packing.add(outcome)
+            self._found.put((number, row_of(item, fingerprint, outcome), False))
+
+
+def _fingerprint(item: Item) -> str | None:
+    try:
+        return item.fingerprint()
+    except OSError:  # the job itself says it
+        return None
+
+
+def row_of(item: Item, fingerprint: str | None, outcome: Outcome) -> Row:
+    """What the table of a batch tells of a plan: times in s; `error` is None where there is one."""
+    figures, failure = outcome.figures or {}, outcome.failure
+    row: Row = {
+        "folder": item.folder,
+        "program": item.program,
+        "machine": figures.get("machine", item.machine),
+        "tolerance": item.tolerance,
+        "method": item.method,
+        **{name: figures.get(name) for name in ("time", "lower_bound", "gap")},
+        "computing": outcome.seconds,
+        "ok": figures.get("ok"),
+        "failures": figures.get("failures", []),
+        "warnings": figures.get("warnings", []),
+        "error": failure.sentence if failure else None,
+        "kind": failure.kind if failure else None,
+        "fingerprint": fingerprint,
+    }
+    return row

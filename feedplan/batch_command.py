@@ -1,0 +1,236 @@
+"""`feedplan batch`: many programs or a sweep, in processes of this computer or on a cluster."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from feedplan import console, outputs, planners
+from feedplan.cluster_options import cluster_options
+from feedplan.command_options import (
+    ACCURACY,
+    FEED,
+    FEED_OVERRIDE,
+    JSON,
+    PATH,
+    QUIET,
+    TIME_LIMIT_HELP,
+    ZERO_OR_MORE,
+    Number,
+    given_only,
+)
+from feedplan.errors import InputError
+from feedplan.geometry.corners import FollowedPath
+from feedplan.jobs.address import ClusterAddress
+from feedplan.program.read import Reading, checked_reading
+from feedplan.program.tools import read_tools
+from feedplan.reading_options import reading_options
+from feedplan.setpoints import MAX_SETPOINTS
+from feedplan.units import counted, duration_text
+
+if TYPE_CHECKING:
+    from feedplan.jobs.place import Place
+
+DONE, FAILED = 0, 1
+# What a method is by the name of the option that gives it, where it is swept.
+_SWEPT = "may be given several times"
+
+
+@click.command()
+@click.argument("programs", metavar="PROGRAM...", nargs=-1, required=True)
+@click.option(
+    "--machine",
+    "-m",
+    "machines",
+    multiple=True,
+    default=("mill",),
+    show_default=True,
+    metavar="NAME|FILE",
+    help=f"A bundled machine, a TOML file, or auto; {_SWEPT}.",
+)
+@click.option(
+    "--tolerance",
+    "tolerances",
+    multiple=True,
+    type=Number(),
+    metavar="MM",
+    help=f"Allowed distance from the programmed path; {_SWEPT}.",
+)
+@click.option(
+    "--method",
+    "methods",
+    multiple=True,
+    type=click.Choice(planners.methods()),
+    default=("bang-bang",),
+    show_default=True,
+    help=f"{_SWEPT[:1].upper()}{_SWEPT[1:]}.",
+)
+@reading_options
+@ACCURACY
+@click.option("--time-limit", type=ZERO_OR_MORE, metavar="S", help=TIME_LIMIT_HELP)
+@PATH
+@FEED
+@FEED_OVERRIDE
+@click.option("--period", type=Number(), metavar="S", help="Servo period in place of the machine's.")
+@click.option(
+    "--max-setpoints",
+    type=click.IntRange(min=1),
+    default=MAX_SETPOINTS,
+    show_default=True,
+    metavar="N",
+    help="A plan of more setpoints is refused.",
+)
+@click.option("--output", "-o", required=True, metavar="DIR", help="A folder for each plan is made there.")
+@click.option(
+    "--format",
+    "formats",
+    type=click.Choice([*(name for name in outputs.formats() if name != "pvt"), "none"]),
+    multiple=True,
+    help=f"Format of the setpoints, npz by default; {_SWEPT}. none: reports without them.",
+)
+@click.option(
+    "--jobs",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Processes of this computer.  [default: as many as it has cores]",
+)
+@cluster_options
+@click.option(
+    "--max-time",
+    type=Number(),
+    default=3600.0,
+    show_default=True,
+    metavar="S",
+    help="Time that a plan may take.",
+)
+@click.option(
+    "--max-memory",
+    type=Number(),
+    default=8000.0,
+    show_default=True,
+    metavar="MB",
+    help="Memory of a process here; the workers of a cluster have limits of their own.",
+)
+@JSON
+@QUIET
+def batch(
+    programs: tuple[str, ...],
+    machines: tuple[str, ...],
+    tolerances: tuple[float, ...],
+    methods: tuple[planners.MethodName, ...],
+    accuracy: float | None,
+    time_limit: float | None,
+    path: FollowedPath,
+    feed: float | None,
+    feed_override: float,
+    period: float | None,
+    max_setpoints: int,
+    output: str,
+    formats: tuple[Any, ...],
+    jobs: int | None,
+    cluster: ClusterAddress | None,
+    max_time: float,
+    max_memory: float,
+    as_json: bool,
+    quiet: bool,
+    reading: Reading,
+) -> int:
+    """Plan every PROGRAM on every machine, at every tolerance, by every method.
+
+    DIR gets a folder for each plan, as plan -o writes it, and batch.csv and batch.json with a row for each. A
+    program that cannot be planned is a row with the reason; the others go on. A batch that was stopped and is
+    started again goes on where it was: plans whose program, machine, options and feedplan are the same are
+    kept, those that failed are tried again.
+
+    Plans are made by processes of this computer, or with --cluster by the workers of a Dask cluster, bit for
+    bit the same. Exit code 1: a limit is broken, or a program has no plan.
+    """
+    from feedplan.batch.run import run_batch
+    from feedplan.batch.summary import HEADER, summary_of, table_rows, write_summary
+    from feedplan.batch.sweep import Sweep, machine_text
+    from feedplan.files import summary_text
+
+    if cluster is not None and jobs is not None:
+        raise click.UsageError("--jobs is for processes of this computer: leave it or --cluster out")
+    if "none" in formats and len(formats) > 1:
+        raise click.UsageError("--format none excludes other formats: leave one of them out")
+    table, folders = reading.pop("tool_table", None), reading.pop("subprograms", ())
+    if table is not None:
+        read_tools(FilePath(table))
+    sweep = Sweep(
+        [FilePath(program) for program in programs],
+        [machine_text(name) for name in dict.fromkeys(machines)],
+        tuple(dict.fromkeys(tolerances)) or (None,),
+        tuple(dict.fromkeys(methods)),
+        {
+            "path": path,
+            "feed_override": feed_override,
+            "max_setpoints": max_setpoints,
+            **given_only(feed=feed, period=period, accuracy=accuracy, time_limit=time_limit),
+        },
+        checked_reading(reading),
+        () if "none" in formats else formats or ("npz",),
+        None if table is None else FilePath(table).absolute(),
+        tuple(FilePath(folder).absolute() for folder in folders),
+    )
+    _require_formats(sweep.formats)
+    folder, start = FilePath(output).absolute(), time.monotonic()
+    with _place(cluster, jobs, max_time, max_memory) as place, console.progress_bar(quiet) as progress:
+        rows, kept = run_batch(sweep, folder, place, progress)
+    summary = summary_of(rows, kept, time.monotonic() - start)
+    files = write_summary(summary, folder)
+    if not quiet:
+        for row in rows:
+            if row["error"] is not None:
+                print(f"{row['folder']}: {row['error']}", file=sys.stderr)
+            for failure in row["failures"]:
+                print(f"{row['folder']}: {failure}", file=sys.stderr)
+        if as_json:
+            sys.stdout.write(summary_text(summary))
+        else:
+            console.print_table(HEADER, table_rows(rows))
+            before = f", {kept} of them before" if kept else ""
+            print(f"{counted(len(rows), 'plan')} in {duration_text(summary['seconds'])}{before}")
+            for file in files:
+                print(file)
+    return FAILED if any(row["error"] is not None or not row["ok"] for row in rows) else DONE
+
+
+def _require_formats(formats: tuple[str, ...]) -> None:
+    """Raises where two formats are one file, or a package of one is missing, before anything is planned."""
+    by_file: dict[str, str] = {}
+    for name in formats:
+        other = by_file.setdefault(outputs.format_named(name).FILE, name)
+        if other != name:
+            raise InputError(f"{name} and {other} are both one file: ask for one of them")
+
+
+@contextmanager
+def _place(
+    cluster: ClusterAddress | None, jobs: int | None, max_time: float, max_memory: float
+) -> Iterator[Place]:
+    """Where plans are made."""
+    from feedplan.jobs.place import JobLimits
+    from feedplan.jobs.processes import Processes
+
+    limits = JobLimits(max_time, max_memory)
+    place: Place
+    if cluster is None:
+        place = Processes(jobs or os.cpu_count() or 1, limits, niceness=0, grace=0.2)
+    else:
+        from feedplan.jobs.cluster import Cluster
+
+        place = Cluster(cluster, limits)
+        if place.threads() == 0:
+            print(f"warning: the cluster at {cluster.url} has no workers yet: waiting", file=sys.stderr)
+    try:
+        yield place
+    finally:
+        place.close()

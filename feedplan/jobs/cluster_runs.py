@@ -1,0 +1,107 @@
+"""Runs of one program on the workers of a Dask cluster: the parts of a plan that do not know of each other.
+
+`feedplan.plan(..., elsewhere=ClusterRuns(address))` sends the runs between stops out in parts, a few for each
+thread, and puts what comes back together as the plan of this computer would be, bit for bit.
+"""
+
+from __future__ import annotations
+
+import secrets
+import threading
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from feedplan.errors import FeedplanError, SolverError
+from feedplan.jobs.address import ClusterAddress
+from feedplan.jobs.cluster_task import other_feedplan, require_wanted
+from feedplan.jobs.identity import identity
+from feedplan.jobs.line import close, connect, require_equals
+from feedplan.progress import Listener, tell
+
+# How often who listens is told, and may end the work [s].
+EVERY = 0.1
+# Parts for each thread: runs take unlike times.
+PARTS = 4
+
+
+class ClusterRuns:
+    """The workers of a cluster as those who plan parts of a program.
+
+    Raises InputError where the cluster cannot be reached or has another feedplan, MissingPackageError without
+    the package.
+    """
+
+    def __init__(self, address: ClusterAddress) -> None:
+        self._client = connect(address)
+        try:
+            require_equals(self._client, address)
+        except FeedplanError:
+            self.close()
+            raise
+
+    def __enter__(self) -> ClusterRuns:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Nothing is called any more."""
+        close(self._client)
+
+    def count(self) -> int:
+        """How many parts keep all threads busy."""
+        threads: int = sum(self._client.nthreads().values())
+        return PARTS * max(threads, 1)
+
+    def map(
+        self, work: Callable[..., Any], given: Sequence[tuple[Any, ...]], progress: Listener | None
+    ) -> list[Any]:
+        """What `work(*arguments, progress)` returns for each of the arguments, on some worker.
+
+        Raises SolverError where the cluster does not do it, and what `progress` raises.
+        """
+        task = f"feedplan-{secrets.token_hex(8)}"
+        changed = threading.Event()
+        futures: list[Any] = []
+        try:
+            for number, arguments in enumerate(given):
+                name = f"{task}-{number}"
+                futures.append(
+                    self._client.submit(run_part, name, identity(), work, arguments, key=name, pure=False)
+                )
+                futures[-1].add_done_callback(lambda _: changed.set())
+            while (done := sum(future.done() for future in futures)) < len(futures):
+                tell(progress, done / len(futures))
+                changed.wait(EVERY)
+                changed.clear()
+            return [_result(future) for future in futures]
+        finally:
+            self._client.cancel([future for future in futures if not future.done()])
+
+
+def _result(future: Any) -> Any:
+    from distributed import CancelledError, KilledWorker
+
+    try:
+        result, sentence = future.result()
+    except (KilledWorker, CancelledError, OSError) as error:
+        raise SolverError(
+            f"the cluster has lost a part of the plan ({type(error).__name__}): "
+            "give its workers more memory, or leave the cluster out"
+        ) from None
+    if sentence is not None:
+        raise SolverError(sentence)
+    return result
+
+
+def run_part(
+    name: str, expected: str, work: Callable[..., Any], arguments: tuple[Any, ...]
+) -> tuple[Any, str | None]:
+    """In a worker: the result, or a sentence why there is none."""
+    from distributed import get_worker
+
+    worker = get_worker()
+    if (sentence := other_feedplan(worker, expected)) is not None:
+        return None, sentence
+    return work(*arguments, lambda _: require_wanted(worker, name)), None

@@ -1,0 +1,99 @@
+"""What became of a job, as plain values."""
+
+from __future__ import annotations
+
+import json
+import traceback
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+from feedplan.errors import (
+    FeedplanError,
+    InfeasibleError,
+    MachineError,
+    MissingPackageError,
+    ProgramError,
+    SolverError,
+)
+
+Kind = Literal[
+    "program",
+    "machine",
+    "package",
+    "infeasible",
+    "solver",
+    "input",
+    "disk",
+    "limit",
+    "worker",
+    "defect",
+]
+# By class; the first that an error is an instance of.
+_KINDS: tuple[tuple[type[FeedplanError], Kind], ...] = (
+    (ProgramError, "program"),
+    (MachineError, "machine"),
+    (MissingPackageError, "package"),
+    (InfeasibleError, "infeasible"),
+    (SolverError, "solver"),
+    (FeedplanError, "input"),
+)
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a job has no plan: one sentence, of a kind, with the line of the program; a defect of feedplan has
+    its `trace`."""
+
+    kind: Kind
+    sentence: str
+    line: int | None = None
+    trace: str = ""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a job, which took `seconds` and made files of `size` bytes.
+
+    `done` has the key figures of its plan, `failed` why there is none; `stopped` was told to; `lost` is a job
+    whose place is gone, and that may run again.
+    """
+
+    state: Literal["done", "failed", "stopped", "lost"]
+    figures: dict[str, Any] | None = None
+    failure: Failure | None = None
+    seconds: float = 0.0
+    size: int = 0
+
+    def text(self) -> str:
+        """The outcome as JSON."""
+        return json.dumps(asdict(self))
+
+    @staticmethod
+    def of(text: str) -> Outcome:
+        """The outcome that `text` has told."""
+        table = json.loads(text)
+        failure = table.pop("failure")
+        return Outcome(**table, failure=failure and Failure(**failure))
+
+    @staticmethod
+    def failed(kind: Kind, sentence: str) -> Outcome:
+        """A job that failed."""
+        return Outcome("failed", failure=Failure(kind, sentence))
+
+
+def kind_of(error: FeedplanError) -> Kind:
+    """The kind of an error of feedplan."""
+    return next(kind for known, kind in _KINDS if isinstance(error, known))
+
+
+def failure_of(error: Exception) -> Failure:
+    """Why a job failed that raised this."""
+    if isinstance(error, MemoryError):
+        said = "the memory of the computer does not suffice below max_memory: split the program"
+        return Failure("limit", said)
+    if not isinstance(error, FeedplanError):
+        told = f"{type(error).__name__}: {error}"[:500]
+        sentence = f"this is a defect in feedplan ({told}): please report it with the program"
+        return Failure("defect", sentence, trace=traceback.format_exc()[-4000:])
+    is_disk = isinstance(error.__cause__, OSError)
+    return Failure("disk" if is_disk else kind_of(error), str(error), getattr(error, "line", None))

@@ -1,0 +1,130 @@
+"""Plans one order: reads, plans, audits, writes. The same work in every place."""
+
+from __future__ import annotations
+
+import io
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path as FilePath
+from typing import Any
+
+from feedplan.files import write_plan
+from feedplan.jobs.order import Order
+from feedplan.jobs.outcome import Outcome, failure_of
+from feedplan.machine.file import parse
+from feedplan.planning import Plan, plan
+from feedplan.program.machine_for import AUTO, smallest_machine
+from feedplan.program.program import Program
+from feedplan.program.read import Reading, read_program
+from feedplan.progress import Progress
+
+# Where each stage begins and ends in the whole work.
+STAGES = {
+    "read": (0.0, 0.1),
+    "fit": (0.1, 0.25),
+    "plan": (0.25, 0.6),
+    "audit": (0.6, 0.8),
+    "write": (0.8, 1.0),
+}
+# Progress is told so often [s], and where a stage begins.
+EVERY = 0.25
+MOST_FAILURES, MOST_WARNINGS = 5, 20
+
+
+class Stopped(Exception):  # noqa: N818 (nothing went wrong)
+    """Nobody wants the work any more."""
+
+
+class _Named(io.BytesIO):
+    """A program as a stream; it is not a file, so that it calls no files beside it."""
+
+    def __init__(self, content: bytes, name: str) -> None:
+        super().__init__(content)
+        self.name = name
+
+
+def work_on(
+    order: Order,
+    content: bytes,
+    folder: FilePath,
+    progress: Progress,
+    *,
+    tool_table: FilePath | None = None,
+    subprograms: Sequence[FilePath] = (),
+) -> Outcome:
+    """Plans a program of this content and writes its plan to `folder`; what goes wrong is in the outcome.
+
+    `progress` may raise Stopped.
+    """
+    start = time.perf_counter()
+    try:
+        figures, size = _planned(order, content, folder, progress, tool_table, subprograms)
+    except Stopped:
+        return Outcome("stopped")
+    except Exception as error:
+        seconds = time.perf_counter() - start
+        return Outcome("failed", failure=failure_of(error), seconds=seconds)
+    return Outcome("done", figures, seconds=time.perf_counter() - start, size=size)
+
+
+def _planned(
+    order: Order,
+    content: bytes,
+    folder: FilePath,
+    progress: Progress,
+    tool_table: FilePath | None,
+    subprograms: Sequence[FilePath],
+) -> tuple[dict[str, Any], int]:
+    """Plans and writes; returns the key figures, and how many bytes were written."""
+    reading = Reading(**order.reading)  # type: ignore[typeddict-item]
+    if tool_table is not None:
+        reading["tool_table"] = tool_table
+    if subprograms:
+        reading["subprograms"] = subprograms
+    source: Program | io.BytesIO = _Named(content, order.name)
+    if order.machine == AUTO:
+        feed = order.options.get("feed")
+        machine, source = smallest_machine(
+            lambda known: read_program(content, known, name=order.name, feed=feed, **reading)
+        )
+    else:
+        machine = parse(order.machine, "of the order")
+    method: Any = order.method
+    made = plan(source, machine, method, reading=reading, progress=progress, **order.options)
+    made.audit(progress)
+    formats: Any = order.formats
+    files = write_plan(made, folder, formats, drawing=order.drawing, progress=progress)
+    return _figures(made), sum(file.stat().st_size for file in files)
+
+
+def _figures(made: Plan) -> dict[str, Any]:
+    summary, verdict = made.summary(), made.audit()
+    names = ("time", "lower_bound", "gap", "machine", "setpoints")
+    return {
+        **{name: summary[name] for name in names},
+        "ok": verdict.ok,
+        "failures": list(verdict.failures[:MOST_FAILURES]),
+        "warnings": list(made.warnings[:MOST_WARNINGS]),
+    }
+
+
+class Pace:
+    """Tells how far a job is some times a second, as `tell(stage, part)`."""
+
+    def __init__(self, tell: Callable[[str, float], None]) -> None:
+        self._tell = tell
+        self._told = ("", 0.0)
+
+    def progress(self, stage: str, part: float) -> None:
+        """The part of a stage is done."""
+        now = time.monotonic()
+        last_stage, last = self._told
+        if stage in STAGES and (stage != last_stage or now - last >= EVERY):
+            self._told = (stage, now)
+            self._tell(stage, part)
+
+
+def of_whole(stage: str, part: float) -> float:
+    """The part of the whole work that is done when that part of a stage is."""
+    start, end = STAGES[stage]
+    return start + (end - start) * part

@@ -1,0 +1,16 @@
+"""One cluster for the tests that leave it as it is: two workers, spoken to by TLS."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from tests.clusters import LocalCluster, make_certificates, running
+
+
+@pytest.fixture(scope="session")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalCluster]:
+    home = tmp_path_factory.mktemp("cluster")
+    with running(home, 2, certificates=make_certificates(home / "certificates")) as found:
+        yield found
