@@ -14,6 +14,7 @@ import time
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path as FilePath
 from typing import Any
 
 from feedplan.errors import InputError
@@ -230,7 +231,7 @@ def _kept(job: Job, returned: cluster_task.Returned | Outcome) -> Outcome:
     try:
         with staged(job.folder, last="plan.json") as stage:
             for name, content in returned.files.items():
-                (stage / name).write_bytes(content)
+                (stage / FilePath(name).name).write_bytes(content)
     except InputError as error:
         return Outcome("failed", failure=failure_of(error))
     return outcome
