@@ -8,7 +8,6 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import pytest
@@ -30,9 +29,7 @@ def planned(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
             raise box["result"]
         return box["result"]
 
-    module = ModuleType("feedplan.planning")
-    module.plan = fake  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "feedplan.planning", module)
+    monkeypatch.setattr("feedplan.planning.plan", fake)
     return box
 
 

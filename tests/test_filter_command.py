@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.named import EXAMPLES
-from feedplan.filter_command import filter_progress
+from feedplan.cli.filter import filter_progress
 from feedplan.program.gcode import read_gcode
 
 INI = """[KINS]

@@ -20,8 +20,8 @@ import numpy as np
 import pytest
 
 import feedplan
-from feedplan import Machine, Plan, console
-from feedplan.cli import main
+from feedplan import Machine, Plan
+from feedplan.cli import main, terminal
 from feedplan.constraints.problem import build_problem
 from feedplan.files import write_plan
 from feedplan.geometry.build import build_path
@@ -108,7 +108,7 @@ def test_fit_and_check_show_how_far_they_are(
     def listening(quiet: bool) -> Iterator[Progress]:
         yield lambda stage, done: told.append((stage, done))
 
-    monkeypatch.setattr(console, "progress_bar", listening)
+    monkeypatch.setattr(terminal, "progress_bar", listening)
     for command, stages in (
         (["fit", str(file), "-m", str(machine_file), "--smooth"], ["fit"]),
         (["check", str(tmp_path / "out")], ["read", "audit"]),

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import click
 
-from feedplan.cluster_options import cluster_options
+from feedplan.cli.cluster_options import cluster_options
 from feedplan.errors import MissingPackageError
 from feedplan.jobs.address import ClusterAddress
 from feedplan.service.limits import Limits

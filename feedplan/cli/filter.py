@@ -16,15 +16,16 @@ from typing import IO
 
 import click
 
-from feedplan import console, planners
-from feedplan.command_options import METHOD, PROGRAM, TOLERANCE
+from feedplan import planners
+from feedplan.cli import terminal
+from feedplan.cli.options import METHOD, PROGRAM, TOLERANCE
+from feedplan.cli.reading_options import machine_for, reading_options
 from feedplan.errors import InfeasibleError
 from feedplan.machine.importers import import_machine
 from feedplan.machine.machine import Machine
 from feedplan.program.program import Program
 from feedplan.program.read import Reading
 from feedplan.program.source import Source
-from feedplan.reading_options import machine_for, reading_options
 
 # How far all is when a stage begins, and its share.
 _STAGES = {"read": (0, 10), "fit": (10, 20), "plan": (30, 40), "audit": (70, 20)}
@@ -78,7 +79,7 @@ def filter_(
     result = plan(source, known, method=method, tolerance=tolerance, reading=reading, progress=tell)
     audit = result.audit(tell)
     if not audit.ok:
-        raise InfeasibleError(console.failure_sentence(audit))
+        raise InfeasibleError(terminal.failure_sentence(audit))
     content = planned_program(result, dialect="linuxcnc").content
     tell("write", 1.0)
     sys.stdout.buffer.write(content)

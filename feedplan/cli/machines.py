@@ -9,7 +9,7 @@ from pathlib import Path
 
 import click
 
-from feedplan import console
+from feedplan.cli import terminal
 from feedplan.errors import InputError
 from feedplan.machine.machine import Axis, Limit, Machine, bundled_machines, bundled_text, template
 
@@ -20,7 +20,7 @@ def machines(context: click.Context) -> None:
     """List the bundled machines; show one, begin your own, or import it from your controller's file."""
     if context.invoked_subcommand is None:
         names = ["machine", "axes", "velocity /s", "acceleration /s²", "period ms", "chord mm"]
-        console.print_table(names, [_machine_row(Machine.load(known)) for known in bundled_machines()])
+        terminal.print_table(names, [_machine_row(Machine.load(known)) for known in bundled_machines()])
 
 
 @machines.command()
@@ -28,7 +28,7 @@ def machines(context: click.Context) -> None:
 def show(name: str) -> None:
     """Show the limits of a bundled machine or of a TOML file, in mm and seconds, rotary axes in degrees."""
     names = ["axis", "unit", "velocity /s", "acceleration /s²", "jerk /s³", "travel"]
-    console.print_table(names, [_axis_row(axis) for axis in Machine.load(name).axes])
+    terminal.print_table(names, [_axis_row(axis) for axis in Machine.load(name).axes])
 
 
 _OUTPUT = click.option("--output", "-o", metavar="FILE", help="Write it there.  [default: standard output]")

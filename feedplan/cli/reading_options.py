@@ -8,7 +8,7 @@ from typing import IO, Any, TypeVar
 
 import click
 
-from feedplan.command_options import with_options
+from feedplan.cli.options import with_options
 from feedplan.machine.machine import Machine
 from feedplan.program.machine_for import AUTO, smallest_machine
 from feedplan.program.program import Program

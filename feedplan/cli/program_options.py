@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from feedplan.command_options import with_options
+from feedplan.cli.options import with_options
 from feedplan.planned_feeds.dialects import DIALECTS
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import click
 
-from feedplan.command_options import with_options
+from feedplan.cli.options import with_options
 from feedplan.jobs.address import ClusterAddress
 
 Command = TypeVar("Command", bound=Callable[..., Any])

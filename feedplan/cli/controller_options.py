@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import click
 
-from feedplan.command_options import with_options
+from feedplan.cli.options import with_options
 from feedplan.errors import MachineError
 from feedplan.machine.controller import MODELS, Controller
 from feedplan.machine.machine import Machine

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from feedplan import console, outputs, planners
-from feedplan.cluster_options import cluster_options
-from feedplan.command_options import (
+from feedplan import outputs, planners
+from feedplan.cli import terminal
+from feedplan.cli.cluster_options import cluster_options
+from feedplan.cli.options import (
     ACCURACY,
     FEED,
     FEED_OVERRIDE,
@@ -26,12 +27,12 @@ from feedplan.command_options import (
     Number,
     given_only,
 )
+from feedplan.cli.reading_options import reading_options
 from feedplan.errors import InputError
 from feedplan.geometry.corners import FollowedPath
 from feedplan.jobs.address import ClusterAddress
 from feedplan.program.read import Reading, checked_reading
 from feedplan.program.tools import read_tools
-from feedplan.reading_options import reading_options
 from feedplan.setpoints import MAX_SETPOINTS
 from feedplan.units import counted, duration_text
 
@@ -182,7 +183,7 @@ def batch(
     )
     _require_formats(sweep.formats)
     folder, start = FilePath(output).absolute(), time.monotonic()
-    with _place(cluster, jobs, max_time, max_memory) as place, console.progress_bar(quiet) as progress:
+    with _place(cluster, jobs, max_time, max_memory) as place, terminal.progress_bar(quiet) as progress:
         rows, kept = run_batch(sweep, folder, place, progress)
     summary = summary_of(rows, kept, time.monotonic() - start)
     files = write_summary(summary, folder)
@@ -195,7 +196,7 @@ def batch(
         if as_json:
             sys.stdout.write(summary_text(summary))
         else:
-            console.print_table(HEADER, table_rows(rows))
+            terminal.print_table(HEADER, table_rows(rows))
             before = f", {kept} of them before" if kept else ""
             print(f"{counted(len(rows), 'plan')} in {duration_text(summary['seconds'])}{before}")
             for file in files:

@@ -7,8 +7,10 @@ from typing import IO
 
 import click
 
-from feedplan import console, planners
-from feedplan.command_options import (
+from feedplan import planners
+from feedplan.cli import terminal
+from feedplan.cli.controller_options import Choice, controller_options
+from feedplan.cli.options import (
     ACCURACY,
     FEED,
     FEED_OVERRIDE,
@@ -23,11 +25,10 @@ from feedplan.command_options import (
     given_only,
     name_of,
 )
-from feedplan.controller_options import Choice, controller_options
+from feedplan.cli.reading_options import machine_for, reading_options
 from feedplan.errors import InfeasibleError
 from feedplan.geometry.corners import FollowedPath
 from feedplan.program.read import Reading
-from feedplan.reading_options import machine_for, reading_options
 from feedplan.report.operations import PARTS, OperationTime, by_tool
 from feedplan.units import duration_text
 
@@ -80,7 +81,7 @@ def time(
     from feedplan.files import summary_text
     from feedplan.planning import plan
 
-    with console.progress_bar(quiet=False) as progress, console.without_others():
+    with terminal.progress_bar(quiet=False) as progress, terminal.without_others():
         known, source = machine_for(machine, program, reading, feed)
         result = plan(
             source,
@@ -114,11 +115,11 @@ def time(
         }
         click.echo(summary_text(summary), nl=False)
     else:
-        console.print_table(*_table(tools, operations, whole))
+        terminal.print_table(*_table(tools, operations, whole))
         if result.today:
-            click.echo(f"today: {console.today_text(result.today.to_json())}")
+            click.echo(f"today: {terminal.today_text(result.today.to_json())}")
     if not audit.ok:
-        raise InfeasibleError(console.failure_sentence(audit))
+        raise InfeasibleError(terminal.failure_sentence(audit))
 
 
 def _table(

@@ -1,0 +1,120 @@
+"""`feedplan compare`: one program by several methods, as a table and a page."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path as FilePath
+from typing import IO, Any
+
+import click
+
+from feedplan.cli import terminal
+from feedplan.cli.controller_options import Choice, controller_options
+from feedplan.cli.ending import BROKEN, DONE
+from feedplan.cli.options import (
+    ACCURACY,
+    FEED,
+    JSON,
+    MACHINE,
+    PATH,
+    PROGRAM,
+    QUIET,
+    TIME_LIMIT_HELP,
+    TOLERANCE,
+    Number,
+    given_only,
+    name_of,
+)
+from feedplan.cli.reading_options import machine_for, reading_options
+from feedplan.comparison import TIME_LIMIT
+from feedplan.geometry.corners import FollowedPath
+from feedplan.program.read import Reading
+from feedplan.units import duration_text
+
+
+@click.command()
+@PROGRAM
+@MACHINE
+@controller_options
+@reading_options
+@click.option("--methods", metavar="A,B,…", help="Methods to compare.  [default: all]")
+@ACCURACY
+@click.option(
+    "--time-limit", type=Number(), default=TIME_LIMIT, show_default=True, metavar="S", help=TIME_LIMIT_HELP
+)
+@TOLERANCE
+@PATH
+@FEED
+@click.option("--period", type=Number(), metavar="S", help="Servo period in place of the machine's.")
+@click.option("--output", "-o", metavar="DIR", help="Write comparison.json and comparison.html there.")
+@JSON
+@QUIET
+def compare(
+    program: str | IO[bytes],
+    machine: str,
+    methods: str | None,
+    accuracy: float | None,
+    time_limit: float,
+    tolerance: float | None,
+    path: FollowedPath,
+    feed: float | None,
+    period: float | None,
+    output: str | None,
+    as_json: bool,
+    quiet: bool,
+    controller: Choice,
+    reading: Reading,
+) -> int:
+    """Plan PROGRAM by several methods: time, proven gap, computing time, and what the audit says of each.
+
+    PROGRAM is as for plan. Exit code 0 if any method has a plan, whether or not its limits hold: that is what
+    the table tells.
+    """
+    from feedplan.comparison import LIMITS
+    from feedplan.comparison import compare as make_comparison
+    from feedplan.files import summary_text, write_comparison
+    from feedplan.outputs._staging import require_folder
+    from feedplan.report.page import missing_pictures
+
+    if output:
+        require_folder(FilePath(output))
+    names: Any = None if methods is None else [name.strip() for name in methods.split(",")]
+    with terminal.progress_bar(quiet) as progress, terminal.without_others():
+        known, source = machine_for(machine, program, reading, feed)
+        rows = make_comparison(
+            source,
+            known,
+            names,
+            time_limit=time_limit,
+            reading=reading,
+            controller=controller(known),
+            progress=progress,
+            tolerance=tolerance,
+            path=path,
+            feed=feed,
+            period=period,
+            **given_only(accuracy=accuracy),
+        )
+        today = next((row.plan.today for row in rows if row.plan and row.plan.today), None)
+        summary = {
+            "program": name_of(program),
+            "machine": known.name,
+            "today": today and today.of_controller(),
+            "methods": [row.to_json() for row in rows],
+        }
+        files = write_comparison(rows, output, summary, progress) if output else ()
+    if not quiet:
+        for row in rows:
+            if row.error:
+                print(f"{row.method}: {row.error}", file=sys.stderr)
+        if output and (missing := missing_pictures()):
+            print(f"warning: {missing}", file=sys.stderr)
+        if as_json:
+            sys.stdout.write(summary_text(summary))
+        else:
+            terminal.print_table(*terminal.comparison_table(rows, LIMITS))
+            if today:
+                print(f"today: {duration_text(today.time)} by {today.controller.name}")
+            for file in files:
+                print(file)
+    return DONE if any(row.plan for row in rows) else BROKEN

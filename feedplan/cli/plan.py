@@ -1,0 +1,225 @@
+"""`feedplan plan`: one plan, here, on a cluster or by a service; its table and its files."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path as FilePath
+from typing import IO, Any
+
+import click
+
+from feedplan import outputs, planners
+from feedplan.cli import terminal
+from feedplan.cli.cluster_options import cluster_options
+from feedplan.cli.controller_options import Choice, controller_options
+from feedplan.cli.ending import BROKEN, DONE, fail
+from feedplan.cli.options import (
+    ACCURACY,
+    FEED,
+    FEED_OVERRIDE,
+    JSON,
+    MACHINE,
+    METHOD,
+    PATH,
+    PROGRAM,
+    QUIET,
+    TOLERANCE,
+    WHOLE_LIMIT_HELP,
+    ZERO_OR_MORE,
+    Number,
+    given_only,
+)
+from feedplan.cli.program_options import ProgramWanted, program_options
+from feedplan.cli.reading_options import machine_for, reading_options
+from feedplan.cli.serve import TOKEN_FILE
+from feedplan.geometry.corners import FollowedPath
+from feedplan.jobs.address import ClusterAddress
+from feedplan.program.read import Reading
+from feedplan.setpoints import INTERPOLATORS, MAX_SETPOINTS, Interpolator
+
+_NO_SETPOINTS = "none"
+
+
+@click.command()
+@PROGRAM
+@MACHINE
+@controller_options
+@reading_options
+@METHOD
+@ACCURACY
+@click.option("--time-limit", type=ZERO_OR_MORE, metavar="S", help=WHOLE_LIMIT_HELP)
+@TOLERANCE
+@PATH
+@FEED
+@FEED_OVERRIDE
+@click.option("--period", type=Number(), metavar="S", help="Servo period in place of the machine's.")
+@click.option("--interpolator", type=click.Choice(INTERPOLATORS), default="sarfraz", show_default=True)
+@click.option(
+    "--max-setpoints",
+    type=click.IntRange(min=1),
+    default=MAX_SETPOINTS,
+    show_default=True,
+    metavar="N",
+    help="A plan of more setpoints is refused.",
+)
+@click.option("--start-speed", type=ZERO_OR_MORE, default=0.0, metavar="MM/S", help="Speed at the start.")
+@click.option("--end-speed", type=ZERO_OR_MORE, default=0.0, metavar="MM/S", help="Speed at the end.")
+@click.option("--one-step-more", is_flag=True, help="Plan again with each limit raised, and tell the gain.")
+@click.option("--output", "-o", metavar="DIR", help="Write plan.json, setpoints and report.html there.")
+@click.option(
+    "--format",
+    "formats",
+    type=click.Choice((*outputs.formats(), _NO_SETPOINTS)),
+    multiple=True,
+    help="Format of the setpoints, npz by default; may be given several times. none: a report without them.",
+)
+@click.option("--step", type=Number(), metavar="S", help="Longest step of a pvt table, which needs it.")
+@program_options
+@click.option("--server", metavar="URL", help="Have a service plan, such as http://127.0.0.1:8000.")
+@TOKEN_FILE
+@cluster_options
+@JSON
+@QUIET
+def plan(
+    program: str | IO[bytes],
+    machine: str,
+    method: planners.MethodName,
+    accuracy: float | None,
+    time_limit: float | None,
+    tolerance: float | None,
+    path: FollowedPath,
+    feed: float | None,
+    feed_override: float,
+    period: float | None,
+    interpolator: Interpolator,
+    max_setpoints: int,
+    start_speed: float,
+    end_speed: float,
+    one_step_more: bool,
+    output: str | None,
+    formats: tuple[Any, ...],
+    step: float | None,
+    server: str | None,
+    token_file: str | None,
+    cluster: ClusterAddress | None,
+    as_json: bool,
+    quiet: bool,
+    controller: Choice,
+    reading: Reading,
+    wanted: ProgramWanted,
+) -> int:
+    """Plan PROGRAM: G-code, a path file (.json) or a drawing (.dxf); - is standard input.
+
+    With --cluster and jerk-limited the workers of a Dask cluster plan the runs between stops, bit for bit as
+    this computer would; reading, fitting, the audit and the files stay here.
+
+    Exit code 1: a limit is broken, or no plan is feasible.
+    """
+    from feedplan.files import files_of_plan, summary_text
+    from feedplan.outputs._staging import require_folder
+    from feedplan.report.page import missing_pictures
+
+    if formats and not output:
+        raise click.UsageError("--format needs a folder to write to: give -o DIR as well")
+    if _NO_SETPOINTS in formats and len(formats) > 1:
+        raise click.UsageError(f"--format {_NO_SETPOINTS} excludes other formats: leave one of them out")
+    if server and (one_step_more or step is not None or wanted.file is not None or wanted.in_folder):
+        raise click.UsageError(
+            "a service gives no program with planned feeds, no pvt table and nothing of --one-step-more: "
+            "leave them out, or --server"
+        )
+    if server and cluster:
+        raise click.UsageError(
+            "a service plans where its own --cluster says: leave --server or --cluster out"
+        )
+    if output:
+        require_folder(FilePath(output))
+    with (
+        _elsewhere(cluster) as elsewhere,
+        terminal.progress_bar(quiet) as progress,
+        terminal.without_others(),
+    ):
+        known, source = machine_for(machine, program, reading, feed)
+        make_plan, write = _place(server, token_file)
+        result = make_plan(
+            source,
+            known,
+            method=method,
+            tolerance=tolerance,
+            path=path,
+            feed=feed,
+            feed_override=feed_override,
+            period=period,
+            start_speed=start_speed,
+            end_speed=end_speed,
+            interpolator=interpolator,
+            max_setpoints=max_setpoints,
+            reading=reading,
+            controller=controller(known),
+            progress=progress,
+            **given_only(accuracy=accuracy, time_limit=time_limit, elsewhere=elsewhere),
+        )
+        audit = result.audit(progress)
+        planned = wanted.make(result)
+        steps = _steps(result) if one_step_more else ()
+        files: tuple[FilePath, ...] = ()
+        if output:
+            own = planned if wanted.in_folder else None
+            here = {} if server else {"program": own, "step": step, "one_step_more": steps}
+            files = write(
+                result,
+                output,
+                () if _NO_SETPOINTS in formats else formats or ("npz",),
+                progress=progress,
+                **here,
+            )
+    warnings = list(result.warnings)
+    if output:
+        earlier = (file for file in files_of_plan(FilePath(output)) if file not in files)
+        warnings += [f"{file} is of an earlier plan" for file in earlier]
+        warnings += filter(None, [missing_pictures()]) if server is None else ()
+    if not quiet:
+        for warning in warnings:
+            print(f"warning: {warning}", file=sys.stderr)
+        more = {"one_step_more": [each.to_json() for each in steps]} if one_step_more else {}
+        summary = {**result.summary(), **more}
+        if as_json:
+            told = {} if planned is None else {"planned_program": planned.to_json()}
+            sys.stdout.write(summary_text({**summary, **told}))
+        else:
+            terminal.print_rows(terminal.plan_rows(summary, audit, files))
+            if planned is not None:
+                print(planned.summary())
+    return DONE if audit.ok else fail(terminal.failure_sentence(audit), BROKEN)
+
+
+def _steps(made: Any) -> tuple[Any, ...]:
+    """What one step more of each limit would bring."""
+    from feedplan.one_step_more import one_step_more
+
+    return one_step_more(made)
+
+
+def _elsewhere(cluster: ClusterAddress | None) -> AbstractContextManager[Any]:
+    """Who plans runs in place of this computer, None for nobody."""
+    if cluster is None:
+        return nullcontext()
+    from feedplan.jobs.cluster_runs import ClusterRuns
+
+    return ClusterRuns(cluster)
+
+
+def _place(server: str | None, token_file: str | None) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    """What plans and what writes plans: here, or on a service."""
+    if server is None:
+        from feedplan.files import write_plan
+        from feedplan.planning import plan
+
+        return plan, write_plan
+    from feedplan.client.client import Client
+    from feedplan.client.token import read_token
+
+    client = Client(server, None if token_file is None else read_token(FilePath(token_file)))
+    return client.plan, client.write_plan
