@@ -5,7 +5,7 @@ NATIVE := $(wildcard $(foreach below,src src/* src/*/*,solvers/*/$(below)/*.rs) 
 PAGE := feedplan/report/bundle/page.js
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: demo test native lint clippy page wheel bench campaign clean cargo
+.PHONY: demo test native lint clippy page wheel docs bench campaign clean cargo
 
 demo: $(VENV)/built $(PAGE)
 	@$(BIN)/python examples/vase.py --blocks 2000 --output out/vase.ngc
@@ -37,13 +37,23 @@ page: $(PAGE)
 wheel: $(VENV)/maturin $(PAGE)
 	CARGO_TARGET_DIR=$(CURDIR)/solvers/target $(BIN)/maturin build --release --out dist
 
+# Warnings are errors. Pages show what the numbered examples print, and load nothing from the network.
+docs: $(VENV)/docs $(PAGE)
+	@mkdir -p out/examples
+	for script in examples/[0-9]_*.py; do \
+		$(BIN)/python $$script >out/examples/$$(basename $$script .py).txt || exit 1; \
+	done
+	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going -d out/doctrees docs out/docs
+	FEEDPLAN_DOCS=out/docs $(BIN)/pytest tests/test_docs.py
+	@echo "The documentation is out/docs/index.html"
+
 bench: $(VENV)/built $(PAGE)
 	cargo run --release --package feedplan-benches --manifest-path solvers/Cargo.toml -- --bench
 	$(BIN)/python -m benchmarks
 
 # Random paths by the million, on every machine by the thousand, and property tests on cases never drawn before. What is
 # found becomes a case of the test that found it; the figures stand in benchmarks/README.md.
-campaign: $(VENV)/built $(PAGE)
+campaign: $(VENV)/built $(PAGE) docs
 	FEEDPLAN_SEEDS=1000000 cargo test --release --manifest-path solvers/Cargo.toml --test kernels planning::random:: -- --nocapture
 	FEEDPLAN_SEEDS=1000000 cargo test --release --manifest-path solvers/Cargo.toml --test kernels planning::bound:: -- --nocapture
 	FEEDPLAN_SEEDS=1250 $(BIN)/pytest --numprocesses auto tests/constraints/test_joints.py -k random
@@ -81,6 +91,10 @@ clean:
 # The native module is built once, and again only when its sources change; the tests of native code link the same crates.
 $(VENV)/built: $(VENV)/maturin $(NATIVE) | cargo
 	MAKEFLAGS= CARGO_TARGET_DIR=$(CURDIR)/solvers/target $(BIN)/pip install --quiet --constraint constraints.txt --no-build-isolation --editable ".[dev]"
+	@touch $@
+
+$(VENV)/docs: pyproject.toml constraints.txt | $(VENV)/built
+	MAKEFLAGS= CARGO_TARGET_DIR=$(CURDIR)/solvers/target $(BIN)/pip install --quiet --constraint constraints.txt --no-build-isolation --editable ".[docs]"
 	@touch $@
 
 cargo:
