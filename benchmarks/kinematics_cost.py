@@ -9,11 +9,11 @@ import numpy as np
 
 from benchmarks.results import Cell, Result
 from benchmarks.timing import best_of
-from feedplan.machine.along import derivatives, enclosures, positions, proxy_constants
 from feedplan.machine.kinematics import Kinematics
 from feedplan.machine.machine import Machine, bundled_machines
+from feedplan.machine.path_derivatives import derivatives, enclosures, interpolation_constants, positions
 from feedplan.machine.rotary import RotaryChain, ToolVector
-from feedplan.machine.survey import survey
+from feedplan.machine.singularities import joint_path
 
 NAME = "kinematics-cost"
 SEED = 1
@@ -31,11 +31,11 @@ def run(quick: bool = False) -> Result:
                 machines[f"{name}, I J K"] = ToolVector(machine.inverse)
     return Result(
         NAME,
-        "Kinematics in numpy: CPU per point or piece [µs]",
+        "Kinematics: CPU per point or piece [µs]",
         tuple({"machine": name, **_row(machine, count)} for name, machine in machines.items()),
         (
             "Derivatives are exact to rounding, all orders up to the one given, at one point of each piece.",
-            "Bounds are intervals proven over a whole piece; a proxy of degree 9 needs one of order 11.",
+            "Bounds are intervals proven over a piece; an interpolant of degree 9 needs one of order 11.",
         ),
     )
 
@@ -58,6 +58,6 @@ def _row(kinematics: Kinematics, count: int) -> dict[str, Cell]:
         "to order 9": cost(partial(derivatives, kinematics, points, width, half, 9)),
         "bounds to 3": cost(partial(enclosures, kinematics, points, width, 3)),
         "bounds to 9": cost(partial(enclosures, kinematics, points, width, 9)),
-        "proxy constant": cost(partial(proxy_constants, kinematics, points, width, 9)),
-        "survey": cost(partial(survey, kinematics, points, width)),
+        "interpolation": cost(partial(interpolation_constants, kinematics, points, width, 9)),
+        "joint path": cost(partial(joint_path, kinematics, points, width)),
     }

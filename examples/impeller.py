@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan import Machine
-from feedplan.machine.along import positions
+from feedplan.machine.path_derivatives import positions
 from feedplan.machine.rotary import RotaryChain, ToolVector
 
 Array = NDArray[np.float64]

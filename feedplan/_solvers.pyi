@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 from feedplan.audit import _Limits
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
+from feedplan.machine.expression import Expression
+from feedplan.machine.joint_interpolants import Accuracy
+from feedplan.machine.path_derivatives import TipPieces
 from feedplan.planners._parts import Part, PartOfProfile
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
@@ -34,6 +37,12 @@ __all__ = [
     "curve_split",
     "feed_between",
     "fit_points",
+    "joint_constants",
+    "joint_derivatives",
+    "joint_enclosures",
+    "joint_interpolants",
+    "joint_path",
+    "joint_positions",
     "look_ahead",
     "lower_bound",
     "path_segments",
@@ -292,6 +301,36 @@ class SetpointAudit:
 # Control points (total, axes), weights (total,) if any piece is rational, offsets (n + 1,), widths (n,).
 _CurveColumns = tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.int64], NDArray[np.float64]]
 
+def joint_positions(expression: Expression, tips: NDArray[np.float64]) -> NDArray[np.float64]: ...
+def joint_derivatives(
+    expression: Expression, tips: TipPieces, fraction: NDArray[np.float64], order: int
+) -> NDArray[np.float64]: ...
+def joint_enclosures(
+    expression: Expression, tips: TipPieces, order: int, parts: NDArray[np.float64] | None = None
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+def joint_constants(
+    expression: Expression, tips: TipPieces, nodes: int, parts: NDArray[np.float64] | None = None
+) -> NDArray[np.float64]: ...
+def joint_path(
+    expression: Expression,
+    tips: TipPieces,
+    travel: NDArray[np.float64] | None = None,
+    start: NDArray[np.float64] | None = None,
+) -> tuple[
+    NDArray[np.int64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    list[tuple[int, float]],
+    list[tuple[int, float, int, float, float]],
+]: ...
+def joint_interpolants(
+    expression: Expression,
+    tips: TipPieces,
+    nodes: NDArray[np.float64],
+    to_bernstein: NDArray[np.float64],
+    tolerance: NDArray[np.float64] | Accuracy,
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
 def spline_pieces(
     control_points: NDArray[np.float64],
     weights: NDArray[np.float64] | None,

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from benchmarks.named import EXAMPLES, example
 from feedplan.curves.composite import CompositeCurve
-from feedplan.machine.along import positions
 from feedplan.machine.machine import Machine
 from feedplan.machine.meaning import Meaning
+from feedplan.machine.path_derivatives import positions
 from feedplan.machine.words import axis_words
 from feedplan.program.gcode import read_gcode
 from feedplan.program.program import Program

@@ -16,7 +16,7 @@ import pytest
 import feedplan
 from feedplan.machine import kinematics
 from feedplan.machine.kinematics import Kinematics
-from feedplan.machine.numbers.elementary import Number
+from feedplan.machine.numbers import Number
 
 FIVE_AXES = ("trunnion-ac", "trunnion-bc", "head-table", "head-head")
 ROOT = FilePath(__file__).parents[1]

@@ -1,8 +1,8 @@
 """Joint motion along a path: one polynomial piece of the joints for each piece of the tool's path.
 
 Where K is affine the joints' control points are K of the tool's. Elsewhere q'' is interpolated with a proven
-distance (`feedplan.machine.proxies`) and the tool's pieces are cut to match. The stand-ins are so close that
-an axis's acceleration is met within 1e-8 of its limit at every speed that the other limits allow.
+distance (`feedplan.machine.joint_interpolants`) and the tool's pieces are cut to match. The stand-ins are so
+close that an axis's acceleration is met within 1e-8 of its limit at every speed that the other limits allow.
 """
 
 from __future__ import annotations
@@ -17,40 +17,27 @@ from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Cut, TipSpeed
 from feedplan.curves.composite import CompositeCurve
-from feedplan.curves.hodograph import (
-    SPEED_NODES,
-    chebyshev,
-    interpolated_squares,
-    interpolation,
-    speed_squares,
-)
+from feedplan.curves.hodograph import SPEED_NODES, interpolated_squares, speed_squares
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
-from feedplan.lazy import cached_property
-from feedplan.machine.along import derivatives, positions
+from feedplan.machine.joint_interpolants import (
+    SPEED_SHARE,
+    Accuracy,
+    Interpolants,
+    SquareOfSpeed,
+    joint_interpolants,
+)
 from feedplan.machine.machine import Machine, size_of
 from feedplan.machine.meaning import Meaning
-from feedplan.machine.proxies import Proxies, build_proxies
-from feedplan.machine.survey import JointPath, survey
+from feedplan.machine.path_derivatives import positions
+from feedplan.machine.singularities import JointPath, joint_path
 from feedplan.machine.words import DIRECTION, AxisWords, axis_words
 
 Array = NDArray[np.float64]
-# Part of an acceleration limit by which the stand-ins may be off.
-SHARE = 1e-9
-# How far positions may be off [mm, deg]: far below what any scale reads.
-POSITION = 1e-9
 # Joints that differ by no more than this are in the same place [mm, deg].
 MEETING = 1e-6
-# What rounding leaves of q'', as a part of itself.
-ROUNDING = 1e-13
 # Chebyshev points of q'': the joints' pieces then have the greatest degree that a curve may have.
 NODES = 8
-# How far |C'|² of rational pieces may be off, as a part of itself.
-SPEED_SHARE = 1e-9
-# Of the greatest |C'|² of a piece: what rounding leaves of it elsewhere.
-SPEED_NOISE = 1e-12
-# Places of a part at which the greatest possible u̇² is estimated, and how many times more it may be.
-PLACES, MARGIN = 3, 4.0
 
 
 @dataclass(frozen=True)
@@ -226,7 +213,7 @@ def _affine(task: _Task) -> _Stretch:
     joints = replace(tool, control_points=positions(words.kinematics, tips.control_points))
     travel = np.array([axis.travel for axis in machine.axes])
     if ((joints.control_points < travel[:, 0]) | (joints.control_points > travel[:, 1])).any():
-        _survey(task, tips)
+        _route(task, tips)
     linear = task.linear(tool)
     speed = _either(TipSpeed(*speed_squares(linear)), TipSpeed(*speed_squares(tool)), _moving(linear))
     origin = joints.control_points[joints.offsets[:-1]]
@@ -254,11 +241,11 @@ def _in_order(stretches: list[_Stretch]) -> _Stretch:
     return _Stretch(stretches[0].words, piece[order], part[order], tool, joints, origin, speed)
 
 
-def _survey(task: _Task, tips: CompositeCurve) -> JointPath:
+def _route(task: _Task, tips: CompositeCurve) -> JointPath:
     """The joints along pieces of one degree; InputError names the first place that they cannot pass."""
     tips = tips.elevated(int(tips.degree.max()))
     kinematics, travel = task.words.kinematics, [axis.travel for axis in task.machine.axes]
-    route = survey(kinematics, tips.by_piece, tips.width, travel, tips.weights_by_piece, task.start)
+    route = joint_path(kinematics, tips.by_piece, tips.width, travel, tips.weights_by_piece, task.start)
     if route.places:
         place = route.places[0]
         raise InputError(place.sentence(kinematics, task.line(place.piece)))
@@ -271,35 +258,29 @@ def _curved(task: _Task) -> _Stretch:
     tips = replace(curve, control_points=task.words.tip(curve.control_points))
     tips = tips.elevated(int(tips.degree.max()))
     control, width, weights = tips.by_piece, tips.width, tips.weights_by_piece
-    route = _survey(task, tips)
-    linear = task.linear(curve)
-    moves = _moving(linear)
-    whole = curve.width
-    squares = []
-    if curve.weights is not None:
-        scaled = replace(curve, control_points=curve.control_points * way_scale(task.path.axes, task.machine))
-        squares += [
-            _Interpolated(_speed_of(linear), curve.rational & moves, whole),
-            _Interpolated(_speed_of(scaled), curve.rational, whole),
-        ]
-    if task.words.meaning is Meaning.VECTOR:
-        squares.append(_Interpolated(_turning_of(task.direction(curve)), ~moves, whole))
-    allowed = _Allowed(task, tips, linear, moves, squares)
-    proxies = build_proxies(kinematics, control, width, allowed, NODES, weights)
-    near = np.isinf(proxies.curvature_error).any(axis=1)
+    route = _route(task, tips)
+    moves = _moving(task.linear(curve))
+    interpolants = joint_interpolants(
+        kinematics, control, width, _accuracy(task, curve, moves), NODES, weights
+    )
+    near = np.isinf(interpolants.curvature_error).any(axis=1)
     if near.any():
-        line = task.line(int(proxies.piece[near.argmax()]))
+        line = task.line(int(interpolants.piece[near.argmax()]))
         raise InputError(
             f"line {line}: the tool passes so near a singular position of machine {task.machine.name} that "
             "its joints cannot be followed: keep the path farther off it"
         )
-    tool = curve.split(proxies.piece, proxies.part[:, 0] * width[proxies.piece]).with_width(proxies.width)
-    joints = _joint_pieces(proxies)
-    origin = route.positions(proxies.piece, proxies.part[:, 0])
+    tool = curve.split(interpolants.piece, interpolants.part[:, 0] * width[interpolants.piece]).with_width(
+        interpolants.width
+    )
+    joints = _joint_pieces(interpolants)
+    origin = route.positions(interpolants.piece, interpolants.part[:, 0])
     speed = _tool_speed(task.linear(tool))
     if not moves.all():
-        speed = _either(speed, _turning_speed(task, tool, joints), moves[proxies.piece])
-    return _Stretch(task.words, task.pieces[proxies.piece], proxies.part, tool, joints, origin, speed)
+        speed = _either(speed, _turning_speed(task, tool, joints), moves[interpolants.piece])
+    return _Stretch(
+        task.words, task.pieces[interpolants.piece], interpolants.part, tool, joints, origin, speed
+    )
 
 
 def _turning_speed(task: _Task, tool: CompositeCurve, joints: CompositeCurve) -> TipSpeed:
@@ -319,100 +300,31 @@ def _moving(curve: CompositeCurve) -> NDArray[np.bool_]:
     return moving
 
 
-@dataclass(frozen=True)
-class _Allowed:
-    """How far q'' may be off on parts of pieces; nothing where the square of a speed would not be met."""
-
-    task: _Task
-    tips: CompositeCurve
-    linear: CompositeCurve
-    moves: NDArray[np.bool_]
-    squares: list[_Interpolated]
-
-    def __call__(self, piece: NDArray[np.int64], part: Array) -> Array:
-        acceleration = np.array([size_of(axis.max_acceleration) for axis in self.task.machine.axes])
-        length = self.tips.width[piece] * (part[:, 1] - part[:, 0])
-        rate_sq, bend = self._rates(piece, part)
-        allowed: Array = np.minimum(SHARE * acceleration / rate_sq[:, None], (POSITION / length**2)[:, None])
-        # Near a cusp u̇² has no bound that would help; no stand-in is nearer than rounding.
-        allowed = np.maximum(allowed, ROUNDING * bend)
-        allowed[~self._is_met(piece, part)] = 0.0
-        return allowed
-
-    def _rates(self, piece: NDArray[np.int64], part: Array) -> tuple[Array, Array]:
-        """About the greatest u̇² (m,) that feed and joint velocities allow, and |q''| (m, joints)."""
-        weights = self.tips.weights_by_piece
-        own = None if weights is None else weights[piece]
-        control, width = self.tips.by_piece[piece], self.tips.width[piece]
-        slowest, fastest = np.array([axis.velocity_range for axis in self.task.machine.axes]).T
-        greatest, bend = np.zeros(len(piece)), np.zeros((len(piece), len(fastest)))
-        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-            for t in np.linspace(0.0, 1.0, PLACES):
-                fraction = part[:, 0] + t * (part[:, 1] - part[:, 0])
-                _, slope, second = derivatives(self.task.words.kinematics, control, width, fraction, 2, own)
-                bend = np.fmax(bend, np.abs(second))
-                tangent = self.linear.evaluate(piece, fraction * width, 1)[1]
-                along = self.task.feed[self.task.pieces[piece]] ** 2 / (tangent**2).sum(axis=1)
-                limit = np.where(slope < 0.0, -slowest, fastest)
-                at_velocity = (limit / np.abs(slope)).min(axis=1) ** 2
-                here = np.minimum(at_velocity, np.where(self.moves[piece], along, np.inf))
-                greatest = np.fmax(greatest, np.where(np.isfinite(here), here, 0.0))
-        rate_sq: Array = MARGIN * np.where(greatest > 0, greatest, 1.0)
-        return rate_sq, bend
-
-    def _is_met(self, piece: NDArray[np.int64], part: Array) -> NDArray[np.bool_]:
-        """Whether interpolation meets the squares of speeds that are no polynomials."""
-        met = np.ones(len(piece), dtype=bool)
-        for square in self.squares:
-            met &= square.is_met(piece, part)
-        return met
+def _accuracy(task: _Task, curve: CompositeCurve, moves: NDArray[np.bool_]) -> Accuracy:
+    """What stand-ins must meet: limits of the machine, and squares of speeds that are no polynomials."""
+    even = curve.elevated(int(curve.degree.max()))
+    squares = []
+    if curve.weights is not None:
+        scale = way_scale(task.path.axes, task.machine)
+        squares += [
+            SquareOfSpeed(task.linear(even).by_piece, curve.rational & moves),
+            SquareOfSpeed(np.ascontiguousarray(even.by_piece * scale), curve.rational),
+        ]
+    if task.words.meaning is Meaning.VECTOR:
+        squares.append(SquareOfSpeed(task.direction(even).by_piece, ~moves, turning=True))
+    slowest, fastest = np.array([axis.velocity_range for axis in task.machine.axes]).T
+    return Accuracy(
+        acceleration=np.array([size_of(axis.max_acceleration) for axis in task.machine.axes]),
+        least_velocity=np.ascontiguousarray(slowest),
+        greatest_velocity=np.ascontiguousarray(fastest),
+        feed=task.feed[task.pieces],
+        linear=task.linear(even).by_piece,
+        moves=moves,
+        squares=squares,
+    )
 
 
-Square = Callable[[NDArray[np.int64], Array], Array]
-
-
-@dataclass(frozen=True)
-class _Interpolated:
-    """The square of a speed by piece and u that is interpolated, on those `pieces` (n,) of these widths."""
-
-    square: Square
-    pieces: NDArray[np.bool_]
-    width: Array
-
-    def is_met(self, piece: NDArray[np.int64], part: Array) -> NDArray[np.bool_]:
-        """Whether it is met halfway between the nodes on parts (m, 2), where it is off the most."""
-        met: NDArray[np.bool_] = ~self.pieces[piece]
-        rows = np.flatnonzero(~met)
-        if len(rows):
-            between = 0.5 - 0.5 * np.cos(np.pi * np.arange(SPEED_NODES + 1) / SPEED_NODES)
-            found, true = (self._at(piece[rows], part[rows], at) for at in (chebyshev(SPEED_NODES), between))
-            miss = np.abs(found @ interpolation(SPEED_NODES, between).T - true)
-            # In a near cusp the speed is rounding, and no limit of the feed.
-            floor = SPEED_NOISE * self._greatest[piece[rows], None]
-            met[rows] = (miss <= SPEED_SHARE * true + floor).all(axis=1)
-        return met
-
-    @cached_property
-    def _greatest(self) -> Array:
-        """About the greatest square on each piece (n,)."""
-        piece = np.arange(len(self.width))
-        greatest: Array = self._at(piece, np.tile([0.0, 1.0], (len(piece), 1)), chebyshev(SPEED_NODES)).max(
-            axis=1
-        )
-        return greatest
-
-    def _at(self, piece: NDArray[np.int64], part: Array, at: Array) -> Array:
-        fraction = part[:, :1] + at * (part[:, 1:] - part[:, :1])
-        u = fraction * self.width[piece][:, None]
-        return self.square(np.repeat(piece, len(at)), u.ravel()).reshape(u.shape)
-
-
-def _speed_of(curve: CompositeCurve) -> Square:
-    """|C'|² of a curve."""
-    return lambda piece, u: np.asarray((curve.evaluate(piece, u, 1)[1] ** 2).sum(axis=1))
-
-
-def _turning_of(curve: CompositeCurve) -> Square:
+def _turning_of(curve: CompositeCurve) -> Callable[[NDArray[np.int64], Array], Array]:
     """The square of the rate at which a direction of any length turns [deg²], by u."""
 
     def square(piece: NDArray[np.int64], u: Array) -> Array:
@@ -423,13 +335,13 @@ def _turning_of(curve: CompositeCurve) -> Square:
     return square
 
 
-def _joint_pieces(proxies: Proxies) -> CompositeCurve:
+def _joint_pieces(interpolants: Interpolants) -> CompositeCurve:
     """The integrals of the slopes, each from 0: small numbers keep what second differences need."""
-    slope, count = proxies.slope, len(proxies)
+    slope, count = interpolants.slope, len(interpolants)
     degree = slope.shape[1]
-    steps = np.cumsum(slope, axis=1) * (proxies.width / degree)[:, None, None]
+    steps = np.cumsum(slope, axis=1) * (interpolants.width / degree)[:, None, None]
     points = np.concatenate([np.zeros_like(steps[:, :1]), steps], axis=1)
-    return CompositeCurve.from_pieces(points.reshape(count, degree + 1, -1), proxies.width)
+    return CompositeCurve.from_pieces(points.reshape(count, degree + 1, -1), interpolants.width)
 
 
 def _tool_speed(linear: CompositeCurve) -> TipSpeed:

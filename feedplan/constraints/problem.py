@@ -195,7 +195,7 @@ class Problem:
         """
         if not self.words:
             return self.path.curve.evaluate(piece, u, order)
-        from feedplan.machine.along import derivatives
+        from feedplan.machine.path_derivatives import derivatives
 
         run = np.searchsorted(self.path.runs, piece, side="right") - 1
         result = np.empty((order + 1, len(u), len(self.axes)))

@@ -68,16 +68,18 @@ def interpolated_squares(
 
 def from_chebyshev(values: Array) -> Array:
     """Bernstein coefficients (n, m, …) of the polynomials with these values (n, m, …) at `chebyshev(m)`."""
-    count = values.shape[1]
-    inverse = np.linalg.inv(_bernstein(count - 1, chebyshev(count)))
-    coefficients: Array = np.einsum("ij,nj...->ni...", inverse, values)
+    coefficients: Array = np.einsum("ij,nj...->ni...", to_bernstein(values.shape[1]), values)
     return coefficients
+
+
+def to_bernstein(count: int) -> Array:
+    """The matrix (count, count) that takes values at `chebyshev(count)` to Bernstein coefficients."""
+    return np.ascontiguousarray(np.linalg.inv(_bernstein(count - 1, chebyshev(count))))
 
 
 def interpolation(count: int, at: Array) -> Array:
     """The matrix (places, count) that takes values at `chebyshev(count)` to those at places in [0, 1]."""
-    basis = _bernstein(count - 1, chebyshev(count))
-    matrix: Array = _bernstein(count - 1, at) @ np.linalg.inv(basis)
+    matrix: Array = _bernstein(count - 1, at) @ to_bernstein(count)
     return matrix
 
 

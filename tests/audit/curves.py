@@ -12,8 +12,8 @@ from feedplan._solvers import plan_curves
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Path
-from feedplan.machine.along import derivatives
 from feedplan.machine.machine import Axis, Machine
+from feedplan.machine.path_derivatives import derivatives
 from feedplan.profile import ArcKind, SpeedProfile
 from feedplan.setpoints import SetpointChunk
 

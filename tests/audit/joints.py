@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from feedplan._solvers import plan_curves
 from feedplan.constraints.problem import Cut, Problem
 from feedplan.curves.composite import CompositeCurve
-from feedplan.machine.along import positions
+from feedplan.machine.joint_interpolants import joint_interpolants
 from feedplan.machine.machine import Machine
-from feedplan.machine.proxies import build_proxies
+from feedplan.machine.path_derivatives import positions
 from feedplan.machine.words import axis_words
 from feedplan.profile import ArcKind, SpeedProfile
 from tests.audit.curves import path_along
@@ -25,14 +25,14 @@ def joint_problem(machine: Machine, names: str, curve: CompositeCurve, **changes
     """From rest to rest along the tip curve, cut where the planner's stand-ins for the joints are."""
     words = axis_words(machine, tuple(names), changes.pop("meaning", None))
     points = curve.by_piece
-    proxies = build_proxies(words.kinematics, words.tip(points), curve.width, 1e-10, nodes=8)
-    cut = proxies.part[:, 0] > 0
+    found = joint_interpolants(words.kinematics, words.tip(points), curve.width, 1e-10, nodes=8)
+    cut = found.part[:, 0] > 0
     path = path_along(
-        curve.split(proxies.piece[cut], proxies.part[cut, 0] * curve.width[proxies.piece[cut]]), names
+        curve.split(found.piece[cut], found.part[cut, 0] * curve.width[found.piece[cut]]), names
     )
     count = len(path)
     start = positions(words.kinematics, words.tip(path.curve.control_points[path.curve.offsets[:-1]]))
-    steps = proxies.slope * (path.width / 9.0)[:, None, None]
+    steps = found.slope * (path.width / 9.0)[:, None, None]
     joints = np.concatenate([start[:, None], start[:, None] + np.cumsum(steps, axis=1)], axis=1)
     problem = Problem(
         path=path,
@@ -46,7 +46,7 @@ def joint_problem(machine: Machine, names: str, curve: CompositeCurve, **changes
         joint_axes=machine.axis_names,
         joints=CompositeCurve.from_pieces(joints, path.width),
         words=(words,),
-        cut=Cut(curve, proxies.piece, proxies.part),
+        cut=Cut(curve, found.piece, found.part),
     )
     return problem if not changes else type(problem)(**{**vars(problem), **changes})
 

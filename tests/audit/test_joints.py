@@ -16,9 +16,9 @@ from feedplan.audit import Audit, audit
 from feedplan.audit.joint_path import JointPath
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
-from feedplan.machine.along import derivatives
 from feedplan.machine.machine import Machine
 from feedplan.machine.meaning import Meaning
+from feedplan.machine.path_derivatives import derivatives
 from feedplan.profile import ArcKind, SpeedProfile
 from feedplan.setpoints import SetpointChunk
 from tests.audit.curves import places_at, sampled

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from feedplan import Machine, MachineError
-from feedplan.machine.along import derivatives, positions
 from feedplan.machine.meaning import Meaning
+from feedplan.machine.path_derivatives import derivatives, positions
 from feedplan.machine.words import axis_words
 
 

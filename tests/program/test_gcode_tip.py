@@ -8,9 +8,9 @@ import pytest
 from numpy.typing import NDArray
 
 from feedplan.errors import MachineError, ProgramError
-from feedplan.machine.along import positions
 from feedplan.machine.machine import Machine
 from feedplan.machine.meaning import Meaning
+from feedplan.machine.path_derivatives import positions
 from feedplan.machine.rotary import RotaryChain
 from feedplan.machine.words import axis_words
 from feedplan.program.gcode import read_gcode

@@ -2,8 +2,8 @@
 
 A module has `build(axes, parameters) -> Kinematics` and is found by its name: the type `trunnion-ac` is the
 module `trunnion_ac`. Users add their own with `register`. K is written once, with the functions of
-`feedplan.machine.numbers`: arrays give positions, series exact derivatives along a curve, series of intervals
-proven bounds of them.
+`feedplan.machine.numbers`; it is called once and recorded, and the record is evaluated natively: positions,
+exact derivatives along a curve, proven bounds of them.
 """
 
 from __future__ import annotations
@@ -15,9 +15,11 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from feedplan.errors import MachineError
+from feedplan.lazy import cached_property
 from feedplan.machine.checks import require, require_text
+from feedplan.machine.expression import Expression, record
 from feedplan.machine.machine import ROTARY_LETTERS
-from feedplan.machine.numbers.elementary import Number
+from feedplan.machine.numbers import Number
 from feedplan.machine.parameters import Parameters
 
 if TYPE_CHECKING:
@@ -57,7 +59,12 @@ class Kinematics(ABC):
 
     @abstractmethod
     def joints(self, tip: Sequence[Number]) -> tuple[Number, ...]:
-        """Joint positions [mm, deg] for the tip [mm, deg], numbers of any one type."""
+        """Joint positions [mm, deg] for the tip [mm, deg]: one formula for all places, of any numbers."""
+
+    @cached_property
+    def recorded(self) -> Expression:
+        """The formula of `joints`, recorded when it is first asked for; MachineError where it cannot be."""
+        return record(self)
 
     def tip(self, joints: Sequence[Number]) -> tuple[Number, ...]:
         """The tip [mm, deg] for joint positions [mm, deg]: the inverse of `joints`, where there is one."""

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from feedplan.errors import MachineError
 from feedplan.machine.kinematics import Kinematics
 from feedplan.machine.machine import AXIS_LETTERS, ROTARY_LETTERS, Axis
-from feedplan.machine.numbers.elementary import Number
+from feedplan.machine.numbers import Number
 from feedplan.machine.parameters import Parameters
 
 

@@ -6,6 +6,7 @@ mod bound;
 mod fit;
 mod gcode;
 mod jerk;
+mod kinematics;
 mod path;
 mod plan;
 mod problem;
@@ -56,5 +57,6 @@ fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     jerk::register(module)?;
     bound::register(module)?;
     gcode::register(module)?;
+    kinematics::register(module)?;
     Ok(())
 }

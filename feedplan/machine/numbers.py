@@ -1,7 +1,8 @@
-"""The elementary functions of a formula, each passed on to the number it is given.
+"""The functions of a kinematics' formula, which also uses + − × ÷, whole powers and abs.
 
-Arrays and floats go to numpy; any other number type brings methods of the same names. `atan2` in degrees is
-`degrees(atan2(y, x))`: the factor 180/π is enclosed, not rounded, where intervals are evaluated.
+Arrays and floats go to numpy; any other number type brings methods of the same names, as the numbers do that
+record a formula (`feedplan.machine.expression`). `atan2` in degrees is `degrees(atan2(y, x))`: the factor
+180/π is enclosed, not rounded, where intervals are evaluated.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-# An array, a float, an Interval, a Series or a type of the user's own with the same methods.
+# An array, a float, a recording number or a type of the user's own with the same methods.
 Number: TypeAlias = Any
 
 

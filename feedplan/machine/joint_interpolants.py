@@ -1,0 +1,114 @@
+"""Polynomials that stand in for a joint's motion q'(u), with a proven distance from it.
+
+q'' is interpolated at n Chebyshev points and integrated from the exact q' at the part's start. With
+c ≥ |q^(n+2)|/(n + 1)! over a part of width h in u (`path_derivatives.interpolation_constants`), by the
+interpolation error formula
+
+    |q'' − interpolant''| ≤ ε₂ = 2 (n + 1) c (h/4)^n,   |q' − interpolant'| ≤ ε₁ = h ε₂,
+
+so a joint's acceleration q' s + q'' p is met within ε₁ |s| + ε₂ p. Parts are halved until ε₂ is small enough.
+What rounding adds is not in ε: some 1e-14 of the largest |q''| of the part.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from feedplan._solvers import joint_interpolants as native_joint_interpolants
+from feedplan.curves.hodograph import SPEED_NODES, chebyshev, interpolation, to_bernstein
+from feedplan.machine.kinematics import Kinematics
+from feedplan.machine.path_derivatives import TipPieces, contiguous
+
+Array = NDArray[np.float64]
+# How far squares of speeds that are no polynomials may be off, as a part of themselves.
+SPEED_SHARE = 1e-9
+
+
+@dataclass(frozen=True)
+class SquareOfSpeed:
+    """The square of a speed that is interpolated on some `pieces` (n,).
+
+    That of a motion with these control points (n, d + 1, axes), or with `turning` the square of the rate
+    [deg] at which a direction of any length turns. Weights are those of the tip.
+    """
+
+    control_points: Array
+    pieces: NDArray[np.bool_]
+    turning: bool = False
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """How near stand-ins must come: an axis's acceleration within 1e-9 of its limit, squares of speeds met.
+
+    Per joint: `acceleration`, the lesser limit of both directions, `least_velocity`, `greatest_velocity`.
+    Per piece: `feed` [mm/s], control points `linear` (n, d + 1, k) of the tool in X, Y, Z, and whether it
+    `moves` there. The speeds that feed and velocities allow are estimated; limits hold at every lower speed.
+    """
+
+    acceleration: Array
+    least_velocity: Array
+    greatest_velocity: Array
+    feed: Array
+    linear: Array
+    moves: NDArray[np.bool_]
+    squares: list[SquareOfSpeed]
+    speed_share: float = SPEED_SHARE
+
+    @property
+    def speed_nodes(self) -> Array:
+        """Where squares of speeds are interpolated."""
+        return chebyshev(SPEED_NODES)
+
+    @property
+    def speed_between(self) -> Array:
+        """Halfway between, where interpolation is off the most."""
+        return np.asarray(0.5 - 0.5 * np.cos(np.pi * np.arange(SPEED_NODES + 1) / SPEED_NODES))
+
+    @property
+    def speed_interpolation(self) -> Array:
+        """From values at the nodes to those between."""
+        return np.ascontiguousarray(interpolation(SPEED_NODES, self.speed_between))
+
+
+@dataclass(frozen=True)
+class Interpolants:
+    """Stand-ins on m parts, in order of the path.
+
+    `piece` (m,) and `part` (m, 2) say of which piece which fractions; `width` (m,) is their length in u.
+    `slope` (m, n + 1, joints) are the Bernstein coefficients of q' [mm or deg per unit of u], degree n;
+    `slope_error` and `curvature_error` (m, joints) are ε₁ and ε₂. They are infinite on parts that could not
+    be made small enough: there K is singular, or so nearly that 2^-30 of a piece is too wide.
+    """
+
+    piece: NDArray[np.int64]
+    part: Array
+    width: Array
+    slope: Array
+    slope_error: Array
+    curvature_error: Array
+
+    def __len__(self) -> int:
+        return len(self.piece)
+
+
+def joint_interpolants(
+    kinematics: Kinematics,
+    control_points: ArrayLike,
+    width: ArrayLike,
+    tolerance: ArrayLike | Accuracy,
+    nodes: int = 9,
+    weights: ArrayLike | None = None,
+) -> Interpolants:
+    """Stand-ins of degree `nodes` with ε₂ within a tolerance, (joints,) or one for all, or as asked."""
+    tips = TipPieces.of(control_points, width, weights)
+    if not isinstance(tolerance, Accuracy):
+        tolerance = contiguous(np.broadcast_to(tolerance, len(kinematics.joint_names)))
+    piece, part, slope, error = native_joint_interpolants(
+        kinematics.recorded, tips, chebyshev(nodes), to_bernstein(nodes), tolerance
+    )
+    length = tips.width[piece] * (part[:, 1] - part[:, 0])
+    return Interpolants(piece, part, length, slope, error * length[:, None] * (1 + 1e-15), error)

@@ -1,0 +1,126 @@
+"""Joint motion along polynomial pieces of a tip path: exact derivatives at points, proven bounds over pieces.
+
+A piece is given by Bézier points (n, d + 1, axes) of the tip, in the order of `Kinematics.tip_names`, over
+u in [0, width]; with weights (n, d + 1) it is rational. The recorded formula of the kinematics is evaluated
+natively on Taylor series in u: at points with numbers as coefficients, over whole pieces with intervals.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from feedplan._solvers import joint_constants, joint_derivatives, joint_enclosures, joint_positions
+from feedplan.machine.kinematics import Kinematics
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TipPieces:
+    """Pieces as the native module takes them."""
+
+    control_points: Array
+    width: Array
+    weights: Array | None
+
+    @classmethod
+    def of(cls, control_points: ArrayLike, width: ArrayLike, weights: ArrayLike | None) -> TipPieces:
+        """From arrays of any kind."""
+        return cls(contiguous(control_points), contiguous(width), contiguous(weights))
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Arrays `lo` ≤ `hi` of one shape that hold what they bound, rounding included."""
+
+    lo: Array
+    hi: Array
+
+    @property
+    def bounded(self) -> NDArray[np.bool_]:
+        """Where both ends are finite."""
+        return np.isfinite(self.lo) & np.isfinite(self.hi)
+
+    @property
+    def middle(self) -> Array:
+        """Numbers inside, about half way; not a number where unbounded."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(0.5 * self.lo + 0.5 * self.hi)
+
+    @property
+    def magnitude(self) -> Array:
+        """The greatest absolute values inside."""
+        return np.asarray(np.maximum(np.abs(self.lo), np.abs(self.hi)))
+
+
+def positions(kinematics: Kinematics, tip: ArrayLike) -> Array:
+    """Joint positions (…, joints) [mm, deg] for tips (…, axes); angles as K gives them, not continuous."""
+    tips = contiguous(tip)
+    found = joint_positions(kinematics.recorded, tips.reshape(-1, tips.shape[-1]))
+    return found.reshape(*tips.shape[:-1], -1)
+
+
+def derivatives(
+    kinematics: Kinematics,
+    control_points: ArrayLike,
+    width: ArrayLike,
+    fraction: ArrayLike,
+    order: int = 3,
+    weights: ArrayLike | None = None,
+) -> Array:
+    """q, q', …, q^(order) (order + 1, n, joints) at u = fraction · width of each piece.
+
+    Exact but for rounding; not finite where K is singular. To have many points of a piece, repeat it.
+    """
+    pieces = TipPieces.of(control_points, width, weights)
+    found = joint_derivatives(kinematics.recorded, pieces, contiguous(fraction), order)
+    return np.ascontiguousarray(np.moveaxis(found, 1, 0))
+
+
+def enclosures(
+    kinematics: Kinematics,
+    control_points: ArrayLike,
+    width: ArrayLike,
+    order: int,
+    parts: ArrayLike | None = None,
+    weights: ArrayLike | None = None,
+) -> Bounds:
+    """Bounds (order + 1, n, joints) of q^(k)(u)/k! for every u of each piece, rounding included.
+
+    `parts` (n, 2) are fractions of the pieces to look at instead, in [0, 1]. A coefficient is unbounded where
+    K is singular on the part, or too near to singular to tell: cut the part smaller. Angles known up to whole
+    turns are continuous over the part, whichever turn they are on.
+    """
+    pieces = TipPieces.of(control_points, width, weights)
+    lo, hi = joint_enclosures(kinematics.recorded, pieces, order, contiguous(parts))
+    return Bounds(np.moveaxis(lo, 1, 0), np.moveaxis(hi, 1, 0))
+
+
+def interpolation_constants(
+    kinematics: Kinematics,
+    control_points: ArrayLike,
+    width: ArrayLike,
+    nodes: int,
+    parts: ArrayLike | None = None,
+    weights: ArrayLike | None = None,
+) -> Array:
+    """c ≥ |q^(n+2)|/(n + 1)! (n, joints) on each part, for interpolation of q'' at n = `nodes` points.
+
+    With h the part's width in u, q'' is then met within 2 (n + 1) c (h/4)^n at Chebyshev points. Infinite
+    where the part must be cut smaller.
+    """
+    pieces = TipPieces.of(control_points, width, weights)
+    return joint_constants(kinematics.recorded, pieces, nodes, contiguous(parts))
+
+
+@overload
+def contiguous(values: None) -> None: ...
+@overload
+def contiguous(values: ArrayLike) -> Array: ...
+def contiguous(values: ArrayLike | None) -> Array | None:
+    """As the native module takes arrays."""
+    return None if values is None else np.ascontiguousarray(values, dtype=np.float64)

@@ -1,0 +1,122 @@
+"""Joint positions along a whole tip path: continuous angles, singular places, travel ends.
+
+Pieces are cut until interval arithmetic proves on each part that K is differentiable there and that no angle
+turns by half a turn or more. What cannot be proven down to 2^-30 of a piece is a singular place: K is
+singular within that distance. A travel end is overrun where the joint's proven range lies beyond it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from feedplan._solvers import joint_path as native_joint_path
+from feedplan.machine.kinematics import Kinematics
+from feedplan.machine.path_derivatives import Bounds, TipPieces, contiguous, derivatives
+
+Array = NDArray[np.float64]
+TURN = 360.0
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a path asks of the machine what it cannot do: at `fraction` of piece `piece`.
+
+    A singular place has the index of no joint (−1), and `what` completes "the tool is at …". A travel end has
+    the `joint`'s index, its position `value` and the travel's end `limit` [mm, deg].
+    """
+
+    piece: int
+    fraction: float
+    what: str = ""
+    joint: int = -1
+    value: float = 0.0
+    limit: float = 0.0
+
+    def sentence(self, kinematics: Kinematics, line: int) -> str:
+        """One sentence for the user, with the source line and the remedy."""
+        if self.joint < 0:
+            turning = zip(kinematics.joint_names, kinematics.turning, strict=True)
+            names = " and ".join(name for name, turns in turning if turns) or "the joints"
+            return (
+                f"line {line}: the tool is at {self.what}, where {names} cannot follow it: "
+                "keep the path off it, or program that stretch in joint positions"
+            )
+        name = kinematics.joint_names[self.joint]
+        unit = "deg" if kinematics.rotary[self.joint] else "mm"
+        return (
+            f"line {line}: {name} would go to {self.value:.6g} {unit}, its travel ends at {self.limit:g} "
+            f"{unit}: place the part elsewhere, or choose another machine"
+        )
+
+
+@dataclass(frozen=True)
+class JointPath:
+    """Parts of a path on which the joints are smooth, in order, and the places where they are not or leave.
+
+    Per part: `piece`, `part` (m, 2) its fractions of the piece, `range` (m, joints) what the joints'
+    positions lie within [mm, deg], angles on their turn. `places` are in order of the path.
+    """
+
+    kinematics: Kinematics
+    tips: TipPieces
+    piece: NDArray[np.int64]
+    part: Array
+    range: Bounds
+    places: tuple[Place, ...]
+
+    def positions(self, piece: NDArray[np.int64], fraction: ArrayLike) -> Array:
+        """Joint positions (n, joints) [mm, deg] at fractions of pieces, angles continuous along the path."""
+        fraction, tips = np.asarray(fraction), self.tips
+        weights = None if tips.weights is None else tips.weights[piece]
+        principal = derivatives(
+            self.kinematics, tips.control_points[piece], tips.width[piece], fraction, 0, weights
+        )[0]
+        # The end of a part is found as the start of the next: there both are on the same turn.
+        found = np.searchsorted(self.piece + self.part[:, 0], piece + fraction, side="right") - 1
+        turns = np.round((self.range.middle[found] - principal) / TURN)
+        return np.asarray(principal + np.nan_to_num(turns) * np.array(self.kinematics.turning) * TURN)
+
+
+def joint_path(
+    kinematics: Kinematics,
+    control_points: ArrayLike,
+    width: ArrayLike,
+    travel: Sequence[tuple[float, float]] | None = None,
+    weights: ArrayLike | None = None,
+    start: ArrayLike | None = None,
+) -> JointPath:
+    """The joints along pieces joined end to end, as `feedplan.machine.path_derivatives` takes them.
+
+    `start` (joints,) [mm, deg] is where the joints are before: angles begin on the nearest turn. Without it
+    they begin on the turn that keeps the whole path within `travel`, (least, greatest) of each joint, if
+    there is one; else as K gives them.
+    """
+    tips = TipPieces.of(control_points, width, weights)
+    piece, part, lo, hi, singular, overruns = native_joint_path(
+        kinematics.recorded, tips, contiguous(travel), contiguous(start)
+    )
+    places = [_singular(kinematics, tips, *place) for place in singular]
+    places += [
+        Place(piece, fraction, joint=joint, value=value, limit=limit)
+        for piece, fraction, joint, value, limit in overruns
+    ]
+    places.sort(key=lambda place: (place.piece, place.fraction))
+    return JointPath(kinematics, tips, piece, part, Bounds(lo, hi), tuple(places))
+
+
+def _singular(kinematics: Kinematics, tips: TipPieces, piece: int, fraction: float) -> Place:
+    """A singular place by the name of what vanishes there."""
+    level = tips.control_points[piece]
+    if tips.weights is not None:
+        level = np.concatenate([level * tips.weights[piece, :, None], tips.weights[piece, :, None]], axis=1)
+    while len(level) > 1:
+        level = (1 - fraction) * level[:-1] + fraction * level[1:]
+    point = level[0] if tips.weights is None else level[0, :-1] / level[0, -1]
+    with np.errstate(all="ignore"):
+        measures = kinematics.singular(tuple(point))
+    what = min(measures, key=lambda name: float(np.nan_to_num(measures[name])), default="")
+    return Place(piece, fraction, what=what or "a singular position of the machine")

@@ -1,0 +1,148 @@
+//! Polynomials that stand in for a joint's motion q'(u), with a proven distance from it.
+//!
+//! q'' is interpolated at n Chebyshev points and integrated from the exact q' at the part's start. With
+//! c ≥ |q^(n+2)|/(n + 1)! over a part of width h in u, by the interpolation error formula
+//! ```text
+//! |q'' − interpolant''| ≤ ε₂ = 2 (n + 1) c (h/4)^n,   |q' − interpolant'| ≤ ε₁ = h ε₂,
+//! ```
+//! so a joint's acceleration q' s + q'' p is met within ε₁ |s| + ε₂ p. q'' is fitted rather than q', because differentiating a
+//! fit loses n² of its accuracy. Parts are halved until ε₂ is small enough. What rounding adds is not in ε: some 1e-14 of the
+//! largest |q''| of the part.
+
+use rayon::prelude::*;
+
+use super::accuracy::Tolerance;
+use super::path_derivatives::{Machine, PartWork, PointWork, BLOCK};
+use super::singularities::{halves, DEEPEST, STRETCH_DEPTH, STRETCH_PARTS};
+use super::tip::Tips;
+
+/// Interpolants on parts, in order of the path.
+#[derive(Debug, Default)]
+pub struct Interpolants {
+    pub piece: Vec<usize>,
+    /// Fractions of the pieces.
+    pub part: Vec<[f64; 2]>,
+    /// Bernstein coefficients of q', degree n: part by part, coefficient by coefficient, joint by joint.
+    pub slope: Vec<f64>,
+    /// ε₂, part by part, joint by joint; infinite on parts that could not be made small enough.
+    pub curvature_error: Vec<f64>,
+}
+
+/// Where q'' is interpolated, in [0, 1], and the matrix from values there to Bernstein coefficients, row by row.
+#[derive(Clone, Copy)]
+pub struct Nodes<'a> {
+    pub at: &'a [f64],
+    pub to_bernstein: &'a [f64],
+}
+
+/// Interpolants with ε₂ within a tolerance.
+pub fn interpolants(machine: Machine, tips: Tips, nodes: Nodes, tolerance: &Tolerance) -> Interpolants {
+    let blocks: Vec<Interpolants> = (0..tips.len().div_ceil(BLOCK))
+        .into_par_iter()
+        .map(|block| {
+            let mut work = Work {
+                machine,
+                tips,
+                nodes,
+                tolerance: tolerance.clone(),
+                parts: PartWork::new(machine, tips, nodes.at.len() + 2),
+                points: PointWork::new(machine, tips, 2),
+            };
+            let mut found = Interpolants::default();
+            for piece in block * BLOCK..((block + 1) * BLOCK).min(tips.len()) {
+                work.piece(piece, &mut found);
+            }
+            found
+        })
+        .collect();
+    blocks.into_iter().fold(Interpolants::default(), |mut all, some| {
+        all.piece.extend(some.piece);
+        all.part.extend(some.part);
+        all.slope.extend(some.slope);
+        all.curvature_error.extend(some.curvature_error);
+        all
+    })
+}
+
+struct Work<'a> {
+    machine: Machine<'a>,
+    tips: Tips<'a>,
+    nodes: Nodes<'a>,
+    tolerance: Tolerance<'a>,
+    parts: PartWork<'a>,
+    points: PointWork<'a>,
+}
+
+impl Work<'_> {
+    /// Adds the parts of one piece.
+    fn piece(&mut self, piece: usize, found: &mut Interpolants) {
+        let joints = self.machine.joints.outputs();
+        let nodes = self.nodes.at.len();
+        let (mut constants, mut allowed) = (vec![0.0; joints], vec![0.0; joints]);
+        let mut done: Vec<([f64; 2], Vec<f64>)> = Vec::new();
+        let mut open = vec![[0.0, 1.0]];
+        for depth in 0..=DEEPEST {
+            let (mut left, mut unbounded) = (Vec::new(), 0);
+            for part in open {
+                self.parts.constants(piece, part, &mut constants);
+                self.tolerance.allowed(&mut self.points, piece, part, &mut allowed);
+                let length = self.tips.width[piece] * (part[1] - part[0]);
+                let per_constant =
+                    2.0 * (nodes + 1) as f64 * (length / 4.0).powi(nodes as i32) * (1.0 + 1e-13);
+                let bound: Vec<f64> = constants.iter().map(|c| c * per_constant).collect();
+                let is_unbounded = constants.iter().any(|c| c.is_infinite());
+                unbounded += usize::from(is_unbounded);
+                if bound.iter().zip(&allowed).all(|(bound, allowed)| bound <= allowed) {
+                    done.push((part, bound));
+                } else {
+                    left.push((part, is_unbounded));
+                }
+            }
+            let is_stretch = unbounded > STRETCH_PARTS && depth >= STRETCH_DEPTH;
+            open = Vec::new();
+            for (part, is_unbounded) in left {
+                if (is_unbounded && is_stretch) || depth == DEEPEST {
+                    done.push((part, vec![f64::INFINITY; joints]));
+                } else {
+                    open.extend(halves(part));
+                }
+            }
+            if open.is_empty() {
+                break;
+            }
+        }
+        done.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]));
+        for (part, bound) in done {
+            self.slopes(piece, part, &mut found.slope);
+            found.piece.push(piece);
+            found.part.push(part);
+            found.curvature_error.extend(bound);
+        }
+    }
+
+    /// Adds the Bernstein coefficients of q': q'' through its values at the nodes, integrated.
+    fn slopes(&mut self, piece: usize, part: [f64; 2], slope: &mut Vec<f64>) {
+        let (joints, nodes) = (self.machine.joints.outputs(), self.nodes.at.len());
+        let length = part[1] - part[0];
+        let mut curvature = vec![0.0; nodes * joints];
+        for (t, row) in self.nodes.at.iter().zip(curvature.chunks_exact_mut(joints)) {
+            self.points.at(piece, part[0] + t * length);
+            for (joint, value) in row.iter_mut().enumerate() {
+                *value = self.points.derivative(joint, 2);
+            }
+        }
+        self.points.at(piece, part[0]);
+        let step = self.tips.width[piece] * length / nodes as f64;
+        let mut sums = vec![0.0; joints];
+        for i in 0..=nodes {
+            for joint in 0..joints {
+                if i > 0 {
+                    let row = &self.nodes.to_bernstein[(i - 1) * nodes..][..nodes];
+                    let values = curvature.iter().skip(joint).step_by(joints);
+                    sums[joint] += step * row.iter().zip(values).map(|(a, b)| a * b).sum::<f64>();
+                }
+                slope.push(self.points.derivative(joint, 1) + sums[joint]);
+            }
+        }
+    }
+}

@@ -1,0 +1,343 @@
+//! Joint positions along a whole tip path: continuous angles, singular places, travel ends.
+//!
+//! Pieces are cut until interval arithmetic proves on each part that K is differentiable there and that no angle turns by
+//! half a turn or more. Then the value of an angle at any point of the part is certain up to the part's turn, and parts are
+//! joined at their ends. What cannot be proven down to 2⁻³⁰ of a piece is a singular place: K is singular within that
+//! distance. A travel end is overrun where an enclosure lies beyond it as a whole.
+
+use rayon::prelude::*;
+
+use super::interval::Interval;
+use super::number::Number;
+use super::path_derivatives::{turns_between, Machine, PartWork, PointWork, BLOCK, TURN};
+use super::tip::Tips;
+
+/// How often a piece is halved at most.
+pub const DEEPEST: usize = 30;
+/// Past this depth, more open parts of one piece than that mean a singular stretch, not singular points.
+pub const STRETCH_DEPTH: usize = 10;
+pub const STRETCH_PARTS: usize = 64;
+/// Rounding of a program to four or more decimals makes no overrun, in mm or degrees.
+const TRAVEL_TOLERANCE: f64 = 1e-6;
+/// The order to which parts are enclosed: positions and slopes, drawn together by the order above.
+const ORDER: usize = 2;
+
+/// Where a joint passes the end of its travel first in a piece, and how far it goes.
+#[derive(Clone, Copy, Debug)]
+pub struct Overrun {
+    pub piece: usize,
+    pub fraction: f64,
+    pub joint: usize,
+    pub value: f64,
+    pub limit: f64,
+}
+
+/// Parts of a path on which the joints are smooth, in order, and the places where they are not or leave their travel.
+#[derive(Debug, Default)]
+pub struct JointPath {
+    pub piece: Vec<usize>,
+    /// Fractions of the pieces.
+    pub part: Vec<[f64; 2]>,
+    /// What the joints' positions lie within on each part, angles on their turn: part by part, joint by joint.
+    pub range: Vec<Interval>,
+    /// Piece and fraction of the first singular place of each row of them.
+    pub singular: Vec<(usize, f64)>,
+    pub overruns: Vec<Overrun>,
+}
+
+/// A part of a piece with the ranges of the joints.
+struct Part {
+    part: [f64; 2],
+    range: Vec<Interval>,
+}
+
+/// Both halves of a part.
+pub fn halves([a, b]: [f64; 2]) -> [[f64; 2]; 2] {
+    let middle = 0.5 * (a + b);
+    [[a, middle], [middle, b]]
+}
+
+/// The joints along pieces joined end to end.
+///
+/// `start` is where the joints are before: angles begin on the nearest turn. Without it they begin on the turn that keeps the
+/// whole path within `travel`, least and greatest of each joint, if there is one; else as K gives them.
+pub fn joint_path(
+    machine: Machine,
+    tips: Tips,
+    travel: Option<&[[f64; 2]]>,
+    start: Option<&[f64]>,
+) -> JointPath {
+    let joints = machine.joints.outputs();
+    let found: Vec<(Vec<Part>, Vec<f64>)> = (0..tips.len())
+        .into_par_iter()
+        .with_min_len(BLOCK)
+        .map_init(|| PartWork::new(machine, tips, ORDER), |work, piece| smooth_parts(machine, work, piece))
+        .collect();
+    let mut path = JointPath::default();
+    for (piece, (parts, singular)) in found.into_iter().enumerate() {
+        for part in parts {
+            path.piece.push(piece);
+            path.part.push(part.part);
+            path.range.extend(part.range);
+        }
+        path.singular.extend(singular.into_iter().map(|fraction| (piece, fraction)));
+    }
+    path.join(machine, tips);
+    path.begin_on_turn(machine, travel, start);
+    if let Some(travel) = travel {
+        // Rows of a piece follow each other.
+        let rows: Vec<&[usize]> = path.piece.chunk_by(|a, b| a == b).collect();
+        let mut first = 0;
+        let starts: Vec<usize> = rows
+            .iter()
+            .map(|rows| {
+                first += rows.len();
+                first - rows.len()
+            })
+            .collect();
+        let overruns = rows.par_iter().zip(starts).with_min_len(BLOCK).map_init(
+            || (PartWork::new(machine, tips, ORDER), PointWork::new(machine, tips, 0)),
+            |(work, points), (rows, first)| {
+                let parts = (first..first + rows.len())
+                    .map(|i| Part { part: path.part[i], range: path.range[i * joints..][..joints].to_vec() })
+                    .collect();
+                overruns(machine, work, points, rows[0], parts, travel)
+            },
+        );
+        path.overruns = overruns.flatten_iter().collect();
+    }
+    path
+}
+
+/// Parts of a piece with bounded K and K' and no half turn of an angle, and middles of parts that are none, one of each row
+/// of neighbours.
+fn smooth_parts(machine: Machine, work: &mut PartWork, piece: usize) -> (Vec<Part>, Vec<f64>) {
+    let joints = machine.joints.outputs();
+    let mut bounds = vec![Interval::WHOLE; (ORDER + 1) * joints];
+    let (mut parts, mut singular) = (Vec::new(), Vec::new());
+    let mut open = vec![[0.0, 1.0]];
+    for depth in 0..=DEEPEST {
+        let mut left = Vec::new();
+        for part in open {
+            work.enclose(piece, part, &mut bounds);
+            let (range, slope) = bounds.split_at(joints);
+            let known = |joint: usize| {
+                let narrow = !machine.turning[joint] || range[joint].width() < TURN / 2.0;
+                range[joint].is_bounded() && slope[joint].is_bounded() && narrow
+            };
+            let own = Part { part, range: range.to_vec() };
+            if (0..joints).all(known) {
+                parts.push(own);
+            } else {
+                left.push(own);
+            }
+        }
+        let is_stretch = depth >= STRETCH_DEPTH && left.len() > STRETCH_PARTS;
+        if is_stretch || depth == DEEPEST {
+            singular.extend(left.iter().map(|own| 0.5 * (own.part[0] + own.part[1])));
+            parts.extend(left);
+            break;
+        }
+        open = left.iter().flat_map(|own| halves(own.part)).collect();
+        if open.is_empty() {
+            break;
+        }
+    }
+    parts.sort_by(|a, b| a.part[0].total_cmp(&b.part[0]));
+    singular.sort_by(f64::total_cmp);
+    let mut last = f64::NEG_INFINITY;
+    singular.retain(|&fraction| {
+        let is_first = fraction - last > 0.5f64.powi(STRETCH_DEPTH as i32);
+        last = fraction;
+        is_first
+    });
+    (parts, singular)
+}
+
+impl JointPath {
+    /// Moves angles by whole turns so that each part begins where the one before ends.
+    fn join(&mut self, machine: Machine, tips: Tips) {
+        let joints = machine.joints.outputs();
+        let mut points = PointWork::new(machine, tips, 0);
+        // Where the part before ends, before it was moved, and the turns so far.
+        let mut ended = vec![f64::NAN; joints];
+        let mut turns = vec![0.0; joints];
+        for (row, (&piece, part)) in self.piece.iter().zip(&self.part).enumerate() {
+            let range = &mut self.range[row * joints..][..joints];
+            let mut ends = [vec![0.0; joints], vec![0.0; joints]];
+            for (end, &fraction) in ends.iter_mut().zip(part) {
+                points.at(piece, fraction);
+                for joint in 0..joints {
+                    let principal = points.derivative(joint, 0);
+                    // A singular part has no middle: its ends are where K says.
+                    let is_moved = machine.turning[joint] && range[joint].is_bounded();
+                    let away = if is_moved { range[joint].middle() - principal } else { 0.0 };
+                    end[joint] = principal + turns_between(away) * TURN;
+                }
+            }
+            for joint in (0..joints).filter(|&joint| machine.turning[joint]) {
+                if row > 0 {
+                    turns[joint] += turns_between(ended[joint] - ends[0][joint]);
+                }
+                range[joint] = moved(range[joint], turns[joint]);
+            }
+            let [_, end] = ends;
+            ended = end;
+        }
+    }
+
+    /// Moves all angles together: near `start`, or else into the travel.
+    fn begin_on_turn(&mut self, machine: Machine, travel: Option<&[[f64; 2]]>, start: Option<&[f64]>) {
+        let joints = machine.joints.outputs();
+        for joint in (0..joints).filter(|&joint| machine.turning[joint]) {
+            let own = self.range.iter().skip(joint).step_by(joints);
+            let turns = match (start, travel) {
+                (Some(start), _) => {
+                    own.take(1).map(|first| turns_between(start[joint] - first.middle())).sum()
+                }
+                (None, Some(travel)) => turns_into(travel[joint], own),
+                (None, None) => 0.0,
+            };
+            for range in self.range.iter_mut().skip(joint).step_by(joints) {
+                *range = moved(*range, turns);
+            }
+        }
+    }
+}
+
+fn moved(range: Interval, turns: f64) -> Interval {
+    range + Interval::exactly(turns * TURN)
+}
+
+/// The fewest turns that bring all bounded ranges into the travel; none where no number of turns does.
+fn turns_into<'a>([lo, hi]: [f64; 2], ranges: impl Iterator<Item = &'a Interval>) -> f64 {
+    let known = ranges.filter(|range| range.is_bounded()).copied().reduce(Interval::hull);
+    let Some(Interval { lo: least, hi: most }) = known else { return 0.0 };
+    let slack = TRAVEL_TOLERANCE / TURN;
+    let (first, last) = ((lo - least) / TURN - slack, (hi - most) / TURN + slack);
+    // Of no turn at all, clipped to what fits.
+    let nearest = 0.0f64.max(first.ceil()).min(last.floor());
+    if nearest.is_finite() && first <= nearest && nearest <= last {
+        nearest
+    } else {
+        0.0
+    }
+}
+
+/// The first overrun of each joint in a piece, with the farthest value found in the piece.
+fn overruns(
+    machine: Machine,
+    work: &mut PartWork,
+    points: &mut PointWork,
+    piece: usize,
+    mut parts: Vec<Part>,
+    travel: &[[f64; 2]],
+) -> Vec<Overrun> {
+    let joints = machine.joints.outputs();
+    let limits = |joint: usize| [travel[joint][0] - TRAVEL_TOLERANCE, travel[joint][1] + TRAVEL_TOLERANCE];
+    let mut bounds = vec![Interval::WHOLE; (ORDER + 1) * joints];
+    // The first place, the farthest value and how far it is over, of each joint.
+    let mut found: Vec<Option<(f64, f64, f64)>> = vec![None; joints];
+    for _ in 0..DEEPEST {
+        let mut halved = Vec::new();
+        for Part { part, range } in &parts {
+            let is_out = |joint: usize| {
+                let ([lo, hi], range) = (limits(joint), range[joint]);
+                range.is_bounded() && (range.hi < lo || range.lo > hi)
+            };
+            let may_leave = |joint: usize| {
+                let ([lo, hi], range) = (limits(joint), range[joint]);
+                range.is_bounded() && (range.lo < lo || range.hi > hi)
+            };
+            if (0..joints).any(is_out) {
+                for &fraction in part {
+                    points.at(piece, fraction);
+                    for joint in (0..joints).filter(|&joint| is_out(joint)) {
+                        let principal = points.derivative(joint, 0);
+                        let away = range[joint].middle() - principal;
+                        let turns = if machine.turning[joint] { turns_between(away) } else { 0.0 };
+                        let value = principal + turns * TURN;
+                        let [lo, hi] = limits(joint);
+                        let over = (lo - value).max(value - hi);
+                        let (first, farthest, most) = found[joint].unwrap_or((1.0, 0.0, 0.0));
+                        let (farthest, most) = if over > most { (value, over) } else { (farthest, most) };
+                        found[joint] = Some((first.min(part[0]), farthest, most));
+                    }
+                }
+            }
+            if (0..joints).any(|joint| may_leave(joint) && !is_out(joint)) {
+                for half in halves(*part) {
+                    work.enclose(piece, half, &mut bounds);
+                    let own = (0..joints).map(|joint| {
+                        let away = range[joint].middle() - bounds[joint].middle();
+                        let turns = if machine.turning[joint] { turns_between(away) } else { 0.0 };
+                        moved(bounds[joint], turns)
+                    });
+                    halved.push(Part { part: half, range: own.collect() });
+                }
+            }
+        }
+        if halved.is_empty() {
+            break;
+        }
+        parts = halved;
+    }
+    let places = found.into_iter().enumerate().filter_map(|(joint, found)| Some((joint, found?)));
+    places
+        .map(|(joint, (fraction, value, _))| {
+            let limit = travel[joint][usize::from(value >= limits(joint)[0])];
+            Overrun { piece, fraction, joint, value, limit }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::expression::Expression;
+
+    /// An angle in degrees about the origin, and the distance from it.
+    fn column() -> Expression {
+        let rows = [[12, 1, 0], [14, 2, 0], [8, 0, 0], [8, 1, 0], [2, 4, 5], [9, 6, 0]];
+        Expression::new(2, &rows, &[0.0; 6], &[3, 7]).expect("a list in order")
+    }
+
+    /// Straight pieces between points.
+    fn lines(points: &[[f64; 2]]) -> (Vec<f64>, Vec<f64>) {
+        let control = points.windows(2).flatten().flatten().copied().collect();
+        (control, vec![1.0; points.len() - 1])
+    }
+
+    fn path(points: &[[f64; 2]], travel: Option<&[[f64; 2]]>) -> JointPath {
+        let ((control, width), joints) = (lines(points), column());
+        let tips = Tips { axes: 2, points: 2, control: &control, weights: &[], width: &width };
+        joint_path(Machine { joints: &joints, turning: &[true, false] }, tips, travel, None)
+    }
+
+    #[test]
+    fn an_angle_goes_on_turning() {
+        let corner = |i: usize| (i as f64 * 45.0).to_radians();
+        let points: Vec<[f64; 2]> = (0..=20).map(|i| [corner(i).cos(), corner(i).sin()]).collect();
+        let found = path(&points, None);
+        assert!(found.singular.is_empty());
+        let last = found.range[found.range.len() - 2];
+        assert!(last.lo <= 900.0 && 900.0 <= last.hi && last.width() < 46.0, "{last:?}");
+    }
+
+    #[test]
+    fn a_line_through_the_column_is_singular_there_and_one_beside_it_is_not() {
+        let found = path(&[[-60.0, 0.0], [-30.0, 0.0], [60.0, 0.0]], None);
+        assert_eq!(found.singular.len(), 1);
+        let (piece, fraction) = found.singular[0];
+        assert!(piece == 1 && (fraction - 1.0 / 3.0).abs() < 1e-8);
+        assert!(path(&[[-60.0, 1e-6], [60.0, 1e-6]], None).singular.is_empty());
+    }
+
+    #[test]
+    fn a_travel_end_is_found_where_it_is_passed() {
+        let found = path(&[[20.0, 0.0], [120.0, 0.0]], Some(&[[-400.0, 400.0], [10.0, 100.0]]));
+        let [overrun] = found.overruns[..] else { panic!("{:?}", found.overruns) };
+        assert_eq!((overrun.joint, overrun.limit), (1, 100.0));
+        assert!((overrun.fraction - 0.8).abs() < 1e-6 && (overrun.value - 120.0).abs() < 0.1);
+    }
+}
