@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from feedplan.audit import _Limits
 from feedplan.constraints.problem import Problem
-from feedplan.curves.composite import CompositeCurve
 from feedplan.machine.expression import Expression
 from feedplan.machine.joint_interpolants import Accuracy
 from feedplan.machine.path_derivatives import TipPieces
@@ -18,11 +17,12 @@ from feedplan.program.program import Program
 
 __all__ = [
     "CurveLength",
+    "JointSetpointAudit",
     "PlanError",
     "Sampler",
     "SetpointAudit",
     "__version__",
-    "audit_places",
+    "audit_joints",
     "audit_plan",
     "bound_jerk_limited",
     "build_path",
@@ -272,9 +272,21 @@ def audit_plan(
     program: Program | None = None,
     progress: _Progress | None = None,
 ) -> _Findings: ...
-def audit_places(
-    curve: CompositeCurve, piece: NDArray[np.int64], u: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+def audit_joints(
+    problem: Problem, limits: _Limits, profile: SpeedProfile, progress: _Progress | None = None
+) -> _Findings: ...
+
+@final
+class JointSetpointAudit:
+    def __new__(cls, problem: Problem, limits: _Limits, profile: SpeedProfile) -> JointSetpointAudit: ...
+    def push(
+        self,
+        t: NDArray[np.float64],
+        position: NDArray[np.float64],
+        velocity: NDArray[np.float64] | None = None,
+        progress: _Progress | None = None,
+    ) -> None: ...
+    def finish(self) -> _Findings: ...
 
 @final
 class SetpointAudit:

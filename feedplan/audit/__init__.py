@@ -10,11 +10,9 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from feedplan._solvers import SetpointAudit, audit_plan
+from feedplan._solvers import JointSetpointAudit, SetpointAudit, audit_joints, audit_plan
 from feedplan.arguments import callback, flag, instance, list_of_names, not_negative, number, positive
 from feedplan.audit.feed import feed_axes, feed_limits
-from feedplan.audit.joint_profile import audit_joint_profile
-from feedplan.audit.joint_setpoints import JointSetpoints
 from feedplan.audit.recorded import audit_recorded
 from feedplan.audit.verdict import PASS_MARK, Audit, LimitCheck, join
 from feedplan.audit.worst import Findings
@@ -165,7 +163,7 @@ def _audit_joints(
     setpoints: Chunks | None,
     report: Listener,
 ) -> Results:
-    """Where the path is the tool tip's: what is the tip's natively, what is the joints' by the kinematics."""
+    """Where the path is the tool tip's: the tip by its path, the joints by the kinematics."""
     axes = len(problem.path.axes)
     free = replace(
         limits,
@@ -182,29 +180,22 @@ def _audit_joints(
     )
     findings, samples = audit_plan(problem, free, feed_limits(problem, program), None, program)
     results: Results = [([found for found in findings if found[1] < 0], samples)]
-    jump = np.array(limits.max_velocity_jump)
     if profile is not None:
+        own = replace(limits, period=float(problem.period))
         whole = 1.0 if setpoints is None else PLAN_SHARE
-        worst = audit_joint_profile(
-            problem,
-            profile,
-            jump,
-            np.array(limits.travel),
-            lambda done: report(whole * done),
-            limits.judges_jerk,
-        )
-        results.append(worst.findings())
+        results.append(audit_joints(problem, own, profile, part(report, 0.0, whole)))
     if setpoints is not None:
         report(PLAN_SHARE)
         stream = SetpointAudit(limits, 0.0)
-        places = None if profile is None else JointSetpoints(problem, profile, jump, limits.period)
+        places = None if profile is None else JointSetpointAudit(problem, limits, profile)
         for chunk, share in setpoints:
             _push(stream, chunk, share)
             if places is not None:
-                places.push(chunk)
+                t, position = _array(chunk.t, np.float64), _array(chunk.position, np.float64)
+                places.push(t, position, _array(chunk.velocity, np.float64))
         results.append(stream.finish())
         if places is not None:
-            results.append(places.finish().findings())
+            results.append(places.finish())
     return results
 
 

@@ -11,8 +11,6 @@ import pytest
 from numpy.typing import NDArray
 
 from feedplan.audit import Audit, audit
-from feedplan.audit.joint_jerk import slopes
-from feedplan.audit.joint_path import JointPath
 from feedplan.constraints.problem import Problem, build_problem
 from feedplan.curves.arc import arc
 from feedplan.curves.composite import CompositeCurve
@@ -289,20 +287,6 @@ def joints(request: pytest.FixtureRequest) -> tuple[Problem, SpeedProfile, Machi
     assert way is not None
     profile = constant_jerk(way, rest_to_rest(CurveLength(way).total, 2000.0, 0.8))
     return problem, profile, machine
-
-
-def test_differences_of_the_kinematics_are_its_derivatives(joints: Any) -> None:
-    problem, _, _ = joints
-    rng = np.random.default_rng(3)
-    piece = rng.integers(0, len(problem.path), 60)
-    u = rng.uniform(0.0, 1.0, 60) * problem.path.width[piece]
-    u[:10], u[10:20] = 0.0, problem.path.width[piece[10:20]]
-    at, exact = slopes(JointPath(problem), piece, u), problem.derivatives(piece, u, 3)
-    for order in (1, 2, 3):
-        away = np.abs(at.joints[order - 1] - exact[order])
-        assert (away <= at.joints_error[order - 1]).all()
-        size = np.abs(exact[order]).max()
-        assert np.median(at.joints_error[order - 1]) <= 1e-5 * size, order
 
 
 def test_the_jerk_of_joints_is_that_of_their_setpoints(joints: Any) -> None:

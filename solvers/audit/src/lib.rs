@@ -13,6 +13,7 @@ pub mod differences;
 pub mod follow;
 pub mod integral;
 pub mod jerk;
+pub mod joints;
 pub mod motion;
 pub mod moves;
 pub mod place;

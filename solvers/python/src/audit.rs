@@ -1,14 +1,14 @@
 //! The audit of plans and setpoints: the package's own types in, findings out.
 
-use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::arrays::{to_array2, CurveArrays};
+use super::arrays::CurveArrays;
 use super::with_padded_axes;
 use super::work::run;
 use feedplan_audit::arcs::Arcs;
-use feedplan_audit::curve::{Curve, Followed, Pieces};
+use feedplan_audit::curve::{Followed, Pieces};
 use feedplan_audit::deviation::{audit_deviation, audit_path};
 use feedplan_audit::follow::Plan;
 use feedplan_audit::moves::Programmed;
@@ -23,9 +23,9 @@ use feedplan_geometry::watch::Watch;
 type Finding = (&'static str, i64, f64, f64, f64, f64, i32);
 
 /// The findings, and how many samples were looked at.
-type Findings = (Vec<Finding>, u64);
+pub type Findings = (Vec<Finding>, u64);
 
-fn findings<const M: usize>(tally: &Tally<M>, axes: usize) -> Findings {
+pub fn findings<const M: usize>(tally: &Tally<M>, axes: usize) -> Findings {
     let mut found = Vec::new();
     for check in Check::ALL {
         for axis in 0..if check.per_axis() { axes } else { 1 } {
@@ -40,7 +40,7 @@ fn findings<const M: usize>(tally: &Tally<M>, axes: usize) -> Findings {
     (found, tally.samples)
 }
 
-fn require(good: bool, what: &str) -> PyResult<()> {
+pub fn require(good: bool, what: &str) -> PyResult<()> {
     if good {
         Ok(())
     } else {
@@ -85,14 +85,14 @@ struct PathArrays<'py> {
 
 /// `feedplan.constraints.problem.Problem`; its other limits come in `LimitArrays`.
 #[derive(FromPyObject)]
-struct ProblemArrays<'py> {
+pub struct ProblemArrays<'py> {
     path: PathArrays<'py>,
     feed_share: Option<PyReadonlyArray2<'py, f64>>,
     junction_speed: PyReadonlyArray1<'py, f64>,
 }
 
 impl ProblemArrays<'_> {
-    fn axes(&self) -> usize {
+    pub fn axes(&self) -> usize {
         self.path.curve.axes()
     }
 
@@ -103,10 +103,21 @@ impl ProblemArrays<'_> {
 
     /// `feed` are the greatest speeds of each piece.
     fn followed<'a>(&'a self, feed: &'a PyReadonlyArray2<'_, f64>) -> PyResult<Followed<'a>> {
+        let followed = Followed { feed: feed.as_slice()?, ..self.unlimited()? };
+        require(followed.feed.len() == FEEDS * followed.len(), "path")?;
+        Ok(followed)
+    }
+
+    pub fn junction_speed(&self) -> PyResult<&[f64]> {
+        Ok(self.junction_speed.as_slice()?)
+    }
+
+    /// The path without its feeds.
+    pub fn unlimited(&self) -> PyResult<Followed<'_>> {
         let path = &self.path;
         let followed = Followed {
             pieces: path.curve.pieces("path")?,
-            feed: feed.as_slice()?,
+            feed: &[],
             line: path.line.as_slice()?,
             moves: path.moves.as_slice()?,
             tolerance: path.tolerance.as_slice()?,
@@ -120,7 +131,6 @@ impl ProblemArrays<'_> {
         let ordered = runs.windows(2).all(|pair| pair[0] <= pair[1]);
         let spanned = runs.first() == Some(&0) && runs.last() == Some(&(pieces as i64));
         let good = [followed.line.len(), followed.tolerance.len()] == [pieces; 2]
-            && followed.feed.len() == FEEDS * pieces
             && self.share()?.len() % (self.axes() * pieces).max(1) == 0
             && followed.moves.len() == 2 * pieces
             && followed.dwell.len() + 1 == runs.len()
@@ -134,7 +144,7 @@ impl ProblemArrays<'_> {
 
 /// `feedplan.profile.SpeedProfile`.
 #[derive(FromPyObject)]
-struct ProfileArrays<'py> {
+pub struct ProfileArrays<'py> {
     piece: PyReadonlyArray1<'py, u32>,
     kind: PyReadonlyArray1<'py, u8>,
     axis: PyReadonlyArray1<'py, u8>,
@@ -150,7 +160,7 @@ struct ProfileArrays<'py> {
 }
 
 impl ProfileArrays<'_> {
-    fn arcs<'a>(&'a self, problem: &'a ProblemArrays<'_>) -> PyResult<Arcs<'a>> {
+    pub fn arcs<'a>(&'a self, problem: &'a ProblemArrays<'_>) -> PyResult<Arcs<'a>> {
         let arcs = Arcs {
             piece: self.piece.as_slice()?,
             kind: self.kind.as_slice()?,
@@ -232,7 +242,7 @@ impl ProgramArrays<'_> {
 
 /// `feedplan.audit.Limits`: what holds everywhere, one number an axis.
 #[derive(FromPyObject)]
-struct LimitArrays {
+pub struct LimitArrays {
     max_velocity: Vec<f64>,
     max_acceleration: Vec<f64>,
     min_velocity: Vec<f64>,
@@ -249,8 +259,13 @@ struct LimitArrays {
 }
 
 impl LimitArrays {
+    /// Number of axes.
+    pub fn axes(&self) -> usize {
+        self.max_velocity.len()
+    }
+
     /// For `axes` axes, those beyond at rest.
-    fn limits<const M: usize>(&self, axes: usize) -> PyResult<Limits<M>> {
+    pub fn limits<const M: usize>(&self, axes: usize) -> PyResult<Limits<M>> {
         let jumps = [&self.max_velocity_jump, &self.jump_beyond];
         let least = [&self.min_velocity, &self.min_acceleration];
         let most = [&self.max_velocity, &self.max_acceleration, &self.max_jerk];
@@ -321,41 +336,18 @@ fn audit_plan(
     })
 }
 
-/// Two (n, axes) arrays.
-type Tables<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
-
-/// C and C' (n, axes) at places of a curve, for what Python measures itself.
-#[pyfunction]
-#[pyo3(signature = (curve, piece, u))]
-fn audit_places<'py>(
-    py: Python<'py>,
-    curve: CurveArrays<'py>,
-    piece: PyReadonlyArray1<'py, i64>,
-    u: PyReadonlyArray1<'py, f64>,
-) -> PyResult<Tables<'py>> {
-    let pieces = curve.pieces("path")?;
-    let (piece, u) = (piece.as_slice()?, u.as_slice()?);
-    let inside = piece.iter().all(|&piece| usize::try_from(piece).is_ok_and(|piece| piece < pieces.len()));
-    require(piece.len() == u.len() && inside, "places")?;
-    let axes = pieces.axes;
-    with_padded_axes!(axes, M, {
-        let (points, slopes) = run(py, None, |watch| {
-            let (mut points, mut slopes) = (Vec::new(), Vec::new());
-            let mut last: Option<(i64, Curve<M>)> = None;
-            for (i, (&number, &u)) in piece.iter().zip(u).enumerate() {
-                watch.check_at(i);
-                let curve = match last.take() {
-                    Some((known, curve)) if known == number => curve,
-                    _ => pieces.curve::<M>(number as usize),
-                };
-                points.push(curve.at(u));
-                slopes.push(curve.derivative(u));
-                last = Some((number, curve));
-            }
-            (points, slopes)
-        })?;
-        Ok((to_array2(py, points, axes), to_array2(py, slopes, axes)))
-    })
+/// Setpoints whose accelerations and lines are not looked at.
+pub fn setpoint_chunk<'a>(
+    axes: usize,
+    t: &'a PyReadonlyArray1<'_, f64>,
+    position: &'a PyReadonlyArray2<'_, f64>,
+    velocity: &'a Option<PyReadonlyArray2<'_, f64>>,
+) -> PyResult<Chunk<'a>> {
+    let velocity = velocity.as_ref().map(|array| array.as_slice()).transpose()?;
+    let (t, position) = (t.as_slice()?, position.as_slice()?);
+    let rows = axes * t.len();
+    require(position.len() == rows && velocity.is_none_or(|flat| flat.len() == rows), "setpoints")?;
+    Ok(Chunk { axes, t, position, velocity, acceleration: None, line: None })
 }
 
 /// A stream whatever its number of axes.
@@ -457,19 +449,12 @@ impl SetpointAudit {
         progress: Option<Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let chunk = Chunk {
-            axes: self.axes,
-            t: t.as_slice()?,
-            position: position.as_slice()?,
-            velocity: velocity.as_ref().map(|array| array.as_slice()).transpose()?,
             acceleration: acceleration.as_ref().map(|array| array.as_slice()).transpose()?,
             line: line.as_ref().map(|array| array.as_slice()).transpose()?,
+            ..setpoint_chunk(self.axes, &t, &position, &velocity)?
         };
-        let count = chunk.t.len();
-        let rows = self.axes * count;
-        let good = chunk.position.len() == rows
-            && chunk.velocity.is_none_or(|flat| flat.len() == rows)
-            && chunk.acceleration.is_none_or(|flat| flat.len() == rows)
-            && chunk.line.is_none_or(|flat| flat.len() == count);
+        let good = chunk.acceleration.is_none_or(|flat| flat.len() == chunk.position.len())
+            && chunk.line.is_none_or(|flat| flat.len() == chunk.t.len());
         require(good, "setpoints")?;
         // An audit that is interrupted is finished.
         let mut stream = self.stream.take().ok_or_else(finished)?;
@@ -530,12 +515,11 @@ fn compare(
     Ok(Some(Compared { problem: problem.unbind(), feed: feed.unbind(), profile: usable, program, starts }))
 }
 
-fn finished() -> PyErr {
+pub fn finished() -> PyErr {
     PyValueError::new_err("this audit is finished")
 }
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(audit_plan, module)?)?;
-    module.add_function(wrap_pyfunction!(audit_places, module)?)?;
     module.add_class::<SetpointAudit>()
 }

@@ -6,6 +6,7 @@ mod bound;
 mod fit;
 mod gcode;
 mod jerk;
+mod joint_audit;
 mod kinematics;
 mod path;
 mod plan;
@@ -58,5 +59,6 @@ fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     bound::register(module)?;
     gcode::register(module)?;
     kinematics::register(module)?;
+    joint_audit::register(module)?;
     Ok(())
 }

@@ -3,6 +3,7 @@
 mod fit;
 mod gcode_fuzz;
 mod jerk_limited;
+mod kinematics;
 mod path_dynamics;
 mod planning;
 mod s_curve;

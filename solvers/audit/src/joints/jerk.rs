@@ -1,0 +1,164 @@
+//! Jerk of joints that are not the path's axes, and how far their accelerations jump where arcs meet.
+//!
+//! With g the slope of the way along the path by u: g u̇ = v, g ü = a − g' u̇², g u⃛ = j − 3 g' u̇ ü − g'' u̇³, and a joint's jerk
+//! is q' u⃛ + 3 q'' u̇ ü + q''' u̇³. How far the derivatives of q and g may be wrong is allowed for.
+
+use rayon::prelude::*;
+
+use super::along::{is_by_way, paces, Pace, PATH_JERK};
+use super::motion::ROUNDING;
+use super::path::{Bends, Piece, Work};
+use super::profile::JointAudit;
+use crate::curve::length;
+use crate::{Check, Seen, Tally, PASS_EXCESS};
+
+/// Steps of an arc: those of arcs up to so many servo periods long.
+const STEPS: [(usize, f64); 3] = [(10, 10.0), (80, 80.0), (640, f64::INFINITY)];
+
+/// Joints that leave a joint at a smaller angle than this, in rad, pass without a corner.
+const SMOOTH: f64 = 1e-6;
+
+/// A rate of each joint, and how wrong it may be.
+type Rate<const M: usize> = ([f64; M], [f64; M]);
+
+/// Acceleration and jerk of the joints at a pace.
+struct Rates<const M: usize> {
+    direction: [f64; M],
+    acceleration: Rate<M>,
+    jerk: Rate<M>,
+}
+
+fn rates<const M: usize>(piece: &Piece<M>, u: f64, pace: impl Fn(f64) -> Pace, work: &mut Work) -> Rates<M> {
+    let Bends { joints: [(q1, e1), (q2, e2), (q3, e3)], way } = piece.bends(u, work);
+    let [(g, _), (dg, dg_error), (ddg, ddg_error)] = way;
+    let Pace { v, a, j, .. } = pace(g);
+    let du = v / g;
+    let ddu = (a - dg * du * du) / g;
+    let ddu_error = dg_error * du * du / g;
+    let dddu = (j - du * (3.0 * dg * ddu + ddg * du * du)) / g;
+    let dddu_error = du * (3.0 * (dg_error * ddu.abs() + dg.abs() * ddu_error) + ddg_error * du * du) / g;
+    let (mut acceleration, mut jerk) = (([0.0; M], [0.0; M]), ([0.0; M], [0.0; M]));
+    for k in 0..piece.joints() {
+        let (q1, q2, q3, e1, e2, e3) = (q1[k], q2[k], q3[k], e1[k], e2[k], e3[k]);
+        acceleration.0[k] = q1 * ddu + q2 * du * du;
+        acceleration.1[k] = e1 * ddu.abs()
+            + q1.abs() * ddu_error
+            + e2 * du * du
+            + ROUNDING * ((q1 * ddu).abs() + q2.abs() * du * du);
+        jerk.0[k] = q1 * dddu + du * (3.0 * q2 * ddu + q3 * du * du);
+        let bent = 3.0 * (e2 * ddu.abs() + q2.abs() * ddu_error) + e3 * du * du;
+        let size = (q1 * dddu).abs() + du * (3.0 * (q2 * ddu).abs() + q3.abs() * du * du);
+        jerk.1[k] = e1 * dddu.abs() + q1.abs() * dddu_error + du * bent + ROUNDING * size;
+    }
+    let size = length(&q1);
+    Rates { direction: q1.map(|slope| slope / size), acceleration, jerk }
+}
+
+/// The jerk on arcs whose numbers are `good`, and the jumps of the acceleration where they begin.
+pub fn audit_jerk<const M: usize>(audit: &JointAudit<M>, good: &[bool], seen: Seen) -> Tally<M> {
+    (0..audit.arcs.len())
+        .into_par_iter()
+        .filter(|&arc| good[arc])
+        .map_init(
+            || audit.path.work(),
+            |work, arc| {
+                let mut tally = Tally::default();
+                let piece = audit.path.piece(audit.arcs.piece[arc] as usize);
+                audit.jerks(arc, &piece, work, &mut tally);
+                audit.alone(arc, piece.line, &mut tally);
+                if arc > 0 && good[arc - 1] && !audit.is_first(arc) {
+                    audit.jumps(arc, &piece, work, &mut tally);
+                }
+                seen(1);
+                tally
+            },
+        )
+        .reduce(Tally::default, Tally::merge)
+}
+
+impl<const M: usize> JointAudit<'_, M> {
+    /// The jerk at even steps of an arc.
+    fn jerks(&self, arc: usize, piece: &Piece<M>, work: &mut Work, tally: &mut Tally<M>) {
+        let (arcs, joints, start) = (&self.arcs, self.path.joints, self.starts[arc]);
+        let is_silent = !is_by_way(arcs.kind[arc]);
+        for k in 0..joints {
+            let limit = self.limits.jerk[k];
+            // Nothing limits the jerk on arcs of other kinds.
+            let unlimited = is_silent && limit.is_finite();
+            let value = if unlimited { f64::INFINITY } else { 0.0 };
+            tally.offer(Check::Jerk, k, value, limit, start, piece.line);
+        }
+        if is_silent {
+            return;
+        }
+        let periods = arcs.duration[arc] / self.limits.period;
+        let Some((steps, _)) = STEPS.into_iter().find(|&(_, most)| periods < most) else { return };
+        let (u0, u1) = (arcs.u0[arc], arcs.u1[arc]);
+        let share = |i: usize| i as f64 / steps as f64;
+        let u: Vec<f64> = (0..=steps).map(|i| u0 * (1.0 - share(i)) + u1 * share(i)).collect();
+        for (u, pace) in u.iter().zip(paces(piece, arcs, arc, &u)) {
+            let (jerk, error) = rates(piece, *u, |_| pace, work).jerk;
+            tally.samples += 1;
+            for k in 0..joints {
+                let value = jerk[k].abs() - error[k];
+                tally.offer(Check::Jerk, k, value, self.limits.jerk[k], start + pace.time, piece.line);
+            }
+        }
+    }
+
+    /// A change of the acceleration along the path over a time that means nothing to any joint: in that time, or in a servo
+    /// period if that is longer, it adds no more than the pass mark to the jerk.
+    fn negligible_pull(&self, time: f64) -> f64 {
+        let least = self.limits.jerk[..self.path.joints].iter().copied().fold(f64::INFINITY, f64::min);
+        PASS_EXCESS * least * time.max(self.limits.period)
+    }
+
+    /// The recorded accelerations of an arc against its jerk, and at rest against 0.
+    fn alone(&self, arc: usize, line: i32, tally: &mut Tally<M>) {
+        let (arcs, time) = (&self.arcs, self.starts[arc]);
+        let (a0, a1) = (arcs.a0[arc], arcs.a1[arc]);
+        let change = arcs.value[arc] * arcs.duration[arc];
+        let mut off = (a1 - a0 - change).abs() - ROUNDING * (a0.abs() + a1.abs() + change.abs());
+        if arcs.kind[arc] != PATH_JERK {
+            off = 0.0;
+        }
+        let [start_speed, end_speed] = self.limits.end_speeds;
+        let begins = self.is_first(arc) && !(arc == 0 && start_speed > 0.0);
+        let ends = self.is_first(arc + 1) && !(arc + 1 == arcs.len() && end_speed > 0.0);
+        let rests = [(begins, a0), (ends, a1)].map(|(here, a)| if here { a.abs() } else { 0.0 });
+        // An error that builds up over the arc is that much jerk.
+        let slack = [self.negligible_pull(arcs.duration[arc]), self.negligible_pull(0.0)];
+        for (value, slack) in [(off, slack[0]), (rests[0], slack[1]), (rests[1], slack[1])] {
+            tally.offer(Check::AccelerationContinuity, 0, value, slack, time, line);
+        }
+    }
+
+    /// From the arc before: no jump along the path, and of a joint only where the curvature jumps.
+    fn jumps(&self, arc: usize, piece: &Piece<M>, work: &mut Work, tally: &mut Tally<M>) {
+        let arcs = &self.arcs;
+        if !is_by_way(arcs.kind[arc]) || !is_by_way(arcs.kind[arc - 1]) {
+            return;
+        }
+        let (time, line) = (self.starts[arc], piece.line);
+        let (from, to) = (arcs.a1[arc - 1], arcs.a0[arc]);
+        let off = (to - from).abs() - ROUNDING * (to.abs() + from.abs());
+        tally.offer(Check::AccelerationContinuity, 0, off, self.negligible_pull(0.0), time, line);
+        let number = arcs.piece[arc - 1] as usize;
+        if number == piece.number {
+            return;
+        }
+        let before: Piece<M> = self.path.piece(number);
+        let pace = |p: f64, a: f64| move |g: f64| Pace { v: g * p.sqrt(), a, j: 0.0, time: 0.0 };
+        let into = rates(&before, arcs.u1[arc - 1], pace(arcs.p1[arc - 1], from), work);
+        let out = rates(piece, arcs.u0[arc], pace(arcs.p0[arc], to), work);
+        let turn = length::<M>(&std::array::from_fn(|k| out.direction[k] - into.direction[k]));
+        for k in 0..self.path.joints {
+            let doubt = into.acceleration.1[k] + out.acceleration.1[k];
+            let step = (out.acceleration.0[k] - into.acceleration.0[k]).abs() - doubt;
+            let step = if turn <= SMOOTH { step } else { 0.0 };
+            // Of a step over the period a third difference of setpoints shows at most three quarters as a jerk.
+            let limit = self.limits.jerk[k] * self.limits.period / 0.75;
+            tally.offer(Check::AccelerationJump, k, step, limit, time, line);
+        }
+    }
+}

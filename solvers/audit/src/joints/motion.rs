@@ -1,0 +1,219 @@
+//! How the joints move on arcs of a profile, from what each arc holds constant and the kinematics' positions.
+//!
+//! On an arc of constant acceleration of joint k: v_k² = v_k(slower end)² + 2 a Δq_k, u̇ = |v_k| / |dq_k/du|, and a way Δq_k
+//! takes 2 Δq_k over the sum of the speeds at its ends. Where a joint's speed is constant: the way over it; where p is linear
+//! in u: Δu over the mean √p; along a speed limit: ∫ |C'| du over the speed, by Gauss's rule; where jerk is limited, speed
+//! and time follow from the length of the way along the path.
+
+use super::along::{gauss, gauss_halved, is_by_way, paces};
+use super::path::{Piece, Place};
+use crate::arcs::Arcs;
+use crate::{EPS, ROUNDINGS};
+
+const AXIS_ACCELERATION: u8 = 0;
+const PARAMETER_ACCELERATION: u8 = 1;
+const FEED: u8 = 2;
+const AXIS_VELOCITY: u8 = 3;
+const CHORD: u8 = 4;
+const SPEED_LINE: u8 = 5;
+
+/// Rounding of a speed or time that a few operations make.
+pub const ROUNDING: f64 = 2.0 * ROUNDINGS * EPS;
+
+/// So much of a speed may be uncertain before it is taken from the recorded ends of the arc.
+const HIDDEN: f64 = 1e-3;
+
+/// The motion at a place of an arc.
+#[derive(Clone, Copy, Debug)]
+pub struct State<const M: usize> {
+    /// Way of the joints from the start of the arc.
+    pub way: [f64; M],
+    pub root_p: f64,
+    /// Share of √p that may be wrong.
+    relative: f64,
+    /// Speed of the arc's own joint, and how wrong it may be.
+    speed: f64,
+    speed_error: f64,
+    pub velocity: [f64; M],
+    pub velocity_error: [f64; M],
+    /// Time of the step before, and the share of it that may be wrong.
+    pub time: f64,
+    pub time_error: f64,
+}
+
+/// The joints on an arc, whose numbers must be good, at places from end to end; the first `timed` steps have times.
+pub fn motion<const M: usize>(
+    piece: &Piece<M>,
+    arcs: &Arcs,
+    arc: usize,
+    places: &[Place<M>],
+    timed: usize,
+) -> Vec<State<M>> {
+    let (kind, value, last) = (arcs.kind[arc], arcs.value[arc], places.len() - 1);
+    let p = [arcs.p0[arc], arcs.p1[arc]];
+    let own = Some(arcs.axis[arc] as usize).filter(|&axis| axis < piece.joints()).unwrap_or(0);
+    let mut states: Vec<State<M>> = places.iter().map(|_| State::STILL).collect();
+    for i in 1..states.len() {
+        let step = piece.between(&places[i - 1].position, &places[i].position, None);
+        states[i].way = std::array::from_fn(|k| states[i - 1].way[k] + step[k]);
+    }
+    let own_slope = |i: usize| places[i].slope[own].abs();
+    let unknown = places.iter().map(|place| place.unknown[own]).fold(0.0, f64::max);
+    // The speed of the arc's own joint, from the slower end where it accelerates.
+    let ends = [own_slope(0).powi(2) * p[0], own_slope(last).powi(2) * p[1]];
+    let from_end = !ends[0].is_finite() || ends[1] < ends[0];
+    let (slower, slower_p) = if from_end { (last, p[1]) } else { (0, p[0]) };
+    let start_sq = ends[usize::from(from_end)];
+    let accelerates = kind == AXIS_ACCELERATION;
+    let governs = accelerates || kind == AXIS_VELOCITY;
+    let slower_way = states[slower].way[own];
+    let sq_error = if accelerates {
+        4.0 * value.abs() * unknown
+            + 2.0 * start_sq.sqrt() * places[slower].slope_error[own] * slower_p.sqrt()
+    } else {
+        0.0
+    };
+    let by_way = is_by_way(kind);
+    let u: Vec<f64> = places.iter().map(|place| place.u).collect();
+    let paces = if by_way { paces(piece, arcs, arc, &u) } else { Vec::new() };
+    let (u0, u1) = (u[0], u[last]);
+    let feed_sq = [places[0].feed_slope.powi(2) * p[0], places[last].feed_slope.powi(2) * p[1]];
+    let line = |u: f64| (feed_sq[0] + (feed_sq[1] - feed_sq[0]) * ((u - u0) / (u1 - u0))).sqrt();
+    let (p_slow, u_slow) = if p[0] <= p[1] { (p[0], u0) } else { (p[1], u1) };
+    for (i, (state, place)) in states.iter_mut().zip(places).enumerate() {
+        let is_start = i == slower;
+        let mut speed_sq = value;
+        if accelerates {
+            speed_sq = start_sq + 2.0 * value * (state.way[own] - slower_way);
+        }
+        if speed_sq < 0.0 && speed_sq >= -sq_error {
+            speed_sq = 0.0;
+        }
+        let speed = speed_sq.sqrt();
+        let hidden = if sq_error > 0.0 { sq_error / (speed + sq_error.sqrt()) } else { 0.0 };
+        (state.speed, state.speed_error) = (speed, hidden + ROUNDING * speed);
+        let slope = own_slope(i);
+        let (mut root_p, mut relative) = match kind {
+            AXIS_ACCELERATION if is_start => (slower_p.sqrt(), ROUNDING),
+            AXIS_ACCELERATION | AXIS_VELOCITY => {
+                (speed / slope, state.speed_error / speed + place.slope_error[own] / slope)
+            }
+            PARAMETER_ACCELERATION => ((p_slow + 2.0 * value * (place.u - u_slow)).sqrt(), ROUNDING),
+            FEED => (value.sqrt() / place.feed_slope, ROUNDING),
+            CHORD => ((value * place.feed_slope).sqrt(), ROUNDING),
+            SPEED_LINE => (line(place.u) / place.feed_slope, ROUNDING),
+            _ => (paces[i].v / place.way_slope, ROUNDING),
+        };
+        // Where rounding hides how the arc's own joint moves, its recorded ends tell: p changes little there.
+        let known = 0.5 * (p[1] - p[0]).abs() / p[0].max(p[1]) + ROUNDING;
+        let is_known = relative <= HIDDEN;
+        if !is_known && known < HIDDEN {
+            root_p = (p[0] + (p[1] - p[0]) * ((place.u - u0) / (u1 - u0))).sqrt();
+            relative = known;
+        }
+        (state.root_p, state.relative) = (root_p, relative);
+        for k in 0..M {
+            let velocity = place.slope[k] * root_p;
+            let mut error = place.slope_error[k] * root_p;
+            if velocity != 0.0 {
+                error += velocity.abs() * (relative + ROUNDING);
+            }
+            (state.velocity[k], state.velocity_error[k]) = (velocity, error);
+        }
+        if governs && !is_start {
+            state.velocity[own] = sign(place.slope[own]) * speed;
+            state.velocity_error[own] = state.speed_error;
+        }
+    }
+    let feed_line = |u: f64| piece.feed_slope(u) / line(u);
+    let feed_rate = |u: f64| piece.feed_slope(u) / value.sqrt();
+    let chord_rate = |u: f64| 1.0 / (value * piece.feed_slope(u)).sqrt();
+    for i in 1..=timed {
+        let (a, b) = (&states[i - 1], &states[i]);
+        let (from, to) = (places[i - 1].u, places[i].u);
+        let step = to - from;
+        if step == 0.0 {
+            continue;
+        }
+        let rounding = ROUNDING * (1.0 + piece.width / step);
+        let (mut time, mut error) = match kind {
+            PARAMETER_ACCELERATION => (2.0 * step / (a.root_p + b.root_p), rounding),
+            FEED => integrated(from, to, rounding, feed_rate),
+            CHORD => integrated(from, to, rounding, chord_rate),
+            SPEED_LINE => integrated(from, to, rounding, feed_line),
+            _ => {
+                let way = (b.way[own] - a.way[own]).abs();
+                by_joint([a, b], step, way, unknown, accelerates.then_some(value.abs()), rounding)
+            }
+        };
+        if by_way {
+            time = paces[i].time - paces[i - 1].time;
+            // The rounding of a time, not only of a step.
+            if time > 0.0 {
+                let longest = paces[1..].iter().map(|pace| pace.time.abs()).fold(0.0, f64::max);
+                error = ROUNDING * (1.0 + longest / time);
+            }
+        }
+        (states[i].time, states[i].time_error) = (time, error);
+    }
+    states
+}
+
+impl<const M: usize> State<M> {
+    const STILL: Self = State {
+        way: [0.0; M],
+        root_p: 0.0,
+        relative: 0.0,
+        speed: 0.0,
+        speed_error: 0.0,
+        velocity: [0.0; M],
+        velocity_error: [0.0; M],
+        time: 0.0,
+        time_error: 0.0,
+    };
+}
+
+fn sign(x: f64) -> f64 {
+    if x == 0.0 {
+        0.0
+    } else {
+        x.signum()
+    }
+}
+
+/// ∫ du/√p over a step, and the share of it that may be wrong.
+fn integrated(a: f64, b: f64, rounding: f64, mut rate: impl FnMut(f64) -> f64) -> (f64, f64) {
+    let (coarse, fine) = (gauss(a, b, &mut rate), gauss_halved(a, b, &mut rate));
+    (fine, (fine - coarse).abs() / fine + rounding)
+}
+
+/// The time of a step by the way of the arc's own joint, which may have a constant acceleration, and the share of it that may
+/// be wrong.
+fn by_joint<const M: usize>(
+    [a, b]: [&State<M>; 2],
+    step: f64,
+    way: f64,
+    unknown: f64,
+    acceleration: Option<f64>,
+    rounding: f64,
+) -> (f64, f64) {
+    let (both, errors) = (a.speed + b.speed, a.speed_error + b.speed_error);
+    let (mut time, mut error) = (2.0 * way / both, 2.0 * unknown / way + errors / both);
+    // Where the way is too short to tell: by the change of speed.
+    if let Some(acceleration) = acceleration {
+        let by_change = (b.speed - a.speed).abs() / acceleration;
+        let change_error = errors / acceleration / by_change;
+        if change_error < error {
+            (time, error) = (by_change, change_error);
+        }
+    }
+    // On arcs so short that no joint's way can be told from rounding: by the parameter.
+    let sides = a.root_p + b.root_p;
+    let place_error = rounding + (b.root_p - a.root_p).abs() / sides + 0.5 * (a.relative + b.relative);
+    let is_known = error <= HIDDEN;
+    let is_better = place_error >= error;
+    if !is_known && !is_better {
+        (time, error) = (2.0 * step / sides, place_error);
+    }
+    (time, error)
+}

@@ -1,0 +1,311 @@
+//! Where the joints are along a path, and how fast they move with it: by the kinematics' formula at places of the path.
+
+use super::formula::{Formula, Jet};
+use crate::curve::{length, Curve, Followed};
+use crate::{EPS, ROUNDINGS};
+
+pub const TURN: f64 = 360.0;
+/// Roundings of a coordinate of the tip, in units of `EPS` of its size: tip, sines and sums lie on the way.
+pub const TIP_ROUNDINGS: f64 = 2.0 * ROUNDINGS;
+
+/// What the words of runs mean.
+pub struct Words {
+    pub formula: Formula,
+    /// Which joints are known up to whole turns only.
+    pub turning: Vec<bool>,
+    /// For each coordinate of the tip the axis of the path, if it has one, and where it stays if not.
+    pub column: Vec<Option<usize>>,
+    pub held: Vec<f64>,
+    /// Whether the tip's coordinates end with a direction I, J, K.
+    pub directed: bool,
+}
+
+/// The joints of a problem whose path is that of the tool's tip.
+///
+/// Angles known up to whole turns are compared the short way round: between two places that are compared they turn by less
+/// than half a turn.
+pub struct JointPath<'a> {
+    pub path: Followed<'a>,
+    /// Number of joints.
+    pub joints: usize,
+    pub words: &'a [Words],
+    /// The words of each run.
+    pub words_of: &'a [usize],
+    /// Axes X, Y, Z and I, J, K of the path.
+    pub xyz: &'a [bool],
+    pub ijk: &'a [bool],
+    /// What each axis of the path counts in its length.
+    pub way_scale: &'a [f64],
+    /// The greatest speed of each piece.
+    pub feed: &'a [f64],
+    pub junction_speed: &'a [f64],
+}
+
+/// A piece ready to be measured.
+pub struct Piece<'a, const M: usize> {
+    pub number: usize,
+    pub run: usize,
+    pub line: i32,
+    pub width: f64,
+    pub curve: Curve<M>,
+    words: &'a Words,
+    /// What each axis counts in the way that the feed is about: X, Y, Z where these move, else the others.
+    pub counts: [f64; M],
+    /// Whether only the direction turns, so that the feed is in degrees of it.
+    turns: bool,
+    way_scale: [f64; M],
+    xyz: [f64; M],
+    ijk: [usize; 3],
+    size: f64,
+    slope_size: [f64; M],
+    joints: usize,
+    start_size: f64,
+}
+
+/// A place of a piece: the tip, the joints and their slopes by u, each with how wrong it may be.
+#[derive(Clone, Copy, Debug)]
+pub struct Place<const M: usize> {
+    pub u: f64,
+    pub tip: [f64; M],
+    pub position: [f64; M],
+    pub unknown: [f64; M],
+    pub slope: [f64; M],
+    pub slope_error: [f64; M],
+    /// Way that the feed is about, and way in all axes, per u.
+    pub feed_slope: f64,
+    pub way_slope: f64,
+}
+
+/// A number of each joint, and how wrong it may be.
+type Rows<const M: usize> = ([f64; M], [f64; M]);
+
+/// First to third derivatives by u of the joints and of the way, each with how wrong it may be.
+pub struct Bends<const M: usize> {
+    pub joints: [Rows<M>; 3],
+    pub way: [(f64, f64); 3],
+}
+
+/// Results of a formula, kept from place to place.
+pub struct Work {
+    positions: Vec<Jet<1>>,
+    slopes: Vec<Jet<2>>,
+    bends: Vec<Jet<4>>,
+}
+
+impl JointPath<'_> {
+    pub fn run_of(&self, piece: usize) -> usize {
+        self.path.runs.partition_point(|&first| first <= piece as i64) - 1
+    }
+
+    /// Room for results of all formulas.
+    pub fn work(&self) -> Work {
+        let most = self.words.iter().map(|words| words.formula.places()).max().unwrap_or(0);
+        Work {
+            positions: vec![Jet::constant(0.0); most],
+            slopes: vec![Jet::constant(0.0); most],
+            bends: vec![Jet::constant(0.0); most],
+        }
+    }
+
+    pub fn piece<const M: usize>(&self, number: usize) -> Piece<'_, M> {
+        let run = self.run_of(number);
+        let curve = self.path.curve::<M>(number);
+        let words = &self.words[self.words_of[run]];
+        let flag = |flags: &[bool], k: usize| flags.get(k).copied().unwrap_or(false);
+        let rows = self.path.rows(number);
+        let axes = self.path.axes;
+        let first = &self.path.control[rows.start * axes..][..axes];
+        let moves = |k: usize| rows.clone().any(|row| self.path.control[row * axes + k] != first[k]);
+        let linear = (0..axes).any(|k| self.xyz[k] && moves(k));
+        let mut ijk = (0..axes).filter(|&k| self.ijk[k]);
+        let number_of = |k: bool| if k { 1.0 } else { 0.0 };
+        Piece {
+            number,
+            run,
+            line: self.path.line[number],
+            width: curve.width(),
+            words,
+            counts: std::array::from_fn(|k| number_of(k < axes && flag(self.xyz, k) == linear)),
+            turns: words.directed && !linear,
+            way_scale: std::array::from_fn(|k| self.way_scale.get(k).copied().unwrap_or(0.0)),
+            xyz: std::array::from_fn(|k| number_of(flag(self.xyz, k))),
+            ijk: std::array::from_fn(|_| ijk.next().unwrap_or(0)),
+            size: curve.magnitude(),
+            slope_size: curve.derivative_size(),
+            joints: self.joints,
+            start_size: first.iter().fold(0.0, |most, x| most.max(x.abs())),
+            curve,
+        }
+    }
+}
+
+fn times<const M: usize>(a: &[f64; M], b: &[f64; M]) -> [f64; M] {
+    std::array::from_fn(|k| a[k] * b[k])
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+impl<const M: usize> Piece<'_, M> {
+    /// Which axes of X, Y, Z the feed is about, 1 or 0.
+    pub fn linear(&self) -> [f64; M] {
+        times(&self.counts, &self.xyz)
+    }
+
+    fn direction(&self, of: &[f64; M]) -> [f64; 3] {
+        self.ijk.map(|k| of[k])
+    }
+
+    /// Whether a joint is known up to whole turns only.
+    pub fn turning(&self, joint: usize) -> bool {
+        self.words.turning.get(joint).copied().unwrap_or(false)
+    }
+
+    /// C'(u) along the axes that the feed is about.
+    pub fn counted_slope(&self, u: f64) -> [f64; M] {
+        times(&self.counts, &self.curve.derivative(u))
+    }
+
+    /// Way that the feed is about, per u.
+    pub fn feed_slope(&self, u: f64) -> f64 {
+        if self.turns {
+            self.feed_slope_of(&self.curve.at(u), &self.curve.derivative(u))
+        } else {
+            length(&self.counted_slope(u))
+        }
+    }
+
+    fn feed_slope_of(&self, tip: &[f64; M], slope: &[f64; M]) -> f64 {
+        if !self.turns {
+            return length(&times(&self.counts, slope));
+        }
+        let direction = self.direction(tip);
+        let across = length(&cross(direction, self.direction(slope)));
+        (across / direction.iter().map(|x| x * x).sum::<f64>()).to_degrees()
+    }
+
+    /// Way that the feed is about, straight from one point of the piece to another.
+    pub fn feed_way(&self, start: &[f64; M], end: &[f64; M]) -> f64 {
+        if !self.turns {
+            let way: [f64; M] = std::array::from_fn(|k| self.counts[k] * (end[k] - start[k]));
+            return length(&way);
+        }
+        let (first, last) = (self.direction(start), self.direction(end));
+        let across = length(&cross(first, last));
+        across.atan2((0..3).map(|k| first[k] * last[k]).sum()).to_degrees()
+    }
+
+    /// Way along the path in all its axes, per u.
+    pub fn way_slope(&self, u: f64) -> f64 {
+        length(&times(&self.way_scale, &self.curve.derivative(u)))
+    }
+
+    fn fill<const N: usize>(&self, table: &mut [Jet<N>], jet: impl Fn(usize) -> Jet<N>) {
+        for (i, (column, &held)) in self.words.column.iter().zip(&self.words.held).enumerate() {
+            table[i] = column.map_or(Jet::constant(held), &jet);
+        }
+        self.words.formula.evaluate(table);
+    }
+
+    fn joint_rows<const N: usize>(&self, table: &[Jet<N>], order: usize) -> Rows<M> {
+        let (mut value, mut error) = ([0.0; M], [0.0; M]);
+        for (joint, &place) in self.words.formula.outputs.iter().enumerate() {
+            let jet = &table[place];
+            (value[joint], error[joint]) = (jet.value[order], EPS * jet.error[order]);
+            // Beside a singular place nothing is known of a slope.
+            if order > 0 && !(value[joint] + error[joint]).is_finite() {
+                (value[joint], error[joint]) = (0.0, f64::INFINITY);
+            }
+        }
+        (value, error)
+    }
+
+    /// Positions of the joints at a tip, angles as the kinematics gives them.
+    pub fn joints_at(&self, tip: &[f64; M], work: &mut Work) -> [f64; M] {
+        self.fill(&mut work.positions, |k| Jet { value: [tip[k]], error: [TIP_ROUNDINGS * self.size] });
+        self.joint_rows(&work.positions, 0).0
+    }
+
+    /// Positions of the joints.
+    pub fn at(&self, u: f64, work: &mut Work) -> [f64; M] {
+        self.joints_at(&self.curve.at(u), work)
+    }
+
+    /// All that is measured at a place.
+    pub fn place(&self, u: f64, work: &mut Work) -> Place<M> {
+        let (tip, slope) = (self.curve.at(u), self.curve.derivative(u));
+        self.fill(&mut work.slopes, |k| Jet {
+            value: [tip[k], slope[k]],
+            error: [TIP_ROUNDINGS * self.size, TIP_ROUNDINGS * self.slope_size[k]],
+        });
+        let (position, unknown) = self.joint_rows(&work.slopes, 0);
+        let (joint_slope, slope_error) = self.joint_rows(&work.slopes, 1);
+        Place {
+            u,
+            tip,
+            position,
+            unknown,
+            slope: joint_slope,
+            slope_error,
+            feed_slope: self.feed_slope_of(&tip, &slope),
+            way_slope: length(&times(&self.way_scale, &slope)),
+        }
+    }
+
+    /// First to third derivatives of the joints by u, and of the way, each with how wrong it may be.
+    pub fn bends(&self, u: f64, work: &mut Work) -> Bends<M> {
+        let tip = self.curve.at(u);
+        let slopes = self.curve.derivatives(u);
+        self.fill(&mut work.bends, |k| {
+            let term = |order: usize| match order {
+                0 => (tip[k], self.size),
+                order => (slopes[order - 1].0[k], slopes[order - 1].1[k]),
+            };
+            Jet {
+                value: std::array::from_fn(|order| term(order).0),
+                error: std::array::from_fn(|order| TIP_ROUNDINGS * term(order).1),
+            }
+        });
+        let joints = [1, 2, 3].map(|order| self.joint_rows(&work.bends, order));
+        // |C'|² by its axes.
+        let mut square = Jet::<3>::constant(0.0);
+        for k in 0..M {
+            let scale = self.way_scale[k];
+            let axis = Jet::<3> {
+                value: std::array::from_fn(|order| scale * slopes[order].0[k]),
+                error: std::array::from_fn(|order| TIP_ROUNDINGS * scale * slopes[order].1[k]),
+            };
+            let own = axis.times(&axis);
+            for order in 0..3 {
+                square.value[order] += own.value[order];
+                square.error[order] += own.error[order] + own.value[order].abs();
+            }
+        }
+        let way = square.root();
+        Bends { joints, way: std::array::from_fn(|order| (way.value[order], EPS * way.error[order])) }
+    }
+
+    /// From one position to another, both of this piece, or the first of an `other` one: joints that turn on one of them
+    /// go the short way round.
+    pub fn between(&self, before: &[f64; M], after: &[f64; M], other: Option<&Piece<M>>) -> [f64; M] {
+        std::array::from_fn(|k| {
+            let way = after[k] - before[k];
+            if self.turning(k) || other.is_some_and(|other| other.turning(k)) {
+                way - TURN * (way / TURN).round()
+            } else {
+                way
+            }
+        })
+    }
+
+    /// The greatest coordinate of the first control point.
+    pub fn start_size(&self) -> f64 {
+        self.start_size
+    }
+
+    /// Number of joints.
+    pub fn joints(&self) -> usize {
+        self.joints
+    }
+}

@@ -1,0 +1,453 @@
+//! Audits a profile whose limits belong to joints that are not the path's axes.
+//!
+//! Every arc is sampled at some ten places. Between two of them the acceleration of a joint is the difference of its
+//! velocities over the time; what velocities and times may be wrong by is allowed for.
+
+use rayon::prelude::*;
+
+use super::along::is_by_way;
+use super::jerk::audit_jerk;
+use super::motion::{motion, State, ROUNDING};
+use super::path::{JointPath, Piece, Place, TURN};
+use crate::arcs::Arcs;
+use crate::curve::{length, Followed};
+use crate::{Check, Limits, Seen, Tally, Worst, EPS, GAP_TOLERANCE, PASS_EXCESS};
+
+/// Places of an arc, as shares of the variable in which √p would be linear if p were: close at the ends, where accelerations
+/// have their extremes.
+const PLACES: [f64; 11] = [0.0, 1.0 / 64.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 63.0 / 64.0, 1.0];
+
+/// Arcs measured at once: the memory for their places stays below some 30 MB.
+const CHUNK: usize = 2048;
+
+/// The chord error is measured with tangents this share of the piece apart.
+const TANGENTS: f64 = 1e-4;
+
+/// What an audit of joints knows.
+pub struct JointAudit<'a, const M: usize> {
+    pub path: JointPath<'a>,
+    pub arcs: Arcs<'a>,
+    pub limits: Limits<M>,
+    /// When each arc begins, and the last one ends.
+    pub starts: &'a [f64],
+}
+
+/// Whether the numbers of an arc can be measured.
+pub fn has_good_numbers(path: &Followed, joints: usize, arcs: &Arcs, i: usize) -> bool {
+    let numbers = [&arcs.value, &arcs.duration, &arcs.u0, &arcs.u1, &arcs.p0, &arcs.p1, &arcs.a0, &arcs.a1];
+    let needs_axis = matches!(arcs.kind[i], 0 | 3);
+    (arcs.piece[i] as usize) < path.len()
+        && arcs.kind[i] <= 7
+        && numbers.iter().all(|column| column[i].is_finite())
+        && (is_by_way(arcs.kind[i]) || (arcs.a0[i] == 0.0 && arcs.a1[i] == 0.0))
+        && arcs.p0[i] >= 0.0
+        && arcs.p1[i] >= 0.0
+        && arcs.duration[i] >= 0.0
+        && (!needs_axis || (arcs.axis[i] as usize) < joints)
+}
+
+/// An arc at its places.
+struct Measured<'a, const M: usize> {
+    arc: usize,
+    piece: Piece<'a, M>,
+    places: Vec<Place<M>>,
+    states: Vec<State<M>>,
+}
+
+impl<const M: usize> Measured<'_, M> {
+    /// Places and states at both ends.
+    fn ends(&self) -> [(&Place<M>, &State<M>); 2] {
+        let last = self.places.len() - 1;
+        [0, last].map(|i| (&self.places[i], &self.states[i]))
+    }
+}
+
+/// What the end of an arc passes on to the next one.
+struct End<'a, const M: usize> {
+    arc: usize,
+    piece: Piece<'a, M>,
+    velocity: [f64; M],
+    doubt: [f64; M],
+    speed: f64,
+}
+
+/// Positions so far, angles continuous.
+struct Reach<const M: usize> {
+    /// Least and greatest, with time and source line.
+    ends: [[(f64, f64, i32); 2]; M],
+    /// As the kinematics gives it and as it goes on, at the end of the last arc.
+    last: Option<(usize, [f64; M], [f64; M])>,
+    /// What these angles are off by, in degrees; not a number before a joint's turn is known.
+    turns: [f64; M],
+}
+
+/// Velocity, acceleration and jumps of the joints, feed, chord error, times and order of the arcs; where the limits say so
+/// the jerk of the joints too, and the jumps of their accelerations.
+pub(super) fn audit_joint_profile<const M: usize>(audit: &JointAudit<M>, seen: Seen) -> Tally<M> {
+    let mut tally = Tally::default();
+    let good = order(audit, &mut tally);
+    let arcs: Vec<usize> = (0..audit.arcs.len()).filter(|&arc| good[arc]).collect();
+    let nowhere = [(f64::NAN, 0.0, 0); 2];
+    let mut reach = Reach { ends: [nowhere; M], last: None, turns: [f64::NAN; M] };
+    let mut before: Option<End<M>> = None;
+    for chunk in arcs.chunks(CHUNK) {
+        let measured: Vec<(Measured<M>, Tally<M>)> = chunk
+            .par_iter()
+            .map_init(
+                || audit.path.work(),
+                |work, &arc| {
+                    let piece: Piece<M> = audit.path.piece(audit.arcs.piece[arc] as usize);
+                    let places: Vec<_> = places(&audit.arcs, arc).map(|u| piece.place(u, work)).into();
+                    let states = motion(&piece, &audit.arcs, arc, &places, places.len() - 1);
+                    let (own, mut tally) = (Measured { arc, piece, places, states }, Tally::default());
+                    audit.arc(&own, &mut tally);
+                    (own, tally)
+                },
+            )
+            .collect();
+        for (own, found) in measured {
+            tally = tally.merge(found);
+            audit.follow(&mut reach, &own);
+            before = Some(audit.joint(before, own, &mut tally));
+        }
+        seen(chunk.len());
+    }
+    if audit.limits.judges_jerk {
+        tally = tally.merge(audit_jerk(audit, &good, seen));
+    }
+    audit.travel(&reach, &mut tally);
+    tally
+}
+
+/// u at the places of an arc.
+fn places(arcs: &Arcs, arc: usize) -> [f64; 11] {
+    let (u0, u1) = (arcs.u0[arc], arcs.u1[arc]);
+    let (near, both) = match (arcs.p0[arc].sqrt(), arcs.p0[arc].sqrt() + arcs.p1[arc].sqrt()) {
+        (near, both) if both.is_finite() && both > 0.0 => (near, both),
+        _ => (1.0, 2.0),
+    };
+    PLACES.map(|x| {
+        let share = x * (2.0 * near + (both - 2.0 * near) * x) / both;
+        if x == 1.0 {
+            u1
+        } else {
+            u0 + (u1 - u0) * share.min(1.0)
+        }
+    })
+}
+
+/// Numbers, and arcs that cover every piece in order; which arcs can be measured.
+fn order<const M: usize>(audit: &JointAudit<M>, tally: &mut Tally<M>) -> Vec<bool> {
+    let (path, arcs, starts) = (&audit.path.path, &audit.arcs, audit.starts);
+    let piece_of = |arc: usize| (arcs.piece[arc] as usize).min(path.len().saturating_sub(1));
+    let line = |arc: usize| path.line.get(piece_of(arc)).copied().unwrap_or(0);
+    let mut offer = |check: Check, value: f64, limit: f64, time: f64, line: i32| {
+        tally.offer(check, 0, value, limit, time, line);
+    };
+    let wrong = |good: bool| if good { 0.0 } else { f64::INFINITY };
+    let numbers: Vec<bool> =
+        (0..arcs.len()).map(|arc| has_good_numbers(path, audit.path.joints, arcs, arc)).collect();
+    for (arc, &good) in numbers.iter().enumerate() {
+        offer(Check::Numbers, wrong(good), 0.0, starts[arc], line(arc));
+    }
+    if path.is_empty() {
+        return numbers;
+    }
+    let slack = |arc: usize| 8.0 * EPS * path.width[piece_of(arc)];
+    let mut good = numbers;
+    for (arc, good) in good.iter_mut().enumerate() {
+        let (u0, u1) = (arcs.u0[arc], arcs.u1[arc]);
+        let inside = u1 > u0 && u0 >= 0.0 && u1 <= path.width[piece_of(arc)] + slack(arc);
+        offer(Check::Order, wrong(inside || !*good), GAP_TOLERANCE, starts[arc], line(arc));
+        *good &= inside;
+    }
+    let runs = arcs.runs;
+    let fits = runs.len() == path.runs.len()
+        && runs.first() == Some(&0)
+        && runs.last() == Some(&(arcs.len() as i64))
+        && runs.windows(2).all(|pair| pair[0] <= pair[1]);
+    if !fits {
+        offer(Check::Order, f64::INFINITY, GAP_TOLERANCE, 0.0, path.line[0]);
+        return good;
+    }
+    for run in 0..runs.len() - 1 {
+        let (first, end) = (runs[run] as usize, runs[run + 1] as usize);
+        let pieces = path.runs[run] as usize..path.runs[run + 1] as usize;
+        // Arc by arc the parameter from the start of the run; pieces passed over show as gaps.
+        for arc in first..end {
+            let piece = piece_of(arc);
+            let gap = if arc == first {
+                if piece == pieces.start {
+                    arcs.u0[arc].abs()
+                } else {
+                    f64::INFINITY
+                }
+            } else {
+                let (before, ended) = (piece_of(arc - 1), arcs.u1[arc - 1]);
+                match piece {
+                    same if same == before => (arcs.u0[arc] - ended).abs(),
+                    next if next == before + 1 => arcs.u0[arc].abs() + (path.width[before] - ended).abs(),
+                    _ => f64::INFINITY,
+                }
+            };
+            offer(Check::Order, gap - 2.0 * slack(arc), GAP_TOLERANCE, starts[arc], line(arc));
+        }
+        let whole = if end > first {
+            let (last, piece) = (end - 1, pieces.end.wrapping_sub(1));
+            piece_of(last) == piece && path.width[piece] - arcs.u1[last] <= GAP_TOLERANCE + slack(last)
+        } else {
+            pieces.is_empty()
+        };
+        if !whole {
+            let line = path.line[pieces.end.saturating_sub(1)];
+            offer(Check::Order, f64::INFINITY, GAP_TOLERANCE, starts[end.saturating_sub(1)], line);
+        }
+    }
+    good
+}
+
+impl<const M: usize> JointAudit<'_, M> {
+    /// A jump of a joint's velocity that means nothing: what the pass mark adds in that time.
+    fn negligible(&self, joint: usize, time: f64) -> f64 {
+        PASS_EXCESS * self.limits.acceleration.least(joint) * time.max(self.limits.period)
+    }
+
+    /// Whether an arc is the first of a run.
+    pub fn is_first(&self, arc: usize) -> bool {
+        self.arcs.runs.binary_search(&(arc as i64)).is_ok()
+    }
+
+    /// Offers what an arc shows by itself.
+    fn arc(&self, own: &Measured<M>, tally: &mut Tally<M>) {
+        let Measured { arc, piece, places, states } = own;
+        let arc = *arc;
+        let (limits, line, joints) = (&self.limits, piece.line, self.path.joints);
+        tally.samples += states.len() as u64;
+        let mut clock = self.starts[arc];
+        let size = places.iter().flat_map(|place| place.position).map(f64::abs).fold(0.0, f64::max);
+        for (i, (state, place)) in states.iter().zip(places).enumerate() {
+            if i > 0 {
+                let before = &states[i - 1];
+                let middle = 0.5 * (clock + (clock + state.time));
+                clock += state.time;
+                for k in 0..joints {
+                    let change = state.velocity[k] - before.velocity[k];
+                    let moved = state.way[k] - before.way[k];
+                    let (mut acceleration, mut mean) = (0.0, 0.0);
+                    // Places that rounding has put together have nothing between them.
+                    if place.u != places[i - 1].u {
+                        let doubt = state.velocity_error[k] + before.velocity_error[k];
+                        acceleration = (change.abs() - doubt) / state.time;
+                        acceleration -= acceleration.abs() * state.time_error;
+                        mean = moved.abs() / state.time;
+                        mean -= 2.0 * ROUNDING * size / state.time + mean * state.time_error;
+                    }
+                    let strongest = limits.acceleration.of(k, change);
+                    tally.offer(Check::Velocity, k, mean, limits.velocity.of(k, moved), middle, line);
+                    tally.offer(Check::Acceleration, k, acceleration, strongest, middle, line);
+                }
+            }
+            for k in 0..joints {
+                let speed = state.velocity[k].abs() - state.velocity_error[k];
+                let limit = limits.velocity.of(k, state.velocity[k]);
+                tally.offer(Check::Velocity, k, speed, limit, clock, line);
+            }
+            self.tip(piece, place, state, clock, tally);
+        }
+        let total: f64 = states.iter().map(|state| state.time).sum();
+        let doubt = states.iter().map(|state| state.time * state.time_error).sum::<f64>() / total;
+        let error = (self.arcs.duration[arc] - total).abs() / total - doubt;
+        tally.offer(Check::Duration, 0, error, PASS_EXCESS, self.starts[arc], line);
+        self.ends(own, tally);
+    }
+
+    /// Feed and chord error of the tip.
+    fn tip(&self, piece: &Piece<M>, place: &Place<M>, state: &State<M>, clock: f64, tally: &mut Tally<M>) {
+        let share = length(&state.velocity_error) / length(&state.velocity);
+        let share = if share.is_finite() { share } else { 0.0 };
+        let speed = place.feed_slope * state.root_p * (1.0 - share - ROUNDING);
+        tally.offer(Check::Feed, 0, speed, self.path.feed[piece.number], clock, piece.line);
+        let tolerance = self.limits.chord_tolerance;
+        if !tolerance.is_finite() {
+            return;
+        }
+        let mut sagitta = 0.0;
+        if piece.linear().iter().any(|&counts| counts != 0.0) {
+            let half = 0.5 * speed * self.limits.period;
+            let reach = half * curvature(piece, place.u);
+            sagitta = if reach < 1.0 { half * reach / (1.0 + (1.0 - reach * reach).sqrt()) } else { half };
+        }
+        tally.offer(Check::Chord, 0, sagitta, tolerance, clock, piece.line);
+    }
+
+    /// Velocities at both ends by the recorded p, with how wrong they may be, and the speeds of the tip.
+    fn recorded(&self, own: &Measured<M>) -> [([f64; M], [f64; M], f64); 2] {
+        let [(first, _), (last, _)] = own.ends();
+        [(first, self.arcs.p0[own.arc]), (last, self.arcs.p1[own.arc])].map(|(place, p)| {
+            let root = p.sqrt();
+            let velocity = place.slope.map(|slope| slope * root);
+            let doubt = std::array::from_fn(|k| place.slope_error[k] * root + ROUNDING * velocity[k].abs());
+            (velocity, doubt, place.feed_slope * root)
+        })
+    }
+
+    /// Recorded p against the law's.
+    fn ends(&self, own: &Measured<M>, tally: &mut Tally<M>) {
+        let (arc, duration) = (own.arc, self.arcs.duration[own.arc]);
+        let roots = [self.arcs.p0[arc].sqrt(), self.arcs.p1[arc].sqrt()];
+        for (side, (velocity, doubt, _)) in self.recorded(own).iter().enumerate() {
+            let (_, state) = own.ends()[side];
+            let time = self.starts[arc] + side as f64 * duration;
+            for k in 0..self.path.joints {
+                let mut away = (state.velocity[k] - velocity[k]).abs() - doubt[k] - state.velocity_error[k];
+                // Where the arc's own joint stands the other joints have no velocity to compare.
+                if roots[side] == state.root_p {
+                    away = 0.0;
+                }
+                tally.offer(Check::Jump, k, away, self.negligible(k, duration), time, own.piece.line);
+            }
+        }
+    }
+
+    /// What jumps from the arc before to this one; what this one passes on.
+    fn joint<'a>(
+        &self,
+        before: Option<End<'a, M>>,
+        own: Measured<'a, M>,
+        tally: &mut Tally<M>,
+    ) -> End<'a, M> {
+        let [(velocity, doubt, speed), (end_velocity, end_doubt, end_speed)] = self.recorded(&own);
+        let slack = self.slow(self.arcs.duration[own.arc], &own.places[0]);
+        let Measured { arc, piece, .. } = own;
+        let (duration, line, start) = (self.arcs.duration[arc], piece.line, self.starts[arc]);
+        let joined = before.filter(|before| before.arc + 1 == arc && !self.is_first(arc));
+        let corner = joined.as_ref().is_some_and(|before| before.piece.number != piece.number);
+        for k in 0..self.path.joints {
+            let jump = joined
+                .as_ref()
+                .map_or(0.0, |before| (velocity[k] - before.velocity[k]).abs() - doubt[k] - before.doubt[k]);
+            let allowed = if corner { self.limits.jump[k] } else { 0.0 };
+            tally.offer(Check::Jump, k, jump, allowed + self.negligible(k, duration), start, line);
+        }
+        let (mut step, mut over) = (0.0, 0.0);
+        if let Some(before) = joined.filter(|_| corner) {
+            let rounding = ROUNDING * (speed + before.speed);
+            // Where the feed is about other axes the speed is another quantity.
+            if before.piece.counts == piece.counts {
+                step = (speed - before.speed).abs() - rounding;
+            }
+            over = speed.max(before.speed) - rounding;
+        }
+        tally.offer(Check::Continuity, 0, step, slack, start, line);
+        let most = self.path.junction_speed[piece.number] + slack;
+        tally.offer(Check::Junction, 0, over, most, start, line);
+        // Speeds at the ends of runs: at rest, but for the ends of the path.
+        let last = self.arcs.len() - 1;
+        let wanted = [
+            if arc == 0 { self.limits.end_speeds[0] } else { 0.0 },
+            if arc == last { self.limits.end_speeds[1] } else { 0.0 },
+        ];
+        let ends = [self.is_first(arc) && arc < self.arcs.len(), self.is_first(arc + 1)];
+        for (side, speed) in [speed, end_speed].into_iter().enumerate() {
+            let off = (speed - wanted[side]).abs();
+            let off = if ends[side] { off } else { 0.0 } - ROUNDING * (speed + wanted[side]);
+            tally.offer(Check::Junction, 0, off, slack, start + side as f64 * duration, line);
+        }
+        End { arc, piece, velocity: end_velocity, doubt: end_doubt, speed: end_speed }
+    }
+
+    /// A jump of the tip's speed that means nothing to any joint.
+    fn slow(&self, duration: f64, place: &Place<M>) -> f64 {
+        let mut least = f64::INFINITY;
+        let mut weakest = f64::INFINITY;
+        for k in 0..self.path.joints {
+            let share = self.negligible(k, duration) / place.slope[k].abs() * place.feed_slope;
+            if share.is_finite() {
+                least = least.min(share);
+            }
+            weakest = weakest.min(self.limits.acceleration.least(k));
+        }
+        let period = PASS_EXCESS * weakest * self.limits.period;
+        if least.is_finite() {
+            least.max(period)
+        } else {
+            period
+        }
+    }
+
+    /// Positions, angles continuous from arc to arc.
+    fn follow(&self, reach: &mut Reach<M>, own: &Measured<M>) {
+        let Measured { arc, piece, states, .. } = own;
+        let [(first, _), (last, end)] = own.ends();
+        let first = first.position;
+        let begin: [f64; M] = match &reach.last {
+            None => first,
+            Some((number, position, seen)) => {
+                let other = (*number != piece.number).then(|| self.path.piece(*number));
+                let step = piece.between(position, &first, other.as_ref());
+                std::array::from_fn(|k| seen[k] + step[k])
+            }
+        };
+        let mut clock = self.starts[*arc];
+        for k in 0..self.path.joints {
+            // Angles known up to whole turns are those that they are where they are known.
+            if !piece.turning(k) && reach.turns[k].is_nan() {
+                reach.turns[k] = TURN * ((first[k] - begin[k]) / TURN).round();
+            }
+        }
+        for state in states {
+            clock += state.time;
+            for k in 0..self.path.joints {
+                let value = begin[k] + state.way[k];
+                for (end, sign) in [(0, -1.0), (1, 1.0)] {
+                    let is_no_farther = sign * value <= sign * reach.ends[k][end].0;
+                    if !is_no_farther && !value.is_nan() {
+                        reach.ends[k][end] = (value, clock, piece.line);
+                    }
+                }
+            }
+        }
+        let seen = std::array::from_fn(|k| begin[k] + end.way[k]);
+        reach.last = Some((piece.number, last.position, seen));
+    }
+
+    /// The travel; angles that are known up to whole turns everywhere on the turn that suits them best.
+    fn travel(&self, reach: &Reach<M>, tally: &mut Tally<M>) {
+        for k in 0..self.path.joints {
+            let [lower, upper] = self.limits.travel[k];
+            let [least, most] = reach.ends[k];
+            if !((upper - lower).is_finite() && (most.0 - least.0).is_finite()) {
+                continue;
+            }
+            let (middle, half) = (0.5 * (lower + upper), 0.5 * (upper - lower));
+            let turns = match reach.turns[k] {
+                turns if turns.is_nan() => TURN * ((middle - 0.5 * (least.0 + most.0)) / TURN).round(),
+                turns => turns,
+            };
+            let is_upper = most.0 + turns - middle > middle - (least.0 + turns);
+            let ((value, time, line), limit) = if is_upper { (most, upper) } else { (least, lower) };
+            let value = value + turns;
+            let ratio = ((value - middle).abs() - 2.0 * ROUNDING * value.abs()) / half;
+            tally.offer_ratio(Check::Travel, k, Worst { value, limit, ratio, time, line });
+        }
+    }
+}
+
+/// Turn of the tip's direction over the way, between two places of the piece.
+fn curvature<const M: usize>(piece: &Piece<M>, u: f64) -> f64 {
+    let step = TANGENTS * piece.width;
+    let centre = u.clamp(step, piece.width - step);
+    let [before, here, after] = [centre - step, centre, centre + step].map(|at| piece.counted_slope(at));
+    let direction = |slope: [f64; M]| {
+        let size = length(&slope);
+        slope.map(|x| x / size)
+    };
+    let (before, after) = (direction(before), direction(after));
+    let turn = length::<M>(&std::array::from_fn(|k| after[k] - before[k]));
+    let found = (turn - ROUNDING).max(0.0) / (2.0 * step * length(&here));
+    if found.is_finite() {
+        found
+    } else {
+        0.0
+    }
+}

@@ -1,0 +1,459 @@
+//! The places of joint setpoints on the path of the tool tip, and when the profile is there.
+//!
+//! A setpoint is compared with K(C(u)): u on the arc that the profile is on at its time, moved along it until no nearer place
+//! is found. How far the setpoint stays off is one error, how far the profile gets between the time of the setpoint and being
+//! at that place the other. The clock starts every run anew: setpoints may wait at a stop for their next period.
+
+use rayon::prelude::*;
+
+use super::motion::{motion, ROUNDING};
+use super::path::{Piece, Place, Work};
+use super::profile::{has_good_numbers, JointAudit};
+use crate::curve::{length, Segment};
+use crate::setpoints::Chunk;
+use crate::{Check, Tally, EPS, PLACE_TOLERANCE, ROUNDINGS};
+
+/// How far a setpoint may lie from its place, as a share of its step.
+const STEP_SHARE: f64 = 1e-6;
+
+/// What times may be off, as a share of the period.
+const UNEVEN: f64 = 1e-6;
+
+/// A recorded velocity may differ from the profile's by this share of what one period of acceleration changes.
+const VELOCITY_SHARE: f64 = 1e-3;
+
+/// A setpoint this near its stop stands on it, beyond rounding.
+const STANDING: f64 = 1e-9;
+
+/// Steps towards the nearest place.
+const MOST_STEPS: usize = 12;
+
+/// Setpoints that one thread looks at in a row.
+const BLOCK: usize = 256;
+
+/// A setpoint.
+#[derive(Clone, Copy, Debug)]
+struct Row<const M: usize> {
+    t: f64,
+    position: [f64; M],
+    velocity: Option<[f64; M]>,
+}
+
+/// Where a setpoint is on the path.
+#[derive(Clone, Copy)]
+struct Spot<const M: usize> {
+    row: Row<M>,
+    is_finite: bool,
+    piece: usize,
+    u: f64,
+    tip: [f64; M],
+    /// The position, or 0 where it is none.
+    target: [f64; M],
+    /// From the place, and how far the profile is from it at the time of the setpoint.
+    off: f64,
+    late: f64,
+    /// Of the profile there, and how wrong it may be.
+    velocity: [f64; M],
+    velocity_error: [f64; M],
+}
+
+/// The chord error of a step, and the length of its chord.
+#[derive(Clone, Copy)]
+struct Chord {
+    error: f64,
+    length: f64,
+    time: f64,
+    line: i32,
+}
+
+/// Looks at setpoints chunk by chunk; what two chunks share is kept, nothing else.
+pub struct JointSetpoints<const M: usize> {
+    tally: Tally<M>,
+    is_usable: bool,
+    /// When the runs began, as far as the setpoints have shown.
+    clock: Vec<f64>,
+    /// The last setpoint, which waits, and the one before it.
+    held: Option<Row<M>>,
+    last: Option<Row<M>>,
+    /// The last chord, which waits for the length of the next one, and the length of the one before it.
+    chord: Option<(Chord, f64)>,
+    begun: bool,
+}
+
+impl<const M: usize> JointSetpoints<M> {
+    pub(super) fn new(audit: &JointAudit<M>) -> Self {
+        let (arcs, path) = (&audit.arcs, &audit.path.path);
+        let runs = arcs.runs;
+        let is_usable = !arcs.is_empty()
+            && runs.len() == path.runs.len()
+            && runs.first() == Some(&0)
+            && runs.last() == Some(&(arcs.len() as i64))
+            && runs.windows(2).all(|pair| pair[0] < pair[1])
+            && (0..arcs.len()).all(|arc| has_good_numbers(path, audit.path.joints, arcs, arc))
+            && (0..arcs.len()).all(|arc| arcs.u1[arc] > arcs.u0[arc])
+            && arcs.piece.windows(2).all(|pair| pair[0] <= pair[1]);
+        let mut tally = Tally::default();
+        if !is_usable {
+            tally.offer(Check::Place, 0, f64::INFINITY, PLACE_TOLERANCE, 0.0, 0);
+        }
+        Self { tally, is_usable, clock: Vec::new(), held: None, last: None, chord: None, begun: false }
+    }
+
+    /// The next setpoints; the last of them waits for the next chunk.
+    pub(super) fn push(&mut self, audit: &JointAudit<M>, chunk: &Chunk) {
+        if !self.is_usable || chunk.t.is_empty() {
+            return;
+        }
+        let of = |flat: &[f64], i: usize| -> [f64; M] {
+            let row = &flat[i * chunk.axes..][..chunk.axes];
+            std::array::from_fn(|k| row.get(k).copied().unwrap_or(0.0))
+        };
+        let own = (0..chunk.t.len()).map(|i| Row {
+            t: chunk.t[i],
+            position: of(chunk.position, i),
+            velocity: chunk.velocity.map(|flat| of(flat, i)),
+        });
+        let rows: Vec<Row<M>> = self.held.take().into_iter().chain(own).collect();
+        self.take(audit, &rows, rows.len() - 1, false);
+        self.held = rows.last().copied();
+    }
+
+    /// The last setpoint must be the end of the path.
+    pub(super) fn finish(mut self, audit: &JointAudit<M>) -> Tally<M> {
+        let Some(row) = self.held.take() else {
+            if self.is_usable {
+                self.tally.offer(Check::Place, 0, f64::INFINITY, PLACE_TOLERANCE, 0.0, 0);
+            }
+            return self.tally;
+        };
+        self.take(audit, &[row], 1, true);
+        let piece = audit.path.piece::<M>(audit.path.path.len() - 1);
+        let end = piece.at(piece.width, &mut audit.path.work());
+        let away = off(&piece, &row.position, &end);
+        self.tally.offer(Check::Place, 0, away, PLACE_TOLERANCE, row.t, piece.line);
+        self.settle_chord(audit, None);
+        self.tally
+    }
+
+    fn take(&mut self, audit: &JointAudit<M>, rows: &[Row<M>], count: usize, last: bool) {
+        let mut work = audit.path.work();
+        if !self.begun {
+            self.begun = true;
+            let piece = audit.path.piece::<M>(0);
+            let away = off(&piece, &rows[0].position, &piece.at(0.0, &mut work));
+            let t = rows[0].t;
+            self.tally.offer(Check::Place, 0, away, PLACE_TOLERANCE, t, piece.line);
+            self.tally.offer(Check::Grid, 0, t.abs(), UNEVEN * audit.limits.period, t, piece.line);
+        }
+        self.extend_clock(audit, rows, last, &mut work);
+        let (clock, last) = (&self.clock, self.last);
+        let judged: Vec<(Tally<M>, Vec<Chord>)> = (0..count.div_ceil(BLOCK))
+            .into_par_iter()
+            .map(|block| {
+                let start = block * BLOCK;
+                let before = start.checked_sub(1).map_or(last, |before| Some(rows[before]));
+                Judge::new(audit, clock).judge(before, &rows[start..count.min(start + BLOCK)])
+            })
+            .collect();
+        for (tally, chords) in judged {
+            self.tally = std::mem::take(&mut self.tally).merge(tally);
+            for chord in chords {
+                let before = self.settle_chord(audit, Some(chord.length)).unwrap_or(chord.length);
+                self.chord = Some((chord, before));
+            }
+        }
+        self.last = count.checked_sub(1).map(|last| rows[last]).or(last);
+    }
+
+    /// Adds the starts of the runs that the rows reach: at the next row where they stand on the stop.
+    fn extend_clock(&mut self, audit: &JointAudit<M>, rows: &[Row<M>], last: bool, work: &mut Work) {
+        let (arcs, path, period) = (&audit.arcs, &audit.path.path, audit.limits.period);
+        while self.clock.len() < arcs.runs.len() - 1 {
+            let run = self.clock.len();
+            let due = if run == 0 {
+                path.start_dwell
+            } else {
+                let (first, end) = (arcs.runs[run - 1] as usize, arcs.runs[run] as usize);
+                let motion_time = audit.starts[end - 1] + arcs.duration[end - 1] - audit.starts[first];
+                self.clock[run - 1] + motion_time + path.dwell[run - 1]
+            };
+            let slack = UNEVEN * period + 2.0 * ROUNDINGS * EPS * due;
+            let n = rows.partition_point(|row| row.t < due - slack);
+            let left = rows.len() - n;
+            if left == 0 {
+                break;
+            }
+            let piece = audit.path.piece::<M>(path.runs[run] as usize);
+            let stop = piece.at(0.0, work);
+            let stands = |row: usize| off(&piece, &rows[row].position, &stop) <= STANDING;
+            let on_time = rows[n].t <= due + slack;
+            if left == 1 && on_time && !last {
+                break;
+            }
+            let row = if left > 1 && on_time && stands(n + 1) { n + 1 } else { n };
+            let begin = if row > n || stands(n) { rows[row].t } else { due };
+            self.clock.push(begin);
+        }
+    }
+
+    /// Judges the chord error that waits, now that the length of the step after it is known or that there is none; the
+    /// length of its own step.
+    fn settle_chord(&mut self, audit: &JointAudit<M>, after: Option<f64>) -> Option<f64> {
+        let (chord, before) = self.chord.take()?;
+        let length = chord.length;
+        // The limit is that of a circle: where the tip gains speed the path leans to one end of the chord.
+        let gain = (length - before).abs().max((after.unwrap_or(length) - length).abs()) / length;
+        let gain = if gain.is_nan() { 0.0 } else { gain.clamp(0.0, 1.0) };
+        let limit = audit.limits.chord_tolerance * (1.0 + 0.5 * gain);
+        self.tally.offer(Check::Chord, 0, chord.error, limit, chord.time, chord.line);
+        Some(length)
+    }
+}
+
+/// Judges setpoints that follow each other.
+struct Judge<'a, const M: usize> {
+    audit: &'a JointAudit<'a, M>,
+    clock: &'a [f64],
+    work: Work,
+    /// The piece before the one of the last setpoint.
+    earlier: Option<Piece<'a, M>>,
+    /// The arc of the last setpoint, its piece, and the places at its ends.
+    known: Option<(usize, Piece<'a, M>, [Place<M>; 2])>,
+    tally: Tally<M>,
+    chords: Vec<Chord>,
+}
+
+impl<'a, const M: usize> Judge<'a, M> {
+    fn new(audit: &'a JointAudit<'a, M>, clock: &'a [f64]) -> Self {
+        let work = audit.path.work();
+        Self { audit, clock, work, earlier: None, known: None, tally: Tally::default(), chords: Vec::new() }
+    }
+
+    /// Judges rows by themselves and against those before them, the first one against `before`.
+    fn judge(mut self, before: Option<Row<M>>, rows: &[Row<M>]) -> (Tally<M>, Vec<Chord>) {
+        let mut last = before.map(|row| self.spot(row));
+        for row in rows {
+            let spot = self.spot(*row);
+            self.place(last.as_ref(), &spot);
+            if let Some(before) = &last {
+                self.step(before, &spot);
+            }
+            self.tally.samples += 1;
+            last = Some(spot);
+        }
+        (self.tally, self.chords)
+    }
+
+    /// The piece of the last setpoint.
+    fn piece(&self) -> &Piece<'a, M> {
+        let Some((_, piece, _)) = &self.known else { unreachable!("a setpoint has been found") };
+        piece
+    }
+
+    /// Offers what a setpoint shows.
+    fn place(&mut self, last: Option<&Spot<M>>, spot: &Spot<M>) {
+        let Some((_, piece, _)) = &self.known else { unreachable!("a setpoint has been found") };
+        let (t, line, tally) = (spot.row.t, piece.line, &mut self.tally);
+        let wrong = if spot.is_finite { 0.0 } else { f64::INFINITY };
+        tally.offer(Check::Numbers, 0, wrong, 0.0, t, line);
+        let away = if spot.is_finite { spot.off } else { f64::INFINITY };
+        tally.offer(Check::Place, 0, away, PLACE_TOLERANCE, t, line);
+        let earlier = last.map_or(spot.row.position, |last| last.row.position);
+        let step = length(&piece.between(&earlier, &spot.target, None));
+        let allowed = if step.is_nan() { step } else { PLACE_TOLERANCE.max(STEP_SHARE * step) };
+        tally.offer(Check::Place, 0, spot.late, allowed, t, line);
+        // A recorded velocity against the profile's, where the setpoint is on its place.
+        let Some(recorded) = spot.row.velocity else { return };
+        let limits = &self.audit.limits;
+        let at_joint = spot.u.min(piece.width - spot.u) <= PLACE_TOLERANCE;
+        let size = spot.row.position.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let away = spot.off.max(0.0) + spot.late + ROUNDING * size;
+        let good = spot.off <= PLACE_TOLERANCE && spot.velocity.iter().all(|velocity| velocity.is_finite());
+        for k in 0..self.audit.path.joints {
+            // From rest, a place known to `away` is passed at a speed known to this.
+            let unknown = (2.0 * limits.acceleration.greatest(k) * away).sqrt() + spot.velocity_error[k];
+            let value = if good { (recorded[k] - spot.velocity[k]).abs() - unknown } else { 0.0 };
+            let jump = if at_joint { limits.jump[k] } else { 0.0 };
+            let limit = VELOCITY_SHARE * limits.acceleration.least(k) * limits.period + jump;
+            tally.offer(Check::RecordedVelocity, k, value, limit, t, line);
+        }
+    }
+
+    /// Speed and chord error of the tip from one setpoint to the next.
+    fn step(&mut self, before: &Spot<M>, spot: &Spot<M>) {
+        let (audit, piece) = (self.audit, self.piece());
+        let (limits, t, line) = (&audit.limits, spot.row.t, piece.line);
+        let time = t - before.row.t;
+        let follows = before.piece <= spot.piece && spot.piece - before.piece <= 1;
+        let is_step = time > 0.0 && time <= 2.0 * limits.period && follows;
+        let crosses = before.piece != spot.piece;
+        let (made, first);
+        first = match &self.earlier {
+            _ if !crosses => piece,
+            Some(earlier) if earlier.number == before.piece => earlier,
+            _ => {
+                made = audit.path.piece(before.piece);
+                &made
+            }
+        };
+        // To the end of the piece before, and from the start of this one, whose words may mean another thing.
+        let until = if crosses { first.width } else { spot.u };
+        let since = if crosses { 0.0 } else { spot.u };
+        let [there, here] =
+            if crosses { [first.curve.at(until), piece.curve.at(since)] } else { [spot.tip; 2] };
+        let size = before.tip.iter().chain(&spot.tip).fold(0.0, |most: f64, x| most.max(x.abs()));
+        let rounding = ROUNDING * size;
+        let (mut way, mut least) = (0.0, 0.0);
+        for (piece, from, to) in [(first, &before.tip, &there), (piece, &here, &spot.tip)] {
+            let step = (piece.feed_way(from, to) - 2.0 * rounding).max(0.0);
+            way += step;
+            least += step / audit.path.feed[piece.number];
+        }
+        let speed = if is_step { way / time } else { 0.0 };
+        let feed = if way > 0.0 { way / least } else { audit.path.feed[piece.number] };
+        let mut chord = None;
+        if limits.chord_tolerance.is_finite() {
+            // From one run to the next the tool stands still: each side has a chord of its own.
+            let stops = first.run != piece.run;
+            let far = if stops { &there } else { &spot.tip };
+            let near = if stops { &here } else { &before.tip };
+            let mut error = 0.0;
+            if crosses {
+                error = chord_error(first, before.u, until, &before.tip, far);
+            }
+            let start = if crosses { 0.0 } else { before.u };
+            error = chord_error(piece, start, spot.u, near, &spot.tip).max(error);
+            let error = if is_step { error - rounding - spot.off.max(0.0) } else { 0.0 };
+            let linear = piece.linear();
+            let length = length::<M>(&std::array::from_fn(|k| linear[k] * (spot.tip[k] - near[k])));
+            chord = Some(Chord { error, length, time: t, line });
+        }
+        self.tally.offer(Check::Feed, 0, speed, feed, t, line);
+        self.chords.extend(chord);
+    }
+
+    /// The arc that a time falls into, and the time since the arc began.
+    fn arc_at(&self, t: f64) -> (usize, f64) {
+        let (arcs, starts) = (&self.audit.arcs, self.audit.starts);
+        let clock = if self.clock.is_empty() { &[self.audit.path.path.start_dwell][..] } else { self.clock };
+        let run = clock.partition_point(|&begin| begin <= t).saturating_sub(1);
+        let (first, end) = (arcs.runs[run] as usize, arcs.runs[run + 1] as usize);
+        let own = t - (clock[run] - starts[first]);
+        let arc = starts[..arcs.len()].partition_point(|&start| start <= own).saturating_sub(1);
+        let arc = arc.clamp(first, end - 1);
+        (arc, (own - starts[arc]).clamp(0.0, arcs.duration[arc]))
+    }
+
+    fn spot(&mut self, row: Row<M>) -> Spot<M> {
+        let (audit, arcs) = (self.audit, &self.audit.arcs);
+        let t = if row.t.is_finite() { row.t } else { 0.0 };
+        let (arc, since) = self.arc_at(t);
+        if self.known.as_ref().is_none_or(|(known, ..)| *known != arc) {
+            let number = arcs.piece[arc] as usize;
+            let piece = match self.known.take() {
+                Some((_, piece, _)) if piece.number == number => piece,
+                other => {
+                    self.earlier = other.map(|(_, piece, _)| piece);
+                    audit.path.piece(number)
+                }
+            };
+            let ends = [arcs.u0[arc], arcs.u1[arc]].map(|u| piece.place(u, &mut self.work));
+            self.known = Some((arc, piece, ends));
+        }
+        let Some((_, piece, ends)) = &self.known else { unreachable!("the arc is known") };
+        let is_finite = row.t.is_finite() && row.position.iter().all(|x| x.is_finite());
+        let target = if is_finite { row.position } else { [0.0; M] };
+        let place = nearest(piece, arcs, arc, since, &target, &mut self.work);
+        let states = motion(piece, arcs, arc, &[ends[0], place, ends[1]], 1);
+        let here = &states[1];
+        let doubt = here.time * here.time_error;
+        let doubt = if doubt.is_nan() { 0.0 } else { doubt };
+        let wait = (here.time - since).abs() - doubt - EPS * row.t.abs() * (arc as f64 + 2.0 * ROUNDINGS);
+        let wait = if wait.is_nan() { wait } else { wait.max(0.0) };
+        let pull = length(&audit.limits.acceleration.greater());
+        Spot {
+            row,
+            is_finite,
+            piece: piece.number,
+            u: place.u,
+            tip: place.tip,
+            target,
+            off: off(piece, &target, &place.position),
+            late: wait * (length(&here.velocity) + 0.5 * wait * pull),
+            velocity: here.velocity,
+            velocity_error: here.velocity_error,
+        }
+    }
+}
+
+/// The greatest distance of four places of a piece from a chord, in X, Y, Z.
+fn chord_error<const M: usize>(
+    piece: &Piece<M>,
+    start: f64,
+    end: f64,
+    from: &[f64; M],
+    to: &[f64; M],
+) -> f64 {
+    let linear = piece.linear();
+    let counted = |point: &[f64; M]| -> [f64; M] { std::array::from_fn(|k| linear[k] * point[k]) };
+    let chord = Segment::new(&counted(from), &counted(to));
+    let away =
+        |share: f64| chord.distance_sq(&counted(&piece.curve.at(start + share * (end - start)))).sqrt();
+    [0.25, 0.5, 0.75, 1.0].map(away).into_iter().fold(0.0, f64::max)
+}
+
+/// The place of an arc that a position is nearest to.
+fn nearest<const M: usize>(
+    piece: &Piece<M>,
+    arcs: &crate::arcs::Arcs,
+    arc: usize,
+    since: f64,
+    target: &[f64; M],
+    work: &mut Work,
+) -> Place<M> {
+    let (low, high) = (arcs.u0[arc], arcs.u1[arc]);
+    let (near, far) = (arcs.p0[arc].sqrt(), arcs.p1[arc].sqrt());
+    let x = (since / arcs.duration[arc]).clamp(0.0, 1.0);
+    let share = x * (2.0 * near + (far - near) * x) / (near + far);
+    let share = if share.is_nan() { 0.5 } else { share };
+    let mut place = piece.place((low + (high - low) * share).clamp(low, high), work);
+    let mut to = piece.between(&place.position, target, None);
+    // No place is known more closely: next to rest it would be passed at another time.
+    let known = rounding(piece, target);
+    for _ in 0..MOST_STEPS {
+        let (mut along, mut slope_sq) = (0.0, 0.0);
+        for k in 0..piece.joints() {
+            along += to[k] * place.slope[k];
+            slope_sq += place.slope[k] * place.slope[k];
+        }
+        // A step within rounding brings it no nearer.
+        if along.abs() <= known * slope_sq.sqrt() {
+            break;
+        }
+        let step = along / slope_sq;
+        let u = (place.u + if step.is_nan() { 0.0 } else { step }).clamp(low, high);
+        if u == place.u {
+            break;
+        }
+        let there = piece.place(u, work);
+        let onward = piece.between(&there.position, target, None);
+        let is_nearer = length(&onward) + known < length(&to);
+        if !is_nearer {
+            break;
+        }
+        (place, to) = (there, onward);
+    }
+    place
+}
+
+/// Distance of a position from a place, less rounding; the same angle on whichever turn.
+fn off<const M: usize>(piece: &Piece<M>, position: &[f64; M], place: &[f64; M]) -> f64 {
+    let away = length(&piece.between(place, position, None));
+    away - rounding(piece, position).max(rounding(piece, place))
+}
+
+/// What rounding makes of a distance: relative to the greatest coordinate of joints and tip.
+fn rounding<const M: usize>(piece: &Piece<M>, position: &[f64; M]) -> f64 {
+    let size = position.iter().fold(piece.start_size(), |most: f64, x| most.max(x.abs()));
+    ROUNDING * (piece.joints() as f64).sqrt() * size
+}
