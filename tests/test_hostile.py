@@ -22,7 +22,7 @@ from feedplan.errors import LONGEST
 from tests.campaign import seeds
 from tests.hostile import DRAWING, MACHINE, OF_CONTROLLERS, PATH_FILE, PROGRAM, mutated, mutated_archive
 
-SEEDS = seeds(200)
+SEEDS = seeds(100)
 SMALL = "G21 G90\nF1200\nG1 X1 Y0.5\nX2\nM2\n"
 # More memory [bytes] than a command of small files has any use for.
 GROWTH = 1 << 29

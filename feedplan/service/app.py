@@ -338,7 +338,7 @@ def _add_knowledge(app: FastAPI, service: Service) -> None:
         response_model=answers.MachineInfo,
         tags=tags,
         summary="What a machine file says, with other limits where these are given",
-        responses=openapi.problems(422),
+        responses=openapi.problems(400, 422),
         openapi_extra=openapi.MACHINE,
     )
     def understood(asked: MachineRequest) -> dict[str, Any]:

@@ -78,6 +78,12 @@ def test_the_page_has_everything_and_loads_nothing(server: Server) -> None:
         assert address in text
 
 
+def test_a_body_that_is_no_text_is_answered_as_documented(server: Server) -> None:
+    for address in ("/v1/machines", "/v1/jobs"):
+        answer = server.send("POST", address, b"e\xedg\x07\x80", {"Content-Type": "application/json"})
+        assert answer.status in (400, 422)
+
+
 def test_the_options_are_those_that_a_plan_takes() -> None:
     kept_here = {"reading", "progress", "elsewhere"}
     of_reading = set(Reading.__annotations__) - {"tool_table", "subprograms", "max_moves"}

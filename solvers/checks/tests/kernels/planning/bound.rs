@@ -121,7 +121,7 @@ fn whole_pieces<const M: usize>(profile: &Profile, case: &Case<M>) -> Profile {
 
 #[test]
 fn the_bound_is_never_above_the_time_and_near_it() {
-    let found = gaps(seeds(30_000), true);
+    let found = gaps(seeds(10_000), true);
     println!(
         "gaps from {:.1e}, {:.1e} in the middle, 9 of 10 below {:.1e}, all below {:.1e}",
         found.least, found.shares[0], found.shares[1], found.shares[2]
