@@ -41,8 +41,10 @@ class ToolPath:
         self._problem, self._motion = problem, motion
         self._linear = [self._axes.index(name) for name in "XYZ" if name in self._axes]
         columns = [column for column, name in enumerate(problem.path.axes) if name in ("X", "Y", "Z")]
-        low = problem.path.curve.control_points[:, columns]
-        extent = float(np.linalg.norm(np.ptp(low, axis=0))) if low.size else 0.0
+        # Column by column: many points are not copied.
+        control = problem.path.curve.control_points
+        sides = [np.ptp(control[:, column]) for column in columns if len(control)]
+        extent = float(np.linalg.norm(sides))
         extent = extent if extent > 0 else 1.0
         cut = problem.feed[np.isfinite(problem.path.feed)]
         top = float((cut if len(cut) else problem.feed).max(initial=0.0)) or 1.0
