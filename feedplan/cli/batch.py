@@ -15,17 +15,22 @@ import click
 from feedplan import outputs, planners
 from feedplan.cli import terminal
 from feedplan.cli.cluster_options import cluster_options
+from feedplan.cli.ending import BROKEN, DONE
 from feedplan.cli.options import (
     ACCURACY,
     FEED,
     FEED_OVERRIDE,
     JSON,
+    MOST_SETPOINTS,
+    NO_SETPOINTS,
     PATH,
+    PERIOD,
     QUIET,
     TIME_LIMIT_HELP,
     ZERO_OR_MORE,
     Number,
     given_only,
+    require_one_or_formats,
 )
 from feedplan.cli.reading_options import reading_options
 from feedplan.errors import InputError
@@ -33,13 +38,11 @@ from feedplan.geometry.corners import FollowedPath
 from feedplan.jobs.address import ClusterAddress
 from feedplan.program.read import Reading, checked_reading
 from feedplan.program.tools import read_tools
-from feedplan.setpoints import MAX_SETPOINTS
 from feedplan.units import counted, duration_text
 
 if TYPE_CHECKING:
     from feedplan.jobs.place import Place
 
-DONE, FAILED = 0, 1
 # What a method is by the name of the option that gives it, where it is swept.
 _SWEPT = "may be given several times"
 
@@ -79,20 +82,13 @@ _SWEPT = "may be given several times"
 @PATH
 @FEED
 @FEED_OVERRIDE
-@click.option("--period", type=Number(), metavar="S", help="Servo period in place of the machine's.")
-@click.option(
-    "--max-setpoints",
-    type=click.IntRange(min=1),
-    default=MAX_SETPOINTS,
-    show_default=True,
-    metavar="N",
-    help="A plan of more setpoints is refused.",
-)
+@PERIOD
+@MOST_SETPOINTS
 @click.option("--output", "-o", required=True, metavar="DIR", help="A folder for each plan is made there.")
 @click.option(
     "--format",
     "formats",
-    type=click.Choice([*(name for name in outputs.formats() if name != "pvt"), "none"]),
+    type=click.Choice([*(name for name in outputs.formats() if name != "pvt"), NO_SETPOINTS]),
     multiple=True,
     help=f"Format of the setpoints, npz by default; {_SWEPT}. none: reports without them.",
 )
@@ -160,8 +156,7 @@ def batch(
 
     if cluster is not None and jobs is not None:
         raise click.UsageError("--jobs is for processes of this computer: leave it or --cluster out")
-    if "none" in formats and len(formats) > 1:
-        raise click.UsageError("--format none excludes other formats: leave one of them out")
+    require_one_or_formats(formats)
     table, folders = reading.pop("tool_table", None), reading.pop("subprograms", ())
     if table is not None:
         read_tools(FilePath(table))
@@ -177,7 +172,7 @@ def batch(
             **given_only(feed=feed, period=period, accuracy=accuracy, time_limit=time_limit),
         },
         checked_reading(reading),
-        () if "none" in formats else formats or ("npz",),
+        () if NO_SETPOINTS in formats else formats or ("npz",),
         None if table is None else FilePath(table).absolute(),
         tuple(FilePath(folder).absolute() for folder in folders),
     )
@@ -201,7 +196,7 @@ def batch(
             print(f"{counted(len(rows), 'plan')} in {duration_text(summary['seconds'])}{before}")
             for file in files:
                 print(file)
-    return FAILED if any(row["error"] is not None or not row["ok"] for row in rows) else DONE
+    return BROKEN if any(row["error"] is not None or not row["ok"] for row in rows) else DONE
 
 
 def _require_formats(formats: tuple[str, ...]) -> None:

@@ -17,6 +17,7 @@ from feedplan.cli.options import (
     JSON,
     MACHINE,
     PATH,
+    PERIOD,
     PROGRAM,
     QUIET,
     TIME_LIMIT_HELP,
@@ -45,7 +46,7 @@ from feedplan.units import duration_text
 @TOLERANCE
 @PATH
 @FEED
-@click.option("--period", type=Number(), metavar="S", help="Servo period in place of the machine's.")
+@PERIOD
 @click.option("--output", "-o", metavar="DIR", help="Write comparison.json and comparison.html there.")
 @JSON
 @QUIET

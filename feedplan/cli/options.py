@@ -11,6 +11,7 @@ import click
 
 from feedplan import planners
 from feedplan.geometry.corners import PATHS
+from feedplan.setpoints import MAX_SETPOINTS
 
 if TYPE_CHECKING:
     NumberType = click.ParamType[float]
@@ -70,10 +71,21 @@ WHOLE_LIMIT_HELP = (
     "fitting, a first plan, the audit and the files are never left out, 0 ends after them; what is left "
     "improves the plan and its bound."
 )
+PERIOD = click.option("--period", type=Number(), metavar="S", help="Servo period in place of the machine's.")
+MOST_SETPOINTS = click.option(
+    "--max-setpoints",
+    type=click.IntRange(min=1),
+    default=MAX_SETPOINTS,
+    show_default=True,
+    metavar="N",
+    help="A plan of more setpoints is refused.",
+)
 JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 QUIET = click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
 PROGRAM = click.argument("program", callback=lambda context, parameter, given: _source(given))
 ZERO_OR_MORE = Number(or_zero=True)
+# In place of a format: no setpoints are written.
+NO_SETPOINTS = "none"
 
 
 def _source(given: str) -> str | IO[bytes]:
@@ -90,6 +102,12 @@ def with_options(command: Callable[..., Any], options: Sequence[Callable[..., An
     for option in reversed(options):
         command = option(command)
     return command
+
+
+def require_one_or_formats(formats: Sequence[str]) -> None:
+    """Raises a UsageError where formats of setpoints are asked for beside none."""
+    if NO_SETPOINTS in formats and len(formats) > 1:
+        raise click.UsageError(f"--format {NO_SETPOINTS} excludes other formats: leave one of them out")
 
 
 def name_of(program: str | IO[bytes]) -> str:

@@ -22,7 +22,10 @@ from feedplan.cli.options import (
     JSON,
     MACHINE,
     METHOD,
+    MOST_SETPOINTS,
+    NO_SETPOINTS,
     PATH,
+    PERIOD,
     PROGRAM,
     QUIET,
     TOLERANCE,
@@ -30,6 +33,7 @@ from feedplan.cli.options import (
     ZERO_OR_MORE,
     Number,
     given_only,
+    require_one_or_formats,
 )
 from feedplan.cli.program_options import ProgramWanted, program_options
 from feedplan.cli.reading_options import machine_for, reading_options
@@ -37,9 +41,7 @@ from feedplan.cli.serve import TOKEN_FILE
 from feedplan.geometry.corners import FollowedPath
 from feedplan.jobs.address import ClusterAddress
 from feedplan.program.read import Reading
-from feedplan.setpoints import INTERPOLATORS, MAX_SETPOINTS, Interpolator
-
-_NO_SETPOINTS = "none"
+from feedplan.setpoints import INTERPOLATORS, Interpolator
 
 
 @click.command()
@@ -54,16 +56,9 @@ _NO_SETPOINTS = "none"
 @PATH
 @FEED
 @FEED_OVERRIDE
-@click.option("--period", type=Number(), metavar="S", help="Servo period in place of the machine's.")
+@PERIOD
 @click.option("--interpolator", type=click.Choice(INTERPOLATORS), default="sarfraz", show_default=True)
-@click.option(
-    "--max-setpoints",
-    type=click.IntRange(min=1),
-    default=MAX_SETPOINTS,
-    show_default=True,
-    metavar="N",
-    help="A plan of more setpoints is refused.",
-)
+@MOST_SETPOINTS
 @click.option("--start-speed", type=ZERO_OR_MORE, default=0.0, metavar="MM/S", help="Speed at the start.")
 @click.option("--end-speed", type=ZERO_OR_MORE, default=0.0, metavar="MM/S", help="Speed at the end.")
 @click.option("--one-step-more", is_flag=True, help="Plan again with each limit raised, and tell the gain.")
@@ -71,7 +66,7 @@ _NO_SETPOINTS = "none"
 @click.option(
     "--format",
     "formats",
-    type=click.Choice((*outputs.formats(), _NO_SETPOINTS)),
+    type=click.Choice((*outputs.formats(), NO_SETPOINTS)),
     multiple=True,
     help="Format of the setpoints, npz by default; may be given several times. none: a report without them.",
 )
@@ -123,8 +118,7 @@ def plan(
 
     if formats and not output:
         raise click.UsageError("--format needs a folder to write to: give -o DIR as well")
-    if _NO_SETPOINTS in formats and len(formats) > 1:
-        raise click.UsageError(f"--format {_NO_SETPOINTS} excludes other formats: leave one of them out")
+    require_one_or_formats(formats)
     if server and (one_step_more or step is not None or wanted.file is not None or wanted.in_folder):
         raise click.UsageError(
             "a service gives no program with planned feeds, no pvt table and nothing of --one-step-more: "
@@ -171,7 +165,7 @@ def plan(
             files = write(
                 result,
                 output,
-                () if _NO_SETPOINTS in formats else formats or ("npz",),
+                () if NO_SETPOINTS in formats else formats or ("npz",),
                 progress=progress,
                 **here,
             )
