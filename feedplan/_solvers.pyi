@@ -47,7 +47,6 @@ __all__ = [
     "lower_bound",
     "path_segments",
     "plan_bang_bang",
-    "plan_curves",
     "plan_jerk_limited",
     "plan_s_curve",
     "profile_of_sections",
@@ -83,7 +82,6 @@ _Changes = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.uint32]]
 _Progress = Callable[[float], None]
 
 def plan_bang_bang(problem: Problem, progress: _Progress | None = None) -> _Profile: ...
-def plan_curves(problem: Problem) -> _Profile: ...
 def plan_jerk_limited(
     problem: Problem | Part,
     jerk: NDArray[np.float64],

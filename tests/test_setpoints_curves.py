@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import quad
 
-from feedplan._solvers import plan_curves
+from feedplan._solvers import plan_bang_bang
 from feedplan.constraints.problem import Problem, TipSpeed
 from feedplan.curves.arc import circle
 from feedplan.curves.composite import CompositeCurve
@@ -73,7 +73,7 @@ def profile_of(*arcs: tuple[int, ArcKind, int, float, float, float, float, float
 
 def planned(problem: Problem) -> SpeedProfile:
     """The fastest profile from rest to rest."""
-    return SpeedProfile(*plan_curves(problem))
+    return SpeedProfile(*plan_bang_bang(problem))
 
 
 def random_problem(seed: int, degree: int | None = None, rational: bool = True) -> Problem:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from feedplan._solvers import plan_curves
+from feedplan._solvers import plan_bang_bang
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Path
@@ -61,7 +61,7 @@ def problem_along(
 
 def planned(problem: Problem) -> SpeedProfile:
     """The exact profile on pieces of any degree."""
-    return SpeedProfile(*plan_curves(problem))
+    return SpeedProfile(*plan_bang_bang(problem))
 
 
 def places_at(problem: Problem, profile: SpeedProfile, t: Array) -> tuple[NDArray[np.int64], Array, Array]:

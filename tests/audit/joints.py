@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from feedplan._solvers import plan_curves
+from feedplan._solvers import plan_bang_bang
 from feedplan.constraints.problem import Cut, Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.machine.joint_interpolants import joint_interpolants
@@ -53,7 +53,7 @@ def joint_problem(machine: Machine, names: str, curve: CompositeCurve, **changes
 
 def planned_joints(problem: Problem) -> SpeedProfile:
     """The exact profile of the joints' limits alone."""
-    return SpeedProfile(*plan_curves(problem))
+    return SpeedProfile(*plan_bang_bang(problem))
 
 
 def steady(problem: Problem, p: float) -> SpeedProfile:

@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from benchmarks.named import butterfly, butterfly_nurbs, lemniscate, trefoil
-from feedplan._solvers import PlanError, plan_bang_bang, plan_curves
+from feedplan._solvers import PlanError, plan_bang_bang
 from feedplan.constraints.problem import Problem
 from feedplan.curves.arc import circle
 from feedplan.curves.composite import CompositeCurve, insert_knot
@@ -60,7 +60,7 @@ class Planned:
         self.velocity = np.broadcast_to(np.asarray(velocity, float), axes).copy()
         self.acceleration = np.broadcast_to(np.asarray(acceleration, float), axes).copy()
         self.problem = problem_of(curve, self.velocity, self.acceleration, feed)
-        self.profile = SpeedProfile(*plan_curves(self.problem))
+        self.profile = SpeedProfile(*plan_bang_bang(self.problem))
         self.time = self.profile.time
 
 
@@ -151,12 +151,12 @@ def test_a_path_that_is_none_is_refused(runs: list[int], weight: float, words: s
     object.__setattr__(curve, "weights", np.array([1.0, weight, 1.0]))
     problem = problem_of(curve, np.ones(1), np.ones(1), 1.0)
     with pytest.raises(PlanError) as caught:
-        plan_curves(replace(problem, path=replace(problem.path, runs=np.array(runs))))
+        plan_bang_bang(replace(problem, path=replace(problem.path, runs=np.array(runs))))
     assert words in caught.value.args[3]
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_quadratics_among_other_pieces_are_planned_by_their_own_planner(seed: int) -> None:
+def test_quadratics_among_pieces_of_elevated_degree_take_the_same_time(seed: int) -> None:
     rng = np.random.default_rng(seed)
     # A C1 quadratic spline, every piece as it is, or every other one elevated.
     points = np.cumsum(rng.normal(size=(40, 3)), axis=0)
@@ -189,7 +189,7 @@ def test_a_flying_lap_of_a_circle_by_hand() -> None:
     problem = problem_of(curve, np.full(2, 1e9), np.full(2, a), 1e9)
     speed = float(np.sqrt(a * r))
     flying = replace(problem, start_speed=speed, end_speed=speed)
-    time = SpeedProfile(*plan_curves(flying)).time
+    time = SpeedProfile(*plan_bang_bang(flying)).time
     assert time == pytest.approx(8 * np.sqrt((2 - np.sqrt(2)) * r / a), rel=1e-12)
 
 

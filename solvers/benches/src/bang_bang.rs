@@ -5,7 +5,8 @@ use std::time::Duration;
 use criterion::{criterion_group, BenchmarkId, Criterion, Throughput};
 use feedplan_geometry::quadratic::{norm, sub, Quadratic};
 use feedplan_geometry::watch::Watch;
-use feedplan_planner::bang_bang_quadratic::{plan, Problem};
+use feedplan_planner::problem::Problem;
+use feedplan_planner::Exact as _;
 
 /// A random number generator that is the same everywhere (splitmix64).
 struct Random(u64);
@@ -56,18 +57,26 @@ fn cam_path(count: usize, seed: u64) -> Vec<Quadratic<3>> {
 }
 
 fn problem<'a>(
-    pieces: &'a [Quadratic<3>],
+    control: &'a [[f64; 3]],
+    offset: &'a [usize],
+    width: &'a [f64],
     runs: &'a [usize],
     feed: &'a [f64],
     junction: &'a [f64],
 ) -> Problem<'a, 3> {
     Problem {
-        pieces,
+        control,
+        weight: &[],
+        offset,
+        width,
+        tip: None,
+        way: None,
+        feed_share: &[],
         runs,
         feed,
         junction_speed: junction,
-        max_velocity: [250.0; 3],
-        max_acceleration: [3000.0, 3000.0, 1000.0],
+        max_velocity: [[250.0; 3]; 2],
+        max_acceleration: [[3000.0, 3000.0, 1000.0]; 2],
         chord_tolerance: 0.01,
         period: 0.001,
         start_speed: 0.0,
@@ -86,8 +95,11 @@ fn pieces(criterion: &mut Criterion) {
             let (runs, feed, junction) = ([0, count], vec![feed; count], vec![f64::INFINITY; count + 1]);
             group.throughput(Throughput::Elements(count as u64));
             group.bench_with_input(BenchmarkId::new(name, count), &count, |bencher, _| {
-                let problem = problem(&path, &runs, &feed, &junction);
-                pool.install(|| bencher.iter(|| plan(&problem).expect("a profile")));
+                let control: Vec<_> = path.iter().flat_map(|piece| piece.control).collect();
+                let width: Vec<_> = path.iter().map(|piece| piece.width).collect();
+                let offset: Vec<_> = (0..=count).map(|i| 3 * i).collect();
+                let problem = problem(&control, &offset, &width, &runs, &feed, &junction);
+                pool.install(|| bencher.iter(|| problem.fastest().expect("a profile")));
             });
         }
     }

@@ -1,6 +1,6 @@
 //! What a profile does to the limits, from the control points and the columns alone.
 
-use feedplan_planner::bang_bang_quadratic::Profile;
+use feedplan_planner::profile::Profile;
 
 use super::cases::Case;
 
@@ -114,10 +114,8 @@ pub fn audit<const M: usize>(case: &Case<M>, profile: &Profile, samples: usize) 
                 let limit = if radius > delta { 2.0 * radius * delta - delta * delta } else { delta * delta };
                 let ratio = v_sq / (speed * speed * limit);
                 worst.chord = worst.chord.max(ratio - 1.0 - grain);
-                // The planner takes ρ_min of a stretch in which ρ at most doubles for ρ in one factor.
-                let least = (0.5 * radius).max(delta).min(511.0 * delta);
-                let lowest = (1.0 - delta / (2.0 * least)) / (1.0 - delta / (2.0 * radius.max(delta)));
-                if ratio > lowest - 1e-9 {
+                // The planner keeps to a straight line that lies below the limit by up to this part.
+                if ratio > 1.0 - 2e-3 {
                     nearest = 0.0;
                 }
             }
@@ -212,7 +210,15 @@ impl<'a, const M: usize> ArcLaw<'a, M> {
             1 => (self.profile.p0[row], 0.0),
             2 => (value / d, -value * e / (d * d)),
             3 => (value / (g[k] * g[k]), -value * c[k] / (g[k] * g[k] * g[k])),
-            _ => (value * d.sqrt(), 0.5 * value * e / d.sqrt()),
+            _ => {
+                let profile = self.profile;
+                let (u0, u1) = (profile.u0[row], profile.u1[row]);
+                let speed_sq = |u: f64, p: f64| self.tangent(u).iter().map(|x| x * x).sum::<f64>() * p;
+                let (start, end) = (speed_sq(u0, profile.p0[row]), speed_sq(u1, profile.p1[row]));
+                let slope = (end - start) / (u1 - u0);
+                let p = (start + slope * (u - u0)) / d;
+                (p, (0.5 * slope - e * p) / d)
+            }
         };
         let acceleration = match self.profile.kind[row] {
             2 => std::array::from_fn(|k| {

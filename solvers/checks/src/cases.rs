@@ -1,8 +1,11 @@
 //! Random planning problems: paths as CAM systems write them, and paths made to break a planner.
 
 use feedplan_geometry::quadratic::Quadratic;
-use feedplan_geometry::watch::Watch;
-use feedplan_planner::bang_bang_quadratic::{plan, Fault, Problem, Profile};
+use feedplan_planner::problem::Fault;
+use feedplan_planner::profile::Profile;
+use feedplan_planner::Exact as _;
+
+use super::elevated::Elevated;
 
 /// A random number generator that is the same everywhere (splitmix64).
 pub struct Random(pub u64);
@@ -94,19 +97,16 @@ impl<const M: usize> Case<M> {
     }
 
     pub fn plan(&self) -> Result<Profile, Fault> {
-        plan(&Problem {
-            pieces: &self.pieces,
-            runs: &[0, self.pieces.len()],
-            feed: &self.feed,
-            junction_speed: &self.junction,
-            max_velocity: self.velocity,
-            max_acceleration: self.acceleration,
-            chord_tolerance: self.chord_tolerance,
-            period: self.period,
-            start_speed: self.start_speed,
-            end_speed: self.end_speed,
-            watch: Watch::default(),
-        })
+        self.plan_elevated(0)
+    }
+
+    /// The plan of its pieces as those of a higher degree.
+    pub fn plan_elevated(&self, elevate: usize) -> Result<Profile, Fault> {
+        if M <= 3 {
+            Elevated::<3>::new(self, elevate).problem(self).fastest()
+        } else {
+            Elevated::<6>::new(self, elevate).problem(self).fastest()
+        }
     }
 
     pub fn time(&self) -> f64 {

@@ -1,8 +1,9 @@
 //! Random problems on curves of any degree, polynomial and rational, most of them made to break a planner.
 
 use feedplan_geometry::watch::Watch;
-use feedplan_planner::bang_bang::{plan, plan_each, Problem};
-use feedplan_planner::bang_bang_quadratic::{Fault, Profile};
+use feedplan_planner::problem::{Fault, Problem};
+use feedplan_planner::profile::Profile;
+use feedplan_planner::Exact as _;
 
 use super::cases::Random;
 use super::{padded, PADDED};
@@ -32,7 +33,8 @@ impl<const M: usize> CurveCase<M> {
         Self { pieces, feed, junction, velocity, acceleration }
     }
 
-    fn planned(&self, by: impl Fn(&Problem<PADDED>) -> Result<Profile, Fault>) -> Result<Profile, Fault> {
+    /// The fastest profile.
+    pub fn plan(&self) -> Result<Profile, Fault> {
         let points = self.pieces.iter().flat_map(|piece| &piece.points);
         let control: Vec<[f64; PADDED]> = points.map(|point| padded(point, 0.0)).collect();
         let weight: Vec<f64> = self.pieces.iter().flat_map(|piece| piece.weights.clone()).collect();
@@ -41,7 +43,7 @@ impl<const M: usize> CurveCase<M> {
         for piece in &self.pieces {
             offset.push(offset[offset.len() - 1] + piece.points.len());
         }
-        by(&Problem {
+        let problem = Problem {
             control: &control,
             weight: if weight.iter().all(|&w| w == 1.0) { &[] } else { &weight },
             offset: &offset,
@@ -59,17 +61,8 @@ impl<const M: usize> CurveCase<M> {
             start_speed: 0.0,
             end_speed: 0.0,
             watch: Watch::default(),
-        })
-    }
-
-    /// By the planner for pieces of any degree alone.
-    pub fn plan(&self) -> Result<Profile, Fault> {
-        self.planned(plan)
-    }
-
-    /// Quadratics by their own planner.
-    pub fn plan_each(&self) -> Result<Profile, Fault> {
-        self.planned(plan_each)
+        };
+        problem.fastest()
     }
 
     /// The path travelled the other way.

@@ -1,20 +1,20 @@
-//! A case of quadratic pieces for the planner of curves, and for the bound: as it is, or with its degree elevated.
+//! A case of quadratic pieces as the planner takes it: as it is, or with its degree elevated.
 
 use feedplan_geometry::watch::Watch;
-use feedplan_planner::bang_bang::Problem;
+use feedplan_planner::problem::Problem;
 
 use super::cases::Case;
-use super::{padded, PADDED};
+use super::padded;
 
-/// The arrays of such a problem.
-pub struct Elevated {
-    control: Vec<[f64; PADDED]>,
+/// The arrays of such a problem in P axes, of which those beyond the case's own rest.
+pub struct Elevated<const P: usize> {
+    control: Vec<[f64; P]>,
     offset: Vec<usize>,
     width: Vec<f64>,
     runs: [usize; 2],
 }
 
-impl Elevated {
+impl<const P: usize> Elevated<P> {
     /// The pieces of a case, of degree 2 and so much more.
     pub fn new<const M: usize>(case: &Case<M>, elevate: usize) -> Self {
         let mut control = vec![];
@@ -39,7 +39,7 @@ impl Elevated {
     }
 
     /// The problem of the case.
-    pub fn problem<'a, const M: usize>(&'a self, case: &'a Case<M>) -> Problem<'a, PADDED> {
+    pub fn problem<'a, const M: usize>(&'a self, case: &'a Case<M>) -> Problem<'a, P> {
         Problem {
             control: &self.control,
             weight: &[],

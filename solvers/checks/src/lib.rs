@@ -40,13 +40,12 @@ macro_rules! for_axes {
 /// As many axes as cases for the kernels of curves have.
 pub const FEW_AXES: [usize; 3] = [1, 2, 3];
 
-/// So many the kernels of curves see, as from Python: each number that they are compiled for costs the compiler a
-/// minute.
+/// So many the kernels are compiled for, as from Python.
 pub const PADDED: usize = 3;
 
 /// The values of all axes, and another one for those that stand still.
-pub fn padded<const M: usize>(values: &[f64; M], still: f64) -> [f64; PADDED] {
-    const { assert!(M <= PADDED) };
+pub fn padded<const M: usize, const P: usize>(values: &[f64; M], still: f64) -> [f64; P] {
+    assert!(M <= P, "{M} axes in {P}");
     std::array::from_fn(|k| values.get(k).copied().unwrap_or(still))
 }
 

@@ -21,8 +21,7 @@ use feedplan_geometry::spline::bezier::{self, derivatives};
 use feedplan_geometry::spline::cusps::CUSP;
 use feedplan_geometry::spline::rational::Hodograph;
 use feedplan_geometry::spline::Piece;
-use feedplan_planner::bang_bang::Problem;
-use feedplan_planner::planning::{self, Both};
+use feedplan_planner::problem::{self, Both, Problem};
 
 /// What the quadrature of a panel may be off, as a part of its length …
 const QUADRATURE: f64 = 1e-12;
@@ -449,7 +448,7 @@ impl<'a, const M: usize> ByLength<'a, M> {
                 let mut speed = self.corner(i);
                 for place in [&before, &after] {
                     speed = speed
-                        .min(planning::along(&problem.max_velocity, &place.first))
+                        .min(problem::along(&problem.max_velocity, &place.first))
                         .min(place.speed_cap)
                         .min(turning_speed(place, &problem.max_acceleration));
                 }
@@ -459,8 +458,8 @@ impl<'a, const M: usize> ByLength<'a, M> {
                     let room = problem
                         .max_acceleration
                         .map(|most| std::array::from_fn(|k| most[k] + second[k].abs() * speed * speed));
-                    changes[0] = changes[0].min(planning::along(&room, first));
-                    changes[1] = changes[1].min(planning::along(&room, &first.map(|first| -first)));
+                    changes[0] = changes[0].min(problem::along(&room, first));
+                    changes[1] = changes[1].min(problem::along(&room, &first.map(|first| -first)));
                 }
                 let acceleration = changes[0].max(changes[1]);
                 let change = std::array::from_fn(|k| if smooth { 0.0 } else { jump(k) });

@@ -5,7 +5,7 @@ use feedplan_geometry::polynomial::Polynomial;
 use feedplan_geometry::spline::bezier::split;
 use feedplan_geometry::spline::rational::Hodograph;
 use feedplan_geometry::spline::{CompositeCurve, Piece};
-use feedplan_planner::bang_bang::Problem;
+use feedplan_planner::problem::Problem;
 
 /// A bound of the share is above the greatest one that is seen by this part at most …
 const ACCURACY: f64 = 1e-3;

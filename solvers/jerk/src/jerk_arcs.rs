@@ -10,8 +10,7 @@ use crate::jerk_limited::{Geometry, Profile};
 use crate::s_curve::Section;
 use feedplan_geometry::arc_length::{W, X};
 use feedplan_planner::arc_kind::ArcKind;
-use feedplan_planner::bang_bang::Problem;
-use feedplan_planner::planning::{greater, lesser};
+use feedplan_planner::problem::{greater, lesser, Problem};
 
 const PATH_JERK: u8 = ArcKind::PathJerk as u8;
 pub const SPEED_CUBIC: u8 = ArcKind::SpeedCubic as u8;

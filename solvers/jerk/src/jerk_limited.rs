@@ -35,7 +35,7 @@ mod windows;
 use std::time::Instant;
 
 use feedplan_geometry::watch::Watch;
-use feedplan_planner::planning::Both;
+use feedplan_planner::problem::Both;
 
 pub use bound::{certify, Certificate};
 pub use profile::Profile;

@@ -13,9 +13,7 @@ use crate::jerk_arcs::{Arcs, SPEED_CUBIC};
 use crate::jerk_limited::{self, Effort, End, Geometry, Limits, Profile};
 use crate::s_curve;
 use crate::stretches::{checked, over_stretches, stretches, Stretch};
-use feedplan_planner::bang_bang::Problem;
-use feedplan_planner::bang_bang_quadratic::Fault;
-use feedplan_planner::planning::along;
+use feedplan_planner::problem::{along, Fault, Problem};
 
 /// A joint holds the speed where the plan is within this part of its cap.
 const HELD: f64 = 0.998;

@@ -12,7 +12,7 @@ pub mod s_curve_path;
 pub mod stretches;
 
 use feedplan_geometry::instances;
-use feedplan_planner::bang_bang_quadratic::Fault;
+use feedplan_planner::problem::Fault;
 
 use jerk_arcs::Arcs;
 use jerk_limited::Effort;
@@ -21,7 +21,7 @@ use s_curve_path::{Cutting, Segmented};
 
 instances! {
     /// Plans of a problem within `jerk` [mm/s³] of every axis.
-    pub trait JerkLimited for [3, 6, 9] feedplan_planner::bang_bang::Problem<'_, M> = {
+    pub trait JerkLimited for [3, 6, 9] feedplan_planner::problem::Problem<'_, M> = {
         /// The fastest profile that the effort finds.
         fn jerk_limited(&self, jerk: &[f64; M], effort: &Effort) -> Result<Arcs, Fault>
             = jerk_limited_path::plan;

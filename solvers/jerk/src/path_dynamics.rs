@@ -26,8 +26,7 @@ mod interval;
 mod shape;
 
 use crate::s_curve::Limits;
-use feedplan_planner::bang_bang_quadratic::Fault;
-use feedplan_planner::planning::{greater, Both};
+use feedplan_planner::problem::{greater, Both, Fault};
 pub use shape::{bounded, sampled, Curve, Shape};
 
 /// Golden-section steps: the bracket shrinks to 1e-5 of itself; the minimum is flat.

@@ -40,7 +40,7 @@ use std::collections::VecDeque;
 
 use buffer::Buffer;
 use feedplan_geometry::watch::Watch;
-use feedplan_planner::bang_bang_quadratic::Fault;
+use feedplan_planner::problem::Fault;
 pub use section::{Section, SectionKind};
 pub use segment::Segment;
 pub use transition::Limits;

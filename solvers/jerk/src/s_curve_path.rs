@@ -18,9 +18,7 @@ use crate::stretches::{checked, over_stretches, stretches, Stretch, CREEP, MOMEN
 use feedplan_geometry::spline::bezier::split;
 use feedplan_geometry::spline::CompositeCurve;
 use feedplan_geometry::watch::Watch;
-use feedplan_planner::bang_bang::Problem;
-use feedplan_planner::bang_bang_quadratic::Fault;
-use feedplan_planner::planning::greater;
+use feedplan_planner::problem::{greater, Fault, Problem};
 
 /// Bounds of derivatives are greater than these by this part.
 const ACCURACY: f64 = 0.05;

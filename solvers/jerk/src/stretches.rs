@@ -11,9 +11,7 @@ use feedplan_geometry::spline::bezier::derivatives;
 use feedplan_geometry::spline::cusps::{piece_cusps, CUSP};
 use feedplan_geometry::spline::rational::Hodograph;
 use feedplan_geometry::watch::Watch;
-use feedplan_planner::bang_bang::{check_pieces, Problem};
-use feedplan_planner::bang_bang_quadratic::Fault;
-use feedplan_planner::planning;
+use feedplan_planner::problem::{lesser, Fault, Problem};
 
 /// Cusps closer to the end of a piece than this part of it are at the end.
 const AT_END: f64 = 1e-9;
@@ -83,8 +81,7 @@ pub fn over_stretches<const M: usize>(
 
 /// The limits of the axes, every number of the problem checked once.
 pub fn checked<const M: usize>(problem: &Problem<M>, jerk: &[f64; M]) -> Result<Limits<M>, Fault> {
-    planning::Limits::of(problem).check(problem.width.len())?;
-    check_pieces(problem)?;
+    problem.check()?;
     for (axis, &limit) in jerk.iter().enumerate() {
         if !(limit > 0.0 && limit.is_finite()) {
             let what = format!("the jerk limit of axis {axis} is {limit} mm/s³: give a positive number");
@@ -260,7 +257,7 @@ fn chord_kinks<const M: usize>(problem: &Problem<M>, i: usize) -> Vec<f64> {
 /// tool would creep, a rest takes no longer that setpoints could tell.
 fn turn_speed<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> f64 {
     let place = place(problem, i, u);
-    let [velocity, acceleration] = [&problem.max_velocity, &problem.max_acceleration].map(planning::lesser);
+    let [velocity, acceleration] = [&problem.max_velocity, &problem.max_acceleration].map(lesser);
     let of_axis = |k: usize| {
         let gained = (acceleration[k] * problem.period).min(MOMENT * velocity[k]);
         (acceleration[k] / place.second[k].abs()).sqrt() / gained

@@ -38,9 +38,8 @@ mod time;
 
 use rayon::prelude::*;
 
-use crate::bang_bang::{check_pieces, Problem};
-use crate::bang_bang_quadratic::Fault;
-use crate::planning::{greater, groups, Both, ChordLimit, Limits};
+use crate::problem::{greater, Both, ChordLimit, Fault, Problem};
+use crate::runs::groups;
 use cells::Cells;
 use feedplan_geometry::quadratic::norm;
 
@@ -96,9 +95,7 @@ struct Task<'a, const M: usize> {
 
 /// A lower bound in s on the time of every profile that keeps the problem's limits.
 pub fn lower_bound<const M: usize>(problem: &Problem<M>, hint: &Hint) -> Result<f64, Fault> {
-    let limits = Limits::of(problem);
-    limits.check(problem.width.len())?;
-    check_pieces(problem)?;
+    problem.check()?;
     let arcs = hint.piece.len();
     if hint.axis.len() != arcs
         || hint.u1.len() != arcs

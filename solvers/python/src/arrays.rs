@@ -61,24 +61,6 @@ fn padded<const M: usize>(values: &[f64], rest: f64) -> [f64; M] {
     std::array::from_fn(|k| values.get(k).copied().unwrap_or(rest))
 }
 
-/// Control points (3 n, m) and widths (n,) of quadratic pieces in M ≥ m axes; the axes beyond m rest at 0.
-pub fn quadratics<const M: usize>(
-    control: &PyReadonlyArray2<f64>,
-    width: &PyReadonlyArray1<f64>,
-) -> PyResult<Vec<Quadratic<M>>> {
-    let flat = control.as_slice().map_err(|_| contiguous())?;
-    let width = width.as_slice().map_err(|_| contiguous())?;
-    let axes = control.shape()[1];
-    Ok(flat
-        .chunks_exact(3 * axes)
-        .zip(width)
-        .map(|(c, &width)| Quadratic {
-            control: std::array::from_fn(|i| padded(&c[i * axes..(i + 1) * axes], 0.0)),
-            width,
-        })
-        .collect())
-}
-
 /// The first `axes` columns of rows to an (n, axes) array.
 pub fn to_array2<'py, T: numpy::Element + Copy, const M: usize>(
     py: Python<'py>,

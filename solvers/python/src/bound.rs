@@ -7,8 +7,8 @@ use super::plan::to_exception;
 use super::problem::{ProblemArrays, ProblemRows};
 use super::with_padded_axes;
 use super::work::run;
-use feedplan_planner::bang_bang::Problem;
 use feedplan_planner::bound::Hint;
+use feedplan_planner::problem::Problem;
 use feedplan_planner::Exact as _;
 
 /// `feedplan.profile.SpeedProfile`.

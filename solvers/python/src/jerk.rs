@@ -17,8 +17,8 @@ use feedplan_jerk::jerk_limited_path;
 use feedplan_jerk::s_curve::{Section, SectionKind, Segment};
 use feedplan_jerk::s_curve_path::Cutting;
 use feedplan_jerk::JerkLimited as _;
-use feedplan_planner::bang_bang::Problem;
-use feedplan_planner::bang_bang_quadratic::NO_AXIS;
+use feedplan_planner::problem::Problem;
+use feedplan_planner::profile::NO_AXIS;
 
 /// The accelerations at both ends of the arcs, and `kinked`.
 type Changes<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u32>>);

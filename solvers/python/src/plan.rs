@@ -4,16 +4,16 @@ use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::arrays::{indices, quadratics, row, rows};
+use super::arrays::{indices, rows};
 use super::problem::{ProblemArrays, ProblemRows};
 use super::with_padded_axes;
 use super::work::run;
 use feedplan_geometry::watch::Watch;
 use feedplan_jerk::JerkLimited as _;
-use feedplan_planner::bang_bang;
-use feedplan_planner::bang_bang_quadratic::{self, Fault, Profile};
 use feedplan_planner::look_ahead::{Change, Segments};
-use feedplan_planner::{Exact as _, ExactQuadratic as _};
+use feedplan_planner::problem::{Fault, Problem};
+use feedplan_planner::profile::Profile;
+use feedplan_planner::Exact as _;
 
 pyo3::create_exception!(
     _solvers,
@@ -37,13 +37,6 @@ pub type Columns<'py> = (
     Bound<'py, PyArray1<u32>>,
 );
 
-/// Which planner takes the runs of polynomial quadratics.
-#[derive(Clone, Copy)]
-enum Quadratics {
-    Their,
-    General,
-}
-
 /// The fastest profile: piece, kind, axis, value, u0, u1, p0, p1, duration, runs, slowed.
 #[pyfunction]
 #[pyo3(signature = (problem, progress=None))]
@@ -52,70 +45,11 @@ fn plan_bang_bang<'py>(
     problem: ProblemArrays<'py>,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Columns<'py>> {
-    plan(py, &problem, Quadratics::Their, progress.as_ref())
-}
-
-/// The same by the planner for pieces of any degree alone.
-#[pyfunction]
-fn plan_curves<'py>(py: Python<'py>, problem: ProblemArrays<'py>) -> PyResult<Columns<'py>> {
-    plan(py, &problem, Quadratics::General, None)
-}
-
-fn plan<'py>(
-    py: Python<'py>,
-    arrays: &ProblemArrays<'py>,
-    by: Quadratics,
-    progress: Option<&Bound<'py, PyAny>>,
-) -> PyResult<Columns<'py>> {
-    let curve = &arrays.curve;
-    if matches!(by, Quadratics::Their)
-        && arrays.tip_speed.is_none()
-        && arrays.feed_share.is_none()
-        && !arrays.is_sided()
-        && curve.is_quadratic()
-    {
-        return plan_quadratics(py, arrays, progress);
-    }
-    with_padded_axes!(curve.axes(), M, {
-        let rows = ProblemRows::<M>::new(arrays)?;
+    with_padded_axes!(problem.curve.axes(), M, {
+        let rows = ProblemRows::<M>::new(&problem)?;
         let problem = rows.problem()?;
-        let plan = |watch: Watch| {
-            let problem = bang_bang::Problem { watch, ..problem };
-            match by {
-                Quadratics::Their => problem.fastest(),
-                Quadratics::General => problem.fastest_as_curves(),
-            }
-        };
-        let profile = run(py, progress, plan)?.map_err(|fault| to_exception(&fault))?;
-        Ok(to_columns(py, profile))
-    })
-}
-
-/// A path of polynomial quadratics alone, without a detour.
-fn plan_quadratics<'py>(
-    py: Python<'py>,
-    arrays: &ProblemArrays<'py>,
-    progress: Option<&Bound<'py, PyAny>>,
-) -> PyResult<Columns<'py>> {
-    let curve = &arrays.curve;
-    let runs = indices(&arrays.path.runs);
-    with_padded_axes!(curve.axes(), M, {
-        let pieces = quadratics::<M>(&curve.control_points, &curve.width)?;
-        let problem = bang_bang_quadratic::Problem {
-            pieces: &pieces,
-            runs: &runs,
-            feed: arrays.feed.as_slice()?,
-            junction_speed: arrays.junction_speed.as_slice()?,
-            max_velocity: row(&arrays.max_velocity, 1.0)?,
-            max_acceleration: row(&arrays.max_acceleration, 1.0)?,
-            chord_tolerance: arrays.chord_tolerance,
-            period: arrays.period,
-            start_speed: arrays.start_speed,
-            end_speed: arrays.end_speed,
-            watch: Watch::default(),
-        };
-        let plan = |watch: Watch| bang_bang_quadratic::Problem { watch, ..problem }.fastest();
-        let profile = run(py, progress, plan)?.map_err(|fault| to_exception(&fault))?;
+        let plan = |watch: Watch| Problem { watch, ..problem }.fastest();
+        let profile = run(py, progress.as_ref(), plan)?.map_err(|fault| to_exception(&fault))?;
         Ok(to_columns(py, profile))
     })
 }
@@ -200,7 +134,6 @@ fn look_ahead<'py>(
 /// Adds the function and its exception to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("PlanError", module.py().get_type::<PlanError>())?;
-    module.add_function(wrap_pyfunction!(plan_curves, module)?)?;
     module.add_function(wrap_pyfunction!(feed_between, module)?)?;
     module.add_function(wrap_pyfunction!(look_ahead, module)?)?;
     module.add_function(wrap_pyfunction!(plan_bang_bang, module)?)

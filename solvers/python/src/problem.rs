@@ -1,22 +1,11 @@
 //! The package's own problem as the kernels take it.
 
-use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 use super::arrays::{indices, row, rows, rows_with, CurveArrays};
 use feedplan_geometry::watch::Watch;
-use feedplan_planner::bang_bang::{Problem, SpeedSquare, Tip, TIP_AXES};
-use feedplan_planner::planning::Both;
-
-impl CurveArrays<'_> {
-    /// Whether all pieces are polynomials of degree 2.
-    pub fn is_quadratic(&self) -> bool {
-        let rises = |pair: (&i64, usize)| *pair.0 == 3 * pair.1 as i64;
-        self.weights.is_none()
-            && self.control_points.shape()[0] == 3 * self.width.len()
-            && self.offsets.as_array().iter().zip(0..).all(rises)
-    }
-}
+use feedplan_planner::problem::{Both, Problem, SpeedSquare, Tip, TIP_AXES};
 
 /// `feedplan.constraints.problem.TipSpeed`.
 #[derive(FromPyObject)]
@@ -50,16 +39,6 @@ pub struct ProblemArrays<'py> {
     pub period: f64,
     pub start_speed: f64,
     pub end_speed: f64,
-}
-
-impl ProblemArrays<'_> {
-    /// Whether a limit is another one in the other direction.
-    pub fn is_sided(&self) -> bool {
-        let sided = |most: &PyReadonlyArray1<f64>, least: &PyReadonlyArray1<f64>| {
-            most.as_array().iter().zip(least.as_array()).any(|(most, least)| *most != -least)
-        };
-        sided(&self.max_velocity, &self.min_velocity) || sided(&self.max_acceleration, &self.min_acceleration)
-    }
 }
 
 /// Limits of the axes as sizes, those at rest 1.

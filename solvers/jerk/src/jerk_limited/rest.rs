@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::{Geometry, Limits, Place, SpeedCap};
-use feedplan_planner::planning::lesser;
+use feedplan_planner::problem::lesser;
 
 /// Ramps are this part of the length on which constant jerk reaches the acceleration or the speed …
 const RAMP: f64 = 1.0 / 90.0;

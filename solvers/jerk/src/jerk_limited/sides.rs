@@ -1,7 +1,7 @@
 //! Limits of what is positive and of what is negative: one factor scales a value of either sign, and it stays smooth where
 //! the sign changes.
 
-use feedplan_planner::planning::Both;
+use feedplan_planner::problem::Both;
 
 /// Limits of each axis for values in parts of the mean of both.
 #[derive(Clone, Copy, Debug)]

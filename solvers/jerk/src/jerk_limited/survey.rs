@@ -4,7 +4,7 @@
 use super::interior_point::Bound;
 use super::{rest, Fault, Geometry, Limits, Place, SpeedCap};
 use feedplan_geometry::watch::Watch;
-use feedplan_planner::planning::{greater, lesser, Both};
+use feedplan_planner::problem::{greater, lesser, Both};
 
 /// Parts of the limits that the caps of the envelope leave to a plan through them.
 const SPEED: f64 = 0.9;

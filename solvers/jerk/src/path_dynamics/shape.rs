@@ -8,7 +8,7 @@
 use super::chain::{Shared, Terms};
 use super::interval::{Interval, Number};
 use feedplan_geometry::polynomial::Polynomial;
-use feedplan_planner::planning::{greater, Both};
+use feedplan_planner::problem::{greater, Both};
 
 /// Most coefficients: N of a rational segment of degree 9 has degree 46.
 const MOST: usize = 48;

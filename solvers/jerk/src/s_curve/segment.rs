@@ -1,7 +1,7 @@
 //! A segment: a stretch of path with its limits along the path, and the checks of its numbers.
 
 use super::transition::Limits;
-use feedplan_planner::bang_bang_quadratic::Fault;
+use feedplan_planner::problem::Fault;
 
 /// Lengths and limits lie in this range, so that no product of three of them leaves the floating-point numbers.
 const LEAST: f64 = 1e-12;

@@ -3,8 +3,7 @@
 //! ρ = |g|³/(|g × g'| ω²) is no polynomial. A part is halved until a straight line below the limit gives away less than
 //! a set part of it; how far the line must lie below is four times what is seen at places between its ends.
 
-use super::piece::Piece;
-use crate::planning::ChordLimit;
+use crate::problem::ChordLimit;
 
 /// Part of the limit that may be given away.
 const GIVEN_AWAY: f64 = 2e-4;
@@ -21,27 +20,33 @@ pub struct SpeedLine {
     pub speed_sq: [f64; 2],
 }
 
+impl SpeedLine {
+    /// v² at t, also beyond the ends.
+    pub fn at(&self, t: f64) -> f64 {
+        let [f0, f1] = self.speed_sq;
+        if f0 == f1 {
+            return f0;
+        }
+        f0 + (f1 - f0) * ((t - self.from) / (self.to - self.from))
+    }
+}
+
 impl ChordLimit {
-    /// Appends the greatest v² over the piece, at most `feed_sq`.
-    pub fn lines<const M: usize, const C: usize>(
-        &self,
-        piece: &Piece<M, C>,
-        feed_sq: f64,
-        out: &mut Vec<SpeedLine>,
-    ) {
-        self.halve(piece, feed_sq, (0.0, 1.0), 0, out);
+    /// Appends the greatest v² over a piece, at most `feed_sq`; `radius` is ρ at t, infinite where the path is straight.
+    pub fn lines(&self, radius: &impl Fn(f64) -> f64, feed_sq: f64, out: &mut Vec<SpeedLine>) {
+        self.halve(radius, feed_sq, (0.0, 1.0), 0, out);
     }
 
-    fn halve<const M: usize, const C: usize>(
+    fn halve(
         &self,
-        piece: &Piece<M, C>,
+        radius_at: &impl Fn(f64) -> f64,
         feed_sq: f64,
         (from, to): (f64, f64),
         depth: u32,
         out: &mut Vec<SpeedLine>,
     ) {
         let place = |i: usize| from + (to - from) * (i as f64 / (PLACES - 1) as f64);
-        let radius: [f64; PLACES] = std::array::from_fn(|i| radius(piece, place(i)));
+        let radius: [f64; PLACES] = std::array::from_fn(|i| radius_at(place(i)));
         let limit = radius.map(|radius| self.speed_sq(radius));
         let binds = |i: usize| limit[i] < 1.01 * feed_sq && limit[i] < 1.01 * self.acceleration * radius[i];
         if depth >= 2 && !(0..PLACES).any(binds) {
@@ -62,8 +67,8 @@ impl ChordLimit {
             return;
         }
         let middle = 0.5 * (from + to);
-        self.halve(piece, feed_sq, (from, middle), depth + 1, out);
-        self.halve(piece, feed_sq, (middle, to), depth + 1, out);
+        self.halve(radius_at, feed_sq, (from, middle), depth + 1, out);
+        self.halve(radius_at, feed_sq, (middle, to), depth + 1, out);
     }
 
     /// The greatest v² where the radius of curvature is ρ.
@@ -75,19 +80,4 @@ impl ChordLimit {
             self.slow_sq
         }
     }
-}
-
-/// ρ at t; infinite where the path is straight.
-fn radius<const M: usize, const C: usize>(piece: &Piece<M, C>, t: f64) -> f64 {
-    let g: [f64; M] = std::array::from_fn(|k| piece.g[k].value(t));
-    let c: [f64; M] = std::array::from_fn(|k| piece.g[k].derivative().value(t));
-    let weight = piece.weight.value(t);
-    let mut twist = 0.0_f64;
-    for j in 0..M {
-        for k in 0..j {
-            twist = twist.hypot(g[j] * c[k] - g[k] * c[j]);
-        }
-    }
-    let square: f64 = g.iter().map(|g| g * g).sum();
-    square * square.sqrt() / (twist * weight * weight)
 }

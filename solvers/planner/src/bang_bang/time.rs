@@ -1,33 +1,15 @@
 //! The time along the tool's speed cap: length over speed, by quadrature.
 
-use super::part::SubPiece;
-use feedplan_geometry::quadratic::norm;
-
 /// Places of the rule.
-const NODES: usize = 6;
-/// Halvings for one arc; some twenty are usual.
+pub const NODES: usize = 6;
+/// Halvings for one phase; some twenty are usual.
 const MOST_HALVINGS: u32 = 1000;
 
-/// ∫ √D/(ω² √f) dx from x0 to x1: length over speed, by Gauss's rule of order 12, halved where it does not agree.
-pub fn time_at_speed<const M: usize, const C: usize>(
-    sub: &SubPiece<M, C>,
-    (f0, f1): (f64, f64),
-    x0: f64,
-    x1: f64,
-) -> f64 {
-    let rate = |x: [f64; NODES]| {
-        let weight = sub.weight.values(x);
-        // Next to a cusp the sum of squares has lost the digits that the tangents still have.
-        let speed = if sub.own_speed {
-            let g = sub.g.each_ref().map(|g| g.values(x));
-            std::array::from_fn(|i| norm(&g.map(|g| g[i])))
-        } else {
-            sub.speed.values(x).map(|speed| speed.max(0.0).sqrt())
-        };
-        std::array::from_fn(|i| speed[i] / ((f0 + x[i] * (f1 - f0)).sqrt() * weight[i] * weight[i]))
-    };
-    let whole = rule(&rate, x0, x1);
-    gauss(&rate, (x0, x1), whole, 1e-14 * whole, &mut { MOST_HALVINGS })
+/// ∫ rate dx from x0 to x1, by Gauss's rule of order 12, halved where it does not agree. `rate` gives length over speed
+/// at several places.
+pub fn integral(rate: &impl Fn([f64; NODES]) -> [f64; NODES], x0: f64, x1: f64) -> f64 {
+    let whole = rule(rate, x0, x1);
+    gauss(rate, (x0, x1), whole, 1e-14 * whole, &mut { MOST_HALVINGS })
 }
 
 /// To an error that does not shrink with the stretches, and in no more than so many halvings: where the rate is rounding

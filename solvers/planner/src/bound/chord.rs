@@ -2,7 +2,7 @@
 
 use super::hodograph::{Hodograph, Node};
 use super::{DOWN, UP};
-use crate::planning::ChordLimit;
+use crate::problem::ChordLimit;
 use feedplan_geometry::polynomial::Polynomial;
 
 /// g' and g of degree 16 give a polynomial of degree 30.

@@ -4,7 +4,7 @@ use super::hodograph::{binomial, Hodograph, Node, Ways};
 use super::length::root_integral;
 use super::time::least_time;
 use super::{Task, DOWN, UP};
-use crate::bang_bang::TIP_AXES;
+use crate::problem::TIP_AXES;
 
 /// The zero of an axis's tangent is sought within this part of a piece.
 const NEAR_TURN: f64 = 1e-7;

@@ -3,17 +3,18 @@
 
 use rayon::prelude::*;
 
-use feedplan_checks::{audit, random_case, seeds, Case, Elevated, Random, FEW_AXES};
+use feedplan_checks::{audit, random_case, seeds, Case, Elevated, Random, FEW_AXES, PADDED};
 use feedplan_geometry::quadratic::Quadratic;
-use feedplan_planner::bang_bang_quadratic::Profile;
-use feedplan_planner::bound::{lower_bound, Hint};
+use feedplan_planner::bound::Hint;
+use feedplan_planner::profile::Profile;
+use feedplan_planner::Exact as _;
 
 fn hint(profile: &Profile) -> Hint<'_> {
     Hint { piece: &profile.piece, axis: &profile.axis, u1: &profile.u1, duration: &profile.duration }
 }
 
 fn bound<const M: usize>(case: &Case<M>, profile: &Profile) -> f64 {
-    lower_bound(&Elevated::new(case, 0).problem(case), &hint(profile)).expect("a bound")
+    Elevated::<PADDED>::new(case, 0).problem(case).lower_bound(&hint(profile)).expect("a bound")
 }
 
 #[test]

@@ -3,17 +3,76 @@
 //! However the piece is parametrised, even with a cusp C' = 0 at an end, the motion is the textbook trapezoid. Only
 //! where the tangent reverses does it stop.
 
-use super::piece::Straight;
-use super::profile::{Profile, Row, NO_AXIS};
-use super::subpiece::Axes;
+use super::quadratic::{Axes, Piece};
 use crate::arc_kind::ArcKind;
+use crate::profile::{Profile, Row, NO_AXIS};
+use feedplan_geometry::quadratic::norm;
 
 /// A shorter part of the length, or of v², than this is rounding.
 const NO_PART: f64 = 1e-15;
 
+/// A straight piece: C' = direction · r(t), r linear; where r changes sign the motion turns back.
+pub struct Line {
+    /// |r| at t = 0 and t = 1
+    pub rate: [f64; 2],
+    /// Where the motion turns back, if it does.
+    pub turn: Option<f64>,
+    /// Greatest acceleration along the line and the axis that sets it.
+    pub acceleration: f64,
+    pub axis: usize,
+    /// Sign of that axis's tangent before and after the turn.
+    pub sign: [f64; 2],
+    /// Square of the greatest speed, and the axis that sets it, None for the feed.
+    pub speed_sq: f64,
+    pub speed_axis: Option<usize>,
+    /// Square of that axis's velocity limit.
+    pub axis_speed_sq: f64,
+}
+
+impl Line {
+    #[inline(always)]
+    /// The piece under this feed, None if it is curved.
+    pub fn of<const M: usize>(piece: &Piece<M>, axes: &Axes<M>, feed: f64) -> Option<Self> {
+        if !piece.is_straight(feed, axes.least) {
+            return None;
+        }
+        let turns = piece.speed[1] < 0.0;
+        let (left, right) = (&piece.left, &piece.right);
+        // The difference of the ends is the direction after the turn, their sum the common direction without one.
+        let sum: [f64; M] =
+            std::array::from_fn(|k| if turns { right[k] - left[k] } else { right[k] + left[k] });
+        let length = norm(&sum);
+        let mut slowest = (0.0, 0);
+        let (mut speed_sq, mut speed_axis) = (feed * feed, None);
+        for k in 0..M {
+            let component = sum[k].abs() / length;
+            let need = component * axes.inverse[k];
+            if need > slowest.0 {
+                slowest = (need, k);
+            }
+            if component * component * speed_sq > axes.velocity_sq[k] {
+                speed_sq = axes.velocity_sq[k] / (component * component);
+                speed_axis = Some(k);
+            }
+        }
+        let rate = [piece.speed[0].sqrt(), piece.speed[2].sqrt()];
+        let sign = if sum[slowest.1] < 0.0 { -1.0 } else { 1.0 };
+        Some(Self {
+            rate,
+            turn: turns.then(|| rate[0] / (rate[0] + rate[1])),
+            acceleration: 1.0 / slowest.0,
+            axis: slowest.1,
+            sign: [if turns { -sign } else { sign }, sign],
+            speed_sq,
+            speed_axis,
+            axis_speed_sq: speed_axis.map_or(0.0, |k| axes.velocity_sq[k]),
+        })
+    }
+}
+
 /// Backward: the greatest v² at the start from which `speed_sq` at the end can be met.
 #[inline(always)]
-pub fn backward(line: &Straight, speed_sq: f64) -> f64 {
+pub fn backward(line: &Line, speed_sq: f64) -> f64 {
     let over = |length: f64, speed_sq: f64| line.speed_sq.min(speed_sq + 2.0 * line.acceleration * length);
     match line.turn {
         None => over(0.5 * (line.rate[0] + line.rate[1]), speed_sq),
@@ -25,7 +84,7 @@ pub fn backward(line: &Straight, speed_sq: f64) -> f64 {
 /// `start_sq` is at most what `backward` gave for `end_sq`.
 #[inline(always)]
 pub fn forward<const M: usize>(
-    line: &Straight,
+    line: &Line,
     axes: &Axes<M>,
     (start_sq, end_sq): (f64, f64),
     (number, width): (u32, f64),
@@ -48,7 +107,7 @@ pub fn forward<const M: usize>(
 
 /// A part of a straight piece on which the motion does not turn back.
 struct Stretch<'a> {
-    line: &'a Straight,
+    line: &'a Line,
     t: [f64; 2],
     /// t[1] − t[0], with all its digits
     span: f64,

@@ -4,8 +4,8 @@
 //! and the backward pass sees the path reversed; both passes are then the same computation. Symbols:
 //! g = |q'|, c = g' = dg/dx (constant), p = (dx/dt)², s = p'/2, D = |g|², a_k = g_k s + c_k p.
 
-use super::curve::{Curve, Denominator};
 use super::piece::Piece;
+use super::quotient::{Denominator, Quotient};
 use feedplan_geometry::quadratic::dot;
 
 /// An axis whose tangent is below this part of the others', each measured by its acceleration limit, is as good as
@@ -25,6 +25,16 @@ pub struct Axes<const M: usize> {
 }
 
 impl<const M: usize> Axes<M> {
+    /// From the limits of acceleration and velocity, the same in both directions.
+    pub fn new(acceleration: [f64; M], velocity: [f64; M]) -> Self {
+        Self {
+            acceleration,
+            inverse: acceleration.map(|a| 1.0 / a),
+            least: acceleration.iter().fold(f64::INFINITY, |least, &a| least.min(a)),
+            velocity_sq: velocity.map(|v| v * v),
+        }
+    }
+
     /// max g_k/A_k
     #[inline(always)]
     pub fn most_moved(&self, g: &[f64; M]) -> f64 {
@@ -44,12 +54,27 @@ impl<const M: usize> Axes<M> {
 /// The lowest velocity cap of a sub-piece.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cap {
-    /// D p ≤ speed², in mm²/s²
-    SpeedSq(f64),
+    /// D p is at most a speed squared [mm²/s²] that is linear in x between these values at the ends: the feed, or a bound
+    /// below the chord-error limit.
+    Speed([f64; 2]),
     /// g_k² p ≤ speed², in mm²/s²
-    AxisSq(u8, f64),
-    /// p ≤ factor · √D: the chord-error limit
-    Chord(f64),
+    Axis(usize, f64),
+}
+
+impl Cap {
+    /// Whether it is this cap of an axis; None stands for the speed.
+    pub fn goes_on(&self, axis: Option<Self>) -> bool {
+        axis.map_or(matches!(self, Self::Speed(_)), |cap| *self == cap)
+    }
+
+    /// As the opposite direction of travel sees it.
+    #[inline(always)]
+    pub fn reversed(self) -> Self {
+        match self {
+            Self::Speed([f0, f1]) => Self::Speed([f1, f0]),
+            cap => cap,
+        }
+    }
 }
 
 /// How a sub-piece lies on its piece.
@@ -142,12 +167,22 @@ impl<'a, const M: usize> SubPiece<'a, M> {
     #[inline(always)]
     pub fn cap_at(&self, x: f64) -> f64 {
         match self.cap {
-            Cap::SpeedSq(speed_sq) => speed_sq / self.speed_sq_at(x),
-            Cap::AxisSq(k, speed_sq) => {
-                let g = self.axis_tangent(k as usize, x);
+            Cap::Speed(_) => self.speed_sq_of_cap(x) / self.speed_sq_at(x),
+            Cap::Axis(k, speed_sq) => {
+                let g = self.axis_tangent(k, x);
                 speed_sq / (g * g)
             }
-            Cap::Chord(factor) => factor * self.speed_sq_at(x).sqrt(),
+        }
+    }
+
+    /// D p on the cap of the tool's speed.
+    #[inline(always)]
+    pub fn speed_sq_of_cap(&self, x: f64) -> f64 {
+        match self.cap {
+            Cap::Speed([f0, f1]) if f0 == f1 || x == 0.0 => f0,
+            Cap::Speed([_, f1]) if x == self.length => f1,
+            Cap::Speed([f0, f1]) => f0 + (f1 - f0) * (x / self.length),
+            Cap::Axis(..) => f64::INFINITY,
         }
     }
 
@@ -175,18 +210,17 @@ impl<'a, const M: usize> SubPiece<'a, M> {
 
     /// The velocity cap on [a, b].
     #[inline(always)]
-    pub fn cap_curve(&self, a: f64, b: f64) -> Curve {
+    pub fn cap_quotient(&self, a: f64, b: f64) -> Quotient {
         match self.cap {
-            Cap::SpeedSq(speed_sq) => {
-                Curve::Quotient { n: [speed_sq; 3], d: self.speed_form(a, b), tag: Denominator::SpeedSq }
+            Cap::Speed(_) => {
+                let (fa, fb) = (self.speed_sq_of_cap(a), self.speed_sq_of_cap(b));
+                let n = [fa, 0.5 * (fa + fb), fb];
+                Quotient { n, d: self.speed_form(a, b), denominator: Denominator::SpeedSq }
             }
-            Cap::AxisSq(k, speed_sq) => {
-                let (ga, gb) = (self.axis_tangent(k as usize, a), self.axis_tangent(k as usize, b));
+            Cap::Axis(k, speed_sq) => {
+                let (ga, gb) = (self.axis_tangent(k, a), self.axis_tangent(k, b));
                 let d = [ga * ga, ga * gb, gb * gb];
-                Curve::Quotient { n: [speed_sq; 3], d, tag: Denominator::AxisSq(k) }
-            }
-            Cap::Chord(factor) => {
-                Curve::Root { square: self.speed_form(a, b).map(|value| factor * factor * value) }
+                Quotient { n: [speed_sq; 3], d, denominator: Denominator::AxisSq(k) }
             }
         }
     }
@@ -195,9 +229,43 @@ impl<'a, const M: usize> SubPiece<'a, M> {
     #[inline(always)]
     pub fn lowest_cap(&self, at_a: f64, at_b: f64) -> f64 {
         match self.cap {
+            Cap::Speed([f0, f1]) if f0 != f1 => 0.0,
             // D and g_k² are convex, so that their reciprocals are lowest at an end.
-            Cap::SpeedSq(_) | Cap::AxisSq(..) => at_a.min(at_b),
-            Cap::Chord(_) => 0.0,
+            _ => at_a.min(at_b),
         }
+    }
+
+    /// Length of the sub-piece on [a, b].
+    ///
+    /// With r = |C'| at both ends, R = r₀ + r₁, E = |C''|, t = C'·C''/E, d² = r² − t², x = E h/R:
+    /// (h/R) [(R² + (t₀ + t₁)²)/4 + d² atanh(x)/x].
+    #[inline(always)]
+    pub fn way(&self, a: f64, b: f64) -> f64 {
+        let (ga, gb) = (self.tangent(a), self.tangent(b));
+        let [da, _, db] = self.speed_form(a, b);
+        // x = |gb − ga| / R with the difference taken as E h.
+        let h = b - a;
+        let bend_sq = dot(&self.bend, &self.bend);
+        let r = da.sqrt() + db.sqrt();
+        let x_sq = bend_sq * h * h / (r * r);
+        let (ta, tb) = (dot(&ga, &self.bend), dot(&gb, &self.bend));
+        let t_sq = (ta + tb) * (ta + tb) / bend_sq;
+        let distance_sq = (0.5 * ((da - ta * ta / bend_sq) + (db - tb * tb / bend_sq))).max(0.0);
+        h / r * (0.25 * (r * r + t_sq) + distance_sq * atanh_over(x_sq))
+    }
+}
+
+/// atanh(x)/x as a function of x².
+#[inline(always)]
+fn atanh_over(x_sq: f64) -> f64 {
+    if x_sq < 0.01 {
+        let odd = [1.0, 3.0, 5.0, 7.0, 9.0, 11.0, 13.0, 15.0];
+        odd.iter().rev().fold(0.0, |sum, n| sum * x_sq + 1.0 / n)
+    } else if x_sq < 1.0 {
+        let x = x_sq.sqrt();
+        0.5 * ((1.0 + x) / (1.0 - x)).ln() / x
+    } else {
+        // The tangent reverses: d² is 0 there.
+        0.0
     }
 }

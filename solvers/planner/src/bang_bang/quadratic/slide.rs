@@ -6,10 +6,10 @@
 //! |---|---|---|
 //! | speed v | v² L_k/D², L_k = Σ g_l W_kl (linear) | A_k D² − v² L_k ≥ 0, a quartic |
 //! | axis j at V | V² W_kj/g_j³ | g_j³ ≥ V² W_kj/A_k, a pure cubic |
-//! | chord error, p = f √D | N_k/√D, N_k = f (g_k E/2 + c_k D), E = g·c | A_k² D − N_k² ≥ 0 where N_k > 0 |
+//! | speed with v² = f linear | (f L_k + g_k D f'/2)/D² | A_k D² − f L_k − g_k D f'/2 ≥ 0, a quartic |
 
+use super::quotient::bernstein;
 use super::subpiece::{Axes, Cap, SubPiece};
-use crate::bernstein::{first_root, multiply, raise, sign_changes};
 use feedplan_geometry::quadratic::dot;
 
 /// The part of a cap that can be followed.
@@ -26,9 +26,9 @@ pub struct Slide {
 #[inline(always)]
 pub fn slide<const M: usize>(sub: &SubPiece<M>, axes: &Axes<M>, a: f64, b: f64, slack: f64) -> Slide {
     match sub.cap {
-        Cap::SpeedSq(speed_sq) => at_speed(sub, axes, a, b, speed_sq, slack),
-        Cap::AxisSq(j, speed_sq) => at_axis_speed(sub, axes, a, b, (j as usize, speed_sq), slack),
-        Cap::Chord(factor) => at_chord_limit(sub, axes, a, b, factor, slack),
+        Cap::Speed([f0, f1]) if f0 == f1 => at_speed(sub, axes, a, b, f0, slack),
+        Cap::Speed(_) => at_sloped_speed(sub, axes, a, b, slack),
+        Cap::Axis(j, speed_sq) => at_axis_speed(sub, axes, a, b, (j, speed_sq), slack),
     }
 }
 
@@ -55,12 +55,11 @@ fn at_speed<const M: usize>(
         if need_a.abs().max(need_b.abs()) <= axes.acceleration[k] * least * least {
             continue;
         }
-        let d_sq = multiply(&d, &d);
         let limit = axes.acceleration[k] * (1.0 + slack);
-        let need: [f64; 5] = std::array::from_fn(|i| need_a + (need_b - need_a) * (0.25 * i as f64));
-        let above: [f64; 5] = std::array::from_fn(|i| limit * d_sq[i] - need[i]);
-        found.low |= (0..5).any(|i| limit * d_sq[i] + need[i] < 0.0);
-        if let Some(t) = first_root(&above) {
+        let d_sq = bernstein(d).multiply(&bernstein(d));
+        let need = bernstein([need_a, need_b]);
+        found.low |= d_sq.combine(limit, &need, 1.0).coefficients().iter().any(|&value| value < 0.0);
+        if let Some(t) = d_sq.combine(limit, &need, -1.0).first_root() {
             stop_at(&mut found, a + (b - a) * t, k);
         }
     }
@@ -100,41 +99,21 @@ fn at_axis_speed<const M: usize>(
 }
 
 #[cold]
-fn at_chord_limit<const M: usize>(
-    sub: &SubPiece<M>,
-    axes: &Axes<M>,
-    a: f64,
-    b: f64,
-    factor: f64,
-    slack: f64,
-) -> Slide {
-    let c = &sub.bend;
+fn at_sloped_speed<const M: usize>(sub: &SubPiece<M>, axes: &Axes<M>, a: f64, b: f64, slack: f64) -> Slide {
+    let (ga, gb) = (sub.tangent(a), sub.tangent(b));
+    let (fa, fb) = (sub.speed_sq_of_cap(a), sub.speed_sq_of_cap(b));
+    let half_slope = 0.5 * (fb - fa) / (b - a);
+    let d = bernstein(sub.speed_form(a, b));
+    let d_sq = d.multiply(&d);
     let mut found = Slide { end: b, saturated: None, low: false };
     for k in 0..M {
+        let twist = sub.twists(k);
+        let turn = bernstein([dot(&ga, &twist), dot(&gb, &twist)]).multiply(&bernstein([fa, fb]));
+        let need = turn.combine(1.0, &d.multiply(&bernstein([ga[k], gb[k]])), half_slope);
         let limit = axes.acceleration[k] * (1.0 + slack);
-        let need = |from: f64, to: f64| -> [f64; 3] {
-            let (ga, gb, d) = (sub.tangent(from), sub.tangent(to), sub.speed_form(from, to));
-            let (ea, eb) = (dot(&ga, c), dot(&gb, c));
-            let g_e = [ga[k] * ea, 0.5 * (ga[k] * eb + gb[k] * ea), gb[k] * eb];
-            std::array::from_fn(|i| factor * (0.5 * g_e[i] + c[k] * d[i]))
-        };
-        // Squares lose the sign: each part has one sign of N_k.
-        let mut cuts = vec![a];
-        sign_changes(&need(a, b), &mut |t| cuts.push(a + (b - a) * t));
-        cuts.push(b);
-        for part in cuts.windows(2) {
-            let (from, to) = (part[0], part[1]);
-            let n = need(from, to);
-            let n_sq = multiply(&n, &n);
-            let d = raise(&sub.speed_form(from, to));
-            let inside: [f64; 5] = std::array::from_fn(|i| limit * limit * d[i] - n_sq[i]);
-            if let Some(t) = first_root(&inside) {
-                if n[0] + n[1] + n[2] > 0.0 {
-                    stop_at(&mut found, from + (to - from) * t, k);
-                    break;
-                }
-                found.low = true;
-            }
+        found.low |= d_sq.combine(limit, &need, 1.0).coefficients().iter().any(|&value| value < 0.0);
+        if let Some(t) = d_sq.combine(limit, &need, -1.0).first_root() {
+            stop_at(&mut found, a + (b - a) * t, k);
         }
     }
     found

@@ -3,7 +3,7 @@
 use super::{
     kept_until, Kind, Pass, Start, Stuck, AT_END, FLAT, MAX_HOPS, NEARLY_FLAT, NEARLY_ON_BOUND, NOISE, TIE,
 };
-use crate::bang_bang::window::Bound;
+use crate::bang_bang::curve::window::Bound;
 use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
 

@@ -1,14 +1,14 @@
-//! The arc of greatest acceleration from a point, up to the event that ends it.
+//! The phase of greatest acceleration from a point, up to the event that ends it.
 //!
 //! The axis j with the least s_k = (A_k − c_k p)/g_k is the control axis. While it accelerates at A_j, the
-//! acceleration of every other axis is linear in Y = (1 − (g_j0/g_j)³)/c_j, which grows along the arc:
+//! acceleration of every other axis is linear in Y = (1 − (g_j0/g_j)³)/c_j, which grows along the phase:
 //! a_l = a_l0 − W_jl s₀ Y. So each axis meets +A_l (a transition: it takes over control) or −A_l (the limit
-//! curve) at one Y, the earliest Y ends the arc, and one cube root gives its place.
+//! curve) at one Y, the earliest Y ends the phase, and one cube root gives its place.
 //!
 //! With s > 0 control only passes to axes of greater c/g, with s < 0 of smaller; W orders the axes for the whole
 //! sub-piece, so that at most M − 1 transitions follow one another and ties cannot loop.
 
-use super::arc::{along, Kind};
+use super::phase::{along, Kind};
 use super::subpiece::{Axes, SubPiece, NEAR_TURN};
 
 /// A_k − c_k p is zero below this part of A_k: the axis holds p where it is.
@@ -17,17 +17,17 @@ const FLAT: f64 = 8.0 * f64::EPSILON;
 /// take its time all the same.
 const TIE: f64 = 4.0 * f64::EPSILON;
 
-/// How an arc ends.
+/// How a phase ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
-    EndOfArc,
+    EndOfPhase,
     /// This axis takes over.
     Transition(usize),
     /// Another axis reaches −A: the velocity limit curve.
     LimitCurve,
 }
 
-/// An arc of greatest acceleration.
+/// A phase of greatest acceleration.
 pub struct Bang {
     pub kind: Kind,
     pub x1: f64,
@@ -35,8 +35,8 @@ pub struct Bang {
     pub event: Event,
 }
 
-/// The arc from (x, p). `control` is the axis that has just saturated, where one has; `limit_curve` says whether
-/// the arc ends there (forward, the bound below the limit curve is met before it).
+/// The phase from (x, p). `control` is the axis that has just saturated, where one has; `limit_curve` says whether
+/// the phase ends there (forward, the bound below the limit curve is met before it).
 #[inline(always)]
 pub fn bang<const M: usize>(
     sub: &SubPiece<M>,
@@ -57,8 +57,8 @@ pub fn bang<const M: usize>(
         }
     });
     if p > sub.flat * (1.0 - NEAR_TURN) {
-        if let Some(arc) = hold(sub, axes, x, p) {
-            return arc;
+        if let Some(phase) = hold(sub, axes, x, p) {
+            return phase;
         }
     }
     let mut j = 0;
@@ -72,17 +72,17 @@ pub fn bang<const M: usize>(
             j = axis;
         }
     }
-    // A tie passes control on without moving, at most M − 1 times; then the arc is taken as it is.
+    // A tie passes control on without moving, at most M − 1 times; then the phase is taken as it is.
     let mut ties = 0;
     loop {
         if s[j] == 0.0 {
             let kind = Kind::Flat(j as u8);
-            return Bang { kind, x1: sub.length, p1: p, event: Event::EndOfArc };
+            return Bang { kind, x1: sub.length, p1: p, event: Event::EndOfPhase };
         }
         let kind = Kind::Accelerating(j as u8);
         let twist = sub.twists(j);
         let mut first_y = f64::INFINITY;
-        let mut event = Event::EndOfArc;
+        let mut event = Event::EndOfPhase;
         for l in 0..M {
             let fall = twist[l] * s[j];
             if fall == 0.0 || (fall > 0.0 && !limit_curve) {
@@ -124,11 +124,11 @@ pub fn bang<const M: usize>(
             }
         }
         let p1 = along(sub, j, axes.acceleration[j], x, p, sub.length);
-        return Bang { kind, x1: sub.length, p1, event: Event::EndOfArc };
+        return Bang { kind, x1: sub.length, p1, event: Event::EndOfPhase };
     }
 }
 
-/// Holds p where an axis has just turned and p is a little below A_k/|c_k|: an arc begun there would take its s from
+/// Holds p where an axis has just turned and p is a little below A_k/|c_k|: a phase begun there would take its s from
 /// a difference without digits. It is begun when the axis has some speed; until then less than the part `NEAR_TURN`
 /// of p is given away, and soon regained.
 #[cold]
@@ -146,7 +146,7 @@ fn hold<const M: usize>(sub: &SubPiece<M>, axes: &Axes<M>, x: f64, p: f64) -> Op
         near.then(|| {
             let x1 = x + (enough - g[k]) / c;
             let x1 = if x1 < sub.length { x1 } else { sub.length };
-            Bang { kind: Kind::Flat(k as u8), x1, p1: p, event: Event::EndOfArc }
+            Bang { kind: Kind::Flat(k as u8), x1, p1: p, event: Event::EndOfPhase }
         })
     })
 }

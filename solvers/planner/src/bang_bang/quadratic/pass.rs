@@ -1,17 +1,14 @@
-//! One pass over one curved sub-piece, in the sense of travel: the greatest p that stays under a bound.
-//!
-//! For every λ in [0, 1] a feasible profile p scaled to λp stays feasible, so that the p from which the end can be
-//! reached are an interval [0, K(x)], and two greedy passes are exact. Backward, under the velocity cap and the
-//! limit curve, gives K; forward under K gives the fastest profile. Neither searches for switching points.
+//! One pass over one sub-piece, in the sense of travel: the greatest p that stays under a bound. Backward the bound is the
+//! velocity cap and the limit curve, forward it is K.
 
 use std::cell::OnceCell;
 
-use super::arc::{Arc, Kind};
 use super::bang::{bang, Event};
-use super::curve::Curve;
+use super::limit_curve::limit_curve;
+use super::phase::{Kind, Phase};
+use super::quotient::Quotient;
 use super::slide::slide;
 use super::subpiece::{Axes, SubPiece};
-use crate::limit_curve::limit_curve;
 
 /// p this close below a bound is on it.
 const ON_BOUND: f64 = 1e-13;
@@ -20,47 +17,47 @@ const ON_LIMIT_CURVE: f64 = 1e-10;
 /// Where a tangential contact is lost in rounding, the cap is followed with an acceleration too high by a part
 /// that grows from the first to the last of these until the contact is clear.
 const SLACK: [f64; 5] = [1e-14, 1e-13, 1e-12, 1e-11, 1e-10];
-/// An arc and its bound agree to this part where they cross.
+/// A phase and its bound agree to this part where they cross.
 const MET: f64 = 1e-12;
 /// More events than this on one sub-piece cannot be: at most M − 1 transitions lie between two slides, and a
 /// slide ends at one of few roots.
 const MAX_EVENTS: u32 = 300;
 
-/// A pass made no headway at this place. Never seen; reported rather than guessed around.
+/// A pass made no headway at this place; never seen.
 #[derive(Clone, Copy, Debug)]
 pub struct Stuck(pub f64);
 
-/// Backward over the reversed sub-piece from p: appends the arcs of K and returns K at the far end.
+/// Backward over the reversed sub-piece from p: appends the phases of K and returns K at the far end.
 #[inline(always)]
 pub fn backward<const M: usize>(
     sub: &SubPiece<M>,
     axes: &Axes<M>,
     mut p: f64,
-    out: &mut Vec<Arc>,
+    out: &mut Vec<Phase>,
 ) -> Result<f64, Stuck> {
     if p > sub.flat {
         p = p.min(axes.limit_at_turns(&sub.start, &sub.bend));
     }
     let cap =
-        [Arc { x0: 0.0, x1: sub.length, p0: sub.cap_at(0.0), p1: sub.cap_at(sub.length), kind: Kind::Cap }];
+        [Phase { x0: 0.0, x1: sub.length, p0: sub.cap_at(0.0), p1: sub.cap_at(sub.length), kind: Kind::Cap }];
     p = Pass::<M, true> { sub, axes, bounds: &cap, out, x: 0.0, p: p.min(cap[0].p0), line: OnceCell::new() }
         .run()?;
-    // The arc that led here stays as it is: forward, p begins below it.
+    // The phase that led here stays as it is: forward, p begins below it.
     if p > sub.flat {
         p = p.min(axes.limit_at_turns(&sub.end, &sub.bend));
     }
     Ok(p)
 }
 
-/// Forward over the sub-piece from p, under the arcs of K as the backward pass left them: appends the arcs of
+/// Forward over the sub-piece from p, under the phases of K as the backward pass left them: appends the phases of
 /// the profile and returns p at the far end.
 #[inline(always)]
 pub fn forward<const M: usize>(
     sub: &SubPiece<M>,
     axes: &Axes<M>,
     p: f64,
-    bounds: &[Arc],
-    out: &mut Vec<Arc>,
+    bounds: &[Phase],
+    out: &mut Vec<Phase>,
 ) -> Result<f64, Stuck> {
     Pass::<M, false> { sub, axes, bounds, out, x: 0.0, p, line: OnceCell::new() }.run()
 }
@@ -69,8 +66,8 @@ struct Pass<'a, const M: usize, const BACKWARD: bool> {
     sub: &'a SubPiece<'a, M>,
     axes: &'a Axes<M>,
     /// What p stays under. Forward: K, from the far end to the near one and reversed.
-    bounds: &'a [Arc],
-    out: &'a mut Vec<Arc>,
+    bounds: &'a [Phase],
+    out: &'a mut Vec<Phase>,
     x: f64,
     p: f64,
     /// The limit curve at both ends of the sub-piece, once it is needed.
@@ -84,7 +81,7 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
         let mut index = 0;
         let mut bound = self.bound(index);
         let mut on_limit_curve = BACKWARD && self.meets_falling_limit_curve();
-        // The axis that has just saturated, and the roots at x that the arc and the bound are known to share.
+        // The axis that has just saturated, and the roots at x that the phase and the bound are known to share.
         let mut control = None;
         let mut leaving = None;
         let mut slack = 0;
@@ -112,7 +109,7 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
             let mut contact = 0;
             if on_bound && leaving.is_none() {
                 match bound.kind {
-                    // Any other motion under an arc of K meets it again later.
+                    // Any other motion under a phase of K meets it again later.
                     Kind::Accelerating(_) | Kind::Braking(_) | Kind::Flat(_) => {
                         self.push(bound.x1, bound.p1, bound.kind);
                         control = None;
@@ -139,16 +136,16 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
                 }
             }
             let contact = leaving.take().unwrap_or(contact);
-            let arc = bang(self.sub, self.axes, self.x, self.p, control.take(), BACKWARD);
-            if arc.x1 > self.x {
-                let whole = Arc { x0: self.x, x1: arc.x1, p0: self.p, p1: arc.p1, kind: arc.kind };
+            let phase = bang(self.sub, self.axes, self.x, self.p, control.take(), BACKWARD);
+            if phase.x1 > self.x {
+                let whole = Phase { x0: self.x, x1: phase.x1, p0: self.p, p1: phase.p1, kind: phase.kind };
                 match self.crossing(&whole, index, contact) {
                     None => {
-                        self.push(arc.x1, arc.p1, arc.kind);
+                        self.push(phase.x1, phase.p1, phase.kind);
                         (slack, line_contact) = (0, 0);
                     }
                     Some((x, p)) if x > self.x => {
-                        self.push(x, p, arc.kind);
+                        self.push(x, p, phase.kind);
                         (slack, line_contact) = (0, 0);
                         continue;
                     }
@@ -166,8 +163,8 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
                     }
                 }
             }
-            match arc.event {
-                Event::EndOfArc => {}
+            match phase.event {
+                Event::EndOfPhase => {}
                 Event::Transition(axis) => control = Some(axis),
                 Event::LimitCurve => on_limit_curve = BACKWARD && self.x < length,
             }
@@ -177,7 +174,7 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
 
     /// The bound number `index` along the sub-piece; the last one beyond its end.
     #[inline(always)]
-    fn bound(&self, index: usize) -> Arc {
+    fn bound(&self, index: usize) -> Phase {
         if BACKWARD {
             self.bounds[0]
         } else {
@@ -187,17 +184,17 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
 
     #[inline(always)]
     fn push(&mut self, x1: f64, p1: f64, kind: Kind) {
-        self.out.push(Arc { x0: self.x, x1, p0: self.p, p1, kind });
+        self.out.push(Phase { x0: self.x, x1, p0: self.p, p1, kind });
         (self.x, self.p) = (x1, p1);
     }
 
     /// The end of the slide along the cap, the axis that ends it, and whether the limit curve ends it instead.
     #[inline(always)]
-    fn slide(&self, bound: &Arc, slack: f64, contact: u32) -> (f64, Option<usize>, bool) {
+    fn slide(&self, bound: &Phase, slack: f64, contact: usize) -> (f64, Option<usize>, bool) {
         let found = slide(self.sub, self.axes, self.x, bound.x1, slack);
         if BACKWARD && found.low && found.end > self.x {
             if let Some(line) = self.limit_curve() {
-                let cap = self.sub.cap_curve(self.x, found.end);
+                let cap = self.sub.cap_quotient(self.x, found.end);
                 let line = self.line_curve(line, self.x, found.end);
                 if let Some(t) = cap.rises_above(&line, contact) {
                     return (self.x + (found.end - self.x) * t, None, true);
@@ -207,36 +204,36 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
         (found.end, found.saturated, false)
     }
 
-    /// Where `arc` rises above the bounds from number `index` on, and the bound there.
+    /// Where `phase` rises above the bounds from number `index` on, and the bound there.
     #[inline(always)]
-    fn crossing(&self, arc: &Arc, mut index: usize, mut contact: u32) -> Option<(f64, f64)> {
+    fn crossing(&self, phase: &Phase, mut index: usize, mut contact: usize) -> Option<(f64, f64)> {
         let (sub, axes) = (self.sub, self.axes);
-        let (mut a, mut at_a) = (arc.x0, arc.p0);
+        let (mut a, mut at_a) = (phase.x0, phase.p0);
         loop {
             let bound = self.bound(index);
-            let b = bound.x1.min(arc.x1);
-            let (at_b, bound_b) = (arc.at(sub, axes, b), bound.at(sub, axes, b));
+            let b = bound.x1.min(phase.x1);
+            let (at_b, bound_b) = (phase.at(sub, axes, b), bound.at(sub, axes, b));
             let bound_a = bound.at(sub, axes, a);
-            // p is monotone on an arc.
+            // p is monotone on a phase.
             let lowest = match bound.kind {
                 Kind::Cap => sub.lowest_cap(bound_a, bound_b),
                 _ => bound_a.min(bound_b),
             };
             if at_a.max(at_b) > lowest {
-                let curve = arc.curve(sub, axes, (a, at_a), (b, at_b));
-                let limit = bound.curve(sub, axes, (a, bound_a), (b, bound_b));
+                let curve = phase.quotient(sub, axes, (a, at_a), (b, at_b));
+                let limit = bound.quotient(sub, axes, (a, bound_a), (b, bound_b));
                 if let Some(t) = curve.rises_above(&limit, contact) {
                     let x = a + (b - a) * t;
                     let limit = bound.at(sub, axes, x);
-                    if (arc.at(sub, axes, x) - limit).abs() <= MET * limit {
+                    if (phase.at(sub, axes, x) - limit).abs() <= MET * limit {
                         return Some((x, limit));
                     }
-                    if let Some(found) = self.search(arc, &bound, a, b) {
+                    if let Some(found) = self.search(phase, &bound, a, b) {
                         return Some(found);
                     }
                 }
             }
-            if b == arc.x1 {
+            if b == phase.x1 {
                 return None;
             }
             (a, at_a) = (b, at_b);
@@ -248,8 +245,8 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
     /// The same where the root has lost its digits, because an axis that hardly moves at a makes the curves too
     /// uneven for one polynomial: by doubling steps from a, then by halving.
     #[cold]
-    fn search(&self, arc: &Arc, bound: &Arc, a: f64, b: f64) -> Option<(f64, f64)> {
-        let above = |x: f64| arc.at(self.sub, self.axes, x) > bound.at(self.sub, self.axes, x);
+    fn search(&self, phase: &Phase, bound: &Phase, a: f64, b: f64) -> Option<(f64, f64)> {
+        let above = |x: f64| phase.at(self.sub, self.axes, x) > bound.at(self.sub, self.axes, x);
         let (mut below, mut step) = (a, (b - a) * f64::EPSILON);
         let mut beyond = (a + step).min(b);
         while !above(beyond) {
@@ -294,11 +291,11 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
 
     /// Follows the limit curve to the end of the sub-piece or to where the cap is lower; says whether it moved.
     #[cold]
-    fn follow_limit_curve(&mut self, cap: &Arc, contact: u32) -> bool {
+    fn follow_limit_curve(&mut self, cap: &Phase, contact: usize) -> bool {
         let Some(line) = self.limit_curve() else { return false };
         let length = self.sub.length;
         let curve = self.line_curve(line, self.x, length);
-        let crossing = curve.rises_above(&self.sub.cap_curve(self.x, length), contact);
+        let crossing = curve.rises_above(&self.sub.cap_quotient(self.x, length), contact);
         let Some(t) = crossing else {
             self.push(length, line[1], Kind::LimitCurve);
             return true;
@@ -322,7 +319,7 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
         })
     }
 
-    fn line_curve(&self, line: [f64; 2], a: f64, b: f64) -> Curve {
+    fn line_curve(&self, line: [f64; 2], a: f64, b: f64) -> Quotient {
         let at = |x: f64| {
             if x == self.sub.length {
                 line[1]
@@ -330,6 +327,6 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
                 line[0] + (line[1] - line[0]) * (x / self.sub.length)
             }
         };
-        Curve::line(at(a), at(b))
+        Quotient::line(at(a), at(b))
     }
 }

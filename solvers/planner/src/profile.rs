@@ -1,9 +1,5 @@
 //! The profile as columns, one row per arc, in the order of the path and in the parameter of its pieces.
 
-use super::arc::{Arc, Kind};
-use super::duration;
-use super::split::{Part, Placed};
-use super::subpiece::{Axes, Cap};
 use crate::arc_kind::ArcKind;
 
 /// No axis belongs to the arc.
@@ -72,6 +68,19 @@ impl Profile {
         self.duration.iter().sum()
     }
 
+    /// One profile of several, in the order of the path.
+    pub(crate) fn join(parts: Vec<Self>) -> Self {
+        let mut parts = parts.into_iter();
+        let mut all = parts.next().unwrap_or_default();
+        for part in parts {
+            let offset = all.len() as i64;
+            all.runs.extend(part.runs.iter().map(|start| start + offset));
+            all.append(part);
+        }
+        all.runs.push(all.len() as i64);
+        all
+    }
+
     /// Closes a run.
     pub(crate) fn end_run(&mut self) {
         let left_out = std::mem::take(&mut self.left_out);
@@ -95,7 +104,7 @@ impl Profile {
     }
 
     /// Appends the rows of another profile.
-    pub(crate) fn append(&mut self, mut other: Self) {
+    fn append(&mut self, mut other: Self) {
         self.piece.append(&mut other.piece);
         self.kind.append(&mut other.kind);
         self.axis.append(&mut other.axis);
@@ -125,12 +134,11 @@ impl Profile {
             }
             return;
         }
-        let value = if row.kind == ArcKind::Chord { row.value * scale * width } else { row.value };
         if row.joins
             && goes_on
             && self.kind[last] == row.kind as u8
             && self.axis[last] == row.axis
-            && self.value[last] == value
+            && self.value[last] == row.value
         {
             self.u1[last] = u1;
             self.p1[last] = p1;
@@ -140,65 +148,11 @@ impl Profile {
         self.piece.push(piece);
         self.kind.push(row.kind as u8);
         self.axis.push(row.axis);
-        self.value.push(value);
+        self.value.push(row.value);
         self.u0.push(u0);
         self.u1.push(u1);
         self.p0.push(p0);
         self.p1.push(p1);
         self.duration.push(duration);
-    }
-
-    /// Appends the arcs of the forward pass over one part of a curved piece.
-    #[inline(always)]
-    pub(super) fn push_arcs<const M: usize>(
-        &mut self,
-        number: u32,
-        width: f64,
-        part: &Part,
-        placed: &Placed<M>,
-        axes: &Axes<M>,
-        arcs: &[Arc],
-    ) {
-        let sub = &placed.sub;
-        for arc in arcs {
-            let t = |x: f64| if x == sub.length { placed.to } else { (placed.from + x).min(placed.to) };
-            let t = t(arc.x1);
-            let step = arc.x1 - arc.x0;
-            let mut joins = true;
-            // The control axis moves at constant acceleration: its way over its mean speed.
-            let mut by_axis = |k: u8| {
-                let (ga, gb) = (sub.axis_tangent(k as usize, arc.x0), sub.axis_tangent(k as usize, arc.x1));
-                // Not with what comes before its axis turns, not even where arcs too short to be kept lie in between.
-                joins = sub.axis_tangent(k as usize, 0.0) > 0.0;
-                step * (ga + gb) / (ga * arc.p0.sqrt() + gb * arc.p1.sqrt())
-            };
-            let signed = |k: u8| {
-                let a = axes.acceleration[k as usize];
-                if part.negative >> k & 1 == 1 {
-                    -a
-                } else {
-                    a
-                }
-            };
-            let (kind, axis, value, duration) = match arc.kind {
-                Kind::Accelerating(k) => (ArcKind::AxisAcceleration, k, signed(k), by_axis(k)),
-                Kind::Braking(k) => (ArcKind::AxisAcceleration, k, -signed(k), by_axis(k)),
-                Kind::Flat(k) => (ArcKind::ParameterAcceleration, k, 0.0, step / arc.p0.sqrt()),
-                // Followed only where it is level.
-                Kind::LimitCurve => (ArcKind::ParameterAcceleration, NO_AXIS, 0.0, step / arc.p0.sqrt()),
-                Kind::Cap => match part.cap {
-                    Cap::SpeedSq(speed_sq) => {
-                        let time = duration::length(sub, arc.x0, arc.x1) / speed_sq.sqrt();
-                        (ArcKind::Feed, NO_AXIS, speed_sq, time)
-                    }
-                    Cap::AxisSq(k, speed_sq) => (ArcKind::AxisVelocity, k, speed_sq, by_axis(k)),
-                    Cap::Chord(factor) => {
-                        let time = duration::at_chord_limit(sub, factor, arc.x0, arc.x1);
-                        (ArcKind::Chord, NO_AXIS, factor, time)
-                    }
-                },
-            };
-            self.push(number, width, Row { kind, axis, value, t, p: [arc.p0, arc.p1], duration, joins });
-        }
     }
 }

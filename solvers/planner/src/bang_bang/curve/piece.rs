@@ -87,6 +87,21 @@ impl<const M: usize, const C: usize> Piece<M, C> {
     pub fn feed_rate(&self) -> Option<Polynomial<C>> {
         self.share.map(|share| counted(&self.g, &share))
     }
+
+    /// The radius of curvature at t; infinite where the path is straight.
+    pub fn radius(&self, t: f64) -> f64 {
+        let g: [f64; M] = std::array::from_fn(|k| self.g[k].value(t));
+        let c: [f64; M] = std::array::from_fn(|k| self.g[k].derivative().value(t));
+        let weight = self.weight.value(t);
+        let mut twist = 0.0_f64;
+        for j in 0..M {
+            for k in 0..j {
+                twist = twist.hypot(g[j] * c[k] - g[k] * c[j]);
+            }
+        }
+        let square = dot(&g, &g);
+        square * square.sqrt() / (twist * weight * weight)
+    }
 }
 
 /// The sum of squares of tangents, each by its share.

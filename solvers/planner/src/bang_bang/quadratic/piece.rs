@@ -1,8 +1,8 @@
-//! One piece of the path, its parameter t running from 0 to 1: straight or curved.
+//! One piece of degree 1 or 2, its parameter t running from 0 to 1.
 
-use super::subpiece::Axes;
 use super::turns::difference_of_products;
-use feedplan_geometry::quadratic::{dot, norm, Quadratic};
+use crate::bang_bang::run::PieceEnd;
+use feedplan_geometry::quadratic::{dot, lerp, sub};
 
 /// Tangents whose cross product is below this part of the square of the longer one are parallel to rounding.
 const PARALLEL: f64 = 1e-15;
@@ -31,9 +31,16 @@ pub struct Piece<const M: usize> {
 }
 
 impl<const M: usize> Piece<M> {
+    /// The piece with two or three control points, None for others.
     #[inline(always)]
-    pub fn new(piece: &Quadratic<M>) -> Self {
-        let (mut left, mut right) = piece.tangents();
+    pub fn new(control: &[[f64; M]]) -> Option<Self> {
+        let (mut left, mut right) = match control {
+            [a, b] => (sub(b, a), sub(b, a)),
+            // The middle of a short line far from the origin is rounded, and would bend it.
+            [a, b, c] if *b == lerp(a, c, 0.5) => (sub(c, a), sub(c, a)),
+            [a, b, c] => (sub(b, a).map(|x| 2.0 * x), sub(c, b).map(|x| 2.0 * x)),
+            _ => return None,
+        };
         let speed = [dot(&left, &left), dot(&left, &right), dot(&right, &right)];
         let (left_zero, right_zero) = (ZERO * speed[0].sqrt(), ZERO * speed[2].sqrt());
         for k in 0..M {
@@ -52,7 +59,7 @@ impl<const M: usize> Piece<M> {
                 twist_sq += minor * minor;
             }
         }
-        Self { left, right, speed, minors, twist: twist_sq.sqrt() }
+        Some(Self { left, right, speed, minors, twist: twist_sq.sqrt() })
     }
 
     /// The least D on the piece.
@@ -83,12 +90,14 @@ impl<const M: usize> Piece<M> {
             && self.twist * feed * feed <= STRAIGHT * least_acceleration * least * least.sqrt()
     }
 
-    /// The unit tangent at an end, at a cusp there its limit.
-    pub fn direction(&self, at_right: bool) -> [f64; M] {
-        let other = if at_right { self.speed[2] == 0.0 } else { self.speed[0] == 0.0 };
-        let here = if at_right != other { &self.right } else { &self.left };
-        let length = norm(here);
-        here.map(|value| value / length)
+    /// Its start and its end.
+    #[inline(always)]
+    pub fn ends(&self) -> [PieceEnd<M>; 2] {
+        let cusps = [self.speed[0] == 0.0, self.speed[2] == 0.0];
+        [
+            PieceEnd { is_cusp: cusps[0], lead: if cusps[0] { self.right } else { self.left } },
+            PieceEnd { is_cusp: cusps[1], lead: if cusps[1] { self.left } else { self.right } },
+        ]
     }
 
     /// The tangent at t, from the nearer end.
@@ -102,61 +111,6 @@ impl<const M: usize> Piece<M> {
             std::array::from_fn(|k| self.left[k] + t * (self.right[k] - self.left[k]))
         } else {
             std::array::from_fn(|k| self.right[k] - (1.0 - t) * (self.right[k] - self.left[k]))
-        }
-    }
-}
-
-/// A straight piece: C' = direction · r(t), r linear; where r changes sign the motion turns back.
-pub struct Straight {
-    /// |r| at t = 0 and t = 1
-    pub rate: [f64; 2],
-    /// Where the motion turns back, if it does.
-    pub turn: Option<f64>,
-    /// Greatest acceleration along the line and the axis that sets it.
-    pub acceleration: f64,
-    pub axis: usize,
-    /// Sign of that axis's tangent before and after the turn.
-    pub sign: [f64; 2],
-    /// Square of the greatest speed, and the axis that sets it, None for the feed.
-    pub speed_sq: f64,
-    pub speed_axis: Option<usize>,
-    /// Square of that axis's velocity limit.
-    pub axis_speed_sq: f64,
-}
-
-impl Straight {
-    #[inline(always)]
-    pub fn new<const M: usize>(piece: &Piece<M>, axes: &Axes<M>, feed_sq: f64) -> Self {
-        let turns = piece.speed[1] < 0.0;
-        let (left, right) = (&piece.left, &piece.right);
-        // The difference of the ends is the direction after the turn, their sum the common direction without one.
-        let sum: [f64; M] =
-            std::array::from_fn(|k| if turns { right[k] - left[k] } else { right[k] + left[k] });
-        let length = norm(&sum);
-        let mut slowest = (0.0, 0);
-        let (mut speed_sq, mut speed_axis) = (feed_sq, None);
-        for k in 0..M {
-            let component = sum[k].abs() / length;
-            let need = component * axes.inverse[k];
-            if need > slowest.0 {
-                slowest = (need, k);
-            }
-            if component * component * speed_sq > axes.velocity_sq[k] {
-                speed_sq = axes.velocity_sq[k] / (component * component);
-                speed_axis = Some(k);
-            }
-        }
-        let rate = [piece.speed[0].sqrt(), piece.speed[2].sqrt()];
-        let sign = if sum[slowest.1] < 0.0 { -1.0 } else { 1.0 };
-        Self {
-            rate,
-            turn: turns.then(|| rate[0] / (rate[0] + rate[1])),
-            acceleration: 1.0 / slowest.0,
-            axis: slowest.1,
-            sign: [if turns { -sign } else { sign }, sign],
-            speed_sq,
-            speed_axis,
-            axis_speed_sq: speed_axis.map_or(0.0, |k| axes.velocity_sq[k]),
         }
     }
 }

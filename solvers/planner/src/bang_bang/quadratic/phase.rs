@@ -1,14 +1,14 @@
-//! An arc of p(x) on a sub-piece: what stays constant on it, its values, its Bernstein form.
+//! A phase p(x) on a sub-piece: what stays constant on it, its values, its quotient of polynomials.
 
-use super::curve::{Curve, Denominator};
+use super::quotient::{Denominator, Quotient};
 use super::subpiece::{Axes, SubPiece};
 
-/// What stays constant on an arc. Acceleration is counted in the sense of travel.
+/// What stays constant on a phase. Acceleration is counted in the sense of travel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
-    /// Axis at +A, begun at the start of the arc.
+    /// Axis at +A, begun at the start of the phase.
     Accelerating(u8),
-    /// Axis at −A: an accelerating arc of the backward pass seen forward, begun at the end of the arc.
+    /// Axis at −A: an accelerating phase of the backward pass seen forward, begun at the end of the phase.
     Braking(u8),
     /// p; the axis is at its acceleration limit.
     Flat(u8),
@@ -20,7 +20,7 @@ pub enum Kind {
 
 /// p(x) on [x0, x1].
 #[derive(Clone, Copy, Debug)]
-pub struct Arc {
+pub struct Phase {
     pub x0: f64,
     pub x1: f64,
     pub p0: f64,
@@ -28,8 +28,8 @@ pub struct Arc {
     pub kind: Kind,
 }
 
-impl Arc {
-    /// The same arc as the opposite direction of travel sees it.
+impl Phase {
+    /// The same phase as the opposite direction of travel sees it.
     #[inline(always)]
     pub fn reversed(&self, length: f64) -> Self {
         let kind = match self.kind {
@@ -64,38 +64,38 @@ impl Arc {
 
     /// p on [a, b], where it is `at_a` and `at_b`.
     #[inline(always)]
-    pub fn curve<const M: usize>(
+    pub fn quotient<const M: usize>(
         &self,
         sub: &SubPiece<M>,
         axes: &Axes<M>,
         (a, at_a): (f64, f64),
         (b, at_b): (f64, f64),
-    ) -> Curve {
-        // n = v_k² and n' = 2 a_k q'_k, from the end where the arc is slower: p may be infinite at the other.
+    ) -> Quotient {
+        // n = v_k² and n' = 2 a_k q'_k, from the end where the phase is slower: p may be infinite at the other.
         let rising = |k: u8| {
             let (ga, gb) = (sub.axis_tangent(k as usize, a), sub.axis_tangent(k as usize, b));
             let gain = axes.acceleration[k as usize] * (b - a);
             let n = ga * ga * at_a;
             let n = [n, n + gain * ga, n + gain * (ga + gb)];
-            Curve::Quotient { n, d: [ga * ga, ga * gb, gb * gb], tag: Denominator::AxisSq(k) }
+            Quotient { n, d: [ga * ga, ga * gb, gb * gb], denominator: Denominator::AxisSq(k as usize) }
         };
         let falling = |k: u8| {
             let (ga, gb) = (sub.axis_tangent(k as usize, a), sub.axis_tangent(k as usize, b));
             let gain = axes.acceleration[k as usize] * (b - a);
             let n = gb * gb * at_b;
             let n = [n + gain * (ga + gb), n + gain * gb, n];
-            Curve::Quotient { n, d: [ga * ga, ga * gb, gb * gb], tag: Denominator::AxisSq(k) }
+            Quotient { n, d: [ga * ga, ga * gb, gb * gb], denominator: Denominator::AxisSq(k as usize) }
         };
         match self.kind {
             Kind::Accelerating(k) => rising(k),
             Kind::Braking(k) => falling(k),
-            Kind::Flat(_) | Kind::LimitCurve => Curve::line(at_a, at_b),
-            Kind::Cap => sub.cap_curve(a, b),
+            Kind::Flat(_) | Kind::LimitCurve => Quotient::line(at_a, at_b),
+            Kind::Cap => sub.cap_quotient(a, b),
         }
     }
 }
 
-/// p at x on the arc through (x0, p0) on which axis k has the acceleration `a`.
+/// p at x on the phase through (x0, p0) on which axis k has the acceleration `a`.
 #[inline(always)]
 pub fn along<const M: usize>(sub: &SubPiece<M>, k: usize, a: f64, x0: f64, p0: f64, x: f64) -> f64 {
     let (g0, g) = (sub.axis_tangent(k, x0), sub.axis_tangent(k, x));

@@ -1,8 +1,8 @@
 //! Along the bound: an arc of the backward pass to its end, the velocity cap while no axis needs more than it has.
 
 use super::{kept_until, Kind, Pass, NOISE};
-use crate::bang_bang::part::Cap;
-use crate::bang_bang::window::Bound;
+use crate::bang_bang::curve::part::Cap;
+use crate::bang_bang::curve::window::Bound;
 use feedplan_geometry::polynomial::Polynomial;
 
 impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {

@@ -1,22 +1,20 @@
 //! Cuts a curved piece where an axis turns round and where the lowest velocity cap changes.
-//!
-//! The chord-error limit v² ≤ α ρ − 4 δ²/T², α = 8 δ/T², ρ = D^1.5/|W|, is taken as p ≤ f √D with
-//! f = (α/|W|)(1 − δ/(2 ρ_min)), ρ_min on the sub-piece: on the safe side, and too low by at most δ/(4 ρ_min) of v²
-//! where ρ doubles within the sub-piece. So the piece is cut where ρ doubles, as far as that part matters. Where
-//! ρ < δ no part of the path shorter than 2 δ leaves its chord by δ: the limit is the constant speed 2 δ/T.
 
 use super::piece::Piece;
+use super::quotient::bernstein;
 use super::subpiece::{Axes, Cap, Orientation, SubPiece};
-use super::turns::{Mark, EDGE};
-use crate::bernstein::{multiply, parabola_sign_changes, product, sign_changes};
-use crate::planning::ChordLimit;
+use super::turns::{Mark, Stretch, EDGE};
+use crate::bang_bang::chord::SpeedLine;
+use crate::problem::ChordLimit;
 use crate::AxisBits;
 use feedplan_geometry::quadratic::dot;
 
+/// Tangents of the chord-error limit are so far apart; see `ChordLimit::lines_below`.
+const STEP: f64 = 0.03;
+/// ρ this close to δ is δ.
+const AT_KINK: f64 = 1e-9;
 /// Cuts closer than this part of a stretch are one.
 const SAME_CUT: f64 = 1e-14;
-/// Beyond this many δ the radius varies without a difference to the chord-error limit.
-const LAST_DOUBLING: f64 = 512.0;
 
 impl ChordLimit {
     /// Whether the limit can bind on the piece.
@@ -25,6 +23,78 @@ impl ChordLimit {
         let least_cube = least * least.sqrt();
         let least_limit = self.alpha * least_cube - self.slow_sq * piece.twist;
         least_limit < feed_sq * piece.twist && least_limit < self.acceleration * least_cube
+    }
+
+    /// Appends the greatest v² over a stretch, at most `feed_sq`: lines that follow one another without a jump.
+    ///
+    /// ρ = |C'|³/|C' × C''| is proportional to (1 + τ²)^1.5, τ = (t − t₀)/w counted from the place t₀ of the least ρ, for C'
+    /// is linear and the cross product constant. That is convex, and so is the limit max(α ρ − 4 δ²/T², 4 δ²/T²): its
+    /// tangents lie below it. Tangents at τ = sinh(i `STEP`) cross at places where they give away less than 0.75 `STEP`²
+    /// of α ρ.
+    #[cold]
+    fn lines_below<const M: usize>(&self, stretch: &Stretch<M>, feed_sq: f64, out: &mut Vec<SpeedLine>) {
+        let piece = &stretch.piece;
+        let bend: [f64; M] = std::array::from_fn(|k| piece.right[k] - piece.left[k]);
+        let bend_sq = dot(&bend, &bend);
+        let (least, width) = (-dot(&piece.left, &bend) / bend_sq, piece.twist * stretch.length / bend_sq);
+        let tangent = |t: f64| {
+            let g = piece.tangent(t);
+            let d = dot(&g, &g);
+            let radius = d * d.sqrt() / piece.twist;
+            if radius < self.tolerance * (1.0 - AT_KINK) {
+                return Tangent { t, value: self.slow_sq, slope: 0.0 };
+            }
+            let share = self.alpha * radius;
+            Tangent { t, value: share - self.slow_sq, slope: share * 3.0 * dot(&g, &bend) / d }
+        };
+        let step = |t: f64| ((t - least) / width).asinh() / STEP;
+        let even = (step(0.0).ceil() as i64..=step(1.0).floor() as i64).map(|i| (i as f64 * STEP).sinh());
+        // Where ρ = δ the limit has a kink.
+        let least_radius = bend_sq * width * width * (bend_sq * width * width).sqrt() / piece.twist;
+        let kink = ((self.tolerance / least_radius).powf(2.0 / 3.0) - 1.0).max(0.0).sqrt();
+        let mut places: Vec<f64> = even.chain([-kink, kink]).map(|tau| least + width * tau).collect();
+        places.retain(|t| (SAME_CUT..1.0 - SAME_CUT).contains(t));
+        places.sort_by(f64::total_cmp);
+        let (mut from, mut last) = (0.0, tangent(0.0));
+        for next in places.into_iter().chain([1.0]).map(tangent) {
+            if next.slope == last.slope {
+                continue;
+            }
+            let crossing = last.t + (next.at(last.t) - last.value) / (last.slope - next.slope);
+            let to = crossing.clamp(last.t, next.t);
+            last.push(from, to, feed_sq, out);
+            (from, last) = (to, next);
+        }
+        last.push(from, 1.0, feed_sq, out);
+    }
+}
+
+/// A straight line in t.
+struct Tangent {
+    t: f64,
+    value: f64,
+    slope: f64,
+}
+
+impl Tangent {
+    fn at(&self, t: f64) -> f64 {
+        self.value + self.slope * (t - self.t)
+    }
+
+    /// Appends its part below the feed, and the feed where that is lower.
+    fn push(&self, from: f64, to: f64, feed_sq: f64, out: &mut Vec<SpeedLine>) {
+        let meets = self.t + (feed_sq - self.value) / self.slope;
+        let middle = if from < meets && meets < to { meets } else { to };
+        for (from, to) in [(from, middle), (middle, to)] {
+            if to - from <= SAME_CUT {
+                continue;
+            }
+            let speed_sq = [from, to].map(|t| self.at(t).min(feed_sq));
+            match out.last_mut() {
+                Some(last) if last.speed_sq == [feed_sq; 2] && speed_sq == last.speed_sq => last.to = to,
+                _ => out.push(SpeedLine { from, to, speed_sq }),
+            }
+        }
     }
 }
 
@@ -79,13 +149,15 @@ impl Part {
         let (ends, travel) = if backward { ([right, left], -1.0) } else { ([left, right], 1.0) };
         let bend = std::array::from_fn(|k| travel * sign[k] * (piece.right[k] - piece.left[k]));
         let orientation = Orientation { sign, travel };
-        Placed { sub: SubPiece::new(length, ends, bend, piece, orientation, self.cap, axes), from, to }
+        let cap = if backward { self.cap.reversed() } else { self.cap };
+        Placed { sub: SubPiece::new(length, ends, bend, piece, orientation, cap, axes), from, to }
     }
 }
 
 /// Cuts pieces; holds the space for it.
 #[derive(Default)]
 pub struct Splitter {
+    lines: Vec<SpeedLine>,
     cuts: Vec<f64>,
     pub parts: Vec<Part>,
 }
@@ -94,7 +166,7 @@ pub struct Splitter {
 struct Limits<'a, const M: usize> {
     axes: &'a Axes<M>,
     feed_sq: f64,
-    chord: Option<ChordLimit>,
+    chord: Option<&'a ChordLimit>,
     /// Bit k: axis k can be faster than its limit at the feed.
     fast: AxisBits,
 }
@@ -107,7 +179,7 @@ impl Splitter {
         piece: &Piece<M>,
         axes: &Axes<M>,
         feed_sq: f64,
-        chord: Option<ChordLimit>,
+        chord: Option<&ChordLimit>,
     ) {
         let (left, right) = (&piece.left, &piece.right);
         self.parts.clear();
@@ -124,14 +196,15 @@ impl Splitter {
         }
         let chord = chord.filter(|chord| chord.binds(piece, feed_sq));
         if fast == 0 && !turns && chord.is_none() {
-            let cap = Cap::SpeedSq(feed_sq);
+            let cap = Cap::Speed([feed_sq; 2]);
             self.parts.push(Part { marks: [EDGE, EDGE], from: 0.0, to: 1.0, cap, negative });
         } else {
             self.cut(piece, &Limits { axes, feed_sq, chord, fast });
         }
     }
 
-    /// Cuts between two turns, then between two doublings of the radius, then between two changes of the cap.
+    /// Cuts between two turns, then where the line below the chord-error limit changes, then between two changes of the
+    /// cap.
     fn cut<const M: usize>(&mut self, piece: &Piece<M>, limits: &Limits<M>) {
         let (turns, count) = piece.turns();
         let mut from = EDGE;
@@ -140,10 +213,16 @@ impl Splitter {
             let stretch = piece.stretch(from, to);
             if stretch.length > 0.0 {
                 let first = self.parts.len();
+                let mut lines = std::mem::take(&mut self.lines);
+                lines.clear();
                 match limits.chord {
-                    Some(chord) => self.cut_by_radius(&stretch.piece, limits, chord, piece.twist),
-                    None => self.cut_by_cap(&stretch.piece, limits, limits.feed_sq, None, (0.0, 1.0)),
+                    Some(chord) => chord.lines_below(&stretch, limits.feed_sq, &mut lines),
+                    None => lines.push(SpeedLine { from: 0.0, to: 1.0, speed_sq: [limits.feed_sq; 2] }),
                 }
+                for line in &lines {
+                    self.cut_by_cap(&stretch.piece, limits, line);
+                }
+                self.lines = lines;
                 let (left, right) = (&stretch.piece.left, &stretch.piece.right);
                 let negative = (0..M).fold(0, |bits, k| bits | AxisBits::from(left[k] + right[k] < 0.0) << k);
                 for part in &mut self.parts[first..] {
@@ -155,115 +234,64 @@ impl Splitter {
         }
     }
 
-    /// Cuts a stretch where the radius doubles.
-    #[cold]
-    fn cut_by_radius<const M: usize>(
-        &mut self,
-        stretch: &Piece<M>,
-        limits: &Limits<M>,
-        chord: ChordLimit,
-        twist: f64,
-    ) {
-        let mut levels = vec![0.0, 1.0];
-        let mut radius = chord.tolerance;
-        let no_limit = (limits.feed_sq + chord.slow_sq) / chord.alpha;
-        while radius <= (chord.tolerance * LAST_DOUBLING).min(2.0 * no_limit) {
-            // D where ρ = D^1.5/|W| has this value.
-            let d = (radius * twist).powf(2.0 / 3.0);
-            parabola_sign_changes(&stretch.speed.map(|value| value - d), &mut |t| levels.push(t));
-            radius *= 2.0;
-        }
-        levels.sort_by(f64::total_cmp);
-        levels.dedup_by(|b, a| *b - *a <= SAME_CUT);
-        if let Some(last) = levels.last_mut() {
-            *last = 1.0;
-        }
-        let bend: [f64; M] = std::array::from_fn(|k| stretch.right[k] - stretch.left[k]);
-        let lowest = -dot(&stretch.left, &bend) / dot(&bend, &bend);
-        for level in levels.windows(2) {
-            let (a, b) = (level[0], level[1]);
-            let radius_at = |t: f64| {
-                let g = stretch.tangent(t);
-                let d = dot(&g, &g);
-                d * d.sqrt() / twist
-            };
-            if radius_at(0.5 * (a + b)) < chord.tolerance {
-                self.cut_by_cap(stretch, limits, limits.feed_sq.min(chord.slow_sq), None, (a, b));
-                continue;
-            }
-            let least =
-                radius_at(a).min(radius_at(b)).min(radius_at(lowest.clamp(a, b))).max(chord.tolerance);
-            let factor = chord.alpha / twist * (1.0 - chord.tolerance / (2.0 * least));
-            self.cut_by_cap(stretch, limits, limits.feed_sq, Some(factor), (a, b));
-        }
-    }
-
-    /// Cuts [from, to] of a stretch where the lowest cap changes, and names it on each part.
-    fn cut_by_cap<const M: usize>(
-        &mut self,
-        stretch: &Piece<M>,
-        limits: &Limits<M>,
-        speed_sq: f64,
-        chord: Option<f64>,
-        (from, to): (f64, f64),
-    ) {
+    /// Cuts a stretch where the lowest cap changes on a line, and names it on each part.
+    fn cut_by_cap<const M: usize>(&mut self, stretch: &Piece<M>, limits: &Limits<M>, line: &SpeedLine) {
         let (axes, fast) = (limits.axes, limits.fast);
         let cuts = &mut self.cuts;
         cuts.clear();
         let mut cut = |t: f64| {
-            if t > from + SAME_CUT && t < to - SAME_CUT {
+            if t > line.from + SAME_CUT && t < line.to - SAME_CUT {
                 cuts.push(t);
             }
         };
         let is_fast = |k: usize| fast >> k & 1 == 1;
+        let speed_sq = if line.speed_sq[0] == line.speed_sq[1] {
+            bernstein([line.speed_sq[0]])
+        } else {
+            bernstein([line.at(0.0), line.at(1.0)])
+        };
         for j in (0..M).filter(|&j| is_fast(j)) {
             let v_sq = axes.velocity_sq[j];
             // Against the speed: v² q'_j² = V_j² D.
-            parabola_sign_changes(&excess(stretch, j, v_sq, speed_sq), &mut cut);
+            let used = bernstein(axis_sq(stretch, j)).multiply(&speed_sq);
+            used.combine(1.0, &bernstein(stretch.speed), -v_sq).sign_changes(&mut cut);
             // Against another axis: V_j |q'_k| = V_k |q'_j|.
             for k in (j + 1..M).filter(|&k| is_fast(k)) {
                 let (v_j, v_k) = (v_sq.sqrt(), axes.velocity_sq[k].sqrt());
                 for sign in [1.0, -1.0] {
                     let at = |g: &[f64; M]| v_j * g[k] - sign * v_k * g[j];
-                    sign_changes(&[at(&stretch.left), at(&stretch.right)], &mut cut);
+                    bernstein([at(&stretch.left), at(&stretch.right)]).sign_changes(&mut cut);
                 }
             }
-            // Against the chord error: V_j⁴ = f² D q'_j⁴.
-            if let Some(factor) = chord {
-                let g_sq = axis_sq(stretch, j);
-                let six: [f64; 7] = product(&multiply(&g_sq, &g_sq), &stretch.speed);
-                sign_changes(&six.map(|value| factor * factor * value - v_sq * v_sq), &mut cut);
-            }
-        }
-        if let Some(factor) = chord {
-            let d = (speed_sq / factor).powf(2.0 / 3.0);
-            parabola_sign_changes(&stretch.speed.map(|value| value - d), &mut cut);
         }
         cuts.sort_by(f64::total_cmp);
-        cuts.push(to);
-        let (start, mut from) = (from, from);
+        cuts.push(line.to);
+        let mut from = line.from;
         for &to in cuts.iter() {
             if to - from <= SAME_CUT {
                 continue;
             }
-            let g = stretch.tangent(0.5 * (from + to));
-            let d = dot(&g, &g);
-            let mut lowest = speed_sq / d;
-            let mut cap = Cap::SpeedSq(speed_sq);
+            let middle = 0.5 * (from + to);
+            let g = stretch.tangent(middle);
+            let mut lowest = line.at(middle) / dot(&g, &g);
+            let mut cap = None;
             for k in (0..M).filter(|&k| is_fast(k)) {
                 if g[k] * g[k] * lowest > axes.velocity_sq[k] {
                     lowest = axes.velocity_sq[k] / (g[k] * g[k]);
-                    cap = Cap::AxisSq(k as u8, axes.velocity_sq[k]);
+                    cap = Some(Cap::Axis(k, axes.velocity_sq[k]));
                 }
             }
-            if let Some(factor) = chord {
-                if factor * d.sqrt() < lowest {
-                    cap = Cap::Chord(factor);
-                }
-            }
+            let speed = |from: f64| Cap::Speed([line.at(from), line.at(to)]);
             match self.parts.last_mut() {
-                Some(part) if part.to == from && part.from >= start && part.cap == cap => part.to = to,
-                _ => self.parts.push(Part { marks: [EDGE, EDGE], from, to, cap, negative: 0 }),
+                // Goes on under the same cap.
+                Some(part) if part.to == from && part.from >= line.from && part.cap.goes_on(cap) => {
+                    part.to = to;
+                    part.cap = cap.unwrap_or(speed(part.from));
+                }
+                _ => {
+                    let cap = cap.unwrap_or(speed(from));
+                    self.parts.push(Part { marks: [EDGE, EDGE], from, to, cap, negative: 0 });
+                }
             }
             from = to;
         }

@@ -1,12 +1,11 @@
 //! Cuts a piece where an axis turns round and where the lowest velocity cap changes.
 
-use super::chord::SpeedLine;
 use super::cusp::{cusps, Cusps, Nearly};
 use super::part::{Cap, End, Part, Remedy, SAME_TURN};
 use super::piece::Piece;
-use super::TIP_AXES;
-use crate::planning::ChordLimit;
-use crate::planning::{greater, Both};
+use crate::bang_bang::chord::SpeedLine;
+use crate::problem::ChordLimit;
+use crate::problem::{greater, Both, TIP_AXES};
 use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
 
@@ -98,8 +97,10 @@ pub fn split<const M: usize, const C: usize>(
     let most_sq = if feed.is_some() { f64::INFINITY } else { feed_sq };
     let (whole, mut below_chord) = ([SpeedLine { from: 0.0, to: 1.0, speed_sq: [most_sq; 2] }], vec![]);
     match (chord, tip) {
-        (Some(chord), Some(tip)) => chord.lines(tip, most_sq, &mut below_chord),
-        (Some(chord), None) if piece.own_speed => chord.lines(piece, most_sq, &mut below_chord),
+        (Some(chord), Some(tip)) => chord.lines(&|t| tip.radius(t), most_sq, &mut below_chord),
+        (Some(chord), None) if piece.own_speed => {
+            chord.lines(&|t| piece.radius(t), most_sq, &mut below_chord)
+        }
         _ => {}
     }
     let lines = if below_chord.is_empty() { &whole } else { below_chord.as_slice() };
@@ -351,9 +352,7 @@ fn lowest_cap<const M: usize>(
     (from, to): (f64, f64),
     fast: AxisBits,
 ) -> Cap {
-    let [f0, f1] = line.speed_sq;
-    let at = |t: f64| if f0 == f1 { f0 } else { f0 + (f1 - f0) * ((t - line.from) / (line.to - line.from)) };
-    let ends = [at(from), at(to)];
+    let ends = [line.at(from), line.at(to)];
     let mut lowest = 0.5 * (ends[0] + ends[1]) / speed;
     let mut cap = Cap::Speed(ends);
     if let Some((rate, feed_sq)) = feed.filter(|(rate, feed_sq)| rate * lowest > *feed_sq) {

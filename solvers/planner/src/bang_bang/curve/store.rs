@@ -42,14 +42,9 @@ impl Store {
         }
     }
 
-    /// The sub-piece that was pushed as this one; `part` is its part of the piece.
-    pub fn get<const M: usize, const C: usize>(
-        &self,
-        number: usize,
-        part: &Part,
-        axes: &Axes<M>,
-    ) -> SubPiece<M, C> {
-        let kept = &self.kept[number];
+    /// Takes the last sub-piece out; `part` is its part of the piece.
+    pub fn pop<const M: usize, const C: usize>(&mut self, part: &Part, axes: &Axes<M>) -> SubPiece<M, C> {
+        let kept = self.kept.pop().expect("each part has a sub-piece");
         let [tangent, weight, speed, degree] = kept.degrees.map(usize::from);
         let mut rest = &self.coefficients[kept.start..];
         let mut next = |degree: usize| {
@@ -57,10 +52,13 @@ impl Store {
             rest = after;
             Polynomial::from_padded(degree, own)
         };
+        let g = std::array::from_fn(|_| next(tangent));
+        let (weight, speed) = (next(weight), next(speed));
+        self.coefficients.truncate(kept.start);
         SubPiece {
-            g: std::array::from_fn(|_| next(tangent)),
-            weight: next(weight),
-            speed: next(speed),
+            g,
+            weight,
+            speed,
             cap: part.cap,
             limits: part.limits(axes),
             moving: part.moving,
