@@ -153,10 +153,8 @@ struct ArcLaw<'a, const M: usize> {
 impl<'a, const M: usize> ArcLaw<'a, M> {
     fn new(case: &Case<M>, profile: &'a Profile, row: usize) -> Self {
         let piece = &case.pieces[profile.piece[row] as usize];
-        let [a, b, c] = &piece.control;
-        let scale = 2.0 / piece.width;
-        let left: [f64; M] = std::array::from_fn(|k| scale * (b[k] - a[k]));
-        let right: [f64; M] = std::array::from_fn(|k| scale * (c[k] - b[k]));
+        let (left, right) = piece.tangents();
+        let [left, right] = [left, right].map(|tangent| tangent.map(|x| x / piece.width));
         let bend: [f64; M] = std::array::from_fn(|k| (right[k] - left[k]) / piece.width);
         let mut twist: f64 = 0.0;
         for j in 0..M {

@@ -1,11 +1,13 @@
 //! Random planning problems: paths as CAM systems write them, and paths made to break a planner.
 
 use feedplan_geometry::quadratic::Quadratic;
+use feedplan_geometry::spline::CompositeCurve;
 use feedplan_planner::problem::Fault;
 use feedplan_planner::profile::Profile;
 use feedplan_planner::Exact as _;
 
 use super::elevated::Elevated;
+use super::regular_path::RegularPath;
 
 /// A random number generator that is the same everywhere (splitmix64).
 pub struct Random(pub u64);
@@ -111,6 +113,20 @@ impl<const M: usize> Case<M> {
 
     pub fn time(&self) -> f64 {
         self.plan().expect("a profile").time()
+    }
+
+    /// The same path as the planner takes it: straight pieces are lines, cut where they turn back.
+    pub fn regular(&self) -> Self {
+        let mut curve = CompositeCurve::default();
+        for piece in &self.pieces {
+            curve.push(&piece.control, &[], piece.width);
+        }
+        let found = RegularPath::new(&curve, &self.junction);
+        let mut other = self.clone();
+        other.pieces = found.curve.pieces().filter_map(|piece| Quadratic::from_piece(&piece)).collect();
+        other.feed = found.source.iter().map(|&i| self.feed[i]).collect();
+        other.junction = found.junction;
+        other
     }
 
     /// The path travelled the other way.
@@ -286,5 +302,5 @@ fn case_of_kinds<const M: usize>(seed: u64, kinds: usize) -> Case<M> {
         let alpha = strength * random.exponential(-3.0, 1.0);
         case.period = (8.0 * case.chord_tolerance / alpha).sqrt();
     }
-    case
+    case.regular()
 }

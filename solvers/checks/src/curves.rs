@@ -1,11 +1,13 @@
 //! Random problems on curves of any degree, polynomial and rational, most of them made to break a planner.
 
+use feedplan_geometry::spline::CompositeCurve;
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::problem::{Fault, Problem};
 use feedplan_planner::profile::Profile;
 use feedplan_planner::Exact as _;
 
 use super::cases::Random;
+use super::regular_path::RegularPath;
 use super::{padded, PADDED};
 
 /// One piece: its control points and weights, and its parameter width.
@@ -35,25 +37,24 @@ impl<const M: usize> CurveCase<M> {
 
     /// The fastest profile.
     pub fn plan(&self) -> Result<Profile, Fault> {
-        let points = self.pieces.iter().flat_map(|piece| &piece.points);
-        let control: Vec<[f64; PADDED]> = points.map(|point| padded(point, 0.0)).collect();
-        let weight: Vec<f64> = self.pieces.iter().flat_map(|piece| piece.weights.clone()).collect();
-        let width: Vec<f64> = self.pieces.iter().map(|piece| piece.width).collect();
-        let mut offset = vec![0];
+        let mut curve = CompositeCurve::default();
         for piece in &self.pieces {
-            offset.push(offset[offset.len() - 1] + piece.points.len());
+            let weights: &[f64] = if piece.weights.iter().all(|&w| w == 1.0) { &[] } else { &piece.weights };
+            curve.push(&piece.points, weights, piece.width);
         }
+        let RegularPath { curve, junction, .. } = RegularPath::new(&curve, &self.junction);
+        let control: Vec<[f64; PADDED]> = curve.control.iter().map(|point| padded(point, 0.0)).collect();
         let problem = Problem {
             control: &control,
-            weight: if weight.iter().all(|&w| w == 1.0) { &[] } else { &weight },
-            offset: &offset,
-            width: &width,
+            weight: &curve.weights,
+            offset: &curve.offsets,
+            width: &curve.width,
             tip: None,
             way: None,
             feed_share: &[],
-            runs: &[0, self.pieces.len()],
-            feed: &vec![self.feed; self.pieces.len()],
-            junction_speed: &self.junction,
+            runs: &[0, curve.len()],
+            feed: &vec![self.feed; curve.len()],
+            junction_speed: &junction,
             max_velocity: [padded(&self.velocity, 1.0); 2],
             max_acceleration: [padded(&self.acceleration, 1.0); 2],
             chord_tolerance: f64::INFINITY,

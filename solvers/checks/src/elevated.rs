@@ -1,5 +1,6 @@
 //! A case of quadratic pieces as the planner takes it: as it is, or with its degree elevated.
 
+use feedplan_geometry::quadratic::{lerp, norm, sub};
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::problem::Problem;
 
@@ -20,8 +21,12 @@ impl<const P: usize> Elevated<P> {
         let mut control = vec![];
         let mut offset = vec![0];
         for piece in &case.pieces {
-            let mut points = piece.control.to_vec();
-            for _ in 0..elevate {
+            let [a, b, c] = piece.control;
+            // A line stays one.
+            let bend = norm(&sub(&b, &lerp(&a, &c, 0.5)));
+            let straight = bend <= 1e-15 * (norm(&a) + norm(&c));
+            let mut points = if straight { vec![a, c] } else { vec![a, b, c] };
+            for _ in 0..if straight { 0 } else { elevate } {
                 let n = points.len() as f64;
                 let mut higher = vec![points[0]];
                 for i in 1..points.len() {

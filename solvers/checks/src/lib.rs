@@ -8,6 +8,7 @@ mod cases;
 pub mod curves;
 mod elevated;
 pub mod polylines;
+mod regular_path;
 pub mod wave;
 
 pub use audit::{audit, Audit};

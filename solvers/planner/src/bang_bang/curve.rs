@@ -24,7 +24,7 @@ mod split;
 mod store;
 mod window;
 
-use super::run::{Between, PieceEnd};
+use super::run::Between;
 use super::time::{integral, NODES};
 use super::Task;
 use crate::arc_kind::ArcKind;
@@ -36,7 +36,7 @@ use feedplan_geometry::polynomial::MOST;
 use feedplan_geometry::quadratic::norm;
 pub use part::Remedy;
 use part::{Cap, Part, SubPiece};
-use pass::{distance, leading, Arc, Kind, State, Stuck};
+use pass::{distance, Arc, Kind, State, Stuck};
 use piece::Piece;
 pub use split::Axes;
 use split::{split, Cut, Limits};
@@ -127,16 +127,6 @@ fn tip_piece<const M: usize, const C: usize>(task: &Task<M>, i: usize) -> Option
     moves.then(|| Piece::new(control, weights_of(tip.weight, tip.offset, i), None))
 }
 
-fn part_end<const M: usize, const C: usize>(
-    sub: &SubPiece<M, C>,
-    negative: AxisBits,
-    at_end: bool,
-) -> PieceEnd<M> {
-    let lead = leading(sub, at_end);
-    let sign = |k: usize| if negative >> k & 1 == 1 { -1.0 } else { 1.0 };
-    PieceEnd { is_cusp: sub.cusp_order(at_end) > 0, lead: std::array::from_fn(|k| sign(k) * lead[k]) }
-}
-
 /// The axes' speed squared at the tool's.
 fn of_axes(tip_sq: f64, tip_share: f64) -> f64 {
     if tip_sq == 0.0 {
@@ -147,14 +137,14 @@ fn of_axes(tip_sq: f64, tip_share: f64) -> f64 {
 }
 
 /// Backward over piece `i`: from `at` at its end to `at` at its start; the number of its parts.
-pub fn backward<const M: usize>(task: &Task<M>, i: usize, at: &mut Between<M>, space: &mut Space) -> usize {
+pub fn backward<const M: usize>(task: &Task<M>, i: usize, at: &mut Between, space: &mut Space) -> usize {
     with_capacity!(task, i, backward_over(task, i, at, space))
 }
 
 fn backward_over<const M: usize, const C: usize>(
     task: &Task<M>,
     i: usize,
-    at: &mut Between<M>,
+    at: &mut Between,
     space: &mut Space,
 ) -> usize {
     let piece = piece::<M, C>(task, i);
@@ -170,8 +160,6 @@ fn backward_over<const M: usize, const C: usize>(
         if number + 1 == space.parts.len() {
             at.speed_sq = at.speed_sq.min(of_axes(at.tip_sq, sub.tip_share(true)));
         }
-        at.enter(part_end(&sub, part.negative, true));
-        at.end = Some(part_end(&sub, part.negative, false));
         space.subs.push(&sub);
         let arcs = space.bounds.len();
         space.offsets.push(arcs);
@@ -195,7 +183,7 @@ pub fn forward<const M: usize>(
     task: &Task<M>,
     i: usize,
     parts: usize,
-    at: &mut Between<M>,
+    at: &mut Between,
     space: &mut Space,
     out: &mut Profile,
 ) {
@@ -206,7 +194,7 @@ fn forward_over<const M: usize, const C: usize>(
     task: &Task<M>,
     i: usize,
     parts: usize,
-    at: &mut Between<M>,
+    at: &mut Between,
     space: &mut Space,
     out: &mut Profile,
 ) {
@@ -218,11 +206,9 @@ fn forward_over<const M: usize, const C: usize>(
         if number == first {
             at.speed_sq = at.speed_sq.min(of_axes(at.tip_sq, sub.tip_share(false)));
         }
-        at.enter(part_end(&sub, part.negative, false));
         if part.starts_at_rest() {
             at.speed_sq = 0.0;
         }
-        at.end = Some(part_end(&sub, part.negative, true));
         space.arcs.clear();
         let state = State { speed_sq: at.speed_sq };
         let kept = pass::run::<M, C, false>(&sub, state, &space.bounds[offset..], &mut space.arcs)

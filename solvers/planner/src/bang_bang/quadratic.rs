@@ -61,8 +61,7 @@ impl Space {
 pub fn backward<const M: usize>(
     piece: &Piece<M>,
     axes: &Axes<M>,
-    feed: f64,
-    chord: Option<&ChordLimit>,
+    (feed, chord): (f64, Option<&ChordLimit>),
     speed_sq: f64,
     space: &mut Space,
 ) -> Result<(f64, usize), Stuck> {

@@ -4,15 +4,13 @@
 //! meet, a few pieces ahead. So a run is planned block by block, in memory that stays near the processor.
 
 use super::curve::{self, Remedy};
-use super::line::{self, Line};
+use super::line::Line;
 use super::quadratic::{self, Piece};
 use super::Task;
 use crate::problem::Fault;
 use crate::profile::Profile;
-use feedplan_geometry::quadratic::norm;
+use feedplan_geometry::quadratic::{lerp, sub};
 
-/// Two directions that differ by more than this at a cusp form a corner.
-const SMOOTH_TURN: f64 = 1e-9;
 /// A speed asked for at an end of the path may exceed what can be had by this part, which is rounding.
 const REACHED: f64 = 1e-12;
 /// A run in which rounding leaves a pass without headway is planned anew so often, with more cuts every time.
@@ -51,51 +49,29 @@ enum Way {
 
 /// Where a pass stands between two pieces.
 #[derive(Clone, Copy)]
-pub struct Between<const M: usize> {
+pub struct Between {
     /// The sum of the axes' velocities squared; v² where the axes are those of the tool.
     pub speed_sq: f64,
     /// The tool's speed squared behind the pass; ahead of it, before a piece is entered, the limit of that.
     pub tip_sq: f64,
-    /// The end of the piece that the pass has left.
-    pub end: Option<PieceEnd<M>>,
 }
 
-/// An end of a piece, or of a part of one.
-#[derive(Clone, Copy)]
-pub struct PieceEnd<const M: usize> {
-    /// The tangent is zero there.
-    pub is_cusp: bool,
-    /// The limit of its direction, of any length.
-    pub lead: [f64; M],
-}
-
-impl<const M: usize> PieceEnd<M> {
-    fn direction(&self) -> [f64; M] {
-        let length = norm(&self.lead);
-        self.lead.map(|x| x / length)
-    }
-
-    /// Whether two ends that meet form the corner of a cusp, where the tool stops.
-    fn is_corner_with(&self, other: &Self) -> bool {
-        if !self.is_cusp && !other.is_cusp {
-            return false;
-        }
-        let (one, other) = (self.direction(), other.direction());
-        norm(&std::array::from_fn::<f64, M, _>(|k| one[k] - other[k])) > SMOOTH_TURN
-    }
-}
-
-impl<const M: usize> Between<M> {
+impl Between {
     fn at_end_of_run(tip_sq: f64) -> Self {
-        Self { speed_sq: f64::INFINITY, tip_sq, end: None }
+        Self { speed_sq: f64::INFINITY, tip_sq }
     }
 
-    /// Enters a piece, or a part of one, at this end.
-    pub fn enter(&mut self, end: PieceEnd<M>) {
-        if self.end.is_some_and(|left| left.is_corner_with(&end)) {
-            self.speed_sq = 0.0;
-        }
+    /// Leaves a piece whose axes are those of the tool.
+    fn leave(&mut self, speed_sq: f64) {
+        (self.speed_sq, self.tip_sq) = (speed_sq, speed_sq);
     }
+}
+
+/// The kernel of a piece.
+enum Kernel<const M: usize> {
+    Line(Line),
+    Quadratic(Piece<M>),
+    Curve,
 }
 
 /// Plans the pieces `first..last` of the task from one speed squared of the tool to another; appends the phases.
@@ -163,7 +139,7 @@ fn block<const M: usize>(
     (begin, last): (usize, usize),
     end_sq: f64,
     space: &mut Workspace,
-) -> Result<(usize, Between<M>), Fault> {
+) -> Result<(usize, Between), Fault> {
     let mut size = BLOCK;
     loop {
         let end = begin + size;
@@ -187,38 +163,35 @@ fn backward<const M: usize>(
     task: &Task<M>,
     (begin, end): (usize, usize),
     last: usize,
-    mut at: Between<M>,
+    mut at: Between,
     space: &mut Workspace,
-) -> Result<Between<M>, Fault> {
+) -> Result<Between, Fault> {
     space.clear();
     for i in (begin..end).rev() {
         task.watch.check_at(i);
         if i + 1 < last {
             at.tip_sq = task.problem.junction_speed[i + 1].powi(2);
         }
-        let way = match task.plain_piece(i) {
-            None => Way::Curve(curve::backward(task, i, &mut at, &mut space.curve)),
-            Some(piece) => {
-                let [start, finish] = piece.ends();
-                at.enter(finish);
-                let speed_sq = at.speed_sq.min(at.tip_sq);
-                at.end = Some(start);
-                let axes = &task.plain_axes;
-                let way;
-                if let Some(line) = Line::of(&piece, axes, task.problem.feed[i]) {
-                    at.tip_sq = line::backward(&line, speed_sq);
-                    way = Way::Line(speed_sq);
-                } else {
-                    let (speed, chord) = (task.problem.feed[i], task.chord.as_ref());
-                    let (start_sq, parts) =
-                        quadratic::backward(&piece, axes, speed, chord, speed_sq, &mut space.quadratic)
-                            .map_err(|stuck| task.fault(i, stuck))?;
-                    at.tip_sq = start_sq;
-                    way = Way::Quadratic(parts);
-                }
-                at.speed_sq = at.tip_sq;
-                way
+        let speed_sq = at.speed_sq.min(at.tip_sq);
+        let way = match task.kernel(i) {
+            Kernel::Line(line) => {
+                at.leave(line.backward(speed_sq));
+                Way::Line(speed_sq)
             }
+            Kernel::Quadratic(piece) => {
+                let (feed, chord) = (task.problem.feed[i], task.chord.as_ref());
+                let (start_sq, parts) = quadratic::backward(
+                    &piece,
+                    &task.plain_axes,
+                    (feed, chord),
+                    speed_sq,
+                    &mut space.quadratic,
+                )
+                .map_err(|stuck| task.fault(i, stuck))?;
+                at.leave(start_sq);
+                Way::Quadratic(parts)
+            }
+            Kernel::Curve => Way::Curve(curve::backward(task, i, &mut at, &mut space.curve)),
         };
         space.ways.push(way);
     }
@@ -230,7 +203,7 @@ fn forward<const M: usize>(
     task: &Task<M>,
     (begin, end): (usize, usize),
     first: usize,
-    at: &mut Between<M>,
+    at: &mut Between,
     space: &mut Workspace,
     out: &mut Profile,
 ) -> Result<(), Fault> {
@@ -239,45 +212,44 @@ fn forward<const M: usize>(
         if i > first {
             at.tip_sq = task.problem.junction_speed[i].powi(2);
         }
-        let way = space.ways.pop();
-        let Some(piece) = task.plain_piece(i) else {
-            let Some(Way::Curve(parts)) = way else { continue };
-            curve::forward(task, i, parts, at, &mut space.curve, out);
-            continue;
-        };
-        let [start, finish] = piece.ends();
-        at.enter(start);
-        let speed_sq = at.speed_sq.min(at.tip_sq);
-        at.end = Some(finish);
-        let (axes, place) = (&task.plain_axes, (i as u32, task.problem.width[i]));
-        match way {
-            Some(Way::Line(end_sq)) => {
-                if let Some(line) = Line::of(&piece, axes, task.problem.feed[i]) {
-                    at.tip_sq = line::forward(&line, axes, (speed_sq, end_sq), place, out);
-                }
+        let (speed_sq, place) = (at.speed_sq.min(at.tip_sq), (i as u32, task.problem.width[i]));
+        match (task.kernel(i), space.ways.pop()) {
+            (Kernel::Line(line), Some(Way::Line(end_sq))) => {
+                at.leave(line.forward((speed_sq, end_sq), place, out));
             }
-            Some(Way::Quadratic(parts)) => {
-                at.tip_sq =
+            (Kernel::Quadratic(piece), Some(Way::Quadratic(parts))) => {
+                let axes = &task.plain_axes;
+                let end_sq =
                     quadratic::forward(&piece, axes, speed_sq, parts, &mut space.quadratic, place, out)
                         .map_err(|stuck| task.fault(i, stuck))?;
+                at.leave(end_sq);
             }
-            _ => {}
+            (Kernel::Curve, Some(Way::Curve(parts))) => {
+                curve::forward(task, i, parts, at, &mut space.curve, out);
+            }
+            _ => unreachable!("the backward pass leaves a way for the kernel of each piece"),
         }
-        at.speed_sq = at.tip_sq;
     }
     Ok(())
 }
 
 impl<const M: usize> Task<'_, M> {
-    /// Piece `i`, where it is for the kernels of lines and of quadratics.
+    /// The kernel of piece `i`.
     #[inline(always)]
-    fn plain_piece(&self, i: usize) -> Option<Piece<M>> {
+    fn kernel(&self, i: usize) -> Kernel<M> {
         let problem = self.problem;
         let weights = problem.weights(i);
         if !self.plain || problem.share(i).is_some() || weights.windows(2).any(|pair| pair[0] != pair[1]) {
-            return None;
+            return Kernel::Curve;
         }
-        Piece::new(problem.points(i))
+        let line = |way: [f64; M]| Kernel::Line(Line::new(&way, &self.plain_axes, problem.feed[i]));
+        match problem.points(i) {
+            [a, b] => line(sub(b, a)),
+            // The middle of a short line far from the origin is rounded, and would bend it.
+            [a, b, c] if *b == lerp(a, c, 0.5) => line(sub(c, a)),
+            [a, b, c] => Kernel::Quadratic(Piece::new(&[*a, *b, *c])),
+            _ => Kernel::Curve,
+        }
     }
 
     #[cold]

@@ -214,11 +214,6 @@ impl<const M: usize, const C: usize> SubPiece<M, C> {
         if self.own_speed || matches!(self.cap, Cap::Feed(_)) {
             return 1.0;
         }
-        self.speed_share(at_end)
-    }
-
-    /// D over |g|² at an end, also in the limit where both vanish.
-    pub fn speed_share(&self, at_end: bool) -> f64 {
         let lead = |p: &Polynomial<C>, r: usize| {
             let c = p.coefficients();
             c.get(if at_end { c.len().wrapping_sub(1 + r) } else { r }).copied().unwrap_or(0.0)

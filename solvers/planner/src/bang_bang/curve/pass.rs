@@ -25,7 +25,6 @@ use super::part::{Cap, SubPiece};
 use super::window::{Bound, Window};
 use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
-use feedplan_geometry::quadratic::norm;
 
 /// Tests are taken for kept while they miss by less than this part of their own terms.
 const NOISE: f64 = 1e-13;
@@ -86,24 +85,6 @@ pub struct State {
     pub speed_sq: f64,
 }
 
-/// The tangents' scaled coefficients next to an end: from the order of its cusp they have the limit direction.
-#[inline(always)]
-pub fn leading<const M: usize, const C: usize>(sub: &SubPiece<M, C>, at_end: bool) -> [f64; M] {
-    match (sub.cusp_order(at_end), at_end) {
-        (0, false) => sub.g.each_ref().map(Polynomial::first),
-        (0, true) => sub.g.each_ref().map(Polynomial::last),
-        (order, false) => sub.g.each_ref().map(|g| g.coefficients()[order]),
-        (order, true) => sub.g.each_ref().map(|g| g.coefficients()[g.degree() - order]),
-    }
-}
-
-/// The limit direction at an end.
-fn direction<const M: usize, const C: usize>(sub: &SubPiece<M, C>, at_end: bool) -> [f64; M] {
-    let lead = leading(sub, at_end);
-    let length = norm(&lead);
-    lead.map(|x| x / length)
-}
-
 /// Over the sub-piece as travelled, from a state, under its cap (backward) or under the arcs of the backward pass
 /// (forward: from its last to its first); appends the arcs and returns the state at the end.
 pub fn run<const M: usize, const C: usize, const BACK: bool>(
@@ -112,8 +93,8 @@ pub fn run<const M: usize, const C: usize, const BACK: bool>(
     bounds: &[Arc],
     out: &mut Vec<Arc>,
 ) -> Result<State, Stuck> {
+    // A curve stops in its cusps.
     let order = sub.cusp_order(false);
-    let straight = sub.straight;
     let pi = if order == 0 { state.speed_sq / sub.rate_sq(false) } else { f64::INFINITY };
     let first = out.len();
     let mut pass = Pass::<M, C, BACK> {
@@ -121,13 +102,7 @@ pub fn run<const M: usize, const C: usize, const BACK: bool>(
         window: Window::new(sub),
         pi,
         order,
-        // A curve stops in its cusps, a straight line need not.
-        cusp_sq: if straight && order > 0 {
-            direction(sub, false).map(|x| x * x * state.speed_sq)
-        } else {
-            [0.0; M]
-        },
-        straight,
+        straight: sub.straight,
         out,
         control: None,
         tied: 0,
@@ -149,36 +124,8 @@ pub fn run<const M: usize, const C: usize, const BACK: bool>(
     if let Some(arc) = out[first..].iter().find(|arc| !sound(arc)) {
         return Err(Stuck(arc.x0));
     }
-    let speed_sq = if sub.cusp_order(true) == 0 {
-        pi * sub.rate_sq(true)
-    } else if straight {
-        let last = out[first..].last();
-        last.map_or(0.0, |arc| end_speed_sq(sub, arc, &direction(sub, true)))
-    } else {
-        0.0
-    };
+    let speed_sq = if sub.cusp_order(true) == 0 { pi * sub.rate_sq(true) } else { 0.0 };
     Ok(State { speed_sq: speed_sq.max(0.0) })
-}
-
-/// The speed squared of the axes at the end of the last arc, where the sub-piece has no tangent.
-fn end_speed_sq<const M: usize, const C: usize>(
-    sub: &SubPiece<M, C>,
-    arc: &Arc,
-    direction: &[f64; M],
-) -> f64 {
-    match arc.kind {
-        Kind::Accelerating(k) => {
-            let way = distance(sub, k, arc.x0, arc.x1);
-            (arc.slow_sq + 2.0 * sub.limits.up[k] * way) / direction[k].powi(2)
-        }
-        Kind::Braking(k) => arc.slow_sq / direction[k].powi(2),
-        Kind::Cap => match sub.cap {
-            Cap::Speed([_, f1]) => f1 / sub.tip_share(true),
-            Cap::Feed(f) => f / sub.speed_share(true),
-            Cap::Axis(k, v_sq) => v_sq / direction[k].powi(2),
-        },
-        Kind::LimitCurve => 0.0,
-    }
 }
 
 /// The way of axis k from x0 to x1 of a sub-piece.
@@ -206,10 +153,8 @@ struct Pass<'a, const M: usize, const C: usize, const BACK: bool> {
     window: Window<M, C>,
     /// π of the window.
     pi: f64,
-    /// All tangents have a zero of this order at the start of the window; then `cusp_sq` holds the squares of the axes'
-    /// velocities.
+    /// All tangents have a zero of this order at the start of the window, and the axes are at rest.
     order: usize,
-    cusp_sq: [f64; M],
     straight: bool,
     out: &'a mut Vec<Arc>,
     /// The axis that has just saturated, and bits of those that share its acceleration.
@@ -325,18 +270,9 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         Err(self.stuck())
     }
 
-    /// Whether the state is on the bound; in the cusp of a straight line its velocities say so.
+    /// Whether the state is on the bound.
     fn is_on_bound(&self) -> bool {
-        if self.order == 0 {
-            return self.pi >= self.window.bound_at_start() * (1.0 - ON_BOUND);
-        }
-        let near = |value: f64, limit: f64| self.straight && value >= limit * (1.0 - ON_BOUND);
-        match &self.window.bound {
-            Bound::Speed(f) => near(self.cusp_sq.iter().sum(), f.first() / self.sub.tip_share(false)),
-            Bound::Axis(k, v_sq) => near(self.cusp_sq[*k], *v_sq),
-            Bound::Arc(k, w) => near(self.cusp_sq[*k], w.first() / self.window.weight.first()),
-            Bound::LimitCurve => false,
-        }
+        self.order == 0 && self.pi >= self.window.bound_at_start() * (1.0 - ON_BOUND)
     }
 
     fn start(&self) -> Start<M> {
@@ -406,7 +342,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         if self.order > 0 {
             // The limit at a cusp.
             pi_start = match kind {
-                Kind::Accelerating(j) if self.order == 1 && slow_sq == 0.0 => {
+                Kind::Accelerating(j) if self.order == 1 => {
                     let lead = self.window.g[j].coefficients()[1];
                     self.sub.limits.up[j] / (lead * self.window.weight.first().powi(2)) * scale
                 }

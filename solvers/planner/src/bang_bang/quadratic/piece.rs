@@ -1,17 +1,7 @@
-//! One piece of degree 1 or 2, its parameter t running from 0 to 1.
+//! One piece of degree 2, its parameter t running from 0 to 1.
 
 use super::turns::difference_of_products;
-use crate::bang_bang::run::PieceEnd;
-use feedplan_geometry::quadratic::{dot, lerp, sub};
-
-/// Tangents whose cross product is below this part of the square of the longer one are parallel to rounding.
-const PARALLEL: f64 = 1e-15;
-/// A tangent shorter than this part of the other one is its rounding: it has no direction.
-const ROUNDING: f64 = 1e-13;
-/// Parallel tangents differ in direction by less, in rad.
-const ALIGNED: f64 = 1e-9;
-/// A piece is straight if bending it back changes no acceleration by more than this part of the least limit.
-const STRAIGHT: f64 = 1e-13;
+use feedplan_geometry::quadratic::{dot, sub};
 
 /// A tangent component this small beside the whole tangent and the component at the other end is zero.
 const ZERO: f64 = 1e-14;
@@ -31,16 +21,10 @@ pub struct Piece<const M: usize> {
 }
 
 impl<const M: usize> Piece<M> {
-    /// The piece with two or three control points, None for others.
+    /// The piece with these control points.
     #[inline(always)]
-    pub fn new(control: &[[f64; M]]) -> Option<Self> {
-        let (mut left, mut right) = match control {
-            [a, b] => (sub(b, a), sub(b, a)),
-            // The middle of a short line far from the origin is rounded, and would bend it.
-            [a, b, c] if *b == lerp(a, c, 0.5) => (sub(c, a), sub(c, a)),
-            [a, b, c] => (sub(b, a).map(|x| 2.0 * x), sub(c, b).map(|x| 2.0 * x)),
-            _ => return None,
-        };
+    pub fn new([a, b, c]: &[[f64; M]; 3]) -> Self {
+        let (mut left, mut right) = (sub(b, a).map(|x| 2.0 * x), sub(c, b).map(|x| 2.0 * x));
         let speed = [dot(&left, &left), dot(&left, &right), dot(&right, &right)];
         let (left_zero, right_zero) = (ZERO * speed[0].sqrt(), ZERO * speed[2].sqrt());
         for k in 0..M {
@@ -59,7 +43,7 @@ impl<const M: usize> Piece<M> {
                 twist_sq += minor * minor;
             }
         }
-        Some(Self { left, right, speed, minors, twist: twist_sq.sqrt() })
+        Self { left, right, speed, minors, twist: twist_sq.sqrt() }
     }
 
     /// The least D on the piece.
@@ -71,33 +55,6 @@ impl<const M: usize> Piece<M> {
         } else {
             self.twist * self.twist / (d0 - 2.0 * d1 + d2)
         }
-    }
-
-    /// Whether the piece is planned as a straight line.
-    #[inline(always)]
-    pub fn is_straight(&self, feed: f64, least_acceleration: f64) -> bool {
-        let [d0, d1, d2] = self.speed;
-        let (shorter, longer) = (d0.min(d2), d0.max(d2));
-        if self.twist <= PARALLEL * longer {
-            // Where the shorter tangent has a direction, it must be that of the longer one.
-            return shorter <= ROUNDING * ROUNDING * longer
-                || self.twist * self.twist <= ALIGNED * ALIGNED * shorter * longer;
-        }
-        // The normal acceleration feed²/ρ, ρ = D^1.5/|W|, and the turn of the tangent.
-        let least = d0.min(d1).min(d2);
-        least > 0.0
-            && self.twist <= STRAIGHT * least
-            && self.twist * feed * feed <= STRAIGHT * least_acceleration * least * least.sqrt()
-    }
-
-    /// Its start and its end.
-    #[inline(always)]
-    pub fn ends(&self) -> [PieceEnd<M>; 2] {
-        let cusps = [self.speed[0] == 0.0, self.speed[2] == 0.0];
-        [
-            PieceEnd { is_cusp: cusps[0], lead: if cusps[0] { self.right } else { self.left } },
-            PieceEnd { is_cusp: cusps[1], lead: if cusps[1] { self.left } else { self.right } },
-        ]
     }
 
     /// The tangent at t, from the nearer end.

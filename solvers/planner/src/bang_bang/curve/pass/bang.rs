@@ -100,8 +100,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         let g = &window.g[j];
         let slow_sq = match (order, turns) {
             (0, false) => self.pi * g.first() * g.first(),
-            (0, true) => 0.0,
-            _ => self.cusp_sq[j],
+            _ => 0.0,
         };
         let gain = g.antiderivative(&window.weight, self.sub.degree);
         // w = ω v_j²
