@@ -20,6 +20,7 @@
 //! | `run` | both passes over a run, from piece to piece |
 //! | `chord` | the chord-error limit as speeds whose squares are linear in the parameter |
 //! | `time` | the time along a cap of the tool's speed |
+//! | `tolerance` | every tolerance, with its reason |
 
 mod chord;
 mod curve;
@@ -27,6 +28,7 @@ mod line;
 mod quadratic;
 mod run;
 mod time;
+mod tolerance;
 
 use std::cell::RefCell;
 

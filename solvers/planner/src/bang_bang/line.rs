@@ -3,11 +3,9 @@
 
 use super::quadratic::Axes;
 use crate::arc_kind::ArcKind;
+use crate::bang_bang::tolerance::NO_PART;
 use crate::profile::{Profile, Row, NO_AXIS};
 use feedplan_geometry::quadratic::norm;
-
-/// A shorter part of the length, or of v², than this is rounding.
-const NO_PART: f64 = 1e-15;
 
 /// A straight piece with its limits.
 pub struct Line {

@@ -7,19 +7,16 @@ use super::curve::{self, Remedy};
 use super::line::Line;
 use super::quadratic::{self, Piece};
 use super::Task;
+use crate::bang_bang::tolerance::{MET, REACHED};
 use crate::problem::Fault;
 use crate::profile::Profile;
 use feedplan_geometry::quadratic::{lerp, sub};
 
-/// A speed asked for at an end of the path may exceed what can be had by this part, which is rounding.
-const REACHED: f64 = 1e-12;
 /// A run in which rounding leaves a pass without headway is planned anew so often, with more cuts every time.
 const MOST_ATTEMPTS: usize = 40;
 /// Pieces of a block, and how many of those after it decide K at its end almost always.
 const BLOCK: usize = 2048;
 const LOOK_AHEAD: usize = 32;
-/// Backward passes that agree to this part have met.
-const MET: f64 = 1e-15;
 
 /// Space for the passes, kept from run to run.
 #[derive(Default)]

@@ -1,5 +1,7 @@
 //! The time along the tool's speed cap: length over speed, by quadrature.
 
+use super::tolerance::TIME;
+
 /// Places of the rule.
 pub const NODES: usize = 6;
 /// Halvings for one phase; some twenty are usual.
@@ -9,7 +11,7 @@ const MOST_HALVINGS: u32 = 1000;
 /// at several places.
 pub fn integral(rate: &impl Fn([f64; NODES]) -> [f64; NODES], x0: f64, x1: f64) -> f64 {
     let whole = rule(rate, x0, x1);
-    gauss(rate, (x0, x1), whole, 1e-14 * whole, &mut { MOST_HALVINGS })
+    gauss(rate, (x0, x1), whole, TIME * whole, &mut { MOST_HALVINGS })
 }
 
 /// To an error that does not shrink with the stretches, and in no more than so many halvings: where the rate is rounding

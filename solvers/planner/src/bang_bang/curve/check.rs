@@ -2,17 +2,11 @@
 
 use super::part::SubPiece;
 use super::pass::{distance, Arc, Kind, Stuck};
+use crate::bang_bang::tolerance::{EXCESS, EXCESS_NEAR, SLOW};
 use feedplan_geometry::polynomial::Polynomial;
 
-/// An arc may exceed a limit by this part …
-const EXCESS: f64 = 1e-9;
-/// … and by this next to a slow end, where more digits are lost.
-const EXCESS_NEAR: f64 = 1e-6;
 /// Places that are looked at on each arc.
 const PLACES: [f64; 4] = [0.02, 0.35, 0.7, 0.98];
-/// Next to a place where all tangents are shorter than this part of the longest one limits are looked at closely:
-/// in these parts of the arc from there.
-const SLOW: f64 = 1e-4;
 const DECADES: [f64; 9] = [0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9];
 
 /// Whether every axis keeps its limits at some places of the arcs, else where it does not: a guard against rounding.

@@ -6,6 +6,7 @@
 //! for one place, where all axes have a zero of order r.
 
 use super::piece::Piece;
+use crate::bang_bang::tolerance::SLOW_SQ;
 use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
 
@@ -13,8 +14,6 @@ use feedplan_geometry::polynomial::Polynomial;
 const MAX_DEPTH: u32 = 52;
 /// So many stretches are looked at in one piece, at most.
 const MAX_STRETCHES: u32 = 4000;
-/// Where |C'|² nowhere falls below this part of its greatest value there is no cusp.
-const FAST: f64 = 1e-10;
 /// So many times half a stretch away from it the tangents have signs.
 const AWAY: f64 = 10.0;
 /// A stretch shorter than this power of a half on which all axes may be at rest is next to a cusp.
@@ -58,7 +57,7 @@ pub struct Nearly {
 /// The cusps of a piece on which these axes move, and the places that are nearly one, in order.
 pub fn cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, moving: AxisBits) -> Cusps {
     let (least, greatest) = piece.speed.range();
-    if piece.own_speed && least > FAST * greatest {
+    if piece.own_speed && least > SLOW_SQ * greatest {
         return Cusps::default();
     }
     let mut search =

@@ -2,15 +2,9 @@
 
 use super::piece::{counted, Piece};
 use super::split::Axes;
+use crate::bang_bang::tolerance::{NARROW, NEAR_END, SAME_TURN};
 use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
-
-/// Turns closer than this part of the piece are one.
-pub const SAME_TURN: f64 = 1e-12;
-/// A part shorter than this part of the piece is not cut once more: its ends become one.
-const NARROW: f64 = 1e-11;
-/// A place nearer to the end of a part than this is at its end.
-const AT_END: f64 = 1e-6;
 
 /// The lowest velocity cap of a sub-piece.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -120,7 +114,7 @@ impl Part {
     pub fn remedy(&self, piece: usize, x: f64) -> Remedy {
         let length = self.to - self.from;
         let narrow = length <= NARROW;
-        let inside = AT_END < x && x < 1.0 - AT_END && !narrow;
+        let inside = NEAR_END < x && x < 1.0 - NEAR_END && !narrow;
         let t = self.from + length * if inside { x } else { 0.5 };
         Remedy { piece, t, reach: if narrow { length } else { 0.0 }, stops: false }
     }

@@ -23,27 +23,10 @@ mod slide;
 
 use super::part::{Cap, SubPiece};
 use super::window::{Bound, Window};
+use crate::bang_bang::tolerance::{NO_STEP, ON_BOUND, ON_LIMIT_CURVE, TEST, WEAK_TIE};
 use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
 
-/// Tests are taken for kept while they miss by less than this part of their own terms.
-const NOISE: f64 = 1e-13;
-/// π this close below a bound is on it.
-const ON_BOUND: f64 = 1e-12;
-/// π this close below a bound that an arc meets at once is on it.
-const NEARLY_ON_BOUND: f64 = 1e-10;
-/// Backward, π this close below the limit curve is on it.
-const ON_LIMIT_CURVE: f64 = 1e-11;
-/// Accelerations this close to each other are equal.
-const TIE: f64 = 1e-10;
-/// A zero of g_k and π this close to A_k/|g_k'|: the axis holds π.
-const FLAT: f64 = 1e-9;
-/// The same where π grows to that without a step.
-const NEARLY_FLAT: f64 = 1e-4;
-/// An event this close to the end of the window is at the end.
-const AT_END: f64 = 1e-11;
-/// A step shorter than this part of x, or of the start of the sub-piece, is none.
-const NO_STEP: f64 = 1e-15;
 const START: f64 = 1e-6;
 /// So many events may follow one another without a step.
 const MAX_HOPS: u32 = 10;
@@ -327,7 +310,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             }
         }
         if let Some((l, needed)) = low {
-            if needed >= s - 1e-9 * (s.abs() + needed.abs()) {
+            if needed >= s - WEAK_TIE * (s.abs() + needed.abs()) {
                 self.limit_curve = Some((j, l));
             }
         }

@@ -1,5 +1,6 @@
 //! One piece of the path as the planner sees it: the hodograph over its parameter t in [0, 1].
 
+use crate::bang_bang::tolerance::{MOST_NOISE, NO_TANGENT, OFF_ITSELF, OFF_LINE, POINT_NOISE, TANGENT_NOISE};
 use feedplan_geometry::polynomial::Polynomial;
 use feedplan_geometry::quadratic::{dot, norm};
 
@@ -24,17 +25,6 @@ pub struct Piece<const M: usize, const C: usize> {
     /// What the axes count in the feed, where that is not D.
     pub share: Option<[f64; M]>,
 }
-
-/// Tangents are known to this part of the greatest one, and coordinates to this part of their size, which is not held
-/// against a piece as short as rounding.
-const TANGENT_NOISE: f64 = 1e-14;
-const POINT_NOISE: f64 = 1e-15;
-const MOST_NOISE: f64 = 1e-9;
-/// A tangent is off a straight line by no more than this part of the longest one, which is rounding, and of itself,
-/// or it is itself as short as rounding.
-const OFF_LINE: f64 = 2e-15;
-const OFF_ITSELF: f64 = 1e-9;
-const NO_TANGENT: f64 = 1e-13;
 
 impl<const M: usize, const C: usize> Piece<M, C> {
     /// The piece with these control points, their weights (none: polynomial) and, where the path is one of joints,

@@ -1,27 +1,19 @@
 //! Cuts a piece where an axis turns round and where the lowest velocity cap changes.
 
 use super::cusp::{cusps, Cusps, Nearly};
-use super::part::{Cap, End, Part, Remedy, SAME_TURN};
+use super::part::{Cap, End, Part, Remedy};
 use super::piece::Piece;
 use crate::bang_bang::chord::SpeedLine;
+use crate::bang_bang::tolerance::{NEAR_CUSP, SAME_CUT, SAME_TURN, SLOW_SQ, ZERO};
 use crate::problem::ChordLimit;
 use crate::problem::{greater, Both, TIP_AXES};
 use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
 
-/// Cuts closer than this part of the piece are one.
-const SAME_CUT: f64 = 1e-13;
-/// Closer than this to a turn where |C'|² is below this part of its greatest value, no velocity cap counts.
-const NEAR_CUSP: f64 = 1e-5;
-const SLOW: f64 = 1e-10;
 /// A weight may be so many times greater than those at the ends of a part.
 const UNEVEN: f64 = 100.0;
 /// A place nearly at rest asks for no cut of its own where there is one, or a cusp, within so many times its reach.
 const AROUND: f64 = 4.0;
-/// The value of a polynomial is rounding below this part of its terms.
-const NOISE: f64 = 1e-14;
-/// A tangent coefficient this small beside the greatest one is zero.
-const ZERO: f64 = 1e-14;
 
 /// Limits of the axes in both directions.
 pub struct Axes<const M: usize> {
@@ -236,7 +228,7 @@ fn put_in_order(cuts: &mut Vec<Cut>) {
 /// for the tool hardly moves.
 fn merge_near_cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, cuts: &mut Vec<Cut>) {
     let (slowest, fastest) = piece.speed.range();
-    if cuts.len() == 2 || slowest > SLOW * fastest {
+    if cuts.len() == 2 || slowest > SLOW_SQ * fastest {
         return;
     }
     let mut turns: Vec<Cut> = cuts.iter().copied().filter(Cut::is_turn_or_end).collect();
@@ -250,7 +242,7 @@ fn merge_near_cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, cuts: &
         }
         same
     });
-    let slow = |t: f64| piece.speed.value(t) <= SLOW * fastest;
+    let slow = |t: f64| piece.speed.value(t) <= SLOW_SQ * fastest;
     let near = |t: f64| turns.iter().any(|turn| (t - turn.t).abs() <= NEAR_CUSP && slow(turn.t));
     cuts.retain(|cut| !cut.is_turn_or_end() && !near(cut.t));
     cuts.extend(turns);
@@ -332,7 +324,7 @@ fn crossings<const C: usize>(p: &Polynomial<C>, cut: &mut impl FnMut(f64)) {
     p.sign_changes(&mut |t| {
         if let Some(&last) = places.last() {
             let middle = 0.5 * (last + t);
-            if p.value(middle).abs() <= NOISE * p.magnitude().value(middle) {
+            if p.value(middle).abs() <= ZERO * p.magnitude().value(middle) {
                 places.pop();
                 return;
             }

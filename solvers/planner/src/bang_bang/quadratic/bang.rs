@@ -9,13 +9,8 @@
 //! sub-piece, so that at most M − 1 transitions follow one another and ties cannot loop.
 
 use super::phase::{along, Kind};
-use super::subpiece::{Axes, SubPiece, NEAR_TURN};
-
-/// A_k − c_k p is zero below this part of A_k: the axis holds p where it is.
-const FLAT: f64 = 8.0 * f64::EPSILON;
-/// A step shorter than this part of the sub-piece does not survive being seen from its other end. At rest it would
-/// take its time all the same.
-const TIE: f64 = 4.0 * f64::EPSILON;
+use super::subpiece::{Axes, SubPiece};
+use crate::bang_bang::tolerance::{FLAT, NEAR_TURN, NO_STEP};
 
 /// How a phase ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -108,7 +103,7 @@ pub fn bang<const M: usize>(
                 let root = cube.cbrt();
                 let step = g0 * y / (root * (1.0 + root + root * root));
                 let x1 = x + step;
-                let moves = step > TIE * sub.length && x1 > x;
+                let moves = step > NO_STEP * sub.length && x1 > x;
                 match event {
                     _ if moves && x1 < sub.length => {
                         return Bang { kind, x1, p1: along(sub, j, axes.acceleration[j], x, p, x1), event };

@@ -1,6 +1,7 @@
 //! One pass over one sub-piece, in the sense of travel: the greatest p that stays under a bound. Backward the bound is the
 //! velocity cap and the limit curve, forward it is K.
 
+use crate::bang_bang::tolerance::{CROSSES, ON_BOUND, ON_LIMIT_CURVE, SLACK};
 use std::cell::OnceCell;
 
 use super::bang::{bang, Event};
@@ -10,15 +11,6 @@ use super::quotient::Quotient;
 use super::slide::slide;
 use super::subpiece::{Axes, SubPiece};
 
-/// p this close below a bound is on it.
-const ON_BOUND: f64 = 1e-13;
-/// Backward, p this close below a falling limit curve is on it.
-const ON_LIMIT_CURVE: f64 = 1e-10;
-/// Where a tangential contact is lost in rounding, the cap is followed with an acceleration too high by a part
-/// that grows from the first to the last of these until the contact is clear.
-const SLACK: [f64; 5] = [1e-14, 1e-13, 1e-12, 1e-11, 1e-10];
-/// A phase and its bound agree to this part where they cross.
-const MET: f64 = 1e-12;
 /// More events than this on one sub-piece cannot be: at most M − 1 transitions lie between two slides, and a
 /// slide ends at one of few roots.
 const MAX_EVENTS: u32 = 300;
@@ -225,7 +217,7 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
                 if let Some(t) = curve.rises_above(&limit, contact) {
                     let x = a + (b - a) * t;
                     let limit = bound.at(sub, axes, x);
-                    if (phase.at(sub, axes, x) - limit).abs() <= MET * limit {
+                    if (phase.at(sub, axes, x) - limit).abs() <= CROSSES * limit {
                         return Some((x, limit));
                     }
                     if let Some(found) = self.search(phase, &bound, a, b) {

@@ -1,10 +1,8 @@
 //! One piece of degree 2, its parameter t running from 0 to 1.
 
 use super::turns::difference_of_products;
+use crate::bang_bang::tolerance::ZERO;
 use feedplan_geometry::quadratic::{dot, sub};
-
-/// A tangent component this small beside the whole tangent and the component at the other end is zero.
-const ZERO: f64 = 1e-14;
 
 /// Tangents at the ends of a piece; the tangent is linear in t between them.
 #[derive(Clone, Copy)]

@@ -3,10 +3,8 @@
 //! Numerator and denominator are quadratics at most, so that two curves cross at the roots of a quartic, of a parabola
 //! where their denominators are the same.
 
+use crate::bang_bang::tolerance::ZERO;
 use feedplan_geometry::polynomial::Polynomial;
-
-/// Coefficients are taken for zero below this part of the terms they come from: a few roundings of a product.
-const NOISE: f64 = 1e-14;
 
 /// A polynomial of degree 4 at most.
 pub type Quartic = Polynomial<5>;
@@ -63,7 +61,7 @@ fn first_root(a: &Quartic, b: &Quartic, contact: usize) -> Option<f64> {
     for ((c, a), b) in c.iter_mut().zip(a.coefficients()).zip(b.coefficients()) {
         let difference = a - b;
         // Exactly 0 where it is rounding.
-        *c = if difference.abs() > NOISE * (a.abs() + b.abs()) { difference } else { 0.0 };
+        *c = if difference.abs() > ZERO * (a.abs() + b.abs()) { difference } else { 0.0 };
     }
     let difference = Quartic::from_padded(a.degree(), &c[..Quartic::padded_len(a.degree())]);
     if difference.is_positive() {

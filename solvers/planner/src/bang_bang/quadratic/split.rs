@@ -5,16 +5,13 @@ use super::quotient::bernstein;
 use super::subpiece::{Axes, Cap, Orientation, SubPiece};
 use super::turns::{Mark, Stretch, EDGE};
 use crate::bang_bang::chord::SpeedLine;
+use crate::bang_bang::tolerance::{AT_KINK, SAME_CUT};
 use crate::problem::ChordLimit;
 use crate::AxisBits;
 use feedplan_geometry::quadratic::dot;
 
 /// Tangents of the chord-error limit are so far apart; see `ChordLimit::lines_below`.
 const STEP: f64 = 0.03;
-/// ρ this close to δ is δ.
-const AT_KINK: f64 = 1e-9;
-/// Cuts closer than this part of a stretch are one.
-const SAME_CUT: f64 = 1e-14;
 
 impl ChordLimit {
     /// Whether the limit can bind on the piece.

@@ -6,11 +6,8 @@
 
 use super::piece::Piece;
 use super::quotient::{Denominator, Quotient};
+use crate::bang_bang::tolerance::NEAR_TURN;
 use feedplan_geometry::quadratic::dot;
-
-/// An axis whose tangent is below this part of the others', each measured by its acceleration limit, is as good as
-/// turning round. Between s and p ≤ A_k/|c_k| a part eps/NEAR_TURN of the digits is lost.
-pub const NEAR_TURN: f64 = 1e-6;
 
 /// The limits of the axes, with what the passes need of them again and again.
 pub struct Axes<const M: usize> {

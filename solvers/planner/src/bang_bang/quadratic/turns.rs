@@ -5,10 +5,8 @@
 //! axis a turns, q'_k = W_ak/c_a, and axis b turns −W_ab/(c_a c_b) after it.
 
 use super::piece::Piece;
+use crate::bang_bang::tolerance::CANCELLED;
 use feedplan_geometry::quadratic::dot;
-
-/// Below this part of its terms a difference of products is computed with their rounding errors.
-const CANCELLED: f64 = 1e-5;
 
 /// The start or end of a stretch: an axis that turns there, or the edge of the piece.
 pub type Mark = u8;

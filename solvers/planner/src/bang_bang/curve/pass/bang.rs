@@ -1,9 +1,8 @@
 //! The arc of greatest acceleration: its control axis, and the event that ends it.
 
-use super::{
-    kept_until, Kind, Pass, Start, Stuck, AT_END, FLAT, MAX_HOPS, NEARLY_FLAT, NEARLY_ON_BOUND, NOISE, TIE,
-};
+use super::{kept_until, Kind, Pass, Start, Stuck, MAX_HOPS};
 use crate::bang_bang::curve::window::Bound;
+use crate::bang_bang::tolerance::{AT_END, NEARLY_FLAT, NEARLY_ON_BOUND, TEST, TIE, WEAK_TIE};
 use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
 
@@ -25,7 +24,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             rests[k] = rest;
             if start.g[k] > 0.0 {
                 s[k] = rest / start.g[k];
-            } else if start.c[k] > 0.0 && rest <= FLAT * start.limit[k] {
+            } else if start.c[k] > 0.0 && rest <= WEAK_TIE * start.limit[k] {
                 s[k] = (start.limit_slope[k] - self.window.g[k].first_bend() * self.pi) / (3.0 * start.c[k]);
                 turns |= 1 << k;
             }
@@ -45,7 +44,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         let mut steepest = f64::INFINITY;
         for k in (0..M).filter(|&k| s[k].is_finite()) {
             let same = if turning(k) {
-                (s[k] - least).abs() <= 1e-9 * (least.abs() + s[k].abs())
+                (s[k] - least).abs() <= WEAK_TIE * (least.abs() + s[k].abs())
             } else {
                 rests[k] - start.g[k] * least <= TIE * start.limit[k]
             };
@@ -133,12 +132,12 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                 let need = along.combine(a[j], &twist, 1.0);
                 let size = |most: f64| {
                     let twist = weighted.magnitude().multiply(&window.g[l].wronskian_magnitude(g));
-                    cube.combine(most, &along, a[j]).combine(NOISE, &twist, NOISE)
+                    cube.combine(most, &along, a[j]).combine(TEST, &twist, TEST)
                 };
                 let roots = known + usize::from(tied >> l & 1 == 1);
                 if !below_limit {
                     let above = cube.combine(a[l], &need, -1.0);
-                    let slack = 1e-9 * a[l] * cube.first();
+                    let slack = WEAK_TIE * a[l] * cube.first();
                     found(kept_until(&above, || size(a[l]), roots, slack), Event::Transition(l));
                 }
                 if !above_limit {
@@ -322,7 +321,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             known += if self.tangent && self.leaving && !same { 2 } else { 1 };
         }
         let gap = limit.combine(1.0, &used, -1.0);
-        let size = || limit.combine(0.1 * NOISE, &used, 0.1 * NOISE);
+        let size = || limit.combine(0.1 * TEST, &used, 0.1 * TEST);
         let slack = if on_bound && self.leaving { f64::INFINITY } else { 0.0 };
         kept_until(&gap, size, known, slack)
     }

@@ -1,6 +1,7 @@
 //! Along the velocity limit curve, backward: two axes at their limits, one up and one down.
 
-use super::{kept_until, Kind, Pass, AT_END, NOISE, ON_BOUND};
+use super::{kept_until, Kind, Pass};
+use crate::bang_bang::tolerance::{AT_END, ON_BOUND, TEST};
 use feedplan_geometry::polynomial::Polynomial;
 
 /// Why the limit curve is left.
@@ -35,9 +36,9 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             }
             let terms = || {
                 let terms = n.magnitude().multiply(&w_slope.magnitude()).combine(
-                    100.0 * NOISE,
+                    100.0 * TEST,
                     &n_slope.magnitude().multiply(&size),
-                    300.0 * NOISE,
+                    300.0 * TEST,
                 );
                 weight.multiply(&terms)
             };
@@ -51,9 +52,9 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             let terms = |most: f64| {
                 let parts = g.derivative().magnitude().multiply(&n.magnitude());
                 size.combine(
-                    NOISE * most,
+                    TEST * most,
                     &parts.combine(1.0, &g.magnitude().multiply(&n_slope.magnitude()), 1.0),
-                    NOISE,
+                    TEST,
                 )
             };
             for (most, sign, what) in [(up[i], -1.0, Leave::Pair(i, l)), (down[i], 1.0, Leave::Pair(j, i))] {
@@ -72,7 +73,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                 let gap = limit.combine(1.0, &used, -1.0);
                 let on = self.pi >= window.bound_at_start() * (1.0 - ON_BOUND);
                 let slack = if on { f64::INFINITY } else { 0.0 };
-                if let Some(t) = kept_until(&gap, || used.magnitude().scale(0.1 * NOISE), 0, slack) {
+                if let Some(t) = kept_until(&gap, || used.magnitude().scale(0.1 * TEST), 0, slack) {
                     if t < first {
                         (first, event) = (t, Some(Leave::Bound));
                     }

@@ -1,8 +1,9 @@
 //! Along the bound: an arc of the backward pass to its end, the velocity cap while no axis needs more than it has.
 
-use super::{kept_until, Kind, Pass, NOISE};
+use super::{kept_until, Kind, Pass};
 use crate::bang_bang::curve::part::Cap;
 use crate::bang_bang::curve::window::Bound;
+use crate::bang_bang::tolerance::TEST;
 use feedplan_geometry::polynomial::Polynomial;
 
 impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
@@ -125,7 +126,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             let y = need(l);
             let (a, low_limit) = (self.sub.limits.up[l], self.sub.limits.down[l]);
             let inside = x.combine(a, &y, -1.0);
-            if let Some(t) = kept_until(&inside, || x.combine(NOISE * a, &size(l), NOISE), 0, 0.0) {
+            if let Some(t) = kept_until(&inside, || x.combine(TEST * a, &size(l), TEST), 0, 0.0) {
                 if t < end {
                     (end, saturated) = (t, Some(l));
                 }
@@ -144,7 +145,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                     }
                     let over = over.multiply(&d);
                     let above = over.combine(1.0, &n.multiply(&weight_sq).multiply(&under), -1.0);
-                    if let Some(t) = kept_until(&above, || over.magnitude().scale(NOISE), 0, 0.0) {
+                    if let Some(t) = kept_until(&above, || over.magnitude().scale(TEST), 0, 0.0) {
                         if t < end {
                             (end, saturated, pair) = (t, None, Some((j, l)));
                         }
