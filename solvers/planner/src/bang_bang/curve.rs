@@ -36,7 +36,7 @@ use feedplan_geometry::polynomial::MOST;
 use feedplan_geometry::quadratic::norm;
 pub use part::Remedy;
 use part::{Cap, Part, SubPiece};
-use pass::{distance, Arc, Kind, State, Stuck};
+use pass::{distance, Kind, Phase, State, Stuck};
 use piece::Piece;
 pub use split::Axes;
 use split::{split, Cut, Limits};
@@ -51,8 +51,8 @@ pub struct Space {
     /// Of each part from right to left: its sub-piece, and where its phases of K begin.
     subs: Store,
     offsets: Vec<usize>,
-    bounds: Vec<Arc>,
-    arcs: Vec<Arc>,
+    bounds: Vec<Phase>,
+    phases: Vec<Phase>,
     /// Cuts where a pass came to no end before, and those that this attempt asks for.
     remedies: Vec<Remedy>,
     asked: Vec<Remedy>,
@@ -161,14 +161,14 @@ fn backward_over<const M: usize, const C: usize>(
             at.speed_sq = at.speed_sq.min(of_axes(at.tip_sq, sub.tip_share(true)));
         }
         space.subs.push(&sub);
-        let arcs = space.bounds.len();
-        space.offsets.push(arcs);
+        let phases = space.bounds.len();
+        space.offsets.push(phases);
         let state = State { speed_sq: at.speed_sq };
         at.speed_sq = match pass::run::<M, C, true>(&sub.reversed(), state, &[], &mut space.bounds) {
             Ok(next) if !part.starts_at_rest() => next.speed_sq,
             Ok(_) => 0.0,
             Err(Stuck(x)) => {
-                space.bounds.truncate(arcs);
+                space.bounds.truncate(phases);
                 space.asked.push(part.remedy(i, 1.0 - x));
                 0.0
             }
@@ -209,34 +209,34 @@ fn forward_over<const M: usize, const C: usize>(
         if part.starts_at_rest() {
             at.speed_sq = 0.0;
         }
-        space.arcs.clear();
+        space.phases.clear();
         let state = State { speed_sq: at.speed_sq };
-        let kept = pass::run::<M, C, false>(&sub, state, &space.bounds[offset..], &mut space.arcs)
-            .and_then(|next| keeps_limits(&sub, &space.arcs).map(|()| next.speed_sq));
+        let kept = pass::run::<M, C, false>(&sub, state, &space.bounds[offset..], &mut space.phases)
+            .and_then(|next| keeps_limits(&sub, &space.phases).map(|()| next.speed_sq));
         space.bounds.truncate(offset);
         at.speed_sq = kept.unwrap_or_else(|Stuck(x)| {
             space.asked.push(part.remedy(i, x));
             0.0
         });
         at.tip_sq = at.speed_sq * sub.tip_share(true);
-        push(task, i, &part, &sub, &space.arcs, out);
+        push(task, i, &part, &sub, &space.phases, out);
     }
     space.parts.truncate(first);
 }
 
-/// Appends the arcs of the forward pass over one part.
+/// Appends the phases of the forward pass over one part.
 fn push<const M: usize, const C: usize>(
     task: &Task<M>,
     number: usize,
     part: &Part,
     sub: &SubPiece<M, C>,
-    arcs: &[Arc],
+    phases: &[Phase],
     out: &mut Profile,
 ) {
     let width = task.problem.width[number];
     let span = part.to - part.from;
-    for arc in arcs {
-        let t = if arc.x1 == 1.0 { part.to } else { part.from + span * arc.x1 };
+    for phase in phases {
+        let t = if phase.x1 == 1.0 { part.to } else { part.from + span * phase.x1 };
         let weight = |x: f64| sub.weight.value(x);
         // p = (dt/dτ)² from π of x. At rest in a cusp p has no limit, and counts as 0.
         let p = |pi: f64, x: f64, rests: bool| {
@@ -246,21 +246,21 @@ fn push<const M: usize, const C: usize>(
                 pi * weight(x).powi(4) * span * span
             }
         };
-        let way = |k: usize| distance(sub, k, arc.x0, arc.x1);
+        let way = |k: usize| distance(sub, k, phase.x0, phase.x1);
         let sign = |k: usize| if part.negative >> k & 1 == 1 { -1.0 } else { 1.0 };
         let mut joins = true;
         let mut by_acceleration = |k: usize, a: f64| {
             // Way over mean speed, the faster speed from the way.
             let way = way(k);
-            // Not with what comes before its axis turns, not even where arcs too short to be kept lie in between.
-            joins = arc.pi[0].is_finite() && arc.pi[1].is_finite() && sub.g[k].first() > 0.0;
+            // Not with what comes before its axis turns, not even where phases too short to be kept lie in between.
+            joins = phase.pi[0].is_finite() && phase.pi[1].is_finite() && sub.g[k].first() > 0.0;
             if way <= 0.0 {
                 return 0.0;
             }
-            2.0 * way / (arc.slow_sq.sqrt() + (arc.slow_sq + 2.0 * a * way).sqrt())
+            2.0 * way / (phase.slow_sq.sqrt() + (phase.slow_sq + 2.0 * a * way).sqrt())
         };
         let (up, down) = (&sub.limits.up, &sub.limits.down);
-        let (kind, axis, value, duration) = match arc.kind {
+        let (kind, axis, value, duration) = match phase.kind {
             Kind::Accelerating(k) => {
                 (ArcKind::AxisAcceleration, k as u8, sign(k) * up[k], by_acceleration(k, up[k]))
             }
@@ -270,9 +270,9 @@ fn push<const M: usize, const C: usize>(
             Kind::LimitCurve => continue,
             Kind::Cap => match sub.cap {
                 Cap::Axis(k, v_sq) => (ArcKind::AxisVelocity, k as u8, v_sq, way(k) / v_sq.sqrt()),
-                Cap::Feed(f) => (ArcKind::Feed, NO_AXIS, f, time_at_speed(sub, (f, f), arc.x0, arc.x1)),
+                Cap::Feed(f) => (ArcKind::Feed, NO_AXIS, f, time_at_speed(sub, (f, f), phase.x0, phase.x1)),
                 Cap::Speed([f0, f1]) => {
-                    let time = time_at_speed(sub, (f0, f1), arc.x0, arc.x1);
+                    let time = time_at_speed(sub, (f0, f1), phase.x0, phase.x1);
                     if f0 == f1 && task.problem.share(number).is_none() {
                         (ArcKind::Feed, NO_AXIS, f0, time)
                     } else {
@@ -282,9 +282,9 @@ fn push<const M: usize, const C: usize>(
             },
         };
         let joins = joins && !matches!(kind, ArcKind::SpeedLine);
-        let rests = [matches!(arc.kind, Kind::Accelerating(_)), matches!(arc.kind, Kind::Braking(_))]
-            .map(|slow| slow && arc.slow_sq == 0.0);
-        let p = [p(arc.pi[0], arc.x0, rests[0]), p(arc.pi[1], arc.x1, rests[1])];
+        let rests = [matches!(phase.kind, Kind::Accelerating(_)), matches!(phase.kind, Kind::Braking(_))]
+            .map(|slow| slow && phase.slow_sq == 0.0);
+        let p = [p(phase.pi[0], phase.x0, rests[0]), p(phase.pi[1], phase.x1, rests[1])];
         out.push(number as u32, width, Row { kind, axis, value, t, p, duration, joins });
     }
 }

@@ -9,7 +9,7 @@
 //!
 //! | while | holds |
 //! |---|---|
-//! | on an arc of axis j, axis l stays below +A_l | A_l g_j³ − A_j g_l g_j² − ω w (g_l' g_j − g_l g_j') ≥ 0 |
+//! | on a phase of axis j, axis l stays below +A_l | A_l g_j³ − A_j g_l g_j² − ω w (g_l' g_j − g_l g_j') ≥ 0 |
 //! | and above −A_l⁻ (backward) | A_l⁻ g_j³ + A_j g_l g_j² + ω w (g_l' g_j − g_l g_j') ≥ 0 |
 //! | under a bound π ≤ n/d | n ω g_j² − w d ≥ 0 |
 //! | on the limit curve π = N/(ω² W), N = A_j g_l + A_l⁻ g_j, W = g_j' g_l − g_j g_l' | ω (N W' − 3 N' W) + 2 ω' N W ≥ 0 |
@@ -32,12 +32,12 @@ const START: f64 = 1e-6;
 const MAX_HOPS: u32 = 10;
 const MAX_EVENTS: u32 = 2000;
 
-/// What stays constant on an arc, in the sense of the pass.
+/// What stays constant on a phase, in the sense of the pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
     /// Axis at +A.
     Accelerating(usize),
-    /// Forward, on an arc of the backward pass: axis at −A.
+    /// Forward, on a phase of the backward pass: axis at −A.
     Braking(usize),
     /// The velocity cap of the sub-piece.
     Cap,
@@ -45,15 +45,15 @@ pub enum Kind {
     LimitCurve,
 }
 
-/// An arc from x0 to x1 of the sub-piece as the pass travels it.
+/// A phase from x0 to x1 of the sub-piece as the pass travels it.
 #[derive(Clone, Copy, Debug)]
-pub struct Arc {
+pub struct Phase {
     pub x0: f64,
     pub x1: f64,
     pub kind: Kind,
     /// π at its ends, of the whole sub-piece; infinite where the tool passes a place without a tangent.
     pub pi: [f64; 2],
-    /// The velocity squared of the axis where the arc is slowest: of an accelerating arc at x0, of a braking one at x1.
+    /// The velocity squared of the axis where the phase is slowest: of an accelerating phase at x0, of a braking one at x1.
     pub slow_sq: f64,
 }
 
@@ -68,13 +68,13 @@ pub struct State {
     pub speed_sq: f64,
 }
 
-/// Over the sub-piece as travelled, from a state, under its cap (backward) or under the arcs of the backward pass
-/// (forward: from its last to its first); appends the arcs and returns the state at the end.
+/// Over the sub-piece as travelled, from a state, under its cap (backward) or under the phases of the backward pass
+/// (forward: from its last to its first); appends the phases and returns the state at the end.
 pub fn run<const M: usize, const C: usize, const BACK: bool>(
     sub: &SubPiece<M, C>,
     state: State,
-    bounds: &[Arc],
-    out: &mut Vec<Arc>,
+    bounds: &[Phase],
+    out: &mut Vec<Phase>,
 ) -> Result<State, Stuck> {
     // A curve stops in its cusps.
     let order = sub.cusp_order(false);
@@ -102,10 +102,11 @@ pub fn run<const M: usize, const C: usize, const BACK: bool>(
         pass.under(bounds)?;
     }
     let pi = pass.pi;
-    let sound =
-        |arc: &Arc| (arc.pi[0] >= 0.0) & (arc.pi[1] >= 0.0) & (arc.slow_sq >= 0.0) & arc.slow_sq.is_finite();
-    if let Some(arc) = out[first..].iter().find(|arc| !sound(arc)) {
-        return Err(Stuck(arc.x0));
+    let sound = |phase: &Phase| {
+        (phase.pi[0] >= 0.0) & (phase.pi[1] >= 0.0) & (phase.slow_sq >= 0.0) & phase.slow_sq.is_finite()
+    };
+    if let Some(phase) = out[first..].iter().find(|phase| !sound(phase)) {
+        return Err(Stuck(phase.x0));
     }
     let speed_sq = if sub.cusp_order(true) == 0 { pi * sub.rate_sq(true) } else { 0.0 };
     Ok(State { speed_sq: speed_sq.max(0.0) })
@@ -139,7 +140,7 @@ struct Pass<'a, const M: usize, const C: usize, const BACK: bool> {
     /// All tangents have a zero of this order at the start of the window, and the axes are at rest.
     order: usize,
     straight: bool,
-    out: &'a mut Vec<Arc>,
+    out: &'a mut Vec<Phase>,
     /// The axis that has just saturated, and bits of those that share its acceleration.
     control: Option<usize>,
     tied: AxisBits,
@@ -169,16 +170,16 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         (0..M).filter(move |k| moving >> k & 1 == 1)
     }
 
-    /// Forward: over one window after the other, each under one arc of the backward pass.
-    fn under(&mut self, bounds: &[Arc]) -> Result<(), Stuck> {
+    /// Forward: over one window after the other, each under one phase of the backward pass.
+    fn under(&mut self, bounds: &[Phase]) -> Result<(), Stuck> {
         let mut x0 = 0.0;
-        for (i, arc) in bounds.iter().rev().enumerate() {
-            let x1 = if i + 1 < bounds.len() { 1.0 - arc.x0 } else { 1.0 };
-            let pi = [arc.pi[1], arc.pi[0]];
-            match arc.kind {
-                // Any other motion under an arc of the backward pass meets it again later.
+        for (i, phase) in bounds.iter().rev().enumerate() {
+            let x1 = if i + 1 < bounds.len() { 1.0 - phase.x0 } else { 1.0 };
+            let pi = [phase.pi[1], phase.pi[0]];
+            match phase.kind {
+                // Any other motion under a phase of the backward pass meets it again later.
                 Kind::Accelerating(k) if self.joins(pi[0]) => {
-                    self.out.push(Arc { x0, x1, kind: Kind::Braking(k), pi, slow_sq: arc.slow_sq });
+                    self.out.push(Phase { x0, x1, kind: Kind::Braking(k), pi, slow_sq: phase.slow_sq });
                     self.pi = pi[1];
                     self.arrived();
                 }
@@ -186,7 +187,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                     if bounds.len() > 1 {
                         self.window = Window::new(self.sub).part(x0, x1);
                     }
-                    self.bound_by(arc);
+                    self.bound_by(phase);
                     // From π of the sub-piece to that of the window.
                     self.pi /= self.window.length().powi(2);
                     self.over_window()?;
@@ -197,27 +198,27 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         Ok(())
     }
 
-    /// Whether π of the sub-piece is on an arc of the backward pass that begins with this one.
+    /// Whether π of the sub-piece is on a phase of the backward pass that begins with this one.
     fn joins(&self, pi: f64) -> bool {
         self.order == 0 && !self.leaving && pi.is_finite() && self.pi >= pi * (1.0 - ON_BOUND)
     }
 
-    /// Puts the window under an arc of the backward pass.
-    fn bound_by(&mut self, arc: &Arc) {
+    /// Puts the window under a phase of the backward pass.
+    fn bound_by(&mut self, phase: &Phase) {
         let window = &mut self.window;
-        match arc.kind {
+        match phase.kind {
             Kind::Accelerating(k) | Kind::Braking(k) => {
                 let (g, weight) = (window.g[k].reverse(), window.weight.reverse());
                 let gain = g.antiderivative(&weight, self.sub.degree);
                 // In the sense of this pass the axis brakes.
-                let w = weight.combine(arc.slow_sq, &gain, 2.0 * self.sub.limits.down[k]);
-                window.bound = Bound::Arc(k, w.reverse());
+                let w = weight.combine(phase.slow_sq, &gain, 2.0 * self.sub.limits.down[k]);
+                window.bound = Bound::Phase(k, w.reverse());
             }
             Kind::Cap => {}
             Kind::LimitCurve => window.bound = Bound::LimitCurve,
         }
-        if arc.kind != Kind::LimitCurve {
-            window.known = [Some(arc.pi[1]), Some(arc.pi[0])];
+        if phase.kind != Kind::LimitCurve {
+            window.known = [Some(phase.pi[1]), Some(phase.pi[0])];
         }
     }
 
@@ -316,7 +317,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         }
     }
 
-    /// Appends an arc to t of the window and leaves the rest; without w, π at the end is that of the bound.
+    /// Appends a phase to t of the window and leaves the rest; without w, π at the end is that of the bound.
     fn push(&mut self, t: f64, kind: Kind, w: Option<&Polynomial<C>>, slow_sq: f64) {
         let length = self.window.length();
         let scale = length * length;
@@ -333,7 +334,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             };
         }
         // π at the end, of the sub-piece.
-        let of_arc = w.and_then(|w| match kind {
+        let of_phase = w.and_then(|w| match kind {
             Kind::Accelerating(j) => {
                 let at = |p: &Polynomial<C>| if t == 1.0 { p.last() } else { p.value(t) };
                 let (w, g, weight) = (at(w), at(&self.window.g[j]), at(&self.window.weight));
@@ -347,14 +348,14 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         if t < 1.0 {
             self.window.leave_before(t);
             let scale = self.window.length().powi(2);
-            pi_end = of_arc.unwrap_or_else(|| self.window.bound_at_start() * scale);
+            pi_end = of_phase.unwrap_or_else(|| self.window.bound_at_start() * scale);
             self.pi = pi_end / scale;
         } else {
-            pi_end = of_arc.unwrap_or_else(|| self.window.bound_at_end());
+            pi_end = of_phase.unwrap_or_else(|| self.window.bound_at_end());
             self.window.x0 = self.window.x1;
             self.pi = pi_end;
         }
-        self.out.push(Arc { x0, x1: self.window.x0, kind, pi: [pi_start, pi_end], slow_sq });
+        self.out.push(Phase { x0, x1: self.window.x0, kind, pi: [pi_start, pi_end], slow_sq });
         self.order = 0;
     }
 

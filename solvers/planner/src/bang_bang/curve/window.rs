@@ -10,9 +10,9 @@ pub enum Bound<const C: usize> {
     Speed(Polynomial<C>),
     /// The velocity squared of an axis is at most this.
     Axis(usize, f64),
-    /// Forward: an arc of the backward pass, on which axis k brakes; its velocity squared times ω.
-    Arc(usize, Polynomial<C>),
-    /// Forward: the backward pass follows the limit curve, which a forward arc does not reach.
+    /// Forward: a phase of the backward pass, on which axis k brakes; its velocity squared times ω.
+    Phase(usize, Polynomial<C>),
+    /// Forward: the backward pass follows the limit curve, which a forward phase does not reach.
     LimitCurve,
 }
 
@@ -75,7 +75,7 @@ impl<const M: usize, const C: usize> Window<M, C> {
         self.weight = self.weight.right(t);
         self.speed = self.speed.right(t).scale(rest * rest);
         match &mut self.bound {
-            Bound::Speed(p) | Bound::Arc(_, p) => *p = p.right(t),
+            Bound::Speed(p) | Bound::Phase(_, p) => *p = p.right(t),
             Bound::Axis(..) | Bound::LimitCurve => {}
         }
         self.known[0] = None;
@@ -90,7 +90,7 @@ impl<const M: usize, const C: usize> Window<M, C> {
         let (n, d) = match &self.bound {
             Bound::Speed(f) => (f.first(), self.speed.first()),
             Bound::Axis(k, v_sq) => (*v_sq, self.g[*k].first().powi(2)),
-            Bound::Arc(k, w) => (w.first(), self.weight.first() * self.g[*k].first().powi(2)),
+            Bound::Phase(k, w) => (w.first(), self.weight.first() * self.g[*k].first().powi(2)),
             Bound::LimitCurve => return f64::INFINITY,
         };
         if d > 0.0 {
@@ -113,7 +113,7 @@ impl<const M: usize, const C: usize> Window<M, C> {
         match &self.bound {
             Bound::Speed(f) => Some((*f, self.speed)),
             Bound::Axis(k, v_sq) => Some((Polynomial::constant(*v_sq), self.g[*k].multiply(&self.g[*k]))),
-            Bound::Arc(k, w) => Some((*w, self.weight.multiply(&self.g[*k].multiply(&self.g[*k])))),
+            Bound::Phase(k, w) => Some((*w, self.weight.multiply(&self.g[*k].multiply(&self.g[*k])))),
             Bound::LimitCurve => None,
         }
     }

@@ -1,4 +1,4 @@
-//! The arc of greatest acceleration: its control axis, and the event that ends it.
+//! The phase of greatest acceleration: its control axis, and the event that ends it.
 
 use super::{kept_until, Kind, Pass, Start, Stuck, MAX_HOPS};
 use crate::bang_bang::curve::window::Bound;
@@ -6,7 +6,7 @@ use crate::bang_bang::tolerance::{AT_END, NEARLY_FLAT, NEARLY_ON_BOUND, TEST, TI
 use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
 
-/// What ends an arc.
+/// What ends a phase.
 enum Event {
     Transition(usize),
     Low(usize),
@@ -83,7 +83,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         Some((j, bits))
     }
 
-    /// Along an arc of greatest acceleration to the event that ends it.
+    /// Along a phase of greatest acceleration to the event that ends it.
     pub(super) fn accelerate(&mut self, start: &Start<M>, on_bound: bool) -> Result<(), Stuck> {
         let order = self.order;
         let (j, mut tied, turns) = if order > 0 {
@@ -231,18 +231,18 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         }
     }
 
-    /// Whether the arc of axis j with w = ω v_j² stays under the bound for sure, as long as all axes keep their limits.
+    /// Whether the phase of axis j with w = ω v_j² stays under the bound for sure, as long as all axes keep their limits.
     fn stays_under(&self, j: usize, w: &Polynomial<C>) -> bool {
         let g = &self.window.g;
         match &self.window.bound {
             Bound::Speed(_) | Bound::Axis(..) => self.cap_is_far(),
-            // No motion that keeps the limits leaves this arc downward once it has met it: the ends tell.
-            Bound::Arc(k, bound) => w.last() * g[*k].last().powi(2) < bound.last() * g[j].last().powi(2),
+            // No motion that keeps the limits leaves this phase downward once it has met it: the ends tell.
+            Bound::Phase(k, bound) => w.last() * g[*k].last().powi(2) < bound.last() * g[j].last().powi(2),
             Bound::LimitCurve => true,
         }
     }
 
-    /// An event at the very start of an arc.
+    /// An event at the very start of a phase.
     fn hop(&mut self, event: Event, j: usize, on_bound: bool) -> Result<(), Stuck> {
         self.hops += 1;
         if self.hops > MAX_HOPS {
@@ -267,7 +267,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             }
             Event::Bound => {
                 if !on_bound {
-                    // So near that the arc meets it at once.
+                    // So near that the phase meets it at once.
                     let bound = self.window.bound_at_start();
                     if self.order > 0 || self.pi < bound * (1.0 - NEARLY_ON_BOUND) {
                         return Err(self.stuck());
@@ -284,21 +284,21 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         Ok(())
     }
 
-    /// After a step along an arc.
+    /// After a step along a phase.
     pub(super) fn arrived(&mut self) {
         (self.hops, self.control, self.tied, self.low) = (0, None, 0, None);
         (self.tangent, self.leaving) = (false, false);
     }
 
-    /// Where the arc of axis j with w = ω v_j² rises above the bound.
+    /// Where the phase of axis j with w = ω v_j² rises above the bound.
     fn gap(&self, j: usize, w: &Polynomial<C>, turns: bool, on_bound: bool) -> Option<f64> {
         let window = &self.window;
         let square = || window.g[j].multiply(&window.g[j]);
         let weight = &window.weight;
         let (limit, used, mut known) = match &window.bound {
             Bound::Axis(k, v_sq) if *k == j => (weight.scale(*v_sq), *w, 0),
-            Bound::Arc(k, bound) if *k == j => (*bound, *w, 0),
-            Bound::Arc(k, bound) => {
+            Bound::Phase(k, bound) if *k == j => (*bound, *w, 0),
+            Bound::Phase(k, bound) => {
                 (bound.multiply(&square()), w.multiply(&window.g[*k].multiply(&window.g[*k])), 2)
             }
             _ => {

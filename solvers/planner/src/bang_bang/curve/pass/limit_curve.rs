@@ -19,7 +19,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         (g[l].combine(limits.up[j], &g[j], limits.down[l]), g[j].wronskian(&g[l]))
     }
 
-    /// Along the limit curve while no arc would leave it downward; says whether it moved.
+    /// Along the limit curve while no phase would leave it downward; says whether it moved.
     pub(super) fn follow_limit_curve(&mut self, (j, l): (usize, usize)) -> bool {
         let window = &self.window;
         let (up, down) = (&self.sub.limits.up, &self.sub.limits.down);
@@ -98,10 +98,10 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             }
             self.push(first, Kind::LimitCurve, None, 0.0);
             // π at the end is that of the limit curve, or of the bound where that is met.
-            if let Some(arc) = self.out.last_mut() {
+            if let Some(phase) = self.out.last_mut() {
                 if !matches!(event, Some(Leave::Bound)) {
-                    end = end.min(arc.pi[1]);
-                    arc.pi[1] = end;
+                    end = end.min(phase.pi[1]);
+                    phase.pi[1] = end;
                     self.pi = if first == 1.0 { end } else { end / self.window.length().powi(2) };
                 }
             }

@@ -1,4 +1,4 @@
-//! Along the bound: an arc of the backward pass to its end, the velocity cap while no axis needs more than it has.
+//! Along the bound: a phase of the backward pass to its end, the velocity cap while no axis needs more than it has.
 
 use super::{kept_until, Kind, Pass};
 use crate::bang_bang::curve::part::Cap;
@@ -10,8 +10,8 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
     /// From a place on the bound: along it as far as possible; says whether that moved or led to the limit curve.
     pub(super) fn follow_bound(&mut self) -> bool {
         let (end, saturated, pair) = match &self.window.bound {
-            // Any other motion under an arc of the backward pass meets it again later.
-            Bound::Arc(k, w) => {
+            // Any other motion under a phase of the backward pass meets it again later.
+            Bound::Phase(k, w) => {
                 let k = *k;
                 let slow_sq = (w.last() / self.window.weight.last()).max(0.0);
                 self.push(1.0, Kind::Braking(k), None, slow_sq);
@@ -42,7 +42,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         self.leaving = true;
         self.control = saturated;
         self.tangent = saturated.is_some() && moved;
-        // The state is on the bound still: the arc that leaves it follows at once.
+        // The state is on the bound still: the phase that leaves it follows at once.
         moved
     }
 
