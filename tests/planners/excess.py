@@ -63,6 +63,8 @@ def worst_excess(problem: Problem, profile: SpeedProfile, samples: int = 10) -> 
             p0[:, None],
         )
         s = np.select(kinds, [(value - c * p) / g, -p * (t1 * t2).sum(axis=2) / speed_sq, -p * c / g], 0.0)
+    # Next to a cusp the way of an axis may be rounding alone, and so its sign.
+    p = np.maximum(p, 0.0)
     # Next to where its axis turns round s is a difference over next to nothing: so much of it is rounding.
     with np.errstate(divide="ignore", invalid="ignore"):
         grain = ROUNDING * np.abs(j1).max(axis=(1, 2))[:, None] * np.abs(c * p) / g**2
@@ -80,16 +82,18 @@ def worst_excess(problem: Problem, profile: SpeedProfile, samples: int = 10) -> 
 
 
 def worst_excess_exactly(problem: Problem, profile: SpeedProfile) -> float:
-    """The same excess of the axes' limits on one polynomial piece, in rational numbers.
+    """The same excess of the axes' limits on polynomial pieces, in rational numbers.
 
     Next to a cusp the piece's derivatives in floats may be rounding alone, and what follows from them.
     """
-    (width,) = map(Fraction, problem.path.width.tolist())
-    points = [list(map(Fraction, point)) for point in problem.curve.control_points.tolist()]
-    rates = _derivative(points, width)
-    bends = _derivative(rates, width)
-    worst = Fraction(0)
-    for arc in np.flatnonzero(profile.u1 - profile.u0 > 1e-6 * problem.path.width[0]):
+    curve, worst = problem.curve, Fraction(0)
+    for arc in np.flatnonzero(profile.u1 - profile.u0 > 1e-6 * problem.path.width[profile.piece]):
+        piece = profile.piece[arc]
+        width = Fraction(float(curve.width[piece]))
+        own = curve.control_points[curve.offsets[piece] : curve.offsets[piece + 1]]
+        points = [list(map(Fraction, point)) for point in own.tolist()]
+        rates = _derivative(points, width)
+        bends = _derivative(rates, width) if len(rates) > 1 else [[Fraction(0)] * len(rates[0])]
         kind, axis = profile.kind[arc], int(profile.axis[arc])
         value, u0, u1 = (Fraction(float(column[arc])) for column in (profile.value, profile.u0, profile.u1))
         for part in (0.001, 0.01, 0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95, 0.99, 0.999):

@@ -37,13 +37,18 @@ def problem_of(curve: CompositeCurve, velocity: Array, acceleration: Array, feed
         dwell=np.zeros(1),
         tolerance=np.zeros(count),
     )
+    return problem_along(path, velocity, acceleration)
+
+
+def problem_along(path: Path, velocity: Array, acceleration: Array) -> Problem:
+    """From rest to rest under the axes' limits and the path's feeds."""
     return Problem(
         path=path,
         max_velocity=velocity,
         max_acceleration=acceleration,
-        max_jerk=np.full(curve.axes, np.inf),
+        max_jerk=np.full(len(path.axes), np.inf),
         feed=path.feed,
-        junction_speed=np.full(count + 1, np.inf),
+        junction_speed=np.full(len(path) + 1, np.inf),
         chord_tolerance=np.inf,
         period=0.001,
     )
@@ -204,7 +209,8 @@ def test_a_cusp_and_a_jump_of_parameter_speed_change_nothing_that_they_should_no
     )
     time = Planned(line, 40.0, 500.0).time
     assert time == pytest.approx(10 / 40 + 40 / 500, rel=1e-12)
-    assert Planned(slow, 40.0, 500.0).time == pytest.approx(time, rel=1e-10)
+    along = problem_along(Path.from_curve(slow, feed=1e9), np.array([40.0]), np.array([500.0]))
+    assert SpeedProfile(*plan_bang_bang(along)).time == pytest.approx(time, rel=1e-10)
     # A semicubical parabola turns back in its cusp: both halves from rest to rest.
     whole = CompositeCurve.from_bezier([[-8.0, 4.0], [8.0, -4.0], [-8.0, -4.0], [8.0, 4.0]])
     assert whole.cusps().u.tolist() == [0.5]

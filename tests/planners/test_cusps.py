@@ -10,13 +10,15 @@ import pytest
 from numpy.typing import NDArray
 
 from feedplan._solvers import plan_bang_bang
+from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
+from feedplan.geometry.path import Path
 from feedplan.planning import rounding_stops
 from feedplan.profile import ArcKind, SpeedProfile
 from feedplan.setpoints import setpoints
 from tests.campaign import seeds
 from tests.planners.excess import worst_excess, worst_excess_exactly
-from tests.planners.test_curves import problem_of
+from tests.planners.test_curves import problem_along
 
 Array = NDArray[np.float64]
 
@@ -42,6 +44,11 @@ def with_cusp(
         powers[1 : len(rate.coef) + 1] = rate.coef / np.arange(1, len(rate.coef) + 1)
         columns.append(bernstein(powers))
     return CompositeCurve.from_bezier(np.array(columns).T)
+
+
+def problem_of(curve: CompositeCurve, velocity: Array, acceleration: Array, feed: float) -> Problem:
+    """From rest to rest along the path of the curve: straight pieces as lines, cut in its cusps."""
+    return problem_along(Path.from_curve(curve, feed=feed), velocity, acceleration)
 
 
 def time_of(curve: CompositeCurve, acceleration: float | Array = 100.0, feed: float = 1e9) -> float:
@@ -137,12 +144,8 @@ def test_the_time_at_a_feed_next_to_a_cusp_is_found_in_a_moment() -> None:
     problem = problem_of(*random_curve(12790))
     profile = SpeedProfile(*plan_bang_bang(problem))
     feed = profile.kind == ArcKind.FEED
-    ways = np.abs(
-        [
-            np.diff(problem.path.curve.evaluate(0, u, 0)[0, :, 0])[0]
-            for u in zip(profile.u0, profile.u1, strict=True)
-        ]
-    )
+    start, end = (problem.path.curve.evaluate(profile.piece, u, 0)[0] for u in (profile.u0, profile.u1))
+    ways = np.linalg.norm(end - start, axis=1)
     np.testing.assert_allclose(profile.duration[feed], ways[feed] / problem.feed[0], rtol=1e-9)
 
 
@@ -159,10 +162,11 @@ def test_setpoints_through_turns_keep_every_limit(seed: int) -> None:
 def test_no_arc_goes_on_where_its_axis_turns_round(seed: int) -> None:
     problem = problem_of(*random_curve(seed))
     profile = SpeedProfile(*plan_bang_bang(problem))
-    for kind, axis, u0, u1 in zip(profile.kind, profile.axis, profile.u0, profile.u1, strict=True):
+    rows = zip(profile.piece, profile.kind, profile.axis, profile.u0, profile.u1, strict=True)
+    for piece, kind, axis, u0, u1 in rows:
         if kind == ArcKind.AXIS_ACCELERATION:
             u = u0 + (u1 - u0) * np.linspace(0.01, 0.99, 99)
-            rate = problem.path.curve.evaluate(np.zeros(99, dtype=int), u, 1)[1, :, axis]
+            rate = problem.path.curve.evaluate(np.full(99, piece), u, 1)[1, :, axis]
             assert (rate > 0).all() or (rate < 0).all()
 
 
@@ -173,6 +177,10 @@ def test_random_curves_next_to_cusps_keep_every_limit() -> None:
         problem = problem_of(*random_curve(seed))
         profile = SpeedProfile(*plan_bang_bang(problem))
         assert np.isfinite(profile.time), seed
-        assert worst_excess(problem, profile)[0] <= 1e-8, seed
+        excess = worst_excess(problem, profile)[0]
+        if excess > 1e-8 and problem.curve.weights is None:
+            # Floats cannot judge everywhere next to a cusp.
+            excess = worst_excess_exactly(problem, profile)
+        assert excess <= 1e-8, seed
         slowed += len(profile.slowed) > 0
     assert slowed <= 2 + count / 300
