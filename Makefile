@@ -3,6 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 NATIVE := $(wildcard $(foreach below,src src/* src/*/*,solvers/*/$(below)/*.rs) solvers/*/Cargo.toml) solvers/Cargo.toml pyproject.toml
 PAGE := feedplan/report/bundle/page.js
+MANYLINUX := $(if $(filter Linux,$(shell uname -s)),--zig --compatibility manylinux_2_28)
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
 .PHONY: demo test native lint clippy page wheel docs bench campaign clean cargo
@@ -33,9 +34,11 @@ clippy: cargo
 
 page: $(PAGE)
 
-# For those who have neither cargo nor Node.js.
-wheel: $(VENV)/maturin $(PAGE)
-	CARGO_TARGET_DIR=$(CURDIR)/solvers/target $(BIN)/maturin build --release --out dist
+# For those who have neither cargo nor Node.js. On Linux zig links it for glibc 2.28 and newer.
+wheel: $(VENV)/built $(VENV)/zig $(PAGE)
+	rm -rf dist
+	MAKEFLAGS= CARGO_TARGET_DIR=$(CURDIR)/solvers/target $(BIN)/maturin build --release $(MANYLINUX) --out dist
+	FEEDPLAN_WHEELS=dist $(BIN)/pytest -rs tests/test_portable.py
 
 # Warnings are errors. Pages show what the numbered examples print, and load nothing from the network.
 docs: $(VENV)/docs $(PAGE)
@@ -53,7 +56,7 @@ bench: $(VENV)/built $(PAGE)
 
 # Random paths by the million, on every machine by the thousand, and property tests on cases never drawn before. What is
 # found becomes a case of the test that found it; the figures stand in benchmarks/README.md.
-campaign: $(VENV)/built $(PAGE) docs
+campaign: $(VENV)/built $(PAGE) docs wheel
 	FEEDPLAN_SEEDS=1000000 cargo test --release --manifest-path solvers/Cargo.toml --test kernels planning::random:: -- --nocapture
 	FEEDPLAN_SEEDS=1000000 cargo test --release --manifest-path solvers/Cargo.toml --test kernels planning::bound:: -- --nocapture
 	FEEDPLAN_SEEDS=1250 $(BIN)/pytest --numprocesses auto tests/constraints/test_joints.py -k random
@@ -95,6 +98,10 @@ $(VENV)/built: $(VENV)/maturin $(NATIVE) | cargo
 
 $(VENV)/docs: pyproject.toml constraints.txt | $(VENV)/built
 	MAKEFLAGS= CARGO_TARGET_DIR=$(CURDIR)/solvers/target $(BIN)/pip install --quiet --constraint constraints.txt --no-build-isolation --editable ".[docs]"
+	@touch $@
+
+$(VENV)/zig: constraints.txt | $(VENV)/maturin
+	$(BIN)/pip install --quiet --constraint constraints.txt ziglang
 	@touch $@
 
 cargo:

@@ -3,9 +3,10 @@
 //! Times are ∫ du/√p in the variable y in [0, 1] in which √p would be linear if p were: du/√p is then finite at
 //! a standstill, and constant where p is linear in u.
 
+use fearless_simd::{f64x4, Simd, SimdBase, SimdInto};
+
 use super::motion::{Law, Motion, State, STEPPED_OVER};
 use super::{EPS, ROUNDINGS};
-use wide::f64x4;
 
 /// Nodes and weights of Kronrod's 7-point rule on [−1, 1], the middle one last; the weights of two rules inside it, Gauss's
 /// of 3 points, which is good to degree 5, and that of the outermost two and the middle, good to degree 3.
@@ -37,12 +38,13 @@ pub(super) fn kronrod(f: impl Fn(f64) -> f64, a: f64, b: f64) -> [f64; 2] {
     by_rules(pairs, f(middle), half)
 }
 
-/// The same of a function of four places at once.
-pub(super) fn kronrod_lanes(f: impl Fn(f64x4) -> f64x4, a: f64, b: f64) -> [f64; 2] {
-    let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
-    let to = f64x4::new([NODES[0], NODES[1], NODES[2], 0.0]) * half;
-    let [outer, gauss, inner, twice] =
-        (f(f64x4::splat(middle) - to) + f(f64x4::splat(middle) + to)).to_array();
+/// The same of a function of four places at once, on the level of instructions `simd`.
+#[inline(always)]
+pub(super) fn kronrod_lanes<S: Simd>(simd: S, f: impl Fn(f64x4<S>) -> f64x4<S>, a: f64, b: f64) -> [f64; 2] {
+    let (middle, half) = (f64x4::splat(simd, 0.5 * (a + b)), 0.5 * (b - a));
+    let nodes: f64x4<S> = [NODES[0], NODES[1], NODES[2], 0.0].simd_into(simd);
+    let to = nodes * half;
+    let [outer, gauss, inner, twice] = (f(middle - to) + f(middle + to)).into();
     by_rules([outer, gauss, inner], 0.5 * twice, half)
 }
 

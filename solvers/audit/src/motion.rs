@@ -9,6 +9,8 @@ mod law;
 
 pub use law::{Law, Pole, Shape};
 
+use fearless_simd::{dispatch, Level};
+
 use super::along::{Along, Pace};
 use super::curve::{from_to, inner, length};
 use super::integral::{kronrod, kronrod_lanes, MOST_HALVINGS, RULES_AGREE};
@@ -189,7 +191,10 @@ impl<const M: usize> Motion<M> {
                 kronrod(|d| length(&tangent(d)), from, to)
             }
             Some(general) => {
-                kronrod_lanes(|t| general.part.speeds(t), from / self.width, (to / self.width).min(1.0))
+                let (from, to) = (from / self.width, (to / self.width).min(1.0));
+                dispatch!(Level::new(), simd => {
+                    kronrod_lanes(simd, #[inline(always)] |t| general.part.speeds(simd, t), from, to)
+                })
             }
         }
     }

@@ -12,8 +12,9 @@
 
 mod nearest;
 
+use fearless_simd::{f64x4, Simd, SimdBase, SimdFloat};
+
 use super::curve::{inner, length};
-use wide::f64x4;
 
 /// Greatest degree.
 pub const MOST: usize = 9;
@@ -95,27 +96,29 @@ impl<const M: usize> Polygon<M> {
     }
 
     /// |dC/dt| at four places, by the same algorithm.
-    pub fn speeds(&self, t: f64x4) -> f64x4 {
-        let (degree, s) = (self.degree, f64x4::ONE - t);
-        let mut steps = [[f64x4::ZERO; M]; MOST];
+    #[inline(always)]
+    pub fn speeds<S: Simd>(&self, simd: S, t: f64x4<S>) -> f64x4<S> {
+        let zero = f64x4::splat(simd, 0.0);
+        let (degree, s) = (self.degree, 1.0 - t);
+        let mut steps = [[zero; M]; MOST];
         for i in 0..degree {
             for k in 0..M {
-                steps[i][k] = f64x4::splat(self.steps[i][k]);
+                steps[i][k] = f64x4::splat(simd, self.steps[i][k]);
             }
         }
-        let mut scale = f64x4::splat(degree as f64);
+        let mut scale = f64x4::splat(simd, degree as f64);
         if self.rational {
-            let mut weights = [f64x4::ZERO; MOST + 1];
+            let mut weights = [zero; MOST + 1];
             for i in 0..=degree {
-                weights[i] = f64x4::splat(self.weights[i]);
+                weights[i] = f64x4::splat(simd, self.weights[i]);
             }
             for count in (2..=degree).rev() {
-                let mut left = [f64x4::ZERO; MOST];
-                let mut right = [f64x4::ZERO; MOST];
+                let mut left = [zero; MOST];
+                let mut right = [zero; MOST];
                 for i in 0..count {
                     let (a, b) = (s * weights[i], t * weights[i + 1]);
                     weights[i] = a + b;
-                    let inverse = f64x4::ONE / weights[i];
+                    let inverse = 1.0 / weights[i];
                     (left[i], right[i]) = (a * inverse, b * inverse);
                 }
                 for i in 0..count - 1 {
@@ -124,7 +127,7 @@ impl<const M: usize> Polygon<M> {
                     }
                 }
             }
-            let inverse = f64x4::ONE / (s * weights[0] + t * weights[1]);
+            let inverse = 1.0 / (s * weights[0] + t * weights[1]);
             scale = scale * weights[0] * weights[1] * inverse * inverse;
         } else {
             for count in (1..degree).rev() {
@@ -135,7 +138,7 @@ impl<const M: usize> Polygon<M> {
                 }
             }
         }
-        let mut square = f64x4::ZERO;
+        let mut square = zero;
         for k in 0..M {
             square += steps[0][k] * steps[0][k];
         }
@@ -385,6 +388,7 @@ fn first_direction<'a, const M: usize>(mut steps: impl Iterator<Item = &'a [f64;
 mod tests {
     use super::*;
     use crate::curve::distance;
+    use fearless_simd::{dispatch, Level, SimdInto};
 
     /// A quarter of a circle of radius 10 about (1000, 0).
     fn quarter() -> Polygon<2> {
@@ -413,8 +417,9 @@ mod tests {
     fn speeds_are_the_lengths_of_slopes() {
         let t = [0.0, 0.3, 0.8, 1.0];
         for piece in [quarter(), cubic(), quarter().part(0.2, 0.5), cubic().part(0.9, 0.1)] {
-            let speeds = piece.speeds(f64x4::new(t));
-            for (t, speed) in t.into_iter().zip(speeds.as_array()) {
+            let speeds: [f64; 4] =
+                dispatch!(Level::new(), simd => piece.speeds(simd, t.simd_into(simd)).into());
+            for (t, speed) in t.into_iter().zip(speeds) {
                 assert!((speed / length(&piece.local(t).slope) - 1.0).abs() < 1e-14, "{speed} at {t}");
             }
         }

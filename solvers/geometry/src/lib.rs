@@ -3,7 +3,6 @@
 pub mod arc_length;
 pub mod conic;
 mod instances;
-pub mod lanes;
 pub mod newton;
 pub mod polynomial;
 pub mod quadratic;

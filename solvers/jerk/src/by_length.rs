@@ -15,7 +15,6 @@ use crate::curvature_jumps::{passages, Jump, Passage};
 use crate::jerk_limited::{Geometry, Place, SpeedCap};
 use crate::path_dynamics::chord_speed;
 use feedplan_geometry::arc_length::{W, X};
-use feedplan_geometry::lanes::Lanes;
 use feedplan_geometry::quadratic::{dot, norm};
 use feedplan_geometry::spline::bezier::{self, derivatives};
 use feedplan_geometry::spline::cusps::CUSP;
@@ -215,9 +214,9 @@ pub fn speed_sq<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> f64 {
 }
 
 /// D at four u of piece `i`.
-fn speeds_sq<const M: usize>(problem: &Problem<M>, i: usize, u: Lanes) -> Lanes {
+fn speeds_sq<const M: usize>(problem: &Problem<M>, i: usize, u: [f64; 4]) -> [f64; 4] {
     if problem.way.is_some() {
-        Lanes::new(u.values().map(|u| speed_sq(problem, i, u)))
+        u.map(|u| speed_sq(problem, i, u))
     } else {
         bezier::speeds_sq(&piece(problem, i), u)
     }
@@ -225,10 +224,11 @@ fn speeds_sq<const M: usize>(problem: &Problem<M>, i: usize, u: Lanes) -> Lanes 
 
 /// The length between two parameters of piece `i`, by one panel.
 fn panel<const M: usize>(problem: &Problem<M>, i: usize, a: f64, b: f64) -> f64 {
-    let (middle, half) = (Lanes::all(0.5 * (a + b)), 0.5 * (b - a));
-    let to = Lanes::new(X) * half;
-    let speeds = speeds_sq(problem, i, middle - to).sqrt() + speeds_sq(problem, i, middle + to).sqrt();
-    half * (Lanes::new(W) * speeds).sum()
+    let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
+    let below = speeds_sq(problem, i, X.map(|x| middle - x * half));
+    let above = speeds_sq(problem, i, X.map(|x| middle + x * half));
+    let [f0, f1, f2, f3] = std::array::from_fn(|lane| W[lane] * (below[lane].sqrt() + above[lane].sqrt()));
+    half * ((f0 + f2) + (f1 + f3))
 }
 
 impl Row {

@@ -20,6 +20,8 @@ mod exact;
 mod grid;
 mod hermite;
 mod interior_point;
+#[cfg(test)]
+mod levels;
 mod model;
 mod newton;
 mod prepare;

@@ -6,6 +6,7 @@ pub mod feed;
 pub mod jerk_arcs;
 pub mod jerk_limited;
 pub mod jerk_limited_path;
+mod lanes;
 pub mod path_dynamics;
 pub mod s_curve;
 pub mod s_curve_path;

@@ -5,7 +5,6 @@
 
 use super::rational::{cut_corners, quotient};
 use super::{CompositeCurve, Piece, MAX_DEGREE};
-use crate::lanes::Lanes;
 
 /// Calls a function for M axes with the number of control points as a constant, for which triangles unroll.
 macro_rules! with_count {
@@ -104,27 +103,28 @@ fn triangle<const M: usize, const N: usize>(mut b: [[f64; M]; N], t: f64) -> [[f
 
 /// |C'|² by u, at four places.
 #[inline]
-pub fn speeds_sq<const M: usize>(piece: &Piece<M>, u: Lanes) -> Lanes {
+pub fn speeds_sq<const M: usize>(piece: &Piece<M>, u: [f64; 4]) -> [f64; 4] {
     with_count!(piece, speeds_sq_of(piece, u))
 }
 
-fn speeds_sq_of<const M: usize, const N: usize>(piece: &Piece<M>, u: Lanes) -> Lanes {
+fn speeds_sq_of<const M: usize, const N: usize>(piece: &Piece<M>, u: [f64; 4]) -> [f64; 4] {
     let (scale, control) = (1.0 / piece.width, &piece.control[..N]);
-    let t = u * scale;
-    let mut sum = Lanes::ZERO;
+    let t = u.map(|u| u * scale);
+    let mut sum = [0.0; 4];
     if piece.is_rational() {
         let weights: &[f64; N] = piece.weights[..N].try_into().expect("a weight for each point");
         let [w0, w1] = value_and_slope(weights, t);
-        let inverse = w0.inverse();
-        let turn = w1 * inverse;
+        let inverse = w0.map(|w| 1.0 / w);
         for k in 0..M {
             let mut points = [0.0; N];
             for i in 0..N {
                 points[i] = (control[i][k] - control[0][k]) * weights[i];
             }
             let [m0, m1] = value_and_slope(&points, t);
-            let tangent = (m1 - turn * m0) * inverse;
-            sum += tangent * tangent;
+            for lane in 0..4 {
+                let tangent = (m1[lane] - w1[lane] * inverse[lane] * m0[lane]) * inverse[lane];
+                sum[lane] += tangent * tangent;
+            }
         }
     } else {
         for k in 0..M {
@@ -133,26 +133,33 @@ fn speeds_sq_of<const M: usize, const N: usize>(piece: &Piece<M>, u: Lanes) -> L
                 points[i] = control[i][k] - control[0][k];
             }
             let [_, tangent] = value_and_slope(&points, t);
-            sum += tangent * tangent;
+            for lane in 0..4 {
+                sum[lane] += tangent[lane] * tangent[lane];
+            }
         }
     }
-    sum * (scale * scale)
+    sum.map(|sum| sum * (scale * scale))
 }
 
-/// Value and derivative by t of a polynomial in Bernstein form.
+/// Value and derivative by t of a polynomial in Bernstein form, at four places.
 #[inline(always)]
-fn value_and_slope<const N: usize>(coefficients: &[f64; N], t: Lanes) -> [Lanes; 2] {
-    let s = Lanes::ONE - t;
-    let mut b = [Lanes::ZERO; N];
-    for i in 0..N {
-        b[i] = Lanes::all(coefficients[i]);
-    }
+fn value_and_slope<const N: usize>(coefficients: &[f64; N], t: [f64; 4]) -> [[f64; 4]; 2] {
+    let s = t.map(|t| 1.0 - t);
+    let mut b = coefficients.map(|coefficient| [coefficient; 4]);
     for left in (2..N).rev() {
         for i in 0..left {
-            b[i] = s * b[i] + t * b[i + 1];
+            for lane in 0..4 {
+                b[i][lane] = s[lane] * b[i][lane] + t[lane] * b[i + 1][lane];
+            }
         }
     }
-    [s * b[0] + t * b[1], (b[1] - b[0]) * (N - 1) as f64]
+    let mut out = [[0.0; 4]; 2];
+    for lane in 0..4 {
+        let (from, to) = (b[0][lane], b[1][lane]);
+        out[0][lane] = s[lane] * from + t[lane] * to;
+        out[1][lane] = (to - from) * (N - 1) as f64;
+    }
+    out
 }
 
 /// C(u).
@@ -336,7 +343,7 @@ mod tests {
         ) {
             let piece = Piece { control: &control, weights: &weights, width: 2.0 };
             let size = control.iter().map(norm).fold(0.0, f64::max);
-            for (u, found) in u.into_iter().zip(speeds_sq(&piece, Lanes::new(u)).values()) {
+            for (u, found) in u.into_iter().zip(speeds_sq(&piece, u)) {
                 let tangent = derivatives(&piece, u)[1];
                 prop_assert!((found - dot(&tangent, &tangent)).abs() <= 1e-10 * size * size);
             }

@@ -33,6 +33,7 @@ pub struct Band {
 
 impl Band {
     /// An empty matrix for so many nodes.
+    #[inline(always)]
     pub fn clear(&mut self, nodes: usize) {
         self.diagonal.clear();
         self.diagonal.resize(nodes, [0.0; 3]);
@@ -56,6 +57,7 @@ impl Band {
     }
 
     /// Factors the matrix with its ends tied; false if it is not positive definite.
+    #[inline(always)]
     pub fn factor(&mut self, ties: [Tie; 2]) -> bool {
         self.ties = Some(ties);
         self.tie(ties);
@@ -97,6 +99,7 @@ impl Band {
         true
     }
 
+    #[inline(always)]
     fn tie(&mut self, ties: [Tie; 2]) {
         let last = self.diagonal.len() - 1;
         for (end, tie) in ties.into_iter().enumerate() {
@@ -122,6 +125,7 @@ impl Band {
     }
 
     /// Solves for the step `out` (pairs dw, dw' flat) with right-hand side `rhs`; `ends` holds the given steps.
+    #[inline(always)]
     pub fn solve(&mut self, rhs: &[f64], ends: [[f64; 2]; 2], out: &mut [f64]) {
         let ties = self.ties.expect("the matrix is factored first");
         let last = self.diagonal.len() - 1;
@@ -163,6 +167,7 @@ impl Band {
     }
 
     /// Forward and backward substitution in scaled unknowns.
+    #[inline(always)]
     fn substitute(&mut self) {
         let (mut p, mut q) = (0.0, 0.0);
         let mut m = [0.0; 4];

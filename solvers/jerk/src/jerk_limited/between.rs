@@ -1,11 +1,13 @@
 //! The limits between the collocation points: the truth at 12 places of each interval, and the peaks of what
 //! interpolates them.
 
+use fearless_simd::{dispatch, Level, Simd};
+
 use super::hermite::{self, combine, local, Basis};
 use super::rows::Rows;
 use super::sides::Sides;
 use super::{Geometry, Limits};
-use feedplan_geometry::lanes::Lanes;
+use crate::lanes::{Lanes, Register};
 
 /// Places of an interval, both ends among them, in groups of four.
 const GROUPS: usize = 3;
@@ -90,24 +92,30 @@ impl<const M: usize> Between<M> {
     ///
     /// Peaks are sought of each axis for itself: of several together they are no peaks of a smooth function.
     pub fn utilisation(&self, x: &[f64], n: usize, h: f64) -> [f64; 3] {
+        dispatch!(Level::new(), simd => self.utilisation_on(simd, x, n, h))
+    }
+
+    #[inline(always)]
+    pub(super) fn utilisation_on<S: Simd>(&self, simd: S, x: &[f64], n: usize, h: f64) -> [f64; 3] {
         let u = local(x, n, h);
         let per_h = 1.0 / h;
         let mut cap = [0.0; PLACES];
         let mut axes = [[[0.0; PLACES]; 3]; M];
         let Self { velocity, acceleration, jerk, .. } = self;
         for (group, (sample, basis)) in self.samples[n].iter().zip(&BASES).enumerate() {
-            let w = combine(&basis[0], &u);
-            let (w1, w2) = (combine(&basis[1], &u) * per_h, combine(&basis[2], &u) * (per_h * per_h));
-            let v = w.max(Lanes::ZERO).sqrt();
+            let w = combine(simd, &basis[0], &u);
+            let w1 = combine(simd, &basis[1], &u) * per_h;
+            let w2 = combine(simd, &basis[2], &u) * (per_h * per_h);
+            let v = w.max(Register::all(simd, 0.0)).sqrt();
             let at = 4 * group..4 * group + 4;
-            cap[at.clone()].copy_from_slice((w * sample.cap).values());
+            cap[at.clone()].copy_from_slice(&(w * sample.cap).values());
             for k in 0..M {
                 let [q1, q2, q3] = sample.q[k];
                 let a = q2 * w + q1 * w1 * 0.5;
                 let j = (q3 * w + q2 * w1 * 1.5 + q1 * w2 * 0.5) * v;
-                axes[k][0][at.clone()].copy_from_slice((q1 * v * velocity.per_mean[k]).values());
-                axes[k][1][at.clone()].copy_from_slice((a * acceleration.per_mean[k]).values());
-                axes[k][2][at.clone()].copy_from_slice((j * (self.calm[n] / jerk[k])).values());
+                axes[k][0][at.clone()].copy_from_slice(&(q1 * v * velocity.per_mean[k]).values());
+                axes[k][1][at.clone()].copy_from_slice(&(a * acceleration.per_mean[k]).values());
+                axes[k][2][at.clone()].copy_from_slice(&(j * (self.calm[n] / jerk[k])).values());
             }
         }
         let [from, to] = self.at_nodes[n];

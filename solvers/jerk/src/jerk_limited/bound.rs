@@ -13,18 +13,19 @@
 
 use std::ops::Range;
 
+use fearless_simd::{dispatch, Simd};
 use rayon::prelude::*;
 
 use super::grid::Grid;
 use super::hermite::{local, MASS};
 use super::interior_point::{self, Bound, InteriorPoint, Outcome};
-use super::model::project;
+use super::model::{fall, pace, project};
 use super::prepare;
-use super::relaxed::{fall, pace, Relaxed};
+use super::relaxed::Relaxed;
 use super::rows::{Order, Rows};
 use super::stretch::ramps;
 use super::{Effort, Geometry, Problem, Profile};
-use feedplan_geometry::lanes::Lanes;
+use crate::lanes::{Lanes, Register};
 
 /// Windows overlap by so many intervals to both sides, at least this part of a window.
 const HALO: usize = 400;
@@ -131,13 +132,15 @@ fn part<const M: usize>(
     for n in core.clone() {
         let interval = &rows.intervals[n];
         let h = interval.h;
-        let cost = MASS * h;
-        out.time += (cost * pace(interval.motion(&local(plan, n, h))[0])).sum();
         let mut dual: Vec<Lanes> = Order::<M>::of(&space.state.dual, n).to_vec();
         if !known {
             dual.fill(Lanes::ZERO);
         }
-        let (value, slope) = lagrangian(rows, n, &local(&x, n, h), &mut dual, cost);
+        let (time, value, slope) = dispatch!(
+            space.level,
+            simd => lagrangian(simd, rows, n, &local(plan, n, h), &local(&x, n, h), &mut dual)
+        );
+        out.time += time;
         out.value += value;
         for (k, scale) in [1.0, h, 1.0, h].into_iter().enumerate() {
             out.slope[2 * (n - core.start) + k] += slope[k] * scale;
@@ -159,37 +162,41 @@ fn part<const M: usize>(
     out
 }
 
-/// Value and local slope of the Lagrangian on interval n, its multipliers made admissible.
-fn lagrangian<const M: usize>(
+/// The plan's time on interval n, and value and local slope of the Lagrangian there, its multipliers made admissible.
+#[inline(always)]
+pub(super) fn lagrangian<S: Simd, const M: usize>(
+    simd: S,
     rows: &Rows<M>,
     n: usize,
+    plan: &[f64; 4],
     u: &[f64; 4],
     dual: &mut [Lanes],
-    cost: Lanes,
-) -> (f64, [f64; 4]) {
+) -> (f64, f64, [f64; 4]) {
     let interval = &rows.intervals[n];
-    let mut jerk = Lanes::ZERO;
+    let cost = MASS.load(simd) * interval.h;
+    let time = (cost * pace(interval.motion(simd, plan)[0])).sum();
+    let mut jerk = Register::all(simd, 0.0);
     for k in 0..M {
         let at = Order::<M>::jerk(k);
-        jerk += dual[at] + dual[at + 1];
+        jerk += dual[at].load(simd) + dual[at + 1];
     }
     // y is bounded below only if the multipliers of its rows add up to its cost.
-    let fit = Lanes::ONE.min(cost * jerk.max(Lanes::all(f64::MIN_POSITIVE)).inverse());
-    let mut fixed = -dual[Order::<M>::SPEED];
+    let most = cost * jerk.max(Register::all(simd, f64::MIN_POSITIVE)).inverse();
+    let fit = Register::all(simd, 1.0).min(most);
+    let mut fixed = -dual[Order::<M>::SPEED].load(simd);
     for k in 0..M {
         let (at, to) = (Order::<M>::acceleration(k), Order::<M>::jerk(k));
         let [up, down] = rows.acceleration.most[k];
-        fixed += -(dual[at] * up + dual[at + 1] * down);
-        dual[to] *= fit;
-        dual[to + 1] *= fit;
+        fixed += -(dual[at].load(simd) * up + dual[at + 1].load(simd) * down);
+        (dual[to], dual[to + 1]) = ((dual[to] * fit).into(), (dual[to + 1] * fit).into());
     }
-    let last = (cost - jerk * fit).max(Lanes::ZERO);
-    let [w, w1, w2] = interval.motion(u);
-    let (pull, _) = rows.pull(n, dual);
+    let last = (cost - jerk * fit).max(Register::all(simd, 0.0));
+    let [w, w1, w2] = interval.motion(simd, u);
+    let (pull, _) = rows.pull(simd, n, dual);
     let pace = pace(w);
     let value = (fixed + last * pace - pull[0] * w - pull[1] * w1 - pull[2] * w2).sum();
     let slope = project(interval.h, &[-pull[0] - last * fall(pace), -pull[1], -pull[2]]);
-    (value, slope)
+    (time, value, slope)
 }
 
 /// The greatest w, w' and −w' that the limits of speed and acceleration allow at a lane of interval n.

@@ -1,9 +1,11 @@
 //! The true problem on a stretch: the time ∫ ds/√w under the rows as they are.
 
-use super::hermite::{combine, duration, AT_NODES, WEIGHTS};
-use super::model::{expand, Local, Model};
+use fearless_simd::Simd;
+
+use super::hermite::{combine, duration_on, AT_NODES, WEIGHTS};
+use super::model::{expand, fall, pace, Local, Model};
 use super::rows::{Order, Rows};
-use feedplan_geometry::lanes::Lanes;
+use crate::lanes::{Lanes, Register};
 
 /// w^(−1/2) at the collocation points of each interval, where the slacks are.
 #[derive(Default)]
@@ -12,75 +14,102 @@ pub struct Exact {
 }
 
 impl<const M: usize> Model<M> for Exact {
-    fn begin(&mut self, rows: &Rows<M>, _: &[f64]) {
+    #[inline(always)]
+    fn begin<S: Simd>(&mut self, _: S, rows: &Rows<M>, _: &[f64]) {
         self.pace.resize(rows.intervals.len(), Lanes::ONE);
     }
 
     #[inline(always)]
-    fn slack(&mut self, rows: &Rows<M>, n: usize, u: &[f64; 4], _: bool, out: &mut [Lanes]) {
-        let [w, w1, _] = rows.intervals[n].motion(u);
-        let pace = w.max(Lanes::all(f64::MIN_POSITIVE)).sqrt().inverse();
-        rows.slack(n, u, pace, w + w1 * rows.intervals[n].inwards(), out);
-        self.pace[n] = pace;
+    fn slack<S: Simd>(
+        &mut self,
+        simd: S,
+        rows: &Rows<M>,
+        n: usize,
+        u: &[f64; 4],
+        _: bool,
+        out: &mut [Lanes],
+    ) {
+        let [w, w1, _] = rows.intervals[n].motion(simd, u);
+        let pace = pace(w);
+        rows.slack(n, u, pace, w + w1 * rows.intervals[n].inwards(simd), out);
+        self.pace[n] = pace.into();
     }
 
     #[inline(always)]
-    fn slack_step(&self, rows: &Rows<M>, n: usize, d: &[f64; 4], out: &mut [Lanes]) {
-        let [w, w1, _] = rows.intervals[n].motion(d);
-        let last = w + w1 * rows.intervals[n].inwards();
-        rows.slack_step(n, d, -(fall(self.pace[n]) * w), last, out);
+    fn slack_step<S: Simd>(&self, simd: S, rows: &Rows<M>, n: usize, d: &[f64; 4], out: &mut [Lanes]) {
+        let [w, w1, _] = rows.intervals[n].motion(simd, d);
+        let last = w + w1 * rows.intervals[n].inwards(simd);
+        rows.slack_step(n, d, -(fall(self.pace[n].load(simd)) * w), last, out);
     }
 
     #[inline(always)]
-    fn local(&mut self, rows: &Rows<M>, n: usize, u: &[f64; 4], weight: &[Lanes], _: &[Lanes]) -> Local {
-        let mut form = rows.curvature(n, weight);
-        let fall = fall(self.pace[n]);
+    fn local<S: Simd>(
+        &mut self,
+        simd: S,
+        rows: &Rows<M>,
+        n: usize,
+        u: &[f64; 4],
+        weight: &[Lanes],
+        _: &[Lanes],
+    ) -> Local {
+        let mut form = rows.curvature(simd, n, weight);
+        let fall = fall(self.pace[n].load(simd));
         let interval = &rows.intervals[n];
-        let (last, inwards) = (weight[Order::<M>::POSITIVE], interval.inwards());
+        let (last, inwards) = (weight[Order::<M>::POSITIVE].load(simd), interval.inwards(simd));
         form[0] += last;
         form[1] += last * inwards;
         form[3] += last * inwards * inwards;
         for k in 0..M {
             // What the slope of w^(−1/2) adds to the two rows of an axis's jerk.
             let at = Order::<M>::jerk(k);
-            let (both, turn) = (weight[at] + weight[at + 1], (weight[at] - weight[at + 1]) * fall);
+            let [up, down] = [weight[at].load(simd), weight[at + 1].load(simd)];
+            let (both, turn) = (up + down, (up - down) * fall);
             let [q1, q2, q3] = interval.q[k];
             let turn = turn * (rows.per_jerk[k] * interval.jerk);
             form[0] += both * fall * fall + turn * q3 * 2.0;
             form[1] += turn * q2 * 1.5;
             form[2] += turn * q1 * 0.5;
         }
-        let pace = combine(&AT_NODES, u).sqrt().inverse();
+        let pace = combine(simd, &AT_NODES, u).sqrt().inverse();
         let pace_sq = pace * pace;
         let slope = WEIGHTS * pace * pace_sq * (-0.5 * interval.h);
-        Local {
-            matrix: expand(interval.h, &form, slope * pace_sq * -1.5),
-            gradient: AT_NODES.map(|basis| (basis * slope).sum()),
+        let mut gradient = [0.0; 4];
+        for k in 0..4 {
+            gradient[k] = (AT_NODES[k] * slope).sum();
         }
+        Local { matrix: expand(interval.h, &form, slope * pace_sq * -1.5), gradient }
     }
 
     #[inline(always)]
-    fn pull(&mut self, rows: &Rows<M>, n: usize, aim: &[Lanes], _: usize) -> [Lanes; 3] {
-        let (mut pull, jerk) = rows.pull(n, aim);
-        let last = aim[Order::<M>::POSITIVE];
-        pull[0] += last - fall(self.pace[n]) * jerk;
-        pull[1] += last * rows.intervals[n].inwards();
+    fn pull<S: Simd>(
+        &mut self,
+        simd: S,
+        rows: &Rows<M>,
+        n: usize,
+        aim: &[Lanes],
+        _: usize,
+    ) -> [Register<S>; 3] {
+        let (mut pull, jerk) = rows.pull(simd, n, aim);
+        let last = aim[Order::<M>::POSITIVE].load(simd);
+        pull[0] += last - fall(self.pace[n].load(simd)) * jerk;
+        pull[1] += last * rows.intervals[n].inwards(simd);
         pull
     }
 
-    fn solved(&mut self, _: &Rows<M>, _: &[f64], _: [f64; 2]) {}
+    #[inline(always)]
+    fn solved<S: Simd>(&mut self, _: S, _: &Rows<M>, _: &[f64], _: [f64; 2]) {}
 
-    fn attempt(&mut self, _: f64) {}
+    #[inline(always)]
+    fn attempt<S: Simd>(&mut self, _: S, _: f64) {}
 
     fn accept(&mut self) {}
 
-    fn time(&self, rows: &Rows<M>, x: &[f64], _: bool) -> f64 {
-        rows.intervals.iter().enumerate().map(|(n, interval)| duration(x, n, interval.h)).sum()
+    #[inline(always)]
+    fn time<S: Simd>(&self, simd: S, rows: &Rows<M>, x: &[f64], _: bool) -> f64 {
+        let mut time = 0.0;
+        for (n, interval) in rows.intervals.iter().enumerate() {
+            time += duration_on(simd, x, n, interval.h);
+        }
+        time
     }
-}
-
-/// w^(−3/2)/2.
-#[inline(always)]
-fn fall(pace: Lanes) -> Lanes {
-    pace * pace * pace * 0.5
 }

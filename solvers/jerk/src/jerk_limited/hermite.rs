@@ -2,7 +2,9 @@
 //!
 //! On an interval of length h with t in [0, 1], w = Σ u_k B_k(t) with u = (w, h w') at its start and at its end.
 
-use feedplan_geometry::lanes::Lanes;
+use fearless_simd::{dispatch, Level, Simd};
+
+use crate::lanes::{Lanes, Register};
 
 /// Where the limits are enforced inside an interval, as parts of its length.
 pub const POINTS: [f64; 4] = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0];
@@ -57,8 +59,9 @@ pub const fn at(t: f64) -> [[f64; 4]; 3] {
 
 /// Σ u_k B_k.
 #[inline(always)]
-pub fn combine(basis: &Basis, u: &[f64; 4]) -> Lanes {
-    basis[0] * u[0] + basis[1] * u[1] + basis[2] * u[2] + basis[3] * u[3]
+pub fn combine<S: Simd>(simd: S, basis: &Basis, u: &[f64; 4]) -> Register<S> {
+    let [b0, b1, b2, b3] = *basis;
+    b0.load(simd) * u[0] + b1.load(simd) * u[1] + b2.load(simd) * u[2] + b3.load(simd) * u[3]
 }
 
 /// The local coefficients of interval `n` of the spline x = (w_0, w'_0, w_1, w'_1, …).
@@ -70,7 +73,13 @@ pub fn local(x: &[f64], n: usize, h: f64) -> [f64; 4] {
 
 /// ∫ ds/√w over each interval; infinite where w is not positive.
 pub fn duration(x: &[f64], n: usize, h: f64) -> f64 {
-    let w = combine(&AT_NODES, &local(x, n, h));
+    dispatch!(Level::new(), simd => duration_on(simd, x, n, h))
+}
+
+/// The same on a level.
+#[inline(always)]
+pub fn duration_on<S: Simd>(simd: S, x: &[f64], n: usize, h: f64) -> f64 {
+    let w = combine(simd, &AT_NODES, &local(x, n, h));
     if w.least() > 0.0 {
         (WEIGHTS * w.sqrt().inverse()).sum() * h
     } else {

@@ -8,12 +8,14 @@
 
 use std::time::Instant;
 
+use fearless_simd::{dispatch, Level, Simd};
+
 use super::band::{Band, Tie};
 use super::hermite::local;
 use super::model::Model;
 use super::newton::State;
 use super::rows::{Order, Rows};
-use feedplan_geometry::lanes::{Lanes, LogProduct};
+use crate::lanes::{Lanes, LogProduct};
 use feedplan_geometry::watch::Watch;
 
 /// What is known at an end of a stretch.
@@ -83,6 +85,8 @@ pub(super) const LEAST_DUAL: f64 = 1e-4;
 
 /// Working space, reused from stretch to stretch.
 pub struct InteriorPoint<X, const M: usize> {
+    /// What instructions the processor has.
+    pub(super) level: Level,
     pub(super) model: X,
     pub(super) band: Band,
     pub(super) state: State,
@@ -112,6 +116,7 @@ pub(super) struct EndRow {
 impl<X: Model<M>, const M: usize> Default for InteriorPoint<X, M> {
     fn default() -> Self {
         Self {
+            level: Level::new(),
             model: X::default(),
             band: Band::default(),
             state: State::default(),
@@ -129,12 +134,25 @@ impl<X: Model<M>, const M: usize> Default for InteriorPoint<X, M> {
 impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
     /// Improves the valid plan x = (w_0, w'_0, w_1, …) in place. Ends given as fixed may be missed by the start.
     pub fn solve(&mut self, rows: &Rows<M>, bounds: [Bound; 2], x: &mut [f64], effort: &Effort) -> Report {
+        dispatch!(self.level, simd => self.improve(simd, rows, bounds, x, effort))
+    }
+
+    #[inline(always)]
+    fn improve<S: Simd>(
+        &mut self,
+        simd: S,
+        rows: &Rows<M>,
+        bounds: [Bound; 2],
+        x: &mut [f64],
+        effort: &Effort,
+    ) -> Report {
         let count = rows.intervals.len();
         let total = (count * 4 * Order::<M>::COUNT + 2) as f64;
         self.resize(count);
-        self.model.begin(rows, x);
-        let mut time = self.time(rows, bounds, x, false);
-        let Some(mut logarithm) = self.enter(rows, bounds, x, effort.barrier * time / total, effort.warm)
+        self.model.begin(simd, rows, x);
+        let mut time = self.time(simd, rows, bounds, x, false);
+        let Some(mut logarithm) =
+            self.enter(simd, rows, bounds, x, effort.barrier * time / total, effort.warm)
         else {
             return Report { outcome: Outcome::NotInside, iterations: 0, time, excess: time };
         };
@@ -148,7 +166,7 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         let mut iterations = 0;
         while iterations < effort.max_iterations && effort.deadline.is_none_or(|end| Instant::now() < end) {
             effort.watch.check();
-            let work = self.assemble(rows, x, dual, least_dual);
+            let work = self.assemble(simd, rows, x, dual, least_dual);
             dual = 0.0;
             let mu = work / total;
             let gap = work / time;
@@ -170,8 +188,8 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
                 *r = -g;
             }
             self.band.solve(&self.rhs, missing, &mut self.step);
-            self.model.solved(rows, &self.step, [0.0; 2]);
-            let after = self.predict(rows, work, 3.0 * mu) / total;
+            self.model.solved(simd, rows, &self.step, [0.0; 2]);
+            let after = self.predict(simd, rows, work, 3.0 * mu) / total;
             let sigma = (after.max(0.0) / mu).powi(3).clamp(if met { 1e-3 } else { 0.3 }, 0.5);
             let least = floor * time / total;
             let target = least.max(sigma * mu);
@@ -180,17 +198,17 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
             let second = if least > sigma * mu { 0.0 } else { 1.0 };
             self.correct(target, second);
             self.band.solve(&self.rhs, missing, &mut self.step);
-            self.model.solved(rows, &self.step, [target, second]);
-            let longest = self.direction(rows, target, second);
+            self.model.solved(simd, rows, &self.step, [target, second]);
+            let longest = self.direction(simd, rows, target, second);
             let mut part = (STEP * longest.0).min(1.0);
-            let mut next = self.attempt(rows, bounds, x, part);
+            let mut next = self.attempt(simd, rows, bounds, x, part);
             for _ in 0..20 {
                 let valid = next.0.is_finite();
                 if valid && (!met || next.0 - target * (next.1 - logarithm) <= time * (1.0 + 1e-9)) {
                     break;
                 }
                 part *= 0.6;
-                next = self.attempt(rows, bounds, x, part);
+                next = self.attempt(simd, rows, bounds, x, part);
             }
             if !next.0.is_finite() {
                 outcome = Outcome::Stalled;
@@ -210,15 +228,16 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
                 break;
             }
         }
-        self.finish(dual);
+        self.finish(simd, dual);
         if miss(&bounds, x, &rows.intervals) < MET {
             settle(&bounds, x);
         } else {
             outcome = Outcome::Missed;
         }
-        Report { outcome, iterations, time: self.time(rows, bounds, x, false), excess }
+        Report { outcome, iterations, time: self.time(simd, rows, bounds, x, false), excess }
     }
 
+    #[inline(always)]
     fn resize(&mut self, count: usize) {
         let state = &mut self.state;
         for vector in [&mut state.slack, &mut state.dual, &mut state.step] {
@@ -233,7 +252,16 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
     }
 
     /// Slacks and multipliers of the start; Σ ln s, unless it is not inside.
-    fn enter(&mut self, rows: &Rows<M>, bounds: [Bound; 2], x: &[f64], mu: f64, warm: bool) -> Option<f64> {
+    #[inline(always)]
+    fn enter<S: Simd>(
+        &mut self,
+        simd: S,
+        rows: &Rows<M>,
+        bounds: [Bound; 2],
+        x: &[f64],
+        mu: f64,
+        warm: bool,
+    ) -> Option<f64> {
         let last = self.ends;
         self.ends = std::array::from_fn(|end| match bounds[end] {
             Bound::Fixed { .. } => None,
@@ -242,10 +270,10 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
                 Some(EndRow { node, ramp, greatest, slack: 1.0, dual: 0.0, step: 0.0 })
             }
         });
-        let logarithm = self.slacks(rows, x, false)?;
+        let logarithm = self.slacks(simd, rows, x, false)?;
         for (dual, slack) in self.state.dual.iter_mut().zip(&self.state.slack) {
-            let centred = slack.inverse() * mu;
-            *dual = if warm { dual.max(centred) } else { centred };
+            let centred = slack.load(simd).inverse() * mu;
+            *dual = if warm { dual.load(simd).max(centred) } else { centred }.into();
         }
         for (row, last) in self.ends.iter_mut().zip(last) {
             if let Some(row) = row {
@@ -257,21 +285,22 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
     }
 
     /// Slacks of x, or of the trial; Σ ln s, unless a limit is broken.
-    pub(super) fn slacks(&mut self, rows: &Rows<M>, x: &[f64], trial: bool) -> Option<f64> {
+    #[inline(always)]
+    pub(super) fn slacks<S: Simd>(&mut self, simd: S, rows: &Rows<M>, x: &[f64], trial: bool) -> Option<f64> {
         let mut product = LogProduct::default();
         for (n, interval) in rows.intervals.iter().enumerate() {
             let slack = Order::<M>::of_mut(&mut self.state.slack, n);
-            self.model.slack(rows, n, &local(x, n, interval.h), trial, slack);
-            let (mut least, mut all) = (slack[0], slack[0]);
+            self.model.slack(simd, rows, n, &local(x, n, interval.h), trial, slack);
+            let (mut least, mut all) = (slack[0].load(simd), slack[0].load(simd));
             for slack in &slack[1..] {
-                least = slack.min(least);
-                all *= *slack;
+                least = slack.load(simd).min(least);
+                all = all * *slack;
             }
             // Also a product that is not a number.
             if least.least() <= 0.0 || all.sum().is_nan() {
                 return None;
             }
-            product.take(all);
+            product.take(all.values());
         }
         let mut logarithm = product.ln();
         for row in self.ends.iter_mut().flatten() {
@@ -285,8 +314,16 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
     }
 
     /// The time of a spline with its ramps, infinite where it is not positive.
-    pub(super) fn time(&self, rows: &Rows<M>, bounds: [Bound; 2], x: &[f64], trial: bool) -> f64 {
-        let mut time = self.model.time(rows, x, trial);
+    #[inline(always)]
+    pub(super) fn time<S: Simd>(
+        &self,
+        simd: S,
+        rows: &Rows<M>,
+        bounds: [Bound; 2],
+        x: &[f64],
+        trial: bool,
+    ) -> f64 {
+        let mut time = self.model.time(simd, rows, x, trial);
         for (bound, w) in bounds.iter().zip([x[0], x[x.len() - 2]]) {
             if let Bound::Rest { ramp, .. } = bound {
                 time += if w > 0.0 { 3.0 * ramp / w.sqrt() } else { f64::INFINITY };

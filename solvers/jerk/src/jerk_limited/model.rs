@@ -1,42 +1,67 @@
 //! What the interior point asks of a problem: its slacks, their steps, and its curvature, interval by interval.
 
+use fearless_simd::Simd;
+
 use super::hermite::{AT_NODES, BEND, SLOPE, VALUE};
 use super::rows::Rows;
-use feedplan_geometry::lanes::Lanes;
+use crate::lanes::{Lanes, Register};
 
 /// A problem over the rows of a stretch; it may have variables of its own at the collocation points.
 pub trait Model<const M: usize>: Default {
     /// Its own variables for the spline x.
-    fn begin(&mut self, rows: &Rows<M>, x: &[f64]);
+    fn begin<S: Simd>(&mut self, simd: S, rows: &Rows<M>, x: &[f64]);
 
     /// The slacks on interval n for local coefficients u, with its own variables as they are or at the trial.
-    fn slack(&mut self, rows: &Rows<M>, n: usize, u: &[f64; 4], trial: bool, out: &mut [Lanes]);
+    fn slack<S: Simd>(
+        &mut self,
+        simd: S,
+        rows: &Rows<M>,
+        n: usize,
+        u: &[f64; 4],
+        trial: bool,
+        out: &mut [Lanes],
+    );
 
     /// Their change for the step d, the convex ones along their tangents.
-    fn slack_step(&self, rows: &Rows<M>, n: usize, d: &[f64; 4], out: &mut [Lanes]);
+    fn slack_step<S: Simd>(&self, simd: S, rows: &Rows<M>, n: usize, d: &[f64; 4], out: &mut [Lanes]);
 
     /// Matrix and gradient of interval n for the weights λ/s and the multipliers λ of its rows.
-    fn local(&mut self, rows: &Rows<M>, n: usize, u: &[f64; 4], weight: &[Lanes], dual: &[Lanes]) -> Local;
+    fn local<S: Simd>(
+        &mut self,
+        simd: S,
+        rows: &Rows<M>,
+        n: usize,
+        u: &[f64; 4],
+        weight: &[Lanes],
+        dual: &[Lanes],
+    ) -> Local;
 
     /// Σ aim ∇s over the rows of interval n, as a linear form of (w, w', w'') at the collocation points; aims are of
     /// the centring (0), or of the predictor's second order (1).
-    fn pull(&mut self, rows: &Rows<M>, n: usize, aim: &[Lanes], which: usize) -> [Lanes; 3];
+    fn pull<S: Simd>(
+        &mut self,
+        simd: S,
+        rows: &Rows<M>,
+        n: usize,
+        aim: &[Lanes],
+        which: usize,
+    ) -> [Register<S>; 3];
 
     /// Its own part of a step whose spline is known, with so much of each pull in it.
-    fn solved(&mut self, rows: &Rows<M>, step: &[f64], pulls: [f64; 2]);
+    fn solved<S: Simd>(&mut self, simd: S, rows: &Rows<M>, step: &[f64], pulls: [f64; 2]);
 
     /// The trial of its own variables is a part of their step away.
-    fn attempt(&mut self, part: f64);
+    fn attempt<S: Simd>(&mut self, simd: S, part: f64);
 
     /// Takes the trial.
     fn accept(&mut self);
 
     /// The time of x without its ramps; infinite where w is not positive.
-    fn time(&self, rows: &Rows<M>, x: &[f64], trial: bool) -> f64;
+    fn time<S: Simd>(&self, simd: S, rows: &Rows<M>, x: &[f64], trial: bool) -> f64;
 }
 
 /// The symmetric form of (w, w', w'') at each collocation point: 00 01 02 11 12 22.
-pub type Form = [Lanes; 6];
+pub type Form<S> = [Register<S>; 6];
 
 /// The upper half of a matrix, and a gradient, in the local coefficients (w, h w') of both nodes.
 pub struct Local {
@@ -46,7 +71,7 @@ pub struct Local {
 
 /// The upper half of a form of (w, w', w'') in local coefficients, with one of w at the nodes of the quadrature.
 #[inline(always)]
-pub fn expand(h: f64, form: &Form, at_nodes: Lanes) -> [[f64; 4]; 4] {
+pub fn expand<S: Simd>(h: f64, form: &Form<S>, at_nodes: Register<S>) -> [[f64; 4]; 4] {
     let per_h = 1.0 / h;
     let per_h2 = per_h * per_h;
     let m = [
@@ -72,8 +97,24 @@ pub fn expand(h: f64, form: &Form, at_nodes: Lanes) -> [[f64; 4]; 4] {
 
 /// A linear form of (w, w', w'') in local coefficients.
 #[inline(always)]
-pub fn project(h: f64, linear: &[Lanes; 3]) -> [f64; 4] {
+pub fn project<S: Simd>(h: f64, linear: &[Register<S>; 3]) -> [f64; 4] {
     let per_h = 1.0 / h;
     let [g0, g1, g2] = [linear[0], linear[1] * per_h, linear[2] * (per_h * per_h)];
-    std::array::from_fn(|k| (g0 * VALUE[k] + g1 * SLOPE[k] + g2 * BEND[k]).sum())
+    let mut out = [0.0; 4];
+    for k in 0..4 {
+        out[k] = (g0 * VALUE[k] + g1 * SLOPE[k] + g2 * BEND[k]).sum();
+    }
+    out
+}
+
+/// w^(−1/2).
+#[inline(always)]
+pub fn pace<S: Simd>(w: Register<S>) -> Register<S> {
+    w.max(Register::all(w.simd(), f64::MIN_POSITIVE)).sqrt().inverse()
+}
+
+/// w^(−3/2)/2.
+#[inline(always)]
+pub fn fall<S: Simd>(pace: Register<S>) -> Register<S> {
+    pace * pace * pace * 0.5
 }

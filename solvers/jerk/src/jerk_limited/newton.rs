@@ -1,10 +1,12 @@
 //! The passes of one Newton iteration over the intervals of a stretch; see `interior_point`.
 
+use fearless_simd::Simd;
+
 use super::hermite::local;
 use super::interior_point::{Bound, InteriorPoint};
 use super::model::{project, Model};
 use super::rows::{Order, Rows};
-use feedplan_geometry::lanes::Lanes;
+use crate::lanes::{Lanes, Register};
 
 /// The iterate, row by row of each interval; see `rows::Order`.
 #[derive(Default)]
@@ -18,25 +20,33 @@ pub struct State {
 
 impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
     /// Matrix and gradient at x; the sum of λ s. Multipliers take a part of their step and stay above `least_dual`/s.
-    pub(super) fn assemble(&mut self, rows: &Rows<M>, x: &[f64], part: f64, least_dual: f64) -> f64 {
+    #[inline(always)]
+    pub(super) fn assemble<S: Simd>(
+        &mut self,
+        simd: S,
+        rows: &Rows<M>,
+        x: &[f64],
+        part: f64,
+        least_dual: f64,
+    ) -> f64 {
         self.band.clear(rows.intervals.len() + 1);
         self.gradient.fill(0.0);
         let state = &mut self.state;
-        let mut work = Lanes::ZERO;
-        let floor = Lanes::all(least_dual);
+        let mut work = Register::all(simd, 0.0);
+        let floor = Register::all(simd, least_dual);
         let weight = &mut self.scratch[..];
         for (n, interval) in rows.intervals.iter().enumerate() {
             let slack = Order::<M>::of_mut(&mut state.slack, n);
             let dual = Order::<M>::of_mut(&mut state.dual, n);
             let step = Order::<M>::of(&state.step, n);
             for k in 0..Order::<M>::COUNT {
-                let inverse = slack[k].inverse();
-                dual[k] = (dual[k] + step[k] * part).max(floor * inverse);
-                work += dual[k] * slack[k];
-                weight[k] = dual[k] * inverse;
-                slack[k] = inverse;
+                let inverse = slack[k].load(simd).inverse();
+                let multiplier = (dual[k] + step[k].load(simd) * part).max(floor * inverse);
+                work += multiplier * slack[k];
+                weight[k] = (multiplier * inverse).into();
+                (dual[k], slack[k]) = (multiplier.into(), inverse.into());
             }
-            let local = self.model.local(rows, n, &local(x, n, interval.h), weight, dual);
+            let local = self.model.local(simd, rows, n, &local(x, n, interval.h), weight, dual);
             self.band.add(n, interval.h, &local.matrix);
             for (k, scale) in [1.0, interval.h, 1.0, interval.h].into_iter().enumerate() {
                 self.gradient[2 * n + k] += local.gradient[k] * scale;
@@ -57,38 +67,42 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
 
     /// The sum of λ s, which is `work` now, at the end of the predictor's longest step. Keeps the predictor's products
     /// −ds dλ, each at most `most`, and the pulls of them and of the centre on each node.
-    pub(super) fn predict(&mut self, rows: &Rows<M>, work: f64, most: f64) -> f64 {
+    #[inline(always)]
+    pub(super) fn predict<S: Simd>(&mut self, simd: S, rows: &Rows<M>, work: f64, most: f64) -> f64 {
         self.pulls.fill([[0.0; 2]; 2]);
         let state = &mut self.state;
         let change = &mut self.scratch[..Order::<M>::COUNT];
-        let (high, low) = (Lanes::all(most), Lanes::all(-most));
-        let (mut least, mut greatest) = (Lanes::ZERO, Lanes::ZERO);
+        let zero = Register::all(simd, 0.0);
+        let (high, low) = (Register::all(simd, most), Register::all(simd, -most));
+        let (mut least, mut greatest) = (zero, zero);
         // Sums of λ ds and λ ds²/s: with dλ = −λ (1 + ds/s) they give λ s after any step.
-        let mut sums = [Lanes::ZERO; 2];
+        let mut sums = [zero; 2];
         for (n, interval) in rows.intervals.iter().enumerate() {
-            self.model.slack_step(rows, n, &local(&self.step, n, interval.h), change);
+            self.model.slack_step(simd, rows, n, &local(&self.step, n, interval.h), change);
             let inverse = Order::<M>::of(&state.slack, n);
             let dual = Order::<M>::of(&state.dual, n);
             let product = Order::<M>::of_mut(&mut state.step, n);
             for k in 0..Order::<M>::COUNT {
-                let part = change[k] * inverse[k];
+                let step = change[k].load(simd);
+                let part = step * inverse[k];
                 least = least.min(part);
                 greatest = greatest.max(part);
-                let first = dual[k] * change[k];
+                let first = dual[k] * step;
                 let second = first * part;
                 sums[0] += first;
                 sums[1] += second;
-                product[k] = (first + second).max(low).min(high);
-                change[k] = product[k] * inverse[k];
+                let both = (first + second).max(low).min(high);
+                (product[k], change[k]) = (both.into(), (both * inverse[k]).into());
             }
-            let pulls = [self.model.pull(rows, n, inverse, 0), self.model.pull(rows, n, change, 1)];
+            let pulls =
+                [self.model.pull(simd, rows, n, inverse, 0), self.model.pull(simd, rows, n, change, 1)];
             for (which, pull) in pulls.iter().enumerate() {
                 let [w0, d0, w1, d1] = project(interval.h, pull);
                 add(&mut self.pulls[n][which], [w0, d0 * interval.h]);
                 add(&mut self.pulls[n + 1][which], [w1, d1 * interval.h]);
             }
         }
-        let mut sums = sums.map(Lanes::sum);
+        let mut sums = [sums[0].sum(), sums[1].sum()];
         let (mut primal, mut dual) = (-least.least(), 1.0 + greatest.greatest());
         for row in self.ends.iter_mut().flatten() {
             let change = -self.step[2 * row.node] / row.greatest;
@@ -109,6 +123,7 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
 
     /// The right-hand side of the corrector: λ s of every row towards `target`, with `second` times the predictor's
     /// products.
+    #[inline(always)]
     pub(super) fn correct(&mut self, target: f64, second: f64) {
         for ((rhs, gradient), pulls) in
             self.rhs.chunks_exact_mut(2).zip(self.gradient.chunks_exact(2)).zip(&self.pulls)
@@ -120,29 +135,39 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
     }
 
     /// The steps of the multipliers; the longest steps that keep slacks and multipliers positive.
-    pub(super) fn direction(&mut self, rows: &Rows<M>, target: f64, second: f64) -> (f64, f64) {
-        let goal = Lanes::all(target);
+    #[inline(always)]
+    pub(super) fn direction<S: Simd>(
+        &mut self,
+        simd: S,
+        rows: &Rows<M>,
+        target: f64,
+        second: f64,
+    ) -> (f64, f64) {
+        let goal = Register::all(simd, target);
         let change = &mut self.scratch[..Order::<M>::COUNT];
         let state = &mut self.state;
-        let mut least = Lanes::all(-1e-12);
+        let mut least = Register::all(simd, -1e-12);
         let mut dual_most = 1e-12;
         for (n, interval) in rows.intervals.iter().enumerate() {
-            self.model.slack_step(rows, n, &local(&self.step, n, interval.h), change);
+            self.model.slack_step(simd, rows, n, &local(&self.step, n, interval.h), change);
             let inverse = Order::<M>::of(&state.slack, n);
             let dual = Order::<M>::of(&state.dual, n);
             let step = Order::<M>::of_mut(&mut state.step, n);
-            let known = Lanes::all(dual_most);
-            let mut beyond = Lanes::ZERO;
+            let known = Register::all(simd, dual_most);
+            let mut beyond = Register::all(simd, 0.0);
             for k in 0..Order::<M>::COUNT {
-                let part = change[k] * inverse[k];
+                let part = change[k].load(simd) * inverse[k];
                 least = least.min(part);
-                step[k] = (goal + step[k] * second) * inverse[k] - dual[k] * (Lanes::ONE + part);
-                beyond = beyond.min(step[k] + dual[k] * known);
+                let aim = (goal + step[k].load(simd) * second) * inverse[k];
+                let next = aim - dual[k] * (Lanes::ONE + part);
+                beyond = beyond.min(next + dual[k] * known);
+                step[k] = next.into();
             }
             // Few intervals ask for a shorter step than all before: only these divide.
             if beyond.least() < 0.0 {
                 for k in 0..Order::<M>::COUNT {
-                    dual_most = (-(step[k] * dual[k].inverse())).greatest().max(dual_most);
+                    let part = step[k] * dual[k].load(simd).inverse();
+                    dual_most = (-part).greatest().max(dual_most);
                 }
             }
         }
@@ -157,24 +182,33 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
     }
 
     /// Time and Σ ln s a part of the step further; the time is infinite where a limit is broken.
-    pub(super) fn attempt(&mut self, rows: &Rows<M>, bounds: [Bound; 2], x: &[f64], part: f64) -> (f64, f64) {
+    #[inline(always)]
+    pub(super) fn attempt<S: Simd>(
+        &mut self,
+        simd: S,
+        rows: &Rows<M>,
+        bounds: [Bound; 2],
+        x: &[f64],
+        part: f64,
+    ) -> (f64, f64) {
         let mut trial = std::mem::take(&mut self.trial);
         for ((to, from), step) in trial.iter_mut().zip(x).zip(&self.step) {
             *to = from + part * step;
         }
-        self.model.attempt(part);
-        let logarithm = self.slacks(rows, &trial, true);
+        self.model.attempt(simd, part);
+        let logarithm = self.slacks(simd, rows, &trial, true);
         self.trial = trial;
         match logarithm {
-            Some(logarithm) => (self.time(rows, bounds, &self.trial, true), logarithm),
+            Some(logarithm) => (self.time(simd, rows, bounds, &self.trial, true), logarithm),
             None => (f64::INFINITY, 0.0),
         }
     }
 
     /// The multipliers take a part of their last step.
-    pub(super) fn finish(&mut self, part: f64) {
+    #[inline(always)]
+    pub(super) fn finish<S: Simd>(&mut self, simd: S, part: f64) {
         for (dual, step) in self.state.dual.iter_mut().zip(&self.state.step) {
-            *dual += *step * part;
+            *dual = (*dual + step.load(simd) * part).into();
         }
         for row in self.ends.iter_mut().flatten() {
             row.dual += part * row.step;

@@ -6,10 +6,12 @@
 //! c the weights of the 3/8 rule. Its least is at most that of the true problem. y is eliminated point by point, so
 //! that Newton's matrix keeps its band.
 
+use fearless_simd::Simd;
+
 use super::hermite::{local, MASS};
-use super::model::{expand, project, Local, Model};
+use super::model::{expand, fall, pace, project, Local, Model};
 use super::rows::{Order, Rows};
-use feedplan_geometry::lanes::Lanes;
+use crate::lanes::{Lanes, Register};
 
 /// The variables of the relaxation, one set of lanes for each interval.
 #[derive(Default)]
@@ -28,7 +30,8 @@ pub struct Relaxed {
 const ABOVE: f64 = 1.1;
 
 impl<const M: usize> Model<M> for Relaxed {
-    fn begin(&mut self, rows: &Rows<M>, x: &[f64]) {
+    #[inline(always)]
+    fn begin<S: Simd>(&mut self, simd: S, rows: &Rows<M>, x: &[f64]) {
         let count = rows.intervals.len();
         for lanes in [&mut self.y, &mut self.step, &mut self.trial, &mut self.pace] {
             lanes.resize(count, Lanes::ONE);
@@ -36,40 +39,59 @@ impl<const M: usize> Model<M> for Relaxed {
         self.pulls.resize(count, [Lanes::ZERO; 2]);
         self.cross.resize(count, [Lanes::ONE; 4]);
         for (n, interval) in rows.intervals.iter().enumerate() {
-            let motion = interval.motion(&local(x, n, interval.h));
+            let motion = interval.motion(simd, &local(x, n, interval.h));
             let mut least = pace(motion[0]);
             for [_, jerk] in rows.axes(interval, motion) {
                 least = least.max(jerk.abs());
             }
-            self.y[n] = least * ABOVE;
+            self.y[n] = (least * ABOVE).into();
         }
     }
 
     #[inline(always)]
-    fn slack(&mut self, rows: &Rows<M>, n: usize, u: &[f64; 4], trial: bool, out: &mut [Lanes]) {
-        let pace = pace(rows.intervals[n].motion(u)[0]);
-        let y = if trial { self.trial[n] } else { self.y[n] };
+    fn slack<S: Simd>(
+        &mut self,
+        simd: S,
+        rows: &Rows<M>,
+        n: usize,
+        u: &[f64; 4],
+        trial: bool,
+        out: &mut [Lanes],
+    ) {
+        let pace = pace(rows.intervals[n].motion(simd, u)[0]);
+        let y = if trial { self.trial[n] } else { self.y[n] }.load(simd);
         rows.slack(n, u, y, y - pace, out);
-        self.pace[n] = pace;
+        self.pace[n] = pace.into();
     }
 
     #[inline(always)]
-    fn slack_step(&self, rows: &Rows<M>, n: usize, d: &[f64; 4], out: &mut [Lanes]) {
-        let w = rows.intervals[n].motion(d)[0];
-        rows.slack_step(n, d, self.step[n], self.step[n] + fall(self.pace[n]) * w, out);
+    fn slack_step<S: Simd>(&self, simd: S, rows: &Rows<M>, n: usize, d: &[f64; 4], out: &mut [Lanes]) {
+        let w = rows.intervals[n].motion(simd, d)[0];
+        let step = self.step[n].load(simd);
+        rows.slack_step(n, d, step, step + fall(self.pace[n].load(simd)) * w, out);
     }
 
     #[inline(always)]
-    fn local(&mut self, rows: &Rows<M>, n: usize, _: &[f64; 4], weight: &[Lanes], dual: &[Lanes]) -> Local {
+    fn local<S: Simd>(
+        &mut self,
+        simd: S,
+        rows: &Rows<M>,
+        n: usize,
+        _: &[f64; 4],
+        weight: &[Lanes],
+        dual: &[Lanes],
+    ) -> Local {
         let interval = &rows.intervals[n];
-        let mut form = rows.curvature(n, weight);
-        let (last, pace) = (weight[Order::<M>::POSITIVE], self.pace[n]);
+        let zero = Register::all(simd, 0.0);
+        let mut form = rows.curvature(simd, n, weight);
+        let (last, pace) = (weight[Order::<M>::POSITIVE].load(simd), self.pace[n].load(simd));
         let fall = fall(pace);
-        let mut cross = [last, last * fall, Lanes::ZERO, Lanes::ZERO];
+        let mut cross = [last, last * fall, zero, zero];
         form[0] += last * fall * fall + dual[Order::<M>::POSITIVE] * fall * pace * pace * 1.5;
         for k in 0..M {
             let at = Order::<M>::jerk(k);
-            let (both, turn) = (weight[at] + weight[at + 1], weight[at + 1] - weight[at]);
+            let [up, down] = [weight[at].load(simd), weight[at + 1].load(simd)];
+            let (both, turn) = (up + down, down - up);
             let turn = turn * (rows.per_jerk[k] * interval.jerk);
             let [q1, q2, q3] = interval.q[k];
             cross[0] += both;
@@ -77,7 +99,7 @@ impl<const M: usize> Model<M> for Relaxed {
             cross[2] += turn * q2 * 1.5;
             cross[3] += turn * q1 * 0.5;
         }
-        self.cross[n] = cross;
+        self.cross[n] = cross.map(Lanes::from);
         let per = cross[0].inverse();
         let [p0, p1, p2] = [cross[1] * per, cross[2] * per, cross[3] * per];
         form[0] += -(p0 * cross[1]);
@@ -86,37 +108,48 @@ impl<const M: usize> Model<M> for Relaxed {
         form[3] += -(p1 * cross[2]);
         form[4] += -(p1 * cross[3]);
         form[5] += -(p2 * cross[3]);
-        let cost = MASS * interval.h;
+        let cost = MASS.load(simd) * interval.h;
         let linear = [-(p0 * cost), -(p1 * cost), -(p2 * cost)];
-        Local { matrix: expand(interval.h, &form, Lanes::ZERO), gradient: project(interval.h, &linear) }
+        Local { matrix: expand(interval.h, &form, zero), gradient: project(interval.h, &linear) }
     }
 
     #[inline(always)]
-    fn pull(&mut self, rows: &Rows<M>, n: usize, aim: &[Lanes], which: usize) -> [Lanes; 3] {
-        let (mut pull, jerk) = rows.pull(n, aim);
-        let last = aim[Order::<M>::POSITIVE];
-        pull[0] += last * fall(self.pace[n]);
-        self.pulls[n][which] = jerk + last;
+    fn pull<S: Simd>(
+        &mut self,
+        simd: S,
+        rows: &Rows<M>,
+        n: usize,
+        aim: &[Lanes],
+        which: usize,
+    ) -> [Register<S>; 3] {
+        let (mut pull, jerk) = rows.pull(simd, n, aim);
+        let last = aim[Order::<M>::POSITIVE].load(simd);
+        pull[0] += last * fall(self.pace[n].load(simd));
+        self.pulls[n][which] = (jerk + last).into();
         let cross = &self.cross[n];
-        let part = (jerk + last) * cross[0].inverse();
+        let part = (jerk + last) * cross[0].load(simd).inverse();
         for k in 0..3 {
             pull[k] += -(part * cross[k + 1]);
         }
         pull
     }
 
-    fn solved(&mut self, rows: &Rows<M>, step: &[f64], pulls: [f64; 2]) {
+    #[inline(always)]
+    fn solved<S: Simd>(&mut self, simd: S, rows: &Rows<M>, step: &[f64], pulls: [f64; 2]) {
         for (n, interval) in rows.intervals.iter().enumerate() {
-            let [w, w1, w2] = interval.motion(&local(step, n, interval.h));
+            let [w, w1, w2] = interval.motion(simd, &local(step, n, interval.h));
             let [own, c0, c1, c2] = self.cross[n];
-            let aim = self.pulls[n][0] * pulls[0] + self.pulls[n][1] * pulls[1];
-            self.step[n] = (aim - MASS * interval.h - c0 * w - c1 * w1 - c2 * w2) * own.inverse();
+            let [centre, product] = self.pulls[n];
+            let aim = centre.load(simd) * pulls[0] + product.load(simd) * pulls[1];
+            let free = aim - MASS.load(simd) * interval.h - c0 * w - c1 * w1 - c2 * w2;
+            self.step[n] = (free * own.load(simd).inverse()).into();
         }
     }
 
-    fn attempt(&mut self, part: f64) {
+    #[inline(always)]
+    fn attempt<S: Simd>(&mut self, simd: S, part: f64) {
         for ((trial, y), step) in self.trial.iter_mut().zip(&self.y).zip(&self.step) {
-            *trial = *y + *step * part;
+            *trial = (*y + step.load(simd) * part).into();
         }
     }
 
@@ -124,27 +157,16 @@ impl<const M: usize> Model<M> for Relaxed {
         std::mem::swap(&mut self.y, &mut self.trial);
     }
 
-    fn time(&self, rows: &Rows<M>, x: &[f64], trial: bool) -> f64 {
+    #[inline(always)]
+    fn time<S: Simd>(&self, simd: S, rows: &Rows<M>, x: &[f64], trial: bool) -> f64 {
         let y = if trial { &self.trial } else { &self.y };
         let mut time = 0.0;
         for (n, interval) in rows.intervals.iter().enumerate() {
-            if interval.motion(&local(x, n, interval.h))[0].least() <= 0.0 {
+            if interval.motion(simd, &local(x, n, interval.h))[0].least() <= 0.0 {
                 return f64::INFINITY;
             }
-            time += (MASS * y[n]).sum() * interval.h;
+            time += (MASS * y[n].load(simd)).sum() * interval.h;
         }
         time
     }
-}
-
-/// w^(−1/2).
-#[inline(always)]
-pub fn pace(w: Lanes) -> Lanes {
-    w.max(Lanes::all(f64::MIN_POSITIVE)).sqrt().inverse()
-}
-
-/// w^(−3/2)/2.
-#[inline(always)]
-pub fn fall(pace: Lanes) -> Lanes {
-    pace * pace * pace * 0.5
 }

@@ -11,12 +11,14 @@
 //!
 //! The slack of the jerk is convex in w: its tangent at a valid plan is a safe inner constraint.
 
+use fearless_simd::{dispatch, Level, Simd};
+
 use super::hermite::{self, combine, local, BEND, SLOPE, VALUE};
 use super::interior_point::Bound;
 use super::model::Form;
 use super::sides::Sides;
 use super::{Geometry, Limits, Place};
-use feedplan_geometry::lanes::Lanes;
+use crate::lanes::{Lanes, Register};
 
 const INWARDS: Lanes = Lanes::new([1.0 / 3.0, 0.0, 0.0, -1.0 / 3.0]);
 
@@ -89,23 +91,31 @@ impl<const M: usize> Interval<M> {
 
     /// Makes the limits of speed, acceleration and jerk tighter by these factors.
     pub fn tighten(&mut self, [speed, acceleration, jerk]: [f64; 3]) {
-        self.speed = self.speed * (speed * speed);
-        self.acceleration = self.acceleration * acceleration;
+        self.speed = self.speed.map(|per_w| per_w * (speed * speed));
+        self.acceleration = self.acceleration.map(|tight| tight * acceleration);
         self.jerk *= jerk;
     }
 
     /// The steps from the ends of the interval to where the tangents of w are its inner Bernstein coefficients: with those
     /// and w at the nodes above 0 so is w everywhere between.
     #[inline(always)]
-    pub fn inwards(&self) -> Lanes {
-        INWARDS * self.h
+    pub fn inwards<S: Simd>(&self, simd: S) -> Register<S> {
+        INWARDS.load(simd) * self.h
+    }
+
+    /// q', q'', q''' of an axis.
+    #[inline(always)]
+    fn loaded<S: Simd>(&self, simd: S, axis: usize) -> [Register<S>; 3] {
+        let [q1, q2, q3] = self.q[axis];
+        [q1.load(simd), q2.load(simd), q3.load(simd)]
     }
 
     /// w, w', w'' at the collocation points.
     #[inline(always)]
-    pub fn motion(&self, u: &[f64; 4]) -> [Lanes; 3] {
+    pub fn motion<S: Simd>(&self, simd: S, u: &[f64; 4]) -> [Register<S>; 3] {
         let per_h = 1.0 / self.h;
-        [combine(&VALUE, u), combine(&SLOPE, u) * per_h, combine(&BEND, u) * (per_h * per_h)]
+        let [value, slope, bend] = [&VALUE, &SLOPE, &BEND];
+        [combine(simd, value, u), combine(simd, slope, u) * per_h, combine(simd, bend, u) * (per_h * per_h)]
     }
 }
 
@@ -156,9 +166,13 @@ impl<const M: usize> Rows<M> {
 
     /// Acceleration and jerk/√w of each axis in parts of A and J.
     #[inline(always)]
-    pub fn axes(&self, interval: &Interval<M>, [w, w1, w2]: [Lanes; 3]) -> [[Lanes; 2]; M] {
+    pub fn axes<S: Simd>(
+        &self,
+        interval: &Interval<M>,
+        [w, w1, w2]: [Register<S>; 3],
+    ) -> [[Register<S>; 2]; M] {
         let (half, bend, more) = (w1 * 0.5, w2 * 0.5, w1 * 1.5);
-        let mut out = [[Lanes::ZERO; 2]; M];
+        let mut out = [[Register::all(w.simd(), 0.0); 2]; M];
         for k in 0..M {
             let [q1, q2, q3] = interval.q[k];
             out[k] = [
@@ -171,58 +185,76 @@ impl<const M: usize> Rows<M> {
 
     /// The slacks on interval n for local coefficients u: the jerk's below `pace`, the last one `last`.
     #[inline(always)]
-    pub fn slack(&self, n: usize, u: &[f64; 4], pace: Lanes, last: Lanes, out: &mut [Lanes]) {
+    pub fn slack<S: Simd>(
+        &self,
+        n: usize,
+        u: &[f64; 4],
+        pace: Register<S>,
+        last: Register<S>,
+        out: &mut [Lanes],
+    ) {
+        let simd = pace.simd();
         let interval = &self.intervals[n];
-        let motion = interval.motion(u);
+        let motion = interval.motion(simd, u);
         let axes = self.axes(interval, motion);
         let out = &mut out[..Order::<M>::COUNT];
         for k in 0..M {
             let [a, j] = axes[k];
             let (at, to) = (Order::<M>::acceleration(k), Order::<M>::jerk(k));
-            let [up, down] = self.acceleration.most[k].map(Lanes::all);
-            (out[at], out[at + 1]) = (up - a, down + a);
-            (out[to], out[to + 1]) = (pace - j, pace + j);
+            let [up, down] = self.acceleration.most[k];
+            out[at] = (Register::all(simd, up) - a).into();
+            out[at + 1] = (Register::all(simd, down) + a).into();
+            (out[to], out[to + 1]) = ((pace - j).into(), (pace + j).into());
         }
-        out[Order::<M>::SPEED] = Lanes::ONE - motion[0] * interval.speed;
-        out[Order::<M>::POSITIVE] = last;
+        out[Order::<M>::SPEED] = (Lanes::ONE - motion[0] * interval.speed).into();
+        out[Order::<M>::POSITIVE] = last.into();
     }
 
     /// Their change for a step with local coefficients d.
     #[inline(always)]
-    pub fn slack_step(&self, n: usize, d: &[f64; 4], pace: Lanes, last: Lanes, out: &mut [Lanes]) {
+    pub fn slack_step<S: Simd>(
+        &self,
+        n: usize,
+        d: &[f64; 4],
+        pace: Register<S>,
+        last: Register<S>,
+        out: &mut [Lanes],
+    ) {
         let interval = &self.intervals[n];
-        let motion = interval.motion(d);
+        let motion = interval.motion(pace.simd(), d);
         let axes = self.axes(interval, motion);
         let out = &mut out[..Order::<M>::COUNT];
         for k in 0..M {
             let [a, j] = axes[k];
             let (at, to) = (Order::<M>::acceleration(k), Order::<M>::jerk(k));
-            (out[at], out[at + 1]) = (-a, a);
-            (out[to], out[to + 1]) = (pace - j, pace + j);
+            (out[at], out[at + 1]) = ((-a).into(), a.into());
+            (out[to], out[to + 1]) = ((pace - j).into(), (pace + j).into());
         }
-        out[Order::<M>::SPEED] = -(motion[0] * interval.speed);
-        out[Order::<M>::POSITIVE] = last;
+        out[Order::<M>::SPEED] = (-(motion[0] * interval.speed)).into();
+        out[Order::<M>::POSITIVE] = last.into();
     }
 
     /// Σ weight ∇s ∇sᵀ over what is linear in the rows of interval n.
     #[inline(always)]
-    pub fn curvature(&self, n: usize, weight: &[Lanes]) -> Form {
+    pub fn curvature<S: Simd>(&self, simd: S, n: usize, weight: &[Lanes]) -> Form<S> {
         let interval = &self.intervals[n];
         let weight = &weight[..Order::<M>::COUNT];
-        let tight = interval.acceleration * interval.acceleration;
-        let mut m = [Lanes::ZERO; 6];
-        m[0] = weight[Order::<M>::SPEED] * interval.speed * interval.speed;
+        let acceleration = interval.acceleration.load(simd);
+        let tight = acceleration * acceleration;
+        let mut m = [Register::all(simd, 0.0); 6];
+        m[0] = weight[Order::<M>::SPEED].load(simd) * interval.speed * interval.speed;
         for k in 0..M {
-            let [q1, q2, q3] = interval.q[k];
+            let [q1, q2, q3] = interval.loaded(simd, k);
             let (half, more) = (q1 * 0.5, q2 * 1.5);
             let at = Order::<M>::acceleration(k);
-            let both = (weight[at] + weight[at + 1]) * tight * self.acceleration.per_mean[k].powi(2);
+            let both =
+                (weight[at].load(simd) + weight[at + 1]) * tight * self.acceleration.per_mean[k].powi(2);
             let (b2, b1) = (both * q2, both * half);
             m[0] += b2 * q2;
             m[1] += b2 * half;
             m[3] += b1 * half;
             let at = Order::<M>::jerk(k);
-            let both = (weight[at] + weight[at + 1]) * (self.per_jerk[k] * interval.jerk).powi(2);
+            let both = (weight[at].load(simd) + weight[at + 1]) * (self.per_jerk[k] * interval.jerk).powi(2);
             let (b0, b1) = (both * q3, both * more);
             m[0] += b0 * q3;
             m[1] += b0 * more;
@@ -236,30 +268,37 @@ impl<const M: usize> Rows<M> {
 
     /// Σ aim ∇s over what is linear in the rows of interval n, as a form of (w, w', w''); Σ aim of the jerks' rows.
     #[inline(always)]
-    pub fn pull(&self, n: usize, aim: &[Lanes]) -> ([Lanes; 3], Lanes) {
+    pub fn pull<S: Simd>(&self, simd: S, n: usize, aim: &[Lanes]) -> ([Register<S>; 3], Register<S>) {
         let interval = &self.intervals[n];
         let aim = &aim[..Order::<M>::COUNT];
-        let mut g = [-(aim[Order::<M>::SPEED] * interval.speed), Lanes::ZERO, Lanes::ZERO];
-        let mut jerk = Lanes::ZERO;
+        let zero = Register::all(simd, 0.0);
+        let mut g = [-(aim[Order::<M>::SPEED].load(simd) * interval.speed), zero, zero];
+        let mut jerk = zero;
         for k in 0..M {
-            let [q1, q2, q3] = interval.q[k];
+            let [q1, q2, q3] = interval.loaded(simd, k);
             let at = Order::<M>::acceleration(k);
-            let a = (aim[at + 1] - aim[at]) * interval.acceleration * self.acceleration.per_mean[k];
+            let a =
+                (aim[at + 1].load(simd) - aim[at]) * interval.acceleration * self.acceleration.per_mean[k];
             let at = Order::<M>::jerk(k);
-            let j = (aim[at + 1] - aim[at]) * (self.per_jerk[k] * interval.jerk);
+            let j = (aim[at + 1].load(simd) - aim[at]) * (self.per_jerk[k] * interval.jerk);
             g[0] += a * q2 + j * q3;
             g[1] += a * q1 * 0.5 + j * q2 * 1.5;
             g[2] += j * q1 * 0.5;
-            jerk += aim[at] + aim[at + 1];
+            jerk += aim[at].load(simd) + aim[at + 1];
         }
         (g, jerk)
     }
 
     /// The greatest uses of the limits on interval n: of speed, acceleration and jerk, 1 at a limit.
     pub fn utilisation(&self, x: &[f64], n: usize) -> [f64; 3] {
+        dispatch!(Level::new(), simd => self.utilisation_on(simd, x, n))
+    }
+
+    #[inline(always)]
+    pub(super) fn utilisation_on<S: Simd>(&self, simd: S, x: &[f64], n: usize) -> [f64; 3] {
         let interval = &self.intervals[n];
-        let motion = interval.motion(&local(x, n, interval.h));
-        let v = motion[0].max(Lanes::ZERO).sqrt();
+        let motion = interval.motion(simd, &local(x, n, interval.h));
+        let v = motion[0].max(Register::all(simd, 0.0)).sqrt();
         let mut worst = [(motion[0] * interval.speed).greatest().max(0.0).sqrt(), 0.0, 0.0];
         for (k, [a, j]) in self.axes(interval, motion).into_iter().enumerate() {
             let [per_up, per_down] = self.acceleration.per_most[k];

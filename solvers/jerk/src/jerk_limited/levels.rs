@@ -1,0 +1,103 @@
+//! The kernel on every level of instructions that this processor has: the same numbers, bit for bit.
+
+use fearless_simd::{dispatch, Level, Simd};
+
+use super::between::Between;
+use super::bound::lagrangian;
+use super::exact::Exact;
+use super::hermite::{duration_on, local};
+use super::interior_point::{Effort, InteriorPoint};
+use super::model::Model;
+use super::prepare::Prepared;
+use super::relaxed::Relaxed;
+use super::rows::{Order, Rows};
+use super::{End, Geometry, Limits, Place, Problem};
+use feedplan_geometry::watch::Watch;
+
+/// A space curve that turns to both sides, its derivatives known by the length.
+struct Winding([f64; 2]);
+
+impl Geometry<3> for Winding {
+    fn knots(&self) -> &[f64] {
+        &self.0
+    }
+
+    fn at(&self, _: usize, s: f64) -> Place<3> {
+        let (x, slope) = (0.6 * s, 0.3f64);
+        let (turn, rate, change) = (1.5 * x.sin(), 0.9 * x.cos(), -0.54 * x.sin());
+        let (sin, cos, flat) = (turn.sin(), turn.cos(), slope.cos());
+        let first = [flat * cos, flat * sin, slope.sin()];
+        let second = [-flat * sin * rate, flat * cos * rate, 0.0];
+        let third =
+            [-flat * (sin * change + cos * rate * rate), flat * (cos * change - sin * rate * rate), 0.0];
+        Place { first, second, third, speed_cap: 200.0 }
+    }
+}
+
+fn levels() -> Vec<Level> {
+    #[cfg(target_arch = "x86_64")]
+    {
+        let best = Level::new();
+        let wider = [best.as_avx2().map(Level::Avx2), best.as_avx512().map(Level::Avx512)];
+        std::iter::once(Level::baseline()).chain(wider.into_iter().flatten()).collect()
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    vec![Level::new()]
+}
+
+/// What an interior point leaves from a plan, as bits.
+fn solved<X: Model<3>>(level: Level, prepared: &Prepared<'_, Winding, 3>, rows: &Rows<3>) -> Vec<u64> {
+    let effort = Effort {
+        tolerance: 1e-7,
+        max_iterations: 60,
+        deadline: None,
+        barrier: 1.0,
+        warm: false,
+        watch: Watch::default(),
+    };
+    let mut space = InteriorPoint::<X, 3> { level, ..InteriorPoint::default() };
+    let mut x: Vec<f64> = prepared.x.iter().map(|x| 0.97 * x).collect();
+    let report = space.solve(rows, prepared.bounds, &mut x, &effort);
+    assert!(report.iterations > 5, "{report:?}");
+    let state = space.state;
+    let rows = [state.slack, state.dual, state.step].concat();
+    let all = rows.iter().flat_map(|row| *row.values()).chain(x).chain([report.time, report.excess]);
+    all.map(f64::to_bits).collect()
+}
+
+/// What the checks of a plan and its bound find on each interval.
+#[inline(always)]
+fn checked<S: Simd>(simd: S, x: &[f64], rows: &Rows<3>, between: &Between<3>) -> Vec<f64> {
+    let mut out = vec![];
+    for (n, interval) in rows.intervals.iter().enumerate() {
+        out.push(duration_on(simd, x, n, interval.h));
+        out.extend(rows.utilisation_on(simd, x, n));
+        out.extend(between.utilisation_on(simd, x, n, interval.h));
+        let u = local(x, n, interval.h);
+        let mut dual = vec![interval.speed; Order::<3>::COUNT];
+        let (time, value, slope) = lagrangian(simd, rows, n, &u, &u, &mut dual);
+        out.extend([time, value]);
+        out.extend(slope);
+    }
+    out
+}
+
+#[test]
+fn results_are_the_same_on_every_level() {
+    let limits = Limits { velocity: [[250.0; 3]; 2], acceleration: [[3000.0; 3]; 2], jerk: [50_000.0; 3] };
+    let geometry = Winding([0.0, 60.0]);
+    let problem = Problem { geometry: &geometry, limits, caps: &[], ends: [End::Rest; 2] };
+    let prepared = Prepared::new(&problem, &Default::default()).expect("a first plan");
+    let stretch = prepared.stretch(0..prepared.grid.pieces.len());
+    let (rows, between) = (&stretch.rows, &stretch.between);
+    let found = |level: Level| {
+        let checks: Vec<f64> = dispatch!(level, simd => checked(simd, &prepared.x, rows, between));
+        let checks = checks.into_iter().map(f64::to_bits).collect();
+        [solved::<Exact>(level, &prepared, rows), solved::<Relaxed>(level, &prepared, rows), checks]
+    };
+    let all = levels();
+    let first = found(all[0]);
+    for &level in &all[1..] {
+        assert!(found(level) == first, "{level:?} differs from {:?}", all[0]);
+    }
+}
