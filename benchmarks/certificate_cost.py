@@ -46,7 +46,7 @@ def _sizes(quick: bool) -> tuple[int, ...]:
 
 
 def _row(name: str, problem: Problem) -> dict[str, Cell]:
-    profile = SpeedProfile(*plan_bang_bang(problem))
+    profile = SpeedProfile.of(plan_bang_bang(problem))
     pieces = len(problem.path)
     times = 3 if pieces > 100_000 else 7
     calls = [partial(plan_bang_bang, problem), partial(lower_bound, problem, profile)]

@@ -89,7 +89,7 @@ def _row(name: str, problem: Problem, cost: float, of_quadratics: float) -> dict
     return {
         "path": name,
         "pieces": pieces,
-        "arcs a piece": len(plan_bang_bang(problem)[0]) / pieces,
+        "arcs a piece": len(plan_bang_bang(problem).piece) / pieces,
         "CPU per piece [µs]": 1e6 * cost / pieces,
         "ratio": cost / pieces / of_quadratics,
     }

@@ -7,18 +7,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.audit import _Limits
-from feedplan.constraints.problem import Problem
+from feedplan.constraints.problem import Problem as _Problem
+from feedplan.geometry.moves import Moves, Rules
 from feedplan.machine.expression import Expression
 from feedplan.machine.joint_interpolants import Accuracy
 from feedplan.machine.path_derivatives import TipPieces
-from feedplan.planners._parts import Part, PartOfProfile
+from feedplan.planners._parts import Part
 from feedplan.profile import SpeedProfile
+from feedplan.program.gcode import Options
 from feedplan.program.program import Program
 
 __all__ = [
+    "Curve",
     "CurveLength",
     "JointSetpointAudit",
     "PlanError",
+    "Problem",
+    "Profile",
     "Sampler",
     "SetpointAudit",
     "__version__",
@@ -26,17 +31,10 @@ __all__ = [
     "audit_plan",
     "bound_jerk_limited",
     "build_path",
-    "check_control_points",
     "csv_rows",
-    "curve_cusps",
-    "curve_elevate",
-    "curve_evaluate",
-    "curve_joints",
-    "curve_regular",
-    "curve_reverse",
-    "curve_split",
     "feed_between",
     "fit_points",
+    "insert_knot",
     "joint_constants",
     "joint_derivatives",
     "joint_enclosures",
@@ -51,62 +49,41 @@ __all__ = [
     "plan_s_curve",
     "profile_of_sections",
     "read_gcode",
-    "spline_insert",
-    "spline_pieces",
-    "turn_pieces",
 ]
 
 __version__: str
 
 class PlanError(Exception): ...
 
-# Columns of `feedplan.profile.SpeedProfile`.
-_Profile = tuple[
-    NDArray[np.uint32],
-    NDArray[np.uint8],
-    NDArray[np.uint8],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.int64],
-    NDArray[np.uint32],
-]
-
-# Its accelerations at both ends of the arcs, and `kinked`.
-_Changes = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.uint32]]
-
 # Who is told how far the work is, 0 to 1; what it raises ends the work and is raised.
 _Progress = Callable[[float], None]
 
-def plan_bang_bang(problem: Problem, progress: _Progress | None = None) -> _Profile: ...
+def plan_bang_bang(problem: _Problem, progress: _Progress | None = None) -> Profile: ...
 def plan_jerk_limited(
-    problem: Problem | Part,
+    problem: _Problem | Part,
     jerk: NDArray[np.float64],
     resolution: float,
     tolerance: float,
     time_limit: float | None = None,
     progress: _Progress | None = None,
-) -> tuple[_Profile, _Changes, tuple[bool, NDArray[np.float64]]]: ...
+) -> tuple[Profile, bool, NDArray[np.float64]]: ...
 def bound_jerk_limited(
-    problem: Problem | Part,
+    problem: _Problem | Part,
     jerk: NDArray[np.float64],
-    profile: SpeedProfile | PartOfProfile,
+    profile: SpeedProfile,
     time_limit: float | None = None,
     progress: _Progress | None = None,
 ) -> NDArray[np.float64]: ...
 def plan_s_curve(
-    problem: Problem,
+    problem: _Problem,
     jerk: NDArray[np.float64],
     cuttings: Sequence[tuple[float, float]],
     look_ahead: int,
     time_limit: float | None = None,
     progress: _Progress | None = None,
-) -> tuple[_Profile, _Changes]: ...
+) -> Profile: ...
 def path_segments(
-    problem: Problem,
+    problem: _Problem,
     jerk: NDArray[np.float64],
     cuttings: Sequence[tuple[float, float]],
     look_ahead: int,
@@ -121,14 +98,14 @@ def path_segments(
     NDArray[np.float64],
 ]: ...
 def profile_of_sections(
-    problem: Problem,
+    problem: _Problem,
     jerk: NDArray[np.float64],
     offsets: NDArray[np.int64],
     sections: NDArray[np.float64],
-) -> tuple[_Profile, _Changes]: ...
-def lower_bound(problem: Problem, profile: SpeedProfile, progress: _Progress | None = None) -> float: ...
+) -> Profile: ...
+def lower_bound(problem: _Problem, profile: SpeedProfile, progress: _Progress | None = None) -> float: ...
 def feed_between(
-    problem: Problem, piece: NDArray[np.int64], u0: NDArray[np.float64], u1: NDArray[np.float64]
+    problem: _Problem, piece: NDArray[np.int64], u0: NDArray[np.float64], u1: NDArray[np.float64]
 ) -> NDArray[np.float64]: ...
 def look_ahead(
     speed: NDArray[np.float64], up: NDArray[np.float64], down: NDArray[np.float64]
@@ -149,34 +126,48 @@ _Chunk = tuple[
 ]
 
 @final
+class Problem:
+    def __new__(cls, problem: _Problem | Part) -> Problem: ...
+
+@final
+class Profile:
+    def __new__(cls, columns: SpeedProfile) -> Profile: ...
+    @property
+    def piece(self) -> NDArray[np.uint32]: ...
+    @property
+    def kind(self) -> NDArray[np.uint8]: ...
+    @property
+    def axis(self) -> NDArray[np.uint8]: ...
+    @property
+    def value(self) -> NDArray[np.float64]: ...
+    @property
+    def u0(self) -> NDArray[np.float64]: ...
+    @property
+    def u1(self) -> NDArray[np.float64]: ...
+    @property
+    def p0(self) -> NDArray[np.float64]: ...
+    @property
+    def p1(self) -> NDArray[np.float64]: ...
+    @property
+    def duration(self) -> NDArray[np.float64]: ...
+    @property
+    def a0(self) -> NDArray[np.float64]: ...
+    @property
+    def a1(self) -> NDArray[np.float64]: ...
+    @property
+    def runs(self) -> NDArray[np.int64]: ...
+    @property
+    def slowed(self) -> NDArray[np.uint32]: ...
+    @property
+    def kinked(self) -> NDArray[np.uint32]: ...
+
+@final
 class Sampler:
     def __new__(
         cls,
-        control_points: NDArray[np.float64],
-        weights: NDArray[np.float64] | None,
-        offsets: NDArray[np.int64],
-        width: NDArray[np.float64],
-        tip_speed: tuple[NDArray[np.float64], NDArray[np.int64]] | None,
-        way_speed: tuple[NDArray[np.float64], NDArray[np.int64]] | None,
-        feed_share: NDArray[np.float64] | None,
-        line: NDArray[np.int32],
-        runs: NDArray[np.int64],
-        start_dwell: float,
-        dwell: NDArray[np.float64],
-        piece: NDArray[np.uint32],
-        kind: NDArray[np.uint8],
-        axis: NDArray[np.uint8],
-        value: NDArray[np.float64],
-        u0: NDArray[np.float64],
-        u1: NDArray[np.float64],
-        p0: NDArray[np.float64],
-        p1: NDArray[np.float64],
-        duration: NDArray[np.float64],
-        a0: NDArray[np.float64],
-        a1: NDArray[np.float64],
-        arc_runs: NDArray[np.int64],
+        problem: _Problem,
+        profile: SpeedProfile,
         period: float,
-        newton: bool,
         progress: _Progress | None = None,
     ) -> Sampler: ...
     @property
@@ -185,25 +176,13 @@ class Sampler:
     def duration(self) -> float: ...
     @property
     def runs(self) -> NDArray[np.float64]: ...
-    def chunk(self, start: int, stop: int) -> _Chunk: ...
+    def chunk(self, start: int, stop: int, newton: bool) -> _Chunk: ...
     def at(self, times: NDArray[np.float64]) -> _Chunk: ...
     def along(self, piece: NDArray[np.uint32], u: NDArray[np.float64]) -> _Chunk: ...
 
 def csv_rows(values: NDArray[np.float64], last: NDArray[np.int32]) -> bytes: ...
 def read_gcode(
-    source: bytes,
-    name: str,
-    places: NDArray[np.float64],
-    machine_axes: str,
-    machines_with: Callable[[str], str] | None,
-    tip_control: object | None,
-    block_delete: bool,
-    max_moves: int,
-    tools: Sequence[tuple[int, int, Sequence[float], float, int]] | None,
-    subprograms: Callable[[str], tuple[str, bytes] | None] | None,
-    feed: float | None,
-    whole_step: float,
-    progress: _Progress | None = None,
+    source: bytes, name: str, options: Options, progress: _Progress | None = None
 ) -> dict[str, Any]: ...
 def fit_points(
     points: NDArray[np.float64],
@@ -215,45 +194,9 @@ def fit_points(
     NDArray[np.float64], NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.uint32]
 ]: ...
 def build_path(
-    name: str,
-    start: NDArray[np.float64],
-    kind: NDArray[np.uint8],
-    target: NDArray[np.float64],
-    feed: NDArray[np.float64],
-    line: NDArray[np.int32],
-    tolerance: NDArray[np.float64],
-    fit_tolerance: NDArray[np.float64],
-    halt: NDArray[np.bool_],
-    arc_move: NDArray[np.int64],
-    arc_plane: NDArray[np.int64],
-    arc_centre: NDArray[np.float64],
-    arc_sweep: NDArray[np.float64],
-    spline_move: NDArray[np.int64],
-    spline_pieces: NDArray[np.int64],
-    splines: tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.int64], NDArray[np.float64]]
-    | None,
-    change_move: NDArray[np.int64],
-    change_start: NDArray[np.float64],
-    joints: NDArray[np.bool_],
-    max_velocity: NDArray[np.float64],
-    max_acceleration: NDArray[np.float64],
-    travel: NDArray[np.float64],
-    jump: bool,
-    exact_tolerance: float,
-    max_chord: float,
-    corner_acceleration: float,
-    max_speed: float,
-    corner_angle: float,
-    corners: str,
-    progress: _Progress | None = None,
+    moves: Moves, rules: Rules, progress: _Progress | None = None
 ) -> tuple[
-    tuple[
-        tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.int64], NDArray[np.float64]],
-        NDArray[np.float64],
-        NDArray[np.int64],
-        NDArray[np.float64],
-        NDArray[np.int64],
-    ],
+    tuple[Curve, NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]],
     tuple[int, int, int, float, list[float] | None],
     tuple[int, int, float] | None,
     tuple[NDArray[np.int64], NDArray[np.int64]],
@@ -263,7 +206,7 @@ def build_path(
 _Findings = tuple[list[tuple[str, int, float, float, float, float, int]], int]
 
 def audit_plan(
-    problem: Problem,
+    problem: _Problem,
     limits: _Limits,
     feed: NDArray[np.float64],
     profile: SpeedProfile | None = None,
@@ -271,12 +214,12 @@ def audit_plan(
     progress: _Progress | None = None,
 ) -> _Findings: ...
 def audit_joints(
-    problem: Problem, limits: _Limits, profile: SpeedProfile, progress: _Progress | None = None
+    problem: _Problem, limits: _Limits, profile: SpeedProfile, progress: _Progress | None = None
 ) -> _Findings: ...
 
 @final
 class JointSetpointAudit:
-    def __new__(cls, problem: Problem, limits: _Limits, profile: SpeedProfile) -> JointSetpointAudit: ...
+    def __new__(cls, problem: _Problem, limits: _Limits, profile: SpeedProfile) -> JointSetpointAudit: ...
     def push(
         self,
         t: NDArray[np.float64],
@@ -292,7 +235,7 @@ class SetpointAudit:
         cls,
         limits: _Limits,
         resolution: float = 0.0,
-        problem: Problem | None = None,
+        problem: _Problem | None = None,
         feed: NDArray[np.float64] | None = None,
         profile: SpeedProfile | None = None,
         program: Program | None = None,
@@ -307,9 +250,6 @@ class SetpointAudit:
         progress: _Progress | None = None,
     ) -> None: ...
     def finish(self) -> _Findings: ...
-
-# Control points (total, axes), weights (total,) if any piece is rational, offsets (n + 1,), widths (n,).
-_CurveColumns = tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.int64], NDArray[np.float64]]
 
 def joint_positions(expression: Expression, tips: NDArray[np.float64]) -> NDArray[np.float64]: ...
 def joint_derivatives(
@@ -341,14 +281,7 @@ def joint_interpolants(
     to_bernstein: NDArray[np.float64],
     tolerance: NDArray[np.float64] | Accuracy,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
-def spline_pieces(
-    control_points: NDArray[np.float64],
-    weights: NDArray[np.float64] | None,
-    knots: NDArray[np.float64],
-    degree: int,
-    periodic: bool,
-) -> _CurveColumns: ...
-def spline_insert(
+def insert_knot(
     control_points: NDArray[np.float64],
     weights: NDArray[np.float64] | None,
     knots: NDArray[np.float64],
@@ -356,85 +289,59 @@ def spline_insert(
     value: float,
     times: int,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.float64]]: ...
-def turn_pieces(
-    start: NDArray[np.float64],
-    plane: tuple[int, int],
-    centre: tuple[float, float],
-    sweep: float,
-    travel: NDArray[np.float64] | None,
-    degree: int,
-    tolerance: float,
-) -> tuple[_CurveColumns, float]: ...
-def check_control_points(
-    control_points: NDArray[np.float64], weights: NDArray[np.float64] | None, degree: int
-) -> None: ...
-def curve_evaluate(
-    control_points: NDArray[np.float64],
-    weights: NDArray[np.float64] | None,
-    offsets: NDArray[np.int64],
-    width: NDArray[np.float64],
-    piece: NDArray[np.uint32],
-    u: NDArray[np.float64],
-    order: int,
-) -> NDArray[np.float64]: ...
-def curve_elevate(
-    control_points: NDArray[np.float64],
-    weights: NDArray[np.float64] | None,
-    offsets: NDArray[np.int64],
-    width: NDArray[np.float64],
-    degree: int,
-) -> _CurveColumns: ...
-def curve_split(
-    control_points: NDArray[np.float64],
-    weights: NDArray[np.float64] | None,
-    offsets: NDArray[np.int64],
-    width: NDArray[np.float64],
-    piece: NDArray[np.uint32],
-    u: NDArray[np.float64],
-) -> _CurveColumns: ...
-def curve_reverse(
-    control_points: NDArray[np.float64],
-    weights: NDArray[np.float64] | None,
-    offsets: NDArray[np.int64],
-    width: NDArray[np.float64],
-) -> _CurveColumns: ...
-def curve_joints(
-    control_points: NDArray[np.float64],
-    weights: NDArray[np.float64] | None,
-    offsets: NDArray[np.int64],
-    width: NDArray[np.float64],
-    closed: bool,
-    gap: float,
-    angle: float,
-    derivative: float,
-) -> tuple[
-    NDArray[np.uint32], NDArray[np.uint8], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
-]: ...
-def curve_regular(
-    control_points: NDArray[np.float64],
-    weights: NDArray[np.float64] | None,
-    offsets: NDArray[np.int64],
-    width: NDArray[np.float64],
-) -> tuple[_CurveColumns, NDArray[np.int64], NDArray[np.bool_]]: ...
-def curve_cusps(
-    control_points: NDArray[np.float64],
-    weights: NDArray[np.float64] | None,
-    offsets: NDArray[np.int64],
-    width: NDArray[np.float64],
-    tolerance: float,
-) -> tuple[NDArray[np.uint32], NDArray[np.float64]]: ...
 
 @final
-class CurveLength:
+class Curve:
     def __new__(
         cls,
         control_points: NDArray[np.float64],
         weights: NDArray[np.float64] | None,
         offsets: NDArray[np.int64],
         width: NDArray[np.float64],
-        accuracy: float,
-        progress: _Progress | None = None,
-    ) -> CurveLength: ...
+    ) -> Curve: ...
+    @staticmethod
+    def of_spline(
+        control_points: NDArray[np.float64],
+        weights: NDArray[np.float64] | None,
+        knots: NDArray[np.float64],
+        degree: int,
+        periodic: bool,
+    ) -> Curve: ...
+    @staticmethod
+    def of_turn(
+        start: NDArray[np.float64],
+        plane: tuple[int, int],
+        centre: tuple[float, float],
+        sweep: float,
+        travel: NDArray[np.float64] | None,
+        degree: int,
+        tolerance: float,
+    ) -> tuple[Curve, float]: ...
+    @property
+    def control_points(self) -> NDArray[np.float64]: ...
+    @property
+    def weights(self) -> NDArray[np.float64] | None: ...
+    @property
+    def offsets(self) -> NDArray[np.int64]: ...
+    @property
+    def width(self) -> NDArray[np.float64]: ...
+    def evaluate(
+        self, piece: NDArray[np.uint32], u: NDArray[np.float64], order: int
+    ) -> NDArray[np.float64]: ...
+    def elevated(self, degree: int) -> Curve: ...
+    def split(self, piece: NDArray[np.uint32], u: NDArray[np.float64]) -> Curve: ...
+    def reversed(self) -> Curve: ...
+    def joints(
+        self, closed: bool, gap: float, angle: float, derivative: float
+    ) -> tuple[
+        NDArray[np.uint32], NDArray[np.uint8], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
+    ]: ...
+    def regular(self) -> tuple[Curve, NDArray[np.int64], NDArray[np.bool_]]: ...
+    def cusps(self, tolerance: float) -> tuple[NDArray[np.uint32], NDArray[np.float64]]: ...
+    def lengths(self, accuracy: float, progress: _Progress | None = None) -> CurveLength: ...
+
+@final
+class CurveLength:
     @property
     def total(self) -> float: ...
     @property

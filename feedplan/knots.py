@@ -32,7 +32,7 @@ class Knots:
     ) -> None:
         self.step = number(step, "the step", "a positive number", positive, "s")
         self.axes = problem.axes
-        self._sampler = sampler(problem, profile, problem.period)
+        self._sampler = sampler(problem, profile)
         self._origin = problem.joint_origin
         self._ends_at_rest = problem.end_speed == 0.0
         begins, _, times = self._sampler.runs.T

@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan._solvers import Profile
+from feedplan.native import OfNative
 from feedplan.units import counted
 
 # The `axis` of an arc whose constant belongs to none.
@@ -28,8 +31,19 @@ class ArcKind(IntEnum):
     SPEED_CUBIC = 7  # v² is a cubic polynomial of the length from end to end, slopes 2a; value is 0
 
 
+# Columns with an entry for each arc, and lists of pieces.
+OF_ARCS = ("piece", "kind", "axis", "value", "u0", "u1", "p0", "p1", "duration", "a0", "a1")
+OF_PIECES = ("slowed", "kinked")
+_DTYPES = {
+    **dict.fromkeys(("value", "u0", "u1", "p0", "p1", "duration", "a0", "a1"), np.float64),
+    **dict.fromkeys(("piece", "slowed", "kinked"), np.uint32),
+    **dict.fromkeys(("kind", "axis"), np.uint8),
+    "runs": np.int64,
+}
+
+
 @dataclass(frozen=True, eq=False)
-class SpeedProfile:
+class SpeedProfile(OfNative[Profile]):
     """Arcs in the order of the path.
 
     Per arc: `piece` (index into the path), `kind` (ArcKind), `axis` (the axis that the arc's constant
@@ -52,6 +66,7 @@ class SpeedProfile:
     `stopped`: a time limit ended the planning early. `excess`: how far the planner itself takes the time to
     be above the least on its grid [s], an estimate and no proof; NaN where it does not say.
     PATH_JERK: v1 = v0 + a0·T + value·T²/2, a1 = a0 + value·T, T the duration. SPEED_CUBIC: v0, v1 > 0.
+    All arrays are read-only. Raises InputError where those of the arcs differ in length.
     """
 
     piece: NDArray[np.uint32]
@@ -72,9 +87,17 @@ class SpeedProfile:
     excess: float = math.nan
 
     def __post_init__(self) -> None:
-        for name in ("a0", "a1"):
-            if len(getattr(self, name)) != len(self.piece):
-                object.__setattr__(self, name, np.zeros(len(self.piece)))
+        for name, dtype in _DTYPES.items():
+            column = np.asarray(getattr(self, name))
+            if name in ("a0", "a1") and len(column) == 0:
+                column = np.zeros(len(self.piece))
+            object.__setattr__(self, name, np.ascontiguousarray(column, dtype))
+        self._hold(Profile(self), stopped=self.stopped, excess=self.excess)
+
+    @classmethod
+    def of(cls, native: Profile, **others: Any) -> SpeedProfile:
+        """The profile of a native one; `others` are `stopped` and `excess`."""
+        return super().of(native, **{"stopped": False, "excess": math.nan, **others})
 
     def __len__(self) -> int:
         return len(self.piece)

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from feedplan._solvers import Sampler
 from feedplan.arguments import is_whole, number, one_of, positive, shown, whole
-from feedplan.constraints.problem import Problem, TipSpeed
+from feedplan.constraints.problem import Problem
 from feedplan.curves.length import INTERPOLATORS as INTERPOLATORS
 from feedplan.curves.length import Interpolator as Interpolator
 from feedplan.errors import InputError
 from feedplan.events import Events, TimedEvents
 from feedplan.profile import SpeedProfile
-from feedplan.progress import Listener
+from feedplan.progress import Listener, tell
 from feedplan.units import counted
-
-Scalar = TypeVar("Scalar", bound=np.generic)
 
 # Six axes of it take 5 GB; a stream of any length goes through in smaller chunks.
 MAX_CHUNK = 20_000_000
@@ -63,6 +61,10 @@ class SamplingStats:
     length_error: float = 0.0
 
 
+# Who takes setpoints chunk by chunk.
+Sink = Callable[[SetpointChunk], None]
+
+
 class Setpoints:
     """The stream of setpoints, computed as it is read; iterating gives chunks.
 
@@ -71,7 +73,8 @@ class Setpoints:
     waits less than one period there, so that `duration` [s], the time of the last of `count` setpoints, is a
     little longer than the plan's time. A path that ends in motion ends at its true time, after a shorter last
     step. At a stop velocity, acceleration and jerk are 0; at a switching point, where the acceleration jumps,
-    a setpoint has the values of the arc that begins there.
+    a setpoint has the values of the arc that begins there. `computing` is the time that this took
+    so far, `passing` what those took to whom they were passed on [s].
     """
 
     def __init__(
@@ -87,7 +90,7 @@ class Setpoints:
         one_of(interpolator, "interpolator", INTERPOLATORS)
         period = number(period, "the period", "a positive number", positive, "s")
         most = whole(max_setpoints, "max_setpoints", "a whole number from 1")
-        self._sampler = sampler(problem, profile, period, interpolator, progress)
+        self._sampler = sampler(problem, profile, period, progress)
         self._source = (problem, profile, period, interpolator, most, None, events)
         self._events = events
         if self.count > most:
@@ -99,7 +102,9 @@ class Setpoints:
         self.axes = problem.axes
         self.interpolator: Interpolator = interpolator
         self.stats = SamplingStats()
+        self.computing = self.passing = 0.0
         self._origin = problem.joint_origin
+        self._sinks: tuple[Sink, ...] = ()
 
     @property
     def count(self) -> int:
@@ -144,7 +149,26 @@ class Setpoints:
 
         The numbers do not depend on the size. Raises InputError for a size out of range.
         """
-        return chunks(self._chunk, self.count, size)
+        return chunks(self._passed, self.count, size)
+
+    def teed(self, sinks: Sequence[Sink]) -> Setpoints:
+        """The same stream; what is read of it by `chunks` goes to `sinks` too."""
+        other = object.__new__(Setpoints)
+        vars(other).update(vars(self), _sinks=(*self._sinks, *sinks))
+        return other
+
+    def around(self, t: float) -> SetpointChunk:
+        """The setpoints next to a time [s]: the last one before it or at it, and the one after."""
+        before = min(max(int(t / self.period), 0), self.count - 1)
+        return self._chunk(before, min(before + 2, self.count))
+
+    def _passed(self, start: int, stop: int) -> SetpointChunk:
+        chunk = self._chunk(start, stop)
+        begin = time.perf_counter()
+        for sink in self._sinks:
+            sink(chunk)
+        self.passing += time.perf_counter() - begin
+        return chunk
 
     def all(self) -> SetpointChunk:
         """The whole stream at once. Raises InputError where it is too long for that."""
@@ -153,14 +177,16 @@ class Setpoints:
         return self._chunk(0, self.count)
 
     def _chunk(self, start: int, stop: int) -> SetpointChunk:
+        begin = time.perf_counter()
         t, position, velocity, acceleration, jerk, line, piece, u, iterations, error = self._sampler.chunk(
-            start, stop
+            start, stop, self.interpolator == "newton"
         )
         self.stats = SamplingStats(
             max(self.stats.iterations, iterations), max(self.stats.length_error, error)
         )
         if self._origin is not None:
             position += self._origin[piece]
+        self.computing += time.perf_counter() - begin
         return SetpointChunk(t, position, velocity, acceleration, jerk, line, self.axes, piece, u)
 
 
@@ -197,46 +223,18 @@ def setpoints(
 
 
 def sampler(
-    problem: Problem,
-    profile: SpeedProfile,
-    period: float,
-    interpolator: Interpolator = "sarfraz",
-    progress: Listener | None = None,
+    problem: Problem, profile: SpeedProfile, period: float | None = None, progress: Listener | None = None
 ) -> Sampler:
-    """The native reader of a profile on its path. Raises InputError as `setpoints`."""
-    path = problem.path
-    return Sampler(
-        *problem.curve.columns(),
-        _columns(problem.tip_speed),
-        _columns(problem.way_speed),
-        None if problem.feed_share is None else _array(problem.feed_share, np.float64),
-        _array(path.line, np.int32),
-        _array(path.runs, np.int64),
-        float(path.start_dwell),
-        _array(path.dwell, np.float64),
-        _array(profile.piece, np.uint32),
-        _array(profile.kind, np.uint8),
-        _array(profile.axis, np.uint8),
-        _array(profile.value, np.float64),
-        _array(profile.u0, np.float64),
-        _array(profile.u1, np.float64),
-        _array(profile.p0, np.float64),
-        _array(profile.p1, np.float64),
-        _array(profile.duration, np.float64),
-        _array(profile.a0, np.float64),
-        _array(profile.a1, np.float64),
-        _array(profile.runs, np.int64),
-        float(period),
-        interpolator == "newton",
-        progress,
-    )
+    """The native reader of a profile on its path, with the times of setpoints laid out every `period` [s].
 
-
-def _columns(speed: TipSpeed | None) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
-    if speed is None:
-        return None
-    return _array(speed.coefficients, np.float64), _array(speed.offsets, np.int64)
-
-
-def _array(values: ArrayLike, dtype: type[Scalar]) -> NDArray[Scalar]:
-    return np.ascontiguousarray(values, dtype=dtype)
+    That of the problem's own period, which is the one by default, is made once and kept with the profile, for
+    all that read the motion. Raises InputError as `setpoints`.
+    """
+    if period not in (None, problem.period):
+        return Sampler(problem, profile, period, progress)
+    kept: tuple[Problem, Sampler] | None = vars(profile).get("motion")
+    if kept is None or kept[0] is not problem:
+        kept = problem, Sampler(problem, profile, problem.period, progress)
+        vars(profile)["motion"] = kept
+    tell(progress, 1.0)
+    return kept[1]

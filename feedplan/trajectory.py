@@ -39,7 +39,7 @@ class Trajectory:
 
     def __init__(self, problem: Problem, profile: SpeedProfile) -> None:
         self._problem, self._profile = problem, profile
-        self.sampler = sampler(problem, profile, problem.period)
+        self.sampler = sampler(problem, profile)
         self.axes, self.unit = problem.axes, problem.unit
         self.duration = profile.time + problem.path.pauses
 

@@ -13,6 +13,7 @@ import pytest
 import feedplan
 from feedplan.checking import check
 from feedplan.curves.composite import CompositeCurve
+from feedplan.curves.length import CurveLength
 from feedplan.errors import InputError, MachineError
 from feedplan.geometry.path import Path
 from feedplan.machine.machine import AXIS_LETTERS, Axis, Machine
@@ -53,6 +54,12 @@ def test_axes_of_any_names_go_through_the_exact_planner_and_all_files(count: int
         assert check(file).ok
     assert plan.setpoints().axes == names_of(count)
     assert names_of(count)[-1] in (tmp_path / "report.html").read_text()
+
+
+@pytest.mark.parametrize("count", range(1, 10))
+def test_each_axis_counts_in_the_length(count: int) -> None:
+    line = CompositeCurve.from_bezier(np.outer([0.0, 3.0], np.arange(count) == count - 1))
+    assert CurveLength(line).total == 3.0
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -73,7 +73,7 @@ def profile_of(*arcs: tuple[int, ArcKind, int, float, float, float, float, float
 
 def planned(problem: Problem) -> SpeedProfile:
     """The fastest profile from rest to rest."""
-    return SpeedProfile(*plan_bang_bang(problem))
+    return SpeedProfile.of(plan_bang_bang(problem))
 
 
 def random_problem(seed: int, degree: int | None = None, rational: bool = True) -> Problem:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -115,7 +115,6 @@ def audit(
         limits = replace(limits, period=setpoints.period)
     stream = None if setpoints is None else _with_shares(setpoints, part(report, PLAN_SHARE, 1.0))
     try:
-        problem, profile, program = _native(problem, profile, program)
         report(0.0)
         work = _audit_axes if problem.joints is None else _audit_joints
         results = work(problem, profile, limits, program, stream, report)
@@ -360,59 +359,7 @@ def _period(times: NDArray[np.float64], default: float) -> float:
     return step if math.isfinite(step) and step > 0 else default
 
 
-Record = TypeVar("Record")
 Scalar = TypeVar("Scalar", bound=np.generic)
-
-_Dtypes = dict[str, np.dtype[Any]]
-
-
-def _dtypes(dtype: type[np.generic], *names: str) -> _Dtypes:
-    return {name: np.dtype(dtype) for name in names}
-
-
-_PATH = {
-    **_dtypes(np.float64, "dwell", "tolerance"),
-    **_dtypes(np.int64, "move", "runs"),
-    **_dtypes(np.int32, "line"),
-}
-_PROBLEM = _dtypes(np.float64, "feed", "junction_speed")
-_SHARES = _dtypes(np.float64, "feed_share")
-_PROFILE = {
-    **_dtypes(np.float64, "value", "u0", "u1", "p0", "p1", "duration", "a0", "a1"),
-    **_dtypes(np.uint8, "kind", "axis"),
-    **_dtypes(np.uint32, "piece"),
-    **_dtypes(np.int64, "runs"),
-}
-_PROGRAM = {
-    **_dtypes(np.float64, "start", "target", "arc_centre", "arc_angle", "change_start"),
-    **_dtypes(np.int32, "line"),
-    **_dtypes(np.int64, "arc_move", "spline_move", "spline_pieces", "change_move"),
-    **_dtypes(np.uint8, "arc_normal"),
-}
-
-
-def _native(
-    problem: Problem, profile: SpeedProfile | None, program: Program | None
-) -> tuple[Problem, SpeedProfile | None, Program | None]:
-    """The same with arrays as the native module takes them; nothing is copied that is so already."""
-    path = _with_dtypes(problem.path, _PATH)
-    problem = _with_dtypes(replace(problem, path=path), _PROBLEM)
-    if problem.feed_share is not None:
-        problem = _with_dtypes(problem, _SHARES)
-    return (
-        problem,
-        None if profile is None else _with_dtypes(profile, _PROFILE),
-        None if program is None else _with_dtypes(program, _PROGRAM),
-    )
-
-
-def _with_dtypes(record: Record, dtypes: _Dtypes) -> Record:
-    changes = {}
-    for name, dtype in dtypes.items():
-        array = np.asarray(getattr(record, name))
-        if array.dtype != dtype or not array.flags.c_contiguous:
-            changes[name] = np.ascontiguousarray(array, dtype)
-    return replace(record, **changes) if changes else record  # type: ignore[type-var]
 
 
 def _array(values: ArrayLike, dtype: type[Scalar]) -> NDArray[Scalar]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan._solvers import Problem as NativeProblem
 from feedplan.arguments import not_negative, number
 from feedplan.constraints.feed import FeedRequest, feed_limit, feed_share
 from feedplan.constraints.junction import junction_limit
@@ -109,6 +110,8 @@ class Problem:
         for name in (*_BY_AXIS, "feed", "junction_speed"):
             column = np.ascontiguousarray(getattr(self, name), dtype=np.float64)
             object.__setattr__(self, name, column)
+        if self.feed_share is not None:
+            object.__setattr__(self, "feed_share", np.ascontiguousarray(self.feed_share, dtype=np.float64))
 
     def __repr__(self) -> str:
         return f"<Problem of the joints {' '.join(self.axes)} on {self.path!r}>"
@@ -179,6 +182,14 @@ class Problem:
     def unit(self) -> str:
         """The unit of the length of the path."""
         return self.way_units[0 if feed_groups(self.path.axes)[:-1].any() else 1]
+
+    @cached_property
+    def native(self) -> NativeProblem:
+        """The problem as kernels take it, made once."""
+        return NativeProblem(self)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "native"}
 
     @property
     def curve(self) -> CompositeCurve:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from feedplan._solvers import turn_pieces
+from feedplan._solvers import Curve
 from feedplan.curves._arrays import MAX_AXES, floats
 from feedplan.curves.composite import MAX_DEGREE, CompositeCurve
 from feedplan.errors import InputError
@@ -85,10 +85,10 @@ def _turn(
         raise InputError(
             f"the arc starts at its centre {middle.tolist()}: its radius is 0; correct one of them"
         )
-    columns, bound = turn_pieces(
+    native, bound = Curve.of_turn(
         first, plane, (float(middle[0]), float(middle[1])), sweep, travel, degree, tolerance
     )
-    return CompositeCurve(*columns), bound
+    return CompositeCurve.of(native), bound
 
 
 def _check_plane(plane: tuple[int, int], axes: int) -> None:

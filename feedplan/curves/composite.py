@@ -11,26 +11,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from feedplan._solvers import (
-    check_control_points,
-    curve_cusps,
-    curve_elevate,
-    curve_evaluate,
-    curve_joints,
-    curve_reverse,
-    curve_split,
-    spline_insert,
-    spline_pieces,
-)
+from feedplan._solvers import Curve
+from feedplan._solvers import insert_knot as native_insert_knot
 from feedplan.arguments import flag, instance, is_number, is_whole, not_negative, number, positive, shown
 from feedplan.arguments import refuse as refusal
 from feedplan.curves._arrays import floats, places, points, refuse, whole_numbers
 from feedplan.errors import InputError
+from feedplan.native import OfNative
 from feedplan.units import counted
 
 MAX_DEGREE = 9
-
-Columns = tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.int64], NDArray[np.float64]]
 
 
 class JointKind(IntEnum):
@@ -74,12 +64,12 @@ class Cusps:
 
 
 @dataclass(frozen=True, eq=False)
-class CompositeCurve:
+class CompositeCurve(OfNative[Curve]):
     """Bézier pieces C_i(u), u in [0, width_i], each of its own degree 1 to 9, polynomial or rational.
 
     `control_points` (total, axes) [mm, or degrees on rotary axes], the degree_i + 1 points of piece i from
     `offsets[i]` to `offsets[i + 1]`; `weights` (total,), ones where a piece is polynomial, or None where all
-    are; `offsets` (n + 1,); `width` (n,) of the parameter intervals.
+    are; `offsets` (n + 1,); `width` (n,) of the parameter intervals. All are read-only.
 
     Raises InputError for columns that do not fit together and values that cannot be used.
     """
@@ -91,35 +81,8 @@ class CompositeCurve:
 
     def __post_init__(self) -> None:
         control, weights = points(self.control_points, self.weights)
-        if len(control):
-            check_control_points(control, weights, 1)
         offsets = np.ascontiguousarray(whole_numbers(self.offsets, "offsets"), dtype=np.int64)
-        width = floats(self.width, "widths", 1)
-        if len(offsets) != len(width) + 1:
-            raise InputError(
-                f"{len(offsets)} offsets for {len(width)} widths: give one width for each piece, and one "
-                "offset more"
-            )
-        degree = np.diff(offsets) - 1
-        if offsets[0] != 0 or offsets[-1] != len(control):
-            raise InputError(
-                f"the offsets go from {offsets[0]} to {offsets[-1]}: they must go from 0 to {len(control)}, "
-                "the number of control points"
-            )
-        refuse(
-            (degree < 1) | (degree > MAX_DEGREE),
-            lambda i: (
-                f"piece {i} has degree {degree[i]}: degrees 1 to {MAX_DEGREE} are supported; correct offsets"
-            ),
-        )
-        refuse(
-            ~((width > 1e-60) & (width < 1e60)),
-            lambda i: f"piece {i} has the width {width[i]}: widths must be positive and finite; correct it",
-        )
-        for name, value in zip(
-            ("control_points", "weights", "offsets", "width"), (control, weights, offsets, width), strict=True
-        ):
-            object.__setattr__(self, name, value)
+        self._hold(Curve(control, weights, offsets, floats(self.width, "widths", 1)))
 
     @classmethod
     def from_pieces(cls, control_points: ArrayLike, width: ArrayLike) -> CompositeCurve:
@@ -193,7 +156,8 @@ class CompositeCurve:
         """
         control, weight = points(control_points, weights)
         around = flag(periodic, "periodic")
-        return cls(*spline_pieces(control, weight, floats(knots, "knots", 1), _degree(degree), around))
+        knots = floats(knots, "knots", 1)
+        return cls.of(Curve.of_spline(control, weight, knots, _degree(degree), around))
 
     @classmethod
     def joined(cls, curves: Sequence[CompositeCurve], gap: float = 1e-6) -> CompositeCurve:
@@ -285,7 +249,7 @@ class CompositeCurve:
             return np.empty((0, 3, self.axes))
         degree = int(self.offsets[1] - self.offsets[0]) - 1
         refuse(self.degree != degree, lambda i: f"piece {i} has degree {self.degree[i]}, others {degree}")
-        return self.control_points.reshape(len(self), degree + 1, self.axes)
+        return np.ascontiguousarray(self.control_points).reshape(len(self), degree + 1, self.axes)
 
     @property
     def weights_by_piece(self) -> NDArray[np.float64] | None:
@@ -312,7 +276,7 @@ class CompositeCurve:
         """C and its derivatives by u to `order` ≤ 3 at places (m,): (order + 1, m, axes)."""
         if not is_whole(order, 0, 3):
             raise InputError(f"derivatives to order {shown(order)}: orders 0 to 3 are supported")
-        return curve_evaluate(*self.columns(), *places(piece, u), int(order))
+        return self.native.evaluate(*places(piece, u), int(order))
 
     def at(self, parameter: ArrayLike, order: int = 0) -> NDArray[np.float64]:
         """The same at parameters (m,) from the start of the curve, 0 to breakpoints[-1]; at a joint, of the
@@ -327,11 +291,11 @@ class CompositeCurve:
 
     def reversed(self) -> CompositeCurve:
         """The curve traversed backwards."""
-        return CompositeCurve(*curve_reverse(*self.columns()))
+        return self.of(self.native.reversed())
 
     def elevated(self, degree: int) -> CompositeCurve:
         """The same curve with every piece of a lower degree raised to `degree`."""
-        return CompositeCurve(*curve_elevate(*self.columns(), _degree(degree)))
+        return self.of(self.native.elevated(_degree(degree)))
 
     def split(self, piece: ArrayLike, u: ArrayLike) -> CompositeCurve:
         """The same curve with pieces cut at places (m,) inside them; cuts at their ends and repeated ones are
@@ -343,7 +307,7 @@ class CompositeCurve:
         new[1:] = (np.diff(pieces) != 0) | (np.diff(at) != 0)
         inside = pieces < len(self)
         new[inside] &= (at[inside] != 0) & (at[inside] != self.width[pieces[inside]])
-        return CompositeCurve(*curve_split(*self.columns(), pieces[new], at[new]))
+        return self.of(self.native.split(pieces[new], at[new]))
 
     def with_width(self, width: ArrayLike) -> CompositeCurve:
         """The same pieces on parameter intervals of other widths (n,), or all of one width."""
@@ -366,7 +330,7 @@ class CompositeCurve:
         around = self.closed if closed is None else flag(closed, "closed")
         for name, value in (("gap", gap), ("angle", angle), ("derivative", derivative)):
             number(value, f"the {name}", "a number of 0 or more", not_negative)
-        return Joints(*curve_joints(*self.columns(), around, gap, angle, derivative))
+        return Joints(*self.native.joints(around, gap, angle, derivative))
 
     def cusps(self, tolerance: float = 1e-9) -> Cusps:
         """Every place where |C'| is at most `tolerance` of the greatest on the piece, ends included.
@@ -375,7 +339,7 @@ class CompositeCurve:
         piece of length zero has one at u = 0.
         """
         number(tolerance, "the tolerance of cusps", "a part from 1e-12 to 1", lambda part: 1e-12 <= part < 1)
-        return Cusps(*curve_cusps(*self.columns(), tolerance))
+        return Cusps(*self.native.cusps(tolerance))
 
     @property
     def zero_length(self) -> NDArray[np.int64]:
@@ -383,10 +347,6 @@ class CompositeCurve:
         first = np.repeat(self.control_points[self.offsets[:-1]], np.diff(self.offsets), axis=0)
         apart = (self.control_points != first).any(axis=1)
         return np.flatnonzero(~np.logical_or.reduceat(apart, self.offsets[:-1]))
-
-    def columns(self) -> Columns:
-        """The four arrays, as the kernels take them."""
-        return self.control_points, self.weights, self.offsets, self.width
 
 
 def insert_knot(
@@ -402,7 +362,7 @@ def insert_knot(
     number(value, "the knot", "a number")
     if not is_whole(times, most=2**31 - 1):
         raise InputError(f"the knot {value} is to be inserted {shown(times)} times: give 1 or more")
-    new, new_weights, new_knots = spline_insert(
+    new, new_weights, new_knots = native_insert_knot(
         control, weight, floats(knots, "knots", 1), _degree(degree), value, times
     )
     return new, new_knots, new_weights

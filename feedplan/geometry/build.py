@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from feedplan.errors import InputError, ProgramError
 from feedplan.geometry.corners import Corners
 from feedplan.geometry.feed_groups import group_feeds, leading_feed, leading_group, told_apart
 from feedplan.geometry.joined import joined
+from feedplan.geometry.moves import Moves, Rules
 from feedplan.geometry.path import FitSummary, Path
 from feedplan.geometry.path_words import path_words
 from feedplan.machine.machine import Machine
@@ -136,38 +137,41 @@ def build_path(
         moving = program.moving()
 
     tell(progress, 0.0)
-    (curve, feed, move, allowed, runs), summary, outside, rough = native_build_path(
-        program.name,
-        program.start,
-        program.kind,
-        program.target,
-        told_apart(names, moving, program.feed),
-        program.line,
-        limit,
-        fit_limit,
-        halt,
-        program.arc_move,
-        _arc_planes(program),
-        np.ascontiguousarray(np.take_along_axis(program.arc_centre, _plane_letters(program), axis=1)),
-        program.arc_angle,
-        np.ascontiguousarray(program.spline_move, dtype=np.int64),
-        np.ascontiguousarray(program.spline_pieces, dtype=np.int64),
-        splines,
-        np.ascontiguousarray(program.change_move, dtype=np.int64),
-        program.change_start,
-        joints,
-        words.max_velocity,
-        words.max_acceleration,
-        words.travel,
-        words.may_jump or (corners is Corners.PROGRAMMED and bool(words.joints.all())),
-        exact,
-        settings.max_chord,
-        settings.alpha * float(np.linalg.norm(words.max_acceleration)),
-        float(np.linalg.norm(words.max_velocity)),
-        math.radians(settings.corner_angle),
-        (Corners.ARCS if corners is Corners.JOINED else corners).value,
-        part(progress, 0.0, _BUILT),
+    moves = Moves(
+        name=program.name,
+        start=program.start,
+        kind=program.kind,
+        target=program.target,
+        feed=told_apart(names, moving, program.feed),
+        line=program.line,
+        tolerance=limit,
+        fit_tolerance=fit_limit,
+        halt=halt,
+        joints=joints,
+        arc_move=program.arc_move,
+        arc_plane=_arc_planes(program),
+        arc_centre=np.ascontiguousarray(np.take_along_axis(program.arc_centre, _plane_letters(program), 1)),
+        arc_angle=program.arc_angle,
+        spline_move=program.spline_move,
+        spline_pieces=program.spline_pieces,
+        splines=splines,
+        change_move=program.change_move,
+        change_start=program.change_start,
     )
+    rules = Rules(
+        max_velocity=words.max_velocity,
+        max_acceleration=words.max_acceleration,
+        travel=words.travel,
+        jump=words.may_jump or (corners is Corners.PROGRAMMED and bool(words.joints.all())),
+        exact_tolerance=exact,
+        max_chord=settings.max_chord,
+        corner_acceleration=settings.alpha * float(np.linalg.norm(words.max_acceleration)),
+        max_speed=float(np.linalg.norm(words.max_velocity)),
+        corner_angle=math.radians(settings.corner_angle),
+        corners=(Corners.ARCS if corners is Corners.JOINED else corners).value,
+    )
+    built, summary, outside, rough = native_build_path(moves, rules, part(progress, 0.0, _BUILT))
+    native, feed, move, allowed, runs = built
     tell(progress, 1.0)
     if outside is not None:
         index, axis, position = outside
@@ -178,7 +182,7 @@ def build_path(
             f"its travel {end} at {bound:.6g} mm: move the work, or correct the travel of the machine"
         )
     first = move[runs[:-1], 0]
-    followed = CompositeCurve(*curve)
+    followed = CompositeCurve.of(native)
     by_group = group_feeds(names, moving, program.feed, followed, move)
     return Path(
         axes=names,
@@ -243,9 +247,7 @@ def _lines(program: Program, moves: NDArray[np.int64], most: int = 5) -> str:
     return f"line {shown}{rest}"
 
 
-def _splines(
-    program: Program,
-) -> tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.int64], NDArray[np.float64]] | None:
+def _splines(program: Program) -> CompositeCurve | None:
     """The program's splines, from exactly where moves start to their targets."""
     if program.splines is None or len(program.spline_move) == 0:
         return None
@@ -272,7 +274,7 @@ def _splines(
                 f"at most {_SPLINE_GAP:g} mm is allowed; correct its points",
                 line,
             )
-    return control, curve.weights, curve.offsets, curve.width
+    return replace(curve, control_points=control)
 
 
 def _plane_letters(program: Program) -> NDArray[np.int64]:

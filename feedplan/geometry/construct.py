@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import build_path as native_build_path
-from feedplan._solvers import curve_regular
 from feedplan.arguments import instance, list_of_names, number
 from feedplan.arguments import refuse as refuse_value
 from feedplan.curves._arrays import points, refuse
@@ -20,6 +19,7 @@ from feedplan.geometry.build import FitSettings, tolerance_of
 from feedplan.geometry.corners import Corners
 from feedplan.geometry.feed_groups import group_feeds, moving_axes
 from feedplan.geometry.joints import tangent_jumps
+from feedplan.geometry.moves import Moves, Rules
 from feedplan.geometry.path import FitSummary, Path
 from feedplan.machine.machine import AXIS_NAME, NAME_REMEDY
 from feedplan.program.program import MoveKind
@@ -38,11 +38,11 @@ def path_of_curve(curve: CompositeCurve, axes: Sequence[str] | None, feed: float
     instance(curve, CompositeCurve, "the curve", "a CompositeCurve")
     names, speed = _names(axes, curve.axes), _feed(feed)
     moving = np.delete(np.arange(len(curve)), curve.zero_length)
-    columns, piece, rests = curve_regular(*_closed_gaps(curve.take(moving)).columns())
+    native, piece, rests = _closed_gaps(curve.take(moving)).native.regular()
     if len(piece) == 0:
         raise InputError("the curve has no length: give control points that differ")
     moves = moving_axes(curve)
-    curve = CompositeCurve(*columns)
+    curve = CompositeCurve.of(native)
     stops = (tangent_jumps(curve) > 0).any(axis=1) | rests[:-1, 1] | rests[1:, 0]
     runs = np.concatenate([[0], np.flatnonzero(stops) + 1, [len(curve)]])
     return _path(names, curve, speed, runs, moves, moving[piece])
@@ -71,39 +71,33 @@ def path_of_points(
     same: NDArray[np.bool_] = (array[1:] == array[:-1]).all(axis=1)
     refuse(same, lambda i: f"points {i} and {i + 1} coincide: remove one of them")
     count, width = len(array) - 1, array.shape[1]
-    (curve, _, move, allowed, runs), summary, _, _ = native_build_path(
-        "points",
-        array[0].copy(),
-        np.full(count, MoveKind.LINE, dtype=np.uint8),
-        array[1:].copy(),
-        np.full(count, speed),
-        np.zeros(count, dtype=np.int32),
-        np.full(count, float(tolerance)),
-        np.full(count, settings.fit_share * tolerance),
-        np.zeros(count, dtype=np.bool_),
-        np.empty(0, dtype=np.int64),
-        np.empty((0, 2), dtype=np.int64),
-        np.empty((0, 2)),
-        np.empty(0),
-        np.empty(0, dtype=np.int64),
-        np.zeros(1, dtype=np.int64),
-        None,
-        np.empty(0, dtype=np.int64),
-        np.empty((0, width)),
-        np.ones(count, dtype=np.bool_),
-        np.full(width, _ANY_SPEED),
-        np.full(width, _ANY_ACCELERATION),
-        np.tile([-np.inf, np.inf], (width, 1)),
-        False,
-        settings.exact_tolerance,
-        settings.max_chord,
-        math.inf,
-        _ANY_SPEED,
-        math.radians(settings.corner_angle),
-        corners.value,
+    moves = Moves(
+        name="points",
+        start=array[0].copy(),
+        kind=np.full(count, MoveKind.LINE, dtype=np.uint8),
+        target=array[1:].copy(),
+        feed=np.full(count, speed),
+        line=np.zeros(count, dtype=np.int32),
+        tolerance=np.full(count, float(tolerance)),
+        fit_tolerance=np.full(count, settings.fit_share * tolerance),
+        halt=np.zeros(count, dtype=np.bool_),
+        joints=np.ones(count, dtype=np.bool_),
     )
+    rules = Rules(
+        max_velocity=np.full(width, _ANY_SPEED),
+        max_acceleration=np.full(width, _ANY_ACCELERATION),
+        travel=np.tile([-np.inf, np.inf], (width, 1)),
+        jump=False,
+        exact_tolerance=settings.exact_tolerance,
+        max_chord=settings.max_chord,
+        corner_acceleration=math.inf,
+        max_speed=_ANY_SPEED,
+        corner_angle=math.radians(settings.corner_angle),
+        corners=corners.value,
+    )
+    (curve, _, move, allowed, runs), summary, _, _ = native_build_path(moves, rules)
     moving = np.diff(array, axis=0) != 0.0
-    path = _path(names, CompositeCurve(*curve), speed, runs, moving, move, allowed, FitSummary.of(*summary))
+    path = _path(names, CompositeCurve.of(curve), speed, runs, moving, move, allowed, FitSummary.of(*summary))
     return replace(path, corners=corners)
 
 

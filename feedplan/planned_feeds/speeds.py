@@ -134,7 +134,7 @@ def speeds_at(problem: Problem, profile: SpeedProfile, piece: Indices, u: Array)
 
     Speeds are 0 where the curve stands still."""
     path = problem.path
-    time, _, velocity, *_ = sampler(problem, profile, problem.period).along(piece.astype(np.uint32), u)
+    time, _, velocity, *_ = sampler(problem, profile).along(piece.astype(np.uint32), u)
     slope = problem.curve.evaluate(piece, u, 1)[1]
     square = (slope**2).sum(axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):

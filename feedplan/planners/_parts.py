@@ -15,8 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan._solvers import PlanError
+from feedplan._solvers import Problem as NativeProblem
 from feedplan.constraints.problem import Problem
-from feedplan.profile import SpeedProfile
+from feedplan.curves.composite import CompositeCurve
+from feedplan.lazy import cached_property
+from feedplan.profile import OF_ARCS, OF_PIECES, SpeedProfile
 from feedplan.progress import Listener
 
 Floats = NDArray[np.float64]
@@ -36,19 +39,12 @@ class Elsewhere(Protocol):
 
 @dataclass(frozen=True)
 class Runs:
-    """Offsets of runs in the pieces, from 0."""
+    """What native code takes of a `Path`: offsets of runs in the pieces, from 0, and what goes with them."""
 
     runs: NDArray[np.int64]
-
-
-@dataclass(frozen=True)
-class Pieces:
-    """Pieces of a `CompositeCurve`."""
-
-    control_points: Floats
-    weights: Floats | None
-    offsets: NDArray[np.int64]
-    width: Floats
+    line: NDArray[np.int32]
+    start_dwell: float
+    dwell: Floats
 
 
 @dataclass(frozen=True)
@@ -70,10 +66,10 @@ class Part:
     end_run: int
     first: int
     path: Runs
-    curve: Pieces
+    curve: CompositeCurve
     tip_speed: Squares | None
     way_speed: Squares | None
-    tip_curve: Pieces | None
+    tip_curve: CompositeCurve | None
     feed_share: Floats | None
     feed: Floats
     junction_speed: Floats
@@ -86,20 +82,10 @@ class Part:
     start_speed: float
     end_speed: float
 
-
-@dataclass(frozen=True)
-class PartOfProfile:
-    """What the native bound takes of a profile, for the arcs of a part."""
-
-    piece: NDArray[np.uint32]
-    kind: NDArray[np.uint8]
-    u0: Floats
-    u1: Floats
-    p0: Floats
-    p1: Floats
-    a0: Floats
-    a1: Floats
-    duration: Floats
+    @cached_property
+    def native(self) -> NativeProblem:
+        """The part as kernels take it."""
+        return NativeProblem(self)
 
 
 def parts(problem: Problem, count: int) -> list[Part]:
@@ -117,11 +103,16 @@ def _part(problem: Problem, run: int, end_run: int) -> Part:
         run=run,
         end_run=end_run,
         first=first,
-        path=Runs(runs[run : end_run + 1] - first),
-        curve=_pieces(problem.curve, first, end),
+        path=Runs(
+            runs=runs[run : end_run + 1] - first,
+            line=problem.path.line[first:end],
+            start_dwell=0.0,
+            dwell=problem.path.dwell[run:end_run],
+        ),
+        curve=problem.curve[first:end],
         tip_speed=_squares(problem.tip_speed, first, end),
         way_speed=_squares(problem.way_speed, first, end),
-        tip_curve=None if problem.tip_curve is None else _pieces(problem.tip_curve, first, end),
+        tip_curve=None if problem.tip_curve is None else problem.tip_curve[first:end],
         feed_share=None if problem.feed_share is None else problem.feed_share[first:end],
         feed=problem.feed[first:end],
         junction_speed=problem.junction_speed[first : end + 1],
@@ -136,16 +127,6 @@ def _part(problem: Problem, run: int, end_run: int) -> Part:
     )
 
 
-def _pieces(curve: Any, first: int, end: int) -> Pieces:
-    own = slice(int(curve.offsets[first]), int(curve.offsets[end]))
-    return Pieces(
-        curve.control_points[own],
-        None if curve.weights is None else curve.weights[own],
-        curve.offsets[first : end + 1] - curve.offsets[first],
-        curve.width[first:end],
-    )
-
-
 def _squares(speed: Any, first: int, end: int) -> Squares | None:
     if speed is None:
         return None
@@ -153,33 +134,28 @@ def _squares(speed: Any, first: int, end: int) -> Squares | None:
     return Squares(speed.coefficients[own], speed.offsets[first : end + 1] - speed.offsets[first])
 
 
-def part_of_profile(profile: SpeedProfile, part: Part) -> PartOfProfile:
-    """The arcs of a part."""
-    arcs = slice(int(profile.runs[part.run]), int(profile.runs[part.end_run]))
-    others = {name: getattr(profile, name)[arcs] for name in PartOfProfile.__dataclass_fields__}
-    return PartOfProfile(**{**others, "piece": profile.piece[arcs] - np.uint32(part.first)})
+def part_of_profile(profile: SpeedProfile, part: Part) -> SpeedProfile:
+    """The arcs of a part, as the native bound takes them."""
+    runs = profile.runs[part.run : part.end_run + 1]
+    own = {name: getattr(profile, name)[runs[0] : runs[-1]] for name in OF_ARCS}
+    none = {name: np.empty(0, np.uint32) for name in OF_PIECES}
+    return replace(profile, **{**own, **none, "piece": own["piece"] - part.first, "runs": runs - runs[0]})
 
 
-def joined(own: Sequence[Part], planned: Sequence[Any]) -> SpeedProfile:
-    """The profile of the whole from those of the parts, as `plan_jerk_limited` gives them."""
-    columns: list[list[NDArray[Any]]] = [[] for _ in range(14)]
-    arcs = 0
-    for part, (profile, changes, _) in zip(own, planned, strict=True):
-        for number, column in enumerate((*profile, *changes)):
-            if number in _OF_PIECES:
-                column = column + np.uint32(part.first)
-            elif number == _RUNS:
-                column = column[1 if columns[_RUNS] else 0 :] + arcs
-            columns[number].append(column)
-        arcs += len(profile[0])
-    ends = [end for _, _, end in planned]
-    whole: Any = [np.concatenate(column) for column in columns]
-    stopped, excess = zip(*ends, strict=True)
-    return replace(SpeedProfile(*whole), stopped=any(stopped), excess=math.fsum(np.concatenate(excess)))
-
-
-# Columns of profiles that name pieces (`piece`, `slowed`, `kinked`), and their offsets of runs.
-_OF_PIECES, _RUNS = (0, 10, 13), 9
+def joined(own: Sequence[Part], planned: Sequence[tuple[SpeedProfile, NDArray[np.float64]]]) -> SpeedProfile:
+    """The profile of the whole from those of the parts, and the excess of their runs."""
+    profiles, excess = zip(*planned, strict=True)
+    names = (*OF_ARCS, *OF_PIECES)
+    columns: dict[str, list[Any]] = {name: [getattr(each, name) for each in profiles] for name in names}
+    for name in ("piece", *OF_PIECES):
+        columns[name] = [column + part.first for part, column in zip(own, columns[name], strict=True)]
+    arcs = np.cumsum([0, *map(len, profiles)])
+    runs = [profile.runs[1:] + before for profile, before in zip(profiles, arcs[:-1], strict=True)]
+    return SpeedProfile(
+        **{name: np.concatenate(column) for name, column in columns.items()},  # type: ignore[arg-type]
+        runs=np.concatenate(([0], *runs)),
+        excess=math.fsum(np.concatenate(excess)),
+    )
 
 
 def fault_of(part: Part, told: tuple[Any, ...]) -> PlanError:

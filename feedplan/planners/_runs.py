@@ -11,11 +11,8 @@ from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InfeasibleError
-from feedplan.profile import SpeedProfile
+from feedplan.profile import OF_ARCS, OF_PIECES, SpeedProfile
 from feedplan.progress import Listener, part
-
-_OF_ARCS = ("piece", "kind", "axis", "value", "u0", "u1", "p0", "p1", "duration", "a0", "a1")
-_OF_PIECES = ("slowed", "kinked")
 
 
 def within_both(
@@ -43,15 +40,15 @@ def fastest_runs(profiles: Sequence[SpeedProfile]) -> SpeedProfile:
     times = np.stack([profile.run_times for profile in profiles])
     planned = np.stack([np.diff(profile.runs) > 0 for profile in profiles])
     best = np.argmin(np.where(planned, times, np.inf), axis=0)
-    columns: dict[str, list[NDArray[np.generic]]] = {name: [] for name in (*_OF_ARCS, *_OF_PIECES)}
+    columns: dict[str, list[NDArray[np.generic]]] = {name: [] for name in (*OF_ARCS, *OF_PIECES)}
     runs = [0]
     for run, chosen in enumerate(best):
         profile = profiles[chosen]
         arcs = slice(int(profile.runs[run]), int(profile.runs[run + 1]))
-        for name in _OF_ARCS:
+        for name in OF_ARCS:
             columns[name].append(getattr(profile, name)[arcs])
         own = profile.piece[arcs]
-        for name in _OF_PIECES:
+        for name in OF_PIECES:
             pieces = getattr(profile, name)
             columns[name].append(pieces[np.isin(pieces, own)])
         runs.append(runs[-1] + len(own))

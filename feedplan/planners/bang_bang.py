@@ -15,7 +15,6 @@ def plan(problem: Problem, *, progress: Listener | None = None) -> SpeedProfile:
     Raises InfeasibleError where the start or end speed cannot be had, with the speed that can.
     """
     try:
-        columns = plan_bang_bang(problem, progress)
+        return SpeedProfile.of(plan_bang_bang(problem, progress))
     except PlanError as fault:
         raise error_of(problem, fault) from None
-    return SpeedProfile(*columns)

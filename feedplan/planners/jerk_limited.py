@@ -23,7 +23,6 @@ from feedplan.planners._jerk import jerk_limits, lowered_limits
 from feedplan.planners._parts import (
     Elsewhere,
     Part,
-    PartOfProfile,
     fault_of,
     joined,
     part_of_profile,
@@ -168,12 +167,10 @@ def _planned(
         return joined(own, [found for found, _ in planned])
     left = None if end is None else max(end - time.perf_counter(), 0.0)
     try:
-        columns, changes, (stopped, excess) = plan_jerk_limited(
-            problem, limits, resolution, gap, left, progress
-        )
+        native, stopped, excess = plan_jerk_limited(problem, limits, resolution, gap, left, progress)
     except PlanError as fault:
         raise error_of(problem, fault) from None
-    return SpeedProfile(*columns, *changes, stopped=stopped, excess=math.fsum(excess))
+    return SpeedProfile.of(native, stopped=stopped, excess=math.fsum(excess))
 
 
 def _parts_of(problem: Problem, elsewhere: Elsewhere | None) -> list[Part]:
@@ -184,15 +181,16 @@ def _parts_of(problem: Problem, elsewhere: Elsewhere | None) -> list[Part]:
 def plan_part(
     part: Part, limits: NDArray[np.float64], resolution: float, gap: float, progress: Listener
 ) -> tuple[Any, tuple[Any, ...]]:
-    """What the native planner returns for a part, or None and what its fault tells."""
+    """The profile of a part and the excess of each of its runs, or None and what the fault tells."""
     try:
-        return plan_jerk_limited(part, limits, resolution, gap, None, progress), ()
+        native, _, excess = plan_jerk_limited(part, limits, resolution, gap, None, progress)
+        return (SpeedProfile.of(native), excess), ()
     except PlanError as fault:
         return None, fault.args
 
 
 def bound_part(
-    part: Part, limits: NDArray[np.float64], profile: PartOfProfile, progress: Listener
+    part: Part, limits: NDArray[np.float64], profile: SpeedProfile, progress: Listener
 ) -> NDArray[np.float64]:
     """The bound of each stretch of a part."""
     return bound_jerk_limited(part, limits, profile, None, progress)

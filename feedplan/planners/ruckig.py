@@ -219,10 +219,10 @@ def _planned(problem: Problem, time_limit: float | None, guide: SpeedProfile | N
         found = [_improved(stretch, motions, deadline) for stretch in stretches]
         offsets = np.cumsum([0] + [len(sections) for sections in found])
         rows = np.array([section for sections in found for section in sections]).reshape(-1, 5)
-        columns, changes = profile_of_sections(problem, limits, offsets, rows)
+        native = profile_of_sections(problem, limits, offsets, rows)
     except PlanError as fault:
         raise error_of(problem, fault) from None
-    return SpeedProfile(*columns, *changes)
+    return SpeedProfile.of(native)
 
 
 def _stretches(problem: Problem, limits: Array, guide: SpeedProfile | None) -> list[Stretch]:

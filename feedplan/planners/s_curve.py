@@ -45,11 +45,9 @@ def _planned(problem: Problem, time_limit: float | None, progress: Listener | No
 
     def solved(problem: Problem, progress: Listener | None) -> SpeedProfile:
         try:
-            columns, changes = plan_s_curve(
-                problem, jerk_limits(problem), CUTTINGS, LOOK_AHEAD, time_limit, progress
-            )
+            native = plan_s_curve(problem, jerk_limits(problem), CUTTINGS, LOOK_AHEAD, time_limit, progress)
         except PlanError as fault:
             raise error_of(problem, fault) from None
-        return SpeedProfile(*columns, *changes)
+        return SpeedProfile.of(native)
 
     return within_both(problem, solved, progress)

@@ -95,8 +95,10 @@ elsewhere.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,12 +115,38 @@ from feedplan.program.subprograms import finder
 from feedplan.program.tools import Tool
 from feedplan.progress import Listener
 
+if TYPE_CHECKING:
+    from feedplan.program.tip import TipControl
+
 WORK_OFFSETS = (
     *("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"),
     *(f"G54.1 P{number}" for number in range(1, 100)),
 )
 
 MAX_MOVES = 50_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Options:
+    """What the native reader needs to know besides the program.
+
+    `places` (n, 9) are the home position, where the program begins, and the work offsets G54 to G59.3 and
+    G54.1 P1 on, in X Y Z A B C U V W; `machine_axes` is empty where there is no machine, `tip_control` None.
+    `machines_with` names the machines that have the axis of a letter; `tools` are rows of the tool table,
+    None where it is not known; `subprograms` gives for a name the file's name and bytes, or None; the others
+    are as for `read_gcode`.
+    """
+
+    places: NDArray[np.float64]
+    machine_axes: str
+    machines_with: Callable[[str], str]
+    tip_control: TipControl | None
+    block_delete: bool
+    max_moves: int
+    tools: Sequence[tuple[int, int, Sequence[float], float, int]] | None
+    subprograms: Callable[[str], tuple[str, bytes] | None] | None
+    feed: float | None
+    whole_step: float
 
 
 def read_gcode(
@@ -153,25 +181,22 @@ def read_gcode(
     from feedplan.program.tip import TipControl
 
     control = None if machine is None else TipControl(machine)
-    columns = read_native(
-        content,
-        name,
-        _places(machine),
-        "" if machine is None else "".join(machine.program_letters),
-        names_of_machines_with,
-        control,
-        block_delete,
-        max_moves,
-        None if tools is None else [tool.row() for tool in tools],
-        finder(folders, max_bytes) if folders else None,
-        feed,
-        whole_step,
-        progress,
+    options = Options(
+        places=_places(machine),
+        machine_axes="" if machine is None else "".join(machine.program_letters),
+        machines_with=names_of_machines_with,
+        tip_control=control,
+        block_delete=block_delete,
+        max_moves=max_moves,
+        tools=None if tools is None else [tool.row() for tool in tools],
+        subprograms=finder(folders, max_bytes) if folders else None,
+        feed=feed,
+        whole_step=whole_step,
     )
+    columns = read_native(content, name, options, progress)
     columns["events"] = Events(*columns.pop("event_columns"))
-    splines = columns.pop("spline_columns")
-    if len(columns["spline_move"]):
-        columns["splines"] = CompositeCurve(*splines)
+    if columns["splines"] is not None:
+        columns["splines"] = CompositeCurve.of(columns["splines"])
     if control is None or not control.applies:
         columns["meaning"] = columns["tool_length"] = None
     return Program(name=name, **columns)

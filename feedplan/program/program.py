@@ -48,6 +48,17 @@ class PathControl(IntEnum):
     TOLERANCE = 2
 
 
+# Of the columns as native code takes them.
+_DTYPES = {
+    **dict.fromkeys(("start", "target", "feed", "blend_tolerance", "fit_tolerance", "dwell"), np.float64),
+    **dict.fromkeys(("arc_centre", "arc_angle", "change_start"), np.float64),
+    **dict.fromkeys(("arc_move", "spline_move", "spline_pieces", "change_move"), np.int64),
+    **dict.fromkeys(("kind", "control", "arc_normal"), np.uint8),
+    "line": np.int32,
+    "stop": np.bool_,
+}
+
+
 @dataclass(frozen=True, eq=False)
 class Program:
     """Moves of a part program in order, in machine coordinates.
@@ -110,6 +121,10 @@ class Program:
     events: Events = field(default_factory=Events.none)
     reading: Mapping[str, Any] | None = field(default=None, repr=False)
 
+    def __post_init__(self) -> None:
+        for name, dtype in _DTYPES.items():
+            object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name), dtype))
+
     def __len__(self) -> int:
         return len(self.kind)
 
@@ -162,15 +177,13 @@ class Program:
         columns = [self.axes.index(name) for name in axes]
         splines = self.splines
         if splines is not None:
-            splines = replace(
-                splines, control_points=np.ascontiguousarray(splines.control_points[:, columns])
-            )
+            splines = replace(splines, control_points=splines.control_points[:, columns])
         changed = self.change_start.reshape(-1, len(self.axes))[:, columns]
         return replace(
             self,
             axes=axes,
-            start=np.ascontiguousarray(self.start[columns]),
-            target=np.ascontiguousarray(self.target[:, columns]),
+            start=self.start[columns],
+            target=self.target[:, columns],
             splines=splines,
-            change_start=np.ascontiguousarray(changed),
+            change_start=changed,
         )

@@ -67,7 +67,7 @@ def activity(
 ) -> Activity:
     """The activity of all limits, that of jerk where it is limited (`jerk`)."""
     time, weight, run = _moments(problem, profile)
-    reader = sampler(problem, profile, problem.period, progress=part(progress, 0.0, 0.6))
+    reader = sampler(problem, profile, progress=part(progress, 0.0, 0.6))
     tell(progress, 0.6)
     states = reader.at(time)
     tell(progress, 0.8)

@@ -62,7 +62,7 @@ def limit_samples(
     """Samples of every drawn arc, a block of arcs at a time; `progress` is told how far it is."""
     count = samples_per_arc(profile)
     drawn = drawn_arcs(profile, motion)
-    states = sampler(problem, profile, problem.period, progress=part(progress, 0.0, 0.2))
+    states = sampler(problem, profile, progress=part(progress, 0.0, 0.2))
     report = part(progress, 0.2, 1.0)
     tell(report, 0.0)
     # Denser towards both ends, where speed changes most on the way from and to a stop.

@@ -18,7 +18,7 @@ from feedplan.geometry.path import Path
 from feedplan.machine.machine import Machine
 from feedplan.planners import planner
 from feedplan.planning import plan
-from feedplan.profile import SpeedProfile
+from feedplan.profile import OF_ARCS, SpeedProfile
 from feedplan.program.program import Program
 from feedplan.setpoints import SetpointChunk, setpoints
 
@@ -65,8 +65,7 @@ class Case:
 
     def arcs(self, change: Callable[[NDArray[Any]], NDArray[Any]], runs: NDArray[np.int64]) -> Case:
         """The case with the same change, of rows, made to every column of the profile."""
-        names = ("piece", "kind", "axis", "value", "u0", "u1", "p0", "p1", "duration")
-        columns = {name: change(getattr(self.profile, name)) for name in names}
+        columns = {name: change(getattr(self.profile, name)) for name in OF_ARCS}
         return self.with_profile(**columns, runs=runs)
 
     def rows(self, change: Callable[[NDArray[Any]], NDArray[Any]]) -> Case:

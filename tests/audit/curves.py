@@ -61,7 +61,7 @@ def problem_along(
 
 def planned(problem: Problem) -> SpeedProfile:
     """The exact profile on pieces of any degree."""
-    return SpeedProfile(*plan_bang_bang(problem))
+    return SpeedProfile.of(plan_bang_bang(problem))
 
 
 def places_at(problem: Problem, profile: SpeedProfile, t: Array) -> tuple[NDArray[np.int64], Array, Array]:

@@ -53,7 +53,7 @@ def joint_problem(machine: Machine, names: str, curve: CompositeCurve, **changes
 
 def planned_joints(problem: Problem) -> SpeedProfile:
     """The exact profile of the joints' limits alone."""
-    return SpeedProfile(*plan_bang_bang(problem))
+    return SpeedProfile.of(plan_bang_bang(problem))
 
 
 def steady(problem: Problem, p: float) -> SpeedProfile:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from copy import copy
 from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any
@@ -197,24 +196,6 @@ def test_a_control_point_moved_by_twice_the_tolerance_is_found(
     assert ("deviation", None) in broken(result)
     assert result.check("deviation").worst == pytest.approx(2.5 * tolerance, rel=0.3)
     assert "jump" in {name for name, _ in broken(result)}
-
-
-def unchecked(curve: CompositeCurve, **columns: Any) -> CompositeCurve:
-    """A curve with columns that its own checks would refuse."""
-    other = copy(curve)
-    for name, column in columns.items():
-        object.__setattr__(other, name, column)
-    return other
-
-
-@pytest.mark.parametrize("bad", [math.nan, math.inf])
-def test_bad_numbers_in_the_path_are_never_fine(part: Any, changed: Change, bad: float) -> None:
-    points = changed(part.path.curve.by_piece, (20, 1, 0), bad)
-    result = part.with_path(curve=unchecked(part.path.curve, control_points=points.reshape(-1, 3))).audit()
-    assert ("numbers", None) in broken(result)
-    assert result.check("numbers").line == part.path.line[20]
-    width = changed(part.path.width, 20, bad)
-    assert not part.with_path(curve=unchecked(part.path.curve, width=width)).audit().ok
 
 
 def test_another_program_is_not_the_one_that_is_followed(part: Any, changed: Change) -> None:

@@ -18,7 +18,7 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.machine.machine import Machine
 from feedplan.machine.meaning import Meaning
 from feedplan.machine.path_derivatives import derivatives
-from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.profile import OF_ARCS, ArcKind, SpeedProfile
 from feedplan.setpoints import SetpointChunk
 from tests.audit.curves import places_at, sampled
 from tests.audit.joints import joint_problem, planned_joints, steady
@@ -189,10 +189,7 @@ def test_every_way_of_breaking_a_profile_is_named(case: Case) -> None:
         assert result.check("numbers").line == line
     assert names(kind=changed(profile.kind, arc, ArcKind.PARAMETER_ACCELERATION)) >= {"jump"}
     assert "order" in names(runs=np.array([0, len(profile) - 1]))
-    without = {
-        name: np.delete(getattr(profile, name), arc)
-        for name in ("piece", "kind", "axis", "value", "u0", "u1", "p0", "p1", "duration")
-    }
+    without = {name: np.delete(getattr(profile, name), arc) for name in OF_ARCS}
     assert "order" in names(**without, runs=np.array([0, len(profile) - 1]))
 
 

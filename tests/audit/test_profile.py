@@ -457,8 +457,8 @@ def test_an_audit_of_nothing_is_not_fine() -> None:
 def test_parts_that_do_not_belong_together_are_refused(part: Any) -> None:
     with pytest.raises(InputError, match="no axis Z"):
         audit(part.problem, part.profile, plane())
-    with pytest.raises(InputError, match="differ in length"):
-        part.with_profile(p0=part.profile.p0[:-1]).audit()
+    with pytest.raises(InputError, match=r"arcs, and `p0` has \d+ entries"):
+        part.with_profile(p0=part.profile.p0[:-1])
     with pytest.raises(InputError, match=r"has no axis Z: it has X, Y, A"):
         part.with_program(axes=("X", "Y", "A")).audit()
     flat = problem_of(LINE)

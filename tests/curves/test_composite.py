@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import json
+import pickle
 from fractions import Fraction
 from itertools import pairwise
 from math import comb
@@ -96,6 +98,25 @@ def test_a_parabola_by_hand() -> None:
     assert first.tolist() == [[1, 0], [1, 2], [1, 4]]
     assert second.tolist() == [[0, 2]] * 3
     assert third.tolist() == [[0, 0]] * 3
+
+
+@pytest.mark.parametrize("axes", range(1, 10))
+def test_arrays_are_views_of_what_the_native_curve_holds(axes: int) -> None:
+    points = np.random.default_rng(axes).normal(size=(5, axes))
+    curve = CompositeCurve(points, [1.0, 2.0, 1.0, 1.0, 3.0], [0, 3, 5], [1.0, 0.5])
+    for one in (curve, pickle.loads(pickle.dumps(curve)), copy.deepcopy(curve)):
+        np.testing.assert_array_equal(one.control_points, points)
+        np.testing.assert_array_equal(one.weights, [1.0, 2.0, 1.0, 1.0, 3.0])
+        np.testing.assert_array_equal(one.offsets, [0, 3, 5])
+        assert (one.offsets.dtype, one.width.tolist()) == (np.int64, [1.0, 0.5])
+        for name in ("control_points", "weights", "offsets", "width"):
+            column = getattr(one, name)
+            assert np.shares_memory(column, getattr(one.native, name))
+            assert not column.flags.writeable
+    # The memory stays as long as a view of it.
+    column = curve.control_points
+    del curve, one
+    np.testing.assert_array_equal(column, points)
 
 
 def test_a_quarter_circle_is_exact() -> None:

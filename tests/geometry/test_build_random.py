@@ -100,19 +100,20 @@ def test_the_path_does_not_depend_on_the_number_of_threads(make_program: Any) ->
     script = """
 import hashlib, numpy as np
 from feedplan import _solvers
+from feedplan.geometry.moves import Moves, Rules
 random = np.random.default_rng(3)
 n = 20000
 heading = np.cumsum(random.normal(size=n) * random.choice([0.02, 2.0], size=n))
 target = np.cumsum(np.stack([np.cos(heading), np.sin(heading)], axis=1) * 0.3, axis=0)
-columns, summary, _, _ = _solvers.build_path(
+moves = Moves(
     "p", np.zeros(2), np.ones(n, np.uint8), target, random.choice([10.0, 20.0], size=n),
     np.arange(n, dtype=np.int32), np.full(n, 0.01), np.full(n, 0.005), np.arange(n) % 7001 == 7000,
-    np.zeros(0, np.int64), np.zeros((0, 2), np.int64), np.zeros((0, 2)), np.zeros(0), np.zeros(0, np.int64),
-    np.zeros(1, np.int64), None, np.zeros(0, np.int64), np.zeros((0, 2)), np.ones(n, bool),
+    np.ones(n, bool))
+rules = Rules(
     np.full(2, 500.0), np.full(2, 3000.0),
     np.array([[-np.inf, np.inf]] * 2), False, 1e-3, 5.0, 2e4, 1e3, 0.48, "rounded")
-(control, _, offsets, width), *rest = columns
-columns = [control, offsets, width, *rest]
+(curve, *rest), summary, _, _ = _solvers.build_path(moves, rules)
+columns = [curve.control_points, curve.offsets, curve.width, *rest]
 print(summary, hashlib.sha256(b"".join(column.tobytes() for column in columns)).hexdigest())
 """
     results = {

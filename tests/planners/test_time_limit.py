@@ -101,9 +101,9 @@ def test_without_time_there_is_a_first_plan_on_a_coarse_grid_and_nothing_more(
 
 def test_no_run_is_begun_after_the_deadline(program: FilePath) -> None:
     problem = plan_program(program, MACHINE, "s-curve").problem
-    columns, changes, (stopped, _) = plan_jerk_limited(problem, jerk_limits(problem), 16.0, 1e-6, 0.0)
+    native, stopped, _ = plan_jerk_limited(problem, jerk_limits(problem), 16.0, 1e-6, 0.0)
     assert stopped
-    late = SpeedProfile(*columns, *changes)
+    late = SpeedProfile.of(native)
     assert (len(late), len(late.runs)) == (0, len(problem.path.runs))
 
 

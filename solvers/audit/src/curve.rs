@@ -11,12 +11,14 @@ use super::FEEDS;
 pub struct Pieces<'a> {
     /// At most as many as the kernels take.
     pub axes: usize,
-    /// Control points, one row of axes each, in mm.
+    /// Coordinates of each control point in `control`: those of the axes, then zeros.
+    pub stride: usize,
+    /// Control points in mm.
     pub control: &'a [f64],
     /// Of every control point; empty where all pieces are polynomial.
     pub weights: &'a [f64],
     /// Of the pieces in the control points, one more than pieces; they grow by 2 to 10.
-    pub offsets: &'a [i64],
+    pub offsets: &'a [usize],
     /// Parameter intervals, in mm.
     pub width: &'a [f64],
 }
@@ -78,17 +80,23 @@ impl Pieces<'_> {
     /// Where the control points of piece `i` are in the table.
     #[inline]
     pub fn rows(&self, i: usize) -> std::ops::Range<usize> {
-        self.offsets[i] as usize..self.offsets[i + 1] as usize
+        self.offsets[i]..self.offsets[i + 1]
+    }
+
+    /// A control point by its row in the table.
+    #[inline]
+    pub fn point<const M: usize>(&self, row: usize) -> [f64; M] {
+        vector(self.control, self.stride, row)
     }
 
     /// The first control point of piece `i`.
     pub fn start<const M: usize>(&self, i: usize) -> [f64; M] {
-        vector(self.control, self.axes, self.rows(i).start)
+        self.point(self.rows(i).start)
     }
 
     /// The last control point of piece `i`.
     pub fn end<const M: usize>(&self, i: usize) -> [f64; M] {
-        vector(self.control, self.axes, self.rows(i).end - 1)
+        self.point(self.rows(i).end - 1)
     }
 
     /// Piece `i`, ready to be evaluated.
@@ -96,7 +104,7 @@ impl Pieces<'_> {
     pub fn curve<const M: usize>(&self, i: usize) -> Curve<M> {
         let rows = self.rows(i);
         if rows.len() == 3 && self.weights.is_empty() {
-            let points = std::array::from_fn(|j| vector(self.control, self.axes, rows.start + j));
+            let points = std::array::from_fn(|j| self.point(rows.start + j));
             Curve::Quadratic(Quadratic::new(&points, self.width[i]))
         } else {
             self.general(i)
@@ -107,7 +115,7 @@ impl Pieces<'_> {
     fn general<const M: usize>(&self, i: usize) -> Curve<M> {
         let rows = self.rows(i);
         let weights = if self.weights.is_empty() { &[][..] } else { &self.weights[rows.clone()] };
-        let points = rows.map(|row| vector(self.control, self.axes, row));
+        let points = rows.map(|row| self.point(row));
         Curve::General(Box::new(Polygon::new(points, weights)), self.width[i])
     }
 
@@ -115,7 +123,7 @@ impl Pieces<'_> {
     pub fn distance_at_least<const M: usize>(&self, i: usize, q: &[f64; M]) -> f64 {
         let (mut least, mut most) = ([f64::INFINITY; M], [f64::NEG_INFINITY; M]);
         for row in self.rows(i) {
-            let point = vector::<M>(self.control, self.axes, row);
+            let point = self.point::<M>(row);
             for k in 0..M {
                 (least[k], most[k]) = (least[k].min(point[k]), most[k].max(point[k]));
             }

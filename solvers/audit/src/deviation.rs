@@ -38,7 +38,7 @@ pub fn audit_path<const M: usize>(
     blocks(path.len(), seen, |i, tally| {
         let (time, line) = (times[i], path.line[i]);
         let (rows, width) = (path.rows(i), path.width[i]);
-        let control = &path.control[rows.start * path.axes..rows.end * path.axes];
+        let control = &path.control[rows.start * path.stride..rows.end * path.stride];
         let weights = if path.weights.is_empty() { &[][..] } else { &path.weights[rows] };
         let finite = control.iter().all(|q| q.is_finite())
             && weights.iter().all(|w| w.is_finite() && *w > 0.0)
@@ -62,7 +62,7 @@ pub fn audit_path<const M: usize>(
                 offer_travel(tally, limits, k, q, time, line);
             }
             // The control points enclose the piece: where they are fine it is.
-            let reach = control.iter().skip(k).step_by(path.axes);
+            let reach = control.iter().skip(k).step_by(path.stride);
             let worst = tally.get(Check::Travel, k).ratio;
             if reach.copied().any(|q| travel_share(limits, k, q) > worst) {
                 for q in curve.extremes(k) {
@@ -312,6 +312,7 @@ fn magnitude<const M: usize>(q: &[f64; M]) -> f64 {
 mod tests {
     use super::*;
     use crate::curve::Pieces;
+    use crate::{Sided, FEEDS};
 
     #[test]
     fn places_are_looked_at_from_near_to_far() {
@@ -319,10 +320,58 @@ mod tests {
         assert_eq!(outwards(5, 5, 5).collect::<Vec<_>>(), [5]);
     }
 
+    /// Two pieces of degree 2 along X, with numbers that may be none.
+    fn numbers(x: f64, weights: &[f64], width: f64) -> f64 {
+        let path = Followed {
+            pieces: Pieces {
+                axes: 1,
+                stride: 1,
+                control: &[0.0, 1.0, 2.0, 2.0, x, 4.0],
+                weights,
+                offsets: &[0, 3, 6],
+                width: &[2.0, width],
+            },
+            feed: &[1.0; 2 * FEEDS],
+            line: &[1, 2],
+            moves: &[0, 0, 1, 1],
+            tolerance: &[0.0; 2],
+            runs: &[0, 2],
+            new_words: &[false],
+            start_dwell: 0.0,
+            dwell: &[0.0],
+        };
+        let of_axes = Sided { positive: [1.0], negative: [1.0] };
+        let limits = Limits {
+            axes: 1,
+            velocity: of_axes,
+            acceleration: of_axes,
+            jerk: [1.0],
+            judges_jerk: false,
+            jump: [0.0],
+            jump_beyond: [0.0],
+            travel: [[f64::NEG_INFINITY, f64::INFINITY]],
+            feed_axes: [[1.0]; FEEDS],
+            chord_tolerance: f64::INFINITY,
+            period: 1e-3,
+            end_speeds: [0.0; 2],
+        };
+        audit_path(&path, None, &limits, &|_| ()).get(Check::Numbers, 0).ratio
+    }
+
+    #[test]
+    fn numbers_that_are_none_are_found() {
+        assert_eq!(numbers(3.0, &[], 2.0), 0.0);
+        for bad in [f64::NAN, f64::INFINITY] {
+            assert!(numbers(bad, &[], 2.0) > 1.0 && numbers(3.0, &[], bad) > 1.0);
+            assert!(numbers(3.0, &[1.0, 1.0, 1.0, 1.0, bad, 1.0], 2.0) > 1.0);
+        }
+        assert!(numbers(3.0, &[1.0, 1.0, 1.0, 1.0, -1.0, 1.0], 2.0) > 1.0);
+    }
+
     #[test]
     fn a_move_without_a_piece_lies_between_its_neighbours() {
         let path = Followed {
-            pieces: Pieces { axes: 2, control: &[], weights: &[], offsets: &[], width: &[1.0; 3] },
+            pieces: Pieces { axes: 2, stride: 2, control: &[], weights: &[], offsets: &[], width: &[1.0; 3] },
             feed: &[],
             line: &[],
             moves: &[0, 1, 1, 1, 4, 5],

@@ -394,7 +394,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const NONE: Pieces = Pieces { axes: 3, control: &[], weights: &[], offsets: &[0], width: &[] };
+    const NONE: Pieces = Pieces { axes: 3, stride: 3, control: &[], weights: &[], offsets: &[0], width: &[] };
 
     /// The distance from the nearest place.
     fn off<const M: usize>(programmed: &Move<M>, q: &[f64; M]) -> f64 {
@@ -406,6 +406,7 @@ mod tests {
         // A line to (4, 0), then a parabola y = (x − 4)²/4 to (8, 4).
         let splines = Pieces {
             axes: 2,
+            stride: 2,
             control: &[0.0, 0.0, 4.0, 0.0, 4.0, 0.0, 6.0, 0.0, 8.0, 4.0],
             weights: &[],
             offsets: &[0, 2, 5],

@@ -276,6 +276,7 @@ mod tests {
     const THERE_AND_BACK: Followed = Followed {
         pieces: Pieces {
             axes: 2,
+            stride: 2,
             control: &[0.0, 0.0, 5.0, 0.0, 10.0, 0.0, 10.0, 0.0, 5.0, 0.0, 0.0, 0.0],
             weights: &[],
             offsets: &[0, 3, 6],

@@ -93,7 +93,7 @@ fn setpoints(c: &mut Criterion) {
                 let arcs = profile(kind, &curve, r);
                 let time: f64 = arcs.iter().map(|arc| arc.duration).sum();
                 let path = PathData {
-                    curve,
+                    curve: curve.into(),
                     tip_speed: None,
                     way_speed: None,
                     feed_share: vec![],
@@ -103,11 +103,15 @@ fn setpoints(c: &mut Criterion) {
                     dwell: vec![0.0],
                 };
                 let period = time / (SETPOINTS - 1) as f64;
-                let sampler = Sampler::new(path, arcs, &[0, PIECES], period, interpolator, Watch::default())
+                let sampler = Sampler::new(path.into(), arcs, &[0, PIECES], period, Watch::default())
                     .expect("a profile");
                 let name = BenchmarkId::new(format!("{interpolator:?}, {shape}"), format!("{kind:?}"));
                 group.bench_function(name, |b| {
-                    b.iter(|| one_thread.install(|| sampler.chunk(0..SETPOINTS, &mut None, Watch::default())))
+                    b.iter(|| {
+                        one_thread.install(|| {
+                            sampler.chunk(0..SETPOINTS, interpolator, &mut None, Watch::default())
+                        })
+                    })
                 });
             }
         }

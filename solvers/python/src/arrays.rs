@@ -8,29 +8,6 @@ use pyo3::prelude::*;
 
 use feedplan_geometry::quadratic::Quadratic;
 
-/// `feedplan.curves.composite.CompositeCurve`.
-#[derive(FromPyObject)]
-pub struct CurveArrays<'py> {
-    pub control_points: PyReadonlyArray2<'py, f64>,
-    pub weights: Option<PyReadonlyArray1<'py, f64>>,
-    pub offsets: PyReadonlyArray1<'py, i64>,
-    pub width: PyReadonlyArray1<'py, f64>,
-}
-
-impl CurveArrays<'_> {
-    pub fn axes(&self) -> usize {
-        self.control_points.shape()[1]
-    }
-
-    /// Empty where all pieces are polynomial.
-    pub fn weights(&self) -> PyResult<&[f64]> {
-        Ok(match &self.weights {
-            Some(weights) => weights.as_slice()?,
-            None => &[],
-        })
-    }
-}
-
 /// Offsets; a negative one becomes one that fits nowhere.
 pub fn indices(array: &PyReadonlyArray1<i64>) -> Vec<usize> {
     array.as_array().iter().map(|&value| usize::try_from(value).unwrap_or(usize::MAX)).collect()
@@ -57,7 +34,7 @@ pub fn row<const M: usize>(array: &PyReadonlyArray1<f64>, rest: f64) -> PyResult
     Ok(padded(flat, rest))
 }
 
-fn padded<const M: usize>(values: &[f64], rest: f64) -> [f64; M] {
+pub fn padded<const M: usize>(values: &[f64], rest: f64) -> [f64; M] {
     std::array::from_fn(|k| values.get(k).copied().unwrap_or(rest))
 }
 

@@ -4,7 +4,9 @@ use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::arrays::CurveArrays;
+use super::curve::Curve;
+use super::native::Of;
+use super::profile::Profile;
 use super::with_padded_axes;
 use super::work::run;
 use feedplan_audit::arcs::Arcs;
@@ -12,7 +14,6 @@ use feedplan_audit::curve::{Followed, Pieces};
 use feedplan_audit::deviation::{audit_deviation, audit_path};
 use feedplan_audit::follow::Plan;
 use feedplan_audit::moves::Programmed;
-use feedplan_audit::polygon::MOST;
 use feedplan_audit::profile::audit_profile;
 use feedplan_audit::setpoints::{Chunk, Stream};
 use feedplan_audit::timed::Timed;
@@ -48,31 +49,22 @@ pub fn require(good: bool, what: &str) -> PyResult<()> {
     }
 }
 
-impl CurveArrays<'_> {
-    fn pieces(&self, whose: &str) -> PyResult<Pieces<'_>> {
-        let pieces = Pieces {
-            axes: self.axes(),
-            control: self.control_points.as_slice()?,
-            weights: self.weights()?,
-            offsets: self.offsets.as_slice()?,
-            width: self.width.as_slice()?,
-        };
-        let points = self.control_points.shape()[0];
-        let offsets = pieces.offsets;
-        let good = offsets.len() == pieces.len() + 1
-            && offsets.first() == Some(&0)
-            && offsets.last() == Some(&(points as i64))
-            && offsets.windows(2).all(|pair| (2..=MOST as i64 + 1).contains(&(pair[1] - pair[0])))
-            && (pieces.weights.is_empty() || pieces.weights.len() == points);
-        require(good, whose)?;
-        Ok(pieces)
+fn pieces(curve: &Curve) -> Pieces<'_> {
+    let (control, stride) = curve.coordinates();
+    Pieces {
+        axes: curve.axes(),
+        stride,
+        control,
+        weights: curve.weight_slice(),
+        offsets: curve.piece_offsets(),
+        width: curve.widths(),
     }
 }
 
 /// `feedplan.Path`.
 #[derive(FromPyObject)]
 struct PathArrays<'py> {
-    curve: CurveArrays<'py>,
+    curve: Of<Curve>,
     line: PyReadonlyArray1<'py, i32>,
     #[pyo3(attribute("move"))]
     moves: PyReadonlyArray2<'py, i64>,
@@ -116,7 +108,7 @@ impl ProblemArrays<'_> {
     pub fn unlimited(&self) -> PyResult<Followed<'_>> {
         let path = &self.path;
         let followed = Followed {
-            pieces: path.curve.pieces("path")?,
+            pieces: pieces(&path.curve),
             feed: &[],
             line: path.line.as_slice()?,
             moves: path.moves.as_slice()?,
@@ -142,48 +134,24 @@ impl ProblemArrays<'_> {
     }
 }
 
-/// `feedplan.profile.SpeedProfile`.
-#[derive(FromPyObject)]
-pub struct ProfileArrays<'py> {
-    piece: PyReadonlyArray1<'py, u32>,
-    kind: PyReadonlyArray1<'py, u8>,
-    axis: PyReadonlyArray1<'py, u8>,
-    value: PyReadonlyArray1<'py, f64>,
-    u0: PyReadonlyArray1<'py, f64>,
-    u1: PyReadonlyArray1<'py, f64>,
-    p0: PyReadonlyArray1<'py, f64>,
-    p1: PyReadonlyArray1<'py, f64>,
-    duration: PyReadonlyArray1<'py, f64>,
-    a0: PyReadonlyArray1<'py, f64>,
-    a1: PyReadonlyArray1<'py, f64>,
-    runs: PyReadonlyArray1<'py, i64>,
-}
-
-impl ProfileArrays<'_> {
-    pub fn arcs<'a>(&'a self, problem: &'a ProblemArrays<'_>) -> PyResult<Arcs<'a>> {
-        let arcs = Arcs {
-            piece: self.piece.as_slice()?,
-            kind: self.kind.as_slice()?,
-            axis: self.axis.as_slice()?,
-            value: self.value.as_slice()?,
-            u0: self.u0.as_slice()?,
-            u1: self.u1.as_slice()?,
-            p0: self.p0.as_slice()?,
-            p1: self.p1.as_slice()?,
-            duration: self.duration.as_slice()?,
-            a0: self.a0.as_slice()?,
-            a1: self.a1.as_slice()?,
-            share: problem.share()?,
-            pieces: problem.path.line.len(),
-            runs: self.runs.as_slice()?,
-        };
-        let [a0, a1] = [arcs.a0, arcs.a1];
-        let numbers = [arcs.u0, arcs.u1, arcs.p0, arcs.p1, arcs.value, arcs.duration, a0, a1];
-        let good = numbers.iter().all(|array| array.len() == arcs.len())
-            && [arcs.kind.len(), arcs.axis.len()] == [arcs.len(); 2];
-        require(good, "profile")?;
-        Ok(arcs)
-    }
+/// The arcs of a profile as the audit takes them.
+pub fn arcs<'a>(profile: &'a Profile, problem: &'a ProblemArrays<'_>) -> PyResult<Arcs<'a>> {
+    Ok(Arcs {
+        piece: &profile.piece,
+        kind: &profile.kind,
+        axis: &profile.axis,
+        value: &profile.value,
+        u0: &profile.u0,
+        u1: &profile.u1,
+        p0: &profile.p0,
+        p1: &profile.p1,
+        duration: &profile.duration,
+        a0: &profile.a0,
+        a1: &profile.a1,
+        share: problem.share()?,
+        pieces: problem.path.line.len(),
+        runs: &profile.runs,
+    })
 }
 
 /// `feedplan.Program`.
@@ -199,14 +167,14 @@ struct ProgramArrays<'py> {
     arc_angle: PyReadonlyArray1<'py, f64>,
     spline_move: PyReadonlyArray1<'py, i64>,
     spline_pieces: PyReadonlyArray1<'py, i64>,
-    splines: Option<CurveArrays<'py>>,
+    splines: Option<Of<Curve>>,
     change_move: PyReadonlyArray1<'py, i64>,
     change_start: PyReadonlyArray2<'py, f64>,
 }
 
 impl ProgramArrays<'_> {
     fn programmed(&self, axes: usize) -> PyResult<Programmed<'_>> {
-        let none = Pieces { axes, control: &[], weights: &[], offsets: &[0], width: &[] };
+        let none = Pieces { axes, stride: axes, control: &[], weights: &[], offsets: &[0], width: &[] };
         let program = Programmed {
             axes,
             start: self.start.as_slice()?,
@@ -218,7 +186,7 @@ impl ProgramArrays<'_> {
             arc_angle: self.arc_angle.as_slice()?,
             spline_move: self.spline_move.as_slice()?,
             spline_pieces: self.spline_pieces.as_slice()?,
-            splines: self.splines.as_ref().map_or(Ok(none), |splines| splines.pieces("program"))?,
+            splines: self.splines.as_ref().map_or(none, |splines| pieces(splines)),
             change_move: self.change_move.as_slice()?,
             change_start: self.change_start.as_slice()?,
             xyz: ["X", "Y", "Z"].map(|letter| self.axes.iter().position(|axis| axis == letter)),
@@ -307,13 +275,13 @@ fn audit_plan(
     problem: ProblemArrays<'_>,
     limits: LimitArrays,
     feed: PyReadonlyArray2<'_, f64>,
-    profile: Option<ProfileArrays<'_>>,
+    profile: Option<Of<Profile>>,
     program: Option<ProgramArrays<'_>>,
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<Findings> {
     let path = problem.followed(&feed)?;
     let junction_speed = problem.junction_speed.as_slice()?;
-    let arcs = profile.as_ref().map(|profile| profile.arcs(&problem)).transpose()?;
+    let arcs = profile.as_ref().map(|profile| arcs(profile, &problem)).transpose()?;
     let program = program.as_ref().map(|program| program.programmed(problem.axes())).transpose()?;
     with_padded_axes!(problem.axes(), M, {
         let limits = limits.limits::<M>(path.axes)?;
@@ -373,7 +341,7 @@ impl<const M: usize> AnyStream for Stream<M> {
 struct Compared {
     problem: Py<PyAny>,
     feed: Py<PyAny>,
-    profile: Option<Py<PyAny>>,
+    profile: Option<Py<Profile>>,
     program: Option<Py<PyAny>>,
     /// When every arc of the profile begins.
     starts: Vec<f64>,
@@ -389,12 +357,10 @@ impl Compared {
     ) -> PyResult<T> {
         let problem: ProblemArrays = self.problem.bind(py).extract()?;
         let feed: PyReadonlyArray2<f64> = self.feed.bind(py).extract()?;
-        let profile: Option<ProfileArrays> =
-            self.profile.as_ref().map(|profile| profile.bind(py).extract()).transpose()?;
         let program: Option<ProgramArrays> =
             self.program.as_ref().map(|program| program.bind(py).extract()).transpose()?;
         let path = problem.followed(&feed)?;
-        let arcs = profile.as_ref().map(|profile| profile.arcs(&problem)).transpose()?;
+        let arcs = self.profile.as_ref().map(|profile| arcs(profile.get(), &problem)).transpose()?;
         let program = program.as_ref().map(|program| program.programmed(problem.axes())).transpose()?;
         let profile = arcs.map(|arcs| Timed { arcs, starts: &self.starts, clock: &[] });
         let plan = Plan { path, profile, program };
@@ -419,7 +385,7 @@ impl SetpointAudit {
         resolution: f64,
         problem: Option<Bound<'_, PyAny>>,
         feed: Option<Bound<'_, PyAny>>,
-        profile: Option<Bound<'_, PyAny>>,
+        profile: Option<Of<Profile>>,
         program: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let axes = limits.max_velocity.len();
@@ -484,7 +450,7 @@ fn compare(
     axes: usize,
     problem: Bound<'_, PyAny>,
     feed: Bound<'_, PyAny>,
-    profile: Option<Bound<'_, PyAny>>,
+    profile: Option<Of<Profile>>,
     program: Option<Bound<'_, PyAny>>,
 ) -> PyResult<Option<Compared>> {
     let arrays: ProblemArrays = problem.extract()?;
@@ -497,8 +463,7 @@ fn compare(
     let mut starts = Vec::new();
     let mut usable = None;
     if let Some(profile) = profile {
-        let extracted: ProfileArrays = profile.extract()?;
-        let arcs = extracted.arcs(&arrays)?;
+        let arcs = arcs(&profile, &arrays)?;
         let runs = arcs.runs;
         let good = !arcs.is_empty()
             && runs.len() == path.runs.len()
@@ -508,7 +473,7 @@ fn compare(
             && (0..arcs.len()).all(|i| !arcs.has_bad_numbers(i, &path));
         if good {
             starts = arcs.starts(&path);
-            usable = Some(profile.unbind());
+            usable = Some(profile.native().clone_ref(problem.py()));
         }
     }
     let program = program.map(Bound::unbind);

@@ -4,9 +4,12 @@ use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::arrays;
+use super::arrays::{padded, rows};
+use super::curve::Curve;
+use super::with_padded_axes;
 use super::work::run;
 use feedplan_gcode::{read, Meaning, Options, Place, Point, TipControl, Tool};
+use feedplan_geometry::spline::CompositeCurve;
 use feedplan_geometry::watch::Watch;
 
 pyo3::import_exception!(feedplan.errors, ProgramError);
@@ -71,27 +74,11 @@ fn names_of(names: &Py<PyAny>, letter: char) -> String {
     Python::attach(|py| names.bind(py).call1((letter,)).and_then(|text| text.extract()).unwrap_or_default())
 }
 
-/// Reads a G-code program; see `feedplan.program.gcode`.
-///
-/// `places` (n, 9): the home position, where the program begins, the work offsets G54 to G59.3 and G54.1 P1 on, in
-/// X Y Z A B C U V W;
-/// `machine_axes` empty where there is no machine; `tip_control` None likewise; `machines_with` names the machines that
-/// have the axis of a letter. `tools` are rows of the tool table, None
-/// where it is not known; `subprograms` gives for a name the file's name and bytes, or None; `feed` [mm/s] is that of
-/// moves before the first F; `whole_step` is what lengths without a decimal point count. Returns the fields of `Program`
-/// but its name, with `spline_columns` and `event_columns` in place of `splines` and `events`.
-#[pyfunction]
-#[allow(clippy::too_many_arguments)]
-#[pyo3(signature = (
-    source, name, places, machine_axes, machines_with, tip_control, block_delete, max_moves, tools, subprograms, feed, whole_step,
-    progress=None
-))]
-fn read_gcode<'py>(
-    py: Python<'py>,
-    source: &[u8],
-    name: &str,
-    places: PyReadonlyArray2<f64>,
-    machine_axes: &str,
+/// `feedplan.program.gcode.Options`.
+#[derive(FromPyObject)]
+struct PyOptions<'py> {
+    places: PyReadonlyArray2<'py, f64>,
+    machine_axes: String,
     machines_with: Option<Py<PyAny>>,
     tip_control: Option<Py<PyAny>>,
     block_delete: bool,
@@ -100,9 +87,20 @@ fn read_gcode<'py>(
     subprograms: Option<Py<PyAny>>,
     feed: Option<f64>,
     whole_step: f64,
+}
+
+/// Reads a G-code program. Returns the fields of `Program` but its name, with a native curve as `splines`, and
+/// `event_columns` in place of `events`.
+#[pyfunction]
+#[pyo3(signature = (source, name, options, progress=None))]
+fn read_gcode<'py>(
+    py: Python<'py>,
+    source: &[u8],
+    name: &str,
+    options: PyOptions<'py>,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let places = arrays::rows::<9>(&places)?;
+    let places = rows::<9>(&options.places)?;
     let [home, start, offsets @ ..] = &places[..] else {
         return Err(pyo3::exceptions::PyValueError::new_err("home and start are two rows"));
     };
@@ -110,11 +108,13 @@ fn read_gcode<'py>(
         offsets: offsets.to_vec(),
         home: *home,
         start: *start,
-        machine_axes: machine_axes.as_bytes().to_vec(),
-        machines_with: machines_with.map(|names| Box::new(move |letter| names_of(&names, letter)) as _),
-        tip_control: tip_control.map(|control| Box::new(PyTipControl(control)) as _),
-        subprograms: subprograms.map(|finder| Box::new(move |name: &str| find(&finder, name)) as _),
-        tools: tools.map(|rows| {
+        machine_axes: options.machine_axes.into_bytes(),
+        machines_with: options
+            .machines_with
+            .map(|names| Box::new(move |letter| names_of(&names, letter)) as _),
+        tip_control: options.tip_control.map(|control| Box::new(PyTipControl(control)) as _),
+        subprograms: options.subprograms.map(|finder| Box::new(move |name: &str| find(&finder, name)) as _),
+        tools: options.tools.map(|rows| {
             let tool = |(number, pocket, offset, diameter, orientation)| Tool {
                 number,
                 pocket,
@@ -124,10 +124,10 @@ fn read_gcode<'py>(
             };
             rows.into_iter().map(tool).collect()
         }),
-        feed,
-        whole_step,
-        block_delete,
-        max_moves,
+        feed: options.feed,
+        whole_step: options.whole_step,
+        block_delete: options.block_delete,
+        max_moves: options.max_moves,
     };
     let lines = source.iter().filter(|&&byte| byte == b'\n').count();
     let read = |watch: Watch| read(source, &options, &|more| watch.each(lines).advance(more));
@@ -157,14 +157,20 @@ fn read_gcode<'py>(
     fields.set_item("arc_angle", PyArray1::from_vec(py, columns.arc_angle))?;
     fields.set_item("spline_move", PyArray1::from_vec(py, columns.spline_move))?;
     fields.set_item("spline_pieces", PyArray1::from_vec(py, columns.spline_pieces))?;
-    let points = columns.spline_control.len() / axes.len();
-    let spline_columns = (
-        PyArray1::from_vec(py, columns.spline_control).reshape([points, axes.len()])?,
-        (!columns.spline_weights.is_empty()).then(|| PyArray1::from_vec(py, columns.spline_weights)),
-        PyArray1::from_vec(py, columns.spline_offsets),
-        PyArray1::from_vec(py, columns.spline_width),
-    );
-    fields.set_item("spline_columns", spline_columns)?;
+    let splines = match columns.spline_width.is_empty() {
+        true => None,
+        false => Some(with_padded_axes!(axes.len(), M, {
+            let points = columns.spline_control.chunks_exact(axes.len());
+            let pieces = CompositeCurve::<M> {
+                control: points.map(|point| padded(point, 0.0)).collect(),
+                weights: columns.spline_weights,
+                offsets: columns.spline_offsets,
+                width: columns.spline_width,
+            };
+            Curve::checked(pieces, axes.len())
+        })?),
+    };
+    fields.set_item("splines", splines.map(|curve| Bound::new(py, curve)).transpose()?)?;
     fields.set_item("meaning", PyArray1::from_vec(py, columns.meaning))?;
     fields.set_item("tool_length", PyArray1::from_vec(py, columns.tool_length))?;
     let changes = columns.change_move.len();

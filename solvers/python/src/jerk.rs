@@ -1,4 +1,4 @@
-//! The planners with limits of jerk: the package's own problem in, the columns of a profile out.
+//! The planners with limits of jerk: the package's own problem in, a profile out.
 
 use std::time::{Duration, Instant};
 
@@ -6,22 +6,19 @@ use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 use super::arrays::{indices, row, rows};
-use super::plan::{to_exception, Columns};
-use super::problem::{ProblemArrays, ProblemRows};
+use super::native::Of;
+use super::plan::to_exception;
+use super::problem::Problem;
+use super::profile::Profile;
 use super::with_padded_axes;
 use super::work::run;
 use feedplan_geometry::watch::Watch;
-use feedplan_jerk::jerk_arcs::Arcs;
 use feedplan_jerk::jerk_limited::Effort;
 use feedplan_jerk::jerk_limited_path;
 use feedplan_jerk::s_curve::{Section, SectionKind, Segment};
 use feedplan_jerk::s_curve_path::Cutting;
 use feedplan_jerk::JerkLimited as _;
-use feedplan_planner::problem::Problem;
-use feedplan_planner::profile::NO_AXIS;
-
-/// The accelerations at both ends of the arcs, and `kinked`.
-type Changes<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u32>>);
+use feedplan_planner::problem;
 
 /// Offsets, then columns of segments.
 type Segments<'py> = (
@@ -41,9 +38,9 @@ fn deadline(time_limit: Option<f64>) -> Option<Instant> {
     Instant::now().checked_add(limit)
 }
 
-/// The columns of all profiles, (a0, a1, kinked), and whether a time limit stopped the planner and how far it takes the
-/// time of each part that it planned to be above the least, in s.
-type Planned<'py> = (Columns<'py>, Changes<'py>, (bool, Bound<'py, PyArray1<f64>>));
+/// The profile; whether a time limit stopped the planner, and how far it takes the time of each part that it planned to be
+/// above the least, in s.
+type Planned<'py> = (Profile, bool, Bound<'py, PyArray1<f64>>);
 
 /// The fastest profile within `jerk` [mm/s³] of every axis. Runs that are not planned when the time limit comes have no
 /// arcs.
@@ -51,7 +48,7 @@ type Planned<'py> = (Columns<'py>, Changes<'py>, (bool, Bound<'py, PyArray1<f64>
 #[pyo3(signature = (problem, jerk, resolution, tolerance, time_limit=None, progress=None))]
 fn plan_jerk_limited<'py>(
     py: Python<'py>,
-    problem: ProblemArrays<'py>,
+    problem: Of<Problem>,
     jerk: PyReadonlyArray1<'py, f64>,
     resolution: f64,
     tolerance: f64,
@@ -59,29 +56,13 @@ fn plan_jerk_limited<'py>(
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Planned<'py>> {
     let effort = Effort { resolution, tolerance, deadline: deadline(time_limit), ..Effort::default() };
-    with_padded_axes!(problem.curve.axes(), M, {
-        let rows = ProblemRows::<M>::new(&problem)?;
-        let (problem, jerk) = (rows.problem()?, row::<M>(&jerk, 1.0)?);
-        let plan = |watch: Watch| Problem { watch, ..problem }.jerk_limited(&jerk, &effort);
+    with_padded_axes!(problem.axes(), M, {
+        let (problem, jerk) = (problem.rows::<M>()?.problem(), row::<M>(&jerk, 1.0)?);
+        let plan = |watch: Watch| problem::Problem { watch, ..problem }.jerk_limited(&jerk, &effort);
         let arcs = run(py, progress.as_ref(), plan)?.map_err(|fault| to_exception(&fault))?;
-        let end = (arcs.stopped, PyArray1::from_slice(py, &arcs.excess));
-        let (columns, changes) = to_columns(py, arcs);
-        Ok((columns, changes, end))
+        let (stopped, excess) = (arcs.stopped, PyArray1::from_slice(py, &arcs.excess));
+        Ok((arcs.into(), stopped, excess))
     })
-}
-
-/// `feedplan.profile.SpeedProfile`.
-#[derive(FromPyObject)]
-struct ProfileArrays<'py> {
-    piece: PyReadonlyArray1<'py, u32>,
-    kind: PyReadonlyArray1<'py, u8>,
-    u0: PyReadonlyArray1<'py, f64>,
-    u1: PyReadonlyArray1<'py, f64>,
-    p0: PyReadonlyArray1<'py, f64>,
-    p1: PyReadonlyArray1<'py, f64>,
-    a0: PyReadonlyArray1<'py, f64>,
-    a1: PyReadonlyArray1<'py, f64>,
-    duration: PyReadonlyArray1<'py, f64>,
 }
 
 /// A lower bound in s of the time of each stretch on the grid of a profile of `plan_jerk_limited`.
@@ -89,54 +70,55 @@ struct ProfileArrays<'py> {
 #[pyo3(signature = (problem, jerk, profile, time_limit=None, progress=None))]
 fn bound_jerk_limited<'py>(
     py: Python<'py>,
-    problem: ProblemArrays<'py>,
+    problem: Of<Problem>,
     jerk: PyReadonlyArray1<'py, f64>,
-    profile: ProfileArrays<'py>,
+    profile: Of<Profile>,
     time_limit: Option<f64>,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let columns = jerk_limited_path::Columns {
-        piece: profile.piece.as_slice()?,
-        kind: profile.kind.as_slice()?,
-        u0: profile.u0.as_slice()?,
-        u1: profile.u1.as_slice()?,
-        p0: profile.p0.as_slice()?,
-        p1: profile.p1.as_slice()?,
-        a0: profile.a0.as_slice()?,
-        a1: profile.a1.as_slice()?,
-        duration: profile.duration.as_slice()?,
+        piece: &profile.piece,
+        kind: &profile.kind,
+        u0: &profile.u0,
+        u1: &profile.u1,
+        p0: &profile.p0,
+        p1: &profile.p1,
+        a0: &profile.a0,
+        a1: &profile.a1,
+        duration: &profile.duration,
     };
     let effort = Effort { deadline: deadline(time_limit), ..Effort::default() };
-    with_padded_axes!(problem.curve.axes(), M, {
-        let rows = ProblemRows::<M>::new(&problem)?;
-        let (problem, jerk) = (rows.problem()?, row::<M>(&jerk, 1.0)?);
-        let bound = |watch: Watch| Problem { watch, ..problem }.jerk_limited_bound(&jerk, &columns, &effort);
+    with_padded_axes!(problem.axes(), M, {
+        let (problem, jerk) = (problem.rows::<M>()?.problem(), row::<M>(&jerk, 1.0)?);
+        let bound =
+            |watch: Watch| problem::Problem { watch, ..problem }.jerk_limited_bound(&jerk, &columns, &effort);
         let bounds = run(py, progress.as_ref(), bound)?.map_err(|fault| to_exception(&fault))?;
         Ok(PyArray1::from_vec(py, bounds))
     })
 }
 
 /// The two-pass profile within `jerk` of every axis, of segments by the quickest of some `s_curve_path::Cutting` (lengths,
-/// alike): the same columns. The time limit is that of stretches left to the jerk-limited planner; see there.
+/// alike). The time limit is that of stretches left to the jerk-limited planner; see there.
 #[pyfunction]
 #[pyo3(signature = (problem, jerk, cuttings, look_ahead, time_limit=None, progress=None))]
 fn plan_s_curve<'py>(
     py: Python<'py>,
-    problem: ProblemArrays<'py>,
+    problem: Of<Problem>,
     jerk: PyReadonlyArray1<'py, f64>,
     cuttings: Vec<(f64, f64)>,
     look_ahead: usize,
     time_limit: Option<f64>,
     progress: Option<Bound<'py, PyAny>>,
-) -> PyResult<(Columns<'py>, Changes<'py>)> {
+) -> PyResult<Profile> {
     let cuttings = to_cuttings(&cuttings);
     let effort = Effort { deadline: deadline(time_limit), ..Effort::default() };
-    with_padded_axes!(problem.curve.axes(), M, {
-        let rows = ProblemRows::<M>::new(&problem)?;
-        let (problem, jerk) = (rows.problem()?, row::<M>(&jerk, 1.0)?);
-        let plan = |watch: Watch| Problem { watch, ..problem }.s_curve(&jerk, &cuttings, look_ahead, &effort);
+    with_padded_axes!(problem.axes(), M, {
+        let (problem, jerk) = (problem.rows::<M>()?.problem(), row::<M>(&jerk, 1.0)?);
+        let plan = |watch: Watch| {
+            problem::Problem { watch, ..problem }.s_curve(&jerk, &cuttings, look_ahead, &effort)
+        };
         let arcs = run(py, progress.as_ref(), plan)?.map_err(|fault| to_exception(&fault))?;
-        Ok(to_columns(py, arcs))
+        Ok(arcs.into())
     })
 }
 
@@ -145,16 +127,15 @@ fn plan_s_curve<'py>(
 #[pyfunction]
 fn path_segments<'py>(
     py: Python<'py>,
-    problem: ProblemArrays<'py>,
+    problem: Of<Problem>,
     jerk: PyReadonlyArray1<'py, f64>,
     cuttings: Vec<(f64, f64)>,
     look_ahead: usize,
 ) -> PyResult<Segments<'py>> {
     let cuttings = to_cuttings(&cuttings);
-    with_padded_axes!(problem.curve.axes(), M, {
-        let rows = ProblemRows::<M>::new(&problem)?;
-        let (problem, jerk) = (rows.problem()?, row::<M>(&jerk, 1.0)?);
-        let cut = |watch: Watch| Problem { watch, ..problem }.segments(&jerk, &cuttings, look_ahead);
+    with_padded_axes!(problem.axes(), M, {
+        let (problem, jerk) = (problem.rows::<M>()?.problem(), row::<M>(&jerk, 1.0)?);
+        let cut = |watch: Watch| problem::Problem { watch, ..problem }.segments(&jerk, &cuttings, look_ahead);
         let segmented = run(py, None, cut)?.map_err(|fault| to_exception(&fault))?;
         let column =
             |of: fn(&Segment) -> f64| PyArray1::from_vec(py, segmented.segments.iter().map(of).collect());
@@ -171,17 +152,17 @@ fn path_segments<'py>(
     })
 }
 
-/// The columns of a profile from sections of constant jerk, (n, 5) rows of duration, position along the stretch, speed,
+/// The profile of sections of constant jerk, (n, 5) rows of duration, position along the stretch, speed,
 /// acceleration, jerk at their starts; those of stretch i from `offsets[i]` on. A stretch without any is planned by the
 /// jerk-limited planner.
 #[pyfunction]
 fn profile_of_sections<'py>(
     py: Python<'py>,
-    problem: ProblemArrays<'py>,
+    problem: Of<Problem>,
     jerk: PyReadonlyArray1<'py, f64>,
     offsets: PyReadonlyArray1<'py, i64>,
     sections: PyReadonlyArray2<'py, f64>,
-) -> PyResult<(Columns<'py>, Changes<'py>)> {
+) -> PyResult<Profile> {
     let sections: Vec<Section> = rows::<5>(&sections)?
         .into_iter()
         .map(|[duration, position, speed, acceleration, jerk]| Section {
@@ -195,36 +176,17 @@ fn profile_of_sections<'py>(
         })
         .collect();
     let offsets = indices(&offsets);
-    with_padded_axes!(problem.curve.axes(), M, {
-        let rows = ProblemRows::<M>::new(&problem)?;
-        let (problem, jerk) = (rows.problem()?, row::<M>(&jerk, 1.0)?);
-        let follow = |watch: Watch| Problem { watch, ..problem }.of_sections(&jerk, &offsets, &sections);
+    with_padded_axes!(problem.axes(), M, {
+        let (problem, jerk) = (problem.rows::<M>()?.problem(), row::<M>(&jerk, 1.0)?);
+        let follow =
+            |watch: Watch| problem::Problem { watch, ..problem }.of_sections(&jerk, &offsets, &sections);
         let arcs = run(py, None, follow)?.map_err(|fault| to_exception(&fault))?;
-        Ok(to_columns(py, arcs))
+        Ok(arcs.into())
     })
 }
 
 fn to_cuttings(pairs: &[(f64, f64)]) -> Vec<Cutting> {
     pairs.iter().map(|&(lengths, alike)| Cutting { lengths, alike }).collect()
-}
-
-fn to_columns(py: Python<'_>, arcs: Arcs) -> (Columns<'_>, Changes<'_>) {
-    let floats = |column| PyArray1::from_vec(py, column);
-    let count = arcs.len();
-    let columns = (
-        PyArray1::from_vec(py, arcs.piece),
-        PyArray1::from_vec(py, arcs.kind),
-        PyArray1::from_vec(py, vec![NO_AXIS; count]),
-        floats(arcs.value),
-        floats(arcs.u0),
-        floats(arcs.u1),
-        floats(arcs.p0),
-        floats(arcs.p1),
-        floats(arcs.duration),
-        PyArray1::from_vec(py, arcs.runs),
-        PyArray1::from_vec(py, vec![]),
-    );
-    (columns, (floats(arcs.a0), floats(arcs.a1), PyArray1::from_vec(py, arcs.kinks)))
 }
 
 /// Adds the functions to the module.

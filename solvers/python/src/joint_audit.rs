@@ -6,10 +6,10 @@ use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::audit::{
-    findings, finished, require, setpoint_chunk, Findings, LimitArrays, ProblemArrays, ProfileArrays,
-};
+use super::audit::{arcs, findings, finished, require, setpoint_chunk, Findings, LimitArrays, ProblemArrays};
 use super::kinematics::{operation_rows, ExpressionArrays};
+use super::native::Of;
+use super::profile::Profile;
 use super::with_padded_axes;
 use super::work::run;
 use feedplan_audit::joints::formula::Formula;
@@ -89,7 +89,7 @@ struct Kept {
 }
 
 impl Kept {
-    fn new(problem: &Bound<'_, PyAny>, profile: &ProfileArrays<'_>, joints: usize) -> PyResult<Self> {
+    fn new(problem: &Bound<'_, PyAny>, profile: &Profile, joints: usize) -> PyResult<Self> {
         let own: JointArrays = problem.extract()?;
         let arrays: ProblemArrays = problem.extract()?;
         let axes = &own.path.axes;
@@ -119,7 +119,7 @@ impl Kept {
             xyz: of(["X", "Y", "Z"]),
             ijk: of(["I", "J", "K"]),
             way_scale,
-            starts: profile.arcs(&arrays)?.starts(&path),
+            starts: arcs(profile, &arrays)?.starts(&path),
         })
     }
 
@@ -127,7 +127,7 @@ impl Kept {
     fn with<const M: usize, T: Send>(
         &self,
         problem: &Bound<'_, PyAny>,
-        profile: &ProfileArrays<'_>,
+        profile: &Profile,
         limits: &LimitArrays,
         progress: Option<&Bound<'_, PyAny>>,
         work: impl FnOnce(&JointAudit<M>, Watch) -> T + Send,
@@ -147,7 +147,7 @@ impl Kept {
                 feed: own.feed.as_slice()?,
                 junction_speed: arrays.junction_speed()?,
             },
-            arcs: profile.arcs(&arrays)?,
+            arcs: arcs(profile, &arrays)?,
             limits: limits.limits::<M>(joints)?,
             starts: &self.starts,
         };
@@ -166,7 +166,7 @@ fn widest(problem: &Bound<'_, PyAny>, limits: &LimitArrays) -> PyResult<usize> {
 fn audit_joints(
     problem: Bound<'_, PyAny>,
     limits: LimitArrays,
-    profile: ProfileArrays<'_>,
+    profile: Of<Profile>,
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<Findings> {
     let joints = limits.axes();
@@ -204,15 +204,13 @@ where
         chunk: &Chunk,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let profile: ProfileArrays = of.profile.bind(py).extract()?;
-        of.kept.with::<M, _>(of.problem.bind(py), &profile, &of.limits, progress, |audit, _| {
+        of.kept.with::<M, _>(of.problem.bind(py), of.profile.get(), &of.limits, progress, |audit, _| {
             audit.push(self, chunk);
         })
     }
 
     fn finish(self: Box<Self>, of: &Compared, py: Python<'_>) -> PyResult<Findings> {
-        let profile: ProfileArrays = of.profile.bind(py).extract()?;
-        of.kept.with::<M, _>(of.problem.bind(py), &profile, &of.limits, None, |audit, _| {
+        of.kept.with::<M, _>(of.problem.bind(py), of.profile.get(), &of.limits, None, |audit, _| {
             findings(&audit.finish(*self), audit.path.joints)
         })
     }
@@ -221,7 +219,7 @@ where
 /// What setpoints are compared with, kept as Python holds it.
 struct Compared {
     problem: Py<PyAny>,
-    profile: Py<PyAny>,
+    profile: Py<Profile>,
     limits: LimitArrays,
     kept: Kept,
 }
@@ -236,15 +234,15 @@ struct JointSetpointAudit {
 #[pymethods]
 impl JointSetpointAudit {
     #[new]
-    fn new(problem: Bound<'_, PyAny>, limits: LimitArrays, profile: Bound<'_, PyAny>) -> PyResult<Self> {
-        let arrays: ProfileArrays = profile.extract()?;
-        let kept = Kept::new(&problem, &arrays, limits.axes())?;
+    fn new(problem: Bound<'_, PyAny>, limits: LimitArrays, profile: Of<Profile>) -> PyResult<Self> {
+        let kept = Kept::new(&problem, &profile, limits.axes())?;
         let stream: Box<dyn AnyStream> = with_padded_axes!(widest(&problem, &limits)?, M, {
-            kept.with::<M, _>(&problem, &arrays, &limits, None, |audit, _| {
+            kept.with::<M, _>(&problem, &profile, &limits, None, |audit, _| {
                 Box::new(audit.begin()) as Box<dyn AnyStream>
             })
         })?;
-        let compared = Compared { problem: problem.unbind(), profile: profile.unbind(), limits, kept };
+        let profile = profile.native().clone_ref(problem.py());
+        let compared = Compared { problem: problem.unbind(), profile, limits, kept };
         Ok(Self { stream: Some(stream), compared })
     }
 

@@ -3,17 +3,21 @@
 mod arrays;
 mod audit;
 mod bound;
+mod curve;
+mod curve_length;
 mod fit;
 mod gcode;
 mod jerk;
 mod joint_audit;
 mod kinematics;
+mod native;
 mod path;
 mod plan;
 mod problem;
+mod profile;
 mod sampling;
-mod spline;
 mod text;
+mod views;
 mod work;
 
 use pyo3::prelude::*;
@@ -53,7 +57,9 @@ fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     text::register(module)?;
     audit::register(module)?;
     sampling::register(module)?;
-    spline::register(module)?;
+    curve::register(module)?;
+    problem::register(module)?;
+    profile::register(module)?;
     plan::register(module)?;
     jerk::register(module)?;
     bound::register(module)?;

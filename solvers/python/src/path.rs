@@ -7,8 +7,9 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-use super::arrays::{row, rows};
-use super::spline::curve;
+use super::arrays::{indices, row, rows, to_array2};
+use super::curve::{Curve, Padded};
+use super::native::Of;
 use super::with_padded_axes;
 use super::work::run;
 use feedplan_geometry::spline::regular::{regular, Regular};
@@ -29,15 +30,52 @@ pub fn register(module: &Bound<PyModule>) -> PyResult<()> {
 /// The travel of an axis that is not there.
 const ANYWHERE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
-/// Control points, weights (if any piece is rational), offsets and widths of the curve; feeds, first and last moves,
-/// tolerances and runs of the path.
+type Floats<'py> = PyReadonlyArray1<'py, f64>;
+type Rows<'py> = PyReadonlyArray2<'py, f64>;
+type Numbers<'py> = PyReadonlyArray1<'py, i64>;
+
+/// `feedplan.geometry.moves.Moves`.
+#[derive(FromPyObject)]
+struct MoveArrays<'py> {
+    name: String,
+    start: Floats<'py>,
+    kind: PyReadonlyArray1<'py, u8>,
+    target: Rows<'py>,
+    feed: Floats<'py>,
+    line: PyReadonlyArray1<'py, i32>,
+    tolerance: Floats<'py>,
+    fit_tolerance: Floats<'py>,
+    halt: PyReadonlyArray1<'py, bool>,
+    joints: PyReadonlyArray1<'py, bool>,
+    arc_move: Numbers<'py>,
+    arc_plane: PyReadonlyArray2<'py, i64>,
+    arc_centre: Rows<'py>,
+    arc_angle: Floats<'py>,
+    spline_move: Numbers<'py>,
+    spline_pieces: Numbers<'py>,
+    splines: Option<Of<Curve>>,
+    change_move: Numbers<'py>,
+    change_start: Rows<'py>,
+}
+
+/// `feedplan.geometry.moves.Rules`.
+#[derive(FromPyObject)]
+struct Rules<'py> {
+    max_velocity: Floats<'py>,
+    max_acceleration: Floats<'py>,
+    travel: Rows<'py>,
+    jump: bool,
+    exact_tolerance: f64,
+    max_chord: f64,
+    corner_acceleration: f64,
+    max_speed: f64,
+    corner_angle: f64,
+    corners: String,
+}
+
+/// The curve; feeds, first and last moves, tolerances and runs of the path.
 type Columns<'py> = (
-    (
-        Bound<'py, PyArray2<f64>>,
-        Option<Bound<'py, PyArray1<f64>>>,
-        Bound<'py, PyArray1<i64>>,
-        Bound<'py, PyArray1<f64>>,
-    ),
+    Curve,
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray2<i64>>,
     Bound<'py, PyArray1<f64>>,
@@ -50,151 +88,121 @@ type Summary = (usize, usize, usize, f64, Option<[f64; 3]>);
 type Place = (usize, usize, f64);
 /// Moves at whose end a smooth path turns back, first and last moves (k, 2) of the places where it keeps its corners.
 type Rough<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray2<i64>>);
-/// Control points, weights, offsets and widths of the splines of a program.
-type Splines<'py> = (
-    PyReadonlyArray2<'py, f64>,
-    Option<PyReadonlyArray1<'py, f64>>,
-    PyReadonlyArray1<'py, i64>,
-    PyReadonlyArray1<'py, f64>,
-);
 
-/// The path of a program. `line` and `name` are for messages.
+impl MoveArrays<'_> {
+    fn len(&self) -> usize {
+        self.kind.len()
+    }
+
+    fn axes(&self) -> usize {
+        self.start.len()
+    }
+
+    fn require_lengths(&self, travel: &Rows) -> PyResult<()> {
+        let (count, axes, arcs, changes) =
+            (self.len(), self.axes(), self.arc_move.len(), self.change_move.len());
+        let columns = [self.feed.len(), self.tolerance.len(), self.fit_tolerance.len()];
+        let others = [self.line.len(), self.halt.len(), self.joints.len()];
+        let good = self.target.shape() == [count, axes]
+            && columns.iter().chain(&others).all(|&len| len == count)
+            && self.arc_plane.shape() == [arcs, 2]
+            && self.arc_centre.shape() == [arcs, 2]
+            && self.arc_angle.len() == arcs
+            && travel.shape() == [axes, 2]
+            && self.spline_pieces.len() == self.spline_move.len() + 1
+            && (changes == 0 || self.change_start.shape() == [changes, axes])
+            && self.splines.as_ref().is_none_or(|splines| splines.axes() == axes);
+        good.then_some(()).ok_or_else(|| PyValueError::new_err("the columns of the program differ in length"))
+    }
+
+    fn arcs(&self) -> PyResult<Vec<(usize, ArcShape)>> {
+        let (planes, centres) = (self.arc_plane.as_slice()?.as_chunks().0, self.arc_centre.as_slice()?);
+        let shapes = planes.iter().zip(centres.as_chunks().0).zip(self.arc_angle.as_slice()?);
+        indices(&self.arc_move)
+            .into_iter()
+            .zip(shapes)
+            .map(|(index, ((plane, &centre), &sweep))| {
+                let plane = plane.map(|axis: i64| usize::try_from(axis).unwrap_or(usize::MAX));
+                if plane.iter().any(|&axis| axis >= self.axes()) || index >= self.len() {
+                    return Err(PyValueError::new_err(
+                        "an arc refers to a move or an axis that does not exist",
+                    ));
+                }
+                Ok((index, ArcShape { plane, centre, sweep }))
+            })
+            .collect()
+    }
+
+    /// Spline moves and the pieces that they take.
+    fn spline_ranges(&self) -> PyResult<(Vec<usize>, Vec<Range<usize>>)> {
+        let pieces = self.splines.as_ref().map_or(0, |splines| splines.widths().len());
+        let moves = indices(&self.spline_move);
+        let ranges: Vec<_> = indices(&self.spline_pieces).windows(2).map(|ends| ends[0]..ends[1]).collect();
+        let good = moves.iter().all(|&index| index < self.len())
+            && ranges.iter().all(|range| range.start <= range.end && range.end <= pieces);
+        let pair = good.then_some((moves, ranges));
+        pair.ok_or_else(|| PyValueError::new_err("a spline refers to a move or a piece that does not exist"))
+    }
+}
+
+/// The path of a program.
 #[pyfunction]
-#[pyo3(signature = (
-    name, start, kind, target, feed, line, tolerance, fit_tolerance, halt, arc_move, arc_plane, arc_centre,
-    arc_sweep, spline_move, spline_pieces, splines, change_move, change_start, joints, max_velocity, max_acceleration, travel, jump, exact_tolerance, max_chord, corner_acceleration,
-    max_speed, corner_angle, corners, progress=None
-))]
-#[allow(clippy::too_many_arguments)]
+#[pyo3(signature = (moves, rules, progress=None))]
 fn build_path<'py>(
     py: Python<'py>,
-    name: &str,
-    start: PyReadonlyArray1<'py, f64>,
-    kind: PyReadonlyArray1<'py, u8>,
-    target: PyReadonlyArray2<'py, f64>,
-    feed: PyReadonlyArray1<'py, f64>,
-    line: PyReadonlyArray1<'py, i32>,
-    tolerance: PyReadonlyArray1<'py, f64>,
-    fit_tolerance: PyReadonlyArray1<'py, f64>,
-    halt: PyReadonlyArray1<'py, bool>,
-    arc_move: PyReadonlyArray1<'py, i64>,
-    arc_plane: PyReadonlyArray2<'py, i64>,
-    arc_centre: PyReadonlyArray2<'py, f64>,
-    arc_sweep: PyReadonlyArray1<'py, f64>,
-    spline_move: PyReadonlyArray1<'py, i64>,
-    spline_pieces: PyReadonlyArray1<'py, i64>,
-    splines: Option<Splines<'py>>,
-    change_move: PyReadonlyArray1<'py, i64>,
-    change_start: PyReadonlyArray2<'py, f64>,
-    joints: PyReadonlyArray1<'py, bool>,
-    max_velocity: PyReadonlyArray1<'py, f64>,
-    max_acceleration: PyReadonlyArray1<'py, f64>,
-    travel: PyReadonlyArray2<'py, f64>,
-    jump: bool,
-    exact_tolerance: f64,
-    max_chord: f64,
-    corner_acceleration: f64,
-    max_speed: f64,
-    corner_angle: f64,
-    corners: &str,
+    moves: MoveArrays<'py>,
+    rules: Rules<'py>,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<(Columns<'py>, Summary, Option<Place>, Rough<'py>)> {
-    let axes = start.len();
-    let count = kind.len();
-    let same = [feed.len(), line.len(), tolerance.len(), fit_tolerance.len(), halt.len(), joints.len()];
-    let arcs = arc_move.len();
-    if target.shape() != [count, axes]
-        || same.iter().any(|&len| len != count)
-        || arc_plane.shape() != [arcs, 2]
-        || arc_centre.shape() != [arcs, 2]
-        || arc_sweep.len() != arcs
-        || travel.shape() != [axes, 2]
-        || spline_pieces.len() != spline_move.len() + 1
-        || (change_move.len() > 0 && change_start.shape() != [change_move.len(), axes])
-        || splines.as_ref().is_some_and(|splines| splines.0.shape()[1] != axes)
-    {
-        return Err(PyValueError::new_err("the columns of the program differ in length"));
-    }
-    let shapes: Vec<(usize, ArcShape)> = (0..arcs)
-        .map(|i| -> PyResult<_> {
-            let index = usize::try_from(arc_move.as_slice()?[i])?;
-            let plane = [arc_plane.as_slice()?[2 * i], arc_plane.as_slice()?[2 * i + 1]];
-            let plane = [usize::try_from(plane[0])?, usize::try_from(plane[1])?];
-            if plane[0] >= axes || plane[1] >= axes || index >= count {
-                return Err(PyValueError::new_err("an arc refers to a move or an axis that does not exist"));
-            }
-            let centre = [arc_centre.as_slice()?[2 * i], arc_centre.as_slice()?[2 * i + 1]];
-            Ok((index, ArcShape { plane, centre, sweep: arc_sweep.as_slice()?[i] }))
-        })
-        .collect::<PyResult<_>>()?;
-    let ends = spline_pieces.as_slice()?;
-    let pieces = splines.as_ref().map_or(0, |splines| splines.3.len());
-    let spline_moves: Vec<(usize, Range<usize>)> = spline_move
-        .as_slice()?
-        .iter()
-        .zip(ends.windows(2))
-        .map(|(&index, ends)| -> PyResult<_> {
-            let (index, range) =
-                (usize::try_from(index)?, usize::try_from(ends[0])?..usize::try_from(ends[1])?);
-            if range.start > range.end || range.end > pieces || index >= count {
-                return Err(PyValueError::new_err(
-                    "a spline refers to a move or a piece that does not exist",
-                ));
-            }
-            Ok((index, range))
-        })
-        .collect::<PyResult<_>>()?;
-    let rounding = if corners == "arcs" { Rounding::Circle } else { Rounding::Parabola };
-    let smooth = ["smooth", "fastest"].contains(&corners);
-    let options =
-        FollowOptions { exact_tolerance, max_chord, corner_acceleration, max_speed, corner_angle, rounding };
+    moves.require_lengths(&rules.travel)?;
+    let (axes, arcs) = (moves.axes(), moves.arcs()?);
+    let (spline_moves, ranges) = moves.spline_ranges()?;
+    let corners = rules.corners.as_str();
+    let options = FollowOptions {
+        exact_tolerance: rules.exact_tolerance,
+        max_chord: rules.max_chord,
+        corner_acceleration: rules.corner_acceleration,
+        max_speed: rules.max_speed,
+        corner_angle: rules.corner_angle,
+        rounding: if corners == "arcs" { Rounding::Circle } else { Rounding::Parabola },
+    };
     with_padded_axes!(axes, M, {
-        let target = rows::<M>(&target)?;
-        let given = match &splines {
-            Some((control, weights, offsets, width)) => {
-                curve::<M>(control, weights.as_ref(), offsets, width)?
-            }
-            None => CompositeCurve::default(),
-        };
-        let ranges: Vec<Range<usize>> = spline_moves.iter().map(|(_, range)| range.clone()).collect();
-        let Regular { curve: splines, ranges, .. } = run(py, None, |watch| regular(&given, &ranges, watch))?;
-        let spline_moves: Vec<(usize, Range<usize>)> =
-            spline_moves.iter().zip(ranges).map(|((index, _), range)| (*index, range)).collect();
-        let starts = if change_move.len() > 0 { rows::<M>(&change_start)? } else { vec![] };
-        let changes: Vec<(usize, [f64; M])> = change_move
-            .as_slice()?
-            .iter()
-            .zip(starts)
-            .map(|(&index, start)| Ok((usize::try_from(index)?, start)))
-            .collect::<PyResult<_>>()?;
-        let moves = Moves {
-            start: row::<M>(&start, 0.0)?,
-            kind: kind.as_slice()?,
+        let target = rows::<M>(&moves.target)?;
+        let none = CompositeCurve::default();
+        let given = moves.splines.as_ref().map_or(Ok(&none), |splines| splines.padded().map(|own| &**own))?;
+        let Regular { curve: splines, ranges, .. } = run(py, None, |watch| regular(given, &ranges, watch))?;
+        let spline_moves: Vec<_> = spline_moves.into_iter().zip(ranges).collect();
+        let starts = if moves.change_move.len() > 0 { rows::<M>(&moves.change_start)? } else { vec![] };
+        let changes: Vec<_> = indices(&moves.change_move).into_iter().zip(starts).collect();
+        let followed = Moves {
+            start: row::<M>(&moves.start, 0.0)?,
+            kind: moves.kind.as_slice()?,
             target: &target,
-            feed: feed.as_slice()?,
-            tolerance: tolerance.as_slice()?,
-            fit_tolerance: fit_tolerance.as_slice()?,
-            halt: halt.as_slice()?,
-            arcs: &shapes,
+            feed: moves.feed.as_slice()?,
+            tolerance: moves.tolerance.as_slice()?,
+            fit_tolerance: moves.fit_tolerance.as_slice()?,
+            halt: moves.halt.as_slice()?,
+            arcs: &arcs,
             spline_moves: &spline_moves,
             changes: &changes,
             splines: &splines,
-            joints: joints.as_slice()?,
+            joints: moves.joints.as_slice()?,
         };
-        let travel = rows::<2>(&travel)?;
+        let travel = rows::<2>(&rules.travel)?;
         let limits = Axes {
-            max_velocity: row::<M>(&max_velocity, 1.0)?,
-            max_acceleration: row::<M>(&max_acceleration, 1.0)?,
+            max_velocity: row::<M>(&rules.max_velocity, 1.0)?,
+            max_acceleration: row::<M>(&rules.max_acceleration, 1.0)?,
             travel: std::array::from_fn(|k| travel.get(k).copied().unwrap_or(ANYWHERE)),
-            jump,
+            jump: rules.jump,
         };
-        let build = |watch: Watch| match smooth {
-            true => moves.smooth_path(&options, &limits, corners == "smooth", watch),
-            false => moves.path(&options, &limits, watch),
+        let build = |watch: Watch| match corners {
+            "smooth" | "fastest" => followed.smooth_path(&options, &limits, corners == "smooth", watch),
+            _ => followed.path(&options, &limits, watch),
         };
         let path = run(py, progress.as_ref(), build)?.map_err(|error| {
-            let line = line.as_slice().map_or(0, |lines| lines[error.index]);
-            ProgramError::new_err((format!("{name}, line {line}: {}", sentence(error.fault)), line))
+            let line = moves.line.as_slice().map_or(0, |lines| lines[error.index]);
+            let (name, sentence) = (&moves.name, sentence(error.fault));
+            ProgramError::new_err((format!("{name}, line {line}: {sentence}"), line))
         })?;
         columns(py, &path, &splines, axes, progress.as_ref())
     })
@@ -221,14 +229,17 @@ fn columns<'py, const M: usize>(
     splines: &CompositeCurve<M>,
     axes: usize,
     progress: Option<&Bound<'_, PyAny>>,
-) -> PyResult<(Columns<'py>, Summary, Option<Place>, Rough<'py>)> {
+) -> PyResult<(Columns<'py>, Summary, Option<Place>, Rough<'py>)>
+where
+    Padded: From<CompositeCurve<M>>,
+{
     let parts = &path.parts;
     let points = |part: &Part<M>, followed: &Followed<M>| match &followed.piece {
         Shape::Conic(_) => 3,
         Shape::Spline(spline) => part.spline(spline, splines).control.len(),
     };
     let one = |_: &Part<M>, _: &Followed<M>| 1;
-    let (control, weights, offsets, width, feed, moves, tolerance) = run(py, progress, |watch| {
+    let (curve, feed, moves, tolerance) = run(py, progress, |watch| {
         // The path is there.
         watch.advance(1);
         let is_rational = |part: &Part<M>, followed: &Followed<M>| match &followed.piece {
@@ -237,57 +248,44 @@ fn columns<'py, const M: usize>(
         };
         let rational =
             parts.par_iter().any(|part| part.pieces.iter().any(|followed| is_rational(part, followed)));
-        let counts = gather(parts, one, |part, followed, out| out[0] = points(part, followed) as i64);
-        let mut offsets = vec![0; counts.len() + 1];
-        for (i, count) in counts.iter().enumerate() {
-            offsets[i + 1] = offsets[i] + count;
+        let mut offsets = vec![0];
+        offsets.extend(gather(parts, 0, one, |part, followed, out| out[0] = points(part, followed)));
+        for i in 1..offsets.len() {
+            offsets[i] += offsets[i - 1];
         }
-        (
-            gather(
-                parts,
-                |part, followed| axes * points(part, followed),
-                |part, followed, out: &mut [f64]| {
-                    let control = match &followed.piece {
-                        Shape::Conic(conic) => &conic.control[..],
-                        Shape::Spline(spline) => part.spline(spline, splines).control,
-                    };
-                    for (row, point) in out.chunks_exact_mut(axes).zip(control) {
-                        row.copy_from_slice(&point[..axes]);
-                    }
-                },
-            ),
-            rational.then(|| {
-                gather(parts, points, |part, followed, out: &mut [f64]| match &followed.piece {
+        let curve = CompositeCurve {
+            control: gather(parts, [0.0; M], points, |part, followed, out| {
+                out.copy_from_slice(match &followed.piece {
+                    Shape::Conic(conic) => &conic.control,
+                    Shape::Spline(spline) => part.spline(spline, splines).control,
+                });
+            }),
+            weights: match rational {
+                false => vec![],
+                true => gather(parts, 0.0, points, |part, followed, out| match &followed.piece {
                     Shape::Conic(conic) => out.copy_from_slice(&[1.0, conic.weight, 1.0]),
                     Shape::Spline(spline) => match part.spline(spline, splines) {
                         Piece { weights: [], .. } => out.fill(1.0),
                         Piece { weights, .. } => out.copy_from_slice(weights),
                     },
-                })
-            }),
+                }),
+            },
             offsets,
-            gather(parts, one, |_, followed, out| out[0] = followed.piece.width()),
-            gather(parts, one, |_, followed, out| out[0] = followed.feed),
-            gather(
-                parts,
-                |_, _| 2,
-                |_, followed, out: &mut [i64]| {
-                    out.copy_from_slice(&[i64::from(followed.first), i64::from(followed.last)]);
-                },
-            ),
-            gather(parts, one, |_, followed, out| out[0] = followed.tolerance),
+            width: gather(parts, 0.0, one, |_, followed, out| out[0] = followed.piece.width()),
+        };
+        (
+            curve,
+            gather(parts, 0.0, one, |_, followed, out| out[0] = followed.feed),
+            gather(parts, [0; 2], one, |_, followed, out| {
+                out[0] = [i64::from(followed.first), i64::from(followed.last)];
+            }),
+            gather(parts, 0.0, one, |_, followed, out| out[0] = followed.tolerance),
         )
     })?;
-    let (rows, count) = (control.len() / axes, width.len());
     let columns = (
-        (
-            PyArray1::from_vec(py, control).reshape([rows, axes]).expect("rows of axes values"),
-            weights.map(|weights| PyArray1::from_vec(py, weights)),
-            PyArray1::from_vec(py, offsets),
-            PyArray1::from_vec(py, width),
-        ),
+        Curve::checked(curve, axes)?,
         PyArray1::from_vec(py, feed),
-        PyArray1::from_vec(py, moves).reshape([count, 2]).expect("n × 2 values"),
+        to_array2(py, moves, 2),
         PyArray1::from_vec(py, tolerance),
         PyArray1::from_vec(py, path.runs.iter().map(|&start| start as i64).collect()),
     );
@@ -301,15 +299,16 @@ fn columns<'py, const M: usize>(
     Ok((columns, summary, path.outside.map(|place| (place.index, place.axis, place.position)), rough))
 }
 
-/// One column, `stride` values a piece, written by all parts at once.
-fn gather<const M: usize, T: Default + Clone + Send>(
+/// One column, `stride` values a piece in place of `initial`, written by all parts at once.
+fn gather<const M: usize, T: Copy + Send>(
     parts: &[Part<M>],
+    initial: T,
     stride: impl Fn(&Part<M>, &Followed<M>) -> usize + Sync,
     write: impl Fn(&Part<M>, &Followed<M>, &mut [T]) + Sync,
 ) -> Vec<T> {
     let length = |part: &Part<M>| part.pieces.iter().map(|followed| stride(part, followed)).sum();
     let lengths: Vec<usize> = parts.par_iter().map(length).collect();
-    let mut column = vec![T::default(); lengths.iter().sum()];
+    let mut column = vec![initial; lengths.iter().sum()];
     let mut rest = &mut column[..];
     let mut slices = Vec::with_capacity(parts.len());
     for length in lengths {

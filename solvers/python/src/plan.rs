@@ -1,18 +1,19 @@
-//! The exact planner: the package's own problem in, the columns of a profile out.
+//! The exact planner: the package's own problem in, a profile out.
 
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::arrays::{indices, rows};
-use super::problem::{ProblemArrays, ProblemRows};
+use super::native::Of;
+use super::problem::Problem;
+use super::profile::Profile;
 use super::with_padded_axes;
 use super::work::run;
 use feedplan_geometry::watch::Watch;
 use feedplan_jerk::JerkLimited as _;
 use feedplan_planner::look_ahead::{Change, Segments};
-use feedplan_planner::problem::{Fault, Problem};
-use feedplan_planner::profile::Profile;
+use feedplan_planner::problem::{self, Fault};
 use feedplan_planner::Exact as _;
 
 pyo3::create_exception!(
@@ -22,53 +23,20 @@ pyo3::create_exception!(
     "No profile: (kind, piece or None, reachable speed or None, sentence), kind start, end, input or stuck."
 );
 
-/// Columns of `feedplan.profile.SpeedProfile`.
-pub type Columns<'py> = (
-    Bound<'py, PyArray1<u32>>,
-    Bound<'py, PyArray1<u8>>,
-    Bound<'py, PyArray1<u8>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<i64>>,
-    Bound<'py, PyArray1<u32>>,
-);
-
-/// The fastest profile: piece, kind, axis, value, u0, u1, p0, p1, duration, runs, slowed.
+/// The fastest profile.
 #[pyfunction]
 #[pyo3(signature = (problem, progress=None))]
 fn plan_bang_bang<'py>(
     py: Python<'py>,
-    problem: ProblemArrays<'py>,
+    problem: Of<Problem>,
     progress: Option<Bound<'py, PyAny>>,
-) -> PyResult<Columns<'py>> {
-    with_padded_axes!(problem.curve.axes(), M, {
-        let rows = ProblemRows::<M>::new(&problem)?;
-        let problem = rows.problem()?;
-        let plan = |watch: Watch| Problem { watch, ..problem }.fastest();
+) -> PyResult<Profile> {
+    with_padded_axes!(problem.axes(), M, {
+        let problem = problem.rows::<M>()?.problem();
+        let plan = |watch: Watch| problem::Problem { watch, ..problem }.fastest();
         let profile = run(py, progress.as_ref(), plan)?.map_err(|fault| to_exception(&fault))?;
-        Ok(to_columns(py, profile))
+        Ok(profile.into())
     })
-}
-
-fn to_columns(py: Python<'_>, profile: Profile) -> Columns<'_> {
-    let floats = |column| PyArray1::from_vec(py, column);
-    (
-        PyArray1::from_vec(py, profile.piece),
-        PyArray1::from_vec(py, profile.kind),
-        PyArray1::from_vec(py, profile.axis),
-        floats(profile.value),
-        floats(profile.u0),
-        floats(profile.u1),
-        floats(profile.p0),
-        floats(profile.p1),
-        floats(profile.duration),
-        PyArray1::from_vec(py, profile.runs),
-        PyArray1::from_vec(py, profile.slowed),
-    )
 }
 
 pub fn to_exception(fault: &Fault) -> PyErr {
@@ -86,7 +54,7 @@ pub fn to_exception(fault: &Fault) -> PyErr {
 #[pyfunction]
 fn feed_between<'py>(
     py: Python<'py>,
-    problem: ProblemArrays<'py>,
+    problem: Of<Problem>,
     piece: PyReadonlyArray1<'py, i64>,
     u0: PyReadonlyArray1<'py, f64>,
     u1: PyReadonlyArray1<'py, f64>,
@@ -95,9 +63,8 @@ fn feed_between<'py>(
     if [u0.len(), u1.len()] != [piece.len(); 2] {
         return Err(PyValueError::new_err("the arrays of the parts differ in length"));
     }
-    with_padded_axes!(problem.curve.axes(), M, {
-        let rows = ProblemRows::<M>::new(&problem)?;
-        let problem = rows.problem()?;
+    with_padded_axes!(problem.axes(), M, {
+        let problem = problem.rows::<M>()?.problem();
         let speeds = run(py, None, |watch| {
             let part = |i: usize| {
                 watch.check_at(i);

@@ -1,44 +1,76 @@
-//! The package's own problem as the kernels take it.
+//! `Problem`: a path with its limits, as the kernels take it.
+
+use std::sync::Arc;
 
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use super::arrays::{indices, row, rows, rows_with, CurveArrays};
+use super::arrays::{indices, row, rows_with};
+use super::curve::Curve;
+use super::native::{InAxes, Of};
+use super::with_padded_axes;
+use feedplan_geometry::spline::CompositeCurve;
 use feedplan_geometry::watch::Watch;
-use feedplan_planner::problem::{Both, Problem, SpeedSquare, Tip, TIP_AXES};
+use feedplan_planner::problem::{self, Both, SpeedSquare, Tip, TIP_AXES};
+use feedplan_setpoints::sampling::PathData;
 
 /// `feedplan.constraints.problem.TipSpeed`.
 #[derive(FromPyObject)]
-pub struct SpeedSquareArrays<'py> {
-    pub coefficients: PyReadonlyArray1<'py, f64>,
-    pub offsets: PyReadonlyArray1<'py, i64>,
+struct SpeedArrays<'py> {
+    coefficients: PyReadonlyArray1<'py, f64>,
+    offsets: PyReadonlyArray1<'py, i64>,
 }
 
 /// `feedplan.geometry.path.Path`.
 #[derive(FromPyObject)]
-pub struct PathArrays<'py> {
-    pub runs: PyReadonlyArray1<'py, i64>,
+struct PathArrays<'py> {
+    runs: PyReadonlyArray1<'py, i64>,
+    line: PyReadonlyArray1<'py, i32>,
+    start_dwell: f64,
+    dwell: PyReadonlyArray1<'py, f64>,
 }
 
 /// `feedplan.constraints.problem.Problem`.
 #[derive(FromPyObject)]
-pub struct ProblemArrays<'py> {
-    pub path: PathArrays<'py>,
-    pub curve: CurveArrays<'py>,
-    pub tip_speed: Option<SpeedSquareArrays<'py>>,
-    pub way_speed: Option<SpeedSquareArrays<'py>>,
-    pub tip_curve: Option<CurveArrays<'py>>,
-    pub feed_share: Option<PyReadonlyArray2<'py, f64>>,
-    pub feed: PyReadonlyArray1<'py, f64>,
-    pub junction_speed: PyReadonlyArray1<'py, f64>,
-    pub max_velocity: PyReadonlyArray1<'py, f64>,
-    pub max_acceleration: PyReadonlyArray1<'py, f64>,
-    pub min_velocity: PyReadonlyArray1<'py, f64>,
-    pub min_acceleration: PyReadonlyArray1<'py, f64>,
-    pub chord_tolerance: f64,
-    pub period: f64,
-    pub start_speed: f64,
-    pub end_speed: f64,
+struct Arrays<'py> {
+    path: PathArrays<'py>,
+    curve: Of<Curve>,
+    tip_speed: Option<SpeedArrays<'py>>,
+    way_speed: Option<SpeedArrays<'py>>,
+    tip_curve: Option<Of<Curve>>,
+    feed_share: Option<PyReadonlyArray2<'py, f64>>,
+    feed: PyReadonlyArray1<'py, f64>,
+    junction_speed: PyReadonlyArray1<'py, f64>,
+    max_velocity: PyReadonlyArray1<'py, f64>,
+    max_acceleration: PyReadonlyArray1<'py, f64>,
+    min_velocity: PyReadonlyArray1<'py, f64>,
+    min_acceleration: PyReadonlyArray1<'py, f64>,
+    chord_tolerance: f64,
+    period: f64,
+    start_speed: f64,
+    end_speed: f64,
+}
+
+/// A path with its limits.
+#[pyclass(frozen, module = "feedplan._solvers")]
+pub struct Problem {
+    axes: usize,
+    /// `Rows`.
+    rows: InAxes,
+}
+
+/// The same in M axes, those beyond its own at rest.
+pub struct Rows<const M: usize> {
+    pub path: Arc<PathData<M>>,
+    tip: Option<Arc<CompositeCurve<TIP_AXES>>>,
+    feed: Vec<f64>,
+    junction_speed: Vec<f64>,
+    max_velocity: Both<M>,
+    max_acceleration: Both<M>,
+    chord_tolerance: f64,
+    period: f64,
+    start_speed: f64,
+    end_speed: f64,
 }
 
 /// Limits of the axes as sizes, those at rest 1.
@@ -46,83 +78,95 @@ fn both<const M: usize>(most: &PyReadonlyArray1<f64>, least: &PyReadonlyArray1<f
     Ok([row(most, 1.0)?, row::<M>(least, -1.0)?.map(|value| -value)])
 }
 
-/// Its rows in M axes, those beyond its own at rest.
-pub struct ProblemRows<'a, 'py, const M: usize> {
-    arrays: &'a ProblemArrays<'py>,
-    control: Vec<[f64; M]>,
-    offset: Vec<usize>,
-    runs: Vec<usize>,
-    tip: Option<TipRows>,
-    way_offset: Vec<usize>,
-    feed_share: Vec<[f64; M]>,
+fn speed(arrays: &Option<SpeedArrays>) -> PyResult<Option<(Vec<f64>, Vec<usize>)>> {
+    let speed = arrays.as_ref();
+    speed.map(|speed| Ok((speed.coefficients.as_slice()?.to_vec(), indices(&speed.offsets)))).transpose()
 }
 
-/// Control points of the tool's path, their offsets, and those of its speed.
-struct TipRows {
-    control: Vec<[f64; TIP_AXES]>,
-    offset: Vec<usize>,
-    speed_offset: Vec<usize>,
+fn square(speed: &Option<(Vec<f64>, Vec<usize>)>) -> Option<SpeedSquare<'_>> {
+    speed.as_ref().map(|(coefficients, offset)| SpeedSquare { coefficients, offset })
 }
 
-impl SpeedSquareArrays<'_> {
-    fn square<'a>(&'a self, offset: &'a [usize]) -> PyResult<SpeedSquare<'a>> {
-        Ok(SpeedSquare { coefficients: self.coefficients.as_slice()?, offset })
-    }
-}
-
-impl<'a, 'py, const M: usize> ProblemRows<'a, 'py, M> {
-    pub fn new(arrays: &'a ProblemArrays<'py>) -> PyResult<Self> {
-        let tip = match (&arrays.tip_speed, &arrays.tip_curve) {
-            (Some(speed), Some(tip)) => Some(TipRows {
-                control: rows::<TIP_AXES>(&tip.control_points)?,
-                offset: indices(&tip.offsets),
-                speed_offset: indices(&speed.offsets),
-            }),
-            _ => None,
-        };
+impl<const M: usize> Rows<M> {
+    fn new(arrays: &Arrays) -> PyResult<Self> {
+        let path = &arrays.path;
         Ok(Self {
-            arrays,
-            control: rows::<M>(&arrays.curve.control_points)?,
-            offset: indices(&arrays.curve.offsets),
-            runs: indices(&arrays.path.runs),
-            tip,
-            way_offset: arrays.way_speed.as_ref().map_or(vec![], |way| indices(&way.offsets)),
-            feed_share: match &arrays.feed_share {
-                Some(share) => rows_with::<M>(share, 1.0)?,
-                None => vec![],
-            },
-        })
-    }
-
-    pub fn problem(&self) -> PyResult<Problem<'_, M>> {
-        let arrays = self.arrays;
-        let tip = match (&self.tip, &arrays.tip_speed, &arrays.tip_curve) {
-            (Some(rows), Some(speed), Some(tip)) => Some(Tip {
-                speed: speed.square(&rows.speed_offset)?,
-                control: &rows.control,
-                weight: tip.weights()?,
-                offset: &rows.offset,
+            path: Arc::new(PathData {
+                curve: arrays.curve.padded()?.clone(),
+                tip_speed: speed(&arrays.tip_speed)?,
+                way_speed: speed(&arrays.way_speed)?,
+                feed_share: match &arrays.feed_share {
+                    Some(share) => rows_with(share, 1.0)?,
+                    None => vec![],
+                },
+                lines: path.line.as_slice()?.to_vec(),
+                runs: indices(&path.runs),
+                start_dwell: path.start_dwell,
+                dwell: path.dwell.as_slice()?.to_vec(),
             }),
-            _ => None,
-        };
-        Ok(Problem {
-            control: &self.control,
-            weight: arrays.curve.weights()?,
-            offset: &self.offset,
-            width: arrays.curve.width.as_slice()?,
-            tip,
-            way: arrays.way_speed.as_ref().map(|way| way.square(&self.way_offset)).transpose()?,
-            feed_share: &self.feed_share,
-            runs: &self.runs,
-            feed: arrays.feed.as_slice()?,
-            junction_speed: arrays.junction_speed.as_slice()?,
+            tip: arrays.tip_curve.as_ref().map(|tip| tip.padded().cloned()).transpose()?,
+            feed: arrays.feed.as_slice()?.to_vec(),
+            junction_speed: arrays.junction_speed.as_slice()?.to_vec(),
             max_velocity: both(&arrays.max_velocity, &arrays.min_velocity)?,
             max_acceleration: both(&arrays.max_acceleration, &arrays.min_acceleration)?,
             chord_tolerance: arrays.chord_tolerance,
             period: arrays.period,
             start_speed: arrays.start_speed,
             end_speed: arrays.end_speed,
-            watch: Watch::default(),
         })
     }
+
+    /// As the planners take it.
+    pub fn problem(&self) -> problem::Problem<'_, M> {
+        let (path, curve) = (&*self.path, &*self.path.curve);
+        problem::Problem {
+            control: &curve.control,
+            weight: &curve.weights,
+            offset: &curve.offsets,
+            width: &curve.width,
+            tip: self.tip.as_deref().zip(square(&path.tip_speed)).map(|(tip, speed)| Tip {
+                speed,
+                control: &tip.control,
+                weight: &tip.weights,
+                offset: &tip.offsets,
+            }),
+            way: square(&path.way_speed),
+            feed_share: &path.feed_share,
+            runs: &path.runs,
+            feed: &self.feed,
+            junction_speed: &self.junction_speed,
+            max_velocity: self.max_velocity,
+            max_acceleration: self.max_acceleration,
+            chord_tolerance: self.chord_tolerance,
+            period: self.period,
+            start_speed: self.start_speed,
+            end_speed: self.end_speed,
+            watch: Watch::default(),
+        }
+    }
+}
+
+impl Problem {
+    pub fn axes(&self) -> usize {
+        self.axes
+    }
+
+    /// Its rows in M axes, as `with_padded_axes` counts them.
+    pub fn rows<const M: usize>(&self) -> PyResult<&Rows<M>> {
+        self.rows.get()
+    }
+}
+
+#[pymethods]
+impl Problem {
+    /// From a `feedplan.constraints.problem.Problem`, or a part of one.
+    #[new]
+    fn new(problem: Arrays<'_>) -> PyResult<Self> {
+        let axes = problem.curve.axes();
+        with_padded_axes!(axes, M, Ok(Self { axes, rows: InAxes::new(Rows::<M>::new(&problem)?) }))
+    }
+}
+
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Problem>()
 }

@@ -13,6 +13,7 @@ mod check;
 mod chunk;
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
@@ -78,7 +79,7 @@ pub struct Resume {
 /// the Bernstein coefficients of the squares of their speeds per parameter, with offsets; the source lines of the
 /// pieces, runs as piece offsets, and the pauses before the first run and after each.
 pub struct PathData<const M: usize> {
-    pub curve: CompositeCurve<M>,
+    pub curve: Arc<CompositeCurve<M>>,
     pub tip_speed: Option<(Vec<f64>, Vec<usize>)>,
     pub way_speed: Option<(Vec<f64>, Vec<usize>)>,
     /// What the axes count in the feed on each piece; empty where that is not by shares.
@@ -91,13 +92,12 @@ pub struct PathData<const M: usize> {
 
 /// A profile on its path, ready to be read at any setpoint.
 pub struct Sampler<const M: usize> {
-    path: PathData<M>,
+    path: Arc<PathData<M>>,
     arcs: Vec<ProfileArc>,
     /// Time from the start of the arc's run.
     starts: Vec<f64>,
     runs: Vec<Run>,
     period: f64,
-    interpolator: Interpolator,
     count: usize,
     /// The path ends at a speed: the last setpoint has its true time.
     ends_moving: bool,
@@ -125,11 +125,10 @@ impl<const M: usize> PathData<M> {
 impl<const M: usize> Sampler<M> {
     /// Lays the time grid. `arc_runs` are the arc offsets of the runs. The error is a sentence for the user.
     pub fn new(
-        path: PathData<M>,
+        path: Arc<PathData<M>>,
         arcs: Vec<ProfileArc>,
         arc_runs: &[usize],
         period: f64,
-        interpolator: Interpolator,
         watch: Watch,
     ) -> Result<Self, String> {
         check(&path, &arcs, arc_runs, watch)?;
@@ -188,7 +187,7 @@ impl<const M: usize> Sampler<M> {
             begin += time + path.dwell[r];
         }
         let count = first as usize + 1;
-        let sampler = Self { path, arcs, starts, runs, period, interpolator, count, ends_moving };
+        let sampler = Self { path, arcs, starts, runs, period, count, ends_moving };
         match sampler.start() {
             Some((speed, ..)) if speed > 0.0 && sampler.path.start_dwell > 0.0 => Err(format!(
                 "line {}: the plan begins at {speed:.6} mm/s, but the program pauses {} s there: plan with start speed 0",
@@ -225,10 +224,16 @@ impl<const M: usize> Sampler<M> {
 
     /// The setpoints in a range. `resume` carries the state of the Newton–Raphson interpolator from one range to
     /// the next; without it, or going back, a run is followed again from its start.
-    pub fn chunk(&self, range: Range<usize>, resume: &mut Option<Resume>, watch: Watch) -> Chunk<M> {
+    pub fn chunk(
+        &self,
+        range: Range<usize>,
+        interpolator: Interpolator,
+        resume: &mut Option<Resume>,
+        watch: Watch,
+    ) -> Chunk<M> {
         let mut chunk = Chunk::with_size(range.len());
-        let parts = chunk.slices(range.start).split(&self.cuts(&range));
-        let results: Vec<(Effort, Option<Resume>)> = match self.interpolator {
+        let parts = chunk.slices(range.start).split(&self.cuts(&range, interpolator));
+        let results: Vec<(Effort, Option<Resume>)> = match interpolator {
             Interpolator::Sarfraz => {
                 parts.into_par_iter().map(|part| (self.fill_by_time(part, watch), None)).collect()
             }
@@ -302,8 +307,8 @@ impl<const M: usize> Sampler<M> {
     }
 
     /// Where a range is cut into tasks: anywhere, or between runs where the steps depend on each other.
-    fn cuts(&self, range: &Range<usize>) -> Vec<usize> {
-        match self.interpolator {
+    fn cuts(&self, range: &Range<usize>, interpolator: Interpolator) -> Vec<usize> {
+        match interpolator {
             Interpolator::Sarfraz => range.clone().step_by(BLOCK).skip(1).collect(),
             Interpolator::Newton => {
                 let inner = |run: &&Run| run.periods > 0 && run.first + 1 < range.end;

@@ -114,8 +114,9 @@ impl JointPath<'_> {
         let flag = |flags: &[bool], k: usize| flags.get(k).copied().unwrap_or(false);
         let rows = self.path.rows(number);
         let axes = self.path.axes;
-        let first = &self.path.control[rows.start * axes..][..axes];
-        let moves = |k: usize| rows.clone().any(|row| self.path.control[row * axes + k] != first[k]);
+        let point = |row: usize| &self.path.control[row * self.path.stride..][..axes];
+        let first = point(rows.start);
+        let moves = |k: usize| rows.clone().any(|row| point(row)[k] != first[k]);
         let linear = (0..axes).any(|k| self.xyz[k] && moves(k));
         let mut ijk = (0..axes).filter(|&k| self.ijk[k]);
         let number_of = |k: bool| if k { 1.0 } else { 0.0 };

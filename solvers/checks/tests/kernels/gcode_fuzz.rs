@@ -82,7 +82,7 @@ fn check_splines(columns: &Columns) -> Result<(), TestCaseError> {
     prop_assert!(columns.spline_width.iter().all(|&width| width > 0.0 && width.is_finite()));
     prop_assert!(columns.spline_weights.iter().all(|&weight| weight > 0.0 && weight.is_finite()));
     for (i, &row) in rows.iter().enumerate() {
-        let end = columns.spline_offsets[columns.spline_pieces[i + 1] as usize] as usize;
+        let end = columns.spline_offsets[columns.spline_pieces[i + 1] as usize];
         let last = &columns.spline_control[(end - 1) * width..end * width];
         let target = &columns.target[row as usize * width..(row as usize + 1) * width];
         // No direction is programmed on a spline.

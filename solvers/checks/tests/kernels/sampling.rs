@@ -35,7 +35,7 @@ fn triangle() -> (Quadratic<2>, [ProfileArc; 2]) {
 
 fn path_of(piece: &Quadratic<2>) -> PathData<2> {
     PathData {
-        curve: raised(piece, 0),
+        curve: raised(piece, 0).into(),
         tip_speed: None,
         way_speed: None,
         feed_share: vec![],
@@ -46,10 +46,10 @@ fn path_of(piece: &Quadratic<2>) -> PathData<2> {
     }
 }
 
-fn sampler(period: f64, interpolator: Interpolator) -> Sampler<2> {
+fn sampler(period: f64) -> Sampler<2> {
     let (line, arcs) = triangle();
     let path = path_of(&line);
-    Sampler::new(path, arcs.to_vec(), &[0, 2], period, interpolator, Watch::default()).unwrap()
+    Sampler::new(path.into(), arcs.to_vec(), &[0, 2], period, Watch::default()).unwrap()
 }
 
 #[test]
@@ -79,9 +79,9 @@ fn a_run_of_a_whole_number_of_periods_ends_on_the_grid() {
         [(0.001, 201), (below, 201), (0.2 / 3.0, 4), (0.2 / 7.0, 8), (0.001_000_1, 201), (1.0, 2)]
     {
         for interpolator in [Interpolator::Sarfraz, Interpolator::Newton] {
-            let sampler = sampler(period, interpolator);
+            let sampler = sampler(period);
             assert_eq!(sampler.count(), count, "{period}");
-            let chunk = sampler.chunk(0..count, &mut None, Watch::default());
+            let chunk = sampler.chunk(0..count, interpolator, &mut None, Watch::default());
             assert_eq!(chunk.position[count - 1], [10.0, 5.0]);
             assert_eq!((chunk.velocity[count - 1], chunk.acceleration[count - 1]), ([0.0; 2], [0.0; 2]));
             assert_eq!(sampler.duration(), (count - 1) as f64 * period);
@@ -92,14 +92,14 @@ fn a_run_of_a_whole_number_of_periods_ends_on_the_grid() {
 #[test]
 fn any_part_of_the_stream_has_the_same_digits() {
     for interpolator in [Interpolator::Sarfraz, Interpolator::Newton] {
-        let sampler = sampler(1e-5, interpolator);
-        let whole = sampler.chunk(0..sampler.count(), &mut None, Watch::default());
+        let sampler = sampler(1e-5);
+        let whole = sampler.chunk(0..sampler.count(), interpolator, &mut None, Watch::default());
         assert!(whole.t.len() > 20_000);
         // Onwards, with gaps, and back; with the state of the part before and without.
         let mut state = None;
         for range in [0..1, 1..2, 4095..4097, 4097..4200, 12_345..20_001, 9_999..10_002] {
             for resume in [&mut None, &mut state] {
-                let part = sampler.chunk(range.clone(), resume, Watch::default());
+                let part = sampler.chunk(range.clone(), interpolator, resume, Watch::default());
                 assert_eq!(part.position, whole.position[range.clone()]);
                 assert_eq!(part.velocity, whole.velocity[range.clone()]);
                 assert_eq!(part.t, whole.t[range.clone()]);
@@ -172,7 +172,7 @@ fn nonsense_is_refused_with_a_sentence() {
         let (line, mut arcs) = triangle();
         change(&mut arcs[1]);
         let path = path_of(&line);
-        Sampler::new(path, arcs.to_vec(), &[0, 2], period, Interpolator::Sarfraz, Watch::default()).err()
+        Sampler::new(path.into(), arcs.to_vec(), &[0, 2], period, Watch::default()).err()
     };
     assert!(build(&|_| (), 0.001).is_none());
     for period in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-12, 5e-324] {

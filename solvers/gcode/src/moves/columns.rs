@@ -32,7 +32,7 @@ pub struct Columns {
     /// The pieces: control points in the columns of `axes`, weights (empty where none is rational), offsets, widths.
     pub spline_control: Vec<f64>,
     pub spline_weights: Vec<f64>,
-    pub spline_offsets: Vec<i64>,
+    pub spline_offsets: Vec<usize>,
     pub spline_width: Vec<f64>,
     /// `Meaning` and tool length of each move.
     pub meaning: Vec<u8>,
@@ -108,7 +108,7 @@ impl Moves {
                 .collect(),
             target: self.directed_target(),
             spline_weights: self.splines.weights,
-            spline_offsets: self.splines.offsets.iter().map(|&offset| offset as i64).collect(),
+            spline_offsets: self.splines.offsets,
             spline_width: self.splines.width,
             kind: self.kind,
             feed: self.feed,

@@ -30,7 +30,6 @@ use super::Task;
 use crate::arc_kind::ArcKind;
 use crate::problem::{weights_of, TIP_AXES};
 use crate::profile::{Profile, Row, NO_AXIS};
-use crate::AxisBits;
 use check::keeps_limits;
 use feedplan_geometry::polynomial::MOST;
 use feedplan_geometry::quadratic::norm;

@@ -21,9 +21,9 @@ mod bang;
 mod limit_curve;
 mod slide;
 
-use super::part::{Cap, SubPiece};
+use super::part::SubPiece;
 use super::window::{Bound, Window};
-use crate::bang_bang::tolerance::{NO_STEP, ON_BOUND, ON_LIMIT_CURVE, TEST, WEAK_TIE};
+use crate::bang_bang::tolerance::{NO_STEP, ON_BOUND, ON_LIMIT_CURVE, WEAK_TIE};
 use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
 

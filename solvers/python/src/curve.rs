@@ -1,0 +1,492 @@
+//! `Curve`: the pieces of a composite curve, checked once and held as the kernels take them.
+
+use std::any::Any;
+use std::sync::Arc;
+
+use numpy::ndarray::{s, ArrayView2};
+use numpy::{
+    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
+};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use rayon::prelude::*;
+
+use super::arrays::{row, rows, to_array2};
+use super::curve_length::CurveLength;
+use super::views::view;
+use super::with_padded_axes;
+use super::work::run;
+use feedplan_geometry::spline::bezier::{derivatives, elevate, reverse, split};
+use feedplan_geometry::spline::circle::Turn;
+use feedplan_geometry::spline::cusps::cusps;
+use feedplan_geometry::spline::error::SplineError;
+use feedplan_geometry::spline::extract::extract;
+use feedplan_geometry::spline::joints::{joints, JointTolerance};
+use feedplan_geometry::spline::knots::{check_points, Spline};
+use feedplan_geometry::spline::regular::regular;
+use feedplan_geometry::spline::{CompositeCurve, MAX_DEGREE};
+
+pyo3::import_exception!(feedplan.errors, InputError);
+
+pub fn register(module: &Bound<PyModule>) -> PyResult<()> {
+    module.add_class::<Curve>()?;
+    module.add_class::<CurveLength>()?;
+    module.add_function(wrap_pyfunction!(insert_knot, module)?)
+}
+
+/// Places that one thread evaluates at a time.
+const BLOCK: usize = 4096;
+/// Widths of pieces lie between this and one over it.
+const LEAST_WIDTH: f64 = 1e-60;
+
+/// Where the values and the derivatives of some places go; their pieces and parameters.
+type Block<'a> = (Vec<&'a mut [f64]>, &'a [u32], &'a [f64]);
+type Array1<'py> = PyReadonlyArray1<'py, f64>;
+type Array2<'py> = PyReadonlyArray2<'py, f64>;
+/// Piece, kind, gap, turn, and speed before and after.
+type JointColumns<'py> = (
+    Bound<'py, PyArray1<u32>>,
+    Bound<'py, PyArray1<u8>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray2<f64>>,
+);
+
+/// Pieces in 3, 6 or 9 axes, those beyond the curve's own at rest.
+#[derive(Clone)]
+pub enum Padded {
+    Three(Arc<CompositeCurve<3>>),
+    Six(Arc<CompositeCurve<6>>),
+    Nine(Arc<CompositeCurve<9>>),
+}
+
+/// Bézier pieces joined end to end.
+#[pyclass(frozen, module = "feedplan._solvers")]
+pub struct Curve {
+    pub pieces: Padded,
+    axes: usize,
+}
+
+/// Calls a generic kernel for the pieces of a curve, which have M axes.
+macro_rules! with_pieces {
+    ($curve:expr, $m:ident, $pieces:ident, $call:expr) => {
+        match &$curve.pieces {
+            Padded::Three($pieces) => {
+                #[allow(dead_code)]
+                const $m: usize = 3;
+                $call
+            }
+            Padded::Six($pieces) => {
+                #[allow(dead_code)]
+                const $m: usize = 6;
+                $call
+            }
+            Padded::Nine($pieces) => {
+                #[allow(dead_code)]
+                const $m: usize = 9;
+                $call
+            }
+        }
+    };
+}
+
+macro_rules! padded {
+    ($($count:literal $name:ident),+) => {
+        $(impl From<CompositeCurve<$count>> for Padded {
+            fn from(pieces: CompositeCurve<$count>) -> Self {
+                Self::$name(Arc::new(pieces))
+            }
+        })+
+    };
+}
+padded!(3 Three, 6 Six, 9 Nine);
+
+fn input_error(error: SplineError) -> PyErr {
+    InputError::new_err(error.to_string())
+}
+
+pub fn weights_of(weights: Option<&Array1>) -> PyResult<Vec<f64>> {
+    weights.map_or(Ok(vec![]), |weights| Ok(weights.as_slice()?.to_vec()))
+}
+
+/// Offsets of this many pieces in this many control points. Raises InputError for others.
+fn checked_offsets(given: &[i64], widths: usize, points: usize) -> PyResult<Vec<usize>> {
+    let error = |sentence: String| Err(InputError::new_err(sentence));
+    if given.len() != widths + 1 {
+        let offsets = given.len();
+        return error(format!(
+            "{offsets} offsets for {widths} widths: give one width for each piece, and one offset more"
+        ));
+    }
+    let (first, last) = (given[0], given[widths]);
+    if first != 0 || usize::try_from(last) != Ok(points) {
+        return error(format!(
+            "the offsets go from {first} to {last}: they must go from 0 to {points}, the number of control points"
+        ));
+    }
+    for (i, ends) in given.windows(2).enumerate() {
+        let degree = ends[1].wrapping_sub(ends[0]).wrapping_sub(1);
+        if !(1..=MAX_DEGREE as i64).contains(&degree) {
+            return error(format!(
+                "piece {i} has degree {degree}: degrees 1 to {MAX_DEGREE} are supported; correct offsets"
+            ));
+        }
+    }
+    Ok(given.iter().map(|&offset| offset as usize).collect())
+}
+
+impl Curve {
+    /// Raises InputError for coordinates, weights and widths that cannot be used.
+    pub fn checked<const M: usize>(pieces: CompositeCurve<M>, axes: usize) -> PyResult<Self>
+    where
+        Padded: From<CompositeCurve<M>>,
+    {
+        if !pieces.control.is_empty() {
+            check_points(1, &pieces.control, &pieces.weights).map_err(input_error)?;
+        }
+        let usable = |width: &f64| *width > LEAST_WIDTH && *width < 1.0 / LEAST_WIDTH;
+        if let Some(i) = pieces.width.iter().position(|width| !usable(width)) {
+            return Err(InputError::new_err(format!(
+                "piece {i} has the width {:?}: widths must be positive and finite; correct it",
+                pieces.width[i]
+            )));
+        }
+        Ok(Self { pieces: pieces.into(), axes })
+    }
+
+    pub fn axes(&self) -> usize {
+        self.axes
+    }
+
+    /// The pieces in M axes, as `with_padded_axes` counts them.
+    pub fn padded<const M: usize>(&self) -> PyResult<&Arc<CompositeCurve<M>>> {
+        let found = with_pieces!(self, N, pieces, (pieces as &dyn Any).downcast_ref());
+        found.ok_or_else(|| {
+            PyValueError::new_err(format!("a curve in {} axes where {M} are meant", self.axes))
+        })
+    }
+
+    pub fn piece_offsets(&self) -> &[usize] {
+        with_pieces!(self, M, pieces, &pieces.offsets)
+    }
+
+    /// Empty where all pieces are polynomial.
+    pub fn weight_slice(&self) -> &[f64] {
+        with_pieces!(self, M, pieces, &pieces.weights)
+    }
+
+    pub fn widths(&self) -> &[f64] {
+        with_pieces!(self, M, pieces, &pieces.width)
+    }
+
+    /// The coordinates of the control points one after the other, and how many each has.
+    pub fn coordinates(&self) -> (&[f64], usize) {
+        with_pieces!(self, M, pieces, (pieces.control.as_flattened(), M))
+    }
+
+    fn table(&self) -> ArrayView2<'_, f64> {
+        let (flat, stride) = self.coordinates();
+        let rows = ArrayView2::from_shape((flat.len() / stride, stride), flat).expect("whole rows");
+        rows.slice_move(s![.., ..self.axes])
+    }
+}
+
+fn spline<const M: usize>(
+    control: &Array2,
+    weights: Option<&Array1>,
+    knots: &Array1,
+    degree: usize,
+    periodic: bool,
+) -> PyResult<Spline<M>> {
+    let (control, weights) = (rows::<M>(control)?, weights_of(weights)?);
+    let make = if periodic { Spline::periodic } else { Spline::new };
+    make(degree, knots.as_slice()?.to_vec(), control, weights).map_err(input_error)
+}
+
+#[pymethods]
+impl Curve {
+    /// From the arrays of `feedplan.curves.composite.CompositeCurve`.
+    #[new]
+    fn new(
+        control_points: Array2<'_>,
+        weights: Option<Array1<'_>>,
+        offsets: PyReadonlyArray1<'_, i64>,
+        width: Array1<'_>,
+    ) -> PyResult<Self> {
+        let axes = control_points.shape()[1];
+        let weights = weights_of(weights.as_ref())?;
+        let width = width.as_slice()?.to_vec();
+        let offsets = checked_offsets(offsets.as_slice()?, width.len(), control_points.shape()[0])?;
+        with_padded_axes!(axes, M, {
+            let control = rows::<M>(&control_points)?;
+            Self::checked(CompositeCurve { control, weights, offsets, width }, axes)
+        })
+    }
+
+    /// The pieces of a B-spline or NURBS curve.
+    #[staticmethod]
+    fn of_spline(
+        py: Python<'_>,
+        control_points: Array2<'_>,
+        weights: Option<Array1<'_>>,
+        knots: Array1<'_>,
+        degree: usize,
+        periodic: bool,
+    ) -> PyResult<Self> {
+        let axes = control_points.shape()[1];
+        with_padded_axes!(axes, M, {
+            let spline = spline::<M>(&control_points, weights.as_ref(), &knots, degree, periodic)?;
+            Self::checked(py.detach(|| extract(&spline)).map_err(input_error)?, axes)
+        })
+    }
+
+    /// An arc, or with `travel` a helix of this degree within a tolerance; and the bound of its error.
+    #[staticmethod]
+    fn of_turn(
+        start: Array1<'_>,
+        plane: [usize; 2],
+        centre: [f64; 2],
+        sweep: f64,
+        travel: Option<Array1<'_>>,
+        degree: usize,
+        tolerance: f64,
+    ) -> PyResult<(Self, f64)> {
+        let axes = start.len();
+        if plane.iter().any(|&axis| axis >= axes) {
+            return Err(PyValueError::new_err("the plane is not one of these axes"));
+        }
+        with_padded_axes!(axes, M, {
+            let turn = Turn { start: row::<M>(&start, 0.0)?, plane, centre, sweep };
+            let (pieces, bound) = match travel {
+                None => (turn.arc(), 0.0),
+                Some(travel) => {
+                    turn.helix(&row::<M>(&travel, 0.0)?, degree, tolerance).map_err(input_error)?
+                }
+            };
+            Ok((Self::checked(pieces, axes)?, bound))
+        })
+    }
+
+    /// (total, axes)
+    #[getter]
+    fn control_points<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        view(slf, Self::table)
+    }
+
+    /// (total,), or None where all pieces are polynomial.
+    #[getter]
+    fn weights<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
+        let rational = !slf.get().weight_slice().is_empty();
+        rational.then(|| view(slf, |curve| curve.weight_slice().into())).transpose()
+    }
+
+    /// (n + 1,)
+    #[getter]
+    fn offsets<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let offsets = view(slf, |curve| curve.piece_offsets().into())?;
+        // The same memory as signed numbers: differences of unsigned ones are none.
+        offsets.call_method1("view", ("i8",))
+    }
+
+    /// (n,)
+    #[getter]
+    fn width<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        view(slf, |curve| curve.widths().into())
+    }
+
+    /// Values and derivatives (order + 1, m, axes) at m places.
+    fn evaluate<'py>(
+        &self,
+        py: Python<'py>,
+        piece: PyReadonlyArray1<'py, u32>,
+        u: Array1<'py>,
+        order: usize,
+    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let (axes, piece, u) = (self.axes, piece.as_slice()?, u.as_slice()?);
+        check_places(self.widths(), piece, u)?;
+        let order = order.min(3);
+        let mut values = vec![0.0; (order + 1) * u.len() * axes];
+        let mut orders: Vec<_> = values
+            .chunks_mut((u.len() * axes).max(1))
+            .map(|of_order| of_order.chunks_mut(BLOCK * axes))
+            .collect();
+        let blocks: Vec<Block> = piece
+            .chunks(BLOCK)
+            .zip(u.chunks(BLOCK))
+            .map(|(piece, u)| (orders.iter_mut().filter_map(Iterator::next).collect(), piece, u))
+            .collect();
+        let fill = |(mut block, piece, u): Block| {
+            with_pieces!(self, M, pieces, {
+                for (i, (&piece, &u)) in piece.iter().zip(u).enumerate() {
+                    let c = derivatives(&pieces.piece(piece as usize), u);
+                    for (rows, value) in block.iter_mut().zip(&c) {
+                        rows[i * axes..(i + 1) * axes].copy_from_slice(&value[..axes]);
+                    }
+                }
+            });
+        };
+        // Few places take less time than to wake other threads.
+        if blocks.len() == 1 {
+            py.detach(|| blocks.into_iter().for_each(fill));
+        } else {
+            run(py, None, |watch| {
+                blocks.into_par_iter().for_each(|block| {
+                    watch.check();
+                    fill(block);
+                });
+            })?;
+        }
+        PyArray1::from_vec(py, values).reshape([order + 1, u.len(), axes])
+    }
+
+    /// The curve with every piece of a degree below `degree` raised to it.
+    fn elevated(&self, degree: usize) -> PyResult<Self> {
+        with_pieces!(self, M, pieces, {
+            let mut raised = CompositeCurve::<M>::default();
+            for piece in pieces.pieces() {
+                elevate(&piece, degree.min(MAX_DEGREE).saturating_sub(piece.degree()), &mut raised);
+            }
+            Self::checked(raised, self.axes)
+        })
+    }
+
+    /// The curve with pieces cut at places in order: piece numbers grow, and u within a piece.
+    fn split(&self, piece: PyReadonlyArray1<'_, u32>, u: Array1<'_>) -> PyResult<Self> {
+        let (piece, u) = (piece.as_slice()?, u.as_slice()?);
+        check_places(self.widths(), piece, u)?;
+        with_pieces!(self, M, pieces, {
+            let mut parts = CompositeCurve::<M>::default();
+            let mut next = 0;
+            for (i, whole) in pieces.pieces().enumerate() {
+                let first = next;
+                while next < piece.len() && piece[next] as usize == i {
+                    next += 1;
+                }
+                split(&whole, &u[first..next], &mut parts);
+            }
+            Self::checked(parts, self.axes)
+        })
+    }
+
+    /// The curve traversed backwards.
+    fn reversed(&self) -> PyResult<Self> {
+        with_pieces!(self, M, pieces, {
+            let mut reversed = CompositeCurve::<M>::default();
+            for i in (0..pieces.len()).rev() {
+                reverse(&pieces.piece(i), &mut reversed);
+            }
+            Self::checked(reversed, self.axes)
+        })
+    }
+
+    /// How neighbouring pieces meet.
+    fn joints<'py>(
+        &self,
+        py: Python<'py>,
+        closed: bool,
+        gap: f64,
+        angle: f64,
+        derivative: f64,
+    ) -> PyResult<JointColumns<'py>> {
+        let tolerance = JointTolerance { gap, angle, derivative };
+        let found = with_pieces!(self, M, pieces, {
+            run(py, None, |watch| joints(pieces, closed, &tolerance, watch))?
+        });
+        Ok((
+            PyArray1::from_iter(py, found.iter().map(|joint| joint.piece as u32)),
+            PyArray1::from_iter(py, found.iter().map(|joint| joint.kind as u8)),
+            PyArray1::from_iter(py, found.iter().map(|joint| joint.gap)),
+            PyArray1::from_iter(py, found.iter().map(|joint| joint.turn)),
+            to_array2(py, found.iter().map(|joint| joint.speed).collect(), 2),
+        ))
+    }
+
+    /// The curve as lines and as curves without a cusp inside; of each piece the first and the last one that it goes
+    /// along (n, 2), and whether it rests at its start and at its end (n, 2).
+    #[allow(clippy::type_complexity)]
+    fn regular<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Self, Bound<'py, PyArray2<i64>>, Bound<'py, PyArray2<bool>>)> {
+        with_pieces!(self, M, pieces, {
+            let whole = 0..pieces.len();
+            let made = run(py, None, |watch| regular(pieces, std::slice::from_ref(&whole), watch))?;
+            let source = made.source.iter().flatten().map(|&source| source as i64);
+            let shape = [made.source.len(), 2];
+            Ok((
+                Self::checked(made.curve, self.axes)?,
+                PyArray1::from_iter(py, source).reshape(shape)?,
+                PyArray1::from_iter(py, made.rests.iter().flatten().copied()).reshape(shape)?,
+            ))
+        })
+    }
+
+    /// Pieces and parameters of the cusps.
+    #[allow(clippy::type_complexity)]
+    fn cusps<'py>(
+        &self,
+        py: Python<'py>,
+        tolerance: f64,
+    ) -> PyResult<(Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<f64>>)> {
+        let found = with_pieces!(self, M, pieces, run(py, None, |watch| cusps(pieces, tolerance, watch))?);
+        Ok((
+            PyArray1::from_iter(py, found.iter().map(|cusp| cusp.piece as u32)),
+            PyArray1::from_iter(py, found.iter().map(|cusp| cusp.u)),
+        ))
+    }
+
+    /// The lengths along the curve, which has at least one piece.
+    #[pyo3(signature = (accuracy, progress=None))]
+    fn lengths(
+        &self,
+        py: Python<'_>,
+        accuracy: f64,
+        progress: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<CurveLength> {
+        CurveLength::new(py, self, accuracy, progress.as_ref())
+    }
+}
+
+/// Control points, weights and knots after inserting a knot.
+#[pyfunction]
+#[allow(clippy::type_complexity)]
+fn insert_knot<'py>(
+    py: Python<'py>,
+    control_points: Array2<'py>,
+    weights: Option<Array1<'py>>,
+    knots: Array1<'py>,
+    degree: usize,
+    value: f64,
+    times: usize,
+) -> PyResult<(Bound<'py, PyArray2<f64>>, Option<Bound<'py, PyArray1<f64>>>, Bound<'py, PyArray1<f64>>)> {
+    let axes = control_points.shape()[1];
+    with_padded_axes!(axes, M, {
+        let mut spline = spline::<M>(&control_points, weights.as_ref(), &knots, degree, false)?;
+        spline.insert(value, times).map_err(input_error)?;
+        Ok((
+            to_array2(py, spline.control, axes),
+            (!spline.weights.is_empty()).then(|| PyArray1::from_vec(py, spline.weights)),
+            PyArray1::from_vec(py, spline.knots),
+        ))
+    })
+}
+
+pub fn check_places(width: &[f64], piece: &[u32], u: &[f64]) -> PyResult<()> {
+    if piece.len() != u.len() {
+        return Err(PyValueError::new_err(format!("{} pieces for {} parameters", piece.len(), u.len())));
+    }
+    for (place, (&piece, &u)) in piece.iter().zip(u).enumerate() {
+        let Some(&width) = width.get(piece as usize) else {
+            return Err(InputError::new_err(format!(
+                "place {place} is on piece {piece}: the curve has {} pieces, counted from 0; choose one of them",
+                width.len()
+            )));
+        };
+        if !(0.0..=width).contains(&u) {
+            return Err(InputError::new_err(format!(
+                "place {place} is at u = {u} of piece {piece}: its parameter goes from 0 to {width}; stay within"
+            )));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,96 @@
+//! `CurveLength`: the lengths along a `Curve`.
+
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+
+use super::curve::{check_places, Curve};
+use super::native::InAxes;
+use super::with_padded_axes;
+use super::work::run;
+use feedplan_geometry::spline::length::CurveLength as Kernel;
+
+/// The lengths along a curve.
+#[pyclass(frozen, module = "feedplan._solvers")]
+pub struct CurveLength {
+    axes: usize,
+    /// `Kernel`.
+    lengths: InAxes,
+    width: Vec<f64>,
+}
+
+impl CurveLength {
+    pub fn new(
+        py: Python<'_>,
+        curve: &Curve,
+        accuracy: f64,
+        progress: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let (axes, width) = (curve.axes(), curve.widths().to_vec());
+        with_padded_axes!(axes, M, {
+            let pieces = curve.padded::<M>()?;
+            let lengths = InAxes::new(run(py, progress, |watch| Kernel::new(pieces, accuracy, watch))?);
+            Ok(Self { axes, lengths, width })
+        })
+    }
+}
+
+#[pymethods]
+impl CurveLength {
+    /// Length of the curve in mm.
+    #[getter]
+    fn total(&self) -> PyResult<f64> {
+        with_padded_axes!(self.axes, M, Ok(self.lengths.get::<Kernel<M>>()?.total()))
+    }
+
+    /// Bound of the error of every length on the curve in mm.
+    #[getter]
+    fn error(&self) -> PyResult<f64> {
+        with_padded_axes!(self.axes, M, Ok(self.lengths.get::<Kernel<M>>()?.error()))
+    }
+
+    /// Lengths (m,) from the start of the curve to m places.
+    fn lengths<'py>(
+        &self,
+        py: Python<'py>,
+        piece: PyReadonlyArray1<'py, u32>,
+        u: PyReadonlyArray1<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let (piece, u) = (piece.as_slice()?, u.as_slice()?);
+        check_places(&self.width, piece, u)?;
+        let found = with_padded_axes!(self.axes, M, {
+            let kernel = self.lengths.get::<Kernel<M>>()?;
+            run(py, None, |_| kernel.lengths(piece, u))
+        })?;
+        Ok(PyArray1::from_vec(py, found))
+    }
+
+    /// Pieces, parameters, iterations and misses at m lengths.
+    #[allow(clippy::type_complexity)]
+    fn locate<'py>(
+        &self,
+        py: Python<'py>,
+        lengths: PyReadonlyArray1<'py, f64>,
+        tolerance: f64,
+        newton: bool,
+    ) -> PyResult<(
+        Bound<'py, PyArray1<u32>>,
+        Bound<'py, PyArray1<f64>>,
+        Bound<'py, PyArray1<u32>>,
+        Bound<'py, PyArray1<f64>>,
+    )> {
+        let wanted = lengths.as_slice()?;
+        let found = with_padded_axes!(self.axes, M, {
+            let kernel = self.lengths.get::<Kernel<M>>()?;
+            run(py, None, |_| match newton {
+                true => kernel.follow(wanted, tolerance),
+                false => kernel.locate_all(wanted, tolerance),
+            })
+        })?;
+        Ok((
+            PyArray1::from_iter(py, found.iter().map(|place| place.piece as u32)),
+            PyArray1::from_iter(py, found.iter().map(|place| place.located.u)),
+            PyArray1::from_iter(py, found.iter().map(|place| place.located.iterations)),
+            PyArray1::from_iter(py, found.iter().map(|place| place.located.miss)),
+        ))
+    }
+}

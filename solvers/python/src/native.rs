@@ -1,0 +1,47 @@
+//! What records of Python hold as `native`, and what native objects hold in as many axes as kernels are made for.
+
+use std::any::Any;
+use std::ops::Deref;
+
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::pyclass::boolean_struct::True;
+use pyo3::{Borrowed, PyClass};
+
+/// A `feedplan.native.OfNative`.
+pub struct Of<T>(Py<T>);
+
+impl<T> Of<T> {
+    pub fn native(&self) -> &Py<T> {
+        &self.0
+    }
+}
+
+impl<'a, 'py, T: PyClass> FromPyObject<'a, 'py> for Of<T> {
+    type Error = PyErr;
+
+    fn extract(record: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        Ok(Self(record.getattr("native")?.cast_into::<T>()?.unbind()))
+    }
+}
+
+impl<T: PyClass<Frozen = True> + Sync> Deref for Of<T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        self.0.get()
+    }
+}
+
+/// Something in M axes, one of those that `with_padded_axes` counts.
+pub struct InAxes(Box<dyn Any + Send + Sync>);
+
+impl InAxes {
+    pub fn new(of_axes: impl Any + Send + Sync) -> Self {
+        Self(Box::new(of_axes))
+    }
+
+    pub fn get<T: Any>(&self) -> PyResult<&T> {
+        self.0.downcast_ref().ok_or_else(|| PyValueError::new_err("this has another number of axes"))
+    }
+}

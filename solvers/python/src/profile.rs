@@ -1,0 +1,109 @@
+//! `Profile`: the columns of a speed profile.
+
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+
+use super::views::view;
+use feedplan_jerk::jerk_arcs::Arcs;
+use feedplan_planner::profile::{self, NO_AXIS};
+
+pyo3::import_exception!(feedplan.errors, InputError);
+
+macro_rules! profile {
+    (arcs: $($column:ident: $type:ty),+; others: $($other:ident: $of:ty),+) => {
+        /// The columns of `feedplan.profile.SpeedProfile`.
+        #[pyclass(frozen, module = "feedplan._solvers")]
+        pub struct Profile {
+            $(pub $column: Vec<$type>,)+
+            $(pub $other: Vec<$of>,)+
+        }
+
+        #[derive(FromPyObject)]
+        struct Columns<'py> {
+            $($column: PyReadonlyArray1<'py, $type>,)+
+            $($other: PyReadonlyArray1<'py, $of>,)+
+        }
+
+        #[pymethods]
+        impl Profile {
+            /// From the arrays of a `SpeedProfile`. Raises InputError where those of its arcs differ in length.
+            #[new]
+            fn new(columns: Columns<'_>) -> PyResult<Self> {
+                let profile = Self {
+                    $($column: columns.$column.as_slice()?.to_vec(),)+
+                    $($other: columns.$other.as_slice()?.to_vec(),)+
+                };
+                let count = profile.piece.len();
+                $(if profile.$column.len() != count {
+                    let (name, length) = (stringify!($column), profile.$column.len());
+                    return Err(InputError::new_err(format!(
+                        "the profile has {count} arcs, and `{name}` has {length} entries: give one for each arc"
+                    )));
+                })+
+                Ok(profile)
+            }
+
+            $(#[getter]
+            fn $column<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<$type>>> {
+                view(slf, |profile| profile.$column[..].into())
+            })+
+
+            $(#[getter]
+            fn $other<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<$of>>> {
+                view(slf, |profile| profile.$other[..].into())
+            })+
+        }
+    };
+}
+
+profile! {
+    arcs: piece: u32, kind: u8, axis: u8, value: f64, u0: f64, u1: f64, p0: f64, p1: f64, duration: f64, a0: f64, a1: f64;
+    others: runs: i64, slowed: u32, kinked: u32
+}
+
+impl From<profile::Profile> for Profile {
+    fn from(planned: profile::Profile) -> Self {
+        let count = planned.len();
+        Self {
+            piece: planned.piece,
+            kind: planned.kind,
+            axis: planned.axis,
+            value: planned.value,
+            u0: planned.u0,
+            u1: planned.u1,
+            p0: planned.p0,
+            p1: planned.p1,
+            duration: planned.duration,
+            a0: vec![0.0; count],
+            a1: vec![0.0; count],
+            runs: planned.runs,
+            slowed: planned.slowed,
+            kinked: vec![],
+        }
+    }
+}
+
+impl From<Arcs> for Profile {
+    fn from(planned: Arcs) -> Self {
+        Self {
+            axis: vec![NO_AXIS; planned.len()],
+            piece: planned.piece,
+            kind: planned.kind,
+            value: planned.value,
+            u0: planned.u0,
+            u1: planned.u1,
+            p0: planned.p0,
+            p1: planned.p1,
+            duration: planned.duration,
+            a0: planned.a0,
+            a1: planned.a1,
+            runs: planned.runs,
+            slowed: vec![],
+            kinked: planned.kinks,
+        }
+    }
+}
+
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Profile>()
+}
