@@ -5,8 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
-import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from numbers import Real
 from pathlib import Path as FilePath
@@ -25,15 +24,15 @@ if TYPE_CHECKING:
     from feedplan.knots import Knots
     from feedplan.one_step_more import Step
     from feedplan.planning import Plan
-    from feedplan.setpoints import SetpointChunk
 
 SUMMARY_FILE = "plan.json"
 PROGRAM_FILE = "program.ngc"
 DRAWING_FILE = "drawing.bin"
 COMPARISON_FILE = "comparison.json"
 _ROWS_AT_ONCE = 10_000
-# How far the writing is after the account, when the times of the setpoints are laid out, and after these.
-ACCOUNT, LAID_OUT, SAMPLED = 0.08, 0.1, 0.75
+# How far reading the setpoints is after the account; how far writing is after them, if the audit was made
+# before, and what of the rest the drawing takes.
+ACCOUNT, SAMPLED, DRAWN = 0.1, 0.75, 0.8
 
 
 def write_plan(
@@ -79,20 +78,18 @@ def write_plan(
     flag(drawing, "the drawing")
     steps = _steps(one_step_more)
     knots = _knots(plan, [name for name, output in outputs.items() if output.ROWS == KNOTS], step)
-    audit = plan.audit(progress)
     share = of_stage(progress, "write")
-    tell(share, 0.0)
-    account = plan.make_account(part(share, 0.0, ACCOUNT))
-    tell(share, ACCOUNT)
-    setpoints = plan.setpoints(progress=part(share, ACCOUNT, LAID_OUT))
-    tell(share, LAID_OUT)
-    report = part(share, LAID_OUT, SAMPLED)
+    # Setpoints are computed once: where the audit is still to be made, in its stage.
+    reading, begun = (
+        (part(share, 0.0, SAMPLED), SAMPLED) if plan.audited else (of_stage(progress, "audit"), 0.0)
+    )
+    tell(reading, 0.0)
+    account = plan.make_account(part(reading, 0.0, ACCOUNT))
+    setpoints = plan.setpoints()
     units = tuple(plan.machine.axis(name).unit for name in setpoints.axes)
     header = Header(setpoints.axes, units, setpoints.period, setpoints.events)
-    marks = [check.time for check in audit.broken]
     points = MANY_POINTS if drawing else POINTS
-    figures = SetpointFigures(plan.problem, account.motion, setpoints.count, marks, points)
-    tell(report, 0.0)
+    figures = SetpointFigures(plan.problem, account.motion, setpoints.count, points)
     with staged(folder, last=SUMMARY_FILE) as stage:
         with ExitStack() as stack:
             sinks = [
@@ -100,10 +97,11 @@ def write_plan(
                 for output in outputs.values()
                 if output.ROWS == SETPOINTS
             ]
-            for chunk in _timed(setpoints.chunks(_ROWS_AT_ONCE), plan.compute):
-                for sink in (*sinks, figures.add):
-                    sink(chunk)
-                tell(report, figures.count / max(setpoints.count, 1))
+            audit = plan.pass_setpoints((*sinks, figures.add), part(reading, ACCOUNT, 1.0))
+        for check in audit.broken:
+            figures.mark(setpoints.around(check.time), check.time)
+        share = part(share, begun, 1.0)
+        tell(share, 0.0)
         summary = plan.summary()
         if program is not None:
             (stage / PROGRAM_FILE).write_bytes(program.content)
@@ -118,8 +116,7 @@ def write_plan(
                     with output.writer(stage / output.FILE, header, knots.count) as add:
                         for chunk in knots.chunks(_ROWS_AT_ONCE):
                             add(chunk)
-        tell(share, SAMPLED)
-        drawn = part(share, SAMPLED, 0.95)
+        drawn = part(share, 0.0, DRAWN)
         data = chart_data(plan.problem, plan.profile, account, figures, audit, drawn)
         if drawing:
             (stage / DRAWING_FILE).write_bytes(contained(data))
@@ -219,18 +216,6 @@ def _steps(given: Sequence[Step]) -> tuple[Step, ...]:
     if isinstance(given, (list, tuple)) and all(isinstance(step, Step) for step in given):
         return tuple(given)
     raise refuse("one_step_more", given, "what feedplan.one_step_more.one_step_more returns")
-
-
-def _timed(chunks: Iterator[SetpointChunk], compute: dict[str, float]) -> Iterator[SetpointChunk]:
-    """The same chunks; the time that computing them took is added to `compute` as `sample` [s]."""
-    compute["sample"] = 0.0
-    while True:
-        start = time.perf_counter()
-        chunk = next(chunks, None)
-        compute["sample"] += time.perf_counter() - start
-        if chunk is None:
-            return
-        yield chunk
 
 
 def summary_text(summary: dict[str, Any]) -> str:

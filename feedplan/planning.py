@@ -6,18 +6,18 @@ import hashlib
 import math
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from feedplan.accuracy import estimate, shortfalls
 from feedplan.arguments import callback, not_negative, number, one_of, refuse, whole
-from feedplan.audit import Audit, audit
+from feedplan.audit import CHUNK, Audit, audit
 from feedplan.bound import lower_bound
 from feedplan.constraints.problem import Problem, build_problem, speed_square
 from feedplan.errors import InputError, SolverError
@@ -50,10 +50,10 @@ from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 from feedplan.program.read import Reading, checked_reading, read_program
 from feedplan.program.source import Source
-from feedplan.progress import Listener, Progress, of_stage, part
+from feedplan.progress import Listener, Progress, of_stage, part, tell
 from feedplan.report.account import Account, account
 from feedplan.report.operations import OperationTime, operation_times
-from feedplan.setpoints import INTERPOLATORS, MAX_SETPOINTS, Interpolator, Setpoints, setpoints
+from feedplan.setpoints import INTERPOLATORS, MAX_SETPOINTS, Interpolator, Setpoints, Sink, setpoints
 from feedplan.time_limit import TimeLimit
 from feedplan.today import Today, beside_plan
 from feedplan.trajectory import State, Trajectory
@@ -90,10 +90,6 @@ class Plan:
     today: Today | None = None
     _verdict: list[Audit] = field(default_factory=list, init=False, repr=False, compare=False)
     _account: list[Account] = field(default_factory=list, init=False, repr=False, compare=False)
-    # Number, duration [s] and starts of the runs of the plan's own setpoints, once they have been laid out.
-    _laid_out: list[tuple[int, float, NDArray[np.float64]]] = field(
-        default_factory=list, init=False, repr=False, compare=False
-    )
 
     def __repr__(self) -> str:
         name = self.program.name if self.program else "a path"
@@ -151,7 +147,7 @@ class Plan:
         used.
         """
         callback(progress, "the part done")
-        points = setpoints(
+        return setpoints(
             self.problem,
             self.profile,
             self.machine.period if period is None else period,
@@ -160,9 +156,6 @@ class Plan:
             progress,
             self._events,
         )
-        if points.period == self.machine.period and not self._laid_out:
-            self._laid_out.append((points.count, points.duration, points.run_starts))
-        return points
 
     def knots(self, step: float) -> Knots:
         """States at equal steps between stops, none longer than `step` [s], by the plan's own clock.
@@ -230,18 +223,41 @@ class Plan:
         """
         callback(progress)
         if not self._verdict:
-            share = of_stage(progress, "audit")
-            with _timed(self.compute, "audit"):
-                verdict = audit(
-                    self.problem,
-                    self.profile,
-                    self.machine,
-                    self.program,
-                    self.setpoints(progress=part(share, 0.0, LAID_OUT)),
-                    jerk=limits_jerk(self.method),
-                    progress=part(share, LAID_OUT, 1.0),
-                )
+            self.pass_setpoints((), of_stage(progress, "audit"))
+        return self._verdict[0]
+
+    @property
+    def audited(self) -> bool:
+        """Whether the audit has been made."""
+        return bool(self._verdict)
+
+    def pass_setpoints(self, sinks: Sequence[Sink], progress: Listener | None = None) -> Audit:
+        """Computes the setpoints once, for all `sinks` and, where it has not been made, for the audit.
+
+        They come in chunks of `feedplan.audit.CHUNK`. `progress` is told how far it is. Returns the audit.
+        """
+        points, rest = self.setpoints(progress=part(progress, 0.0, LAID_OUT)), part(progress, LAID_OUT, 1.0)
+        passed = points.teed(sinks)
+        if self._verdict:
+            done = 0
+            for chunk in passed.chunks(CHUNK):
+                done += len(chunk)
+                tell(rest, done / points.count)
+        else:
+            start = time.perf_counter()
+            verdict = audit(
+                self.problem,
+                self.profile,
+                self.machine,
+                self.program,
+                passed,
+                jerk=limits_jerk(self.method),
+                progress=rest,
+            )
+            whole = time.perf_counter() - start
+            self.compute["audit"] = whole - passed.computing - passed.passing
             self._verdict.append(verdict)
+        self.compute["sample"] = passed.computing
         return self._verdict[0]
 
     def summary(self) -> dict[str, Any]:
@@ -250,8 +266,7 @@ class Plan:
         `setpoints` are those of the machine's period. Hashes tell whether a text was changed.
         """
         fit, program, verdict = self.path.fit, self.program, self.audit()
-        [(count, duration, starts)] = self._laid_out
-        of_setpoints = TimedEvents.none() if self._placed is None else self._placed.on(starts)
+        points = self.setpoints()
         machine_file = self.machine.to_toml()
         return {
             "format": FORMAT,
@@ -273,12 +288,12 @@ class Plan:
                 "axes": list(self.problem.axes),
                 "units": list(self.problem.units),
                 "period": self.machine.period,
-                "count": count,
-                "duration": duration,
+                "count": points.count,
+                "duration": points.duration,
             },
             "events": {
                 **self.events.counts(),
-                "sha256_of_setpoints": of_setpoints.sha256(),
+                "sha256_of_setpoints": points.events.sha256(),
                 "sha256_of_knots": self.events.sha256(),
             },
             **self.account.to_json(),

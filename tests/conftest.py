@@ -61,6 +61,14 @@ class SquarePlan:
     def setpoints(self, progress: object = None) -> Any:
         return _Stream(self.chunk)
 
+    audited = True
+
+    def pass_setpoints(self, sinks: Any, progress: object = None) -> Audit:
+        for chunk in self.setpoints().chunks(300):
+            for sink in sinks:
+                sink(chunk)
+        return self.verdict
+
     def knots(self, step: float) -> Knots:
         return Knots(self.problem, self.profile, step)
 
@@ -100,8 +108,12 @@ class _Stream:
         self.events = TimedEvents.none()
 
     def chunks(self, size: int) -> Iterator[SetpointChunk]:
-        for first in range(0, self.count, 300):
-            yield part_of(self._chunk, first, first + 300)
+        for first in range(0, self.count, size):
+            yield part_of(self._chunk, first, first + size)
+
+    def around(self, t: float) -> SetpointChunk:
+        first = int(t / self.period)
+        return part_of(self._chunk, first, first + 2)
 
 
 def part_of(chunk: SetpointChunk, first: int, last: int) -> SetpointChunk:

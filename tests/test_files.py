@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 
-from feedplan import files
+import feedplan
+from feedplan import files, setpoints
+from feedplan._solvers import Sampler
 from feedplan.errors import InputError
 from feedplan.files import write_plan
 from feedplan.outputs import load_setpoints
@@ -38,6 +40,52 @@ def test_the_setpoints_are_the_plans_in_every_format(name: str, square: Any, tmp
         return
     np.testing.assert_array_equal(read.position, square.chunk.position)
     np.testing.assert_array_equal(read.line, square.chunk.line)
+
+
+class _Counted:
+    """The native sampler; counts how many there are and how many setpoints they compute."""
+
+    made: ClassVar[list[_Counted]] = []
+
+    def __init__(self, *arguments: Any) -> None:
+        self._own, self.rows = Sampler(*arguments), 0
+        self.made.append(self)
+
+    def chunk(self, start: int, stop: int, newton: bool) -> Any:
+        self.rows += stop - start
+        return self._own.chunk(start, stop, newton)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._own, name)
+
+
+@pytest.mark.parametrize("interpolator", ["sarfraz", "newton"])
+def test_the_motion_is_laid_out_once_and_each_setpoint_computed_once(
+    interpolator: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(setpoints, "Sampler", _Counted)
+    monkeypatch.setattr(_Counted, "made", [])
+    plan = feedplan.plan("G21 G90 G1 F600 X10\nY5 M8\nM2\n", "mill", interpolator=interpolator)
+    stages: dict[str, list[float]] = {}
+
+    def tell(stage: str, done: float) -> None:
+        stages.setdefault(stage, []).append(done)
+
+    write_plan(plan, tmp_path, ["npz", "csv", "pvt"], step=0.01, progress=tell)
+    assert plan.audit().ok
+    assert plan.summary()["setpoints"]["count"] == plan.setpoints().count
+    plan.at(0.1)
+    (motion,) = _Counted.made
+    assert motion.rows == motion.count
+    assert list(stages) == ["audit", "write"]
+    assert all(done == sorted(done) and done[-1] == 1.0 for done in stages.values())
+    # Written again, they are read once more, and not audited.
+    write_plan(plan, tmp_path)
+    assert _Counted.made == [motion]
+    assert motion.rows == 2 * motion.count
+    # Another period has a layout of its own.
+    assert plan.setpoints(period=0.01).count < motion.count
+    assert len(_Counted.made) == 2
 
 
 def test_all_formats_at_once_and_each_only_once(square: Any, tmp_path: Path) -> None:

@@ -319,7 +319,7 @@ def test_the_cases_are_all_public_functions_with_all_their_arguments(tmp_path: F
             if method.startswith("_") or not hasattr(function, "__doc__") or isinstance(function, type):
                 continue
             parameters = [own for own in inspect.signature(function).parameters if own != "self"]
-            if parameters and (name, method) not in {("Path", "cut")}:
+            if parameters and (name, method) not in {("Path", "cut"), ("Plan", "pass_setpoints")}:
                 assert set(parameters) <= set(found[f"{name}.{method}"][1]), (name, method)
 
 

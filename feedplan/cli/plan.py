@@ -155,7 +155,6 @@ def plan(
             progress=progress,
             **given_only(accuracy=accuracy, time_limit=time_limit, elsewhere=elsewhere),
         )
-        audit = result.audit(progress)
         planned = wanted.make(result)
         steps = _steps(result) if one_step_more else ()
         files: tuple[FilePath, ...] = ()
@@ -169,6 +168,7 @@ def plan(
                 progress=progress,
                 **here,
             )
+        audit = result.audit(progress)
     warnings = list(result.warnings)
     if output:
         earlier = (file for file in files_of_plan(FilePath(output)) if file not in files)

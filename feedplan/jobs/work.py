@@ -91,7 +91,6 @@ def _planned(
         machine = parse(order.machine, "of the order")
     method: Any = order.method
     made = plan(source, machine, method, reading=reading, progress=progress, **order.options)
-    made.audit(progress)
     formats: Any = order.formats
     files = write_plan(made, folder, formats, drawing=order.drawing, progress=progress)
     return _figures(made), sum(file.stat().st_size for file in files)

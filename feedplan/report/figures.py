@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -30,8 +29,7 @@ _MEAN_POINTS = 1_000  # of the mean of each curve, drawn where it oscillates too
 class SetpointFigures:
     """Takes all setpoints chunk by chunk; holds the curves over time and the tool path.
 
-    `count` setpoints will come; `marks` are times [s] whose place on the tool path is wanted; at most
-    `points` of its points are kept.
+    `count` setpoints will come; at most `points` points of the tool path are kept.
     """
 
     def __init__(
@@ -39,13 +37,12 @@ class SetpointFigures:
         problem: Problem,
         motion: ToolMotion,
         count: int,
-        marks: Sequence[float] = (),
         points: int = POINTS,
     ) -> None:
         self._axes = problem.axes
         columns = 1 + 3 * len(self._axes)
         self._curves = Envelope(count, min(_TIME_POINTS_PER_CURVE, _TIME_POINTS // columns))
-        self._path = ToolPath(problem, motion, marks, points)
+        self._path = ToolPath(problem, motion, points)
         self.count = 0
         self.duration = 0.0
 
@@ -58,6 +55,10 @@ class SetpointFigures:
         self._curves.add(chunk.t, curves, chunk.line.astype(np.int64))
         self.count += len(chunk.t)
         self.duration = float(chunk.t[-1])
+
+    def mark(self, chunk: SetpointChunk, time: float) -> None:
+        """See `ToolPath.mark`."""
+        self._path.mark(chunk, time)
 
     def over_time(self) -> dict[str, Any]:
         """Speed with its source lines, and velocity, acceleration and jerk of each axis, over time."""

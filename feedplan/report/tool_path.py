@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -29,14 +28,9 @@ _SPEED_TOLERANCE = 0.01
 
 
 class ToolPath:
-    """Takes all setpoints chunk by chunk.
+    """Takes all setpoints chunk by chunk; at most `points` points are kept."""
 
-    `marks` are times [s] whose place on the tool path is wanted; at most `points` points are kept.
-    """
-
-    def __init__(
-        self, problem: Problem, motion: ToolMotion, marks: Sequence[float] = (), points: int = POINTS
-    ) -> None:
+    def __init__(self, problem: Problem, motion: ToolMotion, points: int = POINTS) -> None:
         self._axes = problem.axes
         self._problem, self._motion = problem, motion
         self._linear = [self._axes.index(name) for name in "XYZ" if name in self._axes]
@@ -53,8 +47,7 @@ class ToolPath:
         self._overview = _TOLERANCE * extent
         self._path = Polyline(points, self._tolerance)
         self._length, self._before = 0.0, (0.0, 0.0)
-        self._marks = np.asarray(marks, dtype=np.float64)
-        self._mark_places = np.full((len(self._marks), 3), np.nan)
+        self._marks: list[list[float]] = []
         self._is_cut = np.isfinite(problem.path.feed)
         self._top = self._cutting = 0.0
 
@@ -70,10 +63,12 @@ class ToolPath:
         self._path.add(np.column_stack((places, self._speed_weight * speed)), table)
         self._top = max(self._top, float(speed.max()))
         self._cutting = max(self._cutting, float(speed[self._is_cut[chunk.piece]].max(initial=0.0)))
-        near = np.searchsorted(chunk.t, self._marks)
-        inside = (self._marks <= chunk.t[-1]) & np.isnan(self._mark_places[:, 0])
-        self._mark_places[inside] = places[np.minimum(near[inside], len(places) - 1)]
         return speed
+
+    def mark(self, chunk: SetpointChunk, time: float) -> None:
+        """Marks the place of the first of some setpoints at a time [s] or after it."""
+        places, _ = self._tool(chunk)
+        self._marks.append(places[min(int(np.searchsorted(chunk.t, time)), len(chunk) - 1)].tolist())
 
     def data(self, activity: Activity, points: int | None = None) -> dict[str, Any]:
         """Points in X, Y, Z with what is known there, and the marks; at most `points` where that is given.
@@ -104,7 +99,7 @@ class ToolPath:
             "limits": list(activity.names),
             "unit": self._motion.unit,
             "cutting_speed": self._cutting or self._top,
-            "marks": np.nan_to_num(self._mark_places).tolist(),
+            "marks": self._marks,
             "tolerance": tolerance,
         }
 

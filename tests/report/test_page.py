@@ -20,10 +20,11 @@ pytestmark = pytest.mark.skipif(bool(missing_pictures()), reason="the drawing co
 
 
 def page(plan: Any, file: Path, source: Path | None = None) -> str:
-    marks = [check.time for check in plan.verdict.broken]
     account = plan.account
-    figures = SetpointFigures(plan.problem, account.motion, len(plan.chunk.t), marks)
+    figures = SetpointFigures(plan.problem, account.motion, len(plan.chunk.t))
     figures.add(plan.chunk)
+    for check in plan.verdict.broken:
+        figures.mark(plan.chunk, check.time)
     write_report(
         file,
         summary=plan.summary(),
