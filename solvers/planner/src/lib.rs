@@ -12,7 +12,7 @@ mod runs;
 use feedplan_geometry::instances;
 
 use bound::Hint;
-use problem::{Fault, Problem};
+use problem::Fault;
 use profile::Profile;
 
 /// Bit k is about axis k; an instance has at most as many axes.
@@ -20,7 +20,7 @@ type AxisBits = u16;
 
 instances! {
     /// What the exact planner says of a problem.
-    pub trait Exact for [3, 6, 9] Problem<'_, M> = {
+    pub trait Exact for [3, 6, 9] problem::Problem<'_, M> = {
         /// The fastest profile.
         fn fastest(&self) -> Result<Profile, Fault> = bang_bang::plan;
         /// A time [s] that no profile of the problem is below.

@@ -244,7 +244,11 @@ impl<const M: usize> Task<'_, M> {
             [a, b] => line(sub(b, a)),
             // The middle of a short line far from the origin is rounded, and would bend it.
             [a, b, c] if *b == lerp(a, c, 0.5) => line(sub(c, a)),
-            [a, b, c] => Kernel::Quadratic(Piece::new(&[*a, *b, *c])),
+            [a, b, c] => match Piece::new(&[*a, *b, *c]) {
+                piece if piece.twist > 0.0 => Kernel::Quadratic(piece),
+                // Straight for all that it is of degree 2: it may stand still inside.
+                _ => Kernel::Curve,
+            },
             _ => Kernel::Curve,
         }
     }
