@@ -1,4 +1,4 @@
-"""Run benchmarks by name: a table on the terminal, a JSON file and where it helps a chart each."""
+"""Runs benchmarks by name: each prints a table and writes a JSON file and, in some cases, a chart."""
 
 from __future__ import annotations
 
@@ -63,13 +63,13 @@ def main() -> None:
         parser.error(f"there is no benchmark {unknown[0]!r}: use {', '.join(BENCHMARKS)}")
 
     if len(arguments.names) != 1 and not arguments.quick:
-        # In processes of their own: what one leaves in memory is not the next one's.
+        # Each benchmark has its own process, so that it begins with an empty memory.
         for name in arguments.names or BENCHMARKS:
             command = [sys.executable, "-m", "benchmarks", name, "--output", str(arguments.output)]
             if status := subprocess.run(command, check=False).returncode:
                 sys.exit(status)
         return
-    # Wide enough for every table where there is no terminal.
+    # Without a terminal the width is enough for every table.
     console = Console() if sys.stdout.isatty() else Console(width=160)
     for name in arguments.names or BENCHMARKS:
         result = BENCHMARKS[name](arguments.quick)

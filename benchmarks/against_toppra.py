@@ -14,7 +14,7 @@ NAME = "against-toppra"
 
 
 def run(quick: bool = False) -> Result:
-    """Refine toppra's mesh until its time is close enough to the exact one; compare computing times."""
+    """Refines toppra's mesh until its time is close enough to the exact one; compares computing times."""
     cases = [(100, seed, 1e-3) for seed in range(1 if quick else 5)]
     if not quick:
         cases += [(1000, 0, 1e-3), (100, 0, 1e-4)]

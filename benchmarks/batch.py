@@ -1,4 +1,4 @@
-"""What a job of a batch costs beside its plan: in one process, in processes, and on a Dask cluster."""
+"""Overhead of a job over its plan: in one process, in several processes, and on a Dask cluster."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ WORKERS = 2
 
 
 def run(quick: bool = False) -> Result:
-    """Many small programs, planned in each of the three ways; the files must be equal."""
+    """Plans many small programs in each of the three ways; the files must be equal."""
     count = 10 if quick else 500
     with tempfile.TemporaryDirectory() as home:
         folder = Path(home)
@@ -46,7 +46,7 @@ def run(quick: bool = False) -> Result:
 
 
 def _programs(folder: Path, count: int) -> list[Path]:
-    """Circles of points, each another one."""
+    """Different circles of points."""
     import math
 
     folder.mkdir()
@@ -61,7 +61,7 @@ def _programs(folder: Path, count: int) -> list[Path]:
 
 
 def _one_process(programs: list[Path], folder: Path) -> float:
-    """The time of all plans, one after the other [s]."""
+    """The time of all plans in sequence [s]."""
     machine = Machine.load("mill")
     start = time.perf_counter()
     for file in programs:
@@ -70,7 +70,7 @@ def _one_process(programs: list[Path], folder: Path) -> float:
 
 
 def _batch(programs: list[Path], folder: Path, *options: str) -> tuple[float, float]:
-    """The time of a batch, and that of all plans in its workers [s]."""
+    """The time of a batch, and the sum of the times of its plans in the workers [s]."""
     command = [sys.executable, "-m", "feedplan", "batch", *map(str, programs), "-o", str(folder), *options]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     told: dict[str, Any] = json.loads((folder / "batch.json").read_text("utf-8"))
@@ -90,7 +90,7 @@ def _row(name: str, workers: int, wall: float, planning: float, equal: int, coun
 
 
 def _equal(one: Path, other: Path) -> int:
-    """How many folders have the same files."""
+    """The number of folders with equal files."""
     return sum(_content(folder) == _content(other / folder.name) for folder in one.iterdir())
 
 
@@ -103,7 +103,7 @@ def _content(folder: Path) -> dict[str, Any]:
 
 @contextmanager
 def _cluster(folder: Path) -> Iterator[str]:
-    """The address of a cluster of two workers with a thread each, processes of their own."""
+    """The address of a cluster of two worker processes with one thread each."""
     from distributed import Client, LocalCluster
 
     with (

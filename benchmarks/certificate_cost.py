@@ -1,4 +1,4 @@
-"""Cost of the lower bound beside that of the plan that it certifies, and the gap that it leaves."""
+"""Cost of the lower bound over that of its plan, and the gap between both."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ NAME = "certificate-cost"
 
 
 def run(quick: bool = False) -> Result:
-    """The native calls on one path of each kind, the best of five, plan and bound in one process."""
+    """Times the native calls on one path of each kind: the best of five, plan and bound in one process."""
     count = 300 if quick else 3000
     rows = [_row(f"quadratics, {pieces}", random_problem(pieces)) for pieces in _sizes(quick)]
     for kind, curve in random_curves(count).items():

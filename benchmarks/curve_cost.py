@@ -20,12 +20,12 @@ from feedplan.machine.machine import Machine
 NAME = "curve-cost"
 SEED = 1
 FEEDS = (100.0, 1e5)
-# Calls of each, in turn.
+# Number of calls of each; the calls alternate.
 ROUNDS = 15
 
 
 def run(quick: bool = False) -> Result:
-    """One random path of each kind, one run from rest to rest; the best of calls in turn."""
+    """Plans one random path of each kind, one run from rest to rest; the best of alternating calls."""
     count = 300 if quick else 3000
     quadratics = random_problem(count)
     cases = [
@@ -69,7 +69,7 @@ def cylindrical(count: int) -> Problem:
 
 
 def random_curves(count: int) -> dict[str, CompositeCurve]:
-    """Splines through one random walk of points that turns slowly."""
+    """Splines through one random walk of points whose direction changes slowly."""
     rng = np.random.default_rng(SEED)
     heading = np.cumsum(rng.normal(0, 0.25, (count + 1, 3)), axis=0) + np.array([3.0, 0.0, 0.0])
     steps = heading / np.linalg.norm(heading, axis=1)[:, None] * rng.uniform(0.5, 2.0, (count + 1, 1))

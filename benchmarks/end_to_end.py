@@ -15,14 +15,14 @@ from benchmarks.named import example
 from benchmarks.results import Cell, Result
 
 NAME = "end-to-end"
-# The example, the machine that it is made for, how many blocks. A tenth for the lettering: its letters are so
-# much longer than the finishing parts' blocks that it takes hours of machining, and millions of setpoints.
+# Example, its machine, number of blocks. The lettering has a tenth: its strokes are so much longer than the
+# blocks of the finishing parts that it takes hours of machining and millions of setpoints.
 PARTS = (("vase", "vase", 500_000), ("head", "mill", 500_000), ("lettering", "router", 50_000))
 QUICK = 100  # times fewer blocks
 
 
 def run(quick: bool = False) -> Result:
-    """Run `feedplan plan` on every part as a user would, in a process of its own."""
+    """Runs the command `feedplan plan` on every part."""
     rows: list[dict[str, Cell]] = []
     with tempfile.TemporaryDirectory() as directory:
         for part, machine, blocks in PARTS:

@@ -1,7 +1,8 @@
 """Sarfraz predictor-corrector against Newton–Raphson: rounds, length error and time on small and large steps.
 
-First the bare inversion: places at equal steps along a curve. Then the whole setpoint stream with all
-derivatives, at constant feed. Lengths are checked by the closed form of a quadratic, which neither uses.
+First the inversion alone: points at equal steps of length along a curve. Then the whole setpoint stream with
+all derivatives, at constant feed. Lengths are checked by the closed form of a quadratic, which neither of
+them uses.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from feedplan.setpoints import INTERPOLATORS, setpoints
 
 NAME = "interpolators"
 FEED = 50.0  # [mm/s]
-# The length error that is asked for, in parts of a step.
+# Allowed length error over the length of a step.
 STEP_ERROR = 1e-6
 MAX_STEPS = 200_000
 
@@ -76,7 +77,7 @@ def exact_lengths(path: Path, piece: NDArray[np.uint32], u: NDArray[np.float64])
 
 
 def inversion_rows(name: str, path: Path, steps: tuple[float, ...]) -> list[dict[str, Cell]]:
-    """Places at equal steps."""
+    """Times the inversion at equal steps of length."""
     length = CurveLength(path.curve)
     starts = length.length(np.arange(len(path)), np.zeros(len(path)))
     rows: list[dict[str, Cell]] = []
@@ -104,7 +105,7 @@ def inversion_rows(name: str, path: Path, steps: tuple[float, ...]) -> list[dict
 
 
 def constant_feed(path: Path) -> SpeedProfile:
-    """One arc a piece at `FEED`: the stream starts and ends in motion."""
+    """A profile of one phase for each piece at `FEED`: the stream starts and ends in motion."""
     count, length = len(path), CurveLength(path.curve)
     joints = np.append(length.length(np.arange(count), np.zeros(count)), length.total)
     edges = np.diff(path.curve.by_piece, axis=1)
@@ -124,7 +125,7 @@ def constant_feed(path: Path) -> SpeedProfile:
 
 
 def unlimited(path: Path) -> Problem:
-    """The path without limits: the stream looks at none."""
+    """A problem without limits, which the stream does not need."""
     count, axes = len(path), len(path.axes)
     return Problem(
         path=path,
@@ -139,7 +140,7 @@ def unlimited(path: Path) -> Problem:
 
 
 def stream_rows(name: str, path: Path, steps: tuple[float, ...]) -> list[dict[str, Cell]]:
-    """The setpoint stream."""
+    """Times the setpoint stream."""
     profile, problem = constant_feed(path), unlimited(path)
     rows: list[dict[str, Cell]] = []
     for step in steps:
@@ -166,7 +167,7 @@ def stream_rows(name: str, path: Path, steps: tuple[float, ...]) -> list[dict[st
 
 
 def run(quick: bool = False) -> Result:
-    """Both interpolators on small and large steps."""
+    """Runs both interpolators on small and large steps."""
     steps = (0.1, 1.0) if quick else (0.001, 0.01, 0.1, 1.0)
     rows: list[dict[str, Cell]] = []
     for name, path in curves().items():

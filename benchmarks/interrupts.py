@@ -1,4 +1,4 @@
-"""Seconds from Ctrl-C to the prompt in each stage of a large plan, and how often its progress is told."""
+"""Time from Ctrl-C to the prompt in each stage of a large plan, and the intervals of its progress [s]."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from benchmarks.named import example
 from benchmarks.results import Cell, Result
 from feedplan import Machine, Plan
 from feedplan.audit import audit
-from feedplan.bound import lower_bound
 from feedplan.constraints.problem import build_problem
-from feedplan.files import write_plan
 from feedplan.geometry.build import build_path
+from feedplan.lower_bound import lower_bound
+from feedplan.plan_folder import write_plan
 from feedplan.planners import bound_of, corners, limits_jerk, planner
 from feedplan.program.read import read_program
 from feedplan.progress import Listener, part
@@ -31,14 +31,14 @@ from feedplan.setpoints import setpoints
 NAME = "interrupts"
 METHODS = ("bang-bang", "s-curve", "jerk-limited")
 PART, MACHINE, BLOCKS, QUICK = "head", "mill", 1_000_000, 1000
-# Seconds between signals in a stage, and where the one comes that ends it, as a part of the stage's time.
+# Time between signals in a stage [s], and time of the signal that ends a stage over the stage's time.
 EVERY, MOMENT = 0.1, 0.5
 
 Stage = Callable[[Listener], Any]
 
 
 def run(quick: bool = False) -> Result:
-    """Each stage once as a whole, with a listener and many signals, and in a child that a signal ends."""
+    """Runs each stage as a whole, with a listener and many signals, and in a child that a signal ends."""
     blocks = BLOCKS // (QUICK if quick else 1)
     rows: list[dict[str, Cell]] = []
     with tempfile.TemporaryDirectory() as directory:
@@ -60,7 +60,7 @@ def run(quick: bool = False) -> Result:
 
 
 def _stages(program: Path, machine: Machine, method: str, output: Path) -> Iterator[tuple[str, Stage]]:
-    """The stages of a plan; what one makes is for the next, so they are done in order."""
+    """The stages of a plan in order; each uses the results of the stages before."""
     made: dict[str, Any] = {}
 
     def keep(name: str, make: Callable[[Listener], Any]) -> tuple[str, Stage]:
@@ -93,7 +93,7 @@ def _stages(program: Path, machine: Machine, method: str, output: Path) -> Itera
 
 
 def _measured(stage: Stage) -> dict[str, Cell]:
-    """A stage as a whole in this process, and its end in a child of it that has all that came before."""
+    """Runs a stage in this process, and in a forked child that a signal ends."""
     child = _child(stage)
     told: list[tuple[float, float]] = [(time.perf_counter(), 0.0)]
     with _signals() as late:
@@ -113,7 +113,8 @@ def _measured(stage: Stage) -> dict[str, Cell]:
 
 @contextmanager
 def _signals() -> Iterator[list[float]]:
-    """How late each of many signals is handled [s]; those that come while one waits count with it."""
+    """The delay until each of many signals is handled [s]; signals that come while one waits are not
+    counted."""
     late: list[float] = []
     start, handled = time.perf_counter(), 0
 
@@ -133,7 +134,7 @@ def _signals() -> Iterator[list[float]]:
 
 
 def _child(stage: Stage) -> tuple[int, int]:
-    """A child that does the stage when a byte comes through the pipe."""
+    """A forked child that runs the stage when a byte comes through the pipe."""
     sys.stdout.flush()
     out, into = os.pipe()
     heard, ready = os.pipe()
@@ -161,7 +162,7 @@ def _child(stage: Stage) -> tuple[int, int]:
 
 
 def _end(child: tuple[int, int], moment: float) -> float:
-    """Seconds from a signal at a moment of the stage to the end of the child; 0 where it was done before."""
+    """Time from a signal during the stage to the end of the child [s]; 0 if the child was done before."""
     process, into = child
     os.write(into, b".")
     os.close(into)

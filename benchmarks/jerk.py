@@ -1,4 +1,4 @@
-"""Methods with limits of jerk on published curves, beside other people's solvers of the same problem."""
+"""Methods with limits of jerk on published curves, compared with other solvers of the same problem."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ CURVES: dict[str, Callable[[], CompositeCurve]] = {
     "trefoil": trefoil,
     "butterfly": butterfly,
 }
-# Other solvers get the grid of a plan of this accuracy; the butterfly's is too great for IPOPT.
+# Other solvers get the grid of a plan of this accuracy; the butterfly's grid is too large for IPOPT.
 ACCURACY = 1e-3
 OTHERS = {"Clarabel": by_clarabel, "one stage (pseudo-jerk)": pseudo_jerk, "IPOPT": by_ipopt}
-# Lengths of the winding path [mm]; the longest takes about a million intervals.
+# Lengths of the winding path [mm]; the longest needs about a million intervals.
 WINDING = (1e3, 1e4, 1e5)
 
 
 def run(quick: bool = False) -> Result:
-    """Every method on every curve, and the other solvers on the grid of a plan."""
+    """Runs every method on every curve, and the other solvers on the grid of a plan."""
     rows: list[dict[str, Cell]] = []
     for name, make in CURVES.items():
         if quick and name != "lemniscate":
@@ -91,7 +91,7 @@ def run(quick: bool = False) -> Result:
 
 
 def winding(length: float) -> CompositeCurve:
-    """A C2 cubic spline about so long [mm], through points on a way whose two angles are sums of sines."""
+    """A C2 cubic spline of about this length [mm], whose direction has two angles that are sums of sines."""
     from scipy.interpolate import CubicSpline
 
     s = np.arange(0.0, length + 0.5)
@@ -105,7 +105,7 @@ def winding(length: float) -> CompositeCurve:
 
 
 def _cost(length: float) -> dict[str, Cell]:
-    """What the planner takes for a long path."""
+    """Time and memory of the planner for a long path."""
     problem = build_problem(Path.from_curve(winding(length), feed=FREE), MACHINE)
     plan, made = planner("jerk-limited"), list[SpeedProfile]()
     cost = taken(lambda: made.append(plan(problem)))

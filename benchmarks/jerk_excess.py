@@ -1,4 +1,5 @@
-"""How far a profile of limited jerk is beyond its limits, from derivatives of the true motion on its arcs."""
+"""Greatest excess of a jerk-limited profile over its limits, from exact derivatives of the motion in its
+phases."""
 
 from __future__ import annotations
 
@@ -13,9 +14,9 @@ from feedplan.profile import ArcKind, SpeedProfile
 
 Array = NDArray[np.float64]
 NODES, WEIGHTS = leggauss(20)
-# How far inside the ends of an arc limits are looked at, as a part of it.
+# Distance of the outermost samples from the ends of a phase, over its length in u.
 INSET = 1e-7
-# Lengths are added up over parts that shrink towards both ends, where the way may turn sharply.
+# Lengths are integrated over parts that shrink towards both ends, where the path may turn sharply.
 DECADES = 10.0 ** np.arange(-6, -1)
 
 
@@ -23,8 +24,8 @@ DECADES = 10.0 ** np.arange(-6, -1)
 class Excess:
     """Greatest relative excess of axis velocity, acceleration and jerk, of the feed and of the chord speed.
 
-    `gaps`: how far neighbouring arcs are apart in speed, acceleration and u, and what the columns say from
-    the true length and time, as parts of the greatest speed and acceleration, of all length and all time.
+    `gaps`: differences of successive phases in speed, acceleration and u, and of the columns from the true
+    length and time, over the greatest speed and acceleration, the whole length and the whole time.
     """
 
     velocity: float
@@ -40,8 +41,9 @@ class Excess:
 
 
 def jerk_excess(problem: Problem, profile: SpeedProfile, samples: int = 20) -> Excess:
-    """The excess at `samples` places of each arc from end to end."""
-    # Both ends, and the places; those next to the ends a little inside, where every curve has a direction.
+    """The excess at `samples` points of each phase and at its ends."""
+    # Both ends, and the samples; the outermost samples are inside the phase, where every curve has a
+    # direction.
     t = np.concatenate([[0.0], np.linspace(INSET, 1 - INSET, samples), [1.0]])
     fine = np.unique(np.concatenate([t, DECADES, 1 - DECADES]))
     along = profile.u0[:, None] + (profile.u1 - profile.u0)[:, None] * fine
@@ -85,10 +87,10 @@ def jerk_excess(problem: Problem, profile: SpeedProfile, samples: int = 20) -> E
 
 
 def _by_length(problem: Problem, piece: NDArray[np.integer], u: Array) -> tuple[Array, Array, Array]:
-    """Derivatives of the axes by the length of the tool's way (places, axes) up to the third."""
+    """Derivatives of the axes by the length of the tool's path (samples, axes) up to the third."""
     _, c1, c2, c3 = problem.derivatives(piece, u, 3)
     if problem.way_speed is None:
-        # With T the direction and P = I - T Tᵀ: nothing across a straight way at any parameter speed.
+        # With T the direction and P = I - T Tᵀ: on a straight path the result is 0 at any parameter speed.
         d = (c1**2).sum(axis=1, keepdims=True)
         tangent = c1 / np.sqrt(d)
         along = (tangent * c2).sum(axis=1, keepdims=True)
@@ -104,14 +106,15 @@ def _by_length(problem: Problem, piece: NDArray[np.integer], u: Array) -> tuple[
 
 
 def _motion(problem: Problem, profile: SpeedProfile, s: Array) -> tuple[Array, Array, Array]:
-    """Speed, acceleration and jerk along the path at lengths (arcs, samples) from the arcs' starts."""
+    """Speed, acceleration and jerk along the path at lengths (phases, samples) from the starts of the
+    phases."""
     d0 = _speed_sq(problem, profile.piece, profile.u0, 0)[0]
     d1 = _speed_sq(problem, profile.piece, profile.u1, 0)[0]
     with np.errstate(invalid="ignore"):
         v0, v1 = (np.nan_to_num(np.sqrt(d * p)) for d, p in ((d0, profile.p0), (d1, profile.p1)))
     h = s[:, -1:]
     x = s / h
-    # A cubic of v².
+    # v² is a cubic of the length.
     w0, w1, s0, s1 = (
         column[:, None] for column in (v0**2, v1**2, 2 * profile.a0 * h[:, 0], 2 * profile.a1 * h[:, 0])
     )
@@ -121,7 +124,7 @@ def _motion(problem: Problem, profile: SpeedProfile, s: Array) -> tuple[Array, A
     bend = ((6 - 12 * x) * (w1 - w0) + (6 * x - 4) * s0 + (6 * x - 2) * s1) / h**2
     v = np.sqrt(np.maximum(w, 0.0))
     a, j = slope / 2, v * bend / 2
-    # Constant jerk: the time at each length, by halving, from the slower end, where rounding is felt most.
+    # Constant jerk: bisection for the time at each length, from the slower end, where rounding matters most.
     rows = profile.kind == ArcKind.PATH_JERK
     back = (v1 < v0)[rows, None]
     way = np.where(back, h[rows] - s[rows], s[rows])
@@ -139,11 +142,11 @@ def _motion(problem: Problem, profile: SpeedProfile, s: Array) -> tuple[Array, A
 
 
 def _misfits(profile: SpeedProfile, v: Array, s: Array) -> tuple[Array, Array]:
-    """How far length and time (arcs,) are from what the columns of the arcs say."""
+    """Differences of length and time (phases,) from the columns of the profile."""
     t, length = profile.duration, s[:, -1]
     constant = profile.kind == ArcKind.PATH_JERK
     way = t * (v[:, 0] + t * (profile.a0 / 2 + t * profile.value / 6))
-    # Parts as for the lengths: next to rest 1/v is all but singular.
+    # Parts as for the lengths, because 1/v is nearly singular next to rest.
     ends = np.concatenate([[0.0], DECADES, [0.5], 1 - DECADES[::-1], [1.0]])
     half = np.diff(ends)[:, None] / 2
     nodes, weights = (ends[:-1, None] + half * (NODES + 1)).ravel(), (half * WEIGHTS).ravel()
@@ -157,7 +160,7 @@ def _misfits(profile: SpeedProfile, v: Array, s: Array) -> tuple[Array, Array]:
 
 
 def lengths(problem: Problem, piece: NDArray[np.uint32], start: Array, u: Array) -> Array:
-    """Lengths of the tool's way (arcs, samples) from the arcs' starts, sample by sample."""
+    """Lengths of the tool's path (phases, samples) from the starts of the phases."""
     low = np.concatenate([start[:, None], u[:, :-1]], axis=1)
     half = (u - low) / 2
     places = low[..., None] + half[..., None] * (NODES + 1)
@@ -167,14 +170,14 @@ def lengths(problem: Problem, piece: NDArray[np.uint32], start: Array, u: Array)
 
 
 def _tool_share(problem: Problem, piece: NDArray[np.integer], u: Array) -> Array:
-    """The speed that the feed is about over that along the path, at places."""
+    """The speed that the feed limits over the speed along the path, at the samples."""
     if problem.way_speed is None:
         return np.ones(len(u))
     return np.sqrt(speed_square(problem, piece, u) / _speed_sq(problem, piece, u, 0)[0])
 
 
 def _speed_sq(problem: Problem, piece: NDArray[np.integer], u: Array, order: int) -> list[Array]:
-    """|C'|² of the path at places and its derivatives by u."""
+    """|C'|² of the path at the samples, and its derivatives by u."""
     tip = problem.way_speed
     if tip is None:
         _, c1, c2, c3 = problem.path.curve.evaluate(piece, u, 3)

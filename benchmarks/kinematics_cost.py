@@ -20,7 +20,7 @@ SEED = 1
 
 
 def run(quick: bool = False) -> Result:
-    """Cubic pieces some mm long, one machine of each type, the best of three on one thread."""
+    """Times cubic pieces some mm long on one machine of each type: the best of three on one thread."""
     count = 500 if quick else 4000
     machines: dict[str, Kinematics] = {}
     for name in bundled_machines():

@@ -13,15 +13,15 @@ from feedplan.planners import limits_jerk, methods, options_of
 
 NAME = "methods"
 EXACT = "bang-bang"
-# Pieces beyond which a solver on a mesh takes minutes: what it does on fewer says the same.
+# Most pieces for slow methods, which take minutes for more pieces.
 MOST_PIECES = {"casadi": 100, "clarabel": 1000, "toppra": 100, "ruckig": 100}
 QUICK = ("lemniscate", "spline-10")
-# What solvers on a mesh are asked for, and when they give up [s].
+# Relative accuracy and time limit [s] of solvers on meshes.
 ACCURACY, TIME_LIMIT = 1e-3, 10.0
 
 
 def run(quick: bool = False) -> Result:
-    """Plan every problem by every method, the exact one first."""
+    """Plans every problem by every method, the exact one first."""
     rows: list[dict[str, Cell]] = []
     for name, make in NAMED.items():
         if quick and name not in QUICK:
@@ -66,7 +66,7 @@ def _has_mesh(method: str) -> bool:
 def _row(
     problem: str, pieces: int, method: str, said: str, numbers: tuple[float, ...] = ()
 ) -> dict[str, Cell]:
-    """One row; a method without a plan has its reason in place of numbers."""
+    """One row; a method without a plan has the reason instead of numbers."""
     names = ("time [s]", "over optimum [%]", "gap [%]", "computing [ms]", "ratio")
     shown = numbers or ("-",) * len(names)
     return {

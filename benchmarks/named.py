@@ -29,14 +29,14 @@ CURVES = Machine(name="curves", axes=tuple(Axis(name, 250.0, 3000.0) for name in
 FAN = Machine(name="fan", axes=tuple(Axis(name, 100.0, 1000.0) for name in "XYZ"))
 # A feed that no axis of these machines reaches.
 FREE = 1e9
-# The example, its machine, and how many blocks of it.
+# Example, its machine, number of blocks.
 PROGRAMS = {"vase": ("vase", 5000), "lettering": ("router", 2000), "head": ("mill", 5000)}
 
 Named = tuple[Program | Path, Machine]
 
 
 def butterfly_nurbs() -> tuple[Array, Array, int, Array]:
-    """Control points, knots as mostly printed (to these the known times belong), degree, weights."""
+    """Control points, knots (as most publications print them, with the known times), degree, weights."""
     data = _published("butterfly")
     knots = np.round(np.array(data["knots"], dtype=float), 4)
     weights = np.array(data["weights"], dtype=float)
@@ -124,7 +124,7 @@ def example(name: str) -> ModuleType:
 
 
 def part(name: str, blocks: int, model: str | None = None) -> tuple[Program, Machine]:
-    """A program of the examples of about that many blocks, and its machine, or another one."""
+    """A program of the examples of about this many blocks, and its machine or the given one."""
     machine = Machine.load(model or PROGRAMS[name][0])
     with tempfile.TemporaryDirectory() as directory:
         file = FilePath(directory, f"{name}.ngc")

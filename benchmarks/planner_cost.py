@@ -1,4 +1,4 @@
-"""Cost of the exact planner per piece, from ten pieces to a million: it should not grow."""
+"""Cost of the exact planner for each piece, from ten pieces to a million; it should be constant."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ NAME = "planner-cost"
 
 
 def run(quick: bool = False) -> Result:
-    """Plan one random spline of each size, the best of several times, on one thread (one run)."""
+    """Plans one random spline of each size on one thread (one run); the best of several times."""
     rows: list[dict[str, Cell]] = []
     for pieces in (10, 100, 1000, 10_000) if quick else (10, 100, 1000, 10_000, 100_000, 1_000_000):
         problem = random_problem(pieces)

@@ -1,4 +1,4 @@
-"""The problems that the benchmarks plan: random paths like those that come out of CAM and a fit."""
+"""Random problems of the benchmarks, whose paths are like fitted programs of CAM systems."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FEED = 100.0  # [mm/s]
 
 
 def random_spline(pieces: int, seed: int = 0) -> Path:
-    """A C1 quadratic B-spline of that many pieces in X, Y, Z, a pure function of `seed`.
+    """A C1 quadratic B-spline of this many pieces in X, Y, Z, a pure function of `seed`.
 
     Control polygon edges are 0.3 to 3 mm long (log-uniform); directions wander by about 0.15 rad from edge to
     edge, and one edge in twelve turns sharply, up to a reversal. Knot spans are the mean lengths of the edges

@@ -1,4 +1,4 @@
-"""What a benchmark returns, how it is shown and how it is stored."""
+"""The result of a benchmark: a table that is shown, stored as JSON and drawn as a chart."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ Cell = float | int | str
 
 @dataclass(frozen=True)
 class Chart:
-    """Columns of a table to draw against each other on logarithmic scales: `x`, `y`, one colour for each
-    value of `series`, and the `label` of a point."""
+    """The columns of a chart with logarithmic scales: `x`, `y`, `series` (one colour for each value) and the
+    `label` of a point."""
 
     x: str
     y: str
@@ -42,14 +42,14 @@ class Result:
 
 
 def show(result: Result, console: Console) -> None:
-    """Print the table."""
+    """Prints the table."""
     table = Table(
         title=result.title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False
     )
     columns = list(dict.fromkeys(column for row in result.rows for column in row))
     for column in columns:
         words = isinstance(result.rows[0].get(column), str)
-        # Sentences give way to numbers.
+        # Columns of sentences are wrapped, columns of numbers are not.
         table.add_column(as_markup(column), justify="left" if words else "right", no_wrap=not words)
     for row in result.rows:
         table.add_row(*(_written(row[column]) if column in row else "" for column in columns))
@@ -60,7 +60,7 @@ def show(result: Result, console: Console) -> None:
 
 
 def store(result: Result, directory: Path) -> Path:
-    """Write the table and the computer it was made on as JSON; the path of the file."""
+    """Writes the table and the computer that it was made on as JSON; returns the path of the file."""
     directory.mkdir(parents=True, exist_ok=True)
     packages = {name: metadata.version(name) for name in ("feedplan", "numpy")}
     content = {
@@ -79,7 +79,7 @@ def store(result: Result, directory: Path) -> Path:
 
 
 def draw(result: Result, directory: Path) -> Path | None:
-    """Write the chart as a picture (SVG); its path, None where the table has none."""
+    """Writes the chart as a picture (SVG); returns its path, None without a chart."""
     if result.chart is None:
         return None
     path = directory / f"{result.name}.svg"
@@ -87,13 +87,13 @@ def draw(result: Result, directory: Path) -> Path | None:
     return path
 
 
-# Width and height of the picture, the room around its field, and colours told apart without red or green.
+# Width and height of the picture, the margins of its field, and colours that differ without red or green.
 _SIZE, _ROOM = (960, 600), (80, 220, 50, 60)  # left, right, above, below
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#332288", "#882255", "#666666")
 
 
 def _scatter(result: Result, chart: Chart) -> str:
-    """Points on logarithmic scales with lines at powers of ten; their labels show where the pointer is."""
+    """Points on logarithmic scales with lines at powers of ten; the pointer shows the label of a point."""
     rows = [row for row in result.rows if _is_positive(row[chart.x]) and _is_positive(row[chart.y])]
     left, right, above, below = _ROOM
     spans = []
@@ -155,7 +155,7 @@ def _written(cell: Cell) -> str:
 
 
 def _processor() -> str:
-    """The processor's name where the system tells it, else its architecture."""
+    """The processor's name if the system tells it, else its architecture."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:

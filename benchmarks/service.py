@@ -1,4 +1,4 @@
-"""How long requests take while a service plans, and what a job costs beside its plan."""
+"""Time of requests while a service plans, and overhead of a job over its plan."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from feedplan.client.transport import form
 
 NAME = "service"
 SMALL = "G21 G90 G64 P0.01\nF1200\nG1 X10 Y5\nX20 Y0\nM2\n"
-# Seconds between requests, as of a page that looks after a job.
+# Time between requests [s], as of a page that follows a job.
 PAUSE = 0.01
 
 
 def run(quick: bool = False) -> Result:
-    """Requests of each kind to a service at rest and to one with as many jobs as cores."""
+    """Times requests of each kind to an idle service, and to one with as many jobs as cores."""
     blocks, count = (2000, 20) if quick else (100_000, 120)
     with tempfile.TemporaryDirectory() as store, _server(store) as url:
         client = Client(url)
@@ -56,7 +56,7 @@ def run(quick: bool = False) -> Result:
 
 @contextmanager
 def _server(store: str) -> Iterator[str]:
-    """The address of a service of its own."""
+    """The address of a new service."""
     command = [sys.executable, "-m", "feedplan", "serve", "--port", "0", "--store", store]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
@@ -73,14 +73,14 @@ def _long(blocks: int, number: int) -> tuple[bytes, str]:
 
 
 class _Line:
-    """A line to the service that is kept open, as browsers do."""
+    """A connection to the service that is kept open, as browsers do."""
 
     def __init__(self, url: str) -> None:
         parts = urlsplit(url)
         self._connection = http.client.HTTPConnection(str(parts.hostname), parts.port, timeout=60)
 
     def __call__(self, method: str, address: str, body: bytes | None = None, kind: str = "") -> None:
-        """A request, and its whole answer."""
+        """Sends a request and reads its whole answer."""
         self._connection.request(method, address, body, {"Content-Type": kind} if kind else {})
         answer = self._connection.getresponse()
         answer.read()
@@ -121,8 +121,8 @@ def _latencies(url: str, job: str, count: int, when: str, quick: bool) -> list[d
 
 
 def _overhead(client: Client, count: int) -> dict[str, Cell]:
-    """What a small job takes more than its plan with its files takes here."""
-    from feedplan.files import write_plan
+    """Time of a small job less the time of its plan and files in this process [s]."""
+    from feedplan.plan_folder import write_plan
 
     more = []
     for number in range(count):

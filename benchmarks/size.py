@@ -1,4 +1,4 @@
-"""The size of arcs: which radius the smooth paths of methods that limit jerk have on programmed arcs."""
+"""The radius that smooth paths, of methods that limit jerk, have on programmed arcs."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from feedplan.program.gcode import read_gcode
 NAME = "size"
 RADII = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 TOLERANCES = (0.001, 0.01, 0.1)
-# Places of each piece of the path.
+# Samples of each piece of the path.
 PLACES = 200
-# The middle part of an arc counts: elsewhere its ends are near.
+# The part of an arc in its middle that is measured; the rest is near its ends.
 MIDDLE = 0.5
 
 Array = NDArray[np.float64]
@@ -70,7 +70,7 @@ def chords(turn: float) -> Callable[[float], str]:
     return text
 
 
-# Each with the turn of its arc around the origin from (0, −r) [rad].
+# Each shape with the angle of its arc around the origin from (0, −r) [rad].
 SHAPES: dict[str, tuple[Callable[[float], str], float]] = {
     "circle": (full_circle, 2 * math.pi),
     "hole": (hole, 2 * math.pi),
@@ -85,7 +85,7 @@ SHAPES: dict[str, tuple[Callable[[float], str], float]] = {
 
 
 def run(quick: bool = False) -> Result:
-    """All shapes, radii and tolerances on the machine `mill`."""
+    """Measures all shapes, radii and tolerances on the machine `mill`."""
     radii, tolerances = ((2.0,), (0.1,)) if quick else (RADII, TOLERANCES)
     rows = [_row(shape, r, tol) for shape in SHAPES for tol in tolerances for r in radii]
     return Result(
@@ -137,13 +137,13 @@ def radii(shape: str, r: float, tolerance: float, corners: Corners) -> Array:
     near = np.abs(distance - r) <= 2 * tolerance
     place, distance = place[near], distance[near]
     angle = np.arctan2(place[:, 0], -place[:, 1])
-    # Around the middle of the arc, which of one to three turns is opposite to its ends.
+    # Samples near the middle of the arc; arcs of one to three turns have it opposite to their ends.
     off = np.abs(np.angle(np.exp(1j * (angle - turn / 2))))
     return distance[off <= MIDDLE * min(turn, 2 * math.pi) / 2]
 
 
 def _places(path: Path) -> Array:
-    """Places of the path in X and Y but for rapids."""
+    """Points of the path in X and Y without rapids."""
     piece = np.repeat(np.flatnonzero(np.isfinite(path.feed)), PLACES)
     part = np.tile(np.linspace(0.0, 1.0, PLACES), len(piece) // PLACES)
     places: Array = path.curve.evaluate(piece, part * path.width[piece], 0)[0]

@@ -1,10 +1,13 @@
-"""The problem of least time with limits of jerk on the grid of a profile, by two solvers that are not ours.
+"""The least time with limits of jerk on the grid of a profile, by two other solvers.
 
-w = v² is a C¹ cubic in the length between the nodes, ramps w ∝ s^(4/3) lead from and to rest; limits hold
-at four places of each interval. IPOPT takes the problem as it is. Clarabel gets quadratic programs, one after
-the other: the row |L w| ≤ J w^(−1/2) of jerk by the tangent of its right side, which is convex, so that every
-plan is valid; and the plan in one stage that controllers and earlier works make ("pseudo-jerk"), which bounds
-w in the row of jerk by the optimum without limits of jerk.
+w = v² is a C¹ cubic of the length between two stations; ramps w ∝ s^(4/3) lead from rest and to rest; limits
+hold at four points of each interval.
+
+- IPOPT solves this problem directly.
+- Clarabel solves a sequence of quadratic programs. The jerk constraint |L w| ≤ J w^(−1/2) has a convex right
+  side, which is replaced by its tangent, so that every plan is valid.
+- "pseudo-jerk" is the plan in one stage of controllers and earlier works: in the jerk constraint the optimum
+  without limits of jerk replaces w.
 """
 
 from __future__ import annotations
@@ -24,20 +27,20 @@ from feedplan.constraints.problem import Problem
 from feedplan.profile import ArcKind, SpeedProfile
 
 Array = NDArray[np.float64]
-# Matrices of the unknowns and their upper bounds.
+# Matrices for the unknowns, each with the upper limits of its rows.
 Rows = list[tuple[Any, Array]]
 PLACES = np.array([0.0, 1 / 3, 2 / 3, 1.0])
 NODES, WEIGHTS = leggauss(4)
-# The first plan is so much of the one given.
+# The initial w over that of the given plan.
 START = 0.5
-# Quadratic programs, at most, and the gain at which they end.
+# Most quadratic programs, and the relative gain at which they end.
 PROGRAMS, GAIN = 60, 1e-8
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Intervals of length `h` (n,), derivatives by length `q` (3, 4 n, axes) at their places, limits, the
-    lengths of the ramps, and a plan `x` (2 n + 2,): w and w' at the nodes."""
+    """Intervals of length `h` (n,), derivatives by length `q` (3, 4 n, axes) at their four points, limits,
+    the lengths of the ramps, and a plan `x` (2 n + 2,): w and w' at the stations."""
 
     h: Array
     q: Array
@@ -49,13 +52,13 @@ class Grid:
 
     @cached_property
     def reference(self) -> Array:
-        """What unknowns are measured in (2 n + 2,)."""
+        """The scale of each unknown (2 n + 2,)."""
         w = self.x[::2]
         step = np.maximum(np.append(self.h, 0.0), np.append(0.0, self.h))
         return np.stack([w, w / step], axis=1).ravel()
 
     def rows(self, t: Array, order: int) -> sp.csr_matrix:
-        """w, w' or w'' at places t of every interval, from the unknowns over their references."""
+        """Matrix of w, w' or w'' at points t of every interval, for the scaled unknowns."""
         c = np.stack([t**0, t, t**2, t**3], axis=1)
         hermite = np.array([[1, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]], dtype=float)
         if order == 1:
@@ -86,7 +89,7 @@ class Grid:
 
     @cached_property
     def ends(self) -> Any:
-        """Rows that vanish where the ramps go on smoothly."""
+        """Rows that are 0 if the ramps join smoothly."""
         last = len(self.x) - 2
         rows = sp.lil_matrix((2, len(self.x)))
         rows[0, 0], rows[0, 1] = -4 / (3 * self.ramps[0]), 1
@@ -104,13 +107,13 @@ class Grid:
         return sp.vstack([rows, ends]).tocsr(), np.append(weights, 3 * np.array(self.ramps))
 
     def time(self, z: Array) -> float:
-        """The time of unknowns over their references."""
+        """The time of scaled unknowns."""
         rows, weights = self.pace
         return float(np.sum(weights / np.sqrt(rows @ z)))
 
 
 def grid_of(problem: Problem, profile: SpeedProfile) -> Grid:
-    """The grid of a profile from rest to rest whose ramps are one arc each."""
+    """The grid of a profile from rest to rest whose ramps are one phase each."""
     cubic = np.flatnonzero(profile.kind == ArcKind.SPEED_CUBIC)
     assert len(cubic) == len(profile) - 2
     piece, u0, u1 = profile.piece, profile.u0, profile.u1
@@ -118,7 +121,7 @@ def grid_of(problem: Problem, profile: SpeedProfile) -> Grid:
     arc = lengths(problem, piece, u0, u)[:, -1]
     places = np.clip(u[cubic].ravel(), 1e-12, None)
     pieces = np.repeat(piece[cubic], 4)
-    # Each piece's own derivatives at its ends.
+    # At both ends of an interval the derivatives are those of its own piece.
     _, c1, c2, c3 = problem.curve.evaluate(pieces, places, 3)
     d0 = (c1**2).sum(axis=1)
     d1, d2 = 2 * (c1 * c2).sum(axis=1), 2 * (c2**2 + c1 * c3).sum(axis=1)
@@ -178,12 +181,12 @@ def by_ipopt(grid: Grid) -> float:
 
 
 def by_clarabel(grid: Grid) -> float:
-    """A time [s] on a grid that no tangent program improves."""
+    """The time on a grid after which no tangent program gains more [s]."""
     jerks, w = grid.motion[2], grid.rows(PLACES, 0)
 
     def tangents(z: Array) -> Rows:
         at = w @ z
-        # w^(−1/2) is above its tangent at w.
+        # w^(−1/2) is convex, so it lies above its tangent.
         tangent = sp.diags(0.5 * at**-1.5) @ w
         return [(sign * row + tangent, 1.5 / np.sqrt(at)) for row in jerks for sign in (1, -1)]
 
@@ -199,7 +202,8 @@ def pseudo_jerk(grid: Grid) -> float:
 
 
 def _descent(grid: Grid, jerk_rows: Callable[[Array], Rows]) -> Array:
-    """The unknowns over their references that no quadratic program improves, with rows by the last ones."""
+    """The scaled unknowns after which no quadratic program gains more; the rows are made from the unknowns of
+    the program before."""
     import clarabel
 
     speed, accelerations, _ = grid.motion

@@ -1,4 +1,4 @@
-"""What jerk-limited has without time: its first plan beside the best and s-curve, and what follows a plan."""
+"""The first plan of jerk-limited (time limit 0) against the best and s-curve, and the time after a plan."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from benchmarks.results import Cell, Result
 from benchmarks.timing import best_of
 from feedplan import plan
 from feedplan.curves.composite import CompositeCurve
-from feedplan.files import write_plan
 from feedplan.geometry.path import Path
+from feedplan.plan_folder import write_plan
 from feedplan.planners import planner
 from feedplan.time_limit import FOLLOWING
 
@@ -22,7 +22,7 @@ FEEDS, LENGTH = (1.0, 10.0, 100.0), 100.0
 
 
 def run(quick: bool = False) -> Result:
-    """The first plan, the best and s-curve on curves with and without a feed."""
+    """Makes the first plan, the best and s-curve on curves with and without a feed."""
     rows = [_row(name, make(), FREE) for name, make in CURVES.items()]
     if not quick:
         rows += [_row(f"winding at {feed:g} mm/s", winding(LENGTH), feed) for feed in FEEDS]

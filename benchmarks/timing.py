@@ -1,4 +1,4 @@
-"""Times of a call: by the clock on the wall, and by the processor."""
+"""Wall time and processor time of calls."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Taken:
-    """`wall` time [s] and `processor` time, of all threads [s].
+    """`wall` time [s] and `processor` time of all threads [s].
 
-    On a computer that does other work as well only the second says what a call costs.
+    On a computer with other work only the processor time is the cost of a call.
     """
 
     wall: float
@@ -19,7 +19,7 @@ class Taken:
 
 
 def taken(call: Callable[[], object]) -> Taken:
-    """The time of one call."""
+    """Times one call."""
     wall, processor = time.perf_counter(), time.process_time()
     call()
     return Taken(time.perf_counter() - wall, time.process_time() - processor)
@@ -31,7 +31,7 @@ def best_of(call: Callable[[], object], times: int) -> Taken:
 
 
 def best_of_each(calls: Sequence[Callable[[], object]], times: int) -> list[Taken]:
-    """The same of several calls in turn: what the computer does meanwhile befalls all of them."""
+    """The same for several alternating calls, so that other work of the computer affects all of them."""
     rounds = [[taken(call) for call in calls] for _ in range(times)]
     return [
         Taken(min(t.wall for t in measured), min(t.processor for t in measured))

@@ -1,4 +1,4 @@
-"""toppra on the same problem: the coarsest mesh close enough to a known time, and its processor time."""
+"""toppra on the same problem: the coarsest mesh whose time is close enough to a known one, and its cost."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from feedplan.constraints.problem import Problem
 from feedplan.planners import toppra
 
 VERSION = metadata.version("toppra")
-# The part of the accuracy that the error of a mesh near the coarsest uses.
+# Error over accuracy from which a mesh counts as the coarsest one.
 USED = 0.8
 
 
 @dataclass(frozen=True)
 class Solution:
-    """What toppra found: `time` along the path [s], `cells` a piece, `processor` time [s]."""
+    """toppra's result: `time` along the path [s], intervals (`cells`) of each piece, `processor` time [s]."""
 
     time: float
     cells: int
@@ -25,17 +25,18 @@ class Solution:
 
 
 def solve(problem: Problem, cells: int) -> Solution:
-    """Plan by collocation on `cells` cells in every piece; `processor` covers the whole planner."""
+    """Plans by collocation on `cells` intervals in every piece; `processor` is the time of the whole
+    planner."""
     begin = time.process_time()
     profile = toppra.plan(problem, cells=cells, scheme="collocation")
     return Solution(profile.time, cells, time.process_time() - begin)
 
 
 def solve_to(problem: Problem, exact: float, accuracy: float) -> tuple[Solution, float]:
-    """The coarsest mesh, to a fourth, whose time is within `accuracy` (relative) of `exact`, and its error.
+    """The coarsest mesh (to a fourth) whose time is within `accuracy` (relative) of `exact`, and its error.
 
-    The error falls about as 1/cells: each try is sized by the one before, until one is accurate enough; where
-    its error is much less than allowed the mesh is coarsened again between it and the last that was not.
+    The error is about proportional to 1/cells, which gives the size of the next mesh until one is accurate
+    enough. If its error is much less than allowed, a mesh between it and the last inaccurate one is tried.
     """
     too_coarse, cells = 0, 8
     solution = solve(problem, cells)

@@ -1,4 +1,4 @@
-"""What the optimum on fitted splines gains over transitions at corners: Zhang et al. 2010, section 5."""
+"""Gain of the optimum on fitted splines over transitions at corners, as in Zhang et al. 2010, section 5."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from benchmarks.results import Cell, Result
 from feedplan import Program, plan
 
 NAME = "zhang-comparison"
-# The parts of the paper's figure 8 as our examples have them, and their blocks.
+# Our examples of the parts in the paper's figure 8, with their number of blocks.
 PARTS = {"vase": 20_000, "lettering": 10_000, "head": 20_000}
 QUICK = 20  # times fewer blocks
 MACHINE = "vase"  # the accelerations of section 4.3
-# The paper states neither the feed nor the period. None: as the examples are programmed.
+# The paper states neither feed nor period. None is the programmed feed of the examples.
 FEEDS = (None, 200.0)  # [mm/s]
 PERIODS = (0.001, 0.002)  # [s]
 METHODS = {"constant velocity": "constant-velocity-transition", "arcs": "arc-transition"}
 
 
 def run(quick: bool = False) -> Result:
-    """Plan every part by the three methods at each feed and period, and audit what is planned."""
+    """Plans every part by the three methods at each feed and period, and audits the plans."""
     rows: list[dict[str, Cell]] = []
     for name, blocks in PARTS.items():
         program, _ = part(name, blocks // (QUICK if quick else 1), MACHINE)

@@ -12,12 +12,12 @@ copyright = author
 version = release = feedplan.__version__
 
 extensions = ["myst_parser", "sphinx.ext.autodoc"]
-# The pages are Markdown as README.md is, parts of which they show.
+# The pages are Markdown, as README.md is, so that they can include parts of it.
 source_suffix = {".md": "markdown"}
 myst_heading_anchors = 3
 myst_enable_extensions = ["deflist"]
 
-# Code without a language is shown without colours.
+# Code blocks without a language have no colours.
 highlight_language = "none"
 
 html_theme = "furo"
@@ -36,7 +36,7 @@ add_module_names = False
 
 
 def as_written(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
-    """Shows a docstring as it is written: `|` is a bar, and indented lines after a colon are code."""
+    """Makes reStructuredText of plain docstrings: escapes `|`; indented lines after a colon become code."""
     for place, line in enumerate(lines):
         words = line.split("`")
         words[::2] = [word.replace("|", r"\|") for word in words[::2]]

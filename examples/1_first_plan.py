@@ -1,8 +1,8 @@
 """A first plan: a rosette of arcs, engraved in an aluminium plate by a small milling machine.
 
 Twenty-four petals meet in sharp corners around a full circle. The planner may round the corners within the
-tolerance. The script prints for each tolerance the time, the proven lower bound of it, the share of the time
-at the programmed feed, and the verdict of the independent audit. It writes the last plan as a folder: plan,
+tolerance. For each tolerance the script prints the time, its proven lower bound, the share of the time at the
+programmed feed, and the verdict of the independent audit. It writes the last plan to a folder: plan,
 setpoints and report.
 
     python examples/1_first_plan.py --output out/rosette
@@ -26,7 +26,7 @@ def rosette(petals: int = 24, radius: float = 30.0) -> str:
         (radius * math.cos(2.0 * math.pi * k / petals), radius * math.sin(2.0 * math.pi * k / petals))
         for k in range(petals + 1)
     ]
-    # A sixth of a circle from corner to corner: its radius is its chord.
+    # A petal is a sixth of a circle, whose radius is equal to its chord.
     petal = 2.0 * radius * math.sin(math.pi / petals)
     lines = ["(Rosette)", "G21 G90 G17 G94", "S12000 M3", "G0 Z5", f"G0 X{radius:.4f} Y0", "G1 Z-0.5 F600"]
     lines.append(f"F{FEED:g}")

@@ -1,9 +1,9 @@
-"""One's own machine: a delta printer, whose kinematics feedplan does not bring.
+"""A machine of your own: a delta printer, whose kinematics is not in feedplan.
 
-Three carriages on vertical rails hold the nozzle by rods of one length. The script states where a carriage
-stands for a place of the nozzle, registers this as a kinematics, writes a machine file that names it and
-plans three circles. All limits are those of the carriages. The script prints the time of each circle, the
-greatest speed of the nozzle, and how much of its limits each carriage uses.
+Three carriages on vertical rails hold the nozzle by rods of equal length. The script defines the positions of
+the carriages for a position of the nozzle, registers this kinematics, writes a machine file with its name,
+and plans three circles. All limits are those of the carriages. The script prints the time of each circle, the
+greatest speed of the nozzle, and the use of the limits by each carriage.
 
     python examples/2_own_machine.py --output out/delta
 """
@@ -40,7 +40,7 @@ max_acceleration = 4000.0      # [mm/s^2]
 
 
 class Delta(Kinematics):
-    """Carriages T1, T2, T3 for the nozzle at X, Y, Z: each stands √(rod² − distance²) above the nozzle."""
+    """Carriages T1, T2, T3 for the nozzle at X, Y, Z: each is √(rod² − distance²) above the nozzle."""
 
     tip_names, joint_names = ("X", "Y", "Z"), ("T1", "T2", "T3")
 

@@ -1,10 +1,10 @@
-"""Heuristic against optimal: what a finishing pass takes by the planners of controllers and by the exact one.
+"""Heuristic against optimal: a finishing pass by the planners of controllers and by the exact planner.
 
 Two passes over the vase of `vase.py`, a thousand points with creases, are planned on the bundled machine
-`vase` by every method that needs no solver of others. The script prints for each method its time, the seconds
-that it takes beyond the fastest plan that keeps all limits, the limit of an axis that it uses most, and its
-computing time. A use above 1 breaks the limit: such a plan is faster than the machine allows, and its
-time cannot be compared. Methods follow different paths within the tolerance.
+`vase` by every method that needs no other package. For each method the script prints its time, the time over
+that of the fastest plan that keeps all limits, the limit of an axis that it uses most, and its computing
+time. A use above 1 breaks the limit: such a plan is faster than the machine allows, and its time cannot be
+compared. Methods follow different paths within the tolerance.
 
     python examples/3_heuristic_against_optimal.py --output out/heuristic
 """

@@ -1,10 +1,10 @@
 """toppra's quick start, solved exactly: seven joints through five random waypoints.
 
-The spline, the limits and the seed are those of toppra's documentation. toppra plans on a grid, so its time
+The spline, the limits and the seed are those of toppra's documentation. toppra plans on a grid, and its time
 falls towards the optimum as the grid gets finer; feedplan plans on the spline itself and proves by a lower
-bound that no plan is faster. The script prints the time of the motion by both, the computing time, and the
+bound that no plan is faster. For both the script prints the time of the motion, the computing time, and the
 greatest use of a limit: feedplan's as its audit measures it, toppra's on a fine grid of its own trajectory.
-toppra has packages for Linux on x86-64 alone; elsewhere the script prints feedplan's line.
+toppra has packages for Linux on x86-64 only; elsewhere the script prints feedplan's line alone.
 
     python examples/4_toppra_quick_start.py --output out/toppra
 """
@@ -26,7 +26,7 @@ JOINTS = [f"j{k}" for k in range(1, 8)]
 
 
 def quick_start() -> Problem:
-    """Parameters (5,) and places (5, 7) [rad] of the waypoints, and the greatest velocities [rad/s] and
+    """Parameters (5,) and positions (5, 7) [rad] of the waypoints, and the greatest velocities [rad/s] and
     accelerations [rad/s²] of the joints (7,)."""
     random = np.random.RandomState(9)
     points = random.randn(5, 7)
@@ -34,7 +34,7 @@ def quick_start() -> Problem:
 
 
 def best_of_three(call: Callable[[], Any]) -> tuple[Any, float]:
-    """What a call returns, and the least computing time of three [s]."""
+    """The result of a call, and the least computing time of three calls [s]."""
     seconds = []
     for _ in range(3):
         begin = time.perf_counter()

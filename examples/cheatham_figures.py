@@ -1,12 +1,12 @@
-"""Remake the experiment of Cheatham 2007, chapter 6: an automotive panel on the Tarus styling mill.
+"""Repeat the experiment of Cheatham 2007, chapter 6: an automotive panel on the Tarus styling mill.
 
 Table 6.1 of the thesis has the mill's limits; the feed is 80 mm/s and the chord tolerance 0.0254 mm. The
-panel is our own (`panel.py`): the thesis's geometry is not published. Its pass marks are: error of the
-interpolated step at most 1e-6 of it, speed never above the allowable one, chord error far below the
-tolerance, and every axis within its limits, of which the thesis exceeded the jerk by up to 40 %.
+panel is our own (`panel.py`), because the thesis's geometry is not published. The criteria of the thesis are:
+error of the interpolated step at most 1e-6 of the step, speed never above the allowed one, chord error far
+below the tolerance, and every axis within its limits (the thesis exceeded the limit of jerk by up to 40 %).
 
-The figures show the speed by each method (Figures 6.4 to 6.7 of the thesis), and of the method that is
-closest to the optimum the chord error (6.19) and velocity, acceleration and jerk of the axes (6.23 to 6.31),
+The figures show the speed by each method (Figures 6.4 to 6.7 of the thesis) and, for the method that is
+closest to the optimum, the chord error (6.19) and velocity, acceleration and jerk of the axes (6.23 to 6.31),
 each over its limit.
 
     python examples/cheatham_figures.py --output out/cheatham
@@ -35,16 +35,16 @@ import feedplan
 Array = NDArray[np.float64]
 
 SHADE, AMBER, BLUE, RED = "#9aa3ad", "#e8a33d", "#1f6fd0", "#d1495b"
-# Each with its colour; the last is closest to the optimum.
+# Methods with their colours; the last method is closest to the optimum.
 METHODS = {"s-curve": SHADE, "ruckig": AMBER, "jerk-limited": BLUE}
-CLOSE = 4.0  # of the closer look [s], as in the thesis
+CLOSE = 4.0  # duration of the detailed figure, as in the thesis [s]
 
 
 @dataclass(frozen=True)
 class Motion:
-    """The setpoints: `t` (n,) [s]; `use` of each axis's velocity, acceleration and jerk (3, n, axes), the
-    `speed` along the path and what feed, velocities and chord error `allow` there (n,) [mm/s], the `chord`
-    error (n,) [mm], and the greatest error of the interpolated step in parts of it."""
+    """The setpoints: `t` (n,) [s]; `use` of each axis's velocity, acceleration and jerk (3, n, axes); the
+    `speed` along the path, and the speed that feed, velocities and chord error `allow` (n,) [mm/s]; the
+    `chord` error (n,) [mm]; the greatest error of the interpolated step over the step."""
 
     t: Array
     use: Array
@@ -56,7 +56,7 @@ class Motion:
 
 
 def motion_of(plan: feedplan.Plan) -> Motion:
-    """What the axes do at the servo's period."""
+    """The motion at the setpoints of a plan."""
     stream, problem = plan.setpoints(), plan.problem
     setpoints = stream.all()
     limits = np.array(
@@ -102,7 +102,8 @@ def save(drawing: Figure, path: Path) -> Path:
 
 
 def draw_speed(motions: dict[str, Motion], path: Path) -> Path:
-    """Speed by each method and what is allowed: the whole program above, its first seconds below."""
+    """Draws the speed by each method and the allowed speed: the whole program above, its first seconds
+    below."""
     drawing, (whole, close) = plt.subplots(2, 1, figsize=(9.0, 6.0), height_ratios=(1.0, 1.4))
     *_, best = motions.values()
     for axes in (whole, close):
@@ -123,7 +124,7 @@ def draw_speed(motions: dict[str, Motion], path: Path) -> Path:
 
 
 def draw_use(motion: Motion, order: int, title: str, path: Path) -> Path:
-    """A derivative of every axis over its limit."""
+    """Draws a derivative of every axis over its limit."""
     drawing, rows = plt.subplots(len(motion.axes), 1, figsize=(9.0, 6.0), sharex=True)
 
     def draw(axes: Axes, use: Array, name: str) -> None:

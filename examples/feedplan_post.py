@@ -1,13 +1,12 @@
 """A post-processor for FreeCAD's CAM workbench: G-code for LinuxCNC whose feeds feedplan has planned.
 
-FreeCAD finds it as `feedplan` where a copy lies in its folder of macros, which is where it looks for
-post-processors by itself. What stands in the job's field of arguments goes to `feedplan plan`:
-
+FreeCAD offers it as `feedplan` if a copy is in its folder of macros, where it looks for post-processors. The
+text in the job's field of arguments goes to `feedplan plan`:
     --machine mine.toml --feed-step 20
 
-`--feedplan FILE` tells where the command feedplan is, if it is not on the path; `--unplanned` writes the
-program as it is posted. Lengths are in mm, feeds in mm/min, with six digits behind the point: fewer bend arcs
-and smooth surfaces.
+`--feedplan FILE` is the path of the command feedplan, if it is not on PATH; `--unplanned` writes the program
+as it is posted. Lengths are in mm, feeds in mm/min, with six digits after the point: fewer digits would bend
+arcs and smooth surfaces.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ TOOLTIP_ARGS = "--feedplan FILE, --unplanned, and all options of: feedplan plan"
 BEGIN = "G21 G90 G17 G94 G40 G49 G80 G54"
 END = "M5\nM9\nM2"
 DIGITS = 6
-# The order of words, of which each command has some; lengths and turns are numbers, these are whole.
+# The order of words in a block, and the words whose values are whole numbers.
 WORDS = "XYZABCIJKRQPLHDTSF"
 WHOLE = "LHDTS"
 RAPIDS = ("G0", "G00")
@@ -36,14 +35,14 @@ COOLANT = {"Flood": "M8", "Mist": "M7"}
 def export(objects, filename: str, arguments: str = "") -> str:
     """Writes the operations and tool changes in `objects`, in order, to a file; returns the text.
 
-    FreeCAD calls it. Raises RuntimeError with feedplan's sentence where it refuses the program, and writes
-    nothing then.
+    FreeCAD calls it. If feedplan refuses the program, it raises RuntimeError with feedplan's sentence and
+    writes nothing.
     """
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("--feedplan", default="feedplan")
     parser.add_argument("--unplanned", action="store_true")
     own, options = parser.parse_known_args(shlex.split(arguments))
-    # What FreeCAD's dialog gives to all post-processors.
+    # FreeCAD's dialog gives this option to all post-processors.
     options = [option for option in options if option != "--no-show-editor"]
     text = program(objects)
     if not own.unplanned:
@@ -54,7 +53,7 @@ def export(objects, filename: str, arguments: str = "") -> str:
 
 
 def program(objects) -> str:
-    """The G-code of the objects with a path; those that are switched off are left out."""
+    """The G-code of the active objects that have a path."""
     lines = [BEGIN]
     for item in objects:
         base = getattr(item, "Base", None)
@@ -71,7 +70,7 @@ def block(command) -> str:
     if command.Name.startswith("("):
         return comment(command.Name[1:-1])
     words = [command.Name]
-    # K of arcs in the plane XY is none of their words.
+    # Arcs in the plane XY have no word K.
     given = {word: value for word, value in command.Parameters.items() if (word, value) != ("K", 0.0)}
     for word in WORDS:
         if word not in given or (word == "F" and (command.Name in RAPIDS or not given[word])):
@@ -91,7 +90,7 @@ def comment(text: str) -> str:
 
 def planned(text: str, command: list[str], options: list[str]) -> str:
     """The program with planned feeds. Raises RuntimeError with feedplan's sentence."""
-    # Those of FreeCAD's Python are not for feedplan's.
+    # The variables of FreeCAD's Python are not valid for feedplan's.
     environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
     with tempfile.TemporaryDirectory() as folder:
         source, result = Path(folder, "program.ngc"), Path(folder, "planned.ngc")

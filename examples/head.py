@@ -1,9 +1,9 @@
 """Write the finishing of a sculptured head as a part program: raster passes in three axes.
 
-The surface is a height field made of smooth bumps: skull, brow, eyes, nose, lips, chin, hair. A ball-end
-mill touches it along lines x = const; its tip is the contact point moved out by the radius along the normal
-and back down by the radius, so x moves too where the surface leans. As CAM systems do, points are spaced by
-the chord they may cut off, so that blocks are short where the surface curves and long where it does not.
+The surface is a height field made of smooth bumps: skull, brow, eyes, nose, lips, chin, hair. A ball-end mill
+touches it along lines x = const. Its tip is the contact point, moved out along the normal by the radius and
+down by the radius, so that x varies where the surface slopes. As in CAM systems, the chord error of blocks
+decides the distance of points: blocks are short where the surface curves.
 
     python examples/head.py --blocks 5000 --output out/head.ngc
 """
@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-WIDTH, HEIGHT = 84.0, 116.0  # of the field, along x and y [mm]
+WIDTH, HEIGHT = 84.0, 116.0  # size of the field along x and y [mm]
 TOOL_RADIUS = 1.5  # [mm]
-BLOCK_LENGTHS = (0.05, 1.0)  # least and greatest [mm]
-SAMPLES = 512  # of the surface along a pass; the points are chosen on them
+BLOCK_LENGTHS = (0.05, 1.0)  # least and greatest length of a block [mm]
+SAMPLES = 512  # samples of the surface along a pass, from which the points are chosen
 
 # Bumps on the skull: centre (x, y), half widths along both, height [mm]; mirrored where x is not 0.
 BUMPS = (
@@ -84,7 +84,8 @@ def pass_points(x: float, chord: float) -> Array:
     turn = np.linalg.norm(np.diff(tangents, axis=0), axis=1)
     curvature = np.concatenate(([0.0], turn / (0.5 * (lengths[1:] + lengths[:-1]))))
 
-    # A chord of length l cuts off κ l²/8: by the greatest κ near it, for a block spans several samples.
+    # The error of a chord of length l is κ l²/8, with the greatest κ nearby, because a block spans several
+    # samples.
     padded = np.pad(curvature, 2, mode="edge")
     curvature = np.max([padded[i : i + len(curvature)] for i in range(5)], axis=0)
     spacing = np.clip(np.sqrt(8.0 * chord / np.maximum(curvature, 1e-9)), *BLOCK_LENGTHS)
@@ -101,10 +102,10 @@ def program(
     tolerance: float = 0.01,
     decimals: int = 4,
 ) -> str:
-    """The part program with about `blocks` blocks: as many passes over the whole head as they make.
+    """The part program with about `blocks` blocks, which decide the number of passes over the head.
 
-    `chord` that a block may cut off [mm], `feed` [mm/min], `tolerance` of the path control [mm], `decimals`
-    of the coordinates.
+    `chord` error of a block [mm], `feed` [mm/min], `tolerance` of the path control [mm], `decimals` of the
+    coordinates.
     """
     sample = np.linspace(-0.5 * WIDTH, 0.5 * WIDTH, 41)
     per_pass = float(np.mean([len(pass_points(x, chord)) for x in sample]))

@@ -1,8 +1,8 @@
 """Write a five-axis program: the blades of a small impeller, finished by the flank of the tool.
 
-Each blade is ruled: straight lines from the hub outwards, along which the tool lies. A pass goes along one
-side of a blade, around its edge and back along the other side, level by level down to the hub; then the next
-blade.
+Each blade is a ruled surface: straight lines from the hub outwards, to which the tool is parallel. A pass
+goes along one side of a blade, around its edge and back along the other side. Passes go level by level down
+to the hub; then follows the next blade.
 
 The same motion is written in one of three forms:
 
@@ -30,15 +30,16 @@ Array = NDArray[np.float64]
 
 FORMS = ("tip", "vector", "joints")
 BLADES = 5
-HEIGHT = 18.0  # of a blade along its rulings [mm]
+HEIGHT = 18.0  # height of a blade along its rulings [mm]
 THICKNESS = 1.6  # [mm]
 TOOL_RADIUS = 4.0  # [mm]
-CLEARANCE = 40.0  # over the hub between blades, along the tool [mm]
-EDGE_POINTS = 13  # of the half circle around the edge of a blade
+CLEARANCE = 40.0  # distance from the hub between blades, along the tool [mm]
+EDGE_POINTS = 13  # points of the half circle around the edge of a blade
 
 
 def ruling(u: Array, blade: int) -> tuple[Array, Array]:
-    """A blade's middle on the hub (n, 3) [mm] and unit directions of its rulings (n, 3), u in 0 to 1."""
+    """Points of a blade's middle line on the hub (n, 3) [mm] and unit directions of its rulings (n, 3), u in
+    0 to 1."""
     angle = 2.0 * np.pi * blade / BLADES + 0.9 * u**2
     radius, height = 18.0 + 32.0 * u, 46.0 - 30.0 * u**2
     hub = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), height])
@@ -68,7 +69,7 @@ def blade_pass(blade: int, level: float, points: int) -> tuple[Array, Array]:
 
 
 def passes(blocks: int, levels: int) -> list[tuple[Array, Array]]:
-    """All passes, about `blocks` points together, each with its way in and out along the tool."""
+    """All passes, with about `blocks` points in all; each approaches and retracts along the tool."""
     points = max(4, round((blocks / (BLADES * levels) - EDGE_POINTS) / 2.0))
     found = []
     for blade in range(BLADES):
@@ -87,7 +88,7 @@ def passes(blocks: int, levels: int) -> list[tuple[Array, Array]]:
 def rotary_words(machine: Machine, directions: Array) -> Array:
     """The angles (n, 2) [deg] of the two rotary axes that point the tool, by shortest turns.
 
-    Of both poses and of whole turns at the start, those are taken that stay within the axes' travel.
+    Of the two poses, and of whole turns at the start, those within the axes' travel are taken.
     """
     chain = five_axis(machine)
     axes = machine.axes[3:]
@@ -114,10 +115,9 @@ def five_axis(machine: Machine) -> RotaryChain:
 def program(
     machine: Machine, form: str = "tip", blocks: int = 2000, *, levels: int = 3, feed: float = 3000.0
 ) -> str:
-    """The part program with about `blocks` blocks in one of the `FORMS`, in so many passes a blade; `feed` in
-    mm/min of the tip.
+    """The part program with about `blocks` blocks in one of the `FORMS`; `feed` of the tip [mm/min].
 
-    Joint positions have the feed in each block as inverse time (G93), so that the tip keeps its feed.
+    In the form `joints` each block has its feed as inverse time (G93), so that the tip keeps its feed.
     """
     chain = five_axis(machine)
     names = machine.axis_names

@@ -1,8 +1,8 @@
 """Write an engraved text as a part program: sharp corners, arcs, plunges, retracts and rapids.
 
-Lettering is where a planner must stop, or nearly: strokes with corners, short arcs between short lines, and
-a retract, a rapid and a plunge between strokes. The font is a single-stroke one made of lines and arcs. The
-text is repeated, line by line in a square field, until there are enough blocks.
+In lettering a planner must often stop, or nearly stop: strokes have corners and short arcs between short
+lines, and between strokes are a retract, a rapid and a plunge. The single-stroke font consists of lines and
+arcs. The text is repeated, line by line in a square field, until there are enough blocks.
 
     python examples/lettering.py --text "FEEDPLAN" --blocks 1000 --output out/lettering.ngc
 """
@@ -60,9 +60,9 @@ FONT = {
     "/": "0,0 4,6",
     " ": "",
 }
-ADVANCE = 5.6  # from one letter to the next, on the grid
-LINE_ADVANCE = 9.5  # from one line of text to the next, on the grid
-SAFE_HEIGHT = 2.0  # of the rapids over the plate [mm]
+ADVANCE = 5.6  # distance from one letter to the next, on the grid
+LINE_ADVANCE = 9.5  # distance from one line of text to the next, on the grid
+SAFE_HEIGHT = 2.0  # height of the rapids over the plate [mm]
 
 Point = tuple[float, float]
 Segment = tuple[float, float, float]  # end point and bulge
@@ -114,9 +114,9 @@ def program(
     feed: float = 2400.0,
     tolerance: float = 0.05,
 ) -> str:
-    """The part program with about `blocks` blocks: the text again and again, at least once.
+    """The part program with about `blocks` blocks: the text, repeated.
 
-    `height` of the letters and `depth` of the grooves [mm], `feed` [mm/min], a third of it for plunges,
+    `height` of the letters and `depth` of the grooves [mm]; `feed` [mm/min], of which plunges have a third;
     `tolerance` at the corners (G64 P) [mm].
     """
     text = text.upper()
@@ -137,7 +137,7 @@ def program(
         f"G0 Z{SAFE_HEIGHT:.4f}",
     ]
     per_letter = sum(len(list(letter(c, 0.0, 0.0, 1.0, 1.0, 1.0))) for c in text) / len(text)
-    # As many letters a line as make the field about square.
+    # The number of letters in a line makes the field about square.
     columns = math.ceil(math.sqrt(blocks / per_letter * LINE_ADVANCE / ADVANCE))
     count = 0
     while len(lines) < blocks or count < len(text):

@@ -1,11 +1,11 @@
 """Write a path file: finishing passes over an automotive panel in clay, each a NURBS curve.
 
-The panel is a door skin: crowned both ways, with a character line that fades out, the flare of a wheel arch
-and the recess of a handle. A ball tool follows it back and forth; the tool's tip is interpolated by one cubic
-spline a pass, as CAM systems give it. Passes are joined beside the panel by loops, in one of two ways:
+The panel is a door skin: curved in both directions, with a character line that fades out, the flare of a
+wheel arch and the recess of a handle. A ball tool follows it back and forth; one cubic spline for each pass
+interpolates the tool's tip, as CAM systems do. Loops beside the panel join the passes, in one of two ways:
 
-    tangent     cubic loops: the tangent goes on, the curvature jumps at both ends
-    curvature   quintic loops: the curvature goes on as well
+    tangent     cubic loops: the tangent is continuous, the curvature jumps at both ends
+    curvature   quintic loops: the curvature is continuous too
 
     python examples/panel.py --passes 40 --output out/panel.json
     feedplan plan out/panel.json --machine tarus --method jerk-limited
@@ -25,14 +25,14 @@ from scipy.interpolate import BSpline, make_interp_spline
 Array = NDArray[np.float64]
 
 JOINTS = ("tangent", "curvature")
-LENGTH, WIDTH = 420.0, 260.0  # of the panel, x and y [mm]
+LENGTH, WIDTH = 420.0, 260.0  # size of the panel along x and y [mm]
 STEP, MIDDLE = (
     3.0,
     95.0,
-)  # between passes, unless they are too many, and of few passes: over the handle, x [mm]
-TOOL_RADIUS = 6.0  # of the ball [mm]
-SPACING = 4.0  # of the interpolated points along a pass [mm]
-REACH = 12.0  # of the loops' handles [mm]
+)  # distance of passes, unless there are too many; x of few passes, over the handle [mm]
+TOOL_RADIUS = 6.0  # radius of the ball [mm]
+SPACING = 4.0  # distance of the interpolated points along a pass [mm]
+REACH = 12.0  # length of the loops' handles [mm]
 FEED = 80.0  # [mm/s]
 
 
@@ -97,7 +97,7 @@ def loop(before: BSpline, after: BSpline, joint: str) -> Array:
 
 
 def at_end(spline: BSpline, u: float) -> tuple[Array, Array, Array]:
-    """Place, unit tangent and curvature vector [1/mm] at u."""
+    """Position, unit tangent and curvature vector [1/mm] at u."""
     place, first, second = (spline(u, nu=order) for order in range(3))
     speed = np.linalg.norm(first)
     tangent = first / speed
@@ -105,7 +105,7 @@ def at_end(spline: BSpline, u: float) -> tuple[Array, Array, Array]:
 
 
 def panel(passes: int = 8, joint: str = "tangent", feed: float = FEED) -> dict[str, Any]:
-    """The path file's table: so many passes, STEP apart or as many as the panel takes."""
+    """The data of the path file with this number of passes, STEP apart or closer if they do not fit."""
     step = min(STEP, LENGTH / passes)
     width = step * (passes - 1)
     first = min(max(MIDDLE - 0.5 * width, 0.0), LENGTH - width)

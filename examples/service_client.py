@@ -1,9 +1,11 @@
-"""Has a feedplan service plan a program: one file of the standard library, for scripts of CAM systems.
+"""Lets a feedplan service plan a program: one file that needs only the standard library, for scripts of CAM
+systems.
 
     python service_client.py part.ngc --machine mill --server http://127.0.0.1:8000 -o part
 
-Sends the program, shows how far it is, and loads plan.json, report.html and setpoints.csv to a folder. A
-token is read from the file that FEEDPLAN_TOKEN_FILE names. It needs no feedplan on this computer: copy it.
+It sends the program, shows the progress, and loads plan.json, report.html and setpoints.csv to a folder. The
+token is in the file that FEEDPLAN_TOKEN_FILE names. Copy this file: feedplan itself is not needed on this
+computer.
 """
 
 from __future__ import annotations
@@ -45,7 +47,7 @@ class Service:
             return json.load(answer)
 
     def follow(self, job: dict[str, Any]) -> dict[str, Any]:
-        """Shows how far a job is until it has ended; returns it."""
+        """Shows the progress of a job until its end; returns the job."""
         with self.open(job["links"]["events"]) as events:
             for line in events:
                 name, _, value = line.decode().rstrip("\n").partition(": ")

@@ -1,10 +1,10 @@
 """Write a vase relief as a part program: cutting planes in which only y and z move.
 
-The part is the kind of work that Zhang et al. 2010 (section 4.3) plan for: a vase lying along y, finished
-by a ball-end mill in planes x = const, 486 points a pass, back and forth with a small step-over in x. The
-surface is written as the tool tip follows it: a ball rounds every convex edge and leaves a crease wherever
-it touches two features at once, so the path is the upper envelope of smooth features. The creases are what
-a fit has to break its splines at; beads, reeds and waves between them are what it has to follow.
+The part is like the one that Zhang et al. 2010 (section 4.3) plan for: a vase lying along y, finished by a
+ball-end mill in planes x = const, 486 points a pass, back and forth with a small step-over in x. The points
+are those of the tool tip: a ball rounds every convex edge and leaves a crease where it touches two features
+at once, so that the path is the upper envelope of smooth features. A fit must break its splines at the
+creases, and follow the beads, reeds and waves between them.
 
     python examples/vase.py --blocks 2000 --output out/vase.ngc
 """
@@ -20,21 +20,21 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 POINTS_PER_PASS = 486
-LENGTH = 120.0  # of the vase, along y [mm]
-HALF_WIDTH = 32.0  # just outside the widest place [mm]
+LENGTH = 120.0  # length of the vase along y [mm]
+HALF_WIDTH = 32.0  # slightly more than half the greatest width [mm]
 TOOL_RADIUS = 1.5  # [mm]
-SAMPLES = 4096  # of the surface along a pass; the points are chosen on them
+SAMPLES = 4096  # samples of the surface along a pass, from which the points are chosen
 
-# Rows of beads, as the tip of the ball sees them: first and last centre along y, how many, how far each
-# stands out of the body, half its width (ball included) [mm].
+# Rows of beads on the path of the tip: first and last centre along y, number, height over the body, half
+# width including the ball [mm].
 BEADS = (
     (2.0, 7.0, 2, 0.8, 3.6),
     (20.0, 29.0, 4, 0.8, 2.4),
     (91.0, 103.0, 5, 0.8, 2.4),
     (110.5, 117.0, 2, 1.0, 4.2),
 )
-REED_PITCH = 3.5  # of the twisted reeds on the belly, along y [mm]
-REEDS = 28  # around the vase
+REED_PITCH = 3.5  # pitch of the twisted reeds on the belly along y [mm]
+REEDS = 28  # number of reeds around the vase
 REED_DEPTH = 0.6  # [mm]
 
 
@@ -43,8 +43,8 @@ def height(x: float, y: Array) -> Array:
     body = _body(y)
     angle = np.arcsin(np.clip(x / (body + TOOL_RADIUS), -1.0, 1.0))
 
-    # Reeds stand out of the belly and meet in creases; the waves on the collars are smooth. Both fade
-    # towards the silhouette, where the walls are steep.
+    # Reeds on the belly meet in creases; the waves on the collars are smooth. Both fade towards the
+    # silhouette, where the walls are steep.
     turns = y / REED_PITCH + REEDS * angle / (2.0 * np.pi)
     reeds = 1.0 - 4.0 * (turns - np.round(turns)) ** 2
     waves = np.cos(2.0 * np.pi * y / 5.0) * np.cos(12.0 * angle)
@@ -66,8 +66,8 @@ def height(x: float, y: Array) -> Array:
 def pass_points(x: float, points: int = POINTS_PER_PASS) -> Array:
     """The points (y, z) of the pass in the plane `x` [mm], foot to lip, shape (points, 2).
 
-    They lie closer where the path curves, as points spaced by a chord tolerance do, but not at the creases:
-    those fall between points, as they do in a real program.
+    They are closer where the path curves, as with a chord tolerance, but not at the creases: these fall
+    between points, as in a real program.
     """
     y = np.linspace(0.0, LENGTH, SAMPLES)
     z = height(x, y)
@@ -128,7 +128,7 @@ def program(
 
 
 def _body(y: Array) -> Array:
-    """Radius of the plain vase at `y` [mm]: belly, foot and lip."""
+    """Radius of the vase without beads and reeds at `y` [mm]: belly, foot and lip."""
     belly = 18.0 * np.exp(-(((y - 61.0) / 24.0) ** 2))
     foot = 6.0 * np.exp(-((y / 10.0) ** 2))
     lip = 7.0 * np.exp(-(((y - LENGTH) / 10.0) ** 2))

@@ -1,10 +1,10 @@
-"""Remake Figures 4 to 7 of Zhang et al. 2010 on one pass of the vase: fit, limit curve, speed, accelerations.
+"""Repeat Figures 4 to 7 of Zhang et al. 2010 on one pass of the vase: fit, limit curve, speed, accelerations.
 
 The pass has 486 points in a plane x = const; the machine has A_y = 3000 and A_z = 1000 mm/s². The figures
-show the fitted curve with its polynomial pieces, the velocity limit curve with the planned speed and the
-interpolation points of a 1 ms servo, and the accelerations of the y and z axes: one of the two is at its
-limit wherever the feed is not, which is what "bang-bang" says. All are drawn over y, which only grows along
-the pass; each figure shows the whole pass above and a stretch of it below.
+show the fitted curve with its polynomial pieces, the limit curve with the planned speed and the setpoints of
+a 1 ms servo, and the accelerations of the y and z axes. Wherever the speed is below the feed one of the
+accelerations is at its limit ("bang-bang"). All are drawn over y, which grows along the pass; each figure
+shows the whole pass above and a detail of it below.
 
     python examples/zhang_figures.py --output out/zhang
 """
@@ -31,10 +31,10 @@ import feedplan
 
 Array = NDArray[np.float64]
 
-PLANE = 0.0  # of the pass, x [mm]
+PLANE = 0.0  # x of the pass [mm]
 FEED = 6000.0  # [mm/min]
-STRETCH = (57.0, 69.0)  # of the closer look, y [mm]
-FINE = 2e-5  # period at which curves are drawn [s]
+DETAIL = (57.0, 69.0)  # y of the detail [mm]
+FINE = 2e-5  # period of the points of drawn curves [s]
 
 INK, SHADE, BLUE, RED = "#1b1f24", "#9aa3ad", "#1f6fd0", "#d1495b"
 
@@ -64,9 +64,9 @@ class Pieces:
         return self.start[:, None] + u * (first + 0.5 * u * second), first + u * second
 
     def speed_limit(self, samples: int, acceleration: Array) -> Array:
-        """The velocity limit curve at the same places [mm/s]: beyond it no acceleration keeps both limits.
+        """The limit curve at the same points [mm/s]: above it no acceleration keeps both limits.
 
-        Equations 7 and 8 of the paper with the signs that bind: of the squared parameter speed,
+        By equations 7 and 8 of the paper the squared parameter speed is at most
         (A_y |z'| + A_z |y'|) / |y'' z' - z'' y'|.
         """
         derivative = self.at(samples)[1]
@@ -81,7 +81,7 @@ class Pieces:
 
 @dataclass(frozen=True)
 class Motion:
-    """What the axes do: `y` [mm], `speed` [mm/s], `acceleration` (n, 2) in y and z [mm/s²]."""
+    """The motion: `y` [mm], `speed` [mm/s], `acceleration` (n, 2) in y and z [mm/s²]."""
 
     y: Array
     speed: Array
@@ -115,7 +115,7 @@ def axis_limits(machine: feedplan.Machine) -> Array:
 
 
 def figure(path: Path, title: str, unit: str, draw: Callable[[Axes, bool], None]) -> None:
-    """The whole pass above, the stretch below; `draw(axes, close)` fills both."""
+    """A figure with the whole pass above and the detail below; `draw(axes, close)` fills both."""
     drawing, (whole, close) = plt.subplots(2, 1, figsize=(9.0, 6.4), height_ratios=(1.0, 1.5))
     for axes in (whole, close):
         draw(axes, axes is close)
@@ -124,9 +124,9 @@ def figure(path: Path, title: str, unit: str, draw: Callable[[Axes, bool], None]
         axes.grid(True, color="#e6e9ec", linewidth=0.6)
         axes.set_axisbelow(True)
     whole.set_title(title, loc="left", fontsize=11, fontweight="bold")
-    whole.axvspan(*STRETCH, color="#fff3c4", zorder=0)
+    whole.axvspan(*DETAIL, color="#fff3c4", zorder=0)
     whole.set_xlim(0.0, LENGTH)
-    close.set_xlim(*STRETCH)
+    close.set_xlim(*DETAIL)
     close.set_xlabel("y [mm]")
     drawing.tight_layout()
     drawing.savefig(path, dpi=130)
@@ -134,7 +134,7 @@ def figure(path: Path, title: str, unit: str, draw: Callable[[Axes, bool], None]
 
 
 def draw_all(plan: feedplan.Plan, begin: int, output: Path) -> list[Path]:
-    """The four figures of the pass that starts at piece `begin`."""
+    """Draws the four figures of the pass that starts at piece `begin`."""
     machine = plan.machine
     limits = axis_limits(machine)
     pieces = pieces_of(plan.path, begin)
@@ -149,7 +149,7 @@ def draw_all(plan: feedplan.Plan, begin: int, output: Path) -> list[Path]:
         if close:
             axes.plot(*programmed.T, "o", markersize=3.4, fillstyle="none", color=INK, markeredgewidth=0.7)
             axes.plot(*pieces.start.T, "|", markersize=11, color=SHADE, zorder=1)
-            seen = (programmed[:, 0] >= STRETCH[0]) & (programmed[:, 0] <= STRETCH[1])
+            seen = (programmed[:, 0] >= DETAIL[0]) & (programmed[:, 0] <= DETAIL[1])
             low, high = programmed[seen, 1].min(), programmed[seen, 1].max()
             axes.set_ylim(low - 0.06 * (high - low), high + 0.06 * (high - low))
 

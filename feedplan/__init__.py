@@ -4,10 +4,9 @@
     plan.time, plan.lower_bound, plan.audit().ok
     feedplan.write_plan(plan, "part")
 
-`plan` plans a program on a machine, `compare` by several methods, `check` audits setpoints in files; `Client`
-has the same on a service.
-Millimetres, degrees and seconds throughout. Whatever is wrong with what is given raises a `FeedplanError`,
-one sentence with the remedy.
+`plan` plans a program on a machine, `compare` plans it by several methods, `check` audits setpoints in files;
+`Client` does the same on a service. Units are millimetres, degrees and seconds. Wrong input raises a
+`FeedplanError`, one sentence with the remedy.
 """
 
 from feedplan._solvers import __version__ as __version__
@@ -24,11 +23,11 @@ from feedplan.errors import (
     ProgramError,
     SolverError,
 )
-from feedplan.files import write_plan
 from feedplan.geometry.path import Path
 from feedplan.machine.importers import import_machine
 from feedplan.machine.machine import Axis, Machine
 from feedplan.machine.machine import bundled_machines as machines
+from feedplan.plan_folder import write_plan
 from feedplan.planned_feeds import PlannedProgram, planned_program, write_program
 from feedplan.planners import methods
 from feedplan.planning import Plan, plan

@@ -1,4 +1,4 @@
-"""`python -m feedplan` is the command `feedplan`."""
+"""`python -m feedplan` runs the command `feedplan`."""
 
 import sys
 

@@ -1,4 +1,5 @@
-"""What a plan reaches of the accuracy that it was asked for, and what of it is proven, in words."""
+"""Warnings about the accuracy of a plan: how much of the asked accuracy it reaches, and how much is
+proven."""
 
 from __future__ import annotations
 
@@ -8,8 +9,8 @@ from feedplan.profile import SpeedProfile
 
 
 def estimate(profile: SpeedProfile) -> float | None:
-    """How far above the least time on its grid the planner takes a plan to be, as a part of its time: an
-    estimate by the complementarity that is left, no proof. None where the planner does not say."""
+    """The planner's own estimate of (time − least time on the plan's grid) / time, from the remaining
+    complementarity; it is not a proof. None if the planner gives no estimate."""
     if profile.stopped or math.isnan(profile.excess) or profile.time <= 0:
         return None
     return profile.excess / profile.time
@@ -24,10 +25,11 @@ def shortfalls(
     time_limit: float | None,
     left_to_grids: float,
 ) -> tuple[str, ...]:
-    """A sentence where a plan was stopped by its time limit [s], where it does not reach the `accuracy`, and
-    where it does, but its bound does not prove it though that is asked for (`to_prove`).
+    """At most one sentence: the plan was stopped by its time limit [s]; or it does not reach the `accuracy`;
+    or (if `to_prove`) it reaches the accuracy, but its lower bound does not prove that.
 
-    `lower_bound` [s] is that of the profile's time, less the part `left_to_grids` that finer ones may gain.
+    `lower_bound` [s] is a bound of the profile's time, from which the part `left_to_grids` that finer grids
+    may gain has been subtracted.
     """
     slower = profile.time / lower_bound - 1.0 if lower_bound > 0 else math.inf
     most = f"the plan may be up to {percent(slower)} slower than the optimum"
@@ -50,5 +52,5 @@ def shortfalls(
 
 
 def percent(part: float) -> str:
-    """`3.1 %`, in two digits."""
+    """`3.1 %`: two digits."""
     return f"{100.0 * part:.2g} %" if math.isfinite(part) else "any part"

@@ -1,4 +1,4 @@
-"""Arguments as users give them: of the type that is wanted, or one sentence with name, value and remedy."""
+"""Checks arguments of users: returns them in the wanted type, or raises one sentence with the remedy."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ _LONGEST = 60
 
 
 def shown(value: object) -> str:
-    """A value as one short line, whatever it is."""
+    """Any value as one short line."""
     try:
         text = " ".join(_SHOWN.repr(value).split())
-    except ValueError:  # Python writes no integer of more than 4300 digits
+    except ValueError:  # Python prints no integer of more than 4300 digits
         return "a number of thousands of digits"
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
 
@@ -37,7 +37,7 @@ def refuse(what: str, value: object, remedy: str) -> InputError:
 
 
 def is_number(value: object) -> bool:
-    """A real number of any type that a float can hold; truth values are none."""
+    """Whether a value is a real number, of any type, that a float can hold; True and False are not."""
     if not isinstance(value, Real) or isinstance(value, bool):
         return False
     try:
@@ -48,12 +48,12 @@ def is_number(value: object) -> bool:
 
 
 def is_text(value: object) -> bool:
-    """Text without lone surrogates, which no file can hold."""
+    """Whether a value is text without lone surrogates, which cannot be written to a file."""
     return isinstance(value, str) and not any("\ud800" <= letter <= "\udfff" for letter in value)
 
 
 def is_whole(value: object, least: int = 1, most: float = math.inf) -> bool:
-    """A whole number of any type from `least` to `most`."""
+    """Whether a value is a whole number, of any type, from `least` to `most`."""
     return isinstance(value, Integral) and not isinstance(value, bool) and least <= int(value) <= most
 
 
@@ -64,7 +64,7 @@ def number(
     within: Callable[[float], bool] = math.isfinite,
     unit: str = "",
 ) -> float:
-    """The value as a float; raises InputError unless it is a number that is `within` what is wanted."""
+    """The value as a float; raises InputError unless it is a number for which `within` is true."""
     if is_number(value):
         given = float(value)  # type: ignore[arg-type]
         if within(given):
@@ -107,7 +107,7 @@ def one_of(value: object, kind: str, known: Iterable[Name]) -> Name:
 
 
 def list_of_names(value: object, what: str, remedy: str) -> tuple[str, ...]:
-    """Names one by one; raises InputError for a single text, which is no list, and for what is no name."""
+    """The names of a list; raises InputError for a single text instead of a list, and for other values."""
     if isinstance(value, Iterable) and not isinstance(value, (str, bytes)):
         given = tuple(value)
         if all(isinstance(name, str) for name in given):
@@ -123,7 +123,7 @@ def instance(value: object, wanted: type[Wanted], what: str, remedy: str) -> Wan
 
 
 def file_path(value: object, what: str, remedy: str) -> FilePath:
-    """The value as a path; raises InputError where it is none."""
+    """The value as a path; raises InputError for other values."""
     text = os.fspath(value) if isinstance(value, (str, os.PathLike)) else None
     if not isinstance(text, str):
         raise refuse(what, value, remedy)
@@ -132,7 +132,7 @@ def file_path(value: object, what: str, remedy: str) -> FilePath:
     except UnicodeEncodeError:
         text = "\0"
     if "\0" in text:
-        raise InputError(f"{shown(value)} is no path of a file: give {remedy}")
+        raise InputError(f"{shown(value)} is not the path of a file: give {remedy}")
     return FilePath(text)
 
 

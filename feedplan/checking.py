@@ -1,7 +1,7 @@
-"""The check of setpoints in files: against each other, against the plan they are of, and by the audit.
+"""Checks setpoints in files: their columns against each other, against plan.json, and by the audit.
 
-A plan's folder is complete: plan.json holds the machine and says which setpoints belong to it. Other
-setpoints need a machine only.
+The folder of a plan is complete: plan.json holds the machine, and describes the setpoints that belong to the
+plan. Other setpoints need only a machine.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from feedplan.audit import Audit, audit_setpoints
 from feedplan.audit.events import require_events
 from feedplan.audit.knots import audit_knots
 from feedplan.errors import InputError
-from feedplan.files import PROGRAM_FILE, SUMMARY_FILE
 from feedplan.geometry.corners import Corners
 from feedplan.machine.file import parse
 from feedplan.machine.machine import Machine
 from feedplan.outputs import KNOTS, SETPOINTS, SetpointFile, load_setpoints, require_format
+from feedplan.plan_folder import PROGRAM_FILE, SUMMARY_FILE
 from feedplan.planners import corners, limits_jerk, methods
 from feedplan.progress import Progress, of_stage, tell
 
-# What the last time of setpoints may differ from the plan's by rounding, relative.
+# Greatest relative rounding error of the last time of setpoints.
 ROUNDING = 1e-9
 
 
@@ -43,14 +43,14 @@ def check(
     jerk: bool = False,
     progress: Progress | None = None,
 ) -> Audit:
-    """Audits setpoints from files alone: those of a plan's folder, or a file.
+    """Audits setpoints from files alone: `place` is a file of setpoints or the folder of a plan.
 
-    Where plan.json stands beside the setpoints they must be the ones of that plan. `machine`, or the name or
-    file of one, replaces that of the plan. `resolution` [mm] is the last digit of rounded positions. Jerk is
-    judged where the plan's method limits it, or where `jerk` says so. `progress(stage, done)` is called with
-    `read`, then `audit`, and the part of that stage that is done; what it raises ends the work and is raised
-    here. Events of the program are checked as well: in order, within the time, the tool at rest where they
-    stop it. Raises InputError for files that cannot be read, contradict each other or were changed.
+    If plan.json is in the folder of the setpoints, they must be those of that plan. `machine`, a machine or
+    the name or file of one, replaces the machine of the plan. `resolution` [mm] is the last digit of rounded
+    positions. Jerk is judged if the plan's method limits it or `jerk` is true. Events of the program must be
+    in order and within the time, and the tool at rest at those that stop it. `progress(stage, done)` is
+    called with `read`, then `audit`, and the part of the stage that is done; an exception from it ends the
+    check. Raises InputError for files that cannot be read, contradict each other or were changed.
     """
     resolution = number(resolution, "the resolution", "0 or more", not_negative, "mm")
     jerk = flag(jerk, "jerk")
@@ -104,20 +104,21 @@ def check(
             progress=auditing,
             **limits_of_method,
         )
-    if audit.ok:  # setpoints that are not fail by themselves, and tell nothing of events
+    if audit.ok:  # events are not checked against setpoints that fail
         require_events(points.file, points.events, points, resolution, ROUNDING * period)
     return audit
 
 
 def _recorded(values: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """The values; None of a format that has none."""
+    """The values; None if the format has none."""
     return values if len(values) else None
 
 
 @dataclass(frozen=True)
 class _Plan:
-    """What plan.json says of its setpoints: the `count`, from 0 to `duration` [s] every `period` [s]; number,
-    last time and longest step of its `knots`, None where it has none; hashes of the `events` by rows."""
+    """The data of plan.json about its setpoints: `count` of them from 0 to `duration` [s], one every `period`
+    [s]; number, last time and longest step of its `knots`, None without knots; hashes of the `events` for
+    each kind of rows."""
 
     file: FilePath
     machine: Machine
@@ -130,12 +131,12 @@ class _Plan:
     events: dict[str, str]
 
     def rows(self, kind: str) -> tuple[int, float, float] | None:
-        """Number, last time and period of rows of a kind; None where the plan has none."""
+        """Number, last time and period of rows of a kind; None if the plan has no such rows."""
         return self.knots if kind == KNOTS else (self.count, self.duration, self.period)
 
 
 def _read(file: FilePath) -> _Plan:
-    """What a plan.json says. Raises InputError where it is damaged, changed or of another version."""
+    """Reads a plan.json. Raises InputError if it is damaged, changed or has another version."""
     try:
         summary = json.loads(file.read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:
@@ -170,7 +171,7 @@ def _read(file: FilePath) -> _Plan:
         knots=knots,
         events={name: events.take(f"sha256_of_{name}", str) for name in (SETPOINTS, KNOTS)},
     )
-    # Each run, and the pause before the first, takes less than one period more than in the plan.
+    # The setpoints wait less than one period in each run and in the pause before the first.
     time, waits = entries.number("time"), (entries.take("runs", int) + 1) * plan.period
     if not time * (1.0 - ROUNDING) <= plan.duration <= time + waits:
         raise InputError(
@@ -181,7 +182,7 @@ def _read(file: FilePath) -> _Plan:
 
 
 def _require_program(file: FilePath, entries: _Entries, summary: Mapping[str, Any]) -> None:
-    """Raises InputError where the program with planned feeds is not the one of the plan."""
+    """Raises InputError if the program with planned feeds is not the one of the plan."""
     if summary.get("planned_program") is None:
         return
     told = _Entries(file, entries.take("planned_program", dict), "planned_program ")
@@ -204,12 +205,12 @@ class _Entries:
     def __init__(self, file: FilePath, table: Any, place: str = "") -> None:
         if not isinstance(table, Mapping):
             raise InputError(
-                f"{file} is no plan: an object with format, machine_file, … is needed: plan again"
+                f"{file} is not a plan: an object with format, machine_file, … is needed: plan again"
             )
         self._file, self._table, self._place = file, table, place
 
     def take(self, name: str, kind: type) -> Any:
-        """An entry of that type. Raises InputError where it is missing or something else."""
+        """An entry of that type. Raises InputError if it is missing or has another type."""
         value = self._table.get(name)
         if not isinstance(value, kind) or isinstance(value, bool):
             what = "missing" if value is None else shown(value)
@@ -226,7 +227,7 @@ class _Entries:
 
 
 def _require_same(plan: _Plan, points: SetpointFile) -> None:
-    """Raises InputError unless the setpoints are those that the plan tells of."""
+    """Raises InputError unless the setpoints are those that plan.json describes."""
     known = plan.rows(points.rows)
     if known is None:
         raise _other(points, plan, "table", f"one of {points.rows}", "nothing of it")
@@ -240,7 +241,7 @@ def _require_same(plan: _Plan, points: SetpointFile) -> None:
         if own != planned:
             raise _other(points, plan, what, f"{own}{unit}", f"{planned}{unit}")
     last = float(points.t[-1])
-    # What is not a number the audit tells, with its place.
+    # The audit reports a time that is not finite, with its row.
     if math.isfinite(last) and abs(last - duration) > ROUNDING * max(duration, period):
         raise _other(points, plan, "last time", f"{last:.9g} s", f"{duration:.9g} s")
     if points.events.sha256() != plan.events[points.rows]:

@@ -1,6 +1,6 @@
-"""Several methods on one program: time, proven gap, computing time and the worst use of every limit.
+"""Plans one program by several methods: time, proven gap, computing time, worst use of every limit.
 
-Methods may follow different paths within the tolerance; a bound is one of its path alone.
+Methods may follow different paths within the tolerance; a lower bound holds for its own path alone.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ from feedplan.program.source import Source
 from feedplan.progress import Progress
 from feedplan.today import Today
 
-# What the limits of machine and program are called in an audit.
+# The names of the limits of machine and program in an audit.
 LIMITS = ("feed", "velocity", "acceleration", "jerk", "chord", "deviation")
 
-# What each method may take [s] unless the user says otherwise: solvers on meshes may need hours.
+# Time limit of each method unless the user gives one [s]; solvers on meshes could need hours.
 TIME_LIMIT = 10.0
 
-# Where the stages of a plan begin and end in the work on one method, for the progress shown.
+# Begin and end of each stage in the progress of one method (0 to 1).
 STAGES = {"fit": (0.0, 0.2), "plan": (0.2, 0.6), "audit": (0.6, 1.0)}
 
 
 @dataclass(frozen=True)
 class Row:
-    """One method: its plan with the audit, or in a sentence why it has none.
+    """One method: its plan and audit, or a sentence that tells why it has no plan.
 
-    `lower_bound` [s] is the greatest proven by any method on this method's path.
+    `lower_bound` [s] is the greatest one that any method has proven on this method's path.
     """
 
     method: MethodName
@@ -58,14 +58,14 @@ class Row:
 
     @property
     def saved(self) -> float | None:
-        """By how much the plan is faster than the controller of today [s], None where none was named."""
+        """The controller's time of today less the plan's [s]; None without a controller."""
         return self.plan.today.saved if self.plan and self.plan.today else None
 
     @property
     def gap(self) -> float | None:
-        """How much of the time may be lost at most: (time − lower_bound) / time.
+        """(time − lower_bound) / time, an upper limit of the part of the time that could be saved.
 
-        None without a plan, and where limits are broken: what is faster than allowed has no gap.
+        None without a plan, and if limits are broken: such a plan may be faster than the bound.
         """
         if self.plan is None or not self.plan.audit().ok:
             return None
@@ -73,11 +73,11 @@ class Row:
 
     @property
     def audit(self) -> Audit | None:
-        """The verdict on the plan."""
+        """The audit of the plan, None without a plan."""
         return None if self.plan is None else self.plan.audit()
 
     def worst(self, limit: str) -> LimitCheck | None:
-        """The worst use of a limit, over all axes; None where nothing was measured."""
+        """The check with the greatest use of a limit, over all axes; None if nothing was measured."""
         checks = [check for check in self.audit.checks if check.name == limit] if self.audit else []
         return max(checks, key=lambda check: check.ratio, default=None)
 
@@ -104,12 +104,12 @@ def compare(
     progress: Progress | None = None,
     **options: Any,
 ) -> tuple[Row, ...]:
-    """Plans one program by each of the methods, all unless given, and audits every plan.
+    """Plans one program by each of the methods (None: all) and audits every plan.
 
-    `source` and `machine` are as for `feedplan.plan`, and so are `options`: those that only some methods take
-    go to these, and so does the `time_limit` [s] of each (None: no limit). A method that finds no plan, or
-    whose package is missing, says why in its row. `progress(method, done)` is called as it goes on.
-    Raises what `feedplan.plan` raises about the program, the machine and the options.
+    `source`, `machine` and `options` are as for `feedplan.plan`; each method gets those of the options that
+    it takes. `time_limit` [s] is the limit of each method (None: no limit). The row of a method that finds no
+    plan, or whose package is missing, has an error. `progress(method, done)` is called with the part of a
+    method that is done. Raises the errors of `feedplan.plan` about program, machine and options.
     """
     chosen = (
         all_methods() if methods is None else list_of_names(methods, "methods", "a list of methods' names")
@@ -166,12 +166,13 @@ def _show(progress: Progress | None, method: str, stage: str, done: float) -> No
 
 
 def _bounds(other: Plan, made: Plan) -> bool:
-    """The bound of one holds for the other: on the same path, and without limits that only it keeps."""
+    """Whether the lower bound of `other` holds for `made`: both follow the same path, and `made` keeps the
+    limits of jerk if `other` does."""
     return _same_way(made, other) and limits_jerk(made.method) >= limits_jerk(other.method)
 
 
 def _same_way(one: Plan, other: Plan) -> bool:
-    """Both follow the same path: a bound of one holds for the other."""
+    """Whether both follow the same path with the same stops."""
     return all(
         np.array_equal(a, b)
         for a, b in (

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-# No sentence is longer: the middle of its longest words, such as paths, is left out, and then its own.
+# Longest sentence, and longest word in it if it is too long: the middle of long words, such as paths, is left
+# out first, then the middle of the sentence.
 LONGEST, LONGEST_WORD = 300, 60
 
 
@@ -17,7 +18,7 @@ class FeedplanError(Exception):
 
 
 def _shortened(text: str, most: int) -> str:
-    """The text, or its start and its end where it has more than `most` characters, the end the longer one."""
+    """The text; if it has more than `most` characters, its start and a longer part of its end."""
     start = (most - 3) // 3
     return text if len(text) <= most else f"{text[:start]}...{text[start + 3 - most :]}"
 
@@ -29,7 +30,7 @@ class InputError(FeedplanError):
 class ProgramError(InputError):
     """A part program cannot be understood.
 
-    `line` is the 1-based line of the file, or None where the whole file is meant.
+    `line` is the line of the file, from 1, or None for the whole file.
     """
 
     def __init__(self, message: str, line: int | None = None) -> None:
@@ -38,13 +39,13 @@ class ProgramError(InputError):
 
 
 class MachineError(InputError):
-    """A machine description is incomplete, contradictory or does not suit the program."""
+    """A machine file is incomplete or contradictory, or the machine does not suit the program."""
 
 
 class InfeasibleError(FeedplanError):
     """No profile meets the limits.
 
-    `line` is the source line of the place, `reachable` the greatest speed [mm/s] that can be had there.
+    `line` is the source line, `reachable` the greatest speed that is possible there [mm/s].
     """
 
     def __init__(self, message: str, line: int | None = None, reachable: float | None = None) -> None:
@@ -54,7 +55,8 @@ class InfeasibleError(FeedplanError):
 
 
 class SolverError(FeedplanError):
-    """A numerical solver gave up, or a method is not made for the path; the text says why and the remedy."""
+    """A numerical solver failed, or a method cannot plan this kind of path; the text has reason and
+    remedy."""
 
 
 class MissingPackageError(FeedplanError):

@@ -1,4 +1,4 @@
-"""Events in time: what a machine does besides moving, when, and by which line of the program."""
+"""Events: actions of a machine that are not moves, with their time and line of the program."""
 
 from __future__ import annotations
 
@@ -31,12 +31,13 @@ class Event(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TimedEvents:
-    """Events in the order in which they happen, one row each.
+    """Events in the order of time, one row each.
 
-    `time` (m,) [s], by the clock of whoever hands them out; `line` (m,) source line; `kind`, `channel` and
-    `value` (m,) say what happens (`feedplan.program.actions`, NaN where there is none); `stops` (m,) whether
-    the program stops the tool for it; `text` (m,) the word of the program, such as `M62 P3`, or what a
-    message or a comment says. The value of a dwell is its time [s], which begins at `time`.
+    `time` (m,) [s], by the clock of the plan or of the setpoints that the events belong to; `line` (m,)
+    source line; `kind`, `channel` and `value` (m,) as in `feedplan.program.actions`, NaN if there is none;
+    `stops` (m,) is true if the tool stops for the event; `text` (m,) the word of the program, such as `M62
+    P3`, or the text of a message or comment. The value of a dwell is its duration [s], which begins at
+    `time`.
     """
 
     time: NDArray[np.float64]
@@ -80,13 +81,13 @@ class TimedEvents:
         return f"<{counted(len(self), 'event')}{': ' if counts else ''}{counts}>"
 
     def counts(self) -> dict[str, int]:
-        """How many of each kind there are."""
+        """The number of events of each kind."""
         kinds, counts = np.unique(self.kind, return_counts=True)
         found = dict(zip(kinds.tolist(), counts.tolist(), strict=True))
         return {kind: found[kind] for kind in KINDS if kind in found}
 
     def sha256(self) -> str:
-        """A hash of all that they say, to the last digit."""
+        """A hash of all columns, to the last digit."""
         digest = hashlib.sha256()
         for numbers in (self.time, self.line, self.channel, self.value, self.stops):
             values = numbers.astype("<f8")
@@ -96,16 +97,16 @@ class TimedEvents:
 
 
 class Events(Protocol):
-    """Events of a plan, placed in its runs by a reader of its motion."""
+    """The events of a plan, with their times in its runs."""
 
     def placed(self, motion: Callable[[], Sampler]) -> PlacedEvents: ...
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PlacedEvents:
-    """The events of a plan by the runs between its stops: `run` (m,) is the one in which each happens, −1
-    before the first, and `after` (m,) [s] how long after its start; `starts` (runs,) [s] are those of the
-    plan's own clock. The times of `events` are none yet."""
+    """The events of a plan by the runs between its stops: `run` (m,) of each event, −1 before the first run,
+    and its time `after` (m,) the start of that run [s]; `starts` (runs,) [s] of the runs by the plan's own
+    clock. The times of `events` are not set."""
 
     events: TimedEvents
     run: NDArray[np.int64]
@@ -113,9 +114,9 @@ class PlacedEvents:
     starts: NDArray[np.float64]
 
     def on(self, starts: NDArray[np.float64]) -> TimedEvents:
-        """The events by a clock on which the runs start at other times (runs,) [s]."""
+        """The events by a clock on which the runs start at these times (runs,) [s]."""
         time = np.concatenate(([0.0], starts))[self.run + 1] + self.after
-        # A run may start by a rounding before the one before it has ended.
+        # By rounding a run may start before the end of the run before it.
         return replace(self.events, time=np.maximum.accumulate(time))
 
     def timed(self) -> TimedEvents:
@@ -124,7 +125,7 @@ class PlacedEvents:
 
 
 def to_json(event: Event) -> dict[str, Any]:
-    """An event by names; a channel or value that it has not is None."""
+    """An event as an object for JSON; a missing channel or value is None."""
     return {name: None if value != value else value for name, value in event._asdict().items()}
 
 

@@ -1,8 +1,8 @@
 """`functools.cached_property` without its lock.
 
-Before Python 3.12 that lock is one for all objects of a class, held while a value is computed: objects would
-wait for each other, and for ever in a process that is forked meanwhile. Two threads may compute a value
-twice.
+Before Python 3.12 all objects of a class share that lock, which is held while a value is computed: objects
+wait for each other, and a process that is forked at that time waits for ever. Without the lock two threads
+may compute a value twice.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class cached_property(Generic[T]):  # noqa: N801
     def __get__(self, instance: object | None, owner: type | None = None) -> cached_property[T] | T:
         if instance is None:
             return self
-        # The value hides this descriptor from then on.
+        # From now on Python finds the value before this descriptor.
         value: T = self._make(instance)
         instance.__dict__[self._name] = value
         return value

@@ -1,4 +1,4 @@
-"""Records whose arrays are what a native object holds."""
+"""Base class of dataclasses whose arrays are views of the memory of a native object."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ Native = TypeVar("Native")
 
 
 class OfNative(Generic[Native]):
-    """Base of frozen dataclasses whose fields are those of `native`, arrays as read-only views of its memory.
+    """A frozen dataclass whose fields are those of `native`; arrays are read-only views of its memory.
 
-    The native object is made where the record is, and checks it once; kernels take it from there.
+    The native object is made with the record and checks the fields once; kernels take the native object.
     """
 
     native: Native
 
     @classmethod
     def of(cls: type[Record], native: Native, **others: Any) -> Record:
-        """The record of a native object, with `others` for fields that this has not."""
+        """The record of a native object; `others` are the fields that the native object lacks."""
         record = object.__new__(cls)
         record._hold(native, **others)
         return record

@@ -1,4 +1,4 @@
-"""What one step more of each limit would bring: the plan again with that limit alone raised."""
+"""The time that one step more of each limit saves: the plan is made again with that limit alone raised."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from feedplan.machine.machine import Axis, Machine
 from feedplan.planners import options_of
 from feedplan.planning import Plan, plan
 
-# Limits are raised by this factor, the tolerance of corners by the other.
+# Factor on a limit, and factor on the tolerance.
 MORE, TOLERANCE_MORE = 1.2, 2.0
-# A limit counts where it is active for this part of the time.
+# Limits that are active for a smaller part of the time are left out.
 ACTIVE_PART = 0.01
 
 
 @dataclass(frozen=True)
 class Step:
-    """`limit` times `factor`: the time becomes `time` [s], `saved` [s] less."""
+    """With `limit` times `factor` the plan takes `time` [s], which saves `saved` [s]."""
 
     limit: str
     factor: float
@@ -32,10 +32,10 @@ class Step:
 
 
 def one_step_more(made: Plan) -> tuple[Step, ...]:
-    """The steps for a plan's limits, those that save most first.
+    """The steps for a plan's limits, the one that saves most first.
 
-    The limits are those active for a hundredth of the time or more, each raised by 1.2, and the tolerance of
-    the path, doubled, where it has one. A limit that cannot be raised is left out.
+    The limits are those that are active for 1 % of the time or more, each multiplied by 1.2, and the
+    tolerance of the path, if it has one, doubled. A limit that cannot be raised is left out.
     """
     steps = []
     for limit, factor, changes in _changes(made):
@@ -61,7 +61,7 @@ def _request(made: Plan) -> dict[str, Any]:
 
 
 def _changes(made: Plan) -> Iterator[tuple[str, float, dict[str, Any]]]:
-    """Each limit with its factor and the arguments that change."""
+    """Each limit with its factor and the changed arguments."""
     machine = replace(made.machine, controller=None)
     for share in made.account.limits:
         if share.part < ACTIVE_PART:

@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike
 from feedplan.accuracy import estimate, shortfalls
 from feedplan.arguments import callback, not_negative, number, one_of, refuse, whole
 from feedplan.audit import CHUNK, Audit, audit
-from feedplan.bound import lower_bound
 from feedplan.constraints.problem import Problem, build_problem, speed_square
 from feedplan.errors import InputError, SolverError
 from feedplan.event_places import PlannedEvents
@@ -28,6 +27,7 @@ from feedplan.geometry.corners import PATHS, Corners, FollowedPath
 from feedplan.geometry.path import Path
 from feedplan.knots import Knots
 from feedplan.lazy import cached_property
+from feedplan.lower_bound import lower_bound
 from feedplan.machine.controller import Controller
 from feedplan.machine.machine import Machine
 from feedplan.outputs import FORMAT

@@ -1,7 +1,7 @@
-"""How far work is: one number that rises from 0 to 1, told by who does the work.
+"""Progress of a computation: a function that is called with a number that rises from 0 to 1.
 
-Who listens may raise to end it: the work stops within a tenth of a second or so, wherever it is, and what was
-raised goes on to who asked for the work.
+An exception from that function ends the computation within about a tenth of a second, in every stage, and is
+raised to the caller of the computation.
 """
 
 from __future__ import annotations
@@ -10,23 +10,23 @@ from collections.abc import Callable
 from functools import partial
 
 Listener = Callable[[float], None]
-# The same of a work in stages, with the name of the stage.
+# The same for a computation in stages, with the name of the stage.
 Progress = Callable[[str, float], None]
 
 
 def of_stage(progress: Progress | None, stage: str) -> Listener | None:
-    """Who is told of one stage; None where nobody is."""
+    """The listener for one stage; None without a listener."""
     return None if progress is None else partial(progress, stage)
 
 
 def tell(whole: Listener | None, done: float) -> None:
-    """Tells who listens, if anybody does."""
+    """Calls the listener, if there is one."""
     if whole is not None:
         whole(done)
 
 
 def part(whole: Listener | None, start: float, end: float) -> Listener | None:
-    """Who is told of the part of some work from `start` to `end`; None where nobody is."""
+    """The listener for a part of the work, from `start` to `end` of the whole; None without a listener."""
     if whole is None:
         return None
     return lambda done: whole(start + (end - start) * done)

@@ -1,4 +1,4 @@
-"""The time that a controller takes for a program as it is, beside that of a plan."""
+"""The time that a controller of today takes for a program, compared with that of a plan."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from feedplan.program.program import Program
 
 @dataclass(frozen=True)
 class Today:
-    """What `controller` makes of a program: `time` [s] by its model, `planned` [s] by the plan."""
+    """The time of a program by the model of a `controller` (`time` [s]) and by the plan (`planned` [s])."""
 
     controller: Controller
     time: float
@@ -26,7 +26,7 @@ class Today:
 
     @property
     def saved(self) -> float:
-        """By how much the plan is faster [s]."""
+        """The controller's time less the plan's [s]."""
         return self.time - self.planned
 
     def of_controller(self) -> dict[str, Any]:
@@ -49,10 +49,10 @@ def time_by(
     tolerance: float | None,
     **request: Any,
 ) -> float:
-    """The time [s] of the program with its pauses by the model of the controller.
+    """The time of the program, pauses included, by the model of the controller [s].
 
-    `tolerance` and `request` are as for `feedplan.plan`: feed, feed_override, start_speed, end_speed.
-    Raises as that does.
+    `tolerance` and `request` (feed, feed_override, start_speed, end_speed) are arguments of `feedplan.plan`,
+    and so are the errors.
     """
     method = controller.model.method
     if isinstance(source, Program):
@@ -64,8 +64,8 @@ def time_by(
 def beside_plan(
     controller: Controller, time: float, source: Program | Path, machine: Machine, settings: Mapping[str, Any]
 ) -> tuple[Today | None, tuple[str, ...]]:
-    """The controller beside a plan of `time` [s] made with the same settings; None and a sentence where its
-    model has no plan."""
+    """The controller's time for a plan of `time` [s] that was made with the same settings; None and a
+    sentence if the model has no plan."""
     try:
         return Today(controller, time_by(controller, source, machine, **settings), time), ()
     except (InfeasibleError, SolverError) as error:

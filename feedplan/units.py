@@ -1,4 +1,4 @@
-"""Units at the border: everything inside is mm, degrees and seconds."""
+"""Numbers with units as text. All quantities in feedplan are in mm, degrees and seconds."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ SECONDS_PER_MINUTE = 60.0
 
 
 def mm_per_min(speed: float) -> float:
-    """Speed [mm/s] as the mm/min of a part program."""
+    """A speed [mm/s] in mm/min, the unit of part programs."""
     return speed * SECONDS_PER_MINUTE
 
 
 def shared_unit(units: Iterable[str], otherwise: str) -> str:
-    """The unit of all, `otherwise` of none; `units` where they differ, as of robots with linear joints."""
+    """The common unit; `units` if they differ, as for robots with linear joints; `otherwise` if there are
+    none."""
     different = set(units)
     return "units" if len(different) > 1 else next(iter(different), otherwise)
 
@@ -40,9 +41,9 @@ def duration_text(seconds: float) -> str:
 
 
 def difference_text(difference: float, of: float, word: str = "") -> str:
-    """`12.0 s, 7.0 %`: how far two times are apart [s] without its sign, and its part of a time [s].
+    """`12.0 s, 7.0 %`: the amount of a difference of times [s], and the amount over a time [s].
 
-    A `word` such as `less` stands behind the seconds.
+    A `word` such as `less` is added after the seconds.
     """
     part = 100.0 * abs(difference) / of if of > 0.0 else 0.0
     seconds = " ".join(filter(None, (duration_text(abs(difference)), word)))
@@ -55,6 +56,6 @@ def tolerance_text(least: float, greatest: float) -> str:
 
 
 def ratio_text(number: float, other: float) -> str:
-    """`3.0 : 1`, `0.048 : 1`: how many for one of the other."""
+    """The ratio of two counts: `3.0 : 1`, `0.048 : 1`."""
     ratio = number / other
     return f"{ratio:.1f} : 1" if ratio >= 1 else f"{ratio:.2g} : 1"

@@ -1,4 +1,4 @@
-/* Builds the one script and the one style of all pages, into the Python package. */
+/* Builds the script and the style of all pages, into the Python package. */
 
 import { readFileSync, writeFileSync } from "node:fs";
 import { build } from "esbuild";

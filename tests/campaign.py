@@ -1,7 +1,7 @@
-"""How many random cases a test takes: its own number of them, always the same ones, or more in a campaign.
+"""The number of random cases of a test: its own number, always the same cases, or more in a campaign.
 
-FEEDPLAN_SEEDS is how many seeds a test goes through that draws by seeds; FEEDPLAN_EXAMPLES is how many new
-examples a property test draws for each 100 that it draws otherwise.
+FEEDPLAN_SEEDS is the number of seeds of a test with seeds; FEEDPLAN_EXAMPLES is the number of new examples of
+a property test for each 100 of its usual ones.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ EXAMPLES = os.environ.get("FEEDPLAN_EXAMPLES")
 
 
 def seeds(count: int) -> int:
-    """How many seeds, from 0 on."""
+    """The number of seeds, from 0 on."""
     return int(SEEDS or count)
 
 
 def examples(count: int) -> int:
-    """How many examples."""
+    """The number of examples."""
     return count * int(EXAMPLES or 100) // 100

@@ -1,4 +1,4 @@
-"""Dask clusters on this computer as users start them: a scheduler and workers, processes of their own."""
+"""Dask clusters on this computer as users start them: processes of a scheduler and of workers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-# A worker that works on a program of this name ends, as one whose memory is used up.
+# A worker that gets a program of this name is killed, as if its memory ran out.
 DEADLY = "deadly.ngc"
 _PRELOAD = f"""
 import os, signal
@@ -28,7 +28,7 @@ cluster_task.work_on = work_or_end
 
 
 class LocalCluster:
-    """A scheduler with workers of one thread each; `options` tell the command `feedplan` of it."""
+    """A scheduler with workers of one thread each; `options` are those of the command `feedplan` for it."""
 
     def __init__(
         self, folder: Path, workers: int, certificates: Path | None = None, **variables: str
@@ -52,7 +52,7 @@ class LocalCluster:
 
     @property
     def options(self) -> list[str]:
-        """What tells the command of this cluster."""
+        """The options of the command `feedplan` for this cluster."""
         return ["--cluster", self.url, *self._tls]
 
     @property
@@ -75,7 +75,7 @@ class LocalCluster:
             )
 
     def start_scheduler(self) -> None:
-        """Starts it, again after an end; waits until it can be reached."""
+        """Starts the scheduler, also after an end, and waits until it can be reached."""
         scheme = self.url.partition(":")[0]
         where = ["--host", "127.0.0.1", "--port", str(self._port), "--protocol", scheme]
         self.scheduler = self._start("scheduler", *where)
@@ -87,13 +87,13 @@ class LocalCluster:
         raise AssertionError((self.folder / "scheduler.log").read_text())
 
     def start_worker(self, **variables: str) -> None:
-        """Adds a worker, which is started again when it is killed; its environment has more `variables`."""
+        """Adds a worker that is started again when it is killed, with `variables` in its environment."""
         own = ["--nthreads", "1", "--nworkers", "1", "--preload", str(self.folder / "preload.py")]
         own += ["--local-directory", str(self.folder)]
         self._workers.append(self._start("worker", self.url, *own, **variables))
 
     def kill_a_worker(self) -> None:
-        """kill -9 of one that has work."""
+        """Sends kill -9 to a worker that has work."""
         with self.client() as client:
             found = client.run(lambda dask_worker: (len(dask_worker.state.tasks), os.getpid()))
         count, process = max(found.values())
@@ -118,12 +118,12 @@ class LocalCluster:
         return distributed.Client(self.url, security=security, set_as_default=False, timeout=20)
 
     def wait_for(self, workers: int) -> None:
-        """Until so many workers are there."""
+        """Waits for `count` workers."""
         with self.client() as client:
             client.wait_for_workers(workers, timeout=30)
 
     def wait_until_idle(self) -> None:
-        """Until no worker works on anything."""
+        """Waits until no worker has work."""
         with self.client() as client:
             end = time.monotonic() + 20.0
             while time.monotonic() < end:
@@ -142,7 +142,7 @@ class LocalCluster:
 
 @contextmanager
 def running(folder: Path, workers: int, **more: Any) -> Iterator[LocalCluster]:
-    """A cluster with so many workers."""
+    """A cluster with `workers` workers."""
     cluster = LocalCluster(folder, workers, **more)
     try:
         cluster.wait_for(workers)
@@ -152,7 +152,7 @@ def running(folder: Path, workers: int, **more: Any) -> Iterator[LocalCluster]:
 
 
 def make_certificates(folder: Path) -> Path:
-    """An authority, and a certificate with its key for all in a cluster, in a folder."""
+    """A folder with the certificate of an authority, and one certificate and key for all of a cluster."""
     folder.mkdir()
     request = [
         "openssl",

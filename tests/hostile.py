@@ -1,4 +1,4 @@
-"""Files as nobody means them: samples of every kind that is read, and mutations of them."""
+"""Damaged files: samples of every kind of file that is read, and mutations of them."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _PIECES = (
 
 
 def mutated(content: bytes, seed: int) -> bytes:
-    """The content with one to four things done to it."""
+    """The content with one to four changes."""
     draw = random.Random(seed)
     for _ in range(draw.randint(1, 4)):
         content = draw.choice(_MUTATIONS)(content, draw)
@@ -53,7 +53,7 @@ def mutated(content: bytes, seed: int) -> bytes:
 
 
 def mutated_archive(content: bytes, seed: int) -> bytes:
-    """An archive that is damaged, or whole and of damaged members."""
+    """A damaged archive, or an archive with damaged members."""
     if seed % 2:
         return mutated(content, seed)
     draw = random.Random(seed)
@@ -65,7 +65,7 @@ def mutated_archive(content: bytes, seed: int) -> bytes:
         for name in names:
             member = old.read(name)
             if name == damaged and draw.random() < 0.7:
-                # The header is where shape and type are.
+                # The header has the shape and the type.
                 member = mutated(member[:128], seed) + member[128:]
             elif name == damaged:
                 member = mutated(member, seed)
@@ -168,7 +168,7 @@ max_velocity = 100.0
 max_acceleration = 1000.0
 """
 
-# Machines in files of controllers, by the names of these.
+# Machines in files of controllers, by the name of the file.
 OF_CONTROLLERS = {
     "mill.ini": b"""[EMC]
 MACHINE = mill

@@ -9,7 +9,7 @@ import feedplan
 from feedplan import Axis, Machine, Path
 from feedplan.cli import main
 from feedplan.errors import MachineError, ProgramError
-from feedplan.files import write_plan
+from feedplan.plan_folder import write_plan
 from feedplan.program.read import read_program
 
 SUBSETS = ("XY", "YX", "XZ", "ZX", "X", "Y", "A", "XA", "XYA", "UV", "XU", "ABC", "ZC")
@@ -20,13 +20,13 @@ def machine_of(names: str) -> Machine:
 
 
 def points_of(names: str) -> list[list[float]]:
-    """Four points, along no line where there is more than one axis."""
+    """Four points, not on a line if there are several axes."""
     rows = [[0.0] * len(names), [9.0] * len(names), [14.0 + 3.0 * k for k in range(len(names))]]
     return [*rows, [22.0] * len(names)]
 
 
 def gcode(names: str) -> str:
-    """Lines, and a half circle where there is a plane for it."""
+    """Lines, and a half circle if the machine has a plane."""
     rows = [" ".join(f"{name}{q:g}" for name, q in zip(names, row, strict=True)) for row in points_of(names)]
     text = "G21 G90 F600\nG1\n" + "\n".join(rows) + "\n"
     if {"X", "Y"} <= set(names):

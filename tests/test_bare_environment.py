@@ -1,4 +1,4 @@
-"""What works with numpy, click and rich alone, in an environment that holds nothing else."""
+"""feedplan in an environment with numpy, click and rich alone."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ import feedplan
 from feedplan.report.page import missing_pictures
 
 NEEDED = ("numpy", "click", "rich", "tomli")
-# Packages of methods, which are not there, with the command that installs each.
+# Missing packages of methods, with the command that installs each.
 INSTALLS = {name: f"`pip install {name}`" for name in ("casadi", "clarabel", "ruckig", "toppra")}
 NATIVE = [name for name in feedplan.methods() if name not in INSTALLS]
 PROGRAM = "G21 G90 G64 P0.05\nG1 F1000\nX10 Y0 Z0\nY10\nG2 X20 Y0 R10\nM2\n"
 
 
 def _with_dependencies(names: tuple[str, ...]) -> set[str]:
-    """Distributions that are installed, with all that they need."""
+    """The installed distributions of these names, with all their dependencies."""
     found: set[str] = set()
     waiting = list(names)
     while waiting:
@@ -31,7 +31,7 @@ def _with_dependencies(names: tuple[str, ...]) -> set[str]:
         try:
             needs = distribution(name).requires or []
         except PackageNotFoundError:
-            continue  # of another platform or another Python
+            continue  # for another platform or another Python
         if name not in found:
             found.add(name)
             waiting += [re.split(r"[^\w.-]", need)[0] for need in needs if "extra ==" not in need]
@@ -68,7 +68,7 @@ def part(tmp_path: Path) -> Path:
     return file
 
 
-def test_nothing_else_is_there(python: Path, tmp_path: Path) -> None:
+def test_the_environment_has_no_other_package(python: Path, tmp_path: Path) -> None:
     names = [*INSTALLS, "scipy", "ezdxf", "pytest"]
     code = f"import importlib.util as u; print([n for n in {names} if u.find_spec(n)])"
     done = run(python, "-c", code, folder=tmp_path)
@@ -118,7 +118,7 @@ def test_one_missing_package_ends_the_command_with_its_sentence(python: Path, pa
     assert done.stderr.endswith(": pip install feedplan[dxf]\n")
 
 
-def test_the_service_says_what_it_needs_and_its_client_needs_nothing(python: Path, part: Path) -> None:
+def test_the_service_names_its_packages_and_its_client_needs_none(python: Path, part: Path) -> None:
     done = run(python, "-m", "feedplan", "serve", folder=part.parent)
     assert (done.returncode, done.stdout) == (2, "")
     assert re.fullmatch(
@@ -131,7 +131,7 @@ def test_the_service_says_what_it_needs_and_its_client_needs_nothing(python: Pat
     assert done.stderr.startswith("error: the service at http://127.0.0.1:9 cannot be reached")
 
 
-def test_a_batch_needs_nothing_and_a_cluster_says_what_it_needs(python: Path, part: Path) -> None:
+def test_a_batch_needs_no_package_and_a_cluster_names_its_package(python: Path, part: Path) -> None:
     done = run(python, "-m", "feedplan", "batch", "part.ngc", "-o", "out", "-q", folder=part.parent)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     assert (part.parent / "out" / "part" / "plan.json").exists()

@@ -1,4 +1,4 @@
-"""The benchmarks run, and what they compare is the same problem."""
+"""The benchmarks run, and compare solvers on equal problems."""
 
 from __future__ import annotations
 

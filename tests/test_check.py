@@ -1,4 +1,4 @@
-"""The check of a plan's folder from its files alone, and of files that were changed."""
+"""`feedplan.check` of a plan's folder, also after changes of its files."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from feedplan import Axis, Machine, plan, planners
 from feedplan.checking import check
 from feedplan.cli import main
 from feedplan.errors import InputError
-from feedplan.files import write_plan
 from feedplan.machine.kinematics import Kinematics, _registered, register
+from feedplan.plan_folder import write_plan
 from tests.outputs.parquet import FORMATS
 
 PROGRAM = "G21 G90 G64 P0.05\nF3000\nG1 X20 Y5\nG3 X10 Y15 I-5 J5\nG1 X0 Y10\nG1 Y0\nM2\n"
@@ -45,7 +45,7 @@ max_jerk = 20000.0
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folders of plans by two methods on a machine of one's own, in files that are gone afterwards."""
+    """Folders of plans by two methods, whose program and machine file are removed afterwards."""
     home = tmp_path_factory.mktemp("made")
     program, machine = home / "part.ngc", home / "own.toml"
     program.write_text(PROGRAM)
@@ -68,12 +68,12 @@ def test_a_folder_holds_its_machine_whatever_its_name(folder: Any, capsys: Any) 
     out = folder("bang-bang")
     assert main(["check", str(out), "--json"]) == 0
     audit = json.loads(capsys.readouterr().out)
-    # The machine of that name that comes with feedplan has 3000 mm/s².
+    # The bundled machine of that name has 3000 mm/s².
     assert audit["acceleration"]["X"]["limit"] == 500.0
     assert audit["acceleration"]["X"]["ratio"] == pytest.approx(1.0, abs=1e-6)
 
 
-def test_plan_json_says_what_was_planned_and_how(made: Path) -> None:
+def test_plan_json_has_program_machine_and_options(made: Path) -> None:
     summary = json.loads((made / "bang-bang" / "plan.json").read_text())
     assert summary["format"] == 1
     assert summary["units"] == {"length": "mm", "angle": "deg", "time": "s"}
@@ -215,7 +215,7 @@ def test_a_column_of_jerk_is_judged_where_the_method_limits_it(folder: Any, caps
     )
 
 
-def test_without_a_plan_the_files_own_period_judges_its_times(folder: Any, made: Path, capsys: Any) -> None:
+def test_without_plan_json_the_period_of_the_file_is_used(folder: Any, made: Path, capsys: Any) -> None:
     out = folder("bang-bang")
     (out / "plan.json").rename(out / "own.json")
     machine = out / "own.toml"
@@ -290,13 +290,13 @@ def test_the_plan_of_other_setpoints_is_refused(folder: Any, capsys: Any) -> Non
 
 @pytest.mark.parametrize("name", FORMATS)
 @pytest.mark.parametrize("method", sorted(set(planners.methods()) - {"casadi", "clarabel", "toppra"}))
-def test_what_each_method_plans_is_judged_alike_from_every_format(
+def test_the_check_of_every_format_agrees_with_the_audit_for_each_method(
     method: str, name: str, tmp_path: Path
 ) -> None:
     made = planned(method)
     write_plan(made, tmp_path, [name], step=made.machine.period if name == "pvt" else None)
     audit = check(tmp_path)
-    # Two heuristics break limits; setpoints alone show no feed, no chord error and no path.
+    # Two heuristics break limits; setpoints alone do not show feed, chord error and path.
     expected = {(c.name, c.axis) for c in made.audit().broken} & {(c.name, c.axis) for c in audit.checks}
     assert {(c.name, c.axis) for c in audit.broken} >= expected
     assert audit.ok or not made.audit().ok
@@ -309,7 +309,7 @@ def planned(method: str) -> Any:
     if method not in PLANS:
         from feedplan.program.gcode import read_gcode
 
-        # A circle as a polygon: methods that pass corners jump at every one.
+        # A circle as a polygon: methods that pass corners have a velocity jump at each.
         angles = np.linspace(0.0, 2.0 * np.pi, 60)
         points = "".join(f"G1 X{10 * np.cos(a):.4f} Y{10 * np.sin(a):.4f}\n" for a in angles)
         PLANS[method] = plan(
@@ -319,7 +319,7 @@ def planned(method: str) -> Any:
 
 
 class Leaning(Kinematics):
-    """A machine whose Y leans by a part of X."""
+    """A machine whose axis Y is not perpendicular to X."""
 
     tip_names, joint_names = ("X", "Y"), ("X", "Y")
 
@@ -333,7 +333,7 @@ class Leaning(Kinematics):
         return joints[0] - joints[1] * self.lean, joints[1]
 
 
-def test_a_kinematics_of_ones_own_need_not_be_registered_for_the_check(tmp_path: Path, capsys: Any) -> None:
+def test_the_check_needs_no_registered_kinematics(tmp_path: Path, capsys: Any) -> None:
     register("leaning", lambda axes, parameters: Leaning(parameters.number("lean", 0.0, "")))
     try:
         machine = Machine(

@@ -1,4 +1,4 @@
-"""The check of events in files, and of tables of knots."""
+"""`feedplan.check` of events in files and of tables of knots."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from feedplan import Machine, plan
 from feedplan.checking import check
 from feedplan.cli import main
 from feedplan.errors import InputError
-from feedplan.files import write_plan
+from feedplan.plan_folder import write_plan
 
 
 def assert_one_sentence(err: str, words: str) -> None:
@@ -31,7 +31,7 @@ def change_event(number: int, **entries: Any) -> Callable[[list[dict[str, Any]]]
 
 
 def later(events: list[dict[str, Any]]) -> None:
-    """While the tool moves: the coolant comes on after the dwell."""
+    """Moves the coolant event to a time after the dwell, while the tool moves."""
     events[3]["time"] += 0.1
 
 
@@ -50,7 +50,7 @@ EVENT_CHANGES = [
 
 @pytest.mark.parametrize("name", ["json", "csv", "pvt", "halstreamer"])
 @pytest.mark.parametrize(("change", "why"), EVENT_CHANGES)
-def test_events_that_were_changed_are_told(
+def test_changed_events_are_refused(
     name: str, change: Callable[[Any], object], why: str | None, tmp_path: Path, capsys: Any
 ) -> None:
     made = plan(WITH_EVENTS, Machine.load("mill"))
@@ -70,7 +70,7 @@ def test_events_that_were_changed_are_told(
     assert_one_sentence(capsys.readouterr().err, "its events are not those that")
     (tmp_path / "plan.json").unlink()
     machine = ["-m", "mill"]
-    # Without velocities a single setpoint does not show that the tool moves.
+    # A single setpoint without velocities does not show that the tool moves.
     if why is None or (change is later and name == "halstreamer"):
         assert main(["check", str(file), *machine]) == 0
     else:
@@ -78,7 +78,7 @@ def test_events_that_were_changed_are_told(
         assert_one_sentence(capsys.readouterr().err, why)
 
 
-def test_knots_of_another_plan_are_told(tmp_path: Path) -> None:
+def test_knots_of_another_plan_are_refused(tmp_path: Path) -> None:
     made = plan(WITH_EVENTS, Machine.load("mill"))
     write_plan(made, tmp_path / "a", ["pvt"], step=0.01)
     write_plan(made, tmp_path / "b", ["pvt"], step=0.02)
@@ -88,7 +88,7 @@ def test_knots_of_another_plan_are_told(tmp_path: Path) -> None:
         shutil.copy(table, tmp_path / other / "setpoints.pvt")
         with pytest.raises(InputError, match=sentence):
             check(tmp_path / other / "setpoints.pvt")
-    # A knot that no axis can reach shows by itself.
+    # A knot that no axis can reach fails the audit.
     lines = table.read_text().splitlines()
     knots = [number for number, line in enumerate(lines) if line[0] not in "#t"]
     fields = lines[knots[5]].split(",")

@@ -79,7 +79,7 @@ def test_the_folder_is_written_and_named(planned: Any, square: Any, tmp_path: Pa
     assert str(tmp_path / "out" / "report.html") in capsys.readouterr().out
 
 
-def test_setpoints_of_an_earlier_plan_are_pointed_out(
+def test_setpoints_of_an_earlier_plan_give_a_warning(
     planned: Any, square: Any, tmp_path: Path, capsys: Any
 ) -> None:
     planned["result"] = square
@@ -210,7 +210,7 @@ def test_jerk_is_judged_where_the_method_of_the_plan_limits_it(
     out = str(tmp_path / "out")
     assert main(["plan", str(program), "-m", "router", "-o", out, "-q"]) == 0
     assert main(["check", out]) == 0
-    # Bang-bang limits none: a method that says so is found out, by its plan and by its setpoints alone.
+    # Bang-bang does not limit jerk: if it claims to, the audit of the plan and of its setpoints fails.
     monkeypatch.setattr("feedplan.planners.bang_bang.LIMITS_JERK", True, raising=False)
     assert main(["check", out]) == 1
     assert " jerk " in capsys.readouterr().err
@@ -225,7 +225,7 @@ def test_a_check_without_a_machine_asks_for_one(program: Path, tmp_path: Path, c
     assert capsys.readouterr().err.endswith("names no machine: give the machine with --machine\n")
 
 
-def test_fit_tells_what_became_of_the_points(program: Path, capsys: Any) -> None:
+def test_fit_prints_splines_and_deviation(program: Path, capsys: Any) -> None:
     assert main(["fit", str(program)]) == 0
     assert "4 pieces in 4 runs" in capsys.readouterr().out
     assert main(["fit", str(program), "--json"]) == 0
@@ -246,7 +246,7 @@ def test_fit_tells_what_became_of_the_points(program: Path, capsys: Any) -> None
     ],
 )
 @pytest.mark.parametrize("command", ["plan", "fit"])
-def test_a_program_that_is_none_is_one_sentence_and_writes_nothing(
+def test_a_file_that_is_no_program_is_one_sentence_and_writes_nothing(
     command: str, content: bytes | None, tmp_path: Path, capsys: Any
 ) -> None:
     file = tmp_path / "a.ngc"
@@ -300,7 +300,7 @@ def test_a_closed_standard_input_is_one_sentence() -> None:
 
 
 class _Named(io.BytesIO):
-    """What a program is piped into, under the name that it has."""
+    """Standard input with the content of a program."""
 
     name = "<stdin>"
 
@@ -343,19 +343,19 @@ def run(*arguments: str, **more: Any) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, check=False, **more)
 
 
-def test_a_terminal_that_knows_no_unicode_gets_what_it_can_show() -> None:
+def test_a_terminal_without_unicode_gets_replacements() -> None:
     done = run("machines", env={**os.environ, "PYTHONIOENCODING": "ascii"})
     assert (done.returncode, done.stderr) == (0, "")
     assert " /s? " in done.stdout
 
 
-def test_a_reader_that_goes_away_is_no_error() -> None:
+def test_a_closed_pipe_is_no_error() -> None:
     shell = f"{sys.executable} -c '{MAIN}' machines | true"
     done = subprocess.run(["sh", "-c", shell], capture_output=True, text=True, check=False)
     assert done.stderr == ""
 
 
-def test_nothing_slow_is_imported_for_the_help() -> None:
+def test_the_help_imports_no_slow_package() -> None:
     code = "import sys, feedplan.cli; print({'rich', 'scipy', 'toppra'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "set()\n"

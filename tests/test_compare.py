@@ -1,4 +1,4 @@
-"""Several methods side by side: what each row says, and the files and the table of the command."""
+"""Comparison of methods: the rows, and the files and the table of the command."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from feedplan.planners import bang_bang, planner, tangential
 from feedplan.report.page import missing_pictures
 from tests.report.drawn import data_of
 
-# A right angle that the tool passes within a tolerance, and half a circle.
+# A right angle with a tolerance, and half a circle.
 PROGRAM = "G21 G90 G64 P0.05 F3000\nG0 X0 Y0 Z0\nG1 X20\nY10\nG3 X0 Y10 I-10\nM2\n"
 METHODS = ("bang-bang", "tangential", "junction-deviation")
 
@@ -31,7 +31,7 @@ def program(tmp_path: Path) -> Path:
     return file
 
 
-def test_the_optimum_has_no_gap_and_a_method_that_breaks_a_limit_has_none_to_show(program: Path) -> None:
+def test_the_gap_is_0_at_the_optimum_and_none_where_a_limit_is_broken(program: Path) -> None:
     exact, tangential, corners = compare(program, "mill", METHODS)
     assert exact.gap is not None
     assert 0.0 <= exact.gap < 1e-3
@@ -40,18 +40,18 @@ def test_the_optimum_has_no_gap_and_a_method_that_breaks_a_limit_has_none_to_sho
     acceleration = exact.worst("acceleration")
     assert acceleration is not None
     assert acceleration.ratio == pytest.approx(1.0, abs=1e-6)
-    # Along the path alone the acceleration keeps its limit; across it, on the circle, it need not.
+    # The acceleration keeps its limit along the path, but not across it, on the circle.
     broken = tangential.worst("acceleration")
     assert broken is not None
     assert broken.ratio > 1.0
     assert tangential.gap is None
     assert tangential.time < exact.time
-    # Both follow one path, so what is proven for one holds for the other; corners are another path.
+    # Both follow the same path, so the lower bound of one holds for the other; the third follows the corners.
     assert tangential.lower_bound == exact.lower_bound
     assert corners.lower_bound != exact.lower_bound
 
 
-def test_a_method_that_fails_says_why_and_the_others_go_on(
+def test_a_failed_method_has_a_reason_and_the_others_are_planned(
     program: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fails(problem: Any) -> Any:
@@ -71,7 +71,7 @@ def test_options_go_to_the_methods_that_have_them(program: Path) -> None:
         planner("bang-bang", cells=8)
 
 
-def test_what_is_no_comparison_is_refused(program: Path) -> None:
+def test_wrong_comparisons_are_refused(program: Path) -> None:
     with pytest.raises(InputError, match="there is no method to compare"):
         compare(program, "mill", ())
     with pytest.raises(InputError, match="there is no method 'fastest': use one of"):
@@ -118,9 +118,7 @@ def test_no_word_of_other_packages_is_printed(
     assert capfd.readouterr() == ("", "error: line 3: gave up\n")
 
 
-def test_each_method_has_ten_seconds_unless_told_otherwise(
-    program: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_each_method_has_ten_seconds_by_default(program: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     limits: list[float | None] = []
     monkeypatch.setattr(
         "feedplan.planners.clarabel.plan",

@@ -1,4 +1,4 @@
-"""The documentation is complete and its links lead somewhere; `make docs` builds it and checks the pages."""
+"""The documentation is complete and its links resolve; `make docs` checks the built pages too."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_every_page_is_in_the_contents() -> None:
 
 
 @pytest.mark.parametrize("page", TEXTS, ids=name_of)
-def test_links_lead_to_files_and_headings(page: Path) -> None:
+def test_links_resolve_to_files_and_headings(page: Path) -> None:
     for link in _LINK.findall(page.read_text("utf-8")):
         parts = urlsplit(link)
         if parts.scheme:
@@ -55,10 +55,10 @@ def test_links_lead_to_files_and_headings(page: Path) -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
-def test_parts_of_other_files_are_there(page: Path) -> None:
+def test_included_parts_of_other_files_exist(page: Path) -> None:
     for _, path, options in _DIRECTIVE.findall(page.read_text("utf-8")):
         file = page.parent / path
-        if file.parent == ROOT / "docs" / ".." / "out" / "examples":  # what a script prints
+        if file.parent == ROOT / "docs" / ".." / "out" / "examples":  # the output of a script
             assert (ROOT / "examples" / f"{file.stem}.py").is_file(), path
             continue
         lines = file.read_text("utf-8").splitlines()
@@ -73,7 +73,7 @@ def test_parts_of_other_files_are_there(page: Path) -> None:
 
 
 def test_each_section_of_the_first_page_is_shown() -> None:
-    """All of README.md but its last section, which is about the project's files, is in some page."""
+    """Every section of README.md but the first, which begins the first page, and the last is in some page."""
     shown = "".join(page.read_text("utf-8") for page in PAGES)
     headings = re.findall(r"^###? .*", (ROOT / "README.md").read_text("utf-8"), re.MULTILINE)
     missing = [heading for heading in headings[1:-1] if f':start-after: "{heading}"' not in shown]
@@ -89,7 +89,7 @@ def test_numbered_examples_are_shown() -> None:
         assert f"literalinclude}} ../out/examples/{script}.txt" in shown
 
 
-def test_files_and_commands_that_contributors_read_of_exist() -> None:
+def test_files_and_commands_named_to_contributors_exist() -> None:
     text = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
     makefile = (ROOT / "Makefile").read_text("utf-8")
     for target in re.findall(r"\bmake ([a-z]+)\b", text):
@@ -101,18 +101,18 @@ def test_files_and_commands_that_contributors_read_of_exist() -> None:
 
 
 class Page(HTMLParser):
-    """What a page loads, where its links lead, and the places that it names."""
+    """What a page loads, the targets of its links, and the ids in it."""
 
     def __init__(self, file: Path) -> None:
         super().__init__()
         self.loads: list[str] = []
         self.links: list[str] = []
-        self.places: set[str] = set()
+        self.ids: set[str] = set()
         self.feed(file.read_text("utf-8"))
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         given = {name: value or "" for name, value in attrs}
-        self.places |= {given["id"]} if "id" in given else set()
+        self.ids |= {given["id"]} if "id" in given else set()
         if tag == "a" and "href" in given:
             self.links.append(given["href"])
         else:
@@ -133,6 +133,6 @@ def test_built_pages_load_nothing_from_elsewhere_and_their_links_resolve() -> No
             target = (file.parent / unquote(parts.path)).resolve() if parts.path else file
             assert target.exists(), f"{file.name}: {link}"
             if parts.fragment and target in pages:
-                assert unquote(parts.fragment) in pages[target].places, f"{file.name}: {link}"
+                assert unquote(parts.fragment) in pages[target].ids, f"{file.name}: {link}"
     for style in folder.rglob("*.css"):
         assert not re.search(r"(?:url\(|@import)\s*['\"]?(?:https?:)?//", style.read_text("utf-8")), style

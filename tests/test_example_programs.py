@@ -1,4 +1,4 @@
-"""The programs in examples/ are planned as they stand, and `feedplan time` tells their operations."""
+"""The programs in examples/ can be planned unchanged, and `feedplan time` lists their operations."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from feedplan.program.read import read_program
 from feedplan.program.tools import read_tools
 from tests.program.linuxcnc import difference, moves_of, needs_linuxcnc, reference
 
-# By file: a machine for it, its tools, and its operations.
+# For each file: its machine, its tools, and its operations.
 PROGRAMS: dict[str, tuple[str, list[int | None], list[str]]] = {
     "part.ngc": ("mill", [1, 2, 3], ["FACE", "FOUR HOLES"]),
     "bracket.nc": (
@@ -95,7 +95,7 @@ def test_time_prints_a_table_and_takes_standard_input(capsys: Any, monkeypatch: 
     assert any(line.startswith("  FOUR HOLES") for line in lines)
 
 
-def test_time_tells_todays_time_beside_it(capsys: Any) -> None:
+def test_time_shows_the_time_of_today(capsys: Any) -> None:
     command = ["time", str(EXAMPLES / "part.ngc"), "--controller", "grbl"]
     assert main([*command, "--json"]) == 0
     today = json.loads(capsys.readouterr().out)["today"]
@@ -106,7 +106,7 @@ def test_time_tells_todays_time_beside_it(capsys: Any) -> None:
     assert capsys.readouterr().out.splitlines()[-1].startswith("today: ")
 
 
-def test_time_tells_a_limit_that_is_broken(capsys: Any) -> None:
+def test_time_reports_a_broken_limit(capsys: Any) -> None:
     assert main(["time", str(EXAMPLES / "part.ngc"), "--method", "junction-deviation"]) == 1
     out, error = capsys.readouterr()
     assert out.splitlines()[-1].startswith("whole program")

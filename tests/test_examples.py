@@ -1,4 +1,4 @@
-"""Every script in examples/ runs, and the programs they write are what they say."""
+"""Every script in examples/ runs, and the programs that the scripts write agree with their descriptions."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ SCRIPTS = sorted(path.name for path in EXAMPLES.glob("*.py") if not path.stem.en
 
 
 def moves(text: str, words: str) -> NDArray[np.float64]:
-    """The numbers of the lines that hold all of `words`, one row each."""
+    """The numbers in the lines that have all of `words`, one row for each line."""
     pattern = ".*".join(
         rf"\b{word}(-?[\d.]+)" if i == 0 else rf"{word}(-?[\d.]+)" for i, word in enumerate(words)
     )
@@ -162,7 +162,7 @@ def test_blocks_of_the_head_are_as_long_as_their_curvature_allows() -> None:
     assert lengths.min() >= 0.9 * 0.05
     assert lengths.max() <= 1.001
     assert lengths.max() > 5.0 * lengths.min()
-    # The chord error: from the middle of a block across to the path that the points lie on.
+    # The chord error: the distance of the middle of a block from the path through the points.
     path = head.tool_tip(0.3, np.linspace(points[0, 1], points[-1, 1], 20_000))
     middle = 0.5 * (points[1:] + points[:-1])
     beside = np.column_stack([np.interp(middle[:, 1], path[:, 1], path[:, k]) for k in range(3)])
@@ -185,7 +185,7 @@ def test_the_head_moves_all_three_axes() -> None:
 
 
 def joint_positions(program: Program, machine: Machine) -> NDArray[np.float64]:
-    """The joints at the end of every move, by what its words mean."""
+    """The joints at the end of every move."""
     assert program.meaning is not None
     found = np.empty((len(program), len(machine.axes)))
     for meaning in Meaning:
@@ -204,14 +204,14 @@ def test_the_impeller_is_the_same_motion_in_every_form(name: str) -> None:
     tip, vector, joints = (joint_positions(program, machine) for program in programs)
     assert len(joints) > 500
     assert np.abs(tip - joints).max() < 1e-3
-    # Directions leave angles open by whole turns, and the pose by its side.
+    # A direction does not decide whole turns of the angles, nor which of two poses is taken.
     assert programs[1].meaning is not None
     pointed = programs[1].meaning == Meaning.VECTOR
     kinematics = axis_words(machine, programs[1].axes, Meaning.VECTOR).kinematics
     directions = np.array([kinematics.tip(row) for row in joints])
     assert np.abs(directions[pointed] - programs[1].target[pointed][:, [0, 1, 2, 5, 6, 7]]).max() < 1e-3
     assert np.abs(vector - joints)[~pointed].max() < 1e-3
-    # The readings agree where the words change: the last move is one of joints in all forms.
+    # The forms agree after the end of the tip words: the last move is of joints in all forms.
     starts = [program.starts()[-1][:5] for program in programs]
     assert starts[0] == pytest.approx(starts[2], abs=1e-3)
     assert starts[1] == pytest.approx(starts[2], abs=1e-3)

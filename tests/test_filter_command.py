@@ -26,7 +26,7 @@ LINEAR_UNITS = mm
 
 
 def run(*arguments: str, **environment: str) -> tuple[int, bytes, str]:
-    # As AXIS does: nothing on standard input.
+    # As LinuxCNC's AXIS does, without standard input.
     done = subprocess.run(
         [sys.executable, "-m", "feedplan", "filter", *arguments],
         stdin=subprocess.DEVNULL,
@@ -61,7 +61,7 @@ def test_the_machine_is_that_of_the_ini_file_without_its_travel(tmp_path: Path) 
 
 
 @pytest.mark.parametrize("stages", [[("read", 0.5), ("fit", 1.0), ("plan", 2.0), ("write", 1.0)]])
-def test_each_per_cent_is_told_once(stages: list[tuple[str, float]]) -> None:
+def test_each_per_cent_is_reported_once(stages: list[tuple[str, float]]) -> None:
     lines: list[str] = []
     tell = filter_progress(lines.append)
     for stage, done in [*stages, *stages]:

@@ -1,4 +1,4 @@
-"""Plans are made in child processes of every start method, whatever the parent has done before."""
+"""Child processes of every start method can plan, whatever the parent has done before."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from feedplan import lazy
 
 ROOT = Path(__file__).parent.parent
 
-# A program of its own, as users have them: children import it again, and a pool that hangs ends with it.
+# A script of its own, as users have them: children import it again, and a pool that hangs ends with it.
 SCRIPT = """
 import multiprocessing, os, sys, threading
 import feedplan
@@ -61,7 +61,7 @@ def test_children_plan_after_their_parent_has_planned(method: str, busy: bool, t
         pytest.fail("the children hang")
     assert done.returncode == 0, done.stderr
     if sys.platform == "linux":
-        # Python's own thread, and those of a pool of the child's own.
+        # Python's own thread, and the threads of the child's own pool.
         assert int(done.stdout) > 1
 
 
@@ -72,7 +72,7 @@ def test_a_value_that_a_thread_computes_does_not_lock_another_objects() -> None:
 
         @lazy.cached_property
         def value(self) -> int:
-            """What takes long."""
+            """A value that takes long to compute."""
             self.begun.set()
             assert self.goes_on.wait(60)
             return 7
@@ -88,4 +88,4 @@ def test_a_value_that_a_thread_computes_does_not_lock_another_objects() -> None:
     goes_on.set()
     thread.join()
     assert slow.value == 7
-    assert Slow.value.__doc__ == "What takes long."
+    assert Slow.value.__doc__ == "A value that takes long to compute."

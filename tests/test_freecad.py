@@ -1,4 +1,4 @@
-"""The post-processor of examples/ for FreeCAD, run by FreeCAD without a display on a job of its own."""
+"""The post-processor for FreeCAD in examples/, run by FreeCAD without a display."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from feedplan.program.program import MoveKind
 ROOT = EXAMPLES.parent
 FREECAD = shutil.which("freecadcmd") or shutil.which("FreeCADCmd")
 
-# A box is cut around in three levels, and three holes are drilled beside it.
+# The outline of a box in three levels, and three holes beside it.
 JOB = """
 import json, sys
 sys.path.insert(0, {examples!r})

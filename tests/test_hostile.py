@@ -1,4 +1,4 @@
-"""Files that were damaged or made to do harm end in one short sentence, in bounded memory."""
+"""Files that are damaged or made to do harm give one short sentence, in bounded memory."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from tests.hostile import DRAWING, MACHINE, OF_CONTROLLERS, PATH_FILE, PROGRAM, 
 
 SEEDS = seeds(100)
 SMALL = "G21 G90\nF1200\nG1 X1 Y0.5\nX2\nM2\n"
-# More memory [bytes] than a command of small files has any use for.
+# Greatest growth of memory for small files [bytes].
 GROWTH = 1 << 29
 WORDS = len("error: ")
 
 
 def outcome(*arguments: str) -> str:
-    """What is wrong with how a command ended, if anything: its exit code, or what it said."""
+    """An error in the exit code or the output of a command; None if there is none."""
     said, errors = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(said), contextlib.redirect_stderr(errors):
         code = cli.main(list(arguments))
@@ -115,7 +115,7 @@ def test_mutated_setpoints(form: str, tmp_path: Path) -> None:
     of_all(file.read_bytes(), file, lambda: outcome("check", str(folder)), change)
 
 
-# What follows was found by hand.
+# The cases from here on were found by hand.
 
 DEEP = 100_000
 
@@ -285,7 +285,7 @@ def _is_a_sentence(error: str) -> None:
 
 
 def _alone(*arguments: str, stdout: object = subprocess.DEVNULL) -> tuple[int, str]:
-    """A command by itself, in memory for small files."""
+    """Runs a command in a process with little memory."""
     code = (
         "import resource, sys; resource.setrlimit(resource.RLIMIT_AS, (3 << 30, 3 << 30));"
         "from feedplan.cli import main; sys.exit(main(sys.argv[1:]))"

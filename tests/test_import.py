@@ -1,4 +1,4 @@
-"""What a user finds at the top of the package: the names, what they are, and what they tell of themselves."""
+"""The public names of the package: their kinds, signatures and docstrings."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_every_public_name_exists_and_no_other_is_shown() -> None:
     assert shown == sorted(feedplan.__all__)
 
 
-def test_no_module_takes_the_place_of_a_public_name() -> None:
+def test_no_module_hides_a_public_name() -> None:
     before = {name: getattr(feedplan, name) for name in feedplan.__all__}
     for module in pkgutil.walk_packages(feedplan.__path__, "feedplan."):
         if module.name.count(".") == 1 and not module.name.endswith("__main__"):
@@ -44,7 +44,7 @@ def test_the_version_is_that_of_the_distribution() -> None:
     assert feedplan.__version__ == version("feedplan")
 
 
-def test_nothing_that_is_slow_is_imported_with_the_package() -> None:
+def test_the_package_imports_no_slow_package() -> None:
     slow = {
         "click",
         "rich",
@@ -95,7 +95,7 @@ def test_machines_and_methods_are_named() -> None:
     assert {"bang-bang", "jerk-limited", "toppra"} <= set(feedplan.methods())
 
 
-def test_types_of_names_list_what_there_is() -> None:
+def test_literal_types_list_all_names() -> None:
     assert get_args(MethodName) == feedplan.methods()
     assert get_args(FormatName) == formats()
     assert INTERPOLATORS == ("sarfraz", "newton")

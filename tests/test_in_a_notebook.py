@@ -1,4 +1,4 @@
-"""What people do with plans at a prompt: short texts, a card in a notebook, copies in other processes."""
+"""Plans at a prompt: short texts, a card in a notebook, copies in other processes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_every_text_is_short(made: Plan) -> None:
     assert repr(made.audit()).endswith("samples: every limit holds>")
 
 
-def test_one_of_a_thing_is_told_as_one() -> None:
+def test_a_count_of_one_has_no_plural() -> None:
     one = plan("G21 G1 F1000 X10\nM2\n", "mill")
     assert one.figures()["path"] == "1 piece in 1 run"
     assert repr(one.path).endswith("1 piece in 1 run>")
@@ -39,7 +39,7 @@ def test_one_of_a_thing_is_told_as_one() -> None:
     assert two.figures()["path"] == "2 pieces in 2 runs"
 
 
-def test_what_holds_arrays_is_compared_by_identity(made: Plan) -> None:
+def test_objects_with_arrays_compare_by_identity(made: Plan) -> None:
     for thing in (made, made.program, made.path, made.problem, made.profile, made.path.curve):
         assert thing == thing
         assert thing != pickle.loads(pickle.dumps(thing))

@@ -1,4 +1,4 @@
-"""Signals and whoever listens to the progress end every stage of the work, and the progress only rises."""
+"""Signals and listeners of progress can end every stage of the work, and the progress only rises."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ import feedplan
 from feedplan import Machine, Plan
 from feedplan.cli import main, terminal
 from feedplan.constraints.problem import build_problem
-from feedplan.files import write_plan
 from feedplan.geometry.build import build_path
 from feedplan.geometry.corners import Corners
 from feedplan.outputs import FormatName
+from feedplan.plan_folder import write_plan
 from feedplan.planners import planner
 from feedplan.program.gcode import read_gcode
 from feedplan.program.read import read_program
@@ -36,11 +36,11 @@ Progress = Callable[[str, float], None]
 
 
 class StoppedError(Exception):
-    """What a listener raises."""
+    """The exception of a listener."""
 
 
 def wave(blocks: int) -> str:
-    """A program of short blocks along a wave that never comes back to the same place."""
+    """A program of short blocks along a wave that does not repeat."""
     i = np.arange(blocks)
     x, y = 0.05 * i, 3.0 * np.sin(0.05 * i) + np.sin(0.013 * i)
     moves = "\n".join(f"X{a:.4f} Y{b:.4f}" for a, b in zip(x, y, strict=True))
@@ -55,7 +55,7 @@ def machine() -> Machine:
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Long enough for each stage to be told of a few times."""
+    """Long enough for several reports of progress in each stage."""
     place = tmp_path_factory.mktemp("wave") / "wave.ngc"
     place.write_text(wave(8_000), encoding="ascii")
     return place
@@ -63,7 +63,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def long_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """So long that even the reader is told of."""
+    """Long enough for reports of progress while reading."""
     place = tmp_path_factory.mktemp("wave") / "long.ngc"
     place.write_text(wave(1_000_000), encoding="ascii")
     return place
@@ -77,7 +77,7 @@ def everything(file: Path, machine: Machine, method: str, folder: Path, progress
 
 
 @pytest.mark.parametrize("method", ["bang-bang", "s-curve", "jerk-limited"])
-def test_progress_rises_in_each_stage_from_nothing_to_all(
+def test_progress_rises_from_0_to_1_in_each_stage(
     file: Path, machine: Machine, method: str, tmp_path: Path
 ) -> None:
     told: list[tuple[str, float]] = []
@@ -98,7 +98,7 @@ def test_progress_rises_in_each_stage_from_nothing_to_all(
 def test_fit_and_check_show_how_far_they_are(
     form: FormatName, file: Path, machine: Machine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Both commands; and the check ends where its listener says so."""
+    """Both commands report progress, and a listener can end the check."""
     machine_file = tmp_path / "wave.toml"
     machine_file.write_text(machine.to_toml(), encoding="utf-8")
     write_plan(feedplan.plan(file, machine, "s-curve"), tmp_path / "out", [form])
@@ -131,9 +131,7 @@ def test_fit_and_check_show_how_far_they_are(
 
 
 @pytest.mark.parametrize("stage", ["fit", "plan", "audit", "write"])
-def test_a_listener_ends_the_stage_that_it_is_told_of(
-    file: Path, machine: Machine, stage: str, tmp_path: Path
-) -> None:
+def test_a_listener_can_end_its_stage(file: Path, machine: Machine, stage: str, tmp_path: Path) -> None:
     told: list[tuple[str, float]] = []
 
     def stop(name: str, done: float) -> None:
@@ -163,7 +161,7 @@ def test_the_reader_is_ended_too(long_file: Path, machine: Machine) -> None:
 
 
 def spent(work: Callable[[], Any], until: float = 0.0) -> float:
-    """Seconds of processor time until the work ended; a signal comes after `until` of them, if not 0."""
+    """Processor time until the work ended [s]; a signal comes after the time `until` [s], if it is not 0."""
     before = signal.signal(signal.SIGPROF, signal.default_int_handler)
     begun = time.process_time()
     signal.setitimer(signal.ITIMER_PROF, until)
@@ -187,7 +185,8 @@ def test_a_signal_ends_native_work_long_before_it_is_done(file: Path, machine: M
         lambda: planner("jerk-limited")(problem),
         lambda: planner("s-curve")(problem),
     ):
-        # Processor time, because the computer may have other work to do. Not ended it would be the whole.
+        # Processor time, because the computer may have other work. Without the signal it would be the whole
+        # time.
         whole = spent(work)
         assert spent(work, 0.1 * whole) < 0.7 * whole
 
@@ -215,7 +214,7 @@ def test_threads_that_plan_at_once_do_not_disturb_each_other(file: Path, machine
 
 
 def test_the_bars_of_the_command_move_and_a_signal_ends_it(tmp_path: Path) -> None:
-    """On a terminal: some percent are shown, the signal comes, one line is printed, nothing is left."""
+    """On a terminal: the bar moves; after the signal one line is printed, and no file is left."""
     program = tmp_path / "wave.ngc"
     program.write_text(wave(60_000), encoding="ascii")
     master, slave = pty.openpty()
@@ -227,7 +226,7 @@ def test_the_bars_of_the_command_move_and_a_signal_ends_it(tmp_path: Path) -> No
             env=dict(os.environ, TERM="xterm", COLUMNS="100"),
             stdout=results,
             stderr=slave,
-            # Whoever runs the tests in the background has children that are deaf to this signal.
+            # Processes that are started in the background ignore this signal.
             preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         )
     os.close(slave)

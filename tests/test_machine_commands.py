@@ -43,9 +43,7 @@ def test_limits_in_a_row_have_the_units_of_their_axes(capsys: Any) -> None:
     assert rows["mill"].startswith("mill XYZ 500 500 400 mm 3000")
 
 
-def test_the_template_loads_as_it_stands_and_with_every_line_that_it_offers(
-    tmp_path: Path, capsys: Any
-) -> None:
+def test_the_template_loads_unchanged_and_with_all_commented_lines(tmp_path: Path, capsys: Any) -> None:
     file = tmp_path / "mine.toml"
     assert main(["machines", "new", "-o", str(file)]) == 0
     assert capsys.readouterr().out == f"{file}\n"
@@ -53,7 +51,7 @@ def test_the_template_loads_as_it_stands_and_with_every_line_that_it_offers(
     assert file.read_text(encoding="utf-8") == template()
     assert main(["machines", "new"]) == 0
     assert capsys.readouterr().out == template()
-    # What is a comment there can be used: numbers, and an axis of its own.
+    # The commented lines of the template are valid when they are made active.
     offered = [
         line.removeprefix("# ") if " = " in line or "[" in line[:5] else line
         for line in template().splitlines()

@@ -1,4 +1,4 @@
-"""Plans of whole programs: what the time of a plan counts."""
+"""The time of a plan of a whole program, with its pauses."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_the_audit_expects_the_pause_before_the_first_move(planned: dict[str, Pl
         path = replace(late.path, start_dwell=pause)
         hasty = replace(late, problem=replace(late.problem, path=path)).setpoints()
         assert not audit(late.problem, late.profile, MILL, late.program, hasty).ok
-    # And a period of another length, in which the pause does not end.
+    # With another period the pause does not end at a setpoint.
     slow = late.setpoints(period=0.0037)
     assert audit(late.problem, late.profile, MILL.with_period(0.0037), late.program, slow).ok
     assert np.isclose(slow.duration, late.time, atol=3 * 0.0037)

@@ -1,6 +1,6 @@
-"""What is built runs on older processors and systems than those that built it, and plans the same.
+"""The native module runs on older processors and systems than those that built it, and gives equal plans.
 
-`make wheel` checks its wheel so too.
+`make wheel` runs these tests on its wheel too.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ print(json.dumps({method: shown(method) for method in ("bang-bang", "jerk-limite
 
 
 def plans(command: list[str], folder: Path, **settings: str) -> dict[str, list[object]]:
-    """What an interpreter prints for PLANS, with these settings in its environment."""
+    """The output of an interpreter for PLANS, with these settings in its environment."""
     (folder / "part.ngc").write_text(PROGRAM, encoding="ascii")
     clean = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
     done = subprocess.run(
@@ -52,7 +52,7 @@ def plans(command: list[str], folder: Path, **settings: str) -> dict[str, list[o
 
 
 def own_plans(folder: Path, emulator: tuple[str, ...] = ()) -> dict[str, list[object]]:
-    """The same by what is tested here."""
+    """The same by the native module of this package."""
     package = Path(_solvers.__file__).parent
     return plans([*emulator, sys.executable], folder, PYTHONPATH=str(package.parent))
 

@@ -1,4 +1,4 @@
-"""What README.md shows first works as it stands, with the program and the machine that come with it."""
+"""The commands and the code in README.md run unchanged, with the program and the machine from `examples/`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ README = (ROOT / "README.md").read_text("utf-8")
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Where a user begins: with copies of the program and the machine."""
+    """A folder with copies of the program and the machine, as README.md tells to make."""
     for name in ("part.ngc", "mine.toml"):
         shutil.copy(ROOT / "examples" / name, tmp_path)
     monkeypatch.chdir(tmp_path)
@@ -25,7 +25,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def section(title: str, language: str) -> str:
-    """The first block of code of a language under a heading."""
+    """The first block of code in a language under a heading of README.md."""
     text = README.split(f"\n## {title}", 1)[1].split("\n## ", 1)[0]
     return text.split(f"```{language}\n", 1)[1].split("```", 1)[0]
 

@@ -28,7 +28,7 @@ def simulated(runs: list[Run]) -> list:
         pytest.skip(reason)
     try:
         return recorded(MACHINE, runs, TOLERANCE)
-    except SimulatorError:  # it runs in real time, which a busy computer may not leave it
+    except SimulatorError:  # the simulator runs in real time, which a busy computer may not allow
         return recorded(MACHINE, runs, TOLERANCE)
 
 
@@ -52,17 +52,17 @@ def test_the_simulator_takes_the_models_time_and_plays_the_stream_to_the_last_bi
     assert second.motion + pauses == pytest.approx(model(again), rel=0.05)
     setpoints = plan.setpoints().all()
     np.testing.assert_array_equal(third.played, setpoints.position)
-    # A stop is hit at a period of its own: each costs less than one.
+    # Each stop is hit at a whole period and costs less than one.
     assert 0.0 <= setpoints.t[-1] - plan.time < MACHINE.period * (len(plan.path.runs) + 1)
     assert setpoints.t[-1] < first.motion + pauses
     way = places(plan.program, MACHINE)
-    # LinuxCNC rounds corners of points that it has moved: both within P.
+    # LinuxCNC leaves out points and rounds corners, both within P.
     for run in (first, second):
         assert greatest_distance(run.position[run.moving], way) < 2.0 * TOLERANCE
     assert greatest_distance(third.played, way) < 1.001 * TOLERANCE
 
 
-def test_what_the_interpreter_refuses_is_said() -> None:
+def test_a_refusal_of_the_interpreter_is_reported() -> None:
     with pytest.raises(SimulatorError, match=r"run 1 of 1 failed: LinuxCNC says: Unknown g code"):
         simulated([Run(b"G21 G90\nG1 F600 X1\nG77.7 X2\nM2\n", 1.0)])
 

@@ -1,4 +1,4 @@
-"""The controller of today beside a plan: in machine files, from Python and on the command line."""
+"""The controller of today: in machine files, from Python and on the command line."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_a_machine_file_names_its_controller(name: str) -> None:
     assert again.controller == Controller(name)
     short = machine.to_toml().replace(f'[controller]\ntype = "{name}"\n', "")
     assert parse(f'controller = "{name}"\n{short}', "mine.toml") == machine
-    # Every parameter is an option of its method, and may be given as its default.
+    # Every parameter is an option of its method, and its default may be given.
     model = MODELS[name]
     assert model.method in methods()
     assert set(Controller(name).options) <= set(options_of(model.method))
@@ -81,7 +81,7 @@ def test_parameters_of_a_machine_file_are_kept_and_reach_the_model() -> None:
         ),
     ],
 )
-def test_what_is_no_controller_is_refused_in_a_sentence(given: Any, sentence: str) -> None:
+def test_an_unknown_controller_is_refused_in_one_sentence(given: Any, sentence: str) -> None:
     with pytest.raises(MachineError, match=sentence):
         Machine("mine", AXES, controller=given)
     with pytest.raises(MachineError, match=sentence):
@@ -113,7 +113,7 @@ def test_the_request_of_the_plan_holds_for_the_controller() -> None:
         same = plan(program, PLANE, "linuxcnc", **request)  # type: ignore[arg-type]
         assert made.today is not None
         assert made.today.time == same.time, request
-    # Pauses count on both sides.
+    # Both times include the pauses.
     paused = plan(ANGLE.replace("Y30", "G4 P2\nG1 Y30"), machine)
     assert paused.today is not None
     assert paused.today.time > 2.0
@@ -127,7 +127,7 @@ def test_a_path_has_a_controller_too() -> None:
     assert made.today.time == pytest.approx(made.time, rel=0.05)
 
 
-def test_where_the_model_has_no_plan_a_warning_says_why() -> None:
+def test_a_model_without_a_plan_gives_a_warning() -> None:
     made = plan("G21 G90 G64 P0.01 F3000\nG1 X20 Y10\nX30 Y20\nM2\n", "polar", controller="grbl")
     assert made.today is None
     assert any(
@@ -150,8 +150,8 @@ def test_a_comparison_tells_what_each_method_saves(program: Path) -> None:
     assert [row.saved for row in compare(program, PLANE, ("bang-bang",))] == [None]
 
 
-def test_one_step_more_of_the_feed_shortens_what_the_feed_holds() -> None:
-    # One line: the feed, and X's acceleration at both ends.
+def test_one_step_more_of_the_feed_shortens_lines_at_the_feed() -> None:
+    # One line at the feed, with X's acceleration at both ends.
     length, feed = 40.0, 50.0
     made = plan(f"G21 G90 G64 F{60 * feed:g}\nG1 X{length:g}\nM2\n", Machine("mine", AXES, controller="grbl"))
     steps = {step.limit: step for step in one_step_more(made)}
@@ -191,7 +191,7 @@ def test_the_commands_print_it(program: Path, tmp_path: Path, capsys: pytest.Cap
     blocks = [*options, "--controller-option", "block_buffer_size=31", "--json"]
     assert main(["plan", str(program), "--machine", str(mine), *blocks]) == 0
     assert json.loads(capsys.readouterr().out)["today"]["parameters"]["block_buffer_size"] == 31
-    # Another controller has none of the machine's parameters.
+    # Another controller does not get the parameters in the machine file.
     assert main(["plan", str(program), "--machine", str(mine), "--controller", "marlin", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["today"]["parameters"] == {}
     assert main(["plan", str(program), "--machine", "mill", "--json"]) == 0

@@ -32,7 +32,7 @@ LONGEST = 300
 
 
 class Odd:
-    """Nothing that any function wants, with a text that is no help either."""
+    """A type that no function takes, with a text that is long and of several lines."""
 
     def __repr__(self) -> str:
         return "very odd\n" * 1000
@@ -72,12 +72,12 @@ WRONG: list[Any] = [
     int,
     Odd(),
 ]
-# What a function for progress raises is for its owner.
+# Functions are left out: exceptions of a progress function go to its owner.
 NO_FUNCTIONS = [value for value in WRONG if not callable(value)]
 
 
 def cases(tmp_path: FilePath) -> dict[str, tuple[Callable[..., Any], dict[str, Any]]]:
-    """Functions by name, with arguments that they take; positional ones by the names in the signature."""
+    """Functions by name, with valid arguments; positional ones have the names in the signature."""
     file = tmp_path / "part.ngc"
     file.write_text(PROGRAM)
     table = tmp_path / "tool.tbl"
@@ -274,7 +274,7 @@ def cases(tmp_path: FilePath) -> dict[str, tuple[Callable[..., Any], dict[str, A
 
 
 def outcome(function: Callable[..., Any], arguments: dict[str, Any]) -> str | None:
-    """What is wrong with how a function takes its arguments, if anything is."""
+    """An error in the function's reaction to these arguments; None if there is none."""
     try:
         function(**arguments)
     except FeedplanError as error:
@@ -323,7 +323,7 @@ def test_the_cases_are_all_public_functions_with_all_their_arguments(tmp_path: F
                 assert set(parameters) <= set(found[f"{name}.{method}"][1]), (name, method)
 
 
-def test_what_is_close_to_a_number_counts_as_one(tmp_path: FilePath) -> None:
+def test_numbers_of_other_types_are_accepted(tmp_path: FilePath) -> None:
     exact = feedplan.plan(PROGRAM, "mill", feed=8, tolerance=0.5, start_speed=0)
     for number in (np.float32, np.int64, np.float64, Fraction):
         own = feedplan.plan(PROGRAM, "mill", feed=number(8), tolerance=number(1) / 2, start_speed=number(0))

@@ -1,7 +1,7 @@
-"""Programs in LinuxCNC's simulator: as they are, with planned feeds, and as the plan's stream.
+"""Runs programs in LinuxCNC's simulator: as they are, with planned feeds, and as the plan's stream.
 
-For each the time there, the time that the model of LinuxCNC tells, and how far the joints leave the
-path of the program. Times have the program's pauses, which take what they say.
+A row has the time in the simulator, the time by the model of LinuxCNC, and the greatest distance of the
+joints from the path of the program. Times include the program's pauses.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ from feedplan.today import time_by
 Array = NDArray[np.float64]
 
 MACHINE = Machine("simulated", tuple(Axis(name, 100.0, 500.0) for name in "XYZ"), period=0.001)
-# Points of a path [mm].
+# Distance of the points of a path [mm].
 _APART = 0.01
 _COMMENT = re.compile(rb"\([^()\r\n]*\)?|;[^\r\n]*")
 _MM_PER_INCH = 25.4
 
 
 def prepared(content: bytes, feeds: float, tolerance: float) -> bytes:
-    """The program with its F words times `feeds`, and the tolerance [mm] where G64 has none."""
+    """The program with its F words times `feeds`, and with the tolerance [mm] in G64 without P."""
     code = _COMMENT.sub(lambda found: b" " * len(found[0]), content)
     unit = _MM_PER_INCH if re.search(rb"[Gg]0*20(?![\d.])", code) else 1.0
     edits = [
@@ -56,7 +56,7 @@ def prepared(content: bytes, feeds: float, tolerance: float) -> bytes:
 
 
 def places(program: Program, machine: Machine) -> Array:
-    """Points of the path that the program asks for (n, 3)."""
+    """Points of the programmed path (n, 3)."""
     path = build_path(program, machine, corners=Corners.PROGRAMMED)
     curve, width = path.curve, path.width
     pieces = np.arange(len(path))
@@ -72,7 +72,7 @@ def places(program: Program, machine: Machine) -> Array:
 
 
 def greatest_distance(points: Array, way: Array) -> float:
-    """Of points from a way of short lines [mm]."""
+    """The greatest distance of points from a polyline of short lines [mm]."""
     near = np.clip(cKDTree(way).query(points)[1], 1, len(way) - 2)
     best = np.full(len(points), np.inf)
     for first in (near - 1, near):
@@ -87,7 +87,7 @@ def row(file: Path, machine: Machine, feeds: float, tolerance: float) -> dict[st
     """A line of the table. Raises SimulatorError and FeedplanError."""
     original = prepared(file.read_bytes(), feeds, tolerance)
     program = feedplan.read_program(original, machine, name=file.name)
-    # Both follow a program without G64 within the same.
+    # LinuxCNC and the plan follow a program without G64 within the same tolerance.
     own = {} if np.isfinite(program.blend_tolerance).any() else {"tolerance": tolerance}
     plan = feedplan.plan(program, machine, **own)
     rewritten = feedplan.planned_program(plan)

@@ -1,4 +1,4 @@
-"""LinuxCNC's HAL, of which a computer has one, in processes and memory of its own."""
+"""Runs LinuxCNC's HAL, of which a computer can have only one, isolated in its own processes and memory."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-# LinuxCNC's modules are those of the system's Python.
+# LinuxCNC's modules are installed for the system's Python.
 PYTHON = "/usr/bin/python3"
-# A user without rights: HAL refuses to run as root without one.
+# A user without rights; HAL refuses to run as root without one.
 _NOBODY = "65534"
 _ALONE = ["unshare", "--pid", "--fork", "--kill-child", "--mount-proc", "--ipc", "--net"]
 
 
 def missing() -> str | None:
-    """Why HAL cannot run here, in a sentence; None where it can."""
+    """A sentence that tells why HAL cannot run here; None if it can."""
     if shutil.which("halrun") is None:
         return "LinuxCNC is not installed: apt-get install linuxcnc-uspace"
     found = subprocess.run([PYTHON, "-c", "import hal; hal.stream"], env=_clean(), capture_output=True)
@@ -30,16 +30,17 @@ def missing() -> str | None:
 
 
 def alone() -> list[str]:
-    """What gives a command processes, shared memory and ports of its own, which end with it; nothing where
-    the system does not allow that."""
+    """The words before a command that isolate its processes, shared memory and ports, which end with it;
+    empty if the system does not allow that."""
     allowed = shutil.which("unshare") and subprocess.run([*_ALONE, "true"], capture_output=True)
     return _ALONE if allowed and allowed.returncode == 0 else []
 
 
 @contextmanager
 def folder_and_environment() -> Iterator[tuple[Path, dict[str, str]]]:
-    """A folder that HAL's user may write to, and the variables of HAL with its socket there."""
-    # Not in /tmp, where LinuxCNC has a file that says that it runs.
+    """A folder that HAL's user may write to, and HAL's environment variables with its socket in the
+    folder."""
+    # Not in /tmp, where LinuxCNC keeps its lock file.
     with tempfile.TemporaryDirectory(prefix="hal", dir="/var/tmp") as place:
         os.chmod(place, 0o777)
         user = {"RTAPI_UID": _NOBODY} if os.getuid() == 0 else {}
@@ -48,5 +49,5 @@ def folder_and_environment() -> Iterator[tuple[Path, dict[str, str]]]:
 
 
 def _clean() -> dict[str, str]:
-    """The environment without that of this Python."""
+    """The environment without the variables of this Python."""
     return {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}

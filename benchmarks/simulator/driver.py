@@ -1,8 +1,9 @@
-"""LinuxCNC's user interface in the simulator: switches it on, runs what it is told, and records the joints.
+"""The user interface of LinuxCNC in the simulator: switches the machine on, does the runs, records the
+joints.
 
-LinuxCNC starts it as [DISPLAY], by the Python that it is installed for. `runs.json` beside it has the runs,
-programs and streams, in order; `rows.bin` gets a number for each of `PINS` in each servo period of a run,
-`said.json` what LinuxCNC said.
+LinuxCNC starts this file as [DISPLAY], with the Python that LinuxCNC is installed for. `runs.json` beside it
+has the runs (programs and streams) in order; `rows.bin` gets a number for each of `PINS` in each servo period
+of a run, `said.json` the messages of LinuxCNC.
 """
 
 from __future__ import annotations
@@ -19,11 +20,11 @@ import hal
 import linuxcnc
 
 FOLDER = Path(__file__).parent
-# Joints, in motion, a stream is to be played, there is no row of one, number of the run from 1.
+# Joints; in motion; a stream is to be played; the stream has no row; number of the run from 1.
 PINS = "fffbbbs"
-# The key of sampler's memory.
+# The key of sampler's shared memory.
 SAMPLER = 0x48534130
-# Reading of a program begins within this time, and the machine is on [s].
+# Longest time until the machine is on, and until a program begins [s].
 PATIENCE = 30.0
 
 
@@ -49,7 +50,7 @@ class Simulator:
         self.recorder.start()
 
     def record(self) -> None:
-        """Writes rows of runs until it is told to stop."""
+        """Writes rows of runs until `stop`."""
         row = struct.Struct(f"<{len(PINS)}d")
         with (FOLDER / "rows.bin").open("wb") as file:
             while self.recording or self.samples.readable:
@@ -86,7 +87,7 @@ class Simulator:
         return status.interp_state == linuxcnc.INTERP_IDLE and status.inpos and status.queue == 0
 
     def to_start(self, startup: str) -> None:
-        """The modes of a program's begin, and the tool at the origin."""
+        """Sets the modes for the begin of a program, and moves the tool to the origin."""
         self.command.mode(linuxcnc.MODE_MDI)
         self.command.wait_complete(PATIENCE)
         for block in ("G40 G49 G80 G90 G92.1 G54", "G53 G0 X0 Y0 Z0", startup):
@@ -110,7 +111,7 @@ class Simulator:
 
     def run_stream(self, file: str, seconds: float) -> None:
         feeder = subprocess.Popen(["halstreamer", file])
-        # The stream is in its memory, or this is full.
+        # Waits until the stream is in HAL's memory, or the memory is full.
         level = -1
         while feeder.poll() is None and hal.get_value("streamer.0.curr-depth") != level:
             level = hal.get_value("streamer.0.curr-depth")
@@ -140,7 +141,7 @@ def main() -> None:
             time.sleep(0.05)
             simulator.pins["run"] = 0
             results.append(simulator.said)
-    except Exception as error:  # LinuxCNC's own are of no common type
+    except Exception as error:  # LinuxCNC's errors have no common class
         failed = str(error) or type(error).__name__
     finally:
         simulator.recording = False

@@ -1,8 +1,8 @@
 """A session of LinuxCNC's simulator: a machine of X, Y and Z, programs and streams one after the other.
 
-The machine is trivial: its joints are where they are told to be, at once. `mux2` tells the joints to follow
-LinuxCNC's own motion or the stream, and `sampler` records them in every servo period. A program without
-G64 is followed within `tolerance` (G64 P).
+The machine is ideal: its joints follow their commands at once. `mux2` switches the joints between LinuxCNC's
+own motion and the stream, and `sampler` records them in every servo period. A program without G64 is followed
+within `tolerance` (G64 P).
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 NAMES = ("X", "Y", "Z")
-# Starting, stopping and changes between runs may take so long [s], and a run so many times what is expected.
+# Longest time for start, stop and changes between runs [s], and longest time of a run over the expected one.
 _BESIDE, _PATIENCE = 60.0, 3.0
-# What waits in HAL's memory [periods].
+# Depth of the stream in HAL's memory [periods].
 _DEPTH = 16000
-# LinuxCNC's numbers that it keeps: the fewest that it wants in the file.
+# The persistent parameters: the least number that LinuxCNC wants in its file.
 _KEPT = (
     *range(5161, 5170),
     *range(5181, 5190),
@@ -124,12 +124,12 @@ exec linuxcnc -r "$1/machine.ini"
 
 
 class SimulatorError(Exception):
-    """What LinuxCNC said, in a sentence."""
+    """LinuxCNC could not run; the text is its message in one sentence."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """A program, by its text, or a stream, by its file, that takes about `seconds`."""
+    """A run of about `seconds`: the text of a program, or the file of a stream."""
 
     what: bytes | Path
     seconds: float
@@ -148,20 +148,21 @@ class Recorded:
 
     @property
     def motion(self) -> float:
-        """The time in motion of a program [s]; pauses do not count."""
+        """The time in motion of a program, without pauses [s]."""
         return float(self.moving.sum()) * self.period
 
     @property
     def played(self) -> Array:
-        """The positions from the first to the last row of a stream (n, 3), also where a row was late."""
+        """The positions from the first to the last row of a stream (n, 3), including periods in which a row
+        was late."""
         rows = np.flatnonzero(self.playing)
         return self.position[rows[:1].sum() : rows[-1:].sum() + 1]
 
 
 def recorded(machine: Machine, runs: Sequence[Run], tolerance: float) -> list[Recorded]:
-    """What the joints do in each of the runs, each from the origin.
+    """The recorded joints of each run; each run starts at the origin.
 
-    Raises SimulatorError where LinuxCNC does not start or does not end.
+    Raises SimulatorError if LinuxCNC does not start or does not end.
     """
     if machine.axis_names != NAMES:
         raise SimulatorError(f"the machine {machine.name} has other axes than X, Y, Z: take one with these")

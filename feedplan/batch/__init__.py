@@ -1,9 +1,9 @@
-"""Many programs, or a sweep of machines, tolerances and methods: a folder and a row of a table for each plan.
+"""Plans many programs, or a sweep of machines, tolerances and methods: a folder and a table row for each
+plan.
 
     sweep ──► run ──► journal ──► summary
-             (jobs.place, packing)
+              (jobs.executor, packing)
 
-`sweep` has what is to be planned and the names of the folders, `run` plans it in a place for jobs, `journal`
-keeps a row of each plan that is done, so that a batch that was stopped goes on where it was, `summary`
-writes batch.csv and batch.json.
+`sweep` lists the plans and names their folders, `run` has them made by an executor, `journal` keeps the rows
+of finished plans, so that a stopped batch can continue, `summary` writes batch.csv and batch.json.
 """

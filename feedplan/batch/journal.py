@@ -1,4 +1,5 @@
-"""The rows of plans that are done, one a line, as they come: what a batch that was stopped goes on from."""
+"""The rows of finished plans, one a line, in the order in which they end; a stopped batch continues from
+it."""
 
 from __future__ import annotations
 
@@ -12,14 +13,14 @@ from typing import IO, Any
 
 from feedplan.batch.sweep import JOURNAL
 from feedplan.errors import InputError
-from feedplan.files import SUMMARY_FILE
 from feedplan.outputs._staging import require_folder
+from feedplan.plan_folder import SUMMARY_FILE
 
 
 class Journal:
-    """The journal in a folder, which no other batch has meanwhile.
+    """The journal in a folder, locked against other batches.
 
-    Raises InputError where it cannot be used.
+    Raises InputError if it cannot be used.
     """
 
     def __init__(self, folder: FilePath) -> None:
@@ -38,7 +39,7 @@ class Journal:
         except OSError:
             self._file.close()
             raise InputError(f"another batch works on {folder}: choose another folder with -o") from None
-        # What a batch that was killed has left beside.
+        # Temporary folders of a batch that was killed.
         for left in folder.glob(".feedplan-*"):
             shutil.rmtree(left, ignore_errors=True)
         self._known = self._read()
@@ -49,7 +50,7 @@ class Journal:
         torn = False
         for line in self._file:
             torn = not line.endswith("\n")
-            with suppress(ValueError, KeyError, TypeError):  # torn by the end of a process
+            with suppress(ValueError, KeyError, TypeError):  # a line may be incomplete after a kill
                 row = json.loads(line)
                 known[row["folder"]] = row
         if torn:
@@ -60,19 +61,19 @@ class Journal:
         self._file.close()
 
     def done(self, folder: str, fingerprint: str) -> dict[str, Any] | None:
-        """The row of a plan that is there already, in the folder of that name."""
+        """The row of a finished plan in the folder of that name, or None."""
         row = self._known.get(folder)
         if row is None or row.get("fingerprint") != fingerprint:
             return None
         return row if (self._folder / folder / SUMMARY_FILE).exists() else None
 
     def remove(self, folder: str) -> None:
-        """Removes what an earlier plan has left in the folder of that name, if the journal has it."""
+        """Removes the folder of that name if the journal has it from an earlier plan."""
         if self._known.pop(folder, None) is not None:
             shutil.rmtree(self._folder / folder, ignore_errors=True)
 
     def add(self, row: dict[str, Any]) -> None:
-        """Keeps the row of a plan that is done."""
+        """Adds the row of a finished plan."""
         try:
             self._file.write(json.dumps(row, ensure_ascii=False) + "\n")
             self._file.flush()

@@ -1,4 +1,4 @@
-"""Names of folders from the names of programs: readable, safe on every file system, and unlike each other."""
+"""Names of folders from the names of programs: readable, valid on every file system, all different."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ import unicodedata
 from collections.abc import Iterable
 from pathlib import PurePath
 
-# No name is longer: file systems allow 255 bytes, and paths are limited too.
+# Longest name: file systems allow 255 bytes, and the length of paths is limited too.
 LONGEST = 100
 _OTHERS = re.compile(r"[^A-Za-z0-9._+-]+")
-# What no file is called on Windows.
+# Names that Windows reserves for devices.
 _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\.|$)", re.IGNORECASE)
 
 
 def safe_name(program: str, parts: Iterable[str] = ()) -> str:
-    """A name of letters, digits and `._+-` for the folder of a program, the parts of a sweep after it."""
+    """A name of letters, digits and `._+-` from the name of a program and the swept options."""
     stem = PurePath(program.replace("\\", "/")).stem
     plain = unicodedata.normalize("NFKD", stem).encode("ascii", "ignore").decode()
     words = [_OTHERS.sub("_", word).strip("._-") for word in (plain, *parts)]
@@ -27,13 +27,13 @@ def safe_name(program: str, parts: Iterable[str] = ()) -> str:
 
 
 class Names:
-    """Gives each folder a name of its own, whatever the case of its letters."""
+    """Gives each folder a different name; upper and lower case count as equal."""
 
     def __init__(self, taken: Iterable[str]) -> None:
         self._count = {name.lower(): 1 for name in taken}
 
     def own(self, name: str) -> str:
-        """The name, with a number after it where it was given before."""
+        """The name, with a number after it if it was used before."""
         while True:
             count = self._count.get(name.lower(), 0) + 1
             self._count[name.lower()] = count

@@ -1,4 +1,4 @@
-"""How many jobs go together, so that small ones do not drown in what each task costs."""
+"""The number of jobs to send as one task, because a task costs more than a small job."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import threading
 
 from feedplan.jobs.outcome import Outcome
 
-# Jobs that go together take about so long [s], their files about so much [bytes], and are no more.
+# Jobs of one task: about LONG time [s] and LARGE files [bytes] together, and at most MOST jobs.
 LONG, LARGE, MOST = 0.5, 32_000_000, 200
-# The part of what is known of a job that each new one changes.
+# Weight of a new job in the running mean of times and sizes.
 NEWS = 0.1
 
 
 class Packing:
-    """Tells how many jobs go together, from what those so far have taken."""
+    """Chooses the number of jobs of a task from the times and sizes of earlier jobs."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -21,7 +21,7 @@ class Packing:
         self._size = 0.0
 
     def add(self, outcome: Outcome) -> None:
-        """A job has taken so long and made files so large."""
+        """Takes the time [s] and the size of the files [bytes] of a job that has ended."""
         with self._lock:
             if self._seconds is None:
                 self._seconds, self._size = outcome.seconds, float(outcome.size)
@@ -29,7 +29,7 @@ class Packing:
             self._size += NEWS * (outcome.size - self._size)
 
     def count(self, left: int, slots: int) -> int:
-        """How many of the jobs that are left go together, on so many slots: all of these shall have work to
+        """The number of jobs of the next task, of those that are left; small enough to keep all slots busy to
         the end."""
         with self._lock:
             if self._seconds is None:

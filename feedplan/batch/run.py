@@ -1,4 +1,4 @@
-"""Plans a sweep in a place for jobs: a bounded number of jobs is under way, rows are kept as they come."""
+"""Plans a sweep on an executor, with a limited number of jobs at a time; rows are kept as jobs end."""
 
 from __future__ import annotations
 
@@ -13,43 +13,43 @@ from feedplan.batch.journal import Journal
 from feedplan.batch.packing import Packing
 from feedplan.batch.sweep import Item, Sweep
 from feedplan.errors import InputError
+from feedplan.jobs.executor import Executor
 from feedplan.jobs.outcome import Outcome
-from feedplan.jobs.place import Place
 from feedplan.jobs.work import of_whole
 from feedplan.progress import Progress
 
 STAGE = "batch"
-# How often progress is shown and the room of a place is asked for [s].
+# Time between two updates of the progress and of the number of slots [s].
 EVERY = 0.2
-# How long jobs may take to stop [s] before they are left to end by themselves.
+# Longest wait for jobs to stop [s].
 STOPPING = 0.4
 Row = dict[str, Any]
 
 
 def run_batch(
-    sweep: Sweep, folder: FilePath, place: Place, progress: Progress | None = None
+    sweep: Sweep, folder: FilePath, executor: Executor, progress: Progress | None = None
 ) -> tuple[list[Row], int]:
-    """Plans all of a sweep into `folder`; returns a row for each plan in its order, and how many of them were
-    there already.
+    """Plans all of a sweep into `folder`; returns a row for each plan in order, and the number of plans that
+    were there already.
 
-    `progress("batch", done)` is told how far it is. What ends it, as a KeyboardInterrupt, stops the jobs that
-    are under way; those that are done stay, and another run with the same folder goes on from there. Raises
-    InputError where the folder or the place cannot be used any more.
+    `progress("batch", done)` is called with the part that is done. An exception, such as KeyboardInterrupt,
+    stops the running jobs; finished plans stay, and another call with the same folder continues. Raises
+    InputError if the folder or the executor cannot be used any more.
     """
     journal = Journal(folder)
     try:
-        return _Batch(sweep, folder, place, journal).run(progress)
+        return _Batch(sweep, folder, executor, journal).run(progress)
     finally:
         journal.close()
 
 
 class _Batch:
-    """A batch while it runs: threads take items and put outcomes, one thread keeps the rows."""
+    """A running batch: several threads take items and put outcomes, one thread writes the rows."""
 
-    def __init__(self, sweep: Sweep, folder: FilePath, place: Place, journal: Journal) -> None:
+    def __init__(self, sweep: Sweep, folder: FilePath, executor: Executor, journal: Journal) -> None:
         self._items = enumerate(sweep.items(folder))
         self._left, self._count = len(sweep), len(sweep)
-        self._place, self._journal = place, journal
+        self._executor, self._journal = executor, journal
         self._lock = threading.Lock()
         self._stop = threading.Event()
         self._packing = Packing()
@@ -65,9 +65,9 @@ class _Batch:
             while len(rows) < self._count:
                 if time.monotonic() - asked > EVERY:
                     asked = time.monotonic()
-                    self._slots = self._place.slots()
+                    self._slots = self._executor.slots()
                     threads = [thread for thread in threads if thread.is_alive()]
-                    while len(threads) < min(self._slots * self._place.depth, self._left):
+                    while len(threads) < min(self._slots * self._executor.depth, self._left):
                         threads.append(threading.Thread(target=self._work, daemon=True))
                         threads[-1].start()
                     if progress is not None:
@@ -101,7 +101,7 @@ class _Batch:
             self._found.put(error)
 
     def _next(self) -> list[tuple[int, Item, str | None]]:
-        """Items that go together, with their fingerprints; those that are done already are told."""
+        """The items of the next task with their fingerprints; items with a finished plan are put as done."""
         chunk: list[tuple[int, Item, str | None]] = []
         with self._lock:
             size = self._packing.count(self._left, self._slots)
@@ -122,10 +122,10 @@ class _Batch:
             yield numbered
 
     def _run(self, chunk: list[tuple[int, Item, str | None]]) -> None:
-        def told(place: int, stage: str, part: float) -> None:
-            self._parts[chunk[place][0]] = of_whole(stage, part)
+        def report(index: int, stage: str, part: float) -> None:
+            self._parts[chunk[index][0]] = of_whole(stage, part)
 
-        outcomes = self._place.run([item.job for _, item, _ in chunk], told, self._stop)
+        outcomes = self._executor.run([item.job for _, item, _ in chunk], report, self._stop)
         for (number, item, fingerprint), outcome in zip(chunk, outcomes, strict=True):
             if outcome.state in ("lost", "stopped"):
                 if self._stop.is_set():
@@ -140,12 +140,12 @@ class _Batch:
 def _fingerprint(item: Item) -> str | None:
     try:
         return item.fingerprint()
-    except OSError:  # the job itself says it
+    except OSError:  # the job will report it
         return None
 
 
 def row_of(item: Item, fingerprint: str | None, outcome: Outcome) -> Row:
-    """What the table of a batch tells of a plan: times in s; `error` is None where there is one."""
+    """A row of the batch's table: times in s; `error` is None if there is a plan."""
     figures, failure = outcome.figures or {}, outcome.failure
     row: Row = {
         "folder": item.folder,

@@ -8,8 +8,8 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from feedplan.batch.sweep import SUMMARY, TABLE
-from feedplan.files import summary_text
 from feedplan.outputs._staging import staged
+from feedplan.plan_folder import summary_text
 from feedplan.units import duration_text
 
 COLUMNS = (
@@ -20,7 +20,7 @@ HEADER = ("plan", "machine", "tolerance", "method", "time s", "gap", "computing"
 
 
 def summary_of(rows: Sequence[dict[str, Any]], kept: int, seconds: float) -> dict[str, Any]:
-    """What batch.json holds: how many plans there are, how many were there before, and a row for each."""
+    """The content of batch.json: the number of plans, the number of kept ones, and a row for each."""
     return {
         "format": 1,
         "plans": len(rows),
@@ -33,7 +33,7 @@ def summary_of(rows: Sequence[dict[str, Any]], kept: int, seconds: float) -> dic
 
 
 def write_summary(summary: dict[str, Any], folder: FilePath) -> tuple[FilePath, ...]:
-    """Writes both files; returns them. Raises InputError where the file system refuses."""
+    """Writes both files; returns them. Raises InputError if the file system refuses."""
     with staged(folder, last=SUMMARY) as stage:
         (stage / SUMMARY).write_text(summary_text(summary), encoding="utf-8")
         with (stage / TABLE).open("w", encoding="utf-8", errors="replace", newline="") as stream:
@@ -44,7 +44,7 @@ def write_summary(summary: dict[str, Any], folder: FilePath) -> tuple[FilePath, 
 
 
 def _cell(value: Any) -> Any:
-    # A spreadsheet takes texts that begin so for formulas.
+    # A spreadsheet would read texts that begin with these characters as formulas.
     return f"'{value}" if isinstance(value, str) and value[:1] in ("=", "+", "-", "@", "\t") else value
 
 

@@ -1,4 +1,4 @@
-"""What a batch plans: every program on every machine, at every tolerance, by every method."""
+"""The plans of a batch: every program on every machine, at every tolerance, by every method."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from feedplan.planners import given_options, options_of
 from feedplan.planning import OF_ALL_METHODS
 from feedplan.program.machine_for import AUTO
 
-# Files of a batch; no folder of a plan is called so.
+# Files of a batch; no folder of a plan has these names.
 JOURNAL, TABLE, SUMMARY = "batch.jsonl", "batch.csv", "batch.json"
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """`programs` are files; `machines` (name, text of the file); the tolerance None is the program's own.
+    """`programs` are files; `machines` are (name, text of the file); the tolerance None is the program's own.
 
-    `options` are keywords of `feedplan.plan` that hold for all, those that some methods alone take go to
-    these. `reading` has keywords of `read_program` without files, `tool_table` and `subprograms` are those.
+    `options` are keywords of `feedplan.plan` for all plans; a method gets those that it takes. `reading` has
+    keywords of `read_program` except the files, which are `tool_table` and `subprograms`.
     """
 
     programs: Sequence[FilePath]
@@ -52,7 +52,7 @@ class Sweep:
         return len(self.programs) * len(self.machines) * len(self.tolerances) * len(self.methods)
 
     def items(self, folder: FilePath) -> Iterator[Item]:
-        """All that is to be planned, with folders in `folder`: always the same for the same sweep."""
+        """All plans of the sweep, with folders in `folder`; equal sweeps have equal items."""
         names = Names((JOURNAL, TABLE, SUMMARY))
         swept = [len(own) > 1 for own in (self.machines, self.tolerances, self.methods)]
         for program, (machine, text), tolerance, method in product(
@@ -91,9 +91,9 @@ class Item:
         return self.job.folder.name
 
     def fingerprint(self) -> str:
-        """The same where feedplan would plan the same. Raises OSError where a file cannot be read.
+        """A hash that is equal for equal plans; files that a program calls are not part of it.
 
-        Files that a program calls do not count.
+        Raises OSError if a file cannot be read.
         """
         parts = [__version__, self.job.order.text(), _hash(self.job.program)]
         if self.job.tool_table is not None:
@@ -110,7 +110,7 @@ def _hash(file: FilePath) -> str:
 
 
 def machine_text(name: str) -> tuple[str, str]:
-    """The name of a machine, and the text of its file; `auto` is its own text. Raises MachineError."""
+    """The name of a machine and the text of its file; the text of `auto` is `auto`. Raises MachineError."""
     if name == AUTO:
         return AUTO, AUTO
     machine = Machine.load(name)

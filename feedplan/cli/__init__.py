@@ -1,8 +1,7 @@
 """The command line: results on standard output, everything else on standard error.
 
-A file for each command, one for each group of options that commands share, `options` for what all of them
-use, `terminal` for what is printed, `ending` for how a command ends. What is slow to import is imported by
-the command that needs it.
+Each command is a file, and so is each group of options that several commands share; `options` has the single
+options, `terminal` prints, `ending` has the exit codes. Slow imports are inside the command that needs them.
 """
 
 from __future__ import annotations
@@ -47,7 +46,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _close_output()
         return PIPE_CLOSED
     except OSError as error:
-        # Files tell their own errors: this one is of the standard output, a full disk for instance.
+        # Errors of files are FeedplanErrors; an OSError comes from the standard output (a full disk, for
+        # instance).
         _close_output()
         return fail(
             f"the standard output cannot be written: {(error.strerror or str(error)).lower()}", BAD_INPUT
@@ -59,7 +59,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _close_output() -> None:
-    """Nothing more is written: what is left would make the interpreter complain while closing."""
+    """Sends the rest of the output to nowhere: else the interpreter prints an error when it flushes it at
+    exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

@@ -41,9 +41,9 @@ from feedplan.program.tools import read_tools
 from feedplan.units import counted, duration_text
 
 if TYPE_CHECKING:
-    from feedplan.jobs.place import Place
+    from feedplan.jobs.executor import Executor
 
-# What a method is by the name of the option that gives it, where it is swept.
+# Help text of the options that are swept.
 _SWEPT = "may be given several times"
 
 
@@ -90,7 +90,7 @@ _SWEPT = "may be given several times"
     "formats",
     type=click.Choice([*(name for name in outputs.formats() if name != "pvt"), NO_SETPOINTS]),
     multiple=True,
-    help=f"Format of the setpoints, npz by default; {_SWEPT}. none: reports without them.",
+    help=f"Format of the setpoints, npz by default; {_SWEPT}. none: no setpoints.",
 )
 @click.option(
     "--jobs",
@@ -142,20 +142,20 @@ def batch(
     """Plan every PROGRAM on every machine, at every tolerance, by every method.
 
     DIR gets a folder for each plan, as plan -o writes it, and batch.csv and batch.json with a row for each. A
-    program that cannot be planned is a row with the reason; the others go on. A batch that was stopped and is
-    started again goes on where it was: plans whose program, machine, options and feedplan are the same are
-    kept, those that failed are tried again.
+    program that cannot be planned is a row with the reason; the others are planned. A batch that was stopped
+    continues when it is started again: plans whose program, machine, options and feedplan are the same are
+    kept, failed plans are tried again.
 
-    Plans are made by processes of this computer, or with --cluster by the workers of a Dask cluster, bit for
-    bit the same. Exit code 1: a limit is broken, or a program has no plan.
+    Plans are made by processes of this computer, or with --cluster by the workers of a Dask cluster; both
+    give the same files bit for bit. Exit code 1: a limit is broken, or a program has no plan.
     """
     from feedplan.batch.run import run_batch
     from feedplan.batch.summary import HEADER, summary_of, table_rows, write_summary
     from feedplan.batch.sweep import Sweep, machine_text
-    from feedplan.files import summary_text
+    from feedplan.plan_folder import summary_text
 
     if cluster is not None and jobs is not None:
-        raise click.UsageError("--jobs is for processes of this computer: leave it or --cluster out")
+        raise click.UsageError("--jobs is for processes of this computer: leave out --jobs or --cluster")
     require_one_or_formats(formats)
     table, folders = reading.pop("tool_table", None), reading.pop("subprograms", ())
     if table is not None:
@@ -178,8 +178,8 @@ def batch(
     )
     _require_formats(sweep.formats)
     folder, start = FilePath(output).absolute(), time.monotonic()
-    with _place(cluster, jobs, max_time, max_memory) as place, terminal.progress_bar(quiet) as progress:
-        rows, kept = run_batch(sweep, folder, place, progress)
+    with _executor(cluster, jobs, max_time, max_memory) as executor, terminal.progress_bar(quiet) as progress:
+        rows, kept = run_batch(sweep, folder, executor, progress)
     summary = summary_of(rows, kept, time.monotonic() - start)
     files = write_summary(summary, folder)
     if not quiet:
@@ -200,33 +200,33 @@ def batch(
 
 
 def _require_formats(formats: tuple[str, ...]) -> None:
-    """Raises where two formats are one file, or a package of one is missing, before anything is planned."""
+    """Raises if two formats write the same file, or if the package of a format is missing."""
     by_file: dict[str, str] = {}
     for name in formats:
         other = by_file.setdefault(outputs.format_named(name).FILE, name)
         if other != name:
-            raise InputError(f"{name} and {other} are both one file: ask for one of them")
+            raise InputError(f"{name} and {other} write the same file: ask for one of them")
 
 
 @contextmanager
-def _place(
+def _executor(
     cluster: ClusterAddress | None, jobs: int | None, max_time: float, max_memory: float
-) -> Iterator[Place]:
-    """Where plans are made."""
-    from feedplan.jobs.place import JobLimits
+) -> Iterator[Executor]:
+    """The processes of this computer, or the cluster, on which plans are made."""
+    from feedplan.jobs.executor import JobLimits
     from feedplan.jobs.processes import Processes
 
     limits = JobLimits(max_time, max_memory)
-    place: Place
+    executor: Executor
     if cluster is None:
-        place = Processes(jobs or os.cpu_count() or 1, limits, niceness=0, grace=0.2)
+        executor = Processes(jobs or os.cpu_count() or 1, limits, niceness=0, grace=0.2)
     else:
         from feedplan.jobs.cluster import Cluster
 
-        place = Cluster(cluster, limits)
-        if place.threads() == 0:
+        executor = Cluster(cluster, limits)
+        if executor.threads() == 0:
             print(f"warning: the cluster at {cluster.url} has no workers yet: waiting", file=sys.stderr)
     try:
-        yield place
+        yield executor
     finally:
-        place.close()
+        executor.close()

@@ -1,4 +1,4 @@
-"""`feedplan check`: the audit alone, of files."""
+"""`feedplan check`: audits setpoints in files."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from feedplan.cli.options import JSON, ZERO_OR_MORE
 def check(place: str, machine: str | None, resolution: float, jerk: bool, as_json: bool) -> int:
     """Audit setpoints from files alone, against the limits of the machine that plan.json holds.
 
-    Positions, velocities and accelerations are measured by differences alone, and so is the jerk where the
-    plan's method limits it. Exit code 1: a limit is broken.
+    Velocity and acceleration are measured by differences of the positions, and so is the jerk if the plan's
+    method limits it. Exit code 1: a limit is broken.
     """
     from feedplan.checking import check as check_files
-    from feedplan.files import summary_text
+    from feedplan.plan_folder import summary_text
 
     with terminal.progress_bar(quiet=False) as progress:
         audit = check_files(place, machine, resolution=resolution, jerk=jerk, progress=progress)

@@ -1,4 +1,4 @@
-"""Options of the command line that say which cluster plans, and how it is spoken to."""
+"""Options of the command line that name a Dask cluster and its certificates."""
 
 from __future__ import annotations
 

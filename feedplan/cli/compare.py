@@ -66,21 +66,21 @@ def compare(
     controller: Choice,
     reading: Reading,
 ) -> int:
-    """Plan PROGRAM by several methods: time, proven gap, computing time, and what the audit says of each.
+    """Plan PROGRAM by several methods: time, proven gap, computing time and audit of each.
 
-    PROGRAM is as for plan. Exit code 0 if any method has a plan, whether or not its limits hold: that is what
-    the table tells.
+    PROGRAM is as for plan. Exit code 0 if any method has a plan, even if the plan breaks a limit: the table
+    tells that.
     """
     from feedplan.comparison import LIMITS
     from feedplan.comparison import compare as make_comparison
-    from feedplan.files import summary_text, write_comparison
     from feedplan.outputs._staging import require_folder
+    from feedplan.plan_folder import summary_text, write_comparison
     from feedplan.report.page import missing_pictures
 
     if output:
         require_folder(FilePath(output))
     names: Any = None if methods is None else [name.strip() for name in methods.split(",")]
-    with terminal.progress_bar(quiet) as progress, terminal.without_others():
+    with terminal.progress_bar(quiet) as progress, terminal.silenced():
         known, source = machine_for(machine, program, reading, feed)
         rows = make_comparison(
             source,

@@ -14,7 +14,7 @@ from feedplan.machine.controller import MODELS, Controller
 from feedplan.machine.machine import Machine
 
 Command = TypeVar("Command", bound=Callable[..., Any])
-# The controller of the command, beside the machine it is for.
+# Makes the controller that the command line names, for a machine; None without a controller.
 Choice = Callable[[Machine], Controller | None]
 
 _OPTIONS = (
@@ -45,7 +45,8 @@ def controller_options(command: Command) -> Command:
 
 
 def chosen(machine: Machine, name: str | None, parameters: dict[str, Any]) -> Controller | None:
-    """The controller of that name with these parameters, beside those of the machine's if it is its own.
+    """The controller of that name with these parameters, added to the machine's if its controller has this
+    name.
 
     Raises MachineError for parameters without a controller.
     """
@@ -60,7 +61,7 @@ def chosen(machine: Machine, name: str | None, parameters: dict[str, Any]) -> Co
 
 
 def _pair(text: str) -> tuple[str, float | list[float]]:
-    """A number, or several with commas between them, by name."""
+    """Name and value of `NAME=VALUE`, where the value is a number or several with commas between them."""
     name, _, value = text.partition("=")
     try:
         numbers = [float(part) for part in value.split(",")]

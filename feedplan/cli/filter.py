@@ -1,8 +1,9 @@
-"""`feedplan filter`: a program filter of LinuxCNC's [FILTER] section, with the planned program as its output.
+"""`feedplan filter`: a program filter of LinuxCNC's [FILTER] section, whose output is the program with
+planned feeds.
 
 In the INI file: `[FILTER] PROGRAM_EXTENSION = .ngc G-code` and `ngc = feedplan filter --machine FILE`.
-LinuxCNC runs that with the file's path, shows `FILTER_PROGRESS=n` (0 to 100) as a bar, and the rest of the
-standard error where the exit code is not 0.
+LinuxCNC runs this command with the program's path. It shows `FILTER_PROGRESS=n` (0 to 100) as a bar, and the
+other text on standard error if the exit code is not 0.
 """
 
 from __future__ import annotations
@@ -27,12 +28,13 @@ from feedplan.program.program import Program
 from feedplan.program.read import Reading
 from feedplan.program.source import Source
 
-# How far all is when a stage begins, and its share.
+# For each stage: total progress at its begin [%], and its share of the total [%].
 _STAGES = {"read": (0, 10), "fit": (10, 20), "plan": (30, 40), "audit": (70, 20)}
 
 
 def filter_progress(write: Callable[[str], object]) -> Callable[[str, float], None]:
-    """Tells how far all stages are, each whole per cent once, as LinuxCNC reads it."""
+    """A progress function that writes the total over all stages as LinuxCNC reads it, each whole per cent
+    once."""
     told = -1
 
     def tell(stage: str, done: float) -> None:
@@ -70,7 +72,7 @@ def filter_(
     tell = filter_progress(write)
     known: Machine
     source: Source | Program
-    # LinuxCNC tells its programs where its INI file is.
+    # LinuxCNC sets this variable for the filters that it starts.
     own = os.environ.get("INI_FILE_NAME")
     if machine is None and own:
         known, source = _without_travel(import_machine(own)), program
@@ -86,6 +88,6 @@ def filter_(
 
 
 def _without_travel(machine: Machine) -> Machine:
-    """The same machine without ends of travel: LinuxCNC alone knows where the work is."""
+    """The same machine without ends of travel: only LinuxCNC knows the work offsets."""
     free = tuple(replace(axis, travel=(-math.inf, math.inf)) for axis in machine.axes)
     return replace(machine, axes=free)

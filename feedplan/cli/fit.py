@@ -1,4 +1,4 @@
-"""`feedplan fit`: the fit alone, without a plan."""
+"""`feedplan fit`: fits a program's points by splines, without a plan."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from feedplan.program.read import Reading
 @MACHINE
 @reading_options
 @TOLERANCE
-@click.option("--smooth", is_flag=True, help="Fit all moves by curves fit for limits of jerk.")
+@click.option("--smooth", is_flag=True, help="Fit all moves as the methods that limit jerk do.")
 @JSON
 def fit(
     program: str | IO[bytes],
@@ -31,9 +31,9 @@ def fit(
     """Fit PROGRAM's points by splines, without planning; PROGRAM is as for plan."""
     from dataclasses import asdict
 
-    from feedplan.files import summary_text
     from feedplan.geometry.build import build_path
     from feedplan.geometry.corners import Corners
+    from feedplan.plan_folder import summary_text
     from feedplan.program.program import Program
     from feedplan.program.read import read_program
     from feedplan.progress import of_stage

@@ -1,4 +1,4 @@
-"""`feedplan machines`: the bundled machines, one's limits, a template, and machines of other formats."""
+"""`feedplan machines`: lists machines, shows the limits of one, writes a template, imports other formats."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def _limit(given: str) -> tuple[str, float]:
 
 
 def _write(text: str, output: str | None) -> None:
-    """Writes to standard output or to a new file: one that exists may hold what somebody typed."""
+    """Writes to standard output or to a new file; a file that exists may be edited by hand, and is kept."""
     from feedplan.arguments import file_path
     from feedplan.outputs._staging import staged
 

@@ -1,4 +1,4 @@
-"""Arguments and options that several commands take."""
+"""Arguments and single options that several commands take."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ else:
 
 
 class Number(NumberType):
-    """A finite number greater than 0, or also 0."""
+    """A finite number greater than 0; with `or_zero` also 0."""
 
     name = "number"
 
@@ -60,7 +60,7 @@ PATH = click.option(
     type=click.Choice(PATHS),
     default="as-fitted",
     show_default=True,
-    help="Smooth paths keep the size of arcs, or cut them up to the tolerance.",
+    help="Smooth paths keep the size of arcs (as-fitted), or cut arcs up to the tolerance (fastest).",
 )
 ACCURACY = click.option(
     "--accuracy", type=Number(), metavar="PART", help="Relative error of the time, of methods with a mesh."
@@ -68,8 +68,8 @@ ACCURACY = click.option(
 TIME_LIMIT_HELP = "Time that a method with a mesh may take."
 WHOLE_LIMIT_HELP = (
     "Time that a method with a mesh may take. With jerk-limited it is for the whole command: reading, "
-    "fitting, a first plan, the audit and the files are never left out, 0 ends after them; what is left "
-    "improves the plan and its bound."
+    "fitting, a first plan, the audit and the files are never left out, and 0 allows only these; the rest "
+    "of the time improves the plan and its bound."
 )
 PERIOD = click.option("--period", type=Number(), metavar="S", help="Servo period in place of the machine's.")
 MOST_SETPOINTS = click.option(
@@ -84,7 +84,7 @@ JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as
 QUIET = click.option("--quiet", "-q", is_flag=True, help="Print errors only.")
 PROGRAM = click.argument("program", callback=lambda context, parameter, given: _source(given))
 ZERO_OR_MORE = Number(or_zero=True)
-# In place of a format: no setpoints are written.
+# This value of --format means that no setpoints are written.
 NO_SETPOINTS = "none"
 
 
@@ -98,14 +98,14 @@ def _source(given: str) -> str | IO[bytes]:
 
 
 def with_options(command: Callable[..., Any], options: Sequence[Callable[..., Any]]) -> Any:
-    """The command with all of these options, in this order in its help."""
+    """Adds the options to a command; its help lists them in this order."""
     for option in reversed(options):
         command = option(command)
     return command
 
 
 def require_one_or_formats(formats: Sequence[str]) -> None:
-    """Raises a UsageError where formats of setpoints are asked for beside none."""
+    """Raises UsageError if `none` is given together with a format."""
     if NO_SETPOINTS in formats and len(formats) > 1:
         raise click.UsageError(f"--format {NO_SETPOINTS} excludes other formats: leave one of them out")
 
@@ -115,5 +115,5 @@ def name_of(program: str | IO[bytes]) -> str:
 
 
 def given_only(**options: Any) -> dict[str, Any]:
-    """The options that were given: which of them a method takes is for the method to say."""
+    """The options that were given; the method refuses those that it does not take."""
     return {name: value for name, value in options.items() if value is not None}

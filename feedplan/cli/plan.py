@@ -1,4 +1,5 @@
-"""`feedplan plan`: one plan, here, on a cluster or by a service; its table and its files."""
+"""`feedplan plan`: makes one plan on this computer, a cluster or a service, and writes its table and
+files."""
 
 from __future__ import annotations
 
@@ -107,13 +108,13 @@ def plan(
 ) -> int:
     """Plan PROGRAM: G-code, a path file (.json) or a drawing (.dxf); - is standard input.
 
-    With --cluster and jerk-limited the workers of a Dask cluster plan the runs between stops, bit for bit as
-    this computer would; reading, fitting, the audit and the files stay here.
+    With --cluster and jerk-limited the workers of a Dask cluster plan the runs between stops, with the same
+    result bit for bit; reading, fitting, the audit and the files stay on this computer.
 
     Exit code 1: a limit is broken, or no plan is feasible.
     """
-    from feedplan.files import files_of_plan, summary_text
     from feedplan.outputs._staging import require_folder
+    from feedplan.plan_folder import files_of_plan, summary_text
     from feedplan.report.page import missing_pictures
 
     if formats and not output:
@@ -133,7 +134,7 @@ def plan(
     with (
         _elsewhere(cluster) as elsewhere,
         terminal.progress_bar(quiet) as progress,
-        terminal.without_others(),
+        terminal.silenced(),
     ):
         known, source = machine_for(machine, program, reading, feed)
         make_plan, write = _place(server, token_file)
@@ -190,14 +191,14 @@ def plan(
 
 
 def _steps(made: Any) -> tuple[Any, ...]:
-    """What one step more of each limit would bring."""
+    """The time saved by one step more of each limit."""
     from feedplan.one_step_more import one_step_more
 
     return one_step_more(made)
 
 
 def _elsewhere(cluster: ClusterAddress | None) -> AbstractContextManager[Any]:
-    """Who plans runs in place of this computer, None for nobody."""
+    """The cluster that plans runs instead of this computer; None without a cluster."""
     if cluster is None:
         return nullcontext()
     from feedplan.jobs.cluster_runs import ClusterRuns
@@ -206,9 +207,9 @@ def _elsewhere(cluster: ClusterAddress | None) -> AbstractContextManager[Any]:
 
 
 def _place(server: str | None, token_file: str | None) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """What plans and what writes plans: here, or on a service."""
+    """The functions that plan and that write a plan: those of this package, or a client's of a service."""
     if server is None:
-        from feedplan.files import write_plan
+        from feedplan.plan_folder import write_plan
         from feedplan.planning import plan
 
         return plan, write_plan

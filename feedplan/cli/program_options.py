@@ -20,37 +20,41 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 _OPTIONS = (
     click.option("--program-out", metavar="FILE", help="Write the program with planned feeds there."),
-    click.option("--program", "in_folder", is_flag=True, help="Write it into the folder -o, as program.ngc."),
+    click.option(
+        "--program", "in_folder", is_flag=True, help="Write that program into the folder -o, as program.ngc."
+    ),
     click.option(
         "--feed-step",
         type=float,
         metavar="MM/S",
-        help="In it, split lines and arcs where the planned speed varies by more.",
+        help="In that program, split lines and arcs where the planned speed varies by more.",
     ),
-    click.option("--inverse-time", is_flag=True, help="In it, give feeds as inverse time (G93)."),
+    click.option("--inverse-time", is_flag=True, help="In that program, give feeds as inverse time (G93)."),
     click.option(
         "--dialect",
         type=click.Choice(DIALECTS),
         default="linuxcnc",
         show_default=True,
-        help="The control that it is for: what that lacks is told.",
+        help="The control that the program is for: words that it lacks are reported.",
     ),
     click.option(
-        "--expand", is_flag=True, help="Write its moves one by one: without loops, calls and cycles."
+        "--expand",
+        is_flag=True,
+        help="Write the moves of the program one by one, without loops, calls and cycles.",
     ),
 )
 
 
 @dataclass(frozen=True)
 class ProgramWanted:
-    """Where the program with planned feeds is wanted, and how."""
+    """The files in which the program with planned feeds is wanted, and its options."""
 
     file: str | None
     in_folder: bool
     options: dict[str, Any]
 
     def make(self, plan: Plan) -> PlannedProgram | None:
-        """The program, if it is wanted, and in its file, if one is given."""
+        """Makes the program if it is wanted, and writes it to the file if one is given; else returns None."""
         if self.file is None and not self.in_folder:
             return None
         from feedplan.planned_feeds import planned_program

@@ -28,7 +28,7 @@ _OPTIONS = (
         "--whole-step",
         type=float,
         metavar="UNITS",
-        help="What lengths without a decimal point count, such as 0.001.  [default: 1]",
+        help="Unit of lengths without a decimal point, such as 0.001.  [default: 1]",
     ),
 )
 
@@ -59,8 +59,8 @@ def reading_options(command: Command) -> Command:
 def machine_for(
     name: str, source: str | IO[bytes], reading: Reading, feed: float | None = None
 ) -> tuple[Machine, str | IO[bytes] | Program]:
-    """The machine of a name or file, and the source; for `auto` the smallest one that the program fits, and
-    the program, which is read."""
+    """The machine of that name or file, and the source; for `auto` the smallest machine that the program
+    fits, and the program, which has then been read."""
     if name != AUTO:
         return Machine.load(name), source
     given = source if isinstance(source, str) else source.read()

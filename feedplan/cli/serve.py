@@ -1,4 +1,4 @@
-"""The command `feedplan serve`: an option for each limit, by its name."""
+"""`feedplan serve`: starts the service; each of its limits has an option of the same name."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def limit_options(command: Command) -> Command:
             default=own.default,
             show_default=True,
             metavar=own.metadata["unit"].upper(),
-            help=own.metadata["told"],
+            help=own.metadata["help"],
         )(packed)
     return packed  # type: ignore[return-value]
 
@@ -74,10 +74,10 @@ def serve(
     limits: Limits,
     cluster: ClusterAddress | None,
 ) -> None:
-    """Plan for others over HTTP: jobs, progress, results; /docs of its address tells how.
+    """Plan for others over HTTP: jobs, progress, results; its address /docs describes the requests.
 
-    Beyond this computer it needs --token-file. Prints its address when it can be reached. With --cluster jobs
-    run on the workers of a Dask cluster, as many at a time as these have threads.
+    To be reached from other computers the service needs --token-file. It prints its address when it is ready.
+    With --cluster jobs run on the workers of a Dask cluster, as many at a time as these have threads.
     """
     try:
         from feedplan.service.server import serve as run

@@ -1,4 +1,4 @@
-"""What the command line prints: tables on a terminal, plain text in a pipe, progress on a terminal only."""
+"""Prints results: tables on a terminal, plain text in a pipe; progress on a terminal only."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Rows = Sequence[tuple[str, str]]
 
 
 def print_rows(rows: Rows) -> None:
-    """Names and values, one pair a line."""
+    """Prints names and values, one pair a line."""
     if sys.stdout.isatty():
         from rich.console import Console
         from rich.table import Table
@@ -41,7 +41,7 @@ def print_rows(rows: Rows) -> None:
 
 
 def print_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """A table; the first column is text, the others are numbers."""
+    """Prints a table; the first column is text, the others are numbers."""
     if sys.stdout.isatty():
         from rich.console import Console
         from rich.table import Table
@@ -70,7 +70,7 @@ def progress_bar(quiet: bool) -> Iterator[Callable[[str, float], None] | None]:
 
     columns = (TextColumn("{task.description:<7}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"))
     tasks: dict[str, TaskID] = {}
-    # A stream of its own, for where those of the process are silenced.
+    # A copy of standard error, because `silenced` redirects the process's own.
     with (
         os.fdopen(os.dup(sys.stderr.fileno()), "w", encoding="utf-8", errors="replace") as stream,
         Progress(*columns, TimeElapsedColumn(), console=Console(file=stream), transient=True) as bars,
@@ -78,7 +78,7 @@ def progress_bar(quiet: bool) -> Iterator[Callable[[str, float], None] | None]:
 
         def show(stage: str, done: float) -> None:
             if stage not in tasks:
-                # A stage that begins ends those before it, whether or not they said so.
+                # When a stage begins the stages before it are done, even if they did not report 1.0.
                 for earlier in tasks.values():
                     bars.update(earlier, completed=1.0)
                 tasks[stage] = bars.add_task(stage, total=1.0)
@@ -88,13 +88,13 @@ def progress_bar(quiet: bool) -> Iterator[Callable[[str, float], None] | None]:
 
 
 @contextmanager
-def without_others() -> Iterator[None]:
-    """What others print meanwhile, the solvers' C code too, goes nowhere; the progress bar stays."""
+def silenced() -> Iterator[None]:
+    """Discards what other packages print, also from C code; the progress bar stays."""
     with ExitStack() as stack:
         nothing = stack.enter_context(open(os.devnull, "w", encoding="utf-8"))
         for stream, number in ((sys.stdout, 1), (sys.stderr, 2)):
             stream.flush()
-            with suppress(OSError):  # closed by who started the process
+            with suppress(OSError):  # the parent process may have closed the stream
                 kept = os.dup(number)
                 stack.callback(os.close, kept)
                 stack.callback(os.dup2, kept, number)
@@ -154,7 +154,7 @@ def plan_rows(summary: Mapping[str, Any], audit: Audit, files: Sequence[FilePath
 def today_text(today: Mapping[str, Any], lower_bound: float | None = None) -> str:
     """`2 min 52.8 s by grbl: the plan saves 12.0 s, 7.0 %`.
 
-    A time below the path's bound is one that breaks limits, which is said.
+    A time below the lower bound of the path breaks limits; the text says so.
     """
     time, saved = float(today["time"]), float(today["saved"])
     verb = "saves" if saved >= 0 else "takes longer by"
@@ -165,7 +165,7 @@ def today_text(today: Mapping[str, Any], lower_bound: float | None = None) -> st
 
 
 def step_rows(steps: Sequence[Mapping[str, Any]]) -> Rows:
-    """What one step more of each limit brings, one row each: `feed × 1.2`, `1.234 s less`."""
+    """The time that one step more of each limit saves, one row each: `feed × 1.2`, `1.234 s less`."""
     return [
         (
             f"{step['limit']} × {step['factor']:g}",
@@ -182,7 +182,7 @@ def _total_text(total: Mapping[str, float], units: Mapping[str, str]) -> str:
 
 
 def _limits_text(limits: Mapping[str, Mapping[str, float]]) -> str:
-    """The limits by the time that they are active; those below a thousandth are left out."""
+    """The share of the time in which each limit is active; shares below 0.1 % are left out."""
     parts = [f"{name} {100 * share['part']:.1f} %" for name, share in limits.items() if share["part"] >= 1e-3]
     return ", ".join(parts)
 
@@ -198,7 +198,7 @@ def pieces_text(summary: Mapping[str, Any]) -> str:
 
 
 def fit_rows(fit: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """What a fit did; nothing where there was nothing to fit."""
+    """Points, splines and deviation of a fit; empty if nothing was fitted."""
     points, splines, polynomials = (int(fit.get(key) or 0) for key in ("points", "splines", "polynomials"))
     if not points or not splines:
         return []
@@ -209,7 +209,7 @@ def fit_rows(fit: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def _side_rows(fit: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """On which side of the program a smooth path lies; nothing for others."""
+    """Offsets of a smooth path from the program by side; empty for other paths."""
     if fit.get("mean_offset") is None:
         return []
     inside, outside, mean = (1e3 * float(fit[key]) for key in ("inside", "outside", "mean_offset"))
@@ -228,13 +228,13 @@ def audit_text(audit: Audit) -> str:
 
 
 def nearest_limit(audit: Audit) -> LimitCheck | None:
-    """The limit of the machine or the program that is used most; checks of consistency are none."""
+    """The limit of the machine or the program that is used most; checks of consistency are left out."""
     used = (check for check in audit.checks if check.judged and check.name in _LIMITS)
     return max(used, key=lambda check: check.ratio, default=None)
 
 
 def failure_sentence(audit: Audit) -> str:
-    """What is broken, in one sentence."""
+    """The broken limits in one sentence of at most LONGEST characters."""
     failures = audit.failures
     for count in range(_FAILURES_SHOWN, 0, -1):
         more = len(failures) - count
@@ -269,7 +269,7 @@ def audit_rows(audit: Audit) -> list[tuple[str, ...]]:
 def comparison_table(
     rows: Sequence[Row], limits: Sequence[str]
 ) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Header and rows of a comparison: one row a method that has a plan, one column a limit that there is."""
+    """Header and rows of a comparison: one row for each method that has a plan, one column for each limit."""
     planned = [row for row in rows if row.plan is not None]
     limits = [name for name in limits if any(_is_limited(row.worst(name)) for row in planned)]
     saved = any(row.saved is not None for row in planned)
@@ -298,7 +298,7 @@ def _is_limited(check: LimitCheck | None) -> bool:
 
 
 def _use_text(check: LimitCheck | None) -> str:
-    """`99.99 %`; where the limit is broken with the axis and the line."""
+    """`99.99 %`; with the axis and the line if the limit is broken, in brackets if it is not judged."""
     if check is None or not math.isfinite(check.ratio):
         return "-"
     use = f"{100 * check.ratio:.4g} %"

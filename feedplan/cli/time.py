@@ -32,7 +32,7 @@ from feedplan.program.read import Reading
 from feedplan.report.operations import PARTS, OperationTime, by_tool
 from feedplan.units import duration_text
 
-# Of more operations the table has the longest.
+# Most operations in the table: the longest ones.
 _SHOWN = 60
 
 
@@ -74,14 +74,14 @@ def time(
 ) -> None:
     """Machining time of PROGRAM per tool and operation, by the machine's limits.
 
-    Rapids and dwells count. An operation is what follows a comment that is alone in its line. PROGRAM is as
-    for plan. --controller tells today's time beside it, without tool changes. Exit code 1: a limit is broken,
-    or no plan is feasible.
+    Rapids and dwells are included. An operation begins at a comment that is alone in its line. PROGRAM is as
+    for plan. --controller adds today's time, without tool changes. Exit code 1: a limit is broken, or no plan
+    is feasible.
     """
-    from feedplan.files import summary_text
+    from feedplan.plan_folder import summary_text
     from feedplan.planning import plan
 
-    with terminal.progress_bar(quiet=False) as progress, terminal.without_others():
+    with terminal.progress_bar(quiet=False) as progress, terminal.silenced():
         known, source = machine_for(machine, program, reading, feed)
         result = plan(
             source,
@@ -125,7 +125,7 @@ def time(
 def _table(
     tools: Sequence[OperationTime], operations: Sequence[OperationTime], whole: float
 ) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Header and rows: each tool, its operations below it, and the sum. The longest operations are shown."""
+    """Header and rows: each tool, its longest operations below it, and the sum."""
     parts = [part for part in PARTS if part != "change" or any(own.change for own in tools)]
 
     def row(name: str, rows: Sequence[OperationTime], line: int = 0) -> tuple[str, ...]:

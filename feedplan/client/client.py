@@ -35,17 +35,18 @@ from feedplan.program.source import Source, content_of
 from feedplan.progress import Progress
 from feedplan.setpoints import MAX_SETPOINTS, Interpolator
 
-# How long the service may be silent [s]; it tells every 15 s that it is still there.
+# Longest silence of the service [s]; while a job runs it sends something every 15 s.
 SILENCE = 60.0
-# What need not be sent.
+# The defaults of `feedplan.plan`, which need not be sent.
 _USUAL: dict[str, Any] = dict(local_plan.__kwdefaults__ or {})
 
 
 class Client:
-    """The service at an address such as http://127.0.0.1:8000; `token` is what it asks for.
+    """A service at an address such as http://127.0.0.1:8000, with its `token` if it has one.
 
-    `timeout` [s] is how long it may be silent. All methods raise FeedplanError with one sentence where the
-    service cannot be reached or refuses; what is wrong with a program is the same error as without a service.
+    `timeout` [s] is the longest silence of the service. All methods raise FeedplanError with one sentence if
+    the service cannot be reached or refuses the request; a wrong program gives the same error as
+    `feedplan.plan`.
     """
 
     def __init__(self, url: str, token: str | None = None, *, timeout: float = SILENCE) -> None:
@@ -74,10 +75,10 @@ class Client:
         progress: Progress | None = None,
         **options: Any,
     ) -> RemotePlan:
-        """The plan of a program, as `feedplan.plan`, made by the service.
+        """The plan of a program, made by the service; the arguments are those of `feedplan.plan`.
 
-        Of `reading` the service takes `block_delete`, `whole_step` and the content of a `tool_table`. What
-        `progress` raises, and Ctrl-C, cancel the job unless it was there before.
+        Of `reading` the service takes `block_delete`, `whole_step` and the content of a `tool_table`. Ctrl-C,
+        or an exception from `progress`, cancels the job unless an equal job existed before.
         """
         given = {
             "tolerance": tolerance,
@@ -106,14 +107,15 @@ class Client:
         progress: Progress | None = None,
         **options: Any,
     ) -> tuple[Row, ...]:
-        """Several methods on one program, as `feedplan.compare`; rows have the bounds of their own plans."""
+        """Plans one program by several methods, as `feedplan.compare` does; the lower bound in each row is
+        that of its own plan."""
         chosen = all_methods() if methods is None else list_of_names(methods, "methods", "a list of names")
         reading = checked_reading(options.pop("reading", None))
         own = {
             name: value for name, value in {"time_limit": time_limit, **options}.items() if value is not None
         }
         if not isinstance(source, Program):
-            content = content_of(source)  # a stream is read once
+            content = content_of(source)  # a stream can be read only once
             source = _Named(content.content, content.name)
         jobs = [
             self._submitted(
@@ -138,7 +140,7 @@ class Client:
         *,
         progress: Progress | None = None,
     ) -> tuple[FilePath, ...]:
-        """The folder that `feedplan.write_plan` writes, loaded from the service; returns the files."""
+        """Loads the files of a plan from the service into a folder, as `feedplan.write_plan` writes it."""
         if not isinstance(plan, RemotePlan):
             raise refuse("the plan", plan, "what Client.plan returns")
         names = list_of_names(formats, "formats", "a list of names, such as ['npz', 'csv']")
@@ -146,11 +148,11 @@ class Client:
         return plan.write(place, cast("tuple[FormatName, ...]", names), progress)
 
     def machines(self) -> tuple[str, ...]:
-        """The names of the machines that the service has."""
+        """The names of the service's machines."""
         return tuple(row["name"] for row in self._line.json("GET", "/v1/machines")[1]["machines"])
 
     def methods(self) -> tuple[str, ...]:
-        """The names of the planning methods that the service has."""
+        """The names of the service's planning methods."""
         return tuple(row["name"] for row in self._line.json("GET", "/v1/methods")[1]["methods"])
 
     def health(self) -> dict[str, Any]:
@@ -158,7 +160,7 @@ class Client:
         return self._table("GET", "/v1/health")
 
     def jobs(self, state: str | None = None) -> tuple[dict[str, Any], ...]:
-        """All jobs, the newest first, or those in a state: queued, running, done, failed, cancelled."""
+        """All jobs, or those in a state (queued, running, done, failed, cancelled), the newest first."""
         found: list[dict[str, Any]] = []
         query: dict[str, Any] = {"count": 200} | ({} if state is None else {"state": state})
         while True:
@@ -169,11 +171,11 @@ class Client:
             query["before"] = page["before"]
 
     def job(self, job: str) -> dict[str, Any]:
-        """How far a job is, and what became of it."""
+        """The progress and the result of a job."""
         return self._table("GET", _address(job))
 
     def plan_of(self, job: str, progress: Progress | None = None) -> RemotePlan:
-        """The plan of a job by its id; waits for its end."""
+        """Waits for the end of a job and returns its plan."""
         return self._ended(self.job(job), False, callback(progress))
 
     def cancel(self, job: str) -> dict[str, Any]:
@@ -181,7 +183,7 @@ class Client:
         return self._table("POST", f"{_address(job)}/cancel")
 
     def delete(self, job: str) -> None:
-        """Forgets a job and its files."""
+        """Deletes a job and its files."""
         self._line.json("DELETE", _address(job))
 
     def _table(self, method: str, address: str, query: Any = None) -> dict[str, Any]:
@@ -210,13 +212,13 @@ class Client:
         except (TypeError, ValueError):
             raise refuse("an option", options, "numbers and names") from None
         body, kind = form(fields, content, name)
-        # Sent again after the line broke, it is still one job.
+        # With this key a request that is sent again after a broken connection gives the same job.
         headers = {"Content-Type": kind, "Idempotency-Key": secrets.token_hex(16)}
         status, job = self._line.json("POST", "/v1/jobs", body=body, headers=headers)
         return job, status == 202
 
     def _ended(self, job: dict[str, Any], is_new: bool, progress: Progress | None) -> RemotePlan:
-        """The plan of a job when it has ended. Raises why there is none."""
+        """Waits for the end of a job and returns its plan. Raises the error of a job without a plan."""
         try:
             if job["state"] not in ("done", "failed", "cancelled"):
                 for kind, data in self._line.events(job["links"]["events"]):
@@ -271,14 +273,14 @@ def _program(source: Any) -> tuple[bytes, str]:
 
 
 def _machine(given: Machine | str | os.PathLike[str]) -> str:
-    """What the service is told: a name, or the text of a machine file."""
+    """The machine in a request: a name, or the text of a machine file."""
     if isinstance(given, str) and not (given.endswith(".toml") or "/" in given or "\\" in given):
         return given
     return Machine.of(given).to_toml()
 
 
 def _controller(given: Controller | Mapping[str, Any] | str | None) -> Any:
-    """A controller as a machine file has it."""
+    """A controller in the form of a machine file."""
     if isinstance(given, Controller):
         return {"type": given.name, **given.parameters}
     return given

@@ -1,4 +1,4 @@
-"""A plan that a service has made: its figures here, its setpoints and report when they are asked for."""
+"""A plan on a service: its figures are here, its setpoints and report are loaded when they are used."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from feedplan.arguments import is_whole, refuse, shown
 from feedplan.audit import Audit
 from feedplan.client.transport import Transport
 from feedplan.errors import InputError
-from feedplan.files import SUMMARY_FILE, summary_text
 from feedplan.outputs import FormatName, format_named, npz
 from feedplan.outputs._staging import staged
+from feedplan.plan_folder import SUMMARY_FILE, summary_text
 from feedplan.progress import Progress, of_stage, tell
 from feedplan.report.page import FILE as REPORT_FILE
 from feedplan.setpoints import MAX_CHUNK, SetpointChunk
 
 
 class RemotePlan:
-    """A plan on a service, the job `id` there. What it says is as in `feedplan.planning.Plan`; the exact
-    motion (`at`) stays where the plan is."""
+    """A plan on a service, the result of the job `id`. Its attributes are those of `feedplan.planning.Plan`,
+    but without the exact motion (`at`)."""
 
     def __init__(self, transport: Transport, job: Mapping[str, Any]) -> None:
         self._transport = transport
@@ -44,17 +44,17 @@ class RemotePlan:
 
     @property
     def lower_bound(self) -> float:
-        """No feasible profile of this path is faster [s]."""
+        """Lower bound of the time: no feasible profile of this path is faster [s]."""
         return float(self._summary["lower_bound"])
 
     @property
     def gap(self) -> float:
-        """How far the time can be from the optimum at most: (time − lower_bound) / time."""
+        """(time − lower_bound) / time, an upper limit of the part of the time that could be saved."""
         return float(self._summary["gap"])
 
     @property
     def method(self) -> str:
-        """The method that made it."""
+        """The method that made the plan."""
         return str(self._summary["method"])
 
     @property
@@ -64,7 +64,7 @@ class RemotePlan:
 
     @property
     def options(self) -> dict[str, Any]:
-        """Those that the plan was made with."""
+        """The options that the plan was made with."""
         return dict(self._summary["options"])
 
     @property
@@ -73,17 +73,17 @@ class RemotePlan:
         return dict(self._summary["compute"])
 
     def summary(self) -> dict[str, Any]:
-        """What `plan.json` holds."""
+        """The content of plan.json."""
         return dict(self._summary)
 
     def audit(self, progress: Progress | None = None) -> Audit:
-        """The independent check that the service has made."""
+        """The audit that the service has made."""
         points = self._summary["setpoints"]
         units = dict(zip(points["axes"], points["units"], strict=True))
         return Audit.from_json(self._summary["audit"], units, self._summary["units"]["length"])
 
     def setpoints(self, period: float | None = None) -> RemoteSetpoints:
-        """The setpoints, loaded to this computer when they are read.
+        """The setpoints, which are loaded from the service when they are read.
 
         Raises InputError for another period than that of the plan.
         """
@@ -139,7 +139,7 @@ class RemoteSetpoints:
         return self.chunks()
 
     def all(self) -> SetpointChunk:
-        """The whole stream at once, in a file that is mapped into memory."""
+        """The whole stream as one chunk, from a file that is mapped into memory."""
         if self._chunk is None:
             folder = FilePath(tempfile.mkdtemp(prefix="feedplan-"))
             weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)

@@ -1,4 +1,4 @@
-"""The token of a service, read from a file: what stands in a command others on the computer can see."""
+"""Reads the token of a service from a file, because other users can see the arguments of a command."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ SHORTEST = 16
 
 
 def read_token(file: FilePath) -> str:
-    """The token in a file, its first line. Raises InputError where there is none that is long enough."""
+    """The first line of a file. Raises InputError if it is missing or too short for a token."""
     try:
         token = file.read_text("ascii").partition("\n")[0].strip()
     except (OSError, ValueError) as error:

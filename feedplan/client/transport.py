@@ -1,6 +1,6 @@
-"""Requests to a service: JSON, files and events over HTTP, and its problems as errors of feedplan.
+"""Requests to a service over HTTP: JSON, files and events; its problems become errors of feedplan.
 
-`http.client` alone, which is slow to import and is when the first request is sent.
+It needs only `http.client`, which is slow to import and therefore imported with the first request.
 """
 
 from __future__ import annotations
@@ -29,20 +29,20 @@ from feedplan.errors import (
 if TYPE_CHECKING:
     from http.client import HTTPConnection, HTTPResponse
 
-# What the service says in the type of a problem, after its last colon.
+# The error for each type of problem (the part after its last colon).
 _ERRORS: Mapping[str, type[FeedplanError]] = {
     "machine": MachineError,
     "infeasible": InfeasibleError,
     "solver": SolverError,
     "package": MissingPackageError,
 }
-# How often a request is tried where the line breaks, with so long a pause before it [s].
+# The pause before each attempt to send a request [s]; it is sent again if the connection breaks.
 _PAUSES = (0.0, 0.2, 1.0)
 _PART = 1 << 20
 
 
 class Transport:
-    """A line to the service at an address, which asks for the `token` and may be silent for `timeout` [s]."""
+    """Sends requests to the service at an address, with its `token`; `timeout` [s] is its longest silence."""
 
     def __init__(self, url: str, token: str | None, timeout: float) -> None:
         parts = urlsplit(url if is_text(url) else "")
@@ -60,13 +60,13 @@ class Transport:
         self._base = parts.path.rstrip("/")
 
     def json(self, method: str, address: str, query: Any = None, **more: Any) -> tuple[int, Any]:
-        """The status and the answer, None where it has no content. Raises what the problem says."""
+        """The status and the answer, None without content. A problem raises its error."""
         with self.request(method, address, query, **more) as response:
             content = response.read()
             return response.status, json.loads(content) if content else None
 
     def download(self, address: str, file: FilePath, query: Any = None) -> None:
-        """Stores what is at an address."""
+        """Stores the answer of an address in a file."""
         with self.request("GET", address, query) as response, file.open("wb") as target:
             shutil.copyfileobj(response, target, _PART)
 
@@ -80,7 +80,8 @@ class Transport:
         body: bytes | None = None,
         headers: Mapping[str, str] | None = None,
     ) -> Iterator[HTTPResponse]:
-        """The answer to a request, sent again where the line breaks. Raises what the problem says."""
+        """The answer to a request, which is sent again if the connection breaks. A problem raises its
+        error."""
         import http.client
 
         target = self._base + address + (f"?{urlencode(query, doseq=True)}" if query else "")
@@ -115,8 +116,8 @@ class Transport:
         return kind(self._host, self._port, timeout=self._timeout)
 
     def events(self, address: str) -> Iterator[tuple[str, dict[str, Any]]]:
-        """The kind and the data of each event at an address, once, until the stream ends by itself; goes on
-        where it was when the line breaks."""
+        """Kind and data of each event at an address until the stream ends; after a broken connection the
+        stream continues with the next event."""
         last, silent = "0", 0
         while silent < len(_PAUSES):
             with suppress(OSError), self.request("GET", address, headers={"Last-Event-ID": last}) as response:
@@ -134,12 +135,12 @@ class Transport:
                         event = {}
                     else:
                         event = {}
-            # A stream that has ended as it should is empty from here on.
+            # A stream that has ended by itself has no more events.
             silent += 1
 
 
 def _error(response: HTTPResponse) -> FeedplanError:
-    """The error that an answer tells."""
+    """The error for an answer that is a problem."""
     try:
         problem = json.loads(response.read())
         kind, detail, line = problem["type"].rpartition(":")[2], str(problem["detail"]), problem["line"]
@@ -152,7 +153,7 @@ def _error(response: HTTPResponse) -> FeedplanError:
 
 
 def error_of(kind: str, detail: str, line: int | None) -> FeedplanError:
-    """The error of a kind of problem, with its sentence and the line of the program."""
+    """The error for a kind of problem, with its sentence and the line of the program."""
     if kind == "program":
         return ProgramError(detail, line)
     if kind == "infeasible":

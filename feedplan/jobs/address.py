@@ -1,4 +1,4 @@
-"""Which clusters may be spoken to: those of this computer, and others by TLS with certificates."""
+"""The address of a Dask cluster: on this computer, or anywhere by TLS with certificates."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _GOOD = "one such as tcp://127.0.0.1:8786, or tls://planner:8786 for another com
 
 @dataclass(frozen=True)
 class Certificates:
-    """Files (PEM): `ca` has signed the certificates of all in the cluster, `cert` and `key` are ours."""
+    """Files (PEM): `ca` has signed all certificates of the cluster; `cert` and `key` are our own."""
 
     ca: FilePath
     cert: FilePath
@@ -24,7 +24,7 @@ class Certificates:
 
 @dataclass(frozen=True)
 class ClusterAddress:
-    """Where the scheduler of a cluster is, `url`, and the certificates where it is spoken to by TLS."""
+    """The `url` of a cluster's scheduler, and the certificates if it uses TLS."""
 
     url: str
     certificates: Certificates | None
@@ -35,9 +35,9 @@ class ClusterAddress:
     ) -> ClusterAddress:
         """The cluster at an address, such as `tcp://127.0.0.1:8786` or `tls://planner:8786`.
 
-        The protocol of Dask hands over pickled objects: whoever takes part in it can run programs on every
-        computer of the cluster and on this one. Raises InputError where others could: an address that is not
-        of this computer without TLS, and certificates that are missing or cannot be read.
+        The protocol of Dask sends pickled objects: every participant can run programs on all computers of the
+        cluster and on this one. Raises InputError for an address that is not on this computer and has no TLS,
+        and for certificates that are missing or cannot be read.
         """
         text = address if is_text(address) else ""
         parts = urlsplit(text if "//" in text else f"tcp://{text}")
@@ -84,7 +84,7 @@ def _certificates(url: str, files: dict[str, str | None]) -> Certificates:
 
 
 def is_address(host: str) -> bool:
-    """Whether a host is given in numbers."""
+    """Whether a host is a numeric address."""
     try:
         ipaddress.ip_address(host)
     except ValueError:
@@ -93,5 +93,5 @@ def is_address(host: str) -> bool:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether only this computer can reach what binds there."""
+    """Whether only this computer can reach the host."""
     return ipaddress.ip_address(host).is_loopback if is_address(host) else host == "localhost"

@@ -1,4 +1,4 @@
-"""The files that a program calls, found from its text, for places that have no files of ours."""
+"""Finds the files that a program calls from its text, to send them to other computers."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from pathlib import Path as FilePath
 from feedplan.program.source import MAX_BYTES
 from feedplan.program.subprograms import finder, numbered_files
 
-# `O<name> call`, `O100 call`; M98 P100, G65 P100, M97 being inside the file.
+# `O<name> call`, `O100 call`; M98 P100, G65 P100. M97 calls within the file.
 _BY_NAME = re.compile(rb"O\s*(?:<([^>]*)>|(\d+))\s*call", re.IGNORECASE)
 _BY_NUMBER = re.compile(rb"(?:M\s*98|G\s*65|G\s*66)[^\n\r]*?P\s*(?:(\d+)|[#\[])", re.IGNORECASE)
 _COMPUTED = re.compile(rb"O\s*[#\[][^\n\r]*call", re.IGNORECASE)
 
 
 def called_files(content: bytes, folders: Sequence[FilePath]) -> dict[str, bytes]:
-    """The files in these folders that a program of this content may call, by name, and those that they call.
+    """The files in these folders that a program of this content may call, and the files that these call.
 
-    All numbered files where the number is computed. Raises OSError where a file cannot be read, ValueError
-    where it is too large.
+    If a number is computed, all numbered files are in the result. Raises OSError if a file cannot be read,
+    ValueError if it is too large.
     """
     find = finder(folders, MAX_BYTES)
     found: dict[str, bytes] = {}

@@ -1,9 +1,9 @@
-"""Jobs on the workers of a Dask cluster, given by the address of its scheduler.
+"""Runs jobs on the workers of a Dask cluster, given by the address of its scheduler.
 
-A sequence of jobs is one task. Programs go out and the files of plans come back with it, so that workers need
-no disk in common with this computer. Dask runs a task again elsewhere when its worker is lost; one that has
-lost as many workers as Dask allows fails, and the jobs of a sequence are then tried one by one, so that only
-the job that does it fails.
+A sequence of jobs is one task. Programs are sent with the task and the files of plans come back with its
+result, so that workers share no disk with this computer. When a worker is lost Dask runs its task on another
+worker. A task that has lost as many workers as Dask allows fails; its jobs are then tried one by one, so that
+only the job that causes the loss fails.
 """
 
 from __future__ import annotations
@@ -21,23 +21,23 @@ from feedplan.errors import InputError
 from feedplan.jobs import cluster_task
 from feedplan.jobs.address import ClusterAddress
 from feedplan.jobs.called import called_files
+from feedplan.jobs.connection import Client, Future, close, connect, require_equals
+from feedplan.jobs.executor import JobLimits, JobListener
 from feedplan.jobs.identity import identity
-from feedplan.jobs.line import Client, Future, close, connect, require_equals
 from feedplan.jobs.order import Job
 from feedplan.jobs.outcome import Outcome, failure_of
-from feedplan.jobs.place import JobLimits, Told
 from feedplan.outputs._staging import staged
 from feedplan.program.source import content_of
 
-# How often who waits for a task looks whether it was told to stop [s].
+# Time between two checks for a stop while a task runs [s].
 EVERY = 0.05
-# How long a count of threads holds [s].
+# Time for which a count of threads is kept [s].
 COUNTED = 0.5
 
 
 class Cluster:
-    """The workers of a cluster. Raises InputError where it cannot be reached, or has another feedplan, and
-    MissingPackageError without the package."""
+    """The workers of a cluster. Raises InputError if the cluster cannot be reached or has another feedplan,
+    and MissingPackageError without the package."""
 
     depth = 2
 
@@ -55,30 +55,30 @@ class Cluster:
             raise
 
     def threads(self) -> int:
-        """How many threads the workers have now."""
+        """The number of threads that the workers have now."""
         count, last = self._counted
         if time.monotonic() - last > COUNTED:
             count = 0
-            with suppress(OSError, RuntimeError):  # the scheduler has gone
+            with suppress(OSError, RuntimeError):  # the scheduler is lost
                 client = self._connected()
                 count = 0 if client is None else sum(client.nthreads().values())
             self._counted = (count, time.monotonic())
         return count
 
     def slots(self) -> int:
-        """See `Place`; one where there are no workers, for clusters that start some when there is work."""
+        """See `Executor`; 1 without workers, for clusters that start workers when there is work."""
         return max(self.threads(), 1)
 
     def close(self) -> None:
-        """See `Place`."""
+        """See `Executor`."""
         with self._lock:
             self._closed = True
             client, self._client = self._client, None
         if client is not None:
             close(client)
 
-    def run(self, jobs: Sequence[Job], told: Told, stop: threading.Event) -> list[Outcome]:
-        """See `Place`."""
+    def run(self, jobs: Sequence[Job], report: JobListener, stop: threading.Event) -> list[Outcome]:
+        """See `Executor`."""
         outcomes: dict[int, Outcome] = {}
         sent: dict[int, cluster_task.Sent] = {}
         for number, job in enumerate(jobs):
@@ -92,7 +92,7 @@ class Cluster:
             group = groups.pop(0)
             found = self._run_task(
                 [sent[number] for number in group],
-                lambda place, stage, part, group=group: told(group[place], stage, part),  # type: ignore[misc]
+                lambda index, stage, part, group=group: report(group[index], stage, part),  # type: ignore[misc]
                 stop,
             )
             if isinstance(found, _Lost):
@@ -107,9 +107,9 @@ class Cluster:
         return [outcomes[number] for number in range(len(jobs))]
 
     def _run_task(
-        self, sent: Sequence[cluster_task.Sent], told: Told, stop: threading.Event
+        self, sent: Sequence[cluster_task.Sent], report: JobListener, stop: threading.Event
     ) -> Sequence[cluster_task.Returned | Outcome] | _Lost:
-        """What comes back of one task."""
+        """The result of one task."""
         client = None if stop.is_set() else self._connected()
         if client is None:
             return [Outcome("stopped" if stop.is_set() else "lost")] * len(sent)
@@ -126,9 +126,9 @@ class Cluster:
                     return [Outcome("stopped")] * len(sent)
                 heard.changed.wait(EVERY)
                 for number, stage, part in heard.take():
-                    told(number, stage, part)
+                    report(number, stage, part)
             return _returned(future, len(sent), heard.started)
-        except (OSError, RuntimeError):  # the scheduler has gone
+        except (OSError, RuntimeError):  # the scheduler is lost
             return [Outcome("lost")] * len(sent)
         finally:
             del self._heard[name]
@@ -137,11 +137,11 @@ class Cluster:
         _, message = event
         heard = self._heard.get(message.get("task"))
         if heard is not None:
-            heard.add(*message["told"])
+            heard.add(*message["progress"])
 
     def _connected(self) -> Client:
-        """The line to the scheduler, made anew where it was broken, which loses all tasks; None while
-        there is none."""
+        """The connection to the scheduler, made again if it was broken, which loses all tasks; None while it
+        cannot be made."""
         with self._lock:
             if self._client is not None and self._client.status != "running":
                 close(self._client)
@@ -161,9 +161,10 @@ class Cluster:
 
 @dataclass(frozen=True)
 class _Lost:
-    """A task that has lost as many workers as Dask allows: how its job ends, if it is the one that does it.
+    """A task that has lost as many workers as Dask allows, with the outcome of its job, if the task has one
+    job.
 
-    One that never `started` has only waited for workers that another one has lost.
+    A task that never `started` has only waited on workers that another task has lost.
     """
 
     outcome: Outcome
@@ -171,7 +172,7 @@ class _Lost:
 
 
 def _returned(future: Future, count: int, started: bool) -> Sequence[cluster_task.Returned | Outcome] | _Lost:
-    """What a task of so many jobs that has ended gives."""
+    """The result of an ended task of `count` jobs."""
     from distributed import KilledWorker
 
     if future.status not in ("finished", "error"):
@@ -193,7 +194,7 @@ def _returned(future: Future, count: int, started: bool) -> Sequence[cluster_tas
 
 
 class _Heard:
-    """The last word of each job of a task, for who waits for it."""
+    """The last progress of each job of a task."""
 
     def __init__(self) -> None:
         self.changed, self.started = threading.Event(), False
@@ -211,7 +212,7 @@ class _Heard:
 
 
 def _sent(job: Job) -> cluster_task.Sent:
-    """What a worker needs of a job. Raises FeedplanError where a file cannot be read."""
+    """A job in the form that is sent to a worker. Raises FeedplanError if a file cannot be read."""
     content = content_of(job.program).content
     try:
         table = None if job.tool_table is None else job.tool_table.read_bytes()
@@ -222,7 +223,7 @@ def _sent(job: Job) -> cluster_task.Sent:
 
 
 def _kept(job: Job, returned: cluster_task.Returned | Outcome) -> Outcome:
-    """The outcome of a job, after its files are in its folder."""
+    """Writes the files of a job to its folder and returns its outcome."""
     if isinstance(returned, Outcome):
         return returned
     outcome = Outcome.of(returned.outcome)

@@ -1,7 +1,7 @@
-"""Runs of one program on the workers of a Dask cluster: the parts of a plan that do not know of each other.
+"""Plans the runs of one program, which are independent of each other, on the workers of a Dask cluster.
 
-`feedplan.plan(..., elsewhere=ClusterRuns(address))` sends the runs between stops out in parts, a few for each
-thread, and puts what comes back together as the plan of this computer would be, bit for bit.
+`feedplan.plan(..., elsewhere=ClusterRuns(address))` sends the runs between stops in parts, a few for each
+thread, and joins the results to the plan that this computer would make, bit for bit.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ from typing import Any
 from feedplan.errors import FeedplanError, SolverError
 from feedplan.jobs.address import ClusterAddress
 from feedplan.jobs.cluster_task import other_feedplan, require_wanted
+from feedplan.jobs.connection import close, connect, require_equals
 from feedplan.jobs.identity import identity
-from feedplan.jobs.line import close, connect, require_equals
 from feedplan.progress import Listener, tell
 
-# How often who listens is told, and may end the work [s].
+# Time between two reports of progress, which may end the work [s].
 EVERY = 0.1
-# Parts for each thread: runs take unlike times.
+# Parts for each thread: several, because the parts take different times.
 PARTS = 4
 
 
 class ClusterRuns:
-    """The workers of a cluster as those who plan parts of a program.
+    """The workers of a cluster, which plan parts of a program.
 
-    Raises InputError where the cluster cannot be reached or has another feedplan, MissingPackageError without
+    Raises InputError if the cluster cannot be reached or has another feedplan, MissingPackageError without
     the package.
     """
 
@@ -46,20 +46,20 @@ class ClusterRuns:
         self.close()
 
     def close(self) -> None:
-        """Nothing is called any more."""
+        """Closes the connection."""
         close(self._client)
 
     def count(self) -> int:
-        """How many parts keep all threads busy."""
+        """The number of parts that keeps all threads busy."""
         threads: int = sum(self._client.nthreads().values())
         return PARTS * max(threads, 1)
 
     def map(
         self, work: Callable[..., Any], given: Sequence[tuple[Any, ...]], progress: Listener | None
     ) -> list[Any]:
-        """What `work(*arguments, progress)` returns for each of the arguments, on some worker.
+        """The results of `work(*arguments, progress)` for each of the arguments, computed on the workers.
 
-        Raises SolverError where the cluster does not do it, and what `progress` raises.
+        Raises SolverError if the cluster fails, and the exceptions of `progress`.
         """
         task = f"feedplan-{secrets.token_hex(8)}"
         changed = threading.Event()
@@ -98,7 +98,7 @@ def _result(future: Any) -> Any:
 def run_part(
     name: str, expected: str, work: Callable[..., Any], arguments: tuple[Any, ...]
 ) -> tuple[Any, str | None]:
-    """In a worker: the result, or a sentence why there is none."""
+    """Runs in a worker: returns the result, or a sentence that tells why there is none."""
     from distributed import get_worker
 
     worker = get_worker()

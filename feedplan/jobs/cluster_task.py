@@ -1,4 +1,4 @@
-"""What runs in a worker of a cluster: the same work as in a process, with files that are sent both ways."""
+"""Runs in a worker of a cluster: does the same work as a process, with files that are sent both ways."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
+from feedplan.jobs.executor import JobLimits
 from feedplan.jobs.identity import identity
 from feedplan.jobs.order import Order
 from feedplan.jobs.outcome import Outcome, failure_of
-from feedplan.jobs.place import JobLimits
 from feedplan.jobs.work import Pace, Stopped, work_on
 
 TOPIC = "feedplan"
@@ -20,7 +20,8 @@ TOPIC = "feedplan"
 
 @dataclass(frozen=True)
 class Sent:
-    """A job as a worker gets it: the text of its order, the program, its tool table, the files it calls."""
+    """A job as it is sent to a worker: text of its order, program, tool table, files that the program
+    calls."""
 
     order: str
     program: bytes
@@ -30,16 +31,16 @@ class Sent:
 
 @dataclass(frozen=True)
 class Returned:
-    """What comes back: the text of the outcome, and the files of the plan by name."""
+    """The result that a worker sends: text of the outcome, and files of the plan by name."""
 
     outcome: str
     files: dict[str, bytes]
 
 
 def run(name: str, expected: str, limits: tuple[float, float], jobs: Sequence[Sent]) -> list[Returned]:
-    """Works on these jobs, one after the other, and tells their progress under the `name` of the task.
+    """Works on these jobs in order, and reports their progress under the `name` of the task.
 
-    Refuses them where feedplan is not the `expected` one: its plans would be others.
+    Refuses them if this feedplan is not the `expected` one, because its plans may differ.
     """
     from distributed import get_worker
 
@@ -47,21 +48,21 @@ def run(name: str, expected: str, limits: tuple[float, float], jobs: Sequence[Se
     if (sentence := other_feedplan(worker, expected)) is not None:
         return [Returned(Outcome.failed("worker", sentence).text(), {}) for _ in jobs]
     most = JobLimits(*limits)
-    return [_run_one(_Told(worker, name, number, most), job) for number, job in enumerate(jobs)]
+    return [_run_one(_JobProgress(worker, name, number, most), job) for number, job in enumerate(jobs)]
 
 
-def _run_one(told: _Told, job: Sent) -> Returned:
-    """Works on a job; what goes wrong is in the outcome, so that no exception has to go over the line."""
+def _run_one(progress: _JobProgress, job: Sent) -> Returned:
+    """Works on a job; errors are in the outcome, so that no exception is sent."""
     try:
-        return _worked(told, job)
+        return _worked(progress, job)
     except Exception as error:
         return Returned(Outcome("failed", failure=failure_of(error)).text(), {})
 
 
-def _worked(told: _Told, job: Sent) -> Returned:
-    with tempfile.TemporaryDirectory(prefix="feedplan-") as scratch:
-        place = FilePath(scratch)
-        folder, called, table = place / "plan", place / "called", place / "tools.tbl"
+def _worked(progress: _JobProgress, job: Sent) -> Returned:
+    with tempfile.TemporaryDirectory(prefix="feedplan-") as temporary:
+        scratch = FilePath(temporary)
+        folder, called, table = scratch / "plan", scratch / "called", scratch / "tools.tbl"
         called.mkdir()
         for name, content in job.called.items():
             (called / name).write_bytes(content)
@@ -71,29 +72,29 @@ def _worked(told: _Told, job: Sent) -> Returned:
             Order.of(job.order),
             job.program,
             folder,
-            told.progress,
+            progress.progress,
             tool_table=None if job.tool_table is None else table,
             subprograms=[called] if job.called else [],
         )
-        if outcome.state == "stopped" and told.over_time:
-            outcome = told.limits.over_time()
+        if outcome.state == "stopped" and progress.over_time:
+            outcome = progress.limits.over_time()
         text = outcome.text().replace(f"{scratch}/", "")
         files = {file.name: file.read_bytes() for file in folder.iterdir()} if folder.exists() else {}
         return Returned(text, files)
 
 
-class _Told:
-    """Is told of the progress of a job; ends it where its time is over or nobody waits for it."""
+class _JobProgress:
+    """Takes the progress of a job; ends the job when its time is over or its client is gone."""
 
     def __init__(self, worker: Any, name: str, number: int, limits: JobLimits) -> None:
         self._worker, self._name, self.limits = worker, name, limits
         self._end = time.monotonic() + limits.max_time
         self.over_time = False
         send = worker.log_event
-        self._pace = Pace(lambda stage, part: send(TOPIC, {"task": name, "told": [number, stage, part]}))
+        self._pace = Pace(lambda stage, part: send(TOPIC, {"task": name, "progress": [number, stage, part]}))
 
     def progress(self, stage: str, part: float) -> None:
-        """The part of a stage is done. Raises Stopped."""
+        """Reports the part of a stage that is done. Raises Stopped."""
         self.over_time = time.monotonic() > self._end
         if self.over_time:
             raise Stopped
@@ -102,15 +103,15 @@ class _Told:
 
 
 def require_wanted(worker: Any, name: str) -> None:
-    """Raises Stopped where nobody waits for a task: the worker forgets it, or marks it, when its client has
-    cancelled it or is gone."""
+    """Raises Stopped if the worker has removed or marked the task, because its client has cancelled it or is
+    gone."""
     task = worker.state.tasks.get(name)
     if task is None or task.state == "cancelled":
         raise Stopped
 
 
 def other_feedplan(worker: Any, expected: str) -> str | None:
-    """What is wrong with a worker whose feedplan is not the expected one: its plans would be others."""
+    """A sentence about a worker whose feedplan is not the expected one; None if it is."""
     own = identity()
     if own == expected:
         return None

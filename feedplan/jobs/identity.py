@@ -1,4 +1,4 @@
-"""What tells one feedplan from another: only equal ones give the same plans bit for bit."""
+"""The identity of an installation of feedplan: equal identities give equal plans bit for bit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is to be planned, and where the program and its plan are."""
+"""An order (machine, method, options) as plain values, and a job: an order with its files."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Order:
-    """How a program is planned: plain values, the same on every computer.
+    """Plain values that say how to plan a program, the same on every computer.
 
-    `name` of the program stands in messages, its ending tells the language; `machine` is the text of a
-    machine file, or `auto`; `options` are keywords of `feedplan.plan`, `reading` of `read_program`, without
-    files; `formats` those of the setpoints; with `drawing` what a page draws is written as well.
+    `name` of the program is shown in messages, and its ending decides the language; `machine` is the text of
+    a machine file, or `auto`; `options` are keywords of `feedplan.plan`, `reading` keywords of `read_program`
+    except files; `formats` are those of the setpoints; with `drawing` the data of a page is written too.
     """
 
     name: str
@@ -27,20 +27,20 @@ class Order:
     drawing: bool = False
 
     def text(self) -> str:
-        """The order as JSON, equal for equal orders."""
+        """The order as JSON; equal orders have equal texts."""
         return json.dumps(asdict(self), sort_keys=True)
 
     @staticmethod
     def of(text: str) -> Order:
-        """The order that `text` has told."""
+        """The order of such a text."""
         table = json.loads(text)
         return Order(**{**table, "formats": tuple(table["formats"])})
 
 
 @dataclass(frozen=True)
 class Job:
-    """An order with its files: the `program`, the `folder` that its plan is written to, which appears whole
-    or not at all, the `tool_table`, and the folders of `subprograms` that the program may call."""
+    """An order with its files: the `program`, the `tool_table`, the folders of `subprograms` that the program
+    may call, and the `folder` of its plan, which appears whole or not at all."""
 
     order: Order
     program: FilePath

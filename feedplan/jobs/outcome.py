@@ -1,4 +1,4 @@
-"""What became of a job, as plain values."""
+"""The outcome of a job, as plain values."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Kind = Literal[
     "worker",
     "defect",
 ]
-# By class; the first that an error is an instance of.
+# The kind of a failure for each class of error; the first class that matches is used.
 _KINDS: tuple[tuple[type[FeedplanError], Kind], ...] = (
     (ProgramError, "program"),
     (MachineError, "machine"),
@@ -41,8 +41,8 @@ _KINDS: tuple[tuple[type[FeedplanError], Kind], ...] = (
 
 @dataclass(frozen=True)
 class Failure:
-    """Why a job has no plan: one sentence, of a kind, with the line of the program; a defect of feedplan has
-    its `trace`."""
+    """The reason why a job has no plan: its kind, one sentence, the line of the program; for a defect of
+    feedplan the `trace`."""
 
     kind: Kind
     sentence: str
@@ -52,10 +52,10 @@ class Failure:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a job, which took `seconds` and made files of `size` bytes.
+    """The outcome of a job that took `seconds` and made files of `size` bytes.
 
-    `done` has the key figures of its plan, `failed` why there is none; `stopped` was told to; `lost` is a job
-    whose place is gone, and that may run again.
+    A job that is `done` has the key figures of its plan, a `failed` one has a failure; a `stopped` job was
+    told to stop; a `lost` job has lost its executor and may run again.
     """
 
     state: Literal["done", "failed", "stopped", "lost"]
@@ -70,14 +70,14 @@ class Outcome:
 
     @staticmethod
     def of(text: str) -> Outcome:
-        """The outcome that `text` has told."""
+        """The outcome of such a text."""
         table = json.loads(text)
         failure = table.pop("failure")
         return Outcome(**table, failure=failure and Failure(**failure))
 
     @staticmethod
     def failed(kind: Kind, sentence: str) -> Outcome:
-        """A job that failed."""
+        """The outcome of a job that failed."""
         return Outcome("failed", failure=Failure(kind, sentence))
 
 
@@ -87,7 +87,7 @@ def kind_of(error: FeedplanError) -> Kind:
 
 
 def failure_of(error: Exception) -> Failure:
-    """Why a job failed that raised this."""
+    """The failure of a job that raised this error."""
     if isinstance(error, MemoryError):
         said = "the memory of the computer does not suffice below max_memory: split the program"
         return Failure("limit", said)

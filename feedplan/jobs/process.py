@@ -1,7 +1,7 @@
-"""A process of its own that works on the jobs it is told, one after the other.
+"""The process that works on jobs, one after the other.
 
-It and who has started it exchange JSON, never pickled objects. The process ends by itself when the line is
-cut, and stops its job at the next word of progress when it is told to.
+It exchanges JSON with its parent, never pickled objects. The process ends when the connection is closed, and
+stops its job at the next report of progress when it is told to.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from feedplan.jobs.outcome import Outcome, failure_of
 from feedplan.jobs.work import Pace, Stopped, work_on
 from feedplan.program.source import content_of
 
-# What most jobs import; the fork server has it before they begin. `__main__` is that of the command.
+# Modules that most jobs need; the fork server imports them once. `__main__` is that of the command.
 LOADED = (
     __name__,
     *("feedplan.__main__", "feedplan.machine.kinematics", "feedplan.planners.bang_bang"),
@@ -32,7 +32,7 @@ STOP = b"stop"
 
 
 def message_of(job: Job) -> bytes:
-    """A job as the process is told it."""
+    """A job as a message to the process."""
     return json.dumps(
         {
             "order": job.order.text(),
@@ -45,43 +45,43 @@ def message_of(job: Job) -> bytes:
 
 
 def main(connection: Connection, niceness: int) -> None:
-    """Works on jobs until the line is cut; after each its outcome is told."""
+    """Works on jobs until the connection is closed; sends the outcome of each."""
     _become_a_worker(niceness)
-    line = _Line(connection)
+    parent = _Parent(connection)
     while True:
-        outcome = _work_on(line.next_job(), line)
-        line.send({"outcome": outcome.text()})
+        outcome = _work_on(parent.next_job(), parent)
+        parent.send({"outcome": outcome.text()})
 
 
-def _work_on(told: dict[str, Any], line: _Line) -> Outcome:
+def _work_on(message: dict[str, Any], parent: _Parent) -> Outcome:
     try:
-        content = content_of(FilePath(told["program"])).content
+        content = content_of(FilePath(message["program"])).content
     except Exception as error:
         return Outcome("failed", failure=failure_of(error))
     return work_on(
-        Order.of(told["order"]),
+        Order.of(message["order"]),
         content,
-        FilePath(told["folder"]),
-        line.progress(),
-        tool_table=None if told["tool_table"] is None else FilePath(told["tool_table"]),
-        subprograms=[FilePath(folder) for folder in told["subprograms"]],
+        FilePath(message["folder"]),
+        parent.progress(),
+        tool_table=None if message["tool_table"] is None else FilePath(message["tool_table"]),
+        subprograms=[FilePath(folder) for folder in message["subprograms"]],
     )
 
 
 def _become_a_worker(niceness: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # What solvers print goes nowhere.
+    # Discards what solvers print.
     nothing = os.open(os.devnull, os.O_RDWR)
     for stream in range(3):
         os.dup2(nothing, stream)
     with suppress(OSError):
         os.nice(niceness)
-    with suppress(OSError):  # Linux: this process, not who has started it, is ended where memory runs out
+    with suppress(OSError):  # Linux: if memory runs out, this process is killed, not its parent
         FilePath("/proc/self/oom_score_adj").write_text("1000")
 
 
-class _Line:
-    """The line to who has started the process: jobs come, progress and outcomes go."""
+class _Parent:
+    """The connection to the parent: receives jobs, sends progress and outcomes."""
 
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
@@ -93,7 +93,7 @@ class _Line:
         while True:
             try:
                 message = self._connection.recv_bytes(LONGEST_MESSAGE)
-            except (EOFError, OSError):  # nothing of this process is worth an orderly end
+            except (EOFError, OSError):  # the parent is gone: nothing here needs an orderly end
                 os._exit(0)
             if message == STOP:
                 self._stop.set()
@@ -101,21 +101,21 @@ class _Line:
                 self._jobs.put(message)
 
     def next_job(self) -> dict[str, Any]:
-        """The next job, when it comes."""
-        told: dict[str, Any] = json.loads(self._jobs.get())
-        return told
+        """Waits for the next job."""
+        message: dict[str, Any] = json.loads(self._jobs.get())
+        return message
 
     def send(self, message: dict[str, Any]) -> None:
         with suppress(OSError):
             self._connection.send_bytes(json.dumps(message).encode())
 
     def progress(self) -> Any:
-        """Who is told of the progress of one job; raises Stopped when the process was told to stop."""
+        """A progress function for one job, which raises Stopped after the process was told to stop."""
         pace = Pace(lambda stage, part: self.send({"stage": stage, "part": part}))
 
-        def told(stage: str, part: float) -> None:
+        def report(stage: str, part: float) -> None:
             if self._stop.is_set():
                 raise Stopped
             pace.progress(stage, part)
 
-        return told
+        return report

@@ -1,8 +1,8 @@
 """Jobs in processes of this computer.
 
-A process for each sequence of jobs, from a fork server that has feedplan loaded (some 10 ms): a job that is
-killed, or runs out of memory or time, takes nothing with it but its process, the jobs after it get another
-one, and no pipe is shared whose lock a killed process could keep.
+Each sequence of jobs has a process, started in some 10 ms from a fork server that has feedplan loaded. A job
+that is killed, or runs out of memory or time, ends only its process; the jobs after it get another process.
+Processes share no pipe, because a killed process could keep the lock of a shared one.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from pathlib import Path as FilePath
 from threading import Event
 
 from feedplan.jobs import process as work
+from feedplan.jobs.executor import MB, JobLimits, JobListener
 from feedplan.jobs.order import Job
 from feedplan.jobs.outcome import Outcome
-from feedplan.jobs.place import MB, JobLimits, Told
 
-# How often a process is looked after [s], and how long it may take to stop when it is told to.
+# Time between two checks of a process, and longest time for it to stop when it is told to [s].
 EVERY, GRACE = 0.05, 2.0
 _PAGE = os.sysconf("SC_PAGE_SIZE")
 
 
 class Processes:
-    """`count` processes at a time; the system hands them time later than others by `niceness`."""
+    """Runs `count` processes at a time with this `niceness`."""
 
     depth = 1
 
@@ -41,24 +41,26 @@ class Processes:
         forkserver.ensure_running()
 
     def slots(self) -> int:
-        """See `Place`."""
+        """See `Executor`."""
         return self._count
 
     def close(self) -> None:
-        """See `Place`."""
+        """See `Executor`."""
 
-    def run(self, jobs: Sequence[Job], told: Told, stop: Event) -> list[Outcome]:
-        """See `Place`."""
+    def run(self, jobs: Sequence[Job], report: JobListener, stop: Event) -> list[Outcome]:
+        """See `Executor`."""
         outcomes: list[Outcome] = []
         while len(outcomes) < len(jobs):
             if stop.is_set():
                 outcomes += [Outcome("stopped")] * (len(jobs) - len(outcomes))
             else:
-                self._in_a_process(jobs, outcomes, told, stop)
+                self._in_a_process(jobs, outcomes, report, stop)
         return outcomes
 
-    def _in_a_process(self, jobs: Sequence[Job], outcomes: list[Outcome], told: Told, stop: Event) -> None:
-        """Works on the jobs that have no outcome; adds one at least, and as many as the process lives."""
+    def _in_a_process(
+        self, jobs: Sequence[Job], outcomes: list[Outcome], report: JobListener, stop: Event
+    ) -> None:
+        """Works on the jobs without an outcome in one process until it ends; adds at least one outcome."""
         own, other = self._context.Pipe()
         process = self._context.Process(target=work.main, args=(other, self._niceness), daemon=True)
         with own:
@@ -68,7 +70,7 @@ class Processes:
                 while len(outcomes) < len(jobs) and not stop.is_set():
                     number = len(outcomes)
                     own.send_bytes(work.message_of(jobs[number]))
-                    outcome, lives = self._look_after(process, own, number, told, stop)
+                    outcome, lives = self._look_after(process, own, number, report, stop)
                     outcomes.append(outcome)
                     if not lives:
                         return
@@ -81,9 +83,9 @@ class Processes:
                     process.join()
 
     def _look_after(
-        self, process: BaseProcess, connection: Connection, number: int, told: Told, stop: Event
+        self, process: BaseProcess, connection: Connection, number: int, report: JobListener, stop: Event
     ) -> tuple[Outcome, bool]:
-        """What became of the job that the process works on, and whether the process is good for another."""
+        """The outcome of the job in the process, and whether the process can take another job."""
         limits, end = self._limits, time.monotonic() + self._limits.max_time
         problem: Outcome | None = None
         last: float | None = None
@@ -98,7 +100,7 @@ class Processes:
                 if "outcome" in message:
                     outcome = Outcome.of(message["outcome"])
                     return (problem or outcome) if outcome.state == "stopped" else outcome, last is None
-                told(number, message["stage"], message["part"])
+                report(number, message["stage"], message["part"])
             elif ready:
                 process.join()
                 return problem or _ended(process), False
@@ -109,21 +111,21 @@ class Processes:
                 return limits.over_memory(used), False
             if last is None and (stop.is_set() or problem):
                 last = now + self._grace
-                with suppress(OSError):  # it may have ended
+                with suppress(OSError):  # the process may have ended
                     connection.send_bytes(work.STOP)
             if last is not None and now > last:
                 return problem or Outcome("stopped"), False
 
 
 def _ended(process: BaseProcess) -> Outcome:
-    """What a process leaves that ended without an outcome."""
+    """The outcome of a job whose process ended without one."""
     how = process.exitcode
     signal = f"by the signal {-how}" if how is not None and how < 0 else "without a word"
     return Outcome.failed("worker", f"the process of the job was ended {signal}: send it again")
 
 
 def memory_of(process: int | None) -> int:
-    """What a process has in memory [bytes]; 0 where the system does not tell."""
+    """The resident memory of a process [bytes]; 0 if the system does not tell."""
     try:
         return int(FilePath(f"/proc/{process}/statm").read_text("ascii").split()[1]) * _PAGE
     except (OSError, IndexError, ValueError):

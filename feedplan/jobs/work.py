@@ -1,4 +1,4 @@
-"""Plans one order: reads, plans, audits, writes. The same work in every place."""
+"""Plans one order: reads, plans, audits, writes. Every executor calls it."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from collections.abc import Callable, Sequence
 from pathlib import Path as FilePath
 from typing import Any
 
-from feedplan.files import write_plan
 from feedplan.jobs.order import Order
 from feedplan.jobs.outcome import Outcome, failure_of
 from feedplan.machine.file import parse
+from feedplan.plan_folder import write_plan
 from feedplan.planning import Plan, plan
 from feedplan.program.machine_for import AUTO, smallest_machine
 from feedplan.program.program import Program
 from feedplan.program.read import Reading, read_program
 from feedplan.progress import Progress
 
-# Where each stage begins and ends in the whole work.
+# Begin and end of each stage in the whole work (0 to 1).
 STAGES = {
     "read": (0.0, 0.1),
     "fit": (0.1, 0.25),
@@ -26,17 +26,17 @@ STAGES = {
     "audit": (0.6, 0.8),
     "write": (0.8, 1.0),
 }
-# Progress is told so often [s], and where a stage begins.
+# Time between two reports of progress [s]; each begin of a stage is reported too.
 EVERY = 0.25
 MOST_FAILURES, MOST_WARNINGS = 5, 20
 
 
 class Stopped(Exception):  # noqa: N818 (nothing went wrong)
-    """Nobody wants the work any more."""
+    """The job was told to stop."""
 
 
 class _Named(io.BytesIO):
-    """A program as a stream; it is not a file, so that it calls no files beside it."""
+    """A program as a stream instead of a file, so that it cannot call files in its own folder."""
 
     def __init__(self, content: bytes, name: str) -> None:
         super().__init__(content)
@@ -52,7 +52,7 @@ def work_on(
     tool_table: FilePath | None = None,
     subprograms: Sequence[FilePath] = (),
 ) -> Outcome:
-    """Plans a program of this content and writes its plan to `folder`; what goes wrong is in the outcome.
+    """Plans a program of this content and writes its plan to `folder`; errors are in the outcome.
 
     `progress` may raise Stopped.
     """
@@ -75,7 +75,7 @@ def _planned(
     tool_table: FilePath | None,
     subprograms: Sequence[FilePath],
 ) -> tuple[dict[str, Any], int]:
-    """Plans and writes; returns the key figures, and how many bytes were written."""
+    """Plans and writes; returns the key figures and the number of bytes written."""
     reading = Reading(**order.reading)  # type: ignore[typeddict-item]
     if tool_table is not None:
         reading["tool_table"] = tool_table
@@ -108,14 +108,14 @@ def _figures(made: Plan) -> dict[str, Any]:
 
 
 class Pace:
-    """Tells how far a job is some times a second, as `tell(stage, part)`."""
+    """Reports the progress of a job by `tell(stage, part)`, every EVERY seconds at most."""
 
     def __init__(self, tell: Callable[[str, float], None]) -> None:
         self._tell = tell
         self._told = ("", 0.0)
 
     def progress(self, stage: str, part: float) -> None:
-        """The part of a stage is done."""
+        """Reports the part of a stage that is done."""
         now = time.monotonic()
         last_stage, last = self._told
         if stage in STAGES and (stage != last_stage or now - last >= EVERY):
@@ -124,6 +124,6 @@ class Pace:
 
 
 def of_whole(stage: str, part: float) -> float:
-    """The part of the whole work that is done when that part of a stage is."""
+    """The part of the whole work that is done when a part of a stage is done."""
     start, end = STAGES[stage]
     return start + (end - start) * part

@@ -1,15 +1,14 @@
-"""Outputs: one file a format, found by its name, and setpoints read back from them.
+"""Writes setpoints to files, one module for each format, and reads them back.
 
-A format is a module here whose name does not begin with an underscore, and `FormatName` has its name. It has
+A format is a module here whose name does not begin with an underscore and is in `FormatName`. It has
 
-- `FILE`, the name of the file it writes;
-- `ROWS`, which rows it has: `SETPOINTS`, one a servo period, or `KNOTS`, equal steps between stops;
-- `writer(file, header, count)`, a context that writes `count` rows: it gives a function that takes them
-  chunk by chunk in the order of time, and completes the file at its end;
-- `load(file)`, which reads them back as one chunk, a SetpointFile.
+- `FILE`, the name of its file;
+- `ROWS`, the kind of its rows: `SETPOINTS`, one a servo period, or `KNOTS`, equal steps between stops;
+- `writer(file, header, count)`, a context that writes `count` rows: it gives a function that takes chunks
+  in the order of time, and completes the file at its end;
+- `load(file)`, which reads the rows back as one chunk, a SetpointFile.
 
-Each file tells its version, axes, units, period (or longest step) and the events of the program, each
-with its time, line, kind, channel, value, whether the tool stops for it, and its text
+Each file holds version, axes, units, period (or longest step) and the events of the program
 (`feedplan.events`).
 """
 
@@ -30,22 +29,23 @@ from feedplan.events import TimedEvents
 from feedplan.progress import Listener
 from feedplan.setpoints import SetpointChunk
 
-# The columns of a setpoint that have one value an axis, with what follows the unit of the axis in theirs.
+# The columns that have one value for each axis, and what their unit adds to the unit of the axis.
 QUANTITIES = {"position": "", "velocity": "/s", "acceleration": "/s^2", "jerk": "/s^3"}
 
 FormatName = Literal["csv", "halstreamer", "json", "npz", "npz-compressed", "parquet", "pvt"]
 
-# Which rows a format has.
+# The kinds of rows.
 SETPOINTS, KNOTS = "setpoints", "knots"
 
-# The version of all files of a plan. Files without one come from elsewhere and are read as this one.
+# The version of all files of a plan. Files without a version come from other programs and are read as this
+# version.
 FORMAT = 1
 
 
 @dataclass(frozen=True)
 class Header:
-    """What all rows of a file have in common: names of the `axes`, their `units` (mm, deg, …), the servo
-    `period` [s], or of knots the longest step; and the `events` by the clock of the rows."""
+    """The header of a file: names of the `axes`, their `units` (mm, deg, …), the servo `period` [s] or the
+    longest step of knots, and the `events` by the clock of the rows."""
 
     axes: tuple[str, ...]
     units: tuple[str, ...]
@@ -55,9 +55,9 @@ class Header:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SetpointFile(SetpointChunk):
-    """Setpoints read from a `file`; `units` are those of the axes, empty where the file tells none; `period`
-    [s], None where it tells none, of knots the longest step; `rows` as the format's `ROWS`. Velocities,
-    accelerations, jerks and lines have no rows where the format has none. `events` are in the order of the
+    """Setpoints read from a `file`: `units` of the axes, empty if the file has none; `period` [s] or the
+    longest step of knots, None if the file has none; `rows` as the format's `ROWS`. Velocities,
+    accelerations, jerks and lines have no rows if the format lacks them. `events` are in the order of the
     file."""
 
     file: FilePath = FilePath()
@@ -71,7 +71,7 @@ Add = Callable[[SetpointChunk], None]
 
 
 class Format(Protocol):
-    """What a module of this package offers."""
+    """The interface of a module of this package."""
 
     FILE: str
     ROWS: str
@@ -89,7 +89,7 @@ def formats() -> tuple[FormatName, ...]:
 
 
 def format_named(name: str) -> Format:
-    """The format of that name. Raises InputError naming those there are."""
+    """The format of that name. Raises InputError with the names of all formats."""
     one_of(name, "output format", formats())
     return cast(Format, importlib.import_module(f"{__name__}.{name.replace('-', '_')}"))
 
@@ -107,7 +107,7 @@ def load_setpoints(place: str | os.PathLike[str], progress: Listener | None = No
     """The setpoints in a file, or in the folder of a plan, as one chunk.
 
     The arrays of an npz file stay on disk and are read where they are used. `progress` is told how far the
-    reading of a text is. Raises InputError naming the file and the remedy.
+    reading of a text file is. Raises InputError with the file and the remedy.
     """
     callback(progress, "the part done")
     file = file_path(place, "the place", "a file of setpoints or the folder of a plan")

@@ -1,4 +1,4 @@
-"""Setpoints read from a file, checked to be what the names promise."""
+"""Checks the arrays of a file by shape and type, and makes a chunk of setpoints of them."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ COLUMNS = ("t", *QUANTITIES, "line")
 def chunk_of(
     arrays: Mapping[str, Any], file: FilePath, columns: Sequence[str] = COLUMNS, rows: str = SETPOINTS
 ) -> SetpointFile:
-    """The chunk in these named arrays. Raises InputError naming the file and what is wrong with it.
+    """The chunk in these named arrays. Raises InputError with the file and what is wrong in it.
 
-    `columns` are those that the format has. `format`, `units`, `period` and `events` may be missing, as in
-    files from elsewhere.
+    `columns` are the columns of the format. `format`, `units`, `period` and `events` may be missing, as in
+    files of other programs.
     """
     missing = [name for name in (*columns, "axes") if name not in arrays]
     if missing:
@@ -65,6 +65,6 @@ def chunk_of(
 
 
 def _single(value: Any) -> Any:
-    """A number that a file may hold as an array of one."""
+    """A number that a file may hold as an array of one element."""
     array = np.asarray(value)
     return array.item() if array.size == 1 else value

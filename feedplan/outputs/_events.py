@@ -1,4 +1,4 @@
-"""Events in files: as JSON objects, or as an array of records with the texts beside it."""
+"""Events in files: as JSON objects, or as an array of records and a list of texts."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from feedplan.errors import InputError
 from feedplan.events import TimedEvents, of_json
 from feedplan.program.actions import KINDS
 
-# A record; `text` is the place of its text among all different ones.
+# A record; `text` is the index of its text in the list of different texts.
 RECORD = np.dtype(
     [
         ("time", "<f8"),
@@ -29,13 +29,13 @@ _COLUMNS = ("time", "line", "kind", "channel", "value", "stops")
 
 
 def to_records(events: TimedEvents) -> tuple[NDArray[Any], NDArray[np.uint8]]:
-    """Records (m,), and their different texts, one a line, as UTF-8."""
-    places = {text: place for place, text in enumerate(dict.fromkeys(events.text))}
+    """Records (m,), and their different texts as UTF-8, one a line."""
+    indices = {text: index for index, text in enumerate(dict.fromkeys(events.text))}
     records = np.empty(len(events), RECORD)
     for name in _COLUMNS:
         records[name] = getattr(events, name)
-    records["text"] = [places[text] for text in events.text]
-    return records, np.frombuffer("\n".join(places).encode(), np.uint8)
+    records["text"] = [indices[text] for text in events.text]
+    return records, np.frombuffer("\n".join(indices).encode(), np.uint8)
 
 
 def from_records(records: NDArray[Any], texts: NDArray[np.uint8], file: FilePath) -> TimedEvents:
@@ -44,14 +44,14 @@ def from_records(records: NDArray[Any], texts: NDArray[np.uint8], file: FilePath
         known = np.ascontiguousarray(texts, np.uint8).tobytes().decode().split("\n")
         if records.dtype != RECORD or records.ndim != 1:
             raise ValueError(f"records of {records.dtype}")
-        text = tuple(known[place] for place in records["text"].tolist())
+        text = tuple(known[index] for index in records["text"].tolist())
     except (ValueError, IndexError, TypeError) as error:
         raise _refused(file, error) from None
     return TimedEvents(**{name: records[name].copy() for name in _COLUMNS}, text=text)
 
 
 def from_objects(objects: Iterable[object], file: FilePath) -> TimedEvents:
-    """Events from JSON objects, one each. Raises InputError where they are something else."""
+    """Events from JSON objects, one for each event. Raises InputError for anything else."""
     try:
         return TimedEvents.of(map(of_json, objects))
     except (ValueError, TypeError, OverflowError) as error:

@@ -1,4 +1,4 @@
-"""A folder of outputs that appears whole or not at all: written beside, then renamed."""
+"""Writes a folder that appears whole or not at all: files go to a temporary folder, which is then renamed."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from feedplan.errors import InputError
 
 
 def require_folder(folder: FilePath) -> None:
-    """Raises InputError where `folder` or a part of its path is something else than a folder."""
-    for place in (folder, *folder.parents):
+    """Raises InputError if `folder` or a parent of it exists and is not a folder."""
+    for part in (folder, *folder.parents):
         try:
-            is_file = place.exists() and not place.is_dir()
-        except (OSError, ValueError) as error:  # a name that no file can have
+            is_file = part.exists() and not part.is_dir()
+        except (OSError, ValueError) as error:  # a name that the file system does not allow
             raise InputError(_sentence(folder, error)) from None
         if is_file:
-            raise InputError(f"{place} is a file, not a folder: choose another folder with -o")
+            raise InputError(f"{part} is a file, not a folder: choose another folder with -o")
 
 
 @contextmanager
 def staged(folder: FilePath, last: str) -> Iterator[FilePath]:
-    """A fresh folder to write into; what it holds moves to `folder` when the block ends without an error.
+    """A temporary folder to write into; its files move to `folder` when the block ends without an error.
 
-    A new `folder` is one rename. In one that exists each file replaces its namesake, `last` after the others,
-    so that its presence tells that all are there; other files stay. After an error nothing is left behind.
-    Raises InputError where the file system refuses.
+    A new `folder` appears by one rename. In a folder that exists each file replaces the one of the same name,
+    the file `last` after the others: if it is new, all are; other files stay. After an error no temporary
+    file is left. Raises InputError if the file system refuses.
     """
     require_folder(folder)
-    # Inside an existing folder, else in the nearest parent that exists: the same file system either way.
+    # In the folder or in its nearest parent that exists, so that both are on the same file system.
     home = folder
     while not home.exists():
         home = home.parent

@@ -1,7 +1,7 @@
-"""Rows of numbers as text, with what all of them have in common, and the events, in comments between them.
+"""Rows of numbers as text; header and events are comments between the rows.
 
-A comment is `# name {JSON}`, and `#+` goes on with the one before where that would be too long for other
-readers. An event stands before the first row at or after its time.
+A comment is `# name {JSON}`; `#+` continues it on the next line if it is too long for other readers. An event
+is before the first row at or after its time.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from feedplan.outputs._events import from_objects
 from feedplan.progress import Listener, tell
 
 HEADER, EVENT, _MORE = "feedplan", "event", "#+"
-# LinuxCNC's halstreamer reads lines of 4000 bytes.
+# Most bytes of a line; LinuxCNC's halstreamer reads lines of 4000 bytes.
 _LONGEST = 1000
 _BYTES_AT_ONCE = 1_000_000
 _AXIS = re.compile(r"position (\S+) \[([^\s\[\]]+)\]")
@@ -41,7 +41,7 @@ def _comment(name: str, data: object) -> bytes:
 
 
 class RowWriter:
-    """Writes rows of numbers, each closed by an integer, and the events between them."""
+    """Writes rows of numbers, each with an integer at its end, and the events between them."""
 
     def __init__(
         self,
@@ -60,7 +60,7 @@ class RowWriter:
         stream.write(names.encode())
 
     def add(self, t: NDArray[np.float64], values: NDArray[np.float64], last: NDArray[np.int32]) -> None:
-        """Rows (n, k) at the times `t` (n,), and their integers (n,)."""
+        """Writes rows (n, k) at the times `t` (n,) with their integers (n,)."""
         due = int(np.searchsorted(self._time, t[-1], side="right")) if len(t) else self._done
         first = 0
         for row in np.searchsorted(t, self._time[self._done : due], side="left").tolist():
@@ -71,7 +71,7 @@ class RowWriter:
         self._done = max(due, self._done)
 
     def close(self) -> None:
-        """Writes the events after the last row, which rounding may have put there."""
+        """Writes the events that are after the last row by rounding."""
         for _ in range(self._done, len(self._time)):
             self._event()
 
@@ -86,8 +86,8 @@ class RowWriter:
 
 @dataclass
 class Rows:
-    """What a file of rows holds: `header` as written, empty where there is none; the line with the `names`,
-    if the format has one; the `table` (n, k) and the `events`."""
+    """The content of a file of rows: `header` as written, empty if missing; the line with the `names`, if the
+    format has one; the `table` (n, k) and the `events`."""
 
     header: dict[str, Any] = field(default_factory=dict)
     names: str = ""
@@ -95,7 +95,7 @@ class Rows:
     events: TimedEvents = field(default_factory=TimedEvents.none)
 
     def of_header(self, name: str, kind: type, file: FilePath) -> Any:
-        """An entry of the header. Raises InputError where it is missing or of another type."""
+        """An entry of the header. Raises InputError if it is missing or has another type."""
         value = self.header.get(name)
         if not isinstance(value, kind):
             what = "missing" if value is None else shown(value)
@@ -108,7 +108,8 @@ class Rows:
 def read_columns(
     file: FilePath, column_names: Callable[[Sequence[str], Sequence[str]], str], progress: Listener | None
 ) -> tuple[Rows, tuple[str, ...], tuple[str, ...]]:
-    """The rows of a file, its axes and their units, of which `column_names` makes its line of names."""
+    """The rows of a file, its axes and their units; `column_names` makes the expected line of names of
+    these."""
     axes: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
 
@@ -131,9 +132,9 @@ def read_rows(
     separator: str | None = ",",
     progress: Listener | None = None,
 ) -> Rows:
-    """The rows of a file. `width_of` tells how many numbers a row has, from what stands before them.
+    """The rows of a file. `width_of` gives the count of numbers in a row from the lines before the rows.
 
-    Raises InputError naming file, line and what is wrong.
+    Raises InputError with file, line and what is wrong.
     """
     rows, size = Rows(), max(file.stat().st_size, 1)
     parts: list[NDArray[np.float64]] = []
@@ -170,7 +171,7 @@ def read_rows(
 
 
 def _header(comments: list[str], file: FilePath) -> dict[str, Any]:
-    """What the first comment of that name says; nothing where there is none."""
+    """The content of the header comment; empty if there is none."""
     header: object = next(_named(HEADER, comments, file), {})
     if not isinstance(header, dict):
         raise InputError(f"{file}: the comment # {HEADER} is {shown(header)}: give a JSON object")
@@ -178,7 +179,7 @@ def _header(comments: list[str], file: FilePath) -> dict[str, Any]:
 
 
 def _named(name: str, comments: list[str], file: FilePath) -> Iterator[Any]:
-    """What the comments of a name hold."""
+    """The contents of the comments of that name."""
     begin = f"# {name} "
     for text in comments:
         if text.startswith(begin):
@@ -191,7 +192,7 @@ def _named(name: str, comments: list[str], file: FilePath) -> Iterator[Any]:
 def _table(
     numbered: list[tuple[int, str]], width: int, separator: str | None, file: FilePath
 ) -> NDArray[np.float64]:
-    """Lines as numbers, each with its own number in the file."""
+    """The table (n, width) of lines that are given with their line numbers."""
     lines = [line for _, line in numbered]
     try:
         table = np.loadtxt(lines, delimiter=separator, ndmin=2, comments=None, dtype=np.float64)

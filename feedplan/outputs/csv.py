@@ -1,9 +1,8 @@
 """Setpoints as text: a line of names with units, then a line for every setpoint.
 
-Before the names a comment `# feedplan {…}` tells version and period, and a comment `# event {…}` stands
-before the first setpoint at or after an event of the program: `pandas.read_csv(file, comment="#")` leaves
-both out. Every number is the shortest that reads back the same, so checking the text checks the plan
-itself.
+A comment `# feedplan {…}` before the names has version and period; a comment `# event {…}` is before the
+first setpoint at or after an event of the program. `pandas.read_csv(file, comment="#")` skips both. Every
+number is the shortest text that reads back unchanged, so a check of the text checks the plan itself.
 """
 
 from __future__ import annotations

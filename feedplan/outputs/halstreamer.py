@@ -1,11 +1,11 @@
-"""Setpoints for LinuxCNC's `halstreamer`: a line of pins' values for every servo period.
+"""Setpoints for LinuxCNC's `halstreamer`: a line of values for HAL pins for every servo period.
 
-A line has the position of each axis [mm, deg] and the source line: `loadrt streamer depth=16000 cfg=fffs`
-makes pins for three axes, one `f` each, and `s` for the line, and `halstreamer setpoints.halstream` fills
-them. The header, a comment `# feedplan {…}`, has that text as `pins`. Comments `# event {…}` stand before
-the first line at or after an event: halstreamer leaves lines with # out, so HAL sees the motion alone,
-and whoever runs the stream switches spindle, tools and outputs by these comments. Every number is the
-shortest that reads back the same.
+A line has the position of each axis [mm, deg] and the source line. `loadrt streamer depth=16000 cfg=fffs`
+makes the pins of three axes, one `f` each, and `s` for the line; `halstreamer setpoints.halstream` sets them.
+The header, a comment `# feedplan {…}`, has the text `fffs` as `pins`. A comment `# event {…}` is before the
+first line at or after an event. halstreamer skips lines with #: HAL gets the motion only, and another program
+must switch spindle, tools and outputs by these comments. Every number is the shortest text that reads back
+unchanged.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from feedplan.setpoints import SetpointChunk
 
 FILE = "setpoints.halstream"
 ROWS = SETPOINTS
-# What a time may differ from whole periods by rounding [periods].
+# A time may differ from a whole number of periods by this much, which is rounding [periods].
 _ROUNDING = 1e-6
 
 
 def pins(axes: tuple[str, ...]) -> str:
-    """The types of the pins, as streamer's `cfg` wants them: a float for each axis, then the line."""
+    """The types of the pins for streamer's `cfg`: a float for each axis, then the line."""
     return "f" * len(axes) + "s"
 
 
 @contextmanager
 def writer(file: FilePath, header: Header, count: int) -> Iterator[Add]:
-    """Writes the header, then a line for every setpoint. Raises InputError where the last one is early."""
+    """Writes the header, then a line for every setpoint. Raises InputError if the last setpoint is early."""
     with file.open("wb") as stream:
         rows = RowWriter(stream, "halstreamer", header, separator=b" ", extra={"pins": pins(header.axes)})
 
@@ -54,7 +54,8 @@ def writer(file: FilePath, header: Header, count: int) -> Iterator[Add]:
 
 
 def load(file: FilePath, progress: Listener | None = None) -> SetpointFile:
-    """The positions and lines of a file that this format wrote; a setpoint's place tells its time."""
+    """The positions and lines of a file of this format; the time of a setpoint is its index times the
+    period."""
 
     def width_of(rows: Rows) -> int:
         return len(rows.of_header("axes", list, file)) + 1

@@ -1,8 +1,7 @@
-"""Setpoints as one JSON object with the names of the npz arrays; meant for small plans and other languages.
+"""Setpoints as one JSON object with the names of the npz arrays, for small plans and other languages.
 
-`events` are objects, one each, with their text.
-
-JSON has no infinities: a number that is not finite becomes null.
+`events` is a list of objects, one for each event. JSON has no infinities: a number that is not finite becomes
+null.
 """
 
 from __future__ import annotations
@@ -33,7 +32,8 @@ _ROWS_AT_ONCE = 10_000
 
 @contextmanager
 def writer(file: FilePath, header: Header, count: int) -> Iterator[Add]:
-    """Writes one object; each array grows in a file of its own until all are joined, so memory stays flat."""
+    """Writes one object; each array is a file of its own until all are joined, so that memory does not
+    grow."""
     names = ("t", *QUANTITIES, "line")
     with ExitStack() as stack:
         parts: dict[str, IO[str]] = {

@@ -1,10 +1,10 @@
 """Setpoints as numpy's npz: `t`, `position`, `velocity`, `acceleration`, `jerk`, `line`, `axes`, and single
 numbers `format` and `period` [s]; `units` are those of the axes, as mm or deg.
 
-`events` are records of `time` [s], `line`, `kind`, `channel`, `value`, `stops` and `text`, the place of
+`events` are records of `time` [s], `line`, `kind`, `channel`, `value`, `stops` and `text`, the index of
 the text in `bytes(event_texts).decode().split("\n")`.
 
-Uncompressed: servo setpoints hardly shrink, and so they can be mapped into memory instead of read.
+The arrays are not compressed, so that they can be mapped into memory instead of read.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from feedplan.setpoints import SetpointChunk
 FILE = "setpoints.npz"
 ROWS = SETPOINTS
 
-# A file that claims to hold so many times its own bytes [-], and more than some [bytes], was made to fill the
-# memory: compressed setpoints are a third of their size.
+# A file whose arrays take more than 100 times its own bytes, and more than 2^28 bytes, was made to fill the
+# memory: compressed setpoints have a third of their size.
 _DENSEST, _SMALL = 100, 1 << 28
 
 
 @contextmanager
 def writer(file: FilePath, header: Header, count: int) -> Iterator[Add]:
-    """Writes `count` setpoints in one pass; only the chunk at hand is in memory."""
+    """Writes `count` setpoints in one pass; only one chunk is in memory."""
     double, integer = np.dtype("<f8"), np.dtype("<i4")
     records, texts = to_records(header.events)
     common: dict[str, NDArray[Any]] = {
@@ -78,7 +78,7 @@ def load(file: FilePath, progress: Listener | None = None) -> SetpointFile:
             arrays = {info.filename.removesuffix(".npy"): _member(archive, info, file) for info in members}
     except (OSError, InputError):
         raise
-    except Exception as error:  # zipfile and numpy raise whatever a damaged file leads them to
+    except Exception as error:  # zipfile and numpy raise many classes of errors for damaged files
         raise InputError(f"{file} is not a whole npz file: {error}") from None
     if "events" in arrays:
         texts = arrays.get("event_texts", np.empty(0, np.uint8))
@@ -108,6 +108,6 @@ def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo, file: FilePath) -> 
         stored.seek(info.header_offset + 26)
         lengths = np.frombuffer(stored.read(4), dtype="<u2")
     start = info.header_offset + 30 + int(lengths.sum()) + head
-    if count == 0 or start % dtype.itemsize:  # what other writers left unaligned cannot be mapped
+    if count == 0 or start % dtype.itemsize:  # arrays of other writers may be unaligned
         return np.fromfile(file, dtype, count, offset=start).reshape(shape)
     return np.memmap(file, dtype=dtype, mode="r", offset=start, shape=shape)

@@ -1,4 +1,4 @@
-"""Setpoints as compressed npz: smaller, slower to write, and read into memory as a whole."""
+"""Setpoints as compressed npz: smaller and slower to write than npz; reading takes all of it into memory."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ _BYTES_AT_ONCE = 1 << 20
 
 @contextmanager
 def writer(file: FilePath, header: Header, count: int) -> Iterator[Add]:
-    """Writes the npz beside, then compresses it member by member."""
+    """Writes an npz file, then compresses it member by member."""
     with tempfile.TemporaryDirectory(dir=file.parent) as beside:
         whole = FilePath(beside) / FILE
         with npz.writer(whole, header, count) as add:
             yield add
         with zipfile.ZipFile(whole) as plain, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as packed:
             for info in plain.infolist():
-                # With its size known, a large member gets 64-bit fields.
+                # A large member gets 64-bit fields only if its size is known.
                 head = zipfile.ZipInfo(info.filename)
                 head.compress_type, head.file_size = zipfile.ZIP_DEFLATED, info.file_size
                 with plain.open(info) as source, packed.open(head, "w") as target:

@@ -1,6 +1,6 @@
-"""Setpoints as a Parquet table, for pandas, Polars, DuckDB and the like: the columns of csv.
+"""Setpoints as a Parquet table with the columns of csv, for pandas, Polars and DuckDB.
 
-The metadata of the table have under `feedplan` a JSON object with format, period, axes, units and events.
+The entry `feedplan` of the table's metadata is a JSON object with format, period, axes, units and events.
 Needs the package pyarrow.
 """
 
@@ -26,7 +26,7 @@ from feedplan.setpoints import SetpointChunk
 FILE = "setpoints.parquet"
 ROWS = SETPOINTS
 _KEY = b"feedplan"
-# Rows of one group, which a reader takes as a whole.
+# Rows of one row group.
 _GROUP = 100_000
 
 
@@ -42,7 +42,7 @@ def _package() -> Any:
 
 @contextmanager
 def writer(file: FilePath, header: Header, count: int) -> Iterator[Add]:
-    """Writes groups of rows as they come. Raises MissingPackageError."""
+    """Writes row groups. Raises MissingPackageError."""
     arrow = _package()
     names = column_names(header.axes, header.units).split(",")
     about = {
@@ -81,7 +81,7 @@ def load(file: FilePath, progress: Listener | None = None) -> SetpointFile:
         try:
             table = arrow.parquet.read_table(stream)
             about = json.loads((table.schema.metadata or {}).get(_KEY, b"null"))
-        except (arrow.ArrowException, OSError, ValueError):  # its sentences are of several lines
+        except (arrow.ArrowException, OSError, ValueError):  # their messages have several lines
             raise InputError(f"{file} is not a whole parquet file: plan again") from None
     axes, units = (about.get("axes"), about.get("units")) if isinstance(about, dict) else (None, None)
     if not isinstance(axes, list) or not isinstance(units, list):

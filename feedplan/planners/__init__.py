@@ -6,7 +6,7 @@ and the documentation of `feedplan.plan` its options; modules that begin with an
 share. A method that is made for another path than the rounded one says so in `CORNERS`
 (`feedplan.geometry.corners.Corners`); one whose profiles keep the jerk limits of the axes says
 `LIMITS_JERK = True`, and the audit judges them. One that knows a bound of the time beside that of
-`feedplan.bound` has a function `lower_bound(problem, profile)` with the same options, and `GRID_ERROR` if
+`feedplan.lower_bound` has `lower_bound(problem, profile)` with the same options, and `GRID_ERROR` if
 that leaves so many times the accuracy to finer grids. One that tells how far it is takes `PROGRESS`, and so
 does its bound; one that can tell what follows its plan before it is made (`planners.jerk_limited`) takes
 `RESERVE`, and one whose runs may be planned on other computers `ELSEWHERE`, as does its bound.

@@ -64,7 +64,7 @@ def plan(
 ) -> SpeedProfile:
     """The fastest profile, its time within about `accuracy` of the least, as a part of it.
 
-    It is planned by the length of the tool's way (`solvers/jerk/src/jerk_limited_path.rs`). With a
+    It is planned by the length of the tool's way (`solvers/jerk/src/jerk_limited/on_path.rs`). With a
     `time_limit` [s] there is a first plan, on a coarse grid, whatever the limit. `reserve` tells from it what
     is to be kept of the limit for other work [s]. If the rest does not suffice, each run takes the fastest of
     the first plan, of the one that was stopped, if that came to the run, and of the method s-curve; the

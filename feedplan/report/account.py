@@ -1,4 +1,4 @@
-"""What a plan's time and way are made of: limits, slow lines, stops, feed and rapid motion."""
+"""Divides a plan's time and length by active limit, source line, cause of stops, feed and rapid motion."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from feedplan.report.tool_motion import ToolMotion, tool_motion
 
 @dataclass(frozen=True)
 class Total:
-    """`time` of motion [s], its `length` [mm], and what rotary axes `turn` while nothing else moves [deg];
-    `turn_time` [s] is that part of the time. The units may be others (`ToolMotion.units`)."""
+    """`time` of motion [s], its `length` [mm], and the angle that rotary axes `turn` while no other axis
+    moves [deg]; `turn_time` [s] is the time of that turning. `ToolMotion.units` may name other units."""
 
     time: float
     length: float
@@ -30,21 +30,21 @@ class Total:
 
     @property
     def mean(self) -> float:
-        """Mean speed of motion that has a length [mm/s]."""
+        """Mean speed, without turning alone [mm/s]."""
         moving = self.time - self.turn_time
         return self.length / moving if moving > 0 and self.length > 0 else 0.0
 
     @property
     def mean_turn(self) -> float:
-        """Mean speed of turning alone [deg/s]."""
+        """Mean speed of rotary axes that turn alone [deg/s]."""
         return self.turn / self.turn_time if self.turn_time > 0 else 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class Account:
-    """`limits` with their times, the longest first; the lines that lose most; `stops` by cause; totals of
-    motion at a `feed`, `rapid` motion and `all`; `tolerance` [mm] asked for, the least and the greatest.
-    `activity` tells which limit is active when."""
+    """`limits` with their times, the longest first; the lines that lose most time; `stops` by cause; totals
+    of motion at a `feed`, of `rapid` motion and of `all`; the least and the greatest `tolerance` asked for
+    [mm]; `activity`, the active limit at each moment."""
 
     motion: ToolMotion
     activity: Activity
@@ -77,12 +77,9 @@ def account(
     jerk: bool,
     progress: Listener | None = None,
 ) -> Account:
-    """The account of a profile on its path; `jerk`: its method limits jerk.
-
-    `progress` is told how far it is.
-    """
+    """The account of a profile on its path; `jerk` is true if the profile's method limits jerk."""
     path, motion = problem.path, tool_motion(problem)
-    way = motion.lengths(part(progress, 0.0, 0.5))
+    lengths = motion.lengths(part(progress, 0.0, 0.5))
     tell(progress, 0.5)
     time = np.bincount(profile.piece.astype(np.int64), profile.duration, len(path))
     moments = activity(problem, profile, motion, jerk, part(progress, 0.5, 0.95))
@@ -91,7 +88,7 @@ def account(
         turns = own & motion.turns
         moved = own & ~motion.turns
         return Total(
-            *(math.fsum(values) for values in (time[own], way[moved], way[turns], time[turns])),
+            *(math.fsum(values) for values in (time[own], lengths[moved], lengths[turns], time[turns])),
         )
 
     feed = np.isfinite(path.feed)

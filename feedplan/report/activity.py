@@ -1,7 +1,8 @@
-"""Which limit is active when: the use of every limit at moments of a plan, from its states alone.
+"""The active limit at moments of a plan, computed from the plan's states and the limits of its problem.
 
-At a moment the active limit is the one that is used most; below `ACTIVE` of it none is, and the motion is on
-its way from one limit to another. One form for all methods: it needs to know no law of motion.
+The use of a limit is its value over the limit. The active limit is the one with the greatest use, if that is
+at least `ACTIVE`; else no limit is active, and the motion changes from one limit to another. The method does
+not matter: no phase law is used.
 """
 
 from __future__ import annotations
@@ -20,23 +21,23 @@ from feedplan.setpoints import sampler
 
 Floats = NDArray[np.float64]
 
-# The use from which a limit counts as active.
+# A limit is active from this use on.
 ACTIVE = 0.95
 NONE = "no limit active (transition)"
 
-# Moments looked at, at most, and in each arc.
+# Most moments in all, and moments in each phase.
 _MOMENTS = 100_000
-_MOMENTS_PER_ARC = 33
+_MOMENTS_PER_PHASE = 33
 
 
 @dataclass(frozen=True, eq=False)
 class Activity:
     """Moments of a plan in motion, in order (m,).
 
-    `weight` is the time that each stands for [s], `piece` and `speed` of the tool [mm/s, deg/s where it only
-    turns] are those of the moment, `active` the number in `names` of the active limit. `pace` is the part of
-    the speed that feed and axis velocities alone would allow. `run` is the run of the path, `place` the
-    moment's place on it (`place_on`).
+    `weight` is the time that each moment represents [s]; `run`, `piece` and `position` (`path_position`) are
+    its run, piece and position on the path; `speed` is the tool's [mm/s, deg/s where it only turns]; `active`
+    is the number in `names` of the active limit; `pace` is the speed over the speed that feed and axis
+    velocities alone would allow.
     """
 
     names: tuple[str, ...]
@@ -46,15 +47,16 @@ class Activity:
     speed: Floats
     active: NDArray[np.int64]
     pace: Floats
-    place: NDArray[np.int64]
+    position: NDArray[np.int64]
 
-    def at(self, place: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Numbers of the moments nearest to these places before them; the first one where there is none."""
-        return np.maximum(np.searchsorted(self.place, place, "right") - 1, 0)
+    def at(self, position: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Numbers of the last moments at or before these positions on the path; 0 if there is none before."""
+        return np.maximum(np.searchsorted(self.position, position, "right") - 1, 0)
 
     @property
     def lost(self) -> Floats:
-        """Of `weight`, what the way of the moment would not take at the speed of feed and axis velocities."""
+        """The part of `weight` that would be saved at the speed that feed and axis velocities alone allow
+        [s]."""
         return self.weight * np.maximum(1.0 - self.pace, 0.0)
 
 
@@ -65,7 +67,7 @@ def activity(
     jerk: bool,
     progress: Listener | None = None,
 ) -> Activity:
-    """The activity of all limits, that of jerk where it is limited (`jerk`)."""
+    """The activity of all limits; limits of jerk are included if `jerk` is true."""
     time, weight, run = _moments(problem, profile)
     reader = sampler(problem, profile, progress=part(progress, 0.0, 0.6))
     tell(progress, 0.6)
@@ -87,29 +89,29 @@ def activity(
     tell(progress, 0.9)
     names = ("feed", "chord error", *(f"{axis} {name}" for name in groups for axis in problem.axes), NONE)
     use = np.nan_to_num(np.column_stack([at_feed, chord, *groups.values()]), posinf=0.0)
-    # Limits that are used alike but for rounding: the first one counts.
+    # If the uses of several limits differ by rounding only, the first of these limits is the active one.
     most = use.max(axis=1, initial=0.0)
     active = np.where(most >= ACTIVE, (use >= most[:, None] * (1.0 - 1e-6)).argmax(axis=1), len(names) - 1)
     pace = np.column_stack([at_feed, at_velocity]).max(axis=1, initial=0.0)
     tell(progress, 1.0)
-    place = place_on(problem, piece, u)
-    return Activity(names, weight, piece, run, np.nan_to_num(speed), active, np.nan_to_num(pace), place)
+    position = path_position(problem, piece, u)
+    return Activity(names, weight, piece, run, np.nan_to_num(speed), active, np.nan_to_num(pace), position)
 
 
-def place_on(problem: Problem, piece: NDArray[np.integer], u: Floats) -> NDArray[np.int64]:
-    """Places on a path as integers that grow along it: a piece has 2^20 of them."""
+def path_position(problem: Problem, piece: NDArray[np.integer], u: Floats) -> NDArray[np.int64]:
+    """Positions on a path as integers that grow along it: 2^20 for each piece."""
     part = u / problem.path.curve.width[piece]
     return np.asarray((piece.astype(np.int64) << 20) + np.round(part * ((1 << 20) - 1)).astype(np.int64))
 
 
 def _moments(problem: Problem, profile: SpeedProfile) -> tuple[Floats, Floats, NDArray[np.int64]]:
-    """Times by the plan's clock, the time that each stands for, and the run that it is in.
+    """Times by the plan's clock, the time that each represents, and its run.
 
-    Arcs are divided evenly; where there are too many of them all time is.
+    Each phase is divided evenly; if there are too many phases, the whole time is divided evenly.
     """
     count = len(profile)
     if 0 < count <= _MOMENTS:
-        parts = int(np.clip(_MOMENTS // count, 1, _MOMENTS_PER_ARC))
+        parts = int(np.clip(_MOMENTS // count, 1, _MOMENTS_PER_PHASE))
         weight = np.repeat(profile.duration / parts, parts)
         start = np.repeat(np.cumsum(profile.duration) - profile.duration, parts)
         time = start + weight * (np.tile(np.arange(parts), count) + 0.5)

@@ -1,4 +1,4 @@
-"""A plan as a small HTML table with its speed over time as SVG, for notebooks; it needs no other package."""
+"""A plan as a small HTML table and its speed over time as SVG, for notebooks; it needs no other package."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from feedplan.trajectory import Trajectory
 
 WIDTH, HEIGHT, MARGIN = 480, 120, 24
-# Places at which the speed is drawn: more than pixels show nothing more.
+# Number of times at which the speed is drawn: two for each pixel.
 SAMPLES = 2 * WIDTH
 
 

@@ -1,4 +1,4 @@
-"""The page of a comparison: one row a method, speeds overlaid and linked to the tool path; no network."""
+"""The page of a comparison: a row for each method, the speeds in one chart, linked to the tool path."""
 
 from __future__ import annotations
 

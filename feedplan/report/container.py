@@ -1,11 +1,11 @@
-"""What a page draws as bytes: its table in JSON, then all arrays of the table as they are in memory.
+"""The data of a page as bytes: a JSON object, then the arrays in it as they are in memory.
 
     4 bytes    length of the JSON, little-endian
-    the JSON   with {"array": "f4", "at": 0, "count": 3} in the place of each array; spaces up to a multiple
+    the JSON   with {"array": "f4", "at": 0, "count": 3} instead of each array; spaces up to a multiple
                of 4 bytes
     arrays     little-endian, each at a multiple of 4 bytes from the end of the JSON
 
-The page reads it by `page/source/data.js`.
+`page/source/data.js` reads it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _KINDS = {"f": "<f4", "i": "<i4", "u": "<u1"}
 
 
 def contained(data: Mapping[str, Any]) -> bytes:
-    """The data with its arrays: floats and integers become numbers of 32 bits, unsigned ones of 8."""
+    """The data as bytes in this form: floats and integers have 32 bits, unsigned integers 8 bits."""
     arrays: list[bytes] = []
     size = 0
 
@@ -47,7 +47,7 @@ def contained(data: Mapping[str, Any]) -> bytes:
 
 
 def as_text(content: bytes) -> str:
-    """Bytes compressed and in letters, as a page holds them."""
+    """Bytes, compressed and in base 64, for the text of a page."""
     return base64.b64encode(zlib.compress(content, 6)).decode("ascii")
 
 

@@ -1,4 +1,4 @@
-"""What the charts of the page show, reduced while the setpoints pass by once."""
+"""The data of the page's charts, reduced from the setpoints in one pass over them."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from feedplan.profile import SpeedProfile
 from feedplan.progress import Listener
 from feedplan.report.account import Account
 from feedplan.report.activity import Activity
-from feedplan.report.limits import drawn_arcs, limit_samples, samples_per_arc
+from feedplan.report.limits import drawn_phases, limit_samples, samples_per_phase
 from feedplan.report.reduce import Envelope
 from feedplan.report.tool_motion import ToolMotion
 from feedplan.report.tool_path import POINTS, ToolPath
 from feedplan.setpoints import SetpointChunk
 
-# Points kept. The page draws at most a few thousand of them at once and takes the finer ones on zooming in.
-_TIME_POINTS = 240_000  # of all curves over time together
+# Points kept. The page draws a few thousand of them at once, and the finer ones when it is zoomed.
+_TIME_POINTS = 240_000  # all curves over time together
 _TIME_POINTS_PER_CURVE = 24_000
-_LENGTH_POINTS = 12_000  # of each curve over length
-_MEAN_POINTS = 1_000  # of the mean of each curve, drawn where it oscillates too fast for a line
+_LENGTH_POINTS = 12_000  # each curve over length
+_MEAN_POINTS = 1_000  # the mean of each curve, drawn where the curve oscillates too fast for a line
 
 
 class SetpointFigures:
     """Takes all setpoints chunk by chunk; holds the curves over time and the tool path.
 
-    `count` setpoints will come; at most `points` points of the tool path are kept.
+    `count` is the number of setpoints to come; at most `points` points of the tool path are kept.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class SetpointFigures:
         self._path.mark(chunk, time)
 
     def over_time(self) -> dict[str, Any]:
-        """Speed with its source lines, and velocity, acceleration and jerk of each axis, over time."""
+        """Curves over time: speed with its source lines, and velocity, acceleration and jerk of each axis."""
         axes = len(self._axes)
         result: dict[str, Any] = {"speed": _curve(self._curves, 0, with_line=True)}
         for group, name in enumerate(("velocity", "acceleration", "jerk")):
@@ -69,12 +69,12 @@ class SetpointFigures:
         return result
 
     def tool_path(self, activity: Activity, points: int | None = None) -> dict[str, Any]:
-        """The tool path, of at most `points` points where that is given: `ToolPath.data`."""
+        """The tool path of at most `points` points, if given: `ToolPath.data`."""
         return self._path.data(activity, points)
 
 
 def _curve(curves: Envelope, column: int, with_line: bool = False) -> dict[str, Any]:
-    """A column as the page reads it: x, y, the mean, and the source lines where they are wanted."""
+    """A column as the page reads it: x, y, the mean, and the source lines if they are wanted."""
     x, y, line = curves.curve(column)
     mean_x, mean = curves.mean(column, _MEAN_POINTS)
     result: dict[str, Any] = {
@@ -88,22 +88,23 @@ def _curve(curves: Envelope, column: int, with_line: bool = False) -> dict[str, 
 def over_length(
     problem: Problem, profile: SpeedProfile, motion: ToolMotion, progress: Listener | None = None
 ) -> dict[str, Any]:
-    """Speed and the limits on it over the path's length; limits that hold nowhere are left out.
+    """Speed and its limits over the path's length; limits that are infinite everywhere are left out.
 
-    `cutting_speed` is the greatest speed on moves with a feed: rapids would flatten the colours.
+    `cutting_speed` is the greatest speed on moves with a feed; it is the top of the colour scale, because
+    with rapids the colours of cutting moves would hardly differ.
     """
     names = ("speed", "acceleration", "feed", "velocity", "chord")
-    count = len(drawn_arcs(profile, motion)) * samples_per_arc(profile)
+    count = len(drawn_phases(profile, motion)) * samples_per_phase(profile)
     curves = Envelope(count, _LENGTH_POINTS)
     is_cut = np.isfinite(problem.path.feed)[profile.piece.astype(np.int64)]
     top = cutting = 0.0
     for block in limit_samples(problem, profile, motion, progress):
         table = np.column_stack([getattr(block, name) for name in names])
-        piece = profile.piece[block.arc].astype(np.int64)
+        piece = profile.piece[block.phase].astype(np.int64)
         curves.add(block.length, table, problem.path.line[piece].astype(np.int64))
         speed = block.speed[np.isfinite(block.speed)]
         top = max(top, float(speed.max(initial=0.0)))
-        cut = block.speed[is_cut[block.arc]]
+        cut = block.speed[is_cut[block.phase]]
         cutting = max(cutting, float(cut[np.isfinite(cut)].max(initial=0.0)))
     result: dict[str, Any] = {"top_speed": top, "cutting_speed": cutting or top}
     for column, name in enumerate(names):
@@ -112,7 +113,7 @@ def over_length(
             continue
         length, value, _ = curves.curve(column)
         if np.isfinite(value).any():
-            # Far above everything else a limit says no more than "not here"; the chart ends before.
+            # A limit far above all speeds is cut, so that the chart keeps the scale of the speeds.
             value = np.minimum(value, 20.0 * top) if top > 0 else value
             result[name] = {"x": length, "y": value}
     return result
@@ -126,7 +127,7 @@ def chart_data(
     audit: Audit,
     progress: Listener | None = None,
 ) -> dict[str, Any]:
-    """Everything that a page draws, arrays as they are; `progress` is told how far it is."""
+    """All data that a page draws, with its arrays."""
     limits = {
         name: [float(value) if np.isfinite(value) else None for value in getattr(problem, f"max_{name}")]
         for name in ("velocity", "acceleration", "jerk")

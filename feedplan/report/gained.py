@@ -1,4 +1,5 @@
-"""What was gained: the time that today's controller takes beside the plan's, and what more would bring."""
+"""The section "gained" of the page: today's time by the controller, the plan's, and gains by raised
+limits."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ Rows = Sequence[tuple[str, str, float | None]]
 
 
 def gained(summary: Mapping[str, Any]) -> str:
-    """The section of the page; empty where plan.json (`summary`) tells nothing of it."""
+    """The section as HTML; empty if plan.json (`summary`) has none of these times."""
     time = float(summary["time"])
     columns = []
     if today := summary.get("today"):
@@ -55,7 +56,7 @@ def _step_rows(steps: Sequence[Mapping[str, Any]], time: float) -> Rows:
 
 
 def _column(title: str, note: str, rows: Rows) -> str:
-    """A table with a bar for each number, as long as it is beside the greatest."""
+    """A table with a bar for each number, whose length is the number over the greatest one."""
     most = max((size for _, _, size in rows if size is not None), default=0.0) or 1.0
     body = "".join(
         f'<tr><td>{escape(name)}</td>{_bar(size, most)}<td class="n">{escape(text)}</td></tr>'

@@ -1,6 +1,6 @@
-"""Speed and the limits on it over the path's length: the velocity limit curve and the caps.
+"""Samples of the speed and its limits over the path's length: the limit curve and the speed caps.
 
-The limits are written from the definitions, not from the planner's code: q = C(u) per axis, ' is d/du,
+The formulas follow the definitions, not the planner's code: q = C(u) for each axis, ' is d/du,
 p = (du/dt)².
 """
 
@@ -24,17 +24,17 @@ Floats = NDArray[np.float64]
 
 _SAMPLES = 400_000
 _SAMPLES_AT_ONCE = 10_000
-_SAMPLES_PER_ARC = 33
+_SAMPLES_PER_PHASE = 33
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
 @dataclass(frozen=True)
 class LimitSamples:
-    """Samples in the order of the path: `length` [mm], and speeds [mm/s], infinite where nothing limits.
+    """Samples in the order of the path: `length` [mm] and speeds [mm/s], infinite where a limit is absent.
 
-    Lengths and speeds are those of the tool's motion; degrees in place of mm where nothing else moves at all.
-    `speed` is planned; `acceleration` the velocity limit curve of the axis accelerations; `feed`; `velocity`
-    of the axes; `chord`, from the chord error between two setpoints. `arc` is the arc of each sample.
+    Lengths and speeds are those of the tool's motion, in degrees instead of mm if only rotary axes move.
+    `speed` is the planned one, `acceleration` the limit curve of the axis accelerations; `feed`, `velocity`
+    (of the axes) and `chord` (error between two setpoints) are speed caps. `phase` is the sample's phase.
     """
 
     length: Floats
@@ -43,29 +43,29 @@ class LimitSamples:
     feed: Floats
     velocity: Floats
     chord: Floats
-    arc: NDArray[np.int64]
+    phase: NDArray[np.int64]
 
 
-def samples_per_arc(profile: SpeedProfile) -> int:
-    """How many samples `limit_samples` takes on each arc, both ends among them."""
-    return int(np.clip(_SAMPLES // max(len(profile), 1), 2, _SAMPLES_PER_ARC))
+def samples_per_phase(profile: SpeedProfile) -> int:
+    """Number of samples that `limit_samples` takes in each phase, both ends included."""
+    return int(np.clip(_SAMPLES // max(len(profile), 1), 2, _SAMPLES_PER_PHASE))
 
 
-def drawn_arcs(profile: SpeedProfile, motion: ToolMotion) -> NDArray[np.int64]:
-    """The arcs that have samples: not those on which rotary axes alone move, unless there are no others."""
+def drawn_phases(profile: SpeedProfile, motion: ToolMotion) -> NDArray[np.int64]:
+    """The phases that have samples: those in which more than rotary axes move, or all if there are none."""
     return np.flatnonzero(motion.drawn[profile.piece.astype(np.int64)])
 
 
 def limit_samples(
     problem: Problem, profile: SpeedProfile, motion: ToolMotion, progress: Listener | None = None
 ) -> Iterator[LimitSamples]:
-    """Samples of every drawn arc, a block of arcs at a time; `progress` is told how far it is."""
-    count = samples_per_arc(profile)
-    drawn = drawn_arcs(profile, motion)
+    """Samples of every phase that has samples, computed for a block of phases at a time."""
+    count = samples_per_phase(profile)
+    drawn = drawn_phases(profile, motion)
     states = sampler(problem, profile, progress=part(progress, 0.0, 0.2))
     report = part(progress, 0.2, 1.0)
     tell(report, 0.0)
-    # Denser towards both ends, where speed changes most on the way from and to a stop.
+    # Denser towards both ends: the speed changes most next to a stop.
     fraction = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, count))
     step = max(1, _SAMPLES_AT_ONCE // count)
     start = 0.0
@@ -79,7 +79,7 @@ def limit_samples(
 def _integral(
     slope: Callable[[NDArray[np.int64], Floats], Floats], piece: NDArray[np.int64], u0: Floats, u1: Floats
 ) -> Floats:
-    """Way between two parameters of a piece, of which this is the slope by u: Gauss–Legendre, eight nodes."""
+    """Integral of a slope over u between two parameters of a piece, by Gauss–Legendre with eight nodes."""
     total = np.zeros(len(piece))
     for node, weight in zip(_NODES, _WEIGHTS, strict=True):
         total += weight * slope(piece, np.minimum(u0 + 0.5 * (1.0 + node) * (u1 - u0), u1))
@@ -91,23 +91,23 @@ def _sample(
     profile: SpeedProfile,
     motion: ToolMotion,
     states: Sampler,
-    arcs: NDArray[np.int64],
+    phases: NDArray[np.int64],
     fraction: Floats,
     start: float,
 ) -> LimitSamples:
     count = len(fraction)
-    u0, u1 = profile.u0[arcs], profile.u1[arcs]
-    # The last sample is the end itself: u0 + 1·(u1 − u0) may miss it by a rounding.
+    u0, u1 = profile.u0[phases], profile.u1[phases]
+    # Weighted by both ends, so that the last sample is u1: u0 + 1·(u1 − u0) may differ from it by rounding.
     u = u0[:, None] * (1.0 - fraction) + u1[:, None] * fraction
     u = np.clip(u, u0[:, None], u1[:, None]).ravel()
-    arc = np.repeat(arcs, count)
-    piece = profile.piece[arc].astype(np.int64)
+    phase = np.repeat(phases, count)
+    piece = profile.piece[phase].astype(np.int64)
     _, tangent, second = problem.curve.evaluate(piece, u, 2)
-    way = motion.slope(piece, u)
+    slope = motion.slope(piece, u)
     before = np.concatenate((u[:1], u[:-1]))
     before[::count] = u[::count]
     within = np.cumsum(_integral(motion.slope, piece, before, u).reshape(-1, count), axis=1)
-    # Arc by arc, so that rounding does not add up over the samples.
+    # Summed phase by phase, so that rounding errors of the samples do not add up.
     length = (start + np.cumsum(within[:, -1]) - within[:, -1])[:, None] + within
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         velocity = states.along(piece.astype(np.uint32), u)[2]
@@ -115,18 +115,19 @@ def _sample(
         feed = _quotient(problem.feed[piece], np.sqrt(feed_square(problem, piece, u)))
         return LimitSamples(
             length=length.ravel(),
-            speed=way * parameter_speed(tangent, velocity),
-            acceleration=way
+            speed=slope * parameter_speed(tangent, velocity),
+            acceleration=slope
             * np.sqrt(limit_curve(tangent, second, problem.max_acceleration, problem.min_acceleration)),
-            feed=way * feed,
-            velocity=way * np.min(_quotient(np.ones(1), problem.use("velocity", tangent)), axis=1),
-            chord=way * _quotient(chord_speed(problem, tangent, second), joint),
-            arc=arc,
+            feed=slope * feed,
+            velocity=slope * np.min(_quotient(np.ones(1), problem.use("velocity", tangent)), axis=1),
+            chord=slope * _quotient(chord_speed(problem, tangent, second), joint),
+            phase=phase,
         )
 
 
 def parameter_speed(tangent: Floats, velocity: Floats) -> Floats:
-    """u̇ (n,) from q' and q̇ (n, joints), by the joint that moves most: next to a cusp it keeps its digits."""
+    """u̇ (n,) from q' and q̇ (n, joints), by the joint that moves most, which is accurate next to a cusp
+    too."""
     own = np.abs(tangent).argmax(axis=1)[:, None]
     slope, rate = np.take_along_axis(tangent, own, 1), np.take_along_axis(velocity, own, 1)
     return np.asarray(np.abs(rate) / np.where(slope == 0.0, np.inf, np.abs(slope)))[:, 0]
@@ -135,8 +136,8 @@ def parameter_speed(tangent: Floats, velocity: Floats) -> Floats:
 def limit_curve(tangent: Floats, second: Floats, most: Floats, least: Floats) -> Floats:
     """The greatest p that accelerations from `least` to `most` (axes,) allow, from C' and C'' (n, axes).
 
-    With W = q''_j q'_k − q''_k q'_j two axes have W p = a_j q'_k − a_k q'_j: the least over all pairs of the
-    greatest right side over |W|, infinite on straight pieces (Zhang et al. 2010, eqs. 7–8).
+    For two axes j, k and W = q''_j q'_k − q''_k q'_j, W p = a_j q'_k − a_k q'_j. The result is the least over
+    all pairs of (greatest right side) / |W|; it is infinite on straight pieces (Zhang et al. 2010, eqs. 7–8).
     """
     best = np.full(len(tangent), np.inf)
     if tangent.shape[1] == 1:
@@ -158,11 +159,11 @@ def _quotient(top: Floats, bottom: Floats) -> Floats:
 
 
 def chord_speed(problem: Problem, tangent: Floats, second: Floats) -> Floats:
-    """(2/T)·√(2ρδ − δ²) with the radius of curvature ρ; infinite where the tolerance does not limit.
+    """Speed cap of the chord error: (2/T)·√(2ρδ − δ²) [mm/s], by radius of curvature ρ, period T, tolerance
+    δ.
 
-    The speed is that of all axes of `tangent` together [mm/s].
-
-    Below ρ = δ it stays 2δ/T: no shorter part of the path can leave its chord by δ.
+    The speed is that along all axes of `tangent`. It is infinite without a tolerance. For ρ < δ it is 2δ/T:
+    no shorter part of the path can leave its chord by δ.
     """
     tolerance, rate = problem.chord_tolerance, np.linalg.norm(tangent, axis=1)
     if not np.isfinite(tolerance):

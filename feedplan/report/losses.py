@@ -1,4 +1,4 @@
-"""Where the time goes: how long each limit is active, and the source lines that lose most."""
+"""How long each limit is active, and the source lines that lose most time."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from feedplan.report.tool_motion import ToolMotion
 
 @dataclass(frozen=True)
 class Share:
-    """A limit, the time it is active [s], and that as a part of the whole, 0 to 1."""
+    """A limit, the time in which it is active [s], and that time over the whole time (0 to 1)."""
 
     limit: str
     time: float
@@ -23,11 +23,11 @@ class Share:
 
 @dataclass(frozen=True)
 class SlowLine:
-    """A source line that takes longer than its feed and the axis velocities ask for.
+    """A source line that takes longer than its feed and the axis velocities would allow.
 
-    `time` spent and `lost` [s], mean `speed` and the mean speed `wanted` [mm/s, deg/s where the line mostly
-    `turns`], the `limit` that costs most and its part of the loss; `stops` where the tool stands still at an
-    end of the line, `rapid` where no feed is programmed.
+    `time` spent and `lost` [s]; mean `speed`, and the mean speed `wanted` that feed and axis velocities allow
+    [mm/s, deg/s if the line mostly `turns`]; the `limit` that costs most and its part of the loss; `stops` if
+    the tool stops at an end of the line; `rapid` if no feed is programmed.
     """
 
     line: int
@@ -43,7 +43,7 @@ class SlowLine:
 
 
 def time_per_limit(problem: Problem, activity: Activity) -> list[Share]:
-    """The time each limit is active, the longest first; dwells stand as a limit of their own."""
+    """The time in which each limit is active, the longest first; dwells are listed like a limit."""
     times = np.bincount(activity.active, activity.weight, len(activity.names)).tolist()
     rows = [*zip(activity.names, times, strict=True), ("dwell", problem.path.pauses)]
     total = sum(time for _, time in rows)
@@ -55,14 +55,14 @@ def time_per_limit(problem: Problem, activity: Activity) -> list[Share]:
 def slowest_lines(
     problem: Problem, profile: SpeedProfile, motion: ToolMotion, activity: Activity, count: int = 20
 ) -> list[SlowLine]:
-    """The source lines that lose most time, the worst first."""
+    """The source lines that lose most time, the greatest loss first."""
     if len(profile) == 0:
         return []
     path = problem.path
     lines, row_of_piece = np.unique(path.line, return_inverse=True)
     row = row_of_piece[activity.piece]
     time, lost = (np.bincount(row, values, len(lines)) for values in (activity.weight, activity.lost))
-    # Lines that lose alike but for rounding stay in order.
+    # Rounded, so that lines whose losses differ by rounding only stay in the program's order.
     worst = np.argsort(-np.round(lost / time.sum(), 12), kind="stable")[:count]
     worst = worst[lost[worst] > 1e-9 * time.sum()]
     ends = np.zeros(len(lines), dtype=bool)
@@ -73,19 +73,19 @@ def slowest_lines(
         pieces = np.flatnonzero(row_of_piece == index)
         costs = np.bincount(activity.active[own], activity.lost[own])
         active = int(costs.argmax())
-        # Its speed is that of what it does longer, moving or turning alone.
+        # The speed is in mm/s or deg/s, by what the line does for longer: moving or turning alone.
         turning = motion.turns[activity.piece[own]]
         turns = bool(activity.weight[own][turning].sum() > 0.5 * time[index])
         own = own[turning == turns]
-        way, spent = (activity.speed[own] * activity.weight[own]).sum(), activity.weight[own].sum()
+        length, spent = (activity.speed[own] * activity.weight[own]).sum(), activity.weight[own].sum()
         needed = spent - activity.lost[own].sum()
         result.append(
             SlowLine(
                 line=int(lines[index]),
                 time=float(time[index]),
                 lost=float(lost[index]),
-                speed=float(way / spent),
-                wanted=float(way / needed) if needed > 0 else 0.0,
+                speed=float(length / spent),
+                wanted=float(length / needed) if needed > 0 else 0.0,
                 limit=activity.names[active],
                 part=min(1.0, float(costs[active] / lost[index])),
                 stops=bool(ends[index]),

@@ -1,7 +1,7 @@
-"""Where the time of a program goes: by tool and operation, in feed motion, rapids and dwells.
+"""The time of a program by tool and operation: feed motion, rapids, dwells and tool changes [s].
 
-An operation is what follows a comment that is alone in its line, as CAM systems name what they post; of
-several such lines one after the other the first names it. It goes on in subprograms without such comments.
+An operation begins at a comment that is alone in its line, as CAM systems post them; of several such lines in
+succession the first gives the name. An operation continues in subprograms that have no such comments.
 """
 
 from __future__ import annotations
@@ -19,25 +19,25 @@ from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 from feedplan.program.source import content_of
 
-# A block of lines that hold nothing but a comment; only the first of them counts.
+# Successive lines that consist of a comment; the first one gives the name.
 _COMMENTS = re.compile(
     rb"^(?:[ \t]*(?:N\d+[ \t]*)?(?:\([^)\r\n]*\)|;[^\r\n]*)[ \t]*\r?\n)+", re.MULTILINE | re.IGNORECASE
 )
 _TITLE = re.compile(rb"(?:N\d+[ \t]*)?[(;][ \t;]*([^)\r\n]*)", re.IGNORECASE)
-# Comments that do something, and those that end an operation, name none.
+# Comments that are commands, or that end an operation, are no names.
 _NO_TITLE = re.compile(
     rb"(?:MSG|DEBUG|PRINT|LOG\w*|PROBE\w*|ABORT)\s*,|(?:FINISH|END)\w*\s+(?:OF\s+)?OPERATION\b|\W*\Z",
     re.IGNORECASE,
 )
-# Where a subprogram begins or ends.
+# Lines that begin or end a subprogram.
 _SUBPROGRAM = re.compile(
     rb"^[ \t]*(?:N\d+[ \t]*)?(?:[O:]\d+[ \t]*(?=[(;\r\n])|O(?:\d+|<[^>\r\n]*>)[ \t]*(?:END)?SUB\b)",
     re.MULTILINE | re.IGNORECASE,
 )
-# What the time of an operation is made of.
+# The parts of the time of an operation.
 PARTS = ("feed", "rapid", "dwell", "change")
 _LONGEST = 48
-# Sums of dwells differ by this part of them, or less.
+# Relative rounding error of sums of dwells, at most.
 _ROUNDING = 1e-9
 _TOOL_CHANGE = ord("M"), 6
 _TOOL = ord("T")
@@ -47,8 +47,8 @@ _DWELL = ord("G"), 4
 @dataclass(frozen=True)
 class OperationTime:
     """The time of one operation with one tool [s]: motion at a `feed`, `rapid` motion, `dwell`s, and tool
-    `change`s where their duration is told. `tool` is the number, None before the first; `name` is the
-    comment, empty without one, and `line` its line, 0 without one."""
+    `change`s if their duration is given. `tool` is the tool's number, None before the first tool; `name` is
+    the comment, `line` its line; without a comment they are empty and 0."""
 
     tool: int | None
     name: str
@@ -60,7 +60,7 @@ class OperationTime:
 
     @property
     def time(self) -> float:
-        """All of it [s]."""
+        """The whole time [s]."""
         return self.feed + self.rapid + self.dwell + self.change
 
     def to_json(self) -> dict[str, Any]:
@@ -73,13 +73,13 @@ def operation_times(
 ) -> tuple[OperationTime, ...]:
     """The operations of a program in the order in which they begin; their times add up to the whole.
 
-    `tool_change` [s] is the duration of each tool change, which the axes know nothing of.
+    `tool_change` [s] is the duration of each tool change, which is not in the plan.
     """
     path, events = problem.path, program.events
     changes = (events.letter == _TOOL_CHANGE[0]) & (events.number == _TOOL_CHANGE[1])
     numbers = events.p
     if not changes.any():
-        # On lathes T changes the tool.
+        # On lathes a T word changes the tool.
         changes, numbers = events.letter == _TOOL, events.number
     of_move, of_event, lines, names = _operations(program)
     _begin_with_changes(of_move, of_event, program, np.flatnonzero(changes))
@@ -88,7 +88,7 @@ def operation_times(
     of_move += before * (len(lines) + 1)
     of_event += np.cumsum(changes) * (len(lines) + 1)
     dwells = (events.letter == _DWELL[0]) & (events.number == _DWELL[1]) & np.isfinite(events.p)
-    # What a dwell of its own line takes is no part of the operation before it.
+    # A dwell on a line of its own belongs to the operation of that line, not to the move before it.
     pauses = np.concatenate(([program.start_dwell], program.dwell))
     rest = pauses.copy()
     np.subtract.at(rest, events.move[dwells], events.p[dwells])
@@ -105,12 +105,12 @@ def operation_times(
         ("change", of_event[changes], np.full(int(changes.sum()), tool_change)),
     )
     own = np.concatenate([of_part for _, of_part, _ in parts])
-    keys, place = np.unique(own, return_inverse=True)
+    keys, group = np.unique(own, return_inverse=True)
     spent = {name: np.zeros(len(keys)) for name in PARTS}
     ends = np.cumsum([len(of_part) for _, of_part, _ in parts])
-    for (name, _, time), each in zip(parts, np.split(place, ends[:-1]), strict=True):
+    for (name, _, time), each in zip(parts, np.split(group, ends[:-1]), strict=True):
         spent[name] += np.bincount(each, time, len(keys))
-    # When each begins: before so many moves.
+    # The number of moves before the begin of each.
     begin = np.concatenate([np.arange(len(program)), events.move])
     first = np.full(len(keys), len(program))
     known = np.concatenate([of_move, of_event])
@@ -132,8 +132,8 @@ def operation_times(
 def _begin_with_changes(
     of_move: NDArray[np.int64], of_event: NDArray[np.int64], program: Program, changes: NDArray[np.int64]
 ) -> None:
-    """Makes what follows a tool change the begin of the next operation with that tool, if it goes on from one
-    with the tool before; of none where no other comes."""
+    """Moves after a tool change that continue the operation of the old tool get the next operation with the
+    new tool, or none if there is no such operation. Changes both arrays in place."""
     count, at = len(program), program.events.move
     ends = np.flatnonzero((np.diff(of_move) != 0) | (np.diff(program.line) < 0)) + 1
     for k, row in enumerate(changes):
@@ -144,8 +144,8 @@ def _begin_with_changes(
             continue
         last = first
         if first < count and of_move[first] == own:
-            place = np.searchsorted(ends, first, "right")
-            last = min(ends[place] if place < len(ends) else count, later)
+            end = np.searchsorted(ends, first, "right")
+            last = min(ends[end] if end < len(ends) else count, later)
         name = of_move[last] if last < later else 0
         of_move[first:last] = name
         following = np.arange(row, len(at)) if k + 1 == len(changes) else np.arange(row, changes[k + 1])
@@ -157,7 +157,7 @@ def _sum(one: OperationTime, other: OperationTime) -> OperationTime:
 
 
 def by_tool(operations: Iterable[OperationTime]) -> tuple[OperationTime, ...]:
-    """The times of each tool, in the order in which they are used; the rows have no names."""
+    """The times of each tool, in the order of first use; the names are empty."""
     tools: dict[int | None, OperationTime] = {}
     for own in operations:
         tools[own.tool] = _sum(tools.get(own.tool, OperationTime(own.tool, "", 0)), own)
@@ -167,19 +167,19 @@ def by_tool(operations: Iterable[OperationTime]) -> tuple[OperationTime, ...]:
 def _operations(
     program: Program,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], list[str]]:
-    """The operation of each move and of each event, by their numbers from 1 (0 for none); the lines of the
-    comments that name them, and their names."""
+    """The number of the operation of each move and of each event, from 1 (0 for none), and the lines and
+    names of the operations."""
     content = b"" if program.text is None else content_of(program.text, program.name).content
     lines, names = _titles(content)
     ends = _line_numbers(content, [match.start() for match in _SUBPROGRAM.finditer(content)])
-    # In the order in which they happen: an event after so many moves comes before the next one.
+    # In the order of time: an event after k moves comes before move k + 1.
     order = np.argsort(
         np.concatenate([2 * np.arange(len(program)) + 1, 2 * program.events.move]), kind="stable"
     )
     line = np.concatenate([program.line, program.events.line])[order].astype(np.int64)
     number = np.searchsorted(lines, line, "right")
     subprogram = np.searchsorted(ends, line, "right")
-    # A comment of another subprogram says nothing: what is in force goes on.
+    # A comment of another subprogram is ignored: the current operation continues.
     named = np.append(0, np.searchsorted(ends, lines, "right"))[number] == subprogram
     named[number == 0] = False
     latest = np.maximum.accumulate(np.where(named, np.arange(len(order)), -1))
@@ -190,23 +190,23 @@ def _operations(
 
 def _titles(content: bytes) -> tuple[NDArray[np.int64], list[str]]:
     """The lines of the comments that name operations, and their texts."""
-    places: list[int] = []
+    offsets: list[int] = []
     names: list[str] = []
     for block in _COMMENTS.finditer(content):
-        place = block.start()
+        offset = block.start()
         for comment in block[0].splitlines(keepends=True):
             title = _TITLE.match(comment.strip())
             if title and not _NO_TITLE.match(title[1]):
                 text = title[1].decode("utf-8", "replace")
                 printable = "".join(letter if letter.isprintable() else " " for letter in text)
                 names.append(" ".join(printable.split())[:_LONGEST])
-                places.append(place)
+                offsets.append(offset)
                 break
-            place += len(comment)
-    return _line_numbers(content, places), names
+            offset += len(comment)
+    return _line_numbers(content, offsets), names
 
 
-def _line_numbers(content: bytes, places: list[int]) -> NDArray[np.int64]:
-    """The lines, from 1, in which places in a text are."""
+def _line_numbers(content: bytes, offsets: list[int]) -> NDArray[np.int64]:
+    """The line numbers, from 1, of offsets in a text."""
     breaks = np.flatnonzero(np.frombuffer(content, np.uint8) == ord("\n"))
-    return np.asarray(np.searchsorted(breaks, places, "left") + 1, dtype=np.int64)
+    return np.asarray(np.searchsorted(breaks, offsets, "left") + 1, dtype=np.int64)

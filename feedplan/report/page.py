@@ -28,16 +28,16 @@ from feedplan.report.tables import (
 )
 
 FILE = "report.html"
-# What draws all pages, as `make page` builds it from the folder page/ of the source.
+# The script and the style of all pages; `make page` builds them from the folder page/.
 SCRIPT, STYLE = "bundle/page.js", "bundle/page.css"
 
-# What the chart of speed over length shows, by whether the method limits jerk.
+# Description of the chart of speed over length, for methods without and with limits of jerk.
 _SPEED = {
-    False: "The planned speed touches one limit everywhere: it follows the feed, an axis velocity or the "
-    "limit curve of the axis accelerations, or it is on its way between them with one axis at full "
+    False: "The planned speed is at one limit everywhere: it follows the feed, an axis velocity or the "
+    "limit curve of the axis accelerations, or it changes from one to another with one axis at full "
     "acceleration.",
     True: "The planned speed below the feed, the axis velocities and the limit curve of the axis "
-    "accelerations; these know no jerk, which holds it further down.",
+    "accelerations. These take no account of the limits of jerk, which lower the speed further.",
 }
 
 
@@ -52,8 +52,8 @@ def write_report(
     setpoints: int,
     text: FilePath | bytes | None = None,
 ) -> None:
-    """Writes the page. `summary` is the content of plan.json, `data` what `chart_data` makes of `setpoints`,
-    `text` the part program's, or its file."""
+    """Writes the page. `summary` is the content of plan.json, `data` the result of `chart_data`, `text` the
+    text of the part program, or its file."""
     texts = {} if text is None else _lines(text, {row.line for row in account.slow})
     name = FilePath(str(summary.get("program") or "path")).name
     judged = (
@@ -79,7 +79,7 @@ def write_report(
 
 
 def framed(kind: str, title: str, about: str, summary: str, sections: str, data: Mapping[str, Any]) -> str:
-    """A whole page of HTML around its sections, with the data that its script draws, if it is there."""
+    """A whole page of HTML with these sections and, if the script is built, the data that it draws."""
     drawn = not missing_pictures()
     return Template(asset("frame.html")).substitute(
         kind=kind,
@@ -94,7 +94,7 @@ def framed(kind: str, title: str, about: str, summary: str, sections: str, data:
 
 
 def missing_pictures() -> str:
-    """Why a page has no pictures, in a sentence; empty where it has them."""
+    """A sentence that tells why pages have no pictures; empty if they have."""
     if resources.files(__package__).joinpath(SCRIPT).is_file():
         return ""
     return (
@@ -104,13 +104,13 @@ def missing_pictures() -> str:
 
 
 def pictures(charts: str) -> str:
-    """The sections with charts, or why there are none."""
+    """The sections with charts, or the reason why there are none."""
     missing = missing_pictures()
     return f'<section><p class="note">{escape(missing)}</p></section>\n' if missing else charts
 
 
 def _lines(text: FilePath | bytes, wanted: set[int]) -> dict[int, str]:
-    """The text of these lines; none where the file is gone or is no text."""
+    """The text of these lines; empty if the file is gone or is not text."""
     texts: dict[int, str] = {}
     try:
         with io.BytesIO(text) if isinstance(text, bytes) else text.open("rb") as stream:

@@ -1,4 +1,4 @@
-"""Millions of samples as the few thousand points that a chart can show, without losing a peak or a corner."""
+"""Reduces millions of samples to the few thousand points that a chart can show; peaks and corners stay."""
 
 from __future__ import annotations
 
@@ -6,15 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-# Points, their tags, and what was spent between each point and the next.
+# Points, their tags, and the part of the tolerance already used between each point and the next.
 Kept = tuple[Floats, NDArray[np.int64], Floats]
 
 
 class Envelope:
     """The least and the greatest value of each bucket of consecutive samples, for several columns at once.
 
-    `count` samples will come by `add`; at most about `points` are kept a column, both extremes of a bucket
-    where they stand, so that no peak vanishes. With fewer samples than `points` all are kept.
+    `count` is the number of samples that `add` will get. About `points` of each column are kept at most: both
+    extremes of a bucket at their own x, so that no peak is lost. With fewer samples than `points` all are
+    kept.
     """
 
     def __init__(self, count: int, points: int) -> None:
@@ -26,7 +27,7 @@ class Envelope:
         self._done = 0
 
     def add(self, x: Floats, values: Floats, tag: NDArray[np.int64] | None = None) -> None:
-        """The next samples: `x` (n,), `values` (n, columns), and an integer that each sample carries."""
+        """Takes the next samples: `x` (n,), `values` (n, columns), and an integer tag for each."""
         tag = np.zeros(len(x), np.int64) if tag is None else tag.astype(np.int64)
         if self._rest is not None:
             x = np.concatenate((self._rest[0], x))
@@ -37,18 +38,19 @@ class Envelope:
         self._rest = (x[whole:], values[whole:], tag[whole:])
 
     def curve(self, column: int) -> tuple[Floats, Floats, NDArray[np.int64]]:
-        """x, value and tag of the points kept in one column, in order."""
+        """x, value and tag of the points kept of one column, in order."""
         self._finish()
         if not self._parts:
             return np.empty(0), np.empty(0), np.empty(0, np.int64)
-        place, x, value, tag = (
+        number, x, value, tag = (
             np.concatenate([part[i][column].ravel() for part in self._parts]) for i in range(4)
         )
-        single = np.concatenate(([True], np.diff(place) != 0))
+        single = np.concatenate(([True], np.diff(number) != 0))
         return x[single], value[single], tag[single]
 
     def mean(self, column: int, points: int) -> tuple[Floats, Floats]:
-        """x and mean over x of at most `points` stretches of one column: what a band of extremes hides."""
+        """x and mean of one column over at most `points` intervals of x, for curves that oscillate too fast
+        to draw."""
         self._finish()
         if not self._means:
             return np.empty(0), np.empty(0)
@@ -67,14 +69,15 @@ class Envelope:
         if len(x) == 0:
             return
         columns = np.ascontiguousarray(values.T).reshape(values.shape[1], -1, width)
-        # A gap (NaN) is no extreme: it may neither hide a peak nor be lost where all of the bucket is one.
+        # A gap (NaN) is not an extreme, but stays if all of the bucket is a gap.
         least = np.where(np.isnan(columns), np.inf, columns).argmin(axis=2)
         greatest = np.where(np.isnan(columns), -np.inf, columns).argmax(axis=2)
         start = np.arange(columns.shape[1]) * width
         pick = np.sort(np.stack([start + least, start + greatest], axis=-1), axis=-1)
         value = np.take_along_axis(values.T[:, :, None], pick.reshape(len(pick), -1, 1), axis=1)
         self._parts.append((pick + self._done, x[pick], value.reshape(pick.shape), tag[pick]))
-        # Each sample stands for the way from the one before; where there is none, all count alike.
+        # The weight of a sample is its distance in x from the sample before; without distances all weights
+        # are equal.
         before = x[0] if self._last is None else self._last
         weight = np.diff(x, prepend=before).reshape(-1, width)
         weight[weight.sum(axis=1) <= 0] = 1.0
@@ -86,11 +89,11 @@ class Envelope:
 
 
 class Polyline:
-    """A polyline with few points that stays near the one of all samples, corners kept.
+    """A polyline with few points that stays near the polyline of all samples; corners are kept.
 
-    A point goes when it lies, in all its columns, within a tolerance of the straight line between its
-    neighbours; what earlier removals have cost is added up, so the bound holds for every sample. The
-    tolerance starts at `tolerance` and doubles until at most `limit` points are left.
+    A point is removed if it lies, in all its columns, within the tolerance of the straight line between its
+    neighbours. The distances of earlier removals are added, so that the tolerance holds for every sample. It
+    starts at `tolerance` and doubles until at most `limit` points are left.
     """
 
     def __init__(self, limit: int, tolerance: float) -> None:
@@ -101,7 +104,8 @@ class Polyline:
         self._pending_count = 0
 
     def add(self, points: Floats, tag: NDArray[np.int64]) -> None:
-        """The next samples: `points` (n, columns), scaled so that one tolerance suits all, and their tags."""
+        """Takes the next samples: `points` (n, columns), scaled so that one tolerance suits all, and their
+        tags."""
         self._pending.append((points, tag))
         self._pending_count += len(points)
         if self._pending_count >= 2 * self._limit:
@@ -110,8 +114,8 @@ class Polyline:
     def result(
         self, limit: int | None = None, tolerance: float = 0.0
     ) -> tuple[Floats, NDArray[np.int64], float]:
-        """The points kept, their tags and the tolerance; of at most `limit` points, or with a greater
-        `tolerance`, where these are given."""
+        """The points kept, their tags and the tolerance; reduced further to `limit` points or to a greater
+        `tolerance`, if given."""
         self._settle()
         if not self._kept:
             return np.empty((0, 0)), np.empty(0, np.int64), self.tolerance
@@ -137,7 +141,7 @@ class Polyline:
 
 
 def _limited(kept: Kept, tolerance: float, limit: int) -> tuple[Kept, float]:
-    """At most `limit` points, and the tolerance that this takes."""
+    """At most `limit` points, and the tolerance that was needed."""
     while len(kept[0]) > limit:
         tolerance *= 2
         kept = _thin(*kept[:2], kept[2].copy(), tolerance)
@@ -145,11 +149,12 @@ def _limited(kept: Kept, tolerance: float, limit: int) -> tuple[Kept, float]:
 
 
 def _thin(points: Floats, tag: NDArray[np.int64], cost: Floats, tolerance: float) -> Kept:
-    """Removes points within `tolerance`; `cost` is what was spent between each point and the next."""
+    """Removes points within `tolerance`; `cost` is the part of it already used between each point and the
+    next."""
     idle = 0
     parity = 1
     while idle < 2 and len(points) > 2:
-        # Every second point is a candidate: its neighbours stay, so all can be judged at once.
+        # Every second point is a candidate: its neighbours stay, so all candidates can be judged at once.
         middle = np.arange(parity, len(points) - 1, 2)
         spent = np.maximum(cost[middle - 1], cost[middle])
         total = spent + _distance(points[middle], points[middle - 1], points[middle + 1])

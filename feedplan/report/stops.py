@@ -1,4 +1,4 @@
-"""Full stops by their causes: how many, how long the tool waits there, and what stopping costs."""
+"""Full stops by cause: their number, the time for which the tool waits, and the time lost by stopping [s]."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ _BACK, _STRAIGHT = 135.0, 0.5
 
 @dataclass(frozen=True)
 class Stops:
-    """`count` stops of one `cause`; the tool waits for `pause` [s] in all, and loses `lost` [s] by slowing to
-    them and leaving them, against what feeds and axis velocities alone would allow."""
+    """`count` stops of one `cause`. In all the tool waits there for `pause` [s]; braking and starting lose
+    `lost` [s] against the speed that feeds and axis velocities alone would allow."""
 
     cause: str
     count: int
@@ -45,7 +45,7 @@ class Stops:
 
 
 def stops_by_cause(problem: Problem, program: Program | None, activity: Activity) -> list[Stops]:
-    """The stops of a path, by what they cost, the greatest first; start and end count as two."""
+    """The stops of a path by cause, the greatest loss first; start and end of the path are two stops."""
     path = problem.path
     runs = len(path.runs) - 1
     if runs < 1:
@@ -68,7 +68,7 @@ def stops_by_cause(problem: Problem, program: Program | None, activity: Activity
 
 
 def _causes(problem: Problem, program: Program | None) -> list[str]:
-    """Why the path stops after each of its runs but the last."""
+    """The cause of the stop after each run of the path but the last."""
     path = problem.path
     last, first = path.runs[1:-1] - 1, path.runs[1:-1]
     turn = _turns(problem, last, first)
@@ -100,7 +100,7 @@ def _causes(problem: Problem, program: Program | None) -> list[str]:
 
 
 def _turns(problem: Problem, last: NDArray[np.integer], first: NDArray[np.integer]) -> Floats:
-    """By how much the path turns from the end of one piece to the start of another [deg]."""
+    """The angle between the end of one piece and the start of another [deg]."""
     curve = problem.path.curve
     with np.errstate(divide="ignore", invalid="ignore"):
         one, other = (
@@ -117,7 +117,8 @@ def _turns(problem: Problem, last: NDArray[np.integer], first: NDArray[np.intege
 def _slow_parts(activity: Activity, runs: int) -> tuple[Floats, Floats]:
     """Time lost before the end and after the start of each run [s].
 
-    That counts from rest to where the tool is at a feed or an axis velocity, or first slows down.
+    The part after a start ends where the tool reaches a feed or an axis velocity, or first slows down; the
+    part before a stop is its mirror image.
     """
     lost, pace, run = activity.lost, activity.pace, activity.run
     total = np.concatenate(([0.0], np.cumsum(lost)))

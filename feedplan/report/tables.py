@@ -1,4 +1,4 @@
-"""The numbers and tables of the page as HTML; they need no script and print as they are."""
+"""The numbers and tables of the page as HTML; they need no script."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from feedplan.report.losses import Share, SlowLine
 from feedplan.report.stops import Stops
 from feedplan.units import duration_text, mm_per_min, ratio_text, tolerance_text
 
-# Limits of the machine and the program; every other check is one of consistency.
+# Limits of the machine and the program; all other checks are checks of consistency.
 _OF_AXES = {"velocity", "acceleration", "acceleration_jump", "jerk", "travel", "jump"}
 _LIMITS = _OF_AXES | {"feed", "chord", "deviation"}
 
 _NO_JUMP = 1e-3  # [mm/s]
 
-# What a check is called where its own name says too little.
+# Names of checks on the page, if they differ from their names in the audit.
 _NAMES = {
     "chord": "chord error",
     "deviation": "deviation from the program",
@@ -42,7 +42,7 @@ _NAMES = {
 
 
 def verdict(audit: Audit) -> str:
-    """The audit's verdict in one line, with what is broken."""
+    """The audit's verdict in one line, with the broken limits."""
     samples = f"{audit.checked_samples:,}".replace(",", " ")
     if audit.ok:
         used = [check for check in audit.checks if check.judged and _is_limit(check)]
@@ -65,17 +65,17 @@ def numbers(summary: Mapping[str, Any], account: Account, setpoints: int) -> str
     time, whole = float(summary["time"]), account.all
     unit, turning = account.motion.units
     turned = f"turns alone {whole.turn:.4g} {turning}" if whole.turn > 0 else ""
-    way, mean = _length(whole.length, unit), (f"{whole.mean:.4g}", f"{unit}/s")
+    length, mean = _length(whole.length, unit), (f"{whole.mean:.4g}", f"{unit}/s")
     by_minute = f"{mm_per_min(whole.mean):.5g} {unit}/min"
     if account.motion.turns.all():
-        way, mean = (f"{whole.turn:.4g}", turning), (f"{whole.mean_turn:.4g}", f"{turning}/s")
+        length, mean = (f"{whole.turn:.4g}", turning), (f"{whole.mean_turn:.4g}", f"{turning}/s")
         turned, by_minute = "", ""
     bound, gap = summary.get("lower_bound"), summary.get("gap")
     cells = [
         ("Time", *_value_unit(duration_text(time)), f"{time:.6g} s" if time >= 60 else ""),
-        ("Length", *way, turned or f"{summary['pieces']} pieces"),
+        ("Length", *length, turned or f"{summary['pieces']} pieces"),
         ("Mean speed", *mean, by_minute),
-        ("Stops on the way", str(summary["stops"]), "", _counted(summary["runs"], "run")),
+        ("Stops on the length", str(summary["stops"]), "", _counted(summary["runs"], "run")),
         ("Setpoints", f"{setpoints:,}".replace(",", " "), "", ""),
     ]
     if bound is not None:
@@ -106,7 +106,7 @@ def limits_table(shares: Sequence[Share]) -> str:
 
 
 def totals_table(account: Account) -> str:
-    """Time and length at a feed and in rapids; what rotary axes turn alone stands apart."""
+    """Time and length at a feed and in rapids; turning of rotary axes alone is a row of its own."""
     head = '<th>Motion</th><th class="n">Time</th><th class="n">Length</th><th class="n">Mean speed</th>'
     kinds = (("at a feed", account.feed), ("rapid", account.rapid))
     rows = "".join(_total_rows(name, total, account.motion.units) for name, total in kinds if total.time > 0)
@@ -125,15 +125,15 @@ def _total_rows(name: str, total: Total, units: tuple[str, str]) -> str:
         ),
     ]
     return "".join(
-        f'<tr><td>{label}</td><td class="n">{duration_text(time)}</td><td class="n">{way}</td>'
+        f'<tr><td>{label}</td><td class="n">{duration_text(time)}</td><td class="n">{length}</td>'
         f'<td class="n">{mean}</td></tr>'
-        for label, time, way, mean in parts
+        for label, time, length, mean in parts
         if time > 0
     )
 
 
 def stops_table(stops: Sequence[Stops]) -> str:
-    """Stops by cause: how many, how long the tool waits, and what slowing to them and leaving them costs."""
+    """Stops by cause: number, time for which the tool waits, time lost by braking and starting."""
     head = '<th>Stops</th><th class="n">Number</th><th class="n">Waits</th><th class="n">Lost</th>'
     rows = "".join(
         f'<tr><td>{escape(stop.cause)}</td><td class="n">{stop.count}</td>'
@@ -145,7 +145,7 @@ def stops_table(stops: Sequence[Stops]) -> str:
 
 
 def fit_table(summary: Mapping[str, Any], tolerance: tuple[float, float]) -> str:
-    """What the fit did and how long each stage took; the `tolerance` asked for, least and greatest [mm]."""
+    """Figures of the fit, computing time of each stage, and least and greatest `tolerance` asked for [mm]."""
     fit = summary.get("fit") or {}
     rows: list[tuple[str, str]] = []
     points, splines, polynomials = (int(fit.get(key) or 0) for key in ("points", "splines", "polynomials"))
@@ -180,7 +180,7 @@ def fit_table(summary: Mapping[str, Any], tolerance: tuple[float, float]) -> str
 
 
 def slowest_table(rows: Sequence[SlowLine], texts: Mapping[int, str], units: tuple[str, str]) -> str:
-    """The lines that lose most time, with their text where it is known."""
+    """The lines that lose most time, with their text if it is known."""
     if not rows:
         return "<table><tr><td>No line is slower than its feed and its axes allow.</td></tr></table>"
     head = '<th class="n">Line</th>' + ("<th>Source</th>" if texts else "")
@@ -207,9 +207,9 @@ def _slow_row(row: SlowLine, texts: Mapping[int, str], units: tuple[str, str]) -
 
 
 def audit_table(audit: Audit) -> str:
-    """Every check: the worst value, the limit, their ratio, when and on which line.
+    """Every check: the worst value, the limit, their ratio, time and line.
 
-    Limits come first; the checks of consistency fold away unless one of them fails.
+    Limits come first; the checks of consistency are folded unless one of them fails.
     """
     known = [check for check in audit.checks if not check.ok or math.isfinite(check.limit)]
     limits = [check for check in known if _is_limit(check)]
@@ -255,7 +255,7 @@ def _audit_row(check: LimitCheck) -> str:
 
 
 def _is_limit(check: LimitCheck) -> bool:
-    # Where no velocity jump is allowed at corners, its check only confirms that there is none.
+    # If no velocity jump is allowed at corners, this check only confirms that there is none.
     return check.name in _LIMITS and (check.name != "jump" or check.limit > _NO_JUMP)
 
 
@@ -270,7 +270,7 @@ def _with_unit(check: LimitCheck, value: float) -> str:
 
 
 def _percent(ratio: float) -> str:
-    """A ratio as percent; near 100 with the digits that tell on which side it is."""
+    """A ratio as percent; near 100 with enough digits to tell on which side of 100 it is."""
     if not math.isfinite(ratio):
         return "–"
     percent = 100.0 * ratio
@@ -294,6 +294,6 @@ def _length(length: float, unit: str) -> tuple[str, str]:
 
 
 def _value_unit(text: str) -> tuple[str, str]:
-    """`1.234 s` as value and unit; texts of several parts stay whole."""
+    """Splits `1.234 s` into value and unit; texts of more parts stay whole."""
     value, _, unit = text.partition(" ")
     return (value, unit) if " " not in unit else (text, "")

@@ -1,8 +1,9 @@
-"""The tool's way: X, Y, Z [mm] where a piece moves one of them, else U, V, W [mm], else all others [deg].
+"""The tool's motion along a path: X, Y, Z [mm] if a piece moves one of them, else U, V, W [mm], else all
+other axes [deg].
 
-The others are rotary axes, or the joints of an arm: the length is that of the path in their space, in their
-unit. So millimetres and degrees are never added, unless a path has joints of several units. Feeds of part
-programs count along the same axes.
+The other axes are rotary axes or the joints of an arm; the length is then that of the path in their space, in
+their unit. So millimetres and degrees are never added, unless a path has joints of several units. Feeds of
+part programs are speeds along the same axes.
 """
 
 from __future__ import annotations
@@ -21,19 +22,21 @@ from feedplan.progress import Listener
 
 Floats = NDArray[np.float64]
 
-# In this order the first group that moves counts. I, J, K are the tool's direction, a unit vector.
+# The first group that moves is the one whose length is measured. I, J, K are the tool's direction, a unit
+# vector.
 _GROUPS = (("X", "Y", "Z"), ("U", "V", "W"))
 _DEGREES = {name: math.degrees(1.0) for name in "IJK"}
 
-# Roundings of a control point, in units of the last digit of the greatest: they are no motion.
+# Differences of control points up to this many units in the last place of the greatest are rounding, not
+# motion.
 _ROUNDINGS = 64.0
 
 
 @dataclass(frozen=True, eq=False)
 class ToolMotion:
-    """`curve` has a path's pieces with the axes that count, the others at 0; `turns` (n,) are those pieces on
-    which nothing but rotary axes and joints moves. `share` (n, axes) is what each axis counts, None where all
-    do. `units` are those of the way where a tool moves, and where it turns alone."""
+    """`curve` has a path's pieces with the axes whose length is measured, the other axes at 0; `turns` (n,)
+    is true for pieces on which only rotary axes and joints move. `share` (n, axes) is the weight of each
+    axis, None if all are 1. `units` are those of the length if the tool moves, and if it turns alone."""
 
     curve: CompositeCurve
     share: Floats | None
@@ -42,26 +45,26 @@ class ToolMotion:
 
     @property
     def unit(self) -> str:
-        """The unit of what is drawn: that of turning where nothing else moves anywhere."""
+        """The unit of the length that is drawn: that of turning if no piece moves the tool."""
         return self.units[1 if self.turns.all() else 0]
 
     @cached_property
     def drawn(self) -> NDArray[np.bool_]:
-        """Pieces (n,) whose way is in that unit."""
+        """Pieces (n,) whose length is in that unit."""
         return np.asarray(~self.turns | self.turns.all())
 
     def slope(self, piece: NDArray[np.integer], u: Floats) -> Floats:
-        """Way by u at places (m,) [mm or deg]."""
+        """Derivative of the length by u at parameters (m,) [mm or deg]."""
         return np.asarray(np.linalg.norm(self.curve.evaluate(piece, u, 1)[1], axis=1))
 
     def lengths(self, progress: Listener | None = None) -> Floats:
-        """Way of each piece (n,), [deg] where it turns and [mm] elsewhere."""
+        """Length of each piece (n,): [deg] if it turns, else [mm]."""
         table = CurveLength(self.curve, progress=progress)
         return np.diff(table.length(np.arange(len(self.curve)), self.curve.width), prepend=0.0)
 
 
 def tool_motion(problem: Problem) -> ToolMotion:
-    """The way of the tool along a problem's path."""
+    """The tool's motion along a problem's path."""
     curve, axes = problem.path.curve, problem.path.axes
     if set(axes) <= set(_GROUPS[0]):
         return ToolMotion(curve, None, np.zeros(len(curve), dtype=bool), problem.way_units)

@@ -1,4 +1,4 @@
-"""The tool path as a page draws it: few points with their speed, reduced while the setpoints pass by once."""
+"""The tool path as a page draws it: few points with their speed, reduced in one pass over the setpoints."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
-from feedplan.report.activity import Activity, place_on
+from feedplan.report.activity import Activity, path_position
 from feedplan.report.limits import parameter_speed
 from feedplan.report.reduce import Polyline
 from feedplan.report.tool_motion import ToolMotion
 from feedplan.setpoints import SetpointChunk
 
-# Points of the tool path in a file.
+# Most points of the tool path in a report.
 POINTS = 60_000
-# … and where it is drawn by the service, which sends it as it is.
+# Most points in the service's page, which gets them uncompressed.
 MANY_POINTS = 500_000
 
-# The tool path may be drawn this far beside itself, as a part of its extent: a tenth of a pixel at first.
+# Allowed deviation of the drawn tool path over its extent: a tenth of a pixel before zooming.
 _TOLERANCE = 1e-4
-# What is kept at most while the setpoints pass by, for those who zoom in.
+# The least such deviation, for zooming.
 _FINEST = 1e-5
-# A difference in speed weighs like one of length: this part of the top speed like `_TOLERANCE`.
+# Allowed deviation of the drawn speed over the top speed, where that of the path is `_TOLERANCE`.
 _SPEED_TOLERANCE = 0.01
 
 
@@ -35,7 +35,7 @@ class ToolPath:
         self._problem, self._motion = problem, motion
         self._linear = [self._axes.index(name) for name in "XYZ" if name in self._axes]
         columns = [column for column, name in enumerate(problem.path.axes) if name in ("X", "Y", "Z")]
-        # Column by column: many points are not copied.
+        # Column by column, so that the points are not copied.
         control = problem.path.curve.control_points
         sides = [np.ptp(control[:, column]) for column in columns if len(control)]
         extent = float(np.linalg.norm(sides))
@@ -52,32 +52,32 @@ class ToolPath:
         self._top = self._cutting = 0.0
 
     def add(self, chunk: SetpointChunk) -> NDArray[np.float64]:
-        """The next setpoints; returns the tool's speed at each, in the unit drawn a second."""
-        places, speed = self._tool(chunk)
+        """Takes the next setpoints; returns the tool's speed at each, in drawn units a second."""
+        points, speed = self._tool(chunk)
         if len(chunk) == 0:
             return speed
-        place = place_on(self._problem, chunk.piece, chunk.u)
+        position = path_position(self._problem, chunk.piece, chunk.u)
         length = self._lengths(chunk.t, speed)
-        tags = (chunk.line, np.round(1e6 * chunk.t), np.round(1e6 * length), place)
+        tags = (chunk.line, np.round(1e6 * chunk.t), np.round(1e6 * length), position)
         table = np.column_stack([tag.astype(np.int64) for tag in tags])
-        self._path.add(np.column_stack((places, self._speed_weight * speed)), table)
+        self._path.add(np.column_stack((points, self._speed_weight * speed)), table)
         self._top = max(self._top, float(speed.max()))
         self._cutting = max(self._cutting, float(speed[self._is_cut[chunk.piece]].max(initial=0.0)))
         return speed
 
     def mark(self, chunk: SetpointChunk, time: float) -> None:
-        """Marks the place of the first of some setpoints at a time [s] or after it."""
-        places, _ = self._tool(chunk)
-        self._marks.append(places[min(int(np.searchsorted(chunk.t, time)), len(chunk) - 1)].tolist())
+        """Marks the tool's position at the first setpoint of a chunk at a time [s] or after it."""
+        points, _ = self._tool(chunk)
+        self._marks.append(points[min(int(np.searchsorted(chunk.t, time)), len(chunk) - 1)].tolist())
 
     def data(self, activity: Activity, points: int | None = None) -> dict[str, Any]:
-        """Points in X, Y, Z with what is known there, and the marks; at most `points` where that is given.
+        """Points in X, Y, Z with their values, and the marks; at most `points` if given.
 
-        At each point `speed`, source `line`, `time` [s], `length` of the way, programmed `feed` (0: rapid),
-        the number of the `active` limit in `limits`, and `lost`: the part of the time, of 255, that feed and
-        axis velocities alone would not take. `tolerance` is how far off the line may be [mm].
-        `cutting_speed` is the greatest speed on moves with a feed: rapids would flatten the colours. `unit`
-        is that of the way, mm, or deg where nothing but rotary axes moves.
+        The values at each point: `speed`, source `line`, `time` [s], `length` up to it, programmed `feed` (0:
+        rapid), the number of the `active` limit in `limits`, and `lost`, the part of the time (0 to 255) that
+        would be saved at the speed that feed and axis velocities alone allow. `tolerance` is the greatest
+        deviation of the line [mm]. `cutting_speed` is the greatest speed on moves with a feed, the top of the
+        colour scale. `unit` is that of the length: mm, or deg if only rotary axes move.
         """
         kept, tags, tolerance = self._path.result(points, 0.0 if points is None else self._overview)
         kept = kept if kept.size else np.empty((0, 4))
@@ -104,7 +104,7 @@ class ToolPath:
         }
 
     def _lengths(self, t: NDArray[np.float64], speed: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The way up to each setpoint, by the trapezoid rule."""
+        """The length up to each setpoint, by the trapezoid rule."""
         before, last = self._before
         steps = np.diff(t, prepend=before) * 0.5 * (speed + np.concatenate(([last], speed[:-1])))
         length = self._length + np.cumsum(steps)
@@ -112,16 +112,16 @@ class ToolPath:
         return np.asarray(length)
 
     def _tool(self, chunk: SetpointChunk) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Where the tool is in X, Y, Z, and how fast it is in the unit drawn; 0 where it only turns."""
+        """The tool's position in X, Y, Z and its speed in drawn units; 0 where it only turns."""
         problem, motion = self._problem, self._motion
         if problem.tip_curve is not None and problem.joints is not None:
-            (places,) = problem.tip_curve.evaluate(chunk.piece, chunk.u)
+            (points,) = problem.tip_curve.evaluate(chunk.piece, chunk.u)
             tangent = problem.joints.evaluate(chunk.piece, chunk.u, 1)[1]
             speed = motion.slope(chunk.piece, chunk.u) * parameter_speed(tangent, chunk.velocity)
         else:
-            places = np.zeros((len(chunk), 3))
+            points = np.zeros((len(chunk), 3))
             for column in self._linear:
-                places[:, "XYZ".index(self._axes[column])] = chunk.position[:, column]
+                points[:, "XYZ".index(self._axes[column])] = chunk.position[:, column]
             counts = 1.0 if motion.share is None else motion.share[chunk.piece]
             speed = np.linalg.norm(chunk.velocity * counts, axis=1)
-        return places, speed if motion.drawn.all() else speed * motion.drawn[chunk.piece]
+        return points, speed if motion.drawn.all() else speed * motion.drawn[chunk.piece]

@@ -2,9 +2,12 @@
 
     guard ──► app ──► store ◄── runner ──► feedplan.jobs (processes | cluster) ──► planning, files
 
-`limits` and `refusals` are what all share, `requests` what a client sends, `uploads` receives it, `answers`
-is what it gets, `problems` what it gets otherwise. `store` has the folders of jobs, `database` their records,
-`runner` has them planned, `views` and `exports` tell of them, `events` how far they are. `app` has the
-addresses, `guard` stands before all of it, `openapi` and `page` are the documentation, `command` has the
-options, `server` starts everything. The packages it needs come with `pip install feedplan[serve]`.
+- Requests: `guard` checks each one, `app` has the addresses, `uploads` receives programs, `requests` checks
+  what is asked for, `problems` answers errors.
+- Jobs: `store` has their folders, `database` their records, `runner` has them planned.
+- Answers: `answers` has their types, `views` and `exports` make them, `events` streams progress, `front` has
+  the page, `openapi` and `page` the documentation.
+- Shared: `limits` and `refusals`. `server` starts the service.
+
+`pip install feedplan[serve]` installs the packages.
 """

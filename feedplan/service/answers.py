@@ -1,4 +1,4 @@
-"""What the service answers, by the names that its documentation has."""
+"""The types of the service's answers; their names and docstrings are in its documentation."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class ProgramInfo(BaseModel):
 
 
 class Figures(BaseModel):
-    """What became of a program: the key figures of its plan."""
+    """The key figures of a plan."""
 
     time: float = Field(description="Time of the program [s]")
     lower_bound: float = Field(description="No plan of this path is faster [s]")
@@ -53,7 +53,7 @@ class Figures(BaseModel):
 
 
 class Job(BaseModel):
-    """A job: what is planned, how far it is and what became of it."""
+    """A job: its request, its progress and its result."""
 
     id: str
     state: State
@@ -72,10 +72,12 @@ class Job(BaseModel):
 
 
 class Jobs(BaseModel):
-    """Jobs, the newest first; `before` gives those that follow."""
+    """Jobs, the newest first; `before` asks for the next ones."""
 
     jobs: list[Job]
-    before: int | None = Field(description="What to ask for the next ones with; null: there are none")
+    before: int | None = Field(
+        description="Give it as `before` to get the next jobs; null: there are no more"
+    )
 
 
 class ComparedJob(BaseModel):
@@ -96,13 +98,14 @@ class ComparedJob(BaseModel):
 
 
 class Comparison(BaseModel):
-    """Jobs side by side."""
+    """Jobs as rows of one table."""
 
     rows: list[ComparedJob]
 
 
 class Axis(BaseModel):
-    """An axis of a machine; limits are one number, or two where they differ by direction; null: none."""
+    """An axis of a machine; a limit is one number, two if it differs by direction, or null if there is
+    none."""
 
     name: str
     kind: str
@@ -114,7 +117,7 @@ class Axis(BaseModel):
 
 
 class Parameter(BaseModel):
-    """A parameter of a controller: the `option` of the method that it becomes."""
+    """A parameter of a controller, with the `option` of the method that it sets."""
 
     option: str
     default: float | None = Field(description="null: no limit")
@@ -122,8 +125,7 @@ class Parameter(BaseModel):
 
 
 class ControllerInfo(BaseModel):
-    """A controller that is modelled: the method that plans as it does, with options that are always the
-    same."""
+    """A controller that is modelled: the method that models it, with the fixed options of that method."""
 
     name: str
     method: str
@@ -138,21 +140,23 @@ class Controllers(BaseModel):
 
 
 class OwnController(BaseModel):
-    """The controller in a machine file, with the parameters that are given there."""
+    """The controller in a machine file, with the parameters in that file."""
 
     name: str
     parameters: dict[str, Any]
 
 
 class MachineInfo(BaseModel):
-    """A machine as it is understood: defaults, kinds and units are filled in."""
+    """A machine with defaults, kinds and units filled in."""
 
     name: str
     period: float
     chord_tolerance: float | None
     kinematics: str
     axes: list[Axis]
-    controller: OwnController | None = Field(description="What drives it today, where its file says so")
+    controller: OwnController | None = Field(
+        description="The controller of today, if the machine file names one"
+    )
     file: str = Field(description="The text of its machine file (TOML)")
 
 
@@ -176,7 +180,7 @@ class Methods(BaseModel):
 
 
 class Health(BaseModel):
-    """Whether the service works, and what it takes."""
+    """Whether the service works, and its limits."""
 
     status: Literal["ok"]
     version: str

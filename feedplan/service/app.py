@@ -22,10 +22,10 @@ from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 
 from feedplan import __version__, outputs, planners
-from feedplan.files import DRAWING_FILE, SUMMARY_FILE
-from feedplan.jobs.place import Place
+from feedplan.jobs.executor import Executor
 from feedplan.machine.controller import MODELS
 from feedplan.machine.machine import Machine, bundled_machines
+from feedplan.plan_folder import DRAWING_FILE, SUMMARY_FILE
 from feedplan.report.page import FILE as REPORT_FILE
 from feedplan.service import answers, events, exports, front, openapi, page, problems, uploads, views
 from feedplan.service.limits import Limits
@@ -34,10 +34,10 @@ from feedplan.service.requests import MachineRequest, machine_of, order_of
 from feedplan.service.runner import Runner
 from feedplan.service.store import ENDED, Store
 
-# Requests whose programs are received at a time; each may take some memory.
+# Most requests whose programs are received at the same time; each needs memory.
 RECEIVED_AT_ONCE = 4
 MOST_COMPARED = 20
-# A report has scripts of its own and no other; it is not trusted with the service.
+# A report may run its own scripts only, and may not send requests to the service.
 _REPORT_POLICY = (
     "sandbox allow-scripts allow-downloads; default-src 'none'; style-src 'unsafe-inline'; "
     "script-src 'unsafe-inline'; img-src data: blob:"
@@ -49,25 +49,25 @@ Key = Annotated[
     Header(
         alias="Idempotency-Key",
         max_length=200,
-        description="The same key always gives the same job, however often a request is sent",
+        description="Requests with the same key give the same job",
     ),
 ]
 Time = Annotated[float | None, Query(allow_inf_nan=False)]
 
 
 class Service:
-    """What all addresses share."""
+    """The objects that all addresses share."""
 
-    def __init__(self, folder: FilePath, limits: Limits, place: Place) -> None:
+    def __init__(self, folder: FilePath, limits: Limits, executor: Executor) -> None:
         self.limits = limits
         self.bell = events.Bell()
         self.store = Store(folder, limits, self.bell.ring)
-        self.runner = Runner(self.store, limits, place)
+        self.runner = Runner(self.store, limits, executor)
         self.receiving = asyncio.Semaphore(RECEIVED_AT_ONCE)
 
     @asynccontextmanager
     async def lifespan(self, _: FastAPI) -> AsyncIterator[None]:
-        """Jobs run while the application does."""
+        """Runs jobs while the application runs."""
         self.bell.attach(asyncio.get_running_loop())
         self.runner.start()
         try:
@@ -78,10 +78,10 @@ class Service:
             self.store.close()
 
 
-def create(folder: FilePath, limits: Limits, place: Place) -> FastAPI:
-    """The application on a store, without its guard; its jobs run in `place`. Raises InputError where the
-    store cannot be used."""
-    service = Service(folder, limits, place)
+def create(folder: FilePath, limits: Limits, executor: Executor) -> FastAPI:
+    """The application on a store, without its guard; jobs run on `executor`. Raises InputError if the store
+    cannot be used."""
+    service = Service(folder, limits, executor)
     app = FastAPI(
         title="feedplan",
         version=__version__,
@@ -100,9 +100,9 @@ def create(folder: FilePath, limits: Limits, place: Place) -> FastAPI:
     return app
 
 
-def _file(place: FilePath, **more: Any) -> FileResponse:
-    """A file as an answer; raises FileNotFoundError where it is gone."""
-    return FileResponse(place, stat_result=place.stat(), **more)
+def _file(file: FilePath, **more: Any) -> FileResponse:
+    """A file as an answer; raises FileNotFoundError if it is gone."""
+    return FileResponse(file, stat_result=file.stat(), **more)
 
 
 def _add_jobs(app: FastAPI, service: Service) -> None:
@@ -114,17 +114,17 @@ def _add_jobs(app: FastAPI, service: Service) -> None:
         status_code=202,
         response_model=answers.Job,
         tags=tags,
-        summary="Have a program planned",
+        summary="Submit a program to be planned",
         responses={
-            200: {"model": answers.Job, "description": "The job that an equal request has already"},
+            200: {"model": answers.Job, "description": "The job of an earlier, equal request"},
             **openapi.problems(400, 415, 422, 429, 507),
         },
         openapi_extra=openapi.SUBMISSION,
     )
     async def submit(request: Request, key: Key = None) -> Response:
-        """Accepts a program and how it is to be planned, as JSON or as a form; the job runs when its turn
-        comes. A request equal to one that waits, runs or is done gives that job (200), so that nothing is
-        planned twice."""
+        """Accepts a program, a machine and options, as JSON or as a form; the job waits for its turn. If an
+        equal request waits, runs or is done, the answer is that job (200), so that nothing is planned
+        twice."""
 
         def accepted() -> tuple[dict[str, Any], bool]:
             order = order_of(asked, limits)
@@ -172,7 +172,7 @@ def _add_jobs(app: FastAPI, service: Service) -> None:
         "/v1/jobs/{job}",
         response_model=answers.Job,
         tags=tags,
-        summary="How far a job is, and what became of it",
+        summary="Progress and result of a job",
         responses=openapi.problems(404),
     )
     def one(job: str) -> dict[str, Any]:
@@ -198,7 +198,7 @@ def _add_jobs(app: FastAPI, service: Service) -> None:
         responses=openapi.problems(404),
     )
     def cancel(job: str) -> dict[str, Any]:
-        """A job that runs stops within a tenth of a second or so; one that has ended stays as it is."""
+        """A running job stops within about a tenth of a second; a job that has ended does not change."""
         runner.cancel(job)
         return views.job(store.job(job))
 
@@ -216,7 +216,7 @@ def _add_jobs(app: FastAPI, service: Service) -> None:
     def progress(
         job: str, last: Annotated[str | None, Header(alias="Last-Event-ID", max_length=40)] = None
     ) -> Response:
-        """Goes on after the event whose number the client sends as `Last-Event-ID`."""
+        """The stream continues after the event whose number the client sends as `Last-Event-ID`."""
         after = int(last) if last and last.isascii() and last.isdigit() and len(last) < 18 else 0
         record = store.job(job)
         if record["state"] in ENDED and after and not store.events(job, after):
@@ -296,7 +296,7 @@ def _add_results(app: FastAPI, service: Service) -> None:
     @app.get(
         "/v1/jobs/{job}/drawing",
         tags=tags,
-        summary="What the page draws: tool path, speed and axes, as arrays",
+        summary="The data that the page draws: tool path, speed and axes, as arrays",
         response_class=FileResponse,
         responses={
             200: openapi.content(
@@ -306,23 +306,24 @@ def _add_results(app: FastAPI, service: Service) -> None:
         },
     )
     def drawing(job: str) -> Response:
-        """4 bytes with the length of the JSON (little-endian), the JSON, then the arrays.
+        """The answer consists of 4 bytes with the length of the JSON (little-endian), the JSON, and the
+        arrays.
 
-        In the JSON an array is `{"array": "f4", "at": 0, "count": 3}`: little-endian numbers (f4, i4 or u1)
-        from byte `at` after the JSON."""
+        The JSON has `{"array": "f4", "at": 0, "count": 3}` instead of each array: little-endian numbers (f4,
+        i4 or u1) from byte `at` after the JSON."""
         return _file(views.done(store, job) / DRAWING_FILE, media_type="application/octet-stream")
 
     @app.get(
         "/v1/compare",
         response_model=answers.Comparison,
         tags=tags,
-        summary="Jobs side by side",
+        summary="Compare jobs in one table",
         responses=openapi.problems(404, 422),
     )
     def compare(
         job: Annotated[list[str], Query(min_length=1, max_length=MOST_COMPARED)],
     ) -> dict[str, Any]:
-        """One row a job, in the order that they are named in: `?job=ID&job=ID`."""
+        """One row for each job, in the order of the request: `?job=ID&job=ID`."""
         return {"rows": views.compared(store, job)}
 
 
@@ -337,12 +338,12 @@ def _add_knowledge(app: FastAPI, service: Service) -> None:
         "/v1/machines",
         response_model=answers.MachineInfo,
         tags=tags,
-        summary="What a machine file says, with other limits where these are given",
+        summary="Read a machine file, and change limits in it",
         responses=openapi.problems(400, 422),
         openapi_extra=openapi.MACHINE,
     )
     def understood(asked: MachineRequest) -> dict[str, Any]:
-        """Nothing is kept; `file` of the answer is the text to plan with."""
+        """The service keeps nothing; plan with `file` of the answer."""
         return views.machine(machine_of(asked))
 
     @app.get(
@@ -378,7 +379,7 @@ def _add_knowledge(app: FastAPI, service: Service) -> None:
             "status": "ok",
             "version": __version__,
             **{state: counts.get(state, 0) for state in ("queued", "running")},
-            "limits": service.limits.told(),
+            "limits": service.limits.to_json(),
         }
 
     @app.get("/docs", include_in_schema=False)

@@ -1,4 +1,4 @@
-"""The records of jobs in SQLite: their tables, and connections that any thread takes and gives back."""
+"""The records of jobs in SQLite: their tables, and connections that threads share."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ PRAGMA user_version = {VERSION};
 
 
 class Database:
-    """The database in a file, made where there is none. Raises InputError where it is of another version."""
+    """The database in a file, which is made if missing. Raises InputError if it has another version."""
 
     def __init__(self, file: FilePath) -> None:
         self._file = file
@@ -64,13 +64,13 @@ class Database:
             raise InputError(f"{said}: choose another folder with --store")
 
     def close(self) -> None:
-        """Nothing is called any more."""
+        """Closes the connections."""
         for connection in self._idle:
             connection.close()
 
     @contextmanager
     def read(self) -> Iterator[sqlite3.Connection]:
-        """A connection for the block: as many are open as blocks are at a time."""
+        """A connection for the block; blocks that run at the same time have different connections."""
         try:
             db = self._idle.pop()
         except IndexError:
@@ -84,13 +84,13 @@ class Database:
         db = sqlite3.connect(self._file, timeout=30.0, isolation_level=None, check_same_thread=False)
         db.row_factory = sqlite3.Row
         db.execute("PRAGMA foreign_keys = ON")
-        # An accepted job outlives a power failure.
+        # An accepted job survives a power failure.
         db.execute("PRAGMA synchronous = FULL")
         return db
 
     @contextmanager
     def change(self) -> Iterator[sqlite3.Connection]:
-        """A transaction: all or nothing of the block is kept."""
+        """A transaction: all changes of the block are kept, or none."""
         with self.read() as db:
             db.execute("BEGIN IMMEDIATE")
             try:

@@ -1,8 +1,8 @@
-"""How far a job is, as server-sent events: each has a number, and a client that comes back goes on after the
-last one that it had (`Last-Event-ID`).
+"""The progress of a job as server-sent events; a client that connects again gets the events after the last
+one that it had (`Last-Event-ID`).
 
-`state` events have {"state": …}, `progress` events {"stage": …, "part": …, "done": …}, the
-parts of the stage and of the whole job that are done, 0 to 1. The stream ends with the job.
+`state` events have {"state": …}; `progress` events have {"stage": …, "part": …, "done": …}, where `part` of
+the stage and `done` of the whole job are from 0 to 1. The stream ends with the job.
 """
 
 from __future__ import annotations
@@ -16,23 +16,23 @@ from feedplan.service.refusals import Refusal
 from feedplan.service.store import ENDED, Store
 
 MEDIA_TYPE = "text/event-stream"
-# A comment is sent so often [s] where nothing happens, so that proxies keep the line open.
+# Longest time without an event [s]: then a comment is sent, so that proxies keep the connection open.
 HEARTBEAT = 15.0
 
 
 class Bell:
-    """Wakes those who wait for changes of a job; rung from any thread."""
+    """Wakes the streams that wait for changes of a job; `ring` may be called from any thread."""
 
     def __init__(self) -> None:
         self._waiting: defaultdict[str, set[asyncio.Event]] = defaultdict(set)
         self._loop: asyncio.AbstractEventLoop | None = None
 
     def attach(self, loop: asyncio.AbstractEventLoop | None) -> None:
-        """The loop that those who wait are in; None: nobody waits any more."""
+        """Sets the event loop of the streams; None when the application ends."""
         self._loop = loop
 
     def ring(self, job: str) -> None:
-        """The job has changed."""
+        """Wakes the streams of a job."""
         loop = self._loop
         if loop is not None and not loop.is_closed():
             loop.call_soon_threadsafe(self._wake, job)
@@ -42,7 +42,7 @@ class Bell:
             event.set()
 
     async def changes(self, job: str) -> AsyncGenerator[bool, None]:
-        """At once and after each change of the job; False where nothing happened for a while."""
+        """Yields at once and after each change of the job; False after HEARTBEAT without a change."""
         event = asyncio.Event()
         self._waiting[job].add(event)
         try:
@@ -61,7 +61,7 @@ class Bell:
 
 
 async def stream(store: Store, bell: Bell, job: str, after: int) -> AsyncIterator[str]:
-    """The events of a job after the one of that number, as text, until the job has ended or is deleted."""
+    """The events of a job after the event `after`, as text, until the job has ended or is deleted."""
     yield "retry: 1000\n\n"
     async with aclosing(bell.changes(job)) as changes:
         async for changed in changes:
@@ -69,7 +69,7 @@ async def stream(store: Store, bell: Bell, job: str, after: int) -> AsyncIterato
                 yield ": still there\n\n"
                 continue
             try:
-                # The state is read before the events: those of an end are there when the state is.
+                # The state is read before the events, so that after the end of the job no event is missed.
                 state = (await asyncio.to_thread(store.job, job))["state"]
             except Refusal:
                 return

@@ -20,7 +20,7 @@ _MEDIA_TYPES = {".npz": "application/zip"}
 
 
 def formats() -> tuple[FormatName, ...]:
-    """The formats of setpoints: rows of others are laid out from the plan itself."""
+    """The formats of setpoints; formats of knots need the plan itself and are left out."""
     return tuple(name for name in outputs.formats() if format_named(name).ROWS == SETPOINTS)
 
 
@@ -38,10 +38,10 @@ def setpoints_file(
     start: float | None,
     end: float | None,
 ) -> tuple[FilePath, bool]:
-    """A file of the setpoints of a job from `start` to `end` [s] of some `axes` (none: all).
+    """A file of the setpoints of a job from `start` to `end` [s] of some `axes` (empty: all).
 
-    The flag says whether it was made for this, in a folder of its own below `new`, and is to be removed.
-    Raises Refusal where there are no such axes or times.
+    The flag is true if the file is a new one, in a folder of its own below `new`, which the caller removes.
+    Raises Refusal for axes or times that the plan does not have.
     """
     stored = result / npz.FILE
     if format_name == "npz" and not axes and start is None and end is None:

@@ -1,4 +1,4 @@
-"""The page that people use: one document, one style and one script, built in and served from here."""
+"""The page that people use: one document, one style and one script, served by the service itself."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fastapi.responses import HTMLResponse, Response
 
 from feedplan.report.page import SCRIPT, STYLE, asset, missing_pictures
 
-# What has no secrets and so needs no token: the page asks for it.
+# These need no token: they have no secrets, and the page itself asks for the token.
 ADDRESSES = ("/", "/page.css", "/page.js")
 _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src data: blob:; "

@@ -1,11 +1,11 @@
-"""What stands before all addresses: who asks, from where and how much, all before a body is read.
+"""Checks every request before its body is read.
 
-- `Host` must be a name of this service: a page elsewhere whose name was pointed at it (DNS rebinding) has
-  another. Addresses in numbers are always good, for no page has such a name unless it is from here.
-- `Origin`, which browsers send with what a page asks for, must be the service itself.
-- The token, where there is one, comes as `Authorization: Bearer TOKEN`, or as the password of Basic, which
+- `Host` must be a name of this service; a foreign page whose name was pointed at the service (DNS rebinding)
+  sends another name. Numeric addresses are allowed, because a foreign page cannot have them.
+- `Origin`, which browsers send with requests of a page, must be the service itself.
+- The token, if there is one, comes as `Authorization: Bearer TOKEN`, or as the password of Basic, which
   browsers ask their users for.
-- The body is as long as `max_upload` at most, and arrives within `max_upload_time`.
+- The body has at most `max_upload`, and arrives within `max_upload_time`.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ Receive = Callable[[], Awaitable[Message]]
 Send = Callable[[Message], Awaitable[None]]
 App = Callable[[Message, Receive, Send], Awaitable[None]]
 
-# Whether the service works may be asked without a token, and the page itself, which then asks for it.
+# Addresses without a token: the health of the service, and the page, which asks for the token.
 OPEN = ("/v1/health", *front.ADDRESSES)
-# No answer is kept by others, guessed at, or put into the page of somebody else.
+# No answer is cached, its type is not guessed, and no other page embeds it.
 _HEADERS = (
     (b"cache-control", b"no-store"),
     (b"x-content-type-options", b"nosniff"),
@@ -40,7 +40,8 @@ _HEADERS = (
 
 
 class Guard:
-    """An ASGI application before `app`; `hosts` are the names of the service, `token` its users have."""
+    """An ASGI application around `app`; `hosts` are the names of the service, `token` is its token or
+    None."""
 
     def __init__(self, app: App, limits: Limits, hosts: Collection[str], token: str | None) -> None:
         self._app, self._limits = app, limits
@@ -52,7 +53,7 @@ class Guard:
             await self._app(scope, receive, send)
             return
         if scope["type"] != "http":
-            return  # nothing here talks WebSocket: the server refuses it
+            return  # the server refuses WebSocket connections
         begun = False
 
         async def answer(message: Message) -> None:
@@ -115,13 +116,13 @@ class Guard:
         return Refusal(TOO_LARGE, said, limit=self._limits.named_in(said))
 
     def _counted(self, receive: Receive) -> Receive:
-        """The same, up to the greatest length, and in time."""
+        """The same messages; raises Refusal if the body is too long or too late."""
         received, whole = 0, False
         end: float | None = None
 
         async def part() -> Message:
             nonlocal received, whole, end
-            if whole:  # what is left to come is the end of the line
+            if whole:  # only the end of the connection can follow
                 return await receive()
             loop = asyncio.get_running_loop()
             end = loop.time() + self._limits.max_upload_time if end is None else end
@@ -143,7 +144,7 @@ class Guard:
 
 
 def _single(headers: list[tuple[bytes, bytes]]) -> dict[bytes, bytes]:
-    """The headers by name. Raises Refusal where one that is judged comes twice."""
+    """The headers by name. Raises Refusal if a header that is checked comes twice."""
     found: dict[bytes, bytes] = {}
     for name, value in headers:
         if name in found and name in (b"host", b"origin", b"authorization", b"content-length"):
@@ -167,7 +168,7 @@ def _is_address(name: str) -> bool:
 
 
 async def _refuse(refusal: Refusal, send: Send) -> None:
-    """Answers with the problem. The line is closed, since the body may still be on its way."""
+    """Answers with the problem, and closes the connection: the rest of the body is not read."""
     headers = [(b"content-type", MEDIA_TYPE.encode()), (b"connection", b"close")]
     if refusal.kind is TOKEN:
         headers.append((b"www-authenticate", b'Basic realm="feedplan", charset="UTF-8"'))

@@ -1,4 +1,4 @@
-"""What the service takes at most: every limit has the name that its errors and its option have."""
+"""The limits of the service; errors and command-line options use the same names."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from typing import Any
 MB = 1_000_000
 
 
-def _limit(default: float, unit: str, told: str, least: float) -> Any:
-    return field(default=default, metadata={"unit": unit, "told": told, "least": least})
+def _limit(default: float, unit: str, help: str, least: float) -> Any:
+    return field(default=default, metadata={"unit": unit, "help": help, "least": least})
 
 
 @dataclass(frozen=True)
 class Limits:
-    """The limits of a service; each is of the type of its default."""
+    """The limits of a service; the type of each is that of its default."""
 
-    max_upload: float = _limit(256.0, "MB", "Size of a request, and so of a program.", 0.001)
-    max_upload_time: float = _limit(300.0, "s", "Time in which a request has arrived as a whole.", 0.01)
+    max_upload: float = _limit(256.0, "MB", "Size of a request, which contains the program.", 0.001)
+    max_upload_time: float = _limit(300.0, "s", "Time in which a whole request must arrive.", 0.01)
     max_blocks: int = _limit(5_000_000, "lines", "Lines of a program.", 1)
-    max_moves: int = _limit(10_000_000, "moves", "Moves of a program, its loops and calls run.", 1)
+    max_moves: int = _limit(10_000_000, "moves", "Moves of a program, with those of its loops and calls.", 1)
     max_setpoints: int = _limit(20_000_000, "setpoints", "Setpoints of a plan.", 1)
     max_time: float = _limit(600.0, "s", "Time that a job may run.", 0.01)
     max_memory: float = _limit(4000.0, "MB", "Memory of the process that a job runs in.", 1.0)
@@ -31,13 +31,13 @@ class Limits:
     workers: int = _limit(min(4, os.cpu_count() or 1), "processes", "Jobs that run at a time.", 1)
 
     def named_in(self, sentence: str) -> dict[str, Any] | None:
-        """The limit that a sentence names: its name, value and unit; None where there is none."""
+        """Name, value and unit of the limit that a sentence names; None if it names none."""
         for own in fields(self):
             if re.search(rf"\b{own.name}\b", sentence):
                 return {"name": own.name, "value": getattr(self, own.name), "unit": own.metadata["unit"]}
         return None
 
-    def told(self) -> dict[str, dict[str, Any]]:
+    def to_json(self) -> dict[str, dict[str, Any]]:
         """All limits with their values and units."""
         return {
             own.name: {"value": value, "unit": own.metadata["unit"]}

@@ -1,4 +1,4 @@
-"""What the OpenAPI document says beside what FastAPI finds in the code: forms, problems and examples."""
+"""Adds to the OpenAPI document what FastAPI does not find in the code: forms, problems and examples."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from feedplan.service.refusals import MEDIA_TYPE
 from feedplan.service.requests import JobRequest
 
 DESCRIPTION = """\
-Time-optimal feed planning for CNC part programs. A program and a machine go to `POST /v1/jobs`; the job that
-comes back is followed by its events until it is done, and its results are below its address.
+Time-optimal feed planning for CNC part programs. Send a program and a machine to `POST /v1/jobs`; follow the
+events of the job in the answer until it is done; its results are below its address.
 
 Millimetres, degrees and seconds throughout. Errors are problems (RFC 9457) with `file`, `line`, `limit` and
-`remedy`. Where the service has a token it comes as `Authorization: Bearer TOKEN`.
+`remedy`. If the service has a token, send it as `Authorization: Bearer TOKEN`.
 """
 BINARY = {"type": "string", "format": "binary"}
 EVENTS: dict[str, Any] = {
     "example": 'id: 3\nevent: progress\ndata: {"stage": "plan", "part": 0.5, "done": 0.42}\n\n',
 }
-# Any request may be answered by these, before its body is read.
+# The guard may answer any request with these.
 _ALWAYS = (401, 403, 408, 413)
 _PROGRAM = "G21 G90 G64 P0.01\nF1200\nG1 X10 Y5\nX20 Y0\nM2\n"
 _EXAMPLE = {
@@ -60,7 +60,7 @@ SUBMISSION: dict[str, Any] = {
                     "properties": {
                         "program": {
                             **BINARY,
-                            "description": "The program as a file; its name is that of the job",
+                            "description": "The program as a file; the job gets the file's name",
                         },
                         "name": _TEXT,
                         "machine": {
@@ -92,17 +92,17 @@ MACHINE: dict[str, Any] = {
 
 
 def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
-    """Answers that are problems."""
+    """Documents the answers of these statuses as problems."""
     return {status: {"model": Problem} for status in statuses}
 
 
 def content(media_type: str, schema: dict[str, Any], told: str) -> dict[str, Any]:
-    """An answer that is not JSON of a model."""
+    """Documents an answer that is not JSON of a model."""
     return {"content": {media_type: {"schema": schema}}, "description": told}
 
 
 def contents(media_types: Iterable[str]) -> dict[str, Any]:
-    """An answer that is a file of one of these types."""
+    """Documents an answer that is a file of one of these types."""
     return {
         "content": {
             media_type: {"schema": {"type": "object"} if media_type == "application/json" else BINARY}
@@ -113,7 +113,7 @@ def contents(media_types: Iterable[str]) -> dict[str, Any]:
 
 
 def complete(app: FastAPI) -> None:
-    """Problems get their media type, and every operation those that the guard answers with."""
+    """Sets the media type of problems, and adds the guard's answers to every operation."""
     generate = app.openapi
 
     def document() -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The documentation as one page without scripts, made from the OpenAPI document: it needs no network."""
+"""The documentation as one page without scripts, made from the OpenAPI document."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def _operation(verb: str, address: str, operation: Mapping[str, Any]) -> str:
 
 
 def _type(schema: Mapping[str, Any]) -> str:
-    """A type in a word or two, with a link to its table."""
+    """A type in a few words, with a link to its table."""
     if "$ref" in schema:
         name = escape(schema["$ref"].rpartition("/")[2])
         return f'<a href="#{name}">{name}</a>'

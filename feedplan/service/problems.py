@@ -1,4 +1,4 @@
-"""What goes wrong while a request is answered, as problems: no answer of the service is anything else."""
+"""Turns every error during a request into an answer that is a problem (RFC 9457)."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from feedplan.service.requests import sentence_of
 
 
 def add_handlers(app: FastAPI) -> None:
-    """Every error has its answer; those that nobody meant are told to who runs the service as well."""
+    """Adds an answer for every error; unexpected errors also go to the log of the service."""
 
     @app.exception_handler(Refusal)
     async def refused(_: Request, refusal: Refusal) -> Response:
@@ -54,7 +54,7 @@ def add_handlers(app: FastAPI) -> None:
 
     @app.exception_handler(ClientDisconnect)
     async def left(_: Request, error: Exception) -> Response:
-        return Response(status_code=400)  # nobody is there to read it
+        return Response(status_code=400)  # the client is gone
 
     @app.exception_handler(FileNotFoundError)
     async def gone(_: Request, error: Exception) -> Response:

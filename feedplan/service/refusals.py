@@ -1,6 +1,6 @@
-"""What the service refuses, and how jobs fail: one sentence as a problem of RFC 9457.
+"""Refused requests and failed jobs as problems of RFC 9457.
 
-The sentence ends with the remedy, as all errors of feedplan do: `place: what is wrong: remedy`.
+The sentence of a problem ends with the remedy, as all errors of feedplan do: `place: what is wrong: remedy`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ TYPE = "urn:feedplan:"
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of problem: the end of its type, its status and what it is in words."""
+    """A kind of problem: the end of its type, its HTTP status and its title."""
 
     name: str
     status: int
@@ -46,7 +46,7 @@ WORKER = Kind("worker", 500, "The process of the job ended")
 CANCELLED = Kind("cancelled", 409, "The job was cancelled")
 DEFECT = Kind("defect", 500, "A defect in feedplan")
 
-# By the kind of failure of a job.
+# The kind of problem for each kind of failure of a job.
 KINDS: dict[outcome.Kind, Kind] = {
     "program": PROGRAM,
     "machine": MACHINE,
@@ -64,7 +64,7 @@ KINDS: dict[outcome.Kind, Kind] = {
 class Refusal(Exception):  # noqa: N818 (it is an answer)
     """A request that is refused, or the reason why a job has no plan.
 
-    `detail` is the sentence; `file` and `line` are the place in the program, `limit` the limit of the service
+    `detail` is the sentence; `file` and `line` locate it in the program; `limit` is the limit of the service
     that it names, with value and unit.
     """
 
@@ -81,7 +81,7 @@ class Refusal(Exception):  # noqa: N818 (it is an answer)
         self.kind, self.detail, self.file, self.line, self.limit = kind, detail, file, line, limit
 
     def to_json(self) -> dict[str, Any]:
-        """The members of the problem; those that say nothing are None."""
+        """The members of the problem; unknown ones are None."""
         what, _, remedy = self.detail.rpartition(": ")
         return {
             "type": TYPE + self.kind.name,

@@ -1,4 +1,4 @@
-"""What a client sends to have a program planned, as JSON or as a form, and what makes two requests equal."""
+"""Checks a request to plan a program, as JSON or as a form, and makes the fingerprint of equal requests."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from feedplan.service.limits import Limits
 from feedplan.service.refusals import INPUT, LIMIT, MACHINE, Refusal, kind_of
 from feedplan.setpoints import Interpolator
 
-# Names stand in messages and reports; no file is called by them.
+# Longest name of a program. Messages and reports show names; no file is named by them.
 LONGEST_NAME = 120
-# Keywords of `read_program`; the others are of `plan`.
+# Options that are keywords of `read_program`; the other options are keywords of `plan`.
 READING = ("block_delete", "whole_step")
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-# What methods check themselves: numbers, names, lists of numbers.
+# Values of options that the methods check themselves.
 Value = (
     bool
     | int
@@ -44,7 +44,7 @@ _STRICT = ConfigDict(extra="forbid", strict=True)
 
 
 class CommonOptions(BaseModel):
-    """The options of `feedplan.plan`, and how the program is read; each method takes some more."""
+    """Options of reading and planning; each method takes some more."""
 
     model_config = _STRICT
 
@@ -61,9 +61,7 @@ class CommonOptions(BaseModel):
         default=None, description="The controller of today: its name, or a table as in a machine file"
     )
     block_delete: bool | None = Field(default=None, description="Leave out blocks that start with /")
-    whole_step: Positive | None = Field(
-        default=None, description="What lengths without a decimal point count"
-    )
+    whole_step: Positive | None = Field(default=None, description="Unit of lengths without a decimal point")
 
 
 def _of_methods() -> dict[str, Any]:
@@ -85,12 +83,12 @@ else:
 
 
 class PlanRequest(BaseModel):
-    """How a program is to be planned."""
+    """Machine, method and options for planning a program."""
 
     model_config = _STRICT
 
     name: str = Field(
-        "", max_length=LONGEST_NAME, description="Name of the program; its ending tells the language"
+        "", max_length=LONGEST_NAME, description="Name of the program; its ending decides the language"
     )
     machine: str = Field(
         default="mill", description="A bundled machine, auto, or the text of a machine file (TOML)"
@@ -103,13 +101,13 @@ class PlanRequest(BaseModel):
 
 
 class JobRequest(PlanRequest):
-    """A program and how it is to be planned."""
+    """A program, with machine, method and options."""
 
     program: str | dict[str, Any] = Field(description="G-code, a drawing (DXF), or a path file as an object")
 
 
 class LimitChange(BaseModel):
-    """Limits of an axis that take the place of those in a machine file."""
+    """Limits of an axis that replace those in a machine file."""
 
     model_config = _STRICT
 
@@ -117,7 +115,7 @@ class LimitChange(BaseModel):
         default=None, description="One number, or the least and the greatest"
     )
     max_acceleration: float | list[float] | None = None
-    max_jerk: float | None = Field(default=None, description="null: none")
+    max_jerk: float | None = Field(default=None, description="null: no limit")
 
     def on(self, axis: Axis) -> Axis:
         """The axis with these limits. Raises MachineError."""
@@ -128,7 +126,7 @@ class LimitChange(BaseModel):
 
 
 class MachineRequest(BaseModel):
-    """A machine to be understood, with other limits where these are given."""
+    """A machine, and limits that replace some of its own."""
 
     model_config = _STRICT
 
@@ -137,7 +135,7 @@ class MachineRequest(BaseModel):
 
 
 def machine_of(request: MachineRequest) -> Machine:
-    """The machine with its limits. Raises Refusal."""
+    """The machine with the changed limits. Raises Refusal."""
     try:
         known = _machine(request.machine)
         names = [axis.name for axis in known.axes]
@@ -156,8 +154,8 @@ def machine_of(request: MachineRequest) -> Machine:
 
 @dataclass(frozen=True)
 class Order:
-    """A request that was found good: the `name` of the program, the whole text of the `machine`, or `auto`,
-    and its name, the `method`, the `options` that are given, the text of the `tool_table`."""
+    """A checked request: `name` of the program, whole text of the `machine` (or `auto`) and its name,
+    `method`, the given `options`, text of the `tool_table`."""
 
     name: str
     machine: str
@@ -167,7 +165,7 @@ class Order:
     tool_table: str | None
 
     def fingerprint(self, program_sha256: str) -> str:
-        """The same for requests with the same plan, by the same feedplan."""
+        """A hash that is equal for requests with equal plans by the same version of feedplan."""
         parts = [
             __version__,
             program_sha256,
@@ -181,7 +179,7 @@ class Order:
 
 
 def order_of(request: PlanRequest, limits: Limits) -> Order:
-    """The request, checked as far as it can be without reading its program. Raises Refusal."""
+    """The request, checked without reading its program. Raises Refusal."""
     options = request.options.model_dump(exclude_none=True)
     asked = options.get("max_setpoints", 1)
     if asked > limits.max_setpoints:
@@ -198,7 +196,7 @@ def order_of(request: PlanRequest, limits: Limits) -> Order:
 
 
 def _text_of(given: str) -> tuple[str, str]:
-    """The whole text of a machine, or `auto`, and its name."""
+    """The whole text of a machine (or `auto`), and its name."""
     if given == AUTO:
         return AUTO, AUTO
     machine = _machine(given, AUTO)
@@ -206,8 +204,8 @@ def _text_of(given: str) -> tuple[str, str]:
 
 
 def _machine(given: str, *others: str) -> Machine:
-    """A bundled machine, or that of a text; `others` may be given in its place elsewhere. No file is read for
-    what a client says."""
+    """The bundled machine of that name, or the machine of a text. Names in `others` are valid in other
+    requests. The service reads no file that a client names."""
     if given in bundled_machines():
         return Machine.load(given)
     if "=" in given:
@@ -219,18 +217,18 @@ def _machine(given: str, *others: str) -> Machine:
 
 
 def _title(given: str) -> str:
-    """The last part of a name, of printable characters; empty where nothing is left."""
+    """The printable characters of the last part of a name; may be empty."""
     name = PurePosixPath(given.replace("\\", "/")).name
     return "".join(letter for letter in name if letter.isprintable()).strip()
 
 
 def over(limits: Limits, sentence: str) -> Refusal:
-    """The refusal of what is more than a limit that the sentence names."""
+    """The refusal of a request that exceeds the limit in the sentence."""
     return Refusal(LIMIT, sentence, limit=limits.named_in(sentence))
 
 
 def parsed(model: type[Model], text: bytes | str) -> Model:
-    """A model from JSON. Raises Refusal with the first place that is wrong."""
+    """A model from JSON. Raises Refusal for the first member that is wrong."""
     try:
         return model.model_validate_json(text)
     except ValidationError as error:
@@ -238,7 +236,7 @@ def parsed(model: type[Model], text: bytes | str) -> Model:
 
 
 def sentence_of(error: Any) -> str:
-    """What pydantic says of one place, as one sentence."""
-    place = ".".join(str(part)[:60] for part in error["loc"]) or "the request"
+    """An error of pydantic as one sentence."""
+    member = ".".join(str(part)[:60] for part in error["loc"]) or "the request"
     said = str(error["msg"])[:160]
-    return f"{place}: {said[:1].lower()}{said[1:]}: correct it as the documentation at /docs tells"
+    return f"{member}: {said[:1].lower()}{said[1:]}: correct it as the documentation at /docs tells"

@@ -1,4 +1,4 @@
-"""Runs the jobs that wait in a place for jobs, as many as it has room for, and records their ends."""
+"""Runs waiting jobs on an executor, as many as it has slots for, and records their outcomes."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any
 
+from feedplan.jobs.executor import Executor
 from feedplan.jobs.order import Job, Order
 from feedplan.jobs.outcome import Failure, Outcome
-from feedplan.jobs.place import Place
 from feedplan.jobs.work import of_whole
 from feedplan.service.limits import Limits
 from feedplan.service.refusals import CANCELLED, DISK, KINDS, LIMIT, Refusal
 from feedplan.service.requests import READING
 from feedplan.service.store import Record, Store, sync
 
-# How often a place is asked for its room, and how long one that is gone is left alone [s].
+# Time between two requests for the number of slots, and pause after the executor was lost [s].
 EVERY, AWAY = 1.0, 2.0
-# How often old jobs are looked for [s].
+# Time between two searches for old jobs [s].
 KEEPING = 600.0
 
 
 class Runner:
-    """Runs the jobs of a store in a place until `stop`."""
+    """Runs the jobs of a store on an executor until `stop`."""
 
-    def __init__(self, store: Store, limits: Limits, place: Place) -> None:
-        self._store, self._limits, self._place = store, limits, place
+    def __init__(self, store: Store, limits: Limits, executor: Executor) -> None:
+        self._store, self._limits, self._executor = store, limits, executor
         self._wake = threading.Condition()
         self._end = threading.Event()
         self._running: dict[str, _Run] = {}
@@ -41,7 +41,7 @@ class Runner:
             thread.start()
 
     def stop(self) -> None:
-        """Ends; running jobs wait again."""
+        """Stops the running jobs, which wait again for the next server."""
         with self._wake:
             self._end.set()
             for run in self._running.values():
@@ -50,20 +50,20 @@ class Runner:
             self._wake.wait_for(lambda: not self._running)
         for thread in self._threads:
             thread.join()
-        self._place.close()
+        self._executor.close()
 
     def wake(self) -> None:
-        """A job waits."""
+        """Tells the runner that a job waits."""
         with self._wake:
             self._wake.notify_all()
 
     def cancel(self, job: str) -> None:
-        """Stops a job that waits or runs; others stay as they are. Raises Refusal where there is none."""
+        """Stops a job that waits or runs; other jobs do not change. Raises Refusal for an unknown job."""
         if not self._store.cancel_waiting(job):
             self._ask(job)
 
     def delete(self, job: str) -> None:
-        """Forgets a job, and stops it if it runs. Raises Refusal where there is none."""
+        """Deletes a job, and stops it if it runs. Raises Refusal for an unknown job."""
         self._store.delete(job)
         self._ask(job)
 
@@ -79,10 +79,10 @@ class Runner:
                 return
 
     def _hand_out(self) -> None:
-        """Starts a thread for each job, while there are some that wait and there is room."""
+        """Starts a thread for each waiting job while slots are free."""
         while not self._end.is_set():
             try:
-                room = self._place.slots()
+                room = self._executor.slots()
                 with self._wake:
                     if len(self._running) >= room or not self._start_one():
                         self._wake.wait(EVERY)
@@ -91,7 +91,7 @@ class Runner:
                 time.sleep(EVERY)
 
     def _start_one(self) -> bool:
-        # A job is among those running before anybody can see that it runs.
+        # Under the lock a job is added to the running ones before a client can see that it runs.
         record = None if self._end.is_set() else self._store.claim()
         if record is None:
             return False
@@ -101,9 +101,9 @@ class Runner:
 
     def _work_on(self, run: _Run, job: str) -> None:
         try:
-            if run.execute(self._place):
+            if run.execute(self._executor):
                 self._end.wait(AWAY)
-        except Exception:  # a full disk: what is not recorded the next server plans
+        except Exception:  # a full disk, for instance: the next server plans a job that is not recorded
             traceback.print_exc()
             self._end.wait(EVERY)
         finally:
@@ -121,23 +121,23 @@ class _Run:
         self._stop = threading.Event()
 
     def ask(self, why: str) -> None:
-        """Stop, since the job is `cancelled` or the server is `ending`."""
+        """Asks the job to stop because it is `cancelled` or the server is `ending`."""
         self._asked = self._asked or why
         self._stop.set()
 
-    def execute(self, place: Place) -> bool:
-        """Has the job planned and records what became of it; whether its place is gone."""
-        [outcome] = place.run([self._job()], self._told, self._stop)
+    def execute(self, executor: Executor) -> bool:
+        """Has the job planned and records its outcome; returns whether the executor was lost."""
+        [outcome] = executor.run([self._job()], self._report, self._stop)
         self._record_end(outcome)
         return outcome.state == "lost"
 
-    def _told(self, _: int, stage: str, part: float) -> None:
+    def _report(self, _: int, stage: str, part: float) -> None:
         self._store.progress(self._record, stage, part, of_whole(stage, part))
 
     @property
     def _options(self) -> dict[str, Any]:
         options: dict[str, Any] = json.loads(self._record["options"])
-        # What a client asks for is within the limit of the service.
+        # `order_of` has refused larger values of clients.
         options.setdefault("max_setpoints", self._limits.max_setpoints)
         return options
 
@@ -169,14 +169,14 @@ class _Run:
         elif self._asked == "ending" or (self._asked is None and outcome.failure is None):
             store.wait_again(record)
         elif self._asked == "cancelled":
-            told = Refusal(CANCELLED, "the job was cancelled while it ran: send it again").text()
-            store.finish(record, "cancelled", result=None, problem=told)
+            problem = Refusal(CANCELLED, "the job was cancelled while it ran: send it again").text()
+            store.finish(record, "cancelled", result=None, problem=problem)
         elif outcome.failure is not None:
             problem = self._refusal(outcome.failure).text()
             store.finish(record, "failed", result=None, problem=problem)
 
     def _refusal(self, failure: Failure) -> Refusal:
-        """The problem that a failure is, without the place of the store."""
+        """A failure as a problem, without the path of the store."""
         if failure.trace:
             print(failure.trace, file=sys.stderr, flush=True)
         if failure.kind == "disk":

@@ -1,4 +1,4 @@
-"""Starts the service: looks at where it binds, who may use it, and hands over to uvicorn."""
+"""Starts the service: checks its address and token, and runs uvicorn."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ import uvicorn
 from feedplan.client.token import read_token
 from feedplan.errors import InputError
 from feedplan.jobs.address import ClusterAddress, is_address, is_loopback
-from feedplan.jobs.place import JobLimits, Place
+from feedplan.jobs.executor import Executor, JobLimits
 from feedplan.jobs.processes import Processes
 from feedplan.service.app import create
 from feedplan.service.guard import Guard
 from feedplan.service.limits import Limits
 
-# How long answers may go on when the service is told to end [s].
+# Time for answers to finish when the service is told to end [s].
 ENDING = 3
 
 
@@ -33,10 +33,10 @@ def serve(
     cluster: ClusterAddress | None,
     ready: Callable[[str], None],
 ) -> None:
-    """Runs the service until it is told to end by a signal; its jobs run on a cluster, or in processes here.
+    """Runs the service until a signal ends it; its jobs run on a cluster, or in processes of this computer.
 
-    `ready(address)` is called once it can be reached. Raises InputError where it may not bind there without a
-    token, or cannot, and where the token, the store or the cluster cannot be used.
+    `ready(address)` is called when the service can be reached. Raises InputError if the address needs a token
+    or cannot be used, and if the token, the store or the cluster cannot be used.
     """
     token = None if token_file is None else read_token(token_file)
     if token is None and not is_loopback(host):
@@ -44,11 +44,11 @@ def serve(
             f"{host} can be reached from other computers and the service has no token: "
             "give --token-file FILE, or --host 127.0.0.1"
         )
-    # What is wrong with a form is told to who sent it.
+    # Errors in a form go to its sender, not to the log.
     logging.getLogger("python_multipart").setLevel(logging.CRITICAL)
     bound = _bound(host, port)
     with bound:
-        app = create(store, limits, _place(cluster, limits))
+        app = create(store, limits, _executor(cluster, limits))
         names = {"localhost", socket.gethostname(), *allowed_hosts, *([] if is_address(host) else [host])}
         config = uvicorn.Config(
             Guard(app, limits, names, token),
@@ -64,11 +64,11 @@ def serve(
         )
         shown = f"[{host}]" if ":" in host else host
         ready(f"http://{shown}:{bound.getsockname()[1]}")
-        with suppress(KeyboardInterrupt):  # Ctrl-C is how it ends
+        with suppress(KeyboardInterrupt):  # Ctrl-C ends the service
             uvicorn.Server(config).run(sockets=[bound])
 
 
-def _place(cluster: ClusterAddress | None, limits: Limits) -> Place:
+def _executor(cluster: ClusterAddress | None, limits: Limits) -> Executor:
     of_jobs = JobLimits(limits.max_time, limits.max_memory)
     if cluster is None:
         return Processes(limits.workers, of_jobs)
@@ -81,8 +81,9 @@ def _bound(host: str, port: int) -> socket.socket:
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
         bound = socket.create_server((host, port), family=family)
-        # Lines inherit it. asyncio sets it for sockets that name their protocol alone; without it the second
-        # part of an answer on a line that is kept open waits 40 ms for the client's word of the first.
+        # Connections inherit this option. asyncio sets it only for sockets that name their protocol. Without
+        # it the second part of an answer on a kept connection waits 40 ms for the client's acknowledgement of
+        # the first.
         bound.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         return bound
     except (OSError, UnicodeError) as error:

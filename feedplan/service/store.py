@@ -1,16 +1,16 @@
-"""Where jobs are kept: records in SQLite, programs and results in one folder a job.
+"""The jobs on the disk: records in SQLite, programs and results in one folder for each job.
 
-    STORE/jobs.sqlite            the records; what they do not name does not exist
-    STORE/lock                   held by the server that works on the store
-    STORE/new/                   what is being received or cut; emptied at the start
+    STORE/jobs.sqlite            the records; files without a record are not part of the store
+    STORE/lock                   held by the server that uses the store
+    STORE/new/                   files that are being received or made; emptied at the start
     STORE/jobs/ID/program        the program as it was sent
     STORE/jobs/ID/tools.tbl      its tool table
-    STORE/jobs/ID/result-N/      what the N-th attempt has planned, as `feedplan plan -o` writes it
+    STORE/jobs/ID/result-N/      the plan of the N-th attempt, as `feedplan plan -o` writes it
 
-A job is accepted by the transaction that adds its record, after its files are on the disk; it is done by the
-transaction that sets its state, after the result has its name. Whatever ends a server in between leaves files
-that no record names, which the next one removes. A running job of a server that ended waits again, and its
-next attempt has a folder of its own: a worker that was left over cannot touch it.
+The transaction that adds a record accepts a job, after its files are on the disk; the transaction that sets
+the state ends it, after the result has its name. If a server ends in between, files without a record are
+left, and the next server removes them. A running job of a server that ended waits again; its next attempt has
+a new folder, so that a worker left from before cannot change it.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ from feedplan.service.limits import MB, Limits
 from feedplan.service.refusals import BUSY, CANCELLED, DISK, INPUT, UNKNOWN, Refusal
 
 ENDED = ("done", "failed", "cancelled")
-# What a job takes besides its files [bytes]: its record and events.
+# Size of a job's record and events, besides its files [bytes].
 RECORD = 16_384
 
 
 @dataclass(frozen=True)
 class Upload:
-    """A program that was received: its `file` below `new`, `sha256`, `bytes` and `lines`."""
+    """A received program: its `file` below `new`, `sha256`, `bytes` and `lines`."""
 
     file: FilePath
     sha256: str
@@ -49,7 +49,7 @@ class Upload:
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened to a job: the `number`-th, from 1, of a `kind`, with `data` as JSON."""
+    """Event `number` of a job, from 1: its `kind`, and `data` as JSON."""
 
     number: int
     kind: str
@@ -62,8 +62,8 @@ Record = Mapping[str, Any]
 class Store:
     """The jobs of a service; all methods may be called from any thread.
 
-    `changed(job)` is called after each change of a job. Raises InputError where the folder cannot be used or
-    another server has it.
+    `changed(job)` is called after each change of a job. Raises InputError if the folder cannot be used or
+    another server uses it.
     """
 
     def __init__(
@@ -94,12 +94,12 @@ class Store:
         self._tidy()
 
     def close(self) -> None:
-        """Nothing is called any more."""
+        """Closes the store; no method may be called after it."""
         self._database.close()
         os.close(self._lock)
 
     def _tidy(self) -> None:
-        """Puts right what a server that ended has left."""
+        """Removes the files and resets the states that a server left when it ended."""
         for left in self.new.iterdir():
             _remove(left)
         with self._database.change() as db:
@@ -119,7 +119,7 @@ class Store:
     # What is asked for.
 
     def job(self, job: str) -> Record:
-        """The record of a job. Raises Refusal where there is none."""
+        """The record of a job. Raises Refusal for an unknown job."""
         with self._database.read() as db:
             row = db.execute("SELECT * FROM jobs WHERE id = ?", (job,)).fetchone()
         if row is None:
@@ -127,7 +127,7 @@ class Store:
         return dict(row)
 
     def jobs(self, state: str | None, before: int | None, count: int) -> list[Record]:
-        """Records of jobs, the newest first: those in a state, older than the one of the number `before`."""
+        """Records of jobs in a state (None: any) that are older than number `before`, the newest first."""
         where = "WHERE (? IS NULL OR state = ?) AND (? IS NULL OR number < ?)"
         asked = (state, state, before, before, count)
         with self._database.read() as db:
@@ -135,13 +135,13 @@ class Store:
             return [dict(row) for row in rows]
 
     def counts(self) -> dict[str, int]:
-        """How many jobs are in each state."""
+        """The number of jobs in each state."""
         with self._database.read() as db:
             rows = db.execute("SELECT state, COUNT(*) AS count FROM jobs GROUP BY state")
             return {row["state"]: row["count"] for row in rows}
 
     def events(self, job: str, after: int) -> list[Event]:
-        """What happened to a job after the event of that number."""
+        """The events of a job after the event of that number."""
         query = "SELECT number, kind, data FROM events WHERE job = ? AND number > ? ORDER BY number"
         with self._database.read() as db:
             return [Event(*row) for row in db.execute(query, (job, after))]
@@ -151,7 +151,7 @@ class Store:
         return self._jobs / str(record["id"])
 
     def result(self, record: Record) -> FilePath:
-        """The folder of what the last attempt of a job has planned."""
+        """The folder of the plan of a job's last attempt."""
         return self.folder(record) / f"result-{record['attempt']}"
 
     # What happens to jobs.
@@ -169,17 +169,16 @@ class Store:
         tool_table: str | None = None,
         key: str | None = None,
     ) -> tuple[Record, bool]:
-        """The record of a new job, or of the one with the same fingerprint that has not failed.
+        """The record of a new job, or of a job with the same fingerprint that has not failed.
 
-        The flag says whether it is new. The same `key` always gives the same job.
-
-        Raises Refusal where the queue or the disk is full, or the key was used for something else.
+        The flag is true for a new job. The same `key` always gives the same job. Raises Refusal if the queue
+        or the disk is full, or if the key was used for another request.
         """
         if key is None:
             with self._database.read() as db:
                 known = self._known(db, fingerprint, key)
             if known is not None:
-                return self.job(known), False  # nothing is to be written
+                return self.job(known), False
         job = secrets.token_hex(16)
         folder = self._jobs / job
         folder.mkdir(mode=0o700)
@@ -229,7 +228,7 @@ class Store:
         return self.job(known), accepted
 
     def _known(self, db: sqlite3.Connection, fingerprint: str, key: str | None) -> str | None:
-        """The job that a request has already."""
+        """The job of an earlier, equal request, or None."""
         row = None if key is None else db.execute("SELECT * FROM keys WHERE key = ?", (key,)).fetchone()
         if row is not None:
             if row["fingerprint"] != fingerprint:
@@ -256,7 +255,7 @@ class Store:
             raise Refusal(DISK, said, limit=limits.named_in(said))
 
     def claim(self) -> Record | None:
-        """The job that waits longest, which runs from now on; None where none waits."""
+        """Sets the job that has waited longest to running and returns it; None if no job waits."""
         with self._database.change() as db:
             row = db.execute("SELECT id FROM jobs WHERE state = 'queued' ORDER BY number LIMIT 1").fetchone()
             if row is None:
@@ -272,7 +271,7 @@ class Store:
         return self.job(job)
 
     def progress(self, record: Record, stage: str, part: float, done: float) -> None:
-        """A running job is that far in a stage, and as a whole."""
+        """Records the progress of a running job: the part of the stage and of the whole that is done."""
         with self._database.change() as db:
             changed = db.execute(
                 "UPDATE jobs SET stage = ?, done = ? WHERE id = ? AND state = 'running' AND attempt = ?",
@@ -286,7 +285,7 @@ class Store:
     def finish(
         self, record: Record, state: str, *, result: Mapping[str, Any] | None, problem: str | None
     ) -> None:
-        """A running job has ended; without a result its folder has none."""
+        """Records the end of a running job; without a result its result folder is removed."""
         size = sum(file.stat().st_size for file in self.folder(record).rglob("*") if file.is_file())
         if result is None:
             _remove(self.result(record))
@@ -302,16 +301,16 @@ class Store:
             )
             if changed.rowcount:
                 _add_event(db, record["id"], "state", {"state": state})
-        if not changed.rowcount:  # deleted meanwhile
+        if not changed.rowcount:  # the job was deleted
             _remove(self.folder(record))
         self.changed(record["id"])
 
     def wait_again(self, record: Record) -> None:
-        """A running job waits again, since the server ends or the place it runs in is gone."""
+        """Sets a running job to waiting: the server ends, or the executor was lost."""
         _remove(self.result(record))
         with self._database.change() as db:
             known = self._wait_again(db, record["id"])
-        if not known:  # deleted meanwhile
+        if not known:  # the job was deleted
             _remove(self.folder(record))
         self.changed(record["id"])
 
@@ -327,7 +326,7 @@ class Store:
         return changed.rowcount > 0
 
     def cancel_waiting(self, job: str) -> bool:
-        """Cancels a job that waits; False for all others. Raises Refusal where there is none."""
+        """Cancels a job if it waits; else returns False. Raises Refusal for an unknown job."""
         self.job(job)
         told = Refusal(CANCELLED, "the job was cancelled before it ran: send it again").text()
         with self._database.change() as db:
@@ -342,8 +341,8 @@ class Store:
         return changed.rowcount > 0
 
     def delete(self, job: str) -> None:
-        """Forgets a job; of one that runs the folder is removed when its process has ended. Raises Refusal
-        where there is none."""
+        """Deletes a job; the folder of a running job is removed when its process has ended. Raises Refusal
+        for an unknown job."""
         record = self.job(job)
         with self._database.change() as db:
             row = db.execute("SELECT state FROM jobs WHERE id = ?", (job,)).fetchone()
@@ -353,7 +352,7 @@ class Store:
         self.changed(job)
 
     def delete_old(self) -> None:
-        """Forgets the jobs that ended longer ago than they are kept."""
+        """Deletes the jobs that ended more than `keep_days` ago."""
         last = time.time() - 86_400.0 * self._limits.keep_days
         with self._database.read() as db:
             rows = db.execute("SELECT id FROM jobs WHERE finished < ?", (last,)).fetchall()
@@ -369,24 +368,24 @@ def _add_event(db: sqlite3.Connection, job: str, kind: str, data: Mapping[str, A
     )
 
 
-def _remove(place: FilePath) -> None:
-    if place.is_dir():
-        shutil.rmtree(place, ignore_errors=True)
+def _remove(path: FilePath) -> None:
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
     else:
-        place.unlink(missing_ok=True)
+        path.unlink(missing_ok=True)
 
 
 def write_durably(file: FilePath, content: bytes) -> None:
-    """Writes a file that outlives a power failure once its folder is synced."""
+    """Writes a file that survives a power failure once its folder is synced."""
     with file.open("wb") as stream:
         stream.write(content)
         stream.flush()
         os.fsync(stream.fileno())
 
 
-def sync(place: FilePath) -> None:
-    """A file, or the names in a folder, outlive a power failure from here on."""
-    number = os.open(place, os.O_RDONLY)
+def sync(path: FilePath) -> None:
+    """Makes a file, or the names in a folder, survive a power failure from now on."""
+    number = os.open(path, os.O_RDONLY)
     try:
         os.fsync(number)
     finally:

@@ -1,4 +1,4 @@
-"""Receives what a client sends: a program onto the disk, and how it is to be planned."""
+"""Receives a request to plan: the program goes to a file, machine and options to memory."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from feedplan.service.refusals import INPUT, MEDIA, PROGRAM, Refusal
 from feedplan.service.requests import JobRequest, Options, PlanRequest, over, parsed
 from feedplan.service.store import Upload
 
-# Texts beside the program [bytes].
+# Longest text beside the program [bytes].
 LONGEST_TEXT = 1 << 20
 _PART = 1 << 20
 _FIELDS = ("name", "machine", "method", "options", "tool_table")
@@ -52,7 +52,7 @@ def _of_json(body: bytes, new: FilePath, limits: Limits) -> tuple[Upload, PlanRe
 def _path_file(table: dict[str, Any]) -> bytes:
     try:
         return json.dumps(table).encode()
-    except (ValueError, RecursionError):  # integers of thousands of digits
+    except (ValueError, RecursionError):  # ValueError for integers of thousands of digits too
         raise Refusal(INPUT, "program: it has numbers that no path file has: give finite ones") from None
 
 
@@ -94,7 +94,7 @@ def _text(field: str, value: UploadFile | str) -> str:
 
 
 def _stored(stream: IO[bytes], new: FilePath, limits: Limits) -> Upload:
-    """The content in a file of its own, hashed and counted on the way."""
+    """Writes the content to a file; computes its hash and counts its lines at the same time."""
     file = new / secrets.token_hex(16)
     sha256, size, lines, last = hashlib.sha256(), 0, 0, b"\n"
     try:

@@ -1,4 +1,4 @@
-"""What is told of jobs, machines and methods: records and files as the answers of the service."""
+"""Makes the answers of the service from records and files: jobs, comparisons, machines, controllers."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from feedplan.comparison import LIMITS
-from feedplan.files import SUMMARY_FILE
 from feedplan.machine.controller import Model
 from feedplan.machine.machine import Axis, Machine
+from feedplan.plan_folder import SUMMARY_FILE
 from feedplan.service.refusals import STATE, Refusal
 from feedplan.service.store import Record, Store
 
@@ -34,7 +34,7 @@ def job(record: Record) -> dict[str, Any]:
 
 
 def done(store: Store, name: str) -> FilePath:
-    """The folder of what a job has planned. Raises Refusal unless it is done, with why it failed."""
+    """The folder of a job's plan. Raises Refusal with the reason if the job is not done."""
     record = store.job(name)
     if record["state"] == "done":
         return store.result(record)
@@ -52,7 +52,7 @@ def summary(folder: FilePath) -> dict[str, Any]:
 
 
 def compared(store: Store, names: Sequence[str]) -> list[dict[str, Any]]:
-    """Jobs as rows of a comparison. Raises Refusal where there is none of a name."""
+    """Jobs as rows of a comparison. Raises Refusal for an unknown job."""
     return [_row(store, store.job(name)) for name in names]
 
 
@@ -77,7 +77,7 @@ def _row(store: Store, record: Record) -> dict[str, Any]:
 
 
 def _worst(checks: Any) -> dict[str, Any] | None:
-    """The check that uses its limit most: the only one, or one of those by axis."""
+    """The check of this name with the greatest use, over all axes."""
     if not isinstance(checks, dict):
         return None
     by_axis = {None: checks} if "ratio" in checks else checks

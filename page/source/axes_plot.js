@@ -1,4 +1,4 @@
-/* Speed, and velocity, acceleration and jerk of each axis over time with their limits: one chart a quantity. */
+/* Charts over time: speed, and velocity, acceleration and jerk of each axis with their limits. */
 
 import { greatest } from "./curve.js";
 import { shown } from "./numbers.js";
@@ -10,7 +10,7 @@ const PER = { velocity: "s", acceleration: "s²", jerk: "s³" };
 const HEIGHT = { speed: 120, others: 150 };
 
 export class AxesPlot {
-  /* `rows` are names of quantities; `relative`: in parts of the limits. */
+  /* `rows` are names of quantities; with `relative` values are drawn over their limits. */
   constructor(container, data, run, cursor, { rows = ["speed", "velocity", "acceleration", "jerk"], relative = false } = {}) {
     Object.assign(this, { data, run, rows, relative });
     this.tops = {};
@@ -31,7 +31,7 @@ export class AxesPlot {
     this.show();
   }
 
-  /* Buttons for units, and for parts of the limits. */
+  /* Buttons for units or percent of the limits. */
   scaling() {
     const buttons = choice({ units: "units", parts: "% of limit" }, "Scale", (name) => {
       this.relative = name === "parts";
@@ -54,7 +54,7 @@ export class AxesPlot {
     this.show();
   }
 
-  /* What is no limit of the method may have lone spikes; they run out of the chart rather than flatten it. */
+  /* A quantity that the method does not limit may have single high spikes: they are cut at the top of the chart. */
   #reach(name, curve, k) {
     const top = greatest(curve.y);
     if (this.data.judged.includes(name)) return top;
@@ -83,7 +83,7 @@ export class AxesPlot {
     const unit = inParts ? "%" : [...new Set(units)].map((own) => `${own}/${PER[name]}`).join(", ");
     const curves = known.map((k) => ({ name: axes[k], curve: time[name][k], colour: `--axis-${k % 9}`, scale: scales[k] }));
     const top = Math.max(0, ...known.map((k) => this.tops[name][k] * scales[k]));
-    // A limit far outside would squeeze the curves: it is named beside the chart and drawn only when near.
+    // A limit is drawn only if it is near the curves, so that they keep their scale; its value is beside the chart.
     const ends = [...limits, ...least].map((limit, n) => limit && limit * scales[n % limits.length]);
     const near = [...new Set(ends)].filter((value) => value && Math.abs(value) <= 2 * top);
     const lines = near.map((value) => {
@@ -96,7 +96,7 @@ export class AxesPlot {
   }
 }
 
-/* The limits of a quantity in words. */
+/* The limits of a quantity as text. */
 function told({ axes, units, limits, least }, name, isJudged) {
   const known = axes.flatMap((axis, k) => {
     const most = limits[name][k], low = least[name]?.[k];

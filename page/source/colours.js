@@ -1,5 +1,5 @@
-/* Scales of colours: viridis and cividis (matplotlib, both readable without red or green), and a set of eight
-   for kinds (Okabe and Ito 2008, then Tol's muted ones). */
+/* Colour scales: viridis and cividis (matplotlib, both readable without red or green), and a set of colours for
+   kinds (eight of Okabe and Ito 2008, then Tol's muted ones). */
 
 import { channels, isDark } from "./theme.js";
 
@@ -11,21 +11,21 @@ const listed = (text) => text.split(" ").map((colour) => channels(`#${colour}`))
 const SCALES = { viridis: listed(VIRIDIS), cividis: listed(CIVIDIS) };
 const kinds = listed(KINDS);
 
-/* The end that would vanish in the background is left out. */
+/* The end of a scale that is hardly visible on the background is left out. */
 const part = (at) => (isDark() ? 0.12 + 0.88 * at : 0.9 * at);
 
-/* Red, green and blue, 0 to 255, of a place from 0 to 1 on a scale. */
-export function mixed(scale, place) {
+/* Red, green and blue, 0 to 255, of a value from 0 to 1 on a scale. */
+export function mixed(scale, value) {
   const colours = SCALES[scale];
-  const at = part(Math.min(Math.max(place, 0), 1)) * (colours.length - 1);
+  const at = part(Math.min(Math.max(value, 0), 1)) * (colours.length - 1);
   const i = Math.min(Math.floor(at), colours.length - 2);
   return [0, 1, 2].map((k) => Math.round(colours[i][k] + (at - i) * (colours[i + 1][k] - colours[i][k])));
 }
 
-/* The colour of a kind by its number; the last of `count` kinds is that nothing is active, in grey. */
+/* The colour of a kind by its number; the last of `count` kinds, "no limit active", is grey. */
 export const kindColour = (k, count) => (k === count - 1 ? [140, 140, 140] : kinds[k % kinds.length]);
 
 export const css = ([r, g, b]) => `rgb(${r},${g},${b})`;
 
-/* A scale as a gradient of the style sheet. */
+/* A scale as a CSS gradient. */
 export const gradient = (scale) => `linear-gradient(90deg, ${[0, 0.25, 0.5, 0.75, 1].map((at) => css(mixed(scale, at))).join(", ")})`;

@@ -27,7 +27,7 @@ export function comparison(data) {
   });
   cursor.follow((time) => speed.point(time === null ? null : across === "time" ? time : runs[chosen].lengthAt(time)));
 
-  /* A rapid much faster than all cutting would flatten the rest: it runs out of the chart. */
+  /* The chart is scaled by the cutting speeds: much faster rapids are cut at its top. */
   const top = Math.max(...methods.map((method) => method.cutting_speed)) || 1;
   function drawSpeed() {
     const { unit } = methods[chosen];

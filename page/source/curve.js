@@ -1,15 +1,15 @@
-/* Curves of any number of points as the few numbers that a chart of some pixels shows. */
+/* Reduces a curve of any number of points to two values for each column of pixels. */
 
 import { lastUpTo } from "./numbers.js";
 
-/* What a curve { x, y, mean } shows from `from` to `to` in so many columns of pixels: two values a column, the
-   extremes in their order, so that no peak vanishes. Where the curve goes up and down more often than there are
-   pixels, and is no limit, the values are its mean, and `low` and `high` the band that it fills. Limits that
-   oscillate are drawn by their least value. `top` is where the chart ends. */
+/* Reduces a curve { x, y, mean } from `from` to `to` to two values for each column of pixels: the extremes in
+   their order, so that no peak is lost. If the curve oscillates faster than the pixels, the values are its mean,
+   and `low` and `high` its extremes; of a limit that oscillates so fast only the least values are drawn. `top` is
+   the top of the chart. */
 export function sampled(curve, from, to, columns, { isLimit = false, top = Infinity, scale = 1 } = {}) {
   const low = new Float64Array(2 * columns), high = new Float64Array(2 * columns), y = new Float64Array(2 * columns);
   const step = (to - from) / columns;
-  let way = 0, least = Infinity, most = -Infinity, before = NaN;
+  let variation = 0, least = Infinity, most = -Infinity, before = NaN;
   let i = lastUpTo(curve.x, from);
   for (let k = 0; k < columns; k += 1) {
     const start = from + k * step, end = start + step;
@@ -28,7 +28,7 @@ export function sampled(curve, from, to, columns, { isLimit = false, top = Infin
     high[2 * k] = high[2 * k + 1] = Math.max(b, y[2 * k + 1]);
     for (const value of [Math.min(y[2 * k], top), Math.min(y[2 * k + 1], top)]) {
       if (Number.isFinite(value)) {
-        if (Number.isFinite(before)) way += Math.abs(value - before);
+        if (Number.isFinite(before)) variation += Math.abs(value - before);
         least = Math.min(least, value);
         most = Math.max(most, value);
         before = value;
@@ -36,7 +36,7 @@ export function sampled(curve, from, to, columns, { isLimit = false, top = Infin
     }
   }
   const scaled = (values) => (scale === 1 ? values : values.map((value) => value * scale));
-  const isDense = way > 0.5 * columns * (most - least) && most > least;
+  const isDense = variation > 0.5 * columns * (most - least) && most > least;
   if (!isDense) return { y: scaled(y) };
   if (isLimit) return { y: scaled(low) };
   const { mean } = curve;
@@ -47,16 +47,16 @@ export function sampled(curve, from, to, columns, { isLimit = false, top = Infin
   return { y: scaled(y), low: scaled(low), high: scaled(high) };
 }
 
-/* The value at x between the points i and i + 1; NaN outside of the curve. */
-function at({ x, y }, i, place) {
+/* The value at the x `here`, between the points i and i + 1; NaN outside of the curve. */
+function at({ x, y }, i, here) {
   const last = x.length - 1;
-  if (last < 0 || place < x[0] || place > x[last]) return NaN;
+  if (last < 0 || here < x[0] || here > x[last]) return NaN;
   if (i >= last) return y[last];
   const span = x[i + 1] - x[i];
-  return span > 0 ? y[i] + ((place - x[i]) / span) * (y[i + 1] - y[i]) : y[i + 1];
+  return span > 0 ? y[i] + ((here - x[i]) / span) * (y[i + 1] - y[i]) : y[i + 1];
 }
 
-/* The x of two values a column. */
+/* The x of the two values of each column. */
 export function grid(from, to, columns) {
   return Float64Array.from({ length: 2 * columns }, (_, k) => from + ((to - from) * k) / (2 * columns));
 }

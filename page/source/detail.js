@@ -1,18 +1,18 @@
-/* Levels of detail of a tool path. It is cut into chunks of consecutive points; each has levels, the finest first,
-   with fewer points than the one before and a wider tolerance [mm]. */
+/* Levels of detail of a tool path. The path is cut into chunks of consecutive points. Each chunk has levels, the
+   finest first; each next level has fewer points and a greater tolerance [mm]. */
 
 import { extent } from "./numbers.js";
 
-const POINTS = 16384; // of a chunk
-const COARSER = 4; // tolerance of a level over that of the one before
-const FEWEST = 128; // no level with fewer points is worth its memory
-const WIDEST = 0.02; // of the extent: no view is coarser
+const POINTS = 16384; // points of a chunk
+const COARSER = 4; // tolerance of a level over that of the level before
+const FEWEST = 128; // least points of a level
+const WIDEST = 0.02; // greatest tolerance over the extent of the path
 
-/* The chunks of a path one by one: { centre, radius, levels }, a level { tolerance, index }, where `index` are
-   numbers of points. The last point of a chunk is the first one of the next. */
+/* Yields the chunks of a path: { centre, radius, levels }; a level is { tolerance, index }, where `index` are
+   numbers of points. The last point of a chunk is the first point of the next. */
 export function* chunks(path) {
   const size = Math.hypot(...[path.x, path.y, path.z].map((values) => span(extent(values))));
-  // A hundredth of the top speed weighs like a ten-thousandth of the extent, as in `report/tool_path.py`.
+  // 1e-2 of the top speed has the weight of 1e-4 of the extent, as in `report/tool_path.py`.
   const weight = path.cutting_speed > 0 ? (0.01 * size) / path.cutting_speed : 0;
   const count = path.x.length;
   for (let first = 0; first + 1 < count; first += POINTS) {
@@ -23,7 +23,7 @@ export function* chunks(path) {
 
 const span = ([low, high]) => high - low;
 
-/* A ball around the points from the first to the last one of `index`. */
+/* A sphere around the points from the first to the last one of `index`. */
 function ball({ x, y, z }, index) {
   const ends = [x, y, z].map((values) => extent(values.subarray(index[0], index.at(-1) + 1)));
   return { centre: ends.map(([low, high]) => (low + high) / 2), radius: Math.hypot(...ends.map(span)) / 2 };
@@ -41,8 +41,8 @@ function levels(path, index, weight, widest) {
   return found;
 }
 
-/* Every second point is a candidate; it goes when it lies within the tolerance of the line between its
-   neighbours, what earlier removals have cost added up. */
+/* Every second point is a candidate. It is removed if its distance from the line between its neighbours, plus the
+   distances of earlier removals, is within the tolerance. */
 function thin(path, index, cost, tolerance, weight) {
   let gone = 1, parity = 1, idle = 0;
   while (idle < 2 && index.length > 2) {
@@ -70,7 +70,7 @@ function thin(path, index, cost, tolerance, weight) {
   return { index, cost };
 }
 
-/* Distance of the point i from the segment from a to b, speed as a fourth coordinate. */
+/* Distance of the point i from the segment from a to b; the speed is a fourth coordinate. */
 function off({ x, y, z, speed }, w, i, a, b) {
   const bx = x[b] - x[a], by = y[b] - y[a], bz = z[b] - z[a], bs = w * (speed[b] - speed[a]);
   const px = x[i] - x[a], py = y[i] - y[a], pz = z[i] - z[a], ps = w * (speed[i] - speed[a]);

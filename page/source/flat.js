@@ -1,11 +1,11 @@
-/* A tool path on a canvas without WebGL: neighbours of like colour are one line. */
+/* Draws a tool path on a canvas without WebGL: successive points of equal colour are one line. */
 
 import { NONE } from "./modes.js";
 
-const STEPS = 48; // colours told apart on a scale
-const MOST = 60000; // points drawn
+const STEPS = 48; // different colours of a scale
+const MOST = 60000; // most points drawn
 
-/* `levels` are those of `detail.js`; `colours` are texts, `value` is 0 to 1 or the number of a kind. */
+/* `levels` are those of `detail.js`; `colours` are CSS colours; a value is 0 to 1, or the number of a kind. */
 export function drawFlat(context, path, levels, project, { values, isKind }, colours, none, width) {
   const every = Math.ceil(levels.reduce((sum, { index }) => sum + index.length, 0) / MOST);
   context.lineJoin = "round";

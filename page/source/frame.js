@@ -1,13 +1,13 @@
-/* The box around a tool path with ticks, drawn flat over the picture: three of its edges have numbers. */
+/* Draws the box around a tool path over the picture; three of its edges have ticks with numbers. */
 
 import { shown } from "./numbers.js";
 import { font, style } from "./theme.js";
 
-const NEAREST = 48; // pixels between two ticks, about
+const NEAREST = 48; // about the least number of pixels between two ticks
 const AXES = ["X", "Y", "Z"];
 
-/* `project` takes a place [mm] to pixels; `low` and `high` are opposite corners of the box; `isNarrow`:
-   names without units. */
+/* `project` maps a point [mm] to pixels; `low` and `high` are opposite corners of the box; with `isNarrow` the
+   names of the axes have no units. */
 export function drawFrame(context, project, low, high, isNarrow) {
   const ink = style("--soft"), faint = style("--faint");
   context.font = font(12);
@@ -25,7 +25,7 @@ export function drawFrame(context, project, low, high, isNarrow) {
     const size = Math.hypot(to[0] - from[0], to[1] - from[1]);
     if (!(size > 24) || !(high[axis] > low[axis])) continue;
     context.strokeStyle = faint;
-    // The edges at the corner nearest to the eye would cross the path.
+    // The edges at the corner nearest to the viewer are left out, because they would cross the path.
     for (const [a, b] of edges) if (Math.min(a[2], b[2]) > nearest + 1e-6) line(context, a, b);
     const isSteep = Math.abs(to[1] - from[1]) > 2 * Math.abs(to[0] - from[0]);
     const middle = ([a, b]) => (isSteep ? -(a[0] + b[0]) : a[1] + b[1]);
@@ -45,9 +45,9 @@ function ticks(context, [a, b, start], axis, low, high, size, [ax, ay], ink, pro
     context.fillText(words, x + ax * far, y + ay * far);
   };
   for (let value = Math.ceil(low / step - 1e-9) * step; value <= high + 1e-9 * step; value += step) {
-    const place = [...start];
-    place[axis] = value;
-    const at = project(place);
+    const point = [...start];
+    point[axis] = value;
+    const at = project(point);
     line(context, at, [at[0] + 5 * ax, at[1] + 5 * ay]);
     text(shown(Math.abs(value) < 1e-9 * step ? 0 : value), at, 13);
   }
@@ -56,14 +56,14 @@ function ticks(context, [a, b, start], axis, low, high, size, [ax, ay], ink, pro
   context.font = font(12);
 }
 
-/* Across an edge, away from the middle of the box; one long. */
+/* The unit vector across an edge, away from the middle of the box. */
 function away([a, b], centre) {
   const x = a[1] - b[1], y = b[0] - a[0], size = Math.hypot(x, y) || 1;
   const side = x * (a[0] - centre[0]) + y * (a[1] - centre[1]) < 0 ? -1 : 1;
   return [(side * x) / size, (side * y) / size];
 }
 
-/* The nearest of 1, 2, 5 times a power of ten that is not below. */
+/* The least of 1, 2, 5 times a power of ten that is not below the value. */
 function tidy(step) {
   const power = 10 ** Math.floor(Math.log10(step));
   return power * ([1, 2, 5].find((factor) => factor * power >= step * (1 - 1e-9)) ?? 10);

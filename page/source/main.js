@@ -1,4 +1,4 @@
-/* Starts the page that this is. */
+/* Starts the report, the comparison or the page of the service, whichever this page is. */
 
 import "uplot/dist/uPlot.min.css";
 import "./drawing.css";

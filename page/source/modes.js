@@ -1,12 +1,12 @@
-/* What the colours of a tool path tell: for each mode a value at every point, and a legend. */
+/* The modes of colouring a tool path: for each mode a value at every point, and a legend. */
 
 import { css, kindColour } from "./colours.js";
 import { extent, shown } from "./numbers.js";
 
-export const NONE = -1; // no value here: drawn thin and grey
+export const NONE = -1; // no value at this point: drawn thin and grey
 
-/* Each mode makes of a path { values, scale, ends } or, for kinds, { values, colours, kinds }: values from 0 to 1
-   on the scale, the texts at its ends; or the number of the kind. */
+/* Each mode makes of a path { values, scale, ends }, with values from 0 to 1 and the texts at the ends of the
+   scale, or { values, colours, kinds }, with the number of a kind as value. */
 export const MODES = {
   speed: { label: "planned speed", of: (path) => scaled(path, path.speed, path.cutting_speed, "viridis") },
   feed: { label: "programmed feed", of: (path) => scaled(path, path.feed, extent(path.feed)[1], "viridis") },
@@ -14,7 +14,7 @@ export const MODES = {
   lost: { label: "time lost", of: timeLost },
 };
 
-/* Rapids have no feed and would flatten the scale: they have no value, unless there is nothing else. */
+/* Rapids have no value, so that the scale fits the cutting moves, unless all moves are rapids. */
 function scaled(path, list, top, scale) {
   const { feed } = path;
   const hasFeed = extent(feed)[1] > 0;
@@ -40,7 +40,7 @@ function timeLost(path) {
   };
 }
 
-/* What is known at a point, in words. */
+/* The values at a point as texts. */
 export function told(path, i) {
   const feed = path.feed[i] > 0 ? `feed ${shown(path.feed[i])} ${path.unit}/s` : "rapid";
   return [

@@ -1,4 +1,4 @@
-/* Numbers as they are read: four digits, thousands apart. */
+/* Numbers as text: four digits, with a space between thousands. */
 
 const NARROW_SPACE = "\u202f";
 
@@ -10,7 +10,7 @@ export function shown(value, digits = 4) {
   return rest ? `${apart}.${rest}` : apart;
 }
 
-/* A time [s] as a person says it. */
+/* A time [s] as text with units. */
 export function duration(seconds) {
   if (!Number.isFinite(seconds)) return "–";
   if (Math.abs(seconds) < 1) return `${shown(seconds * 1e3)} ms`;
@@ -26,14 +26,14 @@ export function clock(seconds) {
   return `${minutes}:${(seconds - 60 * minutes).toFixed(3).padStart(6, "0")}`;
 }
 
-/* The number that a person has written, or several with commas between them; null of nothing. What is no number stays
-   as it is: the service says so. */
+/* The number in a text, or several with commas between them; null for an empty text. Other texts are returned as
+   they are, and the service refuses them. */
 export function numbersIn(text) {
   const values = text.split(",").map((part) => part.trim()).filter(Boolean).map((part) => (Number.isNaN(Number(part)) ? part : Number(part)));
   return values.length > 1 ? values : values[0] ?? null;
 }
 
-/* The least and the greatest value; 0 and 0 of none. */
+/* The least and the greatest value; 0 and 0 without values. */
 export function extent(values) {
   let low = Infinity, high = -Infinity;
   for (let i = 0; i < values.length; i += 1) {
@@ -43,7 +43,7 @@ export function extent(values) {
   return low <= high ? [low, high] : [0, 0];
 }
 
-/* The last number of a growing list that is not beyond the value; 0 where there is none. */
+/* The index of the last element of a sorted list that is at most the value; 0 if there is none. */
 export function lastUpTo(list, value) {
   let low = 0, high = list.length - 1;
   while (low < high) {

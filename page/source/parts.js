@@ -7,7 +7,7 @@ export function element(tag, kind = "", text = "") {
   return made;
 }
 
-/* Buttons of which one is pressed: names with their texts. */
+/* Buttons of which one is pressed; `names` are the names with their texts. */
 export function choice(names, label, onChoose) {
   const box = element("div", "choice");
   box.setAttribute("role", "group");

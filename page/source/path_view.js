@@ -1,4 +1,4 @@
-/* The tool path with its choices: the view, what the colours tell, and the legend of these. */
+/* The tool path with buttons for view and colour mode, and with the legend of the colours. */
 
 import { gradient } from "./colours.js";
 import { MODES, told } from "./modes.js";
@@ -9,7 +9,7 @@ import { onTheme } from "./theme.js";
 const VIEW_NAMES = { xyz: "3D", xy: "Top", xz: "Front", yz: "Side" };
 
 export class PathView {
-  /* Fills `container`; `tools` gets the buttons; `onChoice` is told when a view or colours are chosen. */
+  /* Fills `container`; `tools` gets the buttons; `onChoice` is called when a view or a colour mode is chosen. */
   constructor(container, tools, cursor, { onMove, onChoice } = {}) {
     Object.assign(this, { cursor, onChoice });
     this.box = container.appendChild(element("div", "path"));
@@ -26,7 +26,7 @@ export class PathView {
     onTheme(() => this.run && this.#showLegend());
   }
 
-  /* Shows a run, with the view and the colours that are chosen. */
+  /* Shows a run in the chosen view and colours. */
   show(run) {
     const isFirst = !this.run;
     const view = this.scene.view;
@@ -55,7 +55,7 @@ export class PathView {
     this.onChoice?.();
   }
 
-  /* The names of modes, for keys. */
+  /* The names of colour modes, for keys. */
   static modes = Object.keys(MODES);
   static views = Object.keys(VIEW_NAMES);
 

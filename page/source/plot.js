@@ -1,4 +1,4 @@
-/* One chart of curves over a common axis: zoomed by dragging, pointed at, and set to a place from outside. */
+/* A chart of curves over a common x axis: dragging zooms, the pointer and other views set a cursor. */
 
 import uPlot from "uplot";
 
@@ -7,18 +7,18 @@ import { shown } from "./numbers.js";
 import { font, style, wash } from "./theme.js";
 import { touch } from "./touch.js";
 
-const AXIS = 64; // pixels of the numbers at the left
+const AXIS = 64; // width of the numbers at the left in pixels
 const LATE = 200; // [ms]
 
 export class Plot {
   #plot = null;
   #bands = [];
   #columns = 0;
-  #place = null;
+  #cursor = null;
   #isPointing = false;
 
-  /* `onZoom(range)` is told the range that is asked for, null for all; `onPoint(x)` where the pointer is. Both are
-     also of touch. */
+  /* `onZoom(range)` is called with the new range, null for all; `onPoint(x)` with the x of the pointer. Touch calls
+     both too. */
   constructor(container, { height, label, onZoom, onPoint }) {
     this.container = container;
     Object.assign(this, { height, label, onZoom, onPoint });
@@ -40,9 +40,9 @@ export class Plot {
     this.draw();
   }
 
-  /* Points at a place of the x axis; null: nowhere. */
+  /* Sets the cursor to an x; null removes it. */
   point(x) {
-    this.#place = x;
+    this.#cursor = x;
     if (!this.#plot || this.#isPointing) return;
     const left = x === null ? -10 : this.#plot.valToPos(x, "x");
     this.#plot.setCursor({ left, top: x === null ? -10 : 0 }, false);
@@ -58,12 +58,12 @@ export class Plot {
     this.#bands = found;
     const data = [grid(from, to, this.#columns), ...found.map((one) => one.y)];
     this.#plot = new uPlot(this.#options(width, from, to, found), data, this.container);
-    if (this.#place !== null) this.point(this.#place);
+    if (this.#cursor !== null) this.point(this.#cursor);
     this.#drawAgain();
   }
 
-  /* The first texts on a canvas can be missing (Chromium without a graphics processor, under load): their glyphs
-     come late. All is there when it is drawn again. */
+  /* The first texts on a canvas can be missing, because their glyphs are loaded late (Chromium without a graphics
+     processor, under load). So the chart is drawn again. */
   #drawAgain() {
     const plot = this.#plot;
     setTimeout(() => plot === this.#plot && plot.redraw(false, false), LATE);
@@ -116,27 +116,27 @@ export class Plot {
     };
   }
 
-  /* A range was dragged over. uPlot ends its own work on that before the chart is drawn anew. */
+  /* Called after dragging over a range. The chart is drawn again after uPlot has finished its own work. */
   #selected(u) {
     const { left, width } = u.select;
     if (width > 4) queueMicrotask(() => this.onZoom([u.posToVal(left, "x"), u.posToVal(left + width, "x")]));
   }
 
-  /* The pointer has moved; where it has left, the place that it had stays. */
+  /* Called when the pointer has moved; when it leaves the chart the cursor stays. */
   #pointed(u) {
-    if (u.cursor.left < 0) return queueMicrotask(() => this.point(this.#place));
+    if (u.cursor.left < 0) return queueMicrotask(() => this.point(this.#cursor));
     this.#isPointing = true;
     this.onPoint(u.posToVal(u.cursor.left, "x"));
     this.#isPointing = false;
   }
 
-  /* A value in the legend; nothing where the curve or the pointer is not. */
+  /* A value in the legend; empty without a value or a pointer. */
   #read({ none = Infinity }, value) {
     if (value === null || Number.isNaN(value)) return "";
     return value < none ? `${shown(value)} ${this.unit}` : "none";
   }
 
-  /* Straight lines across (limits) and down (where a limit is broken). */
+  /* Horizontal lines (limits) and vertical lines (where a limit is broken). */
   #drawLines(u) {
     const { ctx, bbox } = u;
     ctx.save();
@@ -148,13 +148,13 @@ export class Plot {
     }
     ctx.strokeStyle = style("--bad");
     for (const { x } of this.marks) {
-      const place = u.valToPos(x, "x", true);
-      if (place >= bbox.left && place <= bbox.left + bbox.width) stroke(ctx, place, bbox.top, place, bbox.top + bbox.height);
+      const across = u.valToPos(x, "x", true);
+      if (across >= bbox.left && across <= bbox.left + bbox.width) stroke(ctx, across, bbox.top, across, bbox.top + bbox.height);
     }
     ctx.restore();
   }
 
-  /* What a curve fills that oscillates faster than pixels. */
+  /* Fills the range between the extremes of a curve that oscillates faster than the pixels. */
   #drawBand(u, k) {
     const { low, high } = this.#bands[k - 1];
     if (!low || !u.series[k].show) return;

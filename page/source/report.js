@@ -18,7 +18,7 @@ export function report(data) {
   const axes = new AxesPlot(at("time"), data, run, cursor);
   const parts = [speed, axes];
   at("time-tools").append(axes.scaling());
-  // Use of the limits, where the method keeps them all.
+  // The use of the limits is drawn if the method keeps all of them.
   if (data.judged.includes("jerk") && data.limits.jerk.some(Boolean)) {
     at("use-section").hidden = false;
     parts.push(new AxesPlot(at("use"), data, run, cursor, { rows: USED, relative: true }));

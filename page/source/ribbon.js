@@ -1,13 +1,13 @@
-/* A polyline for three.js: each segment is a rectangle of some pixels width, coloured by a value at its ends.
-   What is drawn are levels of `detail.js`; one that was never in view has cost nothing.
-
-   The corners of the rectangles are found from the number of the vertex, and the points in textures. Instances of
-   one rectangle take as long as a draw call each where no graphics processor is. */
+/* A polyline for three.js: each segment is a rectangle some pixels wide, coloured by the values at its ends.
+   It draws levels of `detail.js`; a level gets its textures when it first comes into view.
+   
+   The vertex shader finds the corners of a rectangle from the number of the vertex and the points in a texture.
+   Instances of one rectangle would be slower: without a graphics processor each costs as much as a draw call. */
 
 import { BufferGeometry, DataTexture, FloatType, Group, LinearFilter, Mesh, NearestFilter, RedFormat, RGBAFormat, ShaderMaterial, Vector2, Vector3 } from "three";
 
 const COLOURS = 256;
-const WIDTH = 256; // of the textures that points are in
+const WIDTH = 256; // width of the textures that hold the points
 
 const VERTEX = `
 uniform highp sampler2D points, values;
@@ -16,7 +16,7 @@ uniform float width, isKind;
 varying float value, time, light;
 ivec2 at(int point) { return ivec2(point % ${WIDTH}, point / ${WIDTH}); }
 void main() {
-  // Two triangles: along the segment 0 or 1, across it -1 or 1.
+  // Two triangles: coordinate 0 or 1 along the segment, -1 or 1 across it.
   int segment = gl_VertexID / 6, corner = gl_VertexID % 6;
   float part = corner == 1 || corner == 2 || corner == 4 ? 1.0 : 0.0;
   float side = corner == 2 || corner == 4 || corner == 5 ? 1.0 : -1.0;
@@ -24,22 +24,22 @@ void main() {
   float valueFrom = texelFetch(values, at(segment), 0).r, valueTo = texelFetch(values, at(segment + 1), 0).r;
   vec4 a = projectionMatrix * modelViewMatrix * vec4(from.xyz, 1.0);
   vec4 b = projectionMatrix * modelViewMatrix * vec4(to.xyz, 1.0);
-  vec2 way = (b.xy - a.xy) * resolution;
-  float length_ = length(way);
-  vec2 along = length_ > 0.0 ? way / length_ : vec2(1.0, 0.0);
+  vec2 screen = (b.xy - a.xy) * resolution;
+  float length_ = length(screen);
+  vec2 along = length_ > 0.0 ? screen / length_ : vec2(1.0, 0.0);
   vec2 across = vec2(-along.y, along.x);
   bool isNone = valueTo < -0.5;
-  vec4 place = mix(a, b, part);
-  // Half a width beyond both ends: no gaps at corners.
-  place.xy += (across * side + along * (2.0 * part - 1.0)) * (isNone ? 0.5 : 1.0) * width / resolution;
-  place.z += isNone ? 1e-4 : 0.0;
+  vec4 vertex = mix(a, b, part);
+  // Half a width longer at both ends, so that corners have no gaps.
+  vertex.xy += (across * side + along * (2.0 * part - 1.0)) * (isNone ? 0.5 : 1.0) * width / resolution;
+  vertex.z += isNone ? 1e-4 : 0.0;
   value = isNone || isKind > 0.5 ? valueTo : mix(max(valueFrom, 0.0), valueTo, part);
   time = to.w;
-  // Light from above: what leans is a little darker, so that surfaces of many passes show their form.
+  // Light from above: sloping segments are darker, which shows the form of surfaces of many passes.
   vec3 run = to.xyz - from.xyz;
   float rise = dot(run, run) > 0.0 ? run.z / length(run) : 0.0;
   light = 1.0 - 0.3 * rise * rise;
-  gl_Position = place;
+  gl_Position = vertex;
 }`;
 
 const FRAGMENT = `
@@ -56,7 +56,7 @@ export class Ribbon {
   group = new Group();
   #path;
   #centre;
-  #meshes = new Map(); // by level
+  #meshes = new Map(); // level → mesh
   #values = null;
   #uniforms = {
     resolution: { value: new Vector2(1, 1) },
@@ -69,7 +69,7 @@ export class Ribbon {
     now: { value: Infinity },
   };
 
-  /* Places are counted from `centre`. */
+  /* Coordinates in the textures are relative to `centre`. */
   constructor(path, centre) {
     this.#path = path;
     this.#centre = centre;
@@ -78,22 +78,22 @@ export class Ribbon {
   #mesh({ index }) {
     const { x, y, z, time } = this.#path, [cx, cy, cz] = this.#centre;
     const height = Math.ceil(index.length / WIDTH);
-    const places = new Float32Array(4 * WIDTH * height);
+    const coordinates = new Float32Array(4 * WIDTH * height);
     for (let i = 0; i < index.length; i += 1) {
       const point = index[i];
-      places[4 * i] = x[point] - cx;
-      places[4 * i + 1] = y[point] - cy;
-      places[4 * i + 2] = z[point] - cz;
-      places[4 * i + 3] = time[point];
+      coordinates[4 * i] = x[point] - cx;
+      coordinates[4 * i + 1] = y[point] - cy;
+      coordinates[4 * i + 2] = z[point] - cz;
+      coordinates[4 * i + 3] = time[point];
     }
-    const points = new DataTexture(places, WIDTH, height, RGBAFormat, FloatType);
+    const points = new DataTexture(coordinates, WIDTH, height, RGBAFormat, FloatType);
     const values = new DataTexture(new Float32Array(WIDTH * height), WIDTH, height, RedFormat, FloatType);
     points.needsUpdate = true;
     const geometry = new BufferGeometry();
     geometry.setDrawRange(0, 6 * (index.length - 1));
     const uniforms = { ...this.#uniforms, points: { value: points }, values: { value: values } };
     const mesh = new Mesh(geometry, new ShaderMaterial({ vertexShader: VERTEX, fragmentShader: FRAGMENT, uniforms }));
-    mesh.frustumCulled = false; // what is shown was found to be in view
+    mesh.frustumCulled = false; // `show` gets only levels that are in view
     mesh.userData = { index, points, values, painted: null };
     this.group.add(mesh);
     return mesh;
@@ -120,7 +120,7 @@ export class Ribbon {
     uniforms.count.value = isKind ? colours.length : 0;
   }
 
-  /* The colours [0, 1] of what has no value, and of what fades after the time `now`. */
+  /* Sets the colours [0, 1] of points without a value, and of points after the time `now`. */
   shade(none, later) {
     this.#uniforms.none.value.fromArray(none);
     this.#uniforms.later.value.fromArray(later);

@@ -1,4 +1,4 @@
-/* A planned program as it is drawn, and where its tool is: by time, by length, by source line. */
+/* A planned program as it is drawn, with its tool's position by time, length and source line. */
 
 import { lastUpTo } from "./numbers.js";
 
@@ -12,13 +12,13 @@ export class Run {
     this.unit = path.unit;
   }
 
-  /* Number of the point at or before a time [s]. */
+  /* The number of the point at or before a time [s]. */
   at(time) {
     return lastUpTo(this.path.time, time);
   }
 
-  /* The place [mm] at a time, between two points of the path. */
-  place(time) {
+  /* The position [mm] at a time, between two points of the path. */
+  position(time) {
     const { x, y, z } = this.path;
     const i = this.at(time), j = Math.min(i + 1, this.count - 1), t = this.#part(this.path.time, i, j, time);
     return [x, y, z].map((values) => values[i] + t * (values[j] - values[i]));
@@ -36,7 +36,7 @@ export class Run {
     return this.#moved(this.path.time, this.path.speed, time);
   }
 
-  /* The source line that the tool is on its way along: that of the next point. */
+  /* The source line at a time: that of the next point. */
   lineAt(time) {
     return this.count ? this.path.line[Math.min(this.at(time) + 1, this.count - 1)] : 0;
   }

@@ -1,4 +1,4 @@
-/* The tool path of a run in space: turned, moved and zoomed by hand, with the box around it and marks. */
+/* The tool path of a run in 3D, which the user turns, moves and zooms, with the box around it and marks. */
 
 import { OrthographicCamera, Scene, Vector3, WebGLRenderer, MOUSE, TOUCH } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
@@ -11,32 +11,32 @@ import { extent } from "./numbers.js";
 import { COLOURS, Ribbon } from "./ribbon.js";
 import { channels, onTheme, style } from "./theme.js";
 
-/* Where the eye is, seen from the middle of the path. */
+/* The direction of the viewer from the middle of the path. */
 export const VIEWS = { xyz: [-1.1, -1.5, 1.1], xy: [0, -1e-6, 1], xz: [0, -1, 0], yz: [1, 0, 0] };
-/* Off by so many pixels a level may be, at rest and while the view moves. */
+/* Greatest error of a level in pixels, at rest and while the view moves. */
 const AT_REST = 0.25, MOVING = 1;
-const REST = 160; // [ms], longer where pictures take long
-/* A view that moves is drawn coarser while its pictures take longer than SLOW, finer where they take less than
-   QUICK [ms]; MOST times as coarse at most. */
+const REST = 160; // time without motion after which the view is at rest [ms]; longer if pictures take long
+/* A moving view is drawn coarser while its pictures take longer than SLOW, and finer if they take less than
+   QUICK [ms]; at most MOST times as coarse. */
 const SLOW = 50, QUICK = 25, MOST = 16;
-const SLICE = 20; // [ms] of work between two answers to the user
-const ROOM = [78, 45]; // pixels beside the path, and above and below
-const NARROW = 560; // pixels: names of axes are shorter
-const NEAR = 14; // pixels between the pointer and the point that it means
+const SLICE = 20; // longest work between two reactions to the user [ms]
+const ROOM = [78, 45]; // free pixels beside the path, and above and below it
+const NARROW = 560; // width in pixels below which names of axes are shorter
+const NEAR = 14; // greatest distance in pixels between the pointer and its point
 
 export class PathScene {
   #renderer = null;
   #scene = new Scene();
   #camera = new OrthographicCamera();
   #run = null;
-  shown = []; // levels
+  shown = []; // the levels that are drawn
   #ribbon = null;
   #mode = null;
   #frame = 0;
-  #isStale = true; // the picture below the marks
+  #isStale = true; // whether the picture below the marks must be drawn again
   #movedAt = -Infinity;
   #coarse = 1;
-  #isBusy = false; // with a picture that is not finished
+  #isBusy = false; // whether a picture is not finished
   #chunks = [];
   #cutting = 0;
   #resting = 0;
@@ -44,7 +44,7 @@ export class PathScene {
   #time = null;
   #hasTrail = false;
 
-  /* `onHover(i, event)` is told the number of the point under the pointer, -1 where there is none. */
+  /* `onHover(i, event)` is called with the number of the point under the pointer, -1 without one. */
   constructor(container, { onHover, onMove } = {}) {
     this.container = container;
     container.classList.add("scene");
@@ -57,7 +57,7 @@ export class PathScene {
       this.#renderer = new WebGLRenderer({ canvas: this.canvas, antialias: true, alpha: true, preserveDrawingBuffer: true });
       this.#renderer.setClearColor(0, 0);
     } catch {
-      this.#renderer = null; // drawn flat
+      this.#renderer = null; // without WebGL `flat.js` draws
     }
     this.#camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.#camera, this.over);
@@ -102,7 +102,7 @@ export class PathScene {
     if (isOther) this.look(this.#firstView());
   }
 
-  /* Takes chunks, as many at a time as the page can take without a pause; what is there is drawn. */
+  /* Takes chunks for SLICE at a time, so that the page reacts in between, and draws those that are ready. */
   #cut(rest) {
     const end = performance.now() + SLICE;
     let next = rest.next();
@@ -115,7 +115,7 @@ export class PathScene {
     this.draw();
   }
 
-  /* Colours by another mode. */
+  /* Sets the colour mode. */
   colour(mode) {
     this.#mode = mode;
     this.paint();
@@ -131,7 +131,7 @@ export class PathScene {
     this.drawNow();
   }
 
-  /* A view by its name, with the whole path in it. */
+  /* Sets the view of that name and shows the whole path in it. */
   look(view) {
     this.view = view;
     const isFlat = view !== "xyz";
@@ -145,7 +145,7 @@ export class PathScene {
     this.resize();
   }
 
-  /* The same view as another scene. */
+  /* Sets the view of another scene. */
   lookLike(other) {
     if (this.view !== other.view) this.look(other.view);
     this.#camera.position.copy(other.#camera.position).normalize().multiplyScalar(this.#far());
@@ -157,7 +157,7 @@ export class PathScene {
     this.#moved();
   }
 
-  /* Marks the place at a time [s]; with a trail, what comes after it fades. */
+  /* Marks the tool's position at a time [s]; with a trail, the path after it is faded. */
   mark(time, hasTrail = false) {
     const isNew = hasTrail || this.#hasTrail;
     this.#time = time;
@@ -186,7 +186,7 @@ export class PathScene {
     this.drawNow();
   }
 
-  /* The part of space in view, so that the whole path has room at zoom 1. */
+  /* Sets the camera so that the whole path is in view at zoom 1. */
   #fit(width, height) {
     const camera = this.#camera;
     camera.updateMatrixWorld();
@@ -210,7 +210,7 @@ export class PathScene {
     this.#drawSoon();
   }
 
-  /* The view moves, or what it shows does: it is drawn now, and better when it rests. */
+  /* Called when the view or its content moves: draws now, and again with less error when the view rests. */
   #moved() {
     this.#movedAt = performance.now();
     this.draw();
@@ -259,7 +259,7 @@ export class PathScene {
     }
   }
 
-  /* By how many pixels what is drawn now may be off: less at rest, more where pictures take long. */
+  /* The allowed error in pixels now: less at rest, more if pictures take long. */
   #detail() {
     return this.#isMoving() ? MOVING * this.#coarse : Math.min(AT_REST * this.#coarse, MOVING);
   }
@@ -268,7 +268,7 @@ export class PathScene {
     return performance.now() - this.#movedAt < REST * this.#coarse - 5;
   }
 
-  /* Sees how long a picture takes that moves; the next one waits for its end. */
+  /* Measures the time of a picture while the view moves; the next picture waits for its end. */
   #watch(isMoving) {
     const gl = this.#renderer.getContext(), start = performance.now();
     const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
@@ -286,7 +286,7 @@ export class PathScene {
     setTimeout(look);
   }
 
-  /* Of each chunk in view the coarsest level within a tolerance [mm]. */
+  /* The coarsest level within a tolerance [mm] of each chunk in view. */
   #inView(project, tolerance) {
     const [width, height] = this.#size, pixel = this.#pixel();
     return this.#chunks.filter(({ centre, radius }) => {
@@ -312,8 +312,8 @@ export class PathScene {
     context.fillStyle = style("--ink");
     context.textAlign = "left";
     context.fillText("start", start[0] + 8, start[1] - 8);
-    for (const place of path.marks) dot(project(place), 6, style("--bad"), style("--card"));
-    if (this.#time !== null) dot(project(this.#run.place(this.#time)), 6, style("--accent"), style("--card"));
+    for (const mark of path.marks) dot(project(mark), 6, style("--bad"), style("--card"));
+    if (this.#time !== null) dot(project(this.#run.position(this.#time)), 6, style("--accent"), style("--card"));
   }
 
   /* The number of the drawn point that is nearest to the pointer. */
@@ -335,13 +335,13 @@ export class PathScene {
     return best;
   }
 
-  /* From places [mm] to pixels from the top left, and how far behind they are. */
+  /* The map from points [mm] to pixels from the top left, and to depth. */
   #projector() {
     const rows = this.#rows();
     return ([x, y, z]) => rows.map(([a, b, c, d]) => a * x + b * y + c * z + d);
   }
 
-  /* The same as numbers: a x + b y + c z + d for each of the three. */
+  /* That map as numbers: a, b, c, d of a x + b y + c z + d, for each of the three results. */
   #rows() {
     const [width, height] = this.#size, centre = this.#centre();
     const m = this.#camera.projectionMatrix.clone().multiply(this.#camera.matrixWorldInverse).elements;

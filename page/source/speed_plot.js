@@ -1,4 +1,4 @@
-/* The planned speed below its limits over the length of the path; beside it, that of another run. */
+/* The planned speed below its limits over the length of the path, and the speed of another run. */
 
 import { Plot } from "./plot.js";
 
@@ -10,7 +10,7 @@ const LIMITS = {
 };
 
 export class SpeedPlot {
-  /* `cursor` is a time; `run` tells where that is. */
+  /* `cursor` has a time; the run gives the length at that time. */
   constructor(container, data, run, cursor) {
     this.run = run;
     this.data = data;
@@ -29,7 +29,7 @@ export class SpeedPlot {
   show(other = null) {
     const { length, path } = this.data;
     const { top_speed: top, cutting_speed: cutting } = length;
-    // Rapids much faster than cutting would flatten the rest: they run out of the chart.
+    // The chart is scaled by the cutting speeds: much faster rapids are cut at its top.
     const reach = 1.25 * ((top > 1.5 * cutting ? cutting : top) || 1);
     const curves = Object.entries(LIMITS)
       .filter(([name]) => length[name])

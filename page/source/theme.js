@@ -1,10 +1,10 @@
-/* Colours of the page, light or dark, as the style sheet has them; on paper it is always light. */
+/* The colours of the page from the style sheet, light or dark; printed pages are light. */
 
 const root = document.documentElement;
 const dark = matchMedia("(prefers-color-scheme: dark)");
 const listeners = new Set();
 
-// Asking the browser makes it lay out the page, so it is asked once for each name.
+// Each colour is read once, because reading makes the browser lay out the page.
 const known = new Map();
 
 export function style(name) {
@@ -12,10 +12,10 @@ export function style(name) {
   return known.get(name);
 }
 
-/* The font of drawn texts of so many pixels. */
+/* The font of drawn texts of a size in pixels. */
 export const font = (pixels) => `${pixels}px ${style("font-family")}`;
 
-/* A colour of the style sheet, given as #rrggbb, with an opacity. */
+/* A colour #rrggbb of the style sheet with an opacity. */
 export function wash(name, alpha) {
   return `rgba(${channels(style(name)).join(",")},${alpha})`;
 }
@@ -23,12 +23,12 @@ export function wash(name, alpha) {
 /* Red, green and blue, 0 to 255, of #rrggbb. */
 export const channels = (colour) => [1, 3, 5].map((i) => parseInt(colour.slice(i, i + 2), 16));
 
-/* The colour of the k-th axis, told apart by those who see no red or no green as well. */
+/* The colour of the k-th axis; the colours differ without red or green too. */
 export const axisColour = (k) => style(`--axis-${k % 9}`);
 
 export const isDark = () => dark.matches && !root.classList.contains("printing");
 
-/* Called after the colours have changed, with whether the page is being printed. */
+/* Calls the function after a change of the colours, with true while the page is printed. */
 export const onTheme = (listener) => listeners.add(listener);
 
 function tell(printing) {

@@ -1,6 +1,6 @@
-/* Fingers on a chart: one points at a place, two take hold of the range between them. The page scrolls as ever. */
+/* Touch on a chart: one finger sets the cursor, two fingers zoom and move. Scrolling of the page is not changed. */
 
-/* A plugin of uPlot; `zoom(range)`, `ends()` of the whole axis, `point(x)`. */
+/* A plugin of uPlot; it calls `zoom(range)` and `point(x)`, and `ends()` for the ends of the whole axis. */
 export function touch(zoom, ends, point) {
   return {
     hooks: {

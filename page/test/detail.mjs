@@ -1,4 +1,4 @@
-/* Cuts a long path into chunks with levels of detail and tells, as JSON, how far each level is off its tolerance. */
+/* Cuts a long path into chunks with levels of detail; prints the error of each level over its tolerance as JSON. */
 
 import { chunks } from "../source/detail.js";
 
@@ -13,7 +13,7 @@ for (let i = 0; i < COUNT; i += 1) {
   path.speed[i] = 50 + 40 * Math.sin(i / 900);
 }
 
-/* The greatest distance of a point that a level has left out from the segment drawn in its place. */
+/* The greatest distance of a point that a level leaves out from the segment drawn instead. */
 function farthest({ index }) {
   let most = 0;
   for (let k = 0; k + 1 < index.length; k += 1) {

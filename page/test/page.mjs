@@ -28,7 +28,7 @@ page.on("request", (request) => facts.requests.push({ url: request.url(), hasTok
 page.on("pageerror", (error) => facts.errors.push(error.stack));
 page.on("console", (message) => message.type() === "error" && facts.errors.push(message.text()));
 
-// As long as this is set, texts on charts are missing, as they can be in a first picture.
+// While this is set, texts on charts are missing, as they can be in a first picture.
 await page.addInitScript(() => {
   const own = CanvasRenderingContext2D.prototype.fillText;
   CanvasRenderingContext2D.prototype.fillText = function (...words) {
@@ -43,7 +43,7 @@ if (token) {
 await page.waitForSelector("body[data-ready]");
 facts.machines = await page.locator("#machine option").count();
 
-/* Pixels of a canvas that have a colour, and how many different ones. */
+/* The number of coloured pixels of a canvas, and the number of different colours. */
 const coloured = (selector) => page.evaluate((place) => {
   const source = document.querySelector(place);
   const flat = Object.assign(document.createElement("canvas"), { width: source.width, height: source.height }).getContext("2d");
@@ -82,12 +82,12 @@ facts.changedText = await page.inputValue("#machine-text");
 await page.locator("summary").nth(1).click();
 await page.locator("summary").first().click();
 
-// A program that is refused: the place and the remedy.
+// A program that is refused: line and remedy are shown.
 await page.setInputFiles("#file", { name: "wrong.ngc", mimeType: "text/plain", buffer: Buffer.from("G21 G90\nG1 X10 F1000\nG1 X\nM2\n") });
 await page.waitForSelector("#failure:not([hidden])");
 facts.refused = await text("#failure");
 
-// A program is dropped; the stages of its plan are seen.
+// A program is dropped; the stages of its plan are shown.
 const stages = page.evaluate(() => new Promise((resolve) => {
   const seen = [];
   const watch = new MutationObserver(() => {
@@ -118,7 +118,7 @@ facts.figures = await text("#figures");
 facts.path = await coloured("#path canvas");
 await picture("page");
 
-// The colours tell something else.
+// Another colour mode.
 for (const name of ["feed", "active", "lost"]) {
   await page.click(`#path-tools [data-name=${name}]`);
   facts[name] = { ...(await coloured("#path canvas")), legend: await text("#path .legend, #path + .legend, .pane .legend") };
@@ -183,7 +183,7 @@ await settled();
 facts.clock.push(await text("#player .clock"));
 await page.keyboard.press("Home");
 
-// My controller today beside the optimum: that of the machine file, with its settings and where they are from.
+// The controller of today beside the plan: that of the machine file, with its settings and their sources.
 const beside = async (words) => {
   await page.waitForFunction((text) => document.getElementById("second-name").textContent.includes(text) && document.getElementById("progress").hidden, words);
   await settled();
@@ -203,7 +203,7 @@ await page.waitForFunction(() => document.getElementById("progress").hidden);
 facts.otherSettings = await settings();
 facts.otherOptions = (await jobs())[0].options;
 
-// What if the feed were another?
+// Another feed by the slider.
 await page.locator("#what-if input[name=feed]").fill("40");
 await page.waitForFunction(() => / [−+]?.*%/.test(document.querySelector("#what-if .told").textContent) && !document.querySelector("#what-if .told").textContent.includes("…"));
 await settled();

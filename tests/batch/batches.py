@@ -1,4 +1,4 @@
-"""Batches as users start them, and what they have written."""
+"""Starts batches as users do, and reads their files."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PART = "G21 G90 G64 P0.01\nF1200\nG1 X10 Y5\nX20 Y0\nG2 X30 Y10 R10\nM2\n"
 
 @dataclass(frozen=True)
 class Done:
-    """The end of a command."""
+    """The result of a command."""
 
     code: int
     said: str
@@ -31,7 +31,7 @@ def start(*arguments: str | Path) -> subprocess.Popen[str]:
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        # Whoever runs the tests may be deaf to it.
+        # The parent of the tests may ignore this signal.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
 
@@ -52,7 +52,7 @@ def rows(folder: Path) -> list[dict[str, Any]]:
 
 
 def write(folder: Path, count: int) -> list[Path]:
-    """So many short programs, each another one."""
+    """Writes `count` short programs, all different."""
     folder.mkdir(exist_ok=True)
     files = [folder / f"part{number}.ngc" for number in range(count)]
     for number, file in enumerate(files):
@@ -61,7 +61,7 @@ def write(folder: Path, count: int) -> list[Path]:
 
 
 def content(folder: Path) -> dict[str, Any]:
-    """The files of a plan, without the times that computing took."""
+    """The files of a plan without the computing times in them."""
     files: dict[str, Any] = {file.name: file.read_bytes() for file in folder.iterdir()}
     summary = json.loads(files["plan.json"])
     del summary["compute"]

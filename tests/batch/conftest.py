@@ -1,4 +1,4 @@
-"""One cluster for the tests that leave it as it is: two workers, spoken to by TLS."""
+"""One cluster for the tests that do not change it: two workers, with TLS."""
 
 from __future__ import annotations
 

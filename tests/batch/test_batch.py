@@ -1,4 +1,4 @@
-"""Batches in processes of this computer: folders, rows, going on where one was, and what goes wrong."""
+"""Batches in processes of this computer: folders, rows, continuing a stopped batch, errors."""
 
 from __future__ import annotations
 
@@ -84,13 +84,13 @@ def test_programs_find_the_files_that_they_call_and_their_tools(tmp_path: Path) 
     assert content(tmp_path / "out" / "caller") == content(tmp_path / "alone")
 
 
-def test_a_batch_goes_on_where_it_was(tmp_path: Path) -> None:
+def test_a_stopped_batch_continues(tmp_path: Path) -> None:
     programs = write(tmp_path / "in", 3)
     out = tmp_path / "out"
     (tmp_path / "in" / "part2.ngc").write_text("G1 Xq\nM2\n")
     assert run(*programs, "-o", out).code == 1
     first = {row["folder"]: (out / row["folder"] / "plan.json").stat().st_mtime_ns for row in rows(out)[:2]}
-    # One program is mended, another one changed, and the last line of the journal is torn.
+    # One program is corrected, another one changed, and the last line of the journal is incomplete.
     programs[2].write_text(PART)
     programs[1].write_text(PART.replace("X10", "X7"))
     with (out / "batch.jsonl").open("a") as journal:
@@ -105,7 +105,7 @@ def test_a_batch_goes_on_where_it_was(tmp_path: Path) -> None:
     assert again["part1"] > first["part1"]
     assert not (out / ".feedplan-left").exists()
     assert ", 3 of them before" in run(*programs, "-o", out).said
-    # Another option is another plan; one that fails now leaves nothing of the plan before.
+    # Another option gives another plan; if that fails, the folder of the earlier plan is removed.
     assert "before" not in run(*programs, "-o", out, "--feed", "10").said
     programs[0].write_text("G1 Xq\nM2\n")
     assert run(*programs, "-o", out).code == 1
@@ -155,7 +155,7 @@ def test_one_batch_at_a_time_works_on_a_folder(tmp_path: Path) -> None:
     ("options", "sentence"),
     [
         (("--method", "bang-bang", "--accuracy", "0.1"), "the method bang-bang takes no accuracy: give "),
-        (("--format", "npz", "--format", "npz-compressed"), "are both one file: ask for one of them"),
+        (("--format", "npz", "--format", "npz-compressed"), "write the same file: ask for one of them"),
         (("--format", "npz", "--format", "none"), "--format none excludes other formats: leave one"),
         (("-m", "mil"), "machine"),
         (("--tool-table", "none.tbl"), "the tool table none.tbl cannot be read: No such file"),
@@ -208,7 +208,7 @@ def test_hostile_and_equal_names_have_folders_of_their_own(tmp_path: Path) -> No
     assert len({row["time"] for row in rows(tmp_path / "out")}) == 3
 
 
-def test_small_jobs_go_together_and_large_ones_alone() -> None:
+def test_small_jobs_are_packed_and_large_ones_are_not() -> None:
     packing = Packing()
     assert packing.count(1000, 2) == 1
     packing.add(Outcome("done", seconds=0.05, size=100_000))

@@ -1,4 +1,4 @@
-"""Batches on a Dask cluster: the same files, whatever becomes of its workers, and safe lines."""
+"""Batches on a Dask cluster: equal files, loss of workers, safe connections."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from feedplan.jobs.address import ClusterAddress
 from feedplan.jobs.called import called_files
 from feedplan.jobs.cluster import Cluster
 from feedplan.jobs.cluster_runs import ClusterRuns
+from feedplan.jobs.executor import JobLimits
 from feedplan.jobs.order import Job, Order
-from feedplan.jobs.place import JobLimits
 from feedplan.jobs.work import Stopped
 from tests.batch.batches import PART, content, end, rows, run, start, wait_for, write
 from tests.clusters import DEADLY, LocalCluster, running
@@ -114,7 +114,7 @@ def test_an_interrupt_and_a_limit_of_time_end_jobs_on_a_cluster(
     process.send_signal(signal.SIGINT)
     done = end(process)
     assert (done.code, done.told) == (130, "\nerror: interrupted\n")
-    # The workers have stopped, and do so for one who is killed.
+    # The workers have stopped; they stop too when the client is killed.
     cluster.wait_until_idle()
     process = start(long, *SLOW, "-o", tmp_path / "other", *cluster.options)
     with cluster.client() as client:
@@ -158,7 +158,7 @@ def test_runs_of_one_program_are_planned_on_a_cluster(
     capsys.readouterr()
     assert main(["plan", str(file), *cluster.options]) == 2
     assert "the method bang-bang plans in less time" in capsys.readouterr().err
-    # Who listens ends it, and the workers stop.
+    # The listener ends the plan, and the workers stop.
     long = b"\n".join(long_part().splitlines()[:800]) + b"\nM2\n"
     with ClusterRuns(ClusterAddress.of(*cluster.options[1::2])) as runs:
 
@@ -172,7 +172,7 @@ def test_runs_of_one_program_are_planned_on_a_cluster(
 
 
 def test_a_worker_with_another_feedplan_is_refused_by_name(tmp_path: Path) -> None:
-    """And a cluster that has gone is one sentence; a batch goes on with the next one."""
+    """The loss of a cluster is one sentence, and a batch continues on another cluster."""
     package = tmp_path / "other"
     shutil.copytree(Path(feedplan.__file__).parent, package / "feedplan")
     (package / "feedplan" / "py.typed").write_text("changed")
@@ -183,7 +183,7 @@ def test_a_worker_with_another_feedplan_is_refused_by_name(tmp_path: Path) -> No
         assert done.told.startswith("error: the worker tcp://127.0.0.1:")
         assert " has another feedplan, 0.1.0 (" in done.told
         assert not (tmp_path / "out").exists()
-        # One that comes later is found by its first job.
+        # A worker that joins later is checked by its first job.
         with other.client() as client:
             [returned] = client.submit(cluster_task.run, "name", "0.0.1", (1.0, 1.0), [None]).result()
         assert "has another feedplan, 0.1.0 (" in returned.outcome

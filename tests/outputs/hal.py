@@ -7,8 +7,8 @@ from pathlib import Path
 
 from benchmarks.simulator.alone import PYTHON, alone, folder_and_environment
 
-# The longest stream that waits in HAL's memory before it is played, so that the test does not depend on how
-# busy the computer is.
+# The longest stream in HAL's memory: it is loaded before it is played, so that a busy computer does not
+# matter.
 DEPTH = 16000
 # The key of sampler's shared memory.
 _SAMPLER = 0x48534130
@@ -31,9 +31,9 @@ with open(sys.argv[3], "w") as file:
 
 
 def played(file: Path, pins: str, count: int, folder: Path) -> list[str]:
-    """What `count` periods of a stream are on the pins of these types, as rows of numbers.
+    """The values on the pins of these types in `count` periods of a stream, as rows of numbers.
 
-    Fails where `halstreamer` complains about a line."""
+    Fails if `halstreamer` complains about a line."""
     record, rows = folder / "record.py", folder / "rows.txt"
     record.write_text(_RECORD)
     nets = (f"net pin{k} streamer.0.pin.{k} => sampler.0.pin.{k}" for k in range(len(pins)))

@@ -1,4 +1,4 @@
-"""All formats, where the package that Parquet needs may be missing."""
+"""All formats; Parquet is skipped if its package is missing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Events in files of every format, and what is particular to streams and tables."""
+"""Events in files of every format; special cases of streams and tables."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_events_come_back_to_the_last_digit(name: str, cuts: tuple[int, ...], tm
 @pytest.mark.parametrize("name", ["csv", "pvt", "halstreamer"])
 def test_in_a_text_an_event_stands_before_the_first_row_at_or_after_it(name: str, tmp_path: Path) -> None:
     lines = written(name, tmp_path, chunk(1000)).read_text().splitlines()
-    # No reader of text gets a line that is too long for it.
+    # No line is too long for readers of text.
     assert max(map(len, lines)) <= 1000
     rows, before = 0, {}
     for line in lines[1 + (name != "halstreamer") :]:
@@ -120,7 +120,7 @@ def test_steps_of_a_pvt_table_belong_to_its_times(tmp_path: Path) -> None:
 
 
 @needs_pyarrow
-def test_parquet_is_what_others_read(tmp_path: Path) -> None:
+def test_other_packages_read_parquet(tmp_path: Path) -> None:
     import pyarrow.parquet
 
     whole = chunk(50, "XA")

@@ -1,4 +1,4 @@
-"""Every format that is found gives back what was written, and says plainly when a file is none of its own."""
+"""Every format reads back what it has written, and refuses other files in one sentence."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def test_the_formats_are_found() -> None:
 
 @pytest.mark.parametrize("name", FORMATS)
 @pytest.mark.parametrize("axes", ["X", "XYZ", "XYZABC"])
-def test_what_is_read_is_what_was_written(name: str, axes: str, tmp_path: Path) -> None:
+def test_files_read_back_unchanged(name: str, axes: str, tmp_path: Path) -> None:
     whole = chunk(1000, axes)
     file = written(name, tmp_path, whole)
     read = load_setpoints(file)
@@ -34,7 +34,7 @@ def test_what_is_read_is_what_was_written(name: str, axes: str, tmp_path: Path) 
 
 
 @pytest.mark.parametrize("name", FORMATS)
-def test_the_cuts_into_chunks_leave_no_trace(name: str, tmp_path: Path) -> None:
+def test_the_size_of_chunks_does_not_matter(name: str, tmp_path: Path) -> None:
     (tmp_path / "cut").mkdir()
     whole = chunk(1000)
     in_one = written(name, tmp_path, whole)
@@ -84,7 +84,7 @@ def test_a_missing_file_is_named(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", FORMATS)
-def test_an_interrupted_write_raises_what_interrupted_it(name: str, tmp_path: Path) -> None:
+def test_an_interrupted_write_raises_the_interrupt(name: str, tmp_path: Path) -> None:
     def write() -> None:
         output = format_named(name)
         with output.writer(tmp_path / output.FILE, header(("X",)), 100) as add:
@@ -108,7 +108,7 @@ def test_an_unknown_ending_and_an_empty_folder_name_the_remedy(tmp_path: Path) -
         format_named("xls")
 
 
-def test_npz_is_what_numpy_reads_and_maps_instead_of_loading(tmp_path: Path) -> None:
+def test_numpy_reads_npz_and_its_arrays_are_mapped(tmp_path: Path) -> None:
     whole = chunk(50)
     file = written("npz", tmp_path, whole)
     with np.load(file) as arrays:
@@ -189,7 +189,7 @@ def test_csv_tells_angles_in_degrees(tmp_path: Path) -> None:
         ({"period": [1.0, 2.0]}, r"the period is .*: give a positive number \[s\]"),
     ],
 )
-def test_what_a_file_says_of_its_setpoints_is_read_and_judged(
+def test_columns_of_a_file_are_read_and_checked(
     name: str, change: dict[str, object], sentence: str, tmp_path: Path
 ) -> None:
     whole = chunk(5, "XY")
@@ -226,7 +226,7 @@ def test_csv_errors_name_the_line(tmp_path: Path) -> None:
         load_setpoints(file)
 
 
-def test_json_has_the_names_of_npz_and_null_for_what_is_not_finite(tmp_path: Path) -> None:
+def test_json_has_the_names_of_npz_and_null_for_infinity(tmp_path: Path) -> None:
     whole = chunk(3, "XY")
     whole.jerk[1, 0] = np.inf
     file = written("json", tmp_path, whole)

@@ -9,8 +9,8 @@ import pytest
 
 from benchmarks.simulator.alone import missing
 from feedplan import Machine, plan
-from feedplan.files import write_plan
 from feedplan.outputs import load_setpoints
+from feedplan.plan_folder import write_plan
 from tests.outputs import hal
 
 PROGRAM = """G21 G90 G64 P0.05
@@ -42,5 +42,5 @@ def test_linuxcnc_plays_the_stream_to_the_last_bit(tmp_path: Path) -> None:
     rows = [row.split() for row in hal.played(file, "fffs", len(setpoints), tmp_path)]
     np.testing.assert_array_equal([[float(value) for value in row[:3]] for row in rows], setpoints.position)
     assert [int(row[3]) for row in rows] == setpoints.line.tolist()
-    # And the file itself is what it was made from.
+    # The file has the events of the plan.
     assert load_setpoints(file).events.sha256() == made.setpoints().events.sha256()

@@ -1,4 +1,4 @@
-"""Writers take no memory that grows with the length of what they write."""
+"""The memory of writers does not grow with the number of rows."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ AXES = ("X", "Y", "Z")
 
 
 def peak(name: str, chunks: int, folder: Path) -> int:
-    """The most memory of Python and numpy [bytes], and of Arrow, while so many chunks are written."""
-    rows = 500 if name == "json" else 10_000  # a count of memory makes Python slow
+    """The greatest memory of Python, numpy and Arrow while `chunks` chunks are written [bytes]."""
+    rows = 500 if name == "json" else 10_000  # measuring memory makes Python slow
     values = np.random.default_rng(1).normal(size=(rows, 3))
     line = np.arange(rows, dtype=np.int32)
     events = TimedEvents.of([Event(0.5 * k, k, "output", 1.0, k % 2, False, "M62 P1") for k in range(50)])
@@ -42,7 +42,7 @@ def peak(name: str, chunks: int, folder: Path) -> int:
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_three_times_the_setpoints_take_the_same_memory(name: str, tmp_path: Path) -> None:
-    peak(name, 1, tmp_path)  # what is imported is in memory from then on
+    peak(name, 1, tmp_path)  # imports what is needed
     short, long = peak(name, 10, tmp_path), peak(name, 30, tmp_path)
-    # 20 more chunks have 18 MB as numbers, of json 1 MB.
+    # 20 more chunks have 18 MB of numbers, with json 1 MB.
     assert long <= 1.1 * short + 300_000

@@ -27,7 +27,7 @@ def test_a_new_folder_appears_at_the_end_with_its_parents(tmp_path: Path) -> Non
     assert [entry.name for entry in tmp_path.iterdir()] == ["a"]
 
 
-def test_an_error_leaves_nothing_behind(tmp_path: Path) -> None:
+def test_an_error_leaves_no_file(tmp_path: Path) -> None:
     with pytest.raises(KeyError):
         fail_in(tmp_path / "a")
     assert list(tmp_path.iterdir()) == []
@@ -77,7 +77,7 @@ def test_a_file_in_the_way_is_named(tmp_path: Path) -> None:
         (errno.EACCES, "permission denied.*choose"),
     ],
 )
-def test_what_the_file_system_refuses_is_one_sentence(number: int, words: str, tmp_path: Path) -> None:
+def test_a_refusal_of_the_file_system_is_one_sentence(number: int, words: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=words), staged(tmp_path / "a", last="z"):
         raise OSError(number, os.strerror(number))
     assert list(tmp_path.iterdir()) == []

@@ -1,4 +1,4 @@
-"""The archive that is filled side by side, also with the 64-bit fields of large files."""
+"""The archive whose members are filled in one pass, also with the 64-bit fields of large files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Setpoints and events written in a format, and what should come back."""
+"""Setpoints and events written in a format, and the expected content."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def header(axes: tuple[str, ...], events: TimedEvents = EVENTS) -> Header:
 
 
 def same(read: SetpointChunk, whole: SetpointChunk) -> bool:
-    """Equal in all columns that the format has."""
+    """Whether two chunks are equal in all columns of the format."""
     found = {name: getattr(read, name) for name in NAMES}
     return read.axes == whole.axes and all(
         np.array_equal(column, getattr(whole, name))

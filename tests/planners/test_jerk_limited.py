@@ -12,11 +12,11 @@ from benchmarks.named import FREE, butterfly, lemniscate, trefoil
 from benchmarks.third_order import by_clarabel, by_ipopt, grid_of
 from feedplan import plan as plan_program
 from feedplan.audit import audit
-from feedplan.bound import lower_bound
 from feedplan.constraints.problem import Problem, build_problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InfeasibleError, InputError, SolverError
 from feedplan.geometry.path import Path
+from feedplan.lower_bound import lower_bound
 from feedplan.machine.machine import Axis, Machine
 from feedplan.planners import bound_of, planner
 from feedplan.profile import ArcKind

@@ -15,11 +15,11 @@ import pytest
 
 import feedplan
 from feedplan.audit import Audit, audit
-from feedplan.bound import lower_bound
 from feedplan.constraints.problem import Problem, build_problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InfeasibleError, InputError, MissingPackageError, SolverError
 from feedplan.geometry.path import Path
+from feedplan.lower_bound import lower_bound
 from feedplan.machine.machine import Axis, Machine
 from feedplan.planners import _refinement, bang_bang, casadi, clarabel, methods, planner, toppra
 from feedplan.profile import ArcKind, SpeedProfile

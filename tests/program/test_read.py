@@ -59,5 +59,5 @@ def test_a_file_that_is_too_large_is_an_error(tmp_path: Path) -> None:
 
 
 def test_a_path_that_is_none_is_an_error() -> None:
-    with pytest.raises(ProgramError, match="is no path of a file"):
+    with pytest.raises(ProgramError, match="is not the path of a file"):
         read_program("part\0.ngc")

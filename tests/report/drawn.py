@@ -12,7 +12,7 @@ import numpy as np
 
 
 def unpacked(content: bytes) -> dict[str, Any]:
-    """What `contained` made, read as its description says."""
+    """The data in bytes that `contained` has made."""
     end = 4 + int.from_bytes(content[:4], "little")
     kinds = {"f4": "<f4", "i4": "<i4", "u1": "<u1"}
 

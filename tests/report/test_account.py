@@ -1,4 +1,4 @@
-"""What the time and the way of a plan are made of: by hand, and for every method."""
+"""The parts of a plan's time and length: by hand, and for every method."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def stops(made: Plan) -> dict[str, int]:
 
 
 @pytest.mark.parametrize("method", sorted(set(planners.methods()) - {"toppra", "casadi", "clarabel"}))
-def test_a_line_wholly_at_its_feed_says_so_whatever_the_method(method: str) -> None:
+def test_a_line_at_its_feed_has_the_feed_as_limit_by_every_method(method: str) -> None:
     shares = parts(planned("G1 X200 F600", method))
     assert shares["feed"] > 0.995
     assert math.fsum(shares.values()) == pytest.approx(1.0, abs=1e-12)
@@ -95,11 +95,11 @@ def test_the_tool_counts_on_machines_programmed_by_its_tip() -> None:
     # Corners are rounded within 0.01 mm.
     assert told.feed.length == pytest.approx(30.0, abs=0.02)
     assert told.feed.turn == pytest.approx(math.hypot(30.0, 60.0), abs=0.1)
-    # It starts with all joints at 0, the tip a tool's length of 120 mm below.
+    # It starts with all joints at 0; the tip is 120 mm below, by the tool's length.
     assert told.rapid.length == pytest.approx(270.0, abs=0.02)
 
 
-def test_stops_are_told_by_their_causes() -> None:
+def test_stops_are_counted_by_cause() -> None:
     made = planned(
         "G64 P0.05\nG1 X10 F600\nM0\nG1 X20\nG4 P0.5\nG1 X30\nM5\nM6 T2\nM3 S100\nG1 X40\nM8\nG1 X50\n"
         "G0 Y10\nG1 X40\nG61.1\nG1 X30\nG1 X20\nG61\nG1 X10\nG1 Y0\nG1 Y5\nG1 X20",
@@ -119,7 +119,7 @@ def test_stops_are_told_by_their_causes() -> None:
     }
     by_cause = {row.cause: row for row in made.account.stops}
     assert by_cause["dwell (G4)"].pause == 0.5
-    # From 10 mm/s at 40 000 mm/s³ in 2 √(10/40 000) s and back to it: half of both is lost.
+    # From 10 mm/s to rest in 2 √(10/40 000) s at 40 000 mm/s³, and back: half of both times is lost.
     assert by_cause["programmed stop (M0, M1, M60)"].lost == pytest.approx(
         2.0 * math.sqrt(10 / 4e4), rel=0.05
     )
@@ -131,14 +131,14 @@ def test_stops_of_paths_without_a_program_are_corners() -> None:
     assert stops(made) == {"start and end": 2, "corner that cannot be rounded": 1, "turning back": 1}
 
 
-def test_what_stops_cost_is_no_more_than_what_is_lost() -> None:
+def test_stops_lose_no_more_than_the_whole_plan() -> None:
     for method in ("bang-bang", "jerk-limited", "s-curve"):
         made = planned("G64 P0.02\nF6000\nG1 X3 Y2\nG1 X9 Y-1\nM0\nG1 X9.5\nG0 X0\nG1 Y3", method)
         lost = sum(row.lost for row in made.account.stops)
         assert 0.0 < lost <= made.profile.time
 
 
-def test_the_tolerance_asked_for_is_told() -> None:
+def test_the_given_tolerance_is_shown() -> None:
     assert planned("G64 P0.05\nG1 X10 F600\nG1 X20 Y5").account.tolerance == (0.05, 0.05)
     assert planned("G1 X10 F600\nG1 X20 Y5", tolerance=0.02).account.tolerance == (0.02, 0.02)
     assert planned("G61\nG1 X10 F600\nG64 P0.05\nG1 X20 Y5\nG1 X30").account.tolerance == (0.001, 0.05)
@@ -177,7 +177,7 @@ def test_the_page_the_table_and_plan_json_say_the_same(tmp_path: Path, capsys: A
 def test_more_arcs_than_moments_have_the_same_shares(monkeypatch: pytest.MonkeyPatch) -> None:
     made = planned("G64 P0.02\nF6000\nG1 X30 Y2\nG1 X90 Y-10\nG0 X0\nG1 Y3", "jerk-limited")
     exact = parts(made)
-    # Times spread evenly over the whole, as where there are more arcs than moments.
+    # The moments are spread evenly over the whole time, as if there were more phases than moments.
     monkeypatch.setattr("feedplan.report.activity._MOMENTS", len(made.profile) - 1)
     even = account(made.problem, made.profile, made.program, True)
     assert math.fsum(share.part for share in even.limits) == pytest.approx(1.0)

@@ -1,4 +1,4 @@
-"""The page tells what was gained, from what plan.json says."""
+"""The section "gained" of the page is made from plan.json."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def cells(text: str) -> list[str]:
     return [cell for cell in re.findall(r"<td[^>]*>([^<]+)</td>", text) if cell.strip()]
 
 
-def test_what_was_gained_is_said_in_numbers() -> None:
+def test_the_gain_is_shown_in_numbers() -> None:
     assert cells(gained(SUMMARY)) == [
         *("Today, by grbl", "1 min 20.0 s", "By the plan", "1 min 00.0 s", "Saved", "20.000 s, 25.0 %"),
         *("feed × 1.2", "6.000 s less, 10.0 %"),

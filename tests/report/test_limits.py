@@ -19,12 +19,12 @@ from feedplan.report.tool_motion import tool_motion
 
 def sampled(problem: Any, profile: SpeedProfile) -> LimitSamples:
     blocks = list(limit_samples(problem, profile, tool_motion(problem)))
-    names = ("length", "speed", "acceleration", "feed", "velocity", "chord", "arc")
+    names = ("length", "speed", "acceleration", "feed", "velocity", "chord", "phase")
     return LimitSamples(*(np.concatenate([getattr(block, name) for block in blocks]) for name in names))
 
 
 def test_on_a_bend_the_cross_axis_carries_all() -> None:
-    # Along X with a curvature of 1/10 mm: Y carries v²/10, so 500 mm/s² allow v² = 5000.
+    # Along X with a curvature of 1/10 mm: Y has the acceleration v²/10, so 500 mm/s² allow v² = 5000.
     most = np.array([300.0, 500.0])
     p = limit_curve(np.array([[1.0, 0.0]]), np.array([[0.0, 0.1]]), most, -most)
     assert p == pytest.approx([5000.0])
@@ -65,7 +65,7 @@ def test_the_square_rises_to_its_feed_and_stops_at_its_corners(square: Any) -> N
 def bend(
     square: Any, kind: ArcKind, axis: int, value: float, p: tuple[float, float]
 ) -> tuple[Any, SpeedProfile]:
-    """A quarter turn as a parabola from X to Y, of width 10, in one arc."""
+    """A quarter turn as a parabola from X to Y, of width 10, in one phase."""
     path: Path = replace(
         square.path,
         curve=CompositeCurve.from_pieces([[[0.0, 0, 0], [10, 0, 0], [10, 10, 0]]], [10.0]),
@@ -109,7 +109,7 @@ def test_each_kind_of_arc_has_its_speed_in_the_middle(
 
 def test_arcs_of_limited_jerk_have_the_speed_of_their_length(square: Any) -> None:
     length = 16.23225240140230
-    # From rest at 600 mm/s³: s = 100 t³ and v = 300 t². Half of the length is done in the middle.
+    # From rest at 600 mm/s³: s = 100 t³ and v = 300 t². The middle sample is at half of the length.
     time = (length / 100.0) ** (1 / 3)
     v1 = 300.0 * time**2
     problem, profile = bend(square, ArcKind.PATH_JERK, 255, 600.0, (0.0, (v1 / 2.0) ** 2))

@@ -75,8 +75,8 @@ def test_a_rapid_is_measured_against_its_axes(square: Any) -> None:
     assert row.wanted == pytest.approx(100.0)
 
 
-def test_the_worst_lines_come_first_and_no_more_than_asked(square: Any) -> None:
-    # The third side at half of the feed: 0.05 s up, 0.75 s at 25 mm/s, 0.05 s down in place of 0.4 s.
+def test_the_worst_lines_come_first_up_to_the_given_number(square: Any) -> None:
+    # The third side at half of the feed: 0.05 s up, 0.75 s at 25 mm/s, 0.05 s down instead of 0.4 s.
     slow = {
         name: getattr(square.profile, name).copy() for name in ("u0", "u1", "p0", "p1", "value", "duration")
     }
@@ -91,7 +91,7 @@ def test_the_worst_lines_come_first_and_no_more_than_asked(square: Any) -> None:
     assert (rows[0].limit, rows[0].speed) == (NONE, pytest.approx(20.0 / 0.85))
 
 
-def test_a_line_at_its_feed_all_the_time_loses_nothing(square: Any) -> None:
+def test_a_line_always_at_its_feed_loses_no_time(square: Any) -> None:
     steady = SpeedProfile(
         piece=np.arange(4, dtype=np.uint32),
         kind=np.full(4, ArcKind.FEED, np.uint8),

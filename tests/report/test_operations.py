@@ -1,4 +1,4 @@
-"""Time per tool and operation, by hand: subprograms, tool changes, dwells; it adds up to the plan's."""
+"""Time per tool and operation, by hand: subprograms, tool changes, dwells; the sum is the plan's time."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import feedplan
 from feedplan import Axis, InputError, Machine, Path
 from feedplan.report.operations import OperationTime, by_tool
 
-# 100 mm/s after 0.1 s and 5 mm: 20 mm take 0.3 s at 100 mm/s.
+# 100 mm/s are reached after 0.1 s and 5 mm, so 20 mm take 0.3 s.
 MACHINE = Machine("hand", [Axis(name, 100.0, 1000.0) for name in "XYZ"])
 HEAD = "G21 G90 G61\nF6000\n"
 
@@ -33,12 +33,12 @@ def test_a_tool_change_and_a_dwell_belong_to_what_follows() -> None:
     assert operations(text, 7.0) == [(1, "ONE", 0.3, 0.0, 0.0, 7.0), (2, "TWO", 0.3, 0.3, 2.0, 7.0)]
 
 
-def test_a_tool_without_a_comment_has_no_name() -> None:
+def test_a_tool_without_a_comment_has_no_operation_name() -> None:
     text = "(HEADER)\n(OF TWO LINES)\nT1 M6\nG1 X20\nT12 M6\nG1 X0\nM2\n"
     assert operations(text) == [(1, "HEADER", 0.3, 0.0, 0.0, 0.0), (12, "", 0.3, 0.0, 0.0, 0.0)]
 
 
-def test_before_the_first_tool_there_is_none() -> None:
+def test_before_the_first_tool_the_number_is_none() -> None:
     assert operations("G1 X20\nT3 M6\nG1 X0\nM2\n") == [(None, "", 0.3, 0, 0, 0), (3, "", 0.3, 0, 0, 0)]
 
 
@@ -57,7 +57,7 @@ def test_subprograms_count_where_they_are_called() -> None:
     assert operations(text) == [(None, "ONE", 0.3, 0, 0, 0), (None, "TWO", 0.3, 0, 0, 0)]
 
 
-def test_comments_that_do_something_or_end_something_name_nothing() -> None:
+def test_comments_with_a_command_or_an_end_give_no_name() -> None:
     text = (
         "(FINISH OPERATION: A)\n(MSG, hello)\n; ---\n(BEGIN OPERATION: B)\nG1 X20\n"
         "(END OF OPERATION)\nG1 X0\nN7 (C)\nG1 X20 (D)\n;\x1b[31mE\nG1 X0\nM2\n"
@@ -80,7 +80,7 @@ def test_rows_of_one_tool_add_up() -> None:
     assert by_tool(rows) == (OperationTime(1, "", 0, 1.5, 2.0, 3.0), OperationTime(2, "", 0, 4.0))
 
 
-def test_a_path_has_no_operations_and_a_change_no_negative_time() -> None:
+def test_a_path_has_no_operations_and_the_time_of_a_change_is_not_negative() -> None:
     path = feedplan.plan(Path.from_points([[0, 0, 0], [20, 0, 0], [30, 5, 0]], tolerance=0.1), MACHINE)
     with pytest.raises(InputError, match="a path has no operations: give a program"):
         path.operations()

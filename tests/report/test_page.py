@@ -1,4 +1,4 @@
-"""The page holds what the plan says, loads nothing, and takes no markup from a part program."""
+"""The page has the figures of the plan, loads nothing, and escapes the markup of a part program."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ def test_data_keeps_any_text(broken_square: Any, tmp_path: Path) -> None:
     assert data["failures"][0]["axis"] == "</script>"
 
 
-def test_a_page_says_so_where_the_code_that_draws_is_missing(
+def test_a_page_without_the_script_says_that_pictures_are_missing(
     square: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("feedplan.report.page.SCRIPT", "bundle/none.js")
@@ -150,7 +150,7 @@ def test_the_page_without_its_data_is_below_a_megabyte_and_a_half(square: Any, t
     assert "</script" not in asset(SCRIPT)
 
 
-def test_a_program_that_is_gone_costs_only_its_text(square: Any, tmp_path: Path) -> None:
+def test_without_the_program_the_page_lacks_only_its_text(square: Any, tmp_path: Path) -> None:
     assert "<th>Source</th>" not in page(square, tmp_path / "report.html", tmp_path / "gone.ngc")
 
 
@@ -185,7 +185,7 @@ def test_arrays_are_numbers_of_32_or_8_bits_at_multiples_of_4_bytes() -> None:
     assert len(content) % 4 == 0
 
 
-def test_axes_that_turn_have_curves_but_no_place_on_the_tool_path(square: Any, tmp_path: Path) -> None:
+def test_rotary_axes_have_curves_but_are_not_on_the_tool_path(square: Any, tmp_path: Path) -> None:
     square.problem = replace(square.problem, path=replace(square.path, axes=("A", "Z", "C")))
     data = data_of(page(square, tmp_path / "report.html"))
     assert data["axes"] == ["A", "Z", "C"]

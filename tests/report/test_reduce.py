@@ -45,18 +45,18 @@ def test_one_sample_in_a_million_is_not_lost() -> None:
     assert (x[y.argmax()], y.max()) == (654_321, 7.0)
 
 
-def test_the_mean_of_a_saw_is_its_middle() -> None:
+def test_the_mean_of_a_sawtooth_is_its_middle() -> None:
     values = np.stack([np.arange(10_000) % 2, np.arange(10_000.0)], axis=1)
     curves = envelope(values, 1000, (3, 5000))
     x, mean = curves.mean(0, 100)
     assert len(x) <= 100
-    # The first sample has no way behind it, so the first stretch may lean a little.
+    # The first sample has weight 0, so the first mean may be slightly off.
     assert mean[1:] == pytest.approx(0.5)
     assert mean[0] == pytest.approx(0.5, abs=0.01)
 
 
 def test_the_mean_is_over_x_not_over_samples() -> None:
-    # Nine tenths of the samples crowd in the first tenth of the way, where the value is 1; else it is 0.
+    # Nine tenths of the samples are in the first tenth of x, where the value is 1; elsewhere it is 0.
     x = np.concatenate([np.linspace(0.0, 0.1, 900), np.linspace(0.1, 1.0, 101)[1:]])
     curves = Envelope(1000, 2)
     curves.add(x, (x <= 0.1).astype(float)[:, None])
@@ -86,7 +86,7 @@ def test_extremes_ends_and_order_survive_any_cuts(
 
 
 def distance(point: np.ndarray, line: np.ndarray) -> float:
-    """From a point to the nearest segment of a polyline, one segment after the other."""
+    """Distance of a point from the nearest segment of a polyline."""
     best = np.inf
     for a, b in pairwise(line):
         along = b - a
@@ -104,7 +104,7 @@ def polyline(
     return result.result()
 
 
-def test_a_square_of_many_points_is_its_corners() -> None:
+def test_a_square_of_many_points_is_reduced_to_its_corners() -> None:
     side = np.linspace(0.0, 1.0, 500, endpoint=False)[:, None]
     corners = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1], [0, 0]])
     points = np.concatenate([a + side * (b - a) for a, b in pairwise(corners)])
@@ -115,13 +115,13 @@ def test_a_square_of_many_points_is_its_corners() -> None:
     assert tolerance == 1e-9
 
 
-def test_a_way_there_and_back_keeps_its_far_end() -> None:
+def test_a_path_there_and_back_keeps_its_far_end() -> None:
     along = np.concatenate([np.linspace(0, 1, 100), np.linspace(1, 0, 100)])
     kept, _, _ = polyline(np.stack([along, np.zeros(200)], axis=1), 50, 1e-6)
     assert kept[:, 0].max() == 1.0
 
 
-def test_every_sample_stays_within_the_tolerance_that_is_told() -> None:
+def test_every_sample_stays_within_the_returned_tolerance() -> None:
     random = np.random.default_rng(7)
     points = np.cumsum(random.normal(size=(5000, 3)), axis=0)
     kept, tag, tolerance = polyline(points, 200, 1e-3, size=137)
@@ -134,7 +134,7 @@ def test_every_sample_stays_within_the_tolerance_that_is_told() -> None:
     assert 0.01 * tolerance < worst <= tolerance
 
 
-def test_nothing_and_one_point_are_no_problem() -> None:
+def test_zero_points_and_one_point_can_be_reduced() -> None:
     assert Polyline(10, 1.0).result()[1].size == 0
     assert len(polyline(np.zeros((1, 3)), 10, 1.0)[0]) == 1
     assert len(polyline(np.zeros((5000, 3)), 10, 1.0)[0]) == 2

@@ -1,4 +1,4 @@
-"""Servers as users start them, and requests that check every answer by the service's own OpenAPI text."""
+"""Starts servers as users do, and checks every answer by the service's own OpenAPI document."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from urllib.parse import quote, urlencode, urlsplit
 from feedplan.client.transport import form
 
 PART = b"G21 G90 G64 P0.01\nF1200\nG1 X10 Y5\nX20 Y0\nG2 X30 Y10 R10\nM2\n"
-# Takes a time that tests can wait for, and be sure that it is not over before they have done something.
+# A job that runs long enough for tests to act while it runs, and short enough to wait for.
 LONG = {"machine": "mill", "method": "jerk-limited", "options": '{"accuracy": 1e-5, "time_limit": 60}'}
 ENDED = ("done", "failed", "cancelled")
 
@@ -35,7 +35,7 @@ def long_part(seed: int = 0) -> bytes:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a server has answered."""
+    """An answer of a server."""
 
     status: int
     headers: Mapping[str, str]
@@ -47,7 +47,7 @@ class Answer:
 
     @property
     def detail(self) -> str:
-        """The sentence of a problem, which is one."""
+        """The sentence of a problem; checks that it is one."""
         assert self.headers["content-type"] == "application/problem+json"
         problem = self.json
         assert problem["status"] == self.status
@@ -74,7 +74,7 @@ class Server:
         self.start()
 
     def start(self) -> None:
-        """Starts it, again after an end; waits until it can be reached."""
+        """Starts the server, also after an end, and waits until it can be reached."""
         self.process = subprocess.Popen(
             self._command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True
         )
@@ -86,7 +86,7 @@ class Server:
         self._document: dict[str, Any] | None = None
 
     def end(self, how: signal.Signals = signal.SIGTERM) -> str:
-        """Ends it; returns what it has said of defects."""
+        """Ends the server; returns its messages about defects."""
         self.process.send_signal(how)
         _, said = self.process.communicate(timeout=30)
         return said.decode()
@@ -99,7 +99,7 @@ class Server:
         headers: Mapping[str, str] | None = None,
         query: Any = None,
     ) -> Answer:
-        """A request and its answer, which must be one that the documentation knows."""
+        """Sends a request; the answer must be one that the documentation has."""
         parts = urlsplit(self.url)
         connection = http.client.HTTPConnection(parts.hostname or "", parts.port, timeout=60)
         try:
@@ -123,7 +123,7 @@ class Server:
     def submit(
         self, program: bytes = PART, file: str = "part.ngc", key: str | None = None, **fields: str
     ) -> Answer:
-        """Has a program planned, sent as a form."""
+        """Submits a program as a form."""
         body, kind = form({"machine": "mill", **fields}, program, file)
         headers = {"Content-Type": kind} | ({} if key is None else {"Idempotency-Key": key})
         return self.send("POST", "/v1/jobs", body, headers)
@@ -133,9 +133,9 @@ class Server:
         return self.send("POST", "/v1/jobs", body, {"Content-Type": "application/json"})
 
     def wait(self, job: str, *states: str, seconds: float = 60.0) -> dict[str, Any]:
-        """The job when it is in one of these states (none: has ended)."""
+        """Waits until the job is in one of these states (without states: until it has ended)."""
         if not states:
-            self.send("GET", f"/v1/jobs/{job}/events")  # as long as it is not ended
+            self.send("GET", f"/v1/jobs/{job}/events")  # returns at the end of the job
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             found: dict[str, Any] = self.get(f"/v1/jobs/{job}").json
@@ -152,7 +152,7 @@ class Server:
 
     @property
     def fork_server(self) -> int:
-        """The process that the processes of jobs come from."""
+        """The fork server that starts the processes of jobs."""
         [own] = [
             child
             for child in _children(self.process.pid)
@@ -162,12 +162,12 @@ class Server:
 
     @property
     def workers(self) -> list[int]:
-        """The processes of the jobs that run."""
+        """The processes of the running jobs."""
         return _children(self.fork_server)
 
     @property
     def memory(self) -> int:
-        """What the process of the server has in memory [bytes]."""
+        """The memory of the server's process [bytes]."""
         pages = Path(f"/proc/{self.process.pid}/statm").read_text("ascii").split()[1]
         return int(pages) * os.sysconf("SC_PAGE_SIZE")
 
@@ -198,7 +198,7 @@ def _children(process: int) -> list[int]:
 
 @contextmanager
 def running(store: Path, *options: str, token: str | None = None) -> Iterator[Server]:
-    """A server; what it says of defects fails the test."""
+    """A server; its messages about defects fail the test."""
     server = Server(store, *options, token=token)
     try:
         yield server

@@ -1,4 +1,4 @@
-"""`feedplan.Client`, and `--server` of the command line: the same as without a service."""
+"""`feedplan.Client` and `--server` of the command line give the same results as without a service."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from feedplan.cli import main
 from tests.service.servers import PART, Server, long_part
 
 NAMES = ("t", "position", "velocity", "acceleration", "jerk", "line")
-# What a service cannot say, or says of its own computer.
+# Rows that differ by computer, or that a service does not have.
 OWN = ("computing", "files")
 
 
@@ -40,7 +40,7 @@ def part(tmp_path: Path) -> Path:
 def test_the_calls_are_those_of_the_package(name: str, local: Any) -> None:
     def parameters(function: Any) -> list[tuple[str, Any, Any]]:
         known = inspect.signature(function).parameters.values()
-        # A service has a cluster of its own.
+        # A service uses its own cluster.
         others = ("self", "elsewhere")
         return [(own.name, own.kind, own.default) for own in known if own.name not in others]
 
@@ -85,7 +85,7 @@ def test_a_plan_is_the_same(client: feedplan.Client, part: Path, tmp_path: Path)
         plan.setpoints(period=0.002)
 
 
-def test_what_a_program_and_a_machine_may_be(client: feedplan.Client, part: Path) -> None:
+def test_a_program_and_a_machine_may_have_any_documented_type(client: feedplan.Client, part: Path) -> None:
     mine = feedplan.Machine.load("mill").with_period(0.002)
     time = feedplan.plan(part, mine).time
     program = feedplan.read_program(part, mine)
@@ -131,7 +131,7 @@ def test_an_audit_is_the_same_on_axes_of_other_units() -> None:
 
 
 def test_methods_are_compared(client: feedplan.Client, part: Path) -> None:
-    # Without limits of jerk: one of the methods needs them.
+    # The machine has no limits of jerk, which one of the methods needs.
     mill = feedplan.Machine.load("mill")
     mine = replace(mill, axes=tuple(replace(axis, max_jerk=math.inf) for axis in mill.axes))
     methods = ["bang-bang", "s-curve"]
@@ -142,7 +142,7 @@ def test_methods_are_compared(client: feedplan.Client, part: Path) -> None:
         assert one.audit == other.audit
 
 
-def test_jobs_are_known_by_their_ids(client: feedplan.Client, part: Path) -> None:
+def test_jobs_are_found_by_their_ids(client: feedplan.Client, part: Path) -> None:
     plan = client.plan(part, "mill", tolerance=0.037)
     assert client.job(plan.id)["state"] == "done"
     assert client.plan_of(plan.id).time == plan.time
@@ -155,7 +155,7 @@ def test_jobs_are_known_by_their_ids(client: feedplan.Client, part: Path) -> Non
     assert client.health()["status"] == "ok"
 
 
-def test_what_ends_the_waiting_cancels_the_job(client: feedplan.Client, server: Server) -> None:
+def test_an_exception_while_waiting_cancels_the_job(client: feedplan.Client, server: Server) -> None:
     class EnoughError(Exception):
         pass
 
@@ -170,7 +170,7 @@ def test_what_ends_the_waiting_cancels_the_job(client: feedplan.Client, server: 
         client.plan_of(newest["id"])
 
 
-def test_a_service_that_is_not_there_is_one_sentence() -> None:
+def test_an_unreachable_service_is_one_sentence() -> None:
     with pytest.raises(feedplan.InputError, match=r"the service at http://127\.0\.0\.1:9 cannot be reached"):
         feedplan.Client("http://127.0.0.1:9").machines()
     for url in ("", "127.0.0.1:8000", "ftp://x", "http://", "http://x:y", 7):

@@ -1,4 +1,4 @@
-"""The queue of the service on a Dask cluster: jobs as on this computer, whatever becomes of the cluster."""
+"""The queue of the service on a Dask cluster: jobs as on this computer, also after losses of the cluster."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalCluster]:
 
 @pytest.fixture(scope="module")
 def planner(cluster: LocalCluster, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    """A server whose jobs run there."""
+    """A server whose jobs run on the cluster."""
     with running(tmp_path_factory.mktemp("store"), "--max-time", "30", *cluster.options) as found:
         yield found
 
@@ -85,14 +85,14 @@ def test_a_job_outlives_its_worker_and_a_server_its_end(
     assert done["state"] == "done", done["problem"]
     states = [data["state"] for _, kind, data in events_of(own, job) if kind == "state"]
     assert states == ["queued", "running", "done"]
-    # A scheduler that has gone and comes back, and a server that is killed, lose nothing either.
+    # No job is lost when the scheduler is started again, or the server is killed.
     cluster.wait_for(2)
     first, second = (own.submit(medium + b"(%d)\n" % k, **fields).json["id"] for k in range(2))
     wait_for(lambda: own.get(f"/v1/jobs/{first}").json["stage"] == "plan")
     cluster.kill_scheduler()
     wait_for(lambda: own.get(f"/v1/jobs/{first}").json["state"] == "queued")
     cluster.start_scheduler()
-    for _ in range(2):  # they have gone with it
+    for _ in range(2):  # the workers have ended with the scheduler
         cluster.start_worker()
     wait_for(lambda: own.get(f"/v1/jobs/{second}").json["stage"] == "plan")
     own.process.kill()

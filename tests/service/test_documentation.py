@@ -1,4 +1,4 @@
-"""What the service says of itself: an OpenAPI text that its answers keep, a page that needs no network."""
+"""The service's documentation: answers agree with the OpenAPI document, the page needs no network."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_every_address_is_documented_with_its_problems(server: Server) -> None:
         assert server.wait(answer.json["id"])["state"] == "done"
 
 
-def test_the_page_has_everything_and_loads_nothing(server: Server) -> None:
+def test_the_page_has_all_sections_and_loads_nothing(server: Server) -> None:
     assert b'href="/docs"' in server.get("/").content
     answer = server.get("/docs")
     assert answer.headers["content-security-policy"].startswith("default-src 'none'")
@@ -78,7 +78,7 @@ def test_the_page_has_everything_and_loads_nothing(server: Server) -> None:
         assert address in text
 
 
-def test_a_body_that_is_no_text_is_answered_as_documented(server: Server) -> None:
+def test_a_body_that_is_not_text_has_a_documented_answer(server: Server) -> None:
     for address in ("/v1/machines", "/v1/jobs"):
         answer = server.send("POST", address, b"e\xedg\x07\x80", {"Content-Type": "application/json"})
         assert answer.status in (400, 422)

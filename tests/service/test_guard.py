@@ -1,4 +1,4 @@
-"""Who may ask, from where: judged before any of a body is read, and before the service begins elsewhere."""
+"""Token, Host and Origin are checked before a body is read, and the address before the service starts."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ GOOD = {"host": "localhost:8000", "authorization": f"Bearer {TOKEN}"}
 
 
 def asked(headers: dict[str, str], path: str = "/v1/jobs", token: str | None = TOKEN) -> tuple[int, str]:
-    """The status and the sentence of an answer; 299 where the guard lets the request through."""
+    """The status and the sentence of an answer; 299 if the guard lets the request through."""
     sent: list[dict[str, Any]] = []
 
     async def app(scope: Any, receive: Any, send: Any) -> None:
@@ -72,7 +72,7 @@ def test_other_names_are_refused(host: str) -> None:
         ("", 403),
     ],
 )
-def test_pages_of_other_places_are_refused(origin: str, status: int) -> None:
+def test_pages_of_other_origins_are_refused(origin: str, status: int) -> None:
     assert asked(GOOD | {"origin": origin})[0] == status
 
 
@@ -107,7 +107,7 @@ def test_a_long_body_is_refused_before_it_comes() -> None:
     assert asked(GOOD | {"content-length": "9" * 400})[0] == 413
 
 
-def test_it_is_so_in_the_service_too(tmp_path: Path) -> None:
+def test_the_service_accepts_any_axes_too(tmp_path: Path) -> None:
     file = tmp_path / "token"
     file.write_text(f"{TOKEN}\n")
     with running(tmp_path / "store", "--host", "0.0.0.0", "--token-file", str(file), token=TOKEN) as server:

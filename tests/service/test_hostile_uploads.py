@@ -1,4 +1,4 @@
-"""Requests as nobody means them: each has a plain answer, nothing is lost or left, memory is bounded."""
+"""Damaged requests: each has an answer in one sentence, no file is lost or left, memory is bounded."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.hostile import DRAWING, MACHINE, PATH_FILE, PROGRAM, mutated
 from tests.service.servers import ENDED, Answer, Server
 
 SEEDS = seeds(120)
-# More memory [bytes] than a server of small requests has any use for.
+# Greatest growth of memory for small requests [bytes].
 GROWTH = 1 << 28
 FIELDS = {
     "machine": MACHINE.decode(),
@@ -38,7 +38,7 @@ def of_program(seed: int, draw: random.Random) -> Request:
 
 
 def of_field(seed: int, draw: random.Random) -> Request:
-    """A form with one of its fields damaged; what is no text there is none that a form can hold."""
+    """A form with one damaged field; None if a form cannot hold the value."""
     name = draw.choice(tuple(FIELDS))
     return of_form({**FIELDS, name: mutated(FIELDS[name].encode(), seed).decode("latin-1")}, PROGRAM, "a.ngc")
 
@@ -67,7 +67,7 @@ REQUESTS: tuple[Callable[[int, random.Random], Request], ...] = (
 
 
 def sent(server: Server, body: bytes, headers: dict[str, str]) -> Answer:
-    """The answer, as soon as there is room."""
+    """Sends a request again until the queue has room; returns the answer."""
     while True:
         answer = server.send("POST", "/v1/jobs", body, headers)
         if answer.status != 429:

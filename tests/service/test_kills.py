@@ -1,4 +1,4 @@
-"""kill -9 of the server and of its workers at random moments: no job is lost, none is doubled."""
+"""After kill -9 of the server and of its workers at random moments no job is lost or done twice."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ KILLS = JOBS // 10
 
 
 def program(number: int) -> bytes:
-    """Short programs, each another one; every seventh takes longer."""
+    """A short program, different for each number; every seventh takes longer."""
     rows = "".join(f"X{k % 23}.{number % 10} Y{k % 17}\n" for k in range(300 if number % 7 == 0 else 5))
     return b"(%d)\n" % number + PART.replace(b"M2\n", b"") + f"G1\n{rows}M2\n".encode()
 
@@ -32,14 +32,14 @@ def kill(process: int) -> None:
 
 
 def sent(server: Server, number: int) -> Answer | None:
-    """The answer to a request, None where the server was gone before it came."""
+    """The answer to a request, None if the server ended before it."""
     try:
         return server.submit(program(number), key=f"key-{number}")
     except (OSError, ValueError):
         return None
 
 
-def test_no_job_is_lost_and_none_is_doubled(tmp_path: Path) -> None:
+def test_no_job_is_lost_or_done_twice(tmp_path: Path) -> None:
     draw = random.Random(1)
     server = Server(tmp_path, "--workers", "2", "--max-queue", str(JOBS + 1))
     accepted: dict[int, str] = {}
@@ -71,7 +71,7 @@ def test_no_job_is_lost_and_none_is_doubled(tmp_path: Path) -> None:
         assert answer.status in (200, 202)
         job = answer.json["id"]
         assert accepted.setdefault(number, job) == job
-    # The server ends once more while jobs wait and run: the next one does the rest.
+    # The server ends once more while jobs wait and run; the next server does the rest.
     kill(server.process.pid)
     server.process.communicate()
     server.start()
@@ -99,7 +99,7 @@ def test_no_job_is_lost_and_none_is_doubled(tmp_path: Path) -> None:
 
 
 def require_whole(server: Server, done: dict[str, Any], text: bytes) -> None:
-    """The job was planned once, and has what its program has."""
+    """Checks that the job was planned once, and has the plan of its own program."""
     assert done["state"] == "done", done
     states = [data["state"] for _, kind, data in events_of(server, done["id"]) if kind == "state"]
     assert states.count("done") == 1

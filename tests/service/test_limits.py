@@ -1,4 +1,4 @@
-"""Every limit is kept, and named in the error with its value and a remedy."""
+"""Every limit is enforced, and the error has its name, its value and a remedy."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ BIG = 300_000
 
 @pytest.fixture(scope="module")
 def small(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    """A server of small limits."""
+    """A server with small limits."""
     options = {
         "max-upload": 0.2,
         "max-upload-time": 0.5,
@@ -40,7 +40,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 
 
 def named(problem: Any) -> tuple[str, float]:
-    """The limit of a problem, which its sentence names, and which tells a remedy."""
+    """The limit of a problem; checks that the sentence names it and that there is a remedy."""
     limit = problem["limit"]
     assert re.search(rf"\b{limit['name']}\b", problem["detail"])
     assert problem["remedy"]
@@ -51,7 +51,7 @@ def named(problem: Any) -> tuple[str, float]:
 def test_size_of_a_request(small: Server) -> None:
     answer = small.submit(b"(" + b"x" * BIG + b")\n")
     assert (answer.status, named(answer.json)) == (413, ("max_upload", 0.2))
-    # Without a length beforehand, as long as it takes to know.
+    # Without Content-Length the request is refused when it exceeds the limit.
     parts = urlsplit(small.url)
     with socket.create_connection((parts.hostname, parts.port)) as line:
         head = "POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"

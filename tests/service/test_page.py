@@ -1,6 +1,6 @@
 """The page of the service in a browser: drop, progress, drawing, cursor, comparison, what-if and downloads.
 
-Pictures go into the folder that FEEDPLAN_PICTURES names, of the program that FEEDPLAN_PROGRAM names.
+FEEDPLAN_PICTURES names a folder for pictures, FEEDPLAN_PROGRAM the program that they show.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def _with_token(folder: Path) -> tuple[str, str]:
 
 
 def _used(address: str, program: Path, folder: Path, *token: str) -> dict[str, Any]:
-    """What the page's user has seen."""
+    """The facts that the script of the user has collected."""
     command = ["node", str(ROOT / "page" / "test" / "page.mjs"), address, str(program), str(folder), *token]
     done = subprocess.run(
         command, env={**os.environ, "CHROMIUM": str(CHROMIUM)}, capture_output=True, text=True, check=False
@@ -75,10 +75,10 @@ def facts(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, A
 
 
 @in_a_browser
-def test_it_asks_for_the_token_once_sends_it_as_a_header_and_asks_no_other_place(
+def test_the_token_is_asked_for_once_and_sent_as_a_header_to_the_service_only(
     facts: dict[str, Any],
 ) -> None:
-    # The browser tells of what the service refuses: the missing token, and a limit that is none.
+    # The browser reports two refusals of the service: the missing token, and a wrong limit.
     assert [error for error in facts["errors"] if "401" not in error and "422" not in error] == []
     assert facts["machines"] > 10
     addresses = [one for one in facts["requests"] if not one["url"].startswith(("data:", "blob:"))]
@@ -119,7 +119,7 @@ def test_the_cursor_is_in_chart_path_and_source(facts: dict[str, Any]) -> None:
 
 
 @in_a_browser
-def test_dragging_zooms_and_a_double_click_goes_back_to_the_first_picture(facts: dict[str, Any]) -> None:
+def test_dragging_zooms_and_a_double_click_shows_all_again(facts: dict[str, Any]) -> None:
     assert facts["zooms"]
     assert facts["zoomsBack"]
 
@@ -132,7 +132,7 @@ def test_it_plays_and_stops_by_a_key(facts: dict[str, Any]) -> None:
 
 
 @in_a_browser
-def test_the_controller_of_today_is_drawn_beside_the_optimum(facts: dict[str, Any]) -> None:
+def test_the_controller_of_today_is_drawn_beside_the_plan(facts: dict[str, Any]) -> None:
     assert facts["today"]["name"].partition(" · ")[2] == "grbl (machine file)"
     assert "grbl (machine file)" in facts["today"]["figures"]
     assert facts["today"]["path"]["count"] > 1000
@@ -167,7 +167,7 @@ def test_a_machine_file_is_read_as_the_service_reads_it(facts: dict[str, Any]) -
 
 
 @in_a_browser
-def test_a_refused_program_is_told_with_place_and_remedy(facts: dict[str, Any]) -> None:
+def test_a_refused_program_is_shown_with_line_and_remedy(facts: dict[str, Any]) -> None:
     assert facts["refused"].startswith("wrong.ngc line 3: ")
 
 
@@ -180,7 +180,7 @@ def test_a_slider_plans_again_at_once_and_back(facts: dict[str, Any]) -> None:
 
 
 @in_a_browser
-def test_what_is_downloaded_is_whole(facts: dict[str, Any], folder: Path) -> None:
+def test_downloads_are_complete(facts: dict[str, Any], folder: Path) -> None:
     stem = PROGRAM.stem
     assert facts["downloads"] == [f"{stem}-setpoints.npz", f"{stem}-report.html", PROGRAM.name]
     assert len(npz.load(folder / facts["downloads"][0])) > 1000
@@ -210,7 +210,7 @@ def test_levels_of_detail_join_and_are_within_their_tolerances() -> None:
         assert all(level["off"] <= level["tolerance"] for level in levels)
 
 
-def test_the_page_needs_no_token_and_allows_no_other_place(tmp_path: Path) -> None:
+def test_the_page_needs_no_token_and_allows_no_other_origin(tmp_path: Path) -> None:
     with running(tmp_path / "store", *_with_token(tmp_path)) as server:
         for address, kind in (("/", "text/html"), ("/page.js", "text/javascript"), ("/page.css", "text/css")):
             if missing_pictures() and address != "/":
@@ -224,7 +224,7 @@ def test_the_page_needs_no_token_and_allows_no_other_place(tmp_path: Path) -> No
             assert "connect-src 'self'" in policy
 
 
-def test_what_is_drawn_comes_as_bytes(server: Server) -> None:
+def test_the_drawing_is_sent_as_bytes(server: Server) -> None:
     job = server.planned()
     data = unpacked(server.get(f"/v1/jobs/{job['id']}/drawing").content)
     assert data["axes"] == ["X", "Y", "Z"]

@@ -1,4 +1,4 @@
-"""What survives the end of a server, whatever moment it comes at."""
+"""The store after the end of a server at any moment."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_a_running_job_of_a_server_that_ended_waits_again(tmp_path: Path) -> Non
     again = store.claim()
     assert again is not None
     assert (again["id"], again["attempt"]) == (first["id"], 2)
-    # A process that was left over tells of the first attempt: nobody listens.
+    # Progress of the first attempt, from a process that was left over, is ignored.
     store.progress(running, "write", 1.0, 1.0)
     store.finish(running, "done", result={"time": 2.0}, problem=None)
     assert store.job(first["id"])["state"] == "running"
@@ -78,7 +78,7 @@ def test_a_job_is_accepted_as_a_whole_or_not_at_all(tmp_path: Path, monkeypatch:
     store.close()
 
 
-def test_what_ended_long_ago_is_forgotten(tmp_path: Path) -> None:
+def test_jobs_that_ended_long_ago_are_deleted(tmp_path: Path) -> None:
     store = Store(tmp_path, Limits(keep_days=0.0))
     waiting, ended = (store.accept(upload(store), name, **FIELDS)[0] for name in "ab")
     assert store.cancel_waiting(ended["id"])

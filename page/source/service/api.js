@@ -1,10 +1,10 @@
-/* Requests to the service. Its token, where it has one, is asked for once and kept as long as the tab is open. */
+/* Requests to the service. The user is asked once for its token, which is kept while the tab is open. */
 
 import { element } from "../parts.js";
 
 const KEPT = "feedplan-token";
 
-/* What the service refuses, in its own sentence; `line` is the place in the program. */
+/* A refusal of the service, in its own sentence; `line` is the line of the program. */
 export class Refused extends Error {
   constructor(problem) {
     super(problem.detail ?? problem.title ?? "the service gave no answer");
@@ -12,12 +12,12 @@ export class Refused extends Error {
   }
 }
 
-/* The answer to a request; asks for the token where it is missing. Raises Refused. */
+/* The answer to a request; asks the user for the token if it is missing. Raises Refused. */
 export async function request(address, options = {}) {
   for (;;) {
     const token = sessionStorage.getItem(KEPT);
     const headers = { ...options.headers, ...(token ? { Authorization: `Bearer ${token}` } : {}) };
-    // Without credentials the browser does not ask in a window of its own.
+    // Without credentials the browser does not open its own window for a password.
     const answer = await fetch(address, { ...options, headers, credentials: "omit" });
     if (answer.status === 401) {
       await askToken(Boolean(token));
@@ -30,7 +30,7 @@ export async function request(address, options = {}) {
 
 export const json = async (address, options) => (await request(address, options)).json();
 
-/* Saves what is at an address as a file. */
+/* Saves the answer of an address as a file. */
 export async function download(address, name) {
   const url = URL.createObjectURL(await (await request(address)).blob());
   const link = element("a");
@@ -41,7 +41,7 @@ export async function download(address, name) {
 
 let asking = null;
 
-/* Several requests may need it at the same time: they share one question. */
+/* Requests that need the token at the same time share one question. */
 function askToken(wasWrong) {
   asking ??= new Promise((resolve) => {
     const dialog = element("dialog");
@@ -65,7 +65,7 @@ function askToken(wasWrong) {
   return asking;
 }
 
-/* Server-sent events of an address as [kind, data]; goes on after the last one where the line breaks. */
+/* Server-sent events of an address as [kind, data]; after a broken connection it continues with the next event. */
 export async function* events(address, signal) {
   let last = "";
   for (let failures = 0; failures < 20; ) {

@@ -1,4 +1,4 @@
-/* The page of the service: a program is dropped, planned, looked at and compared. */
+/* The page of the service: takes a program, has it planned, and shows and compares plans. */
 
 import "./service.css";
 
@@ -42,13 +42,13 @@ export async function service() {
     at("plan").disabled = false;
   }
 
-  /* The options that are given; others are the method's own. */
+  /* The options that the user has given. */
   function options() {
     const given = ["tolerance", "feed"].map((name) => [name, numbersIn(at(name).value)]);
     return Object.fromEntries(given.filter(([, value]) => value !== null));
   }
 
-  /* Plans with the progress shown; null where it was stopped or refused, which is told. */
+  /* Plans and shows the progress; shows an error and returns null if the job was stopped or refused. */
   async function plan(order) {
     stop?.abort();
     const own = (stop = new AbortController());
@@ -88,9 +88,9 @@ export async function service() {
     if (made) show(made);
   }
 
-  let older = null; // what to ask for the plans before those that are listed
+  let older = null; // `before` of the request for older plans
 
-  /* Lists the newest plans, or adds those before the last one. */
+  /* Lists the newest plans, or adds older ones to the list. */
   async function recent(before = null) {
     const { jobs, before: next } = await json(`/v1/jobs?state=done&count=${RECENT}${before === null ? "" : `&before=${before}`}`);
     older = next;
@@ -117,7 +117,7 @@ export async function service() {
     }));
   }
 
-  // A program comes by hand or by being dropped anywhere.
+  // A program is chosen by a dialog or dropped anywhere on the page.
   at("file").addEventListener("change", () => {
     if (!at("file").files.length) return;
     take(at("file").files[0]);

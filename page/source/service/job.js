@@ -1,18 +1,18 @@
-/* One program planned by the service: sent, followed to its end, and read as what is drawn. */
+/* Has one program planned by the service: sends it, follows its events, and loads the data to draw. */
 
 import { unpacked } from "../data.js";
 import { Run } from "../run.js";
 import { Refused, events, json, request } from "./api.js";
 
-/* An order is { program (a file), name, machine, method, options }. Sends it, tells `onProgress(stage, done)`, and
-   gives what `opened` gives. Cancels the job where the signal is aborted. */
+/* Sends an order { program (a file), name, machine, method, options }, calls `onProgress(stage, done)`, and returns
+   the result of `opened`. Cancels the job if the signal is aborted. */
 export async function planned(order, { onProgress, signal } = {}) {
   const form = new FormData();
   form.append("program", order.program, order.name);
   form.append("machine", order.machine);
   form.append("method", order.method);
   form.append("options", JSON.stringify(order.options));
-  // A request that is broken off may have been accepted: its job is known, and cancelled, after the answer alone.
+  // The request itself is not aborted: its job may be accepted already, and only the answer has its name.
   const job = await json("/v1/jobs", { method: "POST", body: form });
   try {
     signal?.throwIfAborted();
@@ -27,8 +27,8 @@ export async function planned(order, { onProgress, signal } = {}) {
   return opened(job.id, order);
 }
 
-/* A job that is done: { job, summary (plan.json), data (what is drawn), run, order }. Raises Refused with why it
-   has failed. */
+/* A job that is done: { job, summary (plan.json), data (of the drawing), run, order }. Raises Refused with the
+   reason of a failed job. */
 export async function opened(id, order = null) {
   const job = await json(`/v1/jobs/${id}`);
   if (job.problem) throw new Refused(job.problem);

@@ -1,8 +1,8 @@
-/* The page without a mouse: which key does what. */
+/* The keys of the page. */
 
 import { PathView } from "../path_view.js";
 
-const FEW = 0.002, MANY = 0.02; // parts of the whole time
+const FEW = 0.002, MANY = 0.02; // steps over the whole time
 
 export function keys(result, help) {
   const { cursor, player, path } = result;

@@ -1,4 +1,4 @@
-/* The machine that a program is planned on: chosen by name, its limits edited in a table or as a whole file. */
+/* The machine that a program is planned on: chosen by name, and edited as a table of limits or as a file. */
 
 import { numbersIn } from "../numbers.js";
 import { element } from "../parts.js";
@@ -6,15 +6,15 @@ import { json } from "./api.js";
 import { LIMITS, described, written } from "./machine_file.js";
 
 const AUTO = "auto", EDITED = "edited";
-const PAUSE = 300; // [ms] after the last letter
+const PAUSE = 300; // time from the last keystroke to the request [ms]
 
 export class MachineChoice {
   #known = {};
-  #text = null; // of an edited machine
-  #info = null; // what the service says of the machine; null where it is still to be chosen
+  #text = null; // the file of an edited machine
+  #info = null; // the service's description of the machine; null if none is chosen
   #wait = 0;
 
-  /* `told` is where it stands what is wrong with an edited machine. */
+  /* `told` is the element for errors in an edited machine. */
   constructor(select, table, text, told) {
     Object.assign(this, { select, table, text, told });
     select.addEventListener("change", () => this.#choose());
@@ -36,12 +36,12 @@ export class MachineChoice {
     this.#choose();
   }
 
-  /* What is sent: a name, or the text of a machine file. */
+  /* The machine in a request: a name, or the text of a machine file. */
   get order() {
     return this.#text ?? this.select.value;
   }
 
-  /* Takes over the text of a machine, as of a job that was opened. */
+  /* Sets the text of a machine, such as that of an opened job. */
   take(text) {
     const name = Object.keys(this.#known).find((known) => this.#known[known].file === text);
     if (name) {
@@ -63,19 +63,19 @@ export class MachineChoice {
     this.#fill();
   }
 
-  /* The machine is none of those that are known. */
+  /* Shows that the machine is not one of the bundled ones. */
   #edited(text) {
     this.#text = text;
     if (!this.select.querySelector(`[value=${EDITED}]`)) this.select.append(new Option(EDITED, EDITED));
     this.select.value = EDITED;
   }
 
-  /* Asks what a machine with these limits is, and shows that; what is wrong is told. */
+  /* Asks the service for the machine with these limits and shows it, or shows the error. */
   async #ask(machine, limits = {}) {
     const before = this.order;
     try {
       const info = await described(machine, limits);
-      if (this.order !== before) return; // it was edited again meanwhile
+      if (this.order !== before) return; // the machine has been edited again
       this.#info = info;
       this.told.textContent = "";
       if (Object.keys(limits).length) {

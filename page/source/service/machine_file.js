@@ -1,17 +1,17 @@
-/* What the service says of a machine: its axes, its controller, and the whole text of its file. */
+/* Asks the service for the description of a machine: its axes, its controller, the whole text of its file. */
 
 import { json } from "./api.js";
 
 export const LIMITS = { max_velocity: "velocity", max_acceleration: "acceleration", max_jerk: "jerk" };
 
-/* The machine of a name or of a file's text, with other limits where these are given: { axis: { key: value } }.
-   Raises Refused with what is wrong in the text. */
+/* The machine of a name or of a file's text, with changed limits { axis: { key: value } }. Raises Refused with the
+   error in the text. */
 export function described(machine, limits = {}) {
   const body = JSON.stringify({ machine, limits });
   return json("/v1/machines", { method: "POST", body, headers: { "Content-Type": "application/json" } });
 }
 
-/* A limit as it is written: nothing where there is none, two numbers where directions differ. */
+/* A limit as text: empty without a limit, two numbers if the directions differ. */
 export const written = (limit) => (limit === null ? "" : [limit].flat().join(", "));
 
 /* A limit times a factor, in both directions. */

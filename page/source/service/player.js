@@ -1,10 +1,10 @@
-/* Plays a run: moves the cursor as time goes by. */
+/* Plays a run: moves the cursor with time. */
 
 import { clock } from "../numbers.js";
 import { element } from "../parts.js";
 
 const PACES = [0.1, 0.25, 0.5, 1, 2, 5, 10, 30, 100, 300];
-const STEPS = 4000; // of the slider
+const STEPS = 4000; // steps of the slider
 
 export class Player {
   #frame = 0;
@@ -37,7 +37,7 @@ export class Player {
     });
   }
 
-  /* Plays a run of this duration [s] from now on. */
+  /* Sets the duration of the run to play [s]. */
   show(duration) {
     this.stop();
     this.duration = duration;

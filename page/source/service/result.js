@@ -1,4 +1,4 @@
-/* A plan as it is looked at: figures, tool path, player, speed, axes, slow lines, source; beside it another plan. */
+/* Shows a plan (figures, tool path, player, speed, axes, slow lines, source), and another plan beside it. */
 
 import { AxesPlot } from "../axes_plot.js";
 import { Cursor } from "../cursor.js";
@@ -15,7 +15,7 @@ const FORMATS = ["npz", "csv", "parquet", "json", "halstreamer", "npz-compressed
 const ENDINGS = { "npz-compressed": "npz", halstreamer: "halstream" };
 
 export class Result {
-  /* `at(id)` gives the places of the page. */
+  /* `at(id)` gives an element of the page. */
   constructor(at) {
     this.at = at;
     this.cursor = new Cursor();
@@ -55,7 +55,7 @@ export class Result {
     at("report").href = plan.job.links.report;
   }
 
-  /* Shows another plan of the program beside this one, under a name; null: none. */
+  /* Shows another plan of the program beside this one, under a name; null removes it. */
   beside(plan, name = "") {
     const { at } = this;
     this.other = plan;
@@ -63,7 +63,7 @@ export class Result {
     this.speed.show(plan && { run: plan.run, data: plan.data, name });
     this.#figures(name);
     if (!plan) return this.path.scene.resize();
-    plan.run.path.cutting_speed = this.plan.run.path.cutting_speed; // the same colours
+    plan.run.path.cutting_speed = this.plan.run.path.cutting_speed; // so that both have the same colours
     this.second ??= new PathView(at("second-path"), null, this.cursor, { onMove: (scene) => this.path.scene.lookLike(scene) });
     at("second-name").textContent = `${duration(plan.summary.time)} · ${name}`;
     this.second.modeName = this.path.modeName;
@@ -74,7 +74,7 @@ export class Result {
     this.#follow(this.cursor.time);
   }
 
-  /* Goes to where a source line begins. */
+  /* Sets the cursor to the begin of a source line. */
   goTo(line) {
     const time = this.plan.run.timeOfLine(line);
     this.source.choose(line);
@@ -125,15 +125,15 @@ export class Result {
     const { slow } = this.plan.data;
     const head = element("tr");
     head.append(element("th", "n", "Line"), element("th", "n", "Lost"), element("th", "", "Because of"));
-    const rows = slow.map((place) => {
+    const rows = slow.map((line) => {
       const row = element("tr", "go");
       row.tabIndex = 0;
-      const because = element("td", "", place.limit);
-      if (place.stops) because.append(" ", element("span", "tag", "stop"));
-      if (place.rapid) because.append(" ", element("span", "tag", "rapid"));
-      row.append(element("td", "n", `${place.line}`), element("td", "n", duration(place.lost)), because);
-      row.addEventListener("click", () => this.goTo(place.line));
-      row.addEventListener("keydown", ({ key }) => key === "Enter" && this.goTo(place.line));
+      const because = element("td", "", line.limit);
+      if (line.stops) because.append(" ", element("span", "tag", "stop"));
+      if (line.rapid) because.append(" ", element("span", "tag", "rapid"));
+      row.append(element("td", "n", `${line.line}`), element("td", "n", duration(line.lost)), because);
+      row.addEventListener("click", () => this.goTo(line.line));
+      row.addEventListener("keydown", ({ key }) => key === "Enter" && this.goTo(line.line));
       return row;
     });
     this.at("slow").replaceChildren(head, ...rows);

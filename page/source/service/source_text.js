@@ -1,17 +1,17 @@
-/* The source of the program, of any length: only the lines in view exist. */
+/* The source of the program, of any length: only the lines in view are elements of the page. */
 
 import { element } from "../parts.js";
 
-const ROW = 19; // pixels
-const LINES = 1 << 17; // counted at a time
-const MOST = 12_000_000; // pixels that a browser can scroll
+const ROW = 19; // height of a line in pixels
+const LINES = 1 << 17; // lines found between two reactions to the user
+const MOST = 12_000_000; // greatest height in pixels that a browser can scroll
 
 export class SourceText {
   #bytes = new Uint8Array(0);
   #starts = [0];
   #chosen = 0;
 
-  /* `onLine(number)` is told the line that was clicked. */
+  /* `onLine(number)` is called with the line that was clicked. */
   constructor(container, onLine) {
     this.container = container;
     this.room = container.appendChild(element("div", "room"));
@@ -30,7 +30,7 @@ export class SourceText {
     this.#bytes = bytes;
     for (let at = bytes.indexOf(10); at >= 0; at = bytes.indexOf(10, at + 1)) {
       starts.push(at + 1);
-      if (starts.length % LINES === 0) await new Promise((resolve) => setTimeout(resolve)); // the user comes first
+      if (starts.length % LINES === 0) await new Promise((resolve) => setTimeout(resolve)); // lets the page react
       if (this.#bytes !== bytes) return; // another program is shown
     }
     this.#starts = starts;
@@ -44,7 +44,7 @@ export class SourceText {
     return new TextDecoder().decode(this.#bytes.subarray(this.#starts[line - 1], Math.min(end, this.#starts[line - 1] + 400))).trimEnd();
   }
 
-  /* Marks a line, from 1, and brings it into view. */
+  /* Marks a line (from 1) and scrolls it into view. */
   choose(line) {
     if (line === this.#chosen && line) return;
     this.#chosen = line;

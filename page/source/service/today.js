@@ -1,5 +1,5 @@
-/* What a plan is compared with: a controller of today with its settings, or another method. The settings are
-   those of the machine file where it is its controller, else the controller's own defaults; each can be changed. */
+/* Chooses what a plan is compared with: a controller of today or another method. The settings of a controller are
+   those of the machine file if it names this controller, else the controller's defaults; each can be changed. */
 
 import { numbersIn } from "../numbers.js";
 import { element } from "../parts.js";
@@ -15,7 +15,7 @@ export class Today {
   #own = null; // the controller of the machine file
   #given = {}; // parameters that were changed here
 
-  /* `onChoice()` is told when the choice or a setting has changed. */
+  /* `onChoice()` is called when the choice or a setting has changed. */
   constructor(select, table, onChoice) {
     Object.assign(this, { select, table });
     select.addEventListener("change", () => {
@@ -36,7 +36,7 @@ export class Today {
     this.#methods = methods.map(({ name }) => name);
   }
 
-  /* Starts from a plan; nothing is chosen. */
+  /* Takes a plan; nothing is chosen. */
   async show(plan) {
     this.#plan = plan;
     this.#own = null;
@@ -47,14 +47,14 @@ export class Today {
     this.#options();
   }
 
-  /* Nothing is chosen. */
+  /* Removes the choice. */
   clear() {
     this.select.value = "";
     this.#given = {};
     this.#fill();
   }
 
-  /* What is to be planned: { order, words }, null where nothing is chosen. */
+  /* The chosen plan to make, { order, words }; null if nothing is chosen. */
   get order() {
     const { order } = this.#plan, name = this.select.value;
     if (!name) return null;

@@ -1,18 +1,18 @@
-/* What if the feed, the tolerance or a limit of an axis were another: sliders that have the program planned again. */
+/* Sliders for the feed, the tolerance and a limit of an axis; moving one has the program planned again. */
 
 import { duration, shown } from "../numbers.js";
 import { element } from "../parts.js";
 import { planned } from "./job.js";
 import { LIMITS, described, scaled } from "./machine_file.js";
 
-const PAUSE = 120; // [ms] in which a slider rests that is still held
+const PAUSE = 120; // time for which a slider must rest before planning [ms]
 
-/* From the place of a slider to its value: 0 is as planned. Factors go from a quarter to four times. */
-const factorAt = (place) => 2 ** (place / 50);
+/* The factor at a position of a slider, from 1/4 to 4; 1 (as planned) at position 0. */
+const factorAt = (position) => 2 ** (position / 50);
 const SLIDERS = {
-  feed: { label: "Feed override", shown: (place) => `${shown(100 * factorAt(place), 3)} %` },
-  tolerance: { label: "Tolerance", shown: (place, what) => (place === 0 ? "as planned" : `${shown(what.tolerance * factorAt(2 * place), 2)} mm`) },
-  limit: { label: "Limit of", shown: (place) => `${shown(100 * factorAt(place), 3)} %` },
+  feed: { label: "Feed override", shown: (position) => `${shown(100 * factorAt(position), 3)} %` },
+  tolerance: { label: "Tolerance", shown: (position, what) => (position === 0 ? "as planned" : `${shown(what.tolerance * factorAt(2 * position), 2)} mm`) },
+  limit: { label: "Limit of", shown: (position) => `${shown(100 * factorAt(position), 3)} %` },
 };
 
 export class WhatIf {
@@ -22,7 +22,7 @@ export class WhatIf {
   #isDue = false;
   #stop = null;
 
-  /* `onPlan(plan, words)` is told each new plan, null where all is as planned. */
+  /* `onPlan(plan, words)` is called with each new plan, and with null if all sliders are at 0. */
   constructor(container, onPlan) {
     Object.assign(this, { onPlan });
     this.sliders = {};
@@ -47,7 +47,7 @@ export class WhatIf {
     this.back.addEventListener("click", () => this.reset());
   }
 
-  /* Starts from a plan. */
+  /* Takes the plan to change. */
   async show(plan) {
     this.#base = plan;
     this.quiet();
@@ -66,7 +66,7 @@ export class WhatIf {
     this.onPlan(null);
   }
 
-  /* All sliders as planned. */
+  /* Sets all sliders to 0. */
   quiet() {
     this.#stop?.abort();
     clearTimeout(this.#wait);
@@ -76,8 +76,8 @@ export class WhatIf {
     this.#tell();
   }
 
-  #set(name, place) {
-    this.sliders[name].input.value = place;
+  #set(name, position) {
+    this.sliders[name].input.value = position;
     this.#changed();
   }
 
@@ -95,7 +95,7 @@ export class WhatIf {
     this.#soon(PAUSE);
   }
 
-  /* Plans after so many ms what has changed. */
+  /* Plans with the changes after `wait` ms. */
   #soon(pause) {
     clearTimeout(this.#wait);
     if (this.#isDue) this.#wait = setTimeout(() => this.#plan(), pause);
@@ -120,22 +120,22 @@ export class WhatIf {
 
   async #order() {
     const { order } = this.#base;
-    const place = (name) => Number(this.sliders[name].input.value);
+    const position = (name) => Number(this.sliders[name].input.value);
     const options = { ...order.options }, words = [];
     let { machine } = order;
-    if (place("feed")) {
-      options.feed_override = (options.feed_override ?? 1) * factorAt(place("feed"));
-      words.push(`feed ${SLIDERS.feed.shown(place("feed"))}`);
+    if (position("feed")) {
+      options.feed_override = (options.feed_override ?? 1) * factorAt(position("feed"));
+      words.push(`feed ${SLIDERS.feed.shown(position("feed"))}`);
     }
-    if (place("tolerance")) {
-      options.tolerance = Number((this.tolerance * factorAt(2 * place("tolerance"))).toPrecision(3));
-      words.push(`tolerance ${SLIDERS.tolerance.shown(place("tolerance"), this)}`);
+    if (position("tolerance")) {
+      options.tolerance = Number((this.tolerance * factorAt(2 * position("tolerance"))).toPrecision(3));
+      words.push(`tolerance ${SLIDERS.tolerance.shown(position("tolerance"), this)}`);
     }
-    if (place("limit")) {
+    if (position("limit")) {
       const [axis, key] = this.limit.value.split(" ");
       const limit = this.#axes.find(({ name }) => name === axis)[key];
-      machine = (await described(machine, { [axis]: { [key]: scaled(limit, factorAt(place("limit"))) } })).file;
-      words.push(`${axis} ${LIMITS[key]} ${SLIDERS.limit.shown(place("limit"))}`);
+      machine = (await described(machine, { [axis]: { [key]: scaled(limit, factorAt(position("limit"))) } })).file;
+      words.push(`${axis} ${LIMITS[key]} ${SLIDERS.limit.shown(position("limit"))}`);
     }
     return { order: { ...order, machine, options }, words: words.join(", ") };
   }

@@ -4,7 +4,7 @@
 use std::time::{Duration, Instant};
 
 use criterion::{criterion_group, BenchmarkId, Criterion, Throughput};
-use feedplan_jerk::jerk_limited::{plan, Effort, End, Geometry, Limits, Place, Problem};
+use feedplan_jerk::jerk_limited::{plan, Effort, End, Geometry, Limits, PathPoint, Problem};
 
 /// A space curve that winds to both sides and up and down, its derivatives known by the length.
 struct Winding([f64; 2]);
@@ -14,7 +14,7 @@ impl Geometry<3> for Winding {
         &self.0
     }
 
-    fn at(&self, _: usize, s: f64) -> Place<3> {
+    fn at(&self, _: usize, s: f64) -> PathPoint<3> {
         // Angles of the direction, and two derivatives.
         let (x, z) = (0.31 * s, 0.17 * s);
         let turn = [2.0 * x.sin(), 0.62 * x.cos(), -0.1922 * x.sin()];
@@ -32,7 +32,7 @@ impl Geometry<3> for Winding {
                 + 2.0 * turn[1] * rise[1] * mixed[k]
                 - rise[1] * rise[1] * first[k]
         });
-        Place { first, second, third, speed_cap: f64::INFINITY }
+        PathPoint { first, second, third, speed_cap: f64::INFINITY }
     }
 }
 

@@ -5,7 +5,7 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use criterion::{criterion_group, BenchmarkId, Criterion, Throughput};
-use feedplan_jerk::path_dynamics::{allowable, bounded, sampled, AxisLimits, Curve};
+use feedplan_jerk::path_limits::{allowable, bounded, sampled, AxisLimits, Curve};
 use feedplan_jerk::s_curve::{Limits, Profiler, Segment};
 
 /// Segments of about a length with speeds of 30 to 100 mm/s.

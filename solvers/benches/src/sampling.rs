@@ -9,7 +9,7 @@ use feedplan_geometry::spline::bezier::elevate;
 use feedplan_geometry::spline::length::CurveLength;
 use feedplan_geometry::spline::CompositeCurve;
 use feedplan_geometry::watch::Watch;
-use feedplan_planner::arc_kind::ArcKind;
+use feedplan_planner::phase_law::PhaseLaw;
 use feedplan_setpoints::motion::ProfileArc;
 use feedplan_setpoints::sampling::{Interpolator, PathData, Sampler};
 
@@ -45,7 +45,7 @@ fn changed(curve: &CompositeCurve<3>, by: usize, r: f64) -> CompositeCurve<3> {
     raised
 }
 
-fn profile(kind: ArcKind, curve: &CompositeCurve<3>, r: f64) -> Vec<ProfileArc> {
+fn profile(kind: PhaseLaw, curve: &CompositeCurve<3>, r: f64) -> Vec<ProfileArc> {
     let lengths = CurveLength::new(curve, 1e-13, Watch::default());
     // x' of the weights 1, r, …, r^d on a piece with x' = 1 without them: r at its start, 1/r at its end.
     let at_ends = |p0: f64, p1: f64| (p0 / (r * r), p1 * r * r);
@@ -65,11 +65,11 @@ fn profile(kind: ArcKind, curve: &CompositeCurve<3>, r: f64) -> Vec<ProfileArc> 
                 a1: 0.0,
             };
             match kind {
-                ArcKind::Feed => {
+                PhaseLaw::Feed => {
                     ProfileArc { duration: (lengths.length(i, 1.0) - lengths.length(i, 0.0)) / 100.0, ..arc }
                 }
                 // Between 50 and 100 mm/s on 1 mm.
-                ArcKind::AxisAcceleration => {
+                PhaseLaw::AxisAcceleration => {
                     let (p0, p1) = if i % 2 == 0 { (2500.0, 1e4) } else { (1e4, 2500.0) };
                     let value = 0.5 * (p1 - p0);
                     let (p0, p1) = at_ends(p0, p1);
@@ -87,7 +87,7 @@ fn setpoints(c: &mut Criterion) {
     let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
     let shapes = [("quadratic", 0, 1.0), ("cubic", 1, 1.0), ("quintic", 3, 1.0), ("rational cubic", 1, 1.5)];
     for (shape, by, r) in shapes {
-        for kind in [ArcKind::AxisAcceleration, ArcKind::Feed] {
+        for kind in [PhaseLaw::AxisAcceleration, PhaseLaw::Feed] {
             for interpolator in [Interpolator::Sarfraz, Interpolator::Newton] {
                 let curve = changed(&spline(), by, r);
                 let arcs = profile(kind, &curve, r);

@@ -1,6 +1,6 @@
 //! Plane paths of smooth bends: the curvature is a sum of bumps, so that everything has a closed form.
 
-use feedplan_jerk::jerk_limited::{Geometry, Place};
+use feedplan_jerk::jerk_limited::{Geometry, PathPoint};
 
 /// A bend by an angle within about twice its width.
 #[derive(Clone, Copy, Debug)]
@@ -42,7 +42,7 @@ impl Geometry<2> for Bends {
         &self.knots
     }
 
-    fn at(&self, _: usize, s: f64) -> Place<2> {
+    fn at(&self, _: usize, s: f64) -> PathPoint<2> {
         // κ = angle/(2 width) sech²((s − s₀)/width)
         let (mut theta, mut kappa, mut change) = (self.theta, 0.0, 0.0);
         for bend in &self.bends {
@@ -53,7 +53,7 @@ impl Geometry<2> for Bends {
             change -= 2.0 * hump * t / bend.width;
         }
         let (y, x) = theta.sin_cos();
-        Place {
+        PathPoint {
             first: [x, y],
             second: [-kappa * y, kappa * x],
             third: [-change * y - kappa * kappa * x, change * x - kappa * kappa * y],

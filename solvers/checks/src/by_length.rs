@@ -1,6 +1,6 @@
 //! Curves along their arc length, for tests of the jerk-limited planner.
 
-use feedplan_jerk::jerk_limited::{Geometry, Place};
+use feedplan_jerk::jerk_limited::{Geometry, PathPoint};
 
 /// A curve C(t) in M axes with its first three derivatives.
 pub trait Curve<const M: usize>: Sync {
@@ -85,7 +85,7 @@ impl<C: Curve<M>, const M: usize> Geometry<M> for ByLength<C, M> {
         &self.knots
     }
 
-    fn at(&self, piece: usize, s: f64) -> Place<M> {
+    fn at(&self, piece: usize, s: f64) -> PathPoint<M> {
         let (start, end) = (self.knots[piece], self.knots[piece + 1]);
         // A knot belongs to the piece asked for.
         let inside = 1e-9 * (end - start);
@@ -101,7 +101,7 @@ impl<C: Curve<M>, const M: usize> Geometry<M> for ByLength<C, M> {
         let u2 = slope * u1;
         let u3 = (bend * u1 + slope * slope) * u1;
         let of = |f: &dyn Fn(usize) -> f64| std::array::from_fn(f);
-        Place {
+        PathPoint {
             first: of(&|k| d1[k] * u1),
             second: of(&|k| d2[k] * u1 * u1 + d1[k] * u2),
             third: of(&|k| d3[k] * u1.powi(3) + 3.0 * d2[k] * u1 * u2 + d1[k] * u3),

@@ -1,6 +1,6 @@
 //! A space path without end: the two angles of its direction are sums of sines.
 
-use feedplan_jerk::jerk_limited::{Geometry, Place};
+use feedplan_jerk::jerk_limited::{Geometry, PathPoint};
 
 /// Pieces of 5 mm.
 pub struct Wave {
@@ -35,7 +35,7 @@ impl Geometry<3> for Wave {
         &self.knots
     }
 
-    fn at(&self, _: usize, s: f64) -> Place<3> {
+    fn at(&self, _: usize, s: f64) -> PathPoint<3> {
         let turn = waves(s, &[[0.9, 3.1, 0.0], [0.3, 1.7, 0.0], [1.5, 7.3, 0.0]]);
         let rise = waves(s, &[[0.3, 1.7, 0.0], [0.5, 7.3, std::f64::consts::FRAC_PI_2]]);
         let [sin, cos] = [0, 1].map(|part| {
@@ -48,6 +48,6 @@ impl Geometry<3> for Wave {
         let level = cos(rise);
         let axes = [product(level, cos(turn)), product(level, sin(turn)), sin(rise)];
         let [first, second, third] = std::array::from_fn(|order| axes.map(|axis| axis[order]));
-        Place { first, second, third, speed_cap: f64::INFINITY }
+        PathPoint { first, second, third, speed_cap: f64::INFINITY }
     }
 }

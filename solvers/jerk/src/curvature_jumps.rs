@@ -1,59 +1,60 @@
-//! How fast a path may be passed where its curvature jumps, and what that leaves of the limits of jerk around.
+//! The speed cap at jumps of a path's curvature, and the tighter limits of jerk around them, by third differences of
+//! setpoints.
 //!
-//! A third difference of setpoints over the cube of their period T is the mean of the jerk with the weight B of the quadratic
-//! B-spline on 3 T, whose peak is 3/(4 T). A jump Δ of q'', passed at the speed v, is a step Δ v² of the acceleration: the
-//! difference shows Δ v² B of it as a jerk, where B is that at the time of the jump. So all differences keep the limit J if
+//! A third difference of setpoints over the cube of their period T is the mean of the jerk, weighted by the quadratic
+//! B-spline B on 3 T, whose maximum is 3/(4 T). A jump Δ of q'', passed at the speed v, is a step Δ v² of the
+//! acceleration, which the difference shows as a jerk Δ v² B, with B at the time of the jump. All differences keep the
+//! limit J if
 //!
-//! - Σ |Δ| v² B ≤ κ J over the jumps within any 3 T, κ ≤ `MOST`: that caps v, and
-//! - the jerk between the jumps is at most (1 − κ) J from 3/2 T before each of them to 3/2 T after.
+//! - Σ |Δ| v² B ≤ κ J over the jumps within any 3 T, with κ ≤ `MOST`, which caps v, and
+//! - the jerk between the jumps is at most (1 − κ) J from 3/2 T before each jump to 3/2 T after it.
 //!
-//! A difference whose middle lies beside a jump sees less of its step, and less of what is calm around it: at x periods
-//! from the middle b(x)/b(0) of the step, and of the weight a part I(x) of 3/2 T to both sides. I(x) ≥ b(x)/b(0).
+//! A difference whose middle is x periods from a jump shows the part B(x)/B(0) of its step, and has the part I(x) of
+//! its weight within 3/2 T of the jump. I(x) ≥ B(x)/B(0), so that both conditions suffice for it as well.
 
-/// The greatest part of the limit of jerk that jumps may use: more is faster at the jumps, and slower to and from them.
+/// Greatest part κ of the limit of jerk for jumps: a greater one is faster at jumps, but slower around them.
 pub const MOST: f64 = 0.65;
-/// Jumps that show as less than this part of the limits are rounding: half of what an audit can tell.
+/// Jumps that show as less than this part of the limit are rounding: half of what an audit can tell.
 const UNSEEN: f64 = 5e-7;
-/// Half the time that a third difference looks at, in periods.
+/// Half the time that a third difference spans, in periods.
 pub const HALF: f64 = 1.5;
-/// Places of the difference that are looked at, from one end to the other, and the periods from each to the next.
-const PLACES: usize = 25;
-const STEP: f64 = 2.0 * HALF / (PLACES - 1) as f64;
-/// Halvings for the speed at jumps that show in the same differences.
+/// Samples of the difference's middle over its span, and their spacing in periods.
+const SAMPLES: usize = 25;
+const STEP: f64 = 2.0 * HALF / (SAMPLES - 1) as f64;
+/// Bisection steps for the speed at jumps that show in the same differences.
 const HALVINGS: u32 = 20;
 
 /// A place where q'' jumps.
 #[derive(Clone, Copy, Debug)]
 pub struct Jump<const M: usize> {
-    /// Along the path, in mm.
+    /// Arc length, in mm.
     pub s: f64,
-    /// By how much each axis's q'' jumps, in 1/mm, over its limit of jerk, in mm/s³.
+    /// Jump of each axis's q'', in 1/mm, over its limit of jerk, in mm/s³.
     pub change: [f64; M],
-    /// No more than these is possible there for all other reasons: the speed, in mm/s, and the acceleration along the
-    /// path, in mm/s².
+    /// The greatest speed, in mm/s, and acceleration along the path, in mm/s², by all other limits.
     pub speed: f64,
     pub acceleration: f64,
 }
 
-/// What a jump asks for.
+/// The speed cap at a jump, and the tighter limits of jerk around it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Passage {
-    /// The greatest speed, in mm/s; infinite where the jump does not hold it.
+    /// The greatest speed, in mm/s; infinite where other limits are lower.
     pub speed: f64,
-    /// As far as this to both sides, in mm, …
+    /// The limits of jerk are tighter up to this distance to both sides, in mm.
     pub reach: f64,
-    /// … the limits of jerk are lower by this part; 0 where no setpoints show a jump.
+    /// The part by which they are lower; 0 where no setpoints show a jump.
     pub share: f64,
 }
 
-/// What each of the jumps asks for, which rise along the path.
+/// The passages of all jumps, which must rise in s.
 pub fn passages<const M: usize>(jumps: &[Jump<M>], period: f64) -> Vec<Passage> {
     let fastest: Vec<f64> = (0..jumps.len()).map(|i| greatest_speed(jumps, i, period)).collect();
     let speeds: Vec<f64> =
         jumps.iter().zip(&fastest).map(|(jump, fastest)| jump.speed.min(*fastest)).collect();
     let passage = |i: usize| {
         let jump = &jumps[i];
-        // Of the fastest jump that shows in the same differences.
+        // The speed of the fastest jump that shows in the same differences.
         let mut most = speeds[i];
         for near in around(jumps, i, speeds[i] * period) {
             most = most.max(speeds[near]);
@@ -89,8 +90,7 @@ fn greatest_speed<const M: usize>(jumps: &[Jump<M>], i: usize, period: f64) -> f
     low
 }
 
-/// The greatest part of a limit that any difference shows of jump `i` and those around it, all passed at one speed; 0 for
-/// rounding.
+/// The greatest part of a limit that differences show of jump `i` and those around it at one speed; 0 for rounding.
 fn shown<const M: usize>(jumps: &[Jump<M>], i: usize, speed: f64, period: f64) -> f64 {
     let (per_period, near) = (speed * period, around(jumps, i, speed * period));
     let per_weight = speed * speed / period;
@@ -108,12 +108,12 @@ fn shown<const M: usize>(jumps: &[Jump<M>], i: usize, speed: f64, period: f64) -
         return at_once;
     }
     let mut most = 0.0_f64;
-    for place in 0..PLACES {
-        let centre = STEP * place as f64 - HALF;
+    for sample in 0..SAMPLES {
+        let centre = STEP * sample as f64 - HALF;
         let mut sum = [0.0; M];
         for jump in &jumps[near.clone()] {
             let x = (jump.s - jumps[i].s) / per_period - centre;
-            // The weight's second derivative is −2 in its middle: that much is more between two places.
+            // The weight's second derivative is −2 in its middle, so that it may exceed its samples by this much.
             let between = if x.abs() < 0.5 + STEP { 0.25 * STEP * STEP } else { 0.0 };
             let part = weight(x) + between;
             for k in 0..M {
@@ -125,7 +125,7 @@ fn shown<const M: usize>(jumps: &[Jump<M>], i: usize, speed: f64, period: f64) -
     most * per_weight
 }
 
-/// The jumps that a difference may show together with jump `i` where they are passed at so many mm in a period.
+/// The jumps that a difference may show together with jump `i`, if all are passed at this many mm per period.
 fn around<const M: usize>(jumps: &[Jump<M>], i: usize, per_period: f64) -> std::ops::Range<usize> {
     let (s, reach) = (jumps[i].s, 2.0 * HALF * per_period);
     let before = jumps[..i].iter().rev().take_while(|jump| s - jump.s < reach).count();
@@ -133,7 +133,7 @@ fn around<const M: usize>(jumps: &[Jump<M>], i: usize, per_period: f64) -> std::
     i - before..i + after + 1
 }
 
-/// The weight of a third difference at so many periods from its middle, times the period.
+/// The weight of a third difference at x periods from its middle, times the period.
 fn weight(x: f64) -> f64 {
     let x = x.abs();
     if x < 0.5 {
@@ -171,13 +171,13 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_alone_shows_the_most_that_is_allowed_at_its_greatest_speed() {
+    fn a_single_jump_uses_its_whole_part_of_the_limit_at_its_greatest_speed() {
         // Limit 1: 3/4 · 2 v² = MOST · T.
         let [passage] = passages(&[jump(5.0, 2.0)], PERIOD)[..] else { panic!() };
         assert!((passage.speed / (MOST * PERIOD / 1.5).sqrt() - 1.0).abs() < 1e-12);
         assert!((passage.share - MOST).abs() < 1e-12);
         assert!((passage.reach - 1.5e-3 * (passage.speed + 0.75)).abs() < 1e-12);
-        // One that is slow for other reasons uses less.
+        // A jump that is slow by other limits uses less.
         let slow = Jump { speed: 0.5 * passage.speed, ..jump(5.0, 2.0) };
         let [passage] = passages(&[slow], PERIOD)[..] else { panic!() };
         assert_eq!(passage.speed, f64::INFINITY);
@@ -185,8 +185,8 @@ mod tests {
     }
 
     #[test]
-    fn what_jumps_and_a_calm_jerk_show_together_keeps_the_limit() {
-        // Jumps at even steps of the way, the jerk between them against its lowered limit, all of one sign.
+    fn jumps_and_the_lowered_jerk_between_them_keep_the_limit() {
+        // Jumps at equal distances, with the jerk between them at its lowered limit, all of one sign.
         let mut most = 0.0_f64;
         for spacing in [1e-6, 3e-6, 1e-5, 2e-5, 3e-5, 5e-5, 1e-4, 1.0] {
             let jumps: Vec<_> = (0..200).map(|i| jump(spacing * f64::from(i), 2.0)).collect();

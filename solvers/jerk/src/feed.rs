@@ -1,31 +1,33 @@
-//! The speed that a feed limits where axes count in it by shares, |(share_k q_k')| u̇: beside that of all axes.
+//! The greatest speed [mm/s] along the axes' path by a feed that counts each axis by a share: |(share_k q_k')| u̇ ≤
+//! feed.
+//!
+//! The squares of both speeds are polynomials over one denominator; Bernstein coefficients bound their quotient.
 
-use crate::by_length::{piece, MAX_RATE};
+use crate::arc_length_path::{piece, MAX_RATE};
 use feedplan_geometry::polynomial::Polynomial;
 use feedplan_geometry::spline::bezier::split;
 use feedplan_geometry::spline::rational::Hodograph;
 use feedplan_geometry::spline::{CompositeCurve, Piece};
 use feedplan_planner::problem::Problem;
 
-/// A bound of the share is above the greatest one that is seen by this part at most …
+/// The bound on the quotient exceeds the greatest sampled quotient by at most this part …
 const ACCURACY: f64 = 1e-3;
-/// … unless the part of the piece has been halved so often.
+/// … unless the part of the piece has been halved this often.
 const MAX_DEPTH: u32 = 16;
 
 type Square = Polynomial<MAX_RATE>;
 
-/// The greatest speed along piece `i` that keeps the feed everywhere between two parameters.
+/// The greatest speed along piece `i`, in mm/s, at which the feed is kept everywhere between two parameters.
 pub fn between<const M: usize>(problem: &Problem<M>, i: usize, [from, to]: [f64; 2]) -> f64 {
     let mut parts = CompositeCurve::default();
     split(&piece(problem, i), &[from, to], &mut parts);
     on(problem, i, &parts.piece(1))
 }
 
-/// The same on a part of piece `i`.
+/// `between` for a part of piece `i`.
 pub fn on<const M: usize>(problem: &Problem<M>, i: usize, part: &Piece<M>) -> f64 {
     let Some(share) = problem.share(i) else { return problem.feed[i] };
     let hodograph = Hodograph::new(part);
-    // The denominators of rational pieces are those of both speeds.
     let rows = hodograph.coefficients();
     let square = |share: &[f64; M]| {
         let axis = |k: usize| Square::from_bernstein(rows.iter().map(|row| share[k] * row[k]));
@@ -36,8 +38,7 @@ pub fn on<const M: usize>(problem: &Problem<M>, i: usize, part: &Piece<M>) -> f6
     problem.feed[i] / greatest_quotient(&square(share), &square(&[1.0; M]), most, &mut seen, 0).sqrt()
 }
 
-/// Not below the greatest n/d on [0, 1], which is at most `most`: between Bernstein coefficients of one degree lie
-/// their quotients.
+/// An upper bound on n/d on [0, 1], at most `most`, by the quotients of Bernstein coefficients of one degree.
 fn greatest_quotient(n: &Square, d: &Square, most: f64, seen: &mut f64, depth: u32) -> f64 {
     let quotient = |n: f64, d: f64| if d > 0.0 { (n / d).min(most) } else { most };
     let bound = (0..=n.degree()).map(|i| quotient(n.bernstein(i), d.bernstein(i))).fold(0.0, f64::max);

@@ -1,37 +1,50 @@
-//! Least time along a path under limits of velocity, acceleration and jerk of every axis.
+//! The speed profile of least time along a path, under limits of velocity, acceleration and jerk of every axis.
 //!
-//! With s along the path and w(s) = v² = ṡ², an axis q(s) moves with
+//! Input: derivatives of the axes by the arc length s [mm] (`Geometry`), limits of each axis, speed caps. Output: the
+//! square of the speed w(s) = v² [mm²/s²] as a C¹ cubic spline (`Profile`). An axis q(s) moves with
 //!
 //!   velocity q' √w,   acceleration q'' w + q' w'/2,   jerk √w (q''' w + 3/2 q'' w' + 1/2 q' w'')
 //!
-//! and the time is ∫ ds/√w. w is a C¹ cubic spline on nodes about equal in travel time. `survey` and `grid` place
-//! the nodes, `rest` is the ramp from rest, `baseline` a first plan, `interior_point` improves one stretch,
-//! `stretch` holds the limits between the points, and `windows` does so for paths of any length. `bound`
-//! proves how near to the least time on its grid a plan is.
+//! and the time is T = ∫ ds/√w. Only the limit of jerk is not convex in w; its slack J w^(−1/2) ∓ (q''' w + …) is
+//! convex, so that its tangent at a feasible w is a safe constraint.
 //!
-//! Limits hold to 5e-7 of themselves at all places between the nodes, as far as twelve samples of each interval of
-//! the path's true derivatives tell. All of it keeps a valid plan at all times: whoever stops it gets the best one so far.
+//! | module | what it computes |
+//! |---|---|
+//! | `speed_envelope`, `grid` | the stations of the spline, about equal in travel time |
+//! | `rest_ramp` | the start from rest and the stop: constant jerk, w ∝ s^(4/3) |
+//! | `initial_plan`, `prepare` | a first plan within all limits |
+//! | `constraints`, `exact`, `relaxed` | the limits as slacks; the true problem and its convex relaxation |
+//! | `interior_point`, `newton`, `band` | the primal-dual interior-point method on one window |
+//! | `intersample_check`, `window` | the limits between the collocation points |
+//! | `windows` | paths of any length |
+//! | `lower_bound` | a lower bound on the time on the same grid |
+//! | `on_path` | the planner on the package's own paths |
+//!
+//! The limits hold to 5e-7 of themselves, as checked at 12 samples of each interval with the path's true derivatives.
+//! Every iterate is a valid plan, so that a planner that is stopped returns the best plan so far. The method is our
+//! own; the predictor and corrector are those of Mehrotra (SIAM J. Optim. 2, 1992).
 
 mod band;
-mod baseline;
-mod between;
-mod bound;
+mod constraints;
 mod exact;
 mod grid;
 mod hermite;
+mod initial_plan;
 mod interior_point;
+mod intersample_check;
 #[cfg(test)]
 mod levels;
+mod lower_bound;
 mod model;
 mod newton;
+pub mod on_path;
 mod prepare;
 mod profile;
 mod relaxed;
-mod rest;
-mod rows;
+mod rest_ramp;
 mod sides;
-mod stretch;
-mod survey;
+mod speed_envelope;
+mod window;
 mod windows;
 
 use std::time::Instant;
@@ -39,31 +52,33 @@ use std::time::Instant;
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::problem::Both;
 
-pub use bound::{certify, Certificate};
+pub use lower_bound::{certify, Certificate};
 pub use profile::Profile;
 
-/// Derivatives of the axes along the path at a place, and the greatest speed there.
+/// Derivatives of the axes by the arc length at a point of the path, and the speed cap there.
 #[derive(Clone, Copy, Debug)]
-pub struct Place<const M: usize> {
-    /// q' in mm (or degrees) per mm.
+pub struct PathPoint<const M: usize> {
+    /// q', in mm (or degrees) per mm.
     pub first: [f64; M],
+    /// q'', per mm more.
     pub second: [f64; M],
+    /// q''', per mm² more.
     pub third: [f64; M],
-    /// The greatest speed along the path by feed and chord error, in mm/s; infinite where there is none.
+    /// The greatest speed along the path by feed and chord error, in mm/s; infinite where neither limits it.
     pub speed_cap: f64,
 }
 
-/// A path: pieces between knots, each with smooth derivatives.
+/// A path of smooth pieces between knots.
 pub trait Geometry<const M: usize>: Sync {
-    /// The ends of the pieces along the path in mm, rising from 0. q' is continuous over all of them; q'' may jump
-    /// where the problem caps the speed, q''' anywhere.
+    /// Arc lengths of the ends of the pieces, in mm, strictly rising from 0. q' is continuous at all knots; q'' may
+    /// jump where the problem caps the speed, q''' anywhere.
     fn knots(&self) -> &[f64];
 
-    /// Derivatives at s on a piece, its ends included.
-    fn at(&self, piece: usize, s: f64) -> Place<M>;
+    /// Derivatives at the arc length s on a piece, which may be one of its ends.
+    fn at(&self, piece: usize, s: f64) -> PathPoint<M>;
 }
 
-/// Greatest magnitudes for each axis, in mm/s, mm/s² and mm/s³: of what is positive and of what is negative, but for jerk.
+/// Greatest magnitudes of each axis, in mm/s, mm/s² and mm/s³; all but jerk for positive and for negative values.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits<const M: usize> {
     pub velocity: Both<M>,
@@ -71,22 +86,20 @@ pub struct Limits<const M: usize> {
     pub jerk: [f64; M],
 }
 
-/// A greatest speed at one place, and a lower limit of jerk around it: where q'' jumps the acceleration does, and setpoints
-/// show that as a jerk.
+/// A speed cap, and tighter limits of jerk around it, as setpoints show a jump of q'' as jerk.
 #[derive(Clone, Copy, Debug)]
 pub struct SpeedCap {
-    /// Along the path, in mm.
+    /// Arc length, in mm.
     pub s: f64,
-    /// In mm/s; infinite for none.
+    /// In mm/s; infinite for no cap.
     pub speed: f64,
-    /// As far as this to both sides, in mm, …
+    /// The limits of jerk are tighter up to this distance to both sides, in mm.
     pub reach: f64,
-    /// … the limits of jerk are lower by this part, less than 1.
+    /// The part, less than 1, by which they are lower.
     pub share: f64,
 }
 
 impl SpeedCap {
-    /// A greatest speed alone.
     pub fn new(s: f64, speed: f64) -> Self {
         Self { s, speed, reach: 0.0, share: 0.0 }
     }
@@ -96,37 +109,35 @@ impl SpeedCap {
 #[derive(Clone, Copy, Debug)]
 pub enum End {
     Rest,
-    /// With a speed in mm/s above 0 and an acceleration along the path in mm/s². A first plan does not meet it: only
-    /// after some iterations there is a plan.
+    /// A speed above 0 in mm/s and an acceleration along the path in mm/s². Only some iterations lead to a plan.
     Moving {
         speed: f64,
         acceleration: f64,
     },
 }
 
-/// A path with its limits.
 pub struct Problem<'a, G, const M: usize> {
     pub geometry: &'a G,
     pub limits: Limits<M>,
-    /// Rising in s, speeds above 0.
+    /// Strictly rising in s, with speeds above 0.
     pub caps: &'a [SpeedCap],
     pub ends: [End; 2],
 }
 
-/// How well, and how long, to plan.
+/// Accuracy and effort of a plan.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort<'a> {
-    /// Intervals per time in which the speed can change to its like: 16 leave less than 1e-4 of the time.
+    /// Number of intervals while r = w^(3/4) doubles at its greatest slope: 16 cost less than 1e-4 of the time.
     pub resolution: f64,
-    /// The gap of complementarity at which to stop, in parts of the time.
+    /// Complementarity gap at which iterations stop, as a part of the time.
     pub tolerance: f64,
-    /// Iterations for each stretch.
+    /// Most iterations for each window.
     pub max_iterations: usize,
-    /// A plan is due by then, whatever its quality.
+    /// When a plan must be ready, whatever its quality.
     pub deadline: Option<Instant>,
-    /// Paths of more intervals than this are solved in overlapping windows of about so many.
+    /// Paths of more intervals than this are solved in overlapping windows of about this many intervals.
     pub window: usize,
-    /// Who waits for the plan.
+    /// Takes the progress and may cancel the work.
     pub watch: Watch<'a>,
 }
 
@@ -150,28 +161,25 @@ impl Effort<'_> {
     }
 }
 
-/// Why there is no plan.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Fault {
-    /// The problem is ill-posed; the sentence says how.
+    /// The input is wrong, as the sentence says.
     Input(String),
-    /// No valid plan was found near this place, in mm along the path: no speed is possible there, or a moving end is
-    /// not reached from the path.
+    /// No valid plan was found near this arc length, in mm: no speed is possible, or a moving end is out of reach.
     NoPlan { s: f64 },
 }
 
-/// A plan.
 #[derive(Clone, Debug)]
 pub struct Plan {
     pub profile: Profile,
     /// In s.
     pub time: f64,
-    /// Whether every stretch came to its optimum.
+    /// Whether every window reached its optimum.
     pub converged: bool,
-    /// How far it may be above the least time on its grid, in s, by the complementarity that the multipliers leave; an
-    /// estimate and no bound, and of no meaning where the deadline came first.
+    /// Estimate of the time above the least time on the grid, in s, by the complementarity that the multipliers leave.
+    /// It is no bound, and it has no meaning where the deadline stopped the iterations.
     pub excess: f64,
-    /// Newton steps, summed over the intervals they were taken on, in parts of all intervals.
+    /// Newton steps, averaged over the intervals.
     pub iterations: f64,
 }
 
@@ -180,7 +188,7 @@ pub fn plan<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>, effort: &Ef
     windows::solve(problem, effort, |_| {})
 }
 
-/// The same, handing out each stretch of the profile as soon as it is final, from start to end.
+/// `plan` that hands out each part of the profile as soon as it is final, from start to end.
 pub fn stream<G: Geometry<M>, const M: usize>(
     problem: &Problem<G, M>,
     effort: &Effort,

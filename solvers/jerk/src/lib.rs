@@ -1,44 +1,46 @@
-//! Plans under limits of jerk: the jerk-limited optimum and the heuristic S-curve, by the length of the path.
+//! Speed profiles under limits of jerk [mm/s³] of every axis, along a path of the package: the jerk-limited optimum
+//! (`jerk_limited`) and the two-pass S-curve heuristic (`s_curve`).
+//!
+//! Both plan along the arc length s [mm] of the axes' path (`arc_length_path`), between two places of rest (`subruns`),
+//! and return columns of phases (`jerk_profile`).
 
-pub mod by_length;
+pub mod arc_length_path;
 pub mod curvature_jumps;
 pub mod feed;
-pub mod jerk_arcs;
 pub mod jerk_limited;
-pub mod jerk_limited_path;
+pub mod jerk_profile;
 mod lanes;
-pub mod path_dynamics;
+pub mod path_limits;
 pub mod s_curve;
-pub mod s_curve_path;
-pub mod stretches;
+pub mod subruns;
 
 use feedplan_geometry::instances;
 use feedplan_planner::problem::Fault;
 
-use jerk_arcs::Arcs;
 use jerk_limited::Effort;
+use jerk_profile::JerkProfile;
+use s_curve::on_path::{Cutting, Segmented};
 use s_curve::Section;
-use s_curve_path::{Cutting, Segmented};
 
 instances! {
     /// Plans of a problem within `jerk` [mm/s³] of every axis.
     pub trait JerkLimited for [3, 6, 9] feedplan_planner::problem::Problem<'_, M> = {
         /// The fastest profile that the effort finds.
-        fn jerk_limited(&self, jerk: &[f64; M], effort: &Effort) -> Result<Arcs, Fault>
-            = jerk_limited_path::plan;
-        /// A time [s] that no profile is below, of each stretch, on the grid of a profile.
-        fn jerk_limited_bound(&self, jerk: &[f64; M], columns: &jerk_limited_path::Columns, effort: &Effort)
-            -> Result<Vec<f64>, Fault> = jerk_limited_path::certified;
-        /// The two-pass profile of segments by the quickest cutting.
+        fn jerk_limited(&self, jerk: &[f64; M], effort: &Effort) -> Result<JerkProfile, Fault>
+            = jerk_limited::on_path::plan;
+        /// A lower bound [s] on the time of each subrun, on the stations of a profile.
+        fn jerk_limited_bound(&self, jerk: &[f64; M], columns: &jerk_limited::on_path::Columns, effort: &Effort)
+            -> Result<Vec<f64>, Fault> = jerk_limited::on_path::certified;
+        /// The two-pass profile; each subrun takes the cutting that gives the least time.
         fn s_curve(&self, jerk: &[f64; M], cuttings: &[Cutting], look_ahead: usize, effort: &Effort)
-            -> Result<Arcs, Fault> = s_curve_path::plan;
-        /// The segments of that.
+            -> Result<JerkProfile, Fault> = s_curve::on_path::plan;
+        /// The segments that `s_curve` plans on.
         fn segments(&self, jerk: &[f64; M], cuttings: &[Cutting], look_ahead: usize)
-            -> Result<Segmented, Fault> = s_curve_path::cut;
-        /// The profile of sections of constant jerk; those of stretch i from `offsets[i]` on.
-        fn of_sections(&self, jerk: &[f64; M], offsets: &[usize], sections: &[Section]) -> Result<Arcs, Fault>
-            = s_curve_path::follow;
-        /// The greatest speed [mm/s] along a part of a piece that keeps the feed everywhere on it.
+            -> Result<Segmented, Fault> = s_curve::on_path::cut;
+        /// The profile of sections of constant jerk; subrun i has those from `offsets[i]` to `offsets[i + 1]`.
+        fn of_sections(&self, jerk: &[f64; M], offsets: &[usize], sections: &[Section]) -> Result<JerkProfile, Fault>
+            = s_curve::on_path::of_sections;
+        /// The greatest speed [mm/s] along the axes' path at which the tool keeps the feed on a part of a piece.
         fn feed_between(&self, piece: usize, part: [f64; 2]) -> f64 = feed::between;
     }
 }

@@ -1,37 +1,40 @@
 //! The two-pass jerk-limited speed profiler of Cheatham 2007, "A Geometry-Based Motion Planner for Direct Machining and
-//! Control", chapter 4: segments of path with limits along the path to sections of constant jerk.
+//! Control", chapter 4: from segments of path with limits along the path [mm, s] to sections of constant jerk.
 //!
-//! The acceleration is 0 where segments meet, and a profile always ends at standstill on segments already known. When the
-//! motion is about to enter a segment, the forward recursion raises the speed at its end as far as possible and falls
-//! to standstill; the backward recursion lowers what breaks a limit ahead. What fails leaves the established profile.
-//! So every segment costs no more than looking as far ahead as it takes to stop, and at most `look_ahead` segments.
+//! The acceleration is 0 where segments meet, and a profile always ends at standstill on segments already known. When
+//! the motion is about to enter a segment, the forward recursion raises the speed at its end as far as possible and
+//! falls to standstill; the backward recursion lowers the speeds that break a limit ahead. If it fails, the established
+//! profile stays. So a segment costs no more than looking ahead as far as it takes to stop, and at most `look_ahead`
+//! segments.
 //!
-//! | file | idea |
+//! | module | what it computes |
 //! |---|---|
 //! | `segment` | a segment with its limits |
 //! | `transition` | the S-curve: time, length and highest speed of a change (4.6–4.15) |
-//! | `dead_spot` | which lower speeds can be reached (4.3.4) |
-//! | `buffer` | segments ahead and the limits where they meet |
+//! | `dead_spot` | the lower speeds that can be reached (4.3.4) |
+//! | `buffer` | segments ahead, and the limits where they meet |
 //! | `forward` | acceleration and deceleration stage (4.3.1) |
 //! | `backward` | with and without an established profile (4.3.2) |
-//! | `section` | the seven types of section (4.1) and how they fill a segment |
+//! | `section` | the seven types of section (4.1), and how they fill a segment |
+//! | `on_path` | the profiler on the package's own paths |
 //!
-//! Where this departs from the thesis:
-//! - 4.12: the last term is A³/(6 J²), not 2 A³/(3 J²); only so do 4.12 and 4.13 add up to 4.14.
+//! Differences from the thesis:
+//! - 4.12: the last term is A³/(6 J²), not 2 A³/(3 J²); only then do 4.12 and 4.13 add up to 4.14.
 //! - 4.3.4 has at most two usable roots; the third end is the acceleration limit (see `dead_spot`).
 //! - Sections of constant acceleration and constant speed are used; a segment may rise to a peak and fall again.
 //! - The pseudocode of 4.3.3 joins the established profile wherever it can, which near the standing end is at once, and
-//!   gains nothing. Here the backward recursion follows the forward one down to the present speed, and only where
-//!   it cannot meet that does it join the established profile, as early on the path as it can.
+//!   gains nothing. Here the backward recursion follows the forward one down to the present speed. Only where it cannot
+//!   meet that speed does it join the established profile, as early on the path as it can.
 //! - Zero-length segments, exact stops and speed limits at junctions are allowed.
 //!
-//! The speeds are not the highest possible: no acceleration at the joints costs time, most where segments are
-//! short beside the way to the speed (thesis, 7.1).
+//! The speeds are not the highest possible: zero acceleration where segments meet costs time, most where segments are
+//! short beside the length of a change of speed (thesis, 7.1).
 
 mod backward;
 mod buffer;
 mod dead_spot;
 mod forward;
+pub mod on_path;
 mod section;
 mod segment;
 mod transition;
@@ -45,37 +48,37 @@ pub use section::{Section, SectionKind};
 pub use segment::Segment;
 pub use transition::Limits;
 
-/// A stream of segments in, of sections out.
+/// The streaming profiler: segments in, sections out.
 #[derive(Clone, Debug)]
 pub struct Profiler {
     look_ahead: usize,
     buffer: Buffer,
     /// The established profile: the speed at the start of every segment in the buffer, and 0 at the end.
     speeds: VecDeque<f64>,
-    /// How many speeds from the first on may not be 0.
+    /// Number of speeds from the first one on that may differ from 0.
     moving: usize,
-    place: section::Place,
+    start: section::SegmentStart,
     entered: usize,
     forward: Vec<f64>,
     backward: Vec<f64>,
 }
 
 impl Profiler {
-    /// A profiler at rest, which knows `look_ahead` segments beyond the one that the motion enters.
+    /// A profiler at rest that knows `look_ahead` segments beyond the one that the motion enters.
     pub fn new(look_ahead: usize) -> Self {
         Self {
             look_ahead,
             buffer: Buffer::default(),
             speeds: VecDeque::from([0.0]),
             moving: 0,
-            place: section::Place::default(),
+            start: section::SegmentStart::default(),
             entered: 0,
             forward: vec![],
             backward: vec![],
         }
     }
 
-    /// Takes a segment; where the buffer is full, appends the sections of the oldest to `out`.
+    /// Takes a segment; if the buffer is full, appends the sections of the oldest segment to `out`.
     pub fn push(&mut self, segment: Segment, out: &mut Vec<Section>) -> Result<(), Fault> {
         segment.check(self.entered + self.buffer.len())?;
         self.buffer.push(segment);
@@ -86,7 +89,7 @@ impl Profiler {
         Ok(())
     }
 
-    /// No more segments: appends the sections of the oldest to `out`; false when none is left and the motion stands.
+    /// After the last segment: appends the sections of the oldest one to `out`; false if none is left.
     pub fn drain(&mut self, out: &mut Vec<Section>) -> bool {
         self.buffer.len() > 0 && {
             self.enter(out);
@@ -99,7 +102,7 @@ impl Profiler {
         self.plan();
         let start = self.speeds.pop_front().unwrap_or(0.0);
         if let Some(segment) = self.buffer.pop() {
-            self.place = section::cross(&segment, start, self.speeds[0], self.place, out);
+            self.start = section::cross(&segment, start, self.speeds[0], self.start, out);
             self.entered += 1;
             self.moving = self.moving.saturating_sub(1);
         }
@@ -123,7 +126,7 @@ impl Profiler {
     }
 }
 
-/// The sections of a whole path from rest to rest, planned with a look-ahead of so many segments.
+/// The sections of a whole path from rest to rest, with this look-ahead in segments.
 pub fn plan(segments: &[Segment], look_ahead: usize, watch: Watch) -> Result<Vec<Section>, Fault> {
     let mut profiler = Profiler::new(look_ahead);
     let mut sections = Vec::with_capacity(4 * segments.len());
@@ -135,14 +138,13 @@ pub fn plan(segments: &[Segment], look_ahead: usize, watch: Watch) -> Result<Vec
     Ok(sections)
 }
 
-/// The quickest sections of one segment between speeds at its ends, no acceleration there; None where it does not join
-/// them.
+/// The quickest sections of a segment between speeds without acceleration; None where the segment does not join them.
 pub fn cross(segment: &Segment, [from, to]: [f64; 2]) -> Result<Option<Vec<Section>>, Fault> {
     segment.check(0)?;
     let joins = from.max(to) <= segment.speed() && segment.joins(from, to);
     Ok(joins.then(|| {
         let mut sections = vec![];
-        section::cross(segment, from, to, section::Place::default(), &mut sections);
+        section::cross(segment, from, to, section::SegmentStart::default(), &mut sections);
         sections
     }))
 }

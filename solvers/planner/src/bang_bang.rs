@@ -1,11 +1,48 @@
-//! The exact time-optimal speed along a path under limits of speed, axis velocity, axis acceleration and chord error.
+//! The exact time-optimal speed along a path of lines, polynomial and rational pieces, from the limits of feed, axis
+//! velocity, axis acceleration and chord error, by two passes over every run. After Zhang et al. 2010 and Timar et
+//! al. 2005, with the limits of speed in the plan.
 //!
-//! State p = (du/dt)², s = p'/2 = d²u/dt². Axis k has the velocity q'_k √p and the acceleration a_k = q'_k s + q''_k p.
-//! For every λ in [0, 1] a feasible profile p scaled to λ p stays feasible. So the values of p from which the end of a
-//! run can be reached are an interval [0, K(u)], and two greedy passes over a run are exact: backward, under the velocity
-//! caps and the limit curve, a pass finds K; forward under K, a pass finds the fastest profile. Neither searches for
-//! switches: each phase of greatest acceleration ends at the first root of a polynomial.
-//! After Zhang et al. 2010 and Timar et al. 2005, with the limits of speed taken into the plan.
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | u, t, x | curve parameter: u of a piece; t = u/width in [0, 1]; x of a sub-piece, in the direction of travel | 1 |
+//! | τ | time | s |
+//! | C, q_k | the curve; the position of axis k | mm, deg |
+//! | ω, g | weight and tangent, C' = g/ω²; on polynomial pieces ω = 1 and g_k = q'_k | 1, mm |
+//! | c | g'; on polynomial pieces c_k = q''_k | mm |
+//! | p, s | p = (dx/dτ)², the state of the motion; s = p'/2 = d²x/dτ² (toppra's x and u) | 1/s² |
+//! | π | p/ω⁴: v_k = g_k √π, a_k = ω² (g_k π'/2 + c_k π); on polynomial pieces π = p, a_k = g_k s + c_k p | 1/s² |
+//! | D | v² = D π is the square of the tool's speed: D = \|g\|², or a given polynomial where the axes are joints | mm² |
+//! | W_jk | c_j g_k − c_k g_j, the Wronskian of two tangents; constant on a quadratic piece | mm² |
+//! | V_k, A_k, A_k⁻ | limits of velocity, acceleration, deceleration of axis k | mm/s, mm/s² |
+//! | K | the largest p from which the end of the run can be reached | 1/s² |
+//!
+//! | word | meaning |
+//! |---|---|
+//! | turn, cusp | a zero of one g_k, where axis k reverses; a common zero of all g_k, where all axes rest |
+//! | part | a piece between two cuts: on it no axis turns, and one cap is the lowest |
+//! | sub-piece | a part as a pass travels it: x grows, and axes are reflected so that every g_k ≥ 0 |
+//! | cap | the greatest p by feed, axis velocity and chord error |
+//! | limit curve | the greatest p at which some s keeps every axis within its acceleration limits |
+//! | ceiling | the curve that p stays under in a pass: backward the cap, forward K |
+//! | phase | an interval of x under one law: an axis at its acceleration limit, along the cap, along the limit curve |
+//! | switch | where one phase gives way to the next |
+//! | tip | the tool's point, where the axes are joints |
+//!
+//! If a profile p is feasible, so is λ p for every λ in [0, 1], since v_k and a_k are scaled down. So the values of p
+//! from which the end of a run can be reached form an interval [0, K(u)], and two greedy passes are exact:
+//!
+//! 1. backward, under the cap and the limit curve: the greatest p is K;
+//! 2. forward, under K: the greatest p is the fastest profile. It needs no test against the limit curve.
+//!
+//! A pass does not search for switches. At (x, p) axis k allows s ≤ s_k = (A_k − c_k p)/g_k. The *control axis* has
+//! the least s_k, and the pass follows its full acceleration up to the first of these switches, each a root of a
+//! polynomial:
+//!
+//! * another axis reaches +A (a *transition*): it becomes the control axis;
+//! * another axis reaches −A (backward only): the pass follows the limit curve until a phase leaves it downward;
+//! * p reaches the ceiling: the pass *slides* along the cap while no axis needs more than its acceleration, or,
+//!   forward, copies a phase of K to its end;
+//! * the end of the sub-piece. Between pieces v² is continuous and at most the square of the junction speed.
 //!
 //! A piece is planned by one of three kernels:
 //!
@@ -13,13 +50,13 @@
 //! |---|---|---|
 //! | `line` | straight ones | v² is linear in the length: the trapezoid |
 //! | `quadratic` | polynomials of degree 2 in the tool's own axes | closed forms, and roots of quartics |
-//! | `curve` | all others: any degree, rational, joints with a tool elsewhere | roots of Bernstein polynomials |
+//! | `curve` | all others: any degree, rational, joints | roots of Bernstein polynomials |
 //!
 //! | file | content |
 //! |---|---|
 //! | `run` | both passes over a run, from piece to piece |
-//! | `chord` | the chord-error limit as speeds whose squares are linear in the parameter |
-//! | `time` | the time along a cap of the tool's speed |
+//! | `chord` | the chord-error limit as lines: v² linear in t |
+//! | `time` | the time of a phase along the cap |
 //! | `tolerance` | every tolerance, with its reason |
 
 mod chord;
@@ -38,14 +75,14 @@ use crate::runs::over_runs;
 use feedplan_geometry::quadratic::norm;
 use feedplan_geometry::watch::Watch;
 
-/// The problem as the runs see it.
+/// The problem, with its limits prepared for the kernels.
 struct Task<'a, const M: usize> {
     problem: &'a Problem<'a, M>,
-    /// Limits of the axes for the kernel of curves, and for the others.
+    /// Limits of the axes for the kernel of curves, and for the other two.
     axes: curve::Axes<M>,
     plain_axes: quadratic::Axes<M>,
     chord: Option<ChordLimit>,
-    /// Lines and quadratics have kernels of their own: the axes are the tool's, and their limits are the same in both
+    /// The kernels of lines and quadratics may be used: the axes are the tool's, with the same limits in both
     /// directions.
     plain: bool,
     /// Counts pieces.
@@ -60,7 +97,7 @@ thread_local! {
 pub fn plan<const M: usize>(problem: &Problem<M>) -> Result<Profile, Fault> {
     problem.check()?;
     let (velocity, acceleration) = (&problem.max_velocity, &problem.max_acceleration);
-    // What the joints' limits let the tool have is not known.
+    // With joints, the greatest acceleration of the tip is not known.
     let most = if problem.tip.is_some() { f64::INFINITY } else { norm(&greater(acceleration)) };
     let task = Task {
         problem,

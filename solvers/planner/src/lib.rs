@@ -1,29 +1,29 @@
-//! The exact time-optimal plan under velocity, acceleration, feed and chord error, its lower bound, and the plans of
-//! controllers. Lengths are millimetres, times seconds.
+//! Speed plans without a limit of jerk: the exact time-optimal plan under axis velocity, axis acceleration, feed and
+//! chord error, its lower bound, and the speeds of controllers. Lengths are millimetres, angles degrees, times
+//! seconds.
 
-pub mod arc_kind;
 pub mod bang_bang;
-pub mod bound;
-pub mod look_ahead;
+pub mod lower_bound;
+pub mod phase_law;
 pub mod problem;
 pub mod profile;
 mod runs;
+pub mod trapezoid;
 
 use feedplan_geometry::instances;
 
-use bound::Hint;
+use lower_bound::Hint;
 use problem::Fault;
 use profile::Profile;
 
-/// Bit k is about axis k; an instance has at most as many axes.
+/// Bit k stands for axis k; M is at most 16.
 type AxisBits = u16;
 
 instances! {
-    /// What the exact planner says of a problem.
+    /// The exact planner and its lower bound.
     pub trait Exact for [3, 6, 9] problem::Problem<'_, M> = {
-        /// The fastest profile.
         fn fastest(&self) -> Result<Profile, Fault> = bang_bang::plan;
-        /// A time [s] that no profile of the problem is below.
-        fn lower_bound(&self, hint: &Hint) -> Result<f64, Fault> = bound::lower_bound;
+        /// A time [s] below that of every feasible profile.
+        fn lower_bound(&self, hint: &Hint) -> Result<f64, Fault> = lower_bound::lower_bound;
     }
 }

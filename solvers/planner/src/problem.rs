@@ -1,11 +1,11 @@
-//! The planning problem: a path with its limits, checked once.
+//! The planning problem: a path with its limits, with the checks of all its numbers.
 
 use feedplan_geometry::watch::Watch;
 
-/// Axes that the tool itself moves in.
+/// Number of axes in which the tip moves.
 pub const TIP_AXES: usize = 3;
 
-/// Limits of the axes as sizes: of positive values, of negative values.
+/// Limits of the axes as magnitudes: [of positive values, of negative values].
 pub type Both<const M: usize> = [[f64; M]; 2];
 
 /// The greater limit of both directions.
@@ -18,34 +18,33 @@ pub fn lesser<const M: usize>(limits: &Both<M>) -> [f64; M] {
     std::array::from_fn(|k| limits[0][k].min(limits[1][k]))
 }
 
-/// The greatest multiple of a direction that the limits allow; infinite where all axes stand.
+/// The greatest factor of `direction` that the limits allow; infinite if all its components are 0.
 pub fn along<const M: usize>(limits: &Both<M>, direction: &[f64; M]) -> f64 {
     let of_axis = |k: usize| limits[usize::from(direction[k] < 0.0)][k] / direction[k].abs();
     (0..M).map(of_axis).fold(f64::INFINITY, f64::min)
 }
 
-/// Squares of a speed per (du/dt)², a polynomial on each piece.
+/// The square of a speed over (du/dt)² with the time t, a polynomial on each piece.
 #[derive(Clone, Copy)]
 pub struct SpeedSquare<'a> {
-    /// Bernstein coefficients; those of piece i from offset[i] to offset[i + 1].
+    /// Bernstein coefficients; piece i has coefficients[offset[i]..offset[i + 1]].
     pub coefficients: &'a [f64],
     pub offset: &'a [usize],
 }
 
 impl<'a> SpeedSquare<'a> {
-    /// The coefficients of piece `i`.
     pub fn of(&self, i: usize) -> &'a [f64] {
         &self.coefficients[self.offset[i]..self.offset[i + 1]]
     }
 
-    /// Finite numbers for each of `count` pieces.
+    /// Whether each of `count` pieces has coefficients, all finite.
     fn fits(&self, count: usize) -> bool {
         is_rising(self.offset, count, self.coefficients.len(), 1)
             && self.coefficients.iter().all(|value| value.is_finite())
     }
 }
 
-/// Whether offsets give each of `count` pieces at least so many of `total` rows.
+/// Whether offsets give each of `count` pieces `least` or more of `total` rows.
 fn is_rising(offset: &[usize], count: usize, total: usize, least: usize) -> bool {
     offset.len() == count + 1
         && offset[0] == 0
@@ -53,12 +52,12 @@ fn is_rising(offset: &[usize], count: usize, total: usize, least: usize) -> bool
         && offset.windows(2).all(|pair| pair[1] >= pair[0] + least)
 }
 
-/// The tool's path beside that of the joints, piece by piece over the same parameter.
+/// The path of the tip beside that of the joints, piece by piece over the same parameter.
 #[derive(Clone, Copy)]
 pub struct Tip<'a> {
-    /// The speed that the feed limits, |C'(u)|².
+    /// The speed that the feed limits: |C'(u)|².
     pub speed: SpeedSquare<'a>,
-    /// Control points, weights and offsets as those of the joints, for the chord error.
+    /// Control points, weights and offsets of the tip's path, for the chord error.
     pub control: &'a [[f64; TIP_AXES]],
     pub weight: &'a [f64],
     pub offset: &'a [usize],
@@ -72,46 +71,46 @@ pub struct Problem<'a, const M: usize> {
     /// Their weights; empty where all pieces are polynomial.
     pub weight: &'a [f64],
     pub offset: &'a [usize],
-    /// Parameter intervals.
+    /// Width of each piece's parameter interval.
     pub width: &'a [f64],
-    /// The tool's path, where the axes are not those of the tool.
+    /// The tip, where the axes are joints.
     pub tip: Option<Tip<'a>>,
-    /// The speed along the path that laws of jerk are about, where it is not that of the axes: it vanishes only where
-    /// all axes rest.
+    /// The speed along the path to which laws of jerk refer, if it is not that of the axes; it is 0 only where all
+    /// axes rest.
     pub way: Option<SpeedSquare<'a>>,
-    /// Of each piece: the factor of each axis's velocity in the speed that the feed limits, |(share_k q_k')| u̇;
-    /// empty where all factors are 1, and where `tip` is given.
+    /// Of each piece: the factor of each axis's velocity in the speed that the feed limits, |(share_k q_k')| du/dt.
+    /// Empty if all factors are 1, and where `tip` is given.
     pub feed_share: &'a [[f64; M]],
-    /// Run i is the pieces runs[i]..runs[i + 1]. Every run starts and ends at rest, but for the two ends of the path.
+    /// Run i has the pieces runs[i]..runs[i + 1]. Runs begin and end at rest, except at the two ends of the path.
     pub runs: &'a [usize],
-    /// Greatest speed of each piece, in mm/s.
+    /// Greatest speed of each piece [mm/s].
     pub feed: &'a [f64],
-    /// Greatest speed at the ends of the pieces, in mm/s, one more than pieces; infinite for no limit. Not read where
-    /// a run starts or ends.
+    /// Greatest speed at the start of each piece and at the end of the path [mm/s]; infinite for no limit. Ignored
+    /// where a run begins or ends.
     pub junction_speed: &'a [f64],
-    /// In mm/s and mm/s².
+    /// [mm/s] and [mm/s²].
     pub max_velocity: Both<M>,
     pub max_acceleration: Both<M>,
-    /// In mm, infinite for no limit, and the servo period in s.
+    /// [mm], infinite for no limit; and the servo period [s].
     pub chord_tolerance: f64,
     pub period: f64,
-    /// At the ends of the path, in mm/s.
+    /// At the ends of the path [mm/s].
     pub start_speed: f64,
     pub end_speed: f64,
-    /// Receives progress, and cancels.
+    /// Takes progress, and asks whether to go on.
     pub watch: Watch<'a>,
 }
 
 /// Why there is no profile.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Fault {
-    /// The start speed is too high; `reachable` is the greatest possible, in mm/s.
+    /// The start speed is too high; `reachable` is the greatest possible one [mm/s].
     Start { piece: usize, reachable: f64 },
-    /// The end speed cannot be reached.
+    /// The end speed is too high; `reachable` is the greatest possible one [mm/s].
     End { piece: usize, reachable: f64 },
-    /// An argument cannot be used; `piece` where it belongs to one.
+    /// An argument that cannot be used; of this piece, if of one.
     Input { piece: Option<usize>, what: String },
-    /// A pass makes no headway at u on the piece: a fault of the planner.
+    /// Rounding stopped a pass at u on the piece: a fault of the planner.
     Stuck { piece: usize, u: f64 },
 }
 
@@ -154,7 +153,6 @@ impl<'a, const M: usize> Problem<'a, M> {
         self.width.is_empty()
     }
 
-    /// Control points of piece `i`.
     pub fn points(&self, i: usize) -> &'a [[f64; M]] {
         &self.control[self.offset[i]..self.offset[i + 1]]
     }
@@ -164,12 +162,12 @@ impl<'a, const M: usize> Problem<'a, M> {
         weights_of(self.weight, self.offset, i)
     }
 
-    /// The factors of the axes in the feed on piece `i`, where not all of them are 1.
+    /// The factors of the axes in the feed on piece `i`, or None if all are 1.
     pub fn share(&self, i: usize) -> Option<&'a [f64; M]> {
         self.feed_share.get(i).filter(|share| **share != [1.0; M])
     }
 
-    /// Every array, number and limit: lengths, ranges, finite numbers.
+    /// Checks lengths, ranges and finiteness of every array, number and limit.
     pub fn check(&self) -> Result<(), Fault> {
         self.check_runs()?;
         self.check_limits()?;
@@ -295,21 +293,22 @@ pub fn weights_of<'a>(weight: &'a [f64], offset: &[usize], i: usize) -> &'a [f64
     weight.get(offset[i]..offset[i + 1]).unwrap_or(&[])
 }
 
-/// The chord-error limit v² ≤ α ρ − 4 δ²/T² where it can be lower than what the accelerations allow.
+/// The chord-error limit v² ≤ α ρ − 4 δ²/T² with the radius of curvature ρ, the tolerance δ and the servo period T.
 #[derive(Clone, Copy)]
 pub struct ChordLimit {
-    /// α = 8 δ/T²
+    /// α = 8 δ/T² [mm/s²].
     pub alpha: f64,
-    /// 4 δ²/T²
+    /// 4 δ²/T² [mm²/s²].
     pub slow_sq: f64,
-    /// δ
+    /// δ [mm].
     pub tolerance: f64,
-    /// The greatest acceleration that all axes have together.
+    /// The greatest acceleration of all axes together [mm/s²].
     pub acceleration: f64,
 }
 
 impl ChordLimit {
-    /// None if the limit never binds: v²/ρ is at most `acceleration` on any curve, and the limit nowhere below ρ α/2.
+    /// None if the limit never binds: on any curve v²/ρ is at most `acceleration`, and the limit is nowhere below ρ
+    /// α/2.
     pub fn new(tolerance: f64, period: f64, acceleration: f64) -> Option<Self> {
         let alpha = 8.0 * tolerance / (period * period);
         let slow_sq = 0.5 * alpha * tolerance;

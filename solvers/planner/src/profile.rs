@@ -1,11 +1,11 @@
-//! The profile as columns, one row per arc, in the order of the path and in the parameter of its pieces.
+//! The profile: speed along the path as columns with one row per phase, in the order of the path.
 
-use crate::arc_kind::ArcKind;
+use crate::phase_law::PhaseLaw;
 
-/// No axis belongs to the arc.
+/// The axis of a phase without one.
 pub const NO_AXIS: u8 = 255;
 
-/// Columns of the arcs; see `feedplan.profile.SpeedProfile`.
+/// Columns of the phases; see `feedplan.profile.SpeedProfile`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Profile {
     pub piece: Vec<u32>,
@@ -17,44 +17,43 @@ pub struct Profile {
     pub p0: Vec<f64>,
     pub p1: Vec<f64>,
     pub duration: Vec<f64>,
-    /// Offsets of the runs in the arcs.
+    /// Index of the first phase of each run, and the number of phases.
     pub runs: Vec<i64>,
-    /// Pieces on which the plan is slower than it could be, for rounding hides the way; each as often as that happens.
+    /// Pieces where a remedy against rounding slowed the plan, one entry per remedy.
     pub slowed: Vec<u32>,
     left_out: f64,
 }
 
-/// One row.
 pub(crate) struct Row {
-    pub kind: ArcKind,
+    pub law: PhaseLaw,
     pub axis: u8,
     pub value: f64,
-    /// t at the end; at the start it is that of the row before.
+    /// t at the end; the row before gives t at the start.
     pub t: f64,
     pub p: [f64; 2],
     pub duration: f64,
-    /// The arc goes on from the one before it if that has the same kind, axis and value.
+    /// The phase continues the one before it if that has the same law, axis and value.
     pub joins: bool,
 }
 
 impl Profile {
-    /// No arcs, with space for some.
-    pub(crate) fn with_capacity(arcs: usize) -> Self {
+    /// Without phases, with memory for this many.
+    pub(crate) fn with_capacity(phases: usize) -> Self {
         Self {
-            piece: Vec::with_capacity(arcs),
-            kind: Vec::with_capacity(arcs),
-            axis: Vec::with_capacity(arcs),
-            value: Vec::with_capacity(arcs),
-            u0: Vec::with_capacity(arcs),
-            u1: Vec::with_capacity(arcs),
-            p0: Vec::with_capacity(arcs),
-            p1: Vec::with_capacity(arcs),
-            duration: Vec::with_capacity(arcs),
+            piece: Vec::with_capacity(phases),
+            kind: Vec::with_capacity(phases),
+            axis: Vec::with_capacity(phases),
+            value: Vec::with_capacity(phases),
+            u0: Vec::with_capacity(phases),
+            u1: Vec::with_capacity(phases),
+            p0: Vec::with_capacity(phases),
+            p1: Vec::with_capacity(phases),
+            duration: Vec::with_capacity(phases),
             ..Self::default()
         }
     }
 
-    /// Number of arcs.
+    /// Number of phases.
     pub fn len(&self) -> usize {
         self.piece.len()
     }
@@ -63,12 +62,12 @@ impl Profile {
         self.piece.is_empty()
     }
 
-    /// The time of all arcs, in seconds.
+    /// The time of all phases [s].
     pub fn time(&self) -> f64 {
         self.duration.iter().sum()
     }
 
-    /// One profile of several, in the order of the path.
+    /// Joins profiles in the order of the path.
     pub(crate) fn join(parts: Vec<Self>) -> Self {
         let mut parts = parts.into_iter();
         let mut all = parts.next().unwrap_or_default();
@@ -81,7 +80,7 @@ impl Profile {
         all
     }
 
-    /// Closes a run.
+    /// Closes a run; its last phase gets the time of those too short to keep.
     pub(crate) fn end_run(&mut self) {
         let left_out = std::mem::take(&mut self.left_out);
         if let Some(last) = self.duration.last_mut() {
@@ -89,7 +88,7 @@ impl Profile {
         }
     }
 
-    /// Drops all but the first rows.
+    /// Keeps the first rows only.
     pub(crate) fn truncate(&mut self, rows: usize) {
         self.piece.truncate(rows);
         self.kind.truncate(rows);
@@ -117,8 +116,8 @@ impl Profile {
         self.slowed.append(&mut other.slowed);
     }
 
-    /// Appends an arc of piece number `piece`; t and p belong to the parameter t = u/width. An arc too short for u
-    /// to show it is left out, its time goes to the next one.
+    /// Appends a phase of piece `piece`; t and p are over t = u/width. A phase too short for u to show is left out,
+    /// and the next one gets its time.
     #[inline(always)]
     pub(crate) fn push(&mut self, piece: u32, width: f64, row: Row) {
         let last = self.piece.len().wrapping_sub(1);
@@ -136,7 +135,7 @@ impl Profile {
         }
         if row.joins
             && goes_on
-            && self.kind[last] == row.kind as u8
+            && self.kind[last] == row.law as u8
             && self.axis[last] == row.axis
             && self.value[last] == row.value
         {
@@ -146,7 +145,7 @@ impl Profile {
             return;
         }
         self.piece.push(piece);
-        self.kind.push(row.kind as u8);
+        self.kind.push(row.law as u8);
         self.axis.push(row.axis);
         self.value.push(row.value);
         self.u0.push(u0);

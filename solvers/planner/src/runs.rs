@@ -1,4 +1,4 @@
-//! Runs of a path, planned in parallel.
+//! Plans the runs of a path in parallel and joins their profiles.
 
 use std::cell::RefCell;
 use std::ops::Range;
@@ -9,15 +9,15 @@ use rayon::prelude::*;
 use crate::problem::{Fault, Problem};
 use crate::profile::Profile;
 
-/// Runs are planned in parallel in groups of about this many pieces.
+/// Number of pieces of a group of runs, about; a thread plans one group at a time.
 const GROUP: usize = 8192;
-/// The space of a run of more pieces is given back after it: each thread keeps some MB at most.
+/// The memory of a run of more pieces is freed after it, so that each thread keeps some MB at most.
 const MOST_KEPT: usize = 4096;
 
-/// Space for one run, of each thread: kept from call to call, because asking the system for some MB takes time.
+/// Memory of each thread for one run, kept from call to call: allocating some MB takes time.
 pub type Space<W> = &'static LocalKey<RefCell<W>>;
 
-/// The profiles of all runs as one. `plan` gets the pieces of a run, the squares of the speeds at its ends, space
+/// The profiles of all runs as one. `plan` gets the pieces of a run, the squares of the speeds at its ends, memory,
 /// and the profile to append to.
 pub fn over_runs<const M: usize, W: Default>(
     problem: &Problem<M>,
@@ -50,7 +50,7 @@ pub fn over_runs<const M: usize, W: Default>(
     Ok(Profile::join(plans?))
 }
 
-/// Groups of neighbouring runs with about `GROUP` pieces each.
+/// Groups of successive runs with about `GROUP` pieces each.
 pub fn groups(runs: &[usize]) -> Vec<Range<usize>> {
     let mut groups = vec![];
     let mut first = 0;

@@ -8,7 +8,7 @@ use super::problem::Problem;
 use super::profile::Profile;
 use super::with_padded_axes;
 use super::work::run;
-use feedplan_planner::bound::Hint;
+use feedplan_planner::lower_bound::Hint;
 use feedplan_planner::problem;
 use feedplan_planner::Exact as _;
 

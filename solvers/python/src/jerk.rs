@@ -13,10 +13,10 @@ use super::profile::Profile;
 use super::with_padded_axes;
 use super::work::run;
 use feedplan_geometry::watch::Watch;
+use feedplan_jerk::jerk_limited::on_path;
 use feedplan_jerk::jerk_limited::Effort;
-use feedplan_jerk::jerk_limited_path;
+use feedplan_jerk::s_curve::on_path::Cutting;
 use feedplan_jerk::s_curve::{Section, SectionKind, Segment};
-use feedplan_jerk::s_curve_path::Cutting;
 use feedplan_jerk::JerkLimited as _;
 use feedplan_planner::problem;
 
@@ -76,7 +76,7 @@ fn bound_jerk_limited<'py>(
     time_limit: Option<f64>,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let columns = jerk_limited_path::Columns {
+    let columns = on_path::Columns {
         piece: &profile.piece,
         kind: &profile.kind,
         u0: &profile.u0,
@@ -97,7 +97,7 @@ fn bound_jerk_limited<'py>(
     })
 }
 
-/// The two-pass profile within `jerk` of every axis, of segments by the quickest of some `s_curve_path::Cutting` (lengths,
+/// The two-pass profile within `jerk` of every axis, of segments by the quickest of some `s_curve::on_path::Cutting` (lengths,
 /// alike). The time limit is that of stretches left to the jerk-limited planner; see there.
 #[pyfunction]
 #[pyo3(signature = (problem, jerk, cuttings, look_ahead, time_limit=None, progress=None))]
@@ -140,7 +140,7 @@ fn path_segments<'py>(
         let column =
             |of: fn(&Segment) -> f64| PyArray1::from_vec(py, segmented.segments.iter().map(of).collect());
         Ok((
-            PyArray1::from_vec(py, segmented.stretches),
+            PyArray1::from_vec(py, segmented.subruns),
             column(|segment| segment.length),
             column(Segment::speed),
             column(|segment| segment.limits.acceleration),

@@ -50,7 +50,7 @@ pub(crate) use with_padded_axes;
 /// The native module of feedplan.
 #[pymodule]
 fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    feedplan_planner::bound::prepare();
+    feedplan_planner::lower_bound::prepare();
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     fit::register(module)?;
     path::register(module)?;

@@ -12,8 +12,8 @@ use super::with_padded_axes;
 use super::work::run;
 use feedplan_geometry::watch::Watch;
 use feedplan_jerk::JerkLimited as _;
-use feedplan_planner::look_ahead::{Change, Segments};
 use feedplan_planner::problem::{self, Fault};
+use feedplan_planner::trapezoid::{Change, Segments};
 use feedplan_planner::Exact as _;
 
 pyo3::create_exception!(

@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 
 use super::views::view;
-use feedplan_jerk::jerk_arcs::Arcs;
+use feedplan_jerk::jerk_profile::JerkProfile;
 use feedplan_planner::profile::{self, NO_AXIS};
 
 pyo3::import_exception!(feedplan.errors, InputError);
@@ -83,8 +83,8 @@ impl From<profile::Profile> for Profile {
     }
 }
 
-impl From<Arcs> for Profile {
-    fn from(planned: Arcs) -> Self {
+impl From<JerkProfile> for Profile {
+    fn from(planned: JerkProfile) -> Self {
         Self {
             axis: vec![NO_AXIS; planned.len()],
             piece: planned.piece,

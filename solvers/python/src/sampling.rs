@@ -13,7 +13,7 @@ use super::profile::Profile;
 use super::with_padded_axes;
 use super::work::run;
 use feedplan_geometry::watch::Watch;
-use feedplan_planner::arc_kind::ArcKind;
+use feedplan_planner::phase_law::PhaseLaw;
 use feedplan_setpoints::motion::ProfileArc;
 use feedplan_setpoints::sampling::{Chunk, Interpolator, Resume, Sampler};
 
@@ -36,9 +36,9 @@ type ChunkArrays<'py> = (
 /// Arc i of a profile on a path in so many axes. The error is a sentence for the user.
 fn arc(profile: &Profile, i: usize, axes: usize) -> Result<ProfileArc, String> {
     let (kind, axis) = (profile.kind[i], profile.axis[i]);
-    let kind = ArcKind::from_number(kind)
+    let kind = PhaseLaw::from_number(kind)
         .ok_or_else(|| format!("arc {i} of the profile has the unknown kind {kind}"))?;
-    if matches!(kind, ArcKind::AxisAcceleration | ArcKind::AxisVelocity) && axis as usize >= axes {
+    if matches!(kind, PhaseLaw::AxisAcceleration | PhaseLaw::AxisVelocity) && axis as usize >= axes {
         return Err(format!(
             "arc {i} of the profile is governed by axis {axis}, but the path has {axes}: plan this path again"
         ));

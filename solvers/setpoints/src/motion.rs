@@ -24,7 +24,7 @@ use feedplan_geometry::arc_length::{Integrand, Node, Table, TABLE_ERROR};
 use feedplan_geometry::quadratic::Quadratic;
 use feedplan_geometry::sarfraz::{self, Located};
 use feedplan_geometry::spline::Piece;
-use feedplan_planner::arc_kind::ArcKind;
+use feedplan_planner::phase_law::PhaseLaw;
 use quadratic::QuadraticMotion;
 pub use rate::{TipSpeed, MAX_TIP};
 
@@ -39,7 +39,7 @@ const JERK_STEP_ERROR: f64 = 1e-13;
 #[derive(Clone, Copy, Debug)]
 pub struct ProfileArc {
     pub piece: u32,
-    pub kind: ArcKind,
+    pub kind: PhaseLaw,
     pub axis: u8,
     pub value: f64,
     pub u0: f64,
@@ -99,7 +99,7 @@ impl<'a, const M: usize> Motion<'a, M> {
         arc: &ProfileArc,
         with_lengths: bool,
     ) -> Self {
-        let share = share.filter(|_| arc.kind == ArcKind::Feed);
+        let share = share.filter(|_| arc.kind == PhaseLaw::Feed);
         match Quadratic::from_piece(&piece) {
             Some(quadratic) if tip.is_none() && share.is_none() && !needs_curve(arc.kind) => {
                 Self::Quadratic(Box::new(QuadraticMotion::new(&quadratic, arc, with_lengths)))
@@ -173,8 +173,8 @@ impl<'a, const M: usize> Motion<'a, M> {
 }
 
 /// Whether the general form follows such an arc on quadratic pieces too.
-fn needs_curve(kind: ArcKind) -> bool {
-    kind == ArcKind::SpeedLine || kind.is_along()
+fn needs_curve(kind: PhaseLaw) -> bool {
+    kind == PhaseLaw::SpeedLine || kind.is_along()
 }
 
 /// Tabulates f from one end to another.

@@ -9,7 +9,7 @@ use feedplan_checks::by_length::{ByLength, Lemniscate, Nurbs, Trefoil};
 use feedplan_checks::campaign::seeds;
 use feedplan_checks::wave::Wave;
 use feedplan_jerk::jerk_limited::{
-    certify, plan, stream, Effort, End, Fault, Geometry, Limits, Place, Plan, Problem, Profile, SpeedCap,
+    certify, plan, stream, Effort, End, Fault, Geometry, Limits, PathPoint, Plan, Problem, Profile, SpeedCap,
 };
 
 /// What a dense check may find: the planner's own tolerance and a little more.
@@ -32,8 +32,8 @@ impl Geometry<1> for Line {
         &self.knots
     }
 
-    fn at(&self, _: usize, _: f64) -> Place<1> {
-        Place { first: [1.0], second: [0.0], third: [0.0], speed_cap: self.feed }
+    fn at(&self, _: usize, _: f64) -> PathPoint<1> {
+        PathPoint { first: [1.0], second: [0.0], third: [0.0], speed_cap: self.feed }
     }
 }
 

@@ -3,7 +3,7 @@
 
 use feedplan_checks::{seeds, Random};
 use feedplan_geometry::watch::Watch;
-use feedplan_jerk::path_dynamics::{allowable, bounded, chord_speed, sampled, AxisLimits, Curve, Shape};
+use feedplan_jerk::path_limits::{allowable, bounded, chord_speed, sampled, AxisLimits, Curve, Shape};
 use feedplan_jerk::s_curve::{plan, Limits, Section, Segment};
 
 const AXES: AxisLimits<2> =

@@ -4,7 +4,7 @@ use feedplan_geometry::quadratic::{norm, sub, Quadratic};
 use feedplan_geometry::spline::bezier::elevate;
 use feedplan_geometry::spline::{CompositeCurve, Piece};
 use feedplan_geometry::watch::Watch;
-use feedplan_planner::arc_kind::ArcKind;
+use feedplan_planner::phase_law::PhaseLaw;
 use feedplan_setpoints::motion::{Motion, ProfileArc, State};
 use feedplan_setpoints::sampling::{Interpolator, PathData, Sampler};
 use proptest::prelude::*;
@@ -20,7 +20,7 @@ fn motion<'a, const M: usize>(curve: &'a CompositeCurve<M>, arc: &ProfileArc) ->
     Motion::new(curve.piece(0), None, None, arc, true)
 }
 
-fn arc(kind: ArcKind, value: f64, u: (f64, f64), p: (f64, f64), duration: f64) -> ProfileArc {
+fn arc(kind: PhaseLaw, value: f64, u: (f64, f64), p: (f64, f64), duration: f64) -> ProfileArc {
     let ((u0, u1), (p0, p1)) = (u, p);
     ProfileArc { piece: 0, kind, axis: 0, value, u0, u1, p0, p1, duration, a0: 0.0, a1: 0.0 }
 }
@@ -28,8 +28,8 @@ fn arc(kind: ArcKind, value: f64, u: (f64, f64), p: (f64, f64), duration: f64) -
 /// A line of 10 mm from rest to rest at 1000 mm/s²: up for 0.1 s to 100 mm/s, and down.
 fn triangle() -> (Quadratic<2>, [ProfileArc; 2]) {
     let line = Quadratic::line([0.0, 5.0], [10.0, 5.0]);
-    let up = arc(ArcKind::AxisAcceleration, 1000.0, (0.0, 5.0), (0.0, 1e4), 0.1);
-    let down = arc(ArcKind::AxisAcceleration, -1000.0, (5.0, 10.0), (1e4, 0.0), 0.1);
+    let up = arc(PhaseLaw::AxisAcceleration, 1000.0, (0.0, 5.0), (0.0, 1e4), 0.1);
+    let down = arc(PhaseLaw::AxisAcceleration, -1000.0, (5.0, 10.0), (1e4, 0.0), 0.1);
     (line, [up, down])
 }
 
@@ -112,7 +112,7 @@ fn any_part_of_the_stream_has_the_same_digits() {
 fn the_speed_next_to_a_standstill_keeps_its_digits() {
     // x' grows from 1 to 4 on [0, 3]: 7.5 mm from 15 mm/s down to rest in 1 s at 15 mm/s².
     let piece = Quadratic { control: [[0.0], [1.5], [7.5]], width: 3.0 };
-    let down = arc(ArcKind::AxisAcceleration, -15.0, (0.0, 3.0), (225.0, 0.0), 1.0);
+    let down = arc(PhaseLaw::AxisAcceleration, -15.0, (0.0, 3.0), (225.0, 0.0), 1.0);
     for by in [0, 1, 7] {
         let curve = raised(&piece, by);
         let motion = motion(&curve, &down);
@@ -130,9 +130,9 @@ fn speed_through_a_full_cusp_stays_finite() {
     // C' = u (3, 4)/5 on [0, 2]: length u²/2. p is infinite at 0, the speed is not.
     let piece = Quadratic { control: [[0.0, 0.0], [0.0, 0.0], [1.2, 1.6]], width: 2.0 };
     let speed = 20.0;
-    let feed = arc(ArcKind::Feed, speed * speed, (0.0, 2.0), (f64::INFINITY, 100.0), 0.1);
+    let feed = arc(PhaseLaw::Feed, speed * speed, (0.0, 2.0), (f64::INFINITY, 100.0), 0.1);
     // X gains speed from 3 to 9 mm/s on its 1.2 mm: 0.2 s at 30 mm/s².
-    let axis = arc(ArcKind::AxisAcceleration, 30.0, (0.0, 2.0), (f64::INFINITY, 81.0 / 1.44), 0.2);
+    let axis = arc(PhaseLaw::AxisAcceleration, 30.0, (0.0, 2.0), (f64::INFINITY, 81.0 / 1.44), 0.2);
     for by in [0, 1, 7] {
         let curve = raised(&piece, by);
         let (feed, axis) = (motion(&curve, &feed), motion(&curve, &axis));
@@ -154,7 +154,7 @@ fn speed_through_a_full_cusp_stays_finite() {
 fn a_start_at_rest_in_a_cusp_keeps_p_and_speeds_up() {
     // C' = u, p = 9: u = 3t, x = u²/2 at the constant acceleration 9.
     let piece = Quadratic { control: [[0.0], [0.0], [2.0]], width: 2.0 };
-    let arc = arc(ArcKind::AxisAcceleration, 9.0, (0.0, 2.0), (9.0, 9.0), 2.0 / 3.0);
+    let arc = arc(PhaseLaw::AxisAcceleration, 9.0, (0.0, 2.0), (9.0, 9.0), 2.0 / 3.0);
     for by in [0, 1, 7] {
         let curve = raised(&piece, by);
         let motion = motion(&curve, &arc);
@@ -217,13 +217,13 @@ prop_compose! {
         };
         let (g0, g1) = (tangent(u0), tangent(u1));
         let (x0, x1) = (g0[0].abs(), g1[0].abs());
-        let kind = ArcKind::from_number(kind).unwrap();
+        let kind = PhaseLaw::from_number(kind).unwrap();
         let way = 0.5 * (x0 + x1) * (u1 - u0);
         let v = 10.0 * speeds[0].max(0.5);
         let p = |speed: f64, g: f64| (speed / g).powi(2);
         let mut arc = arc(kind, 0.0, (u0, u1), (v * v, v * v), (u1 - u0) / v);
         match kind {
-            ArcKind::AxisAcceleration => {
+            PhaseLaw::AxisAcceleration => {
                 // Where x' vanishes no finite p has a speed.
                 let (v0, v1) = (speeds[0] * f64::from(x0 > 1e-6), speeds[1] * f64::from(x1 > 1e-6));
                 let v1 = if v0 + v1 == 0.0 { 0.01 } else { v1 };
@@ -231,26 +231,26 @@ prop_compose! {
                 arc.value = sign * (v1 - v0) / arc.duration;
                 (arc.p0, arc.p1) = (p(v0, x0.max(1e-6)), p(v1, x1.max(1e-6)));
             }
-            ArcKind::AxisVelocity => (arc.value, arc.duration) = (v * v, way / v),
-            ArcKind::Feed => (arc.value, arc.duration) = (v * v, length(&piece, u0, u1) / v),
-            ArcKind::Chord => {
+            PhaseLaw::AxisVelocity => (arc.value, arc.duration) = (v * v, way / v),
+            PhaseLaw::Feed => (arc.value, arc.duration) = (v * v, length(&piece, u0, u1) / v),
+            PhaseLaw::Chord => {
                 arc.value = v;
                 let time = |u: f64| 1.0 / (v * norm(&tangent(u))).sqrt();
                 arc.duration = simpson(time, u0, u1);
             }
-            ArcKind::ParameterAcceleration => {
+            PhaseLaw::ParameterAcceleration => {
                 (arc.p0, arc.p1) = (v * v, speeds[1] * speeds[1]);
                 arc.value = 0.5 * (arc.p1 - arc.p0) / (u1 - u0);
                 arc.duration = 2.0 * (u1 - u0) / (v + speeds[1]);
             }
-            ArcKind::SpeedLine => {
+            PhaseLaw::SpeedLine => {
                 let line = speeds.map(|speed| (10.0 * speed.max(10.0)).powi(2));
                 let square = |u: f64| norm(&tangent(u)).powi(2);
                 (arc.p0, arc.p1) = (line[0] / square(u0), line[1] / square(u1));
                 let at = |u: f64| line[0] + (line[1] - line[0]) * (u - u0) / (u1 - u0);
                 arc.duration = simpson(|u| (square(u) / at(u)).sqrt(), u0, u1);
             }
-            ArcKind::PathJerk => {
+            PhaseLaw::PathJerk => {
                 // v is a quadratic polynomial of time with these Bernstein coefficients; from rest also without a pull.
                 let b = [speeds[0], 0.5 * inner[0] * (speeds[0] + speeds[1]), speeds[1]];
                 arc.duration = 3.0 * length(&piece, u0, u1) / (b[0] + b[1] + b[2]);
@@ -258,7 +258,7 @@ prop_compose! {
                 (arc.a0, arc.a1) = (2.0 * (b[1] - b[0]) / arc.duration, 2.0 * (b[2] - b[1]) / arc.duration);
                 arc.value = (arc.a1 - arc.a0) / arc.duration;
             }
-            ArcKind::SpeedCubic => {
+            PhaseLaw::SpeedCubic => {
                 let b = [speeds[0], 10.0 * inner[0], 10.0 * inner[1], speeds[1]].map(|v| (1.0 + v).powi(2));
                 let way = length(&piece, u0, u1);
                 (arc.p0, arc.p1) = (p(b[0].sqrt(), norm(&g0)), p(b[3].sqrt(), norm(&g1)));
@@ -309,7 +309,7 @@ proptest! {
 
     #[test]
     fn place_and_time_undo_each_other((piece, arc) in any_arc(), at in 0.0..1.0f64, by in 0..4usize) {
-        let curve = raised(&piece, if arc.kind == ArcKind::Chord { 0 } else { by });
+        let curve = raised(&piece, if arc.kind == PhaseLaw::Chord { 0 } else { by });
         let motion = motion(&curve, &arc);
         let t = at * arc.duration;
         let state = motion.at_time(t, 1e-3 * arc.duration);
@@ -329,19 +329,19 @@ proptest! {
     fn the_way_of_the_governing_axis_is_its_speed_in_time(
         (piece, arc) in any_arc(), at in 0.0..1.0f64, by in 0..4usize
     ) {
-        if !matches!(arc.kind, ArcKind::AxisAcceleration | ArcKind::AxisVelocity) {
+        if !matches!(arc.kind, PhaseLaw::AxisAcceleration | PhaseLaw::AxisVelocity) {
             return Ok(());
         }
         let curve = raised(&piece, by);
         let motion = motion(&curve, &arc);
         let t = at * arc.duration;
         let [v0, v1] = [arc.u0, arc.u1].map(|u| motion.rates(&motion.at(u)).velocity[0]);
-        if arc.kind == ArcKind::AxisAcceleration {
+        if arc.kind == PhaseLaw::AxisAcceleration {
             prop_assert!(v0 != 0.0 || arc.p0 == 0.0);
             prop_assert!(arc.p0 != 0.0 || v0 == 0.0, "{v0:e} from rest");
             prop_assert!(arc.p1 != 0.0 || v1 == 0.0, "{v1:e} at rest");
         }
-        let a = if arc.kind == ArcKind::AxisAcceleration { arc.value } else { 0.0 };
+        let a = if arc.kind == PhaseLaw::AxisAcceleration { arc.value } else { 0.0 };
         let way = motion.point(&motion.at_time(t, 1e-3))[0] - piece.point(arc.u0)[0];
         prop_assert!((way - (v0 * t + 0.5 * a * t * t)).abs() <= 2e-8 * (1.0 + way.abs()), "{way}");
     }
@@ -353,7 +353,7 @@ proptest! {
         if !tame(&piece, &arc) {
             return Ok(());
         }
-        let curve = raised(&piece, if arc.kind == ArcKind::Chord { 0 } else { by });
+        let curve = raised(&piece, if arc.kind == PhaseLaw::Chord { 0 } else { by });
         let motion = motion(&curve, &arc);
         let (t, h) = (at * arc.duration, 1e-4 * arc.duration);
         let [before, here, after]: [State; 3] = [t - h, t, t + h].map(|t| motion.at_time(t, h));

@@ -1,54 +1,55 @@
-//! LDLᵀ factor of the Newton matrix: symmetric, two unknowns (w, w') a node, neighbours coupled.
+//! LDLᵀ factor of the Newton matrix, a symmetric banded matrix: two unknowns (w, w') per station, coupled with those of
+//! the neighbouring stations.
 //!
-//! The matrix is scaled to a unit diagonal. The two unknowns of an end are tied: to each other where the path starts
-//! from rest (w' = k w), or to given steps where its speed and slope are given.
+//! The matrix is scaled to a unit diagonal. The two unknowns of an end are either tied to each other (w' = k w, where
+//! the path is at rest beyond the ramp) or take given steps (where w and w' are given).
 
-/// How the unknowns at an end may change.
+/// How the unknowns of an end may change.
 #[derive(Clone, Copy, Debug)]
-pub enum Tie {
+pub enum EndCondition {
     /// dw' = k dw.
     Slope(f64),
     /// dw and dw' are given with each right-hand side.
     Given,
 }
 
-/// Added to the unit diagonal: what rounding may take from it.
+/// Added to the unit diagonal, as rounding may take this much from it.
 const REGULAR: f64 = 1e-13;
 
-/// Blocks of the matrix and, after `factor`, of its factor.
+/// The blocks of the matrix and, after `factor`, those of its factor.
 #[derive(Default)]
 pub struct Band {
-    /// (a, b, c) of the symmetric block [a b; b c] of each node.
+    /// (a, b, c) of the symmetric block [a b; b c] of each station.
     pub diagonal: Vec<[f64; 3]>,
-    /// Rows of the block that couples node i with node i + 1: [00 01 10 11].
+    /// Rows of the block that couples station i with station i + 1: [00 01 10 11].
     pub coupling: Vec<[f64; 4]>,
-    ties: Option<[Tie; 2]>,
-    /// Couplings of given ends with their neighbours.
+    conditions: Option<[EndCondition; 2]>,
+    /// Couplings of the given ends with their neighbours.
     given: [[f64; 4]; 2],
     scale: Vec<[f64; 2]>,
-    /// (1/d0, l, 1/d1) of each node, and the rows of L that couple the next one with it: [00 01 10 11].
+    /// (1/d0, l, 1/d1) of each station, and the rows of L that couple the next station with it: [00 01 10 11].
     factor: Vec<([f64; 3], [f64; 4])>,
     work: Vec<[f64; 2]>,
 }
 
 impl Band {
-    /// An empty matrix for so many nodes.
+    /// A zero matrix for this many stations.
     #[inline(always)]
-    pub fn clear(&mut self, nodes: usize) {
+    pub fn clear(&mut self, stations: usize) {
         self.diagonal.clear();
-        self.diagonal.resize(nodes, [0.0; 3]);
+        self.diagonal.resize(stations, [0.0; 3]);
         self.coupling.clear();
-        self.coupling.resize(nodes - 1, [0.0; 4]);
-        self.factor.resize(nodes, Default::default());
-        self.scale.resize(nodes, [0.0; 2]);
-        self.work.resize(nodes, [0.0; 2]);
+        self.coupling.resize(stations - 1, [0.0; 4]);
+        self.factor.resize(stations, Default::default());
+        self.scale.resize(stations, [0.0; 2]);
+        self.work.resize(stations, [0.0; 2]);
     }
 
-    /// Adds the matrix of interval n, of length h, in its local coefficients (w, h w') of both nodes.
+    /// Adds the matrix of interval n, of length h, in its local coefficients (w, h w') at both ends.
     #[inline(always)]
     pub fn add(&mut self, n: usize, h: f64, m: &[[f64; 4]; 4]) {
-        for (node, k) in [(n, 0), (n + 1, 2)] {
-            let d = &mut self.diagonal[node];
+        for (station, k) in [(n, 0), (n + 1, 2)] {
+            let d = &mut self.diagonal[station];
             d[0] += m[k][k];
             d[1] += m[k][k + 1] * h;
             d[2] += m[k + 1][k + 1] * h * h;
@@ -56,11 +57,11 @@ impl Band {
         self.coupling[n] = [m[0][2], m[0][3] * h, m[1][2] * h, m[1][3] * h * h];
     }
 
-    /// Factors the matrix with its ends tied; false if it is not positive definite.
+    /// Factors the matrix under both end conditions; false if it is not positive definite.
     #[inline(always)]
-    pub fn factor(&mut self, ties: [Tie; 2]) -> bool {
-        self.ties = Some(ties);
-        self.tie(ties);
+    pub fn factor(&mut self, conditions: [EndCondition; 2]) -> bool {
+        self.conditions = Some(conditions);
+        self.apply(conditions);
         let last = self.diagonal.len() - 1;
         for (scale, d) in self.scale.iter_mut().zip(&self.diagonal) {
             *scale = [1.0 / d[0].sqrt(), 1.0 / d[2].sqrt()];
@@ -100,25 +101,25 @@ impl Band {
     }
 
     #[inline(always)]
-    fn tie(&mut self, ties: [Tie; 2]) {
+    fn apply(&mut self, conditions: [EndCondition; 2]) {
         let last = self.diagonal.len() - 1;
-        for (end, tie) in ties.into_iter().enumerate() {
-            let (node, link) = if end == 0 { (0, 0) } else { (last, last - 1) };
+        for (end, condition) in conditions.into_iter().enumerate() {
+            let (station, link) = if end == 0 { (0, 0) } else { (last, last - 1) };
             let o = &mut self.coupling[link];
-            match tie {
-                Tie::Slope(k) => {
-                    let [a, b, c] = self.diagonal[node];
-                    self.diagonal[node] = [a + 2.0 * k * b + k * k * c, 0.0, 1.0];
+            match condition {
+                EndCondition::Slope(k) => {
+                    let [a, b, c] = self.diagonal[station];
+                    self.diagonal[station] = [a + 2.0 * k * b + k * k * c, 0.0, 1.0];
                     *o = if end == 0 {
                         [o[0] + k * o[2], o[1] + k * o[3], 0.0, 0.0]
                     } else {
                         [o[0] + k * o[1], 0.0, o[2] + k * o[3], 0.0]
                     };
                 }
-                Tie::Given => {
+                EndCondition::Given => {
                     self.given[end] = *o;
                     *o = [0.0; 4];
-                    self.diagonal[node] = [1.0, 0.0, 1.0];
+                    self.diagonal[station] = [1.0, 0.0, 1.0];
                 }
             }
         }
@@ -127,19 +128,19 @@ impl Band {
     /// Solves for the step `out` (pairs dw, dw' flat) with right-hand side `rhs`; `ends` holds the given steps.
     #[inline(always)]
     pub fn solve(&mut self, rhs: &[f64], ends: [[f64; 2]; 2], out: &mut [f64]) {
-        let ties = self.ties.expect("the matrix is factored first");
+        let conditions = self.conditions.expect("the matrix is factored first");
         let last = self.diagonal.len() - 1;
         for (z, r) in self.work.iter_mut().zip(rhs.chunks_exact(2)) {
             *z = [r[0], r[1]];
         }
-        for (end, tie) in ties.into_iter().enumerate() {
-            let (node, next) = if end == 0 { (0, 1) } else { (last, last - 1) };
-            match tie {
-                Tie::Slope(k) => {
-                    let [a, b] = self.work[node];
-                    self.work[node] = [a + k * b, 0.0];
+        for (end, condition) in conditions.into_iter().enumerate() {
+            let (station, next) = if end == 0 { (0, 1) } else { (last, last - 1) };
+            match condition {
+                EndCondition::Slope(k) => {
+                    let [a, b] = self.work[station];
+                    self.work[station] = [a + k * b, 0.0];
                 }
-                Tie::Given => {
+                EndCondition::Given => {
                     let (o, d) = (self.given[end], ends[end]);
                     let pull = if end == 0 {
                         [o[0] * d[0] + o[2] * d[1], o[1] * d[0] + o[3] * d[1]]
@@ -148,7 +149,7 @@ impl Band {
                     };
                     self.work[next][0] -= pull[0];
                     self.work[next][1] -= pull[1];
-                    self.work[node] = d;
+                    self.work[station] = d;
                 }
             }
         }
@@ -157,11 +158,11 @@ impl Band {
             out[2 * i] = z[0] * self.scale[i][0];
             out[2 * i + 1] = z[1] * self.scale[i][1];
         }
-        for (end, tie) in ties.into_iter().enumerate() {
-            let node = if end == 0 { 0 } else { last };
-            match tie {
-                Tie::Slope(k) => out[2 * node + 1] = k * out[2 * node],
-                Tie::Given => out[2 * node..2 * node + 2].copy_from_slice(&ends[end]),
+        for (end, condition) in conditions.into_iter().enumerate() {
+            let station = if end == 0 { 0 } else { last };
+            match condition {
+                EndCondition::Slope(k) => out[2 * station + 1] = k * out[2 * station],
+                EndCondition::Given => out[2 * station..2 * station + 2].copy_from_slice(&ends[end]),
             }
         }
     }
@@ -191,7 +192,7 @@ impl Band {
 mod tests {
     use super::*;
 
-    /// A positive definite band of five nodes, and its product with a step.
+    /// A positive definite matrix of five stations, and its product with a step.
     fn example() -> (Band, impl Fn(&[f64]) -> Vec<f64>) {
         let diagonal: Vec<[f64; 3]> = (0..5).map(|i| [4.0 + i as f64, 0.5, 3.0]).collect();
         let coupling: Vec<[f64; 4]> = (0..4).map(|i| [0.7, -0.2 * i as f64, 0.4, -0.3]).collect();
@@ -213,12 +214,12 @@ mod tests {
         (band, product)
     }
 
-    fn solved(ties: [Tie; 2], ends: [[f64; 2]; 2]) -> (Vec<f64>, Vec<f64>) {
+    fn solved(conditions: [EndCondition; 2], ends: [[f64; 2]; 2]) -> (Vec<f64>, Vec<f64>) {
         let (mut band, product) = example();
         let (diagonal, coupling) = (band.diagonal.clone(), band.coupling.clone());
         band.clear(5);
         (band.diagonal, band.coupling) = (diagonal, coupling);
-        assert!(band.factor(ties));
+        assert!(band.factor(conditions));
         let rhs: Vec<f64> = (0..10).map(|i| (i as f64).sin()).collect();
         let mut d = vec![0.0; 10];
         band.solve(&rhs, ends, &mut d);
@@ -227,19 +228,19 @@ mod tests {
     }
 
     #[test]
-    fn given_ends_are_taken_and_the_rest_solves_its_equations() {
+    fn given_ends_keep_their_steps_and_all_others_solve_their_equations() {
         let ends = [[0.3, -0.1], [0.2, 0.5]];
-        let (d, left) = solved([Tie::Given, Tie::Given], ends);
+        let (d, left) = solved([EndCondition::Given, EndCondition::Given], ends);
         assert_eq!((d[0], d[1], d[8], d[9]), (0.3, -0.1, 0.2, 0.5));
         assert!(left[2..8].iter().all(|left| left.abs() < 1e-11), "{left:?}");
     }
 
     #[test]
-    fn tied_ends_move_along_their_slope() {
-        let (d, left) = solved([Tie::Slope(2.0), Tie::Slope(-3.0)], [[0.0; 2]; 2]);
+    fn tied_ends_keep_their_slope() {
+        let (d, left) = solved([EndCondition::Slope(2.0), EndCondition::Slope(-3.0)], [[0.0; 2]; 2]);
         assert_eq!((d[1], d[9]), (2.0 * d[0], -3.0 * d[8]));
         assert!(left[2..8].iter().all(|left| left.abs() < 1e-11), "{left:?}");
-        // An end's two equations add up along its slope.
+        // The two equations of an end add up along its slope.
         assert!((left[0] + 2.0 * left[1]).abs() < 1e-11 && (left[8] - 3.0 * left[9]).abs() < 1e-11);
     }
 
@@ -248,6 +249,6 @@ mod tests {
         let mut band = Band::default();
         band.clear(2);
         band.diagonal = vec![[1.0, 2.0, 1.0]; 2];
-        assert!(!band.factor([Tie::Slope(-1.0), Tie::Slope(-1.0)]));
+        assert!(!band.factor([EndCondition::Slope(-1.0), EndCondition::Slope(-1.0)]));
     }
 }

@@ -1,13 +1,13 @@
-//! The true problem on a stretch: the time ∫ ds/√w under the rows as they are.
+//! The true problem on a window: the time ∫ ds/√w under the constraints as they are.
 
 use fearless_simd::Simd;
 
+use super::constraints::{Constraints, RowLayout};
 use super::hermite::{combine, duration_on, AT_NODES, WEIGHTS};
 use super::model::{expand, fall, pace, Local, Model};
-use super::rows::{Order, Rows};
 use crate::lanes::{Lanes, Register};
 
-/// w^(−1/2) at the collocation points of each interval, where the slacks are.
+/// w^(−1/2) at the collocation points of each interval, as the slacks were last evaluated.
 #[derive(Default)]
 pub struct Exact {
     pace: Vec<Lanes>,
@@ -15,7 +15,7 @@ pub struct Exact {
 
 impl<const M: usize> Model<M> for Exact {
     #[inline(always)]
-    fn begin<S: Simd>(&mut self, _: S, rows: &Rows<M>, _: &[f64]) {
+    fn begin<S: Simd>(&mut self, _: S, rows: &Constraints<M>, _: &[f64]) {
         self.pace.resize(rows.intervals.len(), Lanes::ONE);
     }
 
@@ -23,7 +23,7 @@ impl<const M: usize> Model<M> for Exact {
     fn slack<S: Simd>(
         &mut self,
         simd: S,
-        rows: &Rows<M>,
+        rows: &Constraints<M>,
         n: usize,
         u: &[f64; 4],
         _: bool,
@@ -36,7 +36,7 @@ impl<const M: usize> Model<M> for Exact {
     }
 
     #[inline(always)]
-    fn slack_step<S: Simd>(&self, simd: S, rows: &Rows<M>, n: usize, d: &[f64; 4], out: &mut [Lanes]) {
+    fn slack_step<S: Simd>(&self, simd: S, rows: &Constraints<M>, n: usize, d: &[f64; 4], out: &mut [Lanes]) {
         let [w, w1, _] = rows.intervals[n].motion(simd, d);
         let last = w + w1 * rows.intervals[n].inwards(simd);
         rows.slack_step(n, d, -(fall(self.pace[n].load(simd)) * w), last, out);
@@ -46,7 +46,7 @@ impl<const M: usize> Model<M> for Exact {
     fn local<S: Simd>(
         &mut self,
         simd: S,
-        rows: &Rows<M>,
+        rows: &Constraints<M>,
         n: usize,
         u: &[f64; 4],
         weight: &[Lanes],
@@ -55,13 +55,13 @@ impl<const M: usize> Model<M> for Exact {
         let mut form = rows.curvature(simd, n, weight);
         let fall = fall(self.pace[n].load(simd));
         let interval = &rows.intervals[n];
-        let (last, inwards) = (weight[Order::<M>::POSITIVE].load(simd), interval.inwards(simd));
+        let (last, inwards) = (weight[RowLayout::<M>::POSITIVE].load(simd), interval.inwards(simd));
         form[0] += last;
         form[1] += last * inwards;
         form[3] += last * inwards * inwards;
         for k in 0..M {
-            // What the slope of w^(−1/2) adds to the two rows of an axis's jerk.
-            let at = Order::<M>::jerk(k);
+            // The slope of w^(−1/2) adds to the two rows of an axis's jerk.
+            let at = RowLayout::<M>::jerk(k);
             let [up, down] = [weight[at].load(simd), weight[at + 1].load(simd)];
             let (both, turn) = (up + down, (up - down) * fall);
             let [q1, q2, q3] = interval.q[k];
@@ -84,20 +84,20 @@ impl<const M: usize> Model<M> for Exact {
     fn pull<S: Simd>(
         &mut self,
         simd: S,
-        rows: &Rows<M>,
+        rows: &Constraints<M>,
         n: usize,
         aim: &[Lanes],
         _: usize,
     ) -> [Register<S>; 3] {
         let (mut pull, jerk) = rows.pull(simd, n, aim);
-        let last = aim[Order::<M>::POSITIVE].load(simd);
+        let last = aim[RowLayout::<M>::POSITIVE].load(simd);
         pull[0] += last - fall(self.pace[n].load(simd)) * jerk;
         pull[1] += last * rows.intervals[n].inwards(simd);
         pull
     }
 
     #[inline(always)]
-    fn solved<S: Simd>(&mut self, _: S, _: &Rows<M>, _: &[f64], _: [f64; 2]) {}
+    fn solved<S: Simd>(&mut self, _: S, _: &Constraints<M>, _: &[f64], _: [f64; 2]) {}
 
     #[inline(always)]
     fn attempt<S: Simd>(&mut self, _: S, _: f64) {}
@@ -105,7 +105,7 @@ impl<const M: usize> Model<M> for Exact {
     fn accept(&mut self) {}
 
     #[inline(always)]
-    fn time<S: Simd>(&self, simd: S, rows: &Rows<M>, x: &[f64], _: bool) -> f64 {
+    fn time<S: Simd>(&self, simd: S, rows: &Constraints<M>, x: &[f64], _: bool) -> f64 {
         let mut time = 0.0;
         for (n, interval) in rows.intervals.iter().enumerate() {
             time += duration_on(simd, x, n, interval.h);

@@ -1,81 +1,81 @@
-//! The nodes of the spline: about equal in travel time where the speed changes, finer where the path turns, wide
-//! where neither happens, and on every knot of the path.
+//! The stations of the spline, from the samples of the speed envelope and the speed caps: about equal in travel time
+//! where the speed changes, closer where the path turns, far apart elsewhere, and on every knot of the path.
 
-use super::survey::{Change, Slopes, Station};
+use super::speed_envelope::{Change, EnvelopeSample, Slopes};
 use std::ops::Range;
 
-use super::interior_point::Bound;
-use super::rows::Rows;
+use super::constraints::Constraints;
+use super::interior_point::WindowEnd;
 use super::{Geometry, Problem, Profile, SpeedCap};
 use feedplan_geometry::watch::Watch;
 
-/// r counts as changing where it uses more than this part of the greatest slope.
+/// r counts as changing where it uses more than this part of its greatest slope.
 const CHANGING: f64 = 0.02;
-/// A path that turns less than this over the length r/K is straight.
+/// A path that turns by less than this (in radians) over the length r/K counts as straight.
 const TURNING: f64 = 0.02;
-/// Lengths of intervals grow by at most this part of the distance.
+/// Lengths of intervals grow at most by this part of the distance along the path.
 const GROWTH: f64 = 0.5;
-/// The longest interval, in parts of the length over which the path turns: about one radian of a circle. No interval is
-/// planned longer than the path.
+/// The longest interval, as a part of the length over which the path turns: about one radian of a circle. No interval
+/// is planned longer than the path.
 const LONGEST: f64 = 0.5;
-/// An interval that reaches into the surroundings of a cap by no more than this part of them is outside: rounding.
+/// An interval that overlaps the reach of a cap by less than this part of the reach is outside (rounding).
 const CLOSE: f64 = 1e-6;
-/// Every path has at least so many intervals, in parts of the resolution.
+/// Every path has at least this many intervals times the resolution.
 const FEWEST: f64 = 26.0;
 
-/// Nodes, the piece of each interval, and the caps at nodes.
+/// Arc lengths of the stations, the piece of each interval, and the speed caps at stations.
 #[derive(Clone, Debug, Default)]
 pub struct Grid {
-    pub nodes: Vec<f64>,
+    pub stations: Vec<f64>,
     pub pieces: Vec<u32>,
-    /// Node and speed, rising.
+    /// Index of the station, rising, and speed.
     caps: Vec<(usize, f64)>,
-    /// How much tighter the limits of jerk are on each interval: 1 or more.
-    calm: Vec<f64>,
+    /// Factor by which the limits of jerk are tighter on each interval: 1 or more.
+    jerk_factor: Vec<f64>,
 }
 
 impl Grid {
-    /// `resolution` is the number of intervals while r doubles at its greatest slope, nearly.
+    /// `resolution` is about the number of intervals while r doubles at its greatest slope.
     pub fn new(
-        stations: &[Station],
+        samples: &[EnvelopeSample],
         slopes: Slopes,
         caps: &[SpeedCap],
-        bounds: &[Bound; 2],
+        ends: &[WindowEnd; 2],
         resolution: f64,
     ) -> Self {
-        let density = density(stations, slopes, bounds, resolution);
-        let mut grid = Self { nodes: vec![stations[0].s], ..Self::default() };
-        let mut next = caps.iter().skip_while(|cap| cap.s <= stations[0].s).peekable();
+        let density = density(samples, slopes, ends, resolution);
+        let mut grid = Self { stations: vec![samples[0].s], ..Self::default() };
+        let mut next = caps.iter().skip_while(|cap| cap.s <= samples[0].s).peekable();
         let mut whole = 0.0;
-        for i in 1..stations.len() {
-            whole += 0.5 * (density[i - 1] + density[i]) * (stations[i].s - stations[i - 1].s);
+        for i in 1..samples.len() {
+            whole += 0.5 * (density[i - 1] + density[i]) * (samples[i].s - samples[i - 1].s);
         }
         let more = (FEWEST * resolution / whole).max(1.0);
         let mut first = 0;
-        for i in 1..stations.len() {
-            let cap = next.next_if(|cap| cap.s <= stations[i].s);
-            let knot = i + 1 == stations.len() || stations[i + 1].piece != stations[i].piece;
+        for i in 1..samples.len() {
+            let cap = next.next_if(|cap| cap.s <= samples[i].s);
+            let knot = i + 1 == samples.len() || samples[i + 1].piece != samples[i].piece;
             if cap.is_some() || knot {
-                if stations[i].s > stations[first].s {
-                    grid.fill(&stations[first..=i], &density[first..=i], more);
+                if samples[i].s > samples[first].s {
+                    grid.fill(&samples[first..=i], &density[first..=i], more);
                 }
-                first = if knot { (i + 1).min(stations.len() - 1) } else { i };
+                first = if knot { (i + 1).min(samples.len() - 1) } else { i };
             }
             if let Some(cap) = cap {
-                grid.caps.push((grid.nodes.len() - 1, cap.speed));
+                grid.caps.push((grid.stations.len() - 1, cap.speed));
             }
         }
-        grid.calm = calm(&grid.nodes, caps);
+        grid.jerk_factor = jerk_factor(&grid.stations, caps);
         grid
     }
 
-    /// Nodes from the last one to the end of stations of one piece.
-    fn fill(&mut self, stations: &[Station], density: &[f64], more: f64) {
-        let mut sum = Vec::with_capacity(stations.len());
+    /// Adds stations from the last one to the end of some samples of one piece.
+    fn fill(&mut self, samples: &[EnvelopeSample], density: &[f64], more: f64) {
+        let mut sum = Vec::with_capacity(samples.len());
         let mut total = 0.0;
         sum.push(0.0);
-        for i in 1..stations.len() {
-            total += 0.5 * (density[i - 1] + density[i]) * (stations[i].s - stations[i - 1].s) * more;
+        for i in 1..samples.len() {
+            total += 0.5 * (density[i - 1] + density[i]) * (samples[i].s - samples[i - 1].s) * more;
             sum.push(total);
         }
         let count = total.ceil().max(1.0) as usize;
@@ -86,65 +86,65 @@ impl Grid {
                 i += 1;
             }
             let part = (wanted - sum[i - 1]) / (sum[i] - sum[i - 1]);
-            self.nodes.push(stations[i - 1].s + part * (stations[i].s - stations[i - 1].s));
+            self.stations.push(samples[i - 1].s + part * (samples[i].s - samples[i - 1].s));
         }
-        self.nodes.push(stations[stations.len() - 1].s);
-        self.pieces.resize(self.nodes.len() - 1, stations[0].piece);
+        self.stations.push(samples[samples.len() - 1].s);
+        self.pieces.resize(self.stations.len() - 1, samples[0].piece);
     }
 
     /// The grid of a profile on a path with these knots and caps.
     pub fn of(profile: &Profile, knots: &[f64], caps: &[SpeedCap], watch: Watch) -> Self {
-        let nodes = profile.s.clone();
+        let stations = profile.s.clone();
         let piece = |(n, pair): (usize, &[f64])| {
             watch.check_at(n);
             knots.partition_point(|&knot| knot <= 0.5 * (pair[0] + pair[1])) as u32 - 1
         };
-        let pieces = nodes.windows(2).enumerate().map(piece).collect();
-        let node = |s: f64| nodes.binary_search_by(|node| node.total_cmp(&s)).ok();
-        let speeds = caps.iter().filter_map(|cap| Some((node(cap.s)?, cap.speed))).collect();
-        let calm = calm(&nodes, caps);
-        Self { nodes, pieces, caps: speeds, calm }
+        let pieces = stations.windows(2).enumerate().map(piece).collect();
+        let station = |s: f64| stations.binary_search_by(|station| station.total_cmp(&s)).ok();
+        let speeds = caps.iter().filter_map(|cap| Some((station(cap.s)?, cap.speed))).collect();
+        let jerk_factor = jerk_factor(&stations, caps);
+        Self { stations, pieces, caps: speeds, jerk_factor }
     }
 
-    /// The limits on a range of intervals.
-    pub fn rows<G: Geometry<M>, const M: usize>(
+    /// The constraints on a range of intervals.
+    pub fn constraints<G: Geometry<M>, const M: usize>(
         &self,
         problem: &Problem<G, M>,
         range: Range<usize>,
-    ) -> Rows<M> {
-        let nodes = &self.nodes[range.start..=range.end];
-        let (pieces, calm) = (&self.pieces[range.clone()], &self.calm[range.clone()]);
-        let cap = |node| self.cap(range.start + node);
-        Rows::sample(problem.geometry, &problem.limits, nodes, pieces, calm, cap)
+    ) -> Constraints<M> {
+        let stations = &self.stations[range.start..=range.end];
+        let (pieces, jerk_factor) = (&self.pieces[range.clone()], &self.jerk_factor[range.clone()]);
+        let cap = |station| self.cap(range.start + station);
+        Constraints::sample(problem.geometry, &problem.limits, stations, pieces, jerk_factor, cap)
     }
 
-    /// The speed allowed at a node, infinite where no cap is given.
-    pub fn cap(&self, node: usize) -> f64 {
-        match self.caps.binary_search_by_key(&node, |cap| cap.0) {
+    /// The speed cap at a station; infinite without one.
+    pub fn cap(&self, station: usize) -> f64 {
+        match self.caps.binary_search_by_key(&station, |cap| cap.0) {
             Ok(at) => self.caps[at].1,
             Err(_) => f64::INFINITY,
         }
     }
 }
 
-/// How much tighter the caps make the limits of jerk on each interval.
-fn calm(nodes: &[f64], caps: &[SpeedCap]) -> Vec<f64> {
-    let mut calm = vec![1.0_f64; nodes.len() - 1];
+/// The factor by which the caps tighten the limits of jerk on each interval.
+fn jerk_factor(stations: &[f64], caps: &[SpeedCap]) -> Vec<f64> {
+    let mut jerk_factor = vec![1.0_f64; stations.len() - 1];
     for cap in caps.iter().filter(|cap| cap.share > 0.0) {
         let within = (1.0 - CLOSE) * cap.reach;
-        let first = nodes.partition_point(|&node| node <= cap.s - within).saturating_sub(1);
-        let last = nodes.partition_point(|&node| node < cap.s + within).min(calm.len());
-        for calm in &mut calm[first.min(last)..last] {
-            *calm = calm.max(1.0 / (1.0 - cap.share));
+        let first = stations.partition_point(|&station| station <= cap.s - within).saturating_sub(1);
+        let last = stations.partition_point(|&station| station < cap.s + within).min(jerk_factor.len());
+        for jerk_factor in &mut jerk_factor[first.min(last)..last] {
+            *jerk_factor = jerk_factor.max(1.0 / (1.0 - cap.share));
         }
     }
-    calm
+    jerk_factor
 }
 
-/// Intervals per length at each station.
-fn density(stations: &[Station], slopes: Slopes, bounds: &[Bound; 2], resolution: f64) -> Vec<f64> {
-    let s: Vec<f64> = stations.iter().map(|station| station.s).collect();
-    let r = slopes.envelope(stations, bounds);
+/// Intervals per mm at each sample.
+fn density(samples: &[EnvelopeSample], slopes: Slopes, ends: &[WindowEnd; 2], resolution: f64) -> Vec<f64> {
+    let s: Vec<f64> = samples.iter().map(|sample| sample.s).collect();
+    let r = slopes.envelope(samples, ends);
     let last = s.len() - 1;
     let changing = |i: usize| {
         let h = s[i + 1] - s[i];
@@ -153,7 +153,7 @@ fn density(stations: &[Station], slopes: Slopes, bounds: &[Bound; 2], resolution
     };
     let mut length: Vec<f64> = (0..=last)
         .map(|i| {
-            let turning = stations[i].turning;
+            let turning = samples[i].turning;
             let active = (i < last && changing(i)) || (i > 0 && changing(i - 1));
             if active || turning * r[i] > TURNING * slopes.k {
                 1.0 / (1.0 / slopes.length(r[i]) + turning)
@@ -162,10 +162,10 @@ fn density(stations: &[Station], slopes: Slopes, bounds: &[Bound; 2], resolution
             }
         })
         .collect();
-    // A ramp ends where its speed is that of the path at the latest.
-    for (bound, i) in bounds.iter().zip([0, last]) {
-        if let Bound::Rest { ramp, .. } = *bound {
-            length[i] = length[i].min(1.0 / (1.0 / ramp + stations[i].turning));
+    // The first interval is at most as long as the ramp before it, and the last one as the ramp after it.
+    for (kind, i) in ends.iter().zip([0, last]) {
+        if let WindowEnd::Rest { ramp, .. } = *kind {
+            length[i] = length[i].min(1.0 / (1.0 / ramp + samples[i].turning));
         }
     }
     for i in 1..=last {
@@ -176,7 +176,7 @@ fn density(stations: &[Station], slopes: Slopes, bounds: &[Bound; 2], resolution
     }
     (0..=last)
         .map(|i| {
-            let longest = (LONGEST / stations[i].turning).min(s[last] - s[0]);
+            let longest = (LONGEST / samples[i].turning).min(s[last] - s[0]);
             if length[i].is_finite() { resolution / length[i] } else { 0.0 }.max(1.0 / longest)
         })
         .collect()
@@ -184,8 +184,8 @@ fn density(stations: &[Station], slopes: Slopes, bounds: &[Bound; 2], resolution
 
 #[cfg(test)]
 mod tests {
-    use super::super::survey::survey;
-    use super::super::{Limits, Place};
+    use super::super::speed_envelope::sample_envelope;
+    use super::super::{Limits, PathPoint};
     use super::*;
 
     struct Line;
@@ -195,25 +195,26 @@ mod tests {
             &[0.0, 3.0, 3.001, 50.0]
         }
 
-        fn at(&self, _: usize, _: f64) -> Place<1> {
-            Place { first: [1.0], second: [0.0], third: [0.0], speed_cap: 200.0 }
+        fn at(&self, _: usize, _: f64) -> PathPoint<1> {
+            PathPoint { first: [1.0], second: [0.0], third: [0.0], speed_cap: 200.0 }
         }
     }
 
     #[test]
-    fn knots_and_capped_places_are_nodes() {
+    fn knots_and_capped_places_are_stations() {
         let limits = Limits { velocity: [[250.0]; 2], acceleration: [[3000.0]; 2], jerk: [50_000.0] };
         let caps = [SpeedCap::new(3.0, 20.0), SpeedCap::new(30.0, 5.0)];
-        let bounds = [Bound::Rest { ramp: 0.01, greatest: 1.0 }; 2];
-        let (stations, slopes) =
-            survey(&Line, &limits, &caps, [0.01, 49.99], &bounds, Watch::default()).expect("speeds");
-        let grid = Grid::new(&stations, slopes, &caps, &bounds, 16.0);
-        let node = |s: f64| grid.nodes.binary_search_by(|node| node.total_cmp(&s)).expect("a node");
-        assert_eq!((grid.cap(node(3.0)), grid.cap(node(30.0))), (20.0, 5.0));
-        assert_eq!(grid.cap(node(3.001)), f64::INFINITY);
-        assert_eq!(grid.pieces[node(3.0)], 1);
-        assert_eq!(grid.pieces[node(3.001)], 2);
-        assert_eq!((grid.nodes[0], grid.nodes[grid.nodes.len() - 1]), (0.01, 49.99));
-        assert!(grid.nodes.windows(2).all(|pair| pair[0] < pair[1]));
+        let ends = [WindowEnd::Rest { ramp: 0.01, greatest: 1.0 }; 2];
+        let (samples, slopes) =
+            sample_envelope(&Line, &limits, &caps, [0.01, 49.99], &ends, Watch::default()).expect("speeds");
+        let grid = Grid::new(&samples, slopes, &caps, &ends, 16.0);
+        let station =
+            |s: f64| grid.stations.binary_search_by(|station| station.total_cmp(&s)).expect("a station");
+        assert_eq!((grid.cap(station(3.0)), grid.cap(station(30.0))), (20.0, 5.0));
+        assert_eq!(grid.cap(station(3.001)), f64::INFINITY);
+        assert_eq!(grid.pieces[station(3.0)], 1);
+        assert_eq!(grid.pieces[station(3.001)], 2);
+        assert_eq!((grid.stations[0], grid.stations[grid.stations.len() - 1]), (0.01, 49.99));
+        assert!(grid.stations.windows(2).all(|pair| pair[0] < pair[1]));
     }
 }

@@ -1,4 +1,5 @@
-//! The cubic Hermite basis of one interval at its collocation points and at the nodes of the quadrature.
+//! The cubic Hermite basis of one interval at its four collocation points and quadrature nodes; the time of an
+//! interval.
 //!
 //! On an interval of length h with t in [0, 1], w = Σ u_k B_k(t) with u = (w, h w') at its start and at its end.
 
@@ -6,7 +7,7 @@ use fearless_simd::{dispatch, Level, Simd};
 
 use crate::lanes::{Lanes, Register};
 
-/// Where the limits are enforced inside an interval, as parts of its length.
+/// Collocation points, where the limits are enforced, as parts of the interval's length.
 pub const POINTS: [f64; 4] = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0];
 /// Gauss–Legendre nodes and weights on [0, 1].
 const NODES: [f64; 4] =
@@ -71,7 +72,7 @@ pub fn local(x: &[f64], n: usize, h: f64) -> [f64; 4] {
     [x[0], x[1] * h, x[2], x[3] * h]
 }
 
-/// ∫ ds/√w over each interval; infinite where w is not positive.
+/// ∫ ds/√w over interval n, in s; infinite where w is not positive.
 pub fn duration(x: &[f64], n: usize, h: f64) -> f64 {
     dispatch!(Level::new(), simd => duration_on(simd, x, n, h))
 }
@@ -92,7 +93,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_cubic_is_met_with_its_derivatives() {
+    fn a_cubic_is_reproduced_with_its_derivatives() {
         // w = 2 + t − 3 t² + 4 t³
         let u = [2.0, 1.0, 4.0, 7.0];
         for t in [0.0, 0.2, 1.0] {

@@ -1,34 +1,35 @@
-//! A feasible primal-dual interior point on one stretch: least ∫ ds/√w over C¹ cubic splines w under `Rows`.
+//! A feasible primal-dual interior-point method on one window: least ∫ ds/√w over C¹ cubic splines w under
+//! `Constraints`.
 //!
-//! Newton's method on the perturbed optimality conditions, predictor and corrector after Mehrotra. The curvature of
-//! the jerk slack is left out of the matrix, which so stays positive definite; the slack is convex, so a step to
-//! the boundary of its tangent stays valid, and every iterate is a plan.
+//! Newton's method on the perturbed optimality conditions, with the predictor and corrector of Mehrotra (SIAM J. Optim.
+//! 2, 1992). The matrix leaves out the curvature of the jerk's slack, so that it stays positive definite. The slack is
+//! convex: a step up to the boundary of its tangent stays valid, and every iterate is a valid plan.
 //!
-//! λ multipliers, μ their mean complementarity, σ the centring, T the time.
+//! Symbols: λ multipliers, μ mean complementarity λ s per row, σ centring, T time.
 
 use std::time::Instant;
 
 use fearless_simd::{dispatch, Level, Simd};
 
-use super::band::{Band, Tie};
+use super::band::{Band, EndCondition};
+use super::constraints::{Constraints, RowLayout};
 use super::hermite::local;
 use super::model::Model;
 use super::newton::State;
-use super::rows::{Order, Rows};
 use crate::lanes::{Lanes, LogProduct};
 use feedplan_geometry::watch::Watch;
 
-/// What is known at an end of a stretch.
+/// The known values at an end of a window.
 #[derive(Clone, Copy, Debug)]
-pub enum Bound {
-    /// The path begins or ends at rest: w ∝ s^(4/3) on a ramp of this length, with w at most `greatest` at its end.
+pub enum WindowEnd {
+    /// The path begins or ends at rest: a ramp w ∝ s^(4/3) of this length in mm, with w at most `greatest` at its end.
     Rest { ramp: f64, greatest: f64 },
     /// w and w' are given.
     Fixed { w: f64, slope: f64 },
 }
 
-impl Bound {
-    /// Whether a spline with this end is one for it.
+impl WindowEnd {
+    /// Whether a spline that ends with these values meets this end.
     pub fn is_met(&self, end_w: f64, end_slope: f64) -> bool {
         match *self {
             Self::Rest { .. } => true,
@@ -40,13 +41,13 @@ impl Bound {
 /// When to stop.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort<'a> {
-    /// The gap of complementarity, in parts of the time.
+    /// Complementarity gap, as a part of the time.
     pub tolerance: f64,
     pub max_iterations: usize,
     pub deadline: Option<Instant>,
-    /// The first μ in parts of the mean time per row: 1 from afar, less from a plan that is nearly optimal.
+    /// First μ, as a part of the time per row: 1 from afar, less from a nearly optimal plan.
     pub barrier: f64,
-    /// Multipliers begin as the last solution, of these intervals, left them; with those of μ where they are greater.
+    /// Whether multipliers start from the last solution on the same intervals, but not below those of the first μ.
     pub warm: bool,
     pub watch: Watch<'a>,
 }
@@ -54,13 +55,13 @@ pub struct Effort<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     Converged,
-    /// The limit of iterations or time came first; the iterate is valid.
+    /// The limit of iterations or time stopped it; the iterate is valid.
     Stopped,
-    /// No step leads further; the iterate is valid.
+    /// No step improves the iterate, which is valid.
     Stalled,
-    /// The start is not inside the limits.
+    /// The start is not strictly inside the limits.
     NotInside,
-    /// The given ends were not reached: the iterate is no plan.
+    /// The given ends were not reached: the iterate is not a plan.
     Missed,
 }
 
@@ -68,22 +69,22 @@ pub enum Outcome {
 pub struct Report {
     pub outcome: Outcome,
     pub iterations: usize,
-    /// Time of the stretch with its ramps, in s.
+    /// Time of the window with its ramps, in s.
     pub time: f64,
-    /// What the multipliers leave between it and the least one, in s.
+    /// Σ λ s: an estimate of the time above the minimum, in s.
     pub excess: f64,
 }
 
-/// Part of the way to the boundary.
+/// Steps go this part of the distance to the boundary.
 const STEP: f64 = 0.995;
-/// Ends are met to this part of themselves.
+/// Given ends count as met within this relative error.
 const MET: f64 = 1e-9;
-/// Steps below this part of Newton's are no progress.
+/// Steps shorter than this part of Newton's step count as no progress.
 const LEAST_STEP: f64 = 1e-6;
-/// λ s keeps at least this part of the complementarity aimed at.
+/// λ s stays above this part of the complementarity aimed at.
 pub(super) const LEAST_DUAL: f64 = 1e-4;
 
-/// Working space, reused from stretch to stretch.
+/// Working space, reused from window to window.
 pub struct InteriorPoint<X, const M: usize> {
     /// What instructions the processor has.
     pub(super) level: Level,
@@ -94,17 +95,17 @@ pub struct InteriorPoint<X, const M: usize> {
     pub(super) rhs: Vec<f64>,
     pub(super) step: Vec<f64>,
     pub(super) trial: Vec<f64>,
-    /// On (w, w') of each node: the pull of the centre, for λ s of 1, and of the predictor's products.
+    /// Pulls on (w, w') of each station: by the centring with λ s = 1, and by the predictor's products.
     pub(super) pulls: Vec<[[f64; 2]; 2]>,
-    /// Rows of one interval at a time: they stay in the nearest cache.
+    /// The rows of one interval: small enough for the nearest cache.
     pub(super) scratch: Vec<Lanes>,
     pub(super) ends: [Option<EndRow>; 2],
 }
 
-/// The limit of w at the end of a ramp.
+/// The row that limits w at the end of a ramp.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct EndRow {
-    pub node: usize,
+    pub station: usize,
     pub ramp: f64,
     pub greatest: f64,
     pub slack: f64,
@@ -132,33 +133,38 @@ impl<X: Model<M>, const M: usize> Default for InteriorPoint<X, M> {
 }
 
 impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
-    /// Improves the valid plan x = (w_0, w'_0, w_1, …) in place. Ends given as fixed may be missed by the start.
-    pub fn solve(&mut self, rows: &Rows<M>, bounds: [Bound; 2], x: &mut [f64], effort: &Effort) -> Report {
-        dispatch!(self.level, simd => self.improve(simd, rows, bounds, x, effort))
+    /// Improves the valid plan x = (w_0, w'_0, w_1, …) in place. The start need not meet given ends.
+    pub fn solve(
+        &mut self,
+        rows: &Constraints<M>,
+        ends: [WindowEnd; 2],
+        x: &mut [f64],
+        effort: &Effort,
+    ) -> Report {
+        dispatch!(self.level, simd => self.improve(simd, rows, ends, x, effort))
     }
 
     #[inline(always)]
     fn improve<S: Simd>(
         &mut self,
         simd: S,
-        rows: &Rows<M>,
-        bounds: [Bound; 2],
+        rows: &Constraints<M>,
+        ends: [WindowEnd; 2],
         x: &mut [f64],
         effort: &Effort,
     ) -> Report {
         let count = rows.intervals.len();
-        let total = (count * 4 * Order::<M>::COUNT + 2) as f64;
+        let total = (count * 4 * RowLayout::<M>::COUNT + 2) as f64;
         self.resize(count);
         self.model.begin(simd, rows, x);
-        let mut time = self.time(simd, rows, bounds, x, false);
-        let Some(mut logarithm) =
-            self.enter(simd, rows, bounds, x, effort.barrier * time / total, effort.warm)
+        let mut time = self.time(simd, rows, ends, x, false);
+        let Some(mut logarithm) = self.enter(simd, rows, ends, x, effort.barrier * time / total, effort.warm)
         else {
             return Report { outcome: Outcome::NotInside, iterations: 0, time, excess: time };
         };
-        let ties = [tie(&bounds[0], 1.0), tie(&bounds[1], -1.0)];
+        let conditions = [end_condition(&ends[0], 1.0), end_condition(&ends[1], -1.0)];
         let mut floor = 0.3 * effort.barrier;
-        // The part of the multipliers' step that is still to be taken, and their least complementarity then.
+        // The part of the multipliers' last step that is still to be added, and their least complementarity after it.
         let (mut dual, mut least_dual) = (0.0, 0.0);
         let mut gain = f64::INFINITY;
         let mut excess = time;
@@ -171,19 +177,19 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
             let mu = work / total;
             let gap = work / time;
             excess = work;
-            let missing = missing(&bounds, x);
-            let met = miss(&bounds, x, &rows.intervals) < MET;
+            let missing = missing(&ends, x);
+            let met = miss(&ends, x, &rows.intervals) < MET;
             if met && gap < effort.tolerance && gain.abs() < effort.tolerance.max(1e-6) * time {
                 outcome = Outcome::Converged;
                 break;
             }
             iterations += 1;
-            if !self.band.factor(ties) {
+            if !self.band.factor(conditions) {
                 outcome = Outcome::Stalled;
                 break;
             }
 
-            // Predictor: how far does the pure Newton step get?
+            // Predictor: the longest pure Newton step gives the centring σ.
             for (r, g) in self.rhs.iter_mut().zip(&self.gradient) {
                 *r = -g;
             }
@@ -194,21 +200,21 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
             let least = floor * time / total;
             let target = least.max(sigma * mu);
 
-            // Corrector: towards the target, with the second order of the predictor where it is of use.
+            // Corrector: towards the target, with the predictor's second order unless the floor sets the target.
             let second = if least > sigma * mu { 0.0 } else { 1.0 };
             self.correct(target, second);
             self.band.solve(&self.rhs, missing, &mut self.step);
             self.model.solved(simd, rows, &self.step, [target, second]);
             let longest = self.direction(simd, rows, target, second);
             let mut part = (STEP * longest.0).min(1.0);
-            let mut next = self.attempt(simd, rows, bounds, x, part);
+            let mut next = self.attempt(simd, rows, ends, x, part);
             for _ in 0..20 {
                 let valid = next.0.is_finite();
                 if valid && (!met || next.0 - target * (next.1 - logarithm) <= time * (1.0 + 1e-9)) {
                     break;
                 }
                 part *= 0.6;
-                next = self.attempt(simd, rows, bounds, x, part);
+                next = self.attempt(simd, rows, ends, x, part);
             }
             if !next.0.is_finite() {
                 outcome = Outcome::Stalled;
@@ -229,45 +235,45 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
             }
         }
         self.finish(simd, dual);
-        if miss(&bounds, x, &rows.intervals) < MET {
-            settle(&bounds, x);
+        if miss(&ends, x, &rows.intervals) < MET {
+            snap_ends(&ends, x);
         } else {
             outcome = Outcome::Missed;
         }
-        Report { outcome, iterations, time: self.time(simd, rows, bounds, x, false), excess }
+        Report { outcome, iterations, time: self.time(simd, rows, ends, x, false), excess }
     }
 
     #[inline(always)]
     fn resize(&mut self, count: usize) {
         let state = &mut self.state;
         for vector in [&mut state.slack, &mut state.dual, &mut state.step] {
-            vector.resize(count * Order::<M>::COUNT, Lanes::ONE);
+            vector.resize(count * RowLayout::<M>::COUNT, Lanes::ONE);
         }
         state.step.fill(Lanes::ZERO);
-        self.scratch.resize(Order::<M>::COUNT, Lanes::ONE);
+        self.scratch.resize(RowLayout::<M>::COUNT, Lanes::ONE);
         self.pulls.resize(count + 1, [[0.0; 2]; 2]);
         for vector in [&mut self.gradient, &mut self.rhs, &mut self.step, &mut self.trial] {
             vector.resize(2 * count + 2, 0.0);
         }
     }
 
-    /// Slacks and multipliers of the start; Σ ln s, unless it is not inside.
+    /// Slacks and multipliers of the start. Returns Σ ln s, or None unless the start is strictly inside.
     #[inline(always)]
     fn enter<S: Simd>(
         &mut self,
         simd: S,
-        rows: &Rows<M>,
-        bounds: [Bound; 2],
+        rows: &Constraints<M>,
+        ends: [WindowEnd; 2],
         x: &[f64],
         mu: f64,
         warm: bool,
     ) -> Option<f64> {
         let last = self.ends;
-        self.ends = std::array::from_fn(|end| match bounds[end] {
-            Bound::Fixed { .. } => None,
-            Bound::Rest { ramp, greatest } => {
-                let node = end * rows.intervals.len();
-                Some(EndRow { node, ramp, greatest, slack: 1.0, dual: 0.0, step: 0.0 })
+        self.ends = std::array::from_fn(|end| match ends[end] {
+            WindowEnd::Fixed { .. } => None,
+            WindowEnd::Rest { ramp, greatest } => {
+                let station = end * rows.intervals.len();
+                Some(EndRow { station, ramp, greatest, slack: 1.0, dual: 0.0, step: 0.0 })
             }
         });
         let logarithm = self.slacks(simd, rows, x, false)?;
@@ -284,19 +290,25 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         Some(logarithm)
     }
 
-    /// Slacks of x, or of the trial; Σ ln s, unless a limit is broken.
+    /// Slacks of x, or of the trial. Returns Σ ln s, or None if a limit is broken.
     #[inline(always)]
-    pub(super) fn slacks<S: Simd>(&mut self, simd: S, rows: &Rows<M>, x: &[f64], trial: bool) -> Option<f64> {
+    pub(super) fn slacks<S: Simd>(
+        &mut self,
+        simd: S,
+        rows: &Constraints<M>,
+        x: &[f64],
+        trial: bool,
+    ) -> Option<f64> {
         let mut product = LogProduct::default();
         for (n, interval) in rows.intervals.iter().enumerate() {
-            let slack = Order::<M>::of_mut(&mut self.state.slack, n);
+            let slack = RowLayout::<M>::of_mut(&mut self.state.slack, n);
             self.model.slack(simd, rows, n, &local(x, n, interval.h), trial, slack);
             let (mut least, mut all) = (slack[0].load(simd), slack[0].load(simd));
             for slack in &slack[1..] {
                 least = slack.load(simd).min(least);
                 all = all * *slack;
             }
-            // Also a product that is not a number.
+            // A NaN is refused as well.
             if least.least() <= 0.0 || all.sum().is_nan() {
                 return None;
             }
@@ -304,7 +316,7 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         }
         let mut logarithm = product.ln();
         for row in self.ends.iter_mut().flatten() {
-            row.slack = 1.0 - x[2 * row.node] / row.greatest;
+            row.slack = 1.0 - x[2 * row.station] / row.greatest;
             if row.slack <= 0.0 {
                 return None;
             }
@@ -313,19 +325,19 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         Some(logarithm)
     }
 
-    /// The time of a spline with its ramps, infinite where it is not positive.
+    /// The time of a spline with its ramps, in s; infinite where w is not positive.
     #[inline(always)]
     pub(super) fn time<S: Simd>(
         &self,
         simd: S,
-        rows: &Rows<M>,
-        bounds: [Bound; 2],
+        rows: &Constraints<M>,
+        ends: [WindowEnd; 2],
         x: &[f64],
         trial: bool,
     ) -> f64 {
         let mut time = self.model.time(simd, rows, x, trial);
-        for (bound, w) in bounds.iter().zip([x[0], x[x.len() - 2]]) {
-            if let Bound::Rest { ramp, .. } = bound {
+        for (kind, w) in ends.iter().zip([x[0], x[x.len() - 2]]) {
+            if let WindowEnd::Rest { ramp, .. } = kind {
                 time += if w > 0.0 { 3.0 * ramp / w.sqrt() } else { f64::INFINITY };
             }
         }
@@ -333,42 +345,46 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
     }
 }
 
-/// How the unknowns of an end are tied; `sign` is −1 at the end of the path.
-fn tie(bound: &Bound, sign: f64) -> Tie {
-    match bound {
-        Bound::Rest { ramp, .. } => Tie::Slope(sign * 4.0 / (3.0 * ramp)),
-        Bound::Fixed { .. } => Tie::Given,
+/// The condition on the unknowns of an end; `sign` is −1 at the end of the path.
+fn end_condition(kind: &WindowEnd, sign: f64) -> EndCondition {
+    match kind {
+        WindowEnd::Rest { ramp, .. } => EndCondition::Slope(sign * 4.0 / (3.0 * ramp)),
+        WindowEnd::Fixed { .. } => EndCondition::Given,
     }
 }
 
-/// What the ends lack.
-fn missing(bounds: &[Bound; 2], x: &[f64]) -> [[f64; 2]; 2] {
-    std::array::from_fn(|end| match bounds[end] {
-        Bound::Rest { .. } => [0.0; 2],
-        Bound::Fixed { w, slope } => {
+/// The steps of (w, w') that are missing at given ends.
+fn missing(ends: &[WindowEnd; 2], x: &[f64]) -> [[f64; 2]; 2] {
+    std::array::from_fn(|end| match ends[end] {
+        WindowEnd::Rest { .. } => [0.0; 2],
+        WindowEnd::Fixed { w, slope } => {
             let at = end * (x.len() - 2);
             [w - x[at], slope - x[at + 1]]
         }
     })
 }
 
-/// The greatest part of its end by which the spline misses it.
-fn miss<const M: usize>(bounds: &[Bound; 2], x: &[f64], intervals: &[super::rows::Interval<M>]) -> f64 {
-    let lacks = missing(bounds, x);
+/// The greatest relative error at given ends.
+fn miss<const M: usize>(
+    ends: &[WindowEnd; 2],
+    x: &[f64],
+    intervals: &[super::constraints::Interval<M>],
+) -> f64 {
+    let lacks = missing(ends, x);
     let h = [intervals[0].h, intervals[intervals.len() - 1].h];
     let mut worst: f64 = 0.0;
     for end in 0..2 {
-        if let Bound::Fixed { w, .. } = bounds[end] {
+        if let WindowEnd::Fixed { w, .. } = ends[end] {
             worst = worst.max(lacks[end][0].abs() / w).max(lacks[end][1].abs() * h[end] / w);
         }
     }
     worst
 }
 
-/// Ends that are met but for rounding are met exactly.
-fn settle(bounds: &[Bound; 2], x: &mut [f64]) {
-    for (end, bound) in bounds.iter().enumerate() {
-        if let Bound::Fixed { w, slope } = *bound {
+/// Sets given ends exactly, without rounding.
+fn snap_ends(ends: &[WindowEnd; 2], x: &mut [f64]) {
+    for (end, kind) in ends.iter().enumerate() {
+        if let WindowEnd::Fixed { w, slope } = *kind {
             let at = end * (x.len() - 2);
             (x[at], x[at + 1]) = (w, slope);
         }

@@ -2,16 +2,16 @@
 
 use fearless_simd::{dispatch, Level, Simd};
 
-use super::between::Between;
-use super::bound::lagrangian;
+use super::constraints::{Constraints, RowLayout};
 use super::exact::Exact;
 use super::hermite::{duration_on, local};
 use super::interior_point::{Effort, InteriorPoint};
+use super::intersample_check::IntersampleCheck;
+use super::lower_bound::lagrangian;
 use super::model::Model;
 use super::prepare::Prepared;
 use super::relaxed::Relaxed;
-use super::rows::{Order, Rows};
-use super::{End, Geometry, Limits, Place, Problem};
+use super::{End, Geometry, Limits, PathPoint, Problem};
 use feedplan_geometry::watch::Watch;
 
 /// A space curve that turns to both sides, its derivatives known by the length.
@@ -22,7 +22,7 @@ impl Geometry<3> for Winding {
         &self.0
     }
 
-    fn at(&self, _: usize, s: f64) -> Place<3> {
+    fn at(&self, _: usize, s: f64) -> PathPoint<3> {
         let (x, slope) = (0.6 * s, 0.3f64);
         let (turn, rate, change) = (1.5 * x.sin(), 0.9 * x.cos(), -0.54 * x.sin());
         let (sin, cos, flat) = (turn.sin(), turn.cos(), slope.cos());
@@ -30,7 +30,7 @@ impl Geometry<3> for Winding {
         let second = [-flat * sin * rate, flat * cos * rate, 0.0];
         let third =
             [-flat * (sin * change + cos * rate * rate), flat * (cos * change - sin * rate * rate), 0.0];
-        Place { first, second, third, speed_cap: 200.0 }
+        PathPoint { first, second, third, speed_cap: 200.0 }
     }
 }
 
@@ -46,7 +46,7 @@ fn levels() -> Vec<Level> {
 }
 
 /// What an interior point leaves from a plan, as bits.
-fn solved<X: Model<3>>(level: Level, prepared: &Prepared<'_, Winding, 3>, rows: &Rows<3>) -> Vec<u64> {
+fn solved<X: Model<3>>(level: Level, prepared: &Prepared<'_, Winding, 3>, rows: &Constraints<3>) -> Vec<u64> {
     let effort = Effort {
         tolerance: 1e-7,
         max_iterations: 60,
@@ -57,7 +57,7 @@ fn solved<X: Model<3>>(level: Level, prepared: &Prepared<'_, Winding, 3>, rows: 
     };
     let mut space = InteriorPoint::<X, 3> { level, ..InteriorPoint::default() };
     let mut x: Vec<f64> = prepared.x.iter().map(|x| 0.97 * x).collect();
-    let report = space.solve(rows, prepared.bounds, &mut x, &effort);
+    let report = space.solve(rows, prepared.ends, &mut x, &effort);
     assert!(report.iterations > 5, "{report:?}");
     let state = space.state;
     let rows = [state.slack, state.dual, state.step].concat();
@@ -67,14 +67,14 @@ fn solved<X: Model<3>>(level: Level, prepared: &Prepared<'_, Winding, 3>, rows: 
 
 /// What the checks of a plan and its bound find on each interval.
 #[inline(always)]
-fn checked<S: Simd>(simd: S, x: &[f64], rows: &Rows<3>, between: &Between<3>) -> Vec<f64> {
+fn checked<S: Simd>(simd: S, x: &[f64], rows: &Constraints<3>, between: &IntersampleCheck<3>) -> Vec<f64> {
     let mut out = vec![];
     for (n, interval) in rows.intervals.iter().enumerate() {
         out.push(duration_on(simd, x, n, interval.h));
         out.extend(rows.utilisation_on(simd, x, n));
         out.extend(between.utilisation_on(simd, x, n, interval.h));
         let u = local(x, n, interval.h);
-        let mut dual = vec![interval.speed; Order::<3>::COUNT];
+        let mut dual = vec![interval.speed; RowLayout::<3>::COUNT];
         let (time, value, slope) = lagrangian(simd, rows, n, &u, &u, &mut dual);
         out.extend([time, value]);
         out.extend(slope);
@@ -88,8 +88,8 @@ fn results_are_the_same_on_every_level() {
     let geometry = Winding([0.0, 60.0]);
     let problem = Problem { geometry: &geometry, limits, caps: &[], ends: [End::Rest; 2] };
     let prepared = Prepared::new(&problem, &Default::default()).expect("a first plan");
-    let stretch = prepared.stretch(0..prepared.grid.pieces.len());
-    let (rows, between) = (&stretch.rows, &stretch.between);
+    let window = prepared.window(0..prepared.grid.pieces.len());
+    let (rows, between) = (&window.rows, &window.check);
     let found = |level: Level| {
         let checks: Vec<f64> = dispatch!(level, simd => checked(simd, &prepared.x, rows, between));
         let checks = checks.into_iter().map(f64::to_bits).collect();

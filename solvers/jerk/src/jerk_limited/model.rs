@@ -1,75 +1,74 @@
-//! What the interior point asks of a problem: its slacks, their steps, and its curvature, interval by interval.
+//! The interface of the interior-point method to its problems (`exact`, `relaxed`): slacks, gradient and matrix.
 
 use fearless_simd::Simd;
 
+use super::constraints::Constraints;
 use super::hermite::{AT_NODES, BEND, SLOPE, VALUE};
-use super::rows::Rows;
 use crate::lanes::{Lanes, Register};
 
-/// A problem over the rows of a stretch; it may have variables of its own at the collocation points.
+/// A problem over the constraints of a window. It may have own variables at the collocation points.
 pub trait Model<const M: usize>: Default {
-    /// Its own variables for the spline x.
-    fn begin<S: Simd>(&mut self, simd: S, rows: &Rows<M>, x: &[f64]);
+    /// Starts the own variables for the spline x.
+    fn begin<S: Simd>(&mut self, simd: S, rows: &Constraints<M>, x: &[f64]);
 
-    /// The slacks on interval n for local coefficients u, with its own variables as they are or at the trial.
+    /// The slacks on interval n for local coefficients u, with the present or the trial values of the own variables.
     fn slack<S: Simd>(
         &mut self,
         simd: S,
-        rows: &Rows<M>,
+        rows: &Constraints<M>,
         n: usize,
         u: &[f64; 4],
         trial: bool,
         out: &mut [Lanes],
     );
 
-    /// Their change for the step d, the convex ones along their tangents.
-    fn slack_step<S: Simd>(&self, simd: S, rows: &Rows<M>, n: usize, d: &[f64; 4], out: &mut [Lanes]);
+    /// The change of the slacks for the step d; convex slacks change along their tangents.
+    fn slack_step<S: Simd>(&self, simd: S, rows: &Constraints<M>, n: usize, d: &[f64; 4], out: &mut [Lanes]);
 
-    /// Matrix and gradient of interval n for the weights λ/s and the multipliers λ of its rows.
+    /// Matrix and gradient of interval n, for the weights λ/s and the multipliers λ of its rows.
     fn local<S: Simd>(
         &mut self,
         simd: S,
-        rows: &Rows<M>,
+        rows: &Constraints<M>,
         n: usize,
         u: &[f64; 4],
         weight: &[Lanes],
         dual: &[Lanes],
     ) -> Local;
 
-    /// Σ aim ∇s over the rows of interval n, as a linear form of (w, w', w'') at the collocation points; aims are of
-    /// the centring (0), or of the predictor's second order (1).
+    /// Σ aim ∇s over the rows of interval n, as a linear form of (w, w', w'') at the collocation points. `which` is 0
+    /// for the aims of the centring and 1 for those of the predictor's second order.
     fn pull<S: Simd>(
         &mut self,
         simd: S,
-        rows: &Rows<M>,
+        rows: &Constraints<M>,
         n: usize,
         aim: &[Lanes],
         which: usize,
     ) -> [Register<S>; 3];
 
-    /// Its own part of a step whose spline is known, with so much of each pull in it.
-    fn solved<S: Simd>(&mut self, simd: S, rows: &Rows<M>, step: &[f64], pulls: [f64; 2]);
+    /// Computes the step of the own variables from that of the spline; `pulls` are the factors of both aims.
+    fn solved<S: Simd>(&mut self, simd: S, rows: &Constraints<M>, step: &[f64], pulls: [f64; 2]);
 
-    /// The trial of its own variables is a part of their step away.
+    /// Sets the trial values of the own variables, a part of their step away.
     fn attempt<S: Simd>(&mut self, simd: S, part: f64);
 
-    /// Takes the trial.
     fn accept(&mut self);
 
     /// The time of x without its ramps; infinite where w is not positive.
-    fn time<S: Simd>(&self, simd: S, rows: &Rows<M>, x: &[f64], trial: bool) -> f64;
+    fn time<S: Simd>(&self, simd: S, rows: &Constraints<M>, x: &[f64], trial: bool) -> f64;
 }
 
 /// The symmetric form of (w, w', w'') at each collocation point: 00 01 02 11 12 22.
 pub type Form<S> = [Register<S>; 6];
 
-/// The upper half of a matrix, and a gradient, in the local coefficients (w, h w') of both nodes.
+/// The upper half of a matrix, and a gradient, in the local coefficients (w, h w') at both ends.
 pub struct Local {
     pub matrix: [[f64; 4]; 4],
     pub gradient: [f64; 4],
 }
 
-/// The upper half of a form of (w, w', w'') in local coefficients, with one of w at the nodes of the quadrature.
+/// The upper half of a form of (w, w', w'') and of a form of w at the quadrature nodes, in local coefficients.
 #[inline(always)]
 pub fn expand<S: Simd>(h: f64, form: &Form<S>, at_nodes: Register<S>) -> [[f64; 4]; 4] {
     let per_h = 1.0 / h;

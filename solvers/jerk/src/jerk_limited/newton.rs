@@ -1,30 +1,31 @@
-//! The passes of one Newton iteration over the intervals of a stretch; see `interior_point`.
+//! The passes of a Newton iteration of `interior_point` over the intervals: matrix, predictor, corrector, step lengths.
 
 use fearless_simd::Simd;
 
+use super::constraints::{Constraints, RowLayout};
 use super::hermite::local;
-use super::interior_point::{Bound, InteriorPoint};
+use super::interior_point::{InteriorPoint, WindowEnd};
 use super::model::{project, Model};
-use super::rows::{Order, Rows};
 use crate::lanes::{Lanes, Register};
 
-/// The iterate, row by row of each interval; see `rows::Order`.
+/// Slacks and multipliers, by the rows of each interval (`RowLayout`).
 #[derive(Default)]
 pub struct State {
-    /// Slacks, from `attempt` to `assemble`; from there on 1/slack.
+    /// Slacks from `attempt` to `assemble`; after that 1/slack.
     pub slack: Vec<Lanes>,
     pub dual: Vec<Lanes>,
-    /// −ds dλ of the predictor, at most so great; after the corrector dλ.
+    /// −ds dλ of the predictor, limited in size; after the corrector dλ.
     pub step: Vec<Lanes>,
 }
 
 impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
-    /// Matrix and gradient at x; the sum of λ s. Multipliers take a part of their step and stay above `least_dual`/s.
+    /// Assembles matrix and gradient at x, after `part` of the multipliers' step with λ ≥ `least_dual`/s; returns Σ λ
+    /// s.
     #[inline(always)]
     pub(super) fn assemble<S: Simd>(
         &mut self,
         simd: S,
-        rows: &Rows<M>,
+        rows: &Constraints<M>,
         x: &[f64],
         part: f64,
         least_dual: f64,
@@ -36,10 +37,10 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         let floor = Register::all(simd, least_dual);
         let weight = &mut self.scratch[..];
         for (n, interval) in rows.intervals.iter().enumerate() {
-            let slack = Order::<M>::of_mut(&mut state.slack, n);
-            let dual = Order::<M>::of_mut(&mut state.dual, n);
-            let step = Order::<M>::of(&state.step, n);
-            for k in 0..Order::<M>::COUNT {
+            let slack = RowLayout::<M>::of_mut(&mut state.slack, n);
+            let dual = RowLayout::<M>::of_mut(&mut state.dual, n);
+            let step = RowLayout::<M>::of(&state.step, n);
+            for k in 0..RowLayout::<M>::COUNT {
                 let inverse = slack[k].load(simd).inverse();
                 let multiplier = (dual[k] + step[k].load(simd) * part).max(floor * inverse);
                 work += multiplier * slack[k];
@@ -56,22 +57,22 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         for row in self.ends.iter_mut().flatten() {
             row.dual = (row.dual + part * row.step).max(least_dual / row.slack);
             work += row.dual * row.slack;
-            let w = x[2 * row.node];
+            let w = x[2 * row.station];
             let fall = row.ramp / (w * w.sqrt());
-            self.gradient[2 * row.node] -= 1.5 * fall;
-            self.band.diagonal[row.node][0] +=
+            self.gradient[2 * row.station] -= 1.5 * fall;
+            self.band.diagonal[row.station][0] +=
                 2.25 * fall / w + row.dual / row.slack / (row.greatest * row.greatest);
         }
         work
     }
 
-    /// The sum of λ s, which is `work` now, at the end of the predictor's longest step. Keeps the predictor's products
-    /// −ds dλ, each at most `most`, and the pulls of them and of the centre on each node.
+    /// Returns Σ λ s, now `work`, after the predictor's longest step. Keeps the predictor's products −ds dλ, each at
+    /// most `most` in size, and the pulls of these products and of the centring on each station.
     #[inline(always)]
-    pub(super) fn predict<S: Simd>(&mut self, simd: S, rows: &Rows<M>, work: f64, most: f64) -> f64 {
+    pub(super) fn predict<S: Simd>(&mut self, simd: S, rows: &Constraints<M>, work: f64, most: f64) -> f64 {
         self.pulls.fill([[0.0; 2]; 2]);
         let state = &mut self.state;
-        let change = &mut self.scratch[..Order::<M>::COUNT];
+        let change = &mut self.scratch[..RowLayout::<M>::COUNT];
         let zero = Register::all(simd, 0.0);
         let (high, low) = (Register::all(simd, most), Register::all(simd, -most));
         let (mut least, mut greatest) = (zero, zero);
@@ -79,10 +80,10 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         let mut sums = [zero; 2];
         for (n, interval) in rows.intervals.iter().enumerate() {
             self.model.slack_step(simd, rows, n, &local(&self.step, n, interval.h), change);
-            let inverse = Order::<M>::of(&state.slack, n);
-            let dual = Order::<M>::of(&state.dual, n);
-            let product = Order::<M>::of_mut(&mut state.step, n);
-            for k in 0..Order::<M>::COUNT {
+            let inverse = RowLayout::<M>::of(&state.slack, n);
+            let dual = RowLayout::<M>::of(&state.dual, n);
+            let product = RowLayout::<M>::of_mut(&mut state.step, n);
+            for k in 0..RowLayout::<M>::COUNT {
                 let step = change[k].load(simd);
                 let part = step * inverse[k];
                 least = least.min(part);
@@ -105,7 +106,7 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         let mut sums = [sums[0].sum(), sums[1].sum()];
         let (mut primal, mut dual) = (-least.least(), 1.0 + greatest.greatest());
         for row in self.ends.iter_mut().flatten() {
-            let change = -self.step[2 * row.node] / row.greatest;
+            let change = -self.step[2 * row.station] / row.greatest;
             let part = change / row.slack;
             primal = primal.max(-part);
             dual = dual.max(1.0 + part);
@@ -114,15 +115,14 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
             sums[1] += second;
             row.step = (first + second).clamp(-most, most);
             let pull = -1.0 / (row.slack * row.greatest);
-            self.pulls[row.node][0][0] += pull;
-            self.pulls[row.node][1][0] += pull * row.step;
+            self.pulls[row.station][0][0] += pull;
+            self.pulls[row.station][1][0] += pull * row.step;
         }
         let (p, d) = ((1.0 / primal).min(1.0), (1.0 / dual).min(1.0));
         work + p * sums[0] - d * (work + sums[0]) - p * d * (sums[0] + sums[1])
     }
 
-    /// The right-hand side of the corrector: λ s of every row towards `target`, with `second` times the predictor's
-    /// products.
+    /// The corrector's right-hand side: λ s of every row to `target`, and `second` times the predictor's products.
     #[inline(always)]
     pub(super) fn correct(&mut self, target: f64, second: f64) {
         for ((rhs, gradient), pulls) in
@@ -134,28 +134,28 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         }
     }
 
-    /// The steps of the multipliers; the longest steps that keep slacks and multipliers positive.
+    /// Computes the steps of the multipliers; returns the longest steps that keep slacks and multipliers positive.
     #[inline(always)]
     pub(super) fn direction<S: Simd>(
         &mut self,
         simd: S,
-        rows: &Rows<M>,
+        rows: &Constraints<M>,
         target: f64,
         second: f64,
     ) -> (f64, f64) {
         let goal = Register::all(simd, target);
-        let change = &mut self.scratch[..Order::<M>::COUNT];
+        let change = &mut self.scratch[..RowLayout::<M>::COUNT];
         let state = &mut self.state;
         let mut least = Register::all(simd, -1e-12);
         let mut dual_most = 1e-12;
         for (n, interval) in rows.intervals.iter().enumerate() {
             self.model.slack_step(simd, rows, n, &local(&self.step, n, interval.h), change);
-            let inverse = Order::<M>::of(&state.slack, n);
-            let dual = Order::<M>::of(&state.dual, n);
-            let step = Order::<M>::of_mut(&mut state.step, n);
+            let inverse = RowLayout::<M>::of(&state.slack, n);
+            let dual = RowLayout::<M>::of(&state.dual, n);
+            let step = RowLayout::<M>::of_mut(&mut state.step, n);
             let known = Register::all(simd, dual_most);
             let mut beyond = Register::all(simd, 0.0);
-            for k in 0..Order::<M>::COUNT {
+            for k in 0..RowLayout::<M>::COUNT {
                 let part = change[k].load(simd) * inverse[k];
                 least = least.min(part);
                 let aim = (goal + step[k].load(simd) * second) * inverse[k];
@@ -163,9 +163,9 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
                 beyond = beyond.min(next + dual[k] * known);
                 step[k] = next.into();
             }
-            // Few intervals ask for a shorter step than all before: only these divide.
+            // Few intervals need a shorter step than all before; only these divide.
             if beyond.least() < 0.0 {
-                for k in 0..Order::<M>::COUNT {
+                for k in 0..RowLayout::<M>::COUNT {
                     let part = step[k] * dual[k].load(simd).inverse();
                     dual_most = (-part).greatest().max(dual_most);
                 }
@@ -173,7 +173,7 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         }
         let (mut primal, mut dual) = (-least.least(), dual_most);
         for row in self.ends.iter_mut().flatten() {
-            let change = -self.step[2 * row.node] / row.greatest / row.slack;
+            let change = -self.step[2 * row.station] / row.greatest / row.slack;
             primal = primal.max(-change);
             row.step = (target + row.step * second) / row.slack - row.dual * (1.0 + change);
             dual = dual.max(-row.step / row.dual);
@@ -181,13 +181,13 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         (1.0 / primal, 1.0 / dual)
     }
 
-    /// Time and Σ ln s a part of the step further; the time is infinite where a limit is broken.
+    /// Time and Σ ln s after a part of the step; the time is infinite where a limit is broken.
     #[inline(always)]
     pub(super) fn attempt<S: Simd>(
         &mut self,
         simd: S,
-        rows: &Rows<M>,
-        bounds: [Bound; 2],
+        rows: &Constraints<M>,
+        ends: [WindowEnd; 2],
         x: &[f64],
         part: f64,
     ) -> (f64, f64) {
@@ -199,12 +199,12 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         let logarithm = self.slacks(simd, rows, &trial, true);
         self.trial = trial;
         match logarithm {
-            Some(logarithm) => (self.time(simd, rows, bounds, &self.trial, true), logarithm),
+            Some(logarithm) => (self.time(simd, rows, ends, &self.trial, true), logarithm),
             None => (f64::INFINITY, 0.0),
         }
     }
 
-    /// The multipliers take a part of their last step.
+    /// Adds a part of the multipliers' last step.
     #[inline(always)]
     pub(super) fn finish<S: Simd>(&mut self, simd: S, part: f64) {
         for (dual, step) in self.state.dual.iter_mut().zip(&self.state.step) {

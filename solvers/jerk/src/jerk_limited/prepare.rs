@@ -1,33 +1,33 @@
-//! What a plan begins with: a checked problem, its nodes and a first plan that holds all limits.
+//! What the solver starts from: the checked problem, its grid, the known ends, and a first plan within all limits.
 
 use rayon::prelude::*;
 
-use super::baseline;
-use super::between::Between;
+use super::constraints::Constraints;
 use super::grid::Grid;
-use super::interior_point::Bound;
-use super::rest;
-use super::rows::Rows;
-use super::stretch::Stretch;
-use super::survey::{survey, Slopes};
+use super::initial_plan;
+use super::interior_point::WindowEnd;
+use super::intersample_check::IntersampleCheck;
+use super::rest_ramp;
+use super::speed_envelope::{sample_envelope, Slopes};
+use super::window::Window;
 use super::{Effort, End, Fault, Geometry, Limits, Problem};
 use feedplan_geometry::watch::Watch;
 
-/// Intervals sampled at a time.
+/// Intervals that one thread takes at a time.
 const CHUNK: usize = 1024;
-/// Rounds of lowering the first plan where it exceeds a limit.
+/// Rounds in which the first plan is lowered where it exceeds a limit.
 const ROUNDS: usize = 12;
-/// The share of the work of a plan that it is to prepare it.
+/// The share of the preparation in the work of a plan.
 pub const PREPARING: f64 = 0.1;
 
 /// A problem on its grid.
 pub struct Prepared<'a, G, const M: usize> {
     pub problem: &'a Problem<'a, G, M>,
     pub grid: Grid,
-    pub bounds: [Bound; 2],
+    pub ends: [WindowEnd; 2],
     /// A valid plan (w_0, w'_0, w_1, …).
     pub x: Vec<f64>,
-    /// The time of a stop from the greatest speed, in s.
+    /// The time to stop from the greatest speed, in s.
     pub stop_time: f64,
     watch: Watch<'a>,
 }
@@ -38,17 +38,23 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         let knots = problem.geometry.knots();
         let total = knots[knots.len() - 1];
         let limits = &problem.limits;
-        let bounds = bounds(problem);
+        let ends = window_ends(problem);
         let watch = effort.watch.part(PREPARING);
-        let span = |end: usize| match bounds[end] {
-            Bound::Rest { ramp, .. } => ramp,
-            Bound::Fixed { .. } => 0.0,
+        let span = |end: usize| match ends[end] {
+            WindowEnd::Rest { ramp, .. } => ramp,
+            WindowEnd::Fixed { .. } => 0.0,
         };
-        let (stations, slopes) =
-            survey(problem.geometry, limits, problem.caps, [span(0), total - span(1)], &bounds, watch)?;
-        let grid = Grid::new(&stations, slopes, problem.caps, &bounds, effort.resolution);
+        let (samples, slopes) = sample_envelope(
+            problem.geometry,
+            limits,
+            problem.caps,
+            [span(0), total - span(1)],
+            &ends,
+            watch,
+        )?;
+        let grid = Grid::new(&samples, slopes, problem.caps, &ends, effort.resolution);
         watch.check();
-        let mut prepared = Self { problem, grid, bounds, x: vec![], stop_time: 0.0, watch };
+        let mut prepared = Self { problem, grid, ends, x: vec![], stop_time: 0.0, watch };
         prepared.begin(slopes)?;
         Ok(prepared)
     }
@@ -63,34 +69,34 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         let mut worst = f64::INFINITY;
         for _ in 0..ROUNDS {
             self.watch.check();
-            self.x = baseline::smooth(&self.grid.nodes, &caps, slopes, &self.bounds);
-            let used = self.each(|rows, n, x| baseline::used(rows, x, n), 0.0);
+            self.x = initial_plan::smooth(&self.grid.stations, &caps, slopes, &self.ends);
+            let used = self.each(|rows, n, x| initial_plan::used(rows, x, n), 0.0);
             worst = used.iter().copied().fold(0.0, f64::max);
-            if worst <= baseline::USE {
+            if worst <= initial_plan::USE {
                 return Ok(());
             }
             for n in 0..used.len() {
-                if used[n] > baseline::USE {
+                if used[n] > initial_plan::USE {
                     let r = self.x[2 * n].max(self.x[2 * n + 2]).powf(0.75);
-                    caps[n] = caps[n].min(2.0 * r) * baseline::factor(used[n]);
+                    caps[n] = caps[n].min(2.0 * r) * initial_plan::factor(used[n]);
                 }
             }
         }
-        let scale = baseline::USE / worst;
-        if scale == 0.0 || self.bounds.iter().any(|bound| matches!(bound, Bound::Fixed { .. })) {
-            return Err(Fault::NoPlan { s: self.grid.nodes[0] });
+        let scale = initial_plan::USE / worst;
+        if scale == 0.0 || self.ends.iter().any(|kind| matches!(kind, WindowEnd::Fixed { .. })) {
+            return Err(Fault::NoPlan { s: self.grid.stations[0] });
         }
         self.x.iter_mut().for_each(|x| *x *= scale);
         Ok(())
     }
 
-    /// f(rows of some intervals, index in them, x at their nodes) of every interval.
-    fn each(&self, f: impl Fn(&Rows<M>, usize, &[f64]) -> f64 + Sync, fill: f64) -> Vec<f64> {
+    /// f(constraints of some intervals, index among them, x at their stations) for every interval.
+    fn each(&self, f: impl Fn(&Constraints<M>, usize, &[f64]) -> f64 + Sync, fill: f64) -> Vec<f64> {
         let mut out = vec![fill; self.grid.pieces.len()];
         out.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, out)| {
             self.watch.check();
             let first = chunk * CHUNK;
-            let rows = self.grid.rows(self.problem, first..first + out.len());
+            let rows = self.grid.constraints(self.problem, first..first + out.len());
             let x = self.x.get(2 * first..2 * (first + out.len() + 1)).unwrap_or(&[]);
             for (n, out) in out.iter_mut().enumerate() {
                 *out = f(&rows, n, x);
@@ -99,43 +105,48 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         out
     }
 
-    /// The limits on a range of intervals.
-    pub fn stretch(&self, range: std::ops::Range<usize>) -> Stretch<M> {
-        let rows = self.grid.rows(self.problem, range.clone());
-        let nodes = &self.grid.nodes[range.start..=range.end];
+    /// The window of a range of intervals.
+    pub fn window(&self, range: std::ops::Range<usize>) -> Window<M> {
+        let rows = self.grid.constraints(self.problem, range.clone());
+        let stations = &self.grid.stations[range.start..=range.end];
         let pieces = &self.grid.pieces[range];
-        let between = Between::sample(self.problem.geometry, &self.problem.limits, nodes, pieces, &rows);
-        Stretch { rows, between }
+        let check =
+            IntersampleCheck::sample(self.problem.geometry, &self.problem.limits, stations, pieces, &rows);
+        Window { rows, check }
     }
 }
 
-/// What is known at the ends of a path.
-pub fn bounds<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>) -> [Bound; 2] {
+/// The known values at both ends of a path.
+pub fn window_ends<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>) -> [WindowEnd; 2] {
     let knots = problem.geometry.knots();
     let (pieces, limits) = (knots.len() - 1, &problem.limits);
     let total = knots[pieces];
     std::array::from_fn(|end| match problem.ends[end] {
-        End::Moving { speed, acceleration } => Bound::Fixed { w: speed * speed, slope: 2.0 * acceleration },
+        End::Moving { speed, acceleration } => {
+            WindowEnd::Fixed { w: speed * speed, slope: 2.0 * acceleration }
+        }
         End::Rest => {
             let (piece, s) = if end == 0 { (0, 0.0) } else { (pieces - 1, total) };
-            let ramp = rest::length(limits, &problem.geometry.at(piece, s), total);
-            let greatest = rest::greatest(problem.geometry, limits, problem.caps, ramp, end);
-            Bound::Rest { ramp, greatest }
+            let ramp = rest_ramp::length(limits, &problem.geometry.at(piece, s), total);
+            let greatest = rest_ramp::greatest(problem.geometry, limits, problem.caps, ramp, end);
+            WindowEnd::Rest { ramp, greatest }
         }
     })
 }
 
-/// Whether numbers rise, each above the one before.
+/// Whether each number is greater than the one before.
 fn rising(numbers: impl Iterator<Item = f64> + Clone) -> bool {
     numbers.clone().zip(numbers.skip(1)).all(|(a, b)| a < b)
 }
 
-/// The problem's numbers once.
+/// Checks the problem's numbers.
 fn check<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>) -> Result<(), Fault> {
     let wrong = |what: String| Err(Fault::Input(what));
     let knots = problem.geometry.knots();
     if knots.len() < 2 || knots[0] != 0.0 || !rising(knots.iter().copied()) {
-        return wrong("the knots of the path do not rise from 0".into());
+        return wrong(
+            "the knots of the path do not rise from 0 mm: give two or more, each above the last".into(),
+        );
     }
     let limits = &problem.limits;
     let Limits { velocity, acceleration, jerk } = limits;
@@ -157,13 +168,13 @@ fn check<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>) -> Result<(), 
     for cap in problem.caps {
         if cap.speed.is_nan() || cap.speed <= 0.0 {
             return wrong(format!(
-                "the greatest speed at {} mm is {} mm/s: give a positive number, or stop there",
+                "the speed cap at {} mm is {} mm/s: give a positive number, or stop there",
                 cap.s, cap.speed
             ));
         }
     }
     if !rising(problem.caps.iter().map(|cap| cap.s)) {
-        return wrong("the places with a greatest speed do not rise".into());
+        return wrong("the speed caps do not rise along the path: sort them, one at each place".into());
     }
     for end in problem.ends {
         if let End::Moving { speed, acceleration } = end {

@@ -1,23 +1,24 @@
-//! w = v² along a path: a C¹ cubic spline between ramps of constant jerk.
+//! The result of the planner: w = v² [mm²/s²] over the arc length [mm], a C¹ cubic spline between ramps of constant
+//! jerk.
 
 use super::hermite;
 
-/// w at nodes; between the path's end and the first or last node a ramp from rest, w ∝ s^(4/3), where the path
-/// begins or ends at rest.
+/// w at the stations. At rest, a ramp w ∝ s^(4/3) joins the end of the path and the nearest station.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Profile {
-    /// Nodes along the path, in mm.
+    /// Arc lengths of the stations, in mm.
     pub s: Vec<f64>,
-    /// v² at the nodes, in mm²/s².
+    /// v² at the stations, in mm²/s².
     pub speed_sq: Vec<f64>,
     /// Its derivative along the path, twice the acceleration, in mm/s².
     pub slope: Vec<f64>,
-    /// Where the path begins and ends; the nodes begin and end there too where it does not rest.
+    /// Arc lengths of the ends of the path; without a ramp they are the first and the last station.
     pub ends: [f64; 2],
 }
 
 impl Profile {
-    /// w, w' and w'' at a place; at a node from the right, or from the left at the last.
+    /// w, w' and w'' at an arc length; w'' at a station is that of the interval after it, at the last one of that
+    /// before.
     pub fn at(&self, s: f64) -> [f64; 3] {
         let last = self.s.len() - 1;
         if s < self.s[0] {
@@ -26,7 +27,7 @@ impl Profile {
         if s > self.s[last] {
             return ramp(self.ends[1] - s, self.ends[1] - self.s[last], self.speed_sq[last], -1.0);
         }
-        let n = self.s.partition_point(|&node| node <= s).clamp(1, last) - 1;
+        let n = self.s.partition_point(|&station| station <= s).clamp(1, last) - 1;
         let h = self.s[n + 1] - self.s[n];
         let u = [self.speed_sq[n], self.slope[n] * h, self.speed_sq[n + 1], self.slope[n + 1] * h];
         let basis = hermite::at((s - self.s[n]) / h);
@@ -46,7 +47,7 @@ impl Profile {
     }
 }
 
-/// w, w', w'' a distance from rest, on a ramp with w = `greatest` at its end.
+/// w, w', w'' at a distance from rest on a ramp of a length with w = `greatest` at its end.
 fn ramp(distance: f64, length: f64, greatest: f64, sign: f64) -> [f64; 3] {
     let part = distance / length;
     let root = part.cbrt();

@@ -1,37 +1,37 @@
-//! A convex relaxation on a stretch: the pace w^(−1/2) in the jerk rows and in the time becomes a variable y at each
+//! A convex relaxation on a window: in the rows of jerk and in the time, the pace w^(−1/2) becomes a variable y at each
 //! collocation point,
 //!
-//!   least Σ c y   with   y ≥ w^(−1/2),   y ∓ L(w)/J ≥ 0   and the other rows as they are,
+//!   minimise Σ c y   subject to   y ≥ w^(−1/2),   y ∓ L(w)/J ≥ 0   and the other rows as they are,
 //!
-//! c the weights of the 3/8 rule. Its least is at most that of the true problem. y is eliminated point by point, so
-//! that Newton's matrix keeps its band.
+//! with L(w) = q''' w + 3/2 q'' w' + 1/2 q' w'' and the weights c of the 3/8 rule. Its minimum is at most that of the
+//! true problem. y is eliminated at each point, so that Newton's matrix keeps its bandwidth.
 
 use fearless_simd::Simd;
 
+use super::constraints::{Constraints, RowLayout};
 use super::hermite::{local, MASS};
 use super::model::{expand, fall, pace, project, Local, Model};
-use super::rows::{Order, Rows};
 use crate::lanes::{Lanes, Register};
 
-/// The variables of the relaxation, one set of lanes for each interval.
+/// The variables y of the relaxation, four lanes for each interval.
 #[derive(Default)]
 pub struct Relaxed {
     pub y: Vec<Lanes>,
     step: Vec<Lanes>,
     trial: Vec<Lanes>,
-    /// w^(−1/2), where the slacks are.
+    /// w^(−1/2), as the slacks were last evaluated.
     pace: Vec<Lanes>,
-    /// ∂² of y with itself and with (w, w', w''), and the pulls of the rows on y.
+    /// Second derivatives by y and y, and by y and (w, w', w''); then the pulls of the rows on y.
     cross: Vec<[Lanes; 4]>,
     pulls: Vec<[Lanes; 2]>,
 }
 
-/// y begins at this multiple of the least possible.
+/// y starts at this multiple of its least possible value.
 const ABOVE: f64 = 1.1;
 
 impl<const M: usize> Model<M> for Relaxed {
     #[inline(always)]
-    fn begin<S: Simd>(&mut self, simd: S, rows: &Rows<M>, x: &[f64]) {
+    fn begin<S: Simd>(&mut self, simd: S, rows: &Constraints<M>, x: &[f64]) {
         let count = rows.intervals.len();
         for lanes in [&mut self.y, &mut self.step, &mut self.trial, &mut self.pace] {
             lanes.resize(count, Lanes::ONE);
@@ -52,7 +52,7 @@ impl<const M: usize> Model<M> for Relaxed {
     fn slack<S: Simd>(
         &mut self,
         simd: S,
-        rows: &Rows<M>,
+        rows: &Constraints<M>,
         n: usize,
         u: &[f64; 4],
         trial: bool,
@@ -65,7 +65,7 @@ impl<const M: usize> Model<M> for Relaxed {
     }
 
     #[inline(always)]
-    fn slack_step<S: Simd>(&self, simd: S, rows: &Rows<M>, n: usize, d: &[f64; 4], out: &mut [Lanes]) {
+    fn slack_step<S: Simd>(&self, simd: S, rows: &Constraints<M>, n: usize, d: &[f64; 4], out: &mut [Lanes]) {
         let w = rows.intervals[n].motion(simd, d)[0];
         let step = self.step[n].load(simd);
         rows.slack_step(n, d, step, step + fall(self.pace[n].load(simd)) * w, out);
@@ -75,7 +75,7 @@ impl<const M: usize> Model<M> for Relaxed {
     fn local<S: Simd>(
         &mut self,
         simd: S,
-        rows: &Rows<M>,
+        rows: &Constraints<M>,
         n: usize,
         _: &[f64; 4],
         weight: &[Lanes],
@@ -84,12 +84,12 @@ impl<const M: usize> Model<M> for Relaxed {
         let interval = &rows.intervals[n];
         let zero = Register::all(simd, 0.0);
         let mut form = rows.curvature(simd, n, weight);
-        let (last, pace) = (weight[Order::<M>::POSITIVE].load(simd), self.pace[n].load(simd));
+        let (last, pace) = (weight[RowLayout::<M>::POSITIVE].load(simd), self.pace[n].load(simd));
         let fall = fall(pace);
         let mut cross = [last, last * fall, zero, zero];
-        form[0] += last * fall * fall + dual[Order::<M>::POSITIVE] * fall * pace * pace * 1.5;
+        form[0] += last * fall * fall + dual[RowLayout::<M>::POSITIVE] * fall * pace * pace * 1.5;
         for k in 0..M {
-            let at = Order::<M>::jerk(k);
+            let at = RowLayout::<M>::jerk(k);
             let [up, down] = [weight[at].load(simd), weight[at + 1].load(simd)];
             let (both, turn) = (up + down, down - up);
             let turn = turn * (rows.per_jerk[k] * interval.jerk);
@@ -117,13 +117,13 @@ impl<const M: usize> Model<M> for Relaxed {
     fn pull<S: Simd>(
         &mut self,
         simd: S,
-        rows: &Rows<M>,
+        rows: &Constraints<M>,
         n: usize,
         aim: &[Lanes],
         which: usize,
     ) -> [Register<S>; 3] {
         let (mut pull, jerk) = rows.pull(simd, n, aim);
-        let last = aim[Order::<M>::POSITIVE].load(simd);
+        let last = aim[RowLayout::<M>::POSITIVE].load(simd);
         pull[0] += last * fall(self.pace[n].load(simd));
         self.pulls[n][which] = (jerk + last).into();
         let cross = &self.cross[n];
@@ -135,7 +135,7 @@ impl<const M: usize> Model<M> for Relaxed {
     }
 
     #[inline(always)]
-    fn solved<S: Simd>(&mut self, simd: S, rows: &Rows<M>, step: &[f64], pulls: [f64; 2]) {
+    fn solved<S: Simd>(&mut self, simd: S, rows: &Constraints<M>, step: &[f64], pulls: [f64; 2]) {
         for (n, interval) in rows.intervals.iter().enumerate() {
             let [w, w1, w2] = interval.motion(simd, &local(step, n, interval.h));
             let [own, c0, c1, c2] = self.cross[n];
@@ -158,7 +158,7 @@ impl<const M: usize> Model<M> for Relaxed {
     }
 
     #[inline(always)]
-    fn time<S: Simd>(&self, simd: S, rows: &Rows<M>, x: &[f64], trial: bool) -> f64 {
+    fn time<S: Simd>(&self, simd: S, rows: &Constraints<M>, x: &[f64], trial: bool) -> f64 {
         let y = if trial { &self.trial } else { &self.y };
         let mut time = 0.0;
         for (n, interval) in rows.intervals.iter().enumerate() {

@@ -1,16 +1,16 @@
-//! Limits of what is positive and of what is negative: one factor scales a value of either sign, and it stays smooth where
-//! the sign changes.
+//! Limits that differ for positive and negative values, scaled by their mean: one factor scales values of both signs,
+//! so that the scaled value stays smooth where its sign changes.
 
 use feedplan_planner::problem::Both;
 
-/// Limits of each axis for values in parts of the mean of both.
+/// Limits of each axis, scaled by the mean of its two limits.
 #[derive(Clone, Copy, Debug)]
 pub struct Sides<const M: usize> {
-    /// One over the mean of both limits.
+    /// 1/mean of both limits.
     pub per_mean: [f64; M],
-    /// The greatest of positive and of negative values, in parts of the mean: 1 where both are the same.
+    /// The limits of positive and of negative values over the mean: 1 where both are the same.
     pub most: [[f64; 2]; M],
-    /// One over that.
+    /// 1/`most`.
     pub per_most: [[f64; 2]; M],
 }
 
@@ -31,7 +31,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn of_limits_by_hand() {
+    fn two_limits_by_hand() {
         let sides = Sides::new(&[[3.0, 7.0], [1.0, 7.0]]);
         assert_eq!(sides.per_mean, [0.5, 1.0 / 7.0]);
         assert_eq!(sides.most, [[1.5, 0.5], [1.0, 1.0]]);

@@ -1,16 +1,16 @@
-//! The backward recursion (Cheatham 2007, 4.3.2): from where the forward recursion stands back to its start.
+//! The backward recursion (Cheatham 2007, 4.3.2): from the standstill of the forward recursion back to its start, it
+//! lowers the speeds at the ends of segments until every segment joins its ends.
 //!
-//! It first follows the forward recursion, as if no profile were established: every speed as high as the one after it
-//! allows, at most that of the forward recursion. Rises, seen backward, have no dead spot, so it only fails where it has to
-//! meet the speed that the motion already has. Then it is connected with the established profile, which is left
-//! as late as possible.
+//! It first follows the forward recursion as if no profile were established: every speed is as high as the one after it
+//! allows, and at most that of the forward recursion. Seen backward, rises have no dead spot, so that this only fails
+//! at the present speed of the motion. Then it joins the established profile, as early on the path as possible.
 
 use super::buffer::Buffer;
 use super::dead_spot::Fall;
 use super::segment::Segment;
 
-/// Lowers `speeds`, a forward recursion, until all its segments join their ends; where that is not possible from the
-/// start on, the beginning is that of the `established` speeds. False if these are to be kept as they are.
+/// Lowers `speeds`, the forward recursion's, until all segments join their ends; if that fails, from the `established`
+/// ones on. False if those are kept.
 pub fn recursion(
     buffer: &Buffer,
     established: impl Fn(usize) -> f64,
@@ -25,7 +25,8 @@ pub fn recursion(
     fresh::first_segment(buffer.segment(0), speeds[1], forward[0]) || connect(buffer, established, speeds)
 }
 
-/// Leaves the established profile where it first joins the new one, or comes down to it from where that is first above.
+/// Leaves the established profile where it first joins the new one, or where it is first below and the new one falls to
+/// it.
 fn connect(buffer: &Buffer, established: impl Fn(usize) -> f64, speeds: &mut [f64]) -> bool {
     let last = speeds.len() - 1;
     let meets = |&i: &usize| {
@@ -63,17 +64,17 @@ pub mod fresh {
         converged(segment, end, forward).unwrap_or_else(|| nonconverged(segment, end))
     }
 
-    /// a) The forward recursion is out of reach: the highest speed.
+    /// a) The forward recursion's speed is out of reach: the highest speed.
     pub fn nonconverged(segment: &Segment, end: f64) -> f64 {
         segment.limits.highest(end, segment.length)
     }
 
-    /// b) The forward recursion is within reach: its speed.
+    /// b) The forward recursion's speed is within reach.
     pub fn converged(segment: &Segment, end: f64, forward: f64) -> Option<f64> {
         segment.joins(forward, end).then_some(forward)
     }
 
-    /// c) On the first segment only the speed that the motion has will do.
+    /// c) The first segment must start at the present speed of the motion.
     pub fn first_segment(segment: &Segment, end: f64, start: f64) -> bool {
         segment.joins(start, end)
     }
@@ -95,12 +96,12 @@ pub mod established {
         pub limit: f64,
     }
 
-    /// What becomes of the speed at its start.
+    /// The speed at its start.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub enum Step {
-        /// It is the established one; all before it are, too.
+        /// The established speed, as at all segments before.
         Converged,
-        /// It is higher.
+        /// A higher speed.
         Kept(f64),
     }
 
@@ -128,7 +129,7 @@ pub mod established {
         dead.then_some(Step::Kept(reach.upper))
     }
 
-    /// c) The established profile is lower than all within reach: the lowest speed.
+    /// c) The established profile is lower than all speeds within reach: the lowest of these.
     pub fn decreasing(at: &Situation) -> Option<Step> {
         let lowest = fall(at).lowest();
         (at.established < lowest).then_some(Step::Kept(lowest))
@@ -139,7 +140,7 @@ pub mod established {
         (at.established < at.end && at.segment.joins(at.established, at.end)).then_some(Step::Converged)
     }
 
-    /// Backward, a rise is a fall.
+    /// Seen backward, a rise is a fall.
     fn fall(at: &Situation) -> Fall {
         Fall { limits: at.segment.limits, start: at.end, length: at.segment.length }
     }
@@ -236,7 +237,7 @@ mod tests {
 
     #[test]
     fn a_start_out_of_reach_keeps_the_established_beginning() {
-        // The motion has 2 mm/s and stands after 3 segments by its plan; the new one wants a jump to 0.1 at the first joint.
+        // The motion has 2 mm/s and its plan stands after 3 segments; the new plan jumps to 0.1 mm/s after the first.
         let buffer: Buffer = [1.3, 3.0, 3.0, 3.0].map(segment).into_iter().collect();
         let established = [2.0, 1.9, 1.0, 0.0, 0.0];
         let mut speeds = vec![];
@@ -245,7 +246,7 @@ mod tests {
         for i in 0..4 {
             assert!(buffer.segment(i).joins(speeds[i], speeds[i + 1]));
         }
-        // Nothing above the established profile: it is kept.
+        // No new speed is above the established profile, which is kept.
         let established = [2.0, 1.9, 1.8, 0.0];
         assert!(!recursion(&buffer, |i| established[i], &[2.0, 0.1, 0.0], &mut speeds));
     }

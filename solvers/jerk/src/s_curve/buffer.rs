@@ -1,10 +1,10 @@
-//! The segments ahead, and the speed limits where they meet.
+//! The segments that the profiler knows ahead of the motion, and the speed limits [mm/s] where they meet.
 
 use std::collections::VecDeque;
 
 use super::segment::Segment;
 
-/// Segments in order; the motion enters the first one and stands at the end of the last.
+/// Segments in order: the motion enters the first one and stands at the end of the last one.
 #[derive(Clone, Debug, Default)]
 pub struct Buffer {
     segments: VecDeque<Segment>,

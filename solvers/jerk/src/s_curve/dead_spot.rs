@@ -1,32 +1,32 @@
-//! Which speeds a fall reaches within a length: one region, or two with a dead spot between (Cheatham 2007, 4.3.4).
+//! The speeds that a fall from a speed V [mm/s] can reach within a length [mm]: one region, or two with a dead spot
+//! between them (Cheatham 2007, 4.3.4).
 //!
-//! A fall by ΔV takes D = (V − ΔV/2) T(ΔV), concave in ΔV: the gentlest falls are short, the longest leave a third of the
-//! speed (2 V/3 with perfect S-curves), and a fall to standstill is shorter again. Where the length lies between that
-//! of standstill and the longest, speeds in the middle cannot be reached.
+//! A fall by ΔV has the length D = (V − ΔV/2) T(ΔV), concave in ΔV: small falls are short, the longest fall ends at a
+//! third of V (with perfect S-curves), and a fall to standstill is shorter than that one. For lengths between that of
+//! standstill and the longest, speeds in the middle cannot be reached.
 //!
 //! The thesis counts usable A_max. As 4.15 has at most two positive roots (Descartes: −A³ + 2VJ A − ΔS J² changes sign
-//! twice), the third end is the acceleration limit itself; from there falls of constant acceleration go on to standstill.
+//! twice), the third end is the acceleration limit; from there falls of constant acceleration go on to standstill.
 
 use super::transition::{retreat, Limits};
 
-/// Newton's method on what is concave, from the feasible side; it ends by itself except beside the longest fall, where both
-/// roots meet and every step halves the rest.
+/// Most steps of Newton's method on a concave function, from the feasible side. It converges by itself, except beside
+/// the longest fall, where both roots meet and every step only halves the error.
 const STEPS: usize = 48;
-/// A step this small beside the root is rounding.
-const SETTLED: f64 = 4.0 * f64::EPSILON;
+/// A step below this part of the root is rounding.
+const CONVERGED: f64 = 4.0 * f64::EPSILON;
 
-/// Speeds that a fall from V reaches.
+/// The speeds that a fall from V can reach.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reach {
     /// The upper region is [upper, V].
     pub upper: f64,
-    /// The lower region is [0, lower]; None where all reachable speeds hang together.
+    /// The lower region is [0, lower]; None where there is one region.
     pub lower: Option<f64>,
-    /// How many A_max end the regions.
+    /// Number of A_max that end the regions.
     pub usable: Usable,
 }
 
-/// The cases of the thesis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Usable {
     One,
@@ -43,18 +43,15 @@ pub struct Fall {
 }
 
 impl Fall {
-    /// The speeds it reaches.
     pub fn reach(&self) -> Reach {
         self.one_usable().or_else(|| self.two_usable()).unwrap_or_else(|| self.three_usable())
     }
 
-    /// Whether it reaches standstill.
     #[inline]
     pub fn stops(&self) -> bool {
         self.limits.joins(self.start, 0.0, self.length)
     }
 
-    /// The lowest speed it reaches.
     pub fn lowest(&self) -> f64 {
         if self.stops() {
             0.0
@@ -75,7 +72,7 @@ impl Fall {
         }
     }
 
-    /// Two regions of perfect S-curves: between 0 and A_1, and between A_2 and that which ends at standstill.
+    /// Two regions of perfect S-curves: up to A_1, and from A_2 to the A_max that ends at standstill.
     pub fn two_usable(&self) -> Option<Reach> {
         (self.start <= self.limits.full_change()).then(|| self.two_regions(Usable::Two))
     }
@@ -128,8 +125,7 @@ impl Fall {
         retreat(speed, self.start, self.start, |end| self.limits.joins(self.start, end, self.length))
     }
 
-    /// The smaller positive root A_1 of 4.15, p (2 V J − p²) = ΔS J², as a change of speed; tangents of what is
-    /// concave in p keep below it.
+    /// The smaller root A_1 of 4.15, p (2 V J − p²) = ΔS J², as ΔV; tangents of the concave left side stay below it.
     fn perfect_change(&self) -> f64 {
         let jerk = self.limits.jerk;
         let (linear, constant) = (2.0 * self.start * jerk, self.length * jerk * jerk);
@@ -137,7 +133,7 @@ impl Fall {
         for _ in 0..STEPS {
             let slope = linear - 3.0 * p * p;
             let step = (constant - p * (linear - p * p)) / slope;
-            if slope <= 0.0 || step <= SETTLED * p {
+            if slope <= 0.0 || step <= CONVERGED * p {
                 break;
             }
             p += step;
@@ -147,11 +143,11 @@ impl Fall {
 
     /// The highest speed of the lower region; standstill must be within reach.
     fn end_of_dead_spot(&self) -> f64 {
-        // From standstill on, tangents of the concave D keep above the root.
+        // Starting at standstill, tangents of the concave D stay above the root.
         let mut change = self.start;
         for _ in 0..STEPS {
             let step = (self.distance(change) - self.length) / self.slope(change);
-            if step.is_nan() || step <= SETTLED * change {
+            if step.is_nan() || step <= CONVERGED * change {
                 break;
             }
             change -= step;
@@ -220,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn without_length_no_speed_is_reached_but_the_present_one() {
+    fn without_length_only_the_present_speed_is_reached() {
         assert_eq!(perfect(0.0).lowest(), 1.0);
         assert_eq!(Fall { start: 0.0, ..perfect(0.0) }.lowest(), 0.0);
         assert_eq!(Fall { start: 0.0, ..perfect(3.0) }.reach().upper, 0.0);

@@ -1,13 +1,14 @@
-//! The forward recursion (Cheatham 2007, 4.3.1): rise on the first segment, then fall as fast as possible to standstill.
+//! The forward recursion (Cheatham 2007, 4.3.1): speeds at the ends of segments that rise on the first segment and then
+//! fall as fast as possible to standstill.
 //!
-//! Only as many segments are looked at as it takes to stop. Where the fall is too slow for a limit ahead, the speed jumps
-//! down to the limit: the backward recursion has to mend that.
+//! It looks at as many segments as it takes to stop. Where the fall is too slow for a limit ahead, the speed jumps down
+//! to the limit, which the backward recursion must mend.
 
 use super::buffer::Buffer;
 use super::dead_spot::Fall;
 use super::segment::Segment;
 
-/// One segment as a stage sees it.
+/// The input of a stage: one segment and the speeds at its ends.
 #[derive(Clone, Copy, Debug)]
 pub struct Situation<'a> {
     pub segment: &'a Segment,
@@ -31,14 +32,13 @@ impl Situation<'_> {
 /// The speed at the end of a segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Step {
-    /// The segment joins it with the speed at its start.
+    /// A speed that the segment joins with the speed at its start.
     Joined(f64),
-    /// It is a limit that the segment does not reach.
+    /// A limit that the segment cannot reach.
     Jump(f64),
 }
 
-/// The recursion from a speed at the start of the first segment. `speeds` gets the speed at every joint from there to
-/// where the motion stands; true if no limit is missed.
+/// Fills `speeds` with those at the ends of segments, from the first start to standstill; true if no limit is missed.
 pub fn recursion(buffer: &Buffer, start: f64, speeds: &mut Vec<f64>) -> bool {
     speeds.clear();
     speeds.push(start);
@@ -104,7 +104,7 @@ pub mod acceleration {
         at.fall().reach().lower.filter(|&lower| lower < limit).map(Step::Joined)
     }
 
-    /// e) The limit is below all that can be reached.
+    /// e) The limit is below all speeds within reach.
     pub fn violating(at: &Situation) -> Option<Step> {
         at.allowable.map(Step::Jump)
     }
@@ -132,7 +132,7 @@ pub mod deceleration {
         (lowest <= at.limit()).then_some(Step::Joined(lowest))
     }
 
-    /// b) The limit is below all that can be reached.
+    /// b) The limit is below all speeds within reach.
     pub fn violating(at: &Situation) -> Step {
         Step::Jump(at.limit())
     }
@@ -258,7 +258,7 @@ mod tests {
         for (speed, expected) in speeds.iter().zip([0.0, 1.0, 0.75, 0.0]) {
             assert!((speed - expected).abs() < 1e-14, "{speeds:?}");
         }
-        // A limit of 0.5 mm/s at the second joint is too low: a jump, and on from there.
+        // A limit of 0.5 mm/s after the second segment is too low: a jump, and on from there.
         segments[1].junction = 0.5;
         assert!(!recursion(&segments.into_iter().collect(), 0.0, &mut speeds));
         assert_eq!(speeds[2..], [0.5, 0.0]);

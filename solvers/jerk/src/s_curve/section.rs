@@ -1,17 +1,17 @@
-//! Sections of constant jerk, of the seven types of the thesis's figure 4.1, and how they fill a segment.
+//! Sections of constant jerk (the seven types of Cheatham 2007, figure 4.1), and how they fill a segment between two
+//! speeds.
 //!
-//! A segment is crossed by a rise, a constant speed and a fall, each where needed: the highest speed between its ends
-//! that leaves room for both changes. The thesis's one S-curve per segment is the case without a peak.
+//! A segment is crossed by a rise, a constant speed and a fall, each where needed, at the highest speed inside it that
+//! leaves room for both changes. The thesis's one S-curve per segment is the case without a peak.
 
 use super::segment::Segment;
 use super::transition::{retreat, Limits};
 
-/// Newton's method on a convex function from above; far fewer are needed.
+/// Most steps of Newton's method on a convex function from above; far fewer are used.
 const STEPS: usize = 60;
-/// A rest of constant speed this small beside the length is rounding of the changes before and after.
+/// A constant speed over less than this part of the length is rounding of the changes before and after.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
-/// The seven types of section.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SectionKind {
     ConcaveRise = 1,
@@ -23,7 +23,7 @@ pub enum SectionKind {
     ConcaveFall = 7,
 }
 
-/// A section of constant jerk: the state at its start.
+/// A section of constant jerk, with the state at its start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Section {
     pub kind: SectionKind,
@@ -52,7 +52,6 @@ impl Section {
         ]
     }
 
-    /// The state at its end.
     pub fn end(&self) -> [f64; 3] {
         self.state(self.duration)
     }
@@ -60,22 +59,28 @@ impl Section {
 
 /// Where and when a segment begins.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Place {
+pub struct SegmentStart {
     /// In s.
     pub time: f64,
     /// In mm.
     pub position: f64,
 }
 
-/// Appends the sections of a segment between speeds at its ends that it joins; returns where it ends.
-pub fn cross(segment: &Segment, from: f64, to: f64, start: Place, out: &mut Vec<Section>) -> Place {
+/// Appends the sections of a segment between two speeds that it joins; returns where and when it ends.
+pub fn cross(
+    segment: &Segment,
+    from: f64,
+    to: f64,
+    start: SegmentStart,
+    out: &mut Vec<Section>,
+) -> SegmentStart {
     let end_position = start.position + segment.length;
     if segment.length == 0.0 {
-        return Place { position: end_position, ..start };
+        return SegmentStart { position: end_position, ..start };
     }
     let Limits { acceleration, jerk } = segment.limits;
     let peak = peak(segment, from, to);
-    let mut at = Cursor { place: start, speed: from, acceleration: 0.0, out };
+    let mut at = Cursor { start, speed: from, acceleration: 0.0, out };
 
     let rise = ramp(peak - from, acceleration, jerk);
     at.section(SectionKind::ConcaveRise, rise.bend, jerk);
@@ -83,7 +88,7 @@ pub fn cross(segment: &Segment, from: f64, to: f64, start: Place, out: &mut Vec<
     at.section(SectionKind::ConvexRise, rise.bend, -jerk);
 
     let rest = segment.length - segment.limits.distance(from, peak) - segment.limits.distance(peak, to);
-    at.settle(peak);
+    at.set_speed(peak);
     if rest > ROUNDING * segment.length {
         at.section(SectionKind::ConstantSpeed, rest / peak, 0.0);
     }
@@ -92,25 +97,25 @@ pub fn cross(segment: &Segment, from: f64, to: f64, start: Place, out: &mut Vec<
     at.section(SectionKind::ConvexFall, fall.bend, -jerk);
     at.section(SectionKind::LinearFall, fall.hold, 0.0);
     at.section(SectionKind::ConcaveFall, fall.bend, jerk);
-    Place { time: at.place.time, position: end_position }
+    SegmentStart { time: at.start.time, position: end_position }
 }
 
-/// The highest speed between the ends of a segment.
+/// The highest speed inside a segment, in mm/s.
 fn peak(segment: &Segment, from: f64, to: f64) -> f64 {
     let Segment { limits, length, .. } = *segment;
     let (low, high) = (from.min(to), from.max(to));
     let needed = |peak: f64| limits.distance(from, peak) + limits.distance(peak, to);
-    // Each change alone within the length bounds the peak.
+    // The peak is at most what each change alone can reach within the length.
     let most = segment.speed().min(limits.highest(low, length)).min(limits.highest(high, length)).max(high);
     if needed(most) <= length {
         return most;
     }
-    // In q, the root of the excess over the higher end, the length needed is smooth and convex: Newton comes from above.
+    // The length needed is smooth and convex in q = √(peak − higher end): Newton's method comes from above.
     let mut q = (most - high).sqrt();
     for _ in 0..STEPS {
         let (excess, gap) = (q * q, high - low);
         let slope = |change: f64, sum: f64| {
-            // d/dq of sum/2 T(change); q/√change ≤ 1 stays finite at 0.
+            // d/dq of sum/2 T(change), where q/√change ≤ 1 stays finite at 0.
             let perfect = change <= limits.full_change();
             let per_q = if perfect {
                 (excess / change.max(f64::MIN_POSITIVE)).sqrt() / limits.jerk.sqrt()
@@ -129,7 +134,7 @@ fn peak(segment: &Segment, from: f64, to: f64) -> f64 {
     retreat((high + q * q).min(most), high, most, |peak| needed(peak) <= length)
 }
 
-/// The durations of a change of speed: with jerk at either end, with constant acceleration between.
+/// The durations of a change of speed: of each section with jerk, and of the constant acceleration between them.
 struct Ramp {
     bend: f64,
     hold: f64,
@@ -144,9 +149,9 @@ fn ramp(change: f64, acceleration: f64, jerk: f64) -> Ramp {
     }
 }
 
-/// The state between sections, and where they go.
+/// The state after the sections so far, and the list of sections.
 struct Cursor<'a> {
-    place: Place,
+    start: SegmentStart,
     speed: f64,
     acceleration: f64,
     out: &'a mut Vec<Section>,
@@ -157,20 +162,20 @@ impl Cursor<'_> {
         if duration <= 0.0 {
             return;
         }
-        let Place { time, position } = self.place;
+        let SegmentStart { time, position } = self.start;
         let (speed, acceleration) = (self.speed, self.acceleration);
         let section = Section { kind, time, duration, position, speed, acceleration, jerk };
         let [position, speed, acceleration] = section.end();
-        self.place = Place { time: time + duration, position };
-        // A change of speed ends without acceleration: exactly, not to rounding.
+        self.start = SegmentStart { time: time + duration, position };
+        // A change of speed ends with exactly no acceleration.
         let ends = matches!(kind, SectionKind::ConvexRise | SectionKind::ConcaveFall);
         self.speed = speed;
         self.acceleration = if ends { 0.0 } else { acceleration };
         self.out.push(section);
     }
 
-    /// The speed that the sections so far end at, without their roundings.
-    fn settle(&mut self, speed: f64) {
+    /// Sets the speed after the sections so far, without their rounding.
+    fn set_speed(&mut self, speed: f64) {
         self.speed = speed;
     }
 }
@@ -192,7 +197,7 @@ mod tests {
 
     fn sections(length: f64, from: f64, to: f64) -> Vec<Section> {
         let mut out = vec![];
-        let end = cross(&segment(length), from, to, Place::default(), &mut out);
+        let end = cross(&segment(length), from, to, SegmentStart::default(), &mut out);
         assert_eq!(end.position, length);
         let time: f64 = out.iter().map(|section| section.duration).sum();
         assert!((time - end.time).abs() < 1e-12);
@@ -228,11 +233,11 @@ mod tests {
 
     #[test]
     fn a_short_segment_peaks_half_way() {
-        // 2·(J/4)^(1/3)… : L = 2·V·√(V/J) for perfect S-curves up and down; V = 4 mm/s gives 8·√(8e-5) mm.
+        // Perfect S-curves up to V and down take L = 2 V √(V/J): 8 √(8e-5) mm for V = 4 mm/s.
         let all = sections(8.0 * 8e-5f64.sqrt(), 0.0, 0.0);
         assert_eq!(kinds(&all), [ConcaveRise, ConvexRise, ConvexFall, ConcaveFall]);
         assert!((all[2].speed - 4.0).abs() < 1e-13);
-        // Without room for 100 mm/s: 2·V/2·(V/500 + 0.01) = 18 mm at V = (√145 − 1)/… > 0, the root of V² + 5 V = 9000.
+        // 18 mm have no room for 100 mm/s: 2 (V/2) (V/500 + 0.01) = 18 at the positive root of V² + 5 V = 9000.
         let all = sections(18.0, 0.0, 0.0);
         assert_eq!(kinds(&all), [ConcaveRise, LinearRise, ConvexRise, ConvexFall, LinearFall, ConcaveFall]);
         assert!((all[3].speed - 0.5 * (36_025.0_f64.sqrt() - 5.0)).abs() < 1e-12);
@@ -253,7 +258,7 @@ mod tests {
     #[test]
     fn a_segment_without_length_has_no_sections() {
         let mut out = vec![];
-        let start = Place { time: 2.0, position: 3.0 };
+        let start = SegmentStart { time: 2.0, position: 3.0 };
         assert_eq!(cross(&segment(0.0), 50.0, 50.0, start, &mut out), start);
         assert!(out.is_empty());
     }

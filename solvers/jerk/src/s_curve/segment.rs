@@ -1,14 +1,13 @@
-//! A segment: a stretch of path with its limits along the path, and the checks of its numbers.
+//! A segment: its length [mm] and its limits along the path [mm, s], with the checks of these numbers.
 
 use super::transition::Limits;
 use feedplan_planner::problem::Fault;
 
-/// Lengths and limits lie in this range, so that no product of three of them leaves the floating-point numbers.
+/// Range of lengths and limits, in which no product of three of them over- or underflows.
 const LEAST: f64 = 1e-12;
 const GREATEST: f64 = 1e15;
 
-/// A stretch of path. Both speeds are limits: `allowable` is what the machine stands (path dynamics), `desired` what
-/// the program asks for.
+/// A segment of path. Both speeds are limits: `allowable` by the machine (`path_limits`), `desired` by the program.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Segment {
     /// In mm; 0 is allowed.
@@ -18,30 +17,30 @@ pub struct Segment {
     /// In mm/s.
     pub desired: f64,
     pub limits: Limits,
-    /// The speed limit where it meets the next segment, in mm/s: 0 is an exact stop, infinity none of its own.
+    /// The speed limit where it meets the next segment, in mm/s: 0 for an exact stop, infinity for no limit of its own.
     pub junction: f64,
 }
 
 impl Segment {
-    /// The speed limit between its ends, in mm/s.
+    /// The speed limit inside the segment, in mm/s.
     #[inline]
     pub fn speed(&self) -> f64 {
         self.allowable.min(self.desired)
     }
 
-    /// The speed limit between it and the next segment, in mm/s.
+    /// The speed limit where it meets the next segment, in mm/s.
     #[inline]
     pub fn speed_into(&self, next: &Self) -> f64 {
         self.speed().min(next.speed()).min(self.junction)
     }
 
-    /// Whether one speed becomes the other on it, in either direction.
+    /// Whether a speed can change to the other within its length, in either direction.
     #[inline]
     pub fn joins(&self, from: f64, to: f64) -> bool {
         self.limits.joins(from, to, self.length)
     }
 
-    /// Every number once; `number` names the segment in the message.
+    /// Checks every number; `number` names the segment in the message.
     pub fn check(&self, number: usize) -> Result<(), Fault> {
         let limits = [
             ("allowable speed", self.allowable, "mm/s"),

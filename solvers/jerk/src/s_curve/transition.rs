@@ -1,15 +1,15 @@
-//! The S-curve: the quickest change of speed with no acceleration at either end (Cheatham 2007, 4.6–4.15).
+//! The S-curve: the quickest change of speed without acceleration at either end (Cheatham 2007, 4.6–4.15).
 //!
 //! Symbols: A acceleration limit in mm/s², J jerk limit in mm/s³, V speeds in mm/s, ΔV = |V₁ − V₀|. Up to ΔV = A²/J the
-//! acceleration rises to A_max = √(J ΔV) and falls at once, T = 2 A_max/J (4.9); beyond, A holds between, T = ΔV/A + A/J.
-//! Either way the distance is (V₀ + V₁) T/2, of which 4.14 and 4.15 are the case without constant acceleration.
+//! acceleration rises to A_max = √(J ΔV) and falls at once, T = 2 A_max/J (4.9). Beyond, A is held between, and T =
+//! ΔV/A + A/J. The length in mm is (V₀ + V₁) T/2 either way; 4.14 and 4.15 are the case without constant acceleration.
 
-/// Roundings are undone in steps that double; so many reach from one unit in the last place to the whole number.
+/// Most steps of `retreat`: they double, from one unit in the last place up to the whole number.
 const RETREATS: usize = 60;
-/// Newton's method on a cubic from within half of its root above: quadratic, five steps reach rounding.
+/// Steps of Newton's method on a cubic, starting at most half above its root: five reach rounding.
 const CUBIC_STEPS: usize = 6;
 
-/// What one segment allows along the path.
+/// The limits along the path of one segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// A, in mm/s².
@@ -45,7 +45,7 @@ impl Limits {
         }
     }
 
-    /// The change of speed that takes a time: the inverse of `duration`.
+    /// The change of speed in mm/s that takes this time: the inverse of `duration`.
     pub fn change(&self, duration: f64) -> f64 {
         let full = 2.0 * self.acceleration / self.jerk;
         if duration <= full {
@@ -55,19 +55,19 @@ impl Limits {
         }
     }
 
-    /// The least length in which one speed becomes the other, in mm; the same both ways to the last bit.
+    /// The least length in mm for a change between two speeds, to the last bit the same both ways.
     #[inline]
     pub fn distance(&self, from: f64, to: f64) -> f64 {
         0.5 * (from + to) * self.duration((from - to).abs())
     }
 
-    /// Whether one speed becomes the other within a length.
+    /// Whether a speed can change to the other within a length.
     #[inline]
     pub fn joins(&self, from: f64, to: f64, length: f64) -> bool {
         self.distance(from, to) <= length
     }
 
-    /// The highest speed that a rise reaches within a length: the one positive root of 4.14 and, with constant
+    /// The highest speed, in mm/s, that a rise reaches within a length: the positive root of 4.14 or, with constant
     /// acceleration, of (2 V₀ + ΔV)(ΔV + A²/J) = 2 A ΔS.
     pub fn highest(&self, start: f64, length: f64) -> f64 {
         if length == 0.0 {
@@ -86,7 +86,7 @@ impl Limits {
     }
 }
 
-/// The positive root of p³ + a p = b with a, b ≥ 0. Newton's method comes down from where either term alone is b.
+/// The positive root of p³ + a p = b with a, b ≥ 0. Newton's method starts above it, where one term alone equals b.
 fn cubic_root(a: f64, b: f64) -> f64 {
     let mut p = b.cbrt().min(b / a);
     for _ in 0..CUBIC_STEPS {
@@ -95,7 +95,7 @@ fn cubic_root(a: f64, b: f64) -> f64 {
     p
 }
 
-/// The speed, or the nearest one towards `safe` that fits: a root found is off by roundings of numbers of a size.
+/// The first speed that fits, from `speed` towards `safe`: a computed root has roundings of numbers of this size.
 pub fn retreat(speed: f64, safe: f64, size: f64, fits: impl Fn(f64) -> bool) -> f64 {
     let (mut speed, mut step) = (speed, f64::EPSILON * size);
     for _ in 0..RETREATS {
@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn no_length_changes_no_speed() {
+    fn zero_length_leaves_the_speed_as_it_is() {
         assert_eq!(LIMITS.highest(0.0, 0.0), 0.0);
         assert_eq!(LIMITS.highest(30.0, 0.0), 30.0);
         assert_eq!(LIMITS.distance(30.0, 30.0), 0.0);

@@ -1,19 +1,21 @@
-//! The kernel of all curves: polynomial pieces of any degree, rational ones, and joints whose tool is elsewhere.
+//! The kernel of all curves: K and the fastest profile on polynomial pieces of any degree, on rational ones, and on
+//! joints with the tip elsewhere, from control points, weights and the limits of the axes, the feed and the chord
+//! error. Symbols: `bang_bang`.
 //!
-//! The limit curve is not convex here, and every switch is the first root of a Bernstein polynomial whose coefficients'
-//! signs prove that none is missed. Where rounding leaves a pass without headway, a *remedy* is asked for: another cut
-//! of the piece, then a stop; the run is planned anew with it.
+//! The limit curve is not convex here. Every switch is the first root of a Bernstein polynomial; the signs of its
+//! coefficients prove that no earlier root is missed. Where rounding stops a pass, it requests a *remedy*: another
+//! cut of the piece, next time a stop. The run is then planned again.
 //!
 //! | file | content |
 //! |---|---|
-//! | `piece` | the hodograph of a piece, weights multiplied out |
-//! | `cusp` | where all axes rest at once, as far as rounding can tell |
-//! | `split` | cuts where an axis turns round or another velocity cap is the lowest |
-//! | `part` | a part between two cuts, and that part as a pass travels it |
-//! | `store` | sub-pieces from the backward pass to the forward one |
-//! | `window` | what is left of a sub-piece ahead of a pass, with the bound on it |
+//! | `piece` | tangents and D of a piece, free of denominators |
+//! | `cusp` | where all axes rest at once, within rounding |
+//! | `split` | the cuts of a piece |
+//! | `part` | a part between two cuts, and the same part as a pass travels it |
+//! | `store` | sub-pieces, kept from the backward pass for the forward one |
+//! | `window` | what is left of a sub-piece ahead of a pass, with its ceiling |
 //! | `pass` | one pass over one sub-piece: phases (`bang`), along the cap (`slide`), along the `limit_curve` |
-//! | `check` | whether the phases keep the limits at some places, for all that rounding did |
+//! | `check` | whether the phases keep the limits at some samples, in spite of rounding |
 
 mod check;
 mod cusp;
@@ -24,10 +26,10 @@ mod split;
 mod store;
 mod window;
 
-use super::run::Between;
+use super::run::Junction;
 use super::time::{integral, NODES};
 use super::Task;
-use crate::arc_kind::ArcKind;
+use crate::phase_law::PhaseLaw;
 use crate::problem::{weights_of, TIP_AXES};
 use crate::profile::{Profile, Row, NO_AXIS};
 use check::keeps_limits;
@@ -35,26 +37,26 @@ use feedplan_geometry::polynomial::MOST;
 use feedplan_geometry::quadratic::norm;
 pub use part::Remedy;
 use part::{Cap, Part, SubPiece};
-use pass::{distance, Kind, Phase, State, Stuck};
+use pass::{axis_distance, Law, Phase, State, Stuck};
 use piece::Piece;
 pub use split::Axes;
 use split::{split, Cut, Limits};
 use store::Store;
 
-/// What the backward pass leaves for the forward pass, piece by piece from the end of a run; and space.
+/// What the backward pass leaves for the forward pass, from the end of a run to its start; and memory for both.
 #[derive(Default)]
 pub struct Space {
     cuts: Vec<Cut>,
     /// Parts of each piece from left to right.
     parts: Vec<Part>,
-    /// Of each part from right to left: its sub-piece, and where its phases of K begin.
+    /// Of each part from right to left: its sub-piece, and the index of its first phase of K.
     subs: Store,
     offsets: Vec<usize>,
-    bounds: Vec<Phase>,
+    controllable: Vec<Phase>,
     phases: Vec<Phase>,
-    /// Cuts where a pass came to no end before, and those that this attempt asks for.
+    /// Cuts and stops of this attempt, and those that it requests for the next one.
     remedies: Vec<Remedy>,
-    asked: Vec<Remedy>,
+    requested: Vec<Remedy>,
 }
 
 impl Space {
@@ -62,25 +64,24 @@ impl Space {
         self.parts.clear();
         self.subs.clear();
         self.offsets.clear();
-        self.bounds.clear();
+        self.controllable.clear();
     }
 
     /// Begins an attempt with these remedies.
     pub fn set_remedies(&mut self, remedies: &[Remedy]) {
         self.remedies.clear();
         self.remedies.extend_from_slice(remedies);
-        self.asked.clear();
+        self.requested.clear();
     }
 
-    /// What this attempt asks for; nothing if it succeeds.
-    pub fn asked(&self) -> &[Remedy] {
-        &self.asked
+    /// Empty if the attempt succeeds.
+    pub fn requested(&self) -> &[Remedy] {
+        &self.requested
     }
 }
 
-/// Calls a function with the capacity of polynomials that a piece needs: that of quadratics, of cubics and conics, of
-/// other polynomial pieces, of all. For many axes fewer capacities are compiled, since each takes the compiler some seconds:
-/// there a piece of low degree has a greater capacity than it needs.
+/// Calls a function with a sufficient capacity of polynomials: that of cubics and conics, of other polynomial pieces,
+/// or of all pieces. For many axes the smallest one is left out, since each takes the compiler some seconds.
 macro_rules! with_capacity {
     ($task:expr, $i:expr, $function:ident($($argument:expr),*)) => {{
         let needed = coefficients($task, $i);
@@ -94,20 +95,20 @@ macro_rules! with_capacity {
     }};
 }
 
-/// How many coefficients the polynomials of a piece have at most.
+/// The greatest number of coefficients of any polynomial on piece `i`.
 fn coefficients<const M: usize>(task: &Task<M>, i: usize) -> usize {
     let problem = task.problem;
-    // A bound of the speed that is not constant adds one to what rational pieces need.
+    // A sloped line of the chord-error limit adds one to the degree on rational pieces.
     let sloped = usize::from(task.chord.is_some());
-    let of = |offset: &[usize], weight: &[f64]| {
+    let count = |offset: &[usize], weight: &[f64]| {
         let degree = offset[i + 1] - offset[i] - 1;
         let rational = weights_of(weight, offset, i).iter().any(|&w| w != weight[offset[i]]);
         (degree, if rational { 8 * degree - 6 + sloped } else { 4 * degree - 2 })
     };
-    let (degree, own) = of(problem.offset, problem.weight);
+    let (degree, own) = count(problem.offset, problem.weight);
     let Some(tip) = problem.tip else { return own };
     let speed = tip.speed.of(i).len();
-    let chord = if task.chord.is_some() { of(tip.offset, tip.weight).1 } else { 0 };
+    let chord = if task.chord.is_some() { count(tip.offset, tip.weight).1 } else { 0 };
     own.max(2 * speed).max(2 * degree + speed).max(chord)
 }
 
@@ -117,17 +118,17 @@ fn piece<const M: usize, const C: usize>(task: &Task<M>, i: usize) -> Piece<M, C
     Piece::new(problem.points(i), problem.weights(i), speed_sq).with_share(problem.share(i))
 }
 
-/// The tool's own piece where it is another one and its chord error is limited.
+/// The piece of the tip, where it is another one and its chord error is limited.
 fn tip_piece<const M: usize, const C: usize>(task: &Task<M>, i: usize) -> Option<Piece<TIP_AXES, C>> {
     let tip = task.problem.tip.filter(|_| task.chord.is_some())?;
     let control = &tip.control[tip.offset[i]..tip.offset[i + 1]];
-    // Where the tool stands still it has no chord.
+    // A tip at rest has no chord.
     let moves = control.iter().any(|point| *point != control[0]);
     moves.then(|| Piece::new(control, weights_of(tip.weight, tip.offset, i), None))
 }
 
-/// The axes' speed squared at the tool's.
-fn of_axes(tip_sq: f64, tip_share: f64) -> f64 {
+/// The sum of the axes' velocities squared, from v² of the tip.
+fn axes_speed_sq(tip_sq: f64, tip_share: f64) -> f64 {
     if tip_sq == 0.0 {
         0.0
     } else {
@@ -135,15 +136,15 @@ fn of_axes(tip_sq: f64, tip_share: f64) -> f64 {
     }
 }
 
-/// Backward over piece `i`: from `at` at its end to `at` at its start; the number of its parts.
-pub fn backward<const M: usize>(task: &Task<M>, i: usize, at: &mut Between, space: &mut Space) -> usize {
+/// Backward over piece `i`, from `at` at its end to `at` at its start; returns the number of its parts.
+pub fn backward<const M: usize>(task: &Task<M>, i: usize, at: &mut Junction, space: &mut Space) -> usize {
     with_capacity!(task, i, backward_over(task, i, at, space))
 }
 
 fn backward_over<const M: usize, const C: usize>(
     task: &Task<M>,
     i: usize,
-    at: &mut Between,
+    at: &mut Junction,
     space: &mut Space,
 ) -> usize {
     let piece = piece::<M, C>(task, i);
@@ -157,18 +158,18 @@ fn backward_over<const M: usize, const C: usize>(
         let part = space.parts[number];
         let sub = part.sub_piece(&piece, &task.axes);
         if number + 1 == space.parts.len() {
-            at.speed_sq = at.speed_sq.min(of_axes(at.tip_sq, sub.tip_share(true)));
+            at.speed_sq = at.speed_sq.min(axes_speed_sq(at.tip_sq, sub.tip_share(true)));
         }
         space.subs.push(&sub);
-        let phases = space.bounds.len();
+        let phases = space.controllable.len();
         space.offsets.push(phases);
         let state = State { speed_sq: at.speed_sq };
-        at.speed_sq = match pass::run::<M, C, true>(&sub.reversed(), state, &[], &mut space.bounds) {
+        at.speed_sq = match pass::travel::<M, C, true>(&sub.reversed(), state, &[], &mut space.controllable) {
             Ok(next) if !part.starts_at_rest() => next.speed_sq,
             Ok(_) => 0.0,
             Err(Stuck(x)) => {
-                space.bounds.truncate(phases);
-                space.asked.push(part.remedy(i, 1.0 - x));
+                space.controllable.truncate(phases);
+                space.requested.push(part.remedy(i, 1.0 - x));
                 0.0
             }
         };
@@ -177,12 +178,12 @@ fn backward_over<const M: usize, const C: usize>(
     space.parts.len() - start
 }
 
-/// Forward over piece `i` of so many parts, the last that `backward` has left in the space; appends the phases.
+/// Forward over piece `i` with so many parts, the last ones that `backward` has left; appends the phases.
 pub fn forward<const M: usize>(
     task: &Task<M>,
     i: usize,
     parts: usize,
-    at: &mut Between,
+    at: &mut Junction,
     space: &mut Space,
     out: &mut Profile,
 ) {
@@ -193,7 +194,7 @@ fn forward_over<const M: usize, const C: usize>(
     task: &Task<M>,
     i: usize,
     parts: usize,
-    at: &mut Between,
+    at: &mut Junction,
     space: &mut Space,
     out: &mut Profile,
 ) {
@@ -203,18 +204,18 @@ fn forward_over<const M: usize, const C: usize>(
         let sub = space.subs.pop::<M, C>(&part, &task.axes);
         let offset = space.offsets.pop().unwrap_or(0);
         if number == first {
-            at.speed_sq = at.speed_sq.min(of_axes(at.tip_sq, sub.tip_share(false)));
+            at.speed_sq = at.speed_sq.min(axes_speed_sq(at.tip_sq, sub.tip_share(false)));
         }
         if part.starts_at_rest() {
             at.speed_sq = 0.0;
         }
         space.phases.clear();
         let state = State { speed_sq: at.speed_sq };
-        let kept = pass::run::<M, C, false>(&sub, state, &space.bounds[offset..], &mut space.phases)
+        let kept = pass::travel::<M, C, false>(&sub, state, &space.controllable[offset..], &mut space.phases)
             .and_then(|next| keeps_limits(&sub, &space.phases).map(|()| next.speed_sq));
-        space.bounds.truncate(offset);
+        space.controllable.truncate(offset);
         at.speed_sq = kept.unwrap_or_else(|Stuck(x)| {
-            space.asked.push(part.remedy(i, x));
+            space.requested.push(part.remedy(i, x));
             0.0
         });
         at.tip_sq = at.speed_sq * sub.tip_share(true);
@@ -223,7 +224,7 @@ fn forward_over<const M: usize, const C: usize>(
     space.parts.truncate(first);
 }
 
-/// Appends the phases of the forward pass over one part.
+/// Appends the phases of the forward pass over one part to the profile.
 fn push<const M: usize, const C: usize>(
     task: &Task<M>,
     number: usize,
@@ -237,7 +238,7 @@ fn push<const M: usize, const C: usize>(
     for phase in phases {
         let t = if phase.x1 == 1.0 { part.to } else { part.from + span * phase.x1 };
         let weight = |x: f64| sub.weight.value(x);
-        // p = (dt/dτ)² from π of x. At rest in a cusp p has no limit, and counts as 0.
+        // p = (dt/dτ)² from π over x. At rest in a cusp p has no limit, and 0 is written.
         let p = |pi: f64, x: f64, rests: bool| {
             if rests && pi.is_infinite() {
                 0.0
@@ -245,50 +246,51 @@ fn push<const M: usize, const C: usize>(
                 pi * weight(x).powi(4) * span * span
             }
         };
-        let way = |k: usize| distance(sub, k, phase.x0, phase.x1);
+        let distance = |k: usize| axis_distance(sub, k, phase.x0, phase.x1);
         let sign = |k: usize| if part.negative >> k & 1 == 1 { -1.0 } else { 1.0 };
         let mut joins = true;
         let mut by_acceleration = |k: usize, a: f64| {
-            // Way over mean speed, the faster speed from the way.
-            let way = way(k);
-            // Not with what comes before its axis turns, not even where phases too short to be kept lie in between.
+            // Distance over mean speed; the faster speed follows from the distance.
+            let distance = distance(k);
+            // A phase that begins where its axis turns does not join the one before, even if phases too short to keep
+            // lie between.
             joins = phase.pi[0].is_finite() && phase.pi[1].is_finite() && sub.g[k].first() > 0.0;
-            if way <= 0.0 {
+            if distance <= 0.0 {
                 return 0.0;
             }
-            2.0 * way / (phase.slow_sq.sqrt() + (phase.slow_sq + 2.0 * a * way).sqrt())
+            2.0 * distance / (phase.slow_sq.sqrt() + (phase.slow_sq + 2.0 * a * distance).sqrt())
         };
         let (up, down) = (&sub.limits.up, &sub.limits.down);
-        let (kind, axis, value, duration) = match phase.kind {
-            Kind::Accelerating(k) => {
-                (ArcKind::AxisAcceleration, k as u8, sign(k) * up[k], by_acceleration(k, up[k]))
+        let (law, axis, value, duration) = match phase.law {
+            Law::Accelerating(k) => {
+                (PhaseLaw::AxisAcceleration, k as u8, sign(k) * up[k], by_acceleration(k, up[k]))
             }
-            Kind::Braking(k) => {
-                (ArcKind::AxisAcceleration, k as u8, -sign(k) * down[k], by_acceleration(k, down[k]))
+            Law::Braking(k) => {
+                (PhaseLaw::AxisAcceleration, k as u8, -sign(k) * down[k], by_acceleration(k, down[k]))
             }
-            Kind::LimitCurve => continue,
-            Kind::Cap => match sub.cap {
-                Cap::Axis(k, v_sq) => (ArcKind::AxisVelocity, k as u8, v_sq, way(k) / v_sq.sqrt()),
-                Cap::Feed(f) => (ArcKind::Feed, NO_AXIS, f, time_at_speed(sub, (f, f), phase.x0, phase.x1)),
+            Law::LimitCurve => continue,
+            Law::Cap => match sub.cap {
+                Cap::Axis(k, v_sq) => (PhaseLaw::AxisVelocity, k as u8, v_sq, distance(k) / v_sq.sqrt()),
+                Cap::Feed(f) => (PhaseLaw::Feed, NO_AXIS, f, time_at_speed(sub, (f, f), phase.x0, phase.x1)),
                 Cap::Speed([f0, f1]) => {
                     let time = time_at_speed(sub, (f0, f1), phase.x0, phase.x1);
                     if f0 == f1 && task.problem.share(number).is_none() {
-                        (ArcKind::Feed, NO_AXIS, f0, time)
+                        (PhaseLaw::Feed, NO_AXIS, f0, time)
                     } else {
-                        (ArcKind::SpeedLine, NO_AXIS, 0.0, time)
+                        (PhaseLaw::SpeedLine, NO_AXIS, 0.0, time)
                     }
                 }
             },
         };
-        let joins = joins && !matches!(kind, ArcKind::SpeedLine);
-        let rests = [matches!(phase.kind, Kind::Accelerating(_)), matches!(phase.kind, Kind::Braking(_))]
+        let joins = joins && !matches!(law, PhaseLaw::SpeedLine);
+        let rests = [matches!(phase.law, Law::Accelerating(_)), matches!(phase.law, Law::Braking(_))]
             .map(|slow| slow && phase.slow_sq == 0.0);
         let p = [p(phase.pi[0], phase.x0, rests[0]), p(phase.pi[1], phase.x1, rests[1])];
-        out.push(number as u32, width, Row { kind, axis, value, t, p, duration, joins });
+        out.push(number as u32, width, Row { law, axis, value, t, p, duration, joins });
     }
 }
 
-/// ∫ √D/(ω² √f) dx: the time along a speed whose square f is linear in x.
+/// ∫ √D/(ω² √f) dx: the time [s] along a cap whose v² = f is linear in x.
 fn time_at_speed<const M: usize, const C: usize>(
     sub: &SubPiece<M, C>,
     (f0, f1): (f64, f64),
@@ -297,7 +299,7 @@ fn time_at_speed<const M: usize, const C: usize>(
 ) -> f64 {
     let rate = |x: [f64; NODES]| {
         let weight = sub.weight.values(x);
-        // Next to a cusp the sum of squares has lost the digits that the tangents still have.
+        // Next to a cusp D has lost digits that the tangents still have.
         let speed = if sub.own_speed {
             let g = sub.g.each_ref().map(|g| g.values(x));
             std::array::from_fn(|i| norm(&g.map(|g| g[i])))

@@ -1,19 +1,24 @@
-//! The kernel of polynomial pieces of degree 2 in the tool's own axes, by closed forms.
+//! The kernel of polynomial pieces of degree 2 in the tool's own axes: K and the fastest profile in closed form, from
+//! the control points, the feed and the limits of the axes. Zhang et al. 2010, section 4, extended by the limits of
+//! speed.
 //!
-//! C' is linear in the parameter, so that W_jk = c_j q'_k − c_k q'_j with c = q'' is constant along the piece. While one
-//! axis is at its limit, the accelerations of all others are linear in one growing quantity, and a cube root tells where
-//! the next one reaches its own; the limit curve is a straight line; two bounds of p cross at the roots of a quartic.
-//! The tangents where axes turn round follow from W to the last digits, also next to a cusp.
+//! C' is linear in the parameter, so every W_jk is constant along a piece (symbols: `bang_bang`). Consequences:
+//!
+//! * While one axis is at its limit, the accelerations of all others are linear in one growing quantity; a cube root
+//!   gives the x where the next axis reaches its limit.
+//! * The limit curve is a straight line in p.
+//! * A phase and its ceiling cross at the roots of a quartic.
+//! * W gives the tangents at turns to the last digits, also next to a cusp.
 //!
 //! | file | content |
 //! |---|---|
-//! | `piece`, `turns` | tangents and W of a piece; where its axes turn round |
-//! | `split` | parts on which no axis turns round and one velocity cap is the lowest |
+//! | `piece`, `turns` | tangents and W of a piece; where its axes turn |
+//! | `split` | the parts of a piece |
 //! | `subpiece` | a part as a pass travels it |
-//! | `phase`, `quotient` | p(x) of a phase, and where one rises above another |
-//! | `bang` | the phase of greatest acceleration and the event that ends it |
-//! | `slide` | how far a velocity cap can be followed |
-//! | `limit_curve` | the velocity limit curve |
+//! | `phase`, `quotient` | p(x) of a phase, and where one p(x) rises above another |
+//! | `bang` | the phase of greatest acceleration and the switch that ends it |
+//! | `slide` | how far a cap can be followed |
+//! | `limit_curve` | the limit curve |
 //! | `pass` | one pass over one sub-piece |
 
 mod bang;
@@ -28,35 +33,35 @@ mod subpiece;
 mod turns;
 
 use super::time::integral;
-use crate::arc_kind::ArcKind;
+use crate::phase_law::PhaseLaw;
 use crate::problem::ChordLimit;
 use crate::profile::{Profile, Row, NO_AXIS};
 use feedplan_geometry::quadratic::norm;
 pub use pass::Stuck;
-use phase::{Kind, Phase};
+use phase::{Law, Phase};
 pub use piece::Piece;
-use split::{Part, Placed, Splitter};
+use split::{Located, Part, Splitter};
 pub use subpiece::Axes;
 use subpiece::{Cap, SubPiece};
 
-/// What the backward pass leaves for the forward pass, piece by piece from the end of a run; and space.
+/// What the backward pass leaves for the forward pass, from the end of a run to its start; and memory for both.
 #[derive(Default)]
 pub struct Space {
     splitter: Splitter,
-    /// Parts from right to left, and where their phases of K begin.
+    /// Parts from right to left, each with the index of its first phase of K.
     parts: Vec<(Part, usize)>,
-    bounds: Vec<Phase>,
+    controllable: Vec<Phase>,
     phases: Vec<Phase>,
 }
 
 impl Space {
     pub fn clear(&mut self) {
         self.parts.clear();
-        self.bounds.clear();
+        self.controllable.clear();
     }
 }
 
-/// Backward over a piece under its feed: v² at its start from v² at its end, and the number of its parts.
+/// Backward over a piece: from v² at its end to v² at its start and the number of its parts.
 #[inline(always)]
 pub fn backward<const M: usize>(
     piece: &Piece<M>,
@@ -68,16 +73,16 @@ pub fn backward<const M: usize>(
     space.splitter.split(piece, axes, feed * feed, chord);
     let mut p = speed_sq / piece.speed[2];
     for part in space.splitter.parts.iter().rev() {
-        space.parts.push((*part, space.bounds.len()));
-        let placed = part.place(piece, axes, true);
-        p = pass::backward(&placed.sub, axes, p, &mut space.bounds)
-            .map_err(|Stuck(x)| Stuck(placed.to - x))?;
+        space.parts.push((*part, space.controllable.len()));
+        let located = part.locate(piece, axes, true);
+        p = pass::backward(&located.sub, axes, p, &mut space.controllable)
+            .map_err(|Stuck(x)| Stuck(located.to - x))?;
     }
     Ok((p * piece.speed[0], space.splitter.parts.len()))
 }
 
-/// Forward over a piece of so many parts, the last that `backward` has left in the space: v² at its end. Appends the
-/// phases of the piece of this number and width.
+/// Forward over a piece with so many parts, the last ones that `backward` has left: from v² at its start to v² at its
+/// end. Appends the phases of the piece with this number and width.
 #[inline(always)]
 pub fn forward<const M: usize>(
     piece: &Piece<M>,
@@ -90,14 +95,14 @@ pub fn forward<const M: usize>(
 ) -> Result<f64, Stuck> {
     let mut p = speed_sq / piece.speed[0];
     for _ in 0..parts {
-        let Some((part, bounds)) = space.parts.pop() else { break };
-        let placed = part.place(piece, axes, false);
+        let Some((part, controllable)) = space.parts.pop() else { break };
+        let located = part.locate(piece, axes, false);
         space.phases.clear();
-        p = pass::forward(&placed.sub, axes, p, &space.bounds[bounds..], &mut space.phases)
-            .map_err(|Stuck(x)| Stuck(placed.from + x))?;
-        space.bounds.truncate(bounds);
+        p = pass::forward(&located.sub, axes, p, &space.controllable[controllable..], &mut space.phases)
+            .map_err(|Stuck(x)| Stuck(located.from + x))?;
+        space.controllable.truncate(controllable);
         for phase in &space.phases {
-            out.push(number, width, row(phase, &part, &placed, axes));
+            out.push(number, width, row(phase, &part, &located, axes));
         }
     }
     Ok(p * piece.speed[2])
@@ -105,15 +110,16 @@ pub fn forward<const M: usize>(
 
 /// A phase of the forward pass over a part as a row of the profile.
 #[inline(always)]
-fn row<const M: usize>(phase: &Phase, part: &Part, placed: &Placed<M>, axes: &Axes<M>) -> Row {
-    let sub = &placed.sub;
-    let t = if phase.x1 == sub.length { placed.to } else { (placed.from + phase.x1).min(placed.to) };
+fn row<const M: usize>(phase: &Phase, part: &Part, located: &Located<M>, axes: &Axes<M>) -> Row {
+    let sub = &located.sub;
+    let t = if phase.x1 == sub.length { located.to } else { (located.from + phase.x1).min(located.to) };
     let step = phase.x1 - phase.x0;
     let mut joins = true;
-    // The control axis moves at constant acceleration: its way over its mean speed.
+    // The control axis has a constant acceleration: distance over mean speed.
     let mut by_axis = |k: usize| {
         let (ga, gb) = (sub.axis_tangent(k, phase.x0), sub.axis_tangent(k, phase.x1));
-        // Not with what comes before its axis turns, not even where phases too short to be kept lie in between.
+        // A phase that begins where its axis turns does not join the one before, even if phases too short to keep lie
+        // between.
         joins = sub.axis_tangent(k, 0.0) > 0.0;
         step * (ga + gb) / (ga * phase.p0.sqrt() + gb * phase.p1.sqrt())
     };
@@ -125,25 +131,25 @@ fn row<const M: usize>(phase: &Phase, part: &Part, placed: &Placed<M>, axes: &Ax
             a
         }
     };
-    let (kind, axis, value, duration) = match phase.kind {
-        Kind::Accelerating(k) => (ArcKind::AxisAcceleration, k, signed(k as usize), by_axis(k as usize)),
-        Kind::Braking(k) => (ArcKind::AxisAcceleration, k, -signed(k as usize), by_axis(k as usize)),
-        Kind::Flat(k) => (ArcKind::ParameterAcceleration, k, 0.0, step / phase.p0.sqrt()),
-        // Followed only where it is level.
-        Kind::LimitCurve => (ArcKind::ParameterAcceleration, NO_AXIS, 0.0, step / phase.p0.sqrt()),
-        Kind::Cap => match part.cap {
+    let (law, axis, value, duration) = match phase.law {
+        Law::Accelerating(k) => (PhaseLaw::AxisAcceleration, k, signed(k as usize), by_axis(k as usize)),
+        Law::Braking(k) => (PhaseLaw::AxisAcceleration, k, -signed(k as usize), by_axis(k as usize)),
+        Law::Flat(k) => (PhaseLaw::ParameterAcceleration, k, 0.0, step / phase.p0.sqrt()),
+        // Followed only where it is level, so p is constant.
+        Law::LimitCurve => (PhaseLaw::ParameterAcceleration, NO_AXIS, 0.0, step / phase.p0.sqrt()),
+        Law::Cap => match part.cap {
             Cap::Speed([f0, f1]) if f0 == f1 => {
-                (ArcKind::Feed, NO_AXIS, f0, sub.way(phase.x0, phase.x1) / f0.sqrt())
+                (PhaseLaw::Feed, NO_AXIS, f0, sub.arc_length(phase.x0, phase.x1) / f0.sqrt())
             }
-            Cap::Speed(_) => (ArcKind::SpeedLine, NO_AXIS, 0.0, time_at_speed(sub, phase)),
-            Cap::Axis(k, speed_sq) => (ArcKind::AxisVelocity, k as u8, speed_sq, by_axis(k)),
+            Cap::Speed(_) => (PhaseLaw::SpeedLine, NO_AXIS, 0.0, time_at_speed(sub, phase)),
+            Cap::Axis(k, speed_sq) => (PhaseLaw::AxisVelocity, k as u8, speed_sq, by_axis(k)),
         },
     };
-    let joins = joins && !matches!(kind, ArcKind::SpeedLine);
-    Row { kind, axis, value, t, p: [phase.p0, phase.p1], duration, joins }
+    let joins = joins && !matches!(law, PhaseLaw::SpeedLine);
+    Row { law, axis, value, t, p: [phase.p0, phase.p1], duration, joins }
 }
 
-/// The time along a speed whose square is linear in x.
+/// The time [s] along a cap whose v² is linear in x.
 #[cold]
 fn time_at_speed<const M: usize>(sub: &SubPiece<M>, phase: &Phase) -> f64 {
     let rate = |x: f64| norm(&sub.tangent(x)) / sub.speed_sq_of_cap(x).sqrt();

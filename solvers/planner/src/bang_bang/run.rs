@@ -1,7 +1,7 @@
-//! Both passes over one run: from piece to piece, each by its kernel.
+//! Both passes over one run, from piece to piece, each piece by its kernel.
 //!
-//! K depends on what comes next only as far as the next place where the backward passes from rest and from any speed
-//! meet, a few pieces ahead. So a run is planned block by block, in memory that stays near the processor.
+//! K depends on the pieces ahead only up to the point where the backward passes from rest and from any speed meet, a
+//! few pieces ahead. So a run is planned in blocks, in memory that stays in the processor's caches.
 
 use super::curve::{self, Remedy};
 use super::line::Line;
@@ -12,48 +12,48 @@ use crate::problem::Fault;
 use crate::profile::Profile;
 use feedplan_geometry::quadratic::{lerp, sub};
 
-/// A run in which rounding leaves a pass without headway is planned anew so often, with more cuts every time.
+/// Greatest number of attempts for a run in which rounding stops a pass; each attempt makes more cuts.
 const MOST_ATTEMPTS: usize = 40;
-/// Pieces of a block, and how many of those after it decide K at its end almost always.
+/// Pieces of a block, and the number of pieces after it that almost always determine K at its end.
 const BLOCK: usize = 2048;
 const LOOK_AHEAD: usize = 32;
 
-/// Space for the passes, kept from run to run.
+/// Memory for the passes, kept from run to run.
 #[derive(Default)]
 pub struct Workspace {
-    /// What the backward pass has left of each piece, the last piece first.
-    ways: Vec<Way>,
+    /// Of each piece, the last one first.
+    results: Vec<BackwardResult>,
     quadratic: quadratic::Space,
     curve: curve::Space,
 }
 
 impl Workspace {
     fn clear(&mut self) {
-        self.ways.clear();
+        self.results.clear();
         self.quadratic.clear();
         self.curve.clear();
     }
 }
 
-/// What the backward pass leaves for the forward pass on one piece.
-enum Way {
+/// What the backward pass over one piece leaves for the forward pass.
+enum BackwardResult {
     /// v² allowed at the end.
     Line(f64),
-    /// Number of parts; their phases of K are in the space of the kernel.
+    /// Number of parts; the kernel's space holds their phases of K.
     Quadratic(usize),
     Curve(usize),
 }
 
-/// Where a pass stands between two pieces.
+/// The state of a pass between two pieces.
 #[derive(Clone, Copy)]
-pub struct Between {
-    /// The sum of the axes' velocities squared; v² where the axes are those of the tool.
+pub struct Junction {
+    /// The sum of the axes' velocities squared; v² where the axes are the tool's.
     pub speed_sq: f64,
-    /// The tool's speed squared behind the pass; ahead of it, before a piece is entered, the limit of that.
+    /// v² of the tip at the end of the piece just left; before the next piece is entered, its limit.
     pub tip_sq: f64,
 }
 
-impl Between {
+impl Junction {
     fn at_end_of_run(tip_sq: f64) -> Self {
         Self { speed_sq: f64::INFINITY, tip_sq }
     }
@@ -64,14 +64,13 @@ impl Between {
     }
 }
 
-/// The kernel of a piece.
 enum Kernel<const M: usize> {
     Line(Line),
     Quadratic(Piece<M>),
     Curve,
 }
 
-/// Plans the pieces `first..last` of the task from one speed squared of the tool to another; appends the phases.
+/// Plans the pieces `run.0..run.1` between two speeds of the tool, given squared; appends the phases.
 pub fn plan_run<const M: usize>(
     task: &Task<M>,
     run: (usize, usize),
@@ -84,8 +83,8 @@ pub fn plan_run<const M: usize>(
     for attempt in 0..MOST_ATTEMPTS {
         space.curve.set_remedies(&remedies);
         let reached = plan_blocks(task, run, speeds_sq, space, out)?;
-        let asked = space.curve.asked();
-        if asked.is_empty() {
+        let requested = space.curve.requested();
+        if requested.is_empty() {
             if reached < speeds_sq.1 * (1.0 - REACHED) {
                 return Err(Fault::End { piece: run.1 - 1, reachable: reached.sqrt() });
             }
@@ -95,14 +94,14 @@ pub fn plan_run<const M: usize>(
             return Ok(());
         }
         out.truncate(rows);
-        // Other numbers may do; a stop simplifies.
-        remedies.extend(asked.iter().map(|remedy| Remedy { stops: attempt > 0, ..*remedy }));
+        // The first remedy is only a cut, since other numbers may succeed; later ones are stops, which simplify.
+        remedies.extend(requested.iter().map(|remedy| Remedy { stops: attempt > 0, ..*remedy }));
     }
     let Remedy { piece, t, .. } = remedies[remedies.len() - 1];
     Err(Fault::Stuck { piece, u: t * task.problem.width[piece] })
 }
 
-/// Both passes, block by block; the tool's speed squared at the end. Ends early where a remedy is asked for.
+/// Both passes, block by block; returns v² of the tip at the end. Ends early where a remedy is requested.
 fn plan_blocks<const M: usize>(
     task: &Task<M>,
     (first, last): (usize, usize),
@@ -110,12 +109,12 @@ fn plan_blocks<const M: usize>(
     space: &mut Workspace,
     out: &mut Profile,
 ) -> Result<f64, Fault> {
-    let mut at = Between::at_end_of_run(start_sq);
+    let mut at = Junction::at_end_of_run(start_sq);
     let mut begin = first;
-    while begin < last && space.curve.asked().is_empty() {
+    while begin < last && space.curve.requested().is_empty() {
         let (end, at_end) = block(task, (begin, last), end_sq, space)?;
         let reachable = backward(task, (begin, end), last, at_end, space)?.tip_sq;
-        if space.curve.asked().is_empty() {
+        if space.curve.requested().is_empty() {
             if begin == first {
                 if start_sq > reachable * (1.0 + REACHED) {
                     return Err(Fault::Start { piece: first, reachable: reachable.sqrt() });
@@ -130,23 +129,23 @@ fn plan_blocks<const M: usize>(
     Ok(at.tip_sq)
 }
 
-/// The end of the block that begins a run, and the backward pass there.
+/// The end of the block that starts at `begin`, and the state of the backward pass there.
 fn block<const M: usize>(
     task: &Task<M>,
     (begin, last): (usize, usize),
     end_sq: f64,
     space: &mut Workspace,
-) -> Result<(usize, Between), Fault> {
+) -> Result<(usize, Junction), Fault> {
     let mut size = BLOCK;
     loop {
         let end = begin + size;
         if end + LOOK_AHEAD >= last {
-            return Ok((last, Between::at_end_of_run(end_sq)));
+            return Ok((last, Junction::at_end_of_run(end_sq)));
         }
         for ahead in [LOOK_AHEAD, size / 4] {
             let pieces = (end, (end + ahead).min(last));
-            let least = backward(task, pieces, last, Between::at_end_of_run(0.0), space)?;
-            let most = backward(task, pieces, last, Between::at_end_of_run(f64::INFINITY), space)?;
+            let least = backward(task, pieces, last, Junction::at_end_of_run(0.0), space)?;
+            let most = backward(task, pieces, last, Junction::at_end_of_run(f64::INFINITY), space)?;
             if most.speed_sq - least.speed_sq <= MET * least.speed_sq {
                 return Ok((end, least));
             }
@@ -155,14 +154,14 @@ fn block<const M: usize>(
     }
 }
 
-/// Backward over the pieces `begin..end` of a run up to `last`; leaves K in the workspace.
+/// Backward over the pieces `begin..end` of a run that ends at `last`; leaves K in the workspace.
 fn backward<const M: usize>(
     task: &Task<M>,
     (begin, end): (usize, usize),
     last: usize,
-    mut at: Between,
+    mut at: Junction,
     space: &mut Workspace,
-) -> Result<Between, Fault> {
+) -> Result<Junction, Fault> {
     space.clear();
     for i in (begin..end).rev() {
         task.watch.check_at(i);
@@ -170,10 +169,10 @@ fn backward<const M: usize>(
             at.tip_sq = task.problem.junction_speed[i + 1].powi(2);
         }
         let speed_sq = at.speed_sq.min(at.tip_sq);
-        let way = match task.kernel(i) {
+        let result = match task.kernel(i) {
             Kernel::Line(line) => {
                 at.leave(line.backward(speed_sq));
-                Way::Line(speed_sq)
+                BackwardResult::Line(speed_sq)
             }
             Kernel::Quadratic(piece) => {
                 let (feed, chord) = (task.problem.feed[i], task.chord.as_ref());
@@ -186,21 +185,21 @@ fn backward<const M: usize>(
                 )
                 .map_err(|stuck| task.fault(i, stuck))?;
                 at.leave(start_sq);
-                Way::Quadratic(parts)
+                BackwardResult::Quadratic(parts)
             }
-            Kernel::Curve => Way::Curve(curve::backward(task, i, &mut at, &mut space.curve)),
+            Kernel::Curve => BackwardResult::Curve(curve::backward(task, i, &mut at, &mut space.curve)),
         };
-        space.ways.push(way);
+        space.results.push(result);
     }
     Ok(at)
 }
 
-/// Forward over the same pieces of a run from `first` on, under K; appends the phases.
+/// Forward under K over the same pieces of a run that starts at `first`; appends the phases.
 fn forward<const M: usize>(
     task: &Task<M>,
     (begin, end): (usize, usize),
     first: usize,
-    at: &mut Between,
+    at: &mut Junction,
     space: &mut Workspace,
     out: &mut Profile,
 ) -> Result<(), Fault> {
@@ -209,22 +208,29 @@ fn forward<const M: usize>(
         if i > first {
             at.tip_sq = task.problem.junction_speed[i].powi(2);
         }
-        let (speed_sq, place) = (at.speed_sq.min(at.tip_sq), (i as u32, task.problem.width[i]));
-        match (task.kernel(i), space.ways.pop()) {
-            (Kernel::Line(line), Some(Way::Line(end_sq))) => {
-                at.leave(line.forward((speed_sq, end_sq), place, out));
+        let (speed_sq, number_and_width) = (at.speed_sq.min(at.tip_sq), (i as u32, task.problem.width[i]));
+        match (task.kernel(i), space.results.pop()) {
+            (Kernel::Line(line), Some(BackwardResult::Line(end_sq))) => {
+                at.leave(line.forward((speed_sq, end_sq), number_and_width, out));
             }
-            (Kernel::Quadratic(piece), Some(Way::Quadratic(parts))) => {
+            (Kernel::Quadratic(piece), Some(BackwardResult::Quadratic(parts))) => {
                 let axes = &task.plain_axes;
-                let end_sq =
-                    quadratic::forward(&piece, axes, speed_sq, parts, &mut space.quadratic, place, out)
-                        .map_err(|stuck| task.fault(i, stuck))?;
+                let end_sq = quadratic::forward(
+                    &piece,
+                    axes,
+                    speed_sq,
+                    parts,
+                    &mut space.quadratic,
+                    number_and_width,
+                    out,
+                )
+                .map_err(|stuck| task.fault(i, stuck))?;
                 at.leave(end_sq);
             }
-            (Kernel::Curve, Some(Way::Curve(parts))) => {
+            (Kernel::Curve, Some(BackwardResult::Curve(parts))) => {
                 curve::forward(task, i, parts, at, &mut space.curve, out);
             }
-            _ => unreachable!("the backward pass leaves a way for the kernel of each piece"),
+            _ => unreachable!("the backward pass leaves a result for the kernel of each piece"),
         }
     }
     Ok(())
@@ -239,13 +245,13 @@ impl<const M: usize> Task<'_, M> {
         if !self.plain || problem.share(i).is_some() || weights.windows(2).any(|pair| pair[0] != pair[1]) {
             return Kernel::Curve;
         }
-        let line = |way: [f64; M]| Kernel::Line(Line::new(&way, &self.plain_axes, problem.feed[i]));
+        let line = |chord: [f64; M]| Kernel::Line(Line::new(&chord, &self.plain_axes, problem.feed[i]));
         match problem.points(i) {
             [a, b] => line(sub(b, a)),
-            // The middle of a short line far from the origin is rounded, and would bend it.
+            // The middle control point of a short line far from the origin is rounded, which would bend the line.
             [a, b, c] if *b == lerp(a, c, 0.5) => line(sub(c, a)),
             [a, b, c] => match Piece::new(&[*a, *b, *c]) {
-                piece if piece.twist > 0.0 => Kernel::Quadratic(piece),
+                piece if piece.cross > 0.0 => Kernel::Quadratic(piece),
                 // Straight for all that it is of degree 2: it may stand still inside.
                 _ => Kernel::Curve,
             },

@@ -1,21 +1,21 @@
-//! The time along the tool's speed cap: length over speed, by quadrature.
+//! The time [s] along a cap of the tool's speed: the integral of length over speed, by Gauss's quadrature.
 
 use super::tolerance::TIME;
 
-/// Places of the rule.
+/// Nodes of the rule.
 pub const NODES: usize = 6;
-/// Halvings for one phase; some twenty are usual.
+/// Greatest number of halvings for one phase; some twenty are usual.
 const MOST_HALVINGS: u32 = 1000;
 
-/// ∫ rate dx from x0 to x1, by Gauss's rule of order 12, halved where it does not agree. `rate` gives length over speed
-/// at several places.
+/// ∫ rate dx from x0 to x1 by Gauss's rule of order 12, halved until both halves agree with the whole. `rate` gives
+/// length over speed at all nodes.
 pub fn integral(rate: &impl Fn([f64; NODES]) -> [f64; NODES], x0: f64, x1: f64) -> f64 {
     let whole = rule(rate, x0, x1);
     gauss(rate, (x0, x1), whole, TIME * whole, &mut { MOST_HALVINGS })
 }
 
-/// To an error that does not shrink with the stretches, and in no more than so many halvings: where the rate is rounding
-/// throughout, as it may be next to a cusp, more would gain nothing.
+/// `error` stays the same for shorter intervals, and `left` counts down the halvings: next to a cusp the rate can be
+/// all rounding, and more halvings would gain nothing.
 fn gauss(
     rate: &impl Fn([f64; NODES]) -> [f64; NODES],
     (a, b): (f64, f64),

@@ -22,7 +22,7 @@ use feedplan_geometry::sarfraz;
 use feedplan_geometry::spline::bezier::derivatives;
 use feedplan_geometry::spline::speed::{Coefficients, Speed};
 use feedplan_geometry::spline::Piece;
-use feedplan_planner::arc_kind::ArcKind;
+use feedplan_planner::phase_law::PhaseLaw;
 
 /// How far from the end, in parts of the arc, where an axis turns round at a finite p. Continued from there s is
 /// off by the square of this part; s and s' lose as many digits as it and its square have.
@@ -83,7 +83,7 @@ pub fn flaw<const M: usize>(
     }
     let motion = CurveMotion::bare(piece, tip, None, arc);
     let length = quadrature(&motion.time_rate(Line::ONE), arc.u0, arc.u1);
-    if arc.kind == ArcKind::PathJerk {
+    if arc.kind == PhaseLaw::PathJerk {
         JerkLaw::new(arc, motion.end_speeds(), length).flaw()
     } else {
         CubicLaw::flaw(arc, motion.end_speeds(), length)
@@ -134,16 +134,16 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
                 .map_or(Law::Even(EvenLaw::pace(arc)), |law| Law::Axis(Box::new(law)))
         };
         motion.law = match arc.kind {
-            ArcKind::AxisAcceleration => axis(arc.value, None),
-            ArcKind::AxisVelocity => axis(0.0, Some(arc.value.sqrt())),
-            ArcKind::Feed => Law::Speed(Line { start: arc.value, ..Line::ONE }),
-            ArcKind::SpeedLine => Law::Speed(motion.speed_line()),
-            ArcKind::PathJerk => Law::Jerk(JerkLaw::new(arc, motion.end_speeds(), motion.ways().total())),
-            ArcKind::SpeedCubic => {
+            PhaseLaw::AxisAcceleration => axis(arc.value, None),
+            PhaseLaw::AxisVelocity => axis(0.0, Some(arc.value.sqrt())),
+            PhaseLaw::Feed => Law::Speed(Line { start: arc.value, ..Line::ONE }),
+            PhaseLaw::SpeedLine => Law::Speed(motion.speed_line()),
+            PhaseLaw::PathJerk => Law::Jerk(JerkLaw::new(arc, motion.end_speeds(), motion.ways().total())),
+            PhaseLaw::SpeedCubic => {
                 Law::Cubic(Box::new(CubicLaw::new(arc, motion.end_speeds(), motion.ways().total())))
             }
             // `check` has refused chord limits here.
-            ArcKind::ParameterAcceleration | ArcKind::Chord => Law::Even(EvenLaw::new(arc)),
+            PhaseLaw::ParameterAcceleration | PhaseLaw::Chord => Law::Even(EvenLaw::new(arc)),
         };
         motion.keep_off();
         if with_lengths {

@@ -9,7 +9,7 @@ use super::even::EvenLaw;
 use super::{fill, invert, parts, ProfileArc, Rates, State};
 use feedplan_geometry::arc_length::{ChordTime, Hodograph, Length, Node, Table};
 use feedplan_geometry::quadratic::{dot, Quadratic};
-use feedplan_planner::arc_kind::ArcKind;
+use feedplan_planner::phase_law::PhaseLaw;
 
 /// q'_k and the speed of the axis vanish at an end where they are this part of those at the other one.
 const TURN: f64 = 1e-10;
@@ -67,21 +67,22 @@ impl<const M: usize> QuadraticMotion<M> {
         };
         let infinite = arc.p0 == f64::INFINITY || arc.p1 == f64::INFINITY;
         motion.law = match arc.kind {
-            ArcKind::AxisAcceleration => motion.axis_law(arc.axis as usize, arc.value, None),
-            ArcKind::AxisVelocity => motion.axis_law(arc.axis as usize, 0.0, Some(arc.value.sqrt())),
+            PhaseLaw::AxisAcceleration => motion.axis_law(arc.axis as usize, arc.value, None),
+            PhaseLaw::AxisVelocity => motion.axis_law(arc.axis as usize, 0.0, Some(arc.value.sqrt())),
             // Through a cusp the piece is straight, and constant speed is constant speed of its longest axis.
-            ArcKind::Feed if infinite => {
+            PhaseLaw::Feed if infinite => {
                 let c = &motion.second;
                 let k = (0..M).fold(0, |best, k| if c[k].abs() > c[best].abs() { k } else { best });
                 let speed = arc.value.sqrt() * c[k].abs() / dot(c, c).sqrt();
                 motion.axis_law(k, 0.0, Some(speed))
             }
-            ArcKind::Feed => Law::Feed { speed_sq: arc.value },
-            ArcKind::Chord => Law::Chord { value: arc.value },
+            PhaseLaw::Feed => Law::Feed { speed_sq: arc.value },
+            PhaseLaw::Chord => Law::Chord { value: arc.value },
             // `Motion` takes the general form for the last three.
-            ArcKind::ParameterAcceleration | ArcKind::SpeedLine | ArcKind::PathJerk | ArcKind::SpeedCubic => {
-                Law::Even(EvenLaw::new(arc))
-            }
+            PhaseLaw::ParameterAcceleration
+            | PhaseLaw::SpeedLine
+            | PhaseLaw::PathJerk
+            | PhaseLaw::SpeedCubic => Law::Even(EvenLaw::new(arc)),
         };
         if with_lengths || matches!(motion.law, Law::Feed { .. }) {
             motion.length_error = fill(Length(motion.hodograph), (arc.u0, arc.u1), &mut motion.lengths);

@@ -3,7 +3,7 @@
 use super::PathData;
 use crate::motion::{flaw, ProfileArc, MAX_TIP};
 use feedplan_geometry::watch::Watch;
-use feedplan_planner::arc_kind::ArcKind;
+use feedplan_planner::phase_law::PhaseLaw;
 
 /// The error is a sentence for the user.
 pub(super) fn check<const M: usize>(
@@ -83,22 +83,23 @@ fn check_arc<const M: usize>(path: &PathData<M>, run: usize, arc: &ProfileArc) -
     if !(arc.duration >= 0.0 && arc.duration.is_finite()) {
         return Err("has a duration that is negative or not finite");
     }
-    let of_axis = matches!(arc.kind, ArcKind::AxisAcceleration | ArcKind::AxisVelocity);
+    let of_axis = matches!(arc.kind, PhaseLaw::AxisAcceleration | PhaseLaw::AxisVelocity);
     if of_axis && arc.axis as usize >= M {
         return Err("is governed by an axis that the path lacks");
     }
-    if arc.kind == ArcKind::Chord && (path.tip_speed.is_some() || piece.is_rational() || piece.degree() > 2) {
+    if arc.kind == PhaseLaw::Chord && (path.tip_speed.is_some() || piece.is_rational() || piece.degree() > 2)
+    {
         return Err("keeps to the chord-error limit in a way that only quadratic pieces have");
     }
     let infinite = [arc.p0, arc.p1].iter().filter(|p| **p == f64::INFINITY).count();
     let most = match arc.kind {
         // Nothing else would tell the speed.
-        ArcKind::SpeedLine => 1,
-        ArcKind::ParameterAcceleration | ArcKind::Chord | ArcKind::SpeedCubic => 0,
+        PhaseLaw::SpeedLine => 1,
+        PhaseLaw::ParameterAcceleration | PhaseLaw::Chord | PhaseLaw::SpeedCubic => 0,
         _ => 2,
     };
     let signed =
-        matches!(arc.kind, ArcKind::AxisAcceleration | ArcKind::ParameterAcceleration | ArcKind::PathJerk);
+        matches!(arc.kind, PhaseLaw::AxisAcceleration | PhaseLaw::ParameterAcceleration | PhaseLaw::PathJerk);
     if !(arc.p0 >= 0.0 && arc.p1 >= 0.0 && arc.value.is_finite() && (signed || arc.value >= 0.0))
         || infinite > most
     {

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use feedplan_checks::{audit, random_case, seeds, Case, Elevated, Random, FEW_AXES, PADDED};
 use feedplan_geometry::quadratic::Quadratic;
-use feedplan_planner::bound::Hint;
+use feedplan_planner::lower_bound::Hint;
 use feedplan_planner::profile::Profile;
 use feedplan_planner::Exact as _;
 

@@ -1,27 +1,28 @@
-//! The cusps of a piece: places where every axis that moves is at rest within rounding, C' = (t − c)^r · a vector.
+//! The cusps of a piece: points t₀ where every axis that moves is at rest within rounding, C' = (t − t₀)^r · a
+//! vector.
 //!
-//! Control points are rounded, and so the tangents are known to a part of their greatest size only. Around a cusp of
-//! order r that leaves a stretch, about the r-th root of that part wide, on which the digits of the tangents mean
-//! nothing: axes seem to turn round there, or not. The way through it is as short as rounding itself. So it is taken
-//! for one place, where all axes have a zero of order r.
+//! Control points are rounded, so tangents are known to a fraction of their greatest magnitude only. Around a cusp of
+//! order r this leaves an interval, as wide as about the r-th root of that fraction, on which the tangents have no
+//! digits: axes may seem to turn or not. The distance through it is as short as rounding. So the interval is treated
+//! as one point where all axes have a zero of order r.
 
 use super::piece::Piece;
 use crate::bang_bang::tolerance::SLOW_SQ;
 use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
 
-/// Halving stops here; a cusp of order 1 is found some levels earlier.
+/// Greatest number of halvings; a cusp of order 1 is found with fewer.
 const MAX_DEPTH: u32 = 52;
-/// So many stretches are looked at in one piece, at most.
-const MAX_STRETCHES: u32 = 4000;
-/// So many times half a stretch away from it the tangents have signs.
+/// Greatest number of intervals examined on one piece.
+const MAX_INTERVALS: u32 = 4000;
+/// At this many half widths from the interval the tangents have signs.
 const AWAY: f64 = 10.0;
-/// A stretch shorter than this power of a half on which all axes may be at rest is next to a cusp.
-const NEARLY_DEPTH: u32 = 8;
-/// At a cusp of order r the derivatives below r make up less than this part of the tangents nearby.
+/// An interval that needs this many halvings until some axis shows no zero in it is next to a cusp.
+const NEAR_DEPTH: u32 = 8;
+/// At a cusp of order r the derivatives below r make up less than this fraction of the tangents nearby.
 const LOWER: f64 = 0.3;
 
-/// All axes rest at `t`, and closer to it than `reach` as far as can be told.
+/// All axes rest at `t`; within `reach` of `t` the tangents have no digits.
 #[derive(Clone, Copy, Debug)]
 pub struct Cusp {
     pub t: f64,
@@ -34,73 +35,73 @@ struct Search<'a, const M: usize> {
     moving: AxisBits,
     left: u32,
     found: Vec<(f64, f64)>,
-    /// Short stretches in the end without a place where all axes rest, and how often each was halved.
-    nearly: Vec<(f64, f64, u32)>,
+    /// Short intervals in which some axis has no zero, with the number of halvings.
+    near_cusps: Vec<(f64, f64, u32)>,
 }
 
-/// Where all axes rest, and where they nearly do.
+/// The cusps of a piece, and the points next to which all axes are nearly at rest.
 #[derive(Default)]
 pub struct Cusps {
     pub cusps: Vec<Cusp>,
-    /// Next to these places the tangents are so short that what depends on their small differences is lost in the
-    /// rounding of polynomials over the whole piece.
-    pub nearly: Vec<Nearly>,
+    /// There the tangents are so short that polynomials over the whole piece lose their small differences.
+    pub near_cusps: Vec<NearCusp>,
 }
 
 /// Within `reach` of `t` all axes are nearly at rest.
 #[derive(Clone, Copy, Debug)]
-pub struct Nearly {
+pub struct NearCusp {
     pub t: f64,
     pub reach: f64,
 }
 
-/// The cusps of a piece on which these axes move, and the places that are nearly one, in order.
+/// The cusps and near cusps of a piece in order of t; bit k of `moving`: axis k moves.
 pub fn cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, moving: AxisBits) -> Cusps {
     let (least, greatest) = piece.speed.range();
     if piece.own_speed && least > SLOW_SQ * greatest {
         return Cusps::default();
     }
     let mut search =
-        Search { noise: &piece.noise, moving, left: MAX_STRETCHES, found: vec![], nearly: vec![] };
+        Search { noise: &piece.noise, moving, left: MAX_INTERVALS, found: vec![], near_cusps: vec![] };
     search.halve(&piece.g, (0.0, 1.0), 0);
-    let mut stretches: Vec<(f64, f64)> = vec![];
+    let mut intervals: Vec<(f64, f64)> = vec![];
     for (from, to) in search.found {
-        match stretches.last_mut() {
+        match intervals.last_mut() {
             Some(last) if from - last.1 <= to - last.0 - (from - last.1) => last.1 = to,
-            _ => stretches.push((from, to)),
+            _ => intervals.push((from, to)),
         }
     }
     let cusps: Vec<Cusp> =
-        stretches.into_iter().filter_map(|stretch| locate(piece, moving, stretch)).collect();
-    // Of neighbours the shortest stretch stays.
-    let mut nearly: Vec<(f64, f64, u32)> = vec![];
+        intervals.into_iter().filter_map(|interval| locate(piece, moving, interval)).collect();
+    // Of neighbours the shortest interval is kept.
+    let mut near_cusps: Vec<(f64, f64, u32)> = vec![];
     let mut reached = 0.0;
-    for stretch in search.nearly {
-        match nearly.last_mut() {
-            Some(last) if stretch.0 <= reached => {
-                if stretch.2 > last.2 {
-                    *last = stretch;
+    for interval in search.near_cusps {
+        match near_cusps.last_mut() {
+            Some(last) if interval.0 <= reached => {
+                if interval.2 > last.2 {
+                    *last = interval;
                 }
             }
-            _ => nearly.push(stretch),
+            _ => near_cusps.push(interval),
         }
-        reached = stretch.1;
+        reached = interval.1;
     }
-    let place = |(from, to, _): (f64, f64, u32)| Nearly { t: 0.5 * (from + to), reach: 0.5 * (to - from) };
-    Cusps { cusps, nearly: nearly.into_iter().map(place).collect() }
+    let near_cusp =
+        |(from, to, _): (f64, f64, u32)| NearCusp { t: 0.5 * (from + to), reach: 0.5 * (to - from) };
+    Cusps { cusps, near_cusps: near_cusps.into_iter().map(near_cusp).collect() }
 }
 
 impl<const M: usize> Search<'_, M> {
-    /// Collects the stretches on which every axis is at rest within rounding.
+    /// Collects the intervals on which every axis is at rest within rounding.
     fn halve<const C: usize>(&mut self, g: &[Polynomial<C>; M], (from, to): (f64, f64), depth: u32) {
         let moving = self.moving;
         let mut axes = (0..M).filter(|k| moving >> k & 1 == 1);
-        // An axis without a zero here.
+        // Some axis has no zero here.
         if axes.clone().any(|k| (0..=g[k].degree()).all(|i| g[k].bernstein(i) > self.noise[k]))
             || axes.clone().any(|k| (0..=g[k].degree()).all(|i| g[k].bernstein(i) < -self.noise[k]))
         {
-            if depth >= NEARLY_DEPTH {
-                self.nearly.push((from, to, depth));
+            if depth >= NEAR_DEPTH {
+                self.near_cusps.push((from, to, depth));
             }
             return;
         }
@@ -120,7 +121,7 @@ impl<const M: usize> Search<'_, M> {
     }
 }
 
-/// Where in a stretch the cusp is, and its order: the power of the distance that the tangents grow with.
+/// The cusp in an interval, and its order r: the tangents grow as the r-th power of the distance from it.
 fn locate<const M: usize, const C: usize>(
     piece: &Piece<M, C>,
     moving: AxisBits,
@@ -133,7 +134,7 @@ fn locate<const M: usize, const C: usize>(
         _ => 0.5 * (from + to),
     };
     let half = (to - from) * if middle == 0.0 || middle == 1.0 { 1.0 } else { 0.5 };
-    // The tangents' derivatives at t in units of what is known of the tangents, for all axes.
+    // Derivative r of the tangents at t, each axis in units of its noise.
     let derivative = |r: usize, t: f64| -> [f64; M] {
         std::array::from_fn(|k| {
             if moving >> k & 1 == 0 {
@@ -143,8 +144,8 @@ fn locate<const M: usize, const C: usize>(
         })
     };
     let size = |rates: &[f64; M]| rates.iter().map(|x| x * x).sum::<f64>().sqrt();
-    // Where derivative r − 1 vanishes, and how much of the tangents each derivative makes at the ends of the stretch.
-    let place = |r: usize| {
+    // The zero of derivative r − 1; below, the share of each derivative in the tangents at the ends of the interval.
+    let zero_of = |r: usize| {
         let mut t = middle;
         if middle != 0.0 && middle != 1.0 {
             for _ in 0..3 {
@@ -157,20 +158,20 @@ fn locate<const M: usize, const C: usize>(
         t
     };
     let share = |r: usize, t: f64| (1..=r).fold(size(&derivative(r, t)), |share, i| share * half / i as f64);
-    // Whether the tangents point back after the stretch.
+    // Whether the tangents are reversed after the interval.
     let (before, after) =
         (derivative(0, (from - AWAY * half).max(0.0)), derivative(0, (to + AWAY * half).min(1.0)));
     let along: f64 = before.iter().zip(&after).map(|(x, y)| x * y).sum();
     let odd = usize::from(along < 0.0);
     let fits = |r: &usize| middle == 0.0 || middle == 1.0 || r % 2 == odd;
     let alone = |r: &usize| {
-        let t = place(*r);
+        let t = zero_of(*r);
         let (own, lower) = (share(*r, t), (0..*r).map(|i| share(i, t)).fold(0.0, f64::max));
         own > LOWER && lower <= LOWER * own
     };
     let greatest =
         || (1..=degree).filter(fits).max_by(|&a, &b| share(a, middle).total_cmp(&share(b, middle)));
     let order = (1..=degree).rev().filter(fits).find(alone).or_else(greatest)?;
-    let t = place(order);
+    let t = zero_of(order);
     Some(Cusp { t, order: order as u8, reach: (t - from).max(to - t) })
 }

@@ -1,23 +1,24 @@
-//! A part of a piece on which no axis turns round and one velocity cap is the lowest, and that part as a pass travels it.
+//! A part of a piece, on which no axis turns and one cap is the lowest; and the sub-piece, the part as a pass travels
+//! it.
 
-use super::piece::{counted, Piece};
+use super::piece::{weighted_speed_sq, Piece};
 use super::split::Axes;
 use crate::bang_bang::tolerance::{NARROW, NEAR_END, SAME_TURN};
 use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
 
-/// The lowest velocity cap of a sub-piece.
+/// The lowest cap of a sub-piece.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cap {
-    /// The speed squared, linear in t between its two ends: the feed, or a bound below the chord-error limit.
+    /// v² [mm²/s²], linear in t between the ends: the feed, or a line of the chord-error limit.
     Speed([f64; 2]),
-    /// The square of the feed, where the axes count in it by shares.
+    /// The square of the feed, where the axes contribute to the feed by shares.
     Feed(f64),
     /// The square of the velocity limit of an axis.
     Axis(usize, f64),
 }
 
-/// A part [from, to] of a piece on which no axis turns round and one velocity cap is the lowest.
+/// A part [from, to] of a piece.
 #[derive(Clone, Copy, Debug)]
 pub struct Part {
     pub from: f64,
@@ -25,7 +26,7 @@ pub struct Part {
     pub cap: Cap,
     pub left: End,
     pub right: End,
-    /// Bit k: axis k moves backward, moves at all.
+    /// Bit k: axis k moves backward; axis k moves at all.
     pub negative: AxisBits,
     pub moving: AxisBits,
 }
@@ -33,11 +34,11 @@ pub struct Part {
 /// An end of a part.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct End {
-    /// Bit k: axis k turns round there.
+    /// Bit k: axis k turns there.
     pub turns: AxisBits,
     /// All axes have a zero of this order.
     pub order: u8,
-    /// As far as this from the end rounding may have moved the zeros.
+    /// Rounding may have moved the zeros this far from the end.
     pub reach: f64,
     /// The plan stops there.
     pub stops: bool,
@@ -50,28 +51,28 @@ impl End {
     }
 }
 
-/// A place where a piece is cut once more because a pass came to no end there.
+/// One more cut, or a stop, where a pass made no headway.
 #[derive(Clone, Copy, Debug)]
 pub struct Remedy {
     pub piece: usize,
     pub t: f64,
-    /// All cuts closer than this are one.
+    /// All cuts within this distance become one.
     pub reach: f64,
     /// The plan stops there.
     pub stops: bool,
 }
 
-/// Limits of the axes on a part as a pass travels it, where every axis moves forward.
+/// Limits of the axes on a sub-piece, where every axis moves forward.
 #[derive(Clone, Copy, Debug)]
-pub struct Travelled<const M: usize> {
-    /// The greatest acceleration, and the greatest deceleration.
+pub struct TravelLimits<const M: usize> {
+    /// The greatest acceleration and the greatest deceleration [mm/s²].
     pub up: [f64; M],
     pub down: [f64; M],
     pub velocity_sq: [f64; M],
 }
 
-impl<const M: usize> Travelled<M> {
-    /// Those of a part on which the axes of these bits move backward, in the sense of the path.
+impl<const M: usize> TravelLimits<M> {
+    /// The limits where the axes of the bits `negative` move backward on the path.
     #[inline(always)]
     fn new(axes: &Axes<M>, negative: AxisBits) -> Self {
         let side = |k: usize| usize::from(negative >> k & 1);
@@ -83,23 +84,21 @@ impl<const M: usize> Travelled<M> {
     }
 }
 
-/// A part as a pass travels it, its polynomials over x in [0, 1], every axis moving forward.
-///
-/// Here g and π belong to x: π = (dx/dτ)²/ω⁴.
+/// A part as a pass travels it: polynomials over x in [0, 1], with every axis moving forward.
 #[derive(Clone, Copy, Debug)]
 pub struct SubPiece<const M: usize, const C: usize> {
     pub g: [Polynomial<C>; M],
     pub weight: Polynomial<C>,
     pub speed: Polynomial<C>,
     pub cap: Cap,
-    pub limits: Travelled<M>,
-    /// Bit k: axis k moves at all.
+    pub limits: TravelLimits<M>,
+    /// Bit k: axis k moves.
     pub moving: AxisBits,
-    /// Degree of the curve itself.
+    /// Degree of the curve.
     pub degree: usize,
     pub straight: bool,
     pub own_speed: bool,
-    /// The order of the zero that every tangent has at the start and at the end.
+    /// The order of the common zero of all tangents at the start and at the end.
     pub cusp_orders: [u8; 2],
 }
 
@@ -109,8 +108,8 @@ impl Part {
         self.left.stops
     }
 
-    /// Another cut of the part at x where a pass found no way: in the middle where it has one near x. The ends of a
-    /// part as short as rounding become one.
+    /// The remedy where a pass made no headway at x: a cut there, or in the middle if x is near an end, which is a
+    /// cut already. The ends of a part as short as rounding become one cut.
     pub fn remedy(&self, piece: usize, x: f64) -> Remedy {
         let length = self.to - self.from;
         let narrow = length <= NARROW;
@@ -119,13 +118,13 @@ impl Part {
         Remedy { piece, t, reach: if narrow { length } else { 0.0 }, stops: false }
     }
 
-    /// Limits of the axes as the part is travelled forward.
+    /// Limits of the axes for the forward pass.
     #[inline(always)]
-    pub fn limits<const M: usize>(&self, axes: &Axes<M>) -> Travelled<M> {
-        Travelled::new(axes, self.negative)
+    pub fn limits<const M: usize>(&self, axes: &Axes<M>) -> TravelLimits<M> {
+        TravelLimits::new(axes, self.negative)
     }
 
-    /// The part as travelled forward.
+    /// The part as the forward pass travels it.
     pub fn sub_piece<const M: usize, const C: usize>(
         &self,
         piece: &Piece<M, C>,
@@ -153,21 +152,21 @@ impl Part {
                 let known = usize::from(end.order).max(usize::from(turns));
                 let reach = (end.reach / length).min(1.0);
                 for i in 0..=degree {
-                    let place = if at_end { degree - i } else { i };
-                    // An axis that rounding, or a turn taken for another one, sends back stands still.
-                    let back = -g.coefficients()[place] * reach.powi(i as i32);
+                    let index = if at_end { degree - i } else { i };
+                    // An axis that rounding, or a neighbouring turn, sends backward is set to rest.
+                    let back = -g.coefficients()[index] * reach.powi(i as i32);
                     if i >= known && !(turns && back > 0.0 && back <= 64.0 * noise) {
                         break;
                     }
-                    g.clear(place);
+                    g.clear(index);
                     whole = false;
                 }
             }
             g
         });
         let speed = match (self.cap, &piece.share) {
-            (Cap::Feed(_), Some(share)) => counted(&g, share),
-            // Next to a cusp |C'|² is lost in the rounding of that of the whole piece.
+            (Cap::Feed(_), Some(share)) => weighted_speed_sq(&g, share),
+            // Next to a cusp, |C'|² of the whole piece has lost its digits.
             _ if piece.own_speed && !whole => Polynomial::sum_of_squares(&g),
             _ => piece.speed.part(self.from, self.to).scale(length * length),
         };
@@ -187,13 +186,13 @@ impl Part {
 }
 
 impl<const M: usize, const C: usize> SubPiece<M, C> {
-    /// The order of the zero that every tangent has at an end.
+    /// The order of the common zero of all tangents at an end.
     #[inline(always)]
     pub fn cusp_order(&self, at_end: bool) -> usize {
         usize::from(self.cusp_orders[usize::from(at_end)])
     }
 
-    /// The speed squared of the axes over π at an end.
+    /// The sum of the axes' velocities squared over π at an end.
     pub fn rate_sq(&self, at_end: bool) -> f64 {
         let end = |p: &Polynomial<C>| if at_end { p.last() } else { p.first() };
         if self.own_speed {
@@ -203,7 +202,7 @@ impl<const M: usize, const C: usize> SubPiece<M, C> {
         }
     }
 
-    /// The tool's speed squared over that of the axes at an end, also in the limit where both are at rest.
+    /// v² of the tip over the sum of the axes' velocities squared at an end; its limit where both are 0.
     pub fn tip_share(&self, at_end: bool) -> f64 {
         if self.own_speed || matches!(self.cap, Cap::Feed(_)) {
             return 1.0;
@@ -217,7 +216,7 @@ impl<const M: usize, const C: usize> SubPiece<M, C> {
         (lead(&self.speed, 2 * order) / axes).max(0.0)
     }
 
-    /// The same as the backward pass travels it.
+    /// The sub-piece as the backward pass travels it.
     pub fn reversed(&self) -> Self {
         let cap = match self.cap {
             Cap::Speed([f0, f1]) => Cap::Speed([f1, f0]),
@@ -228,14 +227,14 @@ impl<const M: usize, const C: usize> SubPiece<M, C> {
             weight: self.weight.reverse(),
             speed: self.speed.reverse(),
             cap,
-            limits: Travelled { up: self.limits.down, down: self.limits.up, ..self.limits },
+            limits: TravelLimits { up: self.limits.down, down: self.limits.up, ..self.limits },
             cusp_orders: [self.cusp_orders[1], self.cusp_orders[0]],
             ..*self
         }
     }
 }
 
-/// The order of the zero that all of these have at an end.
+/// The order of the common zero of these polynomials at an end.
 fn cusp_order<const M: usize, const C: usize>(g: &[Polynomial<C>; M], at_end: bool) -> u8 {
     let degree = g[0].degree();
     let rests = |r: usize| g.iter().all(|g| g.coefficients()[if at_end { degree - r } else { r }] == 0.0);

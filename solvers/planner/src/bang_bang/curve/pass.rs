@@ -1,82 +1,81 @@
-//! One pass over one sub-piece, in the sense of travel: the greatest π that stays under a bound.
+//! One pass over one sub-piece: the greatest π(x) under a ceiling, from the state at the start. Backward the ceiling
+//! is the cap, and the limit curve is followed where needed; forward the ceiling is K.
 //!
-//! As on quadratic pieces: for every λ in [0, 1] a feasible profile scaled by λ stays feasible, so that backward under
-//! the velocity cap and the limit curve, then forward under what that left, are exact. Every event is the first root
-//! of a polynomial; with N, W, M of axes j, l and w = ω v_j²
-//!
-//! and A the limit of accelerations, A⁻ that of decelerations (an axis that moves backward on the path has them the other
-//! way round; the backward pass swaps them)
+//! Every switch is the first root of a polynomial, with w = ω v_j² on a phase of axis j, W as in `bang_bang`, A⁻ the
+//! limits of decelerations (the backward pass swaps A and A⁻), and ' = d/dx:
 //!
 //! | while | holds |
 //! |---|---|
-//! | on a phase of axis j, axis l stays below +A_l | A_l g_j³ − A_j g_l g_j² − ω w (g_l' g_j − g_l g_j') ≥ 0 |
-//! | and above −A_l⁻ (backward) | A_l⁻ g_j³ + A_j g_l g_j² + ω w (g_l' g_j − g_l g_j') ≥ 0 |
-//! | under a bound π ≤ n/d | n ω g_j² − w d ≥ 0 |
-//! | on the limit curve π = N/(ω² W), N = A_j g_l + A_l⁻ g_j, W = g_j' g_l − g_j g_l' | ω (N W' − 3 N' W) + 2 ω' N W ≥ 0 |
-//! | and axis i from −A_i⁻ to A_i | A_i W − (g_i' N − g_i N') ≥ 0, A_i⁻ W + (g_i' N − g_i N') ≥ 0 |
-//! | along v² = f | A_l D² − ω² ((g_l' D − g_l D'/2) f + g_l D f'/2) ≥ 0 |
-//! | along v_k = V | A_l g_k³ − V² ω² (g_l' g_k − g_l g_k') ≥ 0 |
+//! | on a phase of axis j, axis l stays below +A_l | A_l g_j³ − A_j g_l g_j² − ω w W_lj ≥ 0 |
+//! | and above −A_l⁻ (backward) | A_l⁻ g_j³ + A_j g_l g_j² + ω w W_lj ≥ 0 |
+//! | under a ceiling π ≤ n/d | n ω g_j² − w d ≥ 0 |
+//! | on the limit curve π = N/(ω² W), N = A_j g_l + A_l⁻ g_j, W = W_jl | ω (N W' − 3 N' W) + 2 ω' N W ≥ 0 |
+//! | and axis i from −A_i⁻ to A_i | A_i W − (c_i N − g_i N') ≥ 0, A_i⁻ W + (c_i N − g_i N') ≥ 0 |
+//! | along v² = f | A_l D² − ω² ((c_l D − g_l D'/2) f + g_l D f'/2) ≥ 0 |
+//! | along v_k = V | A_l g_k³ − V² ω² W_lk ≥ 0 |
 
 mod bang;
 mod limit_curve;
 mod slide;
 
 use super::part::SubPiece;
-use super::window::{Bound, Window};
-use crate::bang_bang::tolerance::{NO_STEP, ON_BOUND, ON_LIMIT_CURVE, WEAK_TIE};
+use super::window::{Ceiling, Window};
+use crate::bang_bang::tolerance::{NO_STEP, ON_CEILING, ON_LIMIT_CURVE, WEAK_TIE};
 use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
 
+/// Below this x, steps are compared with `NO_STEP` of this instead of x.
 const START: f64 = 1e-6;
-/// So many events may follow one another without a step.
+/// Greatest number of switches in succession without a step.
 const MAX_HOPS: u32 = 10;
-const MAX_EVENTS: u32 = 2000;
+const MAX_SWITCHES: u32 = 2000;
 
-/// What stays constant on a phase, in the sense of the pass.
+/// What is constant on a phase; accelerations are in the direction of the pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Kind {
-    /// Axis at +A.
+pub enum Law {
+    /// This axis is at +A.
     Accelerating(usize),
-    /// Forward, on a phase of the backward pass: axis at −A.
+    /// This axis is at −A⁻; forward only, along a phase of K.
     Braking(usize),
-    /// The velocity cap of the sub-piece.
+    /// The speed of the cap.
     Cap,
     /// The limit curve; backward only.
     LimitCurve,
 }
 
-/// A phase from x0 to x1 of the sub-piece as the pass travels it.
+/// A phase on [x0, x1] of the sub-piece.
 #[derive(Clone, Copy, Debug)]
 pub struct Phase {
     pub x0: f64,
     pub x1: f64,
-    pub kind: Kind,
-    /// π at its ends, of the whole sub-piece; infinite where the tool passes a place without a tangent.
+    pub law: Law,
+    /// π at both ends, over x of the whole sub-piece; infinite at a cusp that the plan passes.
     pub pi: [f64; 2],
-    /// The velocity squared of the axis where the phase is slowest: of an accelerating phase at x0, of a braking one at x1.
+    /// The square of the control axis's velocity where the phase is slowest: at x0 of an accelerating phase, at x1 of
+    /// a braking one.
     pub slow_sq: f64,
 }
 
-/// A pass made no headway at x.
+/// The pass makes no headway at this x.
 #[derive(Clone, Copy, Debug)]
 pub struct Stuck(pub f64);
 
-/// The state where a pass enters or leaves a sub-piece.
+/// The state in which a pass enters or leaves a sub-piece.
 #[derive(Clone, Copy, Debug)]
 pub struct State {
-    /// The sum of the axes' velocities squared; v² where the axes are those of the tool.
+    /// The sum of the axes' velocities squared; v² where the axes are the tool's.
     pub speed_sq: f64,
 }
 
-/// Over the sub-piece as travelled, from a state, under its cap (backward) or under the phases of the backward pass
-/// (forward: from its last to its first); appends the phases and returns the state at the end.
-pub fn run<const M: usize, const C: usize, const BACK: bool>(
+/// A pass over the sub-piece from a state: backward under its cap, forward under the phases of K, from the last to
+/// the first. Appends the phases and returns the state at the end.
+pub fn travel<const M: usize, const C: usize, const BACK: bool>(
     sub: &SubPiece<M, C>,
     state: State,
-    bounds: &[Phase],
+    controllable: &[Phase],
     out: &mut Vec<Phase>,
 ) -> Result<State, Stuck> {
-    // A curve stops in its cusps.
+    // A curve is at rest in its cusps.
     let order = sub.cusp_order(false);
     let pi = if order == 0 { state.speed_sq / sub.rate_sq(false) } else { f64::INFINITY };
     let first = out.len();
@@ -99,7 +98,7 @@ pub fn run<const M: usize, const C: usize, const BACK: bool>(
     if BACK {
         pass.over_window()?;
     } else {
-        pass.under(bounds)?;
+        pass.under_controllable(controllable)?;
     }
     let pi = pass.pi;
     let sound = |phase: &Phase| {
@@ -112,8 +111,13 @@ pub fn run<const M: usize, const C: usize, const BACK: bool>(
     Ok(State { speed_sq: speed_sq.max(0.0) })
 }
 
-/// The way of axis k from x0 to x1 of a sub-piece.
-pub fn distance<const M: usize, const C: usize>(sub: &SubPiece<M, C>, k: usize, x0: f64, x1: f64) -> f64 {
+/// The distance [mm] of axis k from x0 to x1.
+pub fn axis_distance<const M: usize, const C: usize>(
+    sub: &SubPiece<M, C>,
+    k: usize,
+    x0: f64,
+    x1: f64,
+) -> f64 {
     let g = sub.g[k].part(x0, x1);
     if sub.weight.degree() == 0 {
         return (x1 - x0) * g.mean();
@@ -122,11 +126,11 @@ pub fn distance<const M: usize, const C: usize>(sub: &SubPiece<M, C>, k: usize, 
     (x1 - x0) * g.antiderivative(&weight, sub.degree).last() / weight.last()
 }
 
-/// Tangents and their slopes at the start of the window.
+/// Tangents g and their slopes c at the start of the window.
 struct Start<const M: usize> {
     g: [f64; M],
     c: [f64; M],
-    /// A_k/ω² and its slope, and the same of decelerations.
+    /// A_k/ω², its slope, and A_k⁻/ω².
     limit: [f64; M],
     limit_slope: [f64; M],
     low_limit: [f64; M],
@@ -135,28 +139,28 @@ struct Start<const M: usize> {
 struct Pass<'a, const M: usize, const C: usize, const BACK: bool> {
     sub: &'a SubPiece<M, C>,
     window: Window<M, C>,
-    /// π of the window.
+    /// π over x of the window.
     pi: f64,
-    /// All tangents have a zero of this order at the start of the window, and the axes are at rest.
+    /// At the start of the window all tangents have a zero of this order; where it is positive, the axes rest.
     order: usize,
     straight: bool,
     out: &'a mut Vec<Phase>,
-    /// The axis that has just saturated, and bits of those that share its acceleration.
+    /// The axis that has just reached its limit, and bits of the axes whose accelerations equal its own.
     control: Option<usize>,
     tied: AxisBits,
-    /// The axis at −A, where the limit curve has just been left.
+    /// The axis at −A⁻ on the limit curve that has just been left.
     low: Option<usize>,
-    /// The bound or the limit curve has just been left along its tangent.
+    /// The ceiling or the limit curve was left along its tangent; the ceiling is being left.
     tangent: bool,
     leaving: bool,
     hops: u32,
-    /// The axes at +A and −A on the limit curve.
+    /// The axes at +A and −A⁻ on the limit curve.
     limit_curve: Option<(usize, usize)>,
     entering: bool,
 }
 
 impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
-    /// Whether there is a way from the start of the window to t.
+    /// Whether the interval from the start of the window to t is long enough for a step.
     fn is_step(&self, t: f64) -> bool {
         t * self.window.length() >= NO_STEP * self.window.x0.max(START)
     }
@@ -170,25 +174,25 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         (0..M).filter(move |k| moving >> k & 1 == 1)
     }
 
-    /// Forward: over one window after the other, each under one phase of the backward pass.
-    fn under(&mut self, bounds: &[Phase]) -> Result<(), Stuck> {
+    /// Forward: over one window after the other, each under one phase of K.
+    fn under_controllable(&mut self, controllable: &[Phase]) -> Result<(), Stuck> {
         let mut x0 = 0.0;
-        for (i, phase) in bounds.iter().rev().enumerate() {
-            let x1 = if i + 1 < bounds.len() { 1.0 - phase.x0 } else { 1.0 };
+        for (i, phase) in controllable.iter().rev().enumerate() {
+            let x1 = if i + 1 < controllable.len() { 1.0 - phase.x0 } else { 1.0 };
             let pi = [phase.pi[1], phase.pi[0]];
-            match phase.kind {
-                // Any other motion under a phase of the backward pass meets it again later.
-                Kind::Accelerating(k) if self.joins(pi[0]) => {
-                    self.out.push(Phase { x0, x1, kind: Kind::Braking(k), pi, slow_sq: phase.slow_sq });
+            match phase.law {
+                // Any other motion under a phase of K meets it again later.
+                Law::Accelerating(k) if self.is_on_phase(pi[0]) => {
+                    self.out.push(Phase { x0, x1, law: Law::Braking(k), pi, slow_sq: phase.slow_sq });
                     self.pi = pi[1];
-                    self.arrived();
+                    self.after_step();
                 }
                 _ => {
-                    if bounds.len() > 1 {
+                    if controllable.len() > 1 {
                         self.window = Window::new(self.sub).part(x0, x1);
                     }
-                    self.bound_by(phase);
-                    // From π of the sub-piece to that of the window.
+                    self.set_ceiling(phase);
+                    // From π over x of the sub-piece to that over x of the window.
                     self.pi /= self.window.length().powi(2);
                     self.over_window()?;
                 }
@@ -198,34 +202,34 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         Ok(())
     }
 
-    /// Whether π of the sub-piece is on a phase of the backward pass that begins with this one.
-    fn joins(&self, pi: f64) -> bool {
-        self.order == 0 && !self.leaving && pi.is_finite() && self.pi >= pi * (1.0 - ON_BOUND)
+    /// Whether the state is on a phase of K that begins with this π over x of the sub-piece.
+    fn is_on_phase(&self, pi: f64) -> bool {
+        self.order == 0 && !self.leaving && pi.is_finite() && self.pi >= pi * (1.0 - ON_CEILING)
     }
 
-    /// Puts the window under a phase of the backward pass.
-    fn bound_by(&mut self, phase: &Phase) {
+    /// Makes a phase of K the ceiling of the window.
+    fn set_ceiling(&mut self, phase: &Phase) {
         let window = &mut self.window;
-        match phase.kind {
-            Kind::Accelerating(k) | Kind::Braking(k) => {
+        match phase.law {
+            Law::Accelerating(k) | Law::Braking(k) => {
                 let (g, weight) = (window.g[k].reverse(), window.weight.reverse());
                 let gain = g.antiderivative(&weight, self.sub.degree);
-                // In the sense of this pass the axis brakes.
+                // Seen by this pass the axis brakes.
                 let w = weight.combine(phase.slow_sq, &gain, 2.0 * self.sub.limits.down[k]);
-                window.bound = Bound::Phase(k, w.reverse());
+                window.ceiling = Ceiling::Phase(k, w.reverse());
             }
-            Kind::Cap => {}
-            Kind::LimitCurve => window.bound = Bound::LimitCurve,
+            Law::Cap => {}
+            Law::LimitCurve => window.ceiling = Ceiling::LimitCurve,
         }
-        if phase.kind != Kind::LimitCurve {
+        if phase.law != Law::LimitCurve {
             window.known = [Some(phase.pi[1]), Some(phase.pi[0])];
         }
     }
 
-    /// To the end of the window; leaves π there, of the whole sub-piece.
+    /// To the end of the window; leaves π over x of the whole sub-piece.
     fn over_window(&mut self) -> Result<(), Stuck> {
         self.entering = true;
-        for _ in 0..MAX_EVENTS {
+        for _ in 0..MAX_SWITCHES {
             if self.window.x0 >= self.window.x1 {
                 return Ok(());
             }
@@ -233,7 +237,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             if std::mem::take(&mut self.entering) {
                 self.enter(&start);
             }
-            // The constant comes first: nothing of the limit curve is compiled for the forward pass.
+            // The constant comes first, so that the forward pass is compiled without the limit curve.
             if BACK {
                 if let Some(pair) = self.limit_curve.take() {
                     if !self.follow_limit_curve(pair) && self.hops > MAX_HOPS {
@@ -242,21 +246,20 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                     continue;
                 }
             }
-            let on_bound = self.is_on_bound();
-            if on_bound {
-                self.pi = self.window.bound_at_start();
-                if !self.leaving && self.follow_bound() {
+            let on_ceiling = self.is_on_ceiling();
+            if on_ceiling {
+                self.pi = self.window.ceiling_at_start();
+                if !self.leaving && self.follow_ceiling() {
                     continue;
                 }
             }
-            self.accelerate(&start, on_bound)?;
+            self.accelerate(&start, on_ceiling)?;
         }
         Err(self.stuck())
     }
 
-    /// Whether the state is on the bound.
-    fn is_on_bound(&self) -> bool {
-        self.order == 0 && self.pi >= self.window.bound_at_start() * (1.0 - ON_BOUND)
+    fn is_on_ceiling(&self) -> bool {
+        self.order == 0 && self.pi >= self.window.ceiling_at_start() * (1.0 - ON_CEILING)
     }
 
     fn start(&self) -> Start<M> {
@@ -272,12 +275,12 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         }
     }
 
-    /// Puts π under the bound, under the limits of axes that turn here, and backward on or under the limit curve.
+    /// Lowers π to the ceiling, to the limits of axes that turn here, and backward to the limit curve.
     fn enter(&mut self, start: &Start<M>) {
         if self.order > 0 {
             return;
         }
-        self.pi = self.pi.min(self.window.bound_at_start());
+        self.pi = self.pi.min(self.window.ceiling_at_start());
         for k in 0..M {
             if start.g[k] == 0.0 && start.c[k] != 0.0 {
                 let limit = if start.c[k] > 0.0 { start.limit[k] } else { start.low_limit[k] };
@@ -302,7 +305,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             return;
         }
         self.pi = self.pi.min(lowest);
-        let Some((j, s)) = self.least(start).map(|(j, s, ..)| (j, s)) else { return };
+        let Some((j, s)) = self.control_axis(start).map(|(j, s, ..)| (j, s)) else { return };
         let mut low: Option<(usize, f64)> = None;
         for l in self.moving().filter(|&l| l != j && start.g[l] > 0.0) {
             let needed = (-start.low_limit[l] - start.c[l] * self.pi) / start.g[l];
@@ -317,25 +320,25 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         }
     }
 
-    /// Appends a phase to t of the window and leaves the rest; without w, π at the end is that of the bound.
-    fn push(&mut self, t: f64, kind: Kind, w: Option<&Polynomial<C>>, slow_sq: f64) {
+    /// Appends a phase to t of the window and drops what is before t. Without w, π at the end is that of the ceiling.
+    fn push(&mut self, t: f64, law: Law, w: Option<&Polynomial<C>>, slow_sq: f64) {
         let length = self.window.length();
         let scale = length * length;
         let x0 = self.window.x0;
         let mut pi_start = self.pi * scale;
         if self.order > 0 {
-            // The limit at a cusp.
-            pi_start = match kind {
-                Kind::Accelerating(j) if self.order == 1 => {
+            // The limit of π at a cusp.
+            pi_start = match law {
+                Law::Accelerating(j) if self.order == 1 => {
                     let lead = self.window.g[j].coefficients()[1];
                     self.sub.limits.up[j] / (lead * self.window.weight.first().powi(2)) * scale
                 }
                 _ => f64::INFINITY,
             };
         }
-        // π at the end, of the sub-piece.
-        let of_phase = w.and_then(|w| match kind {
-            Kind::Accelerating(j) => {
+        // π at the end, over x of the sub-piece.
+        let of_phase = w.and_then(|w| match law {
+            Law::Accelerating(j) => {
                 let at = |p: &Polynomial<C>| if t == 1.0 { p.last() } else { p.value(t) };
                 let (w, g, weight) = (at(w), at(&self.window.g[j]), at(&self.window.weight));
                 let pi = if g > 0.0 { w / (weight * g * g) } else { f64::INFINITY };
@@ -348,28 +351,28 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         if t < 1.0 {
             self.window.leave_before(t);
             let scale = self.window.length().powi(2);
-            pi_end = of_phase.unwrap_or_else(|| self.window.bound_at_start() * scale);
+            pi_end = of_phase.unwrap_or_else(|| self.window.ceiling_at_start() * scale);
             self.pi = pi_end / scale;
         } else {
-            pi_end = of_phase.unwrap_or_else(|| self.window.bound_at_end());
+            pi_end = of_phase.unwrap_or_else(|| self.window.ceiling_at_end());
             self.window.x0 = self.window.x1;
             self.pi = pi_end;
         }
-        self.out.push(Phase { x0, x1: self.window.x0, kind, pi: [pi_start, pi_end], slow_sq });
+        self.out.push(Phase { x0, x1: self.window.x0, law, pi: [pi_start, pi_end], slow_sq });
         self.order = 0;
     }
 
-    /// π at the end of the window where axis j turns round: all others hold it there.
+    /// π at the end of the window if axis j turns there: the limit at which all other axes keep it.
     fn at_turn(&self, j: usize) -> Option<f64> {
         let slope = self.window.g[j].reverse().first_slope();
         (slope != 0.0).then(|| self.sub.limits.down[j] / (slope.abs() * self.window.weight.last().powi(2)))
     }
 }
 
-/// Where a test first fails by more than rounding. `size` gives how much rounding it can hold; `known` roots at 0 are
-/// divided out; without any, a start that misses by less than `slack` is kept.
+/// Where a test first fails by more than rounding. `size` gives the magnitude of its rounding. `known` roots at 0 are
+/// divided out; without known roots, a start that fails by less than `slack` passes.
 #[inline(always)]
-fn kept_until<const C: usize>(
+fn first_failure<const C: usize>(
     test: &Polynomial<C>,
     size: impl FnOnce() -> Polynomial<C>,
     known: usize,

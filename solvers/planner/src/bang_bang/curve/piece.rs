@@ -1,41 +1,40 @@
-//! One piece of the path as the planner sees it: the hodograph over its parameter t in [0, 1].
+//! One piece of the path over t in [0, 1], as the kernel of curves needs it: tangents, weight, D, and what rounding
+//! left of them.
 
-use crate::bang_bang::tolerance::{MOST_NOISE, NO_TANGENT, OFF_ITSELF, OFF_LINE, POINT_NOISE, TANGENT_NOISE};
+use crate::bang_bang::tolerance::{MAX_NOISE, NO_TANGENT, OFF_ITSELF, OFF_LINE, POINT_NOISE, TANGENT_NOISE};
 use feedplan_geometry::polynomial::Polynomial;
 use feedplan_geometry::quadratic::{dot, norm};
 
-/// C'(t) = g(t)/ω(t)² by axis, with ω = 1 on polynomial pieces, and the square of the tool's speed over π.
-///
-/// The state of the planner is π = (dt/dτ)²/ω⁴, τ the time, so that rational pieces keep polynomials everywhere:
-/// axis k has the velocity g_k √π and the acceleration ω² (g_k π'/2 + g_k' π).
+/// The tangents C' = g/ω² and D. With the state π = p/ω⁴, rational pieces lead to polynomials only: axis k has the
+/// velocity g_k √π and the acceleration ω² (g_k π'/2 + c_k π).
 #[derive(Clone, Copy, Debug)]
 pub struct Piece<const M: usize, const C: usize> {
     pub g: [Polynomial<C>; M],
     pub weight: Polynomial<C>,
-    /// D: the speed squared is D π.
+    /// D: v² of the tool is D π.
     pub speed: Polynomial<C>,
-    /// By axis: so much of g is rounding, of the control points or on the way from them.
+    /// By axis: the error of g by rounding, of the control points and of the computation.
     pub noise: [f64; M],
-    /// Degree of the curve itself.
+    /// Degree of the curve.
     pub degree: usize,
-    /// All of g has one direction.
+    /// All tangents have one direction.
     pub straight: bool,
-    /// D = |g|²: the axes are those of the tool.
+    /// D = |g|²: the axes are the tool's.
     pub own_speed: bool,
-    /// What the axes count in the feed, where that is not D.
+    /// The factors of the axes in the speed that the feed limits, if that is not the tool's.
     pub share: Option<[f64; M]>,
 }
 
 impl<const M: usize, const C: usize> Piece<M, C> {
-    /// The piece with these control points, their weights (none: polynomial) and, where the path is one of joints,
-    /// the Bernstein coefficients of the tool's |C'|² with a factor.
+    /// From control points, weights (empty: polynomial) and, for joints, the Bernstein coefficients of |C'|² of the
+    /// tip with a factor.
     pub fn new(control: &[[f64; M]], weights: &[f64], speed_sq: Option<(&[f64], f64)>) -> Self {
         let degree = control.len() - 1;
         let rational = weights.iter().any(|&weight| weight != weights[0]);
         let (g, weight) = if rational {
             let weight = Polynomial::from_bernstein(weights.iter().map(|&weight| weight / weights[0]));
             let g = std::array::from_fn(|k| {
-                // About the first point, for the digits.
+                // Relative to the first point, to keep digits.
                 let numerator = Polynomial::from_bernstein(
                     control
                         .iter()
@@ -58,7 +57,7 @@ impl<const M: usize, const C: usize> Piece<M, C> {
             let (low, high) = g[k].range();
             let farthest = control.iter().fold(0.0_f64, |most, point| most.max(point[k].abs()));
             let size = high.max(-low);
-            (POINT_NOISE * degree as f64 * farthest).clamp(TANGENT_NOISE * size, MOST_NOISE * size)
+            (POINT_NOISE * degree as f64 * farthest).clamp(TANGENT_NOISE * size, MAX_NOISE * size)
         });
         let speed = match speed_sq {
             Some((values, factor)) => Polynomial::from_bernstein(values.iter().map(|value| factor * value)),
@@ -68,38 +67,41 @@ impl<const M: usize, const C: usize> Piece<M, C> {
         Self { g, weight, speed, noise, degree, straight: along.is_some(), own_speed, share: None }
     }
 
-    /// The same where the axes count in the feed by these shares.
+    /// The piece with these factors of the axes in the feed.
     pub fn with_share(self, share: Option<&[f64; M]>) -> Self {
         Self { share: share.copied(), ..self }
     }
 
-    /// The square of the speed that the feed limits over π, where it is not D.
+    /// The square of the speed that the feed limits, over π, if that is not D.
     pub fn feed_rate(&self) -> Option<Polynomial<C>> {
-        self.share.map(|share| counted(&self.g, &share))
+        self.share.map(|share| weighted_speed_sq(&self.g, &share))
     }
 
-    /// The radius of curvature at t; infinite where the path is straight.
+    /// The radius of curvature [mm] at t; infinite where the path is straight.
     pub fn radius(&self, t: f64) -> f64 {
         let g: [f64; M] = std::array::from_fn(|k| self.g[k].value(t));
         let c: [f64; M] = std::array::from_fn(|k| self.g[k].derivative().value(t));
         let weight = self.weight.value(t);
-        let mut twist = 0.0_f64;
+        let mut cross = 0.0_f64;
         for j in 0..M {
             for k in 0..j {
-                twist = twist.hypot(g[j] * c[k] - g[k] * c[j]);
+                cross = cross.hypot(g[j] * c[k] - g[k] * c[j]);
             }
         }
         let square = dot(&g, &g);
-        square * square.sqrt() / (twist * weight * weight)
+        square * square.sqrt() / (cross * weight * weight)
     }
 }
 
-/// The sum of squares of tangents, each by its share.
-pub fn counted<const M: usize, const C: usize>(g: &[Polynomial<C>; M], share: &[f64; M]) -> Polynomial<C> {
+/// The sum of the squares of the tangents times their factors.
+pub fn weighted_speed_sq<const M: usize, const C: usize>(
+    g: &[Polynomial<C>; M],
+    share: &[f64; M],
+) -> Polynomial<C> {
     Polynomial::sum_of_squares(&std::array::from_fn::<_, M, _>(|k| g[k].scale(share[k])))
 }
 
-/// The same tangents with exactly one direction, if they have one but for rounding.
+/// The tangents with exactly one direction, if they have one within rounding.
 fn straight_line<const M: usize, const C: usize>(g: &[Polynomial<C>; M]) -> Option<[Polynomial<C>; M]> {
     let tangent = |i: usize| -> [f64; M] { std::array::from_fn(|k| g[k].bernstein(i)) };
     let tangents = || (0..g[0].degree() + 1).map(tangent);

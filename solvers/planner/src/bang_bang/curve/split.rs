@@ -1,6 +1,7 @@
-//! Cuts a piece where an axis turns round and where the lowest velocity cap changes.
+//! Cuts a piece into parts: where an axis turns, at and next to cusps, where another cap becomes the lowest, at the
+//! ends of the chord-error lines, where weights are uneven, and at remedies.
 
-use super::cusp::{cusps, Cusps, Nearly};
+use super::cusp::{cusps, Cusps, NearCusp};
 use super::part::{Cap, End, Part, Remedy};
 use super::piece::Piece;
 use crate::bang_bang::chord::SpeedLine;
@@ -10,19 +11,19 @@ use crate::problem::{greater, Both, TIP_AXES};
 use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
 
-/// A weight may be so many times greater than those at the ends of a part.
+/// Greatest ratio of a weight to those at the ends of a part.
 const UNEVEN: f64 = 100.0;
-/// A place nearly at rest asks for no cut of its own where there is one, or a cusp, within so many times its reach.
+/// A near cusp needs no cut of its own if there is a cut, or a cusp, within this many times its reach.
 const AROUND: f64 = 4.0;
 
-/// Limits of the axes in both directions.
+/// Limits of the axes in both directions, [mm/s²] and [mm²/s²].
 pub struct Axes<const M: usize> {
     pub acceleration: Both<M>,
     pub velocity_sq: Both<M>,
 }
 
 impl<const M: usize> Axes<M> {
-    /// The squares of the different velocity limits of axis k.
+    /// The squares of the velocity limits of axis k: one if both are equal.
     fn velocities_sq(&self, k: usize) -> impl Iterator<Item = f64> + Clone + '_ {
         let count = if self.velocity_sq[0][k] == self.velocity_sq[1][k] { 1 } else { 2 };
         self.velocity_sq[..count].iter().map(move |side| side[k])
@@ -36,7 +37,7 @@ pub struct Limits<'a, const M: usize> {
     pub chord: Option<&'a ChordLimit>,
 }
 
-/// A place that divides two parts.
+/// A cut between two parts.
 #[derive(Clone, Copy, Debug)]
 pub struct Cut {
     t: f64,
@@ -56,7 +57,7 @@ impl Cut {
         Self { t, end: End { turns, reach: SAME_TURN, ..End::default() } }
     }
 
-    /// Takes over what another cut at the same place is for.
+    /// Adds the purposes of another cut at the same t.
     fn join(&mut self, other: &Self) {
         self.end.turns |= other.end.turns;
         self.end.order = self.end.order.max(other.end.order);
@@ -71,8 +72,8 @@ impl From<&Remedy> for Cut {
     }
 }
 
-/// Appends the parts of the piece from left to right; `tip` is the tool's own piece where it is another one, `cuts`
-/// is space.
+/// Appends the parts of the piece from left to right. `tip` is the piece of the tip, where it is another one; `cuts`
+/// is memory.
 pub fn split<const M: usize, const C: usize>(
     piece: &Piece<M, C>,
     tip: Option<&Piece<TIP_AXES, C>>,
@@ -96,7 +97,7 @@ pub fn split<const M: usize, const C: usize>(
         _ => {}
     }
     let lines = if below_chord.is_empty() { &whole } else { below_chord.as_slice() };
-    // Where the axes are the tool's none is faster than the tool.
+    // An axis of the tool's own is never faster than the tool.
     let can_cap = (0..M).fold(0, |bits, k| {
         let slow = piece.own_speed && axes.velocities_sq(k).all(|v_sq| v_sq >= most_sq);
         bits | AxisBits::from(!slow && moving >> k & 1 == 1) << k
@@ -141,7 +142,7 @@ pub fn split<const M: usize, const C: usize>(
     }
 }
 
-/// Cuts where an axis turns round; says which axes move at all.
+/// Cuts at the turns; returns the axes that move.
 fn cut_at_turns<const M: usize, const C: usize>(piece: &Piece<M, C>, cuts: &mut Vec<Cut>) -> AxisBits {
     let size = piece.g.each_ref().map(|g| g.padded().iter().fold(0.0, |most: f64, c| most.max(c.abs())));
     let greatest = size.iter().copied().fold(0.0, f64::max);
@@ -168,10 +169,10 @@ fn cut_at_turns<const M: usize, const C: usize>(piece: &Piece<M, C>, cuts: &mut 
     moving
 }
 
-/// Cuts where the tool is at rest, or nearly; all axes turn in a cusp, or nowhere near.
+/// Cuts where the tool is at rest, or nearly. Around a cusp the cut at which all axes turn replaces all others.
 fn cut_at_cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, moving: AxisBits, cuts: &mut Vec<Cut>) {
-    let Cusps { cusps, nearly } = cusps(piece, moving);
-    for Nearly { t, reach } in nearly {
+    let Cusps { cusps, near_cusps } = cusps(piece, moving);
+    for NearCusp { t, reach } in near_cusps {
         let reach = AROUND * reach.max(SAME_TURN);
         let at_cusp = cusps.iter().any(|cusp| (t - cusp.t).abs() <= AROUND * cusp.reach + reach);
         if !at_cusp && !cuts.iter().any(|cut| (t - cut.t).abs() <= reach) {
@@ -192,7 +193,7 @@ fn cut_at_cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, moving: Axi
     }
 }
 
-/// Makes one cut of all within the remedy's reach.
+/// Joins all cuts within the remedy's reach.
 fn join_around(remedy: &Remedy, cuts: &mut Vec<Cut>) {
     let mut all = Cut::from(remedy);
     cuts.retain(|cut| {
@@ -206,7 +207,7 @@ fn join_around(remedy: &Remedy, cuts: &mut Vec<Cut>) {
     cuts.push(all);
 }
 
-/// Sorts the cuts and joins those at one place.
+/// Sorts the cuts and joins equal ones.
 fn put_in_order(cuts: &mut Vec<Cut>) {
     if !cuts.is_sorted_by(|a, b| a.t <= b.t) {
         cuts.sort_by(|a, b| a.t.total_cmp(&b.t));
@@ -224,8 +225,8 @@ fn put_in_order(cuts: &mut Vec<Cut>) {
     }
 }
 
-/// Near a cusp the axes turn within what rounding can tell apart: there they turn at once, and no velocity cap counts,
-/// for the tool hardly moves.
+/// Next to a cusp rounding hides the order of the turns: they become one. Velocity caps are ignored there, since the
+/// tool hardly moves.
 fn merge_near_cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, cuts: &mut Vec<Cut>) {
     let (slowest, fastest) = piece.speed.range();
     if cuts.len() == 2 || slowest > SLOW_SQ * fastest {
@@ -237,7 +238,7 @@ fn merge_near_cusps<const M: usize, const C: usize>(piece: &Piece<M, C>, cuts: &
         let same = b.t - a.t <= SAME_TURN;
         if same {
             a.join(b);
-            // The ends of the piece stay where they are.
+            // The ends of the piece stay.
             a.t = if b.t == 1.0 { 1.0 } else { a.t };
         }
         same
@@ -260,7 +261,7 @@ fn cut_by_weight<const C: usize>(weight: &Polynomial<C>, (from, to): (f64, f64),
     cut_by_weight(&right, (middle, to), cuts);
 }
 
-/// Cuts the places where the caps cross on a line; says which axes can be faster than their limits.
+/// Cuts where two caps cross on a line; returns the axes that can be faster than their limits.
 fn cut_by_cap<const M: usize, const C: usize>(
     piece: &Piece<M, C>,
     axes: &Axes<M>,
@@ -275,19 +276,19 @@ fn cut_by_cap<const M: usize, const C: usize>(
     let on_line = |p: &Polynomial<C>| if whole { *p } else { p.part(line.from, line.to) };
     let speed = on_line(&piece.speed);
     let [f0, f1] = line.speed_sq;
-    // The tool is never faster than all of its axes at their limits.
+    // The tool is never faster than all its axes at their limits.
     let binds = !piece.own_speed || f0.min(f1) < greater(&axes.velocity_sq).iter().sum();
-    let bound =
+    let speed_sq =
         if f0 == f1 { Polynomial::constant(f0) } else { Polynomial::from_bernstein([f0, f1].into_iter()) };
     let finite = f0.is_finite() && f1.is_finite();
     let feed = feed.map(|(rate, feed_sq)| (on_line(rate), *feed_sq));
-    // Which of its limits holds for an axis is told part by part: the cuts are those of both.
+    // The cuts serve the limits of both directions; each part chooses its own later.
     for k in (0..M).filter(|&k| can_cap >> k & 1 == 1) {
         for v_sq in axes.velocities_sq(k).filter(|&v_sq| v_sq < f64::MAX) {
             let square = || on_line(&piece.g[k].multiply(&piece.g[k]));
             let mut excesses = [None, None];
             if binds && finite {
-                excesses[0] = Some(square().multiply(&bound).combine(1.0, &speed, -v_sq));
+                excesses[0] = Some(square().multiply(&speed_sq).combine(1.0, &speed, -v_sq));
             }
             if let Some((rate, feed_sq)) = &feed {
                 excesses[1] = Some(square().combine(*feed_sq, rate, -v_sq));
@@ -301,7 +302,7 @@ fn cut_by_cap<const M: usize, const C: usize>(
         }
     }
     if let Some((rate, feed_sq)) = feed.filter(|_| finite) {
-        crossings(&rate.multiply(&bound).combine(1.0, &speed, -feed_sq), &mut cut);
+        crossings(&rate.multiply(&speed_sq).combine(1.0, &speed, -feed_sq), &mut cut);
     }
     for j in (0..M).filter(|&j| fast >> j & 1 == 1) {
         for k in (j + 1..M).filter(|&k| fast >> k & 1 == 1) {
@@ -317,24 +318,24 @@ fn cut_by_cap<const M: usize, const C: usize>(
     fast
 }
 
-/// Where a polynomial changes its sign by more than rounding: between two places that rounding alone keeps apart, as
-/// next to a double root, it does not.
+/// The zeros at which a polynomial changes its sign by more than rounding. Between the two zeros that rounding makes
+/// of a double root it does not.
 fn crossings<const C: usize>(p: &Polynomial<C>, cut: &mut impl FnMut(f64)) {
-    let mut places: Vec<f64> = vec![];
+    let mut roots: Vec<f64> = vec![];
     p.sign_changes(&mut |t| {
-        if let Some(&last) = places.last() {
+        if let Some(&last) = roots.last() {
             let middle = 0.5 * (last + t);
             if p.value(middle).abs() <= ZERO * p.magnitude().value(middle) {
-                places.pop();
+                roots.pop();
                 return;
             }
         }
-        places.push(t);
+        roots.push(t);
     });
-    places.into_iter().for_each(cut);
+    roots.into_iter().for_each(cut);
 }
 
-/// The lowest cap in the middle of a part, where it is so everywhere; g and D are those of the middle.
+/// The lowest cap of a part, from g and D in its middle.
 fn lowest_cap<const M: usize>(
     g: &[f64; M],
     speed: f64,

@@ -1,5 +1,5 @@
-//! The sub-pieces of a run, kept from the backward pass to the forward one: what they take up is that of their own
-//! degree, or of the capacity where that is small.
+//! The sub-pieces of a run, kept from the backward pass for the forward one, in memory by their own degree rather
+//! than by the capacity of their polynomials.
 
 use super::part::{Part, SubPiece};
 use super::split::Axes;
@@ -9,11 +9,11 @@ use feedplan_geometry::polynomial::Polynomial;
 #[derive(Default)]
 pub struct Store {
     coefficients: Vec<f64>,
-    kept: Vec<Kept>,
+    entries: Vec<Entry>,
 }
 
-/// Where the coefficients of a sub-piece begin, and what else its part does not say.
-struct Kept {
+/// The start of its coefficients, and what its part does not say.
+struct Entry {
     start: usize,
     /// Degrees of the tangents, the weight, the speed and the curve.
     degrees: [u8; 4],
@@ -25,11 +25,11 @@ struct Kept {
 impl Store {
     pub fn clear(&mut self) {
         self.coefficients.clear();
-        self.kept.clear();
+        self.entries.clear();
     }
 
     pub fn push<const M: usize, const C: usize>(&mut self, sub: &SubPiece<M, C>) {
-        self.kept.push(Kept {
+        self.entries.push(Entry {
             start: self.coefficients.len(),
             degrees: [sub.g[0].degree(), sub.weight.degree(), sub.speed.degree(), sub.degree]
                 .map(|n| n as u8),
@@ -42,11 +42,11 @@ impl Store {
         }
     }
 
-    /// Takes the last sub-piece out; `part` is its part of the piece.
+    /// Removes the last sub-piece; `part` is its part.
     pub fn pop<const M: usize, const C: usize>(&mut self, part: &Part, axes: &Axes<M>) -> SubPiece<M, C> {
-        let kept = self.kept.pop().expect("each part has a sub-piece");
-        let [tangent, weight, speed, degree] = kept.degrees.map(usize::from);
-        let mut rest = &self.coefficients[kept.start..];
+        let entry = self.entries.pop().expect("each part has a sub-piece");
+        let [tangent, weight, speed, degree] = entry.degrees.map(usize::from);
+        let mut rest = &self.coefficients[entry.start..];
         let mut next = |degree: usize| {
             let (own, after) = rest.split_at(Polynomial::<C>::padded_len(degree));
             rest = after;
@@ -54,7 +54,7 @@ impl Store {
         };
         let g = std::array::from_fn(|_| next(tangent));
         let (weight, speed) = (next(weight), next(speed));
-        self.coefficients.truncate(kept.start);
+        self.coefficients.truncate(entry.start);
         SubPiece {
             g,
             weight,
@@ -63,9 +63,9 @@ impl Store {
             limits: part.limits(axes),
             moving: part.moving,
             degree,
-            straight: kept.straight,
-            own_speed: kept.own_speed,
-            cusp_orders: kept.cusp_orders,
+            straight: entry.straight,
+            own_speed: entry.own_speed,
+            cusp_orders: entry.cusp_orders,
         }
     }
 }

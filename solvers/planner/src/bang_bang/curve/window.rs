@@ -1,72 +1,72 @@
-//! What is left of a sub-piece ahead of a pass, with the bound on it: both over x in [0, 1], the state at x = 0.
+//! The window of a pass: what is left of a sub-piece ahead of it under one ceiling. Tangents, weight, D and the
+//! ceiling are polynomials over x in [0, 1] of the window; the state of the pass is at x = 0.
 
 use super::part::{Cap, SubPiece};
 use feedplan_geometry::polynomial::Polynomial;
 
-/// What π stays under.
+/// The ceiling of π.
 #[derive(Clone, Copy, Debug)]
-pub enum Bound<const C: usize> {
-    /// v² is at most this.
+pub enum Ceiling<const C: usize> {
+    /// v² is at most this [mm²/s²].
     Speed(Polynomial<C>),
-    /// The velocity squared of an axis is at most this.
+    /// The velocity of this axis squared is at most this [mm²/s²].
     Axis(usize, f64),
-    /// Forward: a phase of the backward pass, on which axis k brakes; its velocity squared times ω.
+    /// Forward: a phase of K, on which axis k brakes, with ω v_k².
     Phase(usize, Polynomial<C>),
-    /// Forward: the backward pass follows the limit curve, which a forward phase does not reach.
+    /// Forward: the backward pass followed the limit curve, which no forward phase reaches.
     LimitCurve,
 }
 
-/// The part of a sub-piece from x0 on.
+/// The window [x0, x1] of a sub-piece.
 #[derive(Clone, Copy)]
 pub struct Window<const M: usize, const C: usize> {
     pub g: [Polynomial<C>; M],
     pub weight: Polynomial<C>,
     pub speed: Polynomial<C>,
-    pub bound: Bound<C>,
-    /// π of the sub-piece on the bound at the ends of the window, where the backward pass has left it.
+    pub ceiling: Ceiling<C>,
+    /// π on the ceiling at both ends, over x of the sub-piece, if the backward pass has left it.
     pub known: [Option<f64>; 2],
-    /// Its ends on the sub-piece.
     pub x0: f64,
     pub x1: f64,
 }
 
 impl<const M: usize, const C: usize> Window<M, C> {
-    /// The whole sub-piece under its velocity cap.
+    /// The whole sub-piece under its cap.
     pub fn new(sub: &SubPiece<M, C>) -> Self {
-        let bound = match sub.cap {
-            Cap::Speed([f0, f1]) if f0 == f1 => Bound::Speed(Polynomial::constant(f0)),
-            Cap::Speed(ends) => Bound::Speed(Polynomial::from_bernstein(ends.into_iter())),
-            Cap::Feed(f) => Bound::Speed(Polynomial::constant(f)),
-            Cap::Axis(k, v_sq) => Bound::Axis(k, v_sq),
+        let ceiling = match sub.cap {
+            Cap::Speed([f0, f1]) if f0 == f1 => Ceiling::Speed(Polynomial::constant(f0)),
+            Cap::Speed(ends) => Ceiling::Speed(Polynomial::from_bernstein(ends.into_iter())),
+            Cap::Feed(f) => Ceiling::Speed(Polynomial::constant(f)),
+            Cap::Axis(k, v_sq) => Ceiling::Axis(k, v_sq),
         };
-        Self { g: sub.g, weight: sub.weight, speed: sub.speed, bound, known: [None; 2], x0: 0.0, x1: 1.0 }
+        Self { g: sub.g, weight: sub.weight, speed: sub.speed, ceiling, known: [None; 2], x0: 0.0, x1: 1.0 }
     }
 
-    /// The length in x of the sub-piece.
+    /// Its length in x of the sub-piece.
     #[inline(always)]
     pub fn length(&self) -> f64 {
         self.x1 - self.x0
     }
 
-    /// What lies between two places, of the window of a whole sub-piece under its cap.
+    /// The part [x0, x1] of the window that is a whole sub-piece under its cap.
     pub fn part(&self, x0: f64, x1: f64) -> Self {
         let length = x1 - x0;
-        let bound = match &self.bound {
-            Bound::Speed(f) => Bound::Speed(f.part(x0, x1)),
-            bound => *bound,
+        let ceiling = match &self.ceiling {
+            Ceiling::Speed(f) => Ceiling::Speed(f.part(x0, x1)),
+            ceiling => *ceiling,
         };
         Self {
             g: std::array::from_fn(|k| self.g[k].part(x0, x1).scale(length)),
             weight: self.weight.part(x0, x1),
             speed: self.speed.part(x0, x1).scale(length * length),
-            bound,
+            ceiling,
             known: [None; 2],
             x0,
             x1,
         }
     }
 
-    /// Leaves out what lies before t.
+    /// Drops what is before t.
     pub fn leave_before(&mut self, t: f64) {
         let rest = 1.0 - t;
         for g in &mut self.g {
@@ -74,24 +74,24 @@ impl<const M: usize, const C: usize> Window<M, C> {
         }
         self.weight = self.weight.right(t);
         self.speed = self.speed.right(t).scale(rest * rest);
-        match &mut self.bound {
-            Bound::Speed(p) | Bound::Phase(_, p) => *p = p.right(t),
-            Bound::Axis(..) | Bound::LimitCurve => {}
+        match &mut self.ceiling {
+            Ceiling::Speed(p) | Ceiling::Phase(_, p) => *p = p.right(t),
+            Ceiling::Axis(..) | Ceiling::LimitCurve => {}
         }
         self.known[0] = None;
         self.x0 += t * self.length();
     }
 
-    /// The greatest π at the start, infinite for no limit.
-    pub fn bound_at_start(&self) -> f64 {
+    /// The greatest π at the start; infinite for no limit.
+    pub fn ceiling_at_start(&self) -> f64 {
         if let Some(pi) = self.known[0] {
             return pi / self.length().powi(2);
         }
-        let (n, d) = match &self.bound {
-            Bound::Speed(f) => (f.first(), self.speed.first()),
-            Bound::Axis(k, v_sq) => (*v_sq, self.g[*k].first().powi(2)),
-            Bound::Phase(k, w) => (w.first(), self.weight.first() * self.g[*k].first().powi(2)),
-            Bound::LimitCurve => return f64::INFINITY,
+        let (n, d) = match &self.ceiling {
+            Ceiling::Speed(f) => (f.first(), self.speed.first()),
+            Ceiling::Axis(k, v_sq) => (*v_sq, self.g[*k].first().powi(2)),
+            Ceiling::Phase(k, w) => (w.first(), self.weight.first() * self.g[*k].first().powi(2)),
+            Ceiling::LimitCurve => return f64::INFINITY,
         };
         if d > 0.0 {
             n / d
@@ -100,21 +100,21 @@ impl<const M: usize, const C: usize> Window<M, C> {
         }
     }
 
-    /// The greatest π at the end, of the sub-piece.
-    pub fn bound_at_end(&self) -> f64 {
+    /// The greatest π at the end, over x of the sub-piece.
+    pub fn ceiling_at_end(&self) -> f64 {
         self.known[1].unwrap_or_else(|| match self.quotient() {
             Some((n, d)) if d.last() > 0.0 => n.last() / d.last() * self.length().powi(2),
             _ => f64::INFINITY,
         })
     }
 
-    /// The bound as a quotient of polynomials, π ≤ n/d.
+    /// The ceiling n/d of π.
     pub fn quotient(&self) -> Option<(Polynomial<C>, Polynomial<C>)> {
-        match &self.bound {
-            Bound::Speed(f) => Some((*f, self.speed)),
-            Bound::Axis(k, v_sq) => Some((Polynomial::constant(*v_sq), self.g[*k].multiply(&self.g[*k]))),
-            Bound::Phase(k, w) => Some((*w, self.weight.multiply(&self.g[*k].multiply(&self.g[*k])))),
-            Bound::LimitCurve => None,
+        match &self.ceiling {
+            Ceiling::Speed(f) => Some((*f, self.speed)),
+            Ceiling::Axis(k, v_sq) => Some((Polynomial::constant(*v_sq), self.g[*k].multiply(&self.g[*k]))),
+            Ceiling::Phase(k, w) => Some((*w, self.weight.multiply(&self.g[*k].multiply(&self.g[*k])))),
+            Ceiling::LimitCurve => None,
         }
     }
 }

@@ -1,37 +1,37 @@
-//! The phase of greatest acceleration from a point, up to the event that ends it.
+//! The phase of greatest acceleration from a state (x, p), up to the switch that ends it.
 //!
 //! The axis j with the least s_k = (A_k − c_k p)/g_k is the control axis. While it accelerates at A_j, the
-//! acceleration of every other axis is linear in Y = (1 − (g_j0/g_j)³)/c_j, which grows along the phase:
-//! a_l = a_l0 − W_jl s₀ Y. So each axis meets +A_l (a transition: it takes over control) or −A_l (the limit
-//! curve) at one Y, the earliest Y ends the phase, and one cube root gives its place.
+//! acceleration of every other axis is linear in Y = (1 − (g_j0/g_j)³)/c_j, which grows along the phase: a_l = a_l0 −
+//! W_jl s₀ Y (index 0: at the start). So each axis reaches +A_l (a transition: it becomes the control axis) or −A_l
+//! (the limit curve) at one Y. The smallest Y ends the phase, and one cube root gives its x.
 //!
-//! With s > 0 control only passes to axes of greater c/g, with s < 0 of smaller; W orders the axes for the whole
-//! sub-piece, so that at most M − 1 transitions follow one another and ties cannot loop.
+//! With s > 0, control only passes to axes of greater c/g; with s < 0, to axes of smaller c/g. W orders the axes for
+//! the whole sub-piece, so at most M − 1 transitions follow one another and ties cannot loop.
 
-use super::phase::{along, Kind};
+use super::phase::{along, Law};
 use super::subpiece::{Axes, SubPiece};
 use crate::bang_bang::tolerance::{FLAT, NEAR_TURN, NO_STEP};
 
 /// How a phase ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Event {
+pub enum Switch {
     EndOfPhase,
-    /// This axis takes over.
+    /// This axis becomes the control axis.
     Transition(usize),
-    /// Another axis reaches −A: the velocity limit curve.
+    /// Another axis reaches −A.
     LimitCurve,
 }
 
 /// A phase of greatest acceleration.
 pub struct Bang {
-    pub kind: Kind,
+    pub law: Law,
     pub x1: f64,
     pub p1: f64,
-    pub event: Event,
+    pub switch: Switch,
 }
 
-/// The phase from (x, p). `control` is the axis that has just saturated, where one has; `limit_curve` says whether
-/// the phase ends there (forward, the bound below the limit curve is met before it).
+/// The phase from (x, p). `control` is the axis that has just reached its limit, if any. `limit_curve` says whether
+/// the limit curve ends the phase; forward it does not, since K lies below it.
 #[inline(always)]
 pub fn bang<const M: usize>(
     sub: &SubPiece<M>,
@@ -41,11 +41,11 @@ pub fn bang<const M: usize>(
     control: Option<usize>,
     limit_curve: bool,
 ) -> Bang {
-    let (g, c) = (sub.tangent(x), &sub.bend);
+    let (g, c) = (sub.tangent(x), &sub.c);
     let s: [f64; M] = std::array::from_fn(|k| {
         let rest = axes.acceleration[k] - c[k] * p;
         if rest.abs() > FLAT * axes.acceleration[k] {
-            // An axis that does not move yet (g_k = 0, of either sign) is no control axis.
+            // An axis at rest (g_k = 0) is no control axis, whatever the sign of `rest`.
             rest / g[k].abs()
         } else {
             0.0
@@ -67,31 +67,31 @@ pub fn bang<const M: usize>(
             j = axis;
         }
     }
-    // A tie passes control on without moving, at most M − 1 times; then the phase is taken as it is.
+    // A tie passes control on without a step, at most M − 1 times.
     let mut ties = 0;
     loop {
         if s[j] == 0.0 {
-            let kind = Kind::Flat(j as u8);
-            return Bang { kind, x1: sub.length, p1: p, event: Event::EndOfPhase };
+            let law = Law::Flat(j as u8);
+            return Bang { law, x1: sub.length, p1: p, switch: Switch::EndOfPhase };
         }
-        let kind = Kind::Accelerating(j as u8);
-        let twist = sub.twists(j);
+        let law = Law::Accelerating(j as u8);
+        let wronskian = sub.wronskians(j);
         let mut first_y = f64::INFINITY;
-        let mut event = Event::EndOfPhase;
+        let mut switch = Switch::EndOfPhase;
         for l in 0..M {
-            let fall = twist[l] * s[j];
+            let fall = wronskian[l] * s[j];
             if fall == 0.0 || (fall > 0.0 && !limit_curve) {
                 continue;
             }
             let start = g[l] * s[j] + c[l] * p;
             let (y, what) = if fall < 0.0 {
-                ((start - axes.acceleration[l]) / fall, Event::Transition(l))
+                ((start - axes.acceleration[l]) / fall, Switch::Transition(l))
             } else {
-                ((start + axes.acceleration[l]) / fall, Event::LimitCurve)
+                ((start + axes.acceleration[l]) / fall, Switch::LimitCurve)
             };
             if y < first_y {
                 first_y = y;
-                event = what;
+                switch = what;
             }
         }
         let (g0, g1, rest) = (g[j], sub.end[j], sub.length - x);
@@ -104,44 +104,44 @@ pub fn bang<const M: usize>(
                 let step = g0 * y / (root * (1.0 + root + root * root));
                 let x1 = x + step;
                 let moves = step > NO_STEP * sub.length && x1 > x;
-                match event {
+                match switch {
                     _ if moves && x1 < sub.length => {
-                        return Bang { kind, x1, p1: along(sub, j, axes.acceleration[j], x, p, x1), event };
+                        return Bang { law, x1, p1: along(sub, j, axes.acceleration[j], x, p, x1), switch };
                     }
-                    Event::Transition(l) if !moves && ties < M && s[l].is_finite() => {
+                    Switch::Transition(l) if !moves && ties < M && s[l].is_finite() => {
                         j = l;
                         ties += 1;
                         continue;
                     }
-                    Event::LimitCurve if !moves => return Bang { kind, x1: x, p1: p, event },
+                    Switch::LimitCurve if !moves => return Bang { law, x1: x, p1: p, switch },
                     _ => {}
                 }
             }
         }
         let p1 = along(sub, j, axes.acceleration[j], x, p, sub.length);
-        return Bang { kind, x1: sub.length, p1, event: Event::EndOfPhase };
+        return Bang { law, x1: sub.length, p1, switch: Switch::EndOfPhase };
     }
 }
 
-/// Holds p where an axis has just turned and p is a little below A_k/|c_k|: a phase begun there would take its s from
-/// a difference without digits. It is begun when the axis has some speed; until then less than the part `NEAR_TURN`
-/// of p is given away, and soon regained.
+/// Keeps p constant where axis k has just turned and p is a little below A_k/|c_k|: there s would be a difference
+/// without digits. The phase begins when the axis has some speed. Until then p loses less than the fraction
+/// `NEAR_TURN`, and soon regains it.
 #[cold]
 fn hold<const M: usize>(sub: &SubPiece<M>, axes: &Axes<M>, x: f64, p: f64) -> Option<Bang> {
     if p > sub.flat {
         return None;
     }
     let g = sub.tangent(x);
-    let most = axes.most_moved(&g);
+    let most = axes.greatest_scaled_tangent(&g);
     (0..M).find_map(|k| {
-        let (a, c) = (axes.acceleration[k], sub.bend[k]);
+        let (a, c) = (axes.acceleration[k], sub.c[k]);
         let enough = 2.0 * NEAR_TURN * most * a;
         let rest = a - c * p;
         let near = g[k] < 0.5 * enough && rest > FLAT * a && rest < NEAR_TURN * a;
         near.then(|| {
             let x1 = x + (enough - g[k]) / c;
             let x1 = if x1 < sub.length { x1 } else { sub.length };
-            Bang { kind: Kind::Flat(k as u8), x1, p1: p, event: Event::EndOfPhase }
+            Bang { law: Law::Flat(k as u8), x1, p1: p, switch: Switch::EndOfPhase }
         })
     })
 }

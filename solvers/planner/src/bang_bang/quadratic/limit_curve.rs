@@ -1,28 +1,27 @@
-//! The velocity limit curve (VLC) of a quadratic sub-piece: the greatest p = (dx/dt)² at which some
-//! acceleration along the path keeps every axis within its limit.
+//! The limit curve of a quadratic sub-piece: the greatest p at which some s keeps every axis within its acceleration
+//! limits. Zhang et al. 2010, equations 7 and 8, with absolute values.
 //!
-//! With g = q' ≥ 0 and c = q'', two axes bound p by (A_j g_k + A_k g_j)/|c_j g_k − c_k g_j|; the denominator is
-//! constant along a quadratic, so the bound is a straight line, and the lowest pair stays the lowest until an
-//! axis turns round (Zhang et al. 2010, eqs. 7 and 8, with absolute values). Where the line falls the path
-//! ahead forces every motion on it above it; where it rises it is left at once: it is never followed forward.
+//! Two axes limit p to (A_j g_k + A_k g_j)/|W_jk|. W is constant, so this is a straight line, and the lowest pair
+//! stays the lowest until an axis turns. Where the line falls, every motion on it is forced above it further on;
+//! where it rises, a pass leaves it at once. So the forward pass never follows it.
 
-/// Values of p at the start and the end of a sub-piece on which no axis turns round; None if all axes move in
-/// proportion. `g_start`, `g_end` ≥ 0 are the tangents there, `c` the second derivative, `acceleration` the limits.
+/// p at the start and the end of a sub-piece, or None if all axes move in proportion. `g_start`, `g_end` ≥ 0 are the
+/// tangents there, `c` their derivative, `wronskian` gives W_jk for all k.
 pub fn limit_curve<const M: usize>(
     g_start: &[f64; M],
     g_end: &[f64; M],
     c: &[f64; M],
     acceleration: &[f64; M],
-    twist: impl Fn(usize) -> [f64; M],
+    wronskian: impl Fn(usize) -> [f64; M],
 ) -> Option<[f64; 2]> {
     let mut lowest: Option<[f64; 2]> = None;
     for j in 0..M {
-        let twist = twist(j);
+        let wronskian = wronskian(j);
         for k in j + 1..M {
-            if twist[k] == 0.0 {
+            if wronskian[k] == 0.0 {
                 continue;
             }
-            let inverse = 1.0 / twist[k].abs();
+            let inverse = 1.0 / wronskian[k].abs();
             let at = |g: &[f64; M]| (acceleration[j] * g[k] + acceleration[k] * g[j]) * inverse;
             let line = [at(g_start), at(g_end)];
             if lowest.is_none_or(|best| line[0] + line[1] < best[0] + best[1]) {

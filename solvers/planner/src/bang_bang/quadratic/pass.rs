@@ -1,25 +1,25 @@
-//! One pass over one sub-piece, in the sense of travel: the greatest p that stays under a bound. Backward the bound is the
-//! velocity cap and the limit curve, forward it is K.
+//! One pass over one sub-piece: the greatest p(x) under a ceiling, from p at the start. Backward the ceiling is the
+//! cap, and the limit curve is followed where it falls; forward the ceiling is K.
 
-use crate::bang_bang::tolerance::{CROSSES, ON_BOUND, ON_LIMIT_CURVE, SLACK};
+use crate::bang_bang::tolerance::{CROSSES, ON_CEILING, ON_LIMIT_CURVE, SLACK};
 use std::cell::OnceCell;
 
-use super::bang::{bang, Event};
+use super::bang::{bang, Switch};
 use super::limit_curve::limit_curve;
-use super::phase::{Kind, Phase};
+use super::phase::{Law, Phase};
 use super::quotient::Quotient;
 use super::slide::slide;
 use super::subpiece::{Axes, SubPiece};
 
-/// More events than this on one sub-piece cannot be: at most M − 1 transitions lie between two slides, and a
-/// slide ends at one of few roots.
-const MAX_EVENTS: u32 = 300;
+/// More switches than on any sub-piece: at most M − 1 transitions lie between two slides, and a slide ends at one of
+/// few roots.
+const MAX_SWITCHES: u32 = 300;
 
-/// A pass made no headway at this place; never seen.
+/// The pass makes no headway at this x; never seen.
 #[derive(Clone, Copy, Debug)]
 pub struct Stuck(pub f64);
 
-/// Backward over the reversed sub-piece from p: appends the phases of K and returns K at the far end.
+/// Backward over the reversed sub-piece from p: appends the phases of K and returns K at its far end.
 #[inline(always)]
 pub fn backward<const M: usize>(
     sub: &SubPiece<M>,
@@ -28,96 +28,105 @@ pub fn backward<const M: usize>(
     out: &mut Vec<Phase>,
 ) -> Result<f64, Stuck> {
     if p > sub.flat {
-        p = p.min(axes.limit_at_turns(&sub.start, &sub.bend));
+        p = p.min(axes.limit_at_turns(&sub.start, &sub.c));
     }
     let cap =
-        [Phase { x0: 0.0, x1: sub.length, p0: sub.cap_at(0.0), p1: sub.cap_at(sub.length), kind: Kind::Cap }];
-    p = Pass::<M, true> { sub, axes, bounds: &cap, out, x: 0.0, p: p.min(cap[0].p0), line: OnceCell::new() }
-        .run()?;
-    // The phase that led here stays as it is: forward, p begins below it.
+        [Phase { x0: 0.0, x1: sub.length, p0: sub.cap_at(0.0), p1: sub.cap_at(sub.length), law: Law::Cap }];
+    p = Pass::<M, true> {
+        sub,
+        axes,
+        ceilings: &cap,
+        out,
+        x: 0.0,
+        p: p.min(cap[0].p0),
+        line: OnceCell::new(),
+    }
+    .travel()?;
+    // The last phase stays as it is: forward, p begins below it.
     if p > sub.flat {
-        p = p.min(axes.limit_at_turns(&sub.end, &sub.bend));
+        p = p.min(axes.limit_at_turns(&sub.end, &sub.c));
     }
     Ok(p)
 }
 
-/// Forward over the sub-piece from p, under the phases of K as the backward pass left them: appends the phases of
-/// the profile and returns p at the far end.
+/// Forward over the sub-piece from p under the phases of K: appends the phases of the profile and returns p at the
+/// far end.
 #[inline(always)]
 pub fn forward<const M: usize>(
     sub: &SubPiece<M>,
     axes: &Axes<M>,
     p: f64,
-    bounds: &[Phase],
+    ceilings: &[Phase],
     out: &mut Vec<Phase>,
 ) -> Result<f64, Stuck> {
-    Pass::<M, false> { sub, axes, bounds, out, x: 0.0, p, line: OnceCell::new() }.run()
+    Pass::<M, false> { sub, axes, ceilings, out, x: 0.0, p, line: OnceCell::new() }.travel()
 }
 
 struct Pass<'a, const M: usize, const BACKWARD: bool> {
     sub: &'a SubPiece<'a, M>,
     axes: &'a Axes<M>,
-    /// What p stays under. Forward: K, from the far end to the near one and reversed.
-    bounds: &'a [Phase],
+    /// The ceiling. Forward: the phases of K as the backward pass saw them, the last one first.
+    ceilings: &'a [Phase],
     out: &'a mut Vec<Phase>,
     x: f64,
     p: f64,
-    /// The limit curve at both ends of the sub-piece, once it is needed.
+    /// The limit curve at both ends of the sub-piece, computed when it is needed.
     line: OnceCell<Option<[f64; 2]>>,
 }
 
 impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
     #[inline(always)]
-    fn run(mut self) -> Result<f64, Stuck> {
+    fn travel(mut self) -> Result<f64, Stuck> {
         let length = self.sub.length;
         let mut index = 0;
-        let mut bound = self.bound(index);
+        let mut ceiling = self.ceiling(index);
         let mut on_limit_curve = BACKWARD && self.meets_falling_limit_curve();
-        // The axis that has just saturated, and the roots at x that the phase and the bound are known to share.
+        // The axis that has just reached its limit, and the number of roots that the phase and the ceiling share at
+        // x.
         let mut control = None;
         let mut leaving = None;
         let mut slack = 0;
-        // The same for the limit curve and the cap.
+        // The number of roots that the limit curve and the cap share at x.
         let mut line_contact = 0;
-        for _ in 0..MAX_EVENTS {
+        for _ in 0..MAX_SWITCHES {
             if self.x == length {
                 return Ok(self.p);
             }
-            while bound.x1 <= self.x {
+            while ceiling.x1 <= self.x {
                 index += 1;
-                bound = self.bound(index);
+                ceiling = self.ceiling(index);
             }
             if on_limit_curve {
-                let moved = self.follow_limit_curve(&bound, line_contact);
+                let moved = self.follow_limit_curve(&ceiling, line_contact);
                 line_contact = if moved { 1 } else { line_contact + 1 };
                 on_limit_curve = false;
                 continue;
             }
-            let at_bound = bound.at(self.sub, self.axes, self.x);
-            let on_bound = self.p >= at_bound * (1.0 - ON_BOUND);
-            if on_bound {
-                self.p = at_bound;
+            let at_ceiling = ceiling.at(self.sub, self.axes, self.x);
+            let on_ceiling = self.p >= at_ceiling * (1.0 - ON_CEILING);
+            if on_ceiling {
+                self.p = at_ceiling;
             }
             let mut contact = 0;
-            if on_bound && leaving.is_none() {
-                match bound.kind {
+            if on_ceiling && leaving.is_none() {
+                match ceiling.law {
                     // Any other motion under a phase of K meets it again later.
-                    Kind::Accelerating(_) | Kind::Braking(_) | Kind::Flat(_) => {
-                        self.push(bound.x1, bound.p1, bound.kind);
+                    Law::Accelerating(_) | Law::Braking(_) | Law::Flat(_) => {
+                        self.push(ceiling.x1, ceiling.p1, ceiling.law);
                         control = None;
                         continue;
                     }
-                    Kind::LimitCurve => contact = 1,
-                    Kind::Cap => {
+                    Law::LimitCurve => contact = 1,
+                    Law::Cap => {
                         let (end, saturated, meets_limit_curve) =
-                            self.slide(&bound, SLACK[slack], line_contact);
+                            self.slide(&ceiling, SLACK[slack], line_contact);
                         let moved = end > self.x;
                         on_limit_curve = meets_limit_curve;
                         if meets_limit_curve {
                             line_contact = if moved { 1 } else { line_contact + 1 };
                         }
                         if moved {
-                            self.push(end, bound.at(self.sub, self.axes, end), Kind::Cap);
+                            self.push(end, ceiling.at(self.sub, self.axes, end), Law::Cap);
                             (control, leaving) = (saturated, saturated.map(|_| 2));
                         }
                         if moved || meets_limit_curve {
@@ -130,19 +139,19 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
             let contact = leaving.take().unwrap_or(contact);
             let phase = bang(self.sub, self.axes, self.x, self.p, control.take(), BACKWARD);
             if phase.x1 > self.x {
-                let whole = Phase { x0: self.x, x1: phase.x1, p0: self.p, p1: phase.p1, kind: phase.kind };
+                let whole = Phase { x0: self.x, x1: phase.x1, p0: self.p, p1: phase.p1, law: phase.law };
                 match self.crossing(&whole, index, contact) {
                     None => {
-                        self.push(phase.x1, phase.p1, phase.kind);
+                        self.push(phase.x1, phase.p1, phase.law);
                         (slack, line_contact) = (0, 0);
                     }
                     Some((x, p)) if x > self.x => {
-                        self.push(x, p, phase.kind);
+                        self.push(x, p, phase.law);
                         (slack, line_contact) = (0, 0);
                         continue;
                     }
-                    // Not above the bound by more than rounding: follow the bound a little further.
-                    Some(_) if on_bound => {
+                    // Above the ceiling by no more than rounding: follow the ceiling a little further.
+                    Some(_) if on_ceiling => {
                         slack += 1;
                         if slack == SLACK.len() {
                             return Err(Stuck(self.x));
@@ -155,39 +164,40 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
                     }
                 }
             }
-            match phase.event {
-                Event::EndOfPhase => {}
-                Event::Transition(axis) => control = Some(axis),
-                Event::LimitCurve => on_limit_curve = BACKWARD && self.x < length,
+            match phase.switch {
+                Switch::EndOfPhase => {}
+                Switch::Transition(axis) => control = Some(axis),
+                Switch::LimitCurve => on_limit_curve = BACKWARD && self.x < length,
             }
         }
         Err(Stuck(self.x))
     }
 
-    /// The bound number `index` along the sub-piece; the last one beyond its end.
+    /// Phase `index` of the ceiling along the sub-piece; the last one for greater indices.
     #[inline(always)]
-    fn bound(&self, index: usize) -> Phase {
+    fn ceiling(&self, index: usize) -> Phase {
         if BACKWARD {
-            self.bounds[0]
+            self.ceilings[0]
         } else {
-            self.bounds[self.bounds.len() - 1 - index.min(self.bounds.len() - 1)].reversed(self.sub.length)
+            self.ceilings[self.ceilings.len() - 1 - index.min(self.ceilings.len() - 1)]
+                .reversed(self.sub.length)
         }
     }
 
     #[inline(always)]
-    fn push(&mut self, x1: f64, p1: f64, kind: Kind) {
-        self.out.push(Phase { x0: self.x, x1, p0: self.p, p1, kind });
+    fn push(&mut self, x1: f64, p1: f64, law: Law) {
+        self.out.push(Phase { x0: self.x, x1, p0: self.p, p1, law });
         (self.x, self.p) = (x1, p1);
     }
 
-    /// The end of the slide along the cap, the axis that ends it, and whether the limit curve ends it instead.
+    /// The end of the slide along the cap, the axis that ends it, and whether the limit curve ends it.
     #[inline(always)]
-    fn slide(&self, bound: &Phase, slack: f64, contact: usize) -> (f64, Option<usize>, bool) {
-        let found = slide(self.sub, self.axes, self.x, bound.x1, slack);
+    fn slide(&self, ceiling: &Phase, slack: f64, contact: usize) -> (f64, Option<usize>, bool) {
+        let found = slide(self.sub, self.axes, self.x, ceiling.x1, slack);
         if BACKWARD && found.low && found.end > self.x {
             if let Some(line) = self.limit_curve() {
                 let cap = self.sub.cap_quotient(self.x, found.end);
-                let line = self.line_curve(line, self.x, found.end);
+                let line = self.line_quotient(line, self.x, found.end);
                 if let Some(t) = cap.rises_above(&line, contact) {
                     return (self.x + (found.end - self.x) * t, None, true);
                 }
@@ -196,31 +206,31 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
         (found.end, found.saturated, false)
     }
 
-    /// Where `phase` rises above the bounds from number `index` on, and the bound there.
+    /// Where `phase` rises above the ceiling from its phase `index` on, and the ceiling there.
     #[inline(always)]
     fn crossing(&self, phase: &Phase, mut index: usize, mut contact: usize) -> Option<(f64, f64)> {
         let (sub, axes) = (self.sub, self.axes);
         let (mut a, mut at_a) = (phase.x0, phase.p0);
         loop {
-            let bound = self.bound(index);
-            let b = bound.x1.min(phase.x1);
-            let (at_b, bound_b) = (phase.at(sub, axes, b), bound.at(sub, axes, b));
-            let bound_a = bound.at(sub, axes, a);
+            let ceiling = self.ceiling(index);
+            let b = ceiling.x1.min(phase.x1);
+            let (at_b, ceiling_b) = (phase.at(sub, axes, b), ceiling.at(sub, axes, b));
+            let ceiling_a = ceiling.at(sub, axes, a);
             // p is monotone on a phase.
-            let lowest = match bound.kind {
-                Kind::Cap => sub.lowest_cap(bound_a, bound_b),
-                _ => bound_a.min(bound_b),
+            let lowest = match ceiling.law {
+                Law::Cap => sub.lowest_cap(ceiling_a, ceiling_b),
+                _ => ceiling_a.min(ceiling_b),
             };
             if at_a.max(at_b) > lowest {
                 let curve = phase.quotient(sub, axes, (a, at_a), (b, at_b));
-                let limit = bound.quotient(sub, axes, (a, bound_a), (b, bound_b));
+                let limit = ceiling.quotient(sub, axes, (a, ceiling_a), (b, ceiling_b));
                 if let Some(t) = curve.rises_above(&limit, contact) {
                     let x = a + (b - a) * t;
-                    let limit = bound.at(sub, axes, x);
+                    let limit = ceiling.at(sub, axes, x);
                     if (phase.at(sub, axes, x) - limit).abs() <= CROSSES * limit {
                         return Some((x, limit));
                     }
-                    if let Some(found) = self.search(phase, &bound, a, b) {
+                    if let Some(found) = self.search(phase, &ceiling, a, b) {
                         return Some(found);
                     }
                 }
@@ -234,11 +244,11 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
         }
     }
 
-    /// The same where the root has lost its digits, because an axis that hardly moves at a makes the curves too
-    /// uneven for one polynomial: by doubling steps from a, then by halving.
+    /// The same where the root has lost its digits, because g_k near 0 at `a` makes the curves too uneven for one
+    /// polynomial: doubles a step from `a`, then bisects.
     #[cold]
-    fn search(&self, phase: &Phase, bound: &Phase, a: f64, b: f64) -> Option<(f64, f64)> {
-        let above = |x: f64| phase.at(self.sub, self.axes, x) > bound.at(self.sub, self.axes, x);
+    fn search(&self, phase: &Phase, ceiling: &Phase, a: f64, b: f64) -> Option<(f64, f64)> {
+        let above = |x: f64| phase.at(self.sub, self.axes, x) > ceiling.at(self.sub, self.axes, x);
         let (mut below, mut step) = (a, (b - a) * f64::EPSILON);
         let mut beyond = (a + step).min(b);
         while !above(beyond) {
@@ -252,7 +262,7 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
         loop {
             let middle = 0.5 * (below + beyond);
             if middle <= below || middle >= beyond {
-                return Some((below, bound.at(self.sub, self.axes, below)));
+                return Some((below, ceiling.at(self.sub, self.axes, below)));
             }
             if above(middle) {
                 beyond = middle;
@@ -262,7 +272,7 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
         }
     }
 
-    /// Puts p on or under the limit curve at the start; says whether it has to be followed.
+    /// Lowers p to the limit curve at the start; says whether the limit curve has to be followed.
     #[inline(always)]
     fn meets_falling_limit_curve(&mut self) -> bool {
         if self.p <= self.sub.flat * (1.0 - ON_LIMIT_CURVE) {
@@ -281,22 +291,22 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
         }
     }
 
-    /// Follows the limit curve to the end of the sub-piece or to where the cap is lower; says whether it moved.
+    /// Follows the limit curve to the end of the sub-piece or to where the cap is lower; says whether that is a step.
     #[cold]
     fn follow_limit_curve(&mut self, cap: &Phase, contact: usize) -> bool {
         let Some(line) = self.limit_curve() else { return false };
         let length = self.sub.length;
-        let curve = self.line_curve(line, self.x, length);
+        let curve = self.line_quotient(line, self.x, length);
         let crossing = curve.rises_above(&self.sub.cap_quotient(self.x, length), contact);
         let Some(t) = crossing else {
-            self.push(length, line[1], Kind::LimitCurve);
+            self.push(length, line[1], Law::LimitCurve);
             return true;
         };
         let x = self.x + (length - self.x) * t;
         let p = cap.at(self.sub, self.axes, x);
         let moved = x > self.x;
         if moved {
-            self.push(x, p, Kind::LimitCurve);
+            self.push(x, p, Law::LimitCurve);
         } else {
             self.p = p;
         }
@@ -307,11 +317,11 @@ impl<const M: usize, const BACKWARD: bool> Pass<'_, M, BACKWARD> {
     fn limit_curve(&self) -> Option<[f64; 2]> {
         let sub = self.sub;
         *self.line.get_or_init(|| {
-            limit_curve(&sub.start, &sub.end, &sub.bend, &self.axes.acceleration, |j| sub.twists(j))
+            limit_curve(&sub.start, &sub.end, &sub.c, &self.axes.acceleration, |j| sub.wronskians(j))
         })
     }
 
-    fn line_curve(&self, line: [f64; 2], a: f64, b: f64) -> Quotient {
+    fn line_quotient(&self, line: [f64; 2], a: f64, b: f64) -> Quotient {
         let at = |x: f64| {
             if x == self.sub.length {
                 line[1]

@@ -1,20 +1,20 @@
-//! A phase p(x) on a sub-piece: what stays constant on it, its values, its quotient of polynomials.
+//! A phase p(x) on a sub-piece: its law, its values, and p as a quotient of polynomials.
 
 use super::quotient::{Denominator, Quotient};
 use super::subpiece::{Axes, SubPiece};
 
-/// What stays constant on a phase. Acceleration is counted in the sense of travel.
+/// What is constant on a phase; accelerations are in the direction of travel.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Kind {
-    /// Axis at +A, begun at the start of the phase.
+pub enum Law {
+    /// This axis is at +A; p is computed from the start of the phase.
     Accelerating(u8),
-    /// Axis at −A: an accelerating phase of the backward pass seen forward, begun at the end of the phase.
+    /// This axis is at −A, a phase of the backward pass seen forward; p is computed from the end of the phase.
     Braking(u8),
-    /// p; the axis is at its acceleration limit.
+    /// p; this axis is at its acceleration limit.
     Flat(u8),
-    /// The velocity cap of the sub-piece.
+    /// The speed of the cap.
     Cap,
-    /// The velocity limit curve, a straight line in p.
+    /// The limit curve, a straight line in p.
     LimitCurve,
 }
 
@@ -25,24 +25,23 @@ pub struct Phase {
     pub x1: f64,
     pub p0: f64,
     pub p1: f64,
-    pub kind: Kind,
+    pub law: Law,
 }
 
 impl Phase {
-    /// The same phase as the opposite direction of travel sees it.
+    /// The phase as the opposite pass sees it.
     #[inline(always)]
     pub fn reversed(&self, length: f64) -> Self {
-        let kind = match self.kind {
-            Kind::Accelerating(axis) => Kind::Braking(axis),
-            Kind::Braking(axis) => Kind::Accelerating(axis),
-            kind => kind,
+        let law = match self.law {
+            Law::Accelerating(axis) => Law::Braking(axis),
+            Law::Braking(axis) => Law::Accelerating(axis),
+            law => law,
         };
-        // An end of the sub-piece stays exactly that.
+        // Exact at the ends of the sub-piece.
         let mirror = |x: f64| if x == 0.0 { length } else { length - x };
-        Self { x0: mirror(self.x1), x1: mirror(self.x0), p0: self.p1, p1: self.p0, kind }
+        Self { x0: mirror(self.x1), x1: mirror(self.x0), p0: self.p1, p1: self.p0, law }
     }
 
-    /// p at x.
     #[inline(always)]
     pub fn at<const M: usize>(&self, sub: &SubPiece<M>, axes: &Axes<M>, x: f64) -> f64 {
         if x == self.x0 {
@@ -51,18 +50,18 @@ impl Phase {
         if x == self.x1 {
             return self.p1;
         }
-        match self.kind {
-            Kind::Accelerating(k) => {
+        match self.law {
+            Law::Accelerating(k) => {
                 along(sub, k as usize, axes.acceleration[k as usize], self.x0, self.p0, x)
             }
-            Kind::Braking(k) => along(sub, k as usize, -axes.acceleration[k as usize], self.x1, self.p1, x),
-            Kind::Flat(_) => self.p0,
-            Kind::Cap => sub.cap_at(x),
-            Kind::LimitCurve => self.p0 + (self.p1 - self.p0) * ((x - self.x0) / (self.x1 - self.x0)),
+            Law::Braking(k) => along(sub, k as usize, -axes.acceleration[k as usize], self.x1, self.p1, x),
+            Law::Flat(_) => self.p0,
+            Law::Cap => sub.cap_at(x),
+            Law::LimitCurve => self.p0 + (self.p1 - self.p0) * ((x - self.x0) / (self.x1 - self.x0)),
         }
     }
 
-    /// p on [a, b], where it is `at_a` and `at_b`.
+    /// p on [a, b], with its values at both ends.
     #[inline(always)]
     pub fn quotient<const M: usize>(
         &self,
@@ -71,7 +70,7 @@ impl Phase {
         (a, at_a): (f64, f64),
         (b, at_b): (f64, f64),
     ) -> Quotient {
-        // n = v_k² and n' = 2 a_k q'_k, from the end where the phase is slower: p may be infinite at the other.
+        // n = v_k² and n' = 2 a_k g_k, from the end where the phase is slower: p may be infinite at the other.
         let rising = |k: u8| {
             let (ga, gb) = (sub.axis_tangent(k as usize, a), sub.axis_tangent(k as usize, b));
             let gain = axes.acceleration[k as usize] * (b - a);
@@ -86,11 +85,11 @@ impl Phase {
             let n = [n + gain * (ga + gb), n + gain * gb, n];
             Quotient { n, d: [ga * ga, ga * gb, gb * gb], denominator: Denominator::AxisSq(k as usize) }
         };
-        match self.kind {
-            Kind::Accelerating(k) => rising(k),
-            Kind::Braking(k) => falling(k),
-            Kind::Flat(_) | Kind::LimitCurve => Quotient::line(at_a, at_b),
-            Kind::Cap => sub.cap_quotient(a, b),
+        match self.law {
+            Law::Accelerating(k) => rising(k),
+            Law::Braking(k) => falling(k),
+            Law::Flat(_) | Law::LimitCurve => Quotient::line(at_a, at_b),
+            Law::Cap => sub.cap_quotient(a, b),
         }
     }
 }
@@ -99,5 +98,5 @@ impl Phase {
 #[inline(always)]
 pub fn along<const M: usize>(sub: &SubPiece<M>, k: usize, a: f64, x0: f64, p0: f64, x: f64) -> f64 {
     let (g0, g) = (sub.axis_tangent(k, x0), sub.axis_tangent(k, x));
-    p0 + (x - x0) * (g + g0) * (a - sub.bend[k] * p0) / (g * g)
+    p0 + (x - x0) * (g + g0) * (a - sub.c[k] * p0) / (g * g)
 }

@@ -1,25 +1,24 @@
-//! One piece of degree 2, its parameter t running from 0 to 1.
+//! One piece of degree 2 over t in [0, 1], from its three control points: its tangents, D and W.
 
 use super::turns::difference_of_products;
 use crate::bang_bang::tolerance::ZERO;
 use feedplan_geometry::quadratic::{dot, sub};
 
-/// Tangents at the ends of a piece; the tangent is linear in t between them.
+/// The tangent C' is linear in t between the ends.
 #[derive(Clone, Copy)]
 pub struct Piece<const M: usize> {
-    /// C' at t = 0 and t = 1
+    /// C' at t = 0 and t = 1.
     pub left: [f64; M],
     pub right: [f64; M],
-    /// D = |C'|² at the ends and, between them, its middle Bernstein coefficient
+    /// Bernstein coefficients of D = |C'|².
     pub speed: [f64; 3],
-    /// W_jk = c_j q'_k − c_k q'_j, c = q'', constant along the piece
-    pub minors: [[f64; M]; M],
-    /// |C' × C''|, its length
-    pub twist: f64,
+    /// W_jk.
+    pub wronskian: [[f64; M]; M],
+    /// |C' × C''|, constant along the piece.
+    pub cross: f64,
 }
 
 impl<const M: usize> Piece<M> {
-    /// The piece with these control points.
     #[inline(always)]
     pub fn new([a, b, c]: &[[f64; M]; 3]) -> Self {
         let (mut left, mut right) = (sub(b, a).map(|x| 2.0 * x), sub(c, b).map(|x| 2.0 * x));
@@ -32,16 +31,16 @@ impl<const M: usize> Piece<M> {
                 right[k] = 0.0;
             }
         }
-        let mut minors = [[0.0; M]; M];
-        let mut twist_sq = 0.0;
+        let mut wronskian = [[0.0; M]; M];
+        let mut cross_sq = 0.0;
         for j in 0..M {
             for k in j + 1..M {
-                let minor = difference_of_products(right[j], left[k], right[k], left[j]);
-                (minors[j][k], minors[k][j]) = (minor, -minor);
-                twist_sq += minor * minor;
+                let w = difference_of_products(right[j], left[k], right[k], left[j]);
+                (wronskian[j][k], wronskian[k][j]) = (w, -w);
+                cross_sq += w * w;
             }
         }
-        Self { left, right, speed, minors, twist: twist_sq.sqrt() }
+        Self { left, right, speed, wronskian, cross: cross_sq.sqrt() }
     }
 
     /// The least D on the piece.
@@ -51,7 +50,7 @@ impl<const M: usize> Piece<M> {
         if d1 >= d0.min(d2) {
             d0.min(d2)
         } else {
-            self.twist * self.twist / (d0 - 2.0 * d1 + d2)
+            self.cross * self.cross / (d0 - 2.0 * d1 + d2)
         }
     }
 

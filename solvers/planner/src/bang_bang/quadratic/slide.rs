@@ -1,6 +1,6 @@
-//! How far a velocity cap can be followed before an axis would need more than its acceleration.
+//! How far a cap can be followed before an axis would need more than its acceleration limit.
 //!
-//! Along a cap every acceleration is a function of the place alone:
+//! Along a cap every acceleration is a function of x alone:
 //!
 //! | cap | acceleration of axis k | stays below A_k while |
 //! |---|---|---|
@@ -12,17 +12,17 @@ use super::quotient::bernstein;
 use super::subpiece::{Axes, Cap, SubPiece};
 use feedplan_geometry::quadratic::dot;
 
-/// The part of a cap that can be followed.
+/// The interval on which a cap can be followed.
 pub struct Slide {
     pub end: f64,
-    /// The axis that saturates at the end, where one does.
+    /// The axis that reaches its limit at the end, if any.
     pub saturated: Option<usize>,
-    /// Somewhere an axis would need less than −A: the limit curve may lie below the cap there.
+    /// Some axis would need less than −A: the limit curve may lie below the cap.
     pub low: bool,
 }
 
-/// The part of the cap that can be followed from a towards b. An acceleration may exceed its limit by the part
-/// `slack`, which is rounding.
+/// The interval from `a` towards `b` on which the cap can be followed. Accelerations may exceed their limits by the
+/// fraction `slack`, which is rounding.
 #[inline(always)]
 pub fn slide<const M: usize>(sub: &SubPiece<M>, axes: &Axes<M>, a: f64, b: f64, slack: f64) -> Slide {
     match sub.cap {
@@ -44,14 +44,14 @@ fn at_speed<const M: usize>(
     let d = sub.speed_form(a, b);
     let least = d[0].min(d[1]).min(d[2]).max(0.0);
     let mut found = Slide { end: b, saturated: None, low: false };
-    // The whole acceleration is v²/ρ, ρ = D^1.5/|C' × C''|.
-    if speed_sq * sub.twist <= axes.least * least * least.sqrt() {
+    // The whole acceleration is v²/ρ with ρ = D^1.5/|C' × C''|.
+    if speed_sq * sub.cross <= axes.least * least * least.sqrt() {
         return found;
     }
     let (ga, gb) = (sub.tangent(a), sub.tangent(b));
     for k in 0..M {
-        let twist = sub.twists(k);
-        let (need_a, need_b) = (speed_sq * dot(&ga, &twist), speed_sq * dot(&gb, &twist));
+        let wronskian = sub.wronskians(k);
+        let (need_a, need_b) = (speed_sq * dot(&ga, &wronskian), speed_sq * dot(&gb, &wronskian));
         if need_a.abs().max(need_b.abs()) <= axes.acceleration[k] * least * least {
             continue;
         }
@@ -76,11 +76,11 @@ fn at_axis_speed<const M: usize>(
     slack: f64,
 ) -> Slide {
     let (ga, gb) = (sub.axis_tangent(j, a), sub.axis_tangent(j, b));
-    let twist = sub.twists(j);
+    let wronskian = sub.wronskians(j);
     let mut found = Slide { end: b, saturated: None, low: false };
     for k in 0..M {
         // W_kj = −W_jk.
-        let needed_cube = -twist[k] * speed_sq * axes.inverse[k] / (1.0 + slack);
+        let needed_cube = -wronskian[k] * speed_sq * axes.inverse[k] / (1.0 + slack);
         let least = ga.min(gb);
         if needed_cube.abs() <= least * least * least {
             continue;
@@ -90,7 +90,7 @@ fn at_axis_speed<const M: usize>(
         } else if needed_cube > ga * ga * ga {
             stop_at(&mut found, a, k);
         } else {
-            // g_j falls: the place where it is the cube root, from the nearer end.
+            // g_j falls: x where it equals the cube root.
             let g = needed_cube.cbrt();
             stop_at(&mut found, (a + (b - a) * ((ga - g) / (ga - gb))).clamp(a, b), k);
         }
@@ -107,8 +107,8 @@ fn at_sloped_speed<const M: usize>(sub: &SubPiece<M>, axes: &Axes<M>, a: f64, b:
     let d_sq = d.multiply(&d);
     let mut found = Slide { end: b, saturated: None, low: false };
     for k in 0..M {
-        let twist = sub.twists(k);
-        let turn = bernstein([dot(&ga, &twist), dot(&gb, &twist)]).multiply(&bernstein([fa, fb]));
+        let wronskian = sub.wronskians(k);
+        let turn = bernstein([dot(&ga, &wronskian), dot(&gb, &wronskian)]).multiply(&bernstein([fa, fb]));
         let need = turn.combine(1.0, &d.multiply(&bernstein([ga[k], gb[k]])), half_slope);
         let limit = axes.acceleration[k] * (1.0 + slack);
         found.low |= d_sq.combine(limit, &need, 1.0).coefficients().iter().any(|&value| value < 0.0);

@@ -1,16 +1,17 @@
-//! Cuts a curved piece where an axis turns round and where the lowest velocity cap changes.
+//! Cuts a quadratic piece into parts: where an axis turns, where the line of the chord-error limit changes, and where
+//! another cap becomes the lowest. Makes sub-pieces of the parts.
 
 use super::piece::Piece;
 use super::quotient::bernstein;
 use super::subpiece::{Axes, Cap, Orientation, SubPiece};
-use super::turns::{Mark, Stretch, EDGE};
+use super::turns::{Mark, MonotonePart, EDGE};
 use crate::bang_bang::chord::SpeedLine;
 use crate::bang_bang::tolerance::{AT_KINK, SAME_CUT};
 use crate::problem::ChordLimit;
 use crate::AxisBits;
 use feedplan_geometry::quadratic::dot;
 
-/// Tangents of the chord-error limit are so far apart; see `ChordLimit::lines_below`.
+/// Distance of the tangents of the chord-error limit; see `ChordLimit::lines_below`.
 const STEP: f64 = 0.03;
 
 impl ChordLimit {
@@ -18,42 +19,47 @@ impl ChordLimit {
     fn binds<const M: usize>(&self, piece: &Piece<M>, feed_sq: f64) -> bool {
         let least = piece.least_speed_sq();
         let least_cube = least * least.sqrt();
-        let least_limit = self.alpha * least_cube - self.slow_sq * piece.twist;
-        least_limit < feed_sq * piece.twist && least_limit < self.acceleration * least_cube
+        let least_limit = self.alpha * least_cube - self.slow_sq * piece.cross;
+        least_limit < feed_sq * piece.cross && least_limit < self.acceleration * least_cube
     }
 
-    /// Appends the greatest v² over a stretch, at most `feed_sq`: lines that follow one another without a jump.
+    /// Appends the lines of the chord-error limit on a monotone part, at most `feed_sq`, each beginning at the speed
+    /// at which the last one ends.
     ///
-    /// ρ = |C'|³/|C' × C''| is proportional to (1 + τ²)^1.5, τ = (t − t₀)/w counted from the place t₀ of the least ρ, for C'
-    /// is linear and the cross product constant. That is convex, and so is the limit max(α ρ − 4 δ²/T², 4 δ²/T²): its
-    /// tangents lie below it. Tangents at τ = sinh(i `STEP`) cross at places where they give away less than 0.75 `STEP`²
-    /// of α ρ.
+    /// C' is linear and |C' × C''| constant, so ρ = |C'|³/|C' × C''| is proportional to (1 + τ²)^1.5 with τ = (t −
+    /// t₀)/w and the least ρ at t₀. That is convex, and so is the limit max(α ρ − 4 δ²/T², 4 δ²/T²): its tangents lie
+    /// below it. Where the tangents at τ = sinh(i `STEP`) cross, they give away less than 0.75 `STEP`² of α ρ.
     #[cold]
-    fn lines_below<const M: usize>(&self, stretch: &Stretch<M>, feed_sq: f64, out: &mut Vec<SpeedLine>) {
-        let piece = &stretch.piece;
-        let bend: [f64; M] = std::array::from_fn(|k| piece.right[k] - piece.left[k]);
-        let bend_sq = dot(&bend, &bend);
-        let (least, width) = (-dot(&piece.left, &bend) / bend_sq, piece.twist * stretch.length / bend_sq);
+    fn lines_below<const M: usize>(
+        &self,
+        monotone: &MonotonePart<M>,
+        feed_sq: f64,
+        out: &mut Vec<SpeedLine>,
+    ) {
+        let piece = &monotone.piece;
+        let c: [f64; M] = std::array::from_fn(|k| piece.right[k] - piece.left[k]);
+        let c_sq = dot(&c, &c);
+        let (least, width) = (-dot(&piece.left, &c) / c_sq, piece.cross * monotone.length / c_sq);
         let tangent = |t: f64| {
             let g = piece.tangent(t);
             let d = dot(&g, &g);
-            let radius = d * d.sqrt() / piece.twist;
+            let radius = d * d.sqrt() / piece.cross;
             if radius < self.tolerance * (1.0 - AT_KINK) {
                 return Tangent { t, value: self.slow_sq, slope: 0.0 };
             }
             let share = self.alpha * radius;
-            Tangent { t, value: share - self.slow_sq, slope: share * 3.0 * dot(&g, &bend) / d }
+            Tangent { t, value: share - self.slow_sq, slope: share * 3.0 * dot(&g, &c) / d }
         };
         let step = |t: f64| ((t - least) / width).asinh() / STEP;
         let even = (step(0.0).ceil() as i64..=step(1.0).floor() as i64).map(|i| (i as f64 * STEP).sinh());
-        // Where ρ = δ the limit has a kink.
-        let least_radius = bend_sq * width * width * (bend_sq * width * width).sqrt() / piece.twist;
+        // The limit has a kink where ρ = δ.
+        let least_radius = c_sq * width * width * (c_sq * width * width).sqrt() / piece.cross;
         let kink = ((self.tolerance / least_radius).powf(2.0 / 3.0) - 1.0).max(0.0).sqrt();
-        let mut places: Vec<f64> = even.chain([-kink, kink]).map(|tau| least + width * tau).collect();
-        places.retain(|t| (SAME_CUT..1.0 - SAME_CUT).contains(t));
-        places.sort_by(f64::total_cmp);
+        let mut contacts: Vec<f64> = even.chain([-kink, kink]).map(|tau| least + width * tau).collect();
+        contacts.retain(|t| (SAME_CUT..1.0 - SAME_CUT).contains(t));
+        contacts.sort_by(f64::total_cmp);
         let (mut from, mut last) = (0.0, tangent(0.0));
-        for next in places.into_iter().chain([1.0]).map(tangent) {
+        for next in contacts.into_iter().chain([1.0]).map(tangent) {
             if next.slope == last.slope {
                 continue;
             }
@@ -66,7 +72,7 @@ impl ChordLimit {
     }
 }
 
-/// A straight line in t.
+/// A tangent of the limit of v², a line in t.
 struct Tangent {
     t: f64,
     value: f64,
@@ -78,7 +84,7 @@ impl Tangent {
         self.value + self.slope * (t - self.t)
     }
 
-    /// Appends its part below the feed, and the feed where that is lower.
+    /// Appends the tangent, cut off at the feed.
     fn push(&self, from: f64, to: f64, feed_sq: f64, out: &mut Vec<SpeedLine>) {
         let meets = self.t + (feed_sq - self.value) / self.slope;
         let middle = if from < meets && meets < to { meets } else { to };
@@ -95,10 +101,10 @@ impl Tangent {
     }
 }
 
-/// A part of a curved piece under one velocity cap, and what the passes need to know of it.
+/// A part of a piece.
 #[derive(Clone, Copy, Debug)]
 pub struct Part {
-    /// The marks of its stretch, and where it begins and ends on that, from 0 to 1.
+    /// The marks of its monotone part, and its ends as fractions of that.
     marks: [Mark; 2],
     from: f64,
     to: f64,
@@ -107,51 +113,51 @@ pub struct Part {
     pub negative: AxisBits,
 }
 
-/// A part with its place on the piece.
-pub struct Placed<'a, const M: usize> {
+/// A part with its ends on the piece.
+pub struct Located<'a, const M: usize> {
     pub sub: SubPiece<'a, M>,
-    /// t at both ends
+    /// t at both ends.
     pub from: f64,
     pub to: f64,
 }
 
 impl Part {
-    /// The part as a sub-piece travelled forward, or backward.
+    /// The part as a sub-piece, travelled forward or backward.
     #[inline(always)]
-    pub fn place<'a, const M: usize>(
+    pub fn locate<'a, const M: usize>(
         &self,
         piece: &'a Piece<M>,
         axes: &Axes<M>,
         backward: bool,
-    ) -> Placed<'a, M> {
+    ) -> Located<'a, M> {
         let sign: [f64; M] = std::array::from_fn(|k| if self.negative >> k & 1 == 1 { -1.0 } else { 1.0 });
         let reflect = |tangent: &[f64; M]| -> [f64; M] { std::array::from_fn(|k| sign[k] * tangent[k]) };
         let (length, from, to, ends);
         if self.marks == [EDGE, EDGE] && self.from == 0.0 && self.to == 1.0 {
             (length, from, to, ends) = (1.0, 0.0, 1.0, [reflect(&piece.left), reflect(&piece.right)]);
         } else {
-            let stretch = piece.stretch(self.marks[0], self.marks[1]);
-            length = (self.to - self.from) * stretch.length;
-            let place = |part: f64| match part {
-                0.0 => stretch.begin,
-                1.0 => stretch.end,
-                _ => stretch.begin + part * stretch.length,
+            let monotone = piece.monotone_part(self.marks[0], self.marks[1]);
+            length = (self.to - self.from) * monotone.length;
+            let t_at = |share: f64| match share {
+                0.0 => monotone.begin,
+                1.0 => monotone.end,
+                _ => monotone.begin + share * monotone.length,
             };
-            (from, to) = (place(self.from), place(self.to));
-            // An axis that does not turn may come out on the wrong side of zero by rounding.
-            let tangent = |part: f64| reflect(&stretch.piece.tangent(part)).map(|value| value.max(0.0));
+            (from, to) = (t_at(self.from), t_at(self.to));
+            // By rounding, an axis that does not turn may have the wrong sign.
+            let tangent = |share: f64| reflect(&monotone.piece.tangent(share)).map(|value| value.max(0.0));
             ends = [tangent(self.from), tangent(self.to)];
         }
         let [left, right] = ends;
         let (ends, travel) = if backward { ([right, left], -1.0) } else { ([left, right], 1.0) };
-        let bend = std::array::from_fn(|k| travel * sign[k] * (piece.right[k] - piece.left[k]));
+        let c = std::array::from_fn(|k| travel * sign[k] * (piece.right[k] - piece.left[k]));
         let orientation = Orientation { sign, travel };
         let cap = if backward { self.cap.reversed() } else { self.cap };
-        Placed { sub: SubPiece::new(length, ends, bend, piece, orientation, cap, axes), from, to }
+        Located { sub: SubPiece::new(length, ends, c, piece, orientation, cap, axes), from, to }
     }
 }
 
-/// Cuts pieces; holds the space for it.
+/// Cuts pieces, with the memory for it.
 #[derive(Default)]
 pub struct Splitter {
     lines: Vec<SpeedLine>,
@@ -159,7 +165,7 @@ pub struct Splitter {
     pub parts: Vec<Part>,
 }
 
-/// What the cuts depend on.
+/// The limits that determine the cuts.
 struct Limits<'a, const M: usize> {
     axes: &'a Axes<M>,
     feed_sq: f64,
@@ -200,27 +206,26 @@ impl Splitter {
         }
     }
 
-    /// Cuts between two turns, then where the line below the chord-error limit changes, then between two changes of the
-    /// cap.
+    /// Cuts at the turns, then at the ends of the chord-error lines, then where another cap becomes the lowest.
     fn cut<const M: usize>(&mut self, piece: &Piece<M>, limits: &Limits<M>) {
         let (turns, count) = piece.turns();
         let mut from = EDGE;
         for i in 0..=count {
             let to = if i == count { EDGE } else { turns[i] };
-            let stretch = piece.stretch(from, to);
-            if stretch.length > 0.0 {
+            let monotone = piece.monotone_part(from, to);
+            if monotone.length > 0.0 {
                 let first = self.parts.len();
                 let mut lines = std::mem::take(&mut self.lines);
                 lines.clear();
                 match limits.chord {
-                    Some(chord) => chord.lines_below(&stretch, limits.feed_sq, &mut lines),
+                    Some(chord) => chord.lines_below(&monotone, limits.feed_sq, &mut lines),
                     None => lines.push(SpeedLine { from: 0.0, to: 1.0, speed_sq: [limits.feed_sq; 2] }),
                 }
                 for line in &lines {
-                    self.cut_by_cap(&stretch.piece, limits, line);
+                    self.cut_by_cap(&monotone.piece, limits, line);
                 }
                 self.lines = lines;
-                let (left, right) = (&stretch.piece.left, &stretch.piece.right);
+                let (left, right) = (&monotone.piece.left, &monotone.piece.right);
                 let negative = (0..M).fold(0, |bits, k| bits | AxisBits::from(left[k] + right[k] < 0.0) << k);
                 for part in &mut self.parts[first..] {
                     part.marks = [from, to];
@@ -231,8 +236,8 @@ impl Splitter {
         }
     }
 
-    /// Cuts a stretch where the lowest cap changes on a line, and names it on each part.
-    fn cut_by_cap<const M: usize>(&mut self, stretch: &Piece<M>, limits: &Limits<M>, line: &SpeedLine) {
+    /// Cuts a monotone part where another cap becomes the lowest along a line, and names the lowest cap of each part.
+    fn cut_by_cap<const M: usize>(&mut self, monotone: &Piece<M>, limits: &Limits<M>, line: &SpeedLine) {
         let (axes, fast) = (limits.axes, limits.fast);
         let cuts = &mut self.cuts;
         cuts.clear();
@@ -249,15 +254,15 @@ impl Splitter {
         };
         for j in (0..M).filter(|&j| is_fast(j)) {
             let v_sq = axes.velocity_sq[j];
-            // Against the speed: v² q'_j² = V_j² D.
-            let used = bernstein(axis_sq(stretch, j)).multiply(&speed_sq);
-            used.combine(1.0, &bernstein(stretch.speed), -v_sq).sign_changes(&mut cut);
-            // Against another axis: V_j |q'_k| = V_k |q'_j|.
+            // Against the tool's speed: v² g_j² = V_j² D.
+            let used = bernstein(axis_sq(monotone, j)).multiply(&speed_sq);
+            used.combine(1.0, &bernstein(monotone.speed), -v_sq).sign_changes(&mut cut);
+            // Against another axis: V_j |g_k| = V_k |g_j|.
             for k in (j + 1..M).filter(|&k| is_fast(k)) {
                 let (v_j, v_k) = (v_sq.sqrt(), axes.velocity_sq[k].sqrt());
                 for sign in [1.0, -1.0] {
                     let at = |g: &[f64; M]| v_j * g[k] - sign * v_k * g[j];
-                    bernstein([at(&stretch.left), at(&stretch.right)]).sign_changes(&mut cut);
+                    bernstein([at(&monotone.left), at(&monotone.right)]).sign_changes(&mut cut);
                 }
             }
         }
@@ -269,7 +274,7 @@ impl Splitter {
                 continue;
             }
             let middle = 0.5 * (from + to);
-            let g = stretch.tangent(middle);
+            let g = monotone.tangent(middle);
             let mut lowest = line.at(middle) / dot(&g, &g);
             let mut cap = None;
             for k in (0..M).filter(|&k| is_fast(k)) {
@@ -280,7 +285,7 @@ impl Splitter {
             }
             let speed = |from: f64| Cap::Speed([line.at(from), line.at(to)]);
             match self.parts.last_mut() {
-                // Goes on under the same cap.
+                // The same cap goes on.
                 Some(part) if part.to == from && part.from >= line.from && part.cap.goes_on(cap) => {
                     part.to = to;
                     part.cap = cap.unwrap_or(speed(part.from));
@@ -295,14 +300,14 @@ impl Splitter {
     }
 }
 
-/// q'_k² in Bernstein form.
+/// g_k² in Bernstein form.
 #[inline(always)]
 fn axis_sq<const M: usize>(piece: &Piece<M>, k: usize) -> [f64; 3] {
     let (a, b) = (piece.left[k], piece.right[k]);
     [a * a, a * b, b * b]
 }
 
-/// v² q'_k² − V² D: positive where axis k at the speed v would be faster than V.
+/// v² g_k² − V² D: positive where axis k would be faster than V at the speed v.
 #[inline(always)]
 fn excess<const M: usize>(piece: &Piece<M>, k: usize, velocity_sq: f64, speed_sq: f64) -> [f64; 3] {
     let g_sq = axis_sq(piece, k);

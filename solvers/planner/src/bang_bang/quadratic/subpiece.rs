@@ -1,23 +1,22 @@
-//! A curved sub-piece as a pass travels it: from x = 0 to x = `length`, every axis moving forward.
+//! A sub-piece of a quadratic piece: a part as a pass travels it, from x = 0 to x = `length`.
 //!
-//! On a sub-piece no axis turns round and one velocity cap is the lowest. Axes are reflected so that q' ≥ 0,
-//! and the backward pass sees the path reversed; both passes are then the same computation. Symbols:
-//! g = |q'|, c = g' = dg/dx (constant), p = (dx/dt)², s = p'/2, D = |g|², a_k = g_k s + c_k p.
+//! Axes are reflected so that g ≥ 0, and the backward pass sees the path reversed; so both passes are the same
+//! computation. Here g = |q'|, c = g' (constant), and a_k = g_k s + c_k p. Symbols: `bang_bang`.
 
 use super::piece::Piece;
 use super::quotient::{Denominator, Quotient};
 use crate::bang_bang::tolerance::NEAR_TURN;
 use feedplan_geometry::quadratic::dot;
 
-/// The limits of the axes, with what the passes need of them again and again.
+/// The limits of the axes, and numbers that the passes often need.
 pub struct Axes<const M: usize> {
-    /// A, in mm/s²
+    /// A_k [mm/s²].
     pub acceleration: [f64; M],
-    /// 1/A
+    /// 1/A_k.
     pub inverse: [f64; M],
-    /// The least A
+    /// The least A_k.
     pub least: f64,
-    /// V², in mm²/s²
+    /// V_k² [mm²/s²].
     pub velocity_sq: [f64; M],
 }
 
@@ -32,39 +31,38 @@ impl<const M: usize> Axes<M> {
         }
     }
 
-    /// max g_k/A_k
+    /// max g_k/A_k.
     #[inline(always)]
-    pub fn most_moved(&self, g: &[f64; M]) -> f64 {
+    pub fn greatest_scaled_tangent(&self, g: &[f64; M]) -> f64 {
         (0..M).fold(0.0, |most: f64, k| most.max(g[k] * self.inverse[k]))
     }
 
-    /// The least A_k/|c_k| of the axes that turn round or nearly so where the tangent is g: the limit of p there.
+    /// The least A_k/|c_k| of the axes that turn, or nearly turn, where the tangent is g: the limit of p there.
     #[cold]
     pub fn limit_at_turns(&self, g: &[f64; M], c: &[f64; M]) -> f64 {
-        let most = self.most_moved(g);
+        let most = self.greatest_scaled_tangent(g);
         (0..M)
             .filter(|&k| g[k] * self.inverse[k] <= NEAR_TURN * most)
             .fold(f64::INFINITY, |limit, k| limit.min(self.acceleration[k] / c[k].abs()))
     }
 }
 
-/// The lowest velocity cap of a sub-piece.
+/// The lowest cap of a sub-piece.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cap {
-    /// D p is at most a speed squared [mm²/s²] that is linear in x between these values at the ends: the feed, or a bound
-    /// below the chord-error limit.
+    /// D p is at most this v² [mm²/s²], linear in x between the ends: the feed, or a line of the chord-error limit.
     Speed([f64; 2]),
-    /// g_k² p ≤ speed², in mm²/s²
+    /// g_k² p is at most this square of a velocity limit [mm²/s²].
     Axis(usize, f64),
 }
 
 impl Cap {
-    /// Whether it is this cap of an axis; None stands for the speed.
+    /// Whether it is this cap of an axis; None stands for the tool's speed.
     pub fn goes_on(&self, axis: Option<Self>) -> bool {
         axis.map_or(matches!(self, Self::Speed(_)), |cap| *self == cap)
     }
 
-    /// As the opposite direction of travel sees it.
+    /// The cap as the opposite pass sees it.
     #[inline(always)]
     pub fn reversed(self) -> Self {
         match self {
@@ -74,7 +72,7 @@ impl Cap {
     }
 }
 
-/// How a sub-piece lies on its piece.
+/// The reflections between a piece and a sub-piece.
 #[derive(Clone, Copy)]
 pub struct Orientation<const M: usize> {
     /// −1 for axes that move backward on the piece.
@@ -83,33 +81,31 @@ pub struct Orientation<const M: usize> {
     pub travel: f64,
 }
 
-/// A sub-piece in the sense of travel.
 pub struct SubPiece<'a, const M: usize> {
     pub length: f64,
-    /// g at x = 0 and at x = length; exactly 0 where the axis turns round.
+    /// g at x = 0 and at x = length; exactly 0 where the axis turns.
     pub start: [f64; M],
     pub end: [f64; M],
-    /// c
-    pub bend: [f64; M],
-    /// W of the piece.
-    minors: &'a [[f64; M]; M],
+    pub c: [f64; M],
+    /// W_jk of the piece.
+    wronskian: &'a [[f64; M]; M],
     orientation: Orientation<M>,
-    /// D at the ends and, between them, its middle Bernstein coefficient.
+    /// Bernstein coefficients of D.
     pub speed: [f64; 3],
-    /// |C' × C''|
-    pub twist: f64,
+    /// |C' × C''|.
+    pub cross: f64,
     /// min A_k/|c_k|: below it every constant p is feasible.
     pub flat: f64,
     pub cap: Cap,
 }
 
 impl<'a, const M: usize> SubPiece<'a, M> {
-    /// From the tangents at both ends and the bend, as travelled.
+    /// From the tangents at both ends and c, in the direction of travel.
     #[inline(always)]
     pub fn new(
         length: f64,
         [start, end]: [[f64; M]; 2],
-        bend: [f64; M],
+        c: [f64; M],
         piece: &'a Piece<M>,
         orientation: Orientation<M>,
         cap: Cap,
@@ -117,14 +113,14 @@ impl<'a, const M: usize> SubPiece<'a, M> {
     ) -> Self {
         let mut steepest = 0.0;
         for k in 0..M {
-            steepest = f64::max(steepest, bend[k].abs() * axes.inverse[k]);
+            steepest = f64::max(steepest, c[k].abs() * axes.inverse[k]);
         }
         let speed = [dot(&start, &start), dot(&start, &end), dot(&end, &end)];
-        let (minors, twist) = (&piece.minors, piece.twist);
-        Self { length, start, end, bend, minors, orientation, speed, twist, flat: 1.0 / steepest, cap }
+        let (wronskian, cross) = (&piece.wronskian, piece.cross);
+        Self { length, start, end, c, wronskian, orientation, speed, cross, flat: 1.0 / steepest, cap }
     }
 
-    /// g_k at x, from the nearer end, so that it keeps its digits next to a zero.
+    /// g_k at x, computed from the nearer end to keep its digits next to a zero.
     #[inline(always)]
     pub fn axis_tangent(&self, k: usize, x: f64) -> f64 {
         if x == 0.0 {
@@ -132,9 +128,9 @@ impl<'a, const M: usize> SubPiece<'a, M> {
         } else if x == self.length {
             self.end[k]
         } else if x + x <= self.length {
-            self.start[k] + self.bend[k] * x
+            self.start[k] + self.c[k] * x
         } else {
-            self.end[k] - self.bend[k] * (self.length - x)
+            self.end[k] - self.c[k] * (self.length - x)
         }
     }
 
@@ -146,21 +142,21 @@ impl<'a, const M: usize> SubPiece<'a, M> {
         } else if x == self.length {
             self.end
         } else if x + x <= self.length {
-            std::array::from_fn(|k| self.start[k] + self.bend[k] * x)
+            std::array::from_fn(|k| self.start[k] + self.c[k] * x)
         } else {
-            std::array::from_fn(|k| self.end[k] - self.bend[k] * (self.length - x))
+            std::array::from_fn(|k| self.end[k] - self.c[k] * (self.length - x))
         }
     }
 
-    /// W_jk = c_j g_k − c_k g_j for all k: constant along the piece, antisymmetric, its sign exact.
+    /// W_jk for all k; antisymmetric, with exact signs.
     #[inline(always)]
-    pub fn twists(&self, j: usize) -> [f64; M] {
+    pub fn wronskians(&self, j: usize) -> [f64; M] {
         let Orientation { sign, travel } = &self.orientation;
         let factor = travel * sign[j];
-        std::array::from_fn(|k| factor * sign[k] * self.minors[j][k])
+        std::array::from_fn(|k| factor * sign[k] * self.wronskian[j][k])
     }
 
-    /// The velocity cap at x.
+    /// The cap at x.
     #[inline(always)]
     pub fn cap_at(&self, x: f64) -> f64 {
         match self.cap {
@@ -172,7 +168,7 @@ impl<'a, const M: usize> SubPiece<'a, M> {
         }
     }
 
-    /// D p on the cap of the tool's speed.
+    /// v² of the cap of the tool's speed.
     #[inline(always)]
     pub fn speed_sq_of_cap(&self, x: f64) -> f64 {
         match self.cap {
@@ -195,7 +191,7 @@ impl<'a, const M: usize> SubPiece<'a, M> {
         }
     }
 
-    /// D on [a, b].
+    /// Bernstein coefficients of D on [a, b].
     #[inline(always)]
     pub fn speed_form(&self, a: f64, b: f64) -> [f64; 3] {
         if a == 0.0 && b == self.length {
@@ -205,7 +201,7 @@ impl<'a, const M: usize> SubPiece<'a, M> {
         [dot(&ga, &ga), dot(&ga, &gb), dot(&gb, &gb)]
     }
 
-    /// The velocity cap on [a, b].
+    /// The cap on [a, b].
     #[inline(always)]
     pub fn cap_quotient(&self, a: f64, b: f64) -> Quotient {
         match self.cap {
@@ -222,32 +218,32 @@ impl<'a, const M: usize> SubPiece<'a, M> {
         }
     }
 
-    /// A lower bound of the cap on [a, b] from its values there.
+    /// A lower estimate of the cap on [a, b] from its values at the ends.
     #[inline(always)]
     pub fn lowest_cap(&self, at_a: f64, at_b: f64) -> f64 {
         match self.cap {
             Cap::Speed([f0, f1]) if f0 != f1 => 0.0,
-            // D and g_k² are convex, so that their reciprocals are lowest at an end.
+            // D and g_k² are convex, so their reciprocals are least at an end.
             _ => at_a.min(at_b),
         }
     }
 
-    /// Length of the sub-piece on [a, b].
+    /// Length [mm] of the path on [a, b].
     ///
-    /// With r = |C'| at both ends, R = r₀ + r₁, E = |C''|, t = C'·C''/E, d² = r² − t², x = E h/R:
-    /// (h/R) [(R² + (t₀ + t₁)²)/4 + d² atanh(x)/x].
+    /// With r = |C'| at both ends, R = r₀ + r₁, E = |C''|, t = C'·C''/E, d² = r² − t², x = E h/R: (h/R) [(R² + (t₀ +
+    /// t₁)²)/4 + d² atanh(x)/x].
     #[inline(always)]
-    pub fn way(&self, a: f64, b: f64) -> f64 {
+    pub fn arc_length(&self, a: f64, b: f64) -> f64 {
         let (ga, gb) = (self.tangent(a), self.tangent(b));
         let [da, _, db] = self.speed_form(a, b);
-        // x = |gb − ga| / R with the difference taken as E h.
+        // x = |gb − ga|/R, with E h for the difference.
         let h = b - a;
-        let bend_sq = dot(&self.bend, &self.bend);
+        let c_sq = dot(&self.c, &self.c);
         let r = da.sqrt() + db.sqrt();
-        let x_sq = bend_sq * h * h / (r * r);
-        let (ta, tb) = (dot(&ga, &self.bend), dot(&gb, &self.bend));
-        let t_sq = (ta + tb) * (ta + tb) / bend_sq;
-        let distance_sq = (0.5 * ((da - ta * ta / bend_sq) + (db - tb * tb / bend_sq))).max(0.0);
+        let x_sq = c_sq * h * h / (r * r);
+        let (ta, tb) = (dot(&ga, &self.c), dot(&gb, &self.c));
+        let t_sq = (ta + tb) * (ta + tb) / c_sq;
+        let distance_sq = (0.5 * ((da - ta * ta / c_sq) + (db - tb * tb / c_sq))).max(0.0);
         h / r * (0.25 * (r * r + t_sq) + distance_sq * atanh_over(x_sq))
     }
 }
@@ -262,7 +258,7 @@ fn atanh_over(x_sq: f64) -> f64 {
         let x = x_sq.sqrt();
         0.5 * ((1.0 + x) / (1.0 - x)).ln() / x
     } else {
-        // The tangent reverses: d² is 0 there.
+        // The tangent reverses, so d² is 0.
         0.0
     }
 }

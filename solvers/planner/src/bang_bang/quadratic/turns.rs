@@ -1,23 +1,23 @@
-//! Where the axes of a curved piece turn round, and the tangents there to the last digits.
+//! The turns of the axes of a quadratic piece, and the tangents there to the last digits.
 //!
-//! Next to a cusp several axes turn within a tiny stretch, where differences of places and of tangents keep no
-//! digits. All that is needed follows from W_jk = c_j q'_k − c_k q'_j, c = q'', constant along the piece: where
-//! axis a turns, q'_k = W_ak/c_a, and axis b turns −W_ab/(c_a c_b) after it.
+//! Next to a cusp several axes turn so close together that differences of t and of tangents keep no digits. The
+//! constants W_jk give all that is needed: where axis a turns, g_k = W_ak/c_a, and axis b turns −W_ab/(c_a c_b) after
+//! it.
 
 use super::piece::Piece;
 use crate::bang_bang::tolerance::CANCELLED;
 use feedplan_geometry::quadratic::dot;
 
-/// The start or end of a stretch: an axis that turns there, or the edge of the piece.
+/// An end of a monotone part: the axis that turns there, or the edge of the piece.
 pub type Mark = u8;
 pub const EDGE: Mark = 255;
 
-/// A part of a piece on which no axis turns.
-pub struct Stretch<const M: usize> {
+/// What lies between two neighbouring turns of a piece.
+pub struct MonotonePart<const M: usize> {
     pub begin: f64,
     pub end: f64,
     pub length: f64,
-    /// Its tangents as those of a piece; a tangent is exactly 0 where its axis turns.
+    /// Its tangents as those of a piece; exactly 0 for an axis that turns.
     pub piece: Piece<M>,
 }
 
@@ -46,7 +46,7 @@ fn rounding_error(a: f64, b: f64, rounded: f64) -> f64 {
 }
 
 impl<const M: usize> Piece<M> {
-    /// The axes that turn inside the piece, in order along it, and their number.
+    /// The axes that turn inside the piece, in order of t, and their number.
     pub fn turns(&self) -> ([Mark; M], usize) {
         let mut order = [EDGE; M];
         let mut count = 0;
@@ -54,46 +54,46 @@ impl<const M: usize> Piece<M> {
             if self.left[k] * self.right[k] >= 0.0 {
                 continue;
             }
-            let mut place = count;
-            while place > 0 && self.distance(order[place - 1] as usize, k) < 0.0 {
-                order[place] = order[place - 1];
-                place -= 1;
+            let mut index = count;
+            while index > 0 && self.distance(order[index - 1] as usize, k) < 0.0 {
+                order[index] = order[index - 1];
+                index -= 1;
             }
-            order[place] = k as Mark;
+            order[index] = k as Mark;
             count += 1;
         }
         (order, count)
     }
 
-    /// From the turn of axis a to the turn of axis b.
+    /// Distance in t from the turn of axis a to the turn of axis b.
     fn distance(&self, a: usize, b: usize) -> f64 {
-        let bend = |k: usize| self.right[k] - self.left[k];
-        -self.minors[a][b] / (bend(a) * bend(b))
+        let c = |k: usize| self.right[k] - self.left[k];
+        -self.wronskian[a][b] / (c(a) * c(b))
     }
 
     /// The tangent where axis a turns.
     fn tangent_at_turn(&self, a: usize) -> [f64; M] {
-        let bend = self.right[a] - self.left[a];
-        std::array::from_fn(|k| if k == a { 0.0 } else { self.minors[a][k] / bend })
+        let c = self.right[a] - self.left[a];
+        std::array::from_fn(|k| if k == a { 0.0 } else { self.wronskian[a][k] / c })
     }
 
-    /// The part between two marks that follow one another.
-    pub fn stretch(&self, from: Mark, to: Mark) -> Stretch<M> {
-        let place = |k: usize| self.left[k] / (self.left[k] - self.right[k]);
-        let place_from_right = |k: usize| self.right[k] / (self.right[k] - self.left[k]);
+    /// The monotone part between two neighbouring marks.
+    pub fn monotone_part(&self, from: Mark, to: Mark) -> MonotonePart<M> {
+        let turn_from_left = |k: usize| self.left[k] / (self.left[k] - self.right[k]);
+        let turn_from_right = |k: usize| self.right[k] / (self.right[k] - self.left[k]);
         let (a, b) = (from as usize, to as usize);
         let length = match (from, to) {
             (EDGE, EDGE) => 1.0,
-            (EDGE, _) => place(b),
-            (_, EDGE) => place_from_right(a),
+            (EDGE, _) => turn_from_left(b),
+            (_, EDGE) => turn_from_right(a),
             _ => self.distance(a, b),
         };
         let left = if from == EDGE { self.left } else { self.tangent_at_turn(a) };
         let right = if to == EDGE { self.right } else { self.tangent_at_turn(b) };
         let speed = [dot(&left, &left), dot(&left, &right), dot(&right, &right)];
-        Stretch {
-            begin: if from == EDGE { 0.0 } else { place(a) },
-            end: if to == EDGE { 1.0 } else { place(b) },
+        MonotonePart {
+            begin: if from == EDGE { 0.0 } else { turn_from_left(a) },
+            end: if to == EDGE { 1.0 } else { turn_from_left(b) },
             length,
             piece: Piece { left, right, speed, ..*self },
         }

@@ -1,22 +1,22 @@
-//! The phase of greatest acceleration: its control axis, and the event that ends it.
+//! The phase of greatest acceleration in a window: its control axis, and the switch that ends it (tests: table of
+//! `pass`).
 
-use super::{kept_until, Kind, Pass, Start, Stuck, MAX_HOPS};
-use crate::bang_bang::curve::window::Bound;
-use crate::bang_bang::tolerance::{AT_END, NEARLY_FLAT, NEARLY_ON_BOUND, TEST, TIE, WEAK_TIE};
+use super::{first_failure, Law, Pass, Start, Stuck, MAX_HOPS};
+use crate::bang_bang::curve::window::Ceiling;
+use crate::bang_bang::tolerance::{AT_END, NEARLY_FLAT, NEARLY_ON_CEILING, TEST, TIE, WEAK_TIE};
 use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
 
-/// What ends a phase.
-enum Event {
+/// What ends a phase: an axis at +A, an axis at −A⁻, the ceiling.
+enum Switch {
     Transition(usize),
     Low(usize),
-    Bound,
+    Ceiling,
 }
 
 impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
-    /// The control axis of greatest acceleration: the axis, s = π'/2, bits of the axes tied with it, and whether it
-    /// turns here.
-    pub(super) fn least(&self, start: &Start<M>) -> Option<(usize, f64, AxisBits, bool)> {
+    /// The control axis, s = π'/2, bits of the axes tied with it, and whether it turns here.
+    pub(super) fn control_axis(&self, start: &Start<M>) -> Option<(usize, f64, AxisBits, bool)> {
         let (mut s, mut rests) = ([f64::INFINITY; M], [0.0; M]);
         let mut turns = 0;
         for k in 0..M {
@@ -52,7 +52,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                 continue;
             }
             tied |= 1 << k;
-            // The tie goes to the axis whose acceleration would grow the most.
+            // Of tied axes the one whose s_k falls fastest takes control.
             let slope = if turning(k) {
                 f64::INFINITY
             } else {
@@ -71,26 +71,26 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         Some((j, s[j], tied, turning(j)))
     }
 
-    /// The control axis from a cusp: s is infinite, the tangents' leading coefficients decide.
-    fn least_from_cusp(&self) -> Option<(usize, AxisBits)> {
+    /// The control axis at a cusp, from the leading coefficients of the tangents, since s is infinite.
+    fn control_axis_at_cusp(&self) -> Option<(usize, AxisBits)> {
         let lead = |k: usize| self.window.g[k].coefficients()[self.order];
         let ratio = |k: usize| self.sub.limits.up[k] / lead(k);
         let least = self.moving().filter(|&k| lead(k) > 0.0).map(ratio).fold(f64::INFINITY, f64::min);
         let tied = |k: usize| lead(k) > 0.0 && ratio(k) <= least * (1.0 + TIE);
         let bits = self.moving().filter(|&k| tied(k)).fold(0, |bits, k| bits | 1 << k);
-        // Among tied axes an event at once tells which it is.
+        // Among tied axes a switch without a step will tell the right one.
         let j = self.control.filter(|&k| tied(k)).or_else(|| self.moving().find(|&k| tied(k)))?;
         Some((j, bits))
     }
 
-    /// Along a phase of greatest acceleration to the event that ends it.
-    pub(super) fn accelerate(&mut self, start: &Start<M>, on_bound: bool) -> Result<(), Stuck> {
+    /// Along a phase of greatest acceleration to the switch that ends it.
+    pub(super) fn accelerate(&mut self, start: &Start<M>, on_ceiling: bool) -> Result<(), Stuck> {
         let order = self.order;
         let (j, mut tied, turns) = if order > 0 {
-            let (j, tied) = self.least_from_cusp().ok_or(self.stuck())?;
+            let (j, tied) = self.control_axis_at_cusp().ok_or(self.stuck())?;
             (j, tied, false)
         } else {
-            let (j, _, tied, turns) = self.least(start).ok_or(self.stuck())?;
+            let (j, _, tied, turns) = self.control_axis(start).ok_or(self.stuck())?;
             (j, tied, turns)
         };
         tied = (tied | self.tied) & !(1 << j);
@@ -112,33 +112,33 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             0
         };
         let mut first = 1.0;
-        let mut event = None;
-        let mut found = |t: Option<f64>, what: Event| {
+        let mut switch = None;
+        let mut found = |t: Option<f64>, what: Switch| {
             if let Some(t) = t.filter(|&t| t < first) {
-                (first, event) = (t, Some(what));
+                (first, switch) = (t, Some(what));
             }
         };
         if !self.straight {
             for l in self.moving().filter(|&l| l != j) {
-                let [below_limit, above_limit] = self.has_to_spare(l, j, &w);
+                let [below_limit, above_limit] = self.surely_within_limits(l, j, &w);
                 if below_limit && above_limit {
                     continue;
                 }
-                let twist = window.g[l].wronskian(g);
+                let wronskian = window.g[l].wronskian(g);
                 let square = g.multiply(g);
                 let (cube, weighted) = (square.multiply(g), window.weight.multiply(&w));
-                let twist = weighted.multiply(&twist);
+                let wronskian = weighted.multiply(&wronskian);
                 let along = window.g[l].multiply(&square);
-                let need = along.combine(a[j], &twist, 1.0);
+                let need = along.combine(a[j], &wronskian, 1.0);
                 let size = |most: f64| {
-                    let twist = weighted.magnitude().multiply(&window.g[l].wronskian_magnitude(g));
-                    cube.combine(most, &along, a[j]).combine(TEST, &twist, TEST)
+                    let wronskian = weighted.magnitude().multiply(&window.g[l].wronskian_magnitude(g));
+                    cube.combine(most, &along, a[j]).combine(TEST, &wronskian, TEST)
                 };
                 let roots = known + usize::from(tied >> l & 1 == 1);
                 if !below_limit {
                     let above = cube.combine(a[l], &need, -1.0);
                     let slack = WEAK_TIE * a[l] * cube.first();
-                    found(kept_until(&above, || size(a[l]), roots, slack), Event::Transition(l));
+                    found(first_failure(&above, || size(a[l]), roots, slack), Switch::Transition(l));
                 }
                 if !above_limit {
                     let below = cube.combine(low[l], &need, 1.0);
@@ -149,54 +149,54 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                     } else {
                         1
                     };
-                    found(kept_until(&below, || size(low[l]), known + contact, 0.0), Event::Low(l));
+                    found(first_failure(&below, || size(low[l]), known + contact, 0.0), Switch::Low(l));
                 }
             }
         }
-        if on_bound || !self.stays_under(j, &w) {
-            found(self.gap(j, &w, turns, on_bound), Event::Bound);
+        if on_ceiling || !self.stays_below_ceiling(j, &w) {
+            found(self.first_crossing(j, &w, turns, on_ceiling), Switch::Ceiling);
         }
         if first > 1.0 - AT_END && first < 1.0 {
-            (first, event) = (1.0, None);
+            (first, switch) = (1.0, None);
         }
-        let Some(event) = event else {
-            self.push(1.0, Kind::Accelerating(j), Some(&w), slow_sq);
-            self.arrived();
+        let Some(switch) = switch else {
+            self.push(1.0, Law::Accelerating(j), Some(&w), slow_sq);
+            self.after_step();
             return Ok(());
         };
         if !self.is_step(first) {
-            return self.hop(event, j, on_bound);
+            return self.hop(switch, j, on_ceiling);
         }
-        let kind = match event {
-            Event::Bound => None,
+        let law = match switch {
+            Switch::Ceiling => None,
             _ => Some(&w),
         };
-        self.push(first, Kind::Accelerating(j), kind, slow_sq);
-        self.arrived();
-        match event {
-            Event::Transition(l) => (self.control, self.tied) = (Some(l), 1 << j),
-            Event::Low(l) => self.limit_curve = Some((j, l)),
-            Event::Bound => {}
+        self.push(first, Law::Accelerating(j), law, slow_sq);
+        self.after_step();
+        match switch {
+            Switch::Transition(l) => (self.control, self.tied) = (Some(l), 1 << j),
+            Switch::Low(l) => self.limit_curve = Some((j, l)),
+            Switch::Ceiling => {}
         }
         Ok(())
     }
 
-    /// Whether axis l stays below +A and above −A⁻ while axis j is at +A with w = v_j², told without a polynomial of its
-    /// own; forward nothing goes below −A⁻.
+    /// Whether axis l certainly stays below +A_l and above −A_l⁻ while axis j is at +A with w = v_j², without the
+    /// polynomials of the tests. Forward nothing falls below −A_l⁻.
     ///
-    /// Axis l has the acceleration (A_j g_l + π W)/g_j with W = g_l' g_j − g_l g_j', and its slope is
-    /// 3 W (A_j g_j² − w g_j')/g_j⁴ + w W'/g_j³. On a quadratic W and the bracket are constant: the ends tell. On other
-    /// polynomial pieces the Bernstein coefficients enclose the terms, with the greatest π that w allows.
-    fn has_to_spare(&self, l: usize, j: usize, w: &Polynomial<C>) -> [bool; 2] {
+    /// Axis l has the acceleration (A_j g_l + π W)/g_j with W = W_lj; its slope is 3 W (A_j g_j² − w c_j)/g_j⁴ + w
+    /// W'/g_j³. On a quadratic, W and the bracket are constant, so the ends decide. On other polynomial pieces the
+    /// Bernstein coefficients enclose the terms, with the greatest π that w allows.
+    fn surely_within_limits(&self, l: usize, j: usize, w: &Polynomial<C>) -> [bool; 2] {
         let (a, low, window) = (&self.sub.limits.up, &self.sub.limits.down, &self.window);
         let (g, other) = (&window.g[j], &window.g[l]);
         if window.weight.degree() > 0 {
             return [false, !BACK];
         }
         if g.degree() == 1 {
-            let twist = other.last() * g.first() - other.first() * g.last();
+            let wronskian = other.last() * g.first() - other.first() * g.last();
             let keeps = |g: f64, other: f64, w: f64| {
-                let (cube, turn) = (g * g * g, w * twist);
+                let (cube, turn) = (g * g * g, w * wronskian);
                 let need = a[j] * other * g * g + turn;
                 [a[l] * cube >= need, !BACK || low[l] * cube >= -need]
             };
@@ -213,46 +213,48 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         [g.combine(a[l], other, -a[j]).is_above(up), !BACK || g.combine(low[l], other, a[j]).is_above(down)]
     }
 
-    /// Whether no motion within the limits of the axes can reach the velocity cap: each axis gains no more speed on
-    /// its way than its acceleration limit allows.
-    pub(super) fn cap_is_far(&self) -> bool {
+    /// Whether no motion within the limits can reach the cap: 2 A_k times its distance limits the growth of v_k².
+    pub(super) fn cap_is_unreachable(&self) -> bool {
         let window = &self.window;
         let gain = |k: usize| 2.0 * self.sub.limits.up[k] * window.g[k].mean();
         if self.order > 0 || window.weight.degree() > 0 {
             return false;
         }
-        match &window.bound {
-            Bound::Speed(f) if self.sub.own_speed => {
+        match &window.ceiling {
+            Ceiling::Speed(f) if self.sub.own_speed => {
                 let most = self.pi * window.speed.first() + (0..M).map(gain).sum::<f64>();
                 most < f.range().0
             }
-            Bound::Axis(k, v_sq) => self.pi * window.g[*k].first().powi(2) + gain(*k) < *v_sq,
+            Ceiling::Axis(k, v_sq) => self.pi * window.g[*k].first().powi(2) + gain(*k) < *v_sq,
             _ => false,
         }
     }
 
-    /// Whether the phase of axis j with w = ω v_j² stays under the bound for sure, as long as all axes keep their limits.
-    fn stays_under(&self, j: usize, w: &Polynomial<C>) -> bool {
+    /// Whether the phase of axis j with w = ω v_j² certainly stays below the ceiling while all axes keep their
+    /// limits.
+    fn stays_below_ceiling(&self, j: usize, w: &Polynomial<C>) -> bool {
         let g = &self.window.g;
-        match &self.window.bound {
-            Bound::Speed(_) | Bound::Axis(..) => self.cap_is_far(),
-            // No motion that keeps the limits leaves this phase downward once it has met it: the ends tell.
-            Bound::Phase(k, bound) => w.last() * g[*k].last().powi(2) < bound.last() * g[j].last().powi(2),
-            Bound::LimitCurve => true,
+        match &self.window.ceiling {
+            Ceiling::Speed(_) | Ceiling::Axis(..) => self.cap_is_unreachable(),
+            // No motion within the limits leaves a phase of K downward after meeting it, so the ends decide.
+            Ceiling::Phase(k, ceiling) => {
+                w.last() * g[*k].last().powi(2) < ceiling.last() * g[j].last().powi(2)
+            }
+            Ceiling::LimitCurve => true,
         }
     }
 
-    /// An event at the very start of a phase.
-    fn hop(&mut self, event: Event, j: usize, on_bound: bool) -> Result<(), Stuck> {
+    /// A switch at the start of a phase, without a step.
+    fn hop(&mut self, switch: Switch, j: usize, on_ceiling: bool) -> Result<(), Stuck> {
         self.hops += 1;
         if self.hops > MAX_HOPS {
             return Err(self.stuck());
         }
-        match event {
-            // Whether the two are tied shows in their accelerations.
-            Event::Transition(l) => {
+        match switch {
+            // Their accelerations will show whether the two are tied.
+            Switch::Transition(l) => {
                 (self.control, self.tied) = (Some(l), 0);
-                // An axis that turns here cannot show it while π grows to what it allows at once.
+                // An axis that turns here cannot show it while π reaches its limit within a step too short to count.
                 let g = &self.window.g[l];
                 let weight = self.window.weight.first();
                 let flat = self.sub.limits.up[l] / (g.first_slope() * weight * weight);
@@ -261,18 +263,18 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                     self.pi = flat;
                 }
             }
-            Event::Low(l) => {
+            Switch::Low(l) => {
                 self.limit_curve = Some((j, l));
                 self.low = None;
             }
-            Event::Bound => {
-                if !on_bound {
-                    // So near that the phase meets it at once.
-                    let bound = self.window.bound_at_start();
-                    if self.order > 0 || self.pi < bound * (1.0 - NEARLY_ON_BOUND) {
+            Switch::Ceiling => {
+                if !on_ceiling {
+                    // The phase meets the ceiling at once.
+                    let ceiling = self.window.ceiling_at_start();
+                    if self.order > 0 || self.pi < ceiling * (1.0 - NEARLY_ON_CEILING) {
                         return Err(self.stuck());
                     }
-                    self.pi = bound;
+                    self.pi = ceiling;
                 }
                 self.leaving = false;
                 self.control = None;
@@ -284,22 +286,22 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         Ok(())
     }
 
-    /// After a step along a phase.
-    pub(super) fn arrived(&mut self) {
+    /// Forgets the contacts at the start of a step.
+    pub(super) fn after_step(&mut self) {
         (self.hops, self.control, self.tied, self.low) = (0, None, 0, None);
         (self.tangent, self.leaving) = (false, false);
     }
 
-    /// Where the phase of axis j with w = ω v_j² rises above the bound.
-    fn gap(&self, j: usize, w: &Polynomial<C>, turns: bool, on_bound: bool) -> Option<f64> {
+    /// Where the phase of axis j with w = ω v_j² rises above the ceiling.
+    fn first_crossing(&self, j: usize, w: &Polynomial<C>, turns: bool, on_ceiling: bool) -> Option<f64> {
         let window = &self.window;
         let square = || window.g[j].multiply(&window.g[j]);
         let weight = &window.weight;
-        let (limit, used, mut known) = match &window.bound {
-            Bound::Axis(k, v_sq) if *k == j => (weight.scale(*v_sq), *w, 0),
-            Bound::Phase(k, bound) if *k == j => (*bound, *w, 0),
-            Bound::Phase(k, bound) => {
-                (bound.multiply(&square()), w.multiply(&window.g[*k].multiply(&window.g[*k])), 2)
+        let (limit, used, mut known) = match &window.ceiling {
+            Ceiling::Axis(k, v_sq) if *k == j => (weight.scale(*v_sq), *w, 0),
+            Ceiling::Phase(k, ceiling) if *k == j => (*ceiling, *w, 0),
+            Ceiling::Phase(k, ceiling) => {
+                (ceiling.multiply(&square()), w.multiply(&window.g[*k].multiply(&window.g[*k])), 2)
             }
             _ => {
                 let (n, d) = window.quotient()?;
@@ -317,12 +319,12 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         } else {
             0
         };
-        if on_bound {
+        if on_ceiling {
             known += if self.tangent && self.leaving && !same { 2 } else { 1 };
         }
-        let gap = limit.combine(1.0, &used, -1.0);
+        let margin = limit.combine(1.0, &used, -1.0);
         let size = || limit.combine(0.1 * TEST, &used, 0.1 * TEST);
-        let slack = if on_bound && self.leaving { f64::INFINITY } else { 0.0 };
-        kept_until(&gap, size, known, slack)
+        let slack = if on_ceiling && self.leaving { f64::INFINITY } else { 0.0 };
+        first_failure(&margin, size, known, slack)
     }
 }

@@ -1,15 +1,15 @@
-//! Along the velocity limit curve, backward: two axes at their limits, one up and one down.
+//! Along the limit curve, backward only: one axis at +A, one at −A⁻ (tests: table of `pass`).
 
-use super::{kept_until, Kind, Pass};
-use crate::bang_bang::tolerance::{AT_END, ON_BOUND, TEST};
+use super::{first_failure, Law, Pass};
+use crate::bang_bang::tolerance::{AT_END, ON_CEILING, TEST};
 use feedplan_geometry::polynomial::Polynomial;
 
-/// Why the limit curve is left.
+/// Why the limit curve is left: a tangency, another pair of axes, the ceiling.
 #[derive(Clone, Copy)]
 enum Leave {
     Tangent,
     Pair(usize, usize),
-    Bound,
+    Ceiling,
 }
 
 impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
@@ -19,7 +19,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         (g[l].combine(limits.up[j], &g[j], limits.down[l]), g[j].wronskian(&g[l]))
     }
 
-    /// Along the limit curve while no phase would leave it downward; says whether it moved.
+    /// Along the limit curve while no phase would leave it downward; returns whether that was a step.
     pub(super) fn follow_limit_curve(&mut self, (j, l): (usize, usize)) -> bool {
         let window = &self.window;
         let (up, down) = (&self.sub.limits.up, &self.sub.limits.down);
@@ -28,7 +28,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         let size = window.g[j].wronskian_magnitude(&window.g[l]);
         let weight = &window.weight;
         let mut first = 1.0;
-        let mut event = None;
+        let mut switch = None;
         {
             let mut leave = weight.multiply(&n.multiply(&w_slope).combine(1.0, &n_slope.multiply(&w), -3.0));
             if weight.degree() > 0 {
@@ -42,8 +42,8 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                 );
                 weight.multiply(&terms)
             };
-            if let Some(t) = kept_until(&leave, terms, 0, 0.0) {
-                (first, event) = (t, Some(Leave::Tangent));
+            if let Some(t) = first_failure(&leave, terms, 0, 0.0) {
+                (first, switch) = (t, Some(Leave::Tangent));
             }
         }
         for i in self.moving().filter(|&i| i != j && i != l) {
@@ -59,29 +59,29 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             };
             for (most, sign, what) in [(up[i], -1.0, Leave::Pair(i, l)), (down[i], 1.0, Leave::Pair(j, i))] {
                 let inside = w.combine(most, &need, sign);
-                if let Some(t) = kept_until(&inside, || terms(most), 0, 0.0) {
+                if let Some(t) = first_failure(&inside, || terms(most), 0, 0.0) {
                     if t < first {
-                        (first, event) = (t, Some(what));
+                        (first, switch) = (t, Some(what));
                     }
                 }
             }
         }
-        if let Some((bound, d)) = window.quotient().filter(|_| !self.cap_is_far()) {
-            if bound.first().is_finite() {
+        if let Some((ceiling, d)) = window.quotient().filter(|_| !self.cap_is_unreachable()) {
+            if ceiling.first().is_finite() {
                 let used = n.multiply(&d);
-                let limit = bound.multiply(&weight.multiply(weight)).multiply(&w);
-                let gap = limit.combine(1.0, &used, -1.0);
-                let on = self.pi >= window.bound_at_start() * (1.0 - ON_BOUND);
+                let limit = ceiling.multiply(&weight.multiply(weight)).multiply(&w);
+                let margin = limit.combine(1.0, &used, -1.0);
+                let on = self.pi >= window.ceiling_at_start() * (1.0 - ON_CEILING);
                 let slack = if on { f64::INFINITY } else { 0.0 };
-                if let Some(t) = kept_until(&gap, || used.magnitude().scale(0.1 * TEST), 0, slack) {
+                if let Some(t) = first_failure(&margin, || used.magnitude().scale(0.1 * TEST), 0, slack) {
                     if t < first {
-                        (first, event) = (t, Some(Leave::Bound));
+                        (first, switch) = (t, Some(Leave::Ceiling));
                     }
                 }
             }
         }
         if first > 1.0 - AT_END && first < 1.0 {
-            (first, event) = (1.0, None);
+            (first, switch) = (1.0, None);
         }
         let moved = self.is_step(first);
         if moved {
@@ -96,10 +96,10 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                     }
                 }
             }
-            self.push(first, Kind::LimitCurve, None, 0.0);
-            // π at the end is that of the limit curve, or of the bound where that is met.
+            self.push(first, Law::LimitCurve, None, 0.0);
+            // π at the end is that of the limit curve, or of the ceiling if that is met.
             if let Some(phase) = self.out.last_mut() {
-                if !matches!(event, Some(Leave::Bound)) {
+                if !matches!(switch, Some(Leave::Ceiling)) {
                     end = end.min(phase.pi[1]);
                     phase.pi[1] = end;
                     self.pi = if first == 1.0 { end } else { end / self.window.length().powi(2) };
@@ -109,7 +109,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         } else {
             self.hops += 1;
         }
-        match event {
+        match switch {
             None => {}
             Some(Leave::Tangent) => {
                 (self.control, self.low) = (Some(j), Some(l));
@@ -123,7 +123,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                     (self.control, self.low) = (Some(j), Some(l));
                 }
             }
-            Some(Leave::Bound) => self.pi = self.window.bound_at_start(),
+            Some(Leave::Ceiling) => self.pi = self.window.ceiling_at_start(),
         }
         moved
     }

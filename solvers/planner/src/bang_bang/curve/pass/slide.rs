@@ -1,30 +1,31 @@
-//! Along the bound: a phase of the backward pass to its end, the velocity cap while no axis needs more than it has.
+//! Along the ceiling: a phase of K to its end, or the cap while no axis needs more than its acceleration (tests:
+//! table of `pass`).
 
-use super::{kept_until, Kind, Pass};
+use super::{first_failure, Law, Pass};
 use crate::bang_bang::curve::part::Cap;
-use crate::bang_bang::curve::window::Bound;
+use crate::bang_bang::curve::window::Ceiling;
 use crate::bang_bang::tolerance::TEST;
 use feedplan_geometry::polynomial::Polynomial;
 
 impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
-    /// From a place on the bound: along it as far as possible; says whether that moved or led to the limit curve.
-    pub(super) fn follow_bound(&mut self) -> bool {
-        let (end, saturated, pair) = match &self.window.bound {
-            // Any other motion under a phase of the backward pass meets it again later.
-            Bound::Phase(k, w) => {
+    /// Follows the ceiling as far as possible; returns whether that was a step or led to the limit curve.
+    pub(super) fn follow_ceiling(&mut self) -> bool {
+        let (end, saturated, pair) = match &self.window.ceiling {
+            // Any other motion under a phase of K meets it again later.
+            Ceiling::Phase(k, w) => {
                 let k = *k;
                 let slow_sq = (w.last() / self.window.weight.last()).max(0.0);
-                self.push(1.0, Kind::Braking(k), None, slow_sq);
-                self.arrived();
+                self.push(1.0, Law::Braking(k), None, slow_sq);
+                self.after_step();
                 return true;
             }
-            Bound::LimitCurve => return false,
-            Bound::Speed(f) => self.slide_at_speed(f),
-            Bound::Axis(k, v_sq) => self.slide_at_axis_speed(*k, *v_sq),
+            Ceiling::LimitCurve => return false,
+            Ceiling::Speed(f) => self.slide_at_speed(f),
+            Ceiling::Axis(k, v_sq) => self.slide_at_axis_speed(*k, *v_sq),
         };
         let moved = self.is_step(end);
         if moved {
-            self.push(end, Kind::Cap, None, 0.0);
+            self.push(end, Law::Cap, None, 0.0);
             self.hops = 0;
             self.control = None;
             self.tied = 0;
@@ -42,7 +43,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         self.leaving = true;
         self.control = saturated;
         self.tangent = saturated.is_some() && moved;
-        // The state is on the bound still: the phase that leaves it follows at once.
+        // Without a step the state is still on the ceiling; the phase that leaves it follows.
         moved
     }
 
@@ -54,7 +55,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         let window = &self.window;
         let d = &window.speed;
         let constant = f.degree() == 0 && window.weight.degree() == 0 && self.sub.own_speed;
-        if constant && self.bends_little(f.first()) {
+        if constant && self.curvature_is_low(f.first()) {
             return (1.0, None, None);
         }
         let (d_slope, d_sq) = (d.derivative(), d.multiply(d));
@@ -81,21 +82,21 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         self.slide(&d_sq, &need, &size)
     }
 
-    /// Whether v²/ρ = v² |g × g'|/D^1.5 stays below the least acceleration limit.
-    fn bends_little(&self, speed_sq: f64) -> bool {
+    /// Whether v²/ρ = v² |g × c|/D^1.5 is below the least acceleration limit.
+    fn curvature_is_low(&self, speed_sq: f64) -> bool {
         let g = &self.window.g;
-        let mut twist_sq = 0.0;
+        let mut cross_sq = 0.0;
         for j in 0..M {
             for k in 0..j {
                 let w = g[j].wronskian(&g[k]);
                 let most = (0..=w.degree()).fold(0.0_f64, |most, i| most.max(w.bernstein(i).abs()));
-                twist_sq += most * most;
+                cross_sq += most * most;
             }
         }
         let least = self.window.speed.range().0.max(0.0);
         let limits = &self.sub.limits;
         let limit = limits.up.iter().chain(&limits.down).fold(f64::INFINITY, |least, &a| least.min(a));
-        speed_sq * twist_sq.sqrt() <= limit * least * least.sqrt()
+        speed_sq * cross_sq.sqrt() <= limit * least * least.sqrt()
     }
 
     fn slide_at_axis_speed(&self, k: usize, v_sq: f64) -> (f64, Option<usize>, Option<(usize, usize)>) {
@@ -108,8 +109,9 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         })
     }
 
-    /// How far the velocity cap can be followed: axis l has the acceleration `need`(l)/x, with terms of the size
-    /// `size`(l); the axis that saturates, and the axes of the limit curve where that falls below the cap.
+    /// How far the cap can be followed, where axis l has the acceleration `need`(l)/x with terms of magnitude
+    /// `size`(l). Also returns the axis that reaches its limit, or the axes of the limit curve where that falls below
+    /// the cap.
     fn slide(
         &self,
         x: &Polynomial<C>,
@@ -119,14 +121,14 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         let mut end = 1.0;
         let mut saturated = None;
         let mut low = false;
-        if self.straight && matches!(self.window.bound, Bound::Axis(..)) {
+        if self.straight && matches!(self.window.ceiling, Ceiling::Axis(..)) {
             return (end, None, None);
         }
         for l in self.moving() {
             let y = need(l);
             let (a, low_limit) = (self.sub.limits.up[l], self.sub.limits.down[l]);
             let inside = x.combine(a, &y, -1.0);
-            if let Some(t) = kept_until(&inside, || x.combine(TEST * a, &size(l), TEST), 0, 0.0) {
+            if let Some(t) = first_failure(&inside, || x.combine(TEST * a, &size(l), TEST), 0, 0.0) {
                 if t < end {
                     (end, saturated) = (t, Some(l));
                 }
@@ -145,7 +147,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                     }
                     let over = over.multiply(&d);
                     let above = over.combine(1.0, &n.multiply(&weight_sq).multiply(&under), -1.0);
-                    if let Some(t) = kept_until(&above, || over.magnitude().scale(TEST), 0, 0.0) {
+                    if let Some(t) = first_failure(&above, || over.magnitude().scale(TEST), 0, 0.0) {
                         if t < end {
                             (end, saturated, pair) = (t, None, Some((j, l)));
                         }

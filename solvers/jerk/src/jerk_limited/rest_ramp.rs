@@ -1,0 +1,219 @@
+//! The ramp from rest, or to rest: constant jerk along the path, w = c s^(4/3) with the distance s [mm] from rest. Its
+//! length follows from the derivatives and limits at the end of the path, the greatest c from all points of the ramp.
+
+use std::ops::Range;
+
+use super::{Geometry, Limits, PathPoint, SpeedCap};
+use feedplan_planner::problem::lesser;
+
+/// The length of a ramp, as a part of the length on which constant jerk reaches the acceleration or the speed …
+const RAMP: f64 = 1.0 / 90.0;
+/// … and its range, in parts of the path: the rounding of s would leave no digits on a shorter one.
+const PARTS: [f64; 2] = [SHORTEST, 1.0 / 400.0];
+pub const SHORTEST: f64 = 1e-11;
+/// Points of a piece under a ramp, equal in time, are halved with this range of depths …
+const DEPTH: Range<u32> = 4..40;
+/// … where ln c changes by more than `CHANGE` between them, and they are further apart than `APART` of their time.
+const CHANGE: f64 = 0.05;
+const APART: f64 = 1e-5;
+/// Number of octaves of time in which points begin near rest: the path may turn within any length there.
+const OCTAVES: i32 = 12;
+/// Points between the neighbours of the worst point, and rounds of this refinement.
+const SAMPLES: usize = 16;
+const ROUNDS: usize = 2;
+
+/// The length of a ramp, in mm, from the derivatives and the speed cap at the end of the path and the path's length.
+///
+/// It is rounded to a distance that the arc length can express: the slope at the ramp's station is 4/3 w over the
+/// ramp's length, which a rounded station would change.
+pub fn length<const M: usize>(limits: &Limits<M>, point: &PathPoint<M>, path: f64) -> f64 {
+    let [least, most] = PARTS.map(|part| part * path);
+    let along = |limit: &[f64; M]| {
+        (0..M).map(|k| limit[k] / point.first[k].abs().max(f64::MIN_POSITIVE)).fold(f64::INFINITY, f64::min)
+    };
+    let [v, a] = [&limits.velocity, &limits.acceleration].map(|limit| along(&lesser(limit)));
+    let (v, j) = (v.min(point.speed_cap), along(&limits.jerk));
+    let by_acceleration = a * a * a / (6.0 * j * j);
+    let by_speed = (8.0 * v * v * v / j).sqrt() / 6.0;
+    let ramp = most.min(RAMP * by_acceleration.min(by_speed));
+    path - (path - ramp.max(least))
+}
+
+/// The greatest w at the end of a ramp of this length; `end` is 0 at the start of the path and 1 at its end.
+pub fn greatest<const M: usize>(
+    geometry: &impl Geometry<M>,
+    limits: &Limits<M>,
+    caps: &[SpeedCap],
+    ramp: f64,
+    end: usize,
+) -> f64 {
+    let knots = geometry.knots();
+    let total = knots[knots.len() - 1];
+    let sign = if end == 0 { 1.0 } else { -1.0 };
+    let from_rest = |cap: &SpeedCap| if end == 0 { cap.s } else { total - cap.s };
+    let share = |cap: &SpeedCap| if from_rest(cap) - cap.reach < ramp { cap.share } else { 0.0 };
+    let jerk_part = 1.0 - caps.iter().map(share).fold(0.0, f64::max);
+    let mut c = f64::INFINITY;
+    for piece in 0..knots.len() - 1 {
+        let (start, stop) = if end == 0 {
+            (knots[piece], knots[piece + 1].min(ramp))
+        } else {
+            (knots[piece].max(total - ramp), knots[piece + 1])
+        };
+        if start >= stop {
+            continue;
+        }
+        // The greatest c at a time t, in units where the distance from rest is t³.
+        let at = |t: f64| {
+            let x = t * t * t;
+            let point = geometry.at(piece, if end == 0 { x } else { total - x });
+            // w/c, w'/c; then w^(3/2), √w w' and √w w'', all over c^(3/2).
+            let (w, w1) = (x * t, sign * 4.0 / 3.0 * t);
+            let (cubed, crossed, bend) = (x * x, sign * 4.0 / 3.0 * x, 4.0 / 9.0);
+            let mut c = 1.0 / (limits.per_speed_sq(&point) * w);
+            for k in 0..M {
+                let (q1, q2, q3) = (point.first[k], point.second[k], point.third[k]);
+                let a = q2 * w + 0.5 * q1 * w1;
+                let most = limits.acceleration[usize::from(a < 0.0)][k];
+                let j = (q3 * cubed + 1.5 * q2 * crossed + 0.5 * q1 * bend).abs();
+                c = c.min(most / a.abs()).min((jerk_part * limits.jerk[k] / j).cbrt().powi(2));
+            }
+            (t, c)
+        };
+        let distances = if end == 0 { [start, stop] } else { [total - stop, total - start] };
+        let [first, last] = distances.map(f64::cbrt);
+        let mut points = vec![at(first)];
+        let octaves = if first == 0.0 { -OCTAVES..=0 } else { 0..=0 };
+        for octave in octaves {
+            let from = points[points.len() - 1];
+            halve(&at, [from, at(last * 2f64.powi(octave))], 0, &mut points);
+        }
+        for _ in 0..=ROUNDS {
+            let worst = (0..points.len()).fold(0, |i, j| if points[j].1 < points[i].1 { j } else { i });
+            c = c.min(points[worst].1);
+            // c may be less between the worst point and its neighbours.
+            let beside = [worst.saturating_sub(1), (worst + 1).min(points.len() - 1)].map(|i| points[i].0);
+            let point = |i: usize| beside[0] + (beside[1] - beside[0]) * i as f64 / SAMPLES as f64;
+            points = (0..=SAMPLES).map(|i| at(point(i))).collect();
+        }
+    }
+    for cap in caps {
+        let x = from_rest(cap);
+        if x <= ramp {
+            c = c.min(cap.speed * cap.speed / (x * x.cbrt()));
+        }
+    }
+    c * ramp * ramp.cbrt() * (1.0 - 1e-9)
+}
+
+/// Appends points (t, greatest c) from the first to the second of a pair.
+fn halve(at: &impl Fn(f64) -> (f64, f64), [a, b]: [(f64, f64); 2], depth: u32, points: &mut Vec<(f64, f64)>) {
+    let middle = at(0.5 * (a.0 + b.0));
+    let changes = (middle.1 * middle.1 / (a.1 * b.1)).ln().abs() > CHANGE && b.0 - a.0 > APART * b.0;
+    if depth < DEPTH.start || (changes && depth < DEPTH.end) {
+        halve(at, [a, middle], depth + 1, points);
+        halve(at, [middle, b], depth + 1, points);
+    } else {
+        points.extend([middle, b]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Circle {
+        curvature: f64,
+    }
+
+    impl Geometry<2> for Circle {
+        fn knots(&self) -> &[f64] {
+            &[0.0, 100.0]
+        }
+
+        fn at(&self, _: usize, s: f64) -> PathPoint<2> {
+            let k = self.curvature;
+            let (y, x) = (k * s).sin_cos();
+            let (first, second) = ([x, y], [-k * y, k * x]);
+            PathPoint { first, second, third: [-k * k * x, -k * k * y], speed_cap: f64::INFINITY }
+        }
+    }
+
+    const LIMITS: Limits<2> =
+        Limits { velocity: [[100.0; 2]; 2], acceleration: [[1000.0; 2]; 2], jerk: [50_000.0; 2] };
+
+    #[test]
+    fn on_a_line_jerk_is_used_fully() {
+        // s = J t³/6 and v = J t²/2: v = (9 J s²/2)^(1/3).
+        let w = greatest(&Circle { curvature: 0.0 }, &LIMITS, &[], 0.01, 0);
+        let expected = (4.5 * 50_000.0 * 1e-4f64).powf(2.0 / 3.0);
+        assert!((w / expected - 1.0).abs() < 1e-6, "{w} and {expected}");
+        assert_eq!(w, greatest(&Circle { curvature: 0.0 }, &LIMITS, &[], 0.01, 1));
+    }
+
+    /// A line that turns at its start within this length, by the angle arctan(s/length).
+    struct Turn(f64);
+
+    impl Geometry<2> for Turn {
+        fn knots(&self) -> &[f64] {
+            &[0.0, 100.0]
+        }
+
+        fn at(&self, _: usize, s: f64) -> PathPoint<2> {
+            let (x, per) = (s / self.0, 1.0 / self.0);
+            let (sin, cos) = x.atan().sin_cos();
+            let (k, dk) = (per * cos * cos, -2.0 * per * per * x * cos.powi(4));
+            let (first, second) = ([cos, sin], [-k * sin, k * cos]);
+            let third = [-dk * sin - k * k * cos, dk * cos - k * k * sin];
+            PathPoint { first, second, third, speed_cap: f64::INFINITY }
+        }
+    }
+
+    #[test]
+    fn a_turn_of_any_length_lowers_the_ramp_alike() {
+        // The jerk of a ramp depends only on the ratio of the lengths of turn and ramp.
+        let line = greatest(&Circle { curvature: 0.0 }, &LIMITS, &[], 0.01, 0);
+        for i in 0..80 {
+            let length = 1e-3 * 10f64.powf(-0.1 * i as f64);
+            let ramp = greatest(&Turn(length), &LIMITS, &[], 0.01, 0) / line;
+            assert!((ramp - 0.5).abs() < 0.02, "{ramp} beside a turn of {length} mm");
+        }
+    }
+
+    #[test]
+    fn curvature_and_caps_lower_the_ramp() {
+        let line = greatest(&Circle { curvature: 0.0 }, &LIMITS, &[], 0.01, 0);
+        let circle = greatest(&Circle { curvature: 100.0 }, &LIMITS, &[], 0.01, 0);
+        assert!(circle < line, "{circle} and {line}");
+        let cap = [SpeedCap::new(0.01, 0.5)];
+        let capped = greatest(&Circle { curvature: 0.0 }, &LIMITS, &cap, 0.01, 0);
+        assert!((capped - 0.25).abs() < 1e-6, "{capped}");
+    }
+
+    /// A point on a line along the first axis.
+    fn line(speed_cap: f64) -> PathPoint<2> {
+        PathPoint { first: [1.0, 0.0], second: [0.0; 2], third: [0.0; 2], speed_cap }
+    }
+
+    #[test]
+    fn ramps_are_short_on_the_scale_of_the_limits_and_of_the_path() {
+        // A³/(6 J²) = 1/15 mm is the shorter length to a limit.
+        assert!((length(&LIMITS, &line(f64::INFINITY), 100.0) - 1.0 / 15.0 / 90.0).abs() < 1e-12);
+        assert!((length(&LIMITS, &line(f64::INFINITY), 0.1) - 0.1 / 400.0).abs() < 1e-16);
+        // Constant jerk reaches 0.01 mm/s within √(8 · 1e-6/50000)/6 mm.
+        let slow = length(&LIMITS, &line(0.01), 100.0) * 90.0 * 6.0;
+        assert!((slow / (8e-6f64 / 50_000.0).sqrt() - 1.0).abs() < 1e-6);
+        let jerk = Limits { jerk: [1e12; 2], ..LIMITS };
+        assert!((length(&jerk, &line(f64::INFINITY), 0.1) - 1e-12).abs() < 1e-16);
+    }
+
+    #[test]
+    fn a_ramp_is_as_long_as_its_station_is_from_the_end_of_the_path() {
+        for i in 0..60 {
+            let path = 10f64.powf(0.1 * i as f64);
+            let ramp = length(&LIMITS, &line(f64::INFINITY), path);
+            let station = path - ramp;
+            assert_eq!(path - station, ramp, "on {path} mm");
+        }
+    }
+}

@@ -1,0 +1,218 @@
+//! One window solved to its optimum within all limits: the interior-point method at the collocation points, the check
+//! between them, and tighter limits on the intervals where the check shows an excess.
+
+use super::constraints::Constraints;
+use super::exact::Exact;
+use super::hermite::duration;
+use super::interior_point::{Effort, InteriorPoint, Outcome, Report, WindowEnd};
+use super::intersample_check::IntersampleCheck;
+
+/// Greatest use of a limit that counts as kept: rounding, and the error of peaks between samples.
+pub const HELD: f64 = 1.0 + 4e-7;
+/// Limits are tightened by the excess plus a margin: this part of the excess, and at least this part of the limit.
+/// Greater margins would make kinks beside intervals that are not tightened.
+const MARGIN: [f64; 2] = [0.1, 1e-6];
+/// The margin of an interval grows by this factor each time, as a peak may follow slowly.
+const RISE: f64 = 4.0;
+/// Rounds of tightening.
+const ROUNDS: usize = 10;
+/// Complementarity gap at which the first round ends. Where an interval then uses more than the second number of a
+/// limit at its collocation points, peaks exceed these points by about as much as in the final plan.
+const ROUGH: (f64, f64) = (1e-4, 0.97);
+/// Peaks that exceed the collocation points by more than this factor still move.
+const FIRM: f64 = 1.05;
+/// Parts of the way back to the first plan that are tried in order to be inside tightened limits …
+const BACK: [f64; 13] = [3e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3];
+/// … and the factor by which the start is farther back, so that it is not on a limit.
+const FURTHER: f64 = 2.0;
+/// The first barrier there, as a part of the way back.
+const BARRIER: f64 = 0.03;
+/// Parts of the way back to the former plan that are tried where the new plan breaks a limit.
+const RETREATS: [f64; 11] = [1e-6, 3e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.05, 0.15, 0.4, 0.7, 0.9];
+/// A retreat that costs at most this multiple of the tolerance is as good as the plan.
+const CHEAP: f64 = 10.0;
+
+/// The constraints on a range of intervals, and the check between their collocation points.
+#[derive(Clone, Debug)]
+pub struct Window<const M: usize> {
+    pub rows: Constraints<M>,
+    pub check: IntersampleCheck<M>,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+pub struct WindowReport {
+    /// Whether the optimum was reached, to the tolerance.
+    pub converged: bool,
+    /// Estimate of the time above the least time on the grid, in s, by the complementarity that the multipliers leave.
+    pub excess: f64,
+    pub iterations: usize,
+}
+
+impl<const M: usize> Window<M> {
+    /// Improves the valid plan x in place.
+    pub fn improve(
+        &mut self,
+        ends: [WindowEnd; 2],
+        x: &mut [f64],
+        effort: &Effort,
+        space: &mut InteriorPoint<Exact, M>,
+    ) -> WindowReport {
+        self.rows.drop_at_ends(&ends);
+        let mut verdict = WindowReport { excess: self.time(&ends, x), ..WindowReport::default() };
+        let (mut best, mut improved) = (f64::INFINITY, x.to_vec());
+        let rough = Effort { tolerance: effort.tolerance.max(ROUGH.0), ..*effort };
+        let mut attempts = vec![(x.to_vec(), rough)];
+        let mut times = vec![0; self.rows.intervals.len()];
+        for round in 0..ROUNDS {
+            let Some((y, report)) = self.attempt(ends, attempts, space, &mut verdict.iterations) else {
+                break;
+            };
+            let holds = self.tighten(&y, &mut times, round == 0);
+            let stopped = report.outcome == Outcome::Stopped;
+            if holds && (round > 0 || stopped) {
+                if report.time < best {
+                    improved = y;
+                    verdict.excess = report.excess;
+                }
+                verdict.converged = !stopped;
+                break;
+            }
+            // A fallback: as far towards this plan as the limits allow.
+            if let Some((z, time)) = self.retreat(&ends, x, &y) {
+                if time < best {
+                    best = time;
+                    improved.copy_from_slice(&z);
+                    verdict.excess = report.excess + (time - report.time);
+                }
+                verdict.converged =
+                    !stopped && round > 0 && time <= report.time * (1.0 + CHEAP * effort.tolerance);
+            }
+            if stopped || verdict.converged {
+                break;
+            }
+            attempts = self.starts(&ends, x, &y, effort);
+        }
+        x.copy_from_slice(&improved);
+        verdict
+    }
+
+    /// Solves from the first start that leads to a plan; `spent` counts the iterations of all.
+    fn attempt(
+        &self,
+        ends: [WindowEnd; 2],
+        starts: Vec<(Vec<f64>, Effort<'_>)>,
+        space: &mut InteriorPoint<Exact, M>,
+        spent: &mut usize,
+    ) -> Option<(Vec<f64>, Report)> {
+        for (mut y, mut effort) in starts {
+            effort.max_iterations = effort.max_iterations.saturating_sub(*spent);
+            let report = space.solve(&self.rows, ends, &mut y, &effort);
+            *spent += report.iterations;
+            if !matches!(report.outcome, Outcome::NotInside | Outcome::Missed) {
+                return Some((y, report));
+            }
+        }
+        None
+    }
+
+    /// Starts inside the tightened limits, on the ways back from the last plan y, the nearest to y first.
+    fn starts<'e>(
+        &self,
+        ends: &[WindowEnd; 2],
+        x: &[f64],
+        y: &[f64],
+        effort: &Effort<'e>,
+    ) -> Vec<(Vec<f64>, Effort<'e>)> {
+        let inside = |z: &[f64]| {
+            (0..self.rows.intervals.len()).all(|n| self.rows.utilisation(z, n).iter().all(|&used| used < 1.0))
+        };
+        let ways = ways_back(ends, x);
+        let is_near = |part: f64| ways.iter().find(|way| inside(&blend(way, y, part)));
+        let near = BACK.into_iter().find_map(|part| Some((part, is_near(part)?)));
+        let Some((least, way)) = near else { return vec![] };
+        BACK.into_iter()
+            .filter(|&part| part >= least)
+            .map(|part| {
+                let start = Effort { barrier: BARRIER * part, warm: true, ..*effort };
+                (blend(way, y, FURTHER * part), start)
+            })
+            .collect()
+    }
+
+    /// The spline nearest to y on a way back that holds all limits, and its time in s.
+    fn retreat(&self, ends: &[WindowEnd; 2], x: &[f64], y: &[f64]) -> Option<(Vec<f64>, f64)> {
+        if !ends.iter().zip([0, x.len() - 2]).all(|(kind, at)| kind.is_met(x[at], x[at + 1])) {
+            return None;
+        }
+        let ways = ways_back(ends, x);
+        let held = |part: f64| ways.iter().map(|way| blend(way, y, part)).find(|z| self.holds(z, HELD));
+        let z = RETREATS.into_iter().find_map(held)?;
+        let time = self.time(ends, &z);
+        Some((z, time))
+    }
+
+    /// Whether x uses no limit of the machine by more than `most`.
+    pub fn holds(&self, x: &[f64], most: f64) -> bool {
+        (0..self.rows.intervals.len()).all(|n| {
+            let worst = self.check.utilisation(x, n, self.rows.intervals[n].h);
+            worst.iter().all(|&part| part <= most)
+        })
+    }
+
+    /// Tightens the limits where x exceeds them between the collocation points, and counts how often; false if x
+    /// exceeds any. A rough x stays inside its limits; there they are tightened by the ratio of the peak to the
+    /// collocation points.
+    fn tighten(&mut self, x: &[f64], times: &mut [i32], rough: bool) -> bool {
+        let mut holds = true;
+        for (n, times) in times.iter_mut().enumerate() {
+            let margin = MARGIN.map(|least| least * RISE.powi(*times));
+            let mut used = self.check.utilisation(x, n, self.rows.intervals[n].h);
+            holds &= used.iter().all(|&used| used <= HELD);
+            if rough {
+                let at = self.rows.utilisation(x, n);
+                for (used, at) in used.iter_mut().zip(at) {
+                    if at > ROUGH.1 && *used < FIRM * at {
+                        *used /= at;
+                    }
+                }
+            }
+            let factors =
+                used.map(
+                    |used| if used > HELD { used + (margin[0] * (used - 1.0)).max(margin[1]) } else { 1.0 },
+                );
+            if factors != [1.0; 3] {
+                *times += 1;
+                self.rows.intervals[n].tighten(factors);
+            }
+        }
+        holds
+    }
+
+    fn time(&self, ends: &[WindowEnd; 2], x: &[f64]) -> f64 {
+        let inside: f64 =
+            self.rows.intervals.iter().enumerate().map(|(n, interval)| duration(x, n, interval.h)).sum();
+        inside + ramps(ends, x)
+    }
+}
+
+/// Time on the ramps at ends at rest, in s.
+pub fn ramps(ends: &[WindowEnd; 2], x: &[f64]) -> f64 {
+    let time = |end: usize, w: f64| match ends[end] {
+        WindowEnd::Rest { ramp, .. } => 3.0 * ramp / w.sqrt(),
+        WindowEnd::Fixed { .. } => 0.0,
+    };
+    time(0, x[0]) + time(1, x[x.len() - 2])
+}
+
+/// Targets of the ways back from a plan: the first plan x, and standstill where both ends rest. On the way to x the
+/// jerk may rise, as it is a product of two numbers that both change; on the way to standstill every use falls.
+fn ways_back(ends: &[WindowEnd; 2], x: &[f64]) -> Vec<Vec<f64>> {
+    let rests = ends.iter().all(|kind| matches!(kind, WindowEnd::Rest { .. }));
+    let standstill = rests.then(|| vec![0.0; x.len()]);
+    std::iter::once(x.to_vec()).chain(standstill).collect()
+}
+
+/// y plus a part of the way to x.
+fn blend(x: &[f64], y: &[f64], part: f64) -> Vec<f64> {
+    x.iter().zip(y).map(|(x, y)| y + part * (x - y)).collect()
+}

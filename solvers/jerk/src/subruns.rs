@@ -1,0 +1,303 @@
+//! Subruns of a path: runs cut where the tool must rest (stops, and cusps, whose curvature has no bound), and each
+//! subrun cut into parts without such a place and without a kink of the speed cap.
+//!
+//! Input: the pieces and limits of a problem. Lengths in mm, speeds in mm/s, parameters u in [0, width] of a piece.
+
+use rayon::prelude::*;
+
+use crate::arc_length_path::{
+    path_point, per_feed, piece, speed_sq, straight, tool_curvature, Part, MAX_RATE,
+};
+use crate::jerk_limited::Limits;
+use crate::jerk_profile::JerkProfile;
+use feedplan_geometry::polynomial::Polynomial;
+use feedplan_geometry::quadratic::dot;
+use feedplan_geometry::spline::bezier::derivatives;
+use feedplan_geometry::spline::cusps::{piece_cusps, CUSP};
+use feedplan_geometry::spline::rational::Hodograph;
+use feedplan_geometry::watch::Watch;
+use feedplan_planner::problem::{lesser, Fault, Problem};
+
+/// Cusps closer to the end of a piece than this part of it count as its end.
+const AT_END: f64 = 1e-9;
+/// The speed at a sharp turn, in units of the speed that the axes gain in a moment: below `CREEP` the tool would creep,
+/// so that it rests there; below `TIGHT_TURN` the piece is cut there.
+pub const CREEP: f64 = 0.02;
+const TIGHT_TURN: f64 = 10.0;
+/// A moment is a servo period, and at most this part of the time to full speed.
+pub const MOMENT: f64 = 0.1;
+/// A point is slow where |C'(u)|² is below this part of its maximum on the piece.
+const SLOW: f64 = 0.25;
+/// A turn beside a slow point is sought at this many distances, each half the one before, and then by this many rounds
+/// of ternary search. It counts where its curvature exceeds that of the slow point by this factor.
+const LEVELS: i32 = 40;
+const ROUNDS: usize = 20;
+const SHARPER: f64 = 2.0;
+/// To both sides of a slow point |C'(u)|² must rise by more than this part: less may be the rounding of a constant
+/// speed, whose minimum is anywhere.
+const RISE: f64 = 1e-6;
+/// Numbers of equal parts of a piece between which its curvature is sampled: the first, …
+const SAMPLES: [usize; 2] = [4, 64];
+/// … or the second where at a sample the radius is less than this multiple of the chord tolerance.
+const TIGHT: f64 = 10.0;
+/// Distance from a point of a line at which its direction is compared, as a part of the piece.
+const BESIDE: f64 = 1e-4;
+/// The share of this cutting in the work of a plan.
+const CUTTING: f64 = 0.1;
+
+/// Parts of pieces between two places of rest or ends of the path.
+#[derive(Clone, Debug)]
+pub struct Subrun {
+    pub number: usize,
+    run: usize,
+    pub parts: Vec<Part>,
+    /// Speeds along the axes' path at its ends, in mm/s.
+    pub ends: [f64; 2],
+}
+
+/// The profile of a path within these jerk limits in mm/s³; `plan` plans each subrun alone and counts its work. A run
+/// with an unplanned subrun has no phases.
+pub fn over_subruns<const M: usize>(
+    problem: &Problem<M>,
+    jerk: &[f64; M],
+    plan: impl Fn(&Subrun, &Limits<M>, Watch) -> Result<JerkProfile, Fault> + Sync,
+) -> Result<JerkProfile, Fault> {
+    let limits = checked(problem, jerk)?;
+    let subruns = subruns(problem);
+    let watch = problem.watch.part(1.0 - CUTTING).each(problem.width.len());
+    let planned: Result<Vec<JerkProfile>, Fault> = subruns
+        .par_iter()
+        .map(|subrun| plan(subrun, &limits, watch.part(subrun.parts.len() as f64)))
+        .collect();
+    let mut planned = planned?.into_iter();
+    let mut all = JerkProfile::default();
+    all.runs.push(0);
+    for run in subruns.chunk_by(|a, b| a.run == b.run) {
+        let own: Vec<JerkProfile> = planned.by_ref().take(run.len()).collect();
+        if own.iter().any(JerkProfile::is_unplanned) {
+            all.stopped = true;
+        } else {
+            own.into_iter().for_each(|phases| all.append(phases));
+        }
+        all.runs.push(all.len() as i64);
+    }
+    Ok(all)
+}
+
+/// The limits of the axes, after a check of all numbers of the problem.
+pub fn checked<const M: usize>(problem: &Problem<M>, jerk: &[f64; M]) -> Result<Limits<M>, Fault> {
+    problem.check()?;
+    for (axis, &limit) in jerk.iter().enumerate() {
+        if !(limit > 0.0 && limit.is_finite()) {
+            let what = format!("the jerk limit of axis {axis} is {limit} mm/s³: give a positive number");
+            return Err(Fault::Input { piece: None, what });
+        }
+    }
+    Ok(Limits { velocity: problem.max_velocity, acceleration: problem.max_acceleration, jerk: *jerk })
+}
+
+pub fn subruns<const M: usize>(problem: &Problem<M>) -> Vec<Subrun> {
+    let mut out: Vec<Subrun> = vec![];
+    for (run, pair) in problem.runs.windows(2).enumerate() {
+        let mut rests = true;
+        for i in pair[0]..pair[1] {
+            problem.watch.part(CUTTING).each(problem.width.len()).count(i);
+            let (cuts, cusped) = cusps(problem, i);
+            let mut cuts: Vec<(f64, bool)> = cuts.into_iter().map(|u| (u, true)).collect();
+            let at_cusp = |u: f64| cusped[0] && u == 0.0 || cusped[1] && u == problem.width[i];
+            for u in slow_points(problem, i).into_iter().filter(|&u| !at_cusp(u)) {
+                cuts.push((u, turn_speed(problem, i, u) < CREEP));
+                let turns = turns_beside(problem, i, u).into_iter().map(|u| (u, turn_speed(problem, i, u)));
+                cuts.extend(turns.filter(|turn| turn.1 < TIGHT_TURN).map(|(u, speed)| (u, speed < CREEP)));
+            }
+            cuts.extend(chord_kinks(problem, i).into_iter().map(|u| (u, false)));
+            let inside = AT_END * problem.width[i]..=(1.0 - AT_END) * problem.width[i];
+            cuts.retain(|(u, _)| inside.contains(u));
+            cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
+            cuts.dedup_by(|b, a| {
+                let same = b.0 - a.0 <= AT_END * problem.width[i];
+                a.1 |= same && b.1;
+                same
+            });
+            rests |= i > pair[0] && problem.junction_speed[i] == 0.0;
+            let (mut from, mut rest) = (0.0, rests || cusped[0]);
+            for (to, then) in cuts.into_iter().chain([(problem.width[i], false)]) {
+                if rest {
+                    out.push(Subrun { number: out.len(), run, parts: vec![], ends: [0.0; 2] });
+                }
+                let last = out.len() - 1;
+                out[last].parts.push(Part { piece: i, u: [from, to] });
+                (from, rest) = (to, then);
+            }
+            rests = cusped[1];
+        }
+    }
+    // Given end speeds are the tool's; convert them to the axes' path.
+    let along = |speed: f64, i: usize, u: f64| {
+        if speed > 0.0 {
+            speed * per_feed(problem, i, u, speed_sq(problem, i, u))
+        } else {
+            0.0
+        }
+    };
+    let (last, end) = (out.len() - 1, problem.width.len() - 1);
+    out[0].ends[0] = along(problem.start_speed, 0, 0.0);
+    out[last].ends[1] = along(problem.end_speed, end, problem.width[end]);
+    out
+}
+
+/// Parameters inside piece `i` at which the tool must rest, and whether it must at either end.
+fn cusps<const M: usize>(problem: &Problem<M>, i: usize) -> (Vec<f64>, [bool; 2]) {
+    let own = piece(problem, i);
+    let mut points = piece_cusps(&own, CUSP);
+    let line = problem.way.is_none() && straight(&own, 0.5 * own.width).is_some();
+    let ends =
+        [points.first().is_some_and(|&t| t < AT_END), points.last().is_some_and(|&t| t > 1.0 - AT_END)];
+    if line {
+        // A line that does not turn back is no cusp inside. At its ends u̇² would have to be infinite for a speed.
+        let tangent = |t: f64| derivatives(&own, t * own.width)[1];
+        points.retain(|&t| dot(&tangent(t - BESIDE), &tangent(t + BESIDE)) < 0.0);
+    }
+    points.retain(|&t| (AT_END..=1.0 - AT_END).contains(&t));
+    (points.iter().map(|t| t * own.width).collect(), ends)
+}
+
+/// Parameters of piece `i` where |C'(u)| has a low minimum: the path may turn sharply there, or beside it.
+fn slow_points<const M: usize>(problem: &Problem<M>, i: usize) -> Vec<f64> {
+    let square: Polynomial<MAX_RATE> = match problem.way {
+        Some(way) => Polynomial::from_bernstein(way.of(i).iter().copied()),
+        None => {
+            let hodograph = Hodograph::new(&piece(problem, i));
+            let axis = |k: usize| -> Polynomial<MAX_RATE> {
+                Polynomial::from_bernstein(hodograph.coefficients().iter().map(|row| row[k]))
+            };
+            (0..M).map(axis).fold(Polynomial::constant(0.0), |sum, g| sum.combine(1.0, &g.multiply(&g), 1.0))
+        }
+    };
+    let mut turns = vec![0.0];
+    square.derivative().sign_changes(&mut |t| turns.push(t));
+    turns.push(1.0);
+    let greatest = square.range().1;
+    let speeds: Vec<f64> = turns.iter().map(|&t| square.value(t)).collect();
+    let is_low = |n: usize| {
+        let least = speeds[n];
+        least < SLOW * greatest
+            && (n == 0 || rises(least, speeds[..n].iter().rev()))
+            && (n + 1 == speeds.len() || rises(least, speeds[n + 1..].iter()))
+    };
+    (0..turns.len()).filter(|&n| is_low(n)).map(|n| turns[n] * problem.width[i]).collect()
+}
+
+/// Parameters of piece `i` to either side of a slow point where the tool's path turns the most, if it turns more there
+/// than at the slow point: the residual speed at the slow point has a direction of its own, and the path turns where
+/// both components are equal. A path that turns the most at an end of the piece has no such parameter.
+fn turns_beside<const M: usize>(problem: &Problem<M>, i: usize, slow: f64) -> Vec<f64> {
+    let width = problem.width[i];
+    let curvature = |u: f64| {
+        let curvature = tool_curvature(problem, i, u);
+        if curvature.is_finite() {
+            curvature
+        } else {
+            0.0
+        }
+    };
+    let sharpest = |reach: f64| {
+        let at = |n: i32| slow + reach * 0.5_f64.powi(n);
+        let n = (1..LEVELS).max_by(|&a, &b| curvature(at(a)).total_cmp(&curvature(at(b))))?;
+        let (mut low, mut high) = (at(n + 1), at(n - 1));
+        for _ in 0..ROUNDS {
+            let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+            if curvature(a) < curvature(b) {
+                low = a;
+            } else {
+                high = b;
+            }
+        }
+        let u = 0.5 * (low + high);
+        (curvature(u) > SHARPER * curvature(slow) && curvature(u) > curvature(at(0))).then_some(u)
+    };
+    let both = [-slow, width - slow].into_iter().filter(|reach| reach.abs() > AT_END * width);
+    both.filter_map(sharpest).collect()
+}
+
+/// Whether |C'(u)|² rises from a point to one side before it falls below its value at the point.
+fn rises<'a>(least: f64, mut beside: impl Iterator<Item = &'a f64>) -> bool {
+    beside.find(|&&speed| speed < least || speed > (1.0 + RISE) * least).is_some_and(|&speed| speed > least)
+}
+
+/// Parameters inside piece `i` where the radius of the tool's path is the chord tolerance. The speed cap by the chord
+/// error has a kink there: on smaller circles every chord stays within the tolerance.
+fn chord_kinks<const M: usize>(problem: &Problem<M>, i: usize) -> Vec<f64> {
+    let (tolerance, width) = (problem.chord_tolerance, problem.width[i]);
+    if !tolerance.is_finite() {
+        return vec![];
+    }
+    // Tolerance over radius.
+    let inverse_radius = |u: f64| tool_curvature(problem, i, u) * tolerance;
+    let points = |count: usize| (0..=count).map(move |n| width * n as f64 / count as f64);
+    if points(SAMPLES[0]).all(|u| TIGHT * inverse_radius(u) < 1.0) {
+        return vec![];
+    }
+    let looked: Vec<(f64, bool)> = points(SAMPLES[1]).map(|u| (u, inverse_radius(u) > 1.0)).collect();
+    let crossed = looked.windows(2).filter(|pair| pair[0].1 != pair[1].1);
+    let kinks = crossed.map(|pair| {
+        let (mut low, tight, mut high) = (pair[0].0, pair[0].1, pair[1].0);
+        loop {
+            let middle = 0.5 * (low + high);
+            if middle <= low || middle >= high {
+                return middle;
+            }
+            if (inverse_radius(middle) > 1.0) == tight {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+    });
+    kinks.filter(|&u| u > AT_END * width && u < (1.0 - AT_END) * width).collect()
+}
+
+/// The greatest speed at u of piece `i` by the acceleration of turning, in units of the speed that the axes gain in a
+/// moment. Where the tool would creep, setpoints cannot show the time of a stop.
+fn turn_speed<const M: usize>(problem: &Problem<M>, i: usize, u: f64) -> f64 {
+    let point = path_point(problem, i, u);
+    let [velocity, acceleration] = [&problem.max_velocity, &problem.max_acceleration].map(lesser);
+    let of_axis = |k: usize| {
+        let gained = (acceleration[k] * problem.period).min(MOMENT * velocity[k]);
+        (acceleration[k] / point.second[k].abs()).sqrt() / gained
+    };
+    (0..M).map(of_axis).fold(f64::INFINITY, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_that_turns_the_most_at_its_end_is_not_cut_beside_it() {
+        // x = t + t², y = 0.03 t⁴: slow and straight at t = 0, with a curvature that rises to the end.
+        let control = [[0.0, 0.0], [0.25, 0.0], [2.0 / 3.0, 0.0], [1.25, 0.0], [2.0, 0.03]];
+        let problem = Problem {
+            control: &control,
+            weight: &[],
+            offset: &[0, 5],
+            width: &[1.0],
+            tip: None,
+            way: None,
+            feed_share: &[],
+            runs: &[0, 1],
+            feed: &[1e3],
+            junction_speed: &[0.0, 0.0],
+            max_velocity: [[1e3; 2]; 2],
+            max_acceleration: [[1e4; 2]; 2],
+            chord_tolerance: f64::INFINITY,
+            period: 0.01,
+            start_speed: 0.0,
+            end_speed: 0.0,
+            watch: Default::default(),
+        };
+        let found = subruns(&problem);
+        assert_eq!(found.len(), 1);
+        assert_eq!(found[0].parts, [Part { piece: 0, u: [0.0, 1.0] }]);
+    }
+}
