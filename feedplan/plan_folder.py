@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager
 from numbers import Real
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
@@ -17,6 +18,7 @@ from feedplan.outputs import KNOTS, SETPOINTS, FormatName, Header, files_in, for
 from feedplan.outputs._staging import require_folder, staged
 from feedplan.planned_feeds import PlannedProgram
 from feedplan.progress import Progress, of_stage, part, tell
+from feedplan.setpoints import SetpointChunk, Sink
 from feedplan.units import duration_text
 
 if TYPE_CHECKING:
@@ -96,7 +98,8 @@ def write_plan(
                 for output in outputs.values()
                 if output.ROWS == SETPOINTS
             ]
-            audit = plan.pass_setpoints((*sinks, figures.add), part(reading, ACCOUNT, 1.0))
+            beside = stack.enter_context(_beside((*sinks, figures.add)))
+            audit = plan.pass_setpoints((beside,), part(reading, ACCOUNT, 1.0))
         for check in audit.broken:
             figures.mark(setpoints.around(check.time), check.time)
         share = part(share, begun, 1.0)
@@ -134,6 +137,30 @@ def write_plan(
         names = sorted(file.name for file in stage.iterdir())
     tell(share, 1.0)
     return tuple(folder / name for name in names)
+
+
+@contextmanager
+def _beside(sinks: Sequence[Sink]) -> Iterator[Sink]:
+    """Passes chunks to the sinks on a second thread, while the next chunk is computed and audited.
+
+    Two chunks are in memory at most. What a sink raises is raised by the next call or at the end.
+    """
+    last: Future[None] | None = None
+
+    def to_all(chunk: SetpointChunk) -> None:
+        for sink in sinks:
+            sink(chunk)
+
+    def pass_on(chunk: SetpointChunk) -> None:
+        nonlocal last
+        if last is not None:
+            last.result()
+        last = thread.submit(to_all, chunk)
+
+    with ThreadPoolExecutor(1, "files") as thread:
+        yield pass_on
+        if last is not None:
+            last.result()
 
 
 def files_of_plan(folder: FilePath) -> list[FilePath]:
