@@ -24,8 +24,9 @@ from feedplan.errors import (
     SolverError,
 )
 from feedplan.geometry.path import Path
+from feedplan.machine.axis import Axis
 from feedplan.machine.importers import import_machine
-from feedplan.machine.machine import Axis, Machine
+from feedplan.machine.machine import Machine
 from feedplan.machine.machine import bundled_machines as machines
 from feedplan.plan_folder import write_plan
 from feedplan.planned_feeds import PlannedProgram, planned_program, write_program

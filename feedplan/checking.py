@@ -24,7 +24,6 @@ from feedplan.audit.events import require_events
 from feedplan.audit.knots import audit_knots
 from feedplan.errors import InputError
 from feedplan.geometry.corners import Corners
-from feedplan.machine.file import parse
 from feedplan.machine.machine import Machine
 from feedplan.outputs import KNOTS, SETPOINTS, SetpointFile, load_setpoints, require_format
 from feedplan.plan_folder import PROGRAM_FILE, SUMMARY_FILE
@@ -162,7 +161,7 @@ def _read(file: FilePath) -> _Plan:
         knots = own.take("count", int), entries.number("time"), own.number("step")
     plan = _Plan(
         file=file,
-        machine=parse(text, f"in {file}", joints_only=True),
+        machine=Machine.from_toml(text, f"in {file}", joints_only=True),
         method=method,
         axes=tuple(map(str, points.take("axes", list))),
         count=points.take("count", int),

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from feedplan.errors import FeedplanError
-from feedplan.machine.machine import Axis, Machine
+from feedplan.machine.axis import Axis
+from feedplan.machine.machine import Machine
 from feedplan.planners import options_of
 from feedplan.planning import Plan, plan
 

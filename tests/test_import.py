@@ -12,10 +12,11 @@ import sys
 from importlib.metadata import version
 from typing import get_args, get_type_hints
 
+import grimp
 import pytest
 
 import feedplan
-from feedplan.machine.machine import Axis, AxisKind
+from feedplan.machine.axis import Axis, AxisKind
 from feedplan.outputs import FormatName, formats
 from feedplan.planners import MethodName, options_of
 from feedplan.planning import OF_ALL_METHODS
@@ -154,3 +155,12 @@ def test_options_reach_the_method_and_stand_in_the_plan() -> None:
     assert slow.options["square_corner_velocity"] == 1.0
     assert slow.options["deviation"] == 0.01
     assert "accuracy" not in slow.options
+
+
+def test_no_module_imports_itself_through_others() -> None:
+    graph = grimp.build_graph("feedplan", cache_dir=None)
+    left = {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
+    while ends := [module for module, imported in left.items() if not imported & left.keys()]:
+        for module in ends:
+            del left[module]
+    assert sorted(left) == []

@@ -16,7 +16,8 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.length import CurveLength
 from feedplan.errors import InputError, MachineError
 from feedplan.geometry.path import Path
-from feedplan.machine.machine import AXIS_LETTERS, Axis, Machine
+from feedplan.machine.axis import AXIS_LETTERS, Axis
+from feedplan.machine.machine import Machine
 
 METHODS = ("bang-bang", "jerk-limited", "s-curve", "ruckig", "casadi", "clarabel")
 LINUX = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="toppra is for Linux")

@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 from scipy.integrate import quad
 
 from feedplan._solvers import plan_bang_bang
-from feedplan.constraints.problem import Problem, TipSpeed
+from feedplan.constraints.problem import Problem
 from feedplan.curves.arc import circle
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.length import CurveLength
+from feedplan.curves.speed_polynomial import SpeedPolynomial
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
 from feedplan.profile import ArcKind, SpeedProfile
@@ -398,7 +399,7 @@ def joints_case(kind: ArcKind) -> tuple[Problem, SpeedProfile]:
         problem_of(tip),
         joint_axes=("X", "Y", "B"),
         joints=joints,
-        tip_speed=TipSpeed(np.array([1.0, 1.0, 17.0]), np.array([0, 3])),
+        tip_speed=SpeedPolynomial(np.array([1.0, 1.0, 17.0]), np.array([0, 3])),
     )
     speed_sq = (400.0, 400.0) if kind == ArcKind.FEED else (25.0, 400.0)
     duration = tip_time(speed_sq, 2.0)
@@ -462,6 +463,6 @@ def test_what_general_pieces_cannot_do_is_refused_with_a_sentence() -> None:
         with pytest.raises((InputError, ValueError), match=words):
             setpoints(problem, replace(profile, **change), 0.001)  # type: ignore[arg-type]
     for coefficients, offsets in (([1.0], [0, 2]), ([1.0, np.nan], [0, 2]), ([1.0], [0, 1, 1])):
-        tip = TipSpeed(np.array(coefficients), np.array(offsets))
+        tip = SpeedPolynomial(np.array(coefficients), np.array(offsets))
         with pytest.raises(InputError, match="the tip speed does not fit the 1 pieces"):
             setpoints(replace(problem, tip_speed=tip), profile, 0.001)

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from feedplan.constraints.problem import Problem, TipSpeed
+from feedplan.constraints.problem import Problem
 from feedplan.curves.arc import circle
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.length import CurveLength
+from feedplan.curves.speed_polynomial import SpeedPolynomial
 from feedplan.errors import InputError
 from feedplan.profile import ArcKind, SpeedProfile
 from feedplan.setpoints import INTERPOLATORS, SetpointChunk, setpoints
@@ -177,7 +178,7 @@ def test_joints_follow_the_motion_of_the_tip(interpolator: str, seed: int) -> No
         problem_of(tip),
         joint_axes=tuple("XYZABC"[: joints.axes]),
         joints=joints,
-        tip_speed=TipSpeed(np.array([1.0, 1.0, 17.0]), np.array([0, 3])),
+        tip_speed=SpeedPolynomial(np.array([1.0, 1.0, 17.0]), np.array([0, 3])),
     )
     length = CurveLength(tip)
     jerk = constant_jerk(tip, sections := rest_to_rest(length.total, 3000.0))

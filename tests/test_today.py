@@ -14,7 +14,6 @@ from feedplan import Axis, Machine, MachineError, compare, plan
 from feedplan.cli import main
 from feedplan.errors import InputError
 from feedplan.machine.controller import MODELS, Controller
-from feedplan.machine.file import parse
 from feedplan.one_step_more import one_step_more
 from feedplan.planners import methods, options_of
 from feedplan.today import time_by
@@ -36,11 +35,11 @@ def program(tmp_path: Path) -> Path:
 @pytest.mark.parametrize("name", MODELS)
 def test_a_machine_file_names_its_controller(name: str) -> None:
     machine = Machine("mine", AXES, controller=name)
-    again = parse(machine.to_toml(), "mine.toml")
+    again = Machine.from_toml(machine.to_toml(), "mine.toml")
     assert again == machine
     assert again.controller == Controller(name)
     short = machine.to_toml().replace(f'[controller]\ntype = "{name}"\n', "")
-    assert parse(f'controller = "{name}"\n{short}', "mine.toml") == machine
+    assert Machine.from_toml(f'controller = "{name}"\n{short}', "mine.toml") == machine
     # Every parameter is an option of its method, and its default may be given.
     model = MODELS[name]
     assert model.method in methods()
@@ -52,12 +51,12 @@ def test_a_machine_file_names_its_controller(name: str) -> None:
 
 def test_parameters_of_a_machine_file_are_kept_and_reach_the_model() -> None:
     table = {"type": "marlin", "jerk": [8.0, 8.0, 0.4], "block_buffer_size": 31}
-    machine = parse(Machine("mine", AXES, controller=table).to_toml(), "mine.toml")
+    machine = Machine.from_toml(Machine("mine", AXES, controller=table).to_toml(), "mine.toml")
     assert machine.controller is not None
     assert dict(machine.controller.parameters) == {"jerk": [8.0, 8.0, 0.4], "block_buffer_size": 31}
     options = machine.controller.options
     assert (options["axis_jumps"], options["blocks"], options["deviation"]) == ([8.0, 8.0, 0.4], 31, 0.013)
-    assert parse(PLANE.to_toml(), "plane.toml").controller is None
+    assert Machine.from_toml(PLANE.to_toml(), "plane.toml").controller is None
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,8 @@ import feedplan
 from feedplan.checking import check
 from feedplan.errors import InputError, MachineError
 from feedplan.geometry.path import Path
-from feedplan.machine.machine import Axis, Machine
+from feedplan.machine.axis import Axis
+from feedplan.machine.machine import Machine
 
 NAMES = ("j1", "j2", "j3", "j4")
 KNOTS = [0, 0, 0, 0, 1, 2, 3, 3, 3, 3]
@@ -54,9 +55,9 @@ def test_the_unit_of_an_axis_is_in_every_file(tmp_path: FilePath) -> None:
 def test_a_machine_file_keeps_the_unit() -> None:
     for unit in ("rad", "µm", "°", "counts"):
         machine = arm(unit)
-        from feedplan.machine.file import parse
+        from feedplan.machine.machine import Machine
 
-        assert parse(machine.to_toml(), "arm.toml") == machine
+        assert Machine.from_toml(machine.to_toml(), "arm.toml") == machine
 
 
 @pytest.mark.parametrize(

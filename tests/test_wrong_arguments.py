@@ -17,8 +17,8 @@ import feedplan
 from feedplan import Axis, FeedplanError, Machine, Path
 from feedplan.audit import audit_setpoints
 from feedplan.curves.composite import CompositeCurve, insert_knot, knot_continuity
-from feedplan.geometry.build import FitSettings
 from feedplan.geometry.corners import Corners
+from feedplan.geometry.fit_settings import FitSettings
 from feedplan.machine import kinematics
 from feedplan.machine.kinematics import register
 from feedplan.one_step_more import Step
@@ -209,6 +209,10 @@ def cases(tmp_path: FilePath) -> dict[str, tuple[Callable[..., Any], dict[str, A
         ),
         "load_setpoints": (load_setpoints, {"place": tmp_path / "part", "progress": None}),
         "Machine.load": (Machine.load, {"source": "mill"}),
+        "Machine.from_toml": (
+            Machine.from_toml,
+            {"text": machine.to_toml(), "name": "mill.toml", "joints_only": False},
+        ),
         "Machine.of": (Machine.of, {"given": "mill"}),
         "Machine.axis": (machine.axis, {"name": "X"}),
         "Machine.with_period": (machine.with_period, {"period": 0.001}),

@@ -19,7 +19,8 @@ from feedplan.audit.worst import Findings
 from feedplan.constraints.problem import Problem
 from feedplan.curves._arrays import floats, whole_numbers
 from feedplan.errors import InputError
-from feedplan.machine.machine import Axis, Machine, size_of
+from feedplan.machine.axis import Axis, size_of
+from feedplan.machine.machine import Machine
 from feedplan.profile import SpeedProfile
 from feedplan.program.program import Program
 from feedplan.progress import Listener, part, tell

@@ -11,7 +11,8 @@ import click
 
 from feedplan.cli import terminal
 from feedplan.errors import InputError
-from feedplan.machine.machine import Axis, Limit, Machine, bundled_machines, bundled_text, template
+from feedplan.machine.axis import Axis, Limit
+from feedplan.machine.machine import Machine, bundled_machines, bundled_text, template
 
 
 @click.group(invoke_without_command=True)
@@ -59,12 +60,12 @@ def import_(file: str, limits: tuple[str, ...], name: str | None, output: str | 
 
     Each number has its source beside it. Limits that FILE lacks are asked for, and given by --limit.
     """
-    from feedplan.machine.file import parse
     from feedplan.machine.importers import find_machine
+    from feedplan.machine.machine import Machine
 
     found = find_machine(file, dict(map(_limit, limits)), name=name)
     text = found.to_toml()
-    parse(text, found.origin)
+    Machine.from_toml(text, found.origin)
     for note in found.notes():
         print(f"warning: {note}", file=sys.stderr)
     _write(text, output)

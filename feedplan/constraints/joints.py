@@ -10,16 +10,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import groupby, pairwise
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feedplan.constraints.problem import Cut, TipSpeed
 from feedplan.curves.composite import CompositeCurve
-from feedplan.curves.hodograph import SPEED_NODES, interpolated_squares, speed_squares
+from feedplan.curves.speed_polynomial import SpeedPolynomial, interpolated_squares
 from feedplan.errors import InputError
-from feedplan.geometry.path import Path
+from feedplan.geometry.path import Cut, Path
+from feedplan.machine.axis import size_of
 from feedplan.machine.joint_interpolants import (
     SPEED_SHARE,
     Accuracy,
@@ -27,7 +27,7 @@ from feedplan.machine.joint_interpolants import (
     SquareOfSpeed,
     joint_interpolants,
 )
-from feedplan.machine.machine import Machine, size_of
+from feedplan.machine.machine import Machine
 from feedplan.machine.meaning import Meaning
 from feedplan.machine.path_derivatives import positions
 from feedplan.machine.singularities import JointPath, joint_path
@@ -49,7 +49,7 @@ class JointMotion:
     cut: Cut
     joints: CompositeCurve
     origin: Array
-    tip_speed: TipSpeed
+    tip_speed: SpeedPolynomial
     words: tuple[AxisWords, ...]
 
 
@@ -97,12 +97,7 @@ def joint_motion(path: Path, machine: Machine, feed: Array) -> JointMotion:
         start = stretch.origin[-1] + stretch.joints.control_points[-1]
     piece = np.concatenate([stretch.piece for stretch in stretches])
     joints = CompositeCurve.joined([stretch.joints for stretch in stretches], math.inf)
-    speeds = [stretch.speed for stretch in stretches]
-    counts = np.concatenate([np.diff(speed.offsets) for speed in speeds])
-    tip_speed = TipSpeed(
-        np.concatenate([speed.coefficients for speed in speeds]),
-        np.concatenate([[0], np.cumsum(counts)]),
-    )
+    tip_speed = SpeedPolynomial.joined(row for stretch in stretches for row in stretch.speed.rows())
     tool = CompositeCurve.joined([stretch.tool for stretch in stretches], math.inf)
     origin = np.concatenate([stretch.origin for stretch in stretches])
     cut = Cut(path.curve, piece, np.concatenate([stretch.part for stretch in stretches]))
@@ -160,7 +155,7 @@ class _Stretch:
     tool: CompositeCurve
     joints: CompositeCurve
     origin: Array
-    speed: TipSpeed
+    speed: SpeedPolynomial
 
 
 def _words(path: Path, machine: Machine, run: int) -> AxisWords:
@@ -215,7 +210,7 @@ def _affine(task: _Task) -> _Stretch:
     if ((joints.control_points < travel[:, 0]) | (joints.control_points > travel[:, 1])).any():
         _route(task, tips)
     linear = task.linear(tool)
-    speed = _either(TipSpeed(*speed_squares(linear)), TipSpeed(*speed_squares(tool)), _moving(linear))
+    speed = _either(SpeedPolynomial.of(linear), SpeedPolynomial.of(tool), _moving(linear))
     origin = joints.control_points[joints.offsets[:-1]]
     local = joints.control_points - np.repeat(origin, np.diff(joints.offsets), axis=0)
     whole = np.tile([0.0, 1.0], (len(tool), 1))
@@ -231,12 +226,8 @@ def _in_order(stretches: list[_Stretch]) -> _Stretch:
         CompositeCurve.joined([getattr(stretch, name) for stretch in stretches], math.inf).take(order)
         for name in ("tool", "joints")
     )
-    rows = [
-        stretch.speed.coefficients[first:last]
-        for stretch in stretches
-        for first, last in pairwise(stretch.speed.offsets.tolist())
-    ]
-    speed = _joined_speed([rows[i] for i in order.tolist()])
+    rows = [row for stretch in stretches for row in stretch.speed.rows()]
+    speed = SpeedPolynomial.joined(rows[i] for i in order.tolist())
     origin = np.concatenate([stretch.origin for stretch in stretches])[order]
     return _Stretch(stretches[0].words, piece[order], part[order], tool, joints, origin, speed)
 
@@ -283,14 +274,14 @@ def _curved(task: _Task) -> _Stretch:
     )
 
 
-def _turning_speed(task: _Task, tool: CompositeCurve, joints: CompositeCurve) -> TipSpeed:
+def _turning_speed(task: _Task, tool: CompositeCurve, joints: CompositeCurve) -> SpeedPolynomial:
     """What the feed is about where X, Y and Z stand still: the rotary joints, or the tool's direction."""
     if task.words.meaning is Meaning.VECTOR:
         square = interpolated_squares(_turning_of(task.direction(tool)), np.arange(len(tool)), tool.width)
-        return TipSpeed((1 + SPEED_SHARE) * square.ravel(), SPEED_NODES * np.arange(len(tool) + 1))
+        return SpeedPolynomial.joined((1 + SPEED_SHARE) * square)
     rotary = np.array(task.words.kinematics.rotary)
     columns = rotary if rotary.any() else ~rotary
-    return TipSpeed(*speed_squares(replace(joints, control_points=joints.control_points[:, columns])))
+    return SpeedPolynomial.of(replace(joints, control_points=joints.control_points[:, columns]))
 
 
 def _moving(curve: CompositeCurve) -> NDArray[np.bool_]:
@@ -344,23 +335,16 @@ def _joint_pieces(interpolants: Interpolants) -> CompositeCurve:
     return CompositeCurve.from_pieces(points.reshape(count, degree + 1, -1), interpolants.width)
 
 
-def _tool_speed(linear: CompositeCurve) -> TipSpeed:
+def _tool_speed(linear: CompositeCurve) -> SpeedPolynomial:
     """|C'|²: exact for polynomials; for rational pieces interpolated, and above the true one."""
-    coefficients, offsets = speed_squares(linear)
-    above = np.repeat(np.where(linear.rational, 1 + SPEED_SHARE, 1.0), np.diff(offsets))
-    return TipSpeed(coefficients * above, offsets)
+    speed = SpeedPolynomial.of(linear)
+    above = np.repeat(np.where(linear.rational, 1 + SPEED_SHARE, 1.0), np.diff(speed.offsets))
+    return replace(speed, coefficients=speed.coefficients * above)
 
 
-def _either(first: TipSpeed, second: TipSpeed, chosen: NDArray[np.bool_]) -> TipSpeed:
+def _either(first: SpeedPolynomial, second: SpeedPolynomial, chosen: NDArray[np.bool_]) -> SpeedPolynomial:
     """The first where it is chosen, piece by piece, and else the second."""
     if chosen.all():
         return first
-    rows = [
-        speed.coefficients[speed.offsets[i] : speed.offsets[i + 1]]
-        for i, speed in enumerate(first if own else second for own in chosen)
-    ]
-    return _joined_speed(rows)
-
-
-def _joined_speed(rows: list[Array]) -> TipSpeed:
-    return TipSpeed(np.concatenate(rows), np.concatenate([[0], np.cumsum([len(row) for row in rows])]))
+    pairs = zip(first.rows(), second.rows(), chosen, strict=True)
+    return SpeedPolynomial.joined(one if own else other for one, other, own in pairs)

@@ -13,12 +13,13 @@ from feedplan.arguments import not_negative, number
 from feedplan.constraints.feed import FeedRequest, feed_limit, feed_share
 from feedplan.constraints.junction import junction_limit
 from feedplan.curves.composite import CompositeCurve
-from feedplan.curves.hodograph import speed_squares
+from feedplan.curves.speed_polynomial import SpeedPolynomial
 from feedplan.geometry.corners import Corners
 from feedplan.geometry.feed_groups import feed_groups
-from feedplan.geometry.path import Path
+from feedplan.geometry.path import Cut, Path
 from feedplan.lazy import cached_property
-from feedplan.machine.machine import Machine, usual_units
+from feedplan.machine.axis import usual_units
+from feedplan.machine.machine import Machine
 from feedplan.units import shared_unit
 
 if TYPE_CHECKING:
@@ -28,32 +29,6 @@ Limited = Literal["velocity", "acceleration"]
 _BY_AXIS = ("max_velocity", "max_acceleration", "max_jerk", "least_velocity", "least_acceleration")
 # No tool is as fast [mm/s]: what a rapid has where joints set its speed.
 NO_FEED = 1e9
-
-
-@dataclass(frozen=True, eq=False)
-class TipSpeed:
-    """|C'(u)|² of a motion as a polynomial on each piece: Bernstein `coefficients` (total,), those of piece i
-    from `offsets[i]` to `offsets[i + 1]`."""
-
-    coefficients: NDArray[np.float64]
-    offsets: NDArray[np.int64]
-
-
-@dataclass(frozen=True, eq=False)
-class Cut:
-    """What the pieces of a path were cut from: fractions `part` (n, 2) of `piece` (n,) of `curve`.
-
-    Control points of a short part keep the digits of its place, not those of its derivatives.
-    """
-
-    curve: CompositeCurve
-    piece: NDArray[np.int64]
-    part: NDArray[np.float64]
-
-    @cached_property
-    def even(self) -> CompositeCurve:
-        """The curve with all pieces of one degree."""
-        return self.curve.elevated(int(self.curve.degree.max()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +71,7 @@ class Problem:
     least_acceleration: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     joints: CompositeCurve | None = None
     joint_origin: NDArray[np.float64] | None = None
-    tip_speed: TipSpeed | None = None
+    tip_speed: SpeedPolynomial | None = None
     way_scale: NDArray[np.float64] | None = None
     words: tuple[AxisWords, ...] = ()
     cut: Cut | None = None
@@ -244,9 +219,9 @@ class Problem:
         return replace(curve, control_points=curve.control_points * scale)
 
     @cached_property
-    def way_speed(self) -> TipSpeed | None:
+    def way_speed(self) -> SpeedPolynomial | None:
         """The square of the speed of `way_curve`, per u̇²."""
-        return None if self.way_curve is None else TipSpeed(*speed_squares(self.way_curve))
+        return None if self.way_curve is None else SpeedPolynomial.of(self.way_curve)
 
     @cached_property
     def tip_curve(self) -> CompositeCurve | None:
@@ -330,16 +305,7 @@ def speed_square(problem: Problem, piece: NDArray[np.integer], u: NDArray[np.flo
     tip = problem.tip_speed
     if tip is None:
         return np.asarray((problem.curve.evaluate(piece, u, 1)[1] ** 2).sum(axis=1))
-    t = u / problem.path.width[piece]
-    counts = np.diff(tip.offsets)[piece]
-    square = np.empty(len(u))
-    for count in np.unique(counts).tolist():
-        own = counts == count
-        values = tip.coefficients[tip.offsets[piece[own]][:, None] + np.arange(count)].T
-        while len(values) > 1:
-            values = values[:-1] + (values[1:] - values[:-1]) * t[own]
-        square[own] = values[0]
-    return square
+    return tip.evaluate(piece, u / problem.path.width[piece])
 
 
 def _joint_problem(path: Path, machine: Machine, request: FeedRequest, ends: tuple[float, float]) -> Problem:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.errors import MachineError
-from feedplan.machine.machine import AXIS_LETTERS, Machine, size_of
+from feedplan.machine.axis import AXIS_LETTERS, size_of
+from feedplan.machine.machine import Machine
 from feedplan.machine.meaning import Meaning
 from feedplan.program.program import Program
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from feedplan.jobs.order import Order
 from feedplan.jobs.outcome import Outcome, failure_of
-from feedplan.machine.file import parse
+from feedplan.machine.machine import Machine
 from feedplan.plan_folder import write_plan
 from feedplan.planning import Plan, plan
 from feedplan.program.machine_for import AUTO, smallest_machine
@@ -88,7 +88,7 @@ def _planned(
             lambda known: read_program(content, known, name=order.name, feed=feed, **reading)
         )
     else:
-        machine = parse(order.machine, "of the order")
+        machine = Machine.from_toml(order.machine, "of the order")
     method: Any = order.method
     made = plan(source, machine, method, reading=reading, progress=progress, **order.options)
     formats: Any = order.formats

@@ -8,18 +8,15 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.errors import MachineError
-
-if TYPE_CHECKING:
-    from feedplan.machine.kinematics import Kinematics
 
 
 class Op(IntEnum):
@@ -58,22 +55,31 @@ class Expression:
     turning: tuple[bool, ...]
 
 
-def record(kinematics: Kinematics) -> Expression:
-    """The formula of a kinematics; MachineError says in which way it cannot be recorded."""
-    tape = _Tape(type(kinematics).__name__, len(kinematics.tip_names))
-    joints = tuple(kinematics.joints(tuple(Traced(tape, i) for i in range(tape.inputs))))
-    if len(joints) != len(kinematics.joint_names):
+def record(
+    name: str,
+    formula: Callable[[tuple[Traced, ...]], Iterable[Any]],
+    inputs: int,
+    joint_names: tuple[str, ...],
+    turning: Iterable[bool],
+) -> Expression:
+    """The formula of the kinematics `name` from `inputs` tip coordinates to the joints.
+
+    MachineError says in which way it cannot be recorded.
+    """
+    tape = _Tape(name, inputs)
+    joints = tuple(formula(tuple(Traced(tape, i) for i in range(inputs))))
+    if len(joints) != len(joint_names):
         raise MachineError(
-            f"the kinematics {tape.name} gives {len(joints)} joint positions: give one for each of "
-            f"{', '.join(kinematics.joint_names)}"
+            f"the kinematics {name} gives {len(joints)} joint positions: give one for each of "
+            f"{', '.join(joint_names)}"
         )
     outputs = [tape.number(joint) for joint in joints]
     return Expression(
-        tape.inputs,
+        inputs,
         np.array(tape.rows, dtype=np.int32).reshape(-1, 3),
         np.array(tape.constants, dtype=np.float64),
         np.array(outputs, dtype=np.int32),
-        tuple(bool(turns) for turns in kinematics.turning),
+        tuple(map(bool, turning)),
     )
 
 

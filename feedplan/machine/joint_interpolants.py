@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedplan._solvers import joint_interpolants as native_joint_interpolants
-from feedplan.curves.hodograph import SPEED_NODES, chebyshev, interpolation, to_bernstein
+from feedplan.curves.speed_polynomial import SPEED_NODES, chebyshev, interpolation, to_bernstein
 from feedplan.machine.kinematics import Kinematics
 from feedplan.machine.path_derivatives import TipPieces, contiguous
 

@@ -4,55 +4,24 @@ from __future__ import annotations
 
 import math
 import os
-import re
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, field, fields, replace
 from importlib import resources
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any
 
-from feedplan.arguments import is_text, shown
+from feedplan.arguments import shown
 from feedplan.errors import MachineError
 from feedplan.lazy import cached_property
-from feedplan.machine.checks import (
-    numbers,
-    one_by_one,
-    require,
-    require_text,
-    set_limit,
-    set_within,
-    written,
-)
+from feedplan.machine.axis import Axis, size_of, sizes_of
+from feedplan.machine.checks import numbers, one_by_one, require, require_text, set_within, written
 from feedplan.machine.controller import Controller
+from feedplan.machine.toml import MAX_LETTERS, table_lines, table_of, toml_value
 
 if TYPE_CHECKING:
     from feedplan.machine.kinematics import Kinematics
 
 MAX_AXES = 9
-# The letters of programs, and which of them are rotary where an axis does not say.
-AXIS_LETTERS = "XYZABCUVW"
-ROTARY_LETTERS = ("A", "B", "C")
-# I, J and K are the tool's direction.
-AXIS_NAME = re.compile(r"(?![IJK]\Z)[A-Za-z_][A-Za-z0-9_]{0,31}", re.ASCII)
-# The unit of an axis stands in tables, between brackets.
-_UNIT = re.compile(r"[^\s\[\]<>&\"'`\\,;]{1,12}")
-_ROTARY_UNITS = ("deg", "°", "rad")
-NAME_REMEDY = "1 to 32 letters, digits and underscores, no digit first, other than I, J and K"
-AxisKind = Literal["linear", "rotary"]
-# The same in both directions, or the least and the greatest.
-Limit: TypeAlias = float | tuple[float, float]
-
-# What numbers of machines can be, in mm or degrees and seconds. Beyond, a number is a mistake: ramps would be
-# shorter than places are known, or plans longer than a year.
-VELOCITIES = 1e-5, 1e9
-GREATEST_ACCELERATION = 1e10
-# The times [s] after which an axis has its velocity, and its acceleration.
-RISE_TIMES = 1e-5, 1e7
-JERK_TIMES = 1e-7, 1e2
-# The time to full acceleration is this part of the time to full velocity, or more.
-LEAST_JERK_SHARE = 1e-7
-# The least way [mm] in which an axis has its velocity v²/a, and its acceleration a³/j².
-LEAST_WAY = 1e-11
 # The fastest axis is so many times as fast as the slowest one, or less.
 MOST_TIMES = 1e8
 PERIODS = 1e-6, 10.0
@@ -61,89 +30,6 @@ LEAST_PERIOD_SHARE, LONG = 1e-7, 1e2
 CHORD_TOLERANCES = 1e-7, 1e6
 # Chord tolerance e and period T limit the acceleration on arcs to 8 e/T²: to this part of an axis's, or more.
 LEAST_CHORD_SHARE = 1e-9
-FARTHEST = 1e9
-
-
-@dataclass(frozen=True)
-class Axis:
-    """One axis, a joint of the machine, and its limits.
-
-    `name`: 1 to 32 letters, digits and underscores, the first no digit, other than I, J and K (a tool's
-    direction). Programs move axes named by one of the letters XYZABCUVW, paths from Python any axes.
-    `max_velocity` [mm/s], `max_acceleration` [mm/s²], each one number or, where it differs by direction, two:
-    (-1.0, 2.0) is at most 1 backward and 2 forward. `max_jerk` [mm/s³] (infinite: not limited),
-    `travel` (least, greatest) [mm], `max_velocity_jump` [mm/s] allowed at a corner (0: corners stop).
-    On a rotary axis every mm is a degree. `kind` is "linear" or "rotary"; empty, the letter or the unit
-    decides: A, B and C are rotary, and axes in deg, ° or rad.
-
-    `unit` is that of its positions, 1 to 12 characters: empty, mm, or deg on a rotary axis. Another one, such
-    as rad or µm, takes the place of mm in all limits; programs, and kinematics with dimensions, need mm and
-    deg. Limits and positions are never converted.
-
-    Velocities v are from 1e-5 to 1e9, accelerations a at most 1e10; an axis has its velocity after v/a from
-    1e-5 to 1e7 s, and its acceleration after a/j from 1e-7 to 100 s and 1e-7 of that time or more, in ways
-    v²/a and a³/j² of 1e-11 or more. Travel is within 1e9.
-
-    Raises MachineError for values that are none of these.
-    """
-
-    name: str
-    max_velocity: Limit
-    max_acceleration: Limit
-    max_jerk: float = math.inf
-    travel: tuple[float, float] = (-math.inf, math.inf)
-    max_velocity_jump: float = 0.0
-    kind: AxisKind | Literal[""] = ""
-    unit: str = ""
-
-    def __post_init__(self) -> None:
-        named = isinstance(self.name, str) and AXIS_NAME.fullmatch(self.name) is not None
-        require(named, "axis name", self.name, NAME_REMEDY)
-        place = f"axis {self.name}: "
-        kind: object = self.kind
-        require(
-            isinstance(kind, str) and kind in ("linear", "rotary", ""),
-            f"{place}kind",
-            kind,
-            '"linear" or "rotary"',
-        )
-        turns = self.name in ROTARY_LETTERS or (is_text(self.unit) and self.unit in _ROTARY_UNITS)
-        kind = kind or ("rotary" if turns else "linear")
-        object.__setattr__(self, "kind", kind)
-        object.__setattr__(self, "unit", self.unit if self.unit != "" else self.usual_unit)
-        good = is_text(self.unit) and self.unit.isprintable() and _UNIT.fullmatch(self.unit) is not None
-        require(good, f"{place}unit", self.unit, "1 to 12 characters, such as mm, deg or rad")
-        set_limit(self, "max_velocity", place, f"{self.unit}/s", VELOCITIES)
-        slow, fast = sizes_of(self.max_velocity)
-        fastest, slowest = RISE_TIMES
-        most = min(slow / fastest, slow**2 / LEAST_WAY, GREATEST_ACCELERATION)
-        set_limit(self, "max_acceleration", place, f"{self.unit}/s²", (fast / slowest, most))
-        weak, strong = sizes_of(self.max_acceleration)
-        fastest, slowest = JERK_TIMES
-        fastest = max(fastest, LEAST_JERK_SHARE * fast / weak)
-        ends = strong / slowest, min(weak / fastest, math.sqrt(weak**3 / LEAST_WAY))
-        set_within(self, "max_jerk", place, f"{self.unit}/s³", ends, infinite=True)
-        set_within(self, "max_velocity_jump", place, f"{self.unit}/s", (0.0, VELOCITIES[1]))
-        remedy = f"the least position and a greater one, within {FARTHEST:g} {self.unit} or infinite"
-        least, greatest = numbers(self.travel, 2, f"{place}travel", remedy, infinite=True)
-        good = least < greatest and all(abs(end) <= FARTHEST or math.isinf(end) for end in (least, greatest))
-        require(good, f"{place}travel", self.travel, remedy)
-        object.__setattr__(self, "travel", (least, greatest))
-
-    @property
-    def velocity_range(self) -> tuple[float, float]:
-        """The least and the greatest velocity."""
-        return range_of(self.max_velocity)
-
-    @property
-    def acceleration_range(self) -> tuple[float, float]:
-        """The least and the greatest acceleration."""
-        return range_of(self.max_acceleration)
-
-    @property
-    def usual_unit(self) -> str:
-        """mm or deg, as programs have them."""
-        return "deg" if self.kind == "rotary" else "mm"
 
 
 @dataclass(frozen=True)
@@ -245,6 +131,7 @@ class Machine:
     @cached_property
     def inverse(self) -> Kinematics:
         """The kinematics q = K(P) with this machine's dimensions; raises MachineError if they do not fit."""
+        # Most machines are plain, and need none.
         from feedplan.machine import kinematics
 
         return kinematics.create(self.kinematics, self.axes, self.parameters, self.name)
@@ -255,8 +142,6 @@ class Machine:
 
         Raises MachineError naming the file, the key and the remedy.
         """
-        from feedplan.machine.file import MAX_LETTERS, parse
-
         remedy = "the name of a bundled machine, or the path of a .toml file"
         require(isinstance(source, (str, os.PathLike)), "the machine", source, remedy)
         text = os.fspath(source)
@@ -268,44 +153,60 @@ class Machine:
                     content = file.read(MAX_LETTERS + 1)
             except (OSError, ValueError) as error:
                 raise MachineError(f"machine file {text} cannot be read: {error}") from None
-            return parse(content, text)
-        return parse(bundled_text(text), text)
+            return cls.from_toml(content, text)
+        return cls.from_toml(bundled_text(text), text)
 
     @classmethod
     def of(cls, given: Machine | str | os.PathLike[str]) -> Machine:
         """A machine as it is, or what `load` makes of a name or file."""
         return given if isinstance(given, Machine) else cls.load(given)
 
+    @classmethod
+    def from_toml(cls, text: str, name: str, joints_only: bool = False) -> Machine:
+        """The machine that the text of the machine file `name` describes.
+
+        `joints_only` leaves out its kinematics, and what depends on it: setpoints need the limits of joints
+        alone, and are checked where a kinematics that a user registered is not known.
+        Raises MachineError naming the file, the key and the remedy.
+        """
+        require_text(name, "the name of the machine file")
+        require(isinstance(text, str), f"the text of machine file {name}", text, "a text")
+        try:
+            table = table_of(text)
+            if joints_only:
+                table = {key: value for key, value in table.items() if key not in _OF_KINEMATICS}
+            return cls(**_fields(table, name))
+        except MachineError as error:
+            raise MachineError(f"machine file {name}: {error}") from None
+        except (ValueError, RecursionError) as error:
+            raise MachineError(f"machine file {name} is not valid TOML: {error}") from None
+
     def to_toml(self) -> str:
         """The text of a machine file that gives the same machine."""
-        from feedplan.machine.file import text_of
-
-        return text_of(self)
+        head: dict[str, Any] = {"name": self.name, "period": self.period}
+        head["chord_tolerance"] = self.chord_tolerance
+        if self.home:
+            head["home"] = list(self.home)
+        lines = [f"{key} = {toml_value(value)}" for key, value in head.items()]
+        lines += table_lines("[kinematics]", {"type": self.kinematics, **self.parameters})
+        lines += table_lines("[offsets]", dict(self.offsets)) if self.offsets else []
+        if self.controller:
+            lines += table_lines("[controller]", {"type": self.controller.name, **self.controller.parameters})
+        for axis in self.axes:
+            given = {own.name: getattr(axis, own.name) for own in fields(axis)}
+            changed = {key: value for key, value in given.items() if value != _AXIS_DEFAULTS[key]}
+            lines += table_lines("[[axes]]", changed)
+        return "\n".join(lines) + "\n"
 
     def with_period(self, period: float) -> Machine:
         """The same machine with another servo period [s]."""
         return replace(self, period=period)
 
 
-def range_of(limit: Limit) -> tuple[float, float]:
-    """The least and the greatest value that a limit allows."""
-    return limit if isinstance(limit, tuple) else (-limit, limit)
-
-
-def sizes_of(limit: Limit) -> tuple[float, float]:
-    """What a limit allows in both directions, and in one of them."""
-    least, greatest = sorted(map(abs, range_of(limit)))
-    return least, greatest
-
-
-def size_of(limit: Limit) -> float:
-    """What a limit allows in both directions."""
-    return sizes_of(limit)[0]
-
-
-def usual_units(names: Iterable[str]) -> tuple[str, ...]:
-    """The units of axes and directions by their names alone: deg of A, B, C, I, J, K, else mm."""
-    return tuple("deg" if name in (*ROTARY_LETTERS, "I", "J", "K") else "mm" for name in names)
+# Keys of a machine file.
+_AXIS_DEFAULTS = {own.name: own.default for own in fields(Axis)}
+_OF_KINEMATICS = {"kinematics", "home", "offsets", "controller"}
+_MACHINE_KEYS = {own.name for own in fields(Machine)} - {"parameters"} | {"description"}
 
 
 def bundled_machines() -> tuple[str, ...]:
@@ -327,6 +228,46 @@ def bundled_text(name: str) -> str:
 def template() -> str:
     """The text of a machine file with comments, to begin with."""
     return resources.files(__package__).joinpath("template.toml").read_text("utf-8")
+
+
+def _fields(table: dict[str, Any], name: str) -> dict[str, Any]:
+    """The fields of the machine that a machine file describes."""
+    _check_keys(table, _MACHINE_KEYS, "")
+    rows: Any = table.get("axes")
+    remedy = "an [[axes]] table for each axis"
+    require(isinstance(rows, list), "axes", rows, remedy)
+    for number, row in enumerate(rows, 1):
+        require(isinstance(row, dict), f"axis {number}", row, remedy)
+    plain = ("period", "chord_tolerance", "home", "offsets", "controller")
+    given = {key: table[key] for key in plain if key in table}
+    driven = table.get("kinematics", "cartesian")
+    parameters = {"type": driven} if isinstance(driven, str) else driven
+    if not (isinstance(parameters, dict) and isinstance(parameters.get("type"), str)):
+        remedy = 'give a name, or a table with type = "cartesian"'
+        raise MachineError(f"kinematics is {shown(driven)}: {remedy}")
+    return {
+        "name": str(table.get("name", FilePath(name).stem)),
+        "axes": tuple(_axis(row) for row in rows),
+        "kinematics": parameters["type"],
+        "parameters": {key: value for key, value in parameters.items() if key != "type"},
+        **given,
+    }
+
+
+def _axis(row: dict[str, Any]) -> Axis:
+    place = f"axis {row.get('name')}: "
+    _check_keys(row, set(_AXIS_DEFAULTS), place)
+    for key, default in _AXIS_DEFAULTS.items():
+        if default is MISSING and key not in row:
+            raise MachineError(f"{place}{key} is missing: give it")
+    return Axis(**row)
+
+
+def _check_keys(table: dict[str, Any], known: set[str], place: str) -> None:
+    unknown = sorted(set(table) - known)
+    if unknown:
+        remedy = f"give only {', '.join(sorted(known))}"
+        raise MachineError(f"{place}the keys {shown(unknown)} are not known: {remedy}")
 
 
 def _axes(given: Any) -> tuple[Axis, ...]:

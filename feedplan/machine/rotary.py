@@ -16,8 +16,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from feedplan.errors import MachineError
+from feedplan.machine.axis import Axis
 from feedplan.machine.kinematics import Kinematics
-from feedplan.machine.machine import Axis
 from feedplan.machine.numbers import Number, atan2, degrees, hypot, radians, sin_cos
 from feedplan.machine.parameters import Parameters, Vector
 

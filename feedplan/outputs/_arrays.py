@@ -11,7 +11,7 @@ import numpy as np
 from feedplan.arguments import shown
 from feedplan.errors import InputError
 from feedplan.events import TimedEvents
-from feedplan.machine.machine import AXIS_LETTERS
+from feedplan.machine.axis import AXIS_LETTERS
 from feedplan.outputs import FORMAT, QUANTITIES, SETPOINTS, SetpointFile, require_format
 
 COLUMNS = ("t", *QUANTITIES, "line")

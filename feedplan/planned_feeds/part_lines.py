@@ -10,7 +10,7 @@ from decimal import Decimal
 import numpy as np
 from numpy.typing import NDArray
 
-from feedplan.machine.machine import AXIS_LETTERS
+from feedplan.machine.axis import AXIS_LETTERS
 from feedplan.planned_feeds.number import place_text
 from feedplan.planned_feeds.parts import Parts
 from feedplan.planned_feeds.text import blank_of, code_end, line_end

@@ -303,16 +303,7 @@ def _speed_square(problem: Problem, piece: Numbers, u: Array, slope: Array) -> A
     if tip is None:
         return np.asarray((slope**2).sum(axis=2))
     t = u / problem.path.width[piece]
-    result = np.empty(u.shape)
-    degree = np.diff(tip.offsets)[piece] - 1
-    for d in np.unique(degree).tolist():
-        own = degree == d
-        values = tip.coefficients[tip.offsets[piece[own]][:, None] + np.arange(d + 1)].T[:, None, :]
-        values = np.broadcast_to(values, (d + 1, len(u), int(own.sum())))
-        for _ in range(d):
-            values = values[:-1] + (values[1:] - values[:-1]) * t[:, own]
-        result[:, own] = values[0]
-    return result
+    return tip.evaluate(np.tile(piece, len(u)), t.ravel()).reshape(u.shape)
 
 
 def _chord_speed_square(problem: Problem, piece: Numbers, u: Array) -> Array:

@@ -18,6 +18,7 @@ from feedplan._solvers import PlanError
 from feedplan._solvers import Problem as NativeProblem
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
+from feedplan.curves.speed_polynomial import SpeedPolynomial
 from feedplan.lazy import cached_property
 from feedplan.profile import OF_ARCS, OF_PIECES, SpeedProfile
 from feedplan.progress import Listener
@@ -48,14 +49,6 @@ class Runs:
 
 
 @dataclass(frozen=True)
-class Squares:
-    """Some pieces of a `TipSpeed`."""
-
-    coefficients: Floats
-    offsets: NDArray[np.int64]
-
-
-@dataclass(frozen=True)
 class Part:
     """What native planners take of a `Problem`, for the runs from the `run`-th to before the `end_run`-th.
 
@@ -67,8 +60,8 @@ class Part:
     first: int
     path: Runs
     curve: CompositeCurve
-    tip_speed: Squares | None
-    way_speed: Squares | None
+    tip_speed: SpeedPolynomial | None
+    way_speed: SpeedPolynomial | None
     tip_curve: CompositeCurve | None
     feed_share: Floats | None
     feed: Floats
@@ -110,8 +103,8 @@ def _part(problem: Problem, run: int, end_run: int) -> Part:
             dwell=problem.path.dwell[run:end_run],
         ),
         curve=problem.curve[first:end],
-        tip_speed=_squares(problem.tip_speed, first, end),
-        way_speed=_squares(problem.way_speed, first, end),
+        tip_speed=None if problem.tip_speed is None else problem.tip_speed[first:end],
+        way_speed=None if problem.way_speed is None else problem.way_speed[first:end],
         tip_curve=None if problem.tip_curve is None else problem.tip_curve[first:end],
         feed_share=None if problem.feed_share is None else problem.feed_share[first:end],
         feed=problem.feed[first:end],
@@ -125,13 +118,6 @@ def _part(problem: Problem, run: int, end_run: int) -> Part:
         start_speed=problem.start_speed if run == 0 else 0.0,
         end_speed=problem.end_speed if end_run == len(runs) - 1 else 0.0,
     )
-
-
-def _squares(speed: Any, first: int, end: int) -> Squares | None:
-    if speed is None:
-        return None
-    own = slice(int(speed.offsets[first]), int(speed.offsets[end]))
-    return Squares(speed.coefficients[own], speed.offsets[first : end + 1] - speed.offsets[first])
 
 
 def part_of_profile(profile: SpeedProfile, part: Part) -> SpeedProfile:

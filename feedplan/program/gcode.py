@@ -106,7 +106,8 @@ from numpy.typing import NDArray
 from feedplan._solvers import read_gcode as read_native
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import MachineError
-from feedplan.machine.machine import AXIS_LETTERS, Machine
+from feedplan.machine.axis import AXIS_LETTERS
+from feedplan.machine.machine import Machine
 from feedplan.program.events import Events
 from feedplan.program.machine_for import names_of_machines_with
 from feedplan.program.program import Program

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feedplan.curves.composite import CompositeCurve
-from feedplan.machine.machine import AXIS_LETTERS
+from feedplan.machine.axis import AXIS_LETTERS
 from feedplan.program.program import MoveKind, PathControl, Program
 
 # Ends up to this far apart are one point [mm, deg]: what rounding to four decimals can do.

@@ -24,7 +24,8 @@ from numpy.typing import NDArray
 
 from feedplan.curves.composite import MAX_DEGREE, CompositeCurve
 from feedplan.errors import InputError, ProgramError
-from feedplan.machine.machine import AXIS_LETTERS, AXIS_NAME, ROTARY_LETTERS, Machine
+from feedplan.machine.axis import AXIS_LETTERS, AXIS_NAME, ROTARY_LETTERS
+from feedplan.machine.machine import Machine
 from feedplan.program.moves import NO_FEED, TOUCHING, Moves, program_axes
 from feedplan.program.program import Program
 from feedplan.units import MM_PER_INCH

@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from feedplan.errors import MachineError
-from feedplan.machine.machine import AXIS_LETTERS, Machine
+from feedplan.machine.axis import AXIS_LETTERS
+from feedplan.machine.machine import Machine
 from feedplan.machine.meaning import Meaning
 from feedplan.machine.rotary import RotaryChain, ToolVector, shortest_turn
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from feedplan.errors import InputError
-from feedplan.machine.machine import AXIS_LETTERS, ROTARY_LETTERS
+from feedplan.machine.axis import AXIS_LETTERS, ROTARY_LETTERS
 
 MAX_BYTES = 1 << 20
 

@@ -14,9 +14,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 from feedplan import __version__
 from feedplan.errors import FeedplanError, MachineError
 from feedplan.geometry.corners import FollowedPath
+from feedplan.machine.axis import Axis
 from feedplan.machine.controller import Controller
-from feedplan.machine.file import parse
-from feedplan.machine.machine import Axis, Machine, bundled_machines
+from feedplan.machine.machine import Machine, bundled_machines
 from feedplan.planners import MethodName, given_options, methods, options_of
 from feedplan.planning import OF_ALL_METHODS
 from feedplan.program.machine_for import AUTO
@@ -209,7 +209,7 @@ def _machine(given: str, *others: str) -> Machine:
     if given in bundled_machines():
         return Machine.load(given)
     if "=" in given:
-        return parse(given, "of the request")
+        return Machine.from_toml(given, "of the request")
     known = ", ".join((*others, *bundled_machines()))
     raise Refusal(
         MACHINE, f"there is no machine of this name: use one of {known}, or the text of a machine file"

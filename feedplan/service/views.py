@@ -10,8 +10,9 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from feedplan.comparison import LIMITS
+from feedplan.machine.axis import Axis
 from feedplan.machine.controller import Model
-from feedplan.machine.machine import Axis, Machine
+from feedplan.machine.machine import Machine
 from feedplan.plan_folder import SUMMARY_FILE
 from feedplan.service.refusals import STATE, Refusal
 from feedplan.service.store import Record, Store

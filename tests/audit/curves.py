@@ -12,7 +12,8 @@ from feedplan._solvers import plan_bang_bang
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Path
-from feedplan.machine.machine import Axis, Machine
+from feedplan.machine.axis import Axis
+from feedplan.machine.machine import Machine
 from feedplan.machine.path_derivatives import derivatives
 from feedplan.profile import ArcKind, SpeedProfile
 from feedplan.setpoints import SetpointChunk

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan._solvers import plan_bang_bang
-from feedplan.constraints.problem import Cut, Problem
+from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
+from feedplan.geometry.path import Cut
 from feedplan.machine.joint_interpolants import joint_interpolants
 from feedplan.machine.machine import Machine
 from feedplan.machine.path_derivatives import positions

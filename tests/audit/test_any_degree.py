@@ -18,7 +18,8 @@ from feedplan.constraints.problem import Problem
 from feedplan.curves.arc import circle
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
-from feedplan.machine.machine import Axis, Machine
+from feedplan.machine.axis import Axis
+from feedplan.machine.machine import Machine
 from feedplan.profile import ArcKind, SpeedProfile
 from feedplan.program.program import MoveKind, Program
 from tests.audit.curves import machine_of, path_along, planned, problem_along, sampled

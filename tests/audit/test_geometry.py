@@ -16,7 +16,8 @@ from feedplan.audit import Audit, audit
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Path
-from feedplan.machine.machine import Axis, Machine
+from feedplan.machine.axis import Axis
+from feedplan.machine.machine import Machine
 from feedplan.program.program import MoveKind, Program
 
 Change = Callable[..., NDArray[Any]]

@@ -17,7 +17,8 @@ from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
-from feedplan.machine.machine import Axis, Machine
+from feedplan.machine.axis import Axis
+from feedplan.machine.machine import Machine
 from feedplan.profile import ArcKind, SpeedProfile
 
 Change = Callable[..., NDArray[Any]]

@@ -16,7 +16,8 @@ from feedplan.constraints.problem import build_problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
-from feedplan.machine.machine import Axis, Machine
+from feedplan.machine.axis import Axis
+from feedplan.machine.machine import Machine
 from feedplan.planners import planner
 from feedplan.setpoints import setpoints
 

@@ -12,7 +12,8 @@ from feedplan.curves.arc import circle
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
-from feedplan.machine.machine import Axis, Machine, bundled_machines
+from feedplan.machine.axis import Axis
+from feedplan.machine.machine import Machine, bundled_machines
 from feedplan.machine.meaning import Meaning
 from feedplan.planners import planner
 from tests.campaign import seeds

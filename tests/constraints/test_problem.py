@@ -6,7 +6,7 @@ import pytest
 from feedplan import InputError, Machine, Path
 from feedplan.constraints.problem import build_problem
 from feedplan.curves.composite import CompositeCurve
-from feedplan.machine.machine import Axis
+from feedplan.machine.axis import Axis
 
 
 def polyline(points: list[list[float]], feed: float = 10.0, runs: list[int] | None = None) -> Path:

@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 from feedplan.errors import InputError, MachineError, ProgramError
-from feedplan.geometry.build import FitSettings, build_path
-from feedplan.machine.machine import Axis, Machine
+from feedplan.geometry.build import build_path
+from feedplan.geometry.fit_settings import FitSettings
+from feedplan.machine.axis import Axis
+from feedplan.machine.machine import Machine
 from feedplan.program.program import MoveKind, PathControl
 
 MILL = Machine.load("mill")

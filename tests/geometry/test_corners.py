@@ -103,7 +103,7 @@ def test_reversals_are_stops(make_program: Any, check: Any) -> None:
 def test_corners_in_space_and_in_six_axes_are_rounded_alike(make_program: Any, check: Any) -> None:
     from dataclasses import replace
 
-    from feedplan.machine.machine import Axis
+    from feedplan.machine.axis import Axis
 
     machine = replace(MILL, axes=(*MILL.axes, *(Axis(name, 100.0, 1000.0) for name in "ABC")))
     random = np.random.default_rng(5)

@@ -16,7 +16,8 @@ from feedplan.errors import InputError, ProgramError
 from feedplan.geometry.build import build_path
 from feedplan.geometry.joints import tangent_jumps
 from feedplan.geometry.path import Path
-from feedplan.machine.machine import Axis, Machine
+from feedplan.machine.axis import Axis
+from feedplan.machine.machine import Machine
 from feedplan.program.program import MoveKind, PathControl, Program
 
 MILL = Machine.load("mill")

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from feedplan import Machine, MachineError, plan
-from feedplan.machine.machine import Axis, bundled_machines
+from feedplan.machine.axis import Axis
+from feedplan.machine.machine import bundled_machines
 
 GOOD = """
 name = "one"

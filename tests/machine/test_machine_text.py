@@ -11,15 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from feedplan import Axis, Machine, MachineError
-from feedplan.machine.file import parse
+from feedplan.machine.axis import AXIS_LETTERS, FARTHEST
 from feedplan.machine.kinematics import Kinematics, _registered, register
-from feedplan.machine.machine import (
-    AXIS_LETTERS,
-    CHORD_TOLERANCES,
-    FARTHEST,
-    PERIODS,
-    bundled_machines,
-)
+from feedplan.machine.machine import CHORD_TOLERANCES, PERIODS, bundled_machines
 
 FINITE = st.floats(-FARTHEST, FARTHEST)
 NAMES = st.text(min_size=1)
@@ -72,7 +66,7 @@ def machines(draw: st.DrawFn) -> Machine:
 
 @given(machines())
 def test_any_machine_comes_back_from_its_text(machine: Machine) -> None:
-    again = parse(machine.to_toml(), "machine.toml")
+    again = Machine.from_toml(machine.to_toml(), "machine.toml")
     assert again == machine
     assert again.parameters == machine.parameters
 
@@ -96,7 +90,7 @@ def test_any_parameters_of_a_kinematics_come_back(parameters: dict[str, Any]) ->
     try:
         own = (Axis("X", 1, 1), Axis("Y", 1, 1))
         machine = Machine("m", own, kinematics="anything", parameters=parameters, home=(1.0, 2.0))
-        again = parse(machine.to_toml(), "m")
+        again = Machine.from_toml(machine.to_toml(), "m")
         assert (again, again.parameters) == (machine, parameters)
     finally:
         del _registered["anything"]
@@ -105,7 +99,7 @@ def test_any_parameters_of_a_kinematics_come_back(parameters: dict[str, Any]) ->
 @pytest.mark.parametrize("name", bundled_machines())
 def test_every_bundled_machine_comes_back_with_its_kinematics(name: str) -> None:
     machine = Machine.load(name)
-    again = parse(machine.to_toml(), "m")
+    again = Machine.from_toml(machine.to_toml(), "m")
     assert (again, again.parameters, again.inverse) == (machine, machine.parameters, machine.inverse)
 
 
@@ -114,7 +108,7 @@ def test_numbers_of_numpy_are_written_as_numbers() -> None:
     load = Machine.load("trunnion-ac")
     machine = Machine("m", load.axes, kinematics="trunnion-ac", parameters=parameters)
     assert machine.parameters == {"tool_length": 120.5, "pivot_a": [0, 0, 50], "reversed": ["C"]}
-    assert parse(machine.to_toml(), "m").inverse == machine.inverse
+    assert Machine.from_toml(machine.to_toml(), "m").inverse == machine.inverse
 
 
 @pytest.mark.parametrize(

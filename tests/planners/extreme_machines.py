@@ -6,13 +6,8 @@ import math
 import random
 
 from feedplan import Axis, Machine
-from feedplan.machine.machine import (
-    CHORD_TOLERANCES,
-    GREATEST_ACCELERATION,
-    LEAST_CHORD_SHARE,
-    LEAST_PERIOD_SHARE,
-    PERIODS,
-)
+from feedplan.machine.axis import GREATEST_ACCELERATION
+from feedplan.machine.machine import CHORD_TOLERANCES, LEAST_CHORD_SHARE, LEAST_PERIOD_SHARE, PERIODS
 
 # Corners of the ranges of machines that exist; feedplan takes some more, where a limit never matters.
 VELOCITIES, MOST_TIMES = (1e-5, 1e7), 1e6

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
 from feedplan.geometry.path import Path
-from feedplan.machine.machine import Axis, Machine
+from feedplan.machine.axis import Axis
+from feedplan.machine.machine import Machine
 
 Array = NDArray[np.float64]
 

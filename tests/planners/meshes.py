@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from feedplan.constraints.problem import Problem, build_problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Path
-from feedplan.machine.machine import Axis, Machine
+from feedplan.machine.axis import Axis
+from feedplan.machine.machine import Machine
 
 CURVES = FilePath(__file__).parents[2] / "benchmarks" / "curves"
 

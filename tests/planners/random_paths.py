@@ -9,7 +9,8 @@ import numpy as np
 from feedplan.constraints.problem import Problem, build_problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Path
-from feedplan.machine.machine import Axis, Machine
+from feedplan.machine.axis import Axis
+from feedplan.machine.machine import Machine
 
 
 def random_problem(seed: int) -> Problem:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from feedplan.machine.machine import Axis, Machine
+from feedplan.machine.axis import Axis
+from feedplan.machine.machine import Machine
 
 CONTROLS = ["", "G64", "G64 P0.05", "G64 P0.01 Q0.01", "G61", "G61.1"]
 

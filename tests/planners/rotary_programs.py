@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from feedplan.machine.machine import Axis, Machine
+from feedplan.machine.axis import Axis
+from feedplan.machine.machine import Machine
 
 AXES = ("XYZA", "XYZAB", "XYZUVW", "XA", "XYZUA")
 TOLERANCES = (0.001, 0.01, 0.1, 1.0)

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from feedplan.geometry.path import Path
-from feedplan.machine.machine import Axis, Limit, Machine, range_of, size_of
+from feedplan.machine.axis import Axis, Limit, range_of, size_of
+from feedplan.machine.machine import Machine
 
 Pair = tuple[float, float]
 KNOTS = [0, 0, 0, 0, 1, 2, 3, 4, 4, 4, 4]

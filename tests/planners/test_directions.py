@@ -15,8 +15,8 @@ import feedplan
 from feedplan.checking import check
 from feedplan.errors import MachineError
 from feedplan.geometry.path import Path
-from feedplan.machine.file import parse
-from feedplan.machine.machine import Axis, Machine
+from feedplan.machine.axis import Axis
+from feedplan.machine.machine import Machine
 from tests.campaign import seeds
 from tests.planners.differences import exceeded
 from tests.planners.sided import KNOTS, Pair, arm, even, names_of, pairs, random_path, swapped
@@ -280,5 +280,5 @@ def test_limits_that_are_none_are_refused(limit: Any) -> None:
 def test_a_machine_file_has_both_directions() -> None:
     text = ONE.to_toml()
     assert "max_velocity = [-1.0, 2.0]" in text
-    assert parse(text, "one.toml") == ONE
+    assert Machine.from_toml(text, "one.toml") == ONE
     assert Axis("X", [-2, 2], 1.0) == Axis("X", 2.0, 1.0)  # type: ignore[arg-type]

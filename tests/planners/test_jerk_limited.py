@@ -17,7 +17,8 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InfeasibleError, InputError, SolverError
 from feedplan.geometry.path import Path
 from feedplan.lower_bound import lower_bound
-from feedplan.machine.machine import Axis, Machine
+from feedplan.machine.axis import Axis
+from feedplan.machine.machine import Machine
 from feedplan.planners import bound_of, planner
 from feedplan.profile import ArcKind
 from tests.campaign import SEEDS, seeds

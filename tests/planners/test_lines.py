@@ -10,7 +10,8 @@ import pytest
 import feedplan
 from feedplan import _solvers
 from feedplan.geometry.path import Path
-from feedplan.machine.machine import Axis, Machine
+from feedplan.machine.axis import Axis
+from feedplan.machine.machine import Machine
 from tests.campaign import seeds
 from tests.planners.lines import seven_sections, straight_case, trapezoid, ways
 

@@ -20,7 +20,8 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InfeasibleError, InputError, MissingPackageError, SolverError
 from feedplan.geometry.path import Path
 from feedplan.lower_bound import lower_bound
-from feedplan.machine.machine import Axis, Machine
+from feedplan.machine.axis import Axis
+from feedplan.machine.machine import Machine
 from feedplan.planners import _refinement, bang_bang, casadi, clarabel, methods, planner, toppra
 from feedplan.profile import ArcKind, SpeedProfile
 from tests.campaign import seeds

@@ -8,7 +8,8 @@ import pytest
 from feedplan import plan
 from feedplan.constraints.problem import Problem, build_problem
 from feedplan.geometry.path import Path
-from feedplan.machine.machine import Axis, Machine
+from feedplan.machine.axis import Axis
+from feedplan.machine.machine import Machine
 from feedplan.planners import methods, planner
 from feedplan.planners.junction_deviation import GRBL_DEVIATION
 from tests.campaign import seeds

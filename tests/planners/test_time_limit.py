@@ -17,7 +17,8 @@ from feedplan.accuracy import shortfalls
 from feedplan.cli import main
 from feedplan.constraints.problem import Problem, build_problem
 from feedplan.geometry.path import Path
-from feedplan.machine.machine import Axis, Machine
+from feedplan.machine.axis import Axis
+from feedplan.machine.machine import Machine
 from feedplan.planners import jerk_limited, planner
 from feedplan.planners._jerk import jerk_limits
 from feedplan.planners._runs import fastest_runs

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from feedplan.errors import ProgramError
-from feedplan.machine.machine import Axis, Machine
+from feedplan.machine.axis import Axis
+from feedplan.machine.machine import Machine
 from feedplan.program.gcode import read_gcode
 from tests.program.linuxcnc import difference, moves_of, needs_linuxcnc, reference
 

@@ -3,7 +3,8 @@
 import pytest
 
 from feedplan.errors import MachineError, ProgramError
-from feedplan.machine.machine import Axis, Machine
+from feedplan.machine.axis import Axis
+from feedplan.machine.machine import Machine
 from feedplan.program.gcode import read_gcode
 
 

@@ -18,7 +18,7 @@ import pytest
 
 import feedplan
 from feedplan.machine.controller import MODELS, Controller
-from feedplan.machine.file import parse
+from feedplan.machine.machine import Machine
 from feedplan.outputs import format_named
 from feedplan.outputs.npz import load
 from feedplan.service import exports
@@ -348,7 +348,7 @@ def test_a_machine_file_is_described_with_changed_limits(server: Server) -> None
     assert other["axes"][0]["max_velocity"] == [-100.0, 120.0]
     assert other["axes"][0]["max_jerk"] is None
     assert other["axes"][1:] == plain["axes"][1:]
-    assert parse(other["file"], "other").axis("X").max_jerk == math.inf
+    assert Machine.from_toml(other["file"], "other").axis("X").max_jerk == math.inf
     for machine, limits, said in (
         ("tarus", {"X": {"max_velocity": -1.0}}, "axis X: max_velocity is -1.0: give"),
         ("tarus", {"X": {"max_velocity": None}}, "axis X: max_velocity is None: give"),

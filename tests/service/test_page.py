@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from feedplan.machine.controller import Controller
-from feedplan.machine.file import parse
+from feedplan.machine.machine import Machine
 from feedplan.outputs import npz
 from feedplan.report.page import missing_pictures
 from tests.report.drawn import unpacked
@@ -161,7 +161,7 @@ def test_a_machine_file_is_read_as_the_service_reads_it(facts: dict[str, Any]) -
     assert facts["limits"] == [["Xmm", "100", "1000", "20000"], *rest]
     assert facts["refusedLimit"].startswith("axis X: max_velocity is -1")
     assert facts["changedLimits"] == [["Xmm", "120", "1000", "20000"], *rest]
-    machine = parse(facts["changedText"], "changed")
+    machine = Machine.from_toml(facts["changedText"], "changed")
     assert machine.axis("X").max_velocity == 120.0
     assert machine.controller == Controller("grbl", {"junction_deviation": 0.03})
 

@@ -12,7 +12,6 @@ from collections.abc import Mapping
 from feedplan.arguments import file_path, shown
 from feedplan.errors import InputError, MachineError
 from feedplan.machine.checks import require_text
-from feedplan.machine.file import parse
 from feedplan.machine.importers import grbl, klipper, linuxcnc, ros
 from feedplan.machine.importers.description import FoundMachine
 from feedplan.machine.importers.text_files import TextFiles
@@ -35,7 +34,7 @@ def import_machine(
     it names all that are missing.
     """
     found = find_machine(file, limits, name=name)
-    return parse(found.to_toml(), found.origin)
+    return Machine.from_toml(found.to_toml(), found.origin)
 
 
 def find_machine(

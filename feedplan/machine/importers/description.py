@@ -10,10 +10,10 @@ from typing import Any
 
 from feedplan.arguments import is_number, shown
 from feedplan.errors import MachineError
+from feedplan.machine.axis import FARTHEST, GREATEST_ACCELERATION, JERK_TIMES, ROTARY_LETTERS, VELOCITIES
 from feedplan.machine.controller import MODELS
-from feedplan.machine.file import toml_value
 from feedplan.machine.importers.text_files import Setting
-from feedplan.machine.machine import FARTHEST, GREATEST_ACCELERATION, JERK_TIMES, ROTARY_LETTERS, VELOCITIES
+from feedplan.machine.toml import toml_value
 
 # The limits of an axis that can be given, and their keys in a machine file.
 LIMITS = {"velocity": "max_velocity", "acceleration": "max_acceleration", "jerk": "max_jerk"}

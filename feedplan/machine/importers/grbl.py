@@ -19,9 +19,9 @@ import re
 from pathlib import Path
 
 from feedplan.errors import MachineError
+from feedplan.machine.axis import AXIS_LETTERS
 from feedplan.machine.importers.description import Found, FoundAxis, FoundMachine, limits_of, parameters_of
 from feedplan.machine.importers.text_files import Setting, TextFiles
-from feedplan.machine.machine import AXIS_LETTERS
 from feedplan.units import SECONDS_PER_MINUTE
 
 CONTROLLER = "grbl"

@@ -25,6 +25,7 @@ from pathlib import Path
 
 from feedplan.arguments import shown
 from feedplan.errors import MachineError
+from feedplan.machine.axis import AXIS_LETTERS, ROTARY_LETTERS
 from feedplan.machine.importers.description import (
     Found,
     FoundAxis,
@@ -35,7 +36,6 @@ from feedplan.machine.importers.description import (
     travel_of,
 )
 from feedplan.machine.importers.text_files import LONGEST_LINE, Setting, TextFiles
-from feedplan.machine.machine import AXIS_LETTERS, ROTARY_LETTERS
 from feedplan.units import MM_PER_INCH
 
 CONTROLLER = "LinuxCNC"

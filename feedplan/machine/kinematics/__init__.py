@@ -12,18 +12,15 @@ import importlib
 import pkgutil
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from feedplan.errors import MachineError
 from feedplan.lazy import cached_property
+from feedplan.machine.axis import ROTARY_LETTERS, Axis
 from feedplan.machine.checks import require, require_text
 from feedplan.machine.expression import Expression, record
-from feedplan.machine.machine import ROTARY_LETTERS
 from feedplan.machine.numbers import Number
 from feedplan.machine.parameters import Parameters
-
-if TYPE_CHECKING:
-    from feedplan.machine.machine import Axis
 
 
 class Kinematics(ABC):
@@ -64,7 +61,7 @@ class Kinematics(ABC):
     @cached_property
     def recorded(self) -> Expression:
         """The formula of `joints`, recorded when it is first asked for; MachineError where it cannot be."""
-        return record(self)
+        return record(type(self).__name__, self.joints, len(self.tip_names), self.joint_names, self.turning)
 
     def tip(self, joints: Sequence[Number]) -> tuple[Number, ...]:
         """The tip [mm, deg] for joint positions [mm, deg]: the inverse of `joints`, where there is one."""
@@ -75,7 +72,7 @@ class Kinematics(ABC):
         return {}
 
 
-Factory = Callable[[tuple["Axis", ...], Parameters], Kinematics]
+Factory = Callable[[tuple[Axis, ...], Parameters], Kinematics]
 
 _registered: dict[str, Factory] = {}
 

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from feedplan.errors import MachineError
+from feedplan.machine.axis import AXIS_LETTERS, ROTARY_LETTERS, Axis
 from feedplan.machine.kinematics import Kinematics
-from feedplan.machine.machine import AXIS_LETTERS, ROTARY_LETTERS, Axis
 from feedplan.machine.numbers import Number
 from feedplan.machine.parameters import Parameters
 

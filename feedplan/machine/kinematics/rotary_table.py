@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from feedplan.machine.machine import Axis
+from feedplan.machine.axis import Axis
 from feedplan.machine.parameters import Parameters
 from feedplan.machine.rotary import RotaryChain, build_chain
 

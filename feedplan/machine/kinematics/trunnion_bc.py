@@ -5,7 +5,7 @@ Tool direction in the part: (sin b cos c, sin b sin c, cos b).
 
 from __future__ import annotations
 
-from feedplan.machine.machine import Axis
+from feedplan.machine.axis import Axis
 from feedplan.machine.parameters import Parameters
 from feedplan.machine.rotary import RotaryChain, build_chain
 

@@ -14,7 +14,7 @@ use feedplan_geometry::watch::Watch;
 use feedplan_planner::problem::{self, Both, SpeedSquare, Tip, TIP_AXES};
 use feedplan_setpoints::sampling::PathData;
 
-/// `feedplan.constraints.problem.TipSpeed`.
+/// `feedplan.curves.speed_polynomial.SpeedPolynomial`.
 #[derive(FromPyObject)]
 struct SpeedArrays<'py> {
     coefficients: PyReadonlyArray1<'py, f64>,

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from feedplan.machine.axis import Axis
 from feedplan.machine.kinematics import Kinematics, create
-from feedplan.machine.machine import Axis
 from feedplan.machine.path_derivatives import positions
 from feedplan.machine.rotary import RotaryChain, ToolVector, shortest_turn
 from tests.machine.kinematics.bundled import all_kinematics, random_tips

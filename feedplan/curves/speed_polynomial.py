@@ -1,0 +1,127 @@
+"""The square of the speed |C'(u)|² along Bézier pieces as a polynomial of the parameter on each piece."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feedplan.curves.composite import CompositeCurve
+
+Array = NDArray[np.float64]
+
+# Chebyshev points of |C'|² of rational pieces.
+SPEED_NODES = 12
+
+
+@dataclass(frozen=True, eq=False)
+class SpeedPolynomial:
+    """The square of a speed over u̇².
+
+    `coefficients` (total,) are those of Bernstein polynomials of u, those of piece i from `offsets[i]` to
+    before `offsets[i + 1]`; `offsets` (n + 1,).
+    """
+
+    coefficients: Array
+    offsets: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, curve: CompositeCurve) -> SpeedPolynomial:
+        """|C'(u)|² of a curve.
+
+        Exact on polynomial pieces; on rational ones |C'|² is interpolated at `SPEED_NODES` Chebyshev points.
+        """
+        rational = curve.rational
+        count = np.where(rational, SPEED_NODES, 2 * curve.degree - 1)
+        offsets = np.concatenate([[0], np.cumsum(count)])
+        coefficients = np.zeros(int(offsets[-1]))
+        rows = np.flatnonzero(rational)
+        if len(rows):
+            coefficients[offsets[rows][:, None] + np.arange(SPEED_NODES)] = interpolated_squares(
+                lambda piece, u: (curve.evaluate(piece, u, 1)[1] ** 2).sum(axis=1), rows, curve.width[rows]
+            )
+        first = curve.offsets[:-1]
+        for d in np.unique(curve.degree[~rational]).tolist():
+            rows = np.flatnonzero((curve.degree == d) & ~rational)
+            points = curve.control_points[first[rows][:, None] + np.arange(d + 1)]
+            slope = d * np.diff(points, axis=1) / curve.width[rows][:, None, None]
+            # Scaled by binomials a product is a convolution.
+            scaled = slope * _binomials(d - 1)[:, None]
+            square = np.zeros((len(rows), 2 * d - 1))
+            for i in range(d):
+                square[:, i : i + d] += (scaled[:, i : i + 1] * scaled).sum(axis=2)
+            coefficients[offsets[rows][:, None] + np.arange(2 * d - 1)] = square / _binomials(2 * d - 2)
+        return cls(coefficients, offsets)
+
+    @classmethod
+    def joined(cls, rows: Iterable[Array]) -> SpeedPolynomial:
+        """The polynomials with these coefficients, one row a piece."""
+        rows = list(rows)
+        return cls(np.concatenate(rows), np.concatenate([[0], np.cumsum([len(row) for row in rows])]))
+
+    def rows(self) -> list[Array]:
+        """The coefficients of each piece."""
+        return np.split(self.coefficients, self.offsets[1:-1])
+
+    def __getitem__(self, pieces: slice) -> SpeedPolynomial:
+        """Those of neighbouring pieces."""
+        offsets = self.offsets[pieces.start : pieces.stop + 1]
+        return SpeedPolynomial(self.coefficients[offsets[0] : offsets[-1]], offsets - offsets[0])
+
+    def evaluate(self, piece: NDArray[np.integer], t: Array) -> Array:
+        """The square at fractions t (m,) of the parameter intervals of pieces (m,)."""
+        counts = np.diff(self.offsets)[piece]
+        square = np.empty(len(t))
+        for count in np.unique(counts).tolist():
+            own = counts == count
+            values = self.coefficients[self.offsets[piece[own]][:, None] + np.arange(count)].T
+            while len(values) > 1:
+                values = values[:-1] + (values[1:] - values[:-1]) * t[own]
+            square[own] = values[0]
+        return square
+
+
+def interpolated_squares(
+    square: Callable[[NDArray[np.int64], Array], Array], piece: NDArray[np.int64], width: Array
+) -> Array:
+    """Bernstein coefficients (n, SPEED_NODES) through a function of piece and u, on these pieces (n,)."""
+    u = (width[:, None] * chebyshev(SPEED_NODES)).ravel()
+    values = square(np.repeat(piece, SPEED_NODES), u)
+    return from_chebyshev(values.reshape(-1, SPEED_NODES))
+
+
+def from_chebyshev(values: Array) -> Array:
+    """Bernstein coefficients (n, m, …) of the polynomials with these values (n, m, …) at `chebyshev(m)`."""
+    coefficients: Array = np.einsum("ij,nj...->ni...", to_bernstein(values.shape[1]), values)
+    return coefficients
+
+
+def to_bernstein(count: int) -> Array:
+    """The matrix (count, count) that takes values at `chebyshev(count)` to Bernstein coefficients."""
+    return np.ascontiguousarray(np.linalg.inv(_bernstein(count - 1, chebyshev(count))))
+
+
+def interpolation(count: int, at: Array) -> Array:
+    """The matrix (places, count) that takes values at `chebyshev(count)` to those at places in [0, 1]."""
+    matrix: Array = _bernstein(count - 1, at) @ to_bernstein(count)
+    return matrix
+
+
+def _bernstein(degree: int, at: Array) -> Array:
+    """The values (places, degree + 1) of the Bernstein polynomials."""
+    power = np.arange(degree + 1)
+    values: Array = _binomials(degree) * at[:, None] ** power * (1 - at[:, None]) ** (degree - power)
+    return values
+
+
+def chebyshev(count: int) -> Array:
+    """The Chebyshev points of [0, 1]."""
+    nodes: Array = 0.5 - 0.5 * np.cos(np.pi * (np.arange(count) + 0.5) / count)
+    return nodes
+
+
+def _binomials(degree: int) -> Array:
+    return np.array([math.comb(degree, i) for i in range(degree + 1)], dtype=np.float64)

@@ -1,0 +1,141 @@
+"""One axis of a machine with its limits, and the letters by which programs name axes."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+from feedplan.arguments import is_text
+from feedplan.machine.checks import numbers, require, set_limit, set_within
+
+# The letters of programs, and which of them are rotary where an axis does not say.
+AXIS_LETTERS = "XYZABCUVW"
+ROTARY_LETTERS = ("A", "B", "C")
+# I, J and K are the tool's direction.
+AXIS_NAME = re.compile(r"(?![IJK]\Z)[A-Za-z_][A-Za-z0-9_]{0,31}", re.ASCII)
+# The unit of an axis stands in tables, between brackets.
+_UNIT = re.compile(r"[^\s\[\]<>&\"'`\\,;]{1,12}")
+_ROTARY_UNITS = ("deg", "°", "rad")
+NAME_REMEDY = "1 to 32 letters, digits and underscores, no digit first, other than I, J and K"
+AxisKind = Literal["linear", "rotary"]
+# The same in both directions, or the least and the greatest.
+Limit: TypeAlias = float | tuple[float, float]
+
+# What numbers of machines can be, in mm or degrees and seconds. Beyond, a number is a mistake: ramps would be
+# shorter than places are known, or plans longer than a year.
+VELOCITIES = 1e-5, 1e9
+GREATEST_ACCELERATION = 1e10
+# The times [s] after which an axis has its velocity, and its acceleration.
+RISE_TIMES = 1e-5, 1e7
+JERK_TIMES = 1e-7, 1e2
+# The time to full acceleration is this part of the time to full velocity, or more.
+LEAST_JERK_SHARE = 1e-7
+# The least way [mm] in which an axis has its velocity v²/a, and its acceleration a³/j².
+LEAST_WAY = 1e-11
+FARTHEST = 1e9
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis, a joint of the machine, and its limits.
+
+    `name`: 1 to 32 letters, digits and underscores, the first no digit, other than I, J and K (a tool's
+    direction). Programs move axes named by one of the letters XYZABCUVW, paths from Python any axes.
+    `max_velocity` [mm/s], `max_acceleration` [mm/s²], each one number or, where it differs by direction, two:
+    (-1.0, 2.0) is at most 1 backward and 2 forward. `max_jerk` [mm/s³] (infinite: not limited),
+    `travel` (least, greatest) [mm], `max_velocity_jump` [mm/s] allowed at a corner (0: corners stop).
+    On a rotary axis every mm is a degree. `kind` is "linear" or "rotary"; empty, the letter or the unit
+    decides: A, B and C are rotary, and axes in deg, ° or rad.
+
+    `unit` is that of its positions, 1 to 12 characters: empty, mm, or deg on a rotary axis. Another one, such
+    as rad or µm, takes the place of mm in all limits; programs, and kinematics with dimensions, need mm and
+    deg. Limits and positions are never converted.
+
+    Velocities v are from 1e-5 to 1e9, accelerations a at most 1e10; an axis has its velocity after v/a from
+    1e-5 to 1e7 s, and its acceleration after a/j from 1e-7 to 100 s and 1e-7 of that time or more, in ways
+    v²/a and a³/j² of 1e-11 or more. Travel is within 1e9.
+
+    Raises MachineError for values that are none of these.
+    """
+
+    name: str
+    max_velocity: Limit
+    max_acceleration: Limit
+    max_jerk: float = math.inf
+    travel: tuple[float, float] = (-math.inf, math.inf)
+    max_velocity_jump: float = 0.0
+    kind: AxisKind | Literal[""] = ""
+    unit: str = ""
+
+    def __post_init__(self) -> None:
+        named = isinstance(self.name, str) and AXIS_NAME.fullmatch(self.name) is not None
+        require(named, "axis name", self.name, NAME_REMEDY)
+        place = f"axis {self.name}: "
+        kind: object = self.kind
+        require(
+            isinstance(kind, str) and kind in ("linear", "rotary", ""),
+            f"{place}kind",
+            kind,
+            '"linear" or "rotary"',
+        )
+        turns = self.name in ROTARY_LETTERS or (is_text(self.unit) and self.unit in _ROTARY_UNITS)
+        kind = kind or ("rotary" if turns else "linear")
+        object.__setattr__(self, "kind", kind)
+        object.__setattr__(self, "unit", self.unit if self.unit != "" else self.usual_unit)
+        good = is_text(self.unit) and self.unit.isprintable() and _UNIT.fullmatch(self.unit) is not None
+        require(good, f"{place}unit", self.unit, "1 to 12 characters, such as mm, deg or rad")
+        set_limit(self, "max_velocity", place, f"{self.unit}/s", VELOCITIES)
+        slow, fast = sizes_of(self.max_velocity)
+        fastest, slowest = RISE_TIMES
+        most = min(slow / fastest, slow**2 / LEAST_WAY, GREATEST_ACCELERATION)
+        set_limit(self, "max_acceleration", place, f"{self.unit}/s²", (fast / slowest, most))
+        weak, strong = sizes_of(self.max_acceleration)
+        fastest, slowest = JERK_TIMES
+        fastest = max(fastest, LEAST_JERK_SHARE * fast / weak)
+        ends = strong / slowest, min(weak / fastest, math.sqrt(weak**3 / LEAST_WAY))
+        set_within(self, "max_jerk", place, f"{self.unit}/s³", ends, infinite=True)
+        set_within(self, "max_velocity_jump", place, f"{self.unit}/s", (0.0, VELOCITIES[1]))
+        remedy = f"the least position and a greater one, within {FARTHEST:g} {self.unit} or infinite"
+        least, greatest = numbers(self.travel, 2, f"{place}travel", remedy, infinite=True)
+        good = least < greatest and all(abs(end) <= FARTHEST or math.isinf(end) for end in (least, greatest))
+        require(good, f"{place}travel", self.travel, remedy)
+        object.__setattr__(self, "travel", (least, greatest))
+
+    @property
+    def velocity_range(self) -> tuple[float, float]:
+        """The least and the greatest velocity."""
+        return range_of(self.max_velocity)
+
+    @property
+    def acceleration_range(self) -> tuple[float, float]:
+        """The least and the greatest acceleration."""
+        return range_of(self.max_acceleration)
+
+    @property
+    def usual_unit(self) -> str:
+        """mm or deg, as programs have them."""
+        return "deg" if self.kind == "rotary" else "mm"
+
+
+def range_of(limit: Limit) -> tuple[float, float]:
+    """The least and the greatest value that a limit allows."""
+    return limit if isinstance(limit, tuple) else (-limit, limit)
+
+
+def sizes_of(limit: Limit) -> tuple[float, float]:
+    """What a limit allows in both directions, and in one of them."""
+    least, greatest = sorted(map(abs, range_of(limit)))
+    return least, greatest
+
+
+def size_of(limit: Limit) -> float:
+    """What a limit allows in both directions."""
+    return sizes_of(limit)[0]
+
+
+def usual_units(names: Iterable[str]) -> tuple[str, ...]:
+    """The units of axes and directions by their names alone: deg of A, B, C, I, J, K, else mm."""
+    return tuple("deg" if name in (*ROTARY_LETTERS, "I", "J", "K") else "mm" for name in names)
