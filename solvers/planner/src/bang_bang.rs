@@ -89,6 +89,26 @@ struct Task<'a, const M: usize> {
     watch: Watch<'a>,
 }
 
+/// The state of a pass between two pieces.
+#[derive(Clone, Copy)]
+pub struct Junction {
+    /// The sum of the axes' velocities squared; v² where the axes are the tool's.
+    pub speed_sq: f64,
+    /// v² of the tip at the end of the piece just left; before the next piece is entered, its limit.
+    pub tip_sq: f64,
+}
+
+impl Junction {
+    fn at_end_of_run(tip_sq: f64) -> Self {
+        Self { speed_sq: f64::INFINITY, tip_sq }
+    }
+
+    /// Leaves a piece whose axes are those of the tool.
+    fn leave(&mut self, speed_sq: f64) {
+        (self.speed_sq, self.tip_sq) = (speed_sq, speed_sq);
+    }
+}
+
 thread_local! {
     static SPACE: RefCell<run::Workspace> = RefCell::default();
 }

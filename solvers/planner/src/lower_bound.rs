@@ -45,6 +45,8 @@ use crate::runs::groups;
 use feedplan_geometry::quadratic::norm;
 use intervals::Intervals;
 
+pub use intervals::Hint;
+
 /// Factors that exceed the rounding of sixteen operations.
 const UP: f64 = 1.0 + 16.0 * f64::EPSILON;
 const DOWN: f64 = 1.0 - 16.0 * f64::EPSILON;
@@ -71,17 +73,6 @@ const FEW_INTERVALS: usize = 20_000;
 /// Computes the tables that all bounds share. A process forked while a thread computes them would wait for ever.
 pub fn prepare() {
     length::prepare();
-}
-
-/// The profile whose time is to be bounded. Only the first intervals and their refinement depend on it.
-#[derive(Clone, Copy)]
-pub struct Hint<'a> {
-    /// Of each phase: its piece, its control axis, u at its end, its duration [s].
-    pub piece: &'a [u32],
-    /// Any other number stands for no axis.
-    pub axis: &'a [u8],
-    pub u1: &'a [f64],
-    pub duration: &'a [f64],
 }
 
 /// The problem, with its limits prepared for the sweeps.

@@ -26,20 +26,18 @@ mod split;
 mod store;
 mod window;
 
-use super::run::Junction;
 use super::time::{integral, NODES};
-use super::Task;
+use super::{Junction, Task};
 use crate::phase_law::PhaseLaw;
 use crate::problem::{weights_of, TIP_AXES};
 use crate::profile::{Profile, Row, NO_AXIS};
 use check::keeps_limits;
 use feedplan_geometry::polynomial::MOST;
 use feedplan_geometry::quadratic::norm;
-pub use part::Remedy;
+pub use part::{Axes, Remedy};
 use part::{Cap, Part, SubPiece};
 use pass::{axis_distance, Law, Phase, State, Stuck};
 use piece::Piece;
-pub use split::Axes;
 use split::{split, Cut, Limits};
 use store::Store;
 

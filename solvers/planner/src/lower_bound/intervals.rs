@@ -1,6 +1,15 @@
 //! The intervals of a run: at first the phases of a profile, then halved where their bound is loose.
 
-use super::Hint;
+/// The profile whose time is to be bounded. Only the first intervals and their refinement depend on it.
+#[derive(Clone, Copy)]
+pub struct Hint<'a> {
+    /// Of each phase: its piece, its control axis, u at its end, its duration [s].
+    pub piece: &'a [u32],
+    /// Any other number stands for no axis.
+    pub axis: &'a [u8],
+    pub u1: &'a [f64],
+    pub duration: &'a [f64],
+}
 
 /// The interval belongs to no phase.
 const NO_PHASE: u32 = u32::MAX;

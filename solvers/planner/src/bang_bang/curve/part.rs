@@ -2,10 +2,24 @@
 //! it.
 
 use super::piece::{weighted_speed_sq, Piece};
-use super::split::Axes;
 use crate::bang_bang::tolerance::{NARROW, NEAR_END, SAME_TURN};
+use crate::problem::Both;
 use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
+
+/// Limits of the axes in both directions, [mm/s²] and [mm²/s²].
+pub struct Axes<const M: usize> {
+    pub acceleration: Both<M>,
+    pub velocity_sq: Both<M>,
+}
+
+impl<const M: usize> Axes<M> {
+    /// The squares of the velocity limits of axis k: one if both are equal.
+    pub fn velocities_sq(&self, k: usize) -> impl Iterator<Item = f64> + Clone + '_ {
+        let count = if self.velocity_sq[0][k] == self.velocity_sq[1][k] { 1 } else { 2 };
+        self.velocity_sq[..count].iter().map(move |side| side[k])
+    }
+}
 
 /// The lowest cap of a sub-piece.
 #[derive(Clone, Copy, Debug, PartialEq)]

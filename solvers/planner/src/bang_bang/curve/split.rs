@@ -2,12 +2,12 @@
 //! ends of the chord-error lines, where weights are uneven, and at remedies.
 
 use super::cusp::{cusps, Cusps, NearCusp};
-use super::part::{Cap, End, Part, Remedy};
+use super::part::{Axes, Cap, End, Part, Remedy};
 use super::piece::Piece;
 use crate::bang_bang::chord::SpeedLine;
 use crate::bang_bang::tolerance::{NEAR_CUSP, SAME_CUT, SAME_TURN, SLOW_SQ, ZERO};
 use crate::problem::ChordLimit;
-use crate::problem::{greater, Both, TIP_AXES};
+use crate::problem::{greater, TIP_AXES};
 use crate::AxisBits;
 use feedplan_geometry::polynomial::Polynomial;
 
@@ -15,20 +15,6 @@ use feedplan_geometry::polynomial::Polynomial;
 const UNEVEN: f64 = 100.0;
 /// A near cusp needs no cut of its own if there is a cut, or a cusp, within this many times its reach.
 const AROUND: f64 = 4.0;
-
-/// Limits of the axes in both directions, [mm/s²] and [mm²/s²].
-pub struct Axes<const M: usize> {
-    pub acceleration: Both<M>,
-    pub velocity_sq: Both<M>,
-}
-
-impl<const M: usize> Axes<M> {
-    /// The squares of the velocity limits of axis k: one if both are equal.
-    fn velocities_sq(&self, k: usize) -> impl Iterator<Item = f64> + Clone + '_ {
-        let count = if self.velocity_sq[0][k] == self.velocity_sq[1][k] { 1 } else { 2 };
-        self.velocity_sq[..count].iter().map(move |side| side[k])
-    }
-}
 
 /// What limits the speed on a piece.
 pub struct Limits<'a, const M: usize> {

@@ -1,8 +1,7 @@
 //! The sub-pieces of a run, kept from the backward pass for the forward one, in memory by their own degree rather
 //! than by the capacity of their polynomials.
 
-use super::part::{Part, SubPiece};
-use super::split::Axes;
+use super::part::{Axes, Part, SubPiece};
 use feedplan_geometry::polynomial::Polynomial;
 
 /// Sub-pieces of any degree, in the order of the backward pass.

@@ -1,7 +1,6 @@
 //! One piece of degree 2 over t in [0, 1], from its three control points: its tangents, D and W.
 
-use super::turns::difference_of_products;
-use crate::bang_bang::tolerance::ZERO;
+use crate::bang_bang::tolerance::{CANCELLED, ZERO};
 use feedplan_geometry::quadratic::{dot, sub};
 
 /// The tangent C' is linear in t between the ends.
@@ -67,4 +66,28 @@ impl<const M: usize> Piece<M> {
             std::array::from_fn(|k| self.right[k] - (1.0 - t) * (self.right[k] - self.left[k]))
         }
     }
+}
+
+/// a b − c d without cancellation.
+#[inline(always)]
+fn difference_of_products(a: f64, b: f64, c: f64, d: f64) -> f64 {
+    let (ab, cd) = (a * b, c * d);
+    let difference = ab - cd;
+    if difference.abs() >= CANCELLED * (ab.abs() + cd.abs()) {
+        difference
+    } else {
+        difference + (rounding_error(a, b, ab) - rounding_error(c, d, cd))
+    }
+}
+
+/// a b − (its rounded value), exactly (Dekker).
+#[inline(never)]
+fn rounding_error(a: f64, b: f64, rounded: f64) -> f64 {
+    let halves = |x: f64| {
+        let big = 134_217_729.0 * x;
+        let high = big - (big - x);
+        (high, x - high)
+    };
+    let ((a1, a0), (b1, b0)) = (halves(a), halves(b));
+    ((a1 * b1 - rounded) + a1 * b0 + a0 * b1) + a0 * b0
 }

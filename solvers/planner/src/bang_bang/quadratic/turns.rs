@@ -5,7 +5,6 @@
 //! it.
 
 use super::piece::Piece;
-use crate::bang_bang::tolerance::CANCELLED;
 use feedplan_geometry::quadratic::dot;
 
 /// An end of a monotone part: the axis that turns there, or the edge of the piece.
@@ -19,30 +18,6 @@ pub struct MonotonePart<const M: usize> {
     pub length: f64,
     /// Its tangents as those of a piece; exactly 0 for an axis that turns.
     pub piece: Piece<M>,
-}
-
-/// a b − c d without cancellation.
-#[inline(always)]
-pub fn difference_of_products(a: f64, b: f64, c: f64, d: f64) -> f64 {
-    let (ab, cd) = (a * b, c * d);
-    let difference = ab - cd;
-    if difference.abs() >= CANCELLED * (ab.abs() + cd.abs()) {
-        difference
-    } else {
-        difference + (rounding_error(a, b, ab) - rounding_error(c, d, cd))
-    }
-}
-
-/// a b − (its rounded value), exactly (Dekker).
-#[inline(never)]
-fn rounding_error(a: f64, b: f64, rounded: f64) -> f64 {
-    let halves = |x: f64| {
-        let big = 134_217_729.0 * x;
-        let high = big - (big - x);
-        (high, x - high)
-    };
-    let ((a1, a0), (b1, b0)) = (halves(a), halves(b));
-    ((a1 * b1 - rounded) + a1 * b0 + a0 * b1) + a0 * b0
 }
 
 impl<const M: usize> Piece<M> {
