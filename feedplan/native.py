@@ -2,36 +2,51 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
-from typing import Any, Generic, TypeVar
+from dataclasses import MISSING, fields
+from typing import Any, Generic, Protocol, TypeVar
 
 Record = TypeVar("Record", bound="OfNative[Any]")
-Native = TypeVar("Native")
+
+
+class HasFields(Protocol):
+    """A native object."""
+
+    def fields(self) -> dict[str, Any]:
+        """Its arrays by name: read-only views of its memory."""
+
+
+Native = TypeVar("Native", bound=HasFields)
 
 
 class OfNative(Generic[Native]):
-    """A frozen dataclass whose fields are those of `native`; arrays are read-only views of its memory.
+    """A frozen dataclass, some of whose fields are views of the memory of `native`.
 
-    The native object is made with the record and checks the fields once; kernels take the native object.
+    The native object is made with the record and checks these fields once; kernels take the native object.
     """
 
     native: Native
 
     @classmethod
     def of(cls: type[Record], native: Native, **others: Any) -> Record:
-        """The record of a native object; `others` are the fields that the native object lacks."""
+        """The record of a native object; `others` are fields that the native object lacks."""
         record = object.__new__(cls)
-        record._hold(native, **others)
+        for field in fields(record):  # type: ignore[arg-type]
+            if field.default is not MISSING:
+                others.setdefault(field.name, field.default)
+            elif field.default_factory is not MISSING and field.name not in others:
+                others[field.name] = field.default_factory()
+        vars(record).update(others)
+        record._hold(native)
         return record
 
-    def _hold(self, native: Native, **others: Any) -> None:
-        object.__setattr__(self, "native", native)
-        for name in _names(self):
-            object.__setattr__(self, name, others[name] if name in others else getattr(native, name))
+    def with_others(self: Record, **others: Any) -> Record:
+        """The same record with other values of fields that the native object lacks."""
+        record = object.__new__(type(self))
+        vars(record).update(vars(self), **others)
+        return record
+
+    def _hold(self, native: Native) -> None:
+        vars(self).update(native.fields(), native=native)
 
     def __reduce__(self) -> tuple[type, tuple[Any, ...]]:
-        return type(self), tuple(getattr(self, name) for name in _names(self))
-
-
-def _names(record: Any) -> list[str]:
-    return [field.name for field in fields(record)]
+        return type(self), tuple(getattr(self, field.name) for field in fields(self))  # type: ignore[arg-type]

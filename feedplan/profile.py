@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,12 +91,7 @@ class SpeedProfile(OfNative[Profile]):
             if name in ("a0", "a1") and len(column) == 0:
                 column = np.zeros(len(self.piece))
             object.__setattr__(self, name, np.ascontiguousarray(column, dtype))
-        self._hold(Profile(self), stopped=self.stopped, excess=self.excess)
-
-    @classmethod
-    def of(cls, native: Profile, **others: Any) -> SpeedProfile:
-        """The profile of a native one; `others` are `stopped` and `excess`."""
-        return super().of(native, **{"stopped": False, "excess": math.nan, **others})
+        self._hold(Profile(self))
 
     def __len__(self) -> int:
         return len(self.piece)

@@ -15,11 +15,11 @@ from feedplan.geometry.corners import Corners
 from feedplan.geometry.feed_groups import group_feeds, leading_feed, leading_group, told_apart
 from feedplan.geometry.fit_settings import FitSettings, tolerance_of
 from feedplan.geometry.joined import joined
-from feedplan.geometry.moves import Moves, Rules
 from feedplan.geometry.path import FitSummary, Path
 from feedplan.geometry.path_words import path_words
+from feedplan.geometry.rules import Rules
 from feedplan.machine.machine import Machine
-from feedplan.program.program import LINEAR_AXES, PathControl, Program
+from feedplan.program.program import PathControl, Program
 from feedplan.progress import Listener, part, tell
 
 # Splines and their moves come from sums of the same offsets; more than this between them [mm] is no rounding.
@@ -95,28 +95,14 @@ def build_path(
         moving = program.moving()
 
     tell(progress, 0.0)
-    moves = Moves(
+    rules = Rules(
         name=program.name,
-        start=program.start,
-        kind=program.kind,
-        target=program.target,
         feed=told_apart(names, moving, program.feed),
-        line=program.line,
         tolerance=limit,
         fit_tolerance=fit_limit,
         halt=halt,
         joints=joints,
-        arc_move=program.arc_move,
-        arc_plane=_arc_planes(program),
-        arc_centre=np.ascontiguousarray(np.take_along_axis(program.arc_centre, _plane_letters(program), 1)),
-        arc_angle=program.arc_angle,
-        spline_move=program.spline_move,
-        spline_pieces=program.spline_pieces,
         splines=splines,
-        change_move=program.change_move,
-        change_start=program.change_start,
-    )
-    rules = Rules(
         max_velocity=words.max_velocity,
         max_acceleration=words.max_acceleration,
         travel=words.travel,
@@ -128,7 +114,7 @@ def build_path(
         corner_angle=math.radians(settings.corner_angle),
         corners=(Corners.ARCS if corners is Corners.JOINED else corners).value,
     )
-    built, summary, outside, rough = native_build_path(moves, rules, part(progress, 0.0, _BUILT))
+    built, summary, outside, rough = native_build_path(program, rules, part(progress, 0.0, _BUILT))
     native, feed, move, allowed, runs = built
     tell(progress, 1.0)
     if outside is not None:
@@ -233,19 +219,6 @@ def _splines(program: Program) -> CompositeCurve | None:
                 line,
             )
     return replace(curve, control_points=control)
-
-
-def _plane_letters(program: Program) -> NDArray[np.int64]:
-    """(k, 2) the axes of the plane of each arc, turning from the first to the second at a positive angle."""
-    normal = program.arc_normal.astype(np.int64)
-    return np.stack([(normal + 1) % 3, (normal + 2) % 3], axis=1)
-
-
-def _arc_planes(program: Program) -> NDArray[np.int64]:
-    """(k, 2) the columns for the plane of each arc."""
-    names = program.axes
-    columns = np.array([names.index(name) if name in names else -1 for name in LINEAR_AXES])
-    return np.ascontiguousarray(columns[_plane_letters(program)])
 
 
 def _tolerances(

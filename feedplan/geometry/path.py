@@ -22,10 +22,10 @@ from feedplan.geometry.corners import Corners
 from feedplan.geometry.feed_groups import group_feeds, moving_axes
 from feedplan.geometry.fit_settings import FitSettings, tolerance_of
 from feedplan.geometry.joints import tangent_jumps
-from feedplan.geometry.moves import Moves, Rules
+from feedplan.geometry.rules import Rules
 from feedplan.lazy import cached_property
 from feedplan.machine.axis import AXIS_NAME, NAME_REMEDY
-from feedplan.program.program import MoveKind
+from feedplan.program.program import MoveKind, PathControl, Program
 from feedplan.units import counted
 
 DEFAULT_AXES = "XYZABC"
@@ -258,19 +258,27 @@ class Path:
         same: NDArray[np.bool_] = (array[1:] == array[:-1]).all(axis=1)
         refuse(same, lambda i: f"points {i} and {i + 1} coincide: remove one of them")
         count, width = len(array) - 1, array.shape[1]
-        moves = Moves(
+        lines = Program(
             name="points",
-            start=array[0].copy(),
+            axes=names,
+            start=array[0],
             kind=np.full(count, MoveKind.LINE, dtype=np.uint8),
-            target=array[1:].copy(),
+            target=array[1:],
             feed=np.full(count, speed),
             line=np.zeros(count, dtype=np.int32),
-            tolerance=np.full(count, float(tolerance)),
+            control=np.full(count, PathControl.TOLERANCE, dtype=np.uint8),
+            blend_tolerance=np.full(count, tolerance),
             fit_tolerance=np.full(count, settings.fit_share * tolerance),
-            halt=np.zeros(count, dtype=np.bool_),
-            joints=np.ones(count, dtype=np.bool_),
+            stop=np.zeros(count, dtype=np.bool_),
+            dwell=np.zeros(count),
         )
         rules = Rules(
+            name=lines.name,
+            feed=lines.feed,
+            tolerance=lines.blend_tolerance,
+            fit_tolerance=lines.fit_tolerance,
+            halt=lines.stop,
+            joints=np.ones(count, dtype=np.bool_),
             max_velocity=np.full(width, _ANY_SPEED),
             max_acceleration=np.full(width, _ANY_ACCELERATION),
             travel=np.tile([-np.inf, np.inf], (width, 1)),
@@ -282,7 +290,7 @@ class Path:
             corner_angle=math.radians(settings.corner_angle),
             corners=corners.value,
         )
-        (curve, _, move, allowed, runs), summary, _, _ = build_path(moves, rules)
+        (curve, _, move, allowed, runs), summary, _, _ = build_path(lines, rules)
         moving = np.diff(array, axis=0) != 0.0
         path = cls._of(names, CompositeCurve.of(curve), speed, runs, moving, move)
         return replace(path, tolerance=allowed, fit=FitSummary.of(*summary), corners=corners)

@@ -194,13 +194,13 @@ def read_gcode(
         feed=feed,
         whole_step=whole_step,
     )
-    columns = read_native(content, name, options, progress)
+    moves, columns = read_native(content, name, options, progress)
     columns["events"] = Events(*columns.pop("event_columns"))
     if columns["splines"] is not None:
         columns["splines"] = CompositeCurve.of(columns["splines"])
     if control is None or not control.applies:
         columns["meaning"] = columns["tool_length"] = None
-    return Program(name=name, **columns)
+    return Program.of(moves, name=name, **columns)
 
 
 def _places(machine: Machine | None) -> NDArray[np.float64]:

@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan._solvers import Moves
 from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
+from feedplan.native import OfNative
 from feedplan.program.events import Events
 from feedplan.units import counted
 
@@ -60,7 +62,7 @@ _DTYPES = {
 
 
 @dataclass(frozen=True, eq=False)
-class Program:
+class Program(OfNative[Moves]):
     """Moves of a part program in order, in machine coordinates.
 
     `axes` are its letters: readers give X, Y, Z and what else the program uses, in the order XYZABCUVWIJK;
@@ -102,10 +104,10 @@ class Program:
     fit_tolerance: NDArray[np.float64]
     stop: NDArray[np.bool_]
     dwell: NDArray[np.float64]
-    arc_move: NDArray[np.int64]
-    arc_centre: NDArray[np.float64]
-    arc_normal: NDArray[np.uint8]
-    arc_angle: NDArray[np.float64]
+    arc_move: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+    arc_centre: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
+    arc_normal: NDArray[np.uint8] = field(default_factory=lambda: np.empty(0, np.uint8))
+    arc_angle: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     start_dwell: float = 0.0
     spline_move: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
     spline_pieces: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, np.int64))
@@ -124,6 +126,7 @@ class Program:
     def __post_init__(self) -> None:
         for name, dtype in _DTYPES.items():
             object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name), dtype))
+        self._hold(Moves(self))
 
     def __len__(self) -> int:
         return len(self.kind)
@@ -134,8 +137,7 @@ class Program:
     def starts(self) -> NDArray[np.float64]:
         """Where each move starts, in its own words (n, axes) [mm, deg]."""
         starts = np.concatenate([self.start[None, :], self.target[:-1]])
-        if len(self.change_move):
-            starts[self.change_move] = self.change_start
+        starts[self.change_move] = self.change_start
         return starts
 
     def moving(self) -> NDArray[np.bool_]:
@@ -143,8 +145,7 @@ class Program:
         moves = np.empty(self.target.shape, dtype=np.bool_)
         moves[:1] = self.target[:1] != self.start
         moves[1:] = self.target[1:] != self.target[:-1]
-        if len(self.change_move):
-            moves[self.change_move] = self.target[self.change_move] != self.change_start
+        moves[self.change_move] = self.target[self.change_move] != self.change_start
         for column, name in enumerate(LINEAR_AXES):
             if name in self.axes:
                 moves[self.arc_move[self.arc_normal != column], self.axes.index(name)] = True
@@ -178,12 +179,11 @@ class Program:
         splines = self.splines
         if splines is not None:
             splines = replace(splines, control_points=splines.control_points[:, columns])
-        changed = self.change_start.reshape(-1, len(self.axes))[:, columns]
         return replace(
             self,
             axes=axes,
             start=self.start[columns],
             target=self.target[:, columns],
             splines=splines,
-            change_start=changed,
+            change_start=self.change_start[:, columns],
         )

@@ -6,7 +6,6 @@ import hashlib
 import os
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypedDict, cast
 
@@ -123,11 +122,11 @@ def read_program(
             max_moves=max_moves,
             progress=progress,
         )
-        program = replace(program, reading=again)
+        program = program.with_others(reading=again)
     else:
         content_of(content, name, min(max_bytes, most))
         program = reader(content, known, name)
-    return replace(program, sha256=hashlib.sha256(content).hexdigest(), text=text)
+    return program.with_others(sha256=hashlib.sha256(content).hexdigest(), text=text)
 
 
 def _language(content: bytes, name: str) -> str:

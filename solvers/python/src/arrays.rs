@@ -25,6 +25,11 @@ pub fn rows_with<const M: usize>(array: &PyReadonlyArray2<f64>, rest: f64) -> Py
     Ok(flat.chunks_exact(axes).map(|row| padded(row, rest)).collect())
 }
 
+/// Rows of `axes` numbers to rows of M, those beyond at 0.
+pub fn padded_rows<const M: usize>(flat: &[f64], axes: usize) -> Vec<[f64; M]> {
+    flat.chunks_exact(axes).map(|row| padded(row, 0.0)).collect()
+}
+
 /// (m,) array to one row of M ≥ m axes; the axes beyond m get `rest`.
 pub fn row<const M: usize>(array: &PyReadonlyArray1<f64>, rest: f64) -> PyResult<[f64; M]> {
     let flat = array.as_slice().map_err(|_| contiguous())?;

@@ -5,6 +5,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::curve::Curve;
+use super::moves::Moves;
 use super::native::Of;
 use super::profile::Profile;
 use super::with_padded_axes;
@@ -154,58 +155,26 @@ pub fn arcs<'a>(profile: &'a Profile, problem: &'a ProblemArrays<'_>) -> PyResul
     })
 }
 
-/// `feedplan.Program`.
-#[derive(FromPyObject)]
-struct ProgramArrays<'py> {
-    axes: Vec<String>,
-    start: PyReadonlyArray1<'py, f64>,
-    target: PyReadonlyArray2<'py, f64>,
-    line: PyReadonlyArray1<'py, i32>,
-    arc_move: PyReadonlyArray1<'py, i64>,
-    arc_centre: PyReadonlyArray2<'py, f64>,
-    arc_normal: PyReadonlyArray1<'py, u8>,
-    arc_angle: PyReadonlyArray1<'py, f64>,
-    spline_move: PyReadonlyArray1<'py, i64>,
-    spline_pieces: PyReadonlyArray1<'py, i64>,
-    splines: Option<Of<Curve>>,
-    change_move: PyReadonlyArray1<'py, i64>,
-    change_start: PyReadonlyArray2<'py, f64>,
-}
-
-impl ProgramArrays<'_> {
-    fn programmed(&self, axes: usize) -> PyResult<Programmed<'_>> {
-        let none = Pieces { axes, stride: axes, control: &[], weights: &[], offsets: &[0], width: &[] };
-        let program = Programmed {
-            axes,
-            start: self.start.as_slice()?,
-            target: self.target.as_slice()?,
-            line: self.line.as_slice()?,
-            arc_move: self.arc_move.as_slice()?,
-            arc_centre: self.arc_centre.as_slice()?,
-            arc_normal: self.arc_normal.as_slice()?,
-            arc_angle: self.arc_angle.as_slice()?,
-            spline_move: self.spline_move.as_slice()?,
-            spline_pieces: self.spline_pieces.as_slice()?,
-            splines: self.splines.as_ref().map_or(none, |splines| pieces(splines)),
-            change_move: self.change_move.as_slice()?,
-            change_start: self.change_start.as_slice()?,
-            xyz: ["X", "Y", "Z"].map(|letter| self.axes.iter().position(|axis| axis == letter)),
-        };
-        let arcs = program.arc_move.len();
-        let good = program.start.len() == axes
-            && self.axes.len() == axes
-            && program.target.len() == axes * program.len()
-            && program.arc_centre.len() == 3 * arcs
-            && [program.arc_normal.len(), program.arc_angle.len()] == [arcs; 2]
-            && program.arc_normal.iter().all(|&normal| normal < 3)
-            && program.splines.axes == axes
-            && program.change_start.len() == axes * program.change_move.len()
-            && program.spline_pieces.len() == program.spline_move.len() + 1
-            && program.spline_pieces.windows(2).all(|pair| 0 <= pair[0] && pair[0] <= pair[1])
-            && program.spline_pieces.last().is_some_and(|&last| last <= program.splines.len() as i64);
-        require(good, "program")?;
-        Ok(program)
-    }
+/// The moves of a program on a path in so many axes.
+fn programmed(moves: &Moves, axes: usize) -> PyResult<Programmed<'_>> {
+    let none = Pieces { axes, stride: axes, control: &[], weights: &[], offsets: &[0], width: &[] };
+    require(moves.axes() == axes, "program")?;
+    Ok(Programmed {
+        axes,
+        start: &moves.start,
+        target: &moves.target,
+        line: &moves.line,
+        arc_move: &moves.arc_move,
+        arc_centre: &moves.arc_centre,
+        arc_normal: &moves.arc_normal,
+        arc_angle: &moves.arc_angle,
+        spline_move: &moves.spline_move,
+        spline_pieces: &moves.spline_pieces,
+        splines: moves.splines.as_ref().map_or(none, |splines| pieces(splines.get())),
+        change_move: &moves.change_move,
+        change_start: &moves.change_start,
+        xyz: moves.xyz,
+    })
 }
 
 /// `feedplan.audit.Limits`: what holds everywhere, one number an axis.
@@ -276,13 +245,13 @@ fn audit_plan(
     limits: LimitArrays,
     feed: PyReadonlyArray2<'_, f64>,
     profile: Option<Of<Profile>>,
-    program: Option<ProgramArrays<'_>>,
+    program: Option<Of<Moves>>,
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<Findings> {
     let path = problem.followed(&feed)?;
     let junction_speed = problem.junction_speed.as_slice()?;
     let arcs = profile.as_ref().map(|profile| arcs(profile, &problem)).transpose()?;
-    let program = program.as_ref().map(|program| program.programmed(problem.axes())).transpose()?;
+    let program = program.as_ref().map(|moves| programmed(moves, problem.axes())).transpose()?;
     with_padded_axes!(problem.axes(), M, {
         let limits = limits.limits::<M>(path.axes)?;
         run(py, progress.as_ref(), |watch| {
@@ -342,7 +311,7 @@ struct Compared {
     problem: Py<PyAny>,
     feed: Py<PyAny>,
     profile: Option<Py<Profile>>,
-    program: Option<Py<PyAny>>,
+    program: Option<Py<Moves>>,
     /// When every arc of the profile begins.
     starts: Vec<f64>,
 }
@@ -357,11 +326,10 @@ impl Compared {
     ) -> PyResult<T> {
         let problem: ProblemArrays = self.problem.bind(py).extract()?;
         let feed: PyReadonlyArray2<f64> = self.feed.bind(py).extract()?;
-        let program: Option<ProgramArrays> =
-            self.program.as_ref().map(|program| program.bind(py).extract()).transpose()?;
         let path = problem.followed(&feed)?;
         let arcs = self.profile.as_ref().map(|profile| arcs(profile.get(), &problem)).transpose()?;
-        let program = program.as_ref().map(|program| program.programmed(problem.axes())).transpose()?;
+        let program =
+            self.program.as_ref().map(|moves| programmed(moves.get(), problem.axes())).transpose()?;
         let profile = arcs.map(|arcs| Timed { arcs, starts: &self.starts, clock: &[] });
         let plan = Plan { path, profile, program };
         run(py, progress, |watch| work(&plan, watch))
@@ -386,7 +354,7 @@ impl SetpointAudit {
         problem: Option<Bound<'_, PyAny>>,
         feed: Option<Bound<'_, PyAny>>,
         profile: Option<Of<Profile>>,
-        program: Option<Bound<'_, PyAny>>,
+        program: Option<Of<Moves>>,
     ) -> PyResult<Self> {
         let axes = limits.max_velocity.len();
         let stream: Box<dyn AnyStream> = with_padded_axes!(
@@ -451,7 +419,7 @@ fn compare(
     problem: Bound<'_, PyAny>,
     feed: Bound<'_, PyAny>,
     profile: Option<Of<Profile>>,
-    program: Option<Bound<'_, PyAny>>,
+    program: Option<Of<Moves>>,
 ) -> PyResult<Option<Compared>> {
     let arrays: ProblemArrays = problem.extract()?;
     let feeds: PyReadonlyArray2<f64> = feed.extract()?;
@@ -476,7 +444,7 @@ fn compare(
             usable = Some(profile.native().clone_ref(problem.py()));
         }
     }
-    let program = program.map(Bound::unbind);
+    let program = program.map(Of::into_native);
     Ok(Some(Compared { problem: problem.unbind(), feed: feed.unbind(), profile: usable, program, starts }))
 }
 

@@ -9,6 +9,7 @@ use numpy::{
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use rayon::prelude::*;
 
 use super::arrays::{row, rows, to_array2};
@@ -267,31 +268,19 @@ impl Curve {
         })
     }
 
-    /// (total, axes)
-    #[getter]
-    fn control_points<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        view(slf, Self::table)
-    }
-
-    /// (total,), or None where all pieces are polynomial.
-    #[getter]
-    fn weights<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
+    /// Views of `control_points` (total, axes), `weights` (total,), None where all pieces are polynomial, `offsets`
+    /// (n + 1,) and `width` (n,).
+    fn fields<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
         let rational = !slf.get().weight_slice().is_empty();
-        rational.then(|| view(slf, |curve| curve.weight_slice().into())).transpose()
-    }
-
-    /// (n + 1,)
-    #[getter]
-    fn offsets<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let weights = rational.then(|| view(slf, |curve| curve.weight_slice().into())).transpose()?;
         let offsets = view(slf, |curve| curve.piece_offsets().into())?;
-        // The same memory as signed numbers: differences of unsigned ones are none.
-        offsets.call_method1("view", ("i8",))
-    }
-
-    /// (n,)
-    #[getter]
-    fn width<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        view(slf, |curve| curve.widths().into())
+        let fields = PyDict::new(slf.py());
+        fields.set_item("control_points", view(slf, Self::table)?)?;
+        fields.set_item("weights", weights)?;
+        // The same memory as signed numbers: differences of unsigned ones are never negative.
+        fields.set_item("offsets", offsets.call_method1("view", ("i8",))?)?;
+        fields.set_item("width", view(slf, |curve| curve.widths().into())?)?;
+        Ok(fields)
     }
 
     /// Values and derivatives (order + 1, m, axes) at m places.

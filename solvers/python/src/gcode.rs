@@ -1,11 +1,12 @@
-//! `read_gcode`: the bytes of a program to the arrays of `Program`.
+//! `read_gcode`: the bytes of a program to the fields of `Program`.
 
-use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2};
+use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyTuple};
 
 use super::arrays::{padded, rows};
 use super::curve::Curve;
+use super::moves::{places_of_xyz, Moves};
 use super::with_padded_axes;
 use super::work::run;
 use feedplan_gcode::{read, Meaning, Options, Place, Point, TipControl, Tool};
@@ -89,8 +90,8 @@ struct PyOptions<'py> {
     whole_step: f64,
 }
 
-/// Reads a G-code program. Returns the fields of `Program` but its name, with a native curve as `splines`, and
-/// `event_columns` in place of `events`.
+/// Reads a G-code program. Returns its moves and the other fields of `Program` but its name, with a native curve as
+/// `splines`, and `event_columns` in place of `events`.
 #[pyfunction]
 #[pyo3(signature = (source, name, options, progress=None))]
 fn read_gcode<'py>(
@@ -99,7 +100,7 @@ fn read_gcode<'py>(
     name: &str,
     options: PyOptions<'py>,
     progress: Option<Bound<'py, PyAny>>,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> PyResult<(Moves, Bound<'py, PyDict>)> {
     let places = rows::<9>(&options.places)?;
     let [home, start, offsets @ ..] = &places[..] else {
         return Err(pyo3::exceptions::PyValueError::new_err("home and start are two rows"));
@@ -137,26 +138,6 @@ fn read_gcode<'py>(
     })?;
 
     let axes: Vec<String> = columns.axes.iter().map(|&letter| char::from(letter).to_string()).collect();
-    let (count, arcs) = (columns.kind.len(), columns.arc_move.len());
-    let fields = PyDict::new(py);
-    fields.set_item("start", PyArray1::from_vec(py, columns.start))?;
-    fields.set_item("kind", PyArray1::from_vec(py, columns.kind))?;
-    fields.set_item("target", PyArray1::from_vec(py, columns.target).reshape([count, axes.len()])?)?;
-    fields.set_item("feed", PyArray1::from_vec(py, columns.feed))?;
-    fields.set_item("line", PyArray1::from_vec(py, columns.line))?;
-    fields.set_item("control", PyArray1::from_vec(py, columns.control))?;
-    fields.set_item("blend_tolerance", PyArray1::from_vec(py, columns.blend_tolerance))?;
-    fields.set_item("fit_tolerance", PyArray1::from_vec(py, columns.fit_tolerance))?;
-    fields.set_item("stop", PyArray1::from_vec(py, columns.stop))?;
-    fields.set_item("stop_cause", PyArray1::from_vec(py, columns.stop_cause))?;
-    fields.set_item("dwell", PyArray1::from_vec(py, columns.dwell))?;
-    fields.set_item("arc_move", PyArray1::from_vec(py, columns.arc_move))?;
-    let centres = columns.arc_centre.into_flattened();
-    fields.set_item("arc_centre", PyArray1::from_vec(py, centres).reshape([arcs, 3])?)?;
-    fields.set_item("arc_normal", PyArray1::from_vec(py, columns.arc_normal))?;
-    fields.set_item("arc_angle", PyArray1::from_vec(py, columns.arc_angle))?;
-    fields.set_item("spline_move", PyArray1::from_vec(py, columns.spline_move))?;
-    fields.set_item("spline_pieces", PyArray1::from_vec(py, columns.spline_pieces))?;
     let splines = match columns.spline_width.is_empty() {
         true => None,
         false => Some(with_padded_axes!(axes.len(), M, {
@@ -170,14 +151,23 @@ fn read_gcode<'py>(
             Curve::checked(pieces, axes.len())
         })?),
     };
-    fields.set_item("splines", splines.map(|curve| Bound::new(py, curve)).transpose()?)?;
-    fields.set_item("meaning", PyArray1::from_vec(py, columns.meaning))?;
-    fields.set_item("tool_length", PyArray1::from_vec(py, columns.tool_length))?;
-    let changes = columns.change_move.len();
-    fields.set_item("change_move", PyArray1::from_vec(py, columns.change_move))?;
-    let starts = PyArray1::from_vec(py, columns.change_start).reshape([changes, axes.len()])?;
-    fields.set_item("change_start", starts)?;
-    let events = columns.events;
+    let moves = Moves {
+        xyz: places_of_xyz(&axes),
+        start: columns.start,
+        kind: columns.kind,
+        target: columns.target,
+        line: columns.line,
+        arc_move: columns.arc_move,
+        arc_centre: columns.arc_centre.into_flattened(),
+        arc_normal: columns.arc_normal,
+        arc_angle: columns.arc_angle,
+        spline_move: columns.spline_move,
+        spline_pieces: columns.spline_pieces,
+        splines: splines.map(|curve| Py::new(py, curve)).transpose()?,
+        change_move: columns.change_move,
+        change_start: columns.change_start,
+    };
+    let (moves, events) = (moves.checked()?, columns.events);
     let event_columns = (
         PyArray1::from_vec(py, events.moves),
         PyArray1::from_vec(py, events.line),
@@ -185,13 +175,24 @@ fn read_gcode<'py>(
         PyArray1::from_vec(py, events.number),
         PyArray1::from_vec(py, events.p),
         PyArray1::from_vec(py, events.q),
-        pyo3::types::PyTuple::new(py, events.texts)?,
+        PyTuple::new(py, events.texts)?,
     );
+    let fields = PyDict::new(py);
+    fields.set_item("splines", moves.splines.as_ref().map(|curve| curve.clone_ref(py)))?;
+    fields.set_item("feed", PyArray1::from_vec(py, columns.feed))?;
+    fields.set_item("control", PyArray1::from_vec(py, columns.control))?;
+    fields.set_item("blend_tolerance", PyArray1::from_vec(py, columns.blend_tolerance))?;
+    fields.set_item("fit_tolerance", PyArray1::from_vec(py, columns.fit_tolerance))?;
+    fields.set_item("stop", PyArray1::from_vec(py, columns.stop))?;
+    fields.set_item("stop_cause", PyArray1::from_vec(py, columns.stop_cause))?;
+    fields.set_item("dwell", PyArray1::from_vec(py, columns.dwell))?;
+    fields.set_item("meaning", PyArray1::from_vec(py, columns.meaning))?;
+    fields.set_item("tool_length", PyArray1::from_vec(py, columns.tool_length))?;
     fields.set_item("event_columns", event_columns)?;
     fields.set_item("start_dwell", columns.start_dwell)?;
-    fields.set_item("warnings", pyo3::types::PyTuple::new(py, columns.warnings)?)?;
-    fields.set_item("axes", pyo3::types::PyTuple::new(py, axes)?)?;
-    Ok(fields)
+    fields.set_item("warnings", PyTuple::new(py, columns.warnings)?)?;
+    fields.set_item("axes", PyTuple::new(py, axes)?)?;
+    Ok((moves, fields))
 }
 
 /// Adds the functions of this file to the module.

@@ -10,6 +10,7 @@ mod gcode;
 mod jerk;
 mod joint_audit;
 mod kinematics;
+mod moves;
 mod native;
 mod path;
 mod plan;
@@ -53,6 +54,7 @@ fn _solvers(module: &Bound<'_, PyModule>) -> PyResult<()> {
     feedplan_planner::lower_bound::prepare();
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     fit::register(module)?;
+    moves::register(module)?;
     path::register(module)?;
     text::register(module)?;
     audit::register(module)?;

@@ -15,6 +15,10 @@ impl<T> Of<T> {
     pub fn native(&self) -> &Py<T> {
         &self.0
     }
+
+    pub fn into_native(self) -> Py<T> {
+        self.0
+    }
 }
 
 impl<'a, 'py, T: PyClass> FromPyObject<'a, 'py> for Of<T> {

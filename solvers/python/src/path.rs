@@ -1,14 +1,13 @@
-//! `build_path`: the columns of a program to the columns of its path.
-
-use std::ops::Range;
+//! `build_path`: the moves of a program to the columns of its path.
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-use super::arrays::{indices, row, rows, to_array2};
+use super::arrays::{padded, padded_rows, row, rows, to_array2};
 use super::curve::{Curve, Padded};
+use super::moves::Moves;
 use super::native::Of;
 use super::with_padded_axes;
 use super::work::run;
@@ -17,7 +16,7 @@ use feedplan_geometry::spline::{CompositeCurve, Piece};
 use feedplan_geometry::watch::Watch;
 use feedplan_path::arc::ArcError;
 use feedplan_path::corner::Rounding;
-use feedplan_path::follow::{ArcShape, Fault, FollowOptions, Followed, Moves, Shape};
+use feedplan_path::follow::{self, ArcShape, Fault, FollowOptions, Followed, Shape};
 use feedplan_path::path_builder::{Axes, BuiltPath, Part};
 use feedplan_path::Followed as _;
 
@@ -32,35 +31,17 @@ const ANYWHERE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
 type Floats<'py> = PyReadonlyArray1<'py, f64>;
 type Rows<'py> = PyReadonlyArray2<'py, f64>;
-type Numbers<'py> = PyReadonlyArray1<'py, i64>;
 
-/// `feedplan.geometry.moves.Moves`.
+/// `feedplan.geometry.rules.Rules`.
 #[derive(FromPyObject)]
-struct MoveArrays<'py> {
+struct Rules<'py> {
     name: String,
-    start: Floats<'py>,
-    kind: PyReadonlyArray1<'py, u8>,
-    target: Rows<'py>,
     feed: Floats<'py>,
-    line: PyReadonlyArray1<'py, i32>,
     tolerance: Floats<'py>,
     fit_tolerance: Floats<'py>,
     halt: PyReadonlyArray1<'py, bool>,
     joints: PyReadonlyArray1<'py, bool>,
-    arc_move: Numbers<'py>,
-    arc_plane: PyReadonlyArray2<'py, i64>,
-    arc_centre: Rows<'py>,
-    arc_angle: Floats<'py>,
-    spline_move: Numbers<'py>,
-    spline_pieces: Numbers<'py>,
     splines: Option<Of<Curve>>,
-    change_move: Numbers<'py>,
-    change_start: Rows<'py>,
-}
-
-/// `feedplan.geometry.moves.Rules`.
-#[derive(FromPyObject)]
-struct Rules<'py> {
     max_velocity: Floats<'py>,
     max_acceleration: Floats<'py>,
     travel: Rows<'py>,
@@ -89,74 +70,47 @@ type Place = (usize, usize, f64);
 /// Moves at whose end a smooth path turns back, first and last moves (k, 2) of the places where it keeps its corners.
 type Rough<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray2<i64>>);
 
-impl MoveArrays<'_> {
-    fn len(&self) -> usize {
-        self.kind.len()
+impl Rules<'_> {
+    fn require_lengths(&self, moves: &Moves) -> PyResult<()> {
+        let columns = [&self.feed, &self.tolerance, &self.fit_tolerance].map(|column| column.len());
+        let good =
+            columns.into_iter().chain([self.halt.len(), self.joints.len()]).all(|len| len == moves.len())
+                && self.travel.shape() == [moves.axes(), 2]
+                && self.splines.as_ref().is_none_or(|splines| splines.axes() == moves.axes());
+        good.then_some(()).ok_or_else(|| PyValueError::new_err("the rules do not fit the program"))
     }
+}
 
-    fn axes(&self) -> usize {
-        self.start.len()
-    }
-
-    fn require_lengths(&self, travel: &Rows) -> PyResult<()> {
-        let (count, axes, arcs, changes) =
-            (self.len(), self.axes(), self.arc_move.len(), self.change_move.len());
-        let columns = [self.feed.len(), self.tolerance.len(), self.fit_tolerance.len()];
-        let others = [self.line.len(), self.halt.len(), self.joints.len()];
-        let good = self.target.shape() == [count, axes]
-            && columns.iter().chain(&others).all(|&len| len == count)
-            && self.arc_plane.shape() == [arcs, 2]
-            && self.arc_centre.shape() == [arcs, 2]
-            && self.arc_angle.len() == arcs
-            && travel.shape() == [axes, 2]
-            && self.spline_pieces.len() == self.spline_move.len() + 1
-            && (changes == 0 || self.change_start.shape() == [changes, axes])
-            && self.splines.as_ref().is_none_or(|splines| splines.axes() == axes);
-        good.then_some(()).ok_or_else(|| PyValueError::new_err("the columns of the program differ in length"))
-    }
-
-    fn arcs(&self) -> PyResult<Vec<(usize, ArcShape)>> {
-        let (planes, centres) = (self.arc_plane.as_slice()?.as_chunks().0, self.arc_centre.as_slice()?);
-        let shapes = planes.iter().zip(centres.as_chunks().0).zip(self.arc_angle.as_slice()?);
-        indices(&self.arc_move)
-            .into_iter()
-            .zip(shapes)
-            .map(|(index, ((plane, &centre), &sweep))| {
-                let plane = plane.map(|axis: i64| usize::try_from(axis).unwrap_or(usize::MAX));
-                if plane.iter().any(|&axis| axis >= self.axes()) || index >= self.len() {
-                    return Err(PyValueError::new_err(
-                        "an arc refers to a move or an axis that does not exist",
-                    ));
-                }
-                Ok((index, ArcShape { plane, centre, sweep }))
-            })
-            .collect()
-    }
-
-    /// Spline moves and the pieces that they take.
-    fn spline_ranges(&self) -> PyResult<(Vec<usize>, Vec<Range<usize>>)> {
-        let pieces = self.splines.as_ref().map_or(0, |splines| splines.widths().len());
-        let moves = indices(&self.spline_move);
-        let ranges: Vec<_> = indices(&self.spline_pieces).windows(2).map(|ends| ends[0]..ends[1]).collect();
-        let good = moves.iter().all(|&index| index < self.len())
-            && ranges.iter().all(|range| range.start <= range.end && range.end <= pieces);
-        let pair = good.then_some((moves, ranges));
-        pair.ok_or_else(|| PyValueError::new_err("a spline refers to a move or a piece that does not exist"))
-    }
+/// The arcs of a program by their moves, in the columns of its axes.
+fn arcs(moves: &Moves) -> PyResult<Vec<(usize, ArcShape)>> {
+    let rows = moves.arc_centre.as_chunks::<3>().0.iter().zip(&moves.arc_normal).zip(&moves.arc_angle);
+    let arc = |(&index, ((centre, &normal), &sweep)): (&i64, ((&[f64; 3], &u8), &f64))| {
+        // An arc turns from the first of these to the second at a positive angle.
+        let letters = [(normal + 1) % 3, (normal + 2) % 3].map(usize::from);
+        let [Some(first), Some(second)] = letters.map(|letter| moves.xyz[letter]) else {
+            return Err(PyValueError::new_err("an arc turns in an axis that the path does not have"));
+        };
+        let shape = ArcShape { plane: [first, second], centre: letters.map(|letter| centre[letter]), sweep };
+        Ok((index as usize, shape))
+    };
+    moves.arc_move.iter().zip(rows).map(arc).collect()
 }
 
 /// The path of a program.
 #[pyfunction]
-#[pyo3(signature = (moves, rules, progress=None))]
+#[pyo3(signature = (program, rules, progress=None))]
 fn build_path<'py>(
     py: Python<'py>,
-    moves: MoveArrays<'py>,
+    program: Of<Moves>,
     rules: Rules<'py>,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<(Columns<'py>, Summary, Option<Place>, Rough<'py>)> {
-    moves.require_lengths(&rules.travel)?;
-    let (axes, arcs) = (moves.axes(), moves.arcs()?);
-    let (spline_moves, ranges) = moves.spline_ranges()?;
+    let moves = &*program;
+    let (axes, arcs) = (moves.axes(), arcs(moves)?);
+    rules.require_lengths(moves)?;
+    let spline_moves = moves.spline_move.iter().map(|&index| index as usize);
+    let ranges: Vec<_> =
+        moves.spline_pieces.windows(2).map(|ends| ends[0] as usize..ends[1] as usize).collect();
     let corners = rules.corners.as_str();
     let options = FollowOptions {
         exact_tolerance: rules.exact_tolerance,
@@ -167,26 +121,26 @@ fn build_path<'py>(
         rounding: if corners == "arcs" { Rounding::Circle } else { Rounding::Parabola },
     };
     with_padded_axes!(axes, M, {
-        let target = rows::<M>(&moves.target)?;
+        let target = padded_rows::<M>(&moves.target, axes);
         let none = CompositeCurve::default();
-        let given = moves.splines.as_ref().map_or(Ok(&none), |splines| splines.padded().map(|own| &**own))?;
+        let given = rules.splines.as_ref().map_or(Ok(&none), |splines| splines.padded().map(|own| &**own))?;
         let Regular { curve: splines, ranges, .. } = run(py, None, |watch| regular(given, &ranges, watch))?;
-        let spline_moves: Vec<_> = spline_moves.into_iter().zip(ranges).collect();
-        let starts = if moves.change_move.len() > 0 { rows::<M>(&moves.change_start)? } else { vec![] };
-        let changes: Vec<_> = indices(&moves.change_move).into_iter().zip(starts).collect();
-        let followed = Moves {
-            start: row::<M>(&moves.start, 0.0)?,
-            kind: moves.kind.as_slice()?,
+        let spline_moves: Vec<_> = spline_moves.zip(ranges).collect();
+        let starts = padded_rows::<M>(&moves.change_start, axes);
+        let changes: Vec<_> = moves.change_move.iter().map(|&index| index as usize).zip(starts).collect();
+        let followed = follow::Moves {
+            start: padded(&moves.start, 0.0),
+            kind: &moves.kind,
             target: &target,
-            feed: moves.feed.as_slice()?,
-            tolerance: moves.tolerance.as_slice()?,
-            fit_tolerance: moves.fit_tolerance.as_slice()?,
-            halt: moves.halt.as_slice()?,
+            feed: rules.feed.as_slice()?,
+            tolerance: rules.tolerance.as_slice()?,
+            fit_tolerance: rules.fit_tolerance.as_slice()?,
+            halt: rules.halt.as_slice()?,
             arcs: &arcs,
             spline_moves: &spline_moves,
             changes: &changes,
             splines: &splines,
-            joints: moves.joints.as_slice()?,
+            joints: rules.joints.as_slice()?,
         };
         let travel = rows::<2>(&rules.travel)?;
         let limits = Axes {
@@ -200,8 +154,7 @@ fn build_path<'py>(
             _ => followed.path(&options, &limits, watch),
         };
         let path = run(py, progress.as_ref(), build)?.map_err(|error| {
-            let line = moves.line.as_slice().map_or(0, |lines| lines[error.index]);
-            let (name, sentence) = (&moves.name, sentence(error.fault));
+            let (line, name, sentence) = (moves.line[error.index], &rules.name, sentence(error.fault));
             ProgramError::new_err((format!("{name}, line {line}: {sentence}"), line))
         })?;
         columns(py, &path, &splines, axes, progress.as_ref())

@@ -1,7 +1,8 @@
 //! `Profile`: the columns of a speed profile.
 
-use numpy::{PyArray1, PyReadonlyArray1};
+use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use super::views::view;
 use feedplan_jerk::jerk_profile::JerkProfile;
@@ -43,15 +44,13 @@ macro_rules! profile {
                 Ok(profile)
             }
 
-            $(#[getter]
-            fn $column<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<$type>>> {
-                view(slf, |profile| profile.$column[..].into())
-            })+
-
-            $(#[getter]
-            fn $other<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray1<$of>>> {
-                view(slf, |profile| profile.$other[..].into())
-            })+
+            /// Views of the columns by name.
+            fn fields<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
+                let fields = PyDict::new(slf.py());
+                $(fields.set_item(stringify!($column), view(slf, |profile| profile.$column[..].into())?)?;)+
+                $(fields.set_item(stringify!($other), view(slf, |profile| profile.$other[..].into())?)?;)+
+                Ok(fields)
+            }
         }
     };
 }
