@@ -10,6 +10,7 @@ from pathlib import Path
 from rich.console import Console
 
 from benchmarks import (
+    against_copp,
     against_toppra,
     batch,
     certificate_cost,
@@ -36,6 +37,7 @@ BENCHMARKS = {
         curve_cost,
         certificate_cost,
         against_toppra,
+        against_copp,
         end_to_end,
         zhang_comparison,
         interpolators,

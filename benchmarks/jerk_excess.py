@@ -52,7 +52,7 @@ def jerk_excess(problem: Problem, profile: SpeedProfile, samples: int = 20) -> E
     s = lengths(problem, profile.piece, profile.u0, along)[:, looked_at]
     pace = _motion(problem, profile, s)
     piece, inside = np.repeat(profile.piece, samples), u[:, 1:-1]
-    q1, q2, q3 = _by_length(problem, piece, inside.ravel())
+    q1, q2, q3 = derivatives_by_length(problem, piece, inside.ravel())
     v, a, j = (x[:, 1:-1] for x in pace)
     v, a, j = (x.ravel()[:, None] for x in (v, a, j))
     velocity = np.abs(q1 * v) / problem.max_velocity
@@ -86,7 +86,9 @@ def jerk_excess(problem: Problem, profile: SpeedProfile, samples: int = 20) -> E
     )
 
 
-def _by_length(problem: Problem, piece: NDArray[np.integer], u: Array) -> tuple[Array, Array, Array]:
+def derivatives_by_length(
+    problem: Problem, piece: NDArray[np.integer], u: Array
+) -> tuple[Array, Array, Array]:
     """Derivatives of the axes by the length of the tool's path (samples, axes) up to the third."""
     _, c1, c2, c3 = problem.derivatives(piece, u, 3)
     if problem.way_speed is None:

@@ -1,0 +1,189 @@
+"""The jerk-limited plan against copp's third-order program, the best open solver of the same problem.
+
+copp (Wang et al.) solves a second-order cone program on fixed stations: the limits of jerk are linear about a
+given speed, at first that of its own profile without limits of jerk (reachability), then that of the program
+before. The limits hold at its stations. What an axis gets between them shows in the third differences of
+setpoints every millisecond.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from functools import partial
+from time import process_time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.jerk_excess import derivatives_by_length, jerk_excess, lengths
+from benchmarks.named import FREE, butterfly, lemniscate, trefoil
+from benchmarks.results import Cell, Result
+from benchmarks.timing import best_of
+from feedplan import Axis, Machine
+from feedplan.constraints.problem import Problem, build_problem
+from feedplan.curves.composite import CompositeCurve
+from feedplan.geometry.path import Path
+from feedplan.planners import planner
+
+NAME = "against-copp"
+Array = NDArray[np.float64]
+VELOCITY, ACCELERATION, JERK = 250.0, 3000.0, 50_000.0
+# Stations of copp, about uniform in length. Programs follow each other until one gains less than GAIN of the
+# time.
+STATIONS, GAIN, MOST_PROGRAMS = 4001, 1e-4, 10
+PERIOD = 1e-3
+
+
+def six_joints() -> CompositeCurve:
+    """A C2 cubic spline of six joints through 12 random points in a cube of 100 mm (seed 6)."""
+    from scipy.interpolate import CubicSpline
+
+    points = np.random.default_rng(6).uniform(0.0, 100.0, (12, 6))
+    knots = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    spline = CubicSpline(knots, points, bc_type="natural")
+    h, slope = np.diff(knots)[:, None], spline(knots, 1)
+    control = np.stack(
+        [points[:-1], points[:-1] + slope[:-1] * h / 3, points[1:] - slope[1:] * h / 3, points[1:]], 1
+    )
+    return CompositeCurve.from_pieces(control, h[:, 0])
+
+
+CURVES: dict[str, Callable[[], CompositeCurve]] = {
+    "lemniscate": lemniscate,
+    "trefoil": trefoil,
+    "butterfly": butterfly,
+    "six joints": six_joints,
+}
+
+
+def run(quick: bool = False) -> Result:
+    """Time, excess of jerk and computing time of both on every curve."""
+    stations = 401 if quick else STATIONS
+    rows: list[dict[str, Cell]] = []
+    for name, make in itertools.islice(CURVES.items(), 1 if quick else None):
+        problem = _problem(make())
+        plan = partial(planner("jerk-limited"), problem)
+        profile, ours = plan(), best_of(plan, 5)
+        excess = jerk_excess(problem, profile).jerk
+        rows.append(_row(name, "feedplan", profile.time, excess, ours.processor, 1.0, 1.0))
+        begin = process_time()
+        time, excess, programs = _by_copp(problem, stations)
+        spent = process_time() - begin
+        times, ratio = time / profile.time, spent / ours.processor
+        rows.append(_row(name, f"copp, {programs} programs", time, excess, spent, times, ratio))
+    return Result(
+        NAME,
+        f"Jerk-limited plans against copp {_version()}",
+        tuple(rows),
+        (
+            f"{VELOCITY:g} mm/s, {ACCELERATION:g} mm/s², {JERK:g} mm/s³ of each axis, rest to rest.",
+            f"copp: {stations} stations, lengths in units of the path's, from its reachability profile.",
+            f"Programs until one gains less than {GAIN:g} of the time.",
+            "excess of jerk: ours by exact derivatives, copp's by third differences of setpoints every 1 ms.",
+            "computing: processor time of all threads, ours the best of five; ratios to feedplan.",
+        ),
+    )
+
+
+def _problem(curve: CompositeCurve) -> Problem:
+    names = "XYZABC"[: curve.axes]
+    axes = tuple(Axis(name, VELOCITY, ACCELERATION, max_jerk=JERK) for name in names)
+    machine = Machine("against-copp", axes, chord_tolerance=float("inf"))
+    return build_problem(Path.from_curve(curve, feed=FREE), machine)
+
+
+def _by_copp(problem: Problem, stations: int) -> tuple[float, float, int]:
+    """copp's time [s], the relative excess of its third differences over the limit of jerk, and the number of
+    its programs."""
+    import copp_py as copp
+
+    piece, u, s = _stations(problem, stations)
+    total = s[-1]
+    first, second, third = derivatives_by_length(problem, piece, u)
+    position = problem.curve.evaluate(piece, u)[0]
+    s = s / total
+    axes = position.shape[1]
+    robot = copp.Robot(axes, capacity=len(s))
+    robot.append_s(s)
+    # In units of the whole length: q' is the same, each further derivative has one factor more.
+    robot.set_q(position / total, first, second * total, 0, dddq=third * total**2)
+    for add, limit in (
+        (robot.add_velocity_limits, VELOCITY),
+        (robot.add_acceleration_limits, ACCELERATION),
+        (robot.add_jerk_limits, JERK),
+    ):
+        most = np.full(axes, limit / total)
+        add(most, -most, start_idx_s=0, length=len(s))
+    reach = copp.solver.topp2_ra
+    speed_sq = reach.solve(reach.Problem(robot.constraints, (0, len(s) - 1), (0.0, 0.0)), reach.Options())
+    cone = copp.solver.topp3_socp
+    time, before, programs, accelerations = np.inf, np.inf, 0, None
+    while programs < MOST_PROGRAMS and not time > (1.0 - GAIN) * before:
+        program = cone.Problem(robot.constraints, speed_sq, b_linearization=accelerations)
+        profile = cone.solve(program)
+        speed_sq, accelerations, before, programs = profile.a, profile.b, time, programs + 1
+        time, arrivals = copp.interpolation.s_to_t_topp3(s, profile)
+    at = np.asarray(
+        copp.interpolation.t_to_s_topp3_uniform(s, profile, arrivals, PERIOD, include_final=False)
+    )
+    where = np.clip(np.searchsorted(s, at, side="right") - 1, 0, len(s) - 2)
+    # Between two stations of one piece u is a cubic of the length, by the slopes 1/|q'(u)| at both.
+    moved = _between(problem, piece, u, s * total, where, at * total)
+    jerks = np.abs(np.diff(moved, 3, axis=0)) / PERIOD**3
+    return float(time), float(jerks.max()) / JERK - 1.0, programs
+
+
+def _stations(problem: Problem, count: int) -> tuple[NDArray[np.int64], Array, Array]:
+    """Stations about equally far apart: their pieces, parameters, and lengths from the start [mm]."""
+    pieces = np.arange(len(problem.path))
+    fine = np.linspace(0.0, 1.0, 201) * problem.path.width[:, None]
+    table = lengths(problem, pieces, np.zeros(len(pieces)), fine)
+    share = np.maximum(np.round((count - 1) * table[:, -1] / table[:, -1].sum()).astype(int), 2)
+    start = np.concatenate([[0.0], np.cumsum(table[:, -1])])
+    piece = np.repeat(pieces, share)
+    wanted = np.concatenate([np.arange(n) / n * table[i, -1] for i, n in enumerate(share)])
+    u = np.array([np.interp(w, table[i], fine[i]) for i, w in zip(piece, wanted, strict=True)])
+    piece, u = np.append(piece, pieces[-1]), np.append(u, fine[-1, -1])
+    exact = lengths(problem, piece, np.zeros(len(piece)), u[:, None] * np.linspace(0.0, 1.0, 21))[:, -1]
+    return piece, u, start[piece] + exact
+
+
+def _between(
+    problem: Problem, piece: NDArray[np.int64], u: Array, s: Array, where: NDArray[np.int64], at: Array
+) -> Array:
+    """Positions (n, axes) at lengths `at` [mm], which lie after the stations `where`."""
+    own = piece[where]
+    end = np.where(piece[where + 1] == own, u[where + 1], problem.path.width[own])
+    x, h = at - s[where], s[where + 1] - s[where]
+    rate = [1.0 / np.linalg.norm(problem.derivatives(own, v, 1)[1], axis=1) for v in (u[where], end)]
+    chord = (end - u[where]) / h
+    t = x / h
+    bend = rate[0] + rate[1] - 2 * chord
+    cubic = u[where] + x * (rate[0] + t * (chord - rate[0] - bend + t * bend))
+    # One step of Newton on the length removes the error of the cubic.
+    off = at - s[where] - lengths(problem, own, u[where], np.stack([u[where], cubic], axis=1))[:, 1]
+    slope = np.linalg.norm(problem.derivatives(own, cubic, 1)[1], axis=1)
+    return np.asarray(
+        problem.curve.evaluate(own, np.clip(cubic + off / slope, 0.0, problem.path.width[own]))[0]
+    )
+
+
+def _version() -> str:
+    import copp_py
+
+    return str(copp_py.version())
+
+
+def _row(
+    curve: str, solver: str, time: float, excess: float, computing: float, longer: float, ratio: float
+) -> dict[str, Cell]:
+    return {
+        "curve": curve,
+        "solver": solver,
+        "time [s]": f"{time:.5f}",
+        "time over ours": f"{longer:.4f}",
+        "excess of jerk": excess,
+        "computing [s]": computing,
+        "computing over ours": ratio,
+    }
