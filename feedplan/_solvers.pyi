@@ -1,7 +1,7 @@
 """Types of the native module."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, final
+from typing import Any, Final, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,39 +18,17 @@ from feedplan.program.gcode import Options
 from feedplan.program.program import Program
 
 __all__ = [
-    "Curve",
-    "CurveLength",
-    "JointSetpointAudit",
-    "Moves",
-    "PlanError",
-    "Problem",
-    "Profile",
-    "Sampler",
-    "SetpointAudit",
-    "__version__",
-    "audit_joints",
-    "audit_plan",
-    "bound_jerk_limited",
-    "build_path",
-    "csv_rows",
-    "feed_between",
-    "fit_points",
-    "insert_knot",
-    "joint_constants",
-    "joint_derivatives",
-    "joint_enclosures",
-    "joint_interpolants",
-    "joint_path",
-    "joint_positions",
-    "look_ahead",
-    "lower_bound",
-    "path_segments",
-    "plan_bang_bang",
-    "plan_jerk_limited",
-    "plan_s_curve",
-    "profile_of_sections",
+    "Curve", "CurveLength", "JointSetpointAudit", "Moves", "PlanError", "Problem", "Profile", "Sampler",
+    "SetpointAudit", "__version__", "audit_joints", "audit_plan", "bound_jerk_limited", "build_path",
+    "csv_rows", "feed_between", "fit_points", "insert_knot", "joint_constants", "joint_derivatives",
+    "joint_enclosures", "joint_interpolants", "joint_path", "joint_positions", "look_ahead", "lower_bound",
+    "path_segments", "plan_bang_bang", "plan_jerk_limited", "plan_s_curve", "profile_of_sections",
     "read_gcode",
-]
+]  # fmt: skip
+
+_Floats = NDArray[np.float64]
+_Integers = NDArray[np.int64]
+_Naturals = NDArray[np.uint32]
 
 __version__: str
 
@@ -62,69 +40,39 @@ _Progress = Callable[[float], None]
 def plan_bang_bang(problem: _Problem, progress: _Progress | None = None) -> Profile: ...
 def plan_jerk_limited(
     problem: _Problem | Part,
-    jerk: NDArray[np.float64],
+    jerk: _Floats,
     resolution: float,
     tolerance: float,
     time_limit: float | None = None,
     progress: _Progress | None = None,
-) -> tuple[Profile, bool, NDArray[np.float64]]: ...
+) -> tuple[Profile, bool, _Floats]: ...
 def bound_jerk_limited(
     problem: _Problem | Part,
-    jerk: NDArray[np.float64],
+    jerk: _Floats,
     profile: SpeedProfile,
     time_limit: float | None = None,
     progress: _Progress | None = None,
-) -> NDArray[np.float64]: ...
+) -> _Floats: ...
 def plan_s_curve(
     problem: _Problem,
-    jerk: NDArray[np.float64],
+    jerk: _Floats,
     cuttings: Sequence[tuple[float, float]],
     look_ahead: int,
     time_limit: float | None = None,
     progress: _Progress | None = None,
 ) -> Profile: ...
 def path_segments(
-    problem: _Problem,
-    jerk: NDArray[np.float64],
-    cuttings: Sequence[tuple[float, float]],
-    look_ahead: int,
-) -> tuple[
-    NDArray[np.int64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.uint32],
-    NDArray[np.float64],
-]: ...
+    problem: _Problem, jerk: _Floats, cuttings: Sequence[tuple[float, float]], look_ahead: int
+) -> tuple[_Integers, _Floats, _Floats, _Floats, _Floats, _Floats, _Naturals, _Floats]: ...
 def profile_of_sections(
-    problem: _Problem,
-    jerk: NDArray[np.float64],
-    offsets: NDArray[np.int64],
-    sections: NDArray[np.float64],
+    problem: _Problem, jerk: _Floats, offsets: _Integers, sections: _Floats
 ) -> Profile: ...
 def lower_bound(problem: _Problem, profile: SpeedProfile, progress: _Progress | None = None) -> float: ...
-def feed_between(
-    problem: _Problem, piece: NDArray[np.int64], u0: NDArray[np.float64], u1: NDArray[np.float64]
-) -> NDArray[np.float64]: ...
-def look_ahead(
-    speed: NDArray[np.float64], up: NDArray[np.float64], down: NDArray[np.float64]
-) -> NDArray[np.float64]: ...
+def feed_between(problem: _Problem, piece: _Integers, u0: _Floats, u1: _Floats) -> _Floats: ...
+def look_ahead(speed: _Floats, up: _Floats, down: _Floats) -> _Floats: ...
 
 # t, position, velocity, acceleration, jerk, line, piece, u, rounds of the interpolator, length error.
-_Chunk = tuple[
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.int32],
-    NDArray[np.uint32],
-    NDArray[np.float64],
-    int,
-    float,
-]
+_Chunk = tuple[_Floats, _Floats, _Floats, _Floats, _Floats, NDArray[np.int32], _Naturals, _Floats, int, float]
 
 @final
 class Problem:
@@ -138,23 +86,16 @@ class Profile:
 @final
 class Sampler:
     def __new__(
-        cls,
-        problem: _Problem,
-        profile: SpeedProfile,
-        period: float,
-        progress: _Progress | None = None,
+        cls, problem: _Problem, profile: SpeedProfile, period: float, progress: _Progress | None = None
     ) -> Sampler: ...
-    @property
-    def count(self) -> int: ...
-    @property
-    def duration(self) -> float: ...
-    @property
-    def runs(self) -> NDArray[np.float64]: ...
+    count: Final[int]
+    duration: Final[float]
+    runs: Final[_Floats]
     def chunk(self, start: int, stop: int, newton: bool) -> _Chunk: ...
-    def at(self, times: NDArray[np.float64]) -> _Chunk: ...
-    def along(self, piece: NDArray[np.uint32], u: NDArray[np.float64]) -> _Chunk: ...
+    def at(self, times: _Floats) -> _Chunk: ...
+    def along(self, piece: _Naturals, u: _Floats) -> _Chunk: ...
 
-def csv_rows(values: NDArray[np.float64], last: NDArray[np.int32]) -> bytes: ...
+def csv_rows(values: _Floats, last: NDArray[np.int32]) -> bytes: ...
 
 @final
 class Moves:
@@ -165,21 +106,15 @@ def read_gcode(
     source: bytes, name: str, options: Options, progress: _Progress | None = None
 ) -> tuple[Moves, dict[str, Any]]: ...
 def fit_points(
-    points: NDArray[np.float64],
-    tolerance: float,
-    max_chord: float,
-    max_curvature: float,
-    corner_angle: float,
-) -> tuple[
-    NDArray[np.float64], NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.uint32]
-]: ...
+    points: _Floats, tolerance: float, max_chord: float, max_curvature: float, corner_angle: float
+) -> tuple[_Floats, _Floats, _Integers, _Floats, _Naturals]: ...
 def build_path(
     program: Program, rules: Rules, progress: _Progress | None = None
 ) -> tuple[
-    tuple[Curve, NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]],
+    tuple[Curve, _Floats, _Integers, _Floats, _Integers],
     tuple[int, int, int, float, list[float] | None],
     tuple[int, int, float] | None,
-    tuple[NDArray[np.int64], NDArray[np.int64]],
+    tuple[_Integers, _Integers],
 ]: ...
 
 # Per limit: name, axis (-1: none), worst value, limit, ratio, time, source line; and the number of samples.
@@ -188,7 +123,7 @@ _Findings = tuple[list[tuple[str, int, float, float, float, float, int]], int]
 def audit_plan(
     problem: _Problem,
     limits: _Limits,
-    feed: NDArray[np.float64],
+    feed: _Floats,
     profile: SpeedProfile | None = None,
     program: Program | None = None,
     progress: _Progress | None = None,
@@ -202,9 +137,9 @@ class JointSetpointAudit:
     def __new__(cls, problem: _Problem, limits: _Limits, profile: SpeedProfile) -> JointSetpointAudit: ...
     def push(
         self,
-        t: NDArray[np.float64],
-        position: NDArray[np.float64],
-        velocity: NDArray[np.float64] | None = None,
+        t: _Floats,
+        position: _Floats,
+        velocity: _Floats | None = None,
         progress: _Progress | None = None,
     ) -> None: ...
     def finish(self) -> _Findings: ...
@@ -216,110 +151,81 @@ class SetpointAudit:
         limits: _Limits,
         resolution: float = 0.0,
         problem: _Problem | None = None,
-        feed: NDArray[np.float64] | None = None,
+        feed: _Floats | None = None,
         profile: SpeedProfile | None = None,
         program: Program | None = None,
     ) -> SetpointAudit: ...
     def push(
         self,
-        t: NDArray[np.float64],
-        position: NDArray[np.float64],
-        velocity: NDArray[np.float64] | None = None,
-        acceleration: NDArray[np.float64] | None = None,
+        t: _Floats,
+        position: _Floats,
+        velocity: _Floats | None = None,
+        acceleration: _Floats | None = None,
         line: NDArray[np.int32] | None = None,
         progress: _Progress | None = None,
     ) -> None: ...
     def finish(self) -> _Findings: ...
 
-def joint_positions(expression: Expression, tips: NDArray[np.float64]) -> NDArray[np.float64]: ...
-def joint_derivatives(
-    expression: Expression, tips: TipPieces, fraction: NDArray[np.float64], order: int
-) -> NDArray[np.float64]: ...
+def joint_positions(expression: Expression, tips: _Floats) -> _Floats: ...
+def joint_derivatives(expression: Expression, tips: TipPieces, fraction: _Floats, order: int) -> _Floats: ...
 def joint_enclosures(
-    expression: Expression, tips: TipPieces, order: int, parts: NDArray[np.float64] | None = None
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+    expression: Expression, tips: TipPieces, order: int, parts: _Floats | None = None
+) -> tuple[_Floats, _Floats]: ...
 def joint_constants(
-    expression: Expression, tips: TipPieces, nodes: int, parts: NDArray[np.float64] | None = None
-) -> NDArray[np.float64]: ...
+    expression: Expression, tips: TipPieces, nodes: int, parts: _Floats | None = None
+) -> _Floats: ...
 def joint_path(
-    expression: Expression,
-    tips: TipPieces,
-    travel: NDArray[np.float64] | None = None,
-    start: NDArray[np.float64] | None = None,
+    expression: Expression, tips: TipPieces, travel: _Floats | None = None, start: _Floats | None = None
 ) -> tuple[
-    NDArray[np.int64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    list[tuple[int, float]],
-    list[tuple[int, float, int, float, float]],
+    _Integers, _Floats, _Floats, _Floats, list[tuple[int, float]], list[tuple[int, float, int, float, float]]
 ]: ...
 def joint_interpolants(
     expression: Expression,
     tips: TipPieces,
-    nodes: NDArray[np.float64],
-    to_bernstein: NDArray[np.float64],
-    tolerance: NDArray[np.float64] | Accuracy,
-) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
+    nodes: _Floats,
+    to_bernstein: _Floats,
+    tolerance: _Floats | Accuracy,
+) -> tuple[_Integers, _Floats, _Floats, _Floats]: ...
 def insert_knot(
-    control_points: NDArray[np.float64],
-    weights: NDArray[np.float64] | None,
-    knots: NDArray[np.float64],
-    degree: int,
-    value: float,
-    times: int,
-) -> tuple[NDArray[np.float64], NDArray[np.float64] | None, NDArray[np.float64]]: ...
+    control_points: _Floats, weights: _Floats | None, knots: _Floats, degree: int, value: float, times: int
+) -> tuple[_Floats, _Floats | None, _Floats]: ...
 
 @final
 class Curve:
     def __new__(
-        cls,
-        control_points: NDArray[np.float64],
-        weights: NDArray[np.float64] | None,
-        offsets: NDArray[np.int64],
-        width: NDArray[np.float64],
+        cls, control_points: _Floats, weights: _Floats | None, offsets: _Integers, width: _Floats
     ) -> Curve: ...
     @staticmethod
     def of_spline(
-        control_points: NDArray[np.float64],
-        weights: NDArray[np.float64] | None,
-        knots: NDArray[np.float64],
-        degree: int,
-        periodic: bool,
+        control_points: _Floats, weights: _Floats | None, knots: _Floats, degree: int, periodic: bool
     ) -> Curve: ...
     @staticmethod
     def of_turn(
-        start: NDArray[np.float64],
+        start: _Floats,
         plane: tuple[int, int],
         centre: tuple[float, float],
         sweep: float,
-        travel: NDArray[np.float64] | None,
+        travel: _Floats | None,
         degree: int,
         tolerance: float,
     ) -> tuple[Curve, float]: ...
     def fields(self) -> dict[str, Any]: ...
-    def evaluate(
-        self, piece: NDArray[np.uint32], u: NDArray[np.float64], order: int
-    ) -> NDArray[np.float64]: ...
+    def evaluate(self, piece: _Naturals, u: _Floats, order: int) -> _Floats: ...
     def elevated(self, degree: int) -> Curve: ...
-    def split(self, piece: NDArray[np.uint32], u: NDArray[np.float64]) -> Curve: ...
+    def split(self, piece: _Naturals, u: _Floats) -> Curve: ...
     def reversed(self) -> Curve: ...
     def joints(
         self, closed: bool, gap: float, angle: float, derivative: float
-    ) -> tuple[
-        NDArray[np.uint32], NDArray[np.uint8], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
-    ]: ...
-    def regular(self) -> tuple[Curve, NDArray[np.int64], NDArray[np.bool_]]: ...
-    def cusps(self, tolerance: float) -> tuple[NDArray[np.uint32], NDArray[np.float64]]: ...
+    ) -> tuple[_Naturals, NDArray[np.uint8], _Floats, _Floats, _Floats]: ...
+    def regular(self) -> tuple[Curve, _Integers, NDArray[np.bool_]]: ...
+    def cusps(self, tolerance: float) -> tuple[_Naturals, _Floats]: ...
     def lengths(self, accuracy: float, progress: _Progress | None = None) -> CurveLength: ...
 
 @final
 class CurveLength:
-    @property
-    def total(self) -> float: ...
-    @property
-    def error(self) -> float: ...
-    def lengths(self, piece: NDArray[np.uint32], u: NDArray[np.float64]) -> NDArray[np.float64]: ...
+    total: Final[float]
+    error: Final[float]
+    def lengths(self, piece: _Naturals, u: _Floats) -> _Floats: ...
     def locate(
-        self, lengths: NDArray[np.float64], tolerance: float, newton: bool
-    ) -> tuple[NDArray[np.uint32], NDArray[np.float64], NDArray[np.uint32], NDArray[np.float64]]: ...
+        self, lengths: _Floats, tolerance: float, newton: bool
+    ) -> tuple[_Naturals, _Floats, _Naturals, _Floats]: ...
