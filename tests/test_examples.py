@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from benchmarks.named import EXAMPLES, example
 from feedplan.curves.composite import CompositeCurve
+from feedplan.machine.axis_words import axis_words
+from feedplan.machine.coordinate_mode import CoordinateMode
 from feedplan.machine.machine import Machine
-from feedplan.machine.meaning import Meaning
 from feedplan.machine.path_derivatives import positions
-from feedplan.machine.words import axis_words
 from feedplan.program.gcode import read_gcode
 from feedplan.program.program import Program
 from tests.service.servers import running
@@ -186,11 +186,11 @@ def test_the_head_moves_all_three_axes() -> None:
 
 def joint_positions(program: Program, machine: Machine) -> NDArray[np.float64]:
     """The joints at the end of every move."""
-    assert program.meaning is not None
+    assert program.coordinate_mode is not None
     found = np.empty((len(program), len(machine.axes)))
-    for meaning in Meaning:
-        rows = program.meaning == meaning
-        axis = axis_words(machine, program.axes, meaning) if rows.any() else None
+    for coordinate_mode in CoordinateMode:
+        rows = program.coordinate_mode == coordinate_mode
+        axis = axis_words(machine, program.axes, coordinate_mode) if rows.any() else None
         if axis is not None:
             found[rows] = positions(axis.kinematics, axis.tip(program.target[rows]))
     return found
@@ -205,9 +205,9 @@ def test_the_impeller_is_the_same_motion_in_every_form(name: str) -> None:
     assert len(joints) > 500
     assert np.abs(tip - joints).max() < 1e-3
     # A direction does not decide whole turns of the angles, nor which of two poses is taken.
-    assert programs[1].meaning is not None
-    pointed = programs[1].meaning == Meaning.VECTOR
-    kinematics = axis_words(machine, programs[1].axes, Meaning.VECTOR).kinematics
+    assert programs[1].coordinate_mode is not None
+    pointed = programs[1].coordinate_mode == CoordinateMode.VECTOR
+    kinematics = axis_words(machine, programs[1].axes, CoordinateMode.VECTOR).kinematics
     directions = np.array([kinematics.tip(row) for row in joints])
     assert np.abs(directions[pointed] - programs[1].target[pointed][:, [0, 1, 2, 5, 6, 7]]).max() < 1e-3
     assert np.abs(vector - joints)[~pointed].max() < 1e-3

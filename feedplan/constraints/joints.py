@@ -8,7 +8,7 @@ close that an axis's acceleration is met within 1e-8 of its limit at every speed
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 
@@ -20,6 +20,8 @@ from feedplan.curves.speed_polynomial import SpeedPolynomial, interpolated_squar
 from feedplan.errors import InputError
 from feedplan.geometry.path import Cut, Path
 from feedplan.machine.axis import size_of
+from feedplan.machine.axis_words import DIRECTION, AxisWords, axis_words
+from feedplan.machine.coordinate_mode import CoordinateMode
 from feedplan.machine.joint_interpolants import (
     SPEED_SHARE,
     Accuracy,
@@ -28,10 +30,8 @@ from feedplan.machine.joint_interpolants import (
     joint_interpolants,
 )
 from feedplan.machine.machine import Machine
-from feedplan.machine.meaning import Meaning
 from feedplan.machine.path_derivatives import positions
 from feedplan.machine.singularities import JointPath, joint_path
-from feedplan.machine.words import DIRECTION, AxisWords, axis_words
 
 Array = NDArray[np.float64]
 # Joints that differ by no more than this are in the same place [mm, deg].
@@ -42,24 +42,17 @@ NODES = 8
 
 @dataclass(frozen=True)
 class JointMotion:
-    """What a problem has beside a path: the path cut to match, where from, the joints' pieces, each from its
-    `origin`, the tool's speed, and the kinematics of each run."""
+    """The fields of a `Problem` whose joints move in another way than the path's axes; see there.
+
+    `path` is cut so that each of its pieces has one piece of the joints.
+    """
 
     path: Path
     cut: Cut
     joints: CompositeCurve
-    origin: Array
+    joint_origin: Array
     tip_speed: SpeedPolynomial
     words: tuple[AxisWords, ...]
-
-
-def has_joints_of_its_own(path: Path, machine: Machine) -> bool:
-    """Whether the joints move in another way than the path's axes."""
-    if machine.is_plain:
-        return False
-    if machine.inverse.always:
-        return True
-    return path.meaning is not None and bool((path.meaning != Meaning.JOINTS).any())
 
 
 def way_scale(axes: tuple[str, ...], machine: Machine) -> Array:
@@ -82,31 +75,28 @@ def joint_motion(path: Path, machine: Machine, feed: Array) -> JointMotion:
     Raises InputError where the tool passes a singular position or a joint leaves its travel, with the line.
     """
     runs = [_words(path, machine, run) for run in range(len(path.runs) - 1)]
-    stretches: list[_Stretch] = []
+    motions: list[_Motion] = []
     words: list[AxisWords] = []
     start = None
     for own, group in groupby(runs):
         first = len(words)
         words += group
         pieces = np.arange(path.runs[first], path.runs[len(words)])
-        stretch = _posed(_Task(path, machine, own, pieces, feed, start))
+        motion = _posed(_Task(path, machine, own, pieces, feed, start))
         if start is not None:
-            _require_meeting(machine, int(path.line[pieces[0]]), start, stretch)
-        words[first:] = [stretch.words] * (len(words) - first)
-        stretches.append(stretch)
-        start = stretch.origin[-1] + stretch.joints.control_points[-1]
-    piece = np.concatenate([stretch.piece for stretch in stretches])
-    joints = CompositeCurve.joined([stretch.joints for stretch in stretches], math.inf)
-    tip_speed = SpeedPolynomial.joined(row for stretch in stretches for row in stretch.speed.rows())
-    tool = CompositeCurve.joined([stretch.tool for stretch in stretches], math.inf)
-    origin = np.concatenate([stretch.origin for stretch in stretches])
-    cut = Cut(path.curve, piece, np.concatenate([stretch.part for stretch in stretches]))
-    return JointMotion(path.cut(tool, piece), cut, joints, origin, tip_speed, tuple(words))
+            _require_meeting(machine, int(path.line[pieces[0]]), start, motion)
+        words[first:] = [motion.words] * (len(words) - first)
+        motions.append(motion)
+        start = motion.origin[-1] + motion.joints.control_points[-1]
+    whole = _Motion.joined(motions)
+    cut = Cut(path.curve, whole.piece, whole.part)
+    cut_path = path.cut(whole.tool, whole.piece)
+    return JointMotion(cut_path, cut, whole.joints, whole.origin, whole.speed, tuple(words))
 
 
-def _require_meeting(machine: Machine, line: int, start: Array, stretch: _Stretch) -> None:
+def _require_meeting(machine: Machine, line: int, start: Array, motion: _Motion) -> None:
     """The joints begin where those before end: new words for a position move none of them."""
-    begin = stretch.origin[0] + stretch.joints.control_points[0]
+    begin = motion.origin[0] + motion.joints.control_points[0]
     apart = np.abs(begin - start)
     k = int(apart.argmax())
     if apart[k] > MEETING:
@@ -146,8 +136,12 @@ class _Task:
 
 
 @dataclass(frozen=True)
-class _Stretch:
-    """Joint motion of neighbouring runs under one kinematics: `tool` are parts of pieces of the path."""
+class _Motion:
+    """Joint motion on n parts of pieces of the path under one kinematics.
+
+    `piece` (n,) and the fractions `part` (n, 2) of it that each part is, its curve in the `tool`'s path, its
+    curve in the `joints`, counted from `origin` (n, joints) [mm, deg], and the tool's `speed`.
+    """
 
     words: AxisWords
     piece: NDArray[np.int64]
@@ -157,22 +151,49 @@ class _Stretch:
     origin: Array
     speed: SpeedPolynomial
 
+    @classmethod
+    def joined(cls, motions: Sequence[_Motion]) -> _Motion:
+        """Motions one after the other as one, in the words of the first."""
+        return cls(
+            motions[0].words,
+            np.concatenate([motion.piece for motion in motions]),
+            np.concatenate([motion.part for motion in motions]),
+            CompositeCurve.joined([motion.tool for motion in motions], math.inf),
+            CompositeCurve.joined([motion.joints for motion in motions], math.inf),
+            np.concatenate([motion.origin for motion in motions]),
+            SpeedPolynomial.joined(row for motion in motions for row in motion.speed.rows()),
+        )
+
+    def in_order(self) -> _Motion:
+        """The same with the parts in the order of their pieces."""
+        order = np.argsort(self.piece, kind="stable")
+        rows = self.speed.rows()
+        return _Motion(
+            self.words,
+            self.piece[order],
+            self.part[order],
+            self.tool.take(order),
+            self.joints.take(order),
+            self.origin[order],
+            SpeedPolynomial.joined(rows[i] for i in order.tolist()),
+        )
+
 
 def _words(path: Path, machine: Machine, run: int) -> AxisWords:
     length = math.nan if path.tool_length is None else float(path.tool_length[run])
     return axis_words(
         machine,
         path.axes,
-        None if path.meaning is None else Meaning(int(path.meaning[run])),
+        None if path.coordinate_mode is None else CoordinateMode(int(path.coordinate_mode[run])),
         tool_length=None if math.isnan(length) else length,
     )
 
 
-def _posed(task: _Task) -> _Stretch:
-    """The stretch; a tool direction takes the pose nearest the joints before, at first one that can go on."""
+def _posed(task: _Task) -> _Motion:
+    """The motion; a tool direction takes the pose nearest the joints before, at first one that can go on."""
     make = _affine if task.words.kinematics.affine else _curved
     words, start = task.words, task.start
-    if words.meaning is not Meaning.VECTOR:
+    if words.coordinate_mode is not CoordinateMode.VECTOR:
         return make(task)
     poses = [words, words.other_pose]
     if start is not None:
@@ -191,7 +212,7 @@ def _posed(task: _Task) -> _Stretch:
             raise fault from None
 
 
-def _affine(task: _Task) -> _Stretch:
+def _affine(task: _Task) -> _Motion:
     """Joints that are sums of the path's axes: their control points are, too.
 
     Rational pieces get polynomials all the same, so that |C'|² and the joints belong to one parameter.
@@ -202,7 +223,8 @@ def _affine(task: _Task) -> _Stretch:
         curved = _curved(replace(task, pieces=task.pieces[rational]))
         if rational.all():
             return curved
-        return _in_order([_affine(replace(task, pieces=task.pieces[~rational])), curved])
+        straight = _affine(replace(task, pieces=task.pieces[~rational]))
+        return _Motion.joined([straight, curved]).in_order()
     tool = replace(tool, weights=None)
     tips = replace(tool, control_points=words.tip(tool.control_points))
     joints = replace(tool, control_points=positions(words.kinematics, tips.control_points))
@@ -214,22 +236,7 @@ def _affine(task: _Task) -> _Stretch:
     origin = joints.control_points[joints.offsets[:-1]]
     local = joints.control_points - np.repeat(origin, np.diff(joints.offsets), axis=0)
     whole = np.tile([0.0, 1.0], (len(tool), 1))
-    return _Stretch(words, task.pieces, whole, tool, replace(joints, control_points=local), origin, speed)
-
-
-def _in_order(stretches: list[_Stretch]) -> _Stretch:
-    """Stretches whose pieces lie between one another as one."""
-    piece = np.concatenate([stretch.piece for stretch in stretches])
-    part = np.concatenate([stretch.part for stretch in stretches])
-    order = np.argsort(piece, kind="stable")
-    tool, joints = (
-        CompositeCurve.joined([getattr(stretch, name) for stretch in stretches], math.inf).take(order)
-        for name in ("tool", "joints")
-    )
-    rows = [row for stretch in stretches for row in stretch.speed.rows()]
-    speed = SpeedPolynomial.joined(rows[i] for i in order.tolist())
-    origin = np.concatenate([stretch.origin for stretch in stretches])[order]
-    return _Stretch(stretches[0].words, piece[order], part[order], tool, joints, origin, speed)
+    return _Motion(words, task.pieces, whole, tool, replace(joints, control_points=local), origin, speed)
 
 
 def _route(task: _Task, tips: CompositeCurve) -> JointPath:
@@ -243,7 +250,7 @@ def _route(task: _Task, tips: CompositeCurve) -> JointPath:
     return route
 
 
-def _curved(task: _Task) -> _Stretch:
+def _curved(task: _Task) -> _Motion:
     """Joints by polynomials that stand in for K of the tool's pieces."""
     kinematics, curve = task.words.kinematics, task.path.curve.take(task.pieces)
     tips = replace(curve, control_points=task.words.tip(curve.control_points))
@@ -269,14 +276,14 @@ def _curved(task: _Task) -> _Stretch:
     speed = _tool_speed(task.linear(tool))
     if not moves.all():
         speed = _either(speed, _turning_speed(task, tool, joints), moves[interpolants.piece])
-    return _Stretch(
+    return _Motion(
         task.words, task.pieces[interpolants.piece], interpolants.part, tool, joints, origin, speed
     )
 
 
 def _turning_speed(task: _Task, tool: CompositeCurve, joints: CompositeCurve) -> SpeedPolynomial:
     """What the feed is about where X, Y and Z stand still: the rotary joints, or the tool's direction."""
-    if task.words.meaning is Meaning.VECTOR:
+    if task.words.coordinate_mode is CoordinateMode.VECTOR:
         square = interpolated_squares(_turning_of(task.direction(tool)), np.arange(len(tool)), tool.width)
         return SpeedPolynomial.joined((1 + SPEED_SHARE) * square)
     rotary = np.array(task.words.kinematics.rotary)
@@ -301,7 +308,7 @@ def _accuracy(task: _Task, curve: CompositeCurve, moves: NDArray[np.bool_]) -> A
             SquareOfSpeed(task.linear(even).by_piece, curve.rational & moves),
             SquareOfSpeed(np.ascontiguousarray(even.by_piece * scale), curve.rational),
         ]
-    if task.words.meaning is Meaning.VECTOR:
+    if task.words.coordinate_mode is CoordinateMode.VECTOR:
         squares.append(SquareOfSpeed(task.direction(even).by_piece, ~moves, turning=True))
     slowest, fastest = np.array([axis.velocity_range for axis in task.machine.axes]).T
     return Accuracy(

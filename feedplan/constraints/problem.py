@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -18,12 +19,13 @@ from feedplan.geometry.corners import Corners
 from feedplan.geometry.feed_groups import feed_groups
 from feedplan.geometry.path import Cut, Path
 from feedplan.lazy import cached_property
-from feedplan.machine.axis import usual_units
+from feedplan.machine.axis import Axis, size_of, sizes_of, usual_units
+from feedplan.machine.coordinate_mode import CoordinateMode
 from feedplan.machine.machine import Machine
 from feedplan.units import shared_unit
 
 if TYPE_CHECKING:
-    from feedplan.machine.words import AxisWords
+    from feedplan.machine.axis_words import AxisWords
 
 Limited = Literal["velocity", "acceleration"]
 _BY_AXIS = ("max_velocity", "max_acceleration", "max_jerk", "least_velocity", "least_acceleration")
@@ -257,30 +259,31 @@ def build_problem(
     start_speed = number(start_speed, "start speed", remedy, not_negative, "mm/s")
     end_speed = number(end_speed, "end speed", remedy, not_negative, "mm/s")
     request = FeedRequest(feed, feed_override)
-    if not machine.is_plain:
+    if has_joints_of_its_own(path, machine):
         # Kinematics are loaded where they are needed.
-        from feedplan.constraints.joints import has_joints_of_its_own
+        from feedplan.constraints.joints import joint_motion, way_scale
 
-        if has_joints_of_its_own(path, machine):
-            return _joint_problem(path, machine, request, (start_speed, end_speed))
-    axes = [machine.axis(name) for name in path.axes]
+        axes, greatest, jump = list(machine.axes), NO_FEED, None
+        others: dict[str, Any] = vars(joint_motion(path, machine, feed_limit(path, greatest, request)))
+        path = others.pop("path")
+        others |= {"joint_axes": machine.axis_names, "way_scale": way_scale(path.axes, machine)}
+    else:
+        axes = [machine.axis(name) for name in path.axes]
+        greatest = 2.0 * float(np.linalg.norm([sizes_of(axis.max_velocity)[1] for axis in axes]))
+        jump = _velocity_jump(path, machine, axes)
+        others = {"feed_share": feed_share(path, greatest, request)}
     min_velocity, max_velocity = np.array([axis.velocity_range for axis in axes]).T
     min_acceleration, max_acceleration = np.array([axis.acceleration_range for axis in axes]).T
-    greatest = 2.0 * float(np.linalg.norm(np.maximum(max_velocity, -min_velocity)))
-    cut = machine.chord_tolerance / machine.period
-    most = [cut if axis.kind == "linear" else np.inf for axis in axes]
-    jump = np.minimum([axis.max_velocity_jump for axis in axes], most)
-    if path.corners is Corners.PROGRAMMED:
-        jump = np.maximum(jump, np.minimum(max_acceleration, -min_acceleration) * machine.period)
+    # Where the joints move in another way than the tool, corners are stops.
+    junction_speed = junction_limit(path, np.zeros(len(path.axes)) if jump is None else jump)
+    junction_speed[0], junction_speed[-1] = start_speed, end_speed
     return Problem(
         path=path,
         max_velocity=max_velocity,
         max_acceleration=max_acceleration,
         max_jerk=np.array([axis.max_jerk for axis in axes]),
         feed=feed_limit(path, greatest, request),
-        feed_share=feed_share(path, greatest, request),
-        request=request,
-        junction_speed=_with_ends(junction_limit(path, jump), start_speed, end_speed),
+        junction_speed=junction_speed,
         chord_tolerance=machine.chord_tolerance,
         period=machine.period,
         start_speed=start_speed,
@@ -289,7 +292,27 @@ def build_problem(
         joint_units=tuple(axis.unit for axis in axes),
         least_velocity=min_velocity,
         least_acceleration=min_acceleration,
+        request=request,
+        **others,
     )
+
+
+def has_joints_of_its_own(path: Path, machine: Machine) -> bool:
+    """Whether the joints move in another way than the path's axes."""
+    if machine.is_plain:
+        return False
+    mode = path.coordinate_mode
+    return machine.inverse.always or (mode is not None and bool((mode != CoordinateMode.JOINTS).any()))
+
+
+def _velocity_jump(path: Path, machine: Machine, axes: Sequence[Axis]) -> NDArray[np.float64]:
+    """What the velocity of each axis may jump by at a corner (axes,) [mm/s]."""
+    cut = machine.chord_tolerance / machine.period
+    most = [cut if axis.kind == "linear" else np.inf for axis in axes]
+    jump = np.minimum([axis.max_velocity_jump for axis in axes], most)
+    if path.corners is Corners.PROGRAMMED:
+        jump = np.maximum(jump, [size_of(axis.max_acceleration) * machine.period for axis in axes])
+    return jump
 
 
 def feed_square(problem: Problem, piece: NDArray[np.integer], u: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -306,42 +329,3 @@ def speed_square(problem: Problem, piece: NDArray[np.integer], u: NDArray[np.flo
     if tip is None:
         return np.asarray((problem.curve.evaluate(piece, u, 1)[1] ** 2).sum(axis=1))
     return tip.evaluate(piece, u / problem.path.width[piece])
-
-
-def _joint_problem(path: Path, machine: Machine, request: FeedRequest, ends: tuple[float, float]) -> Problem:
-    """The problem where the joints move in another way than the path's axes; corners are stops."""
-    from feedplan.constraints.joints import joint_motion, way_scale
-
-    min_velocity, max_velocity = np.array([axis.velocity_range for axis in machine.axes]).T
-    min_acceleration, max_acceleration = np.array([axis.acceleration_range for axis in machine.axes]).T
-    limit = feed_limit(path, NO_FEED, request)
-    motion = joint_motion(path, machine, limit)
-    path = motion.path
-    return Problem(
-        path=path,
-        max_velocity=max_velocity,
-        max_acceleration=max_acceleration,
-        max_jerk=np.array([axis.max_jerk for axis in machine.axes]),
-        feed=feed_limit(path, NO_FEED, request),
-        request=request,
-        junction_speed=_with_ends(junction_limit(path, np.zeros(len(path.axes))), *ends),
-        chord_tolerance=machine.chord_tolerance,
-        period=machine.period,
-        start_speed=ends[0],
-        end_speed=ends[1],
-        joint_axes=machine.axis_names,
-        joint_units=tuple(axis.unit for axis in machine.axes),
-        least_velocity=min_velocity,
-        least_acceleration=min_acceleration,
-        joints=motion.joints,
-        joint_origin=motion.origin,
-        tip_speed=motion.tip_speed,
-        way_scale=way_scale(path.axes, machine),
-        words=motion.words,
-        cut=motion.cut,
-    )
-
-
-def _with_ends(junction_speed: NDArray[np.float64], start: float, end: float) -> NDArray[np.float64]:
-    junction_speed[0], junction_speed[-1] = start, end
-    return junction_speed

@@ -59,7 +59,7 @@ def build_path(
     corners are rounded one by one between stops, and `Path.warnings` says so.
 
     Corners that cannot be rounded are stops, unless every axis that moves has a `max_velocity_jump`. The
-    tool stops also where the meaning of words or the tool length changes. Axes that the program moves must
+    tool stops also where the coordinate mode or the tool length changes. Axes that the program moves must
     be there; axes that it names and never moves are left out. Where words are joints, the path has them in
     the machine's order and within their travel; where they are the tool tip (and its direction), in the
     order of the machine's kinematics, and travel is a matter of the joints that follow. A fitted chain is
@@ -140,7 +140,7 @@ def build_path(
         tolerance=allowed + left_out[move].max(axis=1, initial=0.0),
         fit=FitSummary.of(*summary),
         start_dwell=program.start_dwell,
-        meaning=None if program.meaning is None else program.meaning[first],
+        coordinate_mode=None if program.coordinate_mode is None else program.coordinate_mode[first],
         tool_length=None if program.tool_length is None else program.tool_length[first],
         new_words=_new_words(program, first),
         corners=corners,
@@ -152,8 +152,8 @@ def _new_words(program: Program, first: NDArray[np.int64]) -> NDArray[np.bool_]:
     """(r,) whether the words of a run, by its first move, differ from those before or changed in between."""
     changes = np.searchsorted(program.change_move, first, side="right")
     new: NDArray[np.bool_] = np.diff(changes, prepend=changes[:1]) > 0
-    if program.meaning is not None:
-        new[1:] |= np.diff(program.meaning[first]) != 0
+    if program.coordinate_mode is not None:
+        new[1:] |= np.diff(program.coordinate_mode[first]) != 0
     if program.tool_length is not None:
         new[1:] |= np.diff(np.nan_to_num(program.tool_length[first], nan=-1.0)) != 0
     return new

@@ -47,7 +47,7 @@ _BY_MOVE = (
     "fit_tolerance",
     "stop",
     "dwell",
-    "meaning",
+    "coordinate_mode",
     "tool_length",
     "stop_cause",
 )

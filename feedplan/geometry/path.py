@@ -106,10 +106,9 @@ class Path:
     offsets: the tool stands still at the start and the end of each run; `dwell` (r,) pause after each run
     [s]; `tolerance` (n,) allowed distance from the programmed path [mm]; `start_dwell` pause before the first
     run [s].
-    `meaning` (r,) what the axes are on the machine in each run (`feedplan.machine.meaning.Meaning`) and
-    `tool_length` (r,) [mm], NaN for the machine file's; None where the machine knows one meaning only.
-    `new_words` (r,) whether a run is told in other words than the one before: without a motion of the joints
-    it may begin elsewhere.
+    `coordinate_mode` (r,) the `CoordinateMode` of each run, `tool_length` (r,) [mm] its tool, NaN for the
+    machine file's; None where the machine has one mode only. `new_words` (r,) whether mode or tool length
+    change before a run: the same joint positions are written in other words, so the path may jump.
     `corners` is what became of those of the program; `warnings` are sentences for the user.
     `group_feed` (n, 3): greatest speed along X, Y, Z, along U, V, W [mm/s], and of all other axes together
     [deg/s], infinite where none is commanded; more than one of them holds on a blend of moves whose feeds
@@ -127,7 +126,7 @@ class Path:
     tolerance: NDArray[np.float64]
     fit: FitSummary = field(default_factory=FitSummary)
     start_dwell: float = 0.0
-    meaning: NDArray[np.uint8] | None = None
+    coordinate_mode: NDArray[np.uint8] | None = None
     tool_length: NDArray[np.float64] | None = None
     new_words: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
     corners: Corners = Corners.ROUNDED

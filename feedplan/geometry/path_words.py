@@ -1,4 +1,4 @@
-"""The axes of a path: which letters of a program a machine takes, what they mean, and the limits they set."""
+"""The axes of a path: which letters of a program a machine takes, in which mode, and the limits they set."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from feedplan.errors import MachineError
 from feedplan.machine.axis import AXIS_LETTERS, size_of
+from feedplan.machine.coordinate_mode import CoordinateMode
 from feedplan.machine.machine import Machine
-from feedplan.machine.meaning import Meaning
 from feedplan.program.program import Program
 
 
@@ -40,22 +40,22 @@ def path_words(program: Program, machine: Machine) -> PathWords:
 
     Raises MachineError where the program moves a letter that the machine does not take, or too many of them.
     """
-    default = Meaning.JOINTS if machine.words_are_joints else Meaning.TIP
-    given = program.meaning
-    meaning = np.full(len(program), default, dtype=np.uint8) if given is None else given
+    default = CoordinateMode.JOINTS if machine.words_are_joints else CoordinateMode.TIP
+    given = program.coordinate_mode
+    coordinate_mode = np.full(len(program), default, dtype=np.uint8) if given is None else given
     known: dict[str, None] = {}
     moving = program.moving()
     used: NDArray[np.bool_] = np.logical_or.reduce(moving, axis=0)
     for value in [default] if given is None or len(given) == 0 else np.unique(given):
-        letters = _letters(machine, Meaning(value))
+        letters = _letters(machine, CoordinateMode(value))
         known.update(dict.fromkeys(letters))
         for column, name in enumerate(program.axes):
             if name in letters:
                 continue
-            moves: NDArray[np.bool_] = moving[:, column] & (meaning == value)
+            moves: NDArray[np.bool_] = moving[:, column] & (coordinate_mode == value)
             if moves.any():
                 line = program.line[int(moves.argmax())]
-                what = "none" if Meaning(value) is Meaning.JOINTS else f"{', '.join(letters)} there"
+                what = "none" if value == CoordinateMode.JOINTS else f"{', '.join(letters)} there"
                 raise MachineError(
                     f"{program.name}, line {line}: axis {name} moves and machine {machine.name} has {what}: "
                     f"choose a machine with {name}, or add it to the machine file"
@@ -69,11 +69,11 @@ def path_words(program: Program, machine: Machine) -> PathWords:
                 f"{program.name} is in {axis.usual_unit} along {axis.name}, and axis {axis.name} of machine "
                 f"{machine.name} in {axis.unit}: convert its limits and leave out unit"
             )
-    changes = meaning[1:] != meaning[:-1]
+    changes = coordinate_mode[1:] != coordinate_mode[:-1]
     if program.tool_length is not None:
         before, after = program.tool_length[:-1], program.tool_length[1:]
         changes |= (before != after) & ~(np.isnan(before) & np.isnan(after))
-    joints = meaning == Meaning.JOINTS
+    joints = coordinate_mode == CoordinateMode.JOINTS
     # Where the joints move in another way than the tip, a corner is a stop.
     may_jump = bool(joints.all()) and all(
         machine.axis(name).max_velocity_jump > 0 for name in names if used[program.axes.index(name)]
@@ -91,16 +91,16 @@ def path_words(program: Program, machine: Machine) -> PathWords:
     )
 
 
-def _letters(machine: Machine, meaning: Meaning) -> tuple[str, ...]:
-    """The program letters that a machine takes under a meaning, in its order."""
-    if meaning is Meaning.JOINTS:
+def _letters(machine: Machine, coordinate_mode: CoordinateMode) -> tuple[str, ...]:
+    """The program letters that a machine takes in a coordinate mode, in its order."""
+    if coordinate_mode is CoordinateMode.JOINTS:
         return machine.axis_names
-    if meaning is Meaning.TIP:
+    if coordinate_mode is CoordinateMode.TIP:
         return machine.inverse.tip_names
     # Kinematics are loaded where they are needed.
-    from feedplan.machine.words import axis_words
+    from feedplan.machine.axis_words import axis_words
 
-    return axis_words(machine, ("I", "J", "K"), meaning).kinematics.tip_names
+    return axis_words(machine, ("I", "J", "K"), coordinate_mode).kinematics.tip_names
 
 
 def _limits(machine: Machine, names: tuple[str, ...], joints: bool, limit: str) -> NDArray[np.float64]:

@@ -1,5 +1,7 @@
-"""What the text of a program says about feeds, line by line: F words, the modes that give them a meaning, and
-the lines that do not run once, in the order in which they stand."""
+"""What the text of a program says about feeds, line by line.
+
+These are its F words, the modes that say how F is read, and the lines that do not run once and in order.
+"""
 
 from __future__ import annotations
 

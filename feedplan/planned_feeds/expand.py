@@ -56,7 +56,7 @@ def expanded(
     Raises InputError for what plain blocks cannot say: the tool's tip (G43.4, G43.5), splines that the
     dialect lacks.
     """
-    if len(program.change_move) and program.meaning is not None and program.meaning.any():
+    if len(program.change_move) and program.coordinate_mode is not None and program.coordinate_mode.any():
         raise InputError(
             f"{program.name}: words of the tool's tip (G43.4, G43.5) are not expanded: leave out --expand"
         )

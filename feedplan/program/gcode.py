@@ -199,7 +199,7 @@ def read_gcode(
     if columns["splines"] is not None:
         columns["splines"] = CompositeCurve.of(columns["splines"])
     if control is None or not control.applies:
-        columns["meaning"] = columns["tool_length"] = None
+        columns["coordinate_mode"] = columns["tool_length"] = None
     return Program.of(moves, name=name, **columns)
 
 

@@ -43,7 +43,7 @@ def smallest_machine(read: Callable[[Machine], Program]) -> tuple[Machine, Progr
 
 def _reaches(machine: Machine, program: Program) -> bool:
     """Whether the ends of all moves lie within the travels; true where words are no joints."""
-    if program.meaning is not None and program.meaning.any():
+    if program.coordinate_mode is not None and program.coordinate_mode.any():
         return True
     travels = np.array([machine.axis(name).travel for name in program.axes])
     return bool((program.target >= travels[:, 0]).all() and (program.target <= travels[:, 1]).all())

@@ -34,7 +34,7 @@ class StopCause(IntEnum):
     """Why a program asks for a full stop after a move; of several causes the last one here."""
 
     NONE = 0
-    CHANGE = 1  # of the meaning of words or the tool length
+    CHANGE = 1  # of the coordinate mode or the tool length
     SWITCH = 2  # of spindle, coolant and the like
     DWELL = 3
     PAUSE = 4  # M0, M1, M60
@@ -80,12 +80,12 @@ class Program(OfNative[Moves]):
     the angle, and so does the radius where it differs at both ends, as rounded coordinates make it.
     Splines, one row each: `spline_move` (index of the move), `spline_pieces` (k + 1,) which pieces of
     `splines` it takes, a curve in all `axes` [mm, deg] from the move's start to its target.
-    What the words mean: `meaning` (n,) (`feedplan.machine.meaning.Meaning`), `tool_length` (n,) [mm] under
-    TIP and VECTOR, NaN for the machine file's; None where the machine knows one meaning only. Under VECTOR
-    the last columns are I, J, K, the unit vector from the tip to the spindle; F on a move of these alone is
-    in deg/s of the tool's turning; columns that a meaning does not use stay as they are. A change of meaning
-    is a full stop and moves no joint: `change_move` (c,) are the first moves in a new meaning, and
-    `change_start` (c, axes) where they start in the new words, `starts` takes both into account.
+    What axis words mean: `coordinate_mode` (n,) a `CoordinateMode`, `tool_length` (n,) [mm] in the modes TIP
+    and VECTOR, NaN for the machine file's; None where the machine has one mode only. In the mode VECTOR the
+    last columns are I, J, K, the unit vector from the tip to the spindle; F on a move of these alone is in
+    deg/s of the tool's turning; columns that a mode does not use stay as they are. A change of mode is a full
+    stop and moves no joint: `change_move` (c,) are the first moves in a new mode, `change_start` (c, axes) is
+    where they start in the new words; `starts` takes both into account.
     `events` are what happens between the moves: spindle, coolant, tools, outputs, dwells, stops, messages.
     `warnings` are sentences for the user. If it was read, `text` is the file it was read from, or the bytes
     themselves, and `sha256` the hash of these; `reading` are the arguments of `read_program` that it was read
@@ -112,7 +112,7 @@ class Program(OfNative[Moves]):
     spline_move: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
     spline_pieces: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, np.int64))
     splines: CompositeCurve | None = None
-    meaning: NDArray[np.uint8] | None = None
+    coordinate_mode: NDArray[np.uint8] | None = None
     tool_length: NDArray[np.float64] | None = None
     change_move: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
     change_start: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0)))

@@ -1,4 +1,4 @@
-"""What G43.4, G43.5 and G49 do on a machine: the same joint positions in words of another meaning."""
+"""What G43.4, G43.5 and G49 do on a machine: the same joint positions in another coordinate mode."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from feedplan.errors import MachineError
 from feedplan.machine.axis import AXIS_LETTERS
+from feedplan.machine.coordinate_mode import CoordinateMode
 from feedplan.machine.machine import Machine
-from feedplan.machine.meaning import Meaning
 from feedplan.machine.rotary import RotaryChain, ToolVector, shortest_turn
 
 # Sine of the angle up to which the tool counts as parallel to a rotary axis.
@@ -27,32 +27,36 @@ class TipControl:
 
     @property
     def applies(self) -> bool:
-        """Whether words can have more than one meaning on the machine."""
+        """Whether the machine has more than one coordinate mode."""
         return isinstance(self.machine.inverse, RotaryChain)
 
-    def check(self, meaning: int) -> None:
-        """Whether words can have that meaning."""
-        if meaning != Meaning.JOINTS:
+    def check(self, mode: int) -> None:
+        """Raises MachineError where the machine does not have that coordinate mode."""
+        if mode != CoordinateMode.JOINTS:
             chain = self._chain(math.nan)
-            if meaning == Meaning.VECTOR and len(chain.joint_names) != 5:
+            if mode == CoordinateMode.VECTOR and len(chain.joint_names) != 5:
                 raise MachineError(
                     f"machine {self.machine.name} has no two rotary axes that point the tool along I, J, K: "
                     "program rotary words (G43.4), or use a five-axis machine"
                 )
 
     def joints(
-        self, meaning: int, tool_length: float, entry: Sequence[float], places: Sequence[Sequence[float]]
+        self,
+        mode: int,
+        tool_length: float,
+        entry: Sequence[float],
+        places: Sequence[Sequence[float]],
     ) -> list[float]:
-        """Joints (9,) at the last of the places (k, 12) of a stretch in one meaning that begins at `entry`.
+        """Joints (9,) at the last of the places (k, 12) of moves in one mode that begin at joints `entry`.
 
         Where directions are programmed, each move takes the pose and the turn next to the one before.
         """
         joints = list(places[-1][: len(AXIS_LETTERS)])
-        if meaning == Meaning.JOINTS:
+        if mode == CoordinateMode.JOINTS:
             return joints
         chain = self._chain(tool_length)
         angles = chain.joint_names[3:]
-        if meaning == Meaning.VECTOR:
+        if mode == CoordinateMode.VECTOR:
             turned = self._follow(chain, entry, places)
             for name, angle in zip(angles, turned, strict=True):
                 joints[AXIS_LETTERS.index(name)] = angle
@@ -61,11 +65,11 @@ class TipControl:
         return joints
 
     def place(
-        self, meaning: int, tool_length: float, joints: Sequence[float]
+        self, mode: int, tool_length: float, joints: Sequence[float]
     ) -> tuple[list[float], list[float]]:
-        """Place (9,) and tool direction (3,) in words of a meaning, where the joints (9,) are."""
+        """Place (9,) and tool direction (3,) in words of a mode, where the joints (9,) are."""
         place, direction = list(joints), [0.0, 0.0, 1.0]
-        if meaning == Meaning.JOINTS:
+        if mode == CoordinateMode.JOINTS:
             return place, direction
         chain = self._chain(tool_length)
         words = _words(chain, joints)

@@ -12,10 +12,10 @@ from feedplan._solvers import plan_bang_bang
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
 from feedplan.geometry.path import Cut
+from feedplan.machine.axis_words import axis_words
 from feedplan.machine.joint_interpolants import joint_interpolants
 from feedplan.machine.machine import Machine
 from feedplan.machine.path_derivatives import positions
-from feedplan.machine.words import axis_words
 from feedplan.profile import ArcKind, SpeedProfile
 from tests.audit.curves import path_along
 
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 def joint_problem(machine: Machine, names: str, curve: CompositeCurve, **changes: Any) -> Problem:
     """From rest to rest along the tip curve, cut where the planner's stand-ins for the joints are."""
-    words = axis_words(machine, tuple(names), changes.pop("meaning", None))
+    words = axis_words(machine, tuple(names), changes.pop("coordinate_mode", None))
     points = curve.by_piece
     found = joint_interpolants(words.kinematics, words.tip(points), curve.width, 1e-10, nodes=8)
     cut = found.part[:, 0] > 0

@@ -15,8 +15,8 @@ from feedplan.constraints.problem import Problem, build_problem
 from feedplan.curves.arc import arc
 from feedplan.curves.composite import CompositeCurve
 from feedplan.curves.length import CurveLength
+from feedplan.machine.coordinate_mode import CoordinateMode
 from feedplan.machine.machine import Machine
-from feedplan.machine.meaning import Meaning
 from feedplan.profile import ArcKind, SpeedProfile
 from feedplan.setpoints import setpoints
 from tests.audit.curves import machine_of, path_along, problem_along
@@ -269,20 +269,20 @@ def test_velocity_feed_acceleration_and_chord_are_measured_on_these_arcs() -> No
 
 JOINTS = {
     "cylindrical": ("cylindrical", "XYZ", past_the_column, None),
-    "trunnion": ("trunnion-ac", "XYZAC", wavy, Meaning.TIP),
+    "trunnion": ("trunnion-ac", "XYZAC", wavy, CoordinateMode.TIP),
 }
 
 
 @pytest.fixture(scope="module", params=list(JOINTS))
 def joints(request: pytest.FixtureRequest) -> tuple[Problem, SpeedProfile, Machine]:
-    name, letters, curve, meaning = JOINTS[request.param]
+    name, letters, curve, coordinate_mode = JOINTS[request.param]
     machine = wide(name)
     free = tuple(
         replace(axis, max_velocity=FREE, max_acceleration=FREE, max_jerk=FREE**2) for axis in machine.axes
     )
     machine = replace(machine, axes=free, chord_tolerance=math.inf)
-    means = None if meaning is None else np.array([meaning], np.uint8)
-    problem = build_problem(path_along(curve(), letters, meaning=means), machine, feed=FREE)
+    means = None if coordinate_mode is None else np.array([coordinate_mode], np.uint8)
+    problem = build_problem(path_along(curve(), letters, coordinate_mode=means), machine, feed=FREE)
     way = problem.way_curve
     assert way is not None
     profile = constant_jerk(way, rest_to_rest(CurveLength(way).total, 2000.0, 0.8))

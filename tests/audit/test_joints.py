@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from feedplan.audit import Audit, audit
 from feedplan.constraints.problem import Problem
 from feedplan.curves.composite import CompositeCurve
+from feedplan.machine.coordinate_mode import CoordinateMode
 from feedplan.machine.machine import Machine
-from feedplan.machine.meaning import Meaning
 from feedplan.machine.path_derivatives import derivatives
 from feedplan.profile import OF_ARCS, ArcKind, SpeedProfile
 from feedplan.setpoints import SetpointChunk
@@ -51,8 +51,8 @@ def wide(name: str) -> Machine:
 
 CASES = {
     "cylindrical": ("cylindrical", "XYZ", past_the_column, {}),
-    "trunnion-ac": ("trunnion-ac", "XYZAC", wavy, {"meaning": Meaning.TIP}),
-    "head-head": ("head-head", None, wavy, {"meaning": Meaning.TIP}),
+    "trunnion-ac": ("trunnion-ac", "XYZAC", wavy, {"coordinate_mode": CoordinateMode.TIP}),
+    "head-head": ("head-head", None, wavy, {"coordinate_mode": CoordinateMode.TIP}),
 }
 
 
@@ -368,7 +368,9 @@ def test_a_speed_along_the_tip_is_constant_over_its_length() -> None:
 def test_where_only_rotary_words_move_the_feed_is_theirs() -> None:
     machine = wide("trunnion-ac")
     turn = np.array([[[5.0, 0.0, 0.0, 0.0, 0.0], [5.0, 0.0, 0.0, 0.0, 30.0]]])
-    problem = joint_problem(machine, "XYZAC", CompositeCurve.from_pieces(turn, [30.0]), meaning=Meaning.TIP)
+    problem = joint_problem(
+        machine, "XYZAC", CompositeCurve.from_pieces(turn, [30.0]), coordinate_mode=CoordinateMode.TIP
+    )
     problem = replace(problem, start_speed=20.0, end_speed=20.0)
     result = audit(problem, steady(problem, 400.0), machine)
     assert result.failures == ()
@@ -443,7 +445,7 @@ def test_a_corner_of_the_joints_needs_the_jump_that_the_machine_allows() -> None
 @given(st.integers(0, 2**32 - 1))
 def test_random_paths_of_a_trunnion_pass_and_a_thousandth_faster_fail(seed: int) -> None:
     machine = wide("trunnion-ac")
-    problem = joint_problem(machine, "XYZAC", wavy(seed), meaning=Meaning.TIP)
+    problem = joint_problem(machine, "XYZAC", wavy(seed), coordinate_mode=CoordinateMode.TIP)
     profile = planned_joints(problem)
     assert audit(problem, profile, machine).failures == ()
     faster = replace(

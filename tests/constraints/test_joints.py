@@ -13,8 +13,8 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.errors import InputError
 from feedplan.geometry.path import Path
 from feedplan.machine.axis import Axis
+from feedplan.machine.coordinate_mode import CoordinateMode
 from feedplan.machine.machine import Machine, bundled_machines
-from feedplan.machine.meaning import Meaning
 from feedplan.planners import planner
 from tests.campaign import seeds
 from tests.planners.excess import worst_excess
@@ -82,11 +82,11 @@ def random_problem(name: str, seed: int) -> Problem:
     """A random NURBS curve of the tool, about half of them rational, some with the tool's direction."""
     rng = np.random.default_rng(seed)
     machine = without_travel(Machine.load(name))
-    axes, meaning = machine.inverse.tip_names, None
+    axes, coordinate_mode = machine.inverse.tip_names, None
     if not machine.inverse.always:
-        meaning = Meaning.TIP
+        coordinate_mode = CoordinateMode.TIP
         if len(machine.axes) == 5 and rng.random() < 0.4:
-            axes, meaning = ("X", "Y", "Z", "I", "J", "K"), Meaning.VECTOR
+            axes, coordinate_mode = ("X", "Y", "Z", "I", "J", "K"), CoordinateMode.VECTOR
     degree = int(rng.integers(2, 6))
     count = degree + 1 + int(rng.integers(0, 6))
     size = 10 ** rng.uniform(-0.5, 1)
@@ -107,7 +107,7 @@ def random_problem(name: str, seed: int) -> Problem:
         curve.with_width(curve.width * size * count),
         tuple(axes),
         10 ** rng.uniform(0.5, 3),
-        meaning=None if meaning is None else np.array([meaning]),
+        coordinate_mode=None if coordinate_mode is None else np.array([coordinate_mode]),
     )
     return build_problem(path, machine)
 
@@ -164,7 +164,7 @@ def test_turning_on_the_spot_counts_in_degrees() -> None:
     machine = without_travel(Machine.load("trunnion-ac"))
     points = [[10.0, 0.0, 0.0, 0.0, 0.0], [10.0, 0.0, 0.0, 0.0, 90.0]]
     turn = CompositeCurve.from_bezier(points, width=90.0).elevated(2)
-    path = path_of(turn, ("X", "Y", "Z", "A", "C"), 30.0, meaning=np.array([Meaning.TIP]))
+    path = path_of(turn, ("X", "Y", "Z", "A", "C"), 30.0, coordinate_mode=np.array([CoordinateMode.TIP]))
     problem = build_problem(path, machine)
     profile = plan(problem)
     assert profile.time == pytest.approx(90 / 30 + 30 / machine.axis("C").max_acceleration, rel=1e-6)

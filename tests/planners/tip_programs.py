@@ -23,7 +23,7 @@ class _Program:
     def __init__(self, rng: np.random.Generator, machine: Machine) -> None:
         self.rng, self.machine = rng, machine
         self.rotary = [axis for axis in machine.axes if axis.kind == "rotary"]
-        self.meaning = JOINTS
+        self.coordinate_mode = JOINTS
         self.lines: list[str] = []
 
     def text(self) -> str:
@@ -58,7 +58,7 @@ class _Program:
 
     def place(self) -> str:
         """Words of X, Y and Z, some of them left out."""
-        if self.meaning == JOINTS:
+        if self.coordinate_mode == JOINTS:
             low, high = self.machine.axis("Z").travel
             z = self.number(low + 0.6 * (high - low), low + 0.95 * (high - low))
         else:
@@ -86,7 +86,7 @@ class _Program:
         return f"I{np.sin(lean) * np.cos(about):.6f} J{np.sin(lean) * np.sin(about):.6f} K{np.cos(lean):.6f}"
 
     def turned(self) -> str:
-        return self.direction() if self.meaning == VECTOR else self.angles()
+        return self.direction() if self.coordinate_mode == VECTOR else self.angles()
 
     def change(self) -> None:
         codes = [TIP, TIP, TIP, JOINTS, JOINTS] + [VECTOR] * (len(self.rotary) > 1)
@@ -98,7 +98,7 @@ class _Program:
             self.lines += [f"G43.1 Z{self.number(20, 150)}", code]
         else:
             self.lines.append(code if code == JOINTS else f"{code} H1")
-        self.meaning = code
+        self.coordinate_mode = code
 
     def move(self) -> None:
         self.lines.append(f"{self.code()} {self.place()}")
@@ -112,22 +112,22 @@ class _Program:
     def retract(self) -> None:
         low, high = self.machine.axis("Z").travel
         top = f"Z{self.number(low + 0.7 * (high - low), low + 0.95 * (high - low))}"
-        if self.meaning == JOINTS:
+        if self.coordinate_mode == JOINTS:
             self.lines.append(f"{self.rng.choice(['G0', 'G53 G0'])} {top}")
         else:
             self.lines.append(f"G91 G0 Z{self.number(5, 60)}\nG90")
 
     def small(self) -> None:
         """A step so short that all of it is start and stop."""
-        letters = ["X", "Y", "Z", *(axis.name for axis in self.rotary if self.meaning != VECTOR)]
+        letters = ["X", "Y", "Z", *(axis.name for axis in self.rotary if self.coordinate_mode != VECTOR)]
         step = self.rng.choice([-1, 1]) * 10 ** self.rng.uniform(-3, 0)
         self.lines.append(f"G91 {self.code()} {self.rng.choice(letters)}{step:.4f}\nG90")
 
     def away(self) -> None:
         """The way home, mostly after G49."""
-        if self.meaning != JOINTS and self.rng.random() < 0.9:
+        if self.coordinate_mode != JOINTS and self.rng.random() < 0.9:
             self.lines.append("G49")
-            self.meaning = JOINTS
+            self.coordinate_mode = JOINTS
         letters = "".join(axis.name for axis in self.rotary)
         words = [f"{letter}0" for letter in f"Z{letters}" if letter == "Z" or self.rng.random() < 0.5]
         self.lines.append(f"G91 {self.rng.choice(['G28', 'G30'])} {' '.join(words)}\nG90")

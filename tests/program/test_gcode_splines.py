@@ -296,8 +296,8 @@ def test_mutated_programs_are_read_or_refused(rng: random.Random) -> None:
         return
     assert np.isfinite(program.target).all()
     assert np.isfinite(program.starts()).all()
-    assert program.meaning is not None
-    assert len(program.meaning) == len(program)
+    assert program.coordinate_mode is not None
+    assert len(program.coordinate_mode) == len(program)
     if program.splines is not None:
         assert len(program.splines) <= 40
         curves(program)

@@ -8,11 +8,11 @@ import pytest
 from numpy.typing import NDArray
 
 from feedplan.errors import MachineError, ProgramError
+from feedplan.machine.axis_words import axis_words
+from feedplan.machine.coordinate_mode import CoordinateMode
 from feedplan.machine.machine import Machine
-from feedplan.machine.meaning import Meaning
 from feedplan.machine.path_derivatives import positions
 from feedplan.machine.rotary import RotaryChain
-from feedplan.machine.words import axis_words
 from feedplan.program.gcode import read_gcode
 from feedplan.program.program import Program
 
@@ -25,14 +25,14 @@ def read(text: str, machine: Machine | str | None = "trunnion-ac") -> Program:
 
 
 def joints(program: Program, machine: Machine, row: int, place: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Joint positions of a place in words of a row's meaning, by the machine's own kinematics."""
-    assert program.meaning is not None
+    """Joint positions of a place in the words of a row, by the machine's own kinematics."""
+    assert program.coordinate_mode is not None
     assert program.tool_length is not None
     length = float(program.tool_length[row])
     words = axis_words(
         machine,
         program.axes,
-        Meaning(int(program.meaning[row])),
+        CoordinateMode(int(program.coordinate_mode[row])),
         tool_length=None if math.isnan(length) else length,
     )
     found: NDArray[np.float64] = positions(words.kinematics, words.tip(place[None]))[0]
@@ -60,8 +60,8 @@ def test_a_change_of_meaning_moves_no_joint(name: str) -> None:
         Z500""",
         name,
     )
-    assert program.meaning is not None
-    assert program.meaning.tolist() == [0, 1, 1, 0, 1, 2, 2, 0]
+    assert program.coordinate_mode is not None
+    assert program.coordinate_mode.tolist() == [0, 1, 1, 0, 1, 2, 2, 0]
     assert program.tool_length == pytest.approx([math.nan, 80, 80] + [math.nan] * 5, nan_ok=True)
     assert program.change_move.tolist() == [1, 3, 4, 5, 7]
     starts = program.starts()
@@ -70,9 +70,10 @@ def test_a_change_of_meaning_moves_no_joint(name: str) -> None:
         after = joints(program, machine, row, starts[row])
         turns = (after - before)[3:] / 360
         # A direction is reached by two pairs of angles; the joints that follow it choose.
-        if Meaning.VECTOR in (program.meaning[row - 1], program.meaning[row]):
+        if CoordinateMode.VECTOR in (program.coordinate_mode[row - 1], program.coordinate_mode[row]):
             direction = [
-                axis_words(machine, program.axes, Meaning.VECTOR).kinematics.tip(q) for q in (before, after)
+                axis_words(machine, program.axes, CoordinateMode.VECTOR).kinematics.tip(q)
+                for q in (before, after)
             ]
             assert direction[0] == pytest.approx(direction[1], abs=1e-9)
         else:
@@ -137,8 +138,8 @@ def test_a_change_before_the_first_move_starts_at_the_joints_zero() -> None:
 
 def test_a_change_without_a_move_leaves_no_trace() -> None:
     program = read("G0 X1\nG43.4 H1\nG49\nG0 X2\nG43.4 H1")
-    assert program.meaning is not None
-    assert program.meaning.tolist() == [0, 0]
+    assert program.coordinate_mode is not None
+    assert program.coordinate_mode.tolist() == [0, 0]
     assert program.starts() == pytest.approx(np.array([[0, 0, 0, 0, 0], [1, 0, 0, 0, 0]]), abs=1e-12)
 
 
@@ -165,7 +166,7 @@ def test_arcs_and_splines_can_be_followed_by_the_tip() -> None:
 def test_words_of_other_machines_have_one_meaning() -> None:
     for machine in (None, "mill", "cylindrical", "corexy"):
         program = read("G0 X1 Y2", machine)
-        assert program.meaning is None
+        assert program.coordinate_mode is None
         assert program.tool_length is None
         assert program.change_move.size == 0
 
@@ -229,7 +230,7 @@ def test_machines_without_rotary_axes_refuse_tips_and_directions() -> None:
             with pytest.raises(ProgramError) as caught:
                 read(text, machine)
             assert words in str(caught.value)
-    assert read("G43.4 H1\nG0 X1", "rotary-table").meaning is not None
+    assert read("G43.4 H1\nG0 X1", "rotary-table").coordinate_mode is not None
     with pytest.raises(ProgramError, match="machine rotary-table has no two rotary axes that point the tool"):
         read("G43.5 H1\nG0 X1", "rotary-table")
 
@@ -237,9 +238,9 @@ def test_machines_without_rotary_axes_refuse_tips_and_directions() -> None:
 def test_columns_of_other_meanings_are_left_out_of_the_words() -> None:
     machine = Machine.load("trunnion-ac")
     letters = (*"XYZACIJK",)
-    assert axis_words(machine, letters, Meaning.JOINTS).column == (0, 1, 2, 3, 4)
-    assert axis_words(machine, letters, Meaning.TIP).column == (0, 1, 2, 3, 4)
-    assert axis_words(machine, letters, Meaning.VECTOR).column == (0, 1, 2, 5, 6, 7)
+    assert axis_words(machine, letters, CoordinateMode.JOINTS).column == (0, 1, 2, 3, 4)
+    assert axis_words(machine, letters, CoordinateMode.TIP).column == (0, 1, 2, 3, 4)
+    assert axis_words(machine, letters, CoordinateMode.VECTOR).column == (0, 1, 2, 5, 6, 7)
     assert isinstance(machine.inverse, RotaryChain)
     with pytest.raises(MachineError, match="the program uses B"):
-        axis_words(machine, (*letters, "B"), Meaning.VECTOR)
+        axis_words(machine, (*letters, "B"), CoordinateMode.VECTOR)

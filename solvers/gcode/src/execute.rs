@@ -15,7 +15,7 @@ use super::modal::{Feed, FeedMode, State};
 use super::moves::{Control, Kind, Mode, Moves, Point, Stop};
 use super::parameters::{first_of_system, Parameters, HOME, SECOND_HOME, SYSTEM};
 use super::spline::Nurbs;
-use super::tip::{takes_direction, Meaning};
+use super::tip::{takes_direction, CoordinateMode};
 use super::tools::Tool;
 use super::Options;
 
@@ -137,7 +137,8 @@ impl<'a> Interpreter<'a> {
     #[inline]
     pub fn run(&mut self, block: &Block, line: u32) -> Outcome<bool> {
         self.line = line;
-        if !block.only_motion() || self.open.is_some() || self.state.meaning == Meaning::Vector {
+        if !block.only_motion() || self.open.is_some() || self.state.coordinate_mode == CoordinateMode::Vector
+        {
             return self.run_all(block);
         }
         // Nearly all blocks are a straight move or an arc and nothing else.
@@ -172,11 +173,11 @@ impl<'a> Interpreter<'a> {
             return Ok(false);
         }
         let axes = axis_words(block);
-        let vector = self.state.meaning == Meaning::Vector;
+        let vector = self.state.coordinate_mode == CoordinateMode::Vector;
         let motion = motion_of(block, axes, self.state.motion, vector)?;
-        let directed = takes_direction(block, self.state.meaning, motion);
+        let directed = takes_direction(block, self.state.coordinate_mode, motion);
         check_use(block, axes, motion, self.state.absolute, directed)?;
-        self.check_meaning(block, motion)?;
+        self.check_coordinate_mode(block, motion)?;
         let motion = motion.filter(|_| !self.switches_look_ahead(block, motion));
 
         if block.corner.is_some() && motion != Some(10) {

@@ -38,7 +38,7 @@ mod turned;
 mod words;
 
 pub use moves::{Columns, Direction, Point};
-pub use tip::{Meaning, Place, TipControl};
+pub use tip::{CoordinateMode, Place, TipControl};
 
 use fault::Fault;
 use run::Runner;

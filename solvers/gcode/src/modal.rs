@@ -1,7 +1,7 @@
 //! What stays in force from block to block: modes, offsets, feed.
 
 use super::moves::{Control, Mode, Point};
-use super::tip::Meaning;
+use super::tip::CoordinateMode;
 
 pub const MM_PER_INCH: f64 = 25.4;
 
@@ -134,7 +134,7 @@ pub struct State {
     pub constant_surface_speed: bool,
     pub sticky: Sticky,
     /// What axis words are; the tool's length in mm then, NaN for the machine file's; the joints where this began.
-    pub meaning: Meaning,
+    pub coordinate_mode: CoordinateMode,
     pub tool_length: f64,
     pub entry: Point,
 }
@@ -164,7 +164,7 @@ impl State {
             spindle_speed: None,
             constant_surface_speed: false,
             sticky: Sticky::default(),
-            meaning: Meaning::Joints,
+            coordinate_mode: CoordinateMode::Joints,
             tool_length: f64::NAN,
             entry: [0.0; 9],
         }

@@ -94,7 +94,7 @@ impl Interpreter<'_> {
             offsets: now.offsets.clone(),
             motion: now.motion,
             sticky: now.sticky,
-            meaning: now.meaning,
+            coordinate_mode: now.coordinate_mode,
             tool_length: now.tool_length,
             entry: now.entry,
             ..saved.clone()

@@ -6,7 +6,7 @@ use super::execute::{Interpreter, RATES};
 use super::fault::{fault, Outcome};
 use super::modal::{Feed, FeedMode};
 use super::moves::{only_turns, straight_length, Arc, Kind, Point};
-use super::tip::{turn, Meaning};
+use super::tip::{turn, CoordinateMode};
 use super::words::count;
 
 /// Words of the centre along X, Y, Z.
@@ -22,7 +22,7 @@ impl Interpreter<'_> {
     /// G0 and G1 to the block's axis words.
     #[inline(always)]
     pub(super) fn straight(&mut self, block: &Block, rapid: bool, machine: bool) -> Outcome<()> {
-        if self.state.meaning == Meaning::Vector {
+        if self.state.coordinate_mode == CoordinateMode::Vector {
             return self.pointed(block, rapid);
         }
         let target = self.target(block, machine)?;

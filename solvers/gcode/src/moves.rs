@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 
 use super::block::rotary;
 use super::fault::{fault, Outcome};
-use super::tip::Meaning;
+use super::tip::CoordinateMode;
 pub use columns::Columns;
 pub use events::{Events, COMMENT, MESSAGE};
 use feedplan_geometry::spline::CompositeCurve;
@@ -71,7 +71,7 @@ pub struct Arc {
 #[repr(u8)]
 pub enum Stop {
     None = 0,
-    /// Of the meaning of words or the tool length.
+    /// Of the coordinate mode or the tool length.
     Change = 1,
     /// Of spindle, coolant and the like.
     Switch = 2,
@@ -89,12 +89,12 @@ pub type Direction = [f64; 3];
 /// The tool is upright until the program says otherwise.
 const UPRIGHT: Direction = [0.0, 0.0, 1.0];
 
-/// Where the words get another meaning: the first move in it, the meaning, the tool's length in mm (NaN for the
+/// Where the coordinate mode changes: the first move in the new one, the mode, the tool's length in mm (NaN for the
 /// machine file's), and where that move starts in the new words.
 #[derive(Clone, Copy, Debug)]
 struct Change {
     row: usize,
-    meaning: Meaning,
+    coordinate_mode: CoordinateMode,
     tool_length: f64,
     start: Point,
     direction: Direction,
@@ -261,14 +261,20 @@ impl Moves {
         self.row(kind, target, feed, control, line)
     }
 
-    /// From here on words have another meaning: the same place is `start` and `direction` in the new words.
-    pub fn change(&mut self, meaning: Meaning, tool_length: f64, start: Point, direction: Direction) {
+    /// From here on another coordinate mode holds: the same place is `start` and `direction` in the new words.
+    pub fn change(
+        &mut self,
+        coordinate_mode: CoordinateMode,
+        tool_length: f64,
+        start: Point,
+        direction: Direction,
+    ) {
         self.stop(Stop::Change);
         let row = self.kind.len();
         if self.changes.last().is_some_and(|last| last.row == row) {
             self.changes.pop();
         }
-        self.changes.push(Change { row, meaning, tool_length, start, direction });
+        self.changes.push(Change { row, coordinate_mode, tool_length, start, direction });
         self.position = start;
         if direction != self.direction {
             self.direction = direction;

@@ -8,7 +8,7 @@ use super::moves::Point;
 use super::parameters::{
     first_of_system, HOME, MOST_FURTHER, ROTATION, SECOND_HOME, SHIFT, SHIFT_IN_FORCE, SYSTEM,
 };
-use super::tip::Meaning;
+use super::tip::CoordinateMode;
 use super::tools::Tool;
 use super::words::count;
 
@@ -157,7 +157,7 @@ impl Interpreter<'_> {
     pub(super) fn set_offsets(&mut self, block: &Block) -> Outcome<()> {
         match block.code(Group::ToolLength) {
             Some(code @ (434 | 435)) => return self.program_tip(block, code),
-            Some(432) if self.state.meaning != Meaning::Joints => {
+            Some(432) if self.state.coordinate_mode != CoordinateMode::Joints => {
                 return fault("G43.2 adds to a tool length and G43.4 is in force: cancel it by G49 before");
             }
             Some(code @ (430 | 432)) if block.words & AXIS_WORDS == 0 || code == 430 => {
@@ -187,7 +187,7 @@ impl Interpreter<'_> {
             _ => {}
         }
         if block.code(Group::ToolLength).is_some() {
-            self.set_meaning(Meaning::Joints, f64::NAN)?;
+            self.set_coordinate_mode(CoordinateMode::Joints, f64::NAN)?;
         }
         self.set_system(block)
     }
@@ -195,12 +195,12 @@ impl Interpreter<'_> {
     /// G43.4 and G43.5: words are the tip, so the tool's length is in none of them. It is the one in force, unless H
     /// calls for another.
     fn program_tip(&mut self, block: &Block, code: u16) -> Outcome<()> {
-        let meaning = if code == 434 { Meaning::Tip } else { Meaning::Vector };
+        let coordinate_mode = if code == 434 { CoordinateMode::Tip } else { CoordinateMode::Vector };
         let tool = &mut self.state.offsets.tool;
-        let length = match (block.has(b'H'), self.state.meaning) {
+        let length = match (block.has(b'H'), self.state.coordinate_mode) {
             (true, _) => f64::NAN,
-            (false, Meaning::Joints) if tool[2] != 0.0 => tool[2],
-            (false, Meaning::Joints) => f64::NAN,
+            (false, CoordinateMode::Joints) if tool[2] != 0.0 => tool[2],
+            (false, CoordinateMode::Joints) => f64::NAN,
             (false, _) => self.state.tool_length,
         };
         if let Some(axis) = [0, 1].into_iter().chain(3..9).find(|&axis| tool[axis] != 0.0) {
@@ -220,7 +220,7 @@ impl Interpreter<'_> {
             ));
         }
         let machine = self.options.machine_axes.iter().fold(0, |sum, &letter| sum | bit(letter));
-        self.set_meaning(meaning, length)?;
+        self.set_coordinate_mode(coordinate_mode, length)?;
         // The joints of a tool direction are axes of the program from here on.
         self.meet(machine)?;
         self.set_system(block)

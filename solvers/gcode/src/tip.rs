@@ -1,5 +1,5 @@
 //! What axis words mean: joint positions, the tool's tip (G43.4), or the tip and a direction (G43.5); and what a
-//! change of meaning does. It moves nothing: the same joint positions are written in the new words.
+//! change of the coordinate mode does. It moves nothing: the same joint positions are written in the new words.
 
 use super::block::{bits, g_name, Block, Group};
 use super::execute::Interpreter;
@@ -7,35 +7,40 @@ use super::fault::{fault, Outcome};
 use super::intent::is_cycle;
 use super::moves::{Direction, Point};
 
-/// Of axis words; as `Meaning` in the Python package.
+/// Of axis words; as `CoordinateMode` in the Python package.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
-pub enum Meaning {
+pub enum CoordinateMode {
     Joints = 0,
     Tip = 1,
     Vector = 2,
 }
 
-/// A place in words of a meaning: X to W, then the tool's direction.
+/// A place in words of a mode: X to W, then the tool's direction.
 pub type Place = (Point, Direction);
 
 /// What a machine's kinematics says about words.
 pub trait TipControl {
-    /// Whether the machine can be programmed in that meaning; a sentence why not.
-    fn check(&self, meaning: Meaning) -> Result<(), String>;
+    /// Whether the machine has that mode; a sentence why not.
+    fn check(&self, coordinate_mode: CoordinateMode) -> Result<(), String>;
 
-    /// The joint positions after a stretch of places in words of one meaning, which begins at the joints `entry`;
+    /// The joint positions after places in words of one mode, which begin at the joints `entry`;
     /// `tool_length` in mm, NaN for the machine file's.
     fn joints(
         &self,
-        meaning: Meaning,
+        coordinate_mode: CoordinateMode,
         tool_length: f64,
         entry: &Point,
         places: &[Place],
     ) -> Result<Point, String>;
 
-    /// The place in words of a meaning where the joints are.
-    fn place(&self, meaning: Meaning, tool_length: f64, joints: &Point) -> Result<Place, String>;
+    /// The place in words of a mode where the joints are.
+    fn place(
+        &self,
+        coordinate_mode: CoordinateMode,
+        tool_length: f64,
+        joints: &Point,
+    ) -> Result<Place, String>;
 }
 
 /// Directions [unit vectors] whose sum is shorter than this are opposite.
@@ -43,9 +48,15 @@ const OPPOSITE: f64 = 1e-6;
 
 impl Interpreter<'_> {
     /// G43.4 and G43.5, and the codes that cancel them; `length` is the tool's in mm, NaN where it is not known.
-    pub(super) fn set_meaning(&mut self, meaning: Meaning, length: f64) -> Outcome<()> {
+    pub(super) fn set_coordinate_mode(
+        &mut self,
+        coordinate_mode: CoordinateMode,
+        length: f64,
+    ) -> Outcome<()> {
         let same = length.to_bits() == self.state.tool_length.to_bits() || length == self.state.tool_length;
-        if meaning == self.state.meaning && (same || meaning == Meaning::Joints) {
+        if coordinate_mode == self.state.coordinate_mode
+            && (same || coordinate_mode == CoordinateMode::Joints)
+        {
             return Ok(());
         }
         let Some(control) = self.options.tip_control.as_deref() else {
@@ -55,39 +66,39 @@ impl Interpreter<'_> {
             );
         };
         let entry = &self.state.entry;
-        let converted = control.check(meaning).and_then(|()| {
-            let joints = match self.state.meaning {
-                Meaning::Joints => self.moves.position,
-                Meaning::Tip => {
+        let converted = control.check(coordinate_mode).and_then(|()| {
+            let joints = match self.state.coordinate_mode {
+                CoordinateMode::Joints => self.moves.position,
+                CoordinateMode::Tip => {
                     let here = (self.moves.position, self.moves.direction);
-                    control.joints(Meaning::Tip, self.state.tool_length, entry, &[here])?
+                    control.joints(CoordinateMode::Tip, self.state.tool_length, entry, &[here])?
                 }
-                Meaning::Vector => {
+                CoordinateMode::Vector => {
                     let stretch = self.moves.since_change();
-                    control.joints(Meaning::Vector, self.state.tool_length, entry, &stretch)?
+                    control.joints(CoordinateMode::Vector, self.state.tool_length, entry, &stretch)?
                 }
             };
-            Ok((joints, control.place(meaning, length, &joints)?))
+            Ok((joints, control.place(coordinate_mode, length, &joints)?))
         });
         let (joints, (start, direction)) = converted.or_else(fault)?;
         self.check_reach(&start)?;
-        self.moves.change(meaning, length, start, direction);
-        self.state.meaning = meaning;
+        self.moves.change(coordinate_mode, length, start, direction);
+        self.state.coordinate_mode = coordinate_mode;
         self.state.tool_length = length;
         self.state.entry = joints;
         Ok(())
     }
 
     /// Refuses what goes to joint positions or along the spindle while words are the tip.
-    pub(super) fn check_meaning(&self, block: &Block, motion: Option<u16>) -> Outcome<()> {
+    pub(super) fn check_coordinate_mode(&self, block: &Block, motion: Option<u16>) -> Outcome<()> {
         let code = match block.code(Group::ToolLength) {
             Some(434) => 434,
             Some(435) => 435,
             Some(_) => return Ok(()),
-            None => match self.state.meaning {
-                Meaning::Joints => return Ok(()),
-                Meaning::Tip => 434,
-                Meaning::Vector => 435,
+            None => match self.state.coordinate_mode {
+                CoordinateMode::Joints => return Ok(()),
+                CoordinateMode::Tip => 434,
+                CoordinateMode::Vector => 435,
             },
         };
         let name = g_name(code);
@@ -153,11 +164,11 @@ pub fn turn(a: &Direction, b: &Direction) -> f64 {
     sine.atan2(a[0] * b[0] + a[1] * b[1] + a[2] * b[2]).to_degrees()
 }
 
-/// True where G43.5 gives the I, J, K of a block their meaning.
-pub fn takes_direction(block: &Block, meaning: Meaning, motion: Option<u16>) -> bool {
+/// True where G43.5 gives the I, J, K of a block the tool's direction.
+pub fn takes_direction(block: &Block, coordinate_mode: CoordinateMode, motion: Option<u16>) -> bool {
     let vector = match block.code(Group::ToolLength) {
         Some(code) => code == 435,
-        None => meaning == Meaning::Vector,
+        None => coordinate_mode == CoordinateMode::Vector,
     };
     vector && matches!(motion, Some(0 | 10))
 }

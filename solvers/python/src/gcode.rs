@@ -9,7 +9,7 @@ use super::curve::Curve;
 use super::moves::{places_of_xyz, Moves};
 use super::with_padded_axes;
 use super::work::run;
-use feedplan_gcode::{read, Meaning, Options, Place, Point, TipControl, Tool};
+use feedplan_gcode::{read, CoordinateMode, Options, Place, Point, TipControl, Tool};
 use feedplan_geometry::spline::CompositeCurve;
 use feedplan_geometry::watch::Watch;
 
@@ -38,24 +38,29 @@ impl PyTipControl {
 }
 
 impl TipControl for PyTipControl {
-    fn check(&self, meaning: Meaning) -> Result<(), String> {
-        self.call::<Option<bool>, _>("check", (meaning as u8,)).map(|_| ())
+    fn check(&self, coordinate_mode: CoordinateMode) -> Result<(), String> {
+        self.call::<Option<bool>, _>("check", (coordinate_mode as u8,)).map(|_| ())
     }
 
     fn joints(
         &self,
-        meaning: Meaning,
+        coordinate_mode: CoordinateMode,
         tool_length: f64,
         entry: &Point,
         places: &[Place],
     ) -> Result<Point, String> {
         let places: Vec<Vec<f64>> =
             places.iter().map(|(point, direction)| [&point[..], &direction[..]].concat()).collect();
-        self.call("joints", (meaning as u8, tool_length, entry.to_vec(), places))
+        self.call("joints", (coordinate_mode as u8, tool_length, entry.to_vec(), places))
     }
 
-    fn place(&self, meaning: Meaning, tool_length: f64, joints: &Point) -> Result<Place, String> {
-        self.call("place", (meaning as u8, tool_length, joints.to_vec()))
+    fn place(
+        &self,
+        coordinate_mode: CoordinateMode,
+        tool_length: f64,
+        joints: &Point,
+    ) -> Result<Place, String> {
+        self.call("place", (coordinate_mode as u8, tool_length, joints.to_vec()))
     }
 }
 
@@ -186,7 +191,7 @@ fn read_gcode<'py>(
     fields.set_item("stop", PyArray1::from_vec(py, columns.stop))?;
     fields.set_item("stop_cause", PyArray1::from_vec(py, columns.stop_cause))?;
     fields.set_item("dwell", PyArray1::from_vec(py, columns.dwell))?;
-    fields.set_item("meaning", PyArray1::from_vec(py, columns.meaning))?;
+    fields.set_item("coordinate_mode", PyArray1::from_vec(py, columns.coordinate_mode))?;
     fields.set_item("tool_length", PyArray1::from_vec(py, columns.tool_length))?;
     fields.set_item("event_columns", event_columns)?;
     fields.set_item("start_dwell", columns.start_dwell)?;

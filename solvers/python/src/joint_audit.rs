@@ -26,7 +26,7 @@ struct WordArrays<'py> {
     kinematics: KinematicsArrays<'py>,
     column: Vec<i64>,
     held: Vec<f64>,
-    meaning: i64,
+    coordinate_mode: i64,
 }
 
 /// `feedplan.machine.kinematics.Kinematics`.
@@ -35,7 +35,7 @@ struct KinematicsArrays<'py> {
     recorded: ExpressionArrays<'py>,
 }
 
-/// `feedplan.machine.meaning.Meaning.VECTOR`.
+/// `feedplan.machine.coordinate_mode.CoordinateMode.VECTOR`.
 const VECTOR: i64 = 2;
 
 impl WordArrays<'_> {
@@ -59,7 +59,7 @@ impl WordArrays<'_> {
             turning: recorded.turning.clone(),
             column,
             held: self.held.clone(),
-            directed: self.meaning == VECTOR,
+            directed: self.coordinate_mode == VECTOR,
         })
     }
 }

@@ -1,25 +1,25 @@
 //! Whatever the bytes, the G-code reader returns columns that fit together, or one sentence with a line that exists.
 
-use feedplan_gcode::{read, Columns, Meaning, Options, Place, Point, ReadError, TipControl};
+use feedplan_gcode::{read, Columns, CoordinateMode, Options, Place, Point, ReadError, TipControl};
 use proptest::prelude::*;
 
 /// An upright tool that hangs below the joints.
 struct Upright;
 
 impl TipControl for Upright {
-    fn check(&self, _: Meaning) -> Result<(), String> {
+    fn check(&self, _: CoordinateMode) -> Result<(), String> {
         Ok(())
     }
 
-    fn joints(&self, _: Meaning, length: f64, _: &Point, places: &[Place]) -> Result<Point, String> {
+    fn joints(&self, _: CoordinateMode, length: f64, _: &Point, places: &[Place]) -> Result<Point, String> {
         let mut joints = places.last().ok_or("a stretch has no place")?.0;
         joints[2] += if length.is_nan() { 100.0 } else { length };
         Ok(joints)
     }
 
-    fn place(&self, meaning: Meaning, length: f64, joints: &Point) -> Result<Place, String> {
+    fn place(&self, coordinate_mode: CoordinateMode, length: f64, joints: &Point) -> Result<Place, String> {
         let mut place = *joints;
-        if meaning != Meaning::Joints {
+        if coordinate_mode != CoordinateMode::Joints {
             place[2] -= if length.is_nan() { 100.0 } else { length };
         }
         Ok((place, [0.0, 0.0, 1.0]))
@@ -92,18 +92,18 @@ fn check_splines(columns: &Columns) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-/// Meanings go with their changes, and directions are unit vectors.
+/// Coordinate modes go with their changes, and directions are unit vectors.
 fn check_changes(columns: &Columns) -> Result<(), TestCaseError> {
     let (count, width) = (columns.kind.len(), columns.axes.len());
-    prop_assert_eq!((columns.meaning.len(), columns.tool_length.len()), (count, count));
+    prop_assert_eq!((columns.coordinate_mode.len(), columns.tool_length.len()), (count, count));
     prop_assert_eq!(columns.change_start.len(), columns.change_move.len() * width);
     prop_assert!(columns.change_start.iter().all(|value| value.abs() <= 1e8));
     prop_assert!(columns.change_move.windows(2).all(|pair| pair[0] < pair[1]));
     for row in 1..count {
-        let same = columns.meaning[row] == columns.meaning[row - 1];
+        let same = columns.coordinate_mode[row] == columns.coordinate_mode[row - 1];
         prop_assert!(same || columns.change_move.contains(&(row as i64)));
     }
-    prop_assert_eq!(columns.axes.ends_with(b"IJK"), columns.meaning.contains(&2));
+    prop_assert_eq!(columns.axes.ends_with(b"IJK"), columns.coordinate_mode.contains(&2));
     if columns.axes.ends_with(b"IJK") {
         for row in columns.target.chunks_exact(width) {
             let size = row[width - 3..].iter().map(|value| value * value).sum::<f64>();

@@ -1,6 +1,6 @@
 //! The columns that the moves of a whole program become.
 
-use super::{Direction, Events, Meaning, Moves, Point, Stop, UPRIGHT};
+use super::{CoordinateMode, Direction, Events, Moves, Point, Stop, UPRIGHT};
 use crate::block::AXES;
 
 /// The letters of a tool direction's columns, after those of the axes.
@@ -34,8 +34,8 @@ pub struct Columns {
     pub spline_weights: Vec<f64>,
     pub spline_offsets: Vec<usize>,
     pub spline_width: Vec<f64>,
-    /// `Meaning` and tool length of each move.
-    pub meaning: Vec<u8>,
+    /// `CoordinateMode` and tool length of each move.
+    pub coordinate_mode: Vec<u8>,
     pub tool_length: Vec<f64>,
     /// Moves that start where their own words say, not where the move before ends, and these places.
     pub change_move: Vec<i64>,
@@ -74,11 +74,11 @@ impl Moves {
             _ => (self.start, UPRIGHT),
         };
         let first = self.changes.first().map_or(count, |change| change.row);
-        let mut meaning = vec![Meaning::Joints as u8; first];
+        let mut coordinate_mode = vec![CoordinateMode::Joints as u8; first];
         let mut tool_length = vec![f64::NAN; first];
         for (i, change) in self.changes.iter().enumerate() {
             let end = self.changes.get(i + 1).map_or(count, |next| next.row);
-            meaning.resize(end, change.meaning as u8);
+            coordinate_mode.resize(end, change.coordinate_mode as u8);
             tool_length.resize(end, change.tool_length);
         }
         self.kind.shrink_to_fit();
@@ -119,7 +119,7 @@ impl Moves {
             stop: stop_cause.iter().map(|&cause| cause != Stop::None as u8).collect(),
             stop_cause,
             dwell,
-            meaning,
+            coordinate_mode,
             tool_length,
             arc_move: self.arcs.iter().map(|&(row, _)| row as i64).collect(),
             arc_centre: self.arcs.iter().map(|(_, arc)| arc.centre).collect(),
@@ -133,7 +133,7 @@ impl Moves {
 
     /// True where the tool's direction has columns.
     fn points_tool(&self) -> bool {
-        self.changes.iter().any(|change| change.meaning == Meaning::Vector)
+        self.changes.iter().any(|change| change.coordinate_mode == CoordinateMode::Vector)
     }
 
     /// The letters of the columns.

@@ -4,34 +4,38 @@ import numpy as np
 import pytest
 
 from feedplan import Machine, MachineError
-from feedplan.machine.meaning import Meaning
+from feedplan.machine.axis_words import axis_words
+from feedplan.machine.coordinate_mode import CoordinateMode
 from feedplan.machine.path_derivatives import derivatives, positions
-from feedplan.machine.words import axis_words
 
 
 def test_words_of_a_five_axis_machine_are_joints_until_said_otherwise() -> None:
     words = axis_words(Machine.load("trunnion-ac"), ("X", "Y", "Z", "A", "C"))
     point = np.array([[1.0, 2.0, 3.0, 40.0, 50.0]])
-    assert words.meaning is Meaning.JOINTS
+    assert words.coordinate_mode is CoordinateMode.JOINTS
     assert (positions(words.kinematics, words.tip(point)) == point).all()
 
 
 def test_words_of_a_cylindrical_machine_are_the_tip() -> None:
     words = axis_words(Machine.load("cylindrical"), ("X", "Y", "Z"))
-    assert words.meaning is Meaning.TIP
+    assert words.coordinate_mode is CoordinateMode.TIP
     assert positions(words.kinematics, words.tip(np.array([[0.0, 30.0, 4.0]]))) == pytest.approx(
         np.array([[90, 30, 4]])
     )
 
 
 def test_joint_positions_of_a_cylindrical_machine_can_be_programmed() -> None:
-    words = axis_words(Machine.load("cylindrical"), ("X", "Z", "C"), Meaning.JOINTS)
+    words = axis_words(Machine.load("cylindrical"), ("X", "Z", "C"), CoordinateMode.JOINTS)
     assert positions(words.kinematics, words.tip(np.array([[30.0, 4.0, 90.0]]))).tolist() == [[90, 30, 4]]
 
 
 def test_a_tip_stretch_has_its_own_tool_and_holds_what_is_not_programmed() -> None:
     words = axis_words(
-        Machine.load("trunnion-ac"), ("X", "Y", "Z", "C"), Meaning.TIP, tool_length=77.0, held={"A": -90.0}
+        Machine.load("trunnion-ac"),
+        ("X", "Y", "Z", "C"),
+        CoordinateMode.TIP,
+        tool_length=77.0,
+        held={"A": -90.0},
     )
     # A−90 about (y, z) = (0, 50): the part's face point (0, 0) comes to (50, 50).
     joints = positions(words.kinematics, words.tip(np.array([[0.0, 0.0, 0.0, 0.0]])))
@@ -39,7 +43,7 @@ def test_a_tip_stretch_has_its_own_tool_and_holds_what_is_not_programmed() -> No
 
 
 def test_a_direction_points_the_tool_at_any_piece() -> None:
-    words = axis_words(Machine.load("trunnion-ac"), ("X", "Y", "Z", "I", "J", "K"), Meaning.VECTOR)
+    words = axis_words(Machine.load("trunnion-ac"), ("X", "Y", "Z", "I", "J", "K"), CoordinateMode.VECTOR)
     curve = np.array([[[0.0, 0, 0, 1, 0, 1], [9, 0, 0, 1, 1, 1]]])
     q = derivatives(words.kinematics, words.tip(curve), np.array([9.0]), np.array([0.0]), 1)
     assert q[0, 0, 3:] == pytest.approx([45, 90])
@@ -49,8 +53,8 @@ def test_a_direction_points_the_tool_at_any_piece() -> None:
 
 def test_a_letter_the_machine_has_not_is_named() -> None:
     with pytest.raises(MachineError, match="the program uses B, but machine trunnion-ac takes X, Y, Z, A, C"):
-        axis_words(Machine.load("trunnion-ac"), ("X", "B"), Meaning.TIP)
+        axis_words(Machine.load("trunnion-ac"), ("X", "B"), CoordinateMode.TIP)
     with pytest.raises(MachineError, match="machine mill has no two rotary axes"):
-        axis_words(Machine.load("mill"), ("X", "I", "J", "K"), Meaning.VECTOR)
+        axis_words(Machine.load("mill"), ("X", "I", "J", "K"), CoordinateMode.VECTOR)
     with pytest.raises(MachineError, match="needs all of I, J and K"):
-        axis_words(Machine.load("head-head"), ("X", "I", "J"), Meaning.VECTOR)
+        axis_words(Machine.load("head-head"), ("X", "I", "J"), CoordinateMode.VECTOR)

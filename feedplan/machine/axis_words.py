@@ -1,8 +1,7 @@
-"""What a program's axis words mean on a machine: joint positions, the tool tip, or the tip and a direction.
+"""The axis words of a program on a machine: from columns of a program to what its kinematics takes.
 
-A reader that knows G43.4 and the like says for each stretch of moves which meaning holds, the tool's length,
-and for directions the columns I, J, K. Under TIP and VECTOR the words are the tip itself, so the reader
-leaves the tool length offset out of them, and adds work offsets, also of rotary axes, as it does now.
+A reader gives the coordinate mode and the tool length of each move, and for directions the columns I, J, K.
+In the modes TIP and VECTOR the words are the tip itself: the reader leaves the tool length out of them.
 """
 
 from __future__ import annotations
@@ -14,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.errors import MachineError
+from feedplan.machine.coordinate_mode import CoordinateMode
 from feedplan.machine.kinematics import Kinematics
 from feedplan.machine.machine import Machine
-from feedplan.machine.meaning import Meaning
 from feedplan.machine.rotary import RotaryChain, ToolVector
 
 DIRECTION = ("I", "J", "K")
@@ -24,12 +23,12 @@ DIRECTION = ("I", "J", "K")
 
 @dataclass(frozen=True)
 class AxisWords:
-    """A stretch of program on a machine: `kinematics` takes the columns `column` of the program's axes.
+    """Moves in one coordinate mode: `kinematics` takes the columns `column` of the program's axes.
 
     A column of −1 is an axis that the program does not use: it stays at `held` [mm, deg].
     """
 
-    meaning: Meaning
+    coordinate_mode: CoordinateMode
     kinematics: Kinematics
     column: tuple[int, ...]
     held: tuple[float, ...]
@@ -52,7 +51,7 @@ class AxisWords:
 def axis_words(
     machine: Machine,
     axes: Sequence[str],
-    meaning: Meaning | None = None,
+    coordinate_mode: CoordinateMode | None = None,
     *,
     tool_length: float | None = None,
     held: Mapping[str, float] | None = None,
@@ -60,21 +59,21 @@ def axis_words(
 ) -> AxisWords:
     """The program axes `axes` on a machine; MachineError names a letter the machine does not have.
 
-    Letters of the machine's other meanings are left out: I, J, K, or rotary joints beside a direction.
+    Letters of other modes are left out: I, J, K, or rotary joints beside a direction.
 
-    Without a meaning, words mean what they do on that machine before any G43.4. `tool_length` [mm] replaces
-    the machine file's; `held` gives positions of axes that the program never moves, 0 by default; `side` ±1
+    Without a `coordinate_mode` it is the machine's own before any G43.4. `tool_length` [mm] replaces the
+    machine file's; `held` gives positions of axes that the program never moves, 0 by default; `side` ±1
     chooses between the two poses that point the tool along a direction.
     """
     axes = tuple(axes)
     kinematics = machine.inverse
-    if meaning is None:
-        meaning = Meaning.TIP if kinematics.always else Meaning.JOINTS
+    if coordinate_mode is None:
+        coordinate_mode = CoordinateMode.TIP if kinematics.always else CoordinateMode.JOINTS
     if tool_length is not None and isinstance(kinematics, RotaryChain):
         kinematics = kinematics.with_tool(tool_length)
-    if meaning is Meaning.JOINTS:
+    if coordinate_mode is CoordinateMode.JOINTS:
         kinematics = _joint_positions(machine)
-    elif meaning is Meaning.VECTOR:
+    elif coordinate_mode is CoordinateMode.VECTOR:
         if not isinstance(kinematics, RotaryChain) or len(kinematics.joint_names) != 5:
             raise MachineError(
                 f"machine {machine.name} has no two rotary axes that point the tool along I, J, K: "
@@ -82,8 +81,8 @@ def axis_words(
             )
         kinematics = ToolVector(kinematics, side)
     known = kinematics.tip_names
-    # The columns of a program with several meanings serve all of them.
-    others = kinematics.joint_names if meaning is Meaning.VECTOR else DIRECTION
+    # The columns of a program with several modes serve all of them.
+    others = kinematics.joint_names if coordinate_mode is CoordinateMode.VECTOR else DIRECTION
     for letter in axes:
         if letter not in known and letter not in others:
             raise MachineError(
@@ -91,9 +90,11 @@ def axis_words(
                 f"take {letter} out of the program, or use a machine that has it"
             )
     column = tuple(axes.index(letter) if letter in axes else -1 for letter in known)
-    if meaning is Meaning.VECTOR and -1 in column[3:]:
+    if coordinate_mode is CoordinateMode.VECTOR and -1 in column[3:]:
         raise MachineError("a tool direction needs all of I, J and K: give the missing words")
-    return AxisWords(meaning, kinematics, column, tuple((held or {}).get(letter, 0.0) for letter in known))
+    return AxisWords(
+        coordinate_mode, kinematics, column, tuple((held or {}).get(letter, 0.0) for letter in known)
+    )
 
 
 def _joint_positions(machine: Machine) -> Kinematics:

@@ -1,0 +1,13 @@
+"""The coordinate mode of a program: what its axis words mean on a machine."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class CoordinateMode(IntEnum):
+    """What axis words mean."""
+
+    JOINTS = 0  # every word is the position of the joint of its letter
+    TIP = 1  # X, Y, Z are the tip on the part, rotary words the angles of the rotary joints (G43.4)
+    VECTOR = 2  # X, Y, Z are the tip on the part, I, J, K the tool's direction (G43.5)
