@@ -1,4 +1,4 @@
-//! A quadratic Bézier piece in M axes, the geometry that the quadratic kernels share.
+//! Vectors, segments and quadratic Bézier pieces in M axes.
 
 use crate::spline::Piece;
 
@@ -28,6 +28,31 @@ pub fn sub<const M: usize>(a: &[f64; M], b: &[f64; M]) -> [f64; M] {
 #[inline(always)]
 pub fn lerp<const M: usize>(a: &[f64; M], b: &[f64; M], t: f64) -> [f64; M] {
     std::array::from_fn(|k| a[k] + t * (b[k] - a[k]))
+}
+
+/// The line from one point to another.
+#[derive(Clone, Copy, Debug)]
+pub struct Segment<const M: usize> {
+    start: [f64; M],
+    vector: [f64; M],
+    length_sq: f64,
+}
+
+impl<const M: usize> Segment<M> {
+    pub fn new(start: &[f64; M], end: &[f64; M]) -> Self {
+        let vector = sub(end, start);
+        // Any positive number, for a segment without a length.
+        Self { start: *start, vector, length_sq: dot(&vector, &vector).max(f64::MIN_POSITIVE) }
+    }
+
+    /// Squared distance from `p`, also if the segment has no length.
+    #[inline(always)]
+    pub fn distance_sq(&self, p: &[f64; M]) -> f64 {
+        let w = sub(p, &self.start);
+        let t = (dot(&w, &self.vector) / self.length_sq).clamp(0.0, 1.0);
+        let rest: [f64; M] = std::array::from_fn(|k| w[k] - t * self.vector[k]);
+        dot(&rest, &rest)
+    }
 }
 
 /// C(u) on u in [0, width], by its three control points in mm.
@@ -70,8 +95,8 @@ impl<const M: usize> Quadratic<M> {
         (std::array::from_fn(|k| scale * (b[k] - a[k])), std::array::from_fn(|k| scale * (c[k] - b[k])))
     }
 
-    /// The same by t = u/width, exactly alike on a line as `line` makes it: the middle of a short one far from the
-    /// origin is rounded, and would bend it.
+    /// C' by t = u/width at both ends. On a line as `line` makes it both are equal: its middle is rounded, which would bend a
+    /// short line far from the origin.
     #[inline(always)]
     pub fn tangents(&self) -> ([f64; M], [f64; M]) {
         let [a, b, c] = &self.control;

@@ -1,28 +1,25 @@
-//! Arcs of a program as conic pieces: true circles, and spirals within a tolerance.
+//! An arc or a helix of a program as conic pieces, with a bound of their distance from it.
 //!
-//! | file | idea |
+//! | file | computes |
 //! |---|---|
-//! | `true_circle` | the circle through both ends; helices on its cylinder |
-//! | `spiral` | what is no circle: an arc whose radius changes with the angle |
+//! | `true_circle` | the circle through both ends, and helices on its cylinder |
+//! | `spiral` | an arc whose ends are too far apart in radius for one circle, within a tolerance |
 
 mod spiral;
 mod true_circle;
 
+use crate::tolerance;
 use feedplan_geometry::conic::Conic;
 use feedplan_geometry::quadratic::{norm, sub};
 use std::f64::consts::{PI, TAU};
 
-/// A programmed sweep is corrected to the end point that the program gives; more than this is no rounding.
-const SWEEP_SLACK: f64 = 0.1;
-
-/// Nobody means an arc of more pieces than this; it would fill the memory.
+/// An arc of more pieces is refused: it would fill the memory.
 const MAX_PIECES: f64 = 1e7;
-/// An arc whose radius changes by more than this times itself per rad is no arc but a line along a radius.
+/// An arc is refused if its radius changes by more than this times itself per rad: it runs along a radius.
 const STEEPEST: f64 = 1e6;
 
-/// An arc in the plane of two axes; all other axes run linearly with the angle.
-///
-/// Where start and end differ in their distance from the centre, the radius changes linearly with the angle.
+/// An arc in the plane of two axes. All other axes are linear in the angle; so is the radius, where start and end
+/// differ in their distance from the centre.
 #[derive(Clone, Copy, Debug)]
 pub struct Arc<const M: usize> {
     pub start: [f64; M],
@@ -58,12 +55,12 @@ struct Polar {
     sweep: f64,
 }
 
-/// The sweep from one spoke to another. The ends decide, the programmed sweep only says how many turns there are.
+/// The sweep from one radius vector to another, with as many turns as the programmed one; None if they disagree.
 fn sweep_to(from: &[f64; 2], to: &[f64; 2], programmed: f64) -> Option<f64> {
     let turn = (from[0] * to[1] - from[1] * to[0]).atan2(from[0] * to[0] + from[1] * to[1]);
     let correction = (turn - programmed + PI).rem_euclid(TAU) - PI;
     let sweep = programmed + correction;
-    (correction.abs() <= SWEEP_SLACK && sweep * programmed > 0.0).then_some(sweep)
+    (correction.abs() <= tolerance::SWEEP && sweep * programmed > 0.0).then_some(sweep)
 }
 
 impl Polar {
@@ -101,14 +98,14 @@ pub fn arc_pieces<const M: usize>(arc: &Arc<M>, tolerance: f64) -> Result<(Vec<C
     }
 }
 
-/// Least and greatest value of axis `k` of the plane (0 or 1) on the arc itself (where the radius changes,
-/// at the angles at which a circle has them).
+/// Least and greatest value of axis `k` of the plane (0 or 1) on the arc. Where the radius changes, the values are
+/// taken at the angles at which a circle has its extremes.
 pub fn arc_extent<const M: usize>(arc: &Arc<M>, k: usize) -> Result<(f64, f64), ArcError> {
     let polar = Polar::new(arc)?;
     let (a, b) = (arc.start[arc.plane[k]], arc.end[arc.plane[k]]);
     let (mut least, mut greatest) = (a.min(b), a.max(b));
     let sign = polar.sweep.signum();
-    // Angles, in the direction of travel, at which the axis has its extremes.
+    // The angles from the start, in the direction of travel, at which the axis has its extremes.
     let start = polar.direction[1].atan2(polar.direction[0]);
     for (side, opposite) in [(1.0, 0.0), (-1.0, PI)] {
         let extreme = 0.5 * PI * k as f64 + opposite;

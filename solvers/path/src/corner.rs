@@ -1,44 +1,44 @@
-//! Rounded corners: how long a corner may be, and the smooth pieces that replace it.
+//! The blend of a corner: the pieces of both its sides, displaced so that they meet smoothly.
 //!
-//! Two smooth sides meet in V with unit tangents t₋ before and t₊ after. On both sides, up to the length l
-//! from V, the displacement D (q/l)² is added to the curve, where q is the distance from the far end of the
-//! side, measured in a parameter in which the side is C1 and has speed 1 in V. With
+//! Two smooth sides meet in V with unit tangents t₋ before and t₊ after. To each side, up to the length l from V, the
+//! displacement D (q/l)² is added, where q is the distance from the far end of the side, measured in a parameter in which
+//! the side is C1 and has speed 1 in V. With
 //!
 //! ```text
 //! D = (t₊ − t₋)/(2/l₋ + 2/l₊)          |D| = l |t₊ − t₋|/4 at equal lengths
 //! ```
 //!
-//! the tangents agree in V + D. The pieces keep their degree, their number stays what it was, and points of equal
-//! parameter are never farther apart than |D|: that bounds the deviation both ways, in any number of axes and
-//! over any number of pieces. The bound is met in V, whose distance from the curve between two equally long lines is
-//! exactly |D|. There the curve is the one parabola with the control points V − l t₋, V, V + l t₊.
+//! the tangents agree in V + D. The pieces keep their number and their degrees. Points of equal parameter are at most
+//! |D| apart, which bounds the deviation both ways, in any number of axes and pieces. Between two lines of equal length
+//! the distance of V from the curve is exactly |D|, and both sides are one parabola, with the control points V − l t₋, V,
+//! V + l t₊.
 //!
-//! A piece of degree d with weights stays one: its control points get shares of D, so that every point gets a mean of
-//! them. The slope of what is added grows with q here too and ends as 2/(lA): the shares' first and last steps on a
-//! piece from q₀ to q₁ are q₀ w₀/w₁ and q₁ w_d/w_{d−1}, those between go evenly from one to the other, all times
-//! 2 (q₁ − q₀)/(d l² A), where A makes their sum over the side 1. On polynomials A = 1 and this is (q/l)².
+//! A rational piece of degree d stays one: its control points get fractions of D. On the piece from q₀ to q₁ the first
+//! step of the fraction is q₀ w₀/w₁, the last q₁ w_d/w_{d−1}, and those between go evenly from one to the other, all times
+//! 2 (q₁ − q₀)/(d l² A). A makes the sum of the steps of a side 1, and the slope in V is 2/(lA). On polynomials A = 1, and
+//! the displacement is D (q/l)².
 //!
-//! # Why this shape
-//! Two quadratics with the polygon A, A + x t₋, B − x t₊, B and the apex at the tolerance leave the ratio
-//! r = x/l free; r = 1/2 is the parabola above. Exact planning of a corner between two lines of 10 mm, apex
-//! 0.01 mm, turns from 10° to 170° in five directions each, axis accelerations 1000/1000 and 400/1000 mm/s²,
-//! feeds 50 and 1000 mm/s (140 cases) gave these times against r = 1/2:
+//! # Why a parabola
+//! Two quadratics with the polygon A, A + x t₋, B − x t₊, B and the apex at the tolerance leave the ratio r = x/l free;
+//! r = 1/2 is the parabola above. The table has the times against r = 1/2 by exact planning of 140 corners between two
+//! lines of 10 mm: apex 0.01 mm, turns from 10° to 170° in five directions each, axis accelerations 1000/1000 and
+//! 400/1000 mm/s², feeds 50 and 1000 mm/s.
 //!
 //! | r    | 0.3    | 0.4   | 0.45  | 0.5 | 0.55   | 0.6   | 0.7   |
 //! |------|--------|-------|-------|-----|--------|-------|-------|
 //! | mean | +2.6 % | +1.1 % | +0.5 % | 0 | −0.01 % | +0.2 % | +0.7 % |
 //! | worst | +15.8 % | +7.6 % | +3.6 % | 0 | +1.4 % | +3.0 % | +6.8 % |
 //!
-//! A parabola is what two axes with constant accelerations draw, so it is where both can be at their limits all
-//! along. Greater ratios also take more of the sides than r = 1/2 does, which short sides do not have.
+//! Two axes with constant accelerations draw a parabola, so on it both can be at their limits all along. Greater ratios
+//! also take more of the sides, which short sides do not have.
 
-mod jump;
-mod share;
+mod share_lengths;
+mod tangent_jump;
 
-pub use jump::Jump;
-pub use share::share_lengths;
+pub use share_lengths::share_lengths;
+pub use tangent_jump::TangentJump;
 
-use crate::follow::{Followed, Shape};
+use crate::program_pieces::{PathPiece, Shape};
 use feedplan_geometry::conic::Conic;
 use feedplan_geometry::quadratic::{norm, sub};
 use feedplan_geometry::spline::CompositeCurve;
@@ -46,28 +46,28 @@ use feedplan_geometry::spline::CompositeCurve;
 /// What a corner between two lines becomes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rounding {
-    /// See "Why this shape".
+    /// See "Why a parabola".
     Parabola,
-    /// The circle that touches both lines: with the turn θ, radius r and length l = r tan(θ/2) on each of them, the
-    /// corner is d = r (1/cos(θ/2) − 1) = l sin(θ/2)/(1 + cos(θ/2)) away. Controllers round so.
+    /// The circle that touches both lines, as many controllers have it. With the turn θ and the radius r it takes
+    /// l = r tan(θ/2) of each line, and the corner is r (1/cos(θ/2) − 1) = l sin(θ/2)/(1 + cos(θ/2)) away from it.
     Circle,
 }
 
 /// The two sides of a corner, each in the order of the path.
 #[derive(Default)]
 pub struct Sides<const M: usize> {
-    pub before: Vec<Followed<M>>,
-    pub after: Vec<Followed<M>>,
-    /// The pieces of splines among them.
+    pub before: Vec<PathPiece<M>>,
+    pub after: Vec<PathPiece<M>>,
+    /// The pieces of splines among them, cut and bent.
     pub made: CompositeCurve<M>,
 }
 
 impl<const M: usize> Sides<M> {
-    /// The one piece that rounds a corner between two lines: a parabola if feed and tolerance are one, a circle at
-    /// the lower of both.
-    pub fn between_lines(&self, jump: &Jump<M>, rounding: Rounding) -> Option<Followed<M>> {
+    /// The one piece that rounds a corner between two lines: a circle with the lower of both feeds, or a parabola if
+    /// feeds and tolerances are equal.
+    pub fn between_lines(&self, jump: &TangentJump<M>, rounding: Rounding) -> Option<PathPiece<M>> {
         let ([before], [after]) = (&self.before[..], &self.after[..]) else { return None };
-        let (Shape::Conic(first), Shape::Conic(second)) = (&before.piece, &after.piece) else { return None };
+        let (Shape::Conic(first), Shape::Conic(second)) = (&before.shape, &after.shape) else { return None };
         let alike = before.feed == after.feed && before.tolerance == after.tolerance;
         if !(first.is_line() && second.is_line() && (alike || rounding == Rounding::Circle)) {
             return None;
@@ -81,11 +81,10 @@ impl<const M: usize> Sides<M> {
         if rounding == Rounding::Circle {
             corner.width = corner.natural_width();
         }
-        // The point in the middle is this share of the parabola's distance away, which has weight 1.
-        let share = 2.0 / (1.0 + weight);
-        let distance = share * norm(&jump.displacement(first.width, second.width));
-        Some(Followed {
-            piece: Shape::Conic(corner),
+        // The distance of a conic from the corner is 2/(1 + weight) times that of the parabola.
+        let distance = 2.0 / (1.0 + weight) * norm(&jump.displacement(first.width, second.width));
+        Some(PathPiece {
+            shape: Shape::Conic(corner),
             last: after.last,
             feed: before.feed.min(after.feed),
             tolerance: before.tolerance.min(after.tolerance),
@@ -94,26 +93,26 @@ impl<const M: usize> Sides<M> {
         })
     }
 
-    /// Bends both sides so that they meet smoothly. Returns by what factor this exceeds what is left of the
-    /// tolerance of some piece, None where a side is empty or stands still within.
-    pub fn bend(&mut self, jump: &Jump<M>) -> Option<f64> {
+    /// Displaces both sides so that they meet smoothly. Returns the greatest ratio of a piece's deviation to the rest of
+    /// its tolerance; None if a side is empty, or has a place where C' is 0.
+    pub fn bend(&mut self, jump: &TangentJump<M>) -> Option<f64> {
         let Self { before, after, made } = self;
         if before.is_empty() || after.is_empty() {
             return None;
         }
         let length_before = rescale(before.iter_mut().rev(), true, made)?;
         let length_after = rescale(after.iter_mut(), false, made)?;
-        let spread_before = spread(before.iter(), length_before, made, true);
-        let spread_after = spread(after.iter().rev(), length_after, made, false);
-        let displacement = jump.displacement(length_before * spread_before, length_after * spread_after);
+        let sum_before = sum_of_steps(before.iter(), length_before, made, true);
+        let sum_after = sum_of_steps(after.iter().rev(), length_after, made, false);
+        let displacement = jump.displacement(length_before * sum_before, length_after * sum_after);
         // From the far ends to the corner, so that q starts as an exact 0 and ends as an exact length.
-        let before = bend(before.iter_mut(), true, &displacement, length_before, spread_before, made)?;
-        let after = bend(after.iter_mut().rev(), false, &displacement, length_after, spread_after, made)?;
+        let before = bend(before.iter_mut(), true, &displacement, length_before, sum_before, made)?;
+        let after = bend(after.iter_mut().rev(), false, &displacement, length_after, sum_after, made)?;
         Some(before.max(after))
     }
 }
 
-/// What bending has to know of a piece: its degree, w₀/w₁ and w_d/w_{d−1}.
+/// The degree of a piece, w₀/w₁ and w_d/w_{d−1}.
 struct Ends {
     degree: usize,
     ratio: [f64; 2],
@@ -144,7 +143,7 @@ impl Ends {
         [degree / self.ratio[0] * norm(&edges[0]), degree / self.ratio[1] * norm(&edges[1])]
     }
 
-    /// The steps of the shares on the piece where q/l goes from `far` to `near`, seen from the far end.
+    /// The steps of the fraction of D on a piece on which q/l grows from `far` to `near`, before the division by A.
     fn steps(&self, far: f64, near: f64, corner_at_end: bool) -> impl Iterator<Item = f64> {
         let [mut first, mut last] = self.ratio;
         if !corner_at_end {
@@ -159,19 +158,19 @@ impl Ends {
     }
 }
 
-/// Makes the pieces of a side, taken from the corner outwards, C1 with speed 1 in the corner, and returns the
-/// length of the side in that parameter, None where a piece begins or ends with no speed.
+/// Gives the pieces of a side, taken from the corner outwards, widths that make it C1 with speed 1 in the corner. Returns
+/// the sum of the widths; None if C' is 0 at an end of a piece.
 fn rescale<'a, const M: usize>(
-    side: impl Iterator<Item = &'a mut Followed<M>>,
+    side: impl Iterator<Item = &'a mut PathPiece<M>>,
     corner_at_end: bool,
     made: &CompositeCurve<M>,
 ) -> Option<f64> {
     let (mut speed, mut length) = (1.0, 0.0);
-    for Followed { piece, .. } in side {
-        let [start, end] = Ends::new(piece, made).speeds(piece, made);
+    for PathPiece { shape, .. } in side {
+        let [start, end] = Ends::new(shape, made).speeds(shape, made);
         let (near, far) = if corner_at_end { (end, start) } else { (start, end) };
         let width = near / speed;
-        match piece {
+        match shape {
             Shape::Conic(conic) => conic.width = width,
             Shape::Spline(spline) => spline.width = width,
         }
@@ -184,63 +183,63 @@ fn rescale<'a, const M: usize>(
     Some(length)
 }
 
-/// The sum A of a side, taken from the far end to the corner.
-fn spread<'a, const M: usize>(
-    side: impl Iterator<Item = &'a Followed<M>>,
+/// The sum A of the steps of a side, taken from the far end to the corner.
+fn sum_of_steps<'a, const M: usize>(
+    side: impl Iterator<Item = &'a PathPiece<M>>,
     length: f64,
     made: &CompositeCurve<M>,
     corner_at_end: bool,
 ) -> f64 {
     let (mut far, mut sum) = (0.0, 0.0);
-    for followed in side {
-        let near = far + followed.piece.width() / length;
-        sum += Ends::new(&followed.piece, made).steps(far, near, corner_at_end).sum::<f64>();
+    for piece in side {
+        let near = far + piece.shape.width() / length;
+        sum += Ends::new(&piece.shape, made).steps(far, near, corner_at_end).sum::<f64>();
         far = near;
     }
     sum
 }
 
-/// Adds the displacement of the corner to the pieces of a side, taken from the far end to the corner. Returns by
-/// what factor the tolerance of some piece is exceeded.
+/// Displaces the pieces of a side, taken from the far end to the corner. Returns the greatest ratio of a piece's deviation
+/// to the rest of its tolerance.
 fn bend<'a, const M: usize>(
-    side: impl ExactSizeIterator<Item = &'a mut Followed<M>>,
+    side: impl ExactSizeIterator<Item = &'a mut PathPiece<M>>,
     corner_at_end: bool,
     displacement: &[f64; M],
     length: f64,
-    spread: f64,
+    sum: f64,
     made: &mut CompositeCurve<M>,
 ) -> Option<f64> {
     let distance = norm(displacement);
     let (mut far, mut reached, mut excess, count) = (0.0, 0.0, 0.0f64, side.len());
-    for (i, followed) in side.enumerate() {
-        let near = if i + 1 == count { 1.0 } else { far + followed.piece.width() / length };
-        let ends = Ends::new(&followed.piece, made);
-        let control = match &mut followed.piece {
+    for (i, piece) in side.enumerate() {
+        let near = if i + 1 == count { 1.0 } else { far + piece.shape.width() / length };
+        let ends = Ends::new(&piece.shape, made);
+        let control = match &mut piece.shape {
             Shape::Conic(conic) => &mut conic.control[..],
             Shape::Spline(spline) => made.control_mut(spline.index as usize),
         };
-        let mut share = reached;
-        let give = |point: &mut [f64; M], share: f64| {
+        let mut fraction = reached;
+        let displace = |point: &mut [f64; M], fraction: f64| {
             for k in 0..M {
-                point[k] += share * displacement[k];
+                point[k] += fraction * displacement[k];
             }
         };
         let at = |i: usize| if corner_at_end { i } else { ends.degree - i };
-        give(&mut control[at(0)], share);
+        displace(&mut control[at(0)], fraction);
         for (i, step) in (1..).zip(ends.steps(far, near, corner_at_end)) {
-            share += step / spread;
-            // Two pieces meet in one point, and the last of a side in the corner.
+            fraction += step / sum;
+            // Both sides meet in V + D exactly.
             let exact = i == ends.degree && near == 1.0;
-            share = if exact { 1.0 } else { share };
-            give(&mut control[at(i)], share);
+            fraction = if exact { 1.0 } else { fraction };
+            displace(&mut control[at(i)], fraction);
         }
-        if let Shape::Spline(spline) = &mut followed.piece {
+        if let Shape::Spline(spline) = &mut piece.shape {
             *spline = spline.bent(made)?;
         }
-        let deviation = share * distance;
-        excess = excess.max(deviation / (followed.tolerance - followed.deviation));
-        followed.deviation += deviation;
-        (far, reached) = (near, share);
+        let deviation = fraction * distance;
+        excess = excess.max(deviation / (piece.tolerance - piece.deviation));
+        piece.deviation += deviation;
+        (far, reached) = (near, fraction);
     }
     Some(excess)
 }
@@ -252,8 +251,8 @@ mod tests {
     use feedplan_geometry::spline::bezier::derivatives;
     use feedplan_geometry::spline::Piece;
 
-    fn conic<const M: usize>(followed: &Followed<M>) -> &Conic<M> {
-        followed.piece.conic().unwrap()
+    fn conic<const M: usize>(piece: &PathPiece<M>) -> &Conic<M> {
+        piece.shape.conic().unwrap()
     }
 
     /// C and C' at a share of the width.
@@ -264,13 +263,13 @@ mod tests {
         [point, tangent]
     }
 
-    fn jump_between<const M: usize>(before: Conic<M>, after: Conic<M>) -> Jump<M> {
-        Jump::new(&Shape::Conic(before), &Shape::Conic(after)).unwrap()
+    fn jump_between<const M: usize>(before: Conic<M>, after: Conic<M>) -> TangentJump<M> {
+        TangentJump::new(&Shape::Conic(before), &Shape::Conic(after)).unwrap()
     }
 
-    fn followed<const M: usize>(piece: Conic<M>) -> Followed<M> {
-        Followed {
-            piece: Shape::Conic(piece),
+    fn path_piece<const M: usize>(conic: Conic<M>) -> PathPiece<M> {
+        PathPiece {
+            shape: Shape::Conic(conic),
             first: 0,
             last: 0,
             feed: 10.0,
@@ -290,8 +289,8 @@ mod tests {
         let length = jump.length_within(0.1, Rounding::Parabola);
         assert!((length - 0.2 * 2f64.sqrt()).abs() < 1e-15);
         let sides = Sides {
-            before: vec![followed(before.part(10.0 - length, 10.0))],
-            after: vec![followed(after.part(0.0, length))],
+            before: vec![path_piece(before.part(10.0 - length, 10.0))],
+            after: vec![path_piece(after.part(0.0, length))],
             made: CompositeCurve::default(),
         };
         let corner = sides.between_lines(&jump, Rounding::Parabola).unwrap();
@@ -319,8 +318,8 @@ mod tests {
         let radius = jump.length_within(0.1, Rounding::Circle);
         assert!((radius - 0.1 / (2f64.sqrt() - 1.0)).abs() < 1e-15);
         let mut sides = Sides {
-            before: vec![followed(before.part(10.0 - radius, 10.0))],
-            after: vec![followed(after.part(0.0, radius))],
+            before: vec![path_piece(before.part(10.0 - radius, 10.0))],
+            after: vec![path_piece(after.part(0.0, radius))],
             made: CompositeCurve::default(),
         };
         sides.after[0].feed = 3.0;
@@ -376,13 +375,13 @@ mod tests {
     fn assert_bends_smoothly<const M: usize>(before: [Conic<M>; 2], after: [Conic<M>; 2]) {
         let jump = jump_between(before[1], after[0]);
         let mut sides = Sides {
-            before: before.map(followed).to_vec(),
-            after: after.map(followed).to_vec(),
+            before: before.map(path_piece).to_vec(),
+            after: after.map(path_piece).to_vec(),
             made: CompositeCurve::default(),
         };
         let excess = sides.bend(&jump).unwrap();
         let all: Vec<_> = sides.before.iter().chain(&sides.after).collect();
-        let pieces: Vec<Conic<M>> = all.iter().map(|followed| *conic(followed)).collect();
+        let pieces: Vec<Conic<M>> = all.iter().map(|piece| *conic(piece)).collect();
         assert_eq!(pieces[0].control[0], before[0].control[0]);
         assert_eq!(pieces[3].control[2], after[1].control[2]);
         assert_eq!(excess, all[1].deviation);
@@ -395,12 +394,12 @@ mod tests {
         let (bent, straight) = (at(&pieces[0], 0.0)[1], at(&before[0], 0.0)[1]);
         let cosine = dot(&bent, &straight) / (norm(&bent) * norm(&straight));
         assert!((cosine - 1.0).abs() < 1e-14);
-        for ((bent, followed), straight) in pieces.iter().zip(&all).zip(before.iter().chain(&after)) {
+        for ((bent, piece), straight) in pieces.iter().zip(&all).zip(before.iter().chain(&after)) {
             assert_eq!(bent.weight, straight.weight);
             for i in 0..=20 {
                 let share = i as f64 / 20.0;
                 let (a, b) = (at(bent, share)[0], at(straight, share)[0]);
-                assert!(norm(&sub(&a, &b)) <= followed.deviation + 1e-14);
+                assert!(norm(&sub(&a, &b)) <= piece.deviation + 1e-14);
             }
         }
         let moved = sub(&pieces[1].control[2], &before[1].control[2]);

@@ -1,19 +1,26 @@
-//! A chain of G01 points as C1 quadratic B-splines within a tolerance that is certified both ways.
+//! A chain of G1 points as C1 quadratic B-splines within a tolerance that is certified both ways.
 //!
-//! The method of Zhang, Yan, Yuan, Wang and Gao, "Curve fitting and optimal interpolation on CNC machines
-//! based on quadratic B-splines", Sci. China Inf. Sci. 53 (2010), section 3, step by step: `breaking` groups
-//! the points (3.1), `features` selects those to interpolate (3.2, Algorithm 1), `spline` interpolates them
-//! (3.3). The paper tests its tolerance on the Bézier curves of Algorithm 1 only; here `certificate` bounds
-//! the distance of the final spline from the programmed polygon and `refine` adds feature points until it
-//! holds, and breaks the spline where none of them helps.
+//! After Zhang, Yan, Yuan, Wang and Gao, "Curve fitting and optimal interpolation on CNC machines based on quadratic
+//! B-splines", Sci. China Inf. Sci. 53 (2010), section 3:
 //!
-//! The tangent at a breaking point that is no corner is the one of the spline through the groups on both
-//! sides, so that the path stays C1 there and every group can be refined by itself, in parallel.
+//! | file | computes | source |
+//! |---|---|---|
+//! | `breaking` | the groups of points between breaking points | 3.1 |
+//! | `features` | the feature points of a group, which are interpolated | 3.2, Algorithm 1 |
+//! | `spline` | the spline through feature points | 3.3 |
+//! | `certificate` | a bound of the distance between spline and polygon, both ways | own |
+//! | `refine` | more feature points until the bound is within the tolerance, and breaks where none helps | own |
+//! | `piece_builder` | the quadratic pieces of a spline | |
+//!
+//! The paper tests its tolerance on the Bézier curves of Algorithm 1 only, not on the spline.
+//!
+//! The tangent at a breaking point that is no corner is that of one spline through the groups on both sides. So the path
+//! is C1 there, and each group can be refined by itself, in parallel.
 
 mod breaking;
 mod certificate;
 mod features;
-mod pieces;
+mod piece_builder;
 mod refine;
 mod spline;
 
@@ -23,23 +30,22 @@ use breaking::{turn_cosine, Break};
 use feedplan_geometry::quadratic::{dot, norm, sub, Quadratic};
 use feedplan_geometry::watch::Watch;
 use refine::Block;
-use spline::End;
+use spline::EndCondition;
 
-/// Below this many points threads cost more than they save.
+/// Chains of fewer points are fitted by one thread, which is faster.
 const PARALLEL: usize = 4096;
-/// A long group is refined in blocks of about so many points, so that one refinement touches few of them.
+/// A long group is refined in blocks of about this many points, so that one refinement changes few of them.
 const BLOCK: usize = 512;
 
 #[derive(Clone, Copy, Debug)]
 pub struct FitOptions {
     /// Allowed distance between spline and polygon, both ways, in mm.
     pub tolerance: f64,
-    /// Longer chords stay lines, in mm; infinite: none.
+    /// Longer chords stay lines, in mm.
     pub max_chord: f64,
-    /// Extreme points of a larger curvature separate the groups, in 1/mm (Zhang eq. 2: α a_max / F²);
-    /// infinite: none.
+    /// Extreme points of a greater curvature are breaking points, in 1/mm (Zhang eq. 2: α a_max / F²).
     pub max_curvature: f64,
-    /// A breaking point that turns by more is a corner, in rad: the tangent may jump there.
+    /// A breaking point that turns by more is a corner, where the tangent may jump, in rad.
     pub corner_angle: f64,
 }
 
@@ -55,13 +61,14 @@ pub struct FittedPiece<const M: usize> {
     pub spline: u32,
 }
 
-/// Fits the chain by lines and C1 quadratic B-splines, each within the tolerance of the polygon both ways.
+/// Lines and C1 quadratic B-splines within the tolerance of the polygon of `points`, both ways.
 ///
-/// At least two points, neighbours distinct. Breaking points and both ends are interpolated exactly. Other
-/// features are too, unless that breaks the tolerance on a chord beside them and passing them at an offset
-/// does not. Where nothing smooth holds the tolerance, the chords themselves are kept, and their corners.
-/// With no positive tolerance, or points that are not finite, every chord is kept. The result does not depend
-/// on threads.
+/// * Breaking points and both ends are interpolated exactly. So are other features, unless a chord beside them is then
+///   out of tolerance; such a feature is passed at an offset.
+/// * Chords that no smooth curve follows within the tolerance stay lines, with corners between them.
+/// * All chords stay lines if the tolerance is not positive, a point is not finite or two neighbours are equal.
+///
+/// The result does not depend on the number of threads.
 pub fn fit_points<const M: usize>(
     points: &[[f64; M]],
     options: &FitOptions,
@@ -126,14 +133,14 @@ struct Chain<'a, const M: usize> {
     /// Polygon length from the first point to each.
     along: &'a [f64],
     tolerance: f64,
-    /// A turn of a smaller cosine is a corner.
+    /// A turn whose cosine is smaller is a corner.
     corner_cosine: f64,
     parallel: bool,
     watch: Watch<'a>,
 }
 
 impl<const M: usize> Chain<'_, M> {
-    /// Results in order, in parallel when that pays.
+    /// The results in order, computed in parallel if the chain is long.
     fn map<T: Sync, R: Send>(&self, items: &[T], watch: Watch, f: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
         let each = watch.each(items.len());
         let f = |item: &T| {
@@ -170,7 +177,7 @@ fn lengths_along<const M: usize>(points: &[[f64; M]]) -> Vec<f64> {
         .collect()
 }
 
-/// Cuts the chain at its breaking points, and long groups at feature points, with the tangent of each cut.
+/// The chain cut at its breaking points, and long groups cut at feature points, each with its tangents at both ends.
 fn blocks<const M: usize>(chain: &Chain<M>, breaks: &[Break], features: &[Vec<usize>]) -> Vec<Block<M>> {
     let count = features.len();
     let direction = |g: usize| chain.direction(breaks[g].at, breaks[g + 1].at);
@@ -182,32 +189,33 @@ fn blocks<const M: usize>(chain: &Chain<M>, breaks: &[Break], features: &[Vec<us
             g += 1;
             continue;
         }
-        // A stretch: groups that run into each other without a line or a corner.
+        // Groups that follow each other without a line or a corner share one spline.
         let first = g;
         g += 1;
         while g < count && !breaks[g].corner && !breaks[g].line {
             g += 1;
         }
         let start = match first > 0 && breaks[first - 1].line && !breaks[first].corner {
-            true => End::Tangent(direction(first - 1)),
-            false => End::Free,
+            true => EndCondition::Tangent(direction(first - 1)),
+            false => EndCondition::Free,
         };
         let finish = match g < count && breaks[g].line && !breaks[g].corner {
-            true => End::Tangent(direction(g)),
-            false => End::Free,
+            true => EndCondition::Tangent(direction(g)),
+            false => EndCondition::Free,
         };
-        stretch_blocks(chain, &breaks[first..=g], &features[first..g], start, finish, &mut blocks);
+        append_blocks(chain, &breaks[first..=g], &features[first..g], start, finish, &mut blocks);
     }
     blocks
 }
 
-/// Interpolates a whole stretch once, and cuts it where its tangents are sound.
-fn stretch_blocks<const M: usize>(
+/// Appends the blocks of groups that share one spline. They are cut where the tangent of that spline is plausible: its
+/// length is near 1, and its direction near those of both chords.
+fn append_blocks<const M: usize>(
     chain: &Chain<M>,
     breaks: &[Break],
     groups: &[Vec<usize>],
-    start: End<M>,
-    finish: End<M>,
+    start: EndCondition<M>,
+    finish: EndCondition<M>,
     blocks: &mut Vec<Block<M>>,
 ) {
     let mut features = vec![groups[0][0]];
@@ -216,7 +224,7 @@ fn stretch_blocks<const M: usize>(
     }
     let through: Vec<_> = features.iter().map(|&at| chain.points[at]).collect();
     let spline = spline::interpolate(&through, start, finish);
-    let sound = |j: usize| {
+    let plausible = |j: usize| {
         let (tangent, at) = (&spline.tangent[j], features[j]);
         let speed = norm(tangent);
         let along = |direction: [f64; M]| dot(tangent, &direction) > 0.8 * speed;
@@ -234,10 +242,10 @@ fn stretch_blocks<const M: usize>(
             let (cut, stop) = if j + 1 == features.len() {
                 (true, finish)
             } else if j == break_at {
-                let tangent = if sound(j) { spline.tangent[j] } else { end.tangent(chain) };
-                (true, End::Tangent(tangent))
+                let tangent = if plausible(j) { spline.tangent[j] } else { end.tangent(chain) };
+                (true, EndCondition::Tangent(tangent))
             } else {
-                (long && sound(j), End::Tangent(spline.tangent[j]))
+                (long && plausible(j), EndCondition::Tangent(spline.tangent[j]))
             };
             if cut {
                 blocks.push(Block::curve(features[from..=j].to_vec(), begin, stop, continues));

@@ -1,28 +1,30 @@
-//! From moves to a path: fitted splines, rounded corners, smooth curves within the tolerance.
+//! The path of a program, from its moves: lines, arcs and splines, fitted chains, blends of corners, smooth curves within
+//! the tolerance.
 
 pub mod arc;
 pub mod corner;
 pub mod fit;
-pub mod follow;
 pub mod path_builder;
+pub mod program_pieces;
 pub mod smooth_fit;
+mod tolerance;
 
 use feedplan_geometry::instances;
 use feedplan_geometry::watch::Watch;
 
 use fit::{FitOptions, FittedPiece};
-use follow::{FollowError, FollowOptions};
 use path_builder::{Axes, BuiltPath};
+use program_pieces::{MoveError, PathOptions};
 
 instances! {
     /// The path of moves.
-    pub trait Followed for [3, 6, 9] follow::Moves<'_, M> = {
+    pub trait PathOfMoves for [3, 6, 9] program_pieces::Moves<'_, M> = {
         /// Lines, arcs and fitted splines, with corners rounded within the tolerance.
-        fn path(&self, options: &FollowOptions, axes: &Axes<M>, watch: Watch)
-            -> Result<BuiltPath<M>, FollowError> = path_builder::build_path;
-        /// One curve between two stops; `sized`: arcs and bends keep their size.
-        fn smooth_path(&self, options: &FollowOptions, axes: &Axes<M>, sized: bool, watch: Watch)
-            -> Result<BuiltPath<M>, FollowError> = path_builder::build_smooth_path;
+        fn path(&self, options: &PathOptions, axes: &Axes<M>, watch: Watch)
+            -> Result<BuiltPath<M>, MoveError> = path_builder::build_path;
+        /// One smooth curve between two stops; with `sized` arcs and bends keep their size.
+        fn smooth_path(&self, options: &PathOptions, axes: &Axes<M>, sized: bool, watch: Watch)
+            -> Result<BuiltPath<M>, MoveError> = path_builder::build_smooth_path;
     }
 }
 

@@ -1,23 +1,20 @@
-//! A program becomes a path: pieces from `follow`, corners from `corner`, runs between full stops.
+//! The path of a program: its pieces in order, and the runs between full stops.
 //!
-//! Joints at which the pieces do not meet smoothly divide the path into stretches. A joint is a stop where the
-//! program halts, a rounded corner where the tolerance allows one, and otherwise a corner that is passed with a
-//! velocity jump (if the machine allows one) or at rest. Rounding starts in the stretches on both sides and
-//! cuts away their ends; what is left of them in the middle stays as it is. All stages run over stretches in
-//! parallel and join their results in order, so the path does not depend on the number of threads.
+//! | file | computes |
+//! |---|---|
+//! | `corner_rounding` | the path with each corner rounded by itself within the tolerance |
+//! | `smooth_path` | the path with one smooth curve between two stops |
+//! | `travel` | the first place that an axis cannot reach |
 
-mod smooth;
-mod stretches;
+mod corner_rounding;
+mod smooth_path;
 mod travel;
 
-use rayon::prelude::*;
-
-use crate::corner::{share_lengths, Sides};
-use crate::follow::{follow, FollowError, FollowOptions, FollowedProgram, Moves};
+use crate::program_pieces::{program_pieces, MoveError, Moves, PathOptions, ProgramPieces};
 use crate::smooth_fit::Offsets;
-pub use smooth::{build_smooth_path, Rough};
-pub use stretches::Part;
-use stretches::{Cuts, Stretches, TASK};
+use corner_rounding::round_corners;
+pub use corner_rounding::Chunk;
+pub use smooth_path::{build_smooth_path, NotSmooth};
 use travel::{outside, Outside};
 
 use feedplan_geometry::watch::Watch;
@@ -29,92 +26,70 @@ pub struct Axes<const M: usize> {
     pub max_acceleration: [f64; M],
     /// Least and greatest position in mm.
     pub travel: [[f64; 2]; M],
-    /// Corners may be passed with a velocity jump.
+    /// Whether corners may be passed with a velocity jump.
     pub jump: bool,
 }
 
 /// The path of a program.
 #[derive(Default)]
 pub struct BuiltPath<const M: usize> {
-    /// The pieces in order, in the parts that were made in parallel.
-    pub parts: Vec<Part<M>>,
+    /// The pieces in order, in the chunks that were made in parallel.
+    pub chunks: Vec<Chunk<M>>,
     /// Index of the first piece of each run, and the number of pieces.
     pub runs: Vec<usize>,
-    /// Upper bound of the distance between path and program, both ways.
+    /// Upper bound of the distance between path and program, both ways, in mm.
     pub deviation: f64,
-    /// On which side of the program a smooth path lies, and how far.
+    /// The side of the program on which a smooth path lies, and its distance.
     pub offsets: Option<Offsets>,
-    /// Chords that were fitted, splines and polynomials that came of it.
+    /// Numbers of fitted chords, of splines fitted to them, and of the splines' polynomials.
     pub points: usize,
     pub splines: usize,
     pub polynomials: usize,
     /// The first place outside the travel of an axis.
     pub outside: Option<Outside>,
-    /// Where a smooth path is not smooth.
-    pub rough: Rough,
+    /// Where a smooth path stops without being told to.
+    pub not_smooth: NotSmooth,
 }
 
-/// The path of a program.
+/// The path of a program, its corners rounded one by one.
 pub fn build_path<const M: usize>(
     moves: &Moves<M>,
-    options: &FollowOptions,
+    options: &PathOptions,
     axes: &Axes<M>,
     watch: Watch,
-) -> Result<BuiltPath<M>, FollowError> {
-    let FollowedProgram { pieces, points, splines, polynomials } = follow(moves, options, watch.part(0.6))?;
-    let (mut parts, mut runs) = (Vec::new(), vec![0]);
-    if !pieces.is_empty() {
-        let stretches = Stretches::new(&pieces, moves.splines, moves.halt, options.rounding);
-        let joints = 0..stretches.joint_count();
-        let each = watch.part(0.3).each(joints.len());
-        let need: Vec<f64> = joints
-            .clone()
-            .into_par_iter()
-            .map(|k| {
-                watch.check_at(k);
-                stretches.need(k, axes)
-            })
-            .collect();
-        let length = share_lengths(&need, &stretches.length);
-        let corners: Vec<Option<Cuts>> = joints
-            .into_par_iter()
-            .with_min_len(TASK)
-            .map_init(Sides::default, |sides, k| {
-                each.count(k);
-                stretches.settle(k, &length, sides)
-            })
-            .collect();
-        (parts, runs) = stretches.assemble(&corners, axes.jump, watch.part(0.1));
-    }
+) -> Result<BuiltPath<M>, MoveError> {
+    let ProgramPieces { pieces, points, splines, polynomials } =
+        program_pieces(moves, options, watch.part(0.6))?;
+    let (chunks, runs) =
+        round_corners(&pieces, moves.splines, moves.halt, options.rounding, axes, watch.part(0.4));
     Ok(BuiltPath {
-        deviation: deviation(&parts),
-        offsets: None,
-        outside: outside(&parts, moves, &axes.travel),
-        parts,
+        deviation: deviation(&chunks),
+        outside: outside(&chunks, moves, &axes.travel),
+        chunks,
         runs,
         points,
         splines,
         polynomials,
-        rough: Rough::default(),
+        ..BuiltPath::default()
     })
 }
 
-/// The greatest bound of the distance between pieces and moves.
-fn deviation<const M: usize>(parts: &[Part<M>]) -> f64 {
-    parts.iter().flat_map(|part| &part.pieces).map(|piece| piece.deviation).fold(0.0, f64::max)
+/// The greatest bound of the distance between pieces and moves, in mm.
+fn deviation<const M: usize>(chunks: &[Chunk<M>]) -> f64 {
+    chunks.iter().flat_map(|chunk| &chunk.pieces).map(|piece| piece.deviation).fold(0.0, f64::max)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::corner::{Jump, Rounding};
-    use crate::follow::{Followed, Shape, LINE, SPLINE};
+    use crate::corner::{Rounding, TangentJump};
+    use crate::program_pieces::{PathPiece, Shape, LINE, SPLINE};
     use feedplan_geometry::conic::Conic;
     use feedplan_geometry::quadratic::{norm, sub};
     use feedplan_geometry::spline::CompositeCurve;
     use proptest::prelude::*;
 
-    const OPTIONS: FollowOptions = FollowOptions {
+    const OPTIONS: PathOptions = PathOptions {
         exact_tolerance: 1e-3,
         max_chord: 5.0,
         corner_acceleration: 4e3,
@@ -132,8 +107,8 @@ mod tests {
         }
     }
 
-    fn all<const M: usize>(path: &BuiltPath<M>) -> Vec<Followed<M>> {
-        path.parts.iter().flat_map(|part| &part.pieces).copied().collect()
+    fn all<const M: usize>(path: &BuiltPath<M>) -> Vec<PathPiece<M>> {
+        path.chunks.iter().flat_map(|chunk| &chunk.pieces).copied().collect()
     }
 
     fn polyline(
@@ -141,7 +116,7 @@ mod tests {
         tolerance: &[f64],
         fit: bool,
         jump: bool,
-    ) -> (Vec<Followed<2>>, Vec<usize>) {
+    ) -> (Vec<PathPiece<2>>, Vec<usize>) {
         let count = points.len() - 1;
         let fit: Vec<f64> =
             tolerance.iter().map(|tolerance| if fit { 0.5 * tolerance } else { 0.0 }).collect();
@@ -163,8 +138,8 @@ mod tests {
         (all(&path), path.runs)
     }
 
-    fn conic<const M: usize>(followed: &Followed<M>) -> &Conic<M> {
-        followed.piece.conic().unwrap()
+    fn conic<const M: usize>(piece: &PathPiece<M>) -> &Conic<M> {
+        piece.shape.conic().unwrap()
     }
 
     #[test]
@@ -199,7 +174,7 @@ mod tests {
             splines: &CompositeCurve::default(),
             joints: &[true; 4],
         };
-        let options = FollowOptions { rounding: Rounding::Circle, ..OPTIONS };
+        let options = PathOptions { rounding: Rounding::Circle, ..OPTIONS };
         let path = build_path(&moves, &options, &axes(false), Watch::default()).unwrap();
         let pieces = all(&path);
         let radius = 0.01 / (2f64.sqrt() - 1.0);
@@ -221,7 +196,7 @@ mod tests {
         assert_eq!((pieces.len(), runs.len()), (41, 2));
         for pair in pieces.windows(2) {
             assert_eq!(conic(&pair[0]).control[2], conic(&pair[1]).control[0]);
-            assert!(Jump::new(&pair[0].piece, &pair[1].piece).unwrap().size < 1e-9);
+            assert!(TangentJump::new(&pair[0].shape, &pair[1].shape).unwrap().size < 1e-9);
         }
     }
 
@@ -270,9 +245,9 @@ mod tests {
         let path = between_lines(0.0, &[true; 3], &limits, false).unwrap();
         let pieces = all(&path);
         assert_eq!((pieces.len(), &path.runs[..]), (4, &[0, 2, 3, 4][..]));
-        let widths: Vec<f64> = pieces.iter().map(|piece| piece.piece.width()).collect();
+        let widths: Vec<f64> = pieces.iter().map(|piece| piece.shape.width()).collect();
         assert_eq!(widths[0], 10.0);
-        assert!(widths[1] == widths[2] && pieces[1].piece.conic().is_none());
+        assert!(widths[1] == widths[2] && pieces[1].shape.conic().is_none());
         assert!(path.outside.is_none() && path.deviation == 0.0);
         // The polygon reaches 12, the curve less than that before its end.
         limits.travel[0] = [f64::NEG_INFINITY, 13.0];
@@ -292,10 +267,10 @@ mod tests {
         assert!(path.deviation > 0.05 && path.deviation <= 0.1 * (1.0 + 1e-9), "{}", path.deviation);
         assert_joined_smoothly(&pieces, &path.runs);
         let no_splines = CompositeCurve::default();
-        let [part] = &path.parts[..] else { panic!("one task") };
-        let curves = pieces.iter().filter_map(|followed| match &followed.piece {
+        let [chunk] = &path.chunks[..] else { panic!("one task") };
+        let curves = pieces.iter().filter_map(|piece| match &piece.shape {
             Shape::Spline(spline) if spline.made => {
-                Some((followed.deviation, part.spline(spline, &no_splines)))
+                Some((piece.deviation, chunk.spline(spline, &no_splines)))
             }
             _ => None,
         });
@@ -308,11 +283,11 @@ mod tests {
         );
     }
 
-    fn assert_joined_smoothly<const M: usize>(pieces: &[Followed<M>], runs: &[usize]) {
+    fn assert_joined_smoothly<const M: usize>(pieces: &[PathPiece<M>], runs: &[usize]) {
         for (i, pair) in pieces.windows(2).enumerate() {
             if runs.binary_search(&(i + 1)).is_err() {
-                let jump = Jump::new(&pair[0].piece, &pair[1].piece).unwrap();
-                assert!(jump.is_smooth(&pair[0].piece, &pair[1].piece), "{i}: {}", jump.size);
+                let jump = TangentJump::new(&pair[0].shape, &pair[1].shape).unwrap();
+                assert!(jump.is_smooth(&pair[0].shape, &pair[1].shape), "{i}: {}", jump.size);
             }
         }
     }
@@ -342,14 +317,14 @@ mod tests {
                 prop_assert!(pair[1].first >= pair[0].first && pair[1].first <= pair[0].last + 1);
                 prop_assert!(pair[1].last >= pair[0].last);
                 if runs.binary_search(&(i + 1)).is_err() {
-                    let jump = Jump::new(&pair[0].piece, &pair[1].piece).unwrap();
-                    prop_assert!(jump.is_smooth(&pair[0].piece, &pair[1].piece), "{}", jump.size);
+                    let jump = TangentJump::new(&pair[0].shape, &pair[1].shape).unwrap();
+                    prop_assert!(jump.is_smooth(&pair[0].shape, &pair[1].shape), "{}", jump.size);
                 }
             }
             for piece in &pieces {
                 prop_assert!(piece.deviation <= piece.tolerance * (1.0 + 1e-9));
                 prop_assert!(!piece.exact || piece.deviation == 0.0);
-                prop_assert!(piece.piece.width() > 0.0);
+                prop_assert!(piece.shape.width() > 0.0);
             }
         }
     }

@@ -16,9 +16,9 @@ use feedplan_geometry::spline::{CompositeCurve, Piece};
 use feedplan_geometry::watch::Watch;
 use feedplan_path::arc::ArcError;
 use feedplan_path::corner::Rounding;
-use feedplan_path::follow::{self, ArcShape, Fault, FollowOptions, Followed, Shape};
-use feedplan_path::path_builder::{Axes, BuiltPath, Part};
-use feedplan_path::Followed as _;
+use feedplan_path::path_builder::{Axes, BuiltPath, Chunk};
+use feedplan_path::program_pieces::{self, ArcShape, MoveFault, PathOptions, PathPiece, Shape};
+use feedplan_path::PathOfMoves as _;
 
 pyo3::import_exception!(feedplan.errors, ProgramError);
 
@@ -67,8 +67,9 @@ type Columns<'py> = (
 type Summary = (usize, usize, usize, f64, Option<[f64; 3]>);
 /// Move, axis and position of the first place outside the travel.
 type Place = (usize, usize, f64);
-/// Moves at whose end a smooth path turns back, first and last moves (k, 2) of the places where it keeps its corners.
-type Rough<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray2<i64>>);
+/// Moves at whose end a smooth path turns back; first and last move (k, 2) of each place where its corners are rounded one
+/// by one.
+type NotSmooth<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray2<i64>>);
 
 impl Rules<'_> {
     fn require_lengths(&self, moves: &Moves) -> PyResult<()> {
@@ -104,7 +105,7 @@ fn build_path<'py>(
     program: Of<Moves>,
     rules: Rules<'py>,
     progress: Option<Bound<'py, PyAny>>,
-) -> PyResult<(Columns<'py>, Summary, Option<Place>, Rough<'py>)> {
+) -> PyResult<(Columns<'py>, Summary, Option<Place>, NotSmooth<'py>)> {
     let moves = &*program;
     let (axes, arcs) = (moves.axes(), arcs(moves)?);
     rules.require_lengths(moves)?;
@@ -112,7 +113,7 @@ fn build_path<'py>(
     let ranges: Vec<_> =
         moves.spline_pieces.windows(2).map(|ends| ends[0] as usize..ends[1] as usize).collect();
     let corners = rules.corners.as_str();
-    let options = FollowOptions {
+    let options = PathOptions {
         exact_tolerance: rules.exact_tolerance,
         max_chord: rules.max_chord,
         corner_acceleration: rules.corner_acceleration,
@@ -128,7 +129,7 @@ fn build_path<'py>(
         let spline_moves: Vec<_> = spline_moves.zip(ranges).collect();
         let starts = padded_rows::<M>(&moves.change_start, axes);
         let changes: Vec<_> = moves.change_move.iter().map(|&index| index as usize).zip(starts).collect();
-        let followed = follow::Moves {
+        let followed = program_pieces::Moves {
             start: padded(&moves.start, 0.0),
             kind: &moves.kind,
             target: &target,
@@ -161,18 +162,20 @@ fn build_path<'py>(
     })
 }
 
-fn sentence(fault: Fault) -> &'static str {
+fn sentence(fault: MoveFault) -> &'static str {
     match fault {
-        Fault::Length => "the move has no length, or a coordinate is not a finite number: correct the block",
-        Fault::Feed => "the move has no positive feed: give F a value above 0",
-        Fault::Arc(ArcError::Radius) => {
+        MoveFault::Length => {
+            "the move has no length, or a coordinate is not a finite number: correct the block"
+        }
+        MoveFault::Feed => "the move has no positive feed: give F a value above 0",
+        MoveFault::Arc(ArcError::Radius) => {
             "the arc has no radius, or no finite one: correct its centre or its end"
         }
-        Fault::Arc(ArcError::Sweep) => {
+        MoveFault::Arc(ArcError::Sweep) => {
             "the arc does not lead to its end point: correct its centre or its end"
         }
-        Fault::Spline => "the move has no spline: give its pieces",
-        Fault::Arc(ArcError::Turns) => "the arc has too many turns to be followed: give fewer",
+        MoveFault::Spline => "the move has no spline: give its pieces",
+        MoveFault::Arc(ArcError::Turns) => "the arc has too many turns to be followed: give fewer",
     }
 }
 
@@ -182,57 +185,57 @@ fn columns<'py, const M: usize>(
     splines: &CompositeCurve<M>,
     axes: usize,
     progress: Option<&Bound<'_, PyAny>>,
-) -> PyResult<(Columns<'py>, Summary, Option<Place>, Rough<'py>)>
+) -> PyResult<(Columns<'py>, Summary, Option<Place>, NotSmooth<'py>)>
 where
     Padded: From<CompositeCurve<M>>,
 {
-    let parts = &path.parts;
-    let points = |part: &Part<M>, followed: &Followed<M>| match &followed.piece {
+    let chunks = &path.chunks;
+    let points = |chunk: &Chunk<M>, piece: &PathPiece<M>| match &piece.shape {
         Shape::Conic(_) => 3,
-        Shape::Spline(spline) => part.spline(spline, splines).control.len(),
+        Shape::Spline(spline) => chunk.spline(spline, splines).control.len(),
     };
-    let one = |_: &Part<M>, _: &Followed<M>| 1;
+    let one = |_: &Chunk<M>, _: &PathPiece<M>| 1;
     let (curve, feed, moves, tolerance) = run(py, progress, |watch| {
-        // The path is there.
+        // The path is built.
         watch.advance(1);
-        let is_rational = |part: &Part<M>, followed: &Followed<M>| match &followed.piece {
+        let is_rational = |chunk: &Chunk<M>, piece: &PathPiece<M>| match &piece.shape {
             Shape::Conic(conic) => conic.weight != 1.0,
-            Shape::Spline(spline) => part.spline(spline, splines).is_rational(),
+            Shape::Spline(spline) => chunk.spline(spline, splines).is_rational(),
         };
         let rational =
-            parts.par_iter().any(|part| part.pieces.iter().any(|followed| is_rational(part, followed)));
+            chunks.par_iter().any(|chunk| chunk.pieces.iter().any(|piece| is_rational(chunk, piece)));
         let mut offsets = vec![0];
-        offsets.extend(gather(parts, 0, one, |part, followed, out| out[0] = points(part, followed)));
+        offsets.extend(gather(chunks, 0, one, |chunk, piece, out| out[0] = points(chunk, piece)));
         for i in 1..offsets.len() {
             offsets[i] += offsets[i - 1];
         }
         let curve = CompositeCurve {
-            control: gather(parts, [0.0; M], points, |part, followed, out| {
-                out.copy_from_slice(match &followed.piece {
+            control: gather(chunks, [0.0; M], points, |chunk, piece, out| {
+                out.copy_from_slice(match &piece.shape {
                     Shape::Conic(conic) => &conic.control,
-                    Shape::Spline(spline) => part.spline(spline, splines).control,
+                    Shape::Spline(spline) => chunk.spline(spline, splines).control,
                 });
             }),
             weights: match rational {
                 false => vec![],
-                true => gather(parts, 0.0, points, |part, followed, out| match &followed.piece {
+                true => gather(chunks, 0.0, points, |chunk, piece, out| match &piece.shape {
                     Shape::Conic(conic) => out.copy_from_slice(&[1.0, conic.weight, 1.0]),
-                    Shape::Spline(spline) => match part.spline(spline, splines) {
+                    Shape::Spline(spline) => match chunk.spline(spline, splines) {
                         Piece { weights: [], .. } => out.fill(1.0),
                         Piece { weights, .. } => out.copy_from_slice(weights),
                     },
                 }),
             },
             offsets,
-            width: gather(parts, 0.0, one, |_, followed, out| out[0] = followed.piece.width()),
+            width: gather(chunks, 0.0, one, |_, piece, out| out[0] = piece.shape.width()),
         };
         (
             curve,
-            gather(parts, 0.0, one, |_, followed, out| out[0] = followed.feed),
-            gather(parts, [0; 2], one, |_, followed, out| {
-                out[0] = [i64::from(followed.first), i64::from(followed.last)];
+            gather(chunks, 0.0, one, |_, piece, out| out[0] = piece.feed),
+            gather(chunks, [0; 2], one, |_, piece, out| {
+                out[0] = [i64::from(piece.first), i64::from(piece.last)];
             }),
-            gather(parts, 0.0, one, |_, followed, out| out[0] = followed.tolerance),
+            gather(chunks, 0.0, one, |_, piece, out| out[0] = piece.tolerance),
         )
     })?;
     let columns = (
@@ -244,35 +247,35 @@ where
     );
     let offsets = path.offsets.map(|offsets| [offsets.mean(), offsets.inside, offsets.outside]);
     let summary = (path.points, path.splines, path.polynomials, path.deviation, offsets);
-    let zones: Vec<i64> = path.rough.corners.iter().flatten().map(|&i| i64::from(i)).collect();
-    let rough = (
-        PyArray1::from_iter(py, path.rough.reversals.iter().map(|&i| i64::from(i))),
-        PyArray1::from_vec(py, zones).reshape([path.rough.corners.len(), 2]).expect("k × 2 values"),
+    let zones: Vec<i64> = path.not_smooth.corners.iter().flatten().map(|&i| i64::from(i)).collect();
+    let not_smooth = (
+        PyArray1::from_iter(py, path.not_smooth.reversals.iter().map(|&i| i64::from(i))),
+        PyArray1::from_vec(py, zones).reshape([path.not_smooth.corners.len(), 2]).expect("k × 2 values"),
     );
-    Ok((columns, summary, path.outside.map(|place| (place.index, place.axis, place.position)), rough))
+    Ok((columns, summary, path.outside.map(|place| (place.index, place.axis, place.position)), not_smooth))
 }
 
-/// One column, `stride` values a piece in place of `initial`, written by all parts at once.
+/// One column, `stride` values a piece in place of `initial`, written by all chunks at once.
 fn gather<const M: usize, T: Copy + Send>(
-    parts: &[Part<M>],
+    chunks: &[Chunk<M>],
     initial: T,
-    stride: impl Fn(&Part<M>, &Followed<M>) -> usize + Sync,
-    write: impl Fn(&Part<M>, &Followed<M>, &mut [T]) + Sync,
+    stride: impl Fn(&Chunk<M>, &PathPiece<M>) -> usize + Sync,
+    write: impl Fn(&Chunk<M>, &PathPiece<M>, &mut [T]) + Sync,
 ) -> Vec<T> {
-    let length = |part: &Part<M>| part.pieces.iter().map(|followed| stride(part, followed)).sum();
-    let lengths: Vec<usize> = parts.par_iter().map(length).collect();
+    let length = |chunk: &Chunk<M>| chunk.pieces.iter().map(|piece| stride(chunk, piece)).sum();
+    let lengths: Vec<usize> = chunks.par_iter().map(length).collect();
     let mut column = vec![initial; lengths.iter().sum()];
     let mut rest = &mut column[..];
-    let mut slices = Vec::with_capacity(parts.len());
+    let mut slices = Vec::with_capacity(chunks.len());
     for length in lengths {
         let (slice, tail) = rest.split_at_mut(length);
         slices.push(slice);
         rest = tail;
     }
-    parts.par_iter().zip(slices).for_each(|(part, mut slice)| {
-        for followed in &part.pieces {
-            let (out, tail) = slice.split_at_mut(stride(part, followed));
-            write(part, followed, out);
+    chunks.par_iter().zip(slices).for_each(|(chunk, mut slice)| {
+        for piece in &chunk.pieces {
+            let (out, tail) = slice.split_at_mut(stride(chunk, piece));
+            write(chunk, piece, out);
             slice = tail;
         }
     });

@@ -1,38 +1,37 @@
-//! Arcs and helices whose radius changes linearly with the angle, as tangent-continuous quadratic pieces within a
-//! tolerance.
+//! An arc or a helix whose radius is linear in the angle, as tangent-continuous quadratic pieces within a tolerance.
 //!
-//! The pieces are one uniform quadratic B-spline: with n pieces of half angle α, control point i stands at
-//! radius r/cos α in the middle of its piece, and pieces join half way between control points. On a circle
-//! those joints lie on it and the control polygon touches it there. Everything that is linear in the angle
-//! (the axis of a helix, further axes) stays exactly linear in the parameter.
+//! The pieces are one uniform quadratic B-spline: with n pieces of half angle α, control point i is at the radius
+//! r/cos α in the middle of its piece, and pieces meet half way between control points. On a circle they meet on it, and
+//! the control polygon touches it there. What is linear in the angle (the axis of a helix, further axes) stays exactly
+//! linear in the parameter.
 //!
 //! With b = sin²α/(2 cos α) and s from −1 to 1 along a piece, a unit circle becomes a curve of
 //! - radius √(1 + b²(1 − s²)²), never inside the circle and at most α⁴/8 outside, and
 //! - polar angle αs − (α³/6)(s − s³) + …, which matters on a helix: the axis runs ahead of the angle.
 //!
-//! Splitting the error to both sides of the circle would save a sixth of the pieces and cost the exact end
-//! points, so it is not done.
+//! Errors on both sides of the circle would save a sixth of the pieces, but the end points would not be exact.
 
 use super::{Arc, ArcError, Polar, MAX_PIECES};
 use feedplan_geometry::conic::Conic;
 use std::f64::consts::PI;
 
-/// Greatest half angle of a piece. The curvature of a piece runs from cos²α/r to 1/(r cos α), so even where
-/// the tolerance would allow a quarter circle a piece slows the tool by no more than 8 %.
+/// Greatest half angle of a piece in rad. The curvature of a piece is between cos²α/r and 1/(r cos α), so a piece is
+/// slower than the arc by 8 % at most.
 const MAX_HALF_ANGLE: f64 = PI / 8.0;
-/// The polar angle of a piece differs from the linear one by at most this times α³ (the supremum is 0.0704
-/// at MAX_HALF_ANGLE and 1/(9√3) in the limit).
+/// The polar angle of a piece differs from the linear one by at most this times α³ (0.0704 at MAX_HALF_ANGLE, and
+/// 1/(9√3) in the limit of small angles).
 const ANGLE_ERROR: f64 = 0.0715;
-/// An upper bound of the distance between arc and pieces of half angle α, both ways: radial error and,
-/// on a helix, the smaller of the ways to make up for the angle (at equal angle, or at equal height).
+
+/// An upper bound of the distance between the arc and pieces of half angle α, both ways, in mm: the radial error, and
+/// on a helix the error of the angle, measured at equal angle or at equal height, whichever is less.
 fn deviation(polar: &Polar, alpha: f64) -> f64 {
     let large = polar.radius.max(polar.radius + polar.growth * polar.sweep.abs());
     let small = polar.radius.min(polar.radius + polar.growth * polar.sweep.abs());
     let (sin, cos) = alpha.sin_cos();
     let b = sin * sin / (2.0 * cos);
     let circle = large * b * b / (1.0 + (1.0 + b * b).sqrt());
-    // A changing radius shears the piece: by less than 0.4 α³ of the growth across the arc, and by less
-    // than 1.5 α² of it along the arc, where the radius is then another.
+    // A changing radius shears the piece: across the arc by less than 0.4 α³ of the growth, and along the arc, to
+    // where the radius differs, by less than 1.5 α² of it.
     let growth = polar.growth.abs();
     let along = 1.5 * growth * alpha * alpha / small;
     let radial = circle + growth * (0.4 * alpha.powi(3) + along);

@@ -1,30 +1,26 @@
-//! Arcs as true circles in conic pieces of at most 90°, helices on their cylinder.
+//! An arc as a true circle in conic pieces of at most 90°, a helix on the cylinder of such a circle.
 //!
-//! Start and end of a programmed arc are rounded, so their distances from the centre differ a little and the arc is a
-//! spiral S(x) of radius r₀ + xΔ about c, x in [0, 1]. The circle through both ends with the centre c + d nearest to
-//! c follows it: with ψ the angle from d to the spoke of S,
+//! Start and end of a programmed arc are rounded, so their distances from the centre c differ a little, and the arc is a
+//! spiral S(x) of radius r₀ + xΔ, x in [0, 1]. It is replaced by the circle through both ends whose centre c + d is
+//! nearest to c. With ψ the angle from d to S − c, and R the radius of the circle,
 //!
 //! ```text
 //! |S − c − d| − R = g + ε,   g = r₀ + xΔ − |d| cos ψ − R,   0 ≤ ε ≤ |d|²/(2 (r − |d|))
 //! ```
 //!
-//! and the greatest |g| is at an end or where sin ψ = −Δ/(|d| dψ/dx). Both ends being common and the angle about
-//! c + d growing all the way, that bounds the distance both ways.
+//! and the greatest |g| is at an end or where sin ψ = −Δ/(|d| dψ/dx). This bounds the distance both ways, since both
+//! curves share their ends and the angle about c + d grows all along.
 //!
-//! An axis that goes with the angle goes with the parameter of the piece instead: `circle::Turn` bounds by how much.
-//! The angles about c and about c + d differ by asin(|d|/r) at most, at the ends too.
+//! An axis that is linear in the angle is linear in the parameter of the piece instead; `circle::Turn` bounds the
+//! difference. The angles about c and about c + d differ by asin(|d|/r) at most, and so do they at the ends.
 
 use std::f64::consts::{PI, TAU};
 
 use super::{sweep_to, Arc, Polar, MAX_PIECES};
+use crate::tolerance;
 use feedplan_geometry::conic::Conic;
 use feedplan_geometry::quadratic::{dot, lerp, norm, sub};
 use feedplan_geometry::spline::circle::Turn;
-
-/// Radii that differ by this many roundings of a coordinate are one.
-const ROUNDING: f64 = 16.0 * f64::EPSILON;
-/// A centre that is farther off than this part of the radius is another arc.
-const MAX_SHIFT: f64 = 0.1;
 
 /// The circle with the centre c + d.
 struct Circle {
@@ -32,7 +28,7 @@ struct Circle {
     sweep: f64,
     /// Bound of the distance from the programmed arc in the plane.
     radial: f64,
-    /// Bound of the difference of both angles in rad, as shares of the sweep.
+    /// Bound of the difference of the angles about both centres, each as a fraction of its sweep, in rad.
     angular: f64,
 }
 
@@ -44,7 +40,7 @@ impl Circle {
         let (start, end) = (norm(&from), norm(&to));
         let (change, least) = (end - start, start.min(end));
         let coordinate = arc.centre.iter().fold(start.max(end), |most, value| most.max(value.abs()));
-        if change.abs() <= ROUNDING * coordinate {
+        if change.abs() <= tolerance::COORDINATE * coordinate {
             let radial = 0.5 * change.abs();
             return Some(Self { shift: [0.0; 2], sweep: polar.sweep, radial, angular: 0.0 });
         }
@@ -52,8 +48,8 @@ impl Circle {
         let along = 0.5 * change * (start + end) / dot(&chord, &chord);
         let shift = chord.map(|value| value * along);
         let distance = norm(&shift);
-        // The second holds where the angle about the new centre grows all the way.
-        let near = distance <= MAX_SHIFT * least
+        // The second condition holds if the angle about the new centre grows all along.
+        let near = distance <= tolerance::CENTRE * least
             && distance * change.abs() < polar.sweep.abs() * least * (least - distance);
         if !near {
             return None;
@@ -61,7 +57,7 @@ impl Circle {
         let spoke = sub(&from, &shift);
         let sweep = sweep_to(&spoke, &sub(&to, &shift), polar.sweep)?;
         let radius = norm(&spoke);
-        // ψ at the start, and its way.
+        // ψ at the start and at the end.
         let cross = shift[0] * from[1] - shift[1] * from[0];
         let first = cross.atan2(dot(&shift, &from));
         let last = first + polar.sweep;
@@ -88,14 +84,14 @@ impl Circle {
     }
 }
 
-/// The arc on its circle, and the bound of the distance; None where that is above `tolerance`, or takes too many
-/// pieces.
+/// The pieces of the circle, and the bound of their distance from the arc; None if that exceeds `tolerance` or takes
+/// too many pieces.
 pub fn pieces<const M: usize>(arc: &Arc<M>, polar: &Polar, tolerance: f64) -> Option<(Vec<Conic<M>>, f64)> {
     let circle = Circle::new(arc, polar)?;
     let centre = [arc.centre[0] + circle.shift[0], arc.centre[1] + circle.shift[1]];
     let turn = Turn { start: arc.start, plane: arc.plane, centre, sweep: circle.sweep };
     let large = polar.radius.max(polar.radius + polar.growth * polar.sweep.abs());
-    // What the other axes miss can be made up for along them or along the circle.
+    // An error of the angle shows along the other axes or along the circle, whichever is less.
     let per_angle = polar.pitch.min(large);
     let least = circle.radial + circle.angular * per_angle;
     let rise = turn.sweep.abs() * per_angle;
@@ -105,14 +101,14 @@ pub fn pieces<const M: usize>(arc: &Arc<M>, polar: &Polar, tolerance: f64) -> Op
         return None;
     }
     while least + error > tolerance && count <= MAX_PIECES {
-        // The error goes with the cube of the sweep of a piece.
+        // The error is proportional to the cube of the sweep of a piece.
         count = (0.99 * count * (error / (tolerance - least)).cbrt()).ceil().max(count + 1.0);
         error = turn.axial_error(rise, 2, count);
     }
     (count <= MAX_PIECES).then(|| (conics(arc, &turn, count), least + error))
 }
 
-/// The turn in `count` equal pieces, the other axes in proportion.
+/// The turn in `count` equal pieces, the other axes in proportion to the angle.
 fn conics<const M: usize>(arc: &Arc<M>, turn: &Turn<M>, count: f64) -> Vec<Conic<M>> {
     let [x, y] = arc.plane;
     let curve = turn.pieces(count);
@@ -128,8 +124,8 @@ fn conics<const M: usize>(arc: &Arc<M>, turn: &Turn<M>, count: f64) -> Vec<Conic
                 let joint = &curve.control[3 * i + 2];
                 (end[x], end[y]) = (joint[x], joint[y]);
             }
-            // Where the tangents meet, from the chord: however small a piece of however great a circle, it is
-            // symmetric.
+            // The point where the tangents meet, computed from the chord: so a small piece of a great circle is
+            // symmetric too.
             let chord = sub(&end, &start);
             let mut middle = lerp(&start, &end, 0.5);
             middle[x] += bulge * chord[y];

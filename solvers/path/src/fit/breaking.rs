@@ -1,49 +1,50 @@
-//! Breaking points and first feature points, by the discrete curvature of the points (Zhang 3.1).
+//! Breaking points and first feature points, from the discrete curvature of the points (Zhang et al. 2010, section 3.1).
 //!
-//! The curvature at a point is that of the circle through it and one point on each side. They are its
-//! neighbours where those already show the curve; where they lie closer than the tolerance can tell from a
-//! line, or in noise, they are taken 2, 4, 8 … points away until the point is off their chord by more than
-//! the tolerance (after Coeurjolly and Svensson, who use the longest digital segments); if it never is, the
-//! curvature is 0. A point where the curvature is greatest between two places where it is a fifth lower is an
-//! extreme, unless what it saw belongs to a sharper extreme as near as its look reaches; plateaus and ripples
-//! have none.
+//! The curvature at a point is that of the circle through it and one point on each side, 1, 2, 4, 8 … points away: the
+//! nearest ones whose chord is off the point by more than the tolerance, so that noise does not count (after Coeurjolly and
+//! Svensson, who use the longest digital segments). If there are none, the curvature is 0. The number of points away is
+//! the *reach* of the curvature.
 //!
-//! Breaking points are: ends of the chain; ends of lines, which are long chords and runs of colinear points;
-//! extremes above the curvature threshold; and corners above it, extremes or not.
+//! A point is an *extreme* if its curvature is the greatest between two points where it is a fifth lower, and no sharper
+//! extreme is within its reach. Plateaus and ripples have no extremes.
+//!
+//! Breaking points are
+//!
+//! * both ends of the chain,
+//! * both ends of lines, which are long chords and sequences of colinear points,
+//! * extremes above the threshold of curvature, and
+//! * corners above it, extremes or not.
 
 use rayon::prelude::*;
 
-use super::certificate::Segment;
 use super::Chain;
-use feedplan_geometry::quadratic::{dot, norm, sub};
+use crate::tolerance;
+use feedplan_geometry::quadratic::{dot, norm, sub, Segment};
 
-/// Widest look for the curvature, in points to each side.
+/// Greatest reach of the curvature, in points to each side.
 const WIDEST: usize = 2048;
-/// An extreme rises this many times above the lowest curvature on both sides.
+/// The curvature at an extreme is this many times the lowest curvature on both sides.
 const PROMINENCE: f64 = 1.2;
-/// Points this much off a line are on it: a share of the tolerance, and roundings of the largest coordinate.
-const COLINEAR: f64 = 1e-6;
-const ROUNDINGS: f64 = 8.0 * f64::EPSILON;
 
 /// A point where one group ends and the next begins.
 pub struct Break {
     pub at: usize,
-    /// The points that show the tangent on either side: `at` itself at an end of the chain.
+    /// The points on either side that determine the tangent: `at` itself at an end of the chain.
     sides: [usize; 2],
-    /// The tangent may jump.
+    /// Whether the tangent may jump.
     pub corner: bool,
-    /// The group that starts here is one line.
+    /// Whether the group that starts here is one line.
     pub line: bool,
 }
 
 impl Break {
-    /// Direction of the circle through the point and its sides.
+    /// The tangent at the point of the circle through it and its sides.
     pub fn tangent<const M: usize>(&self, chain: &Chain<M>) -> [f64; M] {
         let [a, b] = self.sides;
         let before = sub(&chain.points[self.at], &chain.points[a]);
         let after = sub(&chain.points[b], &chain.points[self.at]);
         let (before_sq, after_sq) = (dot(&before, &before), dot(&after, &after));
-        // Inversion at the point makes the circle a line.
+        // Inversion about the point makes the circle a line.
         let tangent: [f64; M] = std::array::from_fn(|k| before[k] * after_sq + after[k] * before_sq);
         let length = norm(&tangent);
         match length > 0.0 {
@@ -85,7 +86,7 @@ pub fn group<const M: usize>(
     (breaks, extremes)
 }
 
-/// The break between the stretch `before` and the stretch `after` of points.
+/// The break between two ranges of points, `before` and `after`.
 fn end_of_line<const M: usize>(
     chain: &Chain<M>,
     before: Option<(usize, usize)>,
@@ -93,7 +94,7 @@ fn end_of_line<const M: usize>(
     after: Option<(usize, usize)>,
     line: bool,
 ) -> Break {
-    // Far enough to tell a direction from noise within the tolerance.
+    // Far enough away that noise within the tolerance does not decide the direction.
     let apart = |&k: &usize| norm(&sub(&chain.points[k], &chain.points[at])) > 2.0 * chain.tolerance;
     let left = before
         .map_or(at, |(from, _)| (from.max(at.saturating_sub(WIDEST))..at).rev().find(apart).unwrap_or(from));
@@ -101,8 +102,8 @@ fn end_of_line<const M: usize>(
     Break { at, sides: [left, right], corner: is_corner(chain, at, [left, right]), line }
 }
 
-/// A corner turns at the point itself and at the scale of the tolerance: noise does not do the one, nor a
-/// small smooth bend the other.
+/// Whether the path turns both at the point itself and at the scale of the tolerance. Noise turns only at points, a small
+/// smooth bend only at the scale of the tolerance.
 fn is_corner<const M: usize>(chain: &Chain<M>, at: usize, [left, right]: [usize; 2]) -> bool {
     chain.is_corner(at)
         && left < at
@@ -116,26 +117,26 @@ pub fn turn_cosine<const M: usize>(a: &[f64; M], p: &[f64; M], b: &[f64; M]) -> 
     dot(&before, &after) / (norm(&before) * norm(&after))
 }
 
-/// Long chords, and runs of colinear points that the path around them does not continue, as ranges of points.
+/// Long chords, and sequences of colinear points whose line the path around them leaves, as ranges of points.
 fn lines<const M: usize>(chain: &Chain<M>, max_chord: f64) -> Vec<(usize, usize)> {
-    let Chain { points, along, tolerance, .. } = *chain;
+    let Chain { points, along, tolerance: allowed, .. } = *chain;
     let last = points.len() - 1;
     let largest = points.iter().flatten().fold(0.0_f64, |largest, value| largest.max(value.abs()));
-    let off_sq = (COLINEAR * tolerance + ROUNDINGS * largest).powi(2);
+    let off_sq = (tolerance::COLINEAR * allowed + tolerance::COLINEAR_ROUNDING * largest).powi(2);
     let mut lines = Vec::new();
     let mut from = 0;
     while from < last {
         let mut to = from + 1;
-        let mut run = sub(&points[to], &points[from]);
+        let mut way = sub(&points[to], &points[from]);
         while to < last {
             let step = sub(&points[to + 1], &points[to]);
             let whole = sub(&points[to + 1], &points[from]);
-            let share = dot(&run, &whole) / dot(&whole, &whole);
-            let off: [f64; M] = std::array::from_fn(|k| run[k] - share * whole[k]);
-            if dot(&off, &off) > off_sq || dot(&run, &step) <= 0.0 {
+            let share = dot(&way, &whole) / dot(&whole, &whole);
+            let off: [f64; M] = std::array::from_fn(|k| way[k] - share * whole[k]);
+            if dot(&off, &off) > off_sq || dot(&way, &step) <= 0.0 {
                 break;
             }
-            (to, run) = (to + 1, whole);
+            (to, way) = (to + 1, whole);
         }
         let long = along[to] - along[from] > max_chord;
         let keep = match to - from {
@@ -150,9 +151,8 @@ fn lines<const M: usize>(chain: &Chain<M>, max_chord: f64) -> Vec<(usize, usize)
     lines
 }
 
-/// Whether the path leaves the line of a run by more than the tolerance within half its length beyond either
-/// end: then a curve that is smooth around the run would bow it by as much. Always if there is no path
-/// beyond.
+/// Whether the path leaves the line through two points by more than the tolerance, within half of their distance beyond
+/// either end: a smooth curve would then bend the line by as much. True if the chain ends at both points.
 fn departs<const M: usize>(chain: &Chain<M>, from: usize, to: usize) -> bool {
     let Chain { points, along, tolerance, .. } = *chain;
     let last = points.len() - 1;
@@ -176,14 +176,14 @@ fn departs<const M: usize>(chain: &Chain<M>, from: usize, to: usize) -> bool {
     })
 }
 
-/// Whether small deviations have not added up.
+/// Whether all points between are on the line: small deviations have not added up.
 fn is_straight<const M: usize>(chain: &Chain<M>, from: usize, to: usize) -> bool {
     let segment = Segment::new(&chain.points[from], &chain.points[to]);
-    let allowed_sq = (1e-3 * chain.tolerance).powi(2);
+    let allowed_sq = (tolerance::STRAIGHT * chain.tolerance).powi(2);
     chain.points[from..to].iter().all(|point| segment.distance_sq(point) <= allowed_sq)
 }
 
-/// The extremes strictly between points `a` and `b`, and the breaks among them.
+/// Appends the extremes strictly between points `a` and `b`, and the breaks among all points there.
 fn curve<const M: usize>(
     chain: &Chain<M>,
     a: usize,
@@ -206,9 +206,9 @@ fn curve<const M: usize>(
     let mut peaks = extremes[first..].iter().copied().peekable();
     for k in a + 1..b {
         let peak = peaks.next_if_eq(&k).is_some();
-        let (kappa, look) = of(k);
+        let (kappa, reach) = of(k);
         if kappa > max_curvature {
-            let sides = [k - look.min(k - a), k + look.min(b - k)];
+            let sides = [k - reach.min(k - a), k + reach.min(b - k)];
             let corner = is_corner(chain, k, sides);
             if peak || corner {
                 breaks.push(Break { at: k, sides, corner, line: false });
@@ -217,29 +217,29 @@ fn curve<const M: usize>(
     }
 }
 
-/// Curvature at point `k` of the stretch from `a` to `b`, and how many points away it was seen.
+/// The curvature at point `k` and its reach; the points on its sides are between `a` and `b`.
 fn curvature<const M: usize>(chain: &Chain<M>, a: usize, b: usize, k: usize) -> (f64, usize) {
     let points = chain.points;
     let enough_sq = chain.tolerance * chain.tolerance;
-    let mut look = 1;
+    let mut reach = 1;
     chain.watch.check_at(k);
     loop {
-        let (left, right) = (k - look.min(k - a), k + look.min(b - k));
+        let (left, right) = (k - reach.min(k - a), k + reach.min(b - k));
         let off_sq = Segment::new(&points[left], &points[right]).distance_sq(&points[k]);
         if off_sq > enough_sq {
             let (before, after) = (sub(&points[k], &points[left]), sub(&points[right], &points[k]));
             let kappa = 2.0 * (off_sq / (dot(&before, &before) * dot(&after, &after))).sqrt();
-            return (kappa, look);
+            return (kappa, reach);
         }
-        if look == WIDEST || (left == a && right == b) {
-            return (0.0, look);
+        if reach == WIDEST || (left == a && right == b) {
+            return (0.0, reach);
         }
-        look *= 2;
+        reach *= 2;
     }
 }
 
-/// Maxima that are `PROMINENCE` above the minima next to them and the greatest within their look, offset by
-/// `first`.
+/// Appends the maxima that are `PROMINENCE` times the minima next to them and the greatest within their reach; `first` is
+/// the point of the first curvature.
 fn peaks(curvature: &[(f64, usize)], first: usize, extremes: &mut Vec<usize>) {
     let mut peaks = Vec::new();
     let mut rising = false;
@@ -259,10 +259,10 @@ fn peaks(curvature: &[(f64, usize)], first: usize, extremes: &mut Vec<usize>) {
         }
     }
     for (i, &peak) in peaks.iter().enumerate() {
-        let (kappa, look) = curvature[peak];
+        let (kappa, reach) = curvature[peak];
         let sharper = |&other: &usize| curvature[other].0 > kappa;
-        let before = peaks[..i].iter().rev().take_while(|&&other| peak - other <= look);
-        let after = peaks[i + 1..].iter().take_while(|&&other| other - peak <= look);
+        let before = peaks[..i].iter().rev().take_while(|&&other| peak - other <= reach);
+        let after = peaks[i + 1..].iter().take_while(|&&other| other - peak <= reach);
         if !before.chain(after).any(sharper) {
             extremes.push(first + peak);
         }

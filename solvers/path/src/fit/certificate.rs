@@ -1,16 +1,19 @@
-//! A rigorous bound of the distance between one step of the spline and the polygon it replaces, both ways.
+//! A rigorous bound of the distance between one step of the spline and its chords, both ways.
 //!
-//! The curve is cut at a foot point of every vertex, in order, and at the knot. The distance to a segment is
-//! convex, so a quadratic part is no farther from its chord than the farthest of its three control points.
-//! For the other way, the part starts within |C(x_k) − P_k| of one end of the chord and ends as near to the
-//! other, so by continuity every point of the chord is that near to the part. A bound that is too large is
-//! sharpened by halving.
+//! The curve is cut at a foot point of each vertex, in order, and at the knot.
+//!
+//! * From curve to polygon: the distance to a segment is convex, so each part of the curve is at most as far from its chord
+//!   as the farthest of its three control points.
+//! * From polygon to curve: the part starts within |C(x_k) − P_k| of one end of the chord and ends as near to the other, so
+//!   by continuity each point of the chord is that near to the part.
+//!
+//! A part whose bound exceeds the tolerance is halved, which makes the bound sharper.
 
-use feedplan_geometry::quadratic::{dot, lerp, sub};
+use feedplan_geometry::quadratic::{dot, lerp, sub, Segment};
 
-/// C' must keep this share of its mean over the step: it neither vanishes nor turns back.
+/// C' along the step is at least this fraction of its mean, so that it neither vanishes nor turns back.
 const PROGRESS: f64 = 0.1;
-/// Halvings of one part; each takes three quarters of what a control point overstates.
+/// Halvings of one part at most. Each makes the excess of the bound four times smaller.
 const HALVINGS: u32 = 3;
 
 /// The spline between two adjacent features: C on [0, h], two quadratics that meet at h/2.
@@ -23,19 +26,20 @@ pub struct Step<const M: usize> {
     pub tangent: [[f64; M]; 3],
 }
 
-/// What the certificate says of a step.
+/// The bound of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Verdict {
-    /// Bounds on the two halves, in mm.
+pub struct StepBound {
+    /// The bound on each of the two halves, in mm.
     pub deviation: [f64; 2],
     /// The chord at the knot.
     pub knot_chord: usize,
-    pub fault: Option<Fault>,
+    /// The worst place that is out of tolerance.
+    pub defect: Option<Defect>,
 }
 
-/// Why a step cannot stay.
+/// Why a step is out of tolerance.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Fault {
+pub enum Defect {
     /// This point is too far from the curve.
     Point(usize),
     /// The curve is too far from this chord.
@@ -44,7 +48,7 @@ pub enum Fault {
     Direction,
 }
 
-/// One of the two quadratics, about the feature it touches: C(x) = origin + slope y + bend y², y = x − shift.
+/// One of the two quadratics of a step, in powers about its feature: C(x) = origin + slope y + bend y², y = x − shift.
 struct Half<const M: usize> {
     origin: [f64; M],
     slope: [f64; M],
@@ -68,31 +72,8 @@ impl<const M: usize> Half<M> {
     }
 }
 
-pub struct Segment<const M: usize> {
-    start: [f64; M],
-    vector: [f64; M],
-    length_sq: f64,
-}
-
-impl<const M: usize> Segment<M> {
-    pub fn new(start: &[f64; M], end: &[f64; M]) -> Self {
-        let vector = sub(end, start);
-        // Any positive length does for a segment that is a point.
-        Self { start: *start, vector, length_sq: dot(&vector, &vector).max(f64::MIN_POSITIVE) }
-    }
-
-    /// Squared distance from `p`, also if the segment is a point.
-    #[inline(always)]
-    pub fn distance_sq(&self, p: &[f64; M]) -> f64 {
-        let w = sub(p, &self.start);
-        let t = (dot(&w, &self.vector) / self.length_sq).clamp(0.0, 1.0);
-        let rest: [f64; M] = std::array::from_fn(|k| w[k] - t * self.vector[k]);
-        dot(&rest, &rest)
-    }
-}
-
 impl<const M: usize> Step<M> {
-    /// C at the knot, from both sides alike.
+    /// C at the knot, as the mean of its values from both sides.
     pub fn knot(&self) -> [f64; M] {
         let [m0, s, m1] = &self.tangent;
         let quarter = 0.25 * self.width;
@@ -119,18 +100,29 @@ impl<const M: usize> Step<M> {
         ]
     }
 
-    /// Bounds the step against the chords from point `a` (its start) to point `b` (its end).
-    pub fn certify(&self, points: &[[f64; M]], along: &[f64], a: usize, b: usize, tolerance: f64) -> Verdict {
+    /// The bound of the distance to the chords from point `a`, where the step starts, to point `b`, where it ends.
+    pub fn certify(
+        &self,
+        points: &[[f64; M]],
+        along: &[f64],
+        a: usize,
+        b: usize,
+        tolerance: f64,
+    ) -> StepBound {
         let chord = sub(&self.end, &self.start);
         let least = PROGRESS * dot(&chord, &chord) / self.width;
         // The negation also catches NaN.
         if !(least > 0.0 && self.tangent.iter().all(|tangent| dot(tangent, &chord) >= least)) {
-            return Verdict { deviation: [f64::INFINITY; 2], knot_chord: a, fault: Some(Fault::Direction) };
+            return StepBound {
+                deviation: [f64::INFINITY; 2],
+                knot_chord: a,
+                defect: Some(Defect::Direction),
+            };
         }
         let halves = self.halves();
         let (middle, tolerance_sq) = (0.5 * self.width, tolerance * tolerance);
         let scale = self.width / (along[b] - along[a]);
-        let (mut worst, mut fault) = (tolerance_sq, None);
+        let (mut worst, mut defect) = (tolerance_sq, None);
         let mut bound_sq = [0.0_f64; 2];
         let mut knot_chord = None;
         let gap_sq = |p: &[f64; M], q: &[f64; M]| {
@@ -146,7 +138,7 @@ impl<const M: usize> Step<M> {
                 }
             };
             if next_off_sq > worst {
-                (worst, fault) = (next_off_sq, Some(Fault::Point(k + 1)));
+                (worst, defect) = (next_off_sq, Some(Defect::Point(k + 1)));
             }
             let segment = Segment::new(&points[k], &points[k + 1]);
             let before = usize::from(x >= middle);
@@ -169,14 +161,14 @@ impl<const M: usize> Step<M> {
                 left.max(right)
             };
             if part_sq > worst {
-                (worst, fault) = (part_sq, Some(Fault::Chord(k)));
+                (worst, defect) = (part_sq, Some(Defect::Chord(k)));
             }
             (x, off_sq) = (next, next_off_sq);
         }
-        Verdict {
+        StepBound {
             deviation: [bound_sq[0].sqrt(), bound_sq[1].sqrt()],
             knot_chord: knot_chord.unwrap_or(b - 1),
-            fault,
+            defect,
         }
     }
 
@@ -207,8 +199,7 @@ impl<const M: usize> Step<M> {
     }
 }
 
-/// Bound of the squared distance from the part on [x0, x1] to the segment; its two ends are bounded by the
-/// caller.
+/// Bound of the squared distance from the part on [x0, x1], without its two ends, to the segment.
 #[inline(always)]
 fn part_bound_sq<const M: usize>(
     half: &Half<M>,
@@ -262,14 +253,15 @@ fn sharpen<const M: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::spline::{interpolate, End};
+    use crate::fit::spline::{interpolate, EndCondition};
     use feedplan_geometry::quadratic::norm;
     use proptest::prelude::*;
 
     /// The step on [0, 1] from (0, 0) to (1, 0) that leaves and arrives at the given slopes.
     fn step(start: f64, end: f64) -> Step<2> {
         let features = [[0.0, 0.0], [1.0, 0.0]];
-        let spline = interpolate(&features, End::Tangent([1.0, start]), End::Tangent([1.0, end]));
+        let spline =
+            interpolate(&features, EndCondition::Tangent([1.0, start]), EndCondition::Tangent([1.0, end]));
         Step {
             start: features[0],
             end: features[1],
@@ -301,11 +293,11 @@ mod tests {
         let points = [[0.0, 0.0], [0.5, 0.1], [1.0, 0.0]];
         let along = [0.0, 0.51, 1.02];
         let verdict = step(0.0, 0.0).certify(&points, &along, 0, 2, 0.2);
-        assert_eq!(verdict.fault, None);
+        assert_eq!(verdict.defect, None);
         for deviation in verdict.deviation {
             assert!((deviation - 0.1).abs() < 1e-9, "{deviation}");
         }
-        assert_eq!(step(0.0, 0.0).certify(&points, &along, 0, 2, 0.09).fault, Some(Fault::Point(1)));
+        assert_eq!(step(0.0, 0.0).certify(&points, &along, 0, 2, 0.09).defect, Some(Defect::Point(1)));
     }
 
     #[test]
@@ -315,9 +307,9 @@ mod tests {
         let (points, along) = ([[0.0, 0.0], [1.0, 0.0]], [0.0, 1.0]);
         assert!((arch.knot()[1] - 0.1).abs() < 1e-15);
         let verdict = arch.certify(&points, &along, 0, 1, 0.101);
-        assert_eq!(verdict.fault, None);
+        assert_eq!(verdict.defect, None);
         assert!(verdict.deviation[0] >= 0.1 - 1e-15 && verdict.deviation[0] <= 0.101);
-        assert_eq!(arch.certify(&points, &along, 0, 1, 0.099).fault, Some(Fault::Chord(0)));
+        assert_eq!(arch.certify(&points, &along, 0, 1, 0.099).defect, Some(Defect::Chord(0)));
     }
 
     #[test]
@@ -325,13 +317,13 @@ mod tests {
         let mut back = step(0.0, 0.0);
         back.tangent[0] = [-0.2, 0.0];
         assert_eq!(
-            back.certify(&[[0.0, 0.0], [1.0, 0.0]], &[0.0, 1.0], 0, 1, 10.0).fault,
-            Some(Fault::Direction)
+            back.certify(&[[0.0, 0.0], [1.0, 0.0]], &[0.0, 1.0], 0, 1, 10.0).defect,
+            Some(Defect::Direction)
         );
         back.tangent[0] = [f64::NAN, 0.0];
         assert_eq!(
-            back.certify(&[[0.0, 0.0], [1.0, 0.0]], &[0.0, 1.0], 0, 1, 10.0).fault,
-            Some(Fault::Direction)
+            back.certify(&[[0.0, 0.0], [1.0, 0.0]], &[0.0, 1.0], 0, 1, 10.0).defect,
+            Some(Defect::Direction)
         );
     }
 
@@ -357,7 +349,7 @@ mod tests {
             let (curve, chords) = sampled(&step, &points);
             prop_assert!(curve <= bound + 1e-12, "{curve} {bound}");
             prop_assert!(chords <= bound + 1e-6, "{chords} {bound}");
-            prop_assert_eq!(verdict.fault.is_none(), bound <= 0.05 + 1e-15);
+            prop_assert_eq!(verdict.defect.is_none(), bound <= 0.05 + 1e-15);
         }
     }
 }

@@ -1,23 +1,24 @@
-//! Feature points: the fewer points that the spline interpolates (Zhang 3.2, Algorithm 1).
+//! The feature points of a group, which the spline interpolates (Zhang et al. 2010, section 3.2, Algorithm 1).
 //!
-//! A quadratic Bézier curve through three features Q1, Q2, Q3 stands for all points between. Where one of
-//! them is too far from it, the worst becomes a feature and the triple shrinks; when all are near, the triple
-//! moves on by one. Two additions keep the cost linear. A triple looks ahead to the next feature only as far
-//! as four times its last step, so that a failed attempt costs no more than what was accepted before. And a
-//! long triple that keeps failing is halved at every fourth attempt.
+//! A quadratic Bézier curve through three features Q1, Q2, Q3 replaces all points between them. If a point is too far
+//! from it, the farthest one becomes a feature and the triple shrinks; if none is, the triple moves on by one. Two
+//! additions keep the cost linear:
+//!
+//! * The third feature is at most four steps ahead of the second one, each as long as the step before, so that a failed
+//!   attempt costs no more than what was accepted before.
+//! * A long triple that fails again and again is halved at each fourth attempt.
 
-use super::certificate::Segment;
 use super::Chain;
-use feedplan_geometry::quadratic::dot;
+use feedplan_geometry::quadratic::{dot, Segment};
 
-/// How many times its last step a triple looks ahead, and its first look, in points.
+/// The third feature is this many steps of the triple ahead at most; the first step of a group is FIRST points at most.
 const REACH: usize = 4;
 const FIRST: usize = 32;
-/// Triples of fewer points shrink as the paper says, however slowly.
+/// Triples of fewer points are never halved: they shrink as in the paper.
 const SMALL: usize = 32;
 
-/// The feature points of the group from point `a` to point `b`, both included; `extremes` are those to begin
-/// with, strictly between, in order.
+/// The feature points of the group from point `a` to point `b`, with both; `extremes` are the first ones to try, strictly
+/// between, in order.
 pub fn select<const M: usize>(chain: &Chain<M>, a: usize, b: usize, mut extremes: &[usize]) -> Vec<usize> {
     let next_extreme =
         |extremes: &[usize], after: usize| extremes.iter().copied().find(|&next| next > after).unwrap_or(b);
@@ -30,8 +31,8 @@ pub fn select<const M: usize>(chain: &Chain<M>, a: usize, b: usize, mut extremes
             None => return vec![a, b],
         }
     }
-    // Features that an earlier triple has accepted, q2 and beyond, nearest last. A triple that steps back
-    // before q2 leaves several.
+    // Features from q2 on that earlier triples have accepted, the nearest last. There are several after a triple has
+    // stepped back before q2.
     let mut accepted: Vec<usize> = Vec::new();
     while q2 < b {
         let mut q3 = match accepted.iter().rev().find(|&&next| next > q2) {
@@ -60,7 +61,7 @@ pub fn select<const M: usize>(chain: &Chain<M>, a: usize, b: usize, mut extremes
     features
 }
 
-/// Of the points between that are too far from the segment, the farthest.
+/// The point between that is farthest from the segment, if it is out of tolerance.
 fn farthest_from_chord<const M: usize>(chain: &Chain<M>, a: usize, b: usize) -> Option<usize> {
     let segment = Segment::new(&chain.points[a], &chain.points[b]);
     let (mut worst_sq, mut farthest) = (chain.tolerance * chain.tolerance, None);
@@ -73,13 +74,13 @@ fn farthest_from_chord<const M: usize>(chain: &Chain<M>, a: usize, b: usize) -> 
     farthest
 }
 
-/// Of the points between that are too far from the Bézier curve through the three, the farthest.
+/// The point between that is farthest from the Bézier curve through the three, if it is out of tolerance.
 fn worst_point<const M: usize>(chain: &Chain<M>, q1: usize, q2: usize, q3: usize) -> Option<usize> {
     let Chain { points, along, tolerance, .. } = *chain;
     if q3 - q1 == 2 {
         return None;
     }
-    // B(u) = c0 + u c1 + u² c2, through Q2 at the share of the length that lies before it.
+    // B(u) = c0 + u c1 + u² c2, at Q2 where u is the fraction of the length before Q2.
     let length = along[q3] - along[q1];
     let u1 = (along[q2] - along[q1]) / length;
     let (start, end) = (&points[q1], &points[q3]);

@@ -1,44 +1,43 @@
-//! A block of points between two given tangents, interpolated again and again with more features until the
-//! certificate holds on every step.
+//! The spline through a block of points between two given tangents, refined until every step is within the tolerance.
 //!
-//! A step that fails gets its worst point as a feature (both ends of the chord, where it is the curve that
-//! leaves the polygon). A step of a single chord that fails although the next points on both sides are
-//! features as well cannot be helped by more of them. Then the spline gives way, in this order: it is broken
-//! at the sharper end of the chord if that turns like a corner; it passes the ends of the chord at an offset,
-//! so that its bulge is shared between points and chords; a tangent at its end is given up, be it prescribed
-//! or free; and at last the chord becomes a line. Every change is for good, and their number is bounded, so
-//! this ends; the rounds are bounded as well, against chains made to need many.
+//! A step is the spline from one feature to the next. In each round a step out of tolerance gets a new feature: its worst
+//! point, or both ends of its worst chord. More features do not help a step of a single chord if the next points on both
+//! sides are features already. Such a step is mended by the first of these that is possible:
+//!
+//! 1. the spline is broken at the sharper end of the chord, if that is a corner;
+//! 2. it passes the ends of the chord at an offset, so that its bulge is shared between points and chords;
+//! 3. the tangent at its end is given up: a given one becomes free, a free one that of the chord;
+//! 4. the chord becomes a line.
+//!
+//! No change is taken back, so their number is bounded. The number of rounds is bounded as well.
 
 use super::breaking::turn_cosine;
-use super::certificate::{Fault, Step, Verdict};
-use super::pieces::{line, Pen};
-use super::spline::{interpolate, End};
+use super::certificate::{Defect, Step, StepBound};
+use super::piece_builder::{line, PieceBuilder};
+use super::spline::{interpolate, EndCondition};
 use super::{Chain, FittedPiece};
+use crate::tolerance;
 use feedplan_geometry::quadratic::{norm, sub};
 
-/// From this round on, a step that fails is halved as well.
+/// From this round on, a step out of tolerance is halved as well.
 const HALVE: usize = 4;
-/// From this round on, a single chord that fails becomes a line at once.
+/// From this round on, a single chord out of tolerance becomes a line at once.
 const LINES: usize = 24;
-/// In this round, every spline that still fails becomes lines.
+/// In this round, each spline that is still out of tolerance becomes lines.
 const LAST: usize = 40;
-/// An offset makes a bulge of up to twice the tolerance fit; beyond that and some allowance none does.
-const HOPELESS: f64 = 2.25;
-/// Deviations up to this ratio are alike.
+/// A deviation is among the worst if it is at least the greatest one divided by this.
 const LIKE: f64 = 1.1;
-/// Largest offset of the curve from a feature, of the tolerance.
-const SHIFT: f64 = 0.75;
 
 /// A group, or a part of a long one.
 pub struct Block<const M: usize> {
     features: Vec<usize>,
-    ends: [End<M>; 2],
+    ends: [EndCondition<M>; 2],
     line: bool,
-    /// Starts within the group of the block before.
+    /// Whether it starts within the group of the block before.
     pub continues: bool,
 }
 
-/// The pieces of a block, their splines numbered from 0, and whether its end tangents were kept.
+/// The pieces of a block, with splines numbered from 0, and whether the given tangents were kept at both ends.
 pub struct FittedBlock<const M: usize> {
     pub pieces: Vec<FittedPiece<M>>,
     pub starts_smooth: bool,
@@ -47,10 +46,15 @@ pub struct FittedBlock<const M: usize> {
 
 impl<const M: usize> Block<M> {
     pub fn line(a: usize, b: usize) -> Self {
-        Self { features: vec![a, b], ends: [End::Free; 2], line: true, continues: false }
+        Self { features: vec![a, b], ends: [EndCondition::Free; 2], line: true, continues: false }
     }
 
-    pub fn curve(features: Vec<usize>, start: End<M>, finish: End<M>, continues: bool) -> Self {
+    pub fn curve(
+        features: Vec<usize>,
+        start: EndCondition<M>,
+        finish: EndCondition<M>,
+        continues: bool,
+    ) -> Self {
         Self { features, ends: [start, finish], line: false, continues }
     }
 
@@ -68,53 +72,53 @@ impl<const M: usize> Block<M> {
         }
         let (first, last) = (&refinement.steps[0], &refinement.steps[refinement.steps.len() - 1]);
         FittedBlock {
-            starts_smooth: !first.line && first.joints[0] == Joint::Smooth,
-            ends_smooth: !last.line && last.joints[1] == Joint::Smooth,
+            starts_smooth: !first.line && first.tangents[0] == SideTangent::Smooth,
+            ends_smooth: !last.line && last.tangents[1] == SideTangent::Smooth,
             pieces: refinement.pieces(),
         }
     }
 }
 
-/// The tangent of a spline at one side of a feature.
+/// The tangent of a step at one of its features.
 #[derive(Clone, Copy, PartialEq)]
-enum Joint {
-    /// As the other side of the feature has it.
+enum SideTangent {
+    /// That on the other side of the feature.
     Smooth,
     Free,
-    /// Along the chord, where a free one makes too much of a bulge.
+    /// Along the chord, where a free one bulges too far.
     Along,
 }
 
-/// From one feature to the next.
+/// A step of the refinement, from one feature to the next.
 #[derive(Clone, Copy)]
-struct State<const M: usize> {
+struct StepState<const M: usize> {
     from: usize,
     to: usize,
-    /// A chord that stays a line.
+    /// Whether it is a chord that stays a line.
     line: bool,
-    /// What becomes of the tangent at the start and at the end.
-    joints: [Joint; 2],
-    /// From the first feature to where the spline passes it, once passing through it was of no use.
+    /// The tangents at the start and at the end.
+    tangents: [SideTangent; 2],
+    /// The vector from the first feature to where the spline passes it, if that is not at the feature.
     offset: Option<[f64; M]>,
-    /// Filled in by `interpolate`; a step that is new or has a new neighbour has none.
-    fitted: Option<(Step<M>, Verdict)>,
+    /// Set by `interpolate`; None for a step that is new or has a new neighbour.
+    fitted: Option<(Step<M>, StepBound)>,
 }
 
 struct Refinement<'a, const M: usize> {
     chain: &'a Chain<'a, M>,
-    ends: [End<M>; 2],
-    steps: Vec<State<M>>,
+    ends: [EndCondition<M>; 2],
+    steps: Vec<StepState<M>>,
 }
 
 impl<'a, const M: usize> Refinement<'a, M> {
-    fn new(chain: &'a Chain<M>, features: &[usize], ends: [End<M>; 2]) -> Self {
+    fn new(chain: &'a Chain<M>, features: &[usize], ends: [EndCondition<M>; 2]) -> Self {
         let steps = features
             .windows(2)
-            .map(|f| State {
+            .map(|f| StepState {
                 from: f[0],
                 to: f[1],
                 line: false,
-                joints: [Joint::Smooth; 2],
+                tangents: [SideTangent::Smooth; 2],
                 offset: None,
                 fitted: None,
             })
@@ -122,13 +126,14 @@ impl<'a, const M: usize> Refinement<'a, M> {
         Self { chain, ends, steps }
     }
 
-    /// Steps `[first, end)` of every spline.
+    /// The steps `[first, end)` of each spline.
     fn splines(&self) -> Vec<(usize, usize)> {
         let mut splines = Vec::new();
         let mut first = 0;
         for j in 0..=self.steps.len() {
-            let stop =
-                j == self.steps.len() || self.steps[j].line || self.steps[j].joints[0] != Joint::Smooth;
+            let stop = j == self.steps.len()
+                || self.steps[j].line
+                || self.steps[j].tangents[0] != SideTangent::Smooth;
             if stop && first < j {
                 splines.push((first, j));
                 first = j;
@@ -140,19 +145,19 @@ impl<'a, const M: usize> Refinement<'a, M> {
         splines
     }
 
-    /// What holds at the start (`side` 0) or at the end (1) of step `j`, where a spline starts or ends.
-    fn end(&self, j: usize, side: usize) -> End<M> {
+    /// The condition at the start (`side` 0) or the end (1) of step `j`, where a spline starts or ends.
+    fn end(&self, j: usize, side: usize) -> EndCondition<M> {
         let step = &self.steps[j];
-        let neighbour = match step.joints[side] {
-            Joint::Free => return End::Free,
-            Joint::Along => return End::Tangent(self.chain.direction(step.from, step.to)),
-            Joint::Smooth if side == 0 && j == 0 => return self.ends[0],
-            Joint::Smooth if side == 1 && j + 1 == self.steps.len() => return self.ends[1],
-            Joint::Smooth => &self.steps[j + 2 * side - 1],
+        let neighbour = match step.tangents[side] {
+            SideTangent::Free => return EndCondition::Free,
+            SideTangent::Along => return EndCondition::Tangent(self.chain.direction(step.from, step.to)),
+            SideTangent::Smooth if side == 0 && j == 0 => return self.ends[0],
+            SideTangent::Smooth if side == 1 && j + 1 == self.steps.len() => return self.ends[1],
+            SideTangent::Smooth => &self.steps[j + 2 * side - 1],
         };
         match neighbour.line && !self.chain.is_corner([step.from, step.to][side]) {
-            true => End::Tangent(self.chain.direction(neighbour.from, neighbour.to)),
-            false => End::Free,
+            true => EndCondition::Tangent(self.chain.direction(neighbour.from, neighbour.to)),
+            false => EndCondition::Free,
         }
     }
 
@@ -163,8 +168,8 @@ impl<'a, const M: usize> Refinement<'a, M> {
         step.offset.map_or(*point, |offset| std::array::from_fn(|k| point[k] + offset[k]))
     }
 
-    /// Half of what a smooth curve through the points bulges over the chords at point `at`, towards their
-    /// inside: by so much the curve can cut the corner to share its deviation between points and chords.
+    /// The offset at point `at`: half of the bulge of a smooth curve through the points over their chords, towards the
+    /// inside of the turn. So the deviation is shared between points and chords.
     fn inward(&self, at: usize) -> [f64; M] {
         let points = self.chain.points;
         let (before, after) = (sub(&points[at], &points[at - 1]), sub(&points[at + 1], &points[at]));
@@ -172,11 +177,11 @@ impl<'a, const M: usize> Refinement<'a, M> {
         let inside: [f64; M] = std::array::from_fn(|k| (a * after[k] - b * before[k]) / (a + b));
         let share = (a + b) * (a + b) / (32.0 * a * b);
         let length = share * norm(&inside);
-        let share = share * (SHIFT * self.chain.tolerance / length).min(1.0);
+        let share = share * (tolerance::OFFSET * self.chain.tolerance / length).min(1.0);
         inside.map(|value| share * value)
     }
 
-    /// Solves and certifies every spline that has changed.
+    /// Computes each spline that has changed, and its bounds.
     fn interpolate(&mut self) {
         let chain = self.chain;
         let mut features = Vec::new();
@@ -196,19 +201,19 @@ impl<'a, const M: usize> Refinement<'a, M> {
                     width: spline.step[i],
                     tangent: [spline.tangent[i], spline.slope[i], spline.tangent[i + 1]],
                 };
-                let verdict = step.certify(chain.points, chain.along, state.from, state.to, chain.tolerance);
-                state.fitted = Some((step, verdict));
+                let bound = step.certify(chain.points, chain.along, state.from, state.to, chain.tolerance);
+                state.fitted = Some((step, bound));
             }
         }
     }
 
-    /// Adds features or breaks splines where steps fail; false if none does.
+    /// Adds features or breaks splines where steps are out of tolerance; false if none is.
     fn improve(&mut self, round: usize) -> bool {
         let mut added: Vec<usize> = Vec::new();
         let mut changed = false;
         for (first, end) in self.splines() {
             for j in first..end {
-                let Some((_, Verdict { fault: Some(fault), .. })) = self.steps[j].fitted else {
+                let Some((_, StepBound { defect: Some(defect), .. })) = self.steps[j].fitted else {
                     continue;
                 };
                 changed = true;
@@ -216,12 +221,12 @@ impl<'a, const M: usize> Refinement<'a, M> {
                     self.give_up(first, end, &mut added);
                     break;
                 }
-                let State { from, to, .. } = self.steps[j];
+                let StepState { from, to, .. } = self.steps[j];
                 if to - from > 1 {
-                    match fault {
-                        Fault::Point(k) => added.push(k),
-                        Fault::Chord(k) => added.extend([k, k + 1].iter().filter(|&&k| from < k && k < to)),
-                        Fault::Direction => added.push(from + (to - from) / 2),
+                    match defect {
+                        Defect::Point(k) => added.push(k),
+                        Defect::Chord(k) => added.extend([k, k + 1].iter().filter(|&&k| from < k && k < to)),
+                        Defect::Direction => added.push(from + (to - from) / 2),
                     }
                     if round >= HALVE {
                         added.push(from + (to - from) / 2);
@@ -242,7 +247,7 @@ impl<'a, const M: usize> Refinement<'a, M> {
                         added.push(to + 1);
                     }
                 }
-                // Of neighbours that fail together the worst is broken first: it may have spoilt the others.
+                // Among neighbours out of tolerance the worst is broken first: it may be the cause of the others.
                 let enough = LIKE * self.excess(j);
                 let worst = (j.saturating_sub(2)..(j + 3).min(end)).all(|i| self.excess(i) <= enough);
                 if added.len() == count && (worst || round >= LINES) {
@@ -256,17 +261,17 @@ impl<'a, const M: usize> Refinement<'a, M> {
         changed
     }
 
-    /// The deviation of a step that fails, else 0.
+    /// The deviation of a step that is out of tolerance, else 0.
     fn excess(&self, j: usize) -> f64 {
         match self.steps[j].fitted {
-            Some((_, Verdict { fault: Some(_), deviation: [a, b], .. })) => a.max(b),
+            Some((_, StepBound { defect: Some(_), deviation: [a, b], .. })) => a.max(b),
             _ => 0.0,
         }
     }
 
-    /// Whether any smooth curve would bulge over the chord of step `j` by more than an offset can share out.
+    /// Whether each smooth curve bulges over the chord of step `j` by too much for an offset.
     fn is_hopeless(&self, j: usize) -> bool {
-        let State { from, to, .. } = self.steps[j];
+        let StepState { from, to, .. } = self.steps[j];
         let points = self.chain.points;
         if from == 0 || to + 1 == points.len() || self.chain.is_corner(from) || self.chain.is_corner(to) {
             return false;
@@ -275,14 +280,14 @@ impl<'a, const M: usize> Refinement<'a, M> {
             |at: usize| turn_cosine(&points[at - 1], &points[at], &points[at + 1]).clamp(-1.0, 1.0).acos();
         let length = self.chain.along[to] - self.chain.along[from];
         let bulge = length * (turn(from) + turn(to)) / 16.0;
-        bulge.min(self.excess(j)) > HOPELESS * self.chain.tolerance
+        bulge.min(self.excess(j)) > tolerance::HOPELESS * self.chain.tolerance
     }
 
-    /// No feature helps the chord of step `j` of the spline `[first, end)`.
+    /// Mends step `j` of the spline `[first, end)`, a single chord that no feature helps.
     fn break_at(&mut self, first: usize, j: usize, end: usize, round: usize) {
-        let State { from, to, .. } = self.steps[j];
+        let StepState { from, to, .. } = self.steps[j];
         let points = self.chain.points;
-        // Ends of the chord where the spline could be broken at a corner.
+        // The cosine of the turn at an end of the chord where the spline can be broken.
         let corner = |at: usize, inside: bool| match inside && self.chain.is_corner(at) {
             true => turn_cosine(&points[at - 1], &points[at], &points[at + 1]),
             false => 1.0,
@@ -290,11 +295,12 @@ impl<'a, const M: usize> Refinement<'a, M> {
         let (left, right) = (corner(from, j > first), corner(to, j + 1 < end));
         let shifts = [j, j + 1].map(|k| first < k && k < end && self.steps[k].offset.is_none());
         let outer = [j == first, j + 1 == end];
-        let joints = self.steps[j].joints;
-        let given =
-            |&side: &usize| outer[side] && joints[side] == Joint::Smooth && self.end(j, side) != End::Free;
-        // A chord with two free ends is a line anyway.
-        let loose = |&side: &usize| outer[side] && !outer[1 - side] && joints[side] != Joint::Along;
+        let tangents = self.steps[j].tangents;
+        let given = |&side: &usize| {
+            outer[side] && tangents[side] == SideTangent::Smooth && self.end(j, side) != EndCondition::Free
+        };
+        // A chord with two free ends is a line already.
+        let loose = |&side: &usize| outer[side] && !outer[1 - side] && tangents[side] != SideTangent::Along;
         if round >= LINES {
             self.steps[j].line = true;
         } else if left < 1.0 && left <= right {
@@ -306,9 +312,9 @@ impl<'a, const M: usize> Refinement<'a, M> {
                 self.steps[k].offset = Some(self.inward(self.steps[k].from));
             }
         } else if let Some(side) = (0..2).find(given) {
-            self.steps[j].joints[side] = Joint::Free;
+            self.steps[j].tangents[side] = SideTangent::Free;
         } else if let Some(side) = (0..2).find(loose) {
-            self.steps[j].joints[side] = Joint::Along;
+            self.steps[j].tangents[side] = SideTangent::Along;
         } else {
             self.steps[j].line = true;
         }
@@ -316,19 +322,19 @@ impl<'a, const M: usize> Refinement<'a, M> {
     }
 
     fn break_between(&mut self, j: usize) {
-        self.steps[j - 1].joints[1] = Joint::Free;
-        self.steps[j].joints[0] = Joint::Free;
+        self.steps[j - 1].tangents[1] = SideTangent::Free;
+        self.steps[j].tangents[0] = SideTangent::Free;
         self.refit(j - 1);
     }
 
-    /// Step `j` or one of its ends has changed.
+    /// Marks step `j` and its neighbours as changed.
     fn refit(&mut self, j: usize) {
         for k in j.saturating_sub(1)..(j + 2).min(self.steps.len()) {
             self.steps[k].fitted = None;
         }
     }
 
-    /// Every chord of the spline `[first, end)` becomes a line.
+    /// Makes each chord of the spline `[first, end)` a line.
     fn give_up(&mut self, first: usize, end: usize, added: &mut Vec<usize>) {
         for step in &mut self.steps[first..end] {
             added.extend(step.from + 1..step.to);
@@ -348,10 +354,15 @@ impl<'a, const M: usize> Refinement<'a, M> {
                 next += 1;
             }
             while next < added.len() && added[next] < rest.to {
-                let [start, finish] = rest.joints;
-                steps.push(State { to: added[next], joints: [start, Joint::Smooth], fitted: None, ..rest });
-                let joints = [Joint::Smooth, finish];
-                rest = State { from: added[next], joints, offset: None, fitted: None, ..rest };
+                let [start, finish] = rest.tangents;
+                steps.push(StepState {
+                    to: added[next],
+                    tangents: [start, SideTangent::Smooth],
+                    fitted: None,
+                    ..rest
+                });
+                let tangents = [SideTangent::Smooth, finish];
+                rest = StepState { from: added[next], tangents, offset: None, fitted: None, ..rest };
                 next += 1;
             }
             steps.push(rest);
@@ -359,7 +370,7 @@ impl<'a, const M: usize> Refinement<'a, M> {
         self.steps = steps;
     }
 
-    /// The quadratics from knot to knot.
+    /// The pieces from knot to knot.
     fn pieces(&self) -> Vec<FittedPiece<M>> {
         let mut pieces = Vec::with_capacity(self.steps.len() + 2);
         let mut spline = 0;
@@ -382,7 +393,8 @@ impl<'a, const M: usize> Refinement<'a, M> {
     }
 
     fn knots_to_pieces(&self, first: usize, end: usize, spline: u32, pieces: &mut Vec<FittedPiece<M>>) {
-        let [free_start, free_end] = [self.end(first, 0), self.end(end - 1, 1)].map(|end| end == End::Free);
+        let [free_start, free_end] =
+            [self.end(first, 0), self.end(end - 1, 1)].map(|end| end == EndCondition::Free);
         if end - first == 1 && free_start && free_end {
             pieces.push(line(self.chain, self.steps[first].from, self.steps[first].to, spline));
             return;
@@ -390,18 +402,18 @@ impl<'a, const M: usize> Refinement<'a, M> {
         let fitted = |j: usize| self.steps[j].fitted.as_ref().expect("the last round has fitted all");
         let Step { start: point, tangent: [tangent, ..], .. } = fitted(first).0;
         let chord = self.steps[first].from;
-        let mut pen = Pen { point, tangent, chord, spline, width: 0.0, deviation: 0.0 };
+        let mut builder = PieceBuilder { point, tangent, chord, spline, width: 0.0, deviation: 0.0 };
         for j in first..end {
-            let (step, verdict) = fitted(j);
-            pen.pass(0.5 * step.width, verdict.deviation[0]);
-            // A knot next to a free end is none: both sides are the same quadratic.
+            let (step, bound) = fitted(j);
+            builder.pass(0.5 * step.width, bound.deviation[0]);
+            // Next to a free end there is no knot: both sides are the same quadratic.
             if !((j == first && free_start) || (j + 1 == end && free_end)) {
-                let chord = verdict.knot_chord;
-                pieces.push(pen.piece(step.knot(), step.tangent[1], chord, chord));
+                let chord = bound.knot_chord;
+                pieces.push(builder.piece(step.knot(), step.tangent[1], chord, chord));
             }
-            pen.pass(0.5 * step.width, verdict.deviation[1]);
+            builder.pass(0.5 * step.width, bound.deviation[1]);
         }
         let (step, to) = (&fitted(end - 1).0, self.steps[end - 1].to);
-        pieces.push(pen.piece(step.end, step.tangent[2], to - 1, to));
+        pieces.push(builder.piece(step.end, step.tangent[2], to - 1, to));
     }
 }

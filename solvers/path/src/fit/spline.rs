@@ -1,30 +1,30 @@
-//! Interpolation of feature points by a C1 quadratic B-spline, one tridiagonal system (Zhang 3.3).
+//! The C1 quadratic B-spline through feature points, from one tridiagonal system (Zhang et al. 2010, section 3.3).
 //!
-//! Data F_j at parameters t_j with steps h_j = |F_{j+1} − F_j| (so that |C'| is near 1), a knot at the middle
-//! of every step. Unknown are the slopes s_j = C'(knot j). C' is linear between knots, so the tangent at the
-//! data is m_j = (h_j s_{j−1} + h_{j−1} s_j)/(h_{j−1} + h_j), and integrating C' over step j gives
+//! Features F_j have the parameters t_j with steps h_j = |F_{j+1} − F_j|, so that |C'| is near 1, and a knot is in the
+//! middle of each step. The unknowns are the slopes s_j = C'(knot j). C' is linear between knots, so the tangent at a
+//! feature is m_j = (h_j s_{j−1} + h_{j−1} s_j)/(h_{j−1} + h_j), and the integral of C' over step j gives
 //!
 //! ```text
 //! m_j + 2 s_j + m_{j+1} = 4 (F_{j+1} − F_j)/h_j
 //! ```
 //!
-//! which is tridiagonal in s with diagonal 2 + (1 − a) + (1 − c) and off-diagonals a, c in [0, 1]: diagonally
-//! dominant for any spacing, whereas the same system in control points is not. At a free end the knot next to
-//! it is left out, and its slope is that of the chord: three points with two free ends give the Bézier curve
-//! of Algorithm 1.
+//! This system is tridiagonal in s with the diagonal 2 + (1 − a) + (1 − c) and off-diagonals a, c in [0, 1]: diagonally
+//! dominant for any spacing, which the system in control points is not. At a free end the knot next to it is left out:
+//! its slope is that of the chord. So three features with two free ends give the Bézier curve of Algorithm 1.
 
 use feedplan_geometry::quadratic::{norm, sub};
 
-/// What the spline must meet at one end besides its point.
+/// The tangent of the spline at one of its ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum End<const M: usize> {
-    /// Any tangent.
+pub enum EndCondition<const M: usize> {
+    /// None is given.
     Free,
     /// C' is this.
     Tangent([f64; M]),
 }
 
-/// C' at the data and at the knots between; `step[j]` is the parameter distance from data j to data j + 1.
+/// C' at the features (`tangent`) and at the knots between them (`slope`); `step[j]` is the parameter interval from feature
+/// j to feature j + 1.
 pub struct Spline<const M: usize> {
     pub step: Vec<f64>,
     pub slope: Vec<[f64; M]>,
@@ -32,11 +32,15 @@ pub struct Spline<const M: usize> {
 }
 
 /// The spline through `features`, at least two.
-pub fn interpolate<const M: usize>(features: &[[f64; M]], start: End<M>, finish: End<M>) -> Spline<M> {
+pub fn interpolate<const M: usize>(
+    features: &[[f64; M]],
+    start: EndCondition<M>,
+    finish: EndCondition<M>,
+) -> Spline<M> {
     let count = features.len() - 1;
     let h: Vec<f64> = features
         .windows(2)
-        // Features that coincide still need a step; the certificate will ask for the points between them.
+        // Features at one place need a step too; the certificate asks for points between them later.
         .map(|f| norm(&sub(&f[1], &f[0])).max(f64::MIN_POSITIVE * 1e10))
         .collect();
     let chord: Vec<[f64; M]> =
@@ -44,11 +48,12 @@ pub fn interpolate<const M: usize>(features: &[[f64; M]], start: End<M>, finish:
     let before = |j: usize| h[j] / (h[j - 1] + h[j]);
     let after = |j: usize| h[j] / (h[j] + h[j + 1]);
 
-    // Chasing forward: row j becomes s_j + upper_j s_{j+1} = slope_j.
+    // Elimination: row j becomes s_j + upper_j s_{j+1} = slope_j.
     let mut upper = vec![0.0; count];
     let mut slope = chord.clone();
     for j in 0..count {
-        let free = (j == 0 && start == End::Free) || (j + 1 == count && finish == End::Free);
+        let free =
+            (j == 0 && start == EndCondition::Free) || (j + 1 == count && finish == EndCondition::Free);
         if free {
             continue;
         }
@@ -58,43 +63,45 @@ pub fn interpolate<const M: usize>(features: &[[f64; M]], start: End<M>, finish:
             let lower = before(j);
             diagonal += 1.0 - lower - lower * upper[j - 1];
             right = std::array::from_fn(|k| right[k] - lower * slope[j - 1][k]);
-        } else if let End::Tangent(tangent) = start {
+        } else if let EndCondition::Tangent(tangent) = start {
             right = std::array::from_fn(|k| right[k] - tangent[k]);
         }
         if j + 1 < count {
             upper[j] = after(j);
             diagonal += 1.0 - upper[j];
-        } else if let End::Tangent(tangent) = finish {
+        } else if let EndCondition::Tangent(tangent) = finish {
             right = std::array::from_fn(|k| right[k] - tangent[k]);
         }
         upper[j] /= diagonal;
         slope[j] = std::array::from_fn(|k| right[k] / diagonal);
     }
-    // And back.
+    // Back substitution.
     for j in (0..count.saturating_sub(1)).rev() {
         slope[j] = std::array::from_fn(|k| slope[j][k] - upper[j] * slope[j + 1][k]);
     }
 
     let mut tangent = Vec::with_capacity(count + 1);
     tangent.push(match (start, finish) {
-        (End::Tangent(tangent), _) => tangent,
-        (End::Free, _) if count > 1 => extrapolate(&slope[0], &slope[1], after(0)),
-        (End::Free, End::Tangent(other)) => extrapolate(&slope[0], &other, 1.0),
-        (End::Free, End::Free) => slope[0],
+        (EndCondition::Tangent(tangent), _) => tangent,
+        (EndCondition::Free, _) if count > 1 => extrapolate(&slope[0], &slope[1], after(0)),
+        (EndCondition::Free, EndCondition::Tangent(other)) => extrapolate(&slope[0], &other, 1.0),
+        (EndCondition::Free, EndCondition::Free) => slope[0],
     });
     tangent.extend((1..count).map(|j| {
         std::array::from_fn(|k| (h[j] * slope[j - 1][k] + h[j - 1] * slope[j][k]) / (h[j - 1] + h[j]))
     }));
     tangent.push(match (start, finish) {
-        (_, End::Tangent(tangent)) => tangent,
-        (_, End::Free) if count > 1 => extrapolate(&slope[count - 1], &slope[count - 2], before(count - 1)),
-        (End::Tangent(other), End::Free) => extrapolate(&slope[0], &other, 1.0),
-        (End::Free, End::Free) => slope[0],
+        (_, EndCondition::Tangent(tangent)) => tangent,
+        (_, EndCondition::Free) if count > 1 => {
+            extrapolate(&slope[count - 1], &slope[count - 2], before(count - 1))
+        }
+        (EndCondition::Tangent(other), EndCondition::Free) => extrapolate(&slope[0], &other, 1.0),
+        (EndCondition::Free, EndCondition::Free) => slope[0],
     });
     Spline { step: h, slope, tangent }
 }
 
-/// The value beyond `near`, seen from `far`.
+/// The line through `far` and `near`, extended beyond `near` by this ratio.
 fn extrapolate<const M: usize>(near: &[f64; M], far: &[f64; M], by: f64) -> [f64; M] {
     std::array::from_fn(|k| near[k] + by * (near[k] - far[k]))
 }
@@ -110,7 +117,7 @@ mod tests {
 
     #[test]
     fn two_points_give_a_line() {
-        let spline = interpolate(&[[1.0, 1.0], [4.0, 5.0]], End::Free, End::Free);
+        let spline = interpolate(&[[1.0, 1.0], [4.0, 5.0]], EndCondition::Free, EndCondition::Free);
         assert_eq!(spline.step, [5.0]);
         assert_eq!(spline.slope, [[0.6, 0.8]]);
         assert_eq!(spline.tangent, [[0.6, 0.8]; 2]);
@@ -120,17 +127,20 @@ mod tests {
     fn three_points_give_the_bezier_curve_of_algorithm_1() {
         // Through (0, 0), (3, 4), (8, 4): u1 = 1/2, so Q1 = 2 (3, 4) − ((0, 0) + (8, 4))/2 = (2, 6), on [0,
         // 10].
-        let spline = interpolate(&[[0.0, 0.0], [3.0, 4.0], [8.0, 4.0]], End::Free, End::Free);
+        let spline =
+            interpolate(&[[0.0, 0.0], [3.0, 4.0], [8.0, 4.0]], EndCondition::Free, EndCondition::Free);
         assert!(close(&spline.tangent[0], &[2.0 * 2.0 / 10.0, 2.0 * 6.0 / 10.0]));
         assert!(close(&spline.tangent[2], &[2.0 * 6.0 / 10.0, -2.0 * 2.0 / 10.0]));
     }
 
     #[test]
     fn one_step_takes_one_free_tangent_from_the_other() {
-        let spline = interpolate(&[[0.0, 0.0], [2.0, 0.0]], End::Tangent([1.0, 0.5]), End::Free);
+        let spline =
+            interpolate(&[[0.0, 0.0], [2.0, 0.0]], EndCondition::Tangent([1.0, 0.5]), EndCondition::Free);
         assert!(close(&spline.slope[0], &[1.0, 0.0]));
         assert!(close(&spline.tangent[1], &[1.0, -0.5]));
-        let spline = interpolate(&[[0.0, 0.0], [2.0, 0.0]], End::Free, End::Tangent([1.0, -0.5]));
+        let spline =
+            interpolate(&[[0.0, 0.0], [2.0, 0.0]], EndCondition::Free, EndCondition::Tangent([1.0, -0.5]));
         assert!(close(&spline.tangent[0], &[1.0, 0.5]));
     }
 
@@ -139,7 +149,8 @@ mod tests {
         let error = |count: usize| {
             let turn = |i: usize| std::f64::consts::PI * i as f64 / count as f64;
             let points: Vec<[f64; 2]> = (0..=count).map(|i| [turn(i).cos(), turn(i).sin()]).collect();
-            let spline = interpolate(&points, End::Tangent([0.0, 1.0]), End::Tangent([0.0, -1.0]));
+            let spline =
+                interpolate(&points, EndCondition::Tangent([0.0, 1.0]), EndCondition::Tangent([0.0, -1.0]));
             let middle = count / 2;
             let [x, y] = spline.tangent[middle];
             // At the top the tangent is (−1, 0), by symmetry in direction; its length tells the error.
@@ -161,7 +172,7 @@ mod tests {
                 let size = 10.0_f64.powf(size);
                 points.push([x + size * angle.cos(), y + size * angle.sin()]);
             }
-            let end = |given: bool, tangent| if given { End::Tangent(tangent) } else { End::Free };
+            let end = |given: bool, tangent| if given { EndCondition::Tangent(tangent) } else { EndCondition::Free };
             let Spline { step, slope, tangent } =
                 interpolate(&points, end(ends.0, [1.0, 0.0]), end(ends.1, [0.0, 1.0]));
             for j in 0..step.len() {

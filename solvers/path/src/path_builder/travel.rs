@@ -1,15 +1,16 @@
-//! The first place of a path that an axis cannot reach.
+//! The first place of a program and its path that an axis cannot reach, from the travel of the axes.
 
 use rayon::prelude::*;
 
-use super::Part;
-use crate::follow::{Moves, Shape};
+use super::Chunk;
+use crate::program_pieces::{Moves, Shape};
+use crate::tolerance::TRAVEL;
 use feedplan_geometry::spline::{bezier, CompositeCurve, Piece};
 
-/// Halvings of a piece of a spline; the hull comes nearer to the curve by a factor of four each time.
+/// Halvings of a spline piece at most; each brings the control polygon four times nearer to the curve.
 const DEPTH: u32 = 26;
 
-/// A position that an axis cannot reach.
+/// A position that an axis cannot reach: the move, the axis and the position in mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outside {
     pub index: usize,
@@ -17,21 +18,19 @@ pub struct Outside {
     pub position: f64,
 }
 
-/// The first position outside the travel: of the moves as programmed, and of the path, whose arcs may be as far
-/// beyond as they deviate.
+/// The first position outside the travel, on the moves as programmed and on the path. A piece of an arc may be outside by
+/// its deviation, for the arc itself is checked.
 pub fn outside<const M: usize>(
-    parts: &[Part<M>],
+    chunks: &[Chunk<M>],
     moves: &Moves<M>,
     travel: &[[f64; 2]; M],
 ) -> Option<Outside> {
-    // Positions come from sums of offsets; a nanometre more is no fault.
-    const SLACK: f64 = 1e-6;
     if travel.iter().flatten().all(|limit| limit.is_infinite()) {
         return None;
     }
     let beyond = |index: usize, axis: usize, (least, greatest): (f64, f64), bulge: f64| {
         let [low, high] = travel[axis];
-        let slack = SLACK + bulge;
+        let slack = TRAVEL + bulge;
         if least < low - slack {
             Some(Outside { index, axis, position: least })
         } else if greatest > high + slack {
@@ -41,32 +40,32 @@ pub fn outside<const M: usize>(
         }
     };
     // Only joints have a travel.
-    let judged = |index: usize| moves.joints[index];
+    let has_travel = |index: usize| moves.joints[index];
     let targets = moves.target.par_iter().enumerate().find_map_first(|(index, target)| {
-        if !judged(index) {
+        if !has_travel(index) {
             return None;
         }
         (0..M).find_map(|axis| beyond(index, axis, (target[axis], target[axis]), 0.0))
     });
     let arcs = moves.arcs.par_iter().find_map_first(|&(index, shape)| {
-        if !judged(index) {
+        if !has_travel(index) {
             return None;
         }
         shape.plane.iter().find_map(|&axis| beyond(index, axis, moves.arc_extent(index, axis)?, 0.0))
     });
-    let curves = parts.par_iter().find_map_first(|part| {
-        part.pieces.iter().find_map(|followed| {
-            let bulge = if followed.arc { followed.deviation } else { 0.0 };
-            let index = followed.first as usize;
-            if !judged(index) {
+    let curves = chunks.par_iter().find_map_first(|chunk| {
+        chunk.pieces.iter().find_map(|piece| {
+            let bulge = if piece.arc { piece.deviation } else { 0.0 };
+            let index = piece.first as usize;
+            if !has_travel(index) {
                 return None;
             }
-            (0..M).find_map(|axis| match &followed.piece {
+            (0..M).find_map(|axis| match &piece.shape {
                 Shape::Conic(conic) => beyond(index, axis, conic.extent(axis), bulge),
                 Shape::Spline(spline) => {
                     let [low, high] = travel[axis];
-                    let piece = part.spline(spline, moves.splines);
-                    let position = beyond_hull(&piece, axis, low - SLACK, high + SLACK, DEPTH)?;
+                    let piece = chunk.spline(spline, moves.splines);
+                    let position = position_outside(&piece, axis, low - TRAVEL, high + TRAVEL, DEPTH)?;
                     Some(Outside { index, axis, position })
                 }
             })
@@ -75,9 +74,9 @@ pub fn outside<const M: usize>(
     [targets, arcs, curves].into_iter().flatten().min_by_key(|place| place.index)
 }
 
-/// A value of an axis on a piece below `low` or above `high`. The control points enclose the piece; where they are
-/// beyond and its ends are not, its halves are looked at.
-fn beyond_hull<const M: usize>(
+/// A position of an axis on a piece below `low` or above `high`. The control points enclose the piece. If some of them are
+/// beyond and both ends are not, the halves are examined.
+fn position_outside<const M: usize>(
     piece: &Piece<M>,
     axis: usize,
     low: f64,
@@ -97,7 +96,7 @@ fn beyond_hull<const M: usize>(
     }
     let mut halves = CompositeCurve::default();
     bezier::split(piece, &[0.5 * piece.width], &mut halves);
-    (0..2).find_map(|i| beyond_hull(&halves.piece(i), axis, low, high, depth - 1))
+    (0..2).find_map(|i| position_outside(&halves.piece(i), axis, low, high, depth - 1))
 }
 
 #[cfg(test)]
@@ -105,7 +104,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_hull_beyond_the_limit_is_halved_until_the_curve_says() {
+    fn a_polygon_beyond_the_limit_is_halved_until_the_curve_is_known() {
         // The polygons reach 2, the parabola 1 of it and the conic w/(1 + w) of it.
         let mut curve = CompositeCurve::<1>::default();
         curve.push(&[[0.0], [2.0], [0.0]], &[], 1.0);
@@ -113,10 +112,10 @@ mod tests {
         bezier::elevate(&parabola.piece(0), 1, &mut curve);
         curve.push(&[[0.0], [2.0], [0.0]], &[1.0, 3.0, 1.0], 1.0);
         for (piece, apex) in curve.pieces().zip([1.0, 1.0, 1.5]) {
-            assert_eq!(beyond_hull(&piece, 0, -0.1, apex + 1e-9, DEPTH), None);
-            let found = beyond_hull(&piece, 0, -0.1, apex - 1e-9, DEPTH).unwrap();
+            assert_eq!(position_outside(&piece, 0, -0.1, apex + 1e-9, DEPTH), None);
+            let found = position_outside(&piece, 0, -0.1, apex - 1e-9, DEPTH).unwrap();
             assert!(found > apex - 1e-9 && found <= apex);
-            assert_eq!(beyond_hull(&piece, 0, 0.1, 2.0, DEPTH), Some(0.0));
+            assert_eq!(position_outside(&piece, 0, 0.1, 2.0, DEPTH), Some(0.0));
         }
     }
 }

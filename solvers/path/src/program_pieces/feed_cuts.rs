@@ -1,15 +1,14 @@
-//! Cuts a fitted piece where it passes the points at which the feed changes.
+//! Cuts a fitted piece at the points where the feed changes, so that each part has one feed.
 //!
-//! Every part gets one feed, and none is faster than a block it covers: a chord counts for a part if the curve is
-//! nearest to some of it there. In a zigzag below the tolerance that can be several parts, out of order.
+//! The feed of a part is the least of the chords that it covers: those of which some point has its nearest point of the
+//! curve there. In a zigzag below the tolerance a chord can be covered by several parts, out of order.
 
 use crate::fit::FittedPiece;
+use crate::tolerance::SLIVER;
 use feedplan_geometry::quadratic::{dot, norm, sub, Quadratic};
 
-/// Parts of a piece that are shorter than this share of it are not cut off.
-const SLIVER: f64 = 1e-6;
-
-/// Cuts a piece; `emit` gets each part, its first and last chord and its feed. `feed[i]` is that of chord i.
+/// Calls `emit` for each part of a piece in order, with its first and last chord and its feed; `feed[i]` is the feed of
+/// chord i.
 pub fn cut_at_feeds<const M: usize>(
     fit: &FittedPiece<M>,
     points: &[[f64; M]],
@@ -23,8 +22,8 @@ pub fn cut_at_feeds<const M: usize>(
     }
     let width = piece.width;
     let inner: Vec<f64> = (first + 1..=last).map(|k| nearest(&piece, &points[k])).collect();
-    // For each chord, the last place of the curve nearest to it or to one before, and the first nearest to it or to
-    // one after.
+    // For each chord: the greatest parameter nearest to a point of it or of a chord before, and the least one nearest to a
+    // point of it or of a chord after.
     let (mut reached, mut left) = (inner.clone(), inner.clone());
     reached.push(width);
     left.insert(0, 0.0);
@@ -34,7 +33,7 @@ pub fn cut_at_feeds<const M: usize>(
     for i in (1..left.len()).rev() {
         left[i - 1] = left[i - 1].min(left[i]);
     }
-    // No chord is left out, though all of it may be nearest to the one place of a cut or of an end.
+    // Each chord is covered by some part, even if all of it is nearest to a cut or an end.
     let mut next = first;
     let mut part = |begin: f64, end: f64| {
         let from = next.min(first + reached.partition_point(|&u| u <= begin));
@@ -54,8 +53,8 @@ pub fn cut_at_feeds<const M: usize>(
     part(begin, width);
 }
 
-/// The parameter at which a piece comes nearest to a point: the best of a few samples, then bisection of the
-/// derivative of the distance around it.
+/// The parameter at which a piece is nearest to a point: by bisection of the derivative of the distance, around the best of
+/// a few samples.
 fn nearest<const M: usize>(piece: &Quadratic<M>, point: &[f64; M]) -> f64 {
     const SAMPLES: usize = 8;
     let (start, end) = piece.end_tangents();

@@ -1,12 +1,10 @@
-//! What a piece of a path is: a conic, or a piece of a spline, as programmed or as corners cut and bent it.
+//! The shape of a path's piece: a conic, or a piece of a spline, as programmed, fitted, or cut and bent at a corner.
 
+use crate::tolerance;
 use feedplan_geometry::conic::Conic;
 use feedplan_geometry::quadratic::{norm, sub};
 use feedplan_geometry::spline::cusps::rests_at_ends;
 use feedplan_geometry::spline::{bezier, CompositeCurve, Piece};
-
-/// Edges of a control polygon that are shorter than this part of it are none, as next to a cusp.
-const VANISHING: f64 = 1e-12;
 
 #[derive(Clone, Copy, Debug)]
 pub enum Shape<const M: usize> {
@@ -14,23 +12,23 @@ pub enum Shape<const M: usize> {
     Spline(Spline<M>),
 }
 
-/// A piece of a spline, known by its number, and what its neighbours have to know of it.
+/// A piece of a spline by its number, and what blends need of its ends.
 #[derive(Clone, Copy, Debug)]
 pub struct Spline<const M: usize> {
-    /// Which piece: of the program's splines, or where `made`, of those that its corners made.
+    /// The number of the piece in the program's splines, or if `made` in those of its chunk.
     pub index: u32,
     pub made: bool,
     pub width: f64,
     start: [f64; M],
-    /// The edges of the control polygon at both ends that have a length.
+    /// The first and the last edge of the control polygon that has a direction.
     start_edge: [f64; M],
     end_edge: [f64; M],
-    /// The tool rests there, in a cusp.
+    /// Whether the tool rests at the start and at the end, in a cusp.
     rests: [bool; 2],
 }
 
 impl<const M: usize> Spline<M> {
-    /// Piece `index` of a program's splines, its width scaled; None where it has no length.
+    /// Piece `index` of a program's splines with its width scaled; None if it has no length.
     pub fn new(splines: &CompositeCurve<M>, index: usize, scale: f64) -> Option<Self> {
         let piece = splines.piece(index);
         Self::of(&piece, index, false, piece.width * scale)
@@ -39,7 +37,7 @@ impl<const M: usize> Spline<M> {
     fn of(piece: &Piece<M>, index: usize, made: bool, width: f64) -> Option<Self> {
         let edges = || piece.control.windows(2).map(|pair| sub(&pair[1], &pair[0]));
         let (extent, _) = piece.extent();
-        let long = |edge: &[f64; M]| norm(edge) > VANISHING * extent;
+        let long = |edge: &[f64; M]| norm(edge) > tolerance::NO_DIRECTION * extent;
         let (start_edge, end_edge) = (edges().find(long)?, edges().rev().find(long)?);
         Some(Self {
             index: index as u32,
@@ -52,8 +50,8 @@ impl<const M: usize> Spline<M> {
         })
     }
 
-    /// The part between two places in [0, width] as a made piece that can be bent, so of degree 2 or more;
-    /// `splines` are the program's.
+    /// The part on [low, high], appended to `made` with degree 2 or more, so that it can be bent; `splines` are the
+    /// program's.
     pub fn part(
         &self,
         splines: &CompositeCurve<M>,
@@ -73,7 +71,7 @@ impl<const M: usize> Spline<M> {
         Self::of(&made.piece(index), index, true, high - low)
     }
 
-    /// The last of the made pieces, its width as it is; None where it has no length.
+    /// The last of the made pieces; None if it has no length.
     pub fn last_made(made: &CompositeCurve<M>) -> Option<Self> {
         let index = made.len().checked_sub(1)?;
         let piece = made.piece(index);
@@ -104,7 +102,7 @@ impl<const M: usize> Shape<M> {
         }
     }
 
-    /// An edge of the control polygon along the tangent at the start.
+    /// An edge of the control polygon in the direction of the tangent at the start.
     #[inline]
     pub fn start_edge(&self) -> [f64; M] {
         match self {
@@ -113,7 +111,7 @@ impl<const M: usize> Shape<M> {
         }
     }
 
-    /// The same at the end.
+    /// An edge of the control polygon in the direction of the tangent at the end.
     #[inline]
     pub fn end_edge(&self) -> [f64; M] {
         match self {
@@ -122,7 +120,7 @@ impl<const M: usize> Shape<M> {
         }
     }
 
-    /// Whether it begins and ends in a cusp, where the tool rests.
+    /// Whether the tool rests at the start and at the end, in a cusp.
     #[inline]
     pub fn rests(&self) -> [bool; 2] {
         match self {

@@ -1,10 +1,9 @@
-//! The quadratics from knot to knot, written down half a step at a time.
+//! The quadratic pieces of a spline from knot to knot, made half a step at a time.
 
-use super::certificate::Segment;
 use super::{Chain, FittedPiece};
-use feedplan_geometry::quadratic::Quadratic;
+use feedplan_geometry::quadratic::{Quadratic, Segment};
 
-/// The line from point `a` to point `b`, all between being on it.
+/// The line from point `a` to point `b`, with its distance from the points between.
 pub fn line<const M: usize>(chain: &Chain<M>, a: usize, b: usize, spline: u32) -> FittedPiece<M> {
     let points = chain.points;
     let segment = Segment::new(&points[a], &points[b]);
@@ -13,29 +12,29 @@ pub fn line<const M: usize>(chain: &Chain<M>, a: usize, b: usize, spline: u32) -
     FittedPiece { piece: Quadratic::line(points[a], points[b]), first: a, last: b - 1, deviation, spline }
 }
 
-/// Position and direction on the way along one spline.
-pub struct Pen<const M: usize> {
+/// The place that the pieces of one spline have reached, and what is known of the next piece.
+pub struct PieceBuilder<const M: usize> {
     pub point: [f64; M],
     pub tangent: [f64; M],
-    /// The chord that the next piece starts on.
+    /// The chord on which the next piece starts.
     pub chord: usize,
     pub spline: u32,
-    /// Since the last knot.
+    /// Since the last knot, as is the deviation in mm.
     pub width: f64,
     pub deviation: f64,
 }
 
-impl<const M: usize> Pen<M> {
-    /// Passes one half of a step.
+impl<const M: usize> PieceBuilder<M> {
+    /// Adds half a step to the next piece.
     pub fn pass(&mut self, width: f64, deviation: f64) {
         self.width += width;
         self.deviation = self.deviation.max(deviation);
     }
 
-    /// The piece that ends here, on chord `last`; the next one starts on chord `next`.
+    /// The piece that ends at `point`, on chord `last`; the next one starts on chord `next`.
     pub fn piece(&mut self, point: [f64; M], tangent: [f64; M], last: usize, next: usize) -> FittedPiece<M> {
         let quarter = 0.25 * self.width;
-        // From both ends alike, so that a reversed chain gives the same piece.
+        // The mean of both ends, so that a reversed chain gives the same piece.
         let middle = std::array::from_fn(|k| {
             0.5 * (self.point[k] + point[k]) + quarter * (self.tangent[k] - tangent[k])
         });

@@ -1,32 +1,28 @@
-//! How the tangent jumps at a corner, and how long rounding it may be.
+//! The jump of the unit tangent at a corner, and the length of the blend that it allows, from the pieces on both sides.
 
 use super::Rounding;
-use crate::follow::Shape;
+use crate::program_pieces::Shape;
+use crate::tolerance;
 use feedplan_geometry::quadratic::norm;
 
-/// Corners that turn back are passed at rest anyway: no rounding where cos(turn/2) is below this (177.7°).
-const LEAST_COSINE: f64 = 0.02;
-/// A corner gets this many times the length that passing it at the feed asks of the axis accelerations, so that
-/// what the sides themselves ask is left to them.
+/// A blend gets this many times the length at which it takes the full acceleration of an axis at the feed, so that the
+/// sides have some left for themselves.
 const EASE: f64 = 8.0;
-/// A unit tangent of an edge e carries an error of some eps·|C|/e, |C| being the size of the coordinates. Turns
-/// below this many times that are no corners, and the rounding of a corner is at least this much longer.
-const ROUNDING: f64 = 16.0;
-/// Turns below this (rad) are no corners.
-const SMOOTH: f64 = 1e-9;
+/// The shortest blend in errors of a coordinate.
+const SHORTEST: f64 = 16.0;
 
-/// How the tangent jumps where two pieces meet.
+/// The jump of the unit tangent where two pieces meet.
 #[derive(Clone, Copy, Debug)]
-pub struct Jump<const M: usize> {
+pub struct TangentJump<const M: usize> {
     /// t₊ − t₋.
     pub change: [f64; M],
     /// |t₊ − t₋| = 2 sin(turn/2).
     pub size: f64,
-    /// Errors of rounding in a length here, in mm.
+    /// Error of a length here by the rounding of coordinates, in mm.
     pub rounding: f64,
 }
 
-impl<const M: usize> Jump<M> {
+impl<const M: usize> TangentJump<M> {
     /// The jump between two pieces, None where a piece ends without a tangent.
     pub fn new(before: &Shape<M>, after: &Shape<M>) -> Option<Self> {
         let (out, into) = (before.end_edge(), after.start_edge());
@@ -36,21 +32,21 @@ impl<const M: usize> Jump<M> {
         }
         let change = std::array::from_fn(|k| into[k] / edge_into - out[k] / edge_out);
         let coordinate = after.start().iter().fold(0.0, |a: f64, b| a.max(b.abs()));
-        Some(Self { change, size: norm(&change), rounding: ROUNDING * f64::EPSILON * coordinate })
+        Some(Self { change, size: norm(&change), rounding: tolerance::COORDINATE * coordinate })
     }
 
-    /// The pieces meet smoothly, as far as their coordinates can tell.
+    /// Whether the pieces meet smoothly, up to the rounding of their coordinates.
     pub fn is_smooth(&self, before: &Shape<M>, after: &Shape<M>) -> bool {
         let (out, into) = (before.end_edge(), after.start_edge());
-        self.size <= SMOOTH + self.rounding / norm(&out).min(norm(&into))
+        self.size <= tolerance::SAME_DIRECTION + self.rounding / norm(&out).min(norm(&into))
     }
 
-    /// The path turns back on itself.
+    /// Whether the path turns back on itself.
     pub fn reverses(&self) -> bool {
-        self.size * self.size >= 4.0 * (1.0 - LEAST_COSINE * LEAST_COSINE)
+        self.size * self.size >= 4.0 * (1.0 - tolerance::REVERSAL_COSINE.powi(2))
     }
 
-    /// The length beyond which a corner between two pieces, passed at `feed`, has nothing to gain, in mm.
+    /// The length in mm beyond which a longer blend is not faster, at `feed`.
     pub fn length_for(
         &self,
         sides: [&Shape<M>; 2],
@@ -73,7 +69,7 @@ impl<const M: usize> Jump<M> {
         (1.0 - 0.25 * self.size * self.size).max(0.0).sqrt()
     }
 
-    /// The length at which the curve is as far from the corner as `deviation`.
+    /// The length of the blend that deviates by `deviation`, in mm.
     pub fn length_within(&self, deviation: f64, rounding: Rounding) -> f64 {
         match rounding {
             Rounding::Parabola => 4.0 * deviation / self.size,
@@ -81,12 +77,12 @@ impl<const M: usize> Jump<M> {
         }
     }
 
-    /// The length is too short to be told from errors of rounding.
+    /// Whether a length is too short to be told from rounding.
     pub fn vanishes(&self, length: f64) -> bool {
-        length <= ROUNDING * self.rounding || length <= 0.0
+        length <= SHORTEST * self.rounding || length <= 0.0
     }
 
-    /// The displacement of the corner for the lengths of its two sides.
+    /// The displacement D of the corner for the lengths of its two sides, in mm.
     pub fn displacement(&self, before: f64, after: f64) -> [f64; M] {
         self.change.map(|x| x / (2.0 / before + 2.0 / after))
     }
@@ -101,12 +97,12 @@ mod tests {
     fn what_rounding_does_is_no_corner_and_a_small_turn_is() {
         let smooth = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
             let (before, after) = (Shape::Conic(Conic::line(a, b)), Shape::Conic(Conic::line(b, c)));
-            Jump::new(&before, &after).unwrap().is_smooth(&before, &after)
+            TangentJump::new(&before, &after).unwrap().is_smooth(&before, &after)
         };
         assert!(smooth([0.1, 0.1], [0.2, 0.2], [0.7, 0.7]));
         assert!(smooth([1e5, 1e5], [1e5 + 1e-6, 1e5 + 1e-6], [1e5 + 3e-6, 1e5 + 3e-6]));
         assert!(!smooth([0.0, 0.0], [1.0, 0.0], [2.0, 1e-8]));
         let (there, back) = (Conic::line([0.0], [1.0]), Conic::line([1.0], [0.0]));
-        assert!(Jump::new(&Shape::Conic(there), &Shape::Conic(back)).unwrap().reverses());
+        assert!(TangentJump::new(&Shape::Conic(there), &Shape::Conic(back)).unwrap().reverses());
     }
 }

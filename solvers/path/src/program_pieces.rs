@@ -1,7 +1,7 @@
-//! The moves of a program as pieces, corners still sharp: lines, arcs, splines and fitted chains of lines.
+//! The moves of a program as pieces with sharp corners: lines, arcs, splines, and splines fitted to chains of lines.
 //!
-//! A chain is a maximal sequence of feed moves along lines that may be fitted together: one tolerance, no
-//! halt in between. A change of feed inside a chain leaves the curve whole; `feed_cuts` cuts its pieces.
+//! A chain is a maximal sequence of G1 lines with one tolerance and no halt. A change of feed does not end it: its curve
+//! stays whole, and a piece is cut where the feed changes (`feed_cuts`).
 
 mod chords;
 mod feed_cuts;
@@ -28,7 +28,7 @@ pub const LINE: u8 = 1;
 pub const ARC: u8 = 2;
 pub const SPLINE: u8 = 3;
 
-/// Moves in plain sequence that one task takes at most.
+/// Moves outside of chains that one task takes at most.
 const TASK: usize = 4096;
 
 /// A program in columns, one row per move, at most 2³² of them; lengths in mm, speeds in mm/s.
@@ -37,20 +37,21 @@ pub struct Moves<'a, const M: usize> {
     pub kind: &'a [u8],
     pub target: &'a [[f64; M]],
     pub feed: &'a [f64],
-    /// Distance allowed between path and program; 0 asks for the exact path.
+    /// Allowed distance between path and program in mm; 0 asks for the exact path.
     pub tolerance: &'a [f64],
-    /// The share of it that the fit may use; 0 keeps lines lines.
+    /// The part of it that the fit of chains may use, in mm; 0: lines are not fitted.
     pub fit_tolerance: &'a [f64],
-    /// The tool stands still after the move.
+    /// Whether the tool stops at the end of the move.
     pub halt: &'a [bool],
     /// Arcs with the index of their move, ascending; start and end are taken from the moves.
     pub arcs: &'a [(usize, ArcShape)],
     /// Spline moves, ascending, with the pieces of `splines` that they take, from the start to the target.
     pub spline_moves: &'a [(usize, Range<usize>)],
-    /// Moves that begin elsewhere than the one before ends, ascending, and where: there the axes mean something else.
+    /// Moves that begin elsewhere than the one before ends, ascending, with their starts: there words change their
+    /// meaning.
     pub changes: &'a [(usize, [f64; M])],
     pub splines: &'a CompositeCurve<M>,
-    /// The coordinates are positions of joints, which have a travel.
+    /// Whether the coordinates are positions of joints, which have a travel.
     pub joints: &'a [bool],
 }
 
@@ -64,49 +65,49 @@ pub struct ArcShape {
 
 /// How moves become pieces.
 #[derive(Clone, Copy, Debug)]
-pub struct FollowOptions {
+pub struct PathOptions {
     /// Distance from arcs that no circle meets and from helices, in mm.
     pub exact_tolerance: f64,
     /// Chords longer than this stay lines, in mm.
     pub max_chord: f64,
-    /// α a_max in mm/s²: where the curvature of a chain exceeds this over F² it is broken.
+    /// α a_max in mm/s²: a chain is broken where its curvature exceeds this over the square of the feed.
     pub corner_acceleration: f64,
-    /// No chain is faster than this, whatever its feed, in mm/s.
+    /// The speed that no chain exceeds, whatever its feed, in mm/s.
     pub max_speed: f64,
-    /// Chains are smooth where they turn less than this, in rad.
+    /// Chains stay smooth where they turn by less than this, in rad.
     pub corner_angle: f64,
     /// What corners between two lines become.
     pub rounding: Rounding,
 }
 
-/// A piece and the moves it follows.
+/// A piece of a path, and the moves that it goes along.
 #[derive(Clone, Copy, Debug)]
-pub struct Followed<const M: usize> {
-    pub piece: Shape<M>,
+pub struct PathPiece<const M: usize> {
+    pub shape: Shape<M>,
     /// First and last move.
     pub first: u32,
     pub last: u32,
     pub feed: f64,
-    /// Upper bound of the distance from the moves, both ways.
+    /// Upper bound of the distance from the moves, both ways, in mm.
     pub deviation: f64,
-    /// Allowed distance.
+    /// Allowed distance in mm.
     pub tolerance: f64,
-    /// The moves ask for the exact path.
+    /// Whether the moves ask for the exact path.
     pub exact: bool,
-    /// The piece stands for an arc: it may lie as far outside the box around it as it deviates.
+    /// Whether the piece is one of an arc, whose extent is checked as programmed.
     pub arc: bool,
 }
 
-/// A move that cannot be followed.
+/// A move that has no path.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FollowError {
+pub struct MoveError {
     pub index: usize,
-    pub fault: Fault,
+    pub fault: MoveFault,
 }
 
-/// What is wrong with it.
+/// What is wrong with a move.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Fault {
+pub enum MoveFault {
     /// The move has no length, or a coordinate is not finite.
     Length,
     /// The feed is not positive.
@@ -116,19 +117,18 @@ pub enum Fault {
     Spline,
 }
 
-/// The pieces of a program and what was fitted.
-pub struct FollowedProgram<const M: usize> {
-    pub pieces: Vec<Followed<M>>,
-    /// Chords that were given to the fit, splines and polynomials that came back.
+/// The pieces of a program, and the numbers of fitted chords, of splines fitted to them, and of their polynomials.
+pub struct ProgramPieces<const M: usize> {
+    pub pieces: Vec<PathPiece<M>>,
     pub points: usize,
     pub splines: usize,
     pub polynomials: usize,
 }
 
 /// Consecutive moves that one task turns into pieces.
-enum Span {
-    Plain(usize, usize),
-    Chain(usize, usize),
+enum Task {
+    OneByOne(Range<usize>),
+    Chain(Range<usize>),
 }
 
 impl<const M: usize> Moves<'_, M> {
@@ -143,7 +143,7 @@ impl<const M: usize> Moves<'_, M> {
         }
     }
 
-    /// Move `i` may be fitted together with the move before.
+    /// Whether move `i` is in one chain with the move before.
     fn chained(&self, i: usize) -> bool {
         let fitted =
             |k: usize| self.kind[k] == LINE && self.fit_tolerance[k] > 0.0 && self.tolerance[k] > 0.0;
@@ -154,49 +154,46 @@ impl<const M: usize> Moves<'_, M> {
             && self.fit_tolerance[i - 1] == self.fit_tolerance[i]
     }
 
-    fn spans(&self) -> Vec<Span> {
+    fn tasks(&self) -> Vec<Task> {
         let count = self.kind.len();
-        let mut spans = Vec::new();
-        let (mut plain, mut i) = (0, 0);
+        let mut tasks = Vec::new();
+        let (mut single, mut i) = (0, 0);
         while i < count {
             let mut end = i + 1;
             while end < count && self.chained(end) {
                 end += 1;
             }
             let chain = end - i > 1;
-            if (chain || i - plain == TASK) && plain < i {
-                spans.push(Span::Plain(plain, i));
-                plain = i;
+            if (chain || i - single == TASK) && single < i {
+                tasks.push(Task::OneByOne(single..i));
+                single = i;
             }
             if chain {
-                spans.push(Span::Chain(i, end));
-                plain = end;
+                tasks.push(Task::Chain(i..end));
+                single = end;
             }
             i = end;
         }
-        if plain < count {
-            spans.push(Span::Plain(plain, count));
+        if single < count {
+            tasks.push(Task::OneByOne(single..count));
         }
-        spans
+        tasks
     }
 
-    fn check(&self, i: usize) -> Result<(), FollowError> {
+    /// Whether move `i` has a feed, and if it is a line a length.
+    fn check(&self, i: usize) -> Result<(), MoveError> {
         let length = norm(&sub(&self.target[i], &self.origin(i)));
-        let open = self.kind[i] != ARC && self.kind[i] != SPLINE;
-        if open && !(length > 0.0 && length.is_finite()) {
-            return Err(FollowError { index: i, fault: Fault::Length });
+        let straight = self.kind[i] != ARC && self.kind[i] != SPLINE;
+        if straight && !(length > 0.0 && length.is_finite()) {
+            return Err(MoveError { index: i, fault: MoveFault::Length });
         }
-        // A NaN must not pass, so the comparison asks for what is right.
-        let good = self.kind[i] == RAPID || self.feed[i] > 0.0;
-        if good {
-            Ok(())
-        } else {
-            Err(FollowError { index: i, fault: Fault::Feed })
-        }
+        // NaN is no feed either.
+        let has_feed = self.kind[i] == RAPID || self.feed[i] > 0.0;
+        has_feed.then_some(()).ok_or(MoveError { index: i, fault: MoveFault::Feed })
     }
 
     /// The arc of move `i`.
-    fn arc(&self, i: usize) -> Result<Arc<M>, FollowError> {
+    fn arc(&self, i: usize) -> Result<Arc<M>, MoveError> {
         let row = self.arcs.partition_point(|(index, _)| *index < i);
         match self.arcs.get(row) {
             Some((index, ArcShape { plane, centre, sweep })) if *index == i => Ok(Arc {
@@ -206,16 +203,16 @@ impl<const M: usize> Moves<'_, M> {
                 plane: *plane,
                 sweep: *sweep,
             }),
-            _ => Err(FollowError { index: i, fault: Fault::Arc(ArcError::Sweep) }),
+            _ => Err(MoveError { index: i, fault: MoveFault::Arc(ArcError::Sweep) }),
         }
     }
 
-    /// The pieces of spline move `i` that have a length, with widths that together are about the length.
-    fn spline(&self, i: usize) -> Result<impl Iterator<Item = Spline<M>> + '_, FollowError> {
+    /// The pieces of spline move `i` that have a length, with widths whose sum is about the length of the spline.
+    fn spline(&self, i: usize) -> Result<impl Iterator<Item = Spline<M>> + '_, MoveError> {
         let row = self.spline_moves.partition_point(|(index, _)| *index < i);
         let range = match self.spline_moves.get(row) {
             Some((index, range)) if *index == i => range.clone(),
-            _ => return Err(FollowError { index: i, fault: Fault::Spline }),
+            _ => return Err(MoveError { index: i, fault: MoveFault::Spline }),
         };
         let sum = |length: f64, width: f64, piece: usize| {
             let piece = self.splines.piece(piece);
@@ -224,9 +221,9 @@ impl<const M: usize> Moves<'_, M> {
         };
         let (length, width) = range.clone().fold((0.0, 0.0), |(a, b), piece| sum(a, b, piece));
         if !(length > 0.0 && length.is_finite()) {
-            return Err(FollowError { index: i, fault: Fault::Length });
+            return Err(MoveError { index: i, fault: MoveFault::Length });
         }
-        // One factor for all keeps the derivatives continuous.
+        // One factor for all pieces keeps the derivatives continuous.
         let scale = length / width;
         Ok(range.filter_map(move |piece| Spline::new(self.splines, piece, scale)))
     }
@@ -238,27 +235,30 @@ impl<const M: usize> Moves<'_, M> {
     }
 }
 
-/// Every move as pieces, in order.
-pub fn follow<const M: usize>(
+/// The pieces of all moves, in order.
+pub fn program_pieces<const M: usize>(
     moves: &Moves<M>,
-    options: &FollowOptions,
+    options: &PathOptions,
     watch: Watch,
-) -> Result<FollowedProgram<M>, FollowError> {
+) -> Result<ProgramPieces<M>, MoveError> {
     let each = watch.each(moves.kind.len());
     let parts: Vec<_> = moves
-        .spans()
+        .tasks()
         .into_par_iter()
-        .map(|span| match span {
-            Span::Plain(first, end) => {
-                each.advance(end - first);
-                plain(moves, options, first, end)
+        .map(|task| match task {
+            Task::OneByOne(range) => {
+                each.advance(range.len());
+                one_by_one(moves, options, range)
             }
-            Span::Chain(first, end) => chain(moves, options, first, end, each.part((end - first) as f64)),
+            Task::Chain(range) => {
+                let watch = each.part(range.len() as f64);
+                chain(moves, options, range, watch)
+            }
         })
         .collect::<Result<_, _>>()?;
     let total = parts.iter().map(|part| part.pieces.len()).sum();
     let mut whole =
-        FollowedProgram { pieces: Vec::with_capacity(total), points: 0, splines: 0, polynomials: 0 };
+        ProgramPieces { pieces: Vec::with_capacity(total), points: 0, splines: 0, polynomials: 0 };
     for part in parts {
         whole.pieces.extend_from_slice(&part.pieces);
         whole.points += part.points;
@@ -268,60 +268,67 @@ pub fn follow<const M: usize>(
     Ok(whole)
 }
 
-/// Moves one by one: lines and arcs.
-fn plain<const M: usize>(
+/// The pieces of moves that are not fitted.
+fn one_by_one<const M: usize>(
     moves: &Moves<M>,
-    options: &FollowOptions,
-    first: usize,
-    end: usize,
-) -> Result<FollowedProgram<M>, FollowError> {
-    let mut pieces = Vec::with_capacity(end - first);
-    for i in first..end {
+    options: &PathOptions,
+    range: Range<usize>,
+) -> Result<ProgramPieces<M>, MoveError> {
+    let mut pieces = Vec::with_capacity(range.len());
+    for i in range {
         moves.check(i)?;
         let exact = moves.tolerance[i] <= 0.0;
         let tolerance = if exact { options.exact_tolerance } else { moves.tolerance[i] };
         let feed = if moves.kind[i] == RAPID { f64::INFINITY } else { moves.feed[i] };
-        let piece = Shape::Conic(Conic::line(moves.origin(i), moves.target[i]));
+        let shape = Shape::Conic(Conic::line(moves.origin(i), moves.target[i]));
         let index = i as u32;
-        let line =
-            Followed { piece, first: index, last: index, feed, deviation: 0.0, tolerance, exact, arc: false };
+        let line = PathPiece {
+            shape,
+            first: index,
+            last: index,
+            feed,
+            deviation: 0.0,
+            tolerance,
+            exact,
+            arc: false,
+        };
         if moves.kind[i] == SPLINE {
-            pieces.extend(moves.spline(i)?.map(|spline| Followed { piece: Shape::Spline(spline), ..line }));
+            pieces.extend(moves.spline(i)?.map(|spline| PathPiece { shape: Shape::Spline(spline), ..line }));
             continue;
         }
         if moves.kind[i] != ARC {
             pieces.push(line);
             continue;
         }
-        // Arcs take half of what there is, so that joints with their neighbours can be smoothed as well.
+        // The other half is left for blends with the neighbours.
         let budget = 0.5 * tolerance.min(options.exact_tolerance);
         let (arc, deviation) = arc_pieces(&moves.arc(i)?, budget)
-            .map_err(|error| FollowError { index: i, fault: Fault::Arc(error) })?;
-        pieces.extend(arc.into_iter().map(|piece| Followed {
-            piece: Shape::Conic(piece),
+            .map_err(|error| MoveError { index: i, fault: MoveFault::Arc(error) })?;
+        pieces.extend(arc.into_iter().map(|piece| PathPiece {
+            shape: Shape::Conic(piece),
             deviation,
             arc: true,
             ..line
         }));
     }
-    Ok(FollowedProgram { pieces, points: 0, splines: 0, polynomials: 0 })
+    Ok(ProgramPieces { pieces, points: 0, splines: 0, polynomials: 0 })
 }
 
-/// A chain of lines, fitted, with one feed for each piece.
+/// The pieces of a chain, with one feed each.
 fn chain<const M: usize>(
     moves: &Moves<M>,
-    options: &FollowOptions,
-    first: usize,
-    end: usize,
+    options: &PathOptions,
+    range: Range<usize>,
     watch: Watch,
-) -> Result<FollowedProgram<M>, FollowError> {
-    for i in first..end {
+) -> Result<ProgramPieces<M>, MoveError> {
+    let Range { start: first, end } = range;
+    for i in range.clone() {
         moves.check(i)?;
     }
     let points: Vec<[f64; M]> =
-        std::iter::once(moves.origin(first)).chain(moves.target[first..end].iter().copied()).collect();
-    // The fastest block decides which curvature the chain can have without slowing the tool.
-    let feed = moves.feed[first..end].iter().fold(0.0, |a: f64, &b| a.max(b)).min(options.max_speed);
+        std::iter::once(moves.origin(first)).chain(moves.target[range.clone()].iter().copied()).collect();
+    // The greatest feed decides which curvature the chain can have without slowing the tool.
+    let feed = moves.feed[range.clone()].iter().fold(0.0, |a: f64, &b| a.max(b)).min(options.max_speed);
     let fitted = fit_points(
         &points,
         &FitOptions {
@@ -335,8 +342,8 @@ fn chain<const M: usize>(
     let mut pieces = Vec::with_capacity(fitted.len());
     for fit in &fitted {
         cut_at_feeds(fit, &points, &moves.feed[first..end], |piece, chords, feed| {
-            pieces.push(Followed {
-                piece: Shape::Conic(piece.into()),
+            pieces.push(PathPiece {
+                shape: Shape::Conic(piece.into()),
                 first: (first + chords.0) as u32,
                 last: (first + chords.1) as u32,
                 feed,
@@ -349,19 +356,14 @@ fn chain<const M: usize>(
     }
     let mut splines: Vec<u32> = fitted.iter().map(|fit| fit.spline).collect();
     splines.dedup();
-    Ok(FollowedProgram {
-        pieces,
-        points: points.len() - 1,
-        splines: splines.len(),
-        polynomials: fitted.len(),
-    })
+    Ok(ProgramPieces { pieces, points: points.len() - 1, splines: splines.len(), polynomials: fitted.len() })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const OPTIONS: FollowOptions = FollowOptions {
+    const OPTIONS: PathOptions = PathOptions {
         exact_tolerance: 1e-3,
         max_chord: 5.0,
         corner_acceleration: f64::INFINITY,
@@ -375,12 +377,12 @@ mod tests {
         (1..=count).map(|i| (0.02 * i as f64).sin_cos()).map(|(sin, cos)| [10.0 * cos, 10.0 * sin]).collect()
     }
 
-    fn follow_lines(
+    fn pieces_of_lines(
         target: &[[f64; 2]],
         feed: &[f64],
         fit_tolerance: &[f64],
         halt: &[bool],
-    ) -> FollowedProgram<2> {
+    ) -> ProgramPieces<2> {
         let moves = Moves {
             start: [10.0, 0.0],
             kind: &vec![LINE; target.len()],
@@ -395,34 +397,34 @@ mod tests {
             splines: &CompositeCurve::default(),
             joints: &vec![true; target.len()],
         };
-        follow(&moves, &OPTIONS, Watch::default()).unwrap()
+        program_pieces(&moves, &OPTIONS, Watch::default()).unwrap()
     }
 
     #[test]
     fn a_change_of_feed_cuts_the_curve_at_the_vertex_and_leaves_it_whole() {
         let target = circle(100);
         let (even, halt, fit) = (vec![10.0; 100], vec![false; 100], vec![0.005; 100]);
-        let whole = follow_lines(&target, &even, &fit, &halt).pieces;
+        let whole = pieces_of_lines(&target, &even, &fit, &halt).pieces;
         let mut feed = even;
         feed[37..].fill(20.0);
-        let cut = follow_lines(&target, &feed, &fit, &halt).pieces;
+        let cut = pieces_of_lines(&target, &feed, &fit, &halt).pieces;
         assert!(cut.len() <= whole.len() + 1 && cut.len() < 40);
         let fast = cut.iter().position(|piece| piece.feed == 20.0).unwrap();
         assert!(cut[..fast].iter().all(|piece| piece.feed == 10.0 && piece.last <= 37));
         assert!(cut[fast..].iter().all(|piece| piece.feed == 20.0 && piece.first >= 37));
-        assert!(norm(&sub(cut[fast].piece.start(), &target[36])) < 0.005);
+        assert!(norm(&sub(cut[fast].shape.start(), &target[36])) < 0.005);
         // Both halves lie on the one curve, with one tangent.
         let unit = |edge: [f64; 2]| edge.map(|value| value / norm(&edge));
-        let (out, into) = (unit(cut[fast - 1].piece.end_edge()), unit(cut[fast].piece.start_edge()));
+        let (out, into) = (unit(cut[fast - 1].shape.end_edge()), unit(cut[fast].shape.start_edge()));
         assert!(norm(&sub(&out, &into)) < 1e-12);
-        assert_eq!(cut[fast - 1].piece.conic().unwrap().control[2], *cut[fast].piece.start());
+        assert_eq!(cut[fast - 1].shape.conic().unwrap().control[2], *cut[fast].shape.start());
     }
 
     #[test]
     fn no_piece_is_faster_than_a_block_it_covers() {
         let target = circle(200);
         let feed: Vec<f64> = (0..200).map(|i| [30.0, 10.0, 20.0][i * i % 3] + (i / 50) as f64).collect();
-        let pieces = follow_lines(&target, &feed, &[0.005; 200], &[false; 200]).pieces;
+        let pieces = pieces_of_lines(&target, &feed, &[0.005; 200], &[false; 200]).pieces;
         for piece in &pieces {
             let slowest =
                 feed[piece.first as usize..=piece.last as usize].iter().fold(f64::MAX, |a, &b| a.min(b));
@@ -439,12 +441,12 @@ mod tests {
         let (feed, mut halt, mut fit) = (vec![10.0; 100], vec![false; 100], vec![0.005; 100]);
         halt[29] = true;
         fit[60..].fill(0.004);
-        let pieces = follow_lines(&target, &feed, &fit, &halt).pieces;
+        let pieces = pieces_of_lines(&target, &feed, &fit, &halt).pieces;
         for end in [30, 60] {
             assert!(pieces.iter().all(|piece| piece.last < end || piece.first >= end));
         }
         fit.fill(0.0);
-        let lines = follow_lines(&target, &feed, &fit, &halt);
+        let lines = pieces_of_lines(&target, &feed, &fit, &halt);
         assert_eq!((lines.pieces.len(), lines.points), (100, 0));
     }
 
@@ -466,14 +468,14 @@ mod tests {
             splines: &CompositeCurve::default(),
             joints: &[true; 5],
         };
-        let error = |moves: &Moves<2>| follow(moves, &OPTIONS, Watch::default()).err().unwrap();
-        assert_eq!(error(&moves), FollowError { index: 3, fault: Fault::Length });
+        let error = |moves: &Moves<2>| program_pieces(moves, &OPTIONS, Watch::default()).err().unwrap();
+        assert_eq!(error(&moves), MoveError { index: 3, fault: MoveFault::Length });
         let target = circle(5);
         let sound = Moves { target: &target, ..moves };
-        assert!(follow(&sound, &OPTIONS, Watch::default()).is_ok());
+        assert!(program_pieces(&sound, &OPTIONS, Watch::default()).is_ok());
         let no_feed = Moves { feed: &[1.0, 1.0, f64::NAN, 0.0, 1.0], ..sound };
-        assert_eq!(error(&no_feed), FollowError { index: 2, fault: Fault::Feed });
+        assert_eq!(error(&no_feed), MoveError { index: 2, fault: MoveFault::Feed });
         let no_arc = Moves { kind: &[LINE, ARC, LINE, LINE, LINE], feed: &[1.0; 5], ..no_feed };
-        assert_eq!(error(&no_arc), FollowError { index: 1, fault: Fault::Arc(ArcError::Sweep) });
+        assert_eq!(error(&no_arc), MoveError { index: 1, fault: MoveFault::Arc(ArcError::Sweep) });
     }
 }

@@ -1,0 +1,421 @@
+//! Rounds the corners of a path within the tolerance: each blend replaces the ends of the pieces on both sides of it.
+//!
+//! A corner is a place between two pieces that do not meet smoothly, a halt, or an end of the path. Span k is the pieces
+//! between corner k and corner k + 1; its stations are sums of widths. All is done for many corners in parallel and joined
+//! in order, so the path does not depend on the number of threads:
+//!
+//! 1. each corner that may be rounded says how long a blend it has a use for;
+//! 2. blends share the spans between them (`share_lengths`);
+//! 3. each blend is made shorter until its deviation is within the tolerance;
+//! 4. blends and what they leave of the spans become the path. A corner without a blend is a stop, unless the machine
+//!    allows a velocity jump there.
+
+use rayon::prelude::*;
+
+use super::Axes;
+use crate::corner::{share_lengths, Rounding, Sides, TangentJump};
+use crate::program_pieces::{PathPiece, Shape, Spline};
+use crate::tolerance;
+use feedplan_geometry::conic::Conic;
+use feedplan_geometry::spline::{CompositeCurve, Piece};
+use feedplan_geometry::watch::Watch;
+
+/// Corners and spans of a task at most.
+const TASK: usize = 1024;
+
+/// Where one span ends and the next begins.
+struct Corner<const M: usize> {
+    /// The first piece after it.
+    at: usize,
+    /// None at a halt, in a cusp, at the ends of the path and where there is no tangent: these are stops.
+    jump: Option<TangentJump<M>>,
+}
+
+/// The pieces of a path with their corners still sharp.
+struct CornerRounding<'a, const M: usize> {
+    pieces: &'a [PathPiece<M>],
+    /// The program's.
+    splines: &'a CompositeCurve<M>,
+    corners: Vec<Corner<M>>,
+    /// The station of each piece in its span.
+    station: Vec<f64>,
+    /// The length of each span.
+    length: Vec<f64>,
+    rounding: Rounding,
+}
+
+/// The stations where a blend begins in the span before the corner and ends in the span after it.
+#[derive(Clone, Copy)]
+struct Cuts {
+    before: f64,
+    after: f64,
+}
+
+/// The pieces with rounded corners, and the first piece of each run, with the number of pieces at the end.
+pub fn round_corners<const M: usize>(
+    pieces: &[PathPiece<M>],
+    splines: &CompositeCurve<M>,
+    halt: &[bool],
+    rounding: Rounding,
+    axes: &Axes<M>,
+    watch: Watch,
+) -> (Vec<Chunk<M>>, Vec<usize>) {
+    if pieces.is_empty() {
+        return (vec![], vec![0]);
+    }
+    let whole = CornerRounding::new(pieces, splines, halt, rounding);
+    let corners = 0..whole.corners.len();
+    let each = watch.part(0.75).each(corners.len());
+    let wanted: Vec<f64> = corners
+        .clone()
+        .into_par_iter()
+        .map(|k| {
+            watch.check_at(k);
+            whole.wanted_length(k, axes)
+        })
+        .collect();
+    let length = share_lengths(&wanted, &whole.length);
+    let cuts: Vec<Option<Cuts>> = corners
+        .into_par_iter()
+        .with_min_len(TASK)
+        .map_init(Sides::default, |sides, k| {
+            each.count(k);
+            whole.fitting_cuts(k, &length, sides)
+        })
+        .collect();
+    whole.assemble(&cuts, axes.jump, watch.part(0.25))
+}
+
+impl<'a, const M: usize> CornerRounding<'a, M> {
+    fn new(
+        pieces: &'a [PathPiece<M>],
+        splines: &'a CompositeCurve<M>,
+        halt: &[bool],
+        rounding: Rounding,
+    ) -> Self {
+        let stop = |at| Corner { at, jump: None };
+        let inner = (1..pieces.len()).into_par_iter().filter_map(|at| {
+            let (before, after) = (&pieces[at - 1], &pieces[at]);
+            let halts = after.first > before.last && halt[before.last as usize];
+            if halts || before.shape.rests()[1] || after.shape.rests()[0] {
+                return Some(stop(at));
+            }
+            let jump = TangentJump::new(&before.shape, &after.shape);
+            match jump {
+                Some(jump) if jump.is_smooth(&before.shape, &after.shape) => None,
+                _ => Some(Corner { at, jump }),
+            }
+        });
+        let mut corners = vec![stop(0)];
+        corners.par_extend(inner);
+        corners.push(stop(pieces.len()));
+
+        let mut station = Vec::with_capacity(pieces.len());
+        let mut length = Vec::with_capacity(corners.len());
+        for pair in corners.windows(2) {
+            let mut sum = 0.0;
+            for piece in &pieces[pair[0].at..pair[1].at] {
+                station.push(sum);
+                sum += piece.shape.width();
+            }
+            length.push(sum);
+        }
+        Self { pieces, splines, corners, station, length, rounding }
+    }
+
+    /// The pieces of the span before corner `k`, from the corner backwards, and those of the span after it.
+    fn sides(&self, k: usize) -> (impl Iterator<Item = &PathPiece<M>>, impl Iterator<Item = &PathPiece<M>>) {
+        let at = self.corners[k].at;
+        let before = &self.pieces[self.corners[k - 1].at..at];
+        let after = &self.pieces[at..self.corners[k + 1].at];
+        (before.iter().rev(), after.iter())
+    }
+
+    /// The length of the blend of corner `k` that the feed passes, or the longest one that the tolerance allows on both
+    /// sides; 0 where the corner is not rounded.
+    fn wanted_length(&self, k: usize, axes: &Axes<M>) -> f64 {
+        let Some(jump) = &self.corners[k].jump else { return 0.0 };
+        let at = self.corners[k].at;
+        let (before, after) = (&self.pieces[at - 1], &self.pieces[at]);
+        let exact = before.exact || after.exact;
+        let curved = |side: &PathPiece<M>| side.arc || matches!(side.shape, Shape::Spline(_));
+        let tangent = (curved(before) || curved(after)) && jump.size <= tolerance::ROUNDED_TANGENT;
+        if jump.reverses() || exact && !tangent {
+            return 0.0;
+        }
+        let mut wanted = jump
+            .length_for(
+                [&before.shape, &after.shape],
+                before.feed.min(after.feed),
+                &axes.max_velocity,
+                &axes.max_acceleration,
+            )
+            .max(tolerance::SHORTEST_BLEND * before.tolerance.min(after.tolerance));
+        // A circle needs one line on each side; other pieces are bent.
+        let lines = [before, after].map(|side| side.shape.conic().filter(|conic| conic.is_line()));
+        let mut rounding = Rounding::Parabola;
+        if let (Rounding::Circle, [Some(first), Some(second)]) = (self.rounding, lines) {
+            (wanted, rounding) = (wanted.min(first.width).min(second.width), Rounding::Circle);
+        }
+        let (backwards, forwards) = self.sides(k);
+        let length = allowed_length(backwards, jump, exact, rounding, wanted);
+        allowed_length(forwards, jump, exact, rounding, length)
+    }
+
+    /// The station where piece `i` of span `k` ends.
+    fn end_station(&self, k: usize, i: usize) -> f64 {
+        if i + 1 < self.corners[k + 1].at {
+            self.station[i + 1]
+        } else {
+            self.length[k]
+        }
+    }
+
+    /// The piece of span `k` at a station.
+    fn piece_at(&self, k: usize, station: f64) -> usize {
+        let (start, end) = (self.corners[k].at, self.corners[k + 1].at);
+        start + self.station[start..end].partition_point(|&other| other <= station).max(1) - 1
+    }
+
+    /// A cut at a station of span `k`, moved to the end of a piece that is next to it, so that no sliver is left. Two
+    /// blends that touch there move it alike, and each keeps its side.
+    fn snapped(&self, k: usize, station: f64) -> f64 {
+        let i = self.piece_at(k, station);
+        let (from, to) = (self.station[i], self.end_station(k, i));
+        let to_corner = station.min(self.length[k] - station);
+        let near = (tolerance::AT_PIECE_END * (to - from)).min(tolerance::MOVED_CUT * to_corner);
+        if station - from <= near {
+            from
+        } else if to - station <= near {
+            to
+        } else {
+            station
+        }
+    }
+
+    /// Appends span `k` between two stations. Pieces of splines that are cut, and all those that are to be `bent`, become
+    /// pieces of `made`.
+    fn append_span(
+        &self,
+        k: usize,
+        [from, to]: [f64; 2],
+        bent: bool,
+        pieces: &mut Vec<PathPiece<M>>,
+        made: &mut CompositeCurve<M>,
+    ) {
+        for i in self.piece_at(k, from)..self.corners[k + 1].at {
+            let (start, end) = (self.station[i], self.end_station(k, i));
+            if start >= to {
+                break;
+            }
+            let whole = &self.pieces[i].shape;
+            let low = if from <= start { 0.0 } else { from - start };
+            let high = if to >= end { whole.width() } else { to - start };
+            if from >= end || low >= high {
+                continue;
+            }
+            let shape = match whole {
+                Shape::Conic(conic) => Some(Shape::Conic(conic.part(low, high))),
+                Shape::Spline(spline) if low == 0.0 && high == spline.width && !bent => Some(*whole),
+                Shape::Spline(spline) => spline.part(self.splines, low, high, made).map(Shape::Spline),
+            };
+            pieces.extend(shape.map(|shape| PathPiece { shape, ..self.pieces[i] }));
+        }
+    }
+
+    /// Sets `sides` to the pieces on both sides of corner `k` between its cuts.
+    fn cut_sides(&self, k: usize, cuts: Cuts, sides: &mut Sides<M>) {
+        let Sides { before, after, made } = sides;
+        before.clear();
+        after.clear();
+        made.clear();
+        self.append_span(k - 1, [cuts.before, f64::INFINITY], true, before, made);
+        self.append_span(k, [0.0, cuts.after], true, after, made);
+    }
+
+    /// Where the blend of corner `k` begins and ends; None if the tolerance leaves no room for it.
+    fn fitting_cuts(&self, k: usize, length: &[f64], sides: &mut Sides<M>) -> Option<Cuts> {
+        const TRIALS: usize = 40;
+        let jump = self.corners[k].jump.as_ref().filter(|jump| !jump.vanishes(length[k]))?;
+        let (mut before, mut after) = (length[k], length[k]);
+        for _ in 0..TRIALS {
+            let mut cuts = Cuts { before: self.length[k - 1] - before, after };
+            // Blends that touch must cut at the same place.
+            if cuts.before - length[k - 1] <= tolerance::TOUCHING * self.length[k - 1] {
+                cuts.before = length[k - 1];
+            }
+            cuts = Cuts { before: self.snapped(k - 1, cuts.before), after: self.snapped(k, cuts.after) };
+            self.cut_sides(k, cuts, sides);
+            let excess = match sides.between_lines(jump, self.rounding) {
+                Some(corner) => corner.deviation / corner.tolerance,
+                None => sides.bend(jump)?,
+            };
+            if excess <= 1.0 + tolerance::EXCESS {
+                return Some(cuts);
+            }
+            // The deviation is in proportion to the length on lines, but not on curved sides.
+            let shorter = (1.0 - tolerance::SHORTER) / excess;
+            (before, after) = (shorter * before, shorter * after);
+            if jump.vanishes(after) {
+                return None;
+            }
+        }
+        None
+    }
+
+    /// Blends and what they leave of the spans, in order, and the first piece of each run.
+    fn assemble(&self, cuts: &[Option<Cuts>], jump: bool, watch: Watch) -> (Vec<Chunk<M>>, Vec<usize>) {
+        let count = self.length.len();
+        let tasks: Vec<(Chunk<M>, Vec<usize>)> = (0..count.div_ceil(TASK))
+            .into_par_iter()
+            .map(|task| {
+                let spans = task * TASK..count.min((task + 1) * TASK);
+                watch.each(count).advance(spans.len());
+                let inside = self.corners[spans.end].at - self.corners[spans.start].at;
+                let mut chunk = Chunk::default();
+                chunk.pieces.reserve(inside + 2 * spans.len());
+                let (mut runs, mut sides) = (Vec::new(), Sides::default());
+                for k in spans {
+                    let start = match (cuts[k], &self.corners[k].jump) {
+                        (Some(cuts), Some(turn)) => {
+                            self.cut_sides(k, cuts, &mut sides);
+                            if let Some(corner) = sides.between_lines(turn, self.rounding) {
+                                chunk.pieces.push(corner);
+                            } else {
+                                sides.bend(turn);
+                                chunk.append(&sides);
+                            }
+                            cuts.after
+                        }
+                        (_, turn) => {
+                            if !(jump && turn.is_some()) {
+                                runs.push(chunk.pieces.len());
+                            }
+                            0.0
+                        }
+                    };
+                    let end = cuts[k + 1].map_or(f64::INFINITY, |cuts| cuts.before);
+                    self.append_span(k, [start, end], false, &mut chunk.pieces, &mut chunk.made);
+                }
+                (chunk, runs)
+            })
+            .collect();
+        let (mut chunks, mut runs, mut total) = (Vec::with_capacity(tasks.len()), Vec::new(), 0);
+        for (chunk, starts) in tasks {
+            runs.extend(starts.iter().map(|start| start + total));
+            total += chunk.pieces.len();
+            chunks.push(chunk);
+        }
+        runs.push(total);
+        (chunks, runs)
+    }
+}
+
+/// Consecutive pieces of a path that one task makes, with the pieces of splines that are not the program's: cut or bent
+/// at corners, or fitted.
+#[derive(Clone, Debug)]
+pub struct Chunk<const M: usize> {
+    pub pieces: Vec<PathPiece<M>>,
+    made: CompositeCurve<M>,
+}
+
+impl<const M: usize> Default for Chunk<M> {
+    fn default() -> Self {
+        Self { pieces: vec![], made: CompositeCurve::default() }
+    }
+}
+
+impl<const M: usize> Chunk<M> {
+    /// The control points of a spline of this chunk; `splines` are the program's. Its width is that of `spline`.
+    pub fn spline<'a>(&'a self, spline: &Spline<M>, splines: &'a CompositeCurve<M>) -> Piece<'a, M> {
+        let source = if spline.made { &self.made } else { splines };
+        source.piece(spline.index as usize)
+    }
+
+    /// Appends a polynomial piece that is `like` another one in all but its shape.
+    pub fn push(&mut self, control: &[[f64; M]], width: f64, like: PathPiece<M>) {
+        if let [start, end] = *control {
+            self.pieces.push(PathPiece { shape: Shape::Conic(Conic::line(start, end)), ..like });
+            return;
+        }
+        self.made.push(control, &[], width);
+        let shape = Spline::last_made(&self.made).map(Shape::Spline);
+        self.pieces.extend(shape.map(|shape| PathPiece { shape, ..like }));
+    }
+
+    /// Appends both sides of a blend.
+    fn append(&mut self, sides: &Sides<M>) {
+        let before = self.made.len() as u32;
+        for piece in sides.made.pieces() {
+            self.made.push(piece.control, piece.weights, piece.width);
+        }
+        for &piece in sides.before.iter().chain(&sides.after) {
+            let mut own = piece;
+            if let Shape::Spline(spline) = &mut own.shape {
+                spline.index += before;
+            }
+            self.pieces.push(own);
+        }
+    }
+}
+
+/// The length of a blend, at most `wanted`, that one side of a corner allows by its own length and by what its pieces
+/// have left of their tolerance.
+fn allowed_length<'a, const M: usize>(
+    side: impl Iterator<Item = &'a PathPiece<M>>,
+    jump: &TangentJump<M>,
+    exact: bool,
+    rounding: Rounding,
+    wanted: f64,
+) -> f64 {
+    let (mut length, mut station) = (wanted, 0.0);
+    for piece in side {
+        if piece.exact && !exact {
+            break;
+        }
+        let room = jump.length_within(piece.tolerance - piece.deviation, rounding);
+        length = length.min(room.max(station));
+        station += piece.shape.width();
+        if station >= length {
+            return length;
+        }
+    }
+    length.min(station)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cuts_next_to_the_end_of_a_piece_leave_no_sliver() {
+        // A line of 10 mm in two pieces.
+        let points = [[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]];
+        let line = |a, b| PathPiece {
+            shape: Shape::Conic(Conic::line(a, b)),
+            first: 0,
+            last: 0,
+            feed: 10.0,
+            deviation: 0.0,
+            tolerance: 1.0,
+            exact: false,
+            arc: false,
+        };
+        let lines = [line(points[0], points[1]), line(points[1], points[2])];
+        let whole = Conic::line(points[0], points[1]);
+        let side = [whole.part(0.0, 4.0), whole.part(4.0, 10.0), Conic::line(points[1], points[2])]
+            .map(|piece| PathPiece { shape: Shape::Conic(piece), ..lines[0] });
+        let splines = CompositeCurve::default();
+        let spans = CornerRounding::new(&side, &splines, &[false; 2], Rounding::Parabola);
+        assert_eq!(spans.length, [10.0, 10.0]);
+        for (station, moved) in [(4.0 + 1e-9, 4.0), (4.0 - 1e-9, 4.0), (4.1, 4.1), (1e-9, 1e-9)] {
+            assert_eq!(spans.snapped(0, station), moved);
+            let (mut before, mut after, mut made) = (Vec::new(), Vec::new(), CompositeCurve::default());
+            spans.append_span(0, [0.0, moved], false, &mut before, &mut made);
+            spans.append_span(0, [moved, f64::INFINITY], false, &mut after, &mut made);
+            let end = before.last().unwrap().shape.conic().unwrap().control[2];
+            assert_eq!(end, *after[0].shape.start());
+            assert_eq!(before.len() + after.len(), if moved == 4.0 { 2 } else { 3 });
+        }
+    }
+}

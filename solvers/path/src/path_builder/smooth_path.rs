@@ -1,0 +1,268 @@
+//! The path of a program as one C4 curve within the tolerance between two stops (`smooth_fit`).
+//!
+//! The tool stops where
+//!
+//! * the program halts,
+//! * rapids begin or end,
+//! * moves that ask for the exact path meet others, and
+//! * the path turns back.
+//!
+//! Lines that ask for the exact path stay lines, and stop at their corners. Arcs and splines that ask for it, with the
+//! lines that touch them, are followed within the exact tolerance.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::travel::outside;
+use super::{deviation, Axes, BuiltPath, Chunk};
+use crate::program_pieces::{Chord, Chords, MoveError, Moves, PathOptions, PathPiece, Shape, RAPID};
+use crate::smooth_fit::polyline::{angle, Polyline};
+use crate::smooth_fit::{smooth_fit, Offsets, SmoothOptions};
+use crate::tolerance;
+use feedplan_geometry::conic::Conic;
+use feedplan_geometry::quadratic::{norm, sub};
+use feedplan_geometry::watch::Watch;
+
+/// Where a smooth path stops without being told to.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct NotSmooth {
+    /// Moves at whose end the path turns back.
+    pub reversals: Vec<u32>,
+    /// First and last move of each place where no smooth curve is within the tolerance. Corners are rounded one by one
+    /// there, between two stops.
+    pub corners: Vec<[u32; 2]>,
+}
+
+/// The path of the moves between two stops of the program.
+#[derive(Default)]
+struct Section<const M: usize> {
+    chunk: Chunk<M>,
+    /// The first piece of each run.
+    runs: Vec<usize>,
+    not_smooth: NotSmooth,
+    /// Numbers of fitted chords, splines and polynomials.
+    fit: [usize; 3],
+    offsets: Offsets,
+}
+
+/// The smooth path of a program. With `sized` bends keep their size; without it they are cut as far as the tolerance
+/// allows, which is faster.
+pub fn build_smooth_path<const M: usize>(
+    moves: &Moves<M>,
+    options: &PathOptions,
+    axes: &Axes<M>,
+    sized: bool,
+    watch: Watch,
+) -> Result<BuiltPath<M>, MoveError> {
+    let each = watch.each(moves.kind.len());
+    let sections: Vec<Section<M>> = sections(moves)
+        .into_par_iter()
+        .map(|range| Section::new(moves, options, axes, range.clone(), sized, each.part(range.len() as f64)))
+        .collect::<Result<_, _>>()?;
+    let mut path = BuiltPath { runs: vec![], ..BuiltPath::default() };
+    let (mut total, mut offsets) = (0, Offsets::default());
+    for section in sections {
+        path.runs.extend(section.runs.iter().map(|start| start + total));
+        total += section.chunk.pieces.len();
+        path.chunks.push(section.chunk);
+        path.points += section.fit[0];
+        path.splines += section.fit[1];
+        path.polynomials += section.fit[2];
+        offsets.merge(&section.offsets);
+        path.not_smooth.reversals.extend(section.not_smooth.reversals);
+        path.not_smooth.corners.extend(section.not_smooth.corners);
+    }
+    path.runs.push(total);
+    path.deviation = deviation(&path.chunks);
+    path.offsets = Some(offsets);
+    path.outside = outside(&path.chunks, moves, &axes.travel);
+    Ok(path)
+}
+
+/// The moves between places where the path stops whatever its shape.
+fn sections<const M: usize>(moves: &Moves<M>) -> Vec<Range<usize>> {
+    let mut sections = Vec::new();
+    let mut first = 0;
+    for i in 1..=moves.kind.len() {
+        let goes_on = i < moves.kind.len() && {
+            let alike = |f: &dyn Fn(usize) -> bool| f(i - 1) == f(i);
+            !moves.halt[i - 1]
+                && alike(&|k| moves.kind[k] == RAPID)
+                && alike(&|k| moves.tolerance[k] > 0.0)
+                && moves.changes.binary_search_by_key(&i, |change| change.0).is_err()
+        };
+        if !goes_on {
+            sections.push(first..i);
+            first = i;
+        }
+    }
+    sections
+}
+
+/// How the runs of a section are fitted.
+struct Rules<const M: usize> {
+    exact: bool,
+    travel: [[f64; 2]; M],
+    /// Longer chords are straight in the middle, in mm.
+    long: f64,
+    /// Whether bends keep their size.
+    sized: bool,
+}
+
+impl<const M: usize> Section<M> {
+    fn new(
+        moves: &Moves<M>,
+        options: &PathOptions,
+        axes: &Axes<M>,
+        range: Range<usize>,
+        sized: bool,
+        watch: Watch,
+    ) -> Result<Self, MoveError> {
+        let exact = moves.tolerance[range.start] <= 0.0;
+        let has_travel = range.clone().all(|i| moves.joints[i]);
+        let travel = if has_travel { axes.travel } else { [[f64::NEG_INFINITY, f64::INFINITY]; M] };
+        let rules = Rules { exact, travel, long: options.max_chord, sized };
+        let chords = moves.chords(options, range)?;
+        let mut section = Self::default();
+        let count = chords.chords.len();
+        let each = watch.each(count);
+        let mut first = 0;
+        for end in 1..=count {
+            let stops = end == count || {
+                let turn = chords.turn(end);
+                if turn > tolerance::REVERSAL && !exact {
+                    section.not_smooth.reversals.push(chords.chords[end - 1].last);
+                }
+                turn > tolerance::REVERSAL || exact && !chords.meet(end)
+            };
+            if stops {
+                let watch = each.part((end - first) as f64);
+                section.append(&chords, first..end, &rules, watch);
+                first = end;
+            }
+        }
+        Ok(section)
+    }
+
+    /// Appends a run.
+    fn append(&mut self, chords: &Chords<M>, run: Range<usize>, rules: &Rules<M>, watch: Watch) {
+        self.runs.push(self.chunk.pieces.len());
+        let own = &chords.chords[run.clone()];
+        if rules.exact && own.iter().all(Chord::is_line) {
+            for i in run {
+                let line = [chords.points[i], chords.points[i + 1]];
+                let like = piece_along(&chords.chords[i..=i], 0.0, true);
+                self.chunk.push(&line, 0.0, like);
+            }
+            return;
+        }
+        let moving: Vec<usize> = (0..M)
+            .filter(|&k| {
+                chords.points[run.start..=run.end].iter().any(|p| p[k] != chords.points[run.start][k])
+            })
+            .collect();
+        match moving.len() {
+            0..=2 => self.append_curve::<2>(chords, run, &moving, rules, watch),
+            3 => self.append_curve::<3>(chords, run, &moving, rules, watch),
+            4 => self.append_curve::<4>(chords, run, &moving, rules, watch),
+            5 => self.append_curve::<5>(chords, run, &moving, rules, watch),
+            6 => self.append_curve::<6>(chords, run, &moving, rules, watch),
+            _ => self.append_curve::<9>(chords, run, &moving, rules, watch),
+        }
+    }
+
+    /// Appends a run in which at most D axes move; the others have no part in the fit.
+    fn append_curve<const D: usize>(
+        &mut self,
+        chords: &Chords<M>,
+        run: Range<usize>,
+        moving: &[usize],
+        rules: &Rules<M>,
+        watch: Watch,
+    ) {
+        let Rules { exact, travel, long, sized } = rules;
+        let own = &chords.chords[run.clone()];
+        let narrow = |p: &[f64; M]| std::array::from_fn(|k| moving.get(k).map_or(0.0, |&axis| p[axis]));
+        let points: Vec<[f64; D]> = chords.points[run.start..=run.end].iter().map(narrow).collect();
+        let mut line = Polyline::new(points, own.iter().map(Chord::rest).collect());
+        line.sized = *sized;
+        line.hold_bends(*long, |i| !own[i].is_line(), watch);
+        let differ = |a: &Chord, b: &Chord| a.feed != b.feed || a.tolerance != b.tolerance;
+        let cut: Vec<bool> =
+            (0..=own.len()).map(|i| i > 0 && i < own.len() && differ(&own[i - 1], &own[i])).collect();
+        // The travel is checked again with twice this slack.
+        let slack = 0.5 * tolerance::TRAVEL;
+        let bounds = |k: usize| match moving.get(k) {
+            Some(&axis) => [travel[axis][0] - slack, travel[axis][1] + slack],
+            None => [f64::NEG_INFINITY, f64::INFINITY],
+        };
+        let options = SmoothOptions { long: *long, bounds: std::array::from_fn(bounds) };
+        let smooth = smooth_fit(&line, &cut, &options, watch);
+        let rest = chords.points[run.start];
+        for (piece, along) in smooth.curve.pieces().zip(&smooth.stretches) {
+            let control: Vec<[f64; M]> = piece
+                .control
+                .iter()
+                .map(|point| {
+                    let mut wide = rest;
+                    for (k, &axis) in moving.iter().enumerate() {
+                        wide[axis] = point[k];
+                    }
+                    wide
+                })
+                .collect();
+            if along.stop {
+                self.runs.push(self.chunk.pieces.len());
+            }
+            let like = piece_along(&own[along.first..=along.last], along.deviation, *exact);
+            self.chunk.push(&control, piece.width, like);
+        }
+        self.fit[0] += (own[own.len() - 1].last - own[0].first) as usize + 1;
+        self.fit[1] += smooth.splines;
+        self.fit[2] += smooth.polynomials;
+        self.offsets.merge(&smooth.offsets);
+        let corners = smooth.corners.iter().map(|zone| [own[zone.start].first, own[zone.end - 1].last]);
+        self.not_smooth.corners.extend(corners);
+    }
+}
+
+/// All of a piece but its shape: it goes along some chords, at most `deviation` from them, in mm.
+fn piece_along<const M: usize>(chords: &[Chord], deviation: f64, exact: bool) -> PathPiece<M> {
+    let (first, last) = (&chords[0], &chords[chords.len() - 1]);
+    let used = chords.iter().map(|chord| chord.used).fold(0.0, f64::max);
+    PathPiece {
+        shape: Shape::Conic(Conic::line([0.0; M], [0.0; M])),
+        first: first.first,
+        last: last.last,
+        feed: chords.iter().map(|chord| chord.feed).fold(f64::INFINITY, f64::min),
+        deviation: if deviation > 0.0 { deviation + used } else { 0.0 },
+        tolerance: chords.iter().map(|chord| chord.tolerance).fold(f64::INFINITY, f64::min),
+        exact,
+        arc: false,
+    }
+}
+
+impl<const M: usize> Chords<M> {
+    fn vector(&self, i: usize) -> [f64; M] {
+        sub(&self.points[i + 1], &self.points[i])
+    }
+
+    /// The angle by which the chords turn at point `i`, in rad.
+    fn turn(&self, i: usize) -> f64 {
+        angle(&self.vector(i - 1), &self.vector(i))
+    }
+
+    /// Whether exact moves go on at point `i` without a stop: both lie on one line, or a curve touches its neighbour.
+    fn meet(&self, i: usize) -> bool {
+        let (before, after) = (&self.chords[i - 1], &self.chords[i]);
+        if before.is_line() && after.is_line() {
+            let coordinate = self.points[i].iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+            let length = norm(&self.vector(i - 1)).min(norm(&self.vector(i)));
+            return self.turn(i) <= tolerance::SAME_DIRECTION + tolerance::COORDINATE * coordinate / length;
+        }
+        let angles = before.end_angle.unwrap_or(0.0) + after.end_angle.unwrap_or(0.0);
+        let same_move = before.last == after.first && before.first == after.last;
+        same_move || self.turn(i) <= tolerance::ROUNDED_TANGENT + angles
+    }
+}

@@ -1,0 +1,168 @@
+//! The moves of a program as chords, for a smooth curve that is fitted to all of them alike.
+//!
+//! Arcs and splines are halved until their chords are within a small fraction of the tolerance; the fit gets the rest.
+
+use std::ops::Range;
+
+use super::{MoveError, MoveFault, Moves, PathOptions, ARC, RAPID, SPLINE};
+use crate::arc::arc_pieces;
+use crate::smooth_fit::polyline::angle;
+use crate::tolerance::{CHORD, LEFT_TO_FIT, SAME_POINT};
+use feedplan_geometry::conic::Conic;
+use feedplan_geometry::quadratic::{norm, sub, Segment};
+use feedplan_geometry::spline::{bezier, CompositeCurve, Piece};
+
+/// Halvings of a piece of an arc or a spline at most.
+const DEPTH: u32 = 14;
+
+/// A chord of one move or more.
+#[derive(Clone, Copy, Debug)]
+pub struct Chord {
+    /// First and last move.
+    pub first: u32,
+    pub last: u32,
+    pub feed: f64,
+    /// Allowed distance between path and moves, in mm.
+    pub tolerance: f64,
+    /// Bound of the distance between chord and moves, in mm: so much of the tolerance is used.
+    pub used: f64,
+    /// The greatest angle between the chord and its curve at their common ends, in rad; None for a line.
+    pub end_angle: Option<f64>,
+}
+
+impl Chord {
+    /// The rest of the tolerance, for the fit.
+    pub fn rest(&self) -> f64 {
+        (self.tolerance - self.used).max(LEFT_TO_FIT * self.tolerance)
+    }
+
+    pub fn is_line(&self) -> bool {
+        self.end_angle.is_none()
+    }
+}
+
+/// Chords from point to point; there is one point more than chords.
+pub struct Chords<const M: usize> {
+    pub points: Vec<[f64; M]>,
+    pub chords: Vec<Chord>,
+    /// The first move, and the least feed, of moves too short for a chord before the first chord.
+    skipped: Option<(u32, f64)>,
+}
+
+impl<const M: usize> Moves<'_, M> {
+    /// The chords of moves of which each starts where the one before ends. The tolerance of moves that ask for the exact
+    /// path is the exact tolerance.
+    pub fn chords(&self, options: &PathOptions, range: Range<usize>) -> Result<Chords<M>, MoveError> {
+        let start = vec![self.origin(range.start)];
+        let mut out = Chords { points: start, chords: vec![], skipped: None };
+        for i in range.clone() {
+            self.check(i)?;
+            let exact = self.tolerance[i] <= 0.0;
+            let tolerance = if exact { options.exact_tolerance } else { self.tolerance[i] };
+            let feed = if self.kind[i] == RAPID { f64::INFINITY } else { self.feed[i] };
+            let index = i as u32;
+            let mut chord = Chord {
+                first: index,
+                last: index,
+                feed,
+                tolerance,
+                used: SAME_POINT * tolerance,
+                end_angle: None,
+            };
+            if self.kind[i] == ARC {
+                let (pieces, deviation) = arc_pieces(&self.arc(i)?, 0.5 * CHORD * tolerance)
+                    .map_err(|error| MoveError { index: i, fault: MoveFault::Arc(error) })?;
+                chord.used += deviation;
+                for piece in &pieces {
+                    out.append_conic(piece, 0.5 * CHORD * tolerance, DEPTH, &chord);
+                }
+            } else if self.kind[i] == SPLINE {
+                for piece in self.spline(i)? {
+                    out.append_spline(
+                        &self.splines.piece(piece.index as usize),
+                        CHORD * tolerance,
+                        DEPTH,
+                        &chord,
+                    );
+                }
+            } else {
+                out.push(self.target[i], chord);
+            }
+        }
+        if let Some(last) = range.clone().last() {
+            out.end_at(self.target[last], &range, options.exact_tolerance.max(self.tolerance[last]));
+        }
+        Ok(out)
+    }
+}
+
+impl<const M: usize> Chords<M> {
+    fn append_conic(&mut self, piece: &Conic<M>, limit: f64, depth: u32, chord: &Chord) {
+        let [a, b, c] = &piece.control;
+        // The middle of the piece is the farthest from the chord.
+        let off = Segment::new(a, c).distance_sq(b).sqrt() * piece.weight / (1.0 + piece.weight);
+        if off <= limit || depth == 0 {
+            let end_angle = angle(&sub(b, a), &sub(c, a)).max(angle(&sub(c, b), &sub(c, a)));
+            self.push(*c, Chord { used: chord.used + off, end_angle: Some(end_angle), ..*chord });
+        } else {
+            self.append_conic(&piece.part(0.0, 0.5 * piece.width), limit, depth - 1, chord);
+            self.append_conic(&piece.part(0.5 * piece.width, piece.width), limit, depth - 1, chord);
+        }
+    }
+
+    fn append_spline(&mut self, piece: &Piece<M>, limit: f64, depth: u32, chord: &Chord) {
+        let (control, last) = (piece.control, piece.degree());
+        let (start, end) = (&control[0], &control[last]);
+        let segment = Segment::new(start, end);
+        let off = control.iter().fold(0.0, |most: f64, point| most.max(segment.distance_sq(point))).sqrt();
+        if off <= limit || depth == 0 {
+            let way = sub(end, start);
+            let angles =
+                [sub(&control[1], start), sub(end, &control[last - 1])].map(|edge| angle(&edge, &way));
+            let end_angle = (last > 1).then_some(angles[0].max(angles[1]));
+            self.push(*end, Chord { used: chord.used + off, end_angle, ..*chord });
+        } else {
+            let mut halves = CompositeCurve::default();
+            bezier::split(piece, &[0.5 * piece.width], &mut halves);
+            for half in halves.pieces() {
+                self.append_spline(&half, limit, depth - 1, chord);
+            }
+        }
+    }
+
+    /// Appends a chord, or gives its moves to its neighbour if it is too short.
+    fn push(&mut self, point: [f64; M], mut chord: Chord) {
+        let length = norm(&sub(&point, &self.points[self.points.len() - 1]));
+        if length > SAME_POINT * chord.tolerance {
+            if let Some((first, feed)) = self.skipped.take().filter(|_| self.chords.is_empty()) {
+                (chord.first, chord.feed) = (first, feed.min(chord.feed));
+            }
+            self.points.push(point);
+            self.chords.push(chord);
+        } else if let Some(last) = self.chords.last_mut() {
+            (last.last, last.feed) = (chord.last, last.feed.min(chord.feed));
+        } else {
+            let (first, feed) = self.skipped.unwrap_or((chord.first, chord.feed));
+            self.skipped = Some((first, feed.min(chord.feed)));
+        }
+    }
+
+    /// Moves the last point to the end of the last move, which may be too short for a chord.
+    fn end_at(&mut self, end: [f64; M], range: &Range<usize>, tolerance: f64) {
+        let last = self.points.len() - 1;
+        if self.points[last] == end {
+            return;
+        }
+        if let Some((first, feed)) = self.skipped.filter(|_| self.chords.is_empty()) {
+            self.points.push(end);
+            let (last, used) = (range.end as u32 - 1, SAME_POINT * tolerance);
+            self.chords.push(Chord { first, last, feed, tolerance, used, end_angle: None });
+        } else if last > 0 {
+            self.points[last] = end;
+            if self.points[last - 1] == end {
+                self.points.pop();
+                self.chords.pop();
+            }
+        }
+    }
+}
