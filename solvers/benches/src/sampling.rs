@@ -133,7 +133,7 @@ fn lengths(c: &mut Criterion) {
             b.iter(|| wanted.iter().map(|&s| table.locate(s, tolerance).located.u).sum::<f64>())
         });
         group.bench_function(BenchmarkId::new("Newton", count), |b| {
-            b.iter(|| table.follow(&wanted, tolerance))
+            b.iter(|| table.locate_in_order(&wanted, tolerance))
         });
     }
     group.finish();

@@ -3,11 +3,12 @@
 
 use criterion::{criterion_group, Criterion, Throughput};
 use feedplan_geometry::spline::bezier::derivatives;
-use feedplan_geometry::spline::cusps::{cusps, CUSP};
+use feedplan_geometry::spline::cusps::cusps;
 use feedplan_geometry::spline::extract::extract;
 use feedplan_geometry::spline::knots::Spline;
 use feedplan_geometry::spline::length::CurveLength;
 use feedplan_geometry::spline::CompositeCurve;
+use feedplan_geometry::tolerance::CUSP;
 use feedplan_geometry::watch::Watch;
 
 const SPANS: usize = 1000;

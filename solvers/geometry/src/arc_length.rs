@@ -1,22 +1,20 @@
-//! The length of a curve as a function of its parameter: a table of Gauss–Legendre quadratures with a proven
-//! error.
+//! The integral S(u) of a positive function f along a curve, as a table of Gauss–Legendre quadratures with a proven error.
 //!
-//! Source: Cheatham 2007, section 3.2, after Guenter & Parent and Yang & Red; with K_n and the table size
-//! corrected. n = 8 nodes per panel; S' = |C'|; f is any positive integrand: S', or the time per parameter
-//! 1/√p of a profile. For a smooth f on a panel of width w
+//! f is |C'|, of which S is the length, or the time per parameter, 1/√p, of a profile. Source: Cheatham 2007, section 3.2,
+//! after Guenter & Parent and Yang & Red, with K_n and the table size corrected. With n = 8 nodes on a panel of width w
 //!
 //!   |∫f − Σ| = w^(2n+1) K_n |f^(2n)(ξ)|,   K_n = (n!)⁴ / ((2n+1) ((2n)!)³)
 //!
-//! and a uniform table of N panels on [a, b] is off by ε at most when
-//! N ≥ ((b−a)^(2n+1) K_n M / ε)^(1/(2n)), M ≥ |f^(2n)|. M comes from Cauchy's estimate on discs that stay clear
-//! of the singularities of f. Where one of them is near, a uniform table would be long: panels are halved
-//! towards it instead, and every panel keeps its own bound.
+//! and the error of N equal panels on [a, b] is at most ε if N ≥ ((b−a)^(2n+1) K_n M / ε)^(1/(2n)), M ≥ |f^(2n)|. M is
+//! Cauchy's estimate on a disc without singularities of f. Near a singularity equal panels would be many, so panels are
+//! halved towards it, and each has a bound of its own.
 
 use crate::quadratic::{dot, Quadratic};
+use crate::tolerance::NO_CURVATURE;
 
 /// Nodes of the quadrature.
 const N: usize = 8;
-/// The positive ones of Gauss–Legendre quadrature on [−1, 1], and the weights of each pair.
+/// The positive nodes of Gauss–Legendre quadrature on [−1, 1], and the weights of each pair.
 pub const X: [f64; 4] =
     [0.183_434_642_495_649_8, 0.525_532_409_916_329, 0.796_666_477_413_626_7, 0.960_289_856_497_536_3];
 pub const W: [f64; 4] =
@@ -32,10 +30,7 @@ const K: f64 = {
     ratio * ratio / (2 * N + 1) as f64
 };
 
-/// Relative error of the tables that sampling builds: steps down to 1e-7 of a table keep 1e-6 of themselves.
-pub const TABLE_ERROR: f64 = 1e-13;
-
-/// So many equal panels are taken rather than halving towards a singularity.
+/// An interval that needs more equal panels is halved.
 const UNIFORM: f64 = 4.0;
 
 /// |f^(2n)| ≤ (2n)! · bound / radius^(2n) on an interval.
@@ -52,31 +47,31 @@ pub trait Integrand: Copy {
     /// Cauchy's estimate of f^(2n), valid for all of [a, b].
     fn disc(&self, a: f64, b: f64) -> Disc;
 
-    /// The place next to the singularities: no panel contains it inside.
+    /// The parameter nearest to the singularities: panels end there.
     fn foot(&self) -> f64;
 
-    /// Bound of the quadrature's error on a panel that ends at the foot, or on a part of it: what is left when
-    /// the disc there is too small to be of use.
+    /// Bound of the quadrature's error on a panel that ends at the foot, where the disc is too small.
     fn foot_error(&self, width: f64) -> f64;
 }
 
 /// |C'(u)|² = E²(u − foot)² + d² of a quadratic piece; E = |C''|, d the least |C'|.
 #[derive(Clone, Copy, Debug)]
-pub struct Hodograph {
+pub struct QuadraticSpeed {
     e: f64,
     e_sq: f64,
     foot: f64,
     d_sq: f64,
 }
 
-impl Hodograph {
-    /// From the two end tangents.
+impl QuadraticSpeed {
     pub fn new<const M: usize>(piece: &Quadratic<M>) -> Self {
         let (g, end) = piece.end_tangents();
         let c: [f64; M] = std::array::from_fn(|k| (end[k] - g[k]) / piece.width);
         let (e_sq, g_sq) = (dot(&c, &c), dot(&g, &g));
-        // So little curvature does not change |C'| by a rounding error.
-        if e_sq.is_nan() || e_sq * piece.width * piece.width <= 1e-40 * g_sq || e_sq < f64::MIN_POSITIVE {
+        if e_sq.is_nan()
+            || e_sq * piece.width * piece.width <= NO_CURVATURE * g_sq
+            || e_sq < f64::MIN_POSITIVE
+        {
             return Self { e: 0.0, e_sq: 0.0, foot: 0.0, d_sq: g_sq };
         }
         let mut wedge_sq = 0.0;
@@ -105,7 +100,7 @@ impl Hodograph {
 
 /// f = |C'|: its integral is the length.
 #[derive(Clone, Copy, Debug)]
-pub struct Length(pub Hodograph);
+pub struct Length(pub QuadraticSpeed);
 
 impl Integrand for Length {
     #[inline(always)]
@@ -131,7 +126,7 @@ impl Integrand for Length {
 
 /// f = |C'|^(−1/2): with p = κ |C'| its integral is √κ times the time.
 #[derive(Clone, Copy, Debug)]
-pub struct ChordTime(pub Hodograph);
+pub struct ChordTime(pub QuadraticSpeed);
 
 impl Integrand for ChordTime {
     #[inline(always)]
@@ -178,7 +173,7 @@ impl<F: Integrand> Table<'_, F> {
         self.nodes[self.nodes.len() - 1].sum
     }
 
-    /// No place is found more closely than this: rounding of the sum, and of u itself.
+    /// The rounding of the integral, by the sum and by u itself: no u is found more closely.
     #[inline]
     pub fn rounding(&self) -> f64 {
         let (first, last) = (&self.nodes[0], &self.nodes[self.nodes.len() - 1]);
@@ -227,8 +222,8 @@ pub fn table_size(width: f64, disc: &Disc, error: f64) -> f64 {
     (width / disc.radius * (K * width * disc.bound / error).powf(exponent)).max(1.0)
 }
 
-/// Appends the table of f over [a, b] to `nodes`, meant to hold `error` wherever it is evaluated; returns the
-/// proven bound, which is greater than `error` only where u runs out of digits next to a cusp.
+/// Appends the table of f over [a, b] to `nodes`, with an error of at most `error` at each u. Returns the proven bound: it
+/// exceeds `error` only next to a cusp, where panels are as narrow as the rounding of u.
 pub fn tabulate<F: Integrand>(f: F, a: f64, b: f64, error: f64, nodes: &mut Vec<Node>) -> f64 {
     nodes.push(Node { u: a, sum: 0.0, rate: f.at(a) });
     let mut builder =
@@ -243,8 +238,8 @@ pub fn tabulate<F: Integrand>(f: F, a: f64, b: f64, error: f64, nodes: &mut Vec<
     builder.bound
 }
 
-/// Panels from left to right. Half of the allowed error is shared out by width, a quarter goes to each of the
-/// two panels at the foot.
+/// Appends panels from left to right. Half of the allowed error is shared by width; each of the two panels at the foot gets
+/// a quarter.
 struct Builder<'a, F> {
     f: F,
     share: f64,
@@ -296,7 +291,7 @@ mod tests {
     /// The closed form on [0, u]: with r = |C'| at the ends, R = r0 + r1, t = E (u − foot) and x = E u / R,
     /// (u/R) [(R² + (t0 + t1)²)/4 + d² atanh(x)/x].
     fn exact_length<const M: usize>(piece: &Quadratic<M>, u: f64) -> f64 {
-        let h = Hodograph::new(piece);
+        let h = QuadraticSpeed::new(piece);
         if h.e == 0.0 || u == 0.0 {
             return u * h.d_sq.sqrt();
         }
@@ -324,14 +319,14 @@ mod tests {
     #[test]
     fn a_straight_piece_takes_one_panel_and_no_error() {
         let line = Quadratic::line([1.0, 2.0], [4.0, 6.0]);
-        let (nodes, bound) = table_of(Length(Hodograph::new(&line)), 0.0, 5.0, 1e-12);
+        let (nodes, bound) = table_of(Length(QuadraticSpeed::new(&line)), 0.0, 5.0, 1e-12);
         assert_eq!((nodes.len(), bound), (2, 0.0));
         assert!((nodes[1].sum - 5.0).abs() < 1e-15);
     }
 
     #[test]
     fn the_unit_parabola_has_its_known_length() {
-        let (nodes, bound) = table_of(Length(Hodograph::new(&parabola())), 0.0, 1.0, 1e-13);
+        let (nodes, bound) = table_of(Length(QuadraticSpeed::new(&parabola())), 0.0, 1.0, 1e-13);
         let expected = 0.5 * (2f64.sqrt() + 1f64.asinh());
         assert!((nodes[nodes.len() - 1].sum - expected).abs() < 1e-15 && bound <= 1e-13);
     }
@@ -346,7 +341,7 @@ mod tests {
 
     #[test]
     fn a_uniform_table_of_the_stated_size_holds_its_error() {
-        let f = Length(Hodograph::new(&parabola()));
+        let f = Length(QuadraticSpeed::new(&parabola()));
         for error in [1e-6, 1e-9, 1e-12] {
             let disc = f.disc(0.0, 1.0);
             let size = table_size(1.0, &disc, error).ceil() as usize;
@@ -360,14 +355,14 @@ mod tests {
     fn a_full_cusp_is_split_there_and_exact() {
         // C' goes from (−1, −2) through 0 to (1, 2): length 2 · √5/2.
         let piece = Quadratic { control: [[0.0, 0.0], [-1.0, -2.0], [0.0, 0.0]], width: 2.0 };
-        let (nodes, bound) = table_of(Length(Hodograph::new(&piece)), 0.0, 2.0, 1e-13);
+        let (nodes, bound) = table_of(Length(QuadraticSpeed::new(&piece)), 0.0, 2.0, 1e-13);
         assert_eq!((nodes.len(), nodes[1].u, bound), (3, 1.0, 0.0));
         assert!((nodes[2].sum - 5f64.sqrt()).abs() < 1e-15);
     }
 
     #[test]
     fn the_time_along_a_chord_limit_matches_a_fine_sum() {
-        let f = ChordTime(Hodograph::new(&parabola()));
+        let f = ChordTime(QuadraticSpeed::new(&parabola()));
         let (nodes, bound) = table_of(f, 0.0, 1.0, 1e-13);
         let fine: f64 = (0..64).map(|i| quadrature(&f, i as f64 / 64.0, (i + 1) as f64 / 64.0)).sum();
         assert!(bound <= 1e-13 && (nodes[nodes.len() - 1].sum - fine).abs() < 1e-14);
@@ -395,7 +390,7 @@ mod tests {
             piece in quadratic(), at in 0.0..1.0f64, digits in 3.0..13.0f64
         ) {
             let u = at * piece.width;
-            let f = Length(Hodograph::new(&piece));
+            let f = Length(QuadraticSpeed::new(&piece));
             let whole = exact_length(&piece, piece.width);
             let (nodes, bound) = table_of(f, 0.0, piece.width, 10f64.powf(-digits) * whole);
             prop_assert!(bound <= 10f64.powf(-digits) * whole * (1.0 + 1e-12));
@@ -406,7 +401,7 @@ mod tests {
 
         #[test]
         fn a_chord_table_holds_its_bound_against_a_tighter_one(piece in quadratic(), at in 0.0..1.0f64) {
-            let f = ChordTime(Hodograph::new(&piece));
+            let f = ChordTime(QuadraticSpeed::new(&piece));
             let estimate = quadrature(&f, 0.0, piece.width);
             let (coarse, bound) = table_of(f, 0.0, piece.width, 1e-6 * estimate);
             let (fine, fine_bound) = table_of(f, 0.0, piece.width, 1e-13 * estimate);

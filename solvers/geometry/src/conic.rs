@@ -1,8 +1,8 @@
-//! A rational quadratic Bézier piece in standard form: the end weights are 1, the middle one says which conic it is.
+//! A rational quadratic Bézier piece in standard form: both end weights are 1, and the middle weight determines the conic.
 //!
-//! Weight 1 is a polynomial. On a circle the weight is the cosine of half the angle, and the tangents of both ends
-//! are equally long; with a width of `natural_width` the parameter has speed 1 there, so that arcs, their parts and
-//! the lines beside them meet C1. Parts of a conic are conics: they are brought to standard form again.
+//! With weight 1 it is a polynomial. On a circle the weight is the cosine of half the angle, and |C'| is equal at both
+//! ends: 1 if the width is `natural_width`, so that arcs, their parts and the lines next to them meet C1. A part of a conic
+//! is a conic in standard form again.
 
 use crate::quadratic::{lerp, norm, sub, Quadratic};
 
@@ -26,24 +26,24 @@ impl<const M: usize> Conic<M> {
         Quadratic::line(a, b).into()
     }
 
-    /// The piece is a line at constant speed, as `line` makes it.
+    /// Whether the piece is a line with constant C', as `line` makes it.
     pub fn is_line(&self) -> bool {
         self.weight == 1.0 && self.control[1] == lerp(&self.control[0], &self.control[2], 0.5)
     }
 
-    /// C'·width at both ends as lengths.
+    /// |C'| times the width at both ends, in mm.
     pub fn end_speeds(&self) -> (f64, f64) {
         let ([a, b, c], factor) = (&self.control, 2.0 * self.weight);
         (factor * norm(&sub(b, a)), factor * norm(&sub(c, b)))
     }
 
-    /// The width at which the speeds of both ends are 1 on average.
+    /// The width with which the mean of |C'| at both ends is 1.
     pub fn natural_width(&self) -> f64 {
         let (start, end) = self.end_speeds();
         0.5 * (start + end)
     }
 
-    /// The part on [u0, u1]. The part of a line is made as a line, free of what rounding does to a middle point.
+    /// The part on [u0, u1]. The part of a line is a line exactly, whatever the rounding of its middle point.
     pub fn part(&self, u0: f64, u1: f64) -> Self {
         if u0 == 0.0 && u1 == self.width {
             return *self;
@@ -52,7 +52,7 @@ impl<const M: usize> Conic<M> {
             let part = Quadratic { control: self.control, width: self.width }.part(u0, u1);
             return if self.is_line() { Self::line(part.control[0], part.control[2]) } else { part.into() };
         }
-        // Blossoms in homogeneous coordinates, the points as seen from the first one so that no digits are lost.
+        // Blossoms in homogeneous coordinates, relative to the first point so that no digits are lost.
         let [a, b, c] = &self.control;
         let blossom = |s: f64, t: f64| {
             let (s, t) = (s / self.width, t / self.width);

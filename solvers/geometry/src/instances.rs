@@ -1,10 +1,10 @@
-//! Kernels that are compiled where they are written.
+//! A macro that compiles kernels for each number of axes in the crate that has them.
 
-/// A trait whose methods are kernels for any count of axes, compiled in the crate that says so, once for each
-/// count that is named (an axis that rests changes no result, so that few are enough). Callers in other crates compile nothing.
+/// A trait whose methods are kernels for any number of axes M, compiled in the crate that uses this macro, once for each
+/// number in the list. Few numbers are enough, for an axis at rest changes no result. Crates that call them compile nothing.
 ///
-/// `fn name(&self, ...) -> ... = kernel;` calls `kernel(self, ...)`; `M` is the count of axes in all types. Tests inside the
-/// crate call the kernels themselves, for the few axes that they have: there nothing is compiled ahead.
+/// `fn name(&self, ...) -> ... = kernel;` calls `kernel(self, ...)`. Tests inside the crate call the kernels directly, with
+/// the few axes that they have.
 #[macro_export]
 macro_rules! instances {
     ($(#[$about:meta])* pub trait $name:ident for [$($count:literal),+] $kind:ty = $body:tt) => {

@@ -1,11 +1,12 @@
-//! Geometry of curves: polynomials, splines, circles, lengths and their inverse. Lengths are millimetres.
+//! Geometry of curves: polynomials, Bézier pieces, splines, circles, lengths and their inverse. Lengths are in mm.
 
 pub mod arc_length;
 pub mod conic;
 mod instances;
+pub mod inverse_length;
 pub mod newton;
 pub mod polynomial;
 pub mod quadratic;
-pub mod sarfraz;
 pub mod spline;
+pub mod tolerance;
 pub mod watch;

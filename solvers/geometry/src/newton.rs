@@ -1,11 +1,11 @@
-//! The parameter one step of given length ahead: a first-order start and Newton–Raphson.
+//! The parameter one step of given length ahead, from a table of lengths: a first-order start and Newton–Raphson.
 //!
-//! Source: Zhang et al. 2010, section 4.2. The paper bounds neither the rounds nor the place; here every iterate
-//! stays between the start of the step and the end of the curve, and bisection takes over where Newton–Raphson
-//! leaves that bracket (a first-order start does so next to a cusp) or does not settle. A step may go back.
+//! Source: Zhang et al. 2010, section 4.2, which bounds neither the number of rounds nor the iterates. Here each iterate is
+//! between the start of the step and the end of the curve. If Newton–Raphson leaves that bracket, as it does next to a
+//! cusp, or does not converge, bisection continues. A step may be negative.
 
 use crate::arc_length::{Integrand, Table};
-use crate::sarfraz::Located;
+use crate::inverse_length::Located;
 
 /// Rounds of Newton–Raphson before bisection takes over.
 const NEWTON_ROUNDS: u32 = 20;
@@ -56,12 +56,12 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::arc_length::{quadrature, tabulate, Hodograph, Length};
+    use crate::arc_length::{quadrature, tabulate, Length, QuadraticSpeed};
     use crate::quadratic::Quadratic;
 
     /// One step along a line of 5 mm, from 1 mm.
     fn on_a_line(step: f64) -> (Located, f64) {
-        let f = Length(Hodograph::new(&Quadratic::line([0.0, 0.0], [3.0, 4.0])));
+        let f = Length(QuadraticSpeed::new(&Quadratic::line([0.0, 0.0], [3.0, 4.0])));
         let mut nodes = Vec::new();
         tabulate(f, 0.0, 5.0, 1e-12, &mut nodes);
         advance(&Table { f, nodes: &nodes }, (1.0, 1.0), step, 1e-12)
@@ -89,7 +89,7 @@ mod tests {
             let off = 10f64.powf(exponent);
             let middle = std::array::from_fn(|k| a[k] + along * (c[k] - a[k]) + off * b[k]);
             let piece = Quadratic::<2> { control: [a, middle, c], width: 3.0 };
-            let f = Length(Hodograph::new(&piece));
+            let f = Length(QuadraticSpeed::new(&piece));
             let mut nodes = Vec::new();
             tabulate(f, 0.0, 3.0, 1e-13 * quadrature(&f, 0.0, 3.0), &mut nodes);
             let table = Table { f, nodes: &nodes };

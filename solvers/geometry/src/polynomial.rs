@@ -1,20 +1,20 @@
 //! Polynomials on [0, 1] of a degree known at run time, in scaled Bernstein form: p(x) = Σ c_i x^i (1 − x)^(n−i).
 //!
-//! The scaled coefficients are the Bernstein coefficients times binomials, so that they have the same signs; a product
-//! is a plain convolution, and a root of known order at 0 is divided out by dropping the first coefficients. `C` bounds
-//! the number of coefficients; no operation allocates.
+//! A scaled coefficient is the Bernstein coefficient times a binomial. So both have the same sign, a product is a
+//! convolution, and a root of order r at 0 is divided out by dropping the first r coefficients. `C` is the greatest number
+//! of coefficients; no operation allocates.
 
 mod integral;
 mod parts;
 mod roots;
 
-/// Most coefficients of any polynomial.
+/// Greatest number of coefficients of any polynomial.
 pub const MOST: usize = 74;
-/// Sums of polynomials with room for no more coefficients than this go through all of it.
+/// If `C` is at most this, loops run over all `C` coefficients: their number is then known to the compiler.
 const FEW: usize = 12;
 
 /// Pascal's triangle.
-static BINOMIALS: [[f64; MOST]; MOST] = binomials();
+pub(crate) static BINOMIALS: [[f64; MOST]; MOST] = binomials();
 
 const fn binomials() -> [[f64; MOST]; MOST] {
     let mut table = [[0.0; MOST]; MOST];
@@ -69,14 +69,13 @@ impl<const C: usize> Polynomial<C> {
         &self.c[..=self.n]
     }
 
-    /// Its scaled coefficients, and zeros after them where that makes their number a constant.
+    /// Its scaled coefficients, followed by zeros up to `padded_len`.
     #[inline(always)]
     pub fn padded(&self) -> &[f64] {
         &self.c[..self.width()]
     }
 
-    /// So many coefficients are kept of a polynomial of degree `n`, or gone through: all where they are few, for the
-    /// number is then a constant.
+    /// The number of coefficients that loops over a polynomial of degree `n` go through: `C` where that is small.
     #[inline(always)]
     pub fn padded_len(n: usize) -> usize {
         if C <= FEW {
@@ -86,7 +85,7 @@ impl<const C: usize> Polynomial<C> {
         }
     }
 
-    /// The polynomial of degree `n` with these scaled coefficients, padded or not.
+    /// The polynomial of degree `n` with these `padded_len` scaled coefficients.
     #[inline(always)]
     pub fn from_padded(n: usize, coefficients: &[f64]) -> Self {
         let mut c = [0.0; C];
@@ -141,7 +140,7 @@ impl<const C: usize> Polynomial<C> {
         self.c[self.n] = value;
     }
 
-    /// Puts scaled coefficient `i` to 0.
+    /// Sets scaled coefficient `i` to 0.
     pub fn clear(&mut self, i: usize) {
         self.c[i] = 0.0;
     }
@@ -166,7 +165,7 @@ impl<const C: usize> Polynomial<C> {
         2.0 * self.c[2] - 2.0 * (n - 1.0) * self.c[1] + n * (n - 1.0) * self.c[0]
     }
 
-    /// Every coefficient changed; 0 stays 0.
+    /// The polynomial with each scaled coefficient changed; `change` maps 0 to 0.
     #[inline(always)]
     pub fn map(&self, change: impl Fn(f64) -> f64) -> Self {
         let mut c = self.c;
@@ -181,7 +180,7 @@ impl<const C: usize> Polynomial<C> {
         self.map(|value| factor * value)
     }
 
-    /// Every coefficient by its size.
+    /// The polynomial with the absolute value of each coefficient.
     #[inline(always)]
     pub fn magnitude(&self) -> Self {
         self.map(f64::abs)
@@ -300,7 +299,7 @@ impl<const C: usize> Polynomial<C> {
         Self { n: 2 * n - 2, c }
     }
 
-    /// The wronskian's terms by their sizes: how much rounding it can hold.
+    /// The sum of the absolute values of the wronskian's terms, to which its rounding is relative.
     pub fn wronskian_magnitude(&self, other: &Self) -> Self {
         let n = self.n;
         if n == 0 {
@@ -321,7 +320,7 @@ impl<const C: usize> Polynomial<C> {
     pub fn antiderivative(&self, weight: &Self, degree: usize) -> Self {
         let mut c = [0.0; C];
         if weight.n == 0 {
-            // w = 1: the plain integral, of degree n + 1.
+            // w = 1: m is the integral of p, of degree n + 1.
             let n = self.n + 1;
             for i in 0..n {
                 c[i + 1] = (self.c[i] + (n - i) as f64 * c[i]) / (i + 1) as f64;
@@ -360,7 +359,7 @@ impl<const C: usize> Polynomial<C> {
         self.values([x])[0]
     }
 
-    /// p at some places, by Horner's rule in x and 1 − x at once: free of divisions and of cancellation.
+    /// p at several x, by Horner's rule in x and 1 − x at once, without divisions and without cancellation.
     #[inline(always)]
     pub fn values<const K: usize>(&self, x: [f64; K]) -> [f64; K] {
         let (mut sum, mut power) = ([self.c[0]; K], [1.0; K]);
@@ -373,13 +372,13 @@ impl<const C: usize> Polynomial<C> {
         sum
     }
 
-    /// Whether no Bernstein coefficient is below this, so that the polynomial is not either.
+    /// Whether no Bernstein coefficient, and so no value, is below `least`.
     #[inline(always)]
     pub fn is_above(&self, least: f64) -> bool {
         self.coefficients().iter().zip(&BINOMIALS[self.n]).all(|(&value, binomial)| value >= least * binomial)
     }
 
-    /// Whether no coefficient is negative, so that the polynomial is not either.
+    /// Whether no coefficient, and so no value, is negative.
     #[inline(always)]
     pub fn is_positive(&self) -> bool {
         self.padded().iter().fold(true, |all, &value| all & (value >= 0.0))

@@ -1,9 +1,17 @@
 //! Curves of any degree: Bézier pieces of degree 1 to 9, polynomial or rational, in M axes, joined end to end.
 //!
-//! A piece is C(u) on u in [0, width]. It is given by its Bernstein control points in mm and, where it is
-//! rational, one positive weight each. `knots` and `extract` make pieces of B-splines and NURBS, `circle` of
-//! arcs and helices; `bezier` and `rational` evaluate and transform them; `joints` and `cusps` say where they
-//! are not smooth, `regular` leaves no such place inside a piece; `speed` and `length` measure them.
+//! A piece is C(u) on u in [0, width], given by its Bernstein control points in mm and, if it is rational, one positive
+//! weight for each. A *place* on a curve is a piece and its parameter u.
+//!
+//! | file | computes |
+//! |---|---|
+//! | `knots`, `extract` | a checked B-spline or NURBS; its pieces |
+//! | `circle` | pieces of arcs and helices |
+//! | `bezier`, `rational` | values and derivatives of a piece, parts of it, the same of another degree |
+//! | `joints`, `cusps` | how neighbours meet; where C' is 0 |
+//! | `regular` | the same curve as pieces without a cusp inside |
+//! | `speed`, `length` | \|C'\| with bounds of its derivatives; the length and its inverse |
+//! | `error` | what is wrong with a spline that a user gives |
 
 pub mod bezier;
 pub mod circle;
@@ -17,27 +25,16 @@ pub mod rational;
 pub mod regular;
 pub mod speed;
 
+use crate::polynomial::BINOMIALS;
+use crate::quadratic::{norm, sub};
+use crate::tolerance::NO_DIRECTION;
+
 /// The greatest degree of a piece.
 pub const MAX_DEGREE: usize = 9;
-/// Coefficients of the greatest hodograph: that of a rational piece has degree 2d − 2.
+/// Greatest number of coefficients of a hodograph: that of a rational piece has degree 2d − 2.
 pub const MAX_HODOGRAPH: usize = 2 * MAX_DEGREE - 1;
-/// Coefficients of its square.
+/// Greatest number of coefficients of its square.
 pub(crate) const MAX_SQUARE: usize = 2 * MAX_HODOGRAPH - 1;
-
-const BINOMIALS: [[f64; MAX_SQUARE]; MAX_SQUARE] = {
-    let mut rows = [[0.0; MAX_SQUARE]; MAX_SQUARE];
-    let mut n = 0;
-    while n < MAX_SQUARE {
-        rows[n][0] = 1.0;
-        let mut k = 1;
-        while k <= n {
-            rows[n][k] = rows[n - 1][k - 1] + rows[n - 1][k];
-            k += 1;
-        }
-        n += 1;
-    }
-    rows
-};
 
 /// n over k, exact for every degree that occurs.
 #[inline(always)]
@@ -45,8 +42,8 @@ pub(crate) fn binomial(n: usize, k: usize) -> f64 {
     BINOMIALS[n][k]
 }
 
-/// One piece: degree + 1 control points in mm, as many weights (none where it is polynomial), and the width of
-/// its parameter interval.
+/// One piece: degree + 1 control points in mm, as many weights (none if it is polynomial), and the width of its parameter
+/// interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Piece<'a, const M: usize> {
     pub control: &'a [[f64; M]],
@@ -55,7 +52,7 @@ pub struct Piece<'a, const M: usize> {
 }
 
 impl<'a, const M: usize> Piece<'a, M> {
-    /// A piece of as many weights as control points, or none; equal weights make it no rational one.
+    /// A piece with as many weights as control points, or none; with equal weights it is polynomial.
     #[inline]
     pub fn new(control: &'a [[f64; M]], weights: &'a [f64], width: f64) -> Self {
         let equal = weights.windows(2).all(|pair| pair[0] == pair[1]);
@@ -70,6 +67,19 @@ impl<'a, const M: usize> Piece<'a, M> {
     #[inline(always)]
     pub fn is_rational(&self) -> bool {
         !self.weights.is_empty()
+    }
+
+    /// The first edge of the control polygon that has a direction, or with `at_end` the last; None if the piece has no
+    /// length. It is in the direction of motion at that end.
+    pub fn edge(&self, at_end: bool) -> Option<[f64; M]> {
+        let (extent, _) = self.extent();
+        let mut edges = self.control.windows(2).map(|pair| sub(&pair[1], &pair[0]));
+        let has_direction = |edge: &[f64; M]| norm(edge) > NO_DIRECTION * extent;
+        if at_end {
+            edges.rfind(has_direction)
+        } else {
+            edges.find(has_direction)
+        }
     }
 
     /// The greatest distance of a control point from the first one, and the greatest coordinate, in mm.
@@ -88,8 +98,8 @@ impl<'a, const M: usize> Piece<'a, M> {
     }
 }
 
-/// Pieces one after the other, each of its own degree: piece i owns the control points from `offsets[i]` to
-/// `offsets[i + 1]`. `weights` is empty where no piece is rational.
+/// Pieces in order, each of its own degree: piece i has the control points from `offsets[i]` to `offsets[i + 1]`. `weights`
+/// is empty if no piece is rational.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CompositeCurve<const M: usize> {
     pub control: Vec<[f64; M]>,
@@ -114,7 +124,7 @@ impl<const M: usize> CompositeCurve<M> {
         self.width.is_empty()
     }
 
-    /// Piece i; equal weights make no piece rational.
+    /// Piece i; with equal weights it is polynomial.
     #[inline]
     pub fn piece(&self, i: usize) -> Piece<'_, M> {
         let range = self.offsets[i]..self.offsets[i + 1];
@@ -146,7 +156,7 @@ impl<const M: usize> CompositeCurve<M> {
         self.width.push(width);
     }
 
-    /// Removes all pieces, and keeps the memory.
+    /// Removes all pieces; the memory stays.
     pub fn clear(&mut self) {
         self.control.clear();
         self.weights.clear();

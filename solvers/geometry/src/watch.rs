@@ -1,46 +1,45 @@
-//! How far the work of a kernel is, and whether it is still wanted.
+//! The progress of a kernel's work, and its cancellation.
 //!
-//! Kernels count what they have done in their outer loops, at least every few milliseconds. Work that is no longer wanted
-//! ends there by unwinding up to who began it, through all threads of the work, without a message: no kernel has to
-//! hand a fault of its own up for it.
+//! Kernels count in their outer loops what they have done, at least every few milliseconds. Cancelled work ends there: it
+//! unwinds without a message to its caller, through all its threads, so no kernel needs an error for it.
 
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 
-/// The whole of a work in the units of its counter: fine enough for each of a thousand million parts, with room above for
-/// work that is done again.
+/// The whole work in units of its counter: 1e9 equal parts are still counted well, and work that is done again has room
+/// above.
 const WHOLE: f64 = (1u64 << 52) as f64;
-/// Small units of work are counted by so many.
+/// Small units of work are counted in groups of this many.
 const STEP: usize = 256;
 
-/// One work: what is done of it, and whether it is still wanted.
+/// The counter of a work, and whether it is cancelled.
 #[derive(Debug, Default)]
 pub struct Work {
     done: AtomicU64,
     cancelled: AtomicBool,
 }
 
-/// What the unwinding of cancelled work carries.
+/// The payload with which cancelled work unwinds.
 pub struct Cancelled;
 
 impl Work {
-    /// The part that is done, 0 to 1; it never falls.
+    /// The fraction that is done, 0 to 1; it never decreases.
     pub fn done(&self) -> f64 {
         (self.done.load(Relaxed) as f64 / WHOLE).min(1.0)
     }
 
-    /// Ends the work where it next counts.
+    /// Makes the work end where it next counts.
     pub fn cancel(&self) {
         self.cancelled.store(true, Relaxed);
     }
 
-    /// Who counts it.
+    /// The counter for all of the work.
     pub fn watch(&self) -> Watch<'_> {
         Watch { work: Some(self), share: WHOLE }
     }
 }
 
-/// Counts a part of a work; that of a work that nobody waits for is the default.
+/// Counts a part of a work. The default counts nothing.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Watch<'a> {
     work: Option<&'a Work>,
@@ -49,17 +48,17 @@ pub struct Watch<'a> {
 }
 
 impl Watch<'_> {
-    /// Counts this share of the part, 0 to 1.
+    /// The counter of this fraction of the part, 0 to 1.
     pub fn part(self, share: f64) -> Self {
         Self { share: share * self.share, ..self }
     }
 
-    /// Counts each of so many equal parts.
+    /// The counter of one of `count` equal parts.
     pub fn each(self, count: usize) -> Self {
         self.part(1.0 / count.max(1) as f64)
     }
 
-    /// So many times the part is done. Unwinds if the work is cancelled.
+    /// Counts the part `times` times. Unwinds if the work is cancelled.
     #[inline]
     pub fn advance(self, times: usize) {
         if let Some(work) = self.work {
@@ -68,7 +67,7 @@ impl Watch<'_> {
         }
     }
 
-    /// The part is done once more, for the number `i` of a loop over small ones: a few hundred are counted at once.
+    /// Counts the part once, in round `i` of a loop over small parts: a few hundred are counted at once.
     #[inline]
     pub fn count(self, i: usize) {
         if i.is_multiple_of(STEP) {
@@ -84,7 +83,7 @@ impl Watch<'_> {
         }
     }
 
-    /// The same in a loop over small units.
+    /// Unwinds if the work is cancelled, in round `i` of a loop over small parts.
     #[inline]
     pub fn check_at(self, i: usize) {
         if i.is_multiple_of(STEP) {

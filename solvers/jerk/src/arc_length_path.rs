@@ -17,9 +17,9 @@ use crate::path_limits::chord_speed;
 use feedplan_geometry::arc_length::{W, X};
 use feedplan_geometry::quadratic::{dot, norm};
 use feedplan_geometry::spline::bezier::{self, derivatives};
-use feedplan_geometry::spline::cusps::CUSP;
 use feedplan_geometry::spline::rational::Hodograph;
 use feedplan_geometry::spline::Piece;
+use feedplan_geometry::tolerance::CUSP;
 use feedplan_planner::problem::{self, Both, Problem};
 
 /// Accuracy of the quadrature of a panel, as a part of its length …

@@ -13,8 +13,9 @@ use crate::jerk_profile::JerkProfile;
 use feedplan_geometry::polynomial::Polynomial;
 use feedplan_geometry::quadratic::dot;
 use feedplan_geometry::spline::bezier::derivatives;
-use feedplan_geometry::spline::cusps::{piece_cusps, CUSP};
+use feedplan_geometry::spline::cusps::piece_cusps;
 use feedplan_geometry::spline::rational::Hodograph;
+use feedplan_geometry::tolerance::CUSP;
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::problem::{lesser, Fault, Problem};
 

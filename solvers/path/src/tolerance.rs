@@ -65,7 +65,5 @@ pub const AT_PIECE_END: f64 = 1e-6;
 pub const MOVED_CUT: f64 = 1e-3;
 /// A piece is not cut at a change of feed within this fraction of its width from an end.
 pub const SLIVER: f64 = 1e-6;
-/// An edge of a control polygon below this fraction of the piece has no direction, as next to a cusp.
-pub const NO_DIRECTION: f64 = 1e-12;
 /// A circle whose centre is off the programmed one by more than this fraction of the radius is another arc.
 pub const CENTRE: f64 = 0.1;

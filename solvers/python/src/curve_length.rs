@@ -82,7 +82,7 @@ impl CurveLength {
         let found = with_padded_axes!(self.axes, M, {
             let kernel = self.lengths.get::<Kernel<M>>()?;
             run(py, None, |_| match newton {
-                true => kernel.follow(wanted, tolerance),
+                true => kernel.locate_in_order(wanted, tolerance),
                 false => kernel.locate_all(wanted, tolerance),
             })
         })?;

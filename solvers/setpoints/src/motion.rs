@@ -20,10 +20,11 @@ use along::Along;
 pub use curve::flaw;
 use curve::CurveMotion;
 use feedplan_geometry::arc_length::{quadrature, tabulate};
-use feedplan_geometry::arc_length::{Integrand, Node, Table, TABLE_ERROR};
+use feedplan_geometry::arc_length::{Integrand, Node, Table};
+use feedplan_geometry::inverse_length::{self, Located};
 use feedplan_geometry::quadratic::Quadratic;
-use feedplan_geometry::sarfraz::{self, Located};
 use feedplan_geometry::spline::Piece;
+use feedplan_geometry::tolerance;
 use feedplan_planner::phase_law::PhaseLaw;
 use quadratic::QuadraticMotion;
 pub use rate::{TipSpeed, MAX_TIP};
@@ -180,7 +181,7 @@ fn needs_curve(kind: PhaseLaw) -> bool {
 /// Tabulates f from one end to another.
 fn fill<F: Integrand>(f: F, ends: (f64, f64), nodes: &mut Vec<Node>) -> f64 {
     let estimate = quadrature(&f, ends.0, ends.1);
-    tabulate(f, ends.0, ends.1, TABLE_ERROR * estimate, nodes)
+    tabulate(f, ends.0, ends.1, tolerance::TABLE * estimate, nodes)
 }
 
 /// The place where a part of the whole integral is done, which grows evenly with time.
@@ -193,7 +194,7 @@ fn invert<F: Integrand>(
 ) -> State {
     let total = table.total();
     let tolerance = (STEP_ERROR * total * period / arc.duration).max(table.rounding());
-    let located = sarfraz::locate(table, done * total, tolerance);
+    let located = inverse_length::locate(table, done * total, tolerance);
     let error = (located.miss + table_error) / total;
     State { u: located.u, iterations: located.iterations, error, ..State::default() }
 }

@@ -1,20 +1,20 @@
-//! The integral of a quotient p/w² of Bernstein forms, as a numerator m over w.
+//! The integral of a quotient p/w² of Bernstein forms, as m/w.
 //!
-//! m' w − m w' = p is a row for each of the 2 d − 1 coefficients of p, with d unknowns. Solved row by row from the first
-//! on, errors grow by a factor of ten or more at each step: all digits are gone at degree 9, whatever the weights. The
-//! least squares of all rows lose none. With m_i = q_i w_i row r is
+//! m' w − m w' = p gives one equation for each of the 2 d − 1 coefficients of p, with d unknowns. If they are solved one
+//! after the other, errors grow tenfold or more at each, and no digits are left at degree 9. The least squares of all
+//! equations lose none. With m_i = q_i w_i equation r is
 //!
 //! ```text
 //! Σ (b − a) w_a w_b (q_b − q_a) = p_r,   a < b, a + b = r + 1,
 //! ```
 //!
-//! a mean of differences once it is divided by the sum of its factors, which is also what the rounding of p_r is
-//! relative to: so each row counts as much as it is known.
+//! Divided by the sum of its factors it is a mean of differences. The rounding of p_r is relative to that sum too, so each
+//! equation has the weight that its accuracy deserves.
 
 /// Rows and columns of the greatest system: degree 9.
 const ROWS: usize = 17;
 const COLUMNS: usize = 9;
-/// The first unknowns are those of their own rows: what is small next to 0 keeps its digits.
+/// The first unknowns are solved from their own equations exactly, so that small values near 0 keep their digits.
 const EXACT: usize = 2;
 
 /// Writes the scaled coefficients of m, m(0) = 0, with (m/w)' = p/w²; `p` has 2 d − 1 coefficients, `w` d + 1.
@@ -60,7 +60,7 @@ pub fn over_weight(p: &[f64], w: &[f64], m: &mut [f64]) {
     }
 }
 
-/// The least squares of the columns' rows by Householder's reflections.
+/// The least-squares solution by Householder's reflections.
 fn least_squares(
     columns: &mut [[f64; ROWS]],
     right: &mut [f64; ROWS],

@@ -1,4 +1,4 @@
-//! A polynomial on a part of [0, 1].
+//! A polynomial on a part of [0, 1], as a polynomial on [0, 1].
 
 use super::{Polynomial, BINOMIALS};
 

@@ -1,14 +1,13 @@
-//! Where a polynomial changes its sign in [0, 1]: Descartes' rule on Bernstein coefficients, halving and Newton's method.
+//! The changes of sign of a polynomial in [0, 1], by Descartes' rule on Bernstein coefficients, halving, and Newton's method.
 
 use super::Polynomial;
+use crate::tolerance::LAST_STEP;
 
-/// Halving stops here: the interval is then as short as the spacing of numbers near 1.
+/// Greatest number of halvings: intervals are then as short as the spacing of numbers near 1.
 const MAX_DEPTH: u32 = 52;
-/// A Newton step this small, quadratically convergent, leaves an error below rounding.
-const LAST_STEP: f64 = 3e-9;
 
 impl<const C: usize> Polynomial<C> {
-    /// First x in [0, 1] after which the polynomial is negative; one that starts negative answers 0.
+    /// First x in [0, 1] after which the polynomial is negative; 0 if it starts negative.
     #[inline(always)]
     pub fn first_root(&self) -> Option<f64> {
         let (before, after) =
@@ -18,23 +17,23 @@ impl<const C: usize> Polynomial<C> {
         } else if after.iter().all(|&c| c <= 0.0) {
             Some(self.single_root())
         } else {
-            Stretch::whole(self).first_root()
+            Interval::whole(self).first_root()
         }
     }
 
-    /// Every x in (0, 1) where the polynomial changes its sign, in order.
+    /// Calls `found` with each x in (0, 1) where the polynomial changes its sign, in order.
     pub fn sign_changes(&self, found: &mut impl FnMut(f64)) {
         let c = self.coefficients();
         if c.iter().any(|&value| value > 0.0) && c.iter().any(|&value| value < 0.0) {
-            Stretch::whole(self).sign_changes(&mut 0.0, found);
+            Interval::whole(self).sign_changes(&mut 0.0, found);
         }
     }
 
     /// The root of a polynomial with one change of sign, from positive to negative: Newton's method inside a bracket.
     ///
-    /// With z = x/(1 − x) the polynomial is Σ c_i z^i over (1 + z)^n; roots beyond ½ are sought from the other end.
+    /// With z = x/(1 − x) the polynomial is Σ c_i z^i over (1 + z)^n. A root beyond ½ is searched from the other end.
     fn single_root(&self) -> f64 {
-        // Roots at 0 and at 1 are not the one.
+        // Without the roots at 0 and at 1.
         let c = self.coefficients();
         let from = c.iter().position(|&value| value != 0.0).unwrap_or(0);
         let to = c.iter().rposition(|&value| value != 0.0).unwrap_or(0);
@@ -50,22 +49,22 @@ impl<const C: usize> Polynomial<C> {
     }
 }
 
-/// A polynomial on a part of [0, 1] that halving has led to.
-struct Stretch<const C: usize> {
+/// A polynomial on an interval of [0, 1] that comes from halving.
+struct Interval<const C: usize> {
     p: Polynomial<C>,
-    /// The sizes of the terms that the coefficients are sums of.
+    /// The sums of the absolute values of the terms of which the coefficients are sums.
     size: Polynomial<C>,
-    /// A coefficient below this part of its terms may be rounding alone, and has no sign then.
+    /// A coefficient below this fraction of its terms may be rounding, and has no sign.
     ///
-    /// Signs left out are never more changes, so that at any depth the stretches with changes are no more than those
-    /// of the polynomial without rounding: half its degree at most. Without this, rounding breeds them at every level.
+    /// Leaving out signs never adds changes, so at any depth at most n/2 intervals have several changes, as without
+    /// rounding. If signs of rounding counted, such intervals would multiply with the depth.
     noise: f64,
     from: f64,
     to: f64,
     depth: u32,
 }
 
-impl<const C: usize> Stretch<C> {
+impl<const C: usize> Interval<C> {
     #[inline(always)]
     fn whole(p: &Polynomial<C>) -> Self {
         Self { p: *p, size: p.magnitude(), noise: 0.0, from: 0.0, to: 1.0, depth: 0 }
@@ -84,7 +83,7 @@ impl<const C: usize> Stretch<C> {
         )
     }
 
-    /// Coefficient i, or 0 where it has no sign.
+    /// Coefficient i, or 0 if it has no sign.
     #[inline(always)]
     fn known(&self, i: usize) -> f64 {
         let value = self.p.c[i];
@@ -110,7 +109,7 @@ impl<const C: usize> Stretch<C> {
         (first, last, changes)
     }
 
-    /// Where the one change of sign is; `first` is the sign before it.
+    /// The x of the one change of sign; `first` is the sign before it.
     fn single_root(&self, first: f64) -> f64 {
         let mut p = self.p;
         for i in 0..=p.n {
@@ -133,7 +132,7 @@ impl<const C: usize> Stretch<C> {
         }
     }
 
-    /// `before` is the last sign seen.
+    /// Calls `found` with each change of sign; `before` is the last sign before the interval, and then that of its end.
     fn sign_changes(&self, before: &mut f64, found: &mut impl FnMut(f64)) {
         let (first, last, changes) = self.signs();
         if changes > 1 && self.depth < MAX_DEPTH {
@@ -157,7 +156,7 @@ impl<const C: usize> Stretch<C> {
 fn root_below_one(c: impl Fn(usize) -> f64, n: usize, at_one: f64) -> f64 {
     let falls = at_one < 0.0;
     let (mut low, mut high) = (0.0, 1.0);
-    // The root of the parabola with the same ends, and the same slope at 0.
+    // Start: the root of the parabola with the same values at both ends and the same slope at 0.
     let (half, bend) = (0.5 * c(1), at_one - c(0) - c(1));
     let q = -(half + (half * half - bend * c(0)).max(0.0).sqrt().copysign(half));
     let mut z = [c(0) / q, q / bend].into_iter().find(|z| (0.0..1.0).contains(z)).unwrap_or(0.5);

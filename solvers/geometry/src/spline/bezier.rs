@@ -1,12 +1,13 @@
-//! One Bézier piece: value and derivatives to the third, splitting, degree elevation and reversal.
+//! Value and derivatives of a Bézier piece to the third, its parts, the same piece of a higher degree or reversed; all by
+//! corner cutting.
 //!
-//! All by corner cutting. The control points are first taken from the nearer end of the piece, so that a small
-//! piece far from the origin loses no digits of its derivatives, and both ends are met exactly.
+//! Control points are first taken relative to the nearer end of the piece. So a small piece far from the origin loses no
+//! digits of its derivatives, and both ends are exact.
 
 use super::rational::{cut_corners, quotient};
 use super::{CompositeCurve, Piece, MAX_DEGREE};
 
-/// Calls a function for M axes with the number of control points as a constant, for which triangles unroll.
+/// Calls a function with the number of control points as a constant, so that its loops are unrolled.
 macro_rules! with_count {
     ($piece:expr, $function:ident($($argument:expr),*)) => {
         match $piece.control.len() {
@@ -67,7 +68,7 @@ fn derivatives_of<const M: usize, const N: usize>(piece: &Piece<M>, u: f64) -> [
 /// De Casteljau's triangle: its last four rows hold the value and the derivatives by t.
 #[inline(always)]
 fn triangle<const M: usize, const N: usize>(mut b: [[f64; M]; N], t: f64) -> [[f64; M]; 4] {
-    // Weights far apart keep their digits in this form of the mean, which takes no differences.
+    // This form of the mean takes no differences, so weights of different magnitudes keep their digits.
     let (d, s) = ((N - 1) as f64, 1.0 - t);
     let cut = |b: &mut [[f64; M]; N], left: usize| {
         for i in 0..left {

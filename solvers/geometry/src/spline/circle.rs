@@ -1,23 +1,22 @@
 //! Arcs and circles as exact rational quadratic pieces, and helices within a proven tolerance.
 //!
-//! An arc of θ ≤ 90° has the weights 1, cos(θ/2), 1; with τ = s tan(θ/4), s = 2t − 1, its angle from the middle
-//! is 2 atan τ and ω = (1 + τ²)/(1 + tan²(θ/4)). A helix is no rational curve: an axis that goes with the angle
-//! would need atan τ. Its pieces keep the exact circle, raised to degree d, and the axis is Z/ω with a polynomial
-//! Z of degree d for (1 + τ²) atan τ: the tool stays exactly on the cylinder and its axis is off by at most the
-//! bound below. All pieces being congruent, the derivative is continuous.
+//! An arc of θ ≤ 90° has the weights 1, cos(θ/2), 1. With τ = s tan(θ/4), s = 2t − 1, its angle from the middle is 2 atan τ,
+//! and ω = (1 + τ²)/(1 + tan²(θ/4)). A helix is not rational: an axis that is linear in the angle is linear in atan τ. So
+//! its pieces are the exact circle, raised to degree d, and the axis is Z/ω with a polynomial Z of degree d near
+//! (1 + τ²) atan τ. The tool is exactly on the cylinder; the error along the axis has the bound below. All pieces are
+//! congruent, so the derivative is continuous.
 //!
-//! Z interpolates f = (1 + τ²) atan τ at τ = −T cos(jπ/d), T = tan(θ/4). Where d is odd it does so at 0 too, both
-//! being odd. With n points in all |Z − f| ≤ max|f⁽ⁿ⁾|/n! · Tⁿ/2ᵈ⁻¹, and f''' = 4/(1 + τ²)², whose poles ±i are
-//! not nearer than 1 to any real τ, gives |f⁽ⁿ⁾|/n! ≤ 2/(n(n − 2)), n ≥ 3. At d = 2 the axis is (Z₀ + Z₂)/2 in the middle.
+//! Z interpolates f = (1 + τ²) atan τ at τ = −T cos(jπ/d), T = tan(θ/4), and at 0 too if d is odd, for then both are odd.
+//! With n points in all |Z − f| ≤ max|f⁽ⁿ⁾|/n! · Tⁿ/2ᵈ⁻¹. From f''' = 4/(1 + τ²)², whose poles ±i are at least 1 away from
+//! any real τ, |f⁽ⁿ⁾|/n! ≤ 2/(n(n − 2)), n ≥ 3. At d = 2 the axis is (Z₀ + Z₂)/2 in the middle.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::bezier::elevate;
 use super::error::SplineError;
 use super::{CompositeCurve, MAX_DEGREE};
+use crate::tolerance::SAME_ANGLE;
 
-/// Angles nearer than this to a quarter or a full turn are taken for it, in rad and rad per turn.
-const SAME_ANGLE: f64 = 4.0 * f64::EPSILON;
 /// More pieces than this are refused.
 const MAX_PIECES: f64 = 1e7;
 
@@ -72,7 +71,7 @@ impl<const M: usize> Turn<M> {
             let slope = (rise / count).hypot(piece.width);
             *curve.width.last_mut().expect("the piece just made") = slope;
             for (j, point) in curve.control[first..].iter_mut().enumerate() {
-                // The joints are the same numbers on both sides.
+                // Neighbours have the same numbers where they meet.
                 let fraction = match j {
                     0 => i as f64 / count,
                     _ if j == degree => (i + 1) as f64 / count,
@@ -115,7 +114,7 @@ impl<const M: usize> Turn<M> {
                 (true, 2) => (0.0, -1.0),
                 (true, _) => (-1.0, 0.0),
                 _ => {
-                    // With what the product loses, or pieces far round would not be of one size.
+                    // With the rounding of the product, so that pieces after many turns are of equal size.
                     let angle = i * theta;
                     let lost = i.mul_add(theta, -angle);
                     let (sin, cos) = angle.sin_cos();
@@ -129,7 +128,7 @@ impl<const M: usize> Turn<M> {
         let width = radius[0].hypot(radius[1]) * theta.abs();
         for i in 0..count as usize {
             let (a, c) = (at(i as f64), at((i + 1) as f64));
-            // Where the tangents of both ends meet.
+            // The point where the tangents of both ends meet.
             let b = [a[0] - tangent * a[1], a[1] + tangent * a[0]];
             let control = [a, b, c].map(|[u, v]| {
                 let mut point = self.start;
@@ -150,7 +149,7 @@ impl<const M: usize> Turn<M> {
 /// The control points of the axis of one piece that goes from 0 to 1.
 fn axial_fractions(theta: f64, degree: usize) -> [f64; MAX_DEGREE + 1] {
     let (n, top) = (degree + 1, (0.25 * theta).tan());
-    // (1 + τ²) atan τ − τ = Σ 2 (−1)^(j+1) τ^(2j+1)/((2j − 1)(2j + 1)): what is left beside a line.
+    // (1 + τ²) atan τ − τ = Σ 2 (−1)^(j+1) τ^(2j+1)/((2j − 1)(2j + 1)).
     let rest = |tau: f64| {
         let (mut sum, mut power) = (0.0, tau);
         for j in 1..40 {
@@ -169,7 +168,7 @@ fn axial_fractions(theta: f64, degree: usize) -> [f64; MAX_DEGREE + 1] {
         row[n] = rest(top * s);
     }
     let rest = solve(&mut matrix, n);
-    // Bernstein coefficients of ω, a parabola raised to the degree.
+    // `weight` is a Bernstein coefficient of ω, a parabola raised to the degree.
     let (cosine, d) = ((0.5 * theta).cos(), degree as f64);
     std::array::from_fn(|i| {
         if i > degree {

@@ -1,31 +1,28 @@
-//! Cusps: where the derivative of a piece vanishes, found from Bernstein coefficients and not by sampling.
+//! The cusps of a piece, where C' is 0, from Bernstein coefficients; all are found, for nothing is sampled.
 //!
-//! The hodograph (C', or its numerator, which vanishes where C' does) is halved again and again. A part is free
-//! of cusps when every Bernstein coefficient of its square, a polynomial of twice the degree, is above the
-//! threshold: the square then is, too. The hodograph is halved, not its square, so that |C'| is known to
-//! rounding of its greatest value instead of to the square root of that.
+//! The hodograph is C', or on rational pieces its numerator, which has the same zeros. It is halved again and again. An
+//! interval has no cusp if each Bernstein coefficient of the hodograph's square is above the threshold, for then the square
+//! is above it too. The hodograph is halved and not its square, so that |C'| is known to ε of its greatest value and not
+//! to √ε.
 
 use super::rational::Hodograph;
 use super::{binomial, CompositeCurve, Piece, MAX_HODOGRAPH, MAX_SQUARE};
 use crate::quadratic::dot;
+use crate::tolerance::SQUARE_ROUNDING;
 use crate::watch::Watch;
 
-/// |C'| below this part of its greatest value is a cusp: it is far above rounding, and a curve passes such a
-/// place as slowly as it would a cusp, whatever the machine.
-pub const CUSP: f64 = 1e-9;
-/// The rounding of a coefficient of the square beside the greatest one.
-const NOISE: f64 = 1e-14;
-/// Halving stops here, at the spacing of numbers near 1.
+/// Greatest number of halvings: intervals are then as short as the spacing of numbers near 1.
 const MAX_DEPTH: u32 = 52;
 
-/// A place where |C'| is at most `CUSP` of its greatest value on the piece, or the least of such places.
+/// A place where |C'| is at most a given fraction of its greatest value on the piece; of neighbours the one with the least
+/// |C'|.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cusp {
     pub piece: usize,
     pub u: f64,
 }
 
-/// The cusps of every piece, in order, ends included. A piece of length zero is one cusp, at its start.
+/// The cusps of each piece in order, with its ends. A piece of length zero has one, at its start.
 pub fn cusps<const M: usize>(curve: &CompositeCurve<M>, tolerance: f64, watch: Watch) -> Vec<Cusp> {
     let mut found = vec![];
     for (i, piece) in curve.pieces().enumerate() {
@@ -57,7 +54,7 @@ pub fn rests_at_ends<const M: usize>(piece: &Piece<M>) -> [bool; 2] {
     [control[0] == control[1], control[last - 1] == control[last]]
 }
 
-/// Joins to `slow` the parts of [lo, hi] where |h|² may be at most `threshold`.
+/// Adds to `slow` the intervals of [lo, hi] where |h|² may be at most `threshold`.
 fn search<const M: usize>(
     h: &[[f64; M]],
     lo: f64,
@@ -78,7 +75,7 @@ fn search<const M: usize>(
         bound = bound.min(square[k] / binomial(2 * n, k));
     }
     let greatest = h.iter().fold(0.0, |most: f64, v| most.max(dot(v, v)));
-    if bound > threshold + NOISE * greatest {
+    if bound > threshold + SQUARE_ROUNDING * greatest {
         return;
     }
     if greatest <= threshold || depth == MAX_DEPTH {
@@ -103,8 +100,8 @@ fn search<const M: usize>(
     search(&right[..=n], middle, hi, depth + 1, threshold, slow);
 }
 
-/// The place of the least |h| in [lo, hi], a part so short that h is nearly a line through 0 or flat there:
-/// the best of its ends, its middle and two Gauss–Newton steps from it.
+/// The t of the least |h| in [lo, hi], which is so short that h is nearly linear: the best of its ends, its middle and two
+/// Gauss–Newton steps from there.
 fn least<const M: usize>(h: &[[f64; M]], [lo, hi]: [f64; 2]) -> f64 {
     let mut places = vec![lo, hi, 0.5 * (lo + hi)];
     for _ in 0..2 {
@@ -143,6 +140,7 @@ fn value_and_slope<const M: usize>(h: &[[f64; M]], t: f64) -> ([f64; M], [f64; M
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tolerance::CUSP;
     use proptest::prelude::*;
 
     fn of<const M: usize>(control: &[[f64; M]], weights: &[f64]) -> Vec<f64> {

@@ -1,15 +1,13 @@
-//! What can be wrong with a spline that a user gives, each in one sentence with its remedy.
+//! The errors of a spline that a user gives, each with one sentence: place, value, limit and remedy.
 
 use std::fmt;
 
 use super::MAX_DEGREE;
 
-/// Coordinates beyond this overflow when a hodograph is squared; it is far beyond any machine, in mm.
+/// Greatest coordinate in mm, far beyond any machine: the square of a hodograph must not overflow.
 pub const MAX_COORDINATE: f64 = 1e60;
-/// Weights beyond this, or below its inverse, overflow in the fourth power.
+/// Greatest weight, and the inverse of the least one: fourth powers must not overflow.
 pub const MAX_WEIGHT: f64 = 1e30;
-/// Knots closer than this part of the greatest one have lost the digits that tell them apart.
-pub const MIN_SPAN: f64 = 1e-13;
 
 /// Why a spline cannot be used.
 #[derive(Clone, Debug, PartialEq)]

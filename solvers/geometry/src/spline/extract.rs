@@ -1,17 +1,15 @@
-//! Bézier extraction: the spans of a spline as pieces of their own, in time linear in their number.
+//! The Bézier pieces of a B-spline or NURBS, one for each span, in linear time.
 //!
-//! With the blossom f of a span [a, b] the Bézier points are f(aᵈ⁻ʳ, bʳ). Two triangles of corner cutting make
-//! them of its d + 1 control points: de Boor's at a leaves f(aᵈ⁻ʲ, t_{k+1}, …, t_{k+j}), the second puts b in
-//! the place of the later knots.
+//! With the blossom f of a span [a, b] the Bézier points are f(aᵈ⁻ʳ, bʳ). Two triangles of corner cutting make them from the
+//! d + 1 control points of the span: de Boor's triangle at a gives f(aᵈ⁻ʲ, t_{k+1}, …, t_{k+j}), and the second one replaces
+//! the later knots by b.
 
 use super::error::SplineError;
 use super::knots::Spline;
 use super::rational::cut_corners;
 use super::{CompositeCurve, MAX_DEGREE};
 use crate::quadratic::{norm, sub};
-
-/// Two control points that should coincide may differ by this part of the coordinates: their rounding in files.
-const COINCIDENT: f64 = 1e-9;
+use crate::tolerance::COINCIDENT;
 
 /// The pieces of a spline, one for each span that is not empty; the width is that of the span.
 pub fn extract<const M: usize>(spline: &Spline<M>) -> Result<CompositeCurve<M>, SplineError> {
@@ -39,7 +37,7 @@ pub fn extract<const M: usize>(spline: &Spline<M>) -> Result<CompositeCurve<M>, 
             if k - before == d + 1 && gap > COINCIDENT * size {
                 return Err(SplineError::Broken { knot: before + 1, value: t[k], gap, degree: d });
             }
-            // Both spans give the joint, up to rounding: it is to be one point.
+            // Both spans give the point where they meet, up to rounding: the first one holds.
             points[0] = last;
         }
         curve.push(&points[..=d], weights, t[k + 1] - t[k]);
@@ -52,13 +50,13 @@ pub fn extract<const M: usize>(spline: &Spline<M>) -> Result<CompositeCurve<M>, 
 fn bezier_points<const M: usize>(knots: &[f64], points: &mut [[f64; M]], weights: &mut [f64]) {
     let d = points.len() - 1;
     let (a, b) = (knots[d - 1], knots[d]);
-    // Each level is one point shorter and leaves its last one in place: f(aᵈ⁻ʲ, t_{k+1}, …, t_{k+j}) at j.
+    // Each level has one point less and leaves the last one where it is: f(aᵈ⁻ʲ, t_{k+1}, …, t_{k+j}) at j.
     for r in 1..=d {
         cut_corners(points, weights, d + 1 - r, |p| {
             (a - knots[p + r - 1]) / (knots[p + d] - knots[p + r - 1])
         });
     }
-    // From the other end, so that each level leaves its first one: f(aᵈ⁻ʳ, bʳ).
+    // From the other end, so that each level leaves the first one where it is: f(aᵈ⁻ʳ, bʳ).
     points.reverse();
     weights.reverse();
     for r in 1..=d {

@@ -1,12 +1,13 @@
-//! How neighbouring pieces meet: a gap, a corner, one tangent with a jump of parameter speed, or derivatives
-//! that agree to some order.
+//! How neighbouring pieces of a curve meet: with a gap, with a corner, with one tangent and a jump of |C'|, or with equal
+//! derivatives to some order.
 
 use super::bezier::derivatives;
 use super::{CompositeCurve, Piece};
 use crate::quadratic::{norm, sub};
+use crate::tolerance::ROUNDING;
 use crate::watch::Watch;
 
-/// What holds at a joint; each kind implies those before it.
+/// What holds where two pieces meet; each kind implies those before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Continuity {
@@ -24,18 +25,18 @@ pub enum Continuity {
     C3 = 5,
 }
 
-/// What counts as the same.
+/// Differences up to which two pieces agree.
 #[derive(Clone, Copy, Debug)]
 pub struct JointTolerance {
     /// Distance in mm.
     pub gap: f64,
     /// Angle between directions in rad.
     pub angle: f64,
-    /// Difference of derivatives beside what the size of the pieces lets expect.
+    /// Difference of derivatives, as a fraction of those that pieces of this extent and width can have.
     pub derivative: f64,
 }
 
-/// The joint after piece `piece`.
+/// How piece `piece` and the next one meet.
 #[derive(Clone, Copy, Debug)]
 pub struct Joint {
     pub piece: usize,
@@ -44,7 +45,7 @@ pub struct Joint {
     pub gap: f64,
     /// Angle between the directions of motion before and after, in rad; 0 next to a piece of length zero.
     pub turn: f64,
-    /// |C'| before and after; 0 where there is a cusp.
+    /// |C'| before and after; 0 in a cusp.
     pub speed: [f64; 2],
 }
 
@@ -72,9 +73,9 @@ fn joint<const M: usize>(
 ) -> Joint {
     let (a, b) = (derivatives(before, before.width), derivatives(after, 0.0));
     let gap = norm(&sub(&a[0], &b[0]));
-    let directions = (direction(before, true), direction(after, false));
-    let turn = match directions {
-        // Kahan's form: no digits are lost for small angles nor for reversals.
+    let unit = |edge: [f64; M]| edge.map(|value| value / norm(&edge));
+    let turn = match (before.edge(true).map(unit), after.edge(false).map(unit)) {
+        // Kahan's form loses no digits at small angles and at reversals.
         (Some(p), Some(q)) => {
             let sum: [f64; M] = std::array::from_fn(|k| p[k] + q[k]);
             2.0 * norm(&sub(&p, &q)).atan2(norm(&sum))
@@ -97,27 +98,9 @@ fn joint<const M: usize>(
     Joint { piece, kind, gap, turn, speed: [norm(&a[1]), norm(&b[1])] }
 }
 
-/// The direction of motion at one end: towards the first control point that differs, which is the derivative
-/// where there is one and its limit at a cusp. None for a piece of length zero.
-fn direction<const M: usize>(piece: &Piece<M>, at_end: bool) -> Option<[f64; M]> {
-    const SAME: f64 = 1e-12;
-    let (extent, _) = piece.extent();
-    let last = piece.degree();
-    (1..=last).find_map(|i| {
-        let along = if at_end {
-            sub(&piece.control[last], &piece.control[last - i])
-        } else {
-            sub(&piece.control[i], &piece.control[0])
-        };
-        let size = norm(&along);
-        (size > SAME * extent).then(|| along.map(|value| value / size))
-    })
-}
-
-/// The difference allowed to a derivative: the tolerance at the size of the piece, and the rounding of its
-/// control points.
+/// The allowed difference of a derivative: the tolerance times the greatest derivative of a piece of this extent and width,
+/// and the rounding of its control points.
 fn scale<const M: usize>(piece: &Piece<M>, at_end: bool, order: usize, tolerance: &JointTolerance) -> f64 {
-    const ROUNDING: f64 = 16.0 * f64::EPSILON;
     let (extent, coordinate) = piece.extent();
     let d = piece.degree();
     let mut factor = 1.0;

@@ -1,13 +1,14 @@
-//! A B-spline or NURBS curve as users give it: checked, periodic ones unrolled, and knot insertion.
+//! A B-spline or NURBS curve from control points, knots and weights as users give them: checked, unrolled if it is periodic,
+//! with knots inserted.
 //!
-//! n control points of degree d stand with knots t₀ … t_{n+d}; the curve is on [t_d, t_n]. Knot vectors need not
-//! be clamped.
+//! n control points of degree d have knots t₀ … t_{n+d}; the curve is on [t_d, t_n]. Knots may be clamped or not.
 
-use super::error::{SplineError, MAX_COORDINATE, MAX_WEIGHT, MIN_SPAN};
+use super::error::{SplineError, MAX_COORDINATE, MAX_WEIGHT};
 use super::rational::cut_corners;
 use super::MAX_DEGREE;
+use crate::tolerance::KNOT_SPAN;
 
-/// A checked spline curve; `weights` is empty where it is polynomial.
+/// A checked spline curve; `weights` is empty if it is polynomial.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spline<const M: usize> {
     pub degree: usize,
@@ -35,8 +36,8 @@ impl<const M: usize> Spline<M> {
         Ok(Self { degree, knots, control, weights })
     }
 
-    /// A closed curve by n control points and the n + 1 knots of one period: the first span belongs to the
-    /// first d + 1 points, every later one to those after them, round and round.
+    /// A closed curve by n control points and the n + 1 knots of one period. The first span has the first d + 1 points, each
+    /// later span those that begin one later, cyclically.
     pub fn periodic(
         degree: usize,
         knots: Vec<f64>,
@@ -66,7 +67,7 @@ impl<const M: usize> Spline<M> {
                 let place = i as isize - degree as isize;
                 let turn = place.div_euclid(n as isize);
                 let within = knots[place.rem_euclid(n as isize) as usize];
-                // The end of the period stays the number it was given as.
+                // The end of the period is the given number exactly.
                 if place == n as isize {
                     knots[n]
                 } else {
@@ -100,7 +101,7 @@ impl<const M: usize> Spline<M> {
         }
         for _ in 0..times {
             let span = self.knots.partition_point(|&knot| knot <= value) - 1;
-            // Points span − d … span become one more: the inner ones are cut.
+            // Points span − d … span become one point more: the inner ones are means.
             let first = span - d;
             let mut points = self.control[first..=span].to_vec();
             let mut weights =
@@ -110,7 +111,7 @@ impl<const M: usize> Spline<M> {
                 let (low, high) = (knots[first + i + 1], knots[first + i + d + 1]);
                 (value - low) / (high - low)
             });
-            // The first stays, then the cut ones, then the last, which `cut_corners` left where it was.
+            // The first stays, then come the means, then the last, which `cut_corners` leaves where it is.
             self.control.splice(first + 1..=span, points);
             if !self.weights.is_empty() {
                 self.weights.splice(first + 1..=span, weights);
@@ -153,7 +154,7 @@ fn check_knots(degree: usize, knots: &[f64]) -> Result<(), SplineError> {
     if let Some(knot) = knots.iter().position(|knot| !knot.is_finite()) {
         return Err(SplineError::KnotNotFinite { knot, value: knots[knot] });
     }
-    let least = MIN_SPAN * knots.iter().fold(0.0, |most: f64, knot| most.max(knot.abs()));
+    let least = KNOT_SPAN * knots.iter().fold(0.0, |most: f64, knot| most.max(knot.abs()));
     let mut count = 1;
     for knot in 1..knots.len() {
         let (before, value) = (knots[knot - 1], knots[knot]);

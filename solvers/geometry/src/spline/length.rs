@@ -1,38 +1,40 @@
-//! The length of a curve of any degree and the place at a given length, by the tables of `arc_length`.
+//! The length of a curve of any degree, and the place at a given length, from one table (`arc_length`) for each piece.
 //!
-//! Panels are halved towards cusps and near-cusps. Quadratic pieces have the closed bound of `arc_length`, the
-//! others that of `speed`.
+//! Panels are halved towards cusps, and towards places that are nearly cusps. The error bound of quadratic pieces is in
+//! closed form (`QuadraticSpeed`); that of others comes from `speed`.
 
 use rayon::prelude::*;
 
-use super::cusps::{piece_cusps, CUSP};
+use super::cusps::piece_cusps;
 use super::speed::{Coefficients, Speed};
 use super::{CompositeCurve, Piece};
-use crate::arc_length::{quadrature, tabulate, Hodograph, Length, Node, Table};
+use crate::arc_length::{quadrature, tabulate, Length, Node, QuadraticSpeed, Table};
+use crate::inverse_length::{self, Located};
 use crate::newton;
 use crate::quadratic::Quadratic;
-use crate::sarfraz::{self, Located};
+use crate::tolerance::CUSP;
 use crate::watch::Watch;
 
-/// A place on a curve: piece and local parameter, and how it was found.
+/// A place on a curve: its piece, its parameter, and how it was found.
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
     pub piece: usize,
     pub located: Located,
 }
 
-/// What the table of a piece integrates.
+/// The integrand |C'| of a piece's table.
 #[derive(Clone, Copy, Debug)]
-enum Shape {
+enum PieceSpeed {
     Quadratic(Length),
-    /// The coefficients of the piece from here on, of its hodograph and of its denominator.
+    /// The ranges of its coefficients in `h` and in `omega`.
     Curve([usize; 2], [usize; 2]),
 }
 
 /// The lengths along a curve, piece after piece.
 #[derive(Clone, Debug)]
 pub struct CurveLength<const M: usize> {
-    shapes: Vec<Shape>,
+    speeds: Vec<PieceSpeed>,
+    /// Coefficients of hodographs and of their denominators.
     h: Vec<[f64; M]>,
     omega: Vec<f64>,
     width: Vec<f64>,
@@ -44,16 +46,16 @@ pub struct CurveLength<const M: usize> {
     error: f64,
 }
 
-/// Calls a generic function on the table of a piece.
+/// Evaluates an expression with the table of a piece, whose type depends on the piece.
 macro_rules! on_table {
     ($lengths:expr, $piece:expr, $table:ident, $call:expr) => {{
         let nodes = &$lengths.nodes[$lengths.tables[$piece]..$lengths.tables[$piece + 1]];
-        match $lengths.shapes[$piece] {
-            Shape::Quadratic(f) => {
+        match $lengths.speeds[$piece] {
+            PieceSpeed::Quadratic(f) => {
                 let $table = Table { f, nodes };
                 $call
             }
-            Shape::Curve(h, omega) => {
+            PieceSpeed::Curve(h, omega) => {
                 let f = $lengths.speed(h, omega, $piece);
                 let $table = Table { f, nodes };
                 $call
@@ -63,11 +65,11 @@ macro_rules! on_table {
 }
 
 impl<const M: usize> CurveLength<M> {
-    /// Tabulates every piece to the error `accuracy`, a part of its length; the curve has at least one piece.
+    /// The tables of all pieces, at least one, each with an error of `accuracy` times its length.
     pub fn new(curve: &CompositeCurve<M>, accuracy: f64, watch: Watch) -> Self {
         let count = curve.len();
         let mut lengths = Self {
-            shapes: Vec::with_capacity(count),
+            speeds: Vec::with_capacity(count),
             h: vec![],
             omega: vec![],
             width: curve.width.clone(),
@@ -77,14 +79,14 @@ impl<const M: usize> CurveLength<M> {
             error: 0.0,
         };
         for piece in curve.pieces() {
-            lengths.shapes.push(match Quadratic::from_piece(&piece) {
-                Some(quadratic) => Shape::Quadratic(Length(Hodograph::new(&quadratic))),
+            lengths.speeds.push(match Quadratic::from_piece(&piece) {
+                Some(quadratic) => PieceSpeed::Quadratic(Length(QuadraticSpeed::new(&quadratic))),
                 None => {
                     let coefficients = Coefficients::new(&piece);
                     let (h, omega) = (lengths.h.len(), lengths.omega.len());
                     lengths.h.extend_from_slice(coefficients.hodograph());
                     lengths.omega.extend_from_slice(coefficients.denominator());
-                    Shape::Curve([h, lengths.h.len()], [omega, lengths.omega.len()])
+                    PieceSpeed::Curve([h, lengths.h.len()], [omega, lengths.omega.len()])
                 }
             });
         }
@@ -93,18 +95,20 @@ impl<const M: usize> CurveLength<M> {
             .with_min_len(64)
             .map(|i| {
                 watch.each(count).count(i);
-                match lengths.shapes[i] {
-                    Shape::Quadratic(f) => {
+                match lengths.speeds[i] {
+                    PieceSpeed::Quadratic(f) => {
                         let mut nodes = vec![];
                         let allowed = accuracy * quadrature(&f, 0.0, curve.width[i]);
                         let bound = tabulate(f, 0.0, curve.width[i], allowed, &mut nodes);
                         (nodes, bound)
                     }
-                    Shape::Curve(h, omega) => table(lengths.speed(h, omega, i), &curve.piece(i), accuracy),
+                    PieceSpeed::Curve(h, omega) => {
+                        table(lengths.speed(h, omega, i), &curve.piece(i), accuracy)
+                    }
                 }
             })
             .collect();
-        // Neumaier's sum: the starts of a long path are as good as its pieces.
+        // Neumaier's sum: the lengths of many pieces are summed without loss.
         let (mut sum, mut lost) = (0.0_f64, 0.0_f64);
         for (nodes, bound) in tables {
             let length = nodes[nodes.len() - 1].sum;
@@ -128,7 +132,7 @@ impl<const M: usize> CurveLength<M> {
         self.width.len()
     }
 
-    /// Rows of all tables.
+    /// Number of rows of all tables.
     pub fn nodes(&self) -> usize {
         self.nodes.len()
     }
@@ -138,8 +142,8 @@ impl<const M: usize> CurveLength<M> {
         self.starts[self.starts.len() - 1]
     }
 
-    /// The bound of the error of every length on the curve in mm: proven for the quadrature, with an allowance
-    /// of eight roundings for its evaluation.
+    /// The bound of the error of each length on the curve in mm: proven for the quadrature, with eight roundings for its
+    /// evaluation.
     pub fn error(&self) -> f64 {
         self.error
     }
@@ -159,7 +163,10 @@ impl<const M: usize> CurveLength<M> {
     /// The place at a length, within `tolerance` mm; a length beyond either end gives that end.
     pub fn locate(&self, length: f64, tolerance: f64) -> Place {
         let (piece, rest) = self.split(length);
-        Place { piece, located: on_table!(self, piece, table, sarfraz::locate(&table, rest, tolerance)) }
+        Place {
+            piece,
+            located: on_table!(self, piece, table, inverse_length::locate(&table, rest, tolerance)),
+        }
     }
 
     /// Lengths up to many places, in parallel.
@@ -177,8 +184,8 @@ impl<const M: usize> CurveLength<M> {
         lengths.par_iter().with_min_len(1024).map(|&length| self.locate(length, tolerance)).collect()
     }
 
-    /// The places at many lengths by Newton–Raphson, each found from the one before; they should not decrease.
-    pub fn follow(&self, lengths: &[f64], tolerance: f64) -> Vec<Place> {
+    /// The places at many lengths in increasing order by Newton–Raphson, each found from the one before.
+    pub fn locate_in_order(&self, lengths: &[f64], tolerance: f64) -> Vec<Place> {
         let mut places = Vec::with_capacity(lengths.len());
         let (mut at, mut from) = (usize::MAX, (0.0, 0.0));
         for &length in lengths {
@@ -196,8 +203,7 @@ impl<const M: usize> CurveLength<M> {
     }
 }
 
-/// The table of one piece and the bound of its error. A piece with several cusps is tabulated in parts that hold
-/// one each.
+/// The table of one piece and the bound of its error. Each cusp of the piece has a part of the table for itself.
 fn table<const M: usize>(speed: Speed<M>, piece: &Piece<M>, accuracy: f64) -> (Vec<Node>, f64) {
     let mut nodes: Vec<Node> = vec![];
     let width = piece.width;

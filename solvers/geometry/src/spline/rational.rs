@@ -1,8 +1,8 @@
-//! What is special to weights: weighted means of points, the numerator of the hodograph, and the quotient rule.
+//! Weighted means of points, the numerator of the hodograph, and the quotient rule, for pieces C = M/ω with
+//! M = Σ wᵢ Pᵢ Bᵢ, ω = Σ wᵢ Bᵢ.
 //!
-//! C = M/ω with M = Σ wᵢ Pᵢ Bᵢ, ω = Σ wᵢ Bᵢ. Weights are positive, so that every mean is one of points with
-//! positive parts, and differences of points are taken before anything is multiplied: the result depends on the
-//! size of the piece, not on where it lies.
+//! Weights are positive, so the factors of each mean are positive. Differences of points are taken before products, so
+//! errors depend on the extent of a piece and not on its coordinates.
 
 use super::{binomial, Piece, MAX_HODOGRAPH};
 use crate::quadratic::{lerp, sub};
@@ -17,8 +17,8 @@ fn mean<const M: usize>(a: &[f64; M], b: &[f64; M], alpha: f64) -> [f64; M] {
     }
 }
 
-/// Replaces the first `count` points by their means with the next one at `alpha(i)`; empty weights are ones.
-/// This is one step of every corner-cutting algorithm: de Casteljau's, de Boor's, elevation.
+/// Replaces each of the first `count` points by its mean with the next one at `alpha(i)`; empty weights are ones. This is
+/// one step of de Casteljau's and de Boor's algorithms, and of degree elevation.
 #[inline(always)]
 pub fn cut_corners<const M: usize>(
     points: &mut [[f64; M]],
@@ -40,8 +40,7 @@ pub fn cut_corners<const M: usize>(
     }
 }
 
-/// Bernstein coefficients of a direction field along C': C' itself for a polynomial piece, C'ω² for a rational
-/// one; by t = u / width.
+/// Bernstein coefficients of C' on polynomial pieces and of C'ω² on rational ones, by t = u / width.
 #[derive(Clone, Copy, Debug)]
 pub struct Hodograph<const M: usize> {
     coefficients: [[f64; M]; MAX_HODOGRAPH],

@@ -1,35 +1,24 @@
-//! A curve as pieces that never stand still inside: straight ones as lines cut where they turn back, curved ones cut in
-//! their cusps.
+//! The same curve as pieces whose C' is not 0 inside: straight pieces become lines cut where they turn back, curved pieces
+//! are cut in their cusps.
 //!
-//! Where C' vanishes a parameter says nothing of a motion, and next to it little. A straight piece, whatever its degree
-//! and its weights, goes over the same places as the lines of degree 1 from one of its turns to the next; so that is what
-//! it becomes. In the cusp of a curved piece the curvature has no bound, and the tool has to rest there: a cusp is the
-//! end of a piece, and of the run that it is in.
+//! Planners need C' ≠ 0 to compute a speed from a parameter. A straight piece of any degree, polynomial or rational, passes
+//! the same places as the lines of degree 1 between its turns. In the cusp of a curved piece the curvature is unbounded, and
+//! the tool rests: the piece and its run end there.
 
 use std::ops::Range;
 
 use super::bezier::{point, split};
-use super::cusps::{piece_cusps, rests_at_ends, CUSP};
+use super::cusps::{piece_cusps, rests_at_ends};
 use super::{CompositeCurve, Piece, MAX_HODOGRAPH};
 use crate::polynomial::Polynomial;
 use crate::quadratic::{dot, norm, sub};
+use crate::tolerance::{AT_END, CUSP, ROUNDING, SAME_DIRECTION};
 use crate::watch::Watch;
 
-/// Differences of places below this part of the greatest coordinate are rounding: that of control points, of what made
-/// them from a spline, and of a few sums.
-const ROUNDING: f64 = 16.0 * f64::EPSILON;
-/// A cusp nearer to an end than this part of the piece is at the end.
-const AT_END: f64 = 1e-9;
-/// Directions that differ by less (rad), and by what rounding does to an edge, are one: half of what the path allows
-/// where pieces meet.
-const SMOOTH: f64 = 5e-10;
-/// Edges shorter than this part of a piece have no direction.
-const VANISHING: f64 = 1e-12;
-
-/// What a curve becomes.
+/// The regular pieces of a curve.
 pub struct Regular<const M: usize> {
     pub curve: CompositeCurve<M>,
-    /// Of each piece the first and the last of the given ones that it goes along.
+    /// For each piece, the first and the last of the given pieces that it goes along.
     pub source: Vec<[usize; 2]>,
     /// Whether a piece begins and ends in a cusp, where the tool rests.
     pub rests: Vec<[bool; 2]>,
@@ -41,7 +30,7 @@ impl<const M: usize> Regular<M> {
     fn push(&mut self, source: [usize; 2], piece: &Piece<M>, rounding: f64) {
         self.curve.push(piece.control, piece.weights, piece.width);
         let last = self.curve.len() - 1;
-        // A piece without length between two that meet is left out.
+        // A piece without length before this one may have been left out.
         if last > 0 {
             let end = self.curve.control[self.curve.offsets[last] - 1];
             let start = &mut self.curve.control_mut(last)[0];
@@ -53,25 +42,26 @@ impl<const M: usize> Regular<M> {
     }
 }
 
-/// How a piece runs.
-enum Course<const M: usize> {
-    /// From its start through its turns to its end.
-    Straight(Vec<Place<M>>),
+/// The form of a piece.
+enum Form<const M: usize> {
+    /// Its start, its turns and its end.
+    Straight(Vec<LinePoint<M>>),
     Curved,
-    Nowhere,
+    /// It has no length.
+    Point,
 }
 
-/// A place on a straight course.
+/// A point of a straight piece, or of neighbours on one line.
 #[derive(Clone, Copy)]
-struct Place<const M: usize> {
+struct LinePoint<const M: usize> {
     point: [f64; M],
-    /// The parameter from the start of the course.
+    /// The parameter from the start of the first of them.
     u: f64,
     /// The pieces before and after it.
     pieces: [usize; 2],
 }
 
-/// A straight line through some points.
+/// The line through some points.
 struct Line<const M: usize> {
     origin: [f64; M],
     direction: [f64; M],
@@ -79,7 +69,7 @@ struct Line<const M: usize> {
 }
 
 impl<const M: usize> Line<M> {
-    /// Through two of the points that are far apart, and all others within rounding; None for a single place.
+    /// Through two of the points that are far apart; None if all are equal.
     fn through(points: impl Iterator<Item = [f64; M]> + Clone) -> Option<Self> {
         let farthest = |from: &[f64; M]| {
             let apart = |point: &[f64; M]| norm(&sub(point, from));
@@ -95,17 +85,17 @@ impl<const M: usize> Line<M> {
         dot(&sub(point, &self.origin), &self.direction)
     }
 
-    /// Whether a point is on it, but for rounding.
-    fn meets(&self, point: &[f64; M], rounding: f64) -> bool {
+    /// Whether a point is on it, up to rounding.
+    fn contains(&self, point: &[f64; M], rounding: f64) -> bool {
         let (offset, along) = (sub(point, &self.origin), self.along(point));
         norm(&std::array::from_fn::<f64, M, _>(|k| offset[k] - along * self.direction[k])) <= rounding
     }
 }
 
-/// The pieces of a curve as lines and curves without a cusp inside, each range of pieces by itself.
+/// The regular pieces of a curve, of each range of its pieces by itself.
 ///
-/// What has no length is left out, and neighbours on one line are one, unless both are lines already. Parameter intervals
-/// stay; lines are passed evenly.
+/// Pieces without length are left out. Neighbours on one line become one line, unless both are lines already. Parameter
+/// intervals stay; on lines C' is constant.
 pub fn regular<const M: usize>(
     given: &CompositeCurve<M>,
     ranges: &[Range<usize>],
@@ -117,33 +107,33 @@ pub fn regular<const M: usize>(
     for range in ranges {
         let first = out.curve.len();
         let pieces: Vec<Piece<M>> = range.clone().map(|i| given.piece(i)).collect();
-        let courses = range.clone().zip(&pieces).map(|(i, piece)| {
+        let forms = range.clone().zip(&pieces).map(|(i, piece)| {
             watch.each(given.len()).count(i);
-            course(i, piece, rounding)
+            form(i, piece, rounding)
         });
-        let mut moving: Vec<(usize, Piece<M>, Course<M>)> = range
+        let mut moving: Vec<(usize, Piece<M>, Form<M>)> = range
             .clone()
             .zip(&pieces)
-            .zip(courses)
-            .map(|((i, piece), course)| (i, *piece, course))
-            .filter(|(_, _, course)| !matches!(course, Course::Nowhere))
+            .zip(forms)
+            .map(|((i, piece), form)| (i, *piece, form))
+            .filter(|(_, _, form)| !matches!(form, Form::Point))
             .collect();
         keep_joints(&mut moving, rounding);
         let mut straight = Straight::default();
-        for (n, (i, piece, course)) in moving.iter().enumerate() {
+        for (n, (i, piece, form)) in moving.iter().enumerate() {
             watch.check_at(n);
-            if let Course::Straight(places) = course {
+            if let Form::Straight(points) = form {
                 let lines = n > 0 && piece.degree() == 1 && moving[n - 1].1.degree() == 1;
-                if lines || !straight.joins(places, rounding) {
-                    straight.leave(rounding, &mut out);
-                    straight.joins(places, rounding);
+                if lines || !straight.extend(points, rounding) {
+                    straight.finish(rounding, &mut out);
+                    straight.extend(points, rounding);
                 }
             } else {
-                straight.leave(rounding, &mut out);
+                straight.finish(rounding, &mut out);
                 cut_in_cusps(*i, piece, rounding, &mut out);
             }
         }
-        straight.leave(rounding, &mut out);
+        straight.finish(rounding, &mut out);
         out.ranges.push(first..out.curve.len());
     }
     out.curve = joined_in_cusps(&out.curve, rounding);
@@ -151,81 +141,81 @@ pub fn regular<const M: usize>(
     out
 }
 
-/// The course of piece `i`.
-fn course<const M: usize>(i: usize, piece: &Piece<M>, rounding: f64) -> Course<M> {
+/// The form of piece `i`.
+fn form<const M: usize>(i: usize, piece: &Piece<M>, rounding: f64) -> Form<M> {
     let control = piece.control;
     let Some(line) = Line::through(control.iter().copied()).filter(|line| line.length > rounding) else {
-        return Course::Nowhere;
+        return Form::Point;
     };
-    if !control.iter().all(|point| line.meets(point, rounding)) {
-        return Course::Curved;
+    if !control.iter().all(|point| line.contains(point, rounding)) {
+        return Form::Curved;
     }
-    let place = |u: f64, point: [f64; M]| Place { point, u, pieces: [i, i] };
-    let mut places = vec![place(0.0, control[0])];
+    let at = |u: f64, point: [f64; M]| LinePoint { point, u, pieces: [i, i] };
+    let mut points = vec![at(0.0, control[0])];
     if piece.degree() > 1 {
-        let turn = |u: f64| place(u, point(piece, u));
-        rate(piece, |point| line.along(point)).sign_changes(&mut |t| places.push(turn(t * piece.width)));
+        let turn = |u: f64| at(u, point(piece, u));
+        rate(piece, |point| line.along(point)).sign_changes(&mut |t| points.push(turn(t * piece.width)));
     }
-    places.push(place(piece.width, control[control.len() - 1]));
-    Course::Straight(places)
+    points.push(at(piece.width, control[control.len() - 1]));
+    Form::Straight(points)
 }
 
-/// Neighbours on one line.
+/// The points of neighbours on one line.
 struct Straight<const M: usize> {
-    places: Vec<Place<M>>,
+    points: Vec<LinePoint<M>>,
     line: Option<Line<M>>,
 }
 
 impl<const M: usize> Default for Straight<M> {
     fn default() -> Self {
-        Self { places: vec![], line: None }
+        Self { points: vec![], line: None }
     }
 }
 
 impl<const M: usize> Straight<M> {
-    /// Takes a straight piece, if it begins where this one ends and goes along the same line.
-    fn joins(&mut self, next: &[Place<M>], rounding: f64) -> bool {
-        let Some((line, end)) = self.line.as_ref().zip(self.places.last().copied()) else {
-            self.places.extend_from_slice(next);
+    /// Adds a straight piece if it begins at the last point and is on the same line; false if not.
+    fn extend(&mut self, next: &[LinePoint<M>], rounding: f64) -> bool {
+        let Some((line, end)) = self.line.as_ref().zip(self.points.last().copied()) else {
+            self.points.extend_from_slice(next);
             self.line = Line::through(next.iter().map(|place| place.point));
             return true;
         };
         if !near(&end.point, &next[0].point, rounding) {
             return false;
         }
-        let points = || self.places.iter().chain(next).map(|place| place.point);
-        // A line twice as long as the one that is known may be another one.
-        let known = |place: &Place<M>| {
+        let points = || self.points.iter().chain(next).map(|place| place.point);
+        // Beyond twice the length of the known line its direction may be wrong: it is computed again.
+        let known = |place: &LinePoint<M>| {
             let reached = line.along(&place.point);
-            line.meets(&place.point, rounding) && reached.abs() <= 2.0 * line.length
+            line.contains(&place.point, rounding) && reached.abs() <= 2.0 * line.length
         };
         if !next.iter().all(known) {
             let Some(line) =
-                Line::through(points()).filter(|line| points().all(|p| line.meets(&p, rounding)))
+                Line::through(points()).filter(|line| points().all(|p| line.contains(&p, rounding)))
             else {
                 return false;
             };
             self.line = Some(line);
         }
-        if let Some(joint) = self.places.last_mut() {
+        if let Some(joint) = self.points.last_mut() {
             joint.pieces[1] = next[0].pieces[1];
         }
-        self.places.extend(next[1..].iter().map(|place| Place { u: end.u + place.u, ..*place }));
+        self.points.extend(next[1..].iter().map(|place| LinePoint { u: end.u + place.u, ..*place }));
         true
     }
 
-    /// Appends the lines from turn to turn, and is empty again.
-    fn leave(&mut self, rounding: f64, out: &mut Regular<M>) {
-        let (Some(line), mut places) = (self.line.take(), std::mem::take(&mut self.places)) else { return };
-        let along = |place: &Place<M>| line.along(&place.point);
-        leave_out_rounding(&mut places, along, rounding);
+    /// Appends the lines from turn to turn to `out`, and removes all points.
+    fn finish(&mut self, rounding: f64, out: &mut Regular<M>) {
+        let (Some(line), mut points) = (self.line.take(), std::mem::take(&mut self.points)) else { return };
+        let along = |place: &LinePoint<M>| line.along(&place.point);
+        drop_rounding(&mut points, along, rounding);
         let turns = |i: usize| {
-            let inside = i > 0 && i + 1 < places.len();
+            let inside = i > 0 && i + 1 < points.len();
             !inside
-                || (along(&places[i]) - along(&places[i - 1])) * (along(&places[i + 1]) - along(&places[i]))
+                || (along(&points[i]) - along(&points[i - 1])) * (along(&points[i + 1]) - along(&points[i]))
                     < 0.0
         };
-        let ends: Vec<Place<M>> = (0..places.len()).filter(|&i| turns(i)).map(|i| places[i]).collect();
+        let ends: Vec<LinePoint<M>> = (0..points.len()).filter(|&i| turns(i)).map(|i| points[i]).collect();
         for pair in ends.windows(2) {
             let control = [pair[0].point, pair[1].point];
             let piece = Piece { control: &control, weights: &[], width: pair[1].u - pair[0].u };
@@ -234,7 +224,7 @@ impl<const M: usize> Straight<M> {
     }
 }
 
-/// The derivative of a coordinate of the control points, or its numerator.
+/// The derivative, or on rational pieces its numerator, of a linear function of the points.
 fn rate<const M: usize>(
     piece: &Piece<M>,
     along: impl Fn(&[f64; M]) -> f64,
@@ -242,49 +232,50 @@ fn rate<const M: usize>(
     let weight = |i: usize| if piece.is_rational() { piece.weights[i] / piece.weights[0] } else { 1.0 };
     let start = along(&piece.control[0]);
     let form = |of: &dyn Fn(usize) -> f64| Polynomial::from_bernstein((0..piece.control.len()).map(of));
-    let places = form(&|i| weight(i) * (along(&piece.control[i]) - start));
+    let values = form(&|i| weight(i) * (along(&piece.control[i]) - start));
     if piece.is_rational() {
-        places.wronskian(&form(&weight))
+        values.wronskian(&form(&weight))
     } else {
-        places.derivative()
+        values.derivative()
     }
 }
 
-/// Leaves out places between which the way is rounding, the shortest first; the ends stay where they are.
-fn leave_out_rounding<T>(places: &mut Vec<T>, along: impl Fn(&T) -> f64, rounding: f64) {
+/// Removes turns between which the path is no longer than rounding, the shortest first. Both ends stay where they are.
+fn drop_rounding<T>(points: &mut Vec<T>, along: impl Fn(&T) -> f64, rounding: f64) {
     loop {
-        let way = |i: usize| (along(&places[i + 1]) - along(&places[i])).abs();
-        let Some(shortest) = (0..places.len() - 1).min_by(|&i, &j| way(i).total_cmp(&way(j))) else { return };
+        let way = |i: usize| (along(&points[i + 1]) - along(&points[i])).abs();
+        let Some(shortest) = (0..points.len() - 1).min_by(|&i, &j| way(i).total_cmp(&way(j))) else { return };
         if way(shortest) > rounding {
             return;
         }
-        let last = places.len() - 1;
-        let step = |i: usize| along(&places[i + 1]) - along(&places[i]);
+        let last = points.len() - 1;
+        let step = |i: usize| along(&points[i + 1]) - along(&points[i]);
         match shortest {
-            // Two turns, of which one undoes the other.
-            i if i > 0 && i + 1 < last && step(i - 1) * step(i + 1) > 0.0 => drop(places.drain(i..i + 2)),
-            // One turn, at both places.
-            i if i > 0 && i + 1 < last => drop(places.remove(i)),
-            // From one end to the other and back.
-            _ if last == 1 => drop(places.drain(..)),
-            0 => drop(places.remove(1)),
-            i => drop(places.remove(i)),
+            // Two turns between which the path is rounding: it goes on in the same direction.
+            i if i > 0 && i + 1 < last && step(i - 1) * step(i + 1) > 0.0 => drop(points.drain(i..i + 2)),
+            // Two points of one turn.
+            i if i > 0 && i + 1 < last => drop(points.remove(i)),
+            // All of the path is rounding.
+            _ if last == 1 => drop(points.drain(..)),
+            0 => drop(points.remove(1)),
+            i => drop(points.remove(i)),
         }
-        if places.is_empty() {
+        if points.is_empty() {
             return;
         }
     }
 }
 
-/// Takes back what is no line for its neighbours: where a line turns a smooth joint into a corner, for it is so short
-/// that the directions of both are rounding, pieces stay as they are.
-fn keep_joints<const M: usize>(moving: &mut [(usize, Piece<M>, Course<M>)], rounding: f64) {
+/// Keeps pieces as they are if as a line they would meet a neighbour in a corner that is smooth now: they are so short that
+/// their directions are rounding.
+fn keep_joints<const M: usize>(moving: &mut [(usize, Piece<M>, Form<M>)], rounding: f64) {
     let mut kept = false;
     while !std::mem::replace(&mut kept, true) {
         for n in 1..moving.len() {
-            let [(_, before, course), (_, after, next)] = &moving[n - 1..=n] else { return };
+            let [(_, before, form), (_, after, next)] = &moving[n - 1..=n] else { return };
+            let edge = |piece: &Piece<M>, at_end| piece.edge(at_end).unwrap_or([0.0; M]);
             let (own, own_next) = (edge(before, true), edge(after, false));
-            let (line, line_next) = (course.edge(true), next.edge(false));
+            let (line, line_next) = (form.edge(true), next.edge(false));
             if (line.is_none() && line_next.is_none())
                 || !near(&before.control[before.degree()], &after.control[0], rounding)
                 || !is_smooth(&own, &own_next, rounding)
@@ -292,9 +283,9 @@ fn keep_joints<const M: usize>(moving: &mut [(usize, Piece<M>, Course<M>)], roun
             {
                 continue;
             }
-            for (_, piece, course) in &mut moving[n - 1..=n] {
-                if piece.degree() > 1 && matches!(course, Course::Straight(_)) {
-                    *course = Course::Curved;
+            for (_, piece, form) in &mut moving[n - 1..=n] {
+                if piece.degree() > 1 && matches!(form, Form::Straight(_)) {
+                    *form = Form::Curved;
                     kept = false;
                 }
             }
@@ -302,29 +293,20 @@ fn keep_joints<const M: usize>(moving: &mut [(usize, Piece<M>, Course<M>)], roun
     }
 }
 
-impl<const M: usize> Course<M> {
-    /// From its first place to its second, or from the last but one to the last.
+impl<const M: usize> Form<M> {
+    /// Its first line, or with `at_end` its last; None if it is not straight.
     fn edge(&self, at_end: bool) -> Option<[f64; M]> {
-        let Self::Straight(places) = self else { return None };
-        let i = if at_end { places.len() - 2 } else { 0 };
-        Some(sub(&places[i + 1].point, &places[i].point))
+        let Self::Straight(points) = self else { return None };
+        let i = if at_end { points.len() - 2 } else { 0 };
+        Some(sub(&points[i + 1].point, &points[i].point))
     }
 }
 
-/// The first or the last edge of a control polygon that has a direction.
-fn edge<const M: usize>(piece: &Piece<M>, at_end: bool) -> [f64; M] {
-    let (extent, _) = piece.extent();
-    let mut edges = piece.control.windows(2).map(|pair| sub(&pair[1], &pair[0]));
-    let long = |edge: &[f64; M]| norm(edge) > VANISHING * extent;
-    let found = if at_end { edges.rfind(long) } else { edges.find(long) };
-    found.unwrap_or([0.0; M])
-}
-
-/// Whether two edges have one direction, as far as their ends are known.
+/// Whether two edges have one direction, up to the rounding of their ends.
 fn is_smooth<const M: usize>(before: &[f64; M], after: &[f64; M], rounding: f64) -> bool {
     let (own, others) = (norm(before), norm(after));
     let turn = norm(&std::array::from_fn::<f64, M, _>(|k| after[k] / others - before[k] / own));
-    turn <= SMOOTH + rounding / own.min(others)
+    turn <= SAME_DIRECTION + rounding / own.min(others)
 }
 
 fn near<const M: usize>(a: &[f64; M], b: &[f64; M], rounding: f64) -> bool {
@@ -346,8 +328,8 @@ fn cut_in_cusps<const M: usize>(source: usize, piece: &Piece<M>, rounding: f64, 
     }
 }
 
-/// The same curve with the control points next to a cusp put there, on both sides of it: the tool rests where C' is
-/// exactly 0. What has become a line is one.
+/// The same curve with the control points next to a cusp moved into it, on both sides, so that C' is exactly 0 there. Pieces
+/// that become straight by this become lines.
 fn joined_in_cusps<const M: usize>(curve: &CompositeCurve<M>, rounding: f64) -> CompositeCurve<M> {
     let sides = |piece| [false, true].map(|at_end| turns_in_cusp(&piece, at_end, rounding));
     let sides: Vec<[Option<bool>; 2]> = curve.pieces().map(sides).collect();
@@ -370,8 +352,8 @@ fn joined_in_cusps<const M: usize>(curve: &CompositeCurve<M>, rounding: f64) -> 
             join_first(control.iter_mut().rev(), reach);
         }
         let joined = Piece { control: &control, ..piece };
-        match course(i, &joined, rounding) {
-            Course::Straight(ends) if ends.len() == 2 => {
+        match form(i, &joined, rounding) {
+            Form::Straight(ends) if ends.len() == 2 => {
                 out.push(&[ends[0].point, ends[1].point], &[], piece.width);
             }
             _ => out.push(joined.control, joined.weights, joined.width),
@@ -380,14 +362,15 @@ fn joined_in_cusps<const M: usize>(curve: &CompositeCurve<M>, rounding: f64) -> 
     out
 }
 
-/// How near to an end of a piece the next control point is in a cusp. The way turns there within reach² over the length
-/// of the piece, which is rounding; and no place is moved by more than `CUSP` of the greatest coordinate.
+/// The distance from an end of a piece within which the next control point makes a cusp. The path turns there within
+/// reach² over the length of the piece, which is rounding; and no point is moved by more than `CUSP` times the greatest
+/// coordinate.
 fn cusp_reach<const M: usize>(piece: &Piece<M>, rounding: f64) -> f64 {
     let size = rounding / ROUNDING;
     (rounding * piece.extent().0).sqrt().min(CUSP * size).max(rounding)
 }
 
-/// Whether the way turns in the cusp at an end of a piece, or nothing but rounding says where it goes; None where no cusp is.
+/// Whether the path turns in the cusp at an end of a piece, or its direction there is rounding; None if there is no cusp.
 fn turns_in_cusp<const M: usize>(piece: &Piece<M>, at_end: bool, rounding: f64) -> Option<bool> {
     let (control, last, reach) = (piece.control, piece.degree(), cusp_reach(piece, rounding));
     let away = |n: usize| match at_end {
@@ -402,7 +385,7 @@ fn turns_in_cusp<const M: usize>(piece: &Piece<M>, at_end: bool, rounding: f64) 
     Some(norm(&edge) <= rounding || !is_smooth(&edge, &long, rounding))
 }
 
-/// Puts the points that follow the first one within reach of it there.
+/// Moves the points that follow the first one within reach of it to it.
 fn join_first<'a, const M: usize>(mut points: impl Iterator<Item = &'a mut [f64; M]>, reach: f64) {
     let Some(&mut first) = points.next() else { return };
     for point in points.take_while(|point| near(point, &first, reach)) {
@@ -551,7 +534,10 @@ mod tests {
         let made = whole(&curve);
         for i in 1..made.curve.len() {
             let (before, after) = (made.curve.piece(i - 1), made.curve.piece(i));
-            assert!(is_smooth(&edge(&before, true), &edge(&after, false), 2.0 * ROUNDING * 1100.0), "{i}");
+            assert!(
+                is_smooth(&before.edge(true).unwrap(), &after.edge(false).unwrap(), 2.0 * ROUNDING * 1100.0),
+                "{i}"
+            );
         }
     }
 

@@ -1,17 +1,17 @@
-//! |C'| of a piece of any degree as an integrand, with the bound of its derivatives that a table needs.
+//! |C'| of a piece of any degree, with the bound of its derivatives that a length table needs.
 //!
-//! |C'| = |h|/ω², h the hodograph numerator. The bound is Cauchy's on a disc about the middle m of a panel: with
-//! S = h·h = s₀ + s₁z + … about m and Σ_{k>0} |s_k| ρᵏ ≤ s₀, S has no zero in |z| < ρ, so that √S is analytic
-//! there and below √(2 s₀); in the same way ω stays above half of ω(m).
+//! |C'| = |h|/ω², with the numerator h of the hodograph. The bound is Cauchy's on a disc about the middle m of a panel: with
+//! S = h·h = s₀ + s₁z + … about m and Σ_{k>0} |s_k| ρᵏ ≤ s₀, S has no zero in |z| < ρ, so √S is analytic there and at most
+//! √(2 s₀). In the same way |ω| is at least ω(m)/2.
 
 use super::rational::Hodograph;
 use super::{binomial, Piece, MAX_DEGREE, MAX_HODOGRAPH, MAX_SQUARE};
 use crate::arc_length::{Disc, Integrand};
 use crate::quadratic::dot;
 
-/// No disc need be greater than so many half panels: one panel then has no error left.
+/// Greatest radius of a disc in half panels: the error of one panel is then below rounding.
 const MAX_RATIO: f64 = 64.0;
-/// Steps in which the radius of a disc is bisected, geometrically: to 4 %.
+/// Bisections of the radius in geometric means: to 4 %.
 const BISECTIONS: u32 = 7;
 
 /// |C'(u)| of one piece.
@@ -22,14 +22,14 @@ pub struct Speed<'a, const M: usize> {
     /// Those of ω; empty for polynomial pieces.
     omega: &'a [f64],
     width: f64,
-    /// The cusp in this part of the piece; not a number without one.
+    /// The cusp in this part of the piece, or NaN.
     foot: f64,
     /// |C'| at most `at_foot + slope |u − foot|`.
     at_foot: f64,
     slope: f64,
 }
 
-/// What `Speed` reads: the coefficients of one piece.
+/// The coefficients that `Speed` reads, of one piece.
 #[derive(Clone, Copy, Debug)]
 pub struct Coefficients<const M: usize> {
     h: [[f64; M]; MAX_HODOGRAPH],
@@ -76,7 +76,7 @@ impl<'a, const M: usize> Speed<'a, M> {
         Self { h, omega, width, foot: f64::NAN, at_foot: 0.0, slope: 0.0 }
     }
 
-    /// The same without a cusp, for tables: |C'| at most its greatest value.
+    /// The same for tables without a cusp: the bound of |C'| is its greatest value.
     pub fn without_foot(mut self) -> Self {
         self.at_foot = self.greatest(|i| self.plain(i)) * self.inverse_square();
         self
@@ -87,7 +87,7 @@ impl<'a, const M: usize> Speed<'a, M> {
         self.h.iter().all(|row| *row == [0.0; M])
     }
 
-    /// The same with a cusp at u.
+    /// The same for tables with a cusp at u.
     pub fn with_foot(mut self, u: f64) -> Self {
         let n = self.h.len() - 1;
         let growth = self.greatest(|i| {
@@ -210,13 +210,13 @@ impl<const M: usize> Integrand for Speed<'_, M> {
         self.foot
     }
 
-    // The length of such a panel and its quadrature are both positive and below its width times the bound.
+    // The length of such a panel and its quadrature are between 0 and its width times the bound.
     fn foot_error(&self, width: f64) -> f64 {
         width * (self.at_foot + self.slope * width)
     }
 }
 
-/// The greatest radius of a disc, in half panels, that is clear of singularities; 1 where none is.
+/// The greatest radius of a disc without singularities, in half panels; 1 if there is none.
 pub fn greatest_ratio(clear: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (1.0, MAX_RATIO);
     if clear(high) {
@@ -234,8 +234,8 @@ pub fn greatest_ratio(clear: impl Fn(f64) -> bool) -> f64 {
     low
 }
 
-/// Bernstein coefficients on [0, 1] to those of powers of z = (t − middle)/half, up to the sign of z: the part
-/// from the middle to the farther end, and its forward differences.
+/// Bernstein coefficients on [0, 1] to coefficients of powers of z = (t − middle)/half, up to the sign of z: forward
+/// differences of the part from the middle to the farther end.
 pub fn to_taylor<const M: usize>(b: &mut [[f64; M]], middle: f64, half: f64) {
     let n = b.len() - 1;
     let t = if middle > 0.5 {

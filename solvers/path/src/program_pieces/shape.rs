@@ -1,8 +1,7 @@
 //! The shape of a path's piece: a conic, or a piece of a spline, as programmed, fitted, or cut and bent at a corner.
 
-use crate::tolerance;
 use feedplan_geometry::conic::Conic;
-use feedplan_geometry::quadratic::{norm, sub};
+use feedplan_geometry::quadratic::sub;
 use feedplan_geometry::spline::cusps::rests_at_ends;
 use feedplan_geometry::spline::{bezier, CompositeCurve, Piece};
 
@@ -35,17 +34,13 @@ impl<const M: usize> Spline<M> {
     }
 
     fn of(piece: &Piece<M>, index: usize, made: bool, width: f64) -> Option<Self> {
-        let edges = || piece.control.windows(2).map(|pair| sub(&pair[1], &pair[0]));
-        let (extent, _) = piece.extent();
-        let long = |edge: &[f64; M]| norm(edge) > tolerance::NO_DIRECTION * extent;
-        let (start_edge, end_edge) = (edges().find(long)?, edges().rev().find(long)?);
         Some(Self {
             index: index as u32,
             made,
             width,
             start: piece.control[0],
-            start_edge,
-            end_edge,
+            start_edge: piece.edge(false)?,
+            end_edge: piece.edge(true)?,
             rests: rests_at_ends(piece),
         })
     }

@@ -6,7 +6,7 @@
 
 use super::{ProfileArc, JERK_STEP_ERROR};
 use feedplan_geometry::arc_length::{quadrature, Disc, Integrand, Node, Table};
-use feedplan_geometry::sarfraz::{self, Located};
+use feedplan_geometry::inverse_length::{self, Located};
 use feedplan_geometry::spline::speed::greatest_ratio;
 
 /// A speed below 0 is rounding where it is this part of what speed and acceleration at the ends make of it.
@@ -188,7 +188,7 @@ impl CubicLaw {
         let table = self.table();
         let total = table.total();
         let tolerance = (JERK_STEP_ERROR * total * period / self.duration).max(table.rounding());
-        let mut located = sarfraz::locate(&table, done * total, tolerance);
+        let mut located = inverse_length::locate(&table, done * total, tolerance);
         located.miss = (located.miss + self.time_error) / total;
         (located, self.motion(located.u, done * self.duration))
     }

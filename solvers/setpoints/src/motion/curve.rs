@@ -16,9 +16,9 @@ use super::even::EvenLaw;
 use super::rate::{FromRest, Line, Rate, Source, Tip, TipSpeed, MAX_TIP};
 use super::{fill, invert, parts, ProfileArc, Rates, State, JERK_STEP_ERROR};
 use feedplan_geometry::arc_length::{quadrature, Node, Table};
+use feedplan_geometry::inverse_length;
 use feedplan_geometry::polynomial::Polynomial;
 use feedplan_geometry::quadratic::{dot, norm};
-use feedplan_geometry::sarfraz;
 use feedplan_geometry::spline::bezier::derivatives;
 use feedplan_geometry::spline::speed::{Coefficients, Speed};
 use feedplan_geometry::spline::Piece;
@@ -336,7 +336,7 @@ impl<'a, const M: usize> CurveMotion<'a, M> {
         let ways = self.ways();
         let total = ways.total();
         let tolerance = (JERK_STEP_ERROR * total * period / self.arc.duration).max(ways.rounding());
-        let located = sarfraz::locate(&ways, part * total, tolerance);
+        let located = inverse_length::locate(&ways, part * total, tolerance);
         let error = (located.miss + self.way_error) / total;
         State { u: located.u, iterations: located.iterations, error, along, ..State::default() }
     }

@@ -7,7 +7,7 @@
 
 use super::even::EvenLaw;
 use super::{fill, invert, parts, ProfileArc, Rates, State};
-use feedplan_geometry::arc_length::{ChordTime, Hodograph, Length, Node, Table};
+use feedplan_geometry::arc_length::{ChordTime, Length, Node, QuadraticSpeed, Table};
 use feedplan_geometry::quadratic::{dot, Quadratic};
 use feedplan_planner::phase_law::PhaseLaw;
 
@@ -40,7 +40,7 @@ pub struct QuadraticMotion<const M: usize> {
     piece: Quadratic<M>,
     tangents: ([f64; M], [f64; M]),
     second: [f64; M],
-    hodograph: Hodograph,
+    hodograph: QuadraticSpeed,
     pub(super) arc: ProfileArc,
     law: Law,
     lengths: Vec<Node>,
@@ -57,7 +57,7 @@ impl<const M: usize> QuadraticMotion<M> {
             piece: *piece,
             tangents,
             second: std::array::from_fn(|k| (tangents.1[k] - tangents.0[k]) / piece.width),
-            hodograph: Hodograph::new(piece),
+            hodograph: QuadraticSpeed::new(piece),
             arc: *arc,
             law: Law::Even(EvenLaw::new(arc)),
             lengths: Vec::new(),

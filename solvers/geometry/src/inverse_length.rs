@@ -1,13 +1,13 @@
-//! The parameter at a given length: a monotone rational cubic predicts it from a table row, the same curve on
-//! the shrinking bracket corrects it.
+//! The parameter u at a given length S, from a table of lengths: a monotone rational cubic predicts it on the panel, and
+//! corrects it on brackets that shrink.
 //!
-//! Source: Cheatham 2007, sections 3.2.3 and 3.2.4 (equations 3.11–3.14), after Sarfraz. S is the integral that
-//! a `Table` holds, S' its integrand, d = 1/S' the slope of u(S).
+//! Source: Cheatham 2007, sections 3.2.3 and 3.2.4 (equations 3.11–3.14), after Sarfraz. S may be the integral of any
+//! `Table`, S' its integrand; d = 1/S' is the slope of u(S).
 
 use crate::arc_length::{quadrature, Integrand, Node, Table};
 
-/// Each round of the corrector divides the miss by four or is followed by a halving of the bracket. From the
-/// width of a panel to the last digit that takes fewer rounds than this, whatever the curve.
+/// Greatest number of rounds. Each makes the miss four times smaller, or a halving of the bracket follows; so fewer are
+/// needed from the width of a panel to its last digit.
 pub const MAX_ITERATIONS: u32 = 200;
 
 /// A parameter and how it was found.
@@ -20,10 +20,9 @@ pub struct Located {
     pub iterations: u32,
 }
 
-/// The Sarfraz curve u(S) between two rows; NaN where S' vanishes at one of them.
+/// The Sarfraz curve u(S) between two rows; NaN if S' is 0 at one of them.
 ///
-/// Over the common denominator the terms of (3.12) collect to d₀ΔS θ(1−θ) + Δu θ³, all positive, so that even
-/// slopes far apart cost no digits.
+/// Over the common denominator the terms of (3.12) are d₀ΔS θ(1−θ) + Δu θ³. All are positive, so no digits are lost.
 #[inline]
 pub fn predict(from: &Node, to: &Node, s: f64) -> f64 {
     let (width, rise) = (to.u - from.u, to.sum - from.sum);
@@ -50,7 +49,7 @@ pub fn locate<F: Integrand>(table: &Table<F>, s: f64, tolerance: f64) -> Located
     for iterations in 1..=MAX_ITERATIONS {
         let middle = 0.5 * (low.u + high.u);
         let mut u = if halve { middle } else { predict(&low, &high, s) };
-        // Next to a cusp, and when only rounding is left, the curve says nothing new.
+        // Next to a cusp, and in a bracket of a few roundings, the prediction is outside.
         if !(low.u < u && u < high.u) {
             u = middle;
         }
@@ -79,7 +78,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::arc_length::{tabulate, Hodograph, Length};
+    use crate::arc_length::{tabulate, Length, QuadraticSpeed};
     use crate::quadratic::Quadratic;
 
     fn row(u: f64, sum: f64, rate: f64) -> Node {
@@ -107,7 +106,7 @@ mod tests {
     fn one_prediction_is_enough_on_a_line() {
         let line = Quadratic::line([0.0, 0.0], [3.0, 4.0]);
         let mut nodes = Vec::new();
-        let f = Length(Hodograph::new(&line));
+        let f = Length(QuadraticSpeed::new(&line));
         tabulate(f, 0.0, 5.0, 1e-12, &mut nodes);
         let located = locate(&Table { f, nodes: &nodes }, 1.25, 1e-12);
         assert_eq!(located.iterations, 1);
@@ -140,7 +139,7 @@ mod tests {
             let off = 10f64.powf(exponent);
             let middle = std::array::from_fn(|k| a[k] + along * (c[k] - a[k]) + off * b[k]);
             let piece = Quadratic::<2> { control: [a, middle, c], width: 3.0 };
-            let f = Length(Hodograph::new(&piece));
+            let f = Length(QuadraticSpeed::new(&piece));
             let mut nodes = Vec::new();
             tabulate(f, 0.0, 3.0, 1e-13 * quadrature(&f, 0.0, 3.0), &mut nodes);
             let table = Table { f, nodes: &nodes };
