@@ -1,15 +1,17 @@
-"""Planners: a problem in, a speed profile out; one file a method, found by its name.
+"""Planners: from a problem to a speed profile; one file a method, found by its name.
 
-A planner module has one function `plan(problem: Problem) -> SpeedProfile`, with what options it has as
-keywords, each with a default. The method `bang-bang` is the module `bang_bang`, `MethodName` has its name,
-and the documentation of `feedplan.plan` its options; modules that begin with an underscore are what methods
-share. A method that is made for another path than the rounded one says so in `CORNERS`
-(`feedplan.geometry.corners.Corners`); one whose profiles keep the jerk limits of the axes says
-`LIMITS_JERK = True`, and the audit judges them. One that knows a bound of the time beside that of
-`feedplan.lower_bound` has `lower_bound(problem, profile)` with the same options, and `GRID_ERROR` if
-that leaves so many times the accuracy to finer grids. One that tells how far it is takes `PROGRESS`, and so
-does its bound; one that can tell what follows its plan before it is made (`planners.jerk_limited`) takes
-`RESERVE`, and one whose runs may be planned on other computers `ELSEWHERE`, as does its bound.
+The method `bang-bang` is the module `bang_bang`; modules that begin with an underscore are shared by methods.
+`MethodName` lists the names, and the documentation of `feedplan.plan` the options. A module has
+
+- `plan(problem: Problem, …) -> SpeedProfile`; options are keyword arguments, each with a default.
+- `CORNERS`, a `feedplan.geometry.corners.Corners`, if the method is for another path than the rounded one.
+- `LIMITS_JERK = True` if its profiles keep the jerk limits of the axes; the audit then checks them.
+- `lower_bound(problem, profile, …)` with the same options, if the method has a lower bound of its own beside
+  `feedplan.lower_bound`; and `GRID_ERROR`, if that bound is above the least time by up to this many times the
+  accuracy, which finer grids would gain.
+
+`plan` and `lower_bound` may take more keyword arguments: `PROGRESS` to report how far they are, `RESERVE` to
+announce the work after the plan (`planners.jerk_limited`), `ELSEWHERE` to plan runs on other computers.
 """
 
 from __future__ import annotations
@@ -84,14 +86,16 @@ def given_options(method: str, options: Mapping[str, Any], others: Iterable[str]
 
 
 def bound_of(method: str, **options: Any) -> Callable[..., float] | None:
-    """What a method itself knows of the least time [s] from one of its profiles, with the same options; None
-    for most; raises as `planner`."""
+    """A method's own lower bound of the time [s], from one of its profiles and the same options.
+
+    None for most methods; raises as `planner`.
+    """
     bound: Callable[..., float] | None = getattr(_module(method), "lower_bound", None)
     return None if bound is None else partial(bound, **given_options(method, options))
 
 
 def grid_error(method: str) -> float:
-    """How many times the accuracy a method's own bound leaves to finer grids, 0 for most."""
+    """How many times the accuracy finer grids would gain on a method's own bound, 0 for most."""
     return float(getattr(_module(method), "GRID_ERROR", 0.0))
 
 
@@ -103,12 +107,12 @@ def options_of(method: str) -> dict[str, Any]:
 
 
 def tells_early(method: str) -> bool:
-    """Whether a method can tell what follows its plan before it is made (`RESERVE`); raises as `planner`."""
+    """Whether a method can announce the work after its plan (`RESERVE`); raises as `planner`."""
     return RESERVE in inspect.signature(_module(method).plan).parameters
 
 
 def tells_progress(method: str) -> bool:
-    """Whether a method tells how far its plan is (`PROGRESS`); raises as `planner`."""
+    """Whether a method reports its progress (`PROGRESS`); raises as `planner`."""
     return PROGRESS in inspect.signature(_module(method).plan).parameters
 
 
@@ -118,7 +122,7 @@ def goes_elsewhere(method: str) -> bool:
 
 
 def corners(method: str) -> Corners:
-    """What becomes of a program's corners in the path that a method is made for; raises as `planner`."""
+    """The corners of the path that a method is made for; raises as `planner`."""
     choice: Corners = getattr(_module(method), "CORNERS", Corners.ROUNDED)
     return choice
 

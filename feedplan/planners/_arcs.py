@@ -1,4 +1,4 @@
-"""The arcs between the nodes of a mesh: from p in the nodes to a profile, and how far it uses every limit."""
+"""The arcs between the stations of a mesh: from p in the stations to a profile and its use of every limit."""
 
 from __future__ import annotations
 
@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from feedplan.constraints.problem import Problem
 from feedplan.planners._mesh import EVEN, INTEGRATION, PLACES, TAIL, Mesh
-from feedplan.profile import ArcKind, SpeedProfile
+from feedplan.profile import NO_AXIS, ArcKind, SpeedProfile
 
 Array = NDArray[np.float64]
 
-NO_AXIS = 255
-# An arc may be governed by a joint whose q' does not vary by more than this factor.
+# The joint of an arc of constant joint acceleration has a q' that varies by at most this factor.
 _VARIES = 1e3
 
 
@@ -59,7 +58,7 @@ class Arcs:
 
 
 def arcs_between(problem: Problem, mesh: Mesh, p: Array, by_axis: bool) -> Arcs:
-    """The arcs through p in the nodes (n + 1,): p linear in u, or one joint's acceleration constant.
+    """The arcs through p in the stations (n + 1,): p linear in u, or one joint's acceleration constant.
 
     Where `by_axis` allows it, of all such arcs of a cell the one that uses the limits least is taken.
     """
@@ -95,7 +94,7 @@ def arcs_between(problem: Problem, mesh: Mesh, p: Array, by_axis: bool) -> Arcs:
         ends = _by_parameter(problem, mesh, ends, axis, value)
     acceleration, speed = motion.acceleration(mesh), motion.speed(mesh)
     used = np.maximum(problem.use("acceleration", acceleration).max(axis=2), speed.max(axis=2))
-    # Each direction on its own: where the sign changes the use of a limit has a kink.
+    # Each direction by itself, because the used share of a limit has a kink where the sign changes.
     peaks = [_peak(acceleration / limit) for limit in (problem.max_acceleration, problem.min_acceleration)]
     return Arcs(
         kind,
@@ -110,8 +109,10 @@ def arcs_between(problem: Problem, mesh: Mesh, p: Array, by_axis: bool) -> Arcs:
 
 
 def _peak(values: Array) -> Array:
-    """The greatest of what values (places, n, …) have in the cells: of parabolas through even
-    places, and what the places do not resolve."""
+    """The greatest values in the cells (n, …), from values at the places (places, n, …).
+
+    It is that of parabolas through even places, and an estimate of the error between the places.
+    """
     even = np.einsum("ij,jck->ick", EVEN, values)
     bent = np.abs(even[2:] - 2.0 * even[1:-1] + even[:-2]) / 8.0
     inside = (even[1:-1] + bent).max(axis=0)
@@ -160,7 +161,7 @@ def _by_parameter(problem: Problem, mesh: Mesh, ends: Array, axis: NDArray[np.ui
 
 
 def profile(problem: Problem, parts: list[tuple[Mesh, Arcs]], runs: list[int]) -> SpeedProfile:
-    """The arcs of all stretches as one profile; `runs` are the arcs' offsets of the runs."""
+    """The arcs of all subruns as one profile; `runs` are the arcs' offsets of the runs."""
     meshes, arcs = [mesh for mesh, _ in parts], [part for _, part in parts]
     return SpeedProfile(
         piece=np.concatenate([mesh.piece for mesh in meshes]).astype(np.uint32),

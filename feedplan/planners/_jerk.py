@@ -1,4 +1,4 @@
-"""What planners with a limit of jerk share."""
+"""Limits of jerk for the planners that keep them."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from feedplan.constraints.problem import Problem
 from feedplan.errors import SolverError
 from feedplan.profile import SpeedProfile
 
-# Joints' third derivatives are compared at arc ends: inside, they may be off by this much more.
+# Third derivatives of joints are compared at the ends of arcs: inside, the error may be this factor greater.
 INSIDE = 1.5
-# What the limits may be exceeded by, as a part of them, without another plan.
+# The share by which limits may be exceeded without another plan.
 HELD = 2e-7
 
 
@@ -34,11 +34,10 @@ def jerk_limits(problem: Problem) -> NDArray[np.float64]:
 def lowered_limits(
     problem: Problem, limits: NDArray[np.float64], profile: SpeedProfile
 ) -> NDArray[np.float64] | None:
-    """`limits` of jerk less what the stand-ins of the joints (`Problem.joints`) miss of it on a profile; None
-    where that is next to nothing.
+    """`limits` of jerk less the error of jerk of the joints' interpolants (`Problem.joints`) on a profile.
 
-    The stand-ins meet accelerations; of jerks they are off by the error of the third derivative times the
-    parameter's speed to the third.
+    None where that error is below the share `HELD` of the limits. The interpolants have exact accelerations;
+    their error of jerk is that of the third derivative times the third power of the parameter's speed.
     """
     if not problem.words:
         return None

@@ -1,4 +1,4 @@
-"""How fast controllers pass from one line to the next."""
+"""The speed at which controllers pass from one line to the next."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from feedplan.planners._segments import Array, both_ways, in_direction
 
-# What keeps the speed between short lines: nothing, half of each line (Klipper), the arc that they stand for
+# The limit of speed between short lines: none, half of each line (Klipper), the arc that they approximate
 # (Marlin).
 ShortLines = Literal["free", "half", "arc"]
 # Marlin takes lines shorter than this [mm], with a cosine of the turn above that, for chords of an arc.

@@ -21,15 +21,15 @@ from feedplan.planners._queue import Queue
 from feedplan.planners._segments import Array, Rule, Segments, segments
 from feedplan.profile import NO_AXIS, ArcKind, SpeedProfile
 
-# A part of a segment as short as so many roundings of its parameter and of v² is left out.
+# Parts of a segment shorter than this many roundings of its parameter and of v² are left out.
 ROUNDINGS = 4.0
 
-# Reached speeds may miss those asked for by this share.
+# A reached speed may be below the given one by this share (rounding).
 ROUNDING = 1e-12
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(6)
 
-# What happens between two of the six places of a segment, and whether it slows down there.
+# Whether the speed is constant between two of the six places of a segment, and whether it falls there.
 _CONSTANT = np.array([True, False, True, False, True])
 _SLOWS = np.array([0, 0, 0, 1, 0])
 
@@ -44,9 +44,9 @@ def look_ahead(
     """The fastest trapezoids.
 
     `corner_speed` (n + 1,) [mm/s] limits the speed at the ends of the pieces; runs end at rest, the path at
-    the problem's speeds. `hold` (n + 1,) [s]: so long before and after the end of a piece the speed stays as
-    it is there; beside a curve the tool stops instead. `queue` is what the controller knows of the path, and
-    its limits along it; by default it knows all, and has none.
+    the problem's speeds. `hold` (n + 1,) [s]: the speed is constant for this time before and after the end of
+    a piece; beside a curve the tool stops instead. `queue` is the part of the path that the controller knows,
+    and its limits along it; by default it knows all, without limits.
     Raises SolverError (see `segments`) and InfeasibleError where start or end speed cannot be had.
     """
     queue = queue or Queue()
@@ -140,7 +140,7 @@ def _profile(problem: Problem, parts: Segments, speed: Array, room: Array) -> Sp
     from_sq, to_sq = speed_sq[segment, phase], speed_sq[segment, phase + 1]
     piece, line = parts.piece[segment], ~np.isnan(parts.rate[segment])
     constant = _CONSTANT[phase]
-    # What is constant is the speed in all axes: on lines that is so of the speed that the feed limits too.
+    # The speed in all axes is constant; on lines the speed that the feed limits is then constant too.
     counted, by_shares = _counted(problem, piece, u0)
     even = np.where(by_shares & ~line, ArcKind.SPEED_LINE, ArcKind.FEED)
     ramp_kind = np.where(line, ArcKind.AXIS_ACCELERATION, ArcKind.SPEED_LINE)

@@ -1,12 +1,12 @@
-"""The mesh of planners that discretise: stretches between stops, cut into cells, with every limit at places.
+"""The mesh of planners that discretise: subruns between stops, cut into cells, with every limit at places.
 
-A stretch is a part of a run that is passed without stopping inside it. Its cells never reach over the end
-of a piece, so that both values of q'' at a knot are kept, each with the cells on its side. Each cell
-carries q', q'' and the greatest p at `PLACES`, both ends among them.
+A subrun is a part of a run without a stop inside. Its cells never reach over the end of a piece, because q''
+has two values at a knot: each side has cells of its own. Each cell has q', q'' and the greatest p at
+`PLACES`, which include both ends.
 
-A piece is meshed over its own parameter u. Only a straight piece with a cusp (q' = 0) at an end, where p
-grows without bound if it is passed at a speed, is meshed over its length: its cells have q' of constant
-size. In any other cusp p is finite, so the tool stands there, and the stretch ends.
+A piece is meshed over its own parameter u. The exception is a straight piece with a cusp (q' = 0) at an end:
+there p grows without bound if the tool does not stop, so the piece is meshed over its length, and q' has a
+constant size. In any other cusp p is finite: the tool stops there, and the subrun ends.
 """
 
 from __future__ import annotations
@@ -25,13 +25,14 @@ from feedplan.errors import InfeasibleError
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 
-# Places of a cell: the ends and the extremes of the Legendre polynomial between them, in [0, 1].
+# Places of a cell in [0, 1]: both ends, and the extremes of the Legendre polynomial between them.
 _DEGREE = 10
 PLACES = np.concatenate(
     [[0.0], 0.5 + 0.5 * np.sort(legendre.legroots(legendre.legder([0.0] * _DEGREE + [1.0]))), [1.0]]
 )
 
-# q' below this part of its size on the piece is a cusp; a tangent off a line by this part is rounding.
+# q' below the first share of its size on the piece is a cusp. A straight piece leaves its chord by less than
+# the second share of the chord, which is rounding.
 _CUSP = 1e-9
 _STRAIGHT = 1e-12
 
@@ -46,19 +47,19 @@ def _integration() -> Array:
 
 INTEGRATION = _integration()
 
-# From values at `PLACES` to the last two Legendre coefficients of the polynomial through them: as much as it
-# may be off where it does not resolve what happens in between.
+# From values at `PLACES` to the last two Legendre coefficients of the polynomial through them: an estimate of
+# the error between the places.
 TAIL = np.linalg.inv(legendre.legvander(2.0 * PLACES - 1.0, _DEGREE))[-2:]
 
-# From values at `PLACES` to those at even places, where what happens in between shows.
+# From values at `PLACES` to values at even places, which show peaks between them.
 EVEN = (np.arange(33) / 32)[:, None] ** np.arange(_DEGREE + 1) @ np.linalg.inv(
     PLACES[:, None] ** np.arange(_DEGREE + 1)
 )
 
 
 @dataclass(frozen=True)
-class Stretch:
-    """Pieces `first` to `last` (not included) of a problem, passed without a stop inside.
+class Subrun:
+    """Pieces `first` to before `last` of a problem, without a stop inside.
 
     `start` and `end` are the squares of the speeds at its ends [mm²/s²]; None at a cusp, where the speed is 0
     whatever p is.
@@ -72,15 +73,15 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Mesh:
-    """The n cells of a stretch.
+    """The n cells of a subrun.
 
     Per cell: `piece`; `ends` (2, n) its local parameter at both ends; `width` (n,) of the variable that it
     is meshed over, `by_length` (n,) whether that is the length. At PLACES: `slope` q' and `bend` q''
     (places, n, joints), `speed` (places, n, joints + 2) the share of the velocities', the feed's and the
     chord error's limit that is used, squared, per p, `way` (places, n, joints) of the joints from the start
     of the cell. `gain` (n,) is p at the start of the cell over p at the end of the cell before, and `cap`
-    (n + 1,) the greatest p in the nodes, at the end of the cell before (of the cell after in the first
-    node). `fixed` holds p at both ends of the stretch where it is given.
+    (n + 1,) the greatest p in the stations, at the end of the cell before (of the cell after in the first
+    station). `fixed` holds p at both ends of the subrun where it is given.
     """
 
     piece: Numbers
@@ -100,13 +101,13 @@ class Mesh:
 
     @property
     def turn(self) -> Array:
-        """By how much q' changes within the cells, in parts of its size (n,)."""
+        """The change of q' within each cell over its greatest size there (n,)."""
         change = np.linalg.norm(self.slope[-1] - self.slope[0], axis=1)
         return np.asarray(change / np.linalg.norm(self.slope, axis=2).max(axis=0))
 
 
-def stretches(problem: Problem) -> Iterator[list[Stretch]]:
-    """The stretches of each run."""
+def subruns(problem: Problem) -> Iterator[list[Subrun]]:
+    """The subruns of each run."""
     count = len(problem.path)
     pieces = np.arange(count)
     width = problem.path.width
@@ -134,7 +135,7 @@ def stretches(problem: Problem) -> Iterator[list[Stretch]]:
             ]
             at_cusp = [still[0][first] and not straight[first], still[1][last - 1] and not straight[last - 1]]
             known = [None if cusp else speed**2 for cusp, speed in zip(at_cusp, speeds, strict=True)]
-            result.append(Stretch(int(first), int(last), known[0], known[1]))
+            result.append(Subrun(int(first), int(last), known[0], known[1]))
         yield result
 
 
@@ -165,7 +166,7 @@ def _straight_to_cusp(problem: Problem) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True)
 class Cuts:
-    """How a stretch is cut: the `piece` of each cell (n,), and where it begins and ends in parts of that."""
+    """The cells of a subrun: `piece` of each (n,), and the shares of it where the cell begins and ends."""
 
     piece: Numbers
     lower: Array
@@ -183,15 +184,15 @@ class Cuts:
         return Cuts(np.repeat(self.piece, count), lower, upper)
 
 
-def even_cuts(stretch: Stretch, cells: int) -> Cuts:
-    """So many `cells` in each piece, even ones but next to a stop.
+def even_cuts(subrun: Subrun, cells: int) -> Cuts:
+    """The same number of `cells` in each piece, of one width but for pieces next to a stop.
 
-    There their width grows evenly, because the time is least smooth.
+    There the width of cells grows with the distance from the stop, because the time is least smooth there.
     """
-    pieces = np.arange(stretch.first, stretch.last)
+    pieces = np.arange(subrun.first, subrun.last)
     even = np.arange(cells + 1) / cells
     shares = np.tile(even, (len(pieces), 1))
-    at_stop = [speed_sq is None or speed_sq == 0.0 for speed_sq in (stretch.start, stretch.end)]
+    at_stop = [speed_sq is None or speed_sq == 0.0 for speed_sq in (subrun.start, subrun.end)]
     if len(pieces) == 1 and all(at_stop):
         shares[0] = 0.5 - 0.5 * np.cos(np.pi * even)
     else:
@@ -203,8 +204,8 @@ def even_cuts(stretch: Stretch, cells: int) -> Cuts:
     return Cuts(np.repeat(pieces, cells), shares[:, :-1].ravel(), shares[:, 1:].ravel())
 
 
-def mesh(problem: Problem, stretch: Stretch, cuts: Cuts) -> Mesh:
-    """The cells of a stretch with the limits in them.
+def mesh(problem: Problem, subrun: Subrun, cuts: Cuts) -> Mesh:
+    """The cells of a subrun with the limits in them.
 
     Raises InfeasibleError where a given end speed is above what holds at that place.
     """
@@ -242,21 +243,19 @@ def mesh(problem: Problem, stretch: Stretch, cuts: Cuts) -> Mesh:
     at_junction = problem.junction_speed[piece[first[1:]]] ** 2 / square[-1, first[1:] - 1]
     cap[first[1:]] = np.minimum(cap[first[1:]], at_junction)
     fixed = []
-    for side, (known, node) in enumerate(((stretch.start, 0), (stretch.end, -1))):
-        p = None if known is None else known / float(square[side * -1, node])
-        if p is not None and p > cap[node] * (1.0 + 1e-12):
-            raise end_error(problem, stretch, side, float(np.sqrt(cap[node] * square[side * -1, node])))
+    for side, (known, station) in enumerate(((subrun.start, 0), (subrun.end, -1))):
+        p = None if known is None else known / float(square[side * -1, station])
+        if p is not None and p > cap[station] * (1.0 + 1e-12):
+            raise end_error(problem, subrun, side, float(np.sqrt(cap[station] * square[side * -1, station])))
         fixed.append(p)
     ends = np.stack([u[0], u[-1]])
     ends[:, :] = np.where(np.stack([lower, upper]) == 1.0, whole, ends)
     return Mesh(piece, ends, width, straight, slope, bend, per_p, way, gain, cap, (fixed[0], fixed[1]))
 
 
-def end_error(
-    problem: Problem, stretch: Stretch, side: int, reachable: float | None = None
-) -> InfeasibleError:
-    """No profile has the speed that is asked for at the start (`side` 0) or the end."""
-    line = int(problem.path.line[stretch.first if side == 0 else stretch.last - 1])
+def end_error(problem: Problem, subrun: Subrun, side: int, reachable: float | None = None) -> InfeasibleError:
+    """The error that no profile has the given speed at the start (`side` 0) or at the end."""
+    line = int(problem.path.line[subrun.first if side == 0 else subrun.last - 1])
     speed = problem.start_speed if side == 0 else problem.end_speed
     known = "" if reachable is None else f" at most {reachable:.6g} {problem.unit}/s is allowed there:"
     which = "starts" if side == 0 else "ends"

@@ -1,6 +1,6 @@
-"""A problem in parts that are planned apart: each run begins and ends at rest, so that none knows of another.
+"""A problem in parts that are planned apart: every run begins and ends at rest, so runs do not interact.
 
-Put together, the profiles of the parts are that of the whole bit for bit.
+The joined profiles of the parts are equal to the profile of the whole bit for bit.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ Floats = NDArray[np.float64]
 
 
 class Elsewhere(Protocol):
-    """Who does parts of the work in place of this process."""
+    """An executor that does parts of the work in place of this process."""
 
     def count(self) -> int:
-        """How many parts keep all of it busy."""
+        """The number of parts that keeps the executor busy."""
 
     def map(
         self, work: Callable[..., Any], given: Sequence[tuple[Any, ...]], progress: Listener | None
@@ -40,7 +40,7 @@ class Elsewhere(Protocol):
 
 @dataclass(frozen=True)
 class Runs:
-    """What native code takes of a `Path`: offsets of runs in the pieces, from 0, and what goes with them."""
+    """The fields of a `Path` that native code takes, for some of its runs; offsets count from 0."""
 
     runs: NDArray[np.int64]
     line: NDArray[np.int32]
@@ -82,7 +82,7 @@ class Part:
 
 
 def parts(problem: Problem, count: int) -> list[Part]:
-    """The problem in so many parts of about as many pieces, or in fewer: a run stays whole."""
+    """The problem in at most `count` parts of about equally many pieces; a run stays whole."""
     runs = problem.path.runs
     wanted = np.linspace(0, runs[-1], count + 1)[1:-1]
     cuts = np.unique([0, *np.searchsorted(runs, wanted), len(runs) - 1])
@@ -144,7 +144,7 @@ def joined(own: Sequence[Part], planned: Sequence[tuple[SpeedProfile, NDArray[np
     )
 
 
-def fault_of(part: Part, told: tuple[Any, ...]) -> PlanError:
-    """A fault of a part, as one of the whole."""
-    kind, piece, reachable, sentence = told
+def fault_of(part: Part, arguments: tuple[Any, ...]) -> PlanError:
+    """The fault of a part with the piece of the whole, from the arguments of a PlanError."""
+    kind, piece, reachable, sentence = arguments
     return PlanError(kind, None if piece is None else piece + part.first, reachable, sentence)

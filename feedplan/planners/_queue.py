@@ -1,4 +1,4 @@
-"""What a controller knows of the path ahead of the tool, and its own limits along the path.
+"""The blocks that a controller knows ahead of the tool, and its own limits along the path.
 
 Controllers hold some blocks, lines that arcs are chopped into as well, and can stop at the end of the last
 one. With the blocks behind the one in motion, of lengths L and accelerations a, that is v² ≤ Σ 2 a L at its
@@ -95,7 +95,7 @@ class Queue:
         return parts, at_end
 
     def _blocks(self, parts: Segments) -> Array:
-        """How many blocks each part is (m,): whole numbers for whole pieces."""
+        """The number of blocks of each part (m,): whole numbers for whole pieces."""
         share = 1.0 / np.bincount(parts.piece)[parts.piece]
         if self.chords is None:
             return share

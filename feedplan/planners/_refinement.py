@@ -1,12 +1,11 @@
-"""Planning by a solver on meshes: stretch by stretch, finer until the time is accurate enough.
+"""Planning by a solver on meshes: each subrun on finer and finer meshes until the time is accurate enough.
 
-The fastest profile is at some limit everywhere. Where the arcs of a mesh are not, and where their rows are
-too strict by the order of the mesh, its cells are cut in two.
+The fastest profile is at some limit everywhere. Cells whose arcs are below all limits, or whose rows are
+stricter than the limits, lose the most time: these cells are cut in two.
 
-On each mesh the solution is checked between the nodes. Where an arc goes beyond a limit that its rows kept,
-the limit is lowered there by as much and the solution repeated; what little is left after some rounds is
-met by scaling p, which keeps every limit. So the result is feasible, and its time approaches the least from
-above.
+On each mesh the solution is checked between the stations. Where an arc exceeds a limit that its rows keep,
+the limit is lowered by the excess and the subrun is solved again. After some rounds p is scaled down by the
+rest, which keeps every limit. So the result is feasible, and its time approaches the least time from above.
 """
 
 from __future__ import annotations
@@ -25,58 +24,59 @@ from feedplan.arguments import is_whole, number, shown
 from feedplan.constraints.problem import Problem
 from feedplan.errors import InfeasibleError, InputError, MissingPackageError, SolverError
 from feedplan.planners._arcs import Arcs, arcs_between, profile
-from feedplan.planners._mesh import Cuts, Mesh, Stretch, end_error, even_cuts, mesh, stretches
+from feedplan.planners._mesh import Cuts, Mesh, Subrun, end_error, even_cuts, mesh, subruns
 from feedplan.planners._transcription import Rows, Transcription, transcribe
 from feedplan.profile import SpeedProfile
 
 Array = NDArray[np.float64]
 
-# The first mesh has as many cells in a piece, and in a stretch.
+# The least numbers of cells of the first mesh in a piece, and in a subrun.
 _LEAST, _FIRST = 4, 32
-# More cells are not tried; the solvers need some 10 kB for each.
+# The greatest number of cells of a subrun: solvers need about 10 kB for each.
 MAX_CELLS = 400_000
-# So many in a piece are no mistake of typing.
+# The greatest number of cells a piece that a user may ask for.
 _MOST_CELLS = 1_000_000_000
-# How often limits are lowered where the arcs go beyond them, and what is left to scaling; more often where
-# speeds given at the ends cannot be scaled. The audit allows 1e-6.
+# How many times limits are lowered where arcs exceed them, more times where given speeds at the ends forbid
+# scaling; and the excess that scaling may remove. The audit allows 1e-6.
 _ROUNDS = 3
 _MOVING_ROUNDS = 8
 _EXCESS = 5e-7
-# A cell that exceeds a limit by more than this though it was lowered is held at both ends.
+# A cell that exceeds a lowered limit by more than this share has its limits at both ends instead.
 _STUBBORN = 1e-4
-# A limit that holds at both ends of a cell costs time where it is used as far as this.
+# A limit that holds at both ends of a cell costs time where more than this share of it is used.
 _NEAR = 0.9
-# Cells that make so much of the error are cut.
+# The cells that make this share of the error are cut.
 _SHARE = 0.9
-# By how much the error falls from mesh to mesh, at best and at worst.
+# The factor of the error from one mesh to the next, at best and at worst.
 _FALLS = 0.25, 0.7
-# An estimate of the error may be wrong by a factor of two.
+# The estimate of the error may be half the error.
 _SAFETY = 0.5
-# The error is about this part, or less, of the time in which arcs do not use any limit wholly.
+# The error is at most about this share of the time in which no limit is used in full.
 _TRUE = 0.35
-# Seen between the checked places, and rounding.
+# Covers rounding, and excess between the places that are checked.
 _MARGIN = 1e-9
 
 
 class Refusal(Exception):  # noqa: N818 (its handler makes the error of it)
-    """A solver ended without a solution: its own word, and whether it proved that there is none."""
+    """A solver ended without a solution: its own word, and whether it proved that no solution exists."""
 
     def __init__(self, word: str, infeasible: bool = False) -> None:
         super().__init__(word)
         self.infeasible = infeasible
 
 
-# x in the nodes of a transcription, within so many seconds; raises Refusal.
+# From a transcription and a time limit [s] to x in its stations; raises Refusal.
 Solve = Callable[[Transcription, float], Array]
 
 
 @dataclass(frozen=True)
 class Method:
-    """A solver and its package, its `rows` of a mesh for limits (n, joints) and for cells that are held at
-    both ends (n,), and what its result is.
+    """A solver of a package.
 
-    `by_axis`: arcs may be of constant joint acceleration. `feasible`: limits are kept between the nodes.
-    `platform`: where the package can be had, if not everywhere. `others` are packages that it needs besides.
+    `rows` gives the rows of a mesh from limits (n, joints) and from the cells whose limits hold at both ends
+    (n,). `by_axis`: arcs may have a constant joint acceleration. `feasible`: the result keeps limits between
+    the stations. `platform`: the only one that the package exists for, if any. `others`: packages that it
+    needs besides.
     """
 
     name: str
@@ -123,9 +123,9 @@ def plan_on_meshes(
     deadline = time.monotonic() + (math.inf if time_limit is None else time_limit)
     parts: list[tuple[Mesh, Arcs]] = []
     runs, count = [0], 0
-    for run in stretches(problem):
-        for stretch in run:
-            part = _Planner(problem, stretch, method, deadline).plan(accuracy, cells)
+    for run in subruns(problem):
+        for subrun in run:
+            part = _Planner(problem, subrun, method, deadline).plan(accuracy, cells)
             parts.append(part)
             count += len(part[0])
         runs.append(count)
@@ -135,7 +135,7 @@ def plan_on_meshes(
 @dataclass(frozen=True)
 class _Strictness:
     """How much stricter than the limits the rows are: parts of the `acceleration` (n, joints) and of p in the
-    nodes, `speed` (n + 1,); and which cells are held `at_ends` (n,). `repeated` after the first time."""
+    stations, `speed` (n + 1,); and which cells are held `at_ends` (n,). `repeated` after the first time."""
 
     acceleration: Array
     speed: Array
@@ -148,7 +148,7 @@ class _Strictness:
         return cls(np.ones((cells, len(problem.axes))), np.ones(cells + 1), np.zeros(cells, dtype=bool))
 
     def tightened(self, arcs: Arcs) -> _Strictness:
-        """Lower where the arcs go beyond; a cell that did so before is held at its ends instead."""
+        """Lower limits where arcs exceed them; a cell that exceeds them again has limits at its ends."""
         stubborn = self.repeated & (arcs.acceleration.max(axis=1) > 1.0 + _STUBBORN) & ~self.at_ends
         acceleration = self.acceleration / _excess(arcs.acceleration)
         acceleration[stubborn] = 1.0
@@ -158,37 +158,37 @@ class _Strictness:
 
     @property
     def share(self) -> Array:
-        """What of the accelerations is not used (n,)."""
+        """The share of the accelerations that is not used (n,)."""
         return np.asarray(1.0 - self.acceleration.min(axis=1))
 
 
 def _excess(used: Array) -> Array:
-    """By how much a limit has to be lowered, 1 where it is kept."""
+    """The factor by which a limit has to be lowered, 1 where it is kept."""
     return np.where(used > 1.0, used * (1.0 + _EXCESS), 1.0)
 
 
 @dataclass(frozen=True)
 class _Planner:
-    """Plans one stretch."""
+    """Plans one subrun."""
 
     problem: Problem
-    stretch: Stretch
+    subrun: Subrun
     method: Method
     deadline: float
 
     def plan(self, accuracy: float, cells: int | None) -> tuple[Mesh, Arcs]:
-        pieces = self.stretch.last - self.stretch.first
+        pieces = self.subrun.last - self.subrun.first
         if cells is not None:
             self._check(pieces * cells, "a coarser mesh (fewer cells)")
-            grid, arcs, _ = self._on(even_cuts(self.stretch, cells))
+            grid, arcs, _ = self._on(even_cuts(self.subrun, cells))
             excess = float(arcs.worst.max()) - 1.0
             if self.method.feasible and excess > _EXCESS:
                 raise SolverError(
-                    f"{self._place}{self.method.name} leaves a limit by {excess:.1g} of it between nodes, "
+                    f"{self._place}{self.method.name} leaves a limit by {excess:.1g} of it between stations, "
                     "and speeds given at the ends of the path keep it from being slower: give more cells"
                 )
             return grid, arcs
-        cuts = even_cuts(self.stretch, max(_LEAST, math.ceil(_FIRST / pieces)))
+        cuts = even_cuts(self.subrun, max(_LEAST, math.ceil(_FIRST / pieces)))
         times: list[float] = []
         reached = ""
         while True:
@@ -212,8 +212,8 @@ class _Planner:
             )
 
     def _on(self, cuts: Cuts) -> tuple[Mesh, Arcs, Array]:
-        """The solution on one mesh, and the time that it costs to keep the limits between the nodes (n,)."""
-        grid = mesh(self.problem, self.stretch, cuts)
+        """The solution on one mesh, and the time (n,) lost by keeping the limits between the stations."""
+        grid = mesh(self.problem, self.subrun, cuts)
         moving = any(p is not None and p > 0.0 for p in grid.fixed)
         strict = _Strictness.none(grid, self.problem)
         arcs, rows = self._under(strict, grid)
@@ -227,7 +227,7 @@ class _Planner:
             try:
                 arcs, rows = self._under(strict, grid)
             except InfeasibleError:
-                break  # what is given at the ends needs all that the limits leave
+                break  # the given speeds at the ends need the whole limits
             if arcs.feasible_time < best[0].feasible_time:
                 best = arcs, rows, strict
         arcs, rows, strict = best
@@ -235,7 +235,7 @@ class _Planner:
         held = (rows.held & (arcs.acceleration > _NEAR)).any(axis=1)
         lost = arcs.duration * (strict.share + np.where(held, grid.turn, 0.0))
         lost += arcs.duration.sum() * np.maximum(arcs.worst - (1.0 + _EXCESS), 0.0)
-        # Speeds given at the ends are not scaled: there the excess has to vanish on a finer mesh.
+        # Speeds given at the ends cannot be scaled: a finer mesh has to remove the excess.
         return grid, arcs if moving else arcs.scaled((1.0 - _MARGIN) / max(worst, 1.0)), lost
 
     def _under(self, strict: _Strictness, grid: Mesh) -> tuple[Arcs, Rows]:
@@ -259,7 +259,7 @@ class _Planner:
             if refusal.infeasible:
                 sides = [side for side, x in enumerate(transcription.fixed) if x]
                 if sides:
-                    raise end_error(self.problem, self.stretch, sides[0]) from None
+                    raise end_error(self.problem, self.subrun, sides[0]) from None
             raise SolverError(
                 f"{self._place}{name} found no profile ({refusal}): allow more time, ask for another "
                 "accuracy, or use bang-bang"
@@ -267,11 +267,11 @@ class _Planner:
 
     @property
     def _place(self) -> str:
-        return f"line {int(self.problem.path.line[self.stretch.first])}: "
+        return f"line {int(self.problem.path.line[self.subrun.first])}: "
 
 
 def _greatest(parts: Array) -> NDArray[np.bool_]:
-    """The greatest of the parts (n,), which together are most of the whole."""
+    """The greatest of the parts (n,) that together are the share `_SHARE` of the sum."""
     order = np.argsort(-parts)
     enough = int(np.searchsorted(np.cumsum(parts[order]), _SHARE * parts.sum())) + 1
     marked = np.zeros(len(parts), dtype=bool)
@@ -280,9 +280,9 @@ def _greatest(parts: Array) -> NDArray[np.bool_]:
 
 
 def _left(times: list[float]) -> float:
-    """By how much the times on finer and finer meshes would still fall.
+    """The estimated fall of the time on all finer meshes.
 
-    From the last two steps, whose ratio tells how fast what is left becomes smaller.
+    The ratio of the last two falls gives the sum of a geometric series.
     """
     before, last = (abs(times[-i] - times[-i - 1]) for i in (2, 1))
     ratio = min(max(last / before, _FALLS[0]), _FALLS[1]) if before > 0.0 else _FALLS[1]

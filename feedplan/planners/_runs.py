@@ -1,4 +1,4 @@
-"""Several profiles of one path: of each run the fastest."""
+"""From several profiles of one path the fastest one of each run."""
 
 from __future__ import annotations
 
@@ -18,15 +18,18 @@ from feedplan.progress import Listener, part
 def within_both(
     problem: Problem, plan: Callable[[Problem, Listener | None], SpeedProfile], progress: Listener | None
 ) -> SpeedProfile:
-    """The profile of a plan; where limits differ by direction also of one within the lesser of both, of each
-    run the faster: what a heuristic makes of wider limits may be slower."""
+    """The profile of a plan, and where limits differ by direction, the faster one of two plans for each run.
+
+    The second plan is within the lesser limits of both directions: a heuristic may be slower with wider
+    limits.
+    """
     if problem.even is problem:
         return plan(problem, progress)
     profile = plan(problem, part(progress, 0.0, 0.5))
     try:
         even = plan(problem.even, part(progress, 0.5, 1.0))
     except InfeasibleError:
-        # Only the wider limits let it begin or end at its speed.
+        # Only the wider limits allow the given speeds at the ends.
         return profile
     return fastest_runs([profile, even])
 

@@ -1,5 +1,4 @@
-"""Paths in segments as controllers see them: one greatest speed each, and what it can speed up and slow down
-by."""
+"""A path in segments as controllers see it: each has one greatest speed and one acceleration each way."""
 
 from __future__ import annotations
 
@@ -25,7 +24,7 @@ Array = NDArray[np.float64]
 # the path, of speeding up and of slowing down (2, m), and across it (m,) [mm/s²].
 Rule = Callable[[Array, Array, Array, Array, Array], tuple[Array, Array]]
 
-# A curved piece is cut into parts on which it turns, and ln |C'| changes, by about this at most.
+# A curved piece is cut into parts. On each the direction, and ln |C'|, change by about this at most.
 STEP = 0.1
 
 # Places of a part at which its limits are taken, as shares of it. On a circle they are exact; elsewhere the
@@ -34,16 +33,16 @@ PLACES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
 # Those of Boole's rule, for a mean over a part.
 WEIGHTS = np.array([7.0, 32.0, 12.0, 32.0, 7.0]) / 90.0
 
-# Places that tell how much a whole piece turns.
+# Places at which the turn of a whole piece is measured.
 SURVEY = np.linspace(0.0, 1.0, 9)
 
-# Greatest speeds of the parts of a piece are one if they differ by this share.
+# Greatest speeds of parts of a piece that differ by less than this share are made equal.
 ONE_SPEED = 1e-9
 
-# A tangent shorter than this share of the longest of its piece is a cusp.
+# A place is a cusp where |C'| is below this share of its greatest value on the piece.
 CUSP = 1e-9
 
-# Control points may lie this share of an edge, and this many roundings, off even spacing on a line.
+# On a line edges between control points differ by at most this share of an edge, and this many roundings.
 UNEVEN, ROUNDINGS = 1e-9, 8.0
 
 
@@ -108,7 +107,7 @@ def is_line(curve: CompositeCurve) -> NDArray[np.bool_]:
     uneven = np.abs(edge - edge[first][own]).max(axis=1, initial=0.0)
     size = UNEVEN * np.abs(edge[first]).max(axis=1)
     size += ROUNDINGS * np.finfo(float).eps * np.abs(control[first]).max(axis=1)
-    # The edge from one piece to the next says nothing.
+    # The step from one piece to the next is no edge.
     uneven[curve.offsets[1:-1] - 1] = 0.0
     line = np.maximum.reduceat(np.append(uneven, 0.0), first) <= size
     return np.asarray(line & ~curve.rational)
@@ -168,7 +167,7 @@ def _curves(problem: Problem, pieces: NDArray[np.int64], rule: Rule, acceleratio
     if problem.feed_share is not None:
         # Between the places the axes that the feed counts along may have more of the speed.
         speed = np.minimum(speed, feed_between(problem, piece, u0, u1))
-    # On a circle the parts differ by rounding alone: one speed for all of them.
+    # On a circle the parts differ by rounding only: they get one speed.
     least = np.repeat(np.minimum.reduceat(speed, np.cumsum(count) - count), count)
     speed = np.where(speed <= least * (1.0 + ONE_SPEED), least, speed)
     return Segments(

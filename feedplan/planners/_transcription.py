@@ -1,4 +1,4 @@
-"""The planning problem of one stretch as numbers: p in the nodes of a mesh, rows that hold in its cells.
+"""The planning problem of one subrun as numbers: p in the stations of a mesh, rows that hold in its cells.
 
 In a cell whose joint k keeps its direction the mean of a_k over the way of joint k is exactly
 
@@ -22,7 +22,7 @@ from feedplan.planners._mesh import Mesh
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 
-# A joint this much slower than all together is taken at both ends: the way it makes may be rounding.
+# A joint slower than this share of all joints together has its limits at both ends: its way may be rounding.
 _SLOW = 1e-6
 
 
@@ -30,7 +30,7 @@ _SLOW = 1e-6
 class Rows:
     """Rows (r,) −`low` ≤ `near`·p_start + `far`·p_end ≤ 1 on the p of `cell` at its ends.
 
-    `held` (n, joints) are the joints whose limit holds at both ends of cells, at the cost of an order.
+    `held` (n, joints): the limit of a joint holds at both ends of the cell, which loses an order of accuracy.
     """
 
     cell: Numbers
@@ -42,10 +42,10 @@ class Rows:
 
 @dataclass(frozen=True)
 class Transcription:
-    """Minimise Σ 2 width/(√p_start + √p_end) over the cells, with p = `scale`·x in the nodes (n + 1,).
+    """Minimise Σ 2 width/(√p_start + √p_end) over the cells, with p = `scale`·x in the stations (n + 1,).
 
-    x is about 1 where the limits leave no more. `most` is the greatest x, `fixed` x at both ends of the
-    stretch where it is given. Per cell: `near`, `far` are √p_start and √p_end over √x, `width`.
+    x is about 1 where p is greatest. `most` is the greatest x, `fixed` x at both ends of the
+    subrun where it is given. Per cell: `near`, `far` are √p_start and √p_end over √x, `width`.
     `rows` are of x.
     """
 
@@ -64,17 +64,17 @@ class Transcription:
 
     @cached_property
     def free(self) -> NDArray[np.bool_]:
-        """Which nodes are to be found (n + 1,)."""
+        """The stations whose x the solver finds (n + 1,)."""
         free = np.ones(self.cells + 1, dtype=bool)
         free[[0, -1]] = [x is None for x in self.fixed]
         return free
 
     @cached_property
     def known(self) -> Array:
-        """x in the nodes where it is given, 0 elsewhere (n + 1,)."""
+        """x in the stations where it is given, 0 elsewhere (n + 1,)."""
         known = np.zeros(self.cells + 1)
-        for node, x in zip((0, -1), self.fixed, strict=True):
-            known[node] = x or 0.0
+        for station, x in zip((0, -1), self.fixed, strict=True):
+            known[station] = x or 0.0
         return known
 
     def time(self, x: Array) -> float:
@@ -87,21 +87,22 @@ def transcribe(
     mesh: Mesh, rows: Rows, acceleration: Array, share: Array, feasible: bool = True
 ) -> Transcription:
     """The problem on a mesh; `acceleration` (2, joints) are the limits backward and forward as sizes, `share`
-    (n + 1,) of the greatest p is allowed in the nodes.
+    (n + 1,) of the greatest p is allowed in the stations.
 
-    A `feasible` profile is nowhere faster in the nodes than some acceleration of the parameter allows on
+    A `feasible` profile is nowhere faster in the stations than some acceleration of the parameter allows on
     both sides.
     """
     limit = np.append(_limit_curve(mesh, acceleration, 0)[:1], _limit_curve(mesh, acceleration, -1))
     limit[:-1] = np.minimum(limit[:-1], _limit_curve(mesh, acceleration, 0) / mesh.gain)
     scale = _reachable(mesh, rows, np.minimum(limit, mesh.cap))
-    # Where nothing limits p, as where all joints stand, and where it is 0 its neighbours tell the size.
+    # Where no limit holds, because all joints rest, and where p is 0 the scale is that of the neighbours.
     endless = ~(np.isfinite(scale) & (scale > 0.0))
     if endless.any():
         where = np.flatnonzero(~endless)
         scale[endless] = np.interp(np.flatnonzero(endless), where, scale[where]) if len(where) else 1.0
     near, far = mesh.gain * scale[:-1], scale[1:]
-    fixed = [None if p is None else p / scale[node] for p, node in zip(mesh.fixed, (0, -1), strict=True)]
+    ends = zip(mesh.fixed, scale[[0, -1]].tolist(), strict=True)
+    fixed = [None if p is None else p / unit for p, unit in ends]
     return Transcription(
         scale=scale,
         most=share * (np.minimum(limit, mesh.cap) if feasible else mesh.cap) / scale,
@@ -114,17 +115,16 @@ def transcribe(
 
 
 def _reachable(mesh: Mesh, rows: Rows, greatest: Array) -> Array:
-    """The greatest p in the nodes that single rows leave, coming from both ends of the stretch (n + 1,).
+    """The greatest p in the stations that the rows allow, one pass from each end of the subrun (n + 1,).
 
-    A row with coefficients of two signs keeps p from growing faster. This is what a solution is like near a
-    stop.
+    A row with coefficients of both signs limits the growth of p from station to station, as near a stop.
     """
     bounds = np.flatnonzero((rows.near * rows.far <= 0.0) & (rows.near != 0.0) & (rows.far != 0.0))
     bounds = bounds[np.argsort(rows.cell[bounds], kind="stable")]
     first = np.searchsorted(rows.cell[bounds], np.arange(len(mesh) + 1)).tolist()
     near = np.abs(rows.near[bounds] * mesh.gain[rows.cell[bounds]]).tolist()
     far = np.abs(rows.far[bounds]).tolist()
-    # What a row leaves as p grows, and as it falls.
+    # The bounds of a row as p grows, and as p falls.
     low = rows.low[bounds]
     rise = np.where(rows.far[bounds] > 0.0, 1.0, low).tolist()
     fall = np.where(rows.near[bounds] > 0.0, 1.0, low).tolist()

@@ -1,7 +1,7 @@
-"""The time-optimal profile by direct transcription: a nonlinear program with p in the nodes, solved by IPOPT.
+"""The time-optimal profile by direct transcription: a nonlinear program in p at stations, solved by IPOPT.
 
-CasADi derives the Hessian of the time; the rows are linear in p, so the program is convex and what IPOPT
-finds is the optimum of the mesh.
+CasADi derives the Hessian of the time. The rows are linear in p, so the program is convex, and IPOPT finds
+the optimum of the mesh.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from feedplan.profile import SpeedProfile
 Array = NDArray[np.float64]
 
 ACCURACY = 1e-4
-# What IPOPT may leave of optimality and rows, both scaled to about 1.
+# Tolerance of IPOPT for optimality and for rows, both scaled to about 1.
 _LEFT = 1e-8
-# Between the nodes of a stretch p is positive: the time would have no bound.
+# Least x between the ends of a subrun: at 0 the time is infinite.
 _SLOWEST = 1e-9
 _START = 0.5
 

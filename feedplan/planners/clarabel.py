@@ -2,7 +2,7 @@
 
 After Verscheure, Demeulenaere, Swevers, De Schutter and Diehl, "Time-optimal path tracking for robots: a
 convex optimization approach", IEEE Transactions on Automatic Control 54 (2009). With x = p, c ≤ √x in the
-nodes and d ≥ 1/(√p_start + √p_end) in the cells the time Σ 2 h d is linear, and both bounds are cones.
+stations and d ≥ 1/(√p_start + √p_end) in the cells the time Σ 2 h d is linear, and both bounds are cones.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from feedplan.profile import SpeedProfile
 Array = NDArray[np.float64]
 
 ACCURACY = 1e-4
-# What the solver may leave of the time, far below the error of any mesh, and of the rows, which hold in the
-# end because p is scaled.
+# Tolerances of the solver for the time, far below the error of any mesh, and for the rows; in the end p is
+# scaled so that all limits hold.
 GAP, ROWS = 1e-6, 1e-7
 
 
@@ -52,7 +52,7 @@ def _solve(task: Transcription, seconds: float) -> Array:
     deadline = time.monotonic() + seconds
     matrix, bound, cones, cost = _program(task)
     none = sparse.csc_matrix((matrix.shape[1], matrix.shape[1]))
-    # The program is scaled already, by what p can be; equilibration on top mostly costs digits, seldom wins.
+    # The program is scaled by the greatest p already: equilibration mostly loses digits, and rarely helps.
     for equilibrate in (False, True):
         settings = clarabel.DefaultSettings()
         settings.verbose = False
@@ -75,7 +75,7 @@ def _solve(task: Transcription, seconds: float) -> Array:
 
 
 def _program(task: Transcription) -> tuple[Any, Array, list[Any], Array]:
-    """A z + s = b, s in cones, minimise cost·z, where z holds x and c in the free nodes, and d in the cells.
+    """A z + s = b, s in cones, minimise cost·z, z being x and c in the free stations and d in the cells.
 
     d is counted in parts of 1/(near + far), so that all of z is about 1.
     """
@@ -100,12 +100,12 @@ def _program(task: Transcription) -> tuple[Any, Array, list[Any], Array]:
     near, far = column[rows.cell], column[rows.cell + 1]
     offset = rows.near * task.known[rows.cell] + rows.far * task.known[rows.cell + 1]
     inside = block(len(number), [(number, near, rows.near), (number, far, rows.far)])
-    nodes = np.arange(free)
+    found = np.arange(free)
     bounded = np.flatnonzero(np.isfinite(task.most) & task.free)
     most = block(len(bounded), [(np.arange(len(bounded)), column[bounded], 1.0)])
     # (x + 1, x − 1, 2 c) and (c_start + c_end + d, c_start + c_end − d, 2), each with s = b − A z.
-    first = 3 * nodes
-    root = block(3 * free, [(first, nodes, -1.0), (first + 1, nodes, -1.0), (first + 2, free + nodes, -2.0)])
+    first = 3 * found
+    root = block(3 * free, [(first, found, -1.0), (first + 1, found, -1.0), (first + 2, free + found, -2.0)])
     cell = np.arange(n)
     weights = (task.near / unit, task.far / unit)
     ends = [np.where(column[at] >= 0, free + column[at], -1) for at in (slice(0, n), slice(1, n + 1))]

@@ -1,11 +1,12 @@
-"""State-to-state profiles along the path: states where segments meet, and the quickest motions between them.
+"""State-to-state profiles along the path: states where segments meet, and the fastest motions between them.
 
 The segments are those of the S-curve, with its limits along the path: one acceleration for speeding up and
-slowing down, by the lesser limit where those of an axis differ by direction. At first they meet without
-acceleration, as fast as looking ahead over the whole of a stretch allows. Then speed and acceleration are
-improved joint after joint, forward and backward, each time with the quickest motions to both neighbours,
-which the package ruckig finds: Berscheid and Kröger, "Jerk-limited real-time trajectory generation with
-arbitrary target states" (2021). No step makes the profile slower: it is at least as fast as the S-curve.
+slowing down, by the lesser limit where those of an axis differ by direction. At first segments meet
+without acceleration, at the greatest speeds that look-ahead over the whole subrun allows. Then speed and
+acceleration are improved at one joint after the other, forward and backward, with the fastest motions to
+both neighbours, which the package ruckig finds: Berscheid and Kröger, "Jerk-limited real-time trajectory
+generation with arbitrary target states" (2021). No step makes the profile slower: it is at least as fast as
+the S-curve.
 """
 
 from __future__ import annotations
@@ -33,23 +34,23 @@ from feedplan.profile import SpeedProfile
 Array = NDArray[np.float64]
 # Speed [mm/s] and acceleration [mm/s²] along the path.
 State = tuple[float, float]
-# A section of constant jerk: duration; at its start position along the stretch, speed, acceleration; jerk.
+# A section of constant jerk: duration; at its start position along the subrun, speed, acceleration; jerk.
 Section = tuple[float, float, float, float, float]
 
 # The profile keeps the limits of jerk, best where curvature does not jump.
 LIMITS_JERK = True
 CORNERS = Corners.SMOOTH
-# Times that all joints are improved, at most, and the gain of one round below which steps are halved.
+# The greatest number of rounds over all joints, and the gain of a round below which steps are halved.
 ROUNDS, GAIN = 24, 3e-4
-# Steps of speed and acceleration as parts of their limits: the first, and the least. All are whole numbers of
-# a grid, so that no rounding decides between states.
+# Steps of speed and acceleration as shares of their limits: the first, and the least. All are multiples of
+# GRID, so that rounding does not decide between states.
 STEP, LEAST_STEP, GRID = 0.25, 0.002, 2.0**-30
-# By what part of them the first speeds are lower than can be had, the first of these that does: the package
-# ruckig misses some motions that only just are possible.
+# The first speeds are lower than the greatest ones by the first of these shares with which all motions are
+# found: the package ruckig misses some motions that are only just possible.
 MARGINS = [2.0**-k for k in range(24, -1, -1)]
-# A motion may be out of its limits by rounding, as a part of them. What is quicker is so by more than that.
+# A motion may exceed its limits by this share (rounding). One motion is faster than another only by more.
 ROUNDING = 1e-9
-# Halvings for a speed that can be reached: to the last digit.
+# Number of halvings that find a reachable speed to the last digit.
 HALVINGS = 60
 # On a segment of a repaired profile the speed is at least this part of what the path allows.
 SLOWEST = 1e-3
@@ -71,13 +72,15 @@ class Segment:
 
     @cached_property
     def unit(self) -> float:
-        """A unit of time [s] in which no limit is below 1, the unit of length being the segment's length: the
-        package ruckig takes numbers for 0 that are below its own least ones."""
+        """A unit of time [s] in which no limit is below 1, if the unit of length is the segment's length.
+
+        The package ruckig takes numbers below its own least ones for 0.
+        """
         by_acceleration, by_jerk = self.length / self.acceleration, self.length / self.jerk
         return max(self.length / self.speed, math.sqrt(by_acceleration), math.pow(by_jerk, 1 / 3))
 
     def highest(self, speed: float) -> float:
-        """The greatest speed that can be reached on it from another one, without acceleration at both."""
+        """The greatest speed that the segment can reach from `speed`, without acceleration at both ends."""
 
         def way(high: float) -> float:
             change = high - speed
@@ -101,7 +104,7 @@ class Segment:
 
 
 @dataclass(frozen=True)
-class Stretch:
+class Subrun:
     """Segments from rest to rest, and the greatest speeds (n + 1,) at their ends."""
 
     segments: list[Segment]
@@ -156,7 +159,7 @@ class Motions:
         return segment.unit * float(self._trajectory.duration) if profile.brake.duration == 0 else math.inf
 
     def sections(self, segment: Segment, start: State, end: State, position: float) -> list[Section]:
-        """The sections of a motion that there is, the first at `position`."""
+        """The sections of a motion that exists, the first at `position`."""
         self._calculate(segment, start, end)
         profile = self._trajectory.profiles[0][0]
         length, unit = segment.length, segment.unit
@@ -215,8 +218,8 @@ def _planned(problem: Problem, time_limit: float | None, guide: SpeedProfile | N
     limits = jerk_limits(problem)
     deadline = math.inf if time_limit is None else time.perf_counter() + time_limit
     try:
-        stretches = _stretches(problem, limits, guide)
-        found = [_improved(stretch, motions, deadline) for stretch in stretches]
+        subruns = _subruns(problem, limits, guide)
+        found = [_improved(subrun, motions, deadline) for subrun in subruns]
         offsets = np.cumsum([0] + [len(sections) for sections in found])
         rows = np.array([section for sections in found for section in sections]).reshape(-1, 5)
         native = profile_of_sections(problem, limits, offsets, rows)
@@ -225,11 +228,11 @@ def _planned(problem: Problem, time_limit: float | None, guide: SpeedProfile | N
     return SpeedProfile.of(native)
 
 
-def _stretches(problem: Problem, limits: Array, guide: SpeedProfile | None) -> list[Stretch]:
-    """The stretches of the path; those for the jerk-limited planner have no segments."""
+def _subruns(problem: Problem, limits: Array, guide: SpeedProfile | None) -> list[Subrun]:
+    """The subruns of the path; those for the jerk-limited planner have no segments."""
     segmented = path_segments(problem, limits, s_curve.CUTTINGS, s_curve.LOOK_AHEAD)
     offsets, length, speed, acceleration, jerk, junction, piece, u = segmented
-    stretches = []
+    subruns = []
     for first, last in pairwise(offsets.tolist()):
         own = slice(first, last)
         v = speed[own]
@@ -240,8 +243,8 @@ def _stretches(problem: Problem, limits: Array, guide: SpeedProfile | None) -> l
             v = np.minimum(v, np.maximum(np.maximum(ends[:-1], ends[1:]), SLOWEST * v))
         columns = (column.tolist() for column in (length[own], v, acceleration[own], jerk[own]))
         segments = [Segment(*row) for row in zip(*columns, strict=True)]
-        stretches.append(Stretch(segments, ends.tolist()))
-    return stretches
+        subruns.append(Subrun(segments, ends.tolist()))
+    return subruns
 
 
 def _speeds(problem: Problem, guide: SpeedProfile, piece: NDArray[np.uint32], u: Array) -> Array:
@@ -255,14 +258,14 @@ def _speeds(problem: Problem, guide: SpeedProfile, piece: NDArray[np.uint32], u:
     return speeds
 
 
-def _improved(stretch: Stretch, motions: Motions, deadline: float) -> list[Section]:
+def _improved(subrun: Subrun, motions: Motions, deadline: float) -> list[Section]:
     """The sections of the quickest profile found; none where there are no segments, or none is found."""
-    segments, inner = stretch.segments, range(1, len(stretch.segments))
+    segments, inner = subrun.segments, range(1, len(subrun.segments))
     for margin in MARGINS:
-        shares = stretch.first_shares(margin)
+        shares = subrun.first_shares(margin)
         states = [(0.0, 0.0)] * len(shares)
         for i in inner:
-            states[i] = stretch.state(i, shares[i])
+            states[i] = subrun.state(i, shares[i])
         durations = [
             motions.duration(segment, *ends) for segment, ends in zip(segments, pairwise(states), strict=True)
         ]
@@ -276,7 +279,7 @@ def _improved(stretch: Stretch, motions: Motions, deadline: float) -> list[Secti
         for i in inner if count % 2 == 0 else reversed(inner):
             if time.perf_counter() >= deadline:
                 break
-            _improve(stretch, motions, shares, states, durations, i, step)
+            _improve(subrun, motions, shares, states, durations, i, step)
         if before - sum(durations) < GAIN * before:
             step /= 2
         if step < LEAST_STEP or time.perf_counter() >= deadline:
@@ -290,7 +293,7 @@ def _improved(stretch: Stretch, motions: Motions, deadline: float) -> list[Secti
 
 
 def _improve(
-    stretch: Stretch,
+    subrun: Subrun,
     motions: Motions,
     shares: list[State],
     states: list[State],
@@ -298,14 +301,14 @@ def _improve(
     i: int,
     step: float,
 ) -> None:
-    """Takes a step of the state between segments i − 1 and i that makes both quicker together."""
-    before, after = stretch.segments[i - 1], stretch.segments[i]
+    """Changes the state between segments i − 1 and i by a step that makes both together faster."""
+    before, after = subrun.segments[i - 1], subrun.segments[i]
     speed, acceleration = shares[i]
     for dv, da in ((1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1), (-1, 0)):
         share = min(max(speed + dv * step, 0.0), 1.0), min(max(acceleration + da * step, -1.0), 1.0)
         if share == shares[i]:
             continue
-        state = stretch.state(i, share)
+        state = subrun.state(i, share)
         most_time = (1 - ROUNDING) * (durations[i - 1] + durations[i])
         first = motions.duration(before, states[i - 1], state)
         if first >= most_time:

@@ -1,7 +1,7 @@
-"""The two-pass profile of constant jerk, no acceleration where segments meet (Cheatham 2007, chapter 4).
+"""The two-pass profile of constant jerk, without acceleration where segments meet (Cheatham 2007, chapter 4).
 
-Where the limits of an axis differ by direction, speeds and what turning takes of accelerations have those of
-the directions that a segment has. Its acceleration along the path is one for speeding up and slowing down, as
+Where the limits of an axis differ by direction, speeds and the accelerations across the path have the limits
+of the segment's direction. The acceleration along the path is the same for speeding up and slowing down, as
 in the thesis: by the lesser of both limits.
 """
 
@@ -21,9 +21,9 @@ LIMITS_JERK = True
 CORNERS = Corners.SMOOTH
 # Segments known beyond the one that the motion enters.
 LOOK_AHEAD = 256
-# Each stretch is cut as gives the quickest profile. A cutting is the length over which a speed has to pay, in
-# lengths from rest to rest that just reach the greatest speed, and the part of them by which the speeds of
-# parts may differ that are one segment.
+# Each subrun is cut in the way that gives the fastest profile. A cutting is the least length of a segment, in
+# lengths from rest to rest that just reach the greatest speed, and the share by which the speeds of parts of
+# one segment may differ.
 CUTTINGS = ((4.0, 0.05), (16.0, 0.05), (64.0, 0.05), (4.0, 0.2), (16.0, 0.2))
 
 
@@ -36,12 +36,12 @@ def plan(problem: Problem, *, progress: Listener | None = None) -> SpeedProfile:
 
 
 def plan_by_itself(problem: Problem, progress: Listener | None = None) -> SpeedProfile:
-    """The same without the runs of which this method leaves a stretch to jerk-limited: they have no arcs."""
+    """The same without arcs on runs that have a subrun which this method leaves to jerk-limited."""
     return _planned(problem, 0.0, progress)
 
 
 def _planned(problem: Problem, time_limit: float | None, progress: Listener | None) -> SpeedProfile:
-    """`time_limit` [s] is for what is left to jerk-limited."""
+    """The profile; `time_limit` [s] is for subruns that are left to jerk-limited."""
 
     def solved(problem: Problem, progress: Listener | None) -> SpeedProfile:
         try:

@@ -6,7 +6,7 @@ IEEE Transactions on Robotics 34 (2018), in the package toppra. Its own scheme a
 serve both values of q'' at a knot and does not converge on C1 splines; here every cell has rows of its own.
 They hold at both ends of the cell (`one-sided`), so that the result is feasible and its time falls to the
 least one as the cells get smaller; or at its start alone (`collocation`), which breaks limits between the
-nodes and whose time rises to it. Both are of first order.
+stations and whose time rises to it. Both are of first order.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from feedplan.profile import SpeedProfile
 Array = NDArray[np.float64]
 
 ACCURACY = 1e-3
-# x is bounded, where nothing else does, by so much of what is usual.
+# Bound of x where no other bound holds, in parts of the median of x.
 _FASTEST = 1e6
 Scheme = Literal["one-sided", "collocation"]
 SCHEMES: tuple[Scheme, ...] = get_args(Scheme)
@@ -69,30 +69,30 @@ def _solve(task: Transcription, seconds: float) -> Array:
 
     # toppra's path has one parameter, whose speed is continuous: that of the pieces, stretched from one to
     # the next, with cells about 1 wide and squared speeds about 1.
-    stretch = np.concatenate([[0.0], np.cumsum(np.log(task.near[1:] / task.far[:-1]))])
-    stretch = np.exp(-stretch) / np.median(task.width * np.exp(-stretch))
-    unit = np.median((stretch * task.near) ** 2)
-    start, end = (stretch * task.near) ** 2 / unit, (stretch * task.far) ** 2 / unit
-    nodes = np.append(start, end[-1])
-    grid = np.concatenate([[0.0], np.cumsum(stretch * task.width)])
-    constraint = _constraint(task, 1.0 / start, 1.0 / end, grid, nodes)
+    factor = np.concatenate([[0.0], np.cumsum(np.log(task.near[1:] / task.far[:-1]))])
+    factor = np.exp(-factor) / np.median(task.width * np.exp(-factor))
+    unit = np.median((factor * task.near) ** 2)
+    start, end = (factor * task.near) ** 2 / unit, (factor * task.far) ** 2 / unit
+    squares = np.append(start, end[-1])
+    grid = np.concatenate([[0.0], np.cumsum(factor * task.width)])
+    constraint = _constraint(task, 1.0 / start, 1.0 / end, grid, squares)
     log = logging.getLogger("toppra")
     level = log.level
     log.setLevel(logging.CRITICAL + 1)
     try:
         solver = TOPPRA([constraint], _path(grid), gridpoints=grid, solver_wrapper="seidel")
         # In a cusp the tool stands whatever p is.
-        ends = [np.sqrt((x or 0.0) * nodes[node]) for node, x in zip((0, -1), task.fixed, strict=True)]
+        ends = [np.sqrt((x or 0.0) * squares[side]) for side, x in zip((0, -1), task.fixed, strict=True)]
         _, speed, _ = solver.compute_parameterization(*ends)
     finally:
         log.setLevel(level)
     if speed is None or not np.isfinite(speed).all():
         raise Refusal(str(solver.problem_data.return_code), infeasible=speed is None)
-    x: Array = speed**2 / nodes
+    x: Array = speed**2 / squares
     return x
 
 
-def _constraint(task: Transcription, start: Array, end: Array, grid: Array, nodes: Array) -> Any:
+def _constraint(task: Transcription, start: Array, end: Array, grid: Array, squares: Array) -> Any:
     """−low ≤ (near + far) x + 2 Δ far u ≤ 1 for the rows of each cell, as toppra has them; 0 ≤ x ≤ most."""
     from toppra.constraint import LinearConstraint
 
@@ -108,7 +108,7 @@ def _constraint(task: Transcription, start: Array, end: Array, grid: Array, node
         far[cell, side] = (rows.far * end[rows.cell])[order] * scale
     step = np.append(np.diff(grid), 0.0)[:, None]
     identity, ones = np.eye(2 * count), np.ones(2 * count)
-    bound = np.column_stack([np.zeros(n + 1), np.minimum(task.most * nodes, _FASTEST * nodes)])
+    bound = np.column_stack([np.zeros(n + 1), np.minimum(task.most * squares, _FASTEST * squares)])
 
     class Cells(LinearConstraint):  # type: ignore[misc]
         def __init__(self) -> None:
