@@ -1,4 +1,4 @@
-"""The feed limit: the commanded feed of each piece, or what the user asks for, and what axes count in it."""
+"""The feed limit of each piece: the commanded feed or the user's, and the share of each axis in it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from feedplan.geometry.path import Path
 
 @dataclass(frozen=True)
 class FeedRequest:
-    """What the user asks for in place of the programmed feeds: `feed` [mm/s], if given, times `override`."""
+    """The user's choice in place of the programmed feeds: `feed` [mm/s], if given, times `override`."""
 
     feed: float | None = None
     override: float = 1.0
@@ -33,16 +33,16 @@ class FeedRequest:
 
 
 def feed_limit(path: Path, greatest: float, request: FeedRequest) -> NDArray[np.float64]:
-    """Greatest speed of each piece (n,) [mm/s], at most `greatest`, which is what a rapid gets."""
+    """Greatest speed of each piece (n,) [mm/s], at most `greatest`, which is the speed of rapids."""
     return np.minimum(request.of(path.feed), greatest)
 
 
 def feed_share(path: Path, greatest: float, request: FeedRequest) -> NDArray[np.float64] | None:
-    """What the velocity of each axis counts in the speed that `feed_limit` limits (n, axes).
+    """The share of the velocity of each axis in the speed that `feed_limit` limits (n, axes).
 
-    1 on the axes along which that feed counts, 0 on those that no feed is about. Where a piece keeps feeds
-    along two groups of axes, the second ones count by the quotient of both feeds: the sum of squares keeps
-    each of them. None where all axes that move count as they are.
+    It is 1 on the axes along which that feed counts, and 0 on axes without a feed. Where a piece keeps feeds
+    along two groups of axes, the share of the second group is the quotient of both feeds, so that the sum of
+    squares keeps both. None where the shares of all axes that move are 1.
     """
     if path.group_feed is None:
         return None

@@ -1,8 +1,8 @@
 """Joint motion along a path: one polynomial piece of the joints for each piece of the tool's path.
 
-Where K is affine the joints' control points are K of the tool's. Elsewhere q'' is interpolated with a proven
-distance (`feedplan.machine.joint_interpolants`) and the tool's pieces are cut to match. The stand-ins are so
-close that an axis's acceleration is met within 1e-8 of its limit at every speed that the other limits allow.
+Where K is affine, the joints' control points are K of the tool's. Elsewhere q'' is interpolated with a proven
+error (`feedplan.machine.joint_interpolants`) and the tool's pieces are cut to match. At every speed that the
+other limits allow the error of an axis's acceleration is below 1e-8 of its limit.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from feedplan.machine.path_derivatives import positions
 from feedplan.machine.singularities import JointPath, joint_path
 
 Array = NDArray[np.float64]
-# Joints that differ by no more than this are in the same place [mm, deg].
+# Joints that differ by less than this are in the same position [mm, deg].
 MEETING = 1e-6
 # Chebyshev points of q'': the joints' pieces then have the greatest degree that a curve may have.
 NODES = 8
@@ -56,10 +56,10 @@ class JointMotion:
 
 
 def way_scale(axes: tuple[str, ...], machine: Machine) -> Array:
-    """What each axis of a path counts in its length (axes,), linear ones 1.
+    """The share of each axis of a path in its length (axes,), 1 for linear axes.
 
-    A degree counts as the way that the slowest linear axis has while the rotary axis turns by it, both at
-    full speed; a direction as the angle it turns by, on the slowest rotary axis.
+    A degree of a rotary axis counts as the way of the slowest linear axis in the time of that turn, both at
+    full speed; a direction counts as the angle by which it turns, on the slowest rotary axis.
     """
     linear = [size_of(axis.max_velocity) for axis in machine.axes if axis.kind == "linear"]
     rotary = {axis.name: size_of(axis.max_velocity) for axis in machine.axes if axis.kind == "rotary"}
@@ -95,7 +95,7 @@ def joint_motion(path: Path, machine: Machine, feed: Array) -> JointMotion:
 
 
 def _require_meeting(machine: Machine, line: int, start: Array, motion: _Motion) -> None:
-    """The joints begin where those before end: new words for a position move none of them."""
+    """Raises InputError unless the joints begin where those before end: a change of mode moves no joint."""
     begin = motion.origin[0] + motion.joints.control_points[0]
     apart = np.abs(begin - start)
     k = int(apart.argmax())
@@ -190,7 +190,7 @@ def _words(path: Path, machine: Machine, run: int) -> AxisWords:
 
 
 def _posed(task: _Task) -> _Motion:
-    """The motion; a tool direction takes the pose nearest the joints before, at first one that can go on."""
+    """The motion; a tool direction takes the pose nearest to the joints before, at first a possible one."""
     make = _affine if task.words.kinematics.affine else _curved
     words, start = task.words, task.start
     if words.coordinate_mode is not CoordinateMode.VECTOR:
@@ -213,9 +213,9 @@ def _posed(task: _Task) -> _Motion:
 
 
 def _affine(task: _Task) -> _Motion:
-    """Joints that are sums of the path's axes: their control points are, too.
+    """Joints that are weighted sums of the path's axes, and so are their control points.
 
-    Rational pieces get polynomials all the same, so that |C'|² and the joints belong to one parameter.
+    Rational pieces are interpolated by polynomials, so that |C'|² and the joints have the same parameter.
     """
     tool, words, machine = task.path.curve.take(task.pieces), task.words, task.machine
     rational = tool.rational
@@ -240,7 +240,7 @@ def _affine(task: _Task) -> _Motion:
 
 
 def _route(task: _Task, tips: CompositeCurve) -> JointPath:
-    """The joints along pieces of one degree; InputError names the first place that they cannot pass."""
+    """The joints along pieces of one degree; raises InputError for the first place that they cannot pass."""
     tips = tips.elevated(int(tips.degree.max()))
     kinematics, travel = task.words.kinematics, [axis.travel for axis in task.machine.axes]
     route = joint_path(kinematics, tips.by_piece, tips.width, travel, tips.weights_by_piece, task.start)
@@ -251,7 +251,7 @@ def _route(task: _Task, tips: CompositeCurve) -> JointPath:
 
 
 def _curved(task: _Task) -> _Motion:
-    """Joints by polynomials that stand in for K of the tool's pieces."""
+    """Joints by polynomials that interpolate K of the tool's pieces."""
     kinematics, curve = task.words.kinematics, task.path.curve.take(task.pieces)
     tips = replace(curve, control_points=task.words.tip(curve.control_points))
     tips = tips.elevated(int(tips.degree.max()))
@@ -282,7 +282,7 @@ def _curved(task: _Task) -> _Motion:
 
 
 def _turning_speed(task: _Task, tool: CompositeCurve, joints: CompositeCurve) -> SpeedPolynomial:
-    """What the feed is about where X, Y and Z stand still: the rotary joints, or the tool's direction."""
+    """The speed of the rotary joints, or of the tool's direction: the feed limits it where X, Y, Z rest."""
     if task.words.coordinate_mode is CoordinateMode.VECTOR:
         square = interpolated_squares(_turning_of(task.direction(tool)), np.arange(len(tool)), tool.width)
         return SpeedPolynomial.joined((1 + SPEED_SHARE) * square)
@@ -299,7 +299,7 @@ def _moving(curve: CompositeCurve) -> NDArray[np.bool_]:
 
 
 def _accuracy(task: _Task, curve: CompositeCurve, moves: NDArray[np.bool_]) -> Accuracy:
-    """What stand-ins must meet: limits of the machine, and squares of speeds that are no polynomials."""
+    """The accuracy of interpolants: limits of the machine, and squares of speeds that are not polynomials."""
     even = curve.elevated(int(curve.degree.max()))
     squares = []
     if curve.weights is not None:
@@ -334,7 +334,7 @@ def _turning_of(curve: CompositeCurve) -> Callable[[NDArray[np.int64], Array], A
 
 
 def _joint_pieces(interpolants: Interpolants) -> CompositeCurve:
-    """The integrals of the slopes, each from 0: small numbers keep what second differences need."""
+    """The integrals of the slopes, each from 0: small numbers keep the digits for second differences."""
     slope, count = interpolants.slope, len(interpolants)
     degree = slope.shape[1]
     steps = np.cumsum(slope, axis=1) * (interpolants.width / degree)[:, None, None]

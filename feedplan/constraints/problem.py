@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 Limited = Literal["velocity", "acceleration"]
 _BY_AXIS = ("max_velocity", "max_acceleration", "max_jerk", "least_velocity", "least_acceleration")
-# No tool is as fast [mm/s]: what a rapid has where joints set its speed.
+# The feed of rapids where the joints limit their speed: no tool is as fast [mm/s].
 NO_FEED = 1e9
 
 
@@ -37,23 +37,27 @@ NO_FEED = 1e9
 class Problem:
     """Minimise the time along `path` under these limits.
 
-    Per joint (`axes` names them, `units` are in place of mm where they are others): `max_velocity` [mm/s],
-    `max_acceleration` [mm/s²], `max_jerk` [mm/s³] (may be infinite), `least_velocity`, `least_acceleration`
-    the negative ones where those are others, else empty. Per piece: `feed` (n,) greatest speed [mm/s],
-    finite, of |(share_k q'_k)| u̇, `feed_share` (n, axes) being what each axis counts in it (None: all as they
-    are). At piece ends: `junction_speed` (n + 1,) greatest speed [mm/s]: 0 at a stop, infinite where
-    nothing but the other limits holds. `chord_tolerance` [mm] and `period` [s] limit the speed on a curve of
-    radius ρ to (2/T)·√(2ρδ − δ²); an infinite tolerance switches that off. `start_speed` and `end_speed`
-    [mm/s] hold at the ends of the path.
-    `velocity_jump` [mm/s] is what each axis velocity may jump by at a corner; None for the machine's own.
+    Each joint (`axes` names them; `units` take the place of mm) has `max_velocity` [mm/s], `max_acceleration`
+    [mm/s²] and `max_jerk` [mm/s³], which may be infinite. `least_velocity` and `least_acceleration` are the
+    negative limits where these differ, else empty.
+
+    Each of the n pieces has `feed` (n,), the greatest |(share_k q'_k)| u̇ [mm/s], finite. `feed_share` (n,
+    axes) is the share of each axis in that speed, None where all are 1. `junction_speed` (n + 1,) is the
+    greatest speed [mm/s] at the ends of the pieces: 0 at a stop, infinite where only the other limits hold. A
+    curve of radius ρ has the speed limit (2/T)·√(2ρδ − δ²) by `chord_tolerance` δ [mm] (infinite: no limit)
+    and `period` T [s]. `start_speed` and `end_speed` [mm/s] are those at the ends of the path.
+    `velocity_jump` is the jump that each axis velocity may make at a corner; None for the machine's own.
     `request` is what the user asked for in place of the programmed feeds.
 
-    Where the path's axes are not the joints of the machine, `joints` is the motion of the joints [mm, deg],
-    one polynomial piece for each of the path and over the same parameter, counted from `joint_origin`
-    (n, joints), 0 without one; `tip_speed` the square of the speed that feed and junctions are about, per
-    u̇²; `way_scale` (path axes,) what each axis of the path counts in its length [mm per mm, deg, or unit of a
-    direction], 1 by default; `words` (one a run) the kinematics from path to joints; and `cut` what the path
-    was before it was cut to match the joints' pieces, if it was.
+    Where the joints move in another way than the path's axes,
+
+    - `joints` is their motion [mm, deg]: for each piece of the path one polynomial piece over the same
+      parameter, counted from `joint_origin` (n, joints), 0 without one; `joint_axes` are their names;
+    - `tip_speed` is the square over u̇² of the speed that feed and junctions limit;
+    - `way_scale` (path axes,) is the share of each axis of the path in its length [mm per mm, deg, or unit of
+      a direction], 1 by default;
+    - `words` (one a run) are the kinematics from path to joints, and `cut` is the path before it was cut to
+      match the joints' pieces.
     """
 
     path: Path
@@ -113,7 +117,7 @@ class Problem:
         return np.asarray(np.where(values < 0.0, down, up))
 
     def use(self, name: Limited, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The part of their limits that values (…, axes) use, each that of its direction."""
+        """The share of their limits that values (…, axes) use, each of the limit of its direction."""
         least, most = getattr(self, f"min_{name}"), getattr(self, f"max_{name}")
         return np.asarray(values / np.where(values < 0.0, least, most))
 
@@ -212,8 +216,9 @@ class Problem:
     def way_curve(self) -> CompositeCurve | None:
         """The path with its axes scaled [mm], where the joints have pieces of their own.
 
-        Its length is that of laws of jerk: its speed vanishes only where all joints rest, while the tool's in
-        X, Y, Z also does where it only turns."""
+        Laws of jerk use its length: its speed is 0 only where all joints rest, while the tool's speed in X,
+        Y, Z is also 0 where the tool only turns.
+        """
         if self.joints is None:
             return None
         curve = self.path.curve
@@ -253,7 +258,7 @@ def build_problem(
     keeps those of the program are passed with the jump that the machine allows, or that its accelerations
     give in one servo period if that is more. A jump that the machine allows is no more than the chord
     tolerance in a period, on linear axes: the line between two setpoints cuts the corner by less.
-    Raises InputError for a value out of range.
+    Raises InputError for a value out of range, and for a place that the joints cannot pass.
     """
     remedy = "a finite speed of 0 or more"
     start_speed = number(start_speed, "start speed", remedy, not_negative, "mm/s")

@@ -1,1 +1,1 @@
-"""Curves of any degree, polynomial and rational, and their lengths: what programs and paths are made of."""
+"""Curves of any degree, polynomial and rational, and their lengths: the parts of programs and paths."""

@@ -1,4 +1,4 @@
-"""Arrays as users give them to the geometry kernels: numbers of the right shape, or a sentence why not."""
+"""Checks of the arrays that users give to geometry kernels: type, shape and range."""
 
 from __future__ import annotations
 
@@ -60,10 +60,10 @@ def whole_numbers(values: ArrayLike, name: str) -> NDArray[Any]:
 
 
 def floats(values: ArrayLike, name: str, dimensions: int | None = None) -> NDArray[np.float64]:
-    """A C-contiguous array of numbers with so many dimensions."""
+    """A C-contiguous array of numbers, of `dimensions` dimensions if that is given."""
     try:
         given = np.asarray(values)
-        # Objects may be numbers, such as fractions; numpy would take texts and truth values for numbers.
+        # Objects may be numbers, such as fractions. NumPy alone would accept texts and truth values too.
         if given.dtype.kind not in "iufO" or (
             given.dtype.kind == "O" and not all(map(is_number, given.flat))
         ):
@@ -84,7 +84,7 @@ def within(given: ArrayLike, name: str, end: float, unit: str) -> NDArray[np.flo
         raise InputError(f"the {name} is {shown(given)}: give a number or a list of numbers") from None
     if values.ndim > 1:
         raise InputError(f"the {name}s have {values.ndim} dimensions: give a number or a list of numbers")
-    # The end of a plan or path, summed up in another order, is the end.
+    # The end of a plan or path may differ by the rounding of its sum.
     outside = ~((values >= 0.0) & (values <= end * (1.0 + 1e-12)))
     if outside.any():
         worst = float(values[outside].flat[0])

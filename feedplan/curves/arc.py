@@ -19,8 +19,8 @@ def arc(
 ) -> CompositeCurve:
     """The arc from `start` (axes,) by `sweep` [rad] about `centre` (2,) in the plane of two axes.
 
-    It turns from the first of them towards the second. Its pieces are exact rational quadratics of at most
-    90°, the width of each its length.
+    It turns from the first axis of the plane towards the second. Its pieces are exact rational quadratics of
+    at most 90°, the width of each its length.
     """
     return _turn(start, centre, sweep, plane, None, 2, 1.0)[0]
 
@@ -52,7 +52,7 @@ def helix(
     A true helix is no rational curve of any degree. The pieces, of `degree` 3 to 9, lie exactly on the circle
     of the plane; along the other axes they are off by at most the bound, which is proven and at most
     `tolerance` [mm], rounding apart. Derivatives by u are continuous (C1). A higher degree takes fewer
-    pieces, an odd one most of all.
+    pieces, odd degrees the fewest.
     """
     if not 0 < tolerance < math.inf:
         raise InputError(f"the tolerance of the helix is {tolerance} mm: give a positive number")

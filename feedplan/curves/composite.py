@@ -24,7 +24,7 @@ MAX_DEGREE = 9
 
 
 class JointKind(IntEnum):
-    """What holds where two pieces meet; each kind implies those before it."""
+    """The continuity where two pieces meet; each kind implies those before it."""
 
     GAP = 0
     """The ends are apart."""
@@ -119,8 +119,8 @@ class CompositeCurve(OfNative[Curve]):
         """A B-spline by n control points (n, axes), n + degree + 1 `knots` and `degree`, as for `from_nurbs`;
         or a `scipy.interpolate.BSpline` as it is.
 
-        Of scipy's spline the base interval [t[k], t[n]] is taken, on which every way to extrapolate agrees; a
-        periodic one is closed there.
+        The curve of a scipy spline is that on the base interval [t[k], t[n]], which does not depend on the
+        kind of extrapolation; a periodic spline is closed there.
         """
         if knots is None and degree is None:
             spline = control_points
@@ -130,7 +130,7 @@ class CompositeCurve(OfNative[Curve]):
                     "or an object with t, c and k as scipy's BSpline"
                 )
             knots, degree = spline.t, int(spline.k)
-            # scipy allows coefficients beyond those that the knots use.
+            # scipy allows more coefficients than the knots use.
             control_points = np.asarray(spline.c)[: max(len(spline.t) - degree - 1, 0)]
         if knots is None or degree is None:
             raise InputError("a B-spline needs control points, knots and degree: one of them is missing")
@@ -298,8 +298,7 @@ class CompositeCurve(OfNative[Curve]):
         return self.of(self.native.elevated(_degree(degree)))
 
     def split(self, piece: ArrayLike, u: ArrayLike) -> CompositeCurve:
-        """The same curve with pieces cut at places (m,) inside them; cuts at their ends and repeated ones are
-        passed over."""
+        """The same curve with pieces cut at places (m,); cuts at their ends and repeated cuts do nothing."""
         pieces, at = places(piece, u)
         order = np.lexsort((at, pieces))
         pieces, at = pieces[order], at[order]
@@ -323,9 +322,9 @@ class CompositeCurve(OfNative[Curve]):
     ) -> Joints:
         """How neighbouring pieces meet, and in a closed curve the last and the first one.
 
-        The same are points within `gap` [mm], directions within `angle` [rad], and derivatives within the
-        part `derivative` of what the size of the pieces lets expect. `closed` includes the joint from end to
-        start; by default where the curve is closed.
+        Points are equal within `gap` [mm], directions within `angle` [rad], and derivatives within the share
+        `derivative` of their expected size, by the size of the pieces. `closed` includes the joint from the
+        end to the start, by default if the curve is closed.
         """
         around = self.closed if closed is None else flag(closed, "closed")
         for name, value in (("gap", gap), ("angle", angle), ("derivative", derivative)):
@@ -335,8 +334,8 @@ class CompositeCurve(OfNative[Curve]):
     def cusps(self, tolerance: float = 1e-9) -> Cusps:
         """Every place where |C'| is at most `tolerance` of the greatest on the piece, ends included.
 
-        Proven to be all; of rational pieces ω²C' is meant. Of neighbouring places the slowest is given. A
-        piece of length zero has one at u = 0.
+        The list is proven to be complete. On rational pieces ω²C' takes the place of C'. Of neighbouring
+        places it has the one of the least |C'|. A piece of length zero has one cusp, at u = 0.
         """
         number(tolerance, "the tolerance of cusps", "a part from 1e-12 to 1", lambda part: 1e-12 <= part < 1)
         return Cusps(*self.native.cusps(tolerance))

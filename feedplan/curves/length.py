@@ -1,4 +1,4 @@
-"""The length along a curve of any degree, and the places at given lengths."""
+"""The length along a curve of any degree, and the inverse: places at given lengths."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ class Places:
 class CurveLength:
     """The length of a curve as a function of the place on it, tabulated to a proven error.
 
-    `accuracy` is the error allowed to each piece, a part of its length; rounding is added to it. Source:
+    `accuracy` is the allowed error of each piece as a share of its length; rounding adds to it. Source:
     Cheatham 2007, chapter 3, corrected, for curves of any degree and halved towards cusps; Zhang et al. 2010,
-    section 4.2, for `newton`. `progress` is told how far the table is.
-    Raises InputError for an empty curve and an accuracy that cannot be had.
+    section 4.2, for `newton`. `progress` gets the part of the table that is done.
+    Raises InputError for an empty curve and an accuracy that is not possible.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""A program on a machine becomes a path: lines, circles, splines, fitted chains, corners and runs."""
+"""From a program on a machine to its path: lines, circles, splines, fitted chains, corners and runs."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from feedplan.machine.machine import Machine
 from feedplan.program.program import PathControl, Program
 from feedplan.progress import Listener, part, tell
 
-# Splines and their moves come from sums of the same offsets; more than this between them [mm] is no rounding.
+# The greatest distance [mm] between the ends of a spline and of its move: both are sums of the same offsets.
 _SPLINE_GAP = 1e-6
-# How far the work is when the native builder is done.
+# The part of the work that is done after the native builder.
 _BUILT = 0.9
 
 
@@ -38,37 +38,45 @@ def build_path(
 ) -> Path:
     """The path that the machine follows.
 
-    G61.1 stops after every move. G61 follows lines, splines and arcs exactly (arcs with rounded ends and
-    helices within `settings.exact_tolerance`), and stops where the direction breaks; only where rounded
-    coordinates leave an arc or a spline and its neighbour a turn of less than a degree is that smoothed,
-    within the same tolerance. G64 stays within its tolerance, both ways: chains of G1 moves are fitted and
-    corners are rounded. The tolerance [mm] is `tolerance`, else the program's P, else
-    `settings.default_tolerance`; 0 means exact lines with stops. Q bounds the fit alone. Where G64 meets G61
-    the joint belongs to the stricter of them. Rapids are lines of their own. Arcs become true circles;
-    splines go into the path as they are, their widths scaled to about the length, pieces without a length
-    left out; only at corners are their ends cut and bent as those of lines and arcs are.
+    The path-control mode of each move decides how exactly it is followed:
 
-    With `corners` ARCS nothing is fitted, and corners of two lines become true arcs within the tolerance;
-    with JOINED the same, after points within Q (without one, the tolerance) of lines are left out. With
-    PROGRAMMED nothing is rounded either, and corners lie within runs. With SMOOTH all moves between two
-    stops are one curve of continuous fourth derivative within the tolerance (Q does not count), arcs and
-    splines too; where the program asks for the exact path, those are followed within `exact_tolerance` with
-    the lines that they touch. Lines longer than `max_chord` are straight in the middle. Arcs, splines and
-    bends of points keep their size, but for FASTEST. It stops where G0 and other moves, or the exact path
-    and another, meet, and where the path turns back by more than 135°; where no curve is found,
-    corners are rounded one by one between stops, and `Path.warnings` says so.
+    - G61.1 stops after every move.
+    - G61 follows lines and splines exactly, arcs (with rounded ends) and helices within
+      `settings.exact_tolerance`, and stops where the direction jumps. A turn of less than a degree beside an
+      arc or a spline comes from rounded coordinates: it is smoothed within the same tolerance.
+    - G64 stays within a tolerance [mm] of the program, and the program within it of the path: chains of G1
+      moves are fitted, and corners are rounded. The tolerance is `tolerance`, else the program's P, else
+      `settings.default_tolerance`; 0 means exact lines with stops. Q limits the fit only.
 
-    Corners that cannot be rounded are stops, unless every axis that moves has a `max_velocity_jump`. The
-    tool stops also where the coordinate mode or the tool length changes. Axes that the program moves must
-    be there; axes that it names and never moves are left out. Where words are joints, the path has them in
-    the machine's order and within their travel; where they are the tool tip (and its direction), in the
-    order of the machine's kinematics, and travel is a matter of the joints that follow. A fitted chain is
-    followed across changes of feed; its pieces are cut there, so that none is faster than a block it covers.
-    A feed counts along X, Y and Z where a move moves one of these, else along U, V and W, else it is that of
-    the rotary axes, at every place of the path; a blend of moves whose feeds count along different axes keeps
-    both (`Path.group_feed`), and where words are the tool tip it is a stop.
+    Where G64 meets G61 the stricter mode holds. Rapids are lines of their own. Arcs become true circles.
+    Splines enter the path unchanged, their widths scaled to about the length, without pieces of no length;
+    only at corners are their ends cut and bent, as those of lines and arcs are.
 
-    `progress` is told how far it is. Raises MachineError (an axis is missing), ProgramError (a move has no
+    `corners` chooses another treatment of corners:
+
+    - ARCS: nothing is fitted, and corners of two lines become true arcs within the tolerance. JOINED: the
+      same, after points within Q, else the tolerance, of a line are left out.
+    - PROGRAMMED: nothing is fitted or rounded, and runs pass corners.
+    - SMOOTH: all moves between two stops, arcs and splines too, are one curve of continuous fourth derivative
+      within the tolerance; Q does not count. Exact moves are followed within `exact_tolerance`, with the
+      lines that they touch. Lines longer than `max_chord` are straight in the middle. Arcs, splines and bends
+      of points keep their size, except with FASTEST. The path stops where G0 meets other moves, where an
+      exact path meets another one, and where it turns back by more than 135°. Where no curve is found,
+      corners are rounded one by one between stops, and `Path.warnings` says so.
+
+    Corners that cannot be rounded are stops, unless every axis that moves has a `max_velocity_jump`. The tool
+    also stops where the coordinate mode or the tool length changes.
+
+    The axes of the path are those of the machine that the program names; axes that it names and never moves
+    may be missing. In the mode JOINTS they are in the machine's order, and positions stay within its travel.
+    In other modes they are in the order of the kinematics, and travel is checked on the joints afterwards.
+
+    A feed counts along X, Y and Z where a move moves one of these, else along U, V and W, else along the
+    rotary axes. A blend of moves whose feeds count along different axes keeps both (`Path.group_feed`); in
+    other modes than JOINTS it is a stop. A fitted chain continues across changes of feed: its pieces are cut
+    there, so that none is faster than the feed of a block that it follows.
+
+    `progress` gets the part done. Raises MachineError (an axis is missing), ProgramError (a move has no
     length, an arc no radius, a spline does not fit its move), InputError (a position outside the travel, a
     negative tolerance).
     """
@@ -149,7 +157,7 @@ def build_path(
 
 
 def _new_words(program: Program, first: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(r,) whether the words of a run, by its first move, differ from those before or changed in between."""
+    """Whether mode or tool length change before a run (r,), of which `first` (r,) is the first move."""
     changes = np.searchsorted(program.change_move, first, side="right")
     new: NDArray[np.bool_] = np.diff(changes, prepend=changes[:1]) > 0
     if program.coordinate_mode is not None:
@@ -168,7 +176,7 @@ def _changes_of_group(names: tuple[str, ...], moving: NDArray[np.bool_]) -> NDAr
 def _rough_places(
     program: Program, reversals: NDArray[np.int64], zones: NDArray[np.int64]
 ) -> tuple[str, ...]:
-    """Sentences on where a smooth path stops without being told to."""
+    """Sentences on the stops of a smooth path that the program does not ask for."""
     sentences = []
     if len(reversals):
         sentences.append(
@@ -197,7 +205,7 @@ def _splines(program: Program) -> CompositeCurve | None:
         return None
     curve, move, pieces = program.splines, program.spline_move, program.spline_pieces
     control = curve.control_points.copy()
-    # Every piece starts with the last control point of the one before, the first one where its move does.
+    # Every piece starts where the one before ends, and the first one where its move starts.
     first, last = curve.offsets[:-1], curve.offsets[1:] - 1
     given = control[first].copy()
     control[first[1:]] = control[last[:-1]]
@@ -237,6 +245,6 @@ def _tolerances(
     limit = np.where(may_leave, limit, 0.0)
     if corners is Corners.JOINED:
         return limit, np.where(np.isinf(fit_limit), limit, np.where(may_leave, fit_limit, 0.0))
-    if corners is not Corners.ROUNDED:  # only that fits a part of the program by itself
+    if corners is not Corners.ROUNDED:  # the others do not fit chains by themselves
         return limit, np.zeros(len(program))
     return limit, np.minimum(fit_limit, settings.fit_share * limit)

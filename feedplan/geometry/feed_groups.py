@@ -1,6 +1,6 @@
-"""Along which axes a feed counts: X, Y, Z, else U, V, W, else all others together, as RS-274 has it.
+"""The axes that a feed counts along: X, Y, Z, else U, V, W, else all others together, as in RS-274.
 
-The others are the rotary axes of a program, and the axes of any other name of a path that is none.
+The others are the rotary axes of a program, or the axes with other names of a path without a program.
 
 A piece of a path keeps the feeds of the moves that it follows. Where it also moves axes that none of these
 moves, as a blend does, it keeps the feed of the next move on either side that counts along those axes. So
@@ -48,7 +48,7 @@ def leading_group(axes: tuple[str, ...], moving: NDArray[np.bool_]) -> NDArray[n
 def told_apart(
     axes: tuple[str, ...], moving: NDArray[np.bool_], feed: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """The feeds (m,), equal numbers along different axes made to differ by a rounding: other feeds."""
+    """The feeds (m,), changed by a rounding where equal numbers count along different axes."""
     if _are_one_group(axes):
         return feed
     group = leading_group(axes, moving)
@@ -64,7 +64,7 @@ def group_feeds(
     curve: CompositeCurve,
     covered: NDArray[np.int64],
 ) -> NDArray[np.float64] | None:
-    """The greatest speed of pieces along each group of axes (n, 3) [mm/s, deg/s], infinite where none holds.
+    """The greatest speed of pieces along each group of axes (n, 3) [mm/s, deg/s], infinite without a limit.
 
     `moving` (m, axes) are the axes that each move moves, `feed` (m,) its feed, infinite on rapids, `covered`
     (n, 2) the first and the last move that each piece of `curve` follows. None where all axes are one group.
@@ -75,7 +75,7 @@ def group_feeds(
     limit = np.where(moves & (np.cumsum(moves, axis=1) == 1), feed[:, None], np.inf)
     own = _over(np.minimum, limit, covered, np.inf)
     foreign = moved_groups(axes, moving_axes(curve)) & ~_over(np.logical_or, moves, covered, False)
-    # The next moves on both sides that go anywhere; the last row stands for none.
+    # The next moves on both sides that move an axis; the last row means that there is no such move.
     limit = np.concatenate([limit, np.full((1, GROUPS), np.inf)])
     goes = np.append(np.flatnonzero(np.logical_or.reduce(moves, axis=1)), len(moves))
     first, last = covered.T

@@ -1,4 +1,4 @@
-"""Points of G1 moves left out where they are within a tolerance of a line: LinuxCNC's naive CAM detector.
+"""Leaves out points of G1 moves that are within a tolerance of a line: LinuxCNC's naive CAM detector.
 
 A line goes from a point of the program to the farthest later one that has all points between them within the
 tolerance, found point by point: the first that has not ends the line at the point before (LinuxCNC,
@@ -17,7 +17,7 @@ from feedplan.program.program import LINEAR_AXES, MoveKind, Program
 
 Array = NDArray[np.float64]
 
-# Points that a line may leave out.
+# The greatest number of points that a line leaves out.
 MOST = 100
 
 
@@ -69,7 +69,7 @@ def _ends(program: Program, tolerance: Array, halt: NDArray[np.bool_]) -> NDArra
         with_next[program.change_move[program.change_move > 0] - 1] = False
     points = np.concatenate([program.start[None, columns], program.target[:, columns]])
     ends = np.ones(len(program), dtype=np.bool_)
-    # Stretches of moves that may be joined; move i goes from point i to point i + 1.
+    # Ranges of moves that may be joined; move i goes from point i to point i + 1.
     edge = np.flatnonzero(np.diff(np.concatenate([[False], with_next, [False]]).astype(np.int8)))
     for first, past in zip(edge[::2].tolist(), edge[1::2].tolist(), strict=True):
         start = first

@@ -1,4 +1,4 @@
-"""How the direction of motion turns where the pieces of a curve meet."""
+"""The change of the direction of motion where the pieces of a curve meet."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ Array = NDArray[np.float64]
 ROUNDING_MARGIN = 32.0
 SMOOTH_TURN = 1e-9
 
-# Edges of a control polygon that are shorter than this part of it are none, as next to a cusp.
+# Edges shorter than this share of a control polygon, as next to a cusp, have no direction.
 VANISHING_EDGE = 1e-12
 
 
 def tangent_jumps(curve: CompositeCurve) -> Array:
     """|T₊ − T₋| by axis at the joints between pieces (n − 1, axes), T being the unit tangents.
 
-    0 where no corner can be told from rounding, NaN next to a piece without length. In a cusp T is the
+    0 where the jump may be rounding, NaN next to a piece without length. In a cusp T is the
     direction in which the motion ends or begins.
     """
     edge_in, edge_out = end_edges(curve)

@@ -30,10 +30,10 @@ from feedplan.units import counted
 
 DEFAULT_AXES = "XYZABC"
 
-# The ends of neighbouring pieces may be this far apart [mm]: it is what rounding makes of one point.
+# The greatest distance [mm] between the ends of neighbouring pieces: rounding separates them so far.
 MAX_GAP = 1e-6
 
-# A speed [mm/s] and an acceleration [mm/s²] for which no corner is too long: the tolerance alone decides.
+# A speed [mm/s] and an acceleration [mm/s²] with which the tolerance alone limits the length of corners.
 _ANY_SPEED, _ANY_ACCELERATION = 1e6, 1.0
 
 
@@ -46,11 +46,11 @@ class FitSummary:
     pieces are cut at changes of feed and at corners. `deviation` is a certified upper bound of the distance
     between the whole path (arcs and corners too) and the programmed one, both ways.
 
-    Of a smooth path (`Corners.SMOOTH`, `FASTEST`), else None: on which side of the program it lies, positive
-    outside, away from the centre of curvature. `mean_offset` [mm] is the mean over all bends, that is arcs
-    and points that turn by less than 30°, away from corners: a hole or a boss is off by as much in radius.
-    `inside` and `outside` [mm] are the greatest distances on each side, corners included, at the programmed
-    points and at places between them.
+    The last three are for smooth paths (`Corners.SMOOTH`, `FASTEST`), else None. They are distances [mm] from
+    the program, positive on the outside, away from the centre of curvature. `mean_offset` is the mean over
+    all bends, which are arcs and points that turn by less than 30°, away from corners: the error of the
+    radius of a hole or a boss. `inside` and `outside` are the greatest distances on each side, corners
+    included, at the programmed points and at places between them.
     """
 
     points: int = 0
@@ -81,9 +81,9 @@ class FitSummary:
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """What the pieces of a path were cut from: fractions `part` (n, 2) of `piece` (n,) of `curve`.
+    """The curve that the pieces of a path were cut from: each is a `part` (n, 2) [fractions] of a `piece` (n,).
 
-    Control points of a short part keep the digits of its place, not those of its derivatives.
+    Derivatives are taken from `curve`: the control points of a short part lack the digits for them.
     """
 
     curve: CompositeCurve
@@ -98,22 +98,30 @@ class Cut:
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """Pieces C_i(u), u in [0, width_i], joined end to end.
+    """Pieces C_i(u), u in [0, width_i], joined end to end, in runs between full stops.
 
-    `axes` names; `curve` the n pieces [mm, deg], each of its own degree, polynomial or rational; `feed` (n,)
-    commanded feed [mm/s], infinite on rapids, `group_feed` says along which axes; `move` (n, 2) first and
-    last program move that the piece follows; `line` (n,) source line of the first; `runs` (r + 1,) piece
-    offsets: the tool stands still at the start and the end of each run; `dwell` (r,) pause after each run
-    [s]; `tolerance` (n,) allowed distance from the programmed path [mm]; `start_dwell` pause before the first
-    run [s].
-    `coordinate_mode` (r,) the `CoordinateMode` of each run, `tool_length` (r,) [mm] its tool, NaN for the
-    machine file's; None where the machine has one mode only. `new_words` (r,) whether mode or tool length
-    change before a run: the same joint positions are written in other words, so the path may jump.
-    `corners` is what became of those of the program; `warnings` are sentences for the user.
-    `group_feed` (n, 3): greatest speed along X, Y, Z, along U, V, W [mm/s], and of all other axes together
-    [deg/s], infinite where none is commanded; more than one of them holds on a blend of moves whose feeds
-    count along different axes, and `feed` is the first. None where all axes count together.
-    Within a run the tangent is continuous, unless corners are passed with a velocity jump.
+    `axes` names the columns of `curve`, which has the n pieces [mm, deg], each of its own degree, polynomial
+    or rational. Within a run the tangent is continuous, unless corners are passed with a velocity jump.
+
+    Each piece has
+
+    - `move` (n, 2), the first and the last program move that it follows, `line` (n,) the source line of the
+      first, and `tolerance` (n,), its allowed distance from the program [mm];
+    - `feed` (n,), the commanded feed [mm/s], infinite on rapids. Where axes of several groups move,
+      `group_feed` (n, 3) has the greatest speeds along X, Y, Z, along U, V, W [mm/s], and of all other axes
+      together [deg/s], infinite where none is commanded; more than one is finite on a blend of moves whose
+      feeds count along different axes, and `feed` is the first. None where all axes are one group.
+
+    Each of the r runs has
+
+    - `runs` (r + 1,), offsets in the pieces: the tool stands still at the start and the end of each run;
+    - `dwell` (r,), the pause after it [s]; `start_dwell` [s] is the pause before the first run;
+    - `coordinate_mode` (r,) and `tool_length` (r,) as in a `Program`; None where the machine has one mode;
+    - `new_words` (r,): mode or tool length change before the run. The same joint positions are written in
+      other words, so the path may jump there.
+
+    `fit` says what fitting did, `corners` what became of the program's corners, and `warnings` are sentences
+    for the user.
     """
 
     axes: tuple[str, ...]
@@ -148,19 +156,20 @@ class Path:
 
         `axes` names them, by default the first of XYZABC: up to nine names of a machine's axes (see `Axis`).
         `feed` [mm/s] is the greatest speed along X, Y and Z on pieces that move one of these, else along U, V
-        and W, else of all other axes together [deg/s], as in a program; by default there is none, and the
-        axes' limits alone hold. Gaps up to 1e-6 mm are closed.
+        and W, else of all other axes together [deg/s], as in a program; by default only
+        the limits of the axes hold. Gaps up to 1e-6 mm are closed.
 
-        Straight pieces, of any degree and with any weights, become lines of degree 1 from each place where
-        they turn back to the next, neighbours on one line together but where both are of degree 1 already;
-        curved pieces are cut in their cusps, and pieces without length are left out. The path goes over the
-        same places as `curve`, and parameter intervals stay: `path.curve` is `curve` at the ends of its
-        pieces and on curved ones, but goes over lines evenly. Differences of 16 roundings of the greatest
-        coordinate are none: within them the control points of a straight piece are on a line. Where a curved
-        piece turns within such a difference it has a cusp, and control points nearer to that than 1e-9 of the
-        greatest coordinate are put there. Runs end at corners, at turns and in cusps, which are stops.
-        `path.move` gives the first and the last piece of `curve` that a piece goes along, and the source line
-        of all is 0.
+        Straight pieces, of any degree and with any weights, become lines of degree 1, cut where they turn
+        back. Neighbours on one line become one, unless both had degree 1. Curved pieces are cut in their
+        cusps. Pieces without length are left out. The path has the same places as `curve` and the same
+        parameter intervals; only the speed of the parameter on lines becomes constant.
+
+        Differences of up to 16 roundings of the greatest coordinate count as 0. A piece is straight if its
+        control points are so near to a line. A curved piece that turns back within this distance has a cusp;
+        control points within 1e-9 of the greatest coordinate from the cusp are moved into it.
+
+        Runs end at corners, where the path turns back, and in cusps; these are stops. `path.move` gives the
+        first and the last piece of `curve` that a piece follows, and all source lines are 0.
         Raises InputError for gaps, and for axes or a feed that cannot be used.
         """
         instance(curve, CompositeCurve, "the curve", "a CompositeCurve")
@@ -186,7 +195,8 @@ class Path:
     ) -> Path:
         """The path along a Bézier curve; see `CompositeCurve.from_bezier` and `from_curve`.
 
-        Its width is the length of its control polygon."""
+        The parameter interval is the length of the control polygon.
+        """
         return cls._scaled(CompositeCurve.from_bezier(control_points, weights), axes, feed)
 
     @classmethod
@@ -202,7 +212,8 @@ class Path:
     ) -> Path:
         """The path along a B-spline; see `CompositeCurve.from_bspline` and `from_curve`.
 
-        Its widths are as the knots', in all the length of its control polygon."""
+        The parameter intervals are those of the knots, scaled to the length of the control polygon.
+        """
         curve = CompositeCurve.from_bspline(control_points, knots, degree, periodic=periodic)
         return cls._scaled(curve, axes, feed)
 
@@ -220,7 +231,8 @@ class Path:
     ) -> Path:
         """The path along a NURBS curve; see `CompositeCurve.from_nurbs` and `from_curve`.
 
-        Its widths are as the knots', in all the length of its control polygon."""
+        The parameter intervals are those of the knots, scaled to the length of the control polygon.
+        """
         curve = CompositeCurve.from_nurbs(control_points, knots, degree, weights, periodic=periodic)
         return cls._scaled(curve, axes, feed)
 
@@ -342,7 +354,7 @@ class Path:
         return self.curve.width
 
     def __getstate__(self) -> dict[str, Any]:
-        # The table of lengths is made anew where it is needed.
+        # The copy makes its own table of lengths.
         return {name: value for name, value in vars(self).items() if name != "lengths"}
 
     @property
@@ -378,7 +390,7 @@ class Path:
         return CurveLength(self.curve)
 
     def cut(self, curve: CompositeCurve, piece: NDArray[np.int64]) -> Path:
-        """The same path with pieces cut: `curve` are the parts in order, `piece` (m,) what they are of."""
+        """The same path with pieces cut: `curve` has the parts in order, part i of the piece `piece[i]`."""
         return replace(
             self,
             curve=curve,

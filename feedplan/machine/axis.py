@@ -24,14 +24,14 @@ AxisKind = Literal["linear", "rotary"]
 # The same in both directions, or the least and the greatest.
 Limit: TypeAlias = float | tuple[float, float]
 
-# What numbers of machines can be, in mm or degrees and seconds. Beyond, a number is a mistake: ramps would be
-# shorter than places are known, or plans longer than a year.
+# Ranges of the numbers of machines, in mm or degrees and seconds. A number outside is a mistake: ramps would
+# be shorter than the rounding of positions, or plans longer than a year.
 VELOCITIES = 1e-5, 1e9
 GREATEST_ACCELERATION = 1e10
 # The times [s] after which an axis has its velocity, and its acceleration.
 RISE_TIMES = 1e-5, 1e7
 JERK_TIMES = 1e-7, 1e2
-# The time to full acceleration is this part of the time to full velocity, or more.
+# The least time to full acceleration as a share of the time to full velocity.
 LEAST_JERK_SHARE = 1e-7
 # The least way [mm] in which an axis has its velocity v²/a, and its acceleration a³/j².
 LEAST_WAY = 1e-11
@@ -58,7 +58,7 @@ class Axis:
     1e-5 to 1e7 s, and its acceleration after a/j from 1e-7 to 100 s and 1e-7 of that time or more, in ways
     v²/a and a³/j² of 1e-11 or more. Travel is within 1e9.
 
-    Raises MachineError for values that are none of these.
+    Raises MachineError for other values.
     """
 
     name: str
@@ -126,13 +126,13 @@ def range_of(limit: Limit) -> tuple[float, float]:
 
 
 def sizes_of(limit: Limit) -> tuple[float, float]:
-    """What a limit allows in both directions, and in one of them."""
+    """The lesser and the greater size of a limit of two directions."""
     least, greatest = sorted(map(abs, range_of(limit)))
     return least, greatest
 
 
 def size_of(limit: Limit) -> float:
-    """What a limit allows in both directions."""
+    """The size that a limit allows in both directions."""
     return sizes_of(limit)[0]
 
 

@@ -1,4 +1,4 @@
-"""Values of a machine as numbers; what is wrong is one sentence with place, value and remedy."""
+"""Checks of values of a machine; an error is one sentence with place, value and remedy."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 from feedplan.arguments import is_number, is_text, shown
 from feedplan.errors import MachineError
 
-# Ends of ranges are quotients and products: by this part of them numbers may be beyond.
+# Numbers may exceed the ends of ranges by this share, because the ends are rounded quotients.
 ROUNDING = 1e-12
 
 
@@ -21,13 +21,13 @@ def require(condition: bool, what: str, value: object, remedy: str) -> None:
 
 
 def one_by_one(values: Any, what: str, remedy: str) -> tuple[Any, ...]:
-    """The values one by one; raises MachineError where they cannot be told so."""
+    """The values as a tuple; raises MachineError where they cannot be iterated."""
     require(isinstance(values, Iterable), what, values, remedy)
     return tuple(values)
 
 
 def numbers(values: Any, count: int, what: str, remedy: str, infinite: bool = False) -> tuple[float, ...]:
-    """So many numbers, as floats; raises MachineError for anything else."""
+    """`count` numbers as floats; raises MachineError for anything else."""
     given = one_by_one(values, what, remedy)
     good = len(given) == count and all(map(is_number, given))
     require(good and (infinite or all(map(math.isfinite, given))), what, values, remedy)
@@ -37,7 +37,7 @@ def numbers(values: Any, count: int, what: str, remedy: str, infinite: bool = Fa
 def set_within(
     owner: object, key: str, place: str, unit: str, ends: tuple[float, float], infinite: bool = False
 ) -> None:
-    """Makes a field a float; raises MachineError unless it is between the ends, or infinite if it may be."""
+    """Makes a field a float; raises MachineError unless it is between the ends, or infinite if allowed."""
     value = getattr(owner, key)
     good = is_number(value) and (_within(value, ends) or (infinite and value == math.inf))
     remedy = f"a number from {ends[0]:g} to {ends[1]:g} [{unit}]{', or inf' if infinite else ''}"
@@ -46,7 +46,7 @@ def set_within(
 
 
 def set_limit(owner: object, key: str, place: str, unit: str, ends: tuple[float, float]) -> None:
-    """Makes a field a float between the ends, or two, negative and positive, where directions differ."""
+    """Makes a field a float between the ends, or a negative and a positive one where directions differ."""
     value = getattr(owner, key)
     if not isinstance(value, (list, tuple)):
         return set_within(owner, key, place, unit, ends)
@@ -66,7 +66,7 @@ def _within(value: float, ends: tuple[float, float]) -> bool:
 
 
 def require_text(value: object, what: str) -> None:
-    """Raises MachineError unless the value is text that is not empty and that a file can hold."""
+    """Raises MachineError unless the value is a text, not empty, that a file can hold."""
     require(is_text(value) and value != "", what, value, "a text")
 
 

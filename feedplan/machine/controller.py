@@ -1,4 +1,4 @@
-"""The controllers that are modelled, and their parameters by the names of their own files.
+"""Models of controllers, and their parameters by the names in the controllers' own files.
 
 A machine file names its controller as `controller = "grbl"`, or in a table with parameters:
 
@@ -6,7 +6,7 @@ A machine file names its controller as `controller = "grbl"`, or in a table with
     type = "grbl"
     junction_deviation = 0.02
 
-What is left out has the controller's own default. Units are mm and seconds here as everywhere.
+Parameters that are left out have the controller's own defaults. Units are mm and seconds.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Parameter:
     unit: str
 
     def checked(self, what: str, value: Any) -> Any:
-        """The value as a machine file has it; raises MachineError for one that it cannot have."""
+        """The value as a machine file has it; raises MachineError for a value that is not allowed."""
         value = written(value, what)
         if self.unit == "blocks":
             good = is_number(value) and value >= 2 and value % 1 == 0

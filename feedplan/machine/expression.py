@@ -84,7 +84,7 @@ def record(
 
 
 class _Tape:
-    """The operations so far; what has been computed before is not computed again."""
+    """The operations so far; an operation on the same operands is recorded once."""
 
     def __init__(self, name: str, inputs: int) -> None:
         self.name, self.inputs = name, inputs
@@ -93,7 +93,7 @@ class _Tape:
         self._known: dict[tuple[int, int, int, float, float], int] = {}
 
     def add(self, op: Op, first: int = 0, second: int = 0, constant: float = 0.0) -> Traced:
-        # A quotient tells 0 from −0.
+        # The sign of 0 matters in a quotient.
         key = (op, first, second, constant, math.copysign(1.0, constant))
         if key not in self._known:
             self._known[key] = self.inputs + len(self.rows)
@@ -117,7 +117,7 @@ class _Tape:
 
 
 def _refused(what: str) -> Callable[..., Any]:
-    """A method that a formula must not use."""
+    """A method that refuses its use in a formula."""
 
     def method(self: Traced, *_: Any, **__: Any) -> NoReturn:
         self.tape.refuse(what)

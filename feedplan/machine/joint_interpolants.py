@@ -1,4 +1,4 @@
-"""Polynomials that stand in for a joint's motion q'(u), with a proven distance from it.
+"""Polynomials that interpolate a joint's motion q'(u), with a proven bound of the error.
 
 q'' is interpolated at n Chebyshev points and integrated from the exact q' at the part's start. With
 c ≥ |q^(n+2)|/(n + 1)! over a part of width h in u (`path_derivatives.interpolation_constants`), by the
@@ -6,8 +6,8 @@ interpolation error formula
 
     |q'' − interpolant''| ≤ ε₂ = 2 (n + 1) c (h/4)^n,   |q' − interpolant'| ≤ ε₁ = h ε₂,
 
-so a joint's acceleration q' s + q'' p is met within ε₁ |s| + ε₂ p. Parts are halved until ε₂ is small enough.
-What rounding adds is not in ε: some 1e-14 of the largest |q''| of the part.
+so the error of a joint's acceleration q' s + q'' p is at most ε₁ |s| + ε₂ p. Parts are halved until ε₂ is
+small enough. Rounding is not part of ε: it adds some 1e-14 of the largest |q''| of the part.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from feedplan.machine.kinematics import Kinematics
 from feedplan.machine.path_derivatives import TipPieces, contiguous
 
 Array = NDArray[np.float64]
-# How far squares of speeds that are no polynomials may be off, as a part of themselves.
+# The greatest relative error of squares of speeds that are not polynomials.
 SPEED_SHARE = 1e-9
 
 
@@ -42,7 +42,7 @@ class SquareOfSpeed:
 
 @dataclass(frozen=True)
 class Accuracy:
-    """How near stand-ins must come: an axis's acceleration within 1e-9 of its limit, squares of speeds met.
+    """The required accuracy of interpolants: accelerations within 1e-9 of their limits.
 
     Per joint: `acceleration`, the lesser limit of both directions, `least_velocity`, `greatest_velocity`.
     Per piece: `feed` [mm/s], control points `linear` (n, d + 1, k) of the tool in X, Y, Z, and whether it
@@ -60,28 +60,28 @@ class Accuracy:
 
     @property
     def speed_nodes(self) -> Array:
-        """Where squares of speeds are interpolated."""
+        """The places at which squares of speeds are interpolated."""
         return chebyshev(SPEED_NODES)
 
     @property
     def speed_between(self) -> Array:
-        """Halfway between, where interpolation is off the most."""
+        """Places halfway between them, where the error of interpolation is greatest."""
         return np.asarray(0.5 - 0.5 * np.cos(np.pi * np.arange(SPEED_NODES + 1) / SPEED_NODES))
 
     @property
     def speed_interpolation(self) -> Array:
-        """From values at the nodes to those between."""
+        """The matrix from values at the nodes to values at the places between."""
         return np.ascontiguousarray(interpolation(SPEED_NODES, self.speed_between))
 
 
 @dataclass(frozen=True)
 class Interpolants:
-    """Stand-ins on m parts, in order of the path.
+    """Interpolants on m parts, in order of the path.
 
     `piece` (m,) and `part` (m, 2) say of which piece which fractions; `width` (m,) is their length in u.
     `slope` (m, n + 1, joints) are the Bernstein coefficients of q' [mm or deg per unit of u], degree n;
     `slope_error` and `curvature_error` (m, joints) are ε₁ and ε₂. They are infinite on parts that could not
-    be made small enough: there K is singular, or so nearly that 2^-30 of a piece is too wide.
+    be made small enough, because K is singular there or 2^-30 of a piece is still too wide.
     """
 
     piece: NDArray[np.int64]
@@ -103,7 +103,7 @@ def joint_interpolants(
     nodes: int = 9,
     weights: ArrayLike | None = None,
 ) -> Interpolants:
-    """Stand-ins of degree `nodes` with ε₂ within a tolerance, (joints,) or one for all, or as asked."""
+    """Interpolants of degree `nodes` with ε₂ within `tolerance`, (joints,), one for all, or an Accuracy."""
     tips = TipPieces.of(control_points, width, weights)
     if not isinstance(tolerance, Accuracy):
         tolerance = contiguous(np.broadcast_to(tolerance, len(kinematics.joint_names)))

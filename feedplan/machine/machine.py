@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from feedplan.machine.kinematics import Kinematics
 
 MAX_AXES = 9
-# The fastest axis is so many times as fast as the slowest one, or less.
+# The greatest quotient of the velocities of two axes.
 MOST_TIMES = 1e8
 PERIODS = 1e-6, 10.0
-# A period is this part of the longest time to full velocity, or of this time [s], or more.
+# The least period as a share of the longest time to full velocity, which counts as at most this time [s].
 LEAST_PERIOD_SHARE, LONG = 1e-7, 1e2
 CHORD_TOLERANCES = 1e-7, 1e6
-# Chord tolerance e and period T limit the acceleration on arcs to 8 e/T²: to this part of an axis's, or more.
+# Chord tolerance e and period T limit the acceleration on arcs to 8 e/T²: the least share of an axis's limit.
 LEAST_CHORD_SHARE = 1e-9
 
 
@@ -46,7 +46,7 @@ class Machine:
     tolerances e from 1e-7 to 1e6 mm; the acceleration 8 e/T² to which they limit arcs is at least 1e-9 of the
     greatest of an axis, and no axis is more than 1e8 times as fast as another one.
 
-    Raises MachineError for values that are none of these.
+    Raises MachineError for other values.
     """
 
     name: str
@@ -226,7 +226,7 @@ def bundled_text(name: str) -> str:
 
 
 def template() -> str:
-    """The text of a machine file with comments, to begin with."""
+    """The text of a machine file with comments, from which users begin."""
     return resources.files(__package__).joinpath("template.toml").read_text("utf-8")
 
 

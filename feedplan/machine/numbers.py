@@ -26,7 +26,7 @@ def square(x: Number) -> Number:
 
 
 def sin_cos(x: Number) -> tuple[Number, Number]:
-    """Sine and cosine of an angle in radians, at the cost of one."""
+    """Sine and cosine of an angle in radians; together they cost as much as one."""
     if hasattr(x, "sin_cos"):
         sine, cosine = x.sin_cos()
         return sine, cosine

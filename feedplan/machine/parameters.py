@@ -13,7 +13,7 @@ Vector = tuple[float, float, float]
 
 
 class Parameters:
-    """Keys of a kinematics and their values; `finish` refuses those that nobody asked for."""
+    """Keys of a kinematics and their values; `finish` refuses keys that were never read."""
 
     def __init__(self, values: Mapping[str, Any], machine: str) -> None:
         self.machine = machine

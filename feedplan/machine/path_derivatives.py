@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class TipPieces:
-    """Pieces as the native module takes them."""
+    """Pieces of a tip path as the native module takes them."""
 
     control_points: Array
     width: Array
@@ -35,7 +35,7 @@ class TipPieces:
 
 @dataclass(frozen=True)
 class Bounds:
-    """Arrays `lo` ≤ `hi` of one shape that hold what they bound, rounding included."""
+    """Lower and upper bounds `lo` ≤ `hi` of one shape; rounding is included."""
 
     lo: Array
     hi: Array
@@ -47,7 +47,7 @@ class Bounds:
 
     @property
     def middle(self) -> Array:
-        """Numbers inside, about half way; not a number where unbounded."""
+        """Numbers about half way between the bounds; NaN where unbounded."""
         with np.errstate(invalid="ignore"):
             return np.asarray(0.5 * self.lo + 0.5 * self.hi)
 
@@ -74,7 +74,7 @@ def derivatives(
 ) -> Array:
     """q, q', …, q^(order) (order + 1, n, joints) at u = fraction · width of each piece.
 
-    Exact but for rounding; not finite where K is singular. To have many points of a piece, repeat it.
+    Exact but for rounding; not finite where K is singular. For many points of a piece repeat the piece.
     """
     pieces = TipPieces.of(control_points, width, weights)
     found = joint_derivatives(kinematics.recorded, pieces, contiguous(fraction), order)
@@ -91,9 +91,9 @@ def enclosures(
 ) -> Bounds:
     """Bounds (order + 1, n, joints) of q^(k)(u)/k! for every u of each piece, rounding included.
 
-    `parts` (n, 2) are fractions of the pieces to look at instead, in [0, 1]. A coefficient is unbounded where
-    K is singular on the part, or too near to singular to tell: cut the part smaller. Angles known up to whole
-    turns are continuous over the part, whichever turn they are on.
+    `parts` (n, 2) are fractions of the pieces in [0, 1], if not the whole pieces are meant. A bound is
+    infinite where K is singular on the part, or too near to it to decide: cut the part smaller. Angles known
+    up to whole turns are continuous over the part, whichever turn they are on.
     """
     pieces = TipPieces.of(control_points, width, weights)
     lo, hi = joint_enclosures(kinematics.recorded, pieces, order, contiguous(parts))
@@ -122,5 +122,5 @@ def contiguous(values: None) -> None: ...
 @overload
 def contiguous(values: ArrayLike) -> Array: ...
 def contiguous(values: ArrayLike | None) -> Array | None:
-    """As the native module takes arrays."""
+    """A C-contiguous array of floats, as the native module takes them."""
     return None if values is None else np.ascontiguousarray(values, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""Machines with rotary axes in a row, on the table, on the head or both: the tip with its angles to joints.
+"""Machines with rotary axes on the table, on the head or on both: from the tip and its angles to the joints.
 
     J = T(w) − H(0, 0, −L),   T = T_1 ∘ T_2,  T_i(x) = p_i + R(−θ_i)(x − p_i),   H alike with R(+θ_i)
 

@@ -1,4 +1,4 @@
-"""Joint positions along a whole tip path: continuous angles, singular places, travel ends.
+"""Joint positions along a whole tip path: continuous angles, singular places, overrun travel ends.
 
 Pieces are cut until interval arithmetic proves on each part that K is differentiable there and that no angle
 turns by half a turn or more. What cannot be proven down to 2^-30 of a piece is a singular place: K is
@@ -23,7 +23,7 @@ TURN = 360.0
 
 @dataclass(frozen=True)
 class Place:
-    """Where a path asks of the machine what it cannot do: at `fraction` of piece `piece`.
+    """A place that the machine cannot pass, at `fraction` of piece `piece`.
 
     A singular place has the index of no joint (−1), and `what` completes "the tool is at …". A travel end has
     the `joint`'s index, its position `value` and the travel's end `limit` [mm, deg].
@@ -55,10 +55,10 @@ class Place:
 
 @dataclass(frozen=True)
 class JointPath:
-    """Parts of a path on which the joints are smooth, in order, and the places where they are not or leave.
+    """Parts of a path on which the joints are smooth, in order, and the places that they cannot pass.
 
-    Per part: `piece`, `part` (m, 2) its fractions of the piece, `range` (m, joints) what the joints'
-    positions lie within [mm, deg], angles on their turn. `places` are in order of the path.
+    Per part: `piece`, `part` (m, 2) its fractions of the piece, `range` (m, joints) bounds of the
+    joints' positions [mm, deg], angles on their turn. `places` are in order of the path.
     """
 
     kinematics: Kinematics
@@ -109,7 +109,7 @@ def joint_path(
 
 
 def _singular(kinematics: Kinematics, tips: TipPieces, piece: int, fraction: float) -> Place:
-    """A singular place by the name of what vanishes there."""
+    """A singular place; its name is that of the measure of `Kinematics.singular` that vanishes there."""
     level = tips.control_points[piece]
     if tips.weights is not None:
         level = np.concatenate([level * tips.weights[piece, :, None], tips.weights[piece, :, None]], axis=1)

@@ -33,7 +33,7 @@ KINDS = (
     "comment", "other",
 )  # fmt: skip
 
-# M codes that happen as the tool passes by, and those that stop the program.
+# M codes that act while the tool moves on, and those that stop the program.
 _PASSING = (61, 62, 63, 67)
 _STOPS = (0, 1, 2, 30, 60)
 
@@ -43,8 +43,8 @@ Marks = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Actions:
-    """What events do, one row each: `kind`, `channel` and `value` (m,), NaN where there is none; `stops`
-    (m,): the tool stands still for it."""
+    """What m events do: `kind`, `channel` and `value` (m,), NaN where they have none; `stops` (m,): the tool
+    stands still for the event."""
 
     kind: NDArray[np.str_]
     channel: Floats
@@ -68,7 +68,7 @@ def actions(events: Events) -> Actions:
     flows = (_last(code(7)) > off) + 2.0 * (_last(code(8)) > off)
     outputs = code(62, 63, 64, 65)
     analog = code(67, 68)
-    # A row is of the first kind that it fits.
+    # The first kind that fits a row counts.
     cases: list[tuple[str, Marks, Floats]] = [
         ("spindle", spindle, speed),
         ("coolant", coolant, flows),

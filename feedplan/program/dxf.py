@@ -8,11 +8,11 @@
 | ELLIPSE | an exact rational curve |
 | SPLINE | its NURBS curve; through its fit points as CAD systems do, where it has no control points |
 
-The model space is followed in drawing order. An open entity whose end touches where the tool is is followed
-backwards; where entities do not touch, a rapid goes from one to the next. Coordinates are the drawing's, with
-its units ($INSUNITS). What else a drawing holds, and what is on layers that are off or frozen, is left out
-with a warning; so are arcs and polylines in a tilted plane. A drawing has no feed: only the machine limits
-it.
+The model space is followed in drawing order. An open entity is followed backwards where its end touches the
+position of the tool; where entities do not touch, a rapid goes from one to the next. Coordinates are the
+drawing's, with its units ($INSUNITS). Other entities, those on layers that are off or frozen, and arcs and
+polylines in a tilted plane are left out with a warning. A drawing has no feed: the limits of the machine set
+the speed.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ Point = NDArray[np.float64]
 MAX_ENTITIES = 5_000_000
 _FARTHEST = 1e6  # [mm]; beyond is a mistake
 _QUARTER = math.pi / 2.0
-# What the package raises for an entity with entries that are missing or of another type.
+# Errors of the package for an entity with missing entries or entries of another type.
 _DAMAGED = (ValueError, ArithmeticError, TypeError, LookupError, AttributeError)
 
 
@@ -48,7 +48,7 @@ class _Line:
 
     @property
     def reach(self) -> float:
-        """No coordinate of a place on it is greater [mm]."""
+        """An upper bound of the coordinates on it [mm]."""
         return float(np.abs([self.start, self.end]).max())
 
     def reversed(self) -> _Line:
@@ -69,7 +69,7 @@ class _Arc:
 
     @property
     def reach(self) -> float:
-        """No coordinate of a place on it is greater [mm]."""
+        """An upper bound of the coordinates on it [mm]."""
         chord = 2.0 * math.sin(0.5 * min(abs(self.angle), math.pi))
         return float(np.abs(self.start).max()) + chord * math.dist(self.start, self.centre)
 
@@ -94,7 +94,7 @@ class _Curve:
 
     @property
     def reach(self) -> float:
-        """No coordinate of a place on it is greater [mm]."""
+        """An upper bound of the coordinates on it [mm]."""
         return float(np.abs(self.curve.control_points).max())
 
     def reversed(self) -> _Curve:
@@ -129,11 +129,11 @@ def read_dxf(content: bytes, name: str = "drawing.dxf") -> Program:
     try:
         document: Any = recover.read(io.BytesIO(content))[0]
         units = int(document.header.get("$INSUNITS", 0))
-        # The package has its factors to some digits only: 25.400000000102.
+        # The package rounds its factors: 25.400000000102.
         factor = conversion_factor(InsertUnits(units), InsertUnits.Millimeters) if units else 1.0
         scale = float(f"{factor:.9g}")
         entities = list(document.modelspace())
-    except Exception as error:  # the package raises whatever a broken file leads it to
+    except Exception as error:  # a broken file makes the package raise errors of any type
         what = " ".join(str(error).split()) or type(error).__name__
         raise ProgramError(f"{name} cannot be read as DXF ({what}): save the drawing anew") from None
     if len(entities) > MAX_ENTITIES:
@@ -146,7 +146,7 @@ def read_dxf(content: bytes, name: str = "drawing.dxf") -> Program:
             skipped["on layers that are off or frozen"] += 1
             continue
         try:
-            with np.errstate(all="ignore"):  # the reach of what is not finite is refused below
+            with np.errstate(all="ignore"):  # coordinates that are not finite are refused below
                 segments = _segments(entity, scale)
         except (_UnsupportedError, InputError, *_DAMAGED) as error:
             skipped[f"{entity.dxftype()} ({error})" if str(error) else str(entity.dxftype())] += 1
@@ -251,7 +251,7 @@ def _arc(entity: Any, scale: float) -> _Arc:
 
 
 def _on_side(point: Sequence[float], side: float) -> Point:
-    """A point of an entity's own coordinates in those of the drawing: from below X and Z count backwards."""
+    """A point in the drawing's coordinates; seen from below X and Z of an entity count backwards."""
     x, y, z = (*point, 0.0)[:3]
     return np.array([side * x, y, side * z], dtype=np.float64)
 

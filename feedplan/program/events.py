@@ -1,4 +1,4 @@
-"""What stands between the moves of a program: spindle, coolant, tools, outputs, dwells, stops, remarks."""
+"""Events between the moves of a program: spindle, coolant, tools, outputs, dwells, stops, remarks."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ class Events:
     """Words that switch something, in the order of the program, one row each.
 
     `move` (m,) is how many moves come before it, `line` (m,) its 1-based source line, `letter` (m,) and
-    `number` (m,) the word: M3, S1000, T5, M62, M0, G4. `p` and `q` (m,) are the words that go with it, NaN
-    where there is none: of M6 `p` is the tool's number, of G4 the seconds, of M66 to M68 the word E. A
+    `number` (m,) the word: M3, S1000, T5, M62, M0, G4. `p` and `q` (m,) are the words that belong to it, NaN
+    where it has none: of M6 `p` is the tool's number, of G4 the seconds, of M66 to M68 the word E. A
     message (MSG, DEBUG, PRINT and LOG of LinuxCNC, M117) has the letter `(`, a comment `;`, and as its number
     the place of its text in `texts`.
     """
@@ -49,7 +49,7 @@ class Events:
         return tuple(f"({text})" if said else text for text, said in zip(*self.said(), strict=True))
 
     def said(self) -> tuple[list[str], list[bool]]:
-        """The text of each event, and whether it is that of a message or a comment."""
+        """The text of each event, and whether the event is a message or a comment."""
         is_text = np.isin(self.letter, [ord(MESSAGE), ord(COMMENT)])
         rows = np.stack([self.letter, self.number, self.p, self.q], axis=1)
         different, place = np.unique(rows[~is_text], axis=0, return_inverse=True)
@@ -63,7 +63,7 @@ class Events:
 
 
 def _word(letter: float, number: float, p: float, q: float) -> str:
-    """A word with those that go with it."""
+    """A word with the words that belong to it."""
     first = "E" if letter == ord("M") and number in _ANALOG else "P"
     others = "".join(f" {name}{value:g}" for name, value in ((first, p), ("Q", q)) if not math.isnan(value))
     return f"{chr(int(letter))}{number:g}{others}"

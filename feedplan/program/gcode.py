@@ -52,7 +52,7 @@ are errors. Loops and calls are bounded: by `max_moves`, four lines a move besid
 deep. Subprograms in files are looked for beside the program, then in `subprograms`; their moves have the
 line of the call.
 
-What is refused, by name, line and remedy:
+These words are refused; the message has the word, the line and the remedy:
 
 | words | reason |
 |---|---|
@@ -129,7 +129,7 @@ MAX_MOVES = 50_000_000
 
 @dataclass(frozen=True, eq=False)
 class Options:
-    """What the native reader needs to know besides the program.
+    """What the native reader takes besides the program.
 
     `places` (n, 9) are the home position, where the program begins, and the work offsets G54 to G59.3 and
     G54.1 P1 on, in X Y Z A B C U V W; `machine_axes` is empty where there is no machine, `tip_control` None.
@@ -171,9 +171,8 @@ def read_gcode(
     stands in messages, instead of the file's name. `block_delete` leaves out blocks that start with `/`, as
     LinuxCNC does. `tools` is the tool table; without one lengths by H are 0. `subprograms` are folders of the
     files that the program calls, after its own. `feed` [mm/s, deg/s] is that of moves before the first F.
-    `whole_step` is what lengths and angles without a decimal point count, in units of the program: 0.001 on
-    controls that are set so. `max_bytes` and `max_moves` bound what is read. `progress` is told how far it
-    is.
+    `whole_step` is the unit of lengths and angles without a decimal point, in units of the program: 0.001 on
+    controls that are set so. `max_bytes` and `max_moves` bound the program. `progress` gets the part done.
     Raises ProgramError naming file, line, word and remedy, MachineError where an offset's name is unknown.
     """
     content, name, text = content_of(source, name, max_bytes)
@@ -208,7 +207,7 @@ def _places(machine: Machine | None) -> NDArray[np.float64]:
     places = np.zeros((2 + len(WORK_OFFSETS), len(AXIS_LETTERS)))
     if machine is None:
         return places
-    # A machine's other axes are none of a program's.
+    # Axes of other names cannot be programmed.
     own = [k for k, letter in enumerate(machine.program_letters) if letter in tuple(AXIS_LETTERS)]
     columns = [AXIS_LETTERS.index(machine.program_letters[k]) for k in own]
     for key, row in machine.offsets:
@@ -219,6 +218,6 @@ def _places(machine: Machine | None) -> NDArray[np.float64]:
     if machine.home:
         places[0, columns] = np.array(machine.home)[own]
     if not machine.words_are_joints:
-        # Zero may be a place that the tip cannot reach, as the axis of a turning column.
+        # The tip may be unable to reach zero, for example on the axis of a turning column.
         places[1] = places[0]
     return places

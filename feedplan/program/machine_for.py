@@ -1,4 +1,4 @@
-"""Which bundled machine a program fits."""
+"""The smallest bundled machine that fits a program."""
 
 from __future__ import annotations
 
@@ -11,24 +11,25 @@ from feedplan.errors import ProgramError
 from feedplan.machine.machine import Machine, bundled_machines
 from feedplan.program.program import Program
 
-# The machine that the smallest one is asked for by.
+# The name by which users ask for the smallest machine.
 AUTO = "auto"
 
-# Of machines with the same axes this one comes first.
+# The machine that comes first among those with the same axes.
 _FIRST = "mill"
 
 
 def names_of_machines_with(letter: str) -> str:
-    """The bundled machines whose programs may name an axis, as a part of a sentence; empty for none."""
+    """The bundled machines that have an axis, as a part of a sentence; empty where none has it."""
     names = [machine.name for machine in _by_size() if letter in machine.program_letters]
     return f" ({', '.join(names)})" if names else ""
 
 
 def smallest_machine(read: Callable[[Machine], Program]) -> tuple[Machine, Program]:
-    """The bundled machine with the fewest axes that a program can be read for and whose travels hold its
-    places, and the program; where none holds them, the first that it can be read for.
+    """The bundled machine with the fewest axes that fits a program, and the program.
 
-    `read` reads the program for a machine. Raises what it raises for the largest machine where none will do.
+    A machine fits if the program can be read for it and stays within its travels. Where no travels suffice it
+    is the first machine that the program can be read for. `read` reads the program for a machine; its error
+    for the largest machine is raised where the program can be read for none.
     """
     found: tuple[Machine, Program] | None = None
     *smaller, largest = _by_size()
@@ -42,7 +43,7 @@ def smallest_machine(read: Callable[[Machine], Program]) -> tuple[Machine, Progr
 
 
 def _reaches(machine: Machine, program: Program) -> bool:
-    """Whether the ends of all moves lie within the travels; true where words are no joints."""
+    """Whether the ends of all moves lie within the travels; true in other modes than JOINTS."""
     if program.coordinate_mode is not None and program.coordinate_mode.any():
         return True
     travels = np.array([machine.axis(name).travel for name in program.axes])

@@ -1,4 +1,4 @@
-"""Collects the moves of programs that are drawn, not written: curves, lines and arcs one after the other."""
+"""Collects lines, arcs and curves as the moves of a program: for readers of drawings and path files."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from feedplan.curves.composite import CompositeCurve
 from feedplan.machine.axis import AXIS_LETTERS
 from feedplan.program.program import MoveKind, PathControl, Program
 
-# Ends up to this far apart are one point [mm, deg]: what rounding to four decimals can do.
+# Ends closer than this are one point [mm, deg]: rounding to four decimals moves them so far.
 TOUCHING = 2e-4
 
-# The feed [mm/s] of moves that have none: finite, as they are no rapids, and beyond every machine.
+# The feed [mm/s] of moves without one: above the speed of every machine, and finite as they are no rapids.
 NO_FEED = 1e6
 
 
 class Moves:
-    """Moves of a program in `axes`, in the order XYZABCUVW with X, Y and Z; the first `start`s it."""
+    """Moves of a program in `axes`, which are in the order XYZABCUVW and include X, Y and Z."""
 
     def __init__(self, axes: tuple[str, ...]) -> None:
         self.axes = axes
@@ -29,30 +29,30 @@ class Moves:
         self._splines: list[tuple[int, CompositeCurve]] = []
 
     def gap(self, point: NDArray[np.float64]) -> float:
-        """How far [mm] a point is from where the last move ends; 0 at the start."""
+        """The distance [mm] of a point from the end of the last move; 0 before the first move."""
         return 0.0 if self._start is None else float(np.abs(point - self._position).max())
 
     def go_to(self, point: NDArray[np.float64], line: int) -> None:
-        """A rapid to a point (axes,), none where the tool is there; the first one is the start."""
+        """Adds a rapid to a point (axes,), unless the tool is there; the first point is the start."""
         if self._start is None:
             self._start = self._position = point
         elif self.gap(point) > TOUCHING:
             self._move(MoveKind.RAPID, point, np.inf, line)
 
     def line(self, target: NDArray[np.float64], feed: float, line: int) -> None:
-        """A straight move, none where it has no length."""
+        """Adds a straight move, unless it has no length."""
         if self.gap(target) > 0.0:
             self._move(MoveKind.LINE, target, feed, line)
 
     def arc(
         self, target: NDArray[np.float64], centre: ArrayLike, angle: float, feed: float, line: int
     ) -> None:
-        """An arc in XY about `centre` (3,) through `angle` [rad], positive counter-clockwise."""
+        """Adds an arc in XY about `centre` (3,) through `angle` [rad], positive counter-clockwise."""
         self._arcs.append((len(self._rows), np.asarray(centre, dtype=np.float64), angle))
         self._move(MoveKind.ARC, target, feed, line)
 
     def spline(self, curve: CompositeCurve, feed: float, line: int) -> None:
-        """A curve in all axes; it starts where the tool is, to rounding, none where it has no extent."""
+        """Adds a curve in all axes from where the tool is, to rounding, unless all its points coincide."""
         control = curve.control_points.copy()
         control[0] = self._position
         if (control == control[0]).all():
@@ -104,5 +104,5 @@ class Moves:
 
 
 def program_axes(letters: tuple[str, ...]) -> tuple[str, ...]:
-    """Letters and X, Y, Z, in the order of a program."""
+    """These letters and X, Y, Z, in the order of a program."""
     return tuple(letter for letter in AXIS_LETTERS if letter in {*letters, "X", "Y", "Z"})

@@ -4,9 +4,9 @@
      "curves": [{"degree": 3, "control_points": [[0, 0, 0], …], "knots": […], "weights": […], "feed": 60.0}]}
 
 Only "curves" is required. "unit" is "mm" (default) or "inch", for linear axes and feeds; rotary ones are in
-degrees. "axes" names the columns, X, Y, Z, A, B, C as many as there are by default. Where one of them is no
-letter of a program, as "j1", all are the machine's own axes in the machine's own units, and there is no
-"unit". "feed" is in units per second and may be given for each curve. Without "knots" degree + 1 control
+degrees. "axes" names the columns, X, Y, Z, A, B, C as many as there are by default. If one of them is no
+letter of a program, such as "j1", all are axes of the machine in its own units, and "unit" must be left
+out. "feed" is in units per second and may be given for each curve. Without "knots" degree + 1 control
 points are a Bézier curve, and more of them a B-spline with clamped uniform knots; with knots there are
 points + degree + 1. Each curve starts where the one before ends, or with "rapid": true a rapid goes there.
 The program starts where its first curve does. Places are machine coordinates; on a five-axis machine they are
@@ -123,7 +123,7 @@ class _PathFile:
             len(points) > degree, f"{place}.control_points", f"{len(points)} points", f"more than {degree}"
         )
         n = len(points)
-        # Clamped and uniform; of degree + 1 points a Bézier curve.
+        # Clamped and uniform; with degree + 1 points it is a Bézier curve.
         knots = np.clip(np.arange(n + degree + 1, dtype=np.float64), degree, n) - degree
         if row.get("knots") is not None:
             knots = self._numbers(row["knots"], f"{place}.knots", n + degree + 1)

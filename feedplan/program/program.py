@@ -50,7 +50,7 @@ class PathControl(IntEnum):
     TOLERANCE = 2
 
 
-# Of the columns as native code takes them.
+# Types of the columns that native code takes.
 _DTYPES = {
     **dict.fromkeys(("start", "target", "feed", "blend_tolerance", "fit_tolerance", "dwell"), np.float64),
     **dict.fromkeys(("arc_centre", "arc_angle", "change_start"), np.float64),
@@ -63,33 +63,40 @@ _DTYPES = {
 
 @dataclass(frozen=True, eq=False)
 class Program(OfNative[Moves]):
-    """Moves of a part program in order, in machine coordinates.
+    """Moves of a part program in order, in machine coordinates [mm, deg].
 
-    `axes` are its letters: readers give X, Y, Z and what else the program uses, in the order XYZABCUVWIJK;
-    `along` takes some of them, in any order. `start` (axes,) is where the first move begins, in its own words
-    [mm, deg], after standing still for `start_dwell` [s]. Per move, `n` rows: `kind` (MoveKind), `target`
-    (n, axes) [mm, deg], `feed` [mm/s] (infinite on rapids alone),
-    `line` (1-based source line), `control` (PathControl), `blend_tolerance` and `fit_tolerance` (G64 P and Q
-    [mm], NaN where the program gives none), `stop` (a full stop after the move: M words, dwells, the end),
-    `stop_cause` (StopCause; None where only the end stops), `dwell` [s] after it. A feed counts along X, Y, Z
-    where one of these moves, else along U, V, W, else it is in deg/s of the rotary axes; on an arc it counts
-    along the circle or helix.
-    Arcs, one row each: `arc_move` (index of the move), `arc_centre` (k, 3) [mm] in X, Y, Z, `arc_normal`
-    (k,) the axis 0, 1, 2 the arc turns about, `arc_angle` (k,) signed sweep [rad], positive
-    counter-clockwise seen from the tip of the normal; it may exceed a turn. All other axes move linearly with
-    the angle, and so does the radius where it differs at both ends, as rounded coordinates make it.
-    Splines, one row each: `spline_move` (index of the move), `spline_pieces` (k + 1,) which pieces of
-    `splines` it takes, a curve in all `axes` [mm, deg] from the move's start to its target.
-    What axis words mean: `coordinate_mode` (n,) a `CoordinateMode`, `tool_length` (n,) [mm] in the modes TIP
-    and VECTOR, NaN for the machine file's; None where the machine has one mode only. In the mode VECTOR the
-    last columns are I, J, K, the unit vector from the tip to the spindle; F on a move of these alone is in
-    deg/s of the tool's turning; columns that a mode does not use stay as they are. A change of mode is a full
-    stop and moves no joint: `change_move` (c,) are the first moves in a new mode, `change_start` (c, axes) is
-    where they start in the new words; `starts` takes both into account.
-    `events` are what happens between the moves: spindle, coolant, tools, outputs, dwells, stops, messages.
-    `warnings` are sentences for the user. If it was read, `text` is the file it was read from, or the bytes
-    themselves, and `sha256` the hash of these; `reading` are the arguments of `read_program` that it was read
-    with as G-code, to read it again.
+    `axes` are the letters of its columns: readers give X, Y, Z and the others that the program uses, in the
+    order XYZABCUVWIJK. `start` (axes,) is where the first move begins, after a pause of `start_dwell` [s].
+
+    Each of the n moves has
+
+    - `kind` (MoveKind), `line` (1-based source line) and `target` (n, axes), where it ends;
+    - `feed` [mm/s], infinite on rapids only. It counts along X, Y, Z where one of these moves, else along
+      U, V, W, else it is in deg/s of the rotary axes; on an arc it counts along the circle or helix;
+    - `control` (PathControl), `blend_tolerance` and `fit_tolerance` (G64 P and Q [mm], NaN without them);
+    - `stop`: a full stop follows, by an M word, a dwell or the end; `stop_cause` (StopCause; None where only
+      the end stops) and `dwell` [s] after it.
+
+    Each of the k arcs has `arc_move` (index of its move), `arc_centre` (k, 3) in X, Y, Z, `arc_normal` (0, 1,
+    2: the axis that it turns about) and `arc_angle` [rad], positive counter-clockwise seen from the tip of
+    the normal; it may exceed a turn. All other axes move linearly with the angle, and so does the radius,
+    which rounded coordinates make different at both ends.
+
+    Each of the splines has `spline_move` (index of its move) and the pieces of `splines` from `spline_pieces`
+    (k + 1,), a curve in all `axes` from the move's start to its target.
+
+    Axis words have a meaning, `coordinate_mode` (n,), a `CoordinateMode`, and in the modes TIP and VECTOR a
+    tool, `tool_length` (n,) [mm], NaN for the machine file's; both are None where the machine has one mode
+    only. In the mode VECTOR the last columns are I, J, K, the unit vector from the tip to the spindle; F on a
+    move of these alone is in deg/s of the tool's turning. Columns that a mode does not use stay as they are.
+    A change of mode is a full stop and moves no joint: `change_move` (c,) are the first moves in a new mode,
+    and `change_start` (c, axes) is where they start in the new words.
+
+    `events` happen between the moves: spindle, coolant, tools, outputs, dwells, stops, messages. `warnings`
+    are sentences for the user. Of a program that was read, `text` is its file, or its bytes, and `sha256` the
+    hash of these; `reading` are the arguments of `read_program` that read it again as G-code.
+
+    The arrays of the moves' geometry are read-only views of a native object.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Reads a part program, in whatever language it is written."""
+"""Reads a part program in any language: G-code, path file or drawing."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from feedplan.progress import Listener
 
 
 class Reading(TypedDict, total=False):
-    """How a program is read: keywords of `read_program`."""
+    """Keywords of `read_program`."""
 
     block_delete: bool
     tool_table: str | os.PathLike[str] | None
@@ -43,14 +43,14 @@ def checked_reading(reading: object) -> Reading:
 
 Reader = Callable[[bytes, Machine | None, str], Program]
 
-# By the end of the name, with the most bytes that are read; everything else is G-code.
+# Readers by the ending of the name, with the greatest size [bytes]; everything else is G-code.
 READERS: dict[str, tuple[Reader, int]] = {
     ".json": (read_path_file, path_file.MAX_BYTES),
     ".dxf": (lambda content, machine, name: read_dxf(content, name), path_file.MAX_BYTES),
 }
 _FOLDER = "the path of a folder"
 _TABLE = "the path of a tool table (.tbl)"
-# How programs without an ending begin; no G-code does.
+# How programs without an ending begin; G-code never begins so.
 _BEGINNINGS = {
     ".json": re.compile(rb"(\xef\xbb\xbf)?\s*\{"),
     ".dxf": re.compile(rb"\s*(0\s+SECTION|999\s|AutoCAD Binary DXF)"),
@@ -79,9 +79,9 @@ def read_program(
     offsets and home, see `feedplan.program.gcode.read_gcode`, and the axes there are. `block_delete` leaves
     out blocks that start with `/`. `tool_table` is a file of LinuxCNC (.tbl) with lengths and diameters of
     tools; `subprograms` are folders of files that the program calls, after its own; `feed` [mm/s, deg/s] is
-    that of moves before the first F; `whole_step` is what lengths without a decimal point count, in units of
-    the program; G-code of more than `max_moves`, its loops and calls run, is refused. `progress` is told how
-    far it is.
+    that of moves before the first F; `whole_step` is the unit of lengths without a decimal point, in units of
+    the program; G-code of more than `max_moves`, loops and calls counted, is refused. `progress` gets the
+    part done.
     Raises ProgramError in one sentence where the program is missing, a directory, empty, binary, larger than
     `max_bytes` or not understood, MissingPackageError where a drawing needs a package, MachineError,
     InputError for other arguments that cannot be used.
@@ -130,7 +130,7 @@ def read_program(
 
 
 def _language(content: bytes, name: str) -> str:
-    """The ending that a program of this name has, or would have by its first characters."""
+    """The ending of a program's name, or the one that its first characters imply."""
     ending = Path(name).suffix.lower()
     if ending:
         return ending

@@ -1,4 +1,4 @@
-"""What a part program is read from: a file, or the text itself as str, bytes or a stream."""
+"""The content of a part program: from a file, or from the text itself as str, bytes or a stream."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from feedplan.errors import InputError, ProgramError
 Source = str | bytes | os.PathLike[str] | IO[str] | IO[bytes]
 
 MAX_BYTES = 1 << 30
-# Read at once from what does not tell its size [bytes].
+# The part of a stream that is read at once [bytes].
 _PART = 1 << 24
-# What stands in messages for a program without a file.
+# The name of a program without a file in messages.
 NO_NAME = "program"
 _REMEDY = "the path of a file, the program as text with its line breaks or as bytes, or an open file"
 
@@ -57,7 +57,7 @@ def _of_file(path: Path, max_bytes: int) -> bytes:
         size = path.stat().st_size
         _check_size(size, str(path), max_bytes)
         with path.open("rb") as stream:
-            # What is no plain file, as a pipe, has the size 0 whatever it holds.
+            # Pipes and other special files have the size 0 whatever they hold.
             content = stream.read(size + 1) if size else b"".join(_parts(stream, max_bytes))
     except OSError as error:
         raise ProgramError(f"{path} cannot be read: {error.strerror or error}") from None
@@ -80,7 +80,7 @@ def _of_stream(stream: Any, name: str | None, max_bytes: int) -> Content:
 
 
 def _parts(stream: Any, max_bytes: int) -> Iterator[Any]:
-    """What a stream holds, part by part, up to the one that goes beyond `max_bytes`."""
+    """The parts of a stream, up to the one that exceeds `max_bytes`."""
     size = 0
     while size <= max_bytes and (part := stream.read(min(_PART, max_bytes + 1 - size))):
         yield part
@@ -88,7 +88,7 @@ def _parts(stream: Any, max_bytes: int) -> Iterator[Any]:
 
 
 def _checked(content: bytes, place: str, max_bytes: int) -> bytes:
-    """What was read, if there is something and not too much."""
+    """The content; raises ProgramError where it is empty or exceeds `max_bytes`."""
     if not content:
         raise ProgramError(f"{place} is empty: give a part program")
     _check_size(len(content), place, max_bytes)

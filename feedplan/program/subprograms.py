@@ -9,12 +9,12 @@ from feedplan.program.source import MAX_BYTES
 
 Finder = Callable[[str], tuple[str, bytes] | None]
 
-# The endings of subprograms, in the order that they are tried.
+# The endings of subprogram files, in the order of the search.
 ENDINGS = (".ngc", ".nc", "")
 
 
 def finder(folders: Iterable[Path], max_bytes: int = MAX_BYTES) -> Finder:
-    """A function that gives for a name the file's name and its bytes, or None where no folder has it.
+    """A function from the name of a subprogram to its file's name and bytes, or None where no folder has it.
 
     Names are looked up in the order of `folders`, whatever the case of their letters. The function raises
     OSError where a file cannot be read, ValueError where it is larger than `max_bytes`.
@@ -38,8 +38,10 @@ def finder(folders: Iterable[Path], max_bytes: int = MAX_BYTES) -> Finder:
 
 
 def numbered_files(folders: Iterable[Path], max_bytes: int = MAX_BYTES) -> dict[str, bytes]:
-    """All files that a program may call by a number that it computes, by name; those of the first folder that
-    has one. Raises as what `finder` returns."""
+    """All files that a program may call by a computed number, by name; the first folder with a name counts.
+
+    Raises as the function that `finder` returns.
+    """
     find = finder(folders, max_bytes)
     stems = {file.name.lower().partition(".")[0] for folder in folders for file in _files(folder)}
     numbers = {stem.removeprefix("o").lstrip("0") for stem in stems if stem.removeprefix("o").isdigit()}

@@ -2,7 +2,7 @@
 
 A line is a tool: `T1 P2 Z50.3 D6 ;6 mm end mill`. T is its number, P its pocket, X to W its offset [mm, deg],
 D its diameter [mm], I and J the angles of a lathe tool, which no path needs, Q the side of its tip that cuts.
-What stands behind `;` is a comment.
+Text after `;` is a comment.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ class Tool:
     orientation: int
 
     def row(self) -> tuple[int, int, tuple[float, ...], float, int]:
-        """As the native reader takes it."""
+        """The tool as a row for the native reader."""
         return self.number, self.pocket, self.offset, self.diameter, self.orientation
 
 
 def read_tools(file: Path, *, inches: bool = False) -> tuple[Tool, ...]:
-    """The tools of a table, whose lengths are in inches where `inches` says so.
+    """The tools of a table; with `inches` its lengths are in inches.
 
     Raises InputError naming file, line and word where it cannot be read.
     """

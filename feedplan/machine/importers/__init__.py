@@ -1,7 +1,8 @@
 """Machines from files of controllers: LinuxCNC's INI, grbl's $$, Klipper's printer.cfg, ROS's joint limits.
 
 A format is a module with `CONTROLLER`, its name, `RECOGNISED`, a pattern of what only its files hold, and
-`read(path, files)`, which finds the numbers with their sources. What a file lacks is asked for, not guessed.
+`read(path, files)`, which finds the numbers with their sources. Numbers that a file lacks are never guessed:
+the user gives them.
 """
 
 from __future__ import annotations
@@ -40,8 +41,10 @@ def import_machine(
 def find_machine(
     file: str | os.PathLike[str], limits: Mapping[str, float] | None = None, *, name: str | None = None
 ) -> FoundMachine:
-    """What `import_machine` makes the machine of: its numbers with their sources. Raises as it does, but for
-    numbers that no machine can have."""
+    """The numbers, with their sources, from which `import_machine` makes the machine.
+
+    Raises as `import_machine`, but not for numbers outside the ranges of a machine.
+    """
     if not (limits is None or isinstance(limits, Mapping)):
         raise MachineError(f"limits is {shown(limits)}: give a dictionary such as {{'X.jerk': 50000}}")
     if name is not None:
@@ -50,7 +53,7 @@ def find_machine(
         path = file_path(file, "the file of a machine", _REMEDY)
     except InputError as error:
         raise MachineError(str(error)) from None
-    # Which format it is, the file itself must tell: it may be one that includes all others.
+    # The format follows from the file itself, not from files that it includes.
     text = "\n".join(line for line, _ in TextFiles(path).lines(path))
     form = next((each for each in FORMATS if each.RECOGNISED.search(text)), None)
     if form is None:

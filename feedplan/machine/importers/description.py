@@ -1,4 +1,4 @@
-"""A machine as it is found in another file: numbers with their sources, and the machine file they make."""
+"""A machine found in a controller's file: numbers with their sources, and the machine file made from them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from feedplan.machine.toml import toml_value
 # The limits of an axis that can be given, and their keys in a machine file.
 LIMITS = {"velocity": "max_velocity", "acceleration": "max_acceleration", "jerk": "max_jerk"}
 _NEEDED = ("velocity", "acceleration")
-# From here on a number stands for no limit, as 1e99 does.
+# Numbers from here on, such as 1e99, mean that nothing is limited.
 _NONE_FROM = {
     "velocity": VELOCITIES[1],
     "acceleration": GREATEST_ACCELERATION,
@@ -38,12 +38,12 @@ class Found:
 
 
 def least(candidates: Iterable[Found | None]) -> Found | None:
-    """The least of several limits; None where there is none."""
+    """The least of those limits that are known; None where none is."""
     return min((each for each in candidates if each is not None), key=lambda each: each.value, default=None)
 
 
 def greatest(candidates: Iterable[Found | None]) -> Found | None:
-    """The greatest of several; None where there is none."""
+    """The greatest of those numbers that are known; None where none is."""
     return max((each for each in candidates if each is not None), key=lambda each: each.value, default=None)
 
 
@@ -92,15 +92,15 @@ class FoundMachine:
         return self if name is None else replace(self, name=name)
 
     def with_missing_files(self, names: Iterable[str]) -> FoundMachine:
-        """The same with a warning of files that it includes and that there are not."""
+        """The same with a warning of included files that do not exist."""
         missing = tuple(f"{shown(name)} is not there: what it holds is left out" for name in names)
         return replace(self, warnings=(*self.warnings, *missing))
 
     def with_limits(self, given: Mapping[str, float]) -> FoundMachine:
         """The same with limits given by name, such as `X.jerk`, in place of the file's.
 
-        Raises MachineError for names that there are not, for what is no positive number, and for velocities
-        and accelerations that neither has: it names all of these.
+        Raises MachineError for unknown names, for values that are no positive numbers, and for velocities and
+        accelerations that are still missing: it names all of these.
         """
         axes = {axis.name: axis for axis in self.axes}
         for key, value in given.items():
@@ -165,7 +165,7 @@ class FoundMachine:
 
 
 def limits_of(found: Mapping[str, Found | None]) -> dict[str, Found]:
-    """The limits that there are: without those that are not known, 0 for jerk, or too great to be one."""
+    """The limits that are known; 0 for jerk and numbers too great for a limit are left out."""
     return {
         limit: own
         for limit, own in found.items()
@@ -174,7 +174,7 @@ def limits_of(found: Mapping[str, Found | None]) -> dict[str, Found]:
 
 
 def parameters_of(controller: str, settings: Mapping[str, Setting]) -> dict[str, Found]:
-    """What a controller's settings say of the parameters of its model: those that it can have."""
+    """The parameters of the controller's model that its settings give with an allowed value."""
     parameters = MODELS[controller].parameters
     found: dict[str, Found] = {}
     for key, setting in settings.items():
@@ -184,7 +184,7 @@ def parameters_of(controller: str, settings: Mapping[str, Setting]) -> dict[str,
 
 
 def travel_of(low: Found | None, high: Found | None) -> tuple[Found, Found] | None:
-    """The travel between two ends, infinite where one is not known or too far; None without any."""
+    """The travel between two ends, infinite at an end that is unknown or too far; None without both ends."""
     low, high = low or Found(-math.inf, "no lower end"), high or Found(math.inf, "no upper end")
     return None if min(abs(low.value), abs(high.value)) > FARTHEST else (low, high)
 
@@ -210,7 +210,7 @@ def _row(key: str, found: Found) -> str:
 
 
 def _number(value: float) -> str:
-    """A number without the roundings that a conversion of units leaves."""
+    """A number without the rounding of a conversion of units."""
     return repr(float(f"{value:.{_DIGITS}g}"))
 
 

@@ -110,7 +110,7 @@ def _read(path: Path, inside: tuple[Path, ...], files: TextFiles, options: Optio
     section = ""
     for line, place in files.lines(path):
         line = _COMMENT.sub("", line).rstrip()
-        # What is indented belongs to an option of several lines, such as the G-code of a macro.
+        # Indented lines belong to an option of several lines, such as the G-code of a macro.
         if not line or line[0].isspace():
             continue
         head = _SECTION.match(line)

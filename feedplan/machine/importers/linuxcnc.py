@@ -71,7 +71,7 @@ class Ini:
         self._read(path, ())
 
     def get(self, section: str, *keys: str) -> Setting | None:
-        """The setting of the first key that there is."""
+        """The setting of the first of these keys that exists."""
         found = (self._settings.get((section, key)) for key in keys)
         return next((each for each in found if each is not None and each.text), None)
 
@@ -164,11 +164,11 @@ class _AxisReader:
         return FoundAxis(name, limits_of(limits), travel)
 
     def _without_offsets(self, section: str, own: Found | None) -> Found | None:
-        """What is left of a limit for programs, beside external offsets."""
+        """The share of a limit that programs have beside external offsets."""
         ratio = self._ini.get(section, "OFFSET_AV_RATIO")
         if ratio is None or own is None:
             return own
-        # LinuxCNC takes 0.1 for what it does not allow.
+        # LinuxCNC replaces values that it does not allow by 0.1.
         part = ratio.number if 0.0 <= ratio.number <= 0.9 else 0.1
         return Found(own.value * (1.0 - part), f"{own.source}, less OFFSET_AV_RATIO = {part:g}")
 

@@ -35,7 +35,7 @@ Joint = dict[str, Setting]
 
 
 def read(path: Path, files: TextFiles) -> FoundMachine:
-    """The machine of the joints in a file; raises MachineError for what such files do not have."""
+    """The machine of the joints in a file; raises MachineError for lines that such files do not have."""
     joints = _joints(path, files)
     if not joints:
         raise MachineError(f"{path.name} has no joints below joint_limits: give a joint_limits.yaml")

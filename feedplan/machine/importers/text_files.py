@@ -11,7 +11,7 @@ from pathlib import Path
 from feedplan.arguments import shown
 from feedplan.errors import MachineError
 
-# Of all files together [bytes], and how many they are, each inside the one before it so many times.
+# Bounds of all files together: size [bytes], number, and depth of inclusion.
 MAX_BYTES = 1 << 20
 MAX_FILES = 100
 MAX_DEPTH = 16
@@ -31,7 +31,7 @@ class Setting:
 
     @property
     def number(self) -> float:
-        """The number that the text begins with; raises MachineError where there is none."""
+        """The number at the start of the text; raises MachineError where there is none."""
         match = _NUMBER.match(self.text)
         if match is None:
             raise MachineError(f"{self.place}: {self.label} is {shown(self.text)}: give a number")
@@ -45,7 +45,7 @@ class Setting:
 
 @dataclass
 class TextFiles:
-    """The file that is imported, and those that it includes; `missing` are those that there are not."""
+    """The imported file and the files that it includes; `missing` are those that do not exist."""
 
     main: Path
     missing: list[str] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""Kinematics q = K(P): the tool tip's coordinates in, the joints' out; one file a machine type.
+"""Kinematics q = K(P): from the coordinates of the tool tip to those of the joints; one file a machine type.
 
 A module has `build(axes, parameters) -> Kinematics` and is found by its name: the type `trunnion-ac` is the
 module `trunnion_ac`. Users add their own with `register`. K is written once, with the functions of
@@ -60,7 +60,7 @@ class Kinematics(ABC):
 
     @cached_property
     def recorded(self) -> Expression:
-        """The formula of `joints`, recorded when it is first asked for; MachineError where it cannot be."""
+        """The formula of `joints`, recorded on first use; raises MachineError where that is not possible."""
         return record(type(self).__name__, self.joints, len(self.tip_names), self.joint_names, self.turning)
 
     def tip(self, joints: Sequence[Number]) -> tuple[Number, ...]:
@@ -68,7 +68,7 @@ class Kinematics(ABC):
         raise MachineError(f"the kinematics {type(self).__name__} has no tip(joints): write that method")
 
     def singular(self, tip: Sequence[Number]) -> dict[str, Number]:
-        """What vanishes where K is singular, by a name that completes "the tool is at …"; none by default."""
+        """What vanishes where K is singular, by names that complete "the tool is at …"; empty by default."""
         return {}
 
 
