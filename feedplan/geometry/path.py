@@ -81,7 +81,7 @@ class FitSummary:
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """The curve that the pieces of a path were cut from: each is a `part` (n, 2) [fractions] of a `piece` (n,).
+    """The curve from which a path was cut: its piece i is the fractions `part[i]` (n, 2) of `piece[i]` (n,).
 
     Derivatives are taken from `curve`: the control points of a short part lack the digits for them.
     """
