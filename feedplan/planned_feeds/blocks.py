@@ -57,11 +57,11 @@ _OPENS = (b"SUB", b"WHILE", b"DO", b"REPEAT", b"IF")
 _CLOSES = (b"ENDSUB", b"ENDWHILE", b"ENDREPEAT", b"ENDIF")
 
 
-class Aside(IntEnum):
-    """Why a line cannot have an F of its own, or another one."""
+class Exclusion(IntEnum):
+    """Why the F of a line cannot be changed."""
 
     NO = 0
-    FLOW = 1  # inside a subroutine, loop or branch, a call of one, or behind the end of the program
+    FLOW = 1  # in a subroutine, loop or branch, a call of one, or after the end of the program
     THREAD = 2  # G33, G76 and tapping: the feed follows the spindle
     MODES = 3  # M70 to M73 save and restore the feed
     DELETED = 4  # after /
@@ -69,11 +69,11 @@ class Aside(IntEnum):
 
 
 REASONS = {
-    Aside.FLOW: "in a subroutine, loop or branch, or calls one",
-    Aside.THREAD: "feed of a thread or a tap, which follows the spindle",
-    Aside.MODES: "M70 to M73 save and restore the feed",
-    Aside.DELETED: "after /, left out",
-    Aside.REPEATED: "runs more than once, or out of order",
+    Exclusion.FLOW: "in a subroutine, loop or branch, or calls one",
+    Exclusion.THREAD: "feed of a thread or a tap, which follows the spindle",
+    Exclusion.MODES: "M70 to M73 save and restore the feed",
+    Exclusion.DELETED: "after /, left out",
+    Exclusion.REPEATED: "runs more than once, or out of order",
 }
 
 
@@ -81,18 +81,21 @@ REASONS = {
 class Blocks:
     """The lines of a text, of which there are n.
 
-    `start` (n + 1,) is where each line begins; `aside` (n,) an Aside; `feed_at` (n, 2) where the number of
-    its F begins and ends, −1 without one; `feed` (n,) that number, NaN without one and where it is computed;
-    `inverse` and `per_minute` (n,) whether G93, G94 is in force; `voids` (n,) whether a change of units or of
-    the feed mode makes an F before it mean something else; `modes` (n, 2) where the number of a code G93 to
-    G95 begins and ends, −1 without one. `absolute`, `absolute_centres`, `inches` (n,) are what is in force on
-    the line; `plain` (n,) whether words of axes are places of the tool, without compensation, polar words and
-    diameters. `calls_set_feed`: after a line of FLOW or MODES the feed in force is not known.
+    - `start` (n + 1,): where each line begins; `exclusion` (n,): an `Exclusion`;
+    - `feed_at` (n, 2): where the number of its F begins and ends, −1 without one; `feed` (n,): that number,
+      NaN without one and where it is computed;
+    - `modes` (n, 2): where the number of a code G93 to G95 begins and ends, −1 without one;
+    - `voids` (n,): a change of units or of the feed mode gives the F in force another meaning;
+    - in force on the line (n,): `inverse` (G93), `per_minute` (G94), `absolute`, `absolute_centres`,
+      `inches`, and `plain`: words of axes are positions of the tool, without compensation, polar words and
+      diameters.
+
+    `calls_set_feed`: after a line of FLOW or MODES the feed in force is not known.
     """
 
     content: bytes
     start: NDArray[np.int64]
-    aside: NDArray[np.uint8]
+    exclusion: NDArray[np.uint8]
     feed_at: NDArray[np.int64]
     feed: NDArray[np.float64]
     inverse: NDArray[np.bool_]
@@ -125,7 +128,7 @@ def line_starts(content: bytes) -> NDArray[np.int64]:
 
 
 class _Modes:
-    """What is in force, and from which line on each of it is."""
+    """The modes in force, and the lines where they change."""
 
     def __init__(self) -> None:
         self.now = {
@@ -140,7 +143,7 @@ class _Modes:
         self.units = self.feed_mode = b""
 
     def take(self, line: int, code: bytes) -> bool:
-        """Takes a code in; True where it makes an F before it mean something else."""
+        """Applies a code; returns whether it gives the F in force another meaning."""
         voids = False
         if code in (b"93", b"94", b"95"):
             voids = code != (self.feed_mode or b"94")
@@ -163,7 +166,7 @@ class _Modes:
         return voids
 
     def column(self, name: str, count: int, first: bool) -> NDArray[np.bool_]:
-        """What is in force on each line (count,)."""
+        """A mode on each line (count,)."""
         column = np.full(count, first)
         for k, (line, given) in enumerate(self.given):
             end = self.given[k + 1][0] if k + 1 < len(self.given) else count
@@ -175,14 +178,14 @@ def blocks_of(content: bytes, block_delete: bool = True) -> Blocks:
     """The lines of a program; those after `/` are left out with `block_delete`."""
     start = line_starts(content)
     count = len(start) - 1
-    aside = np.zeros(count, dtype=np.uint8)
+    exclusion = np.zeros(count, dtype=np.uint8)
     feed_at, modes = np.full((count, 2), -1, dtype=np.int64), np.full((count, 2), -1, dtype=np.int64)
     feed, voids = np.full(count, np.nan), np.zeros(count, dtype=np.bool_)
     now, depth, opened, calls, subs, ended = _Modes(), 0, 0, False, False, False
     dos, jumps = 0, False
     for token, line in _tokens(content, start):
         kind = token.lastgroup
-        if kind is None or aside[line] == Aside.DELETED:
+        if kind is None or exclusion[line] == Exclusion.DELETED:
             continue
         if kind == "feed":
             feed_at[line] = token.span("feed")
@@ -190,7 +193,7 @@ def blocks_of(content: bytes, block_delete: bool = True) -> Blocks:
         elif kind == "code":
             code = token["code"]
             if code in (b"33", b"33.1", b"76", b"74", b"84"):
-                aside[line] = Aside.THREAD
+                exclusion[line] = Exclusion.THREAD
                 continue
             voids[line] |= now.take(line, code)
             if code in (b"93", b"94", b"95"):
@@ -199,53 +202,53 @@ def blocks_of(content: bytes, block_delete: bool = True) -> Blocks:
             jumps = True
         elif kind == "macro":
             calls = True
-            aside[line] = Aside.FLOW
+            exclusion[line] = Exclusion.FLOW
         elif kind == "computed":
             feed_at[line] = token.span("computed")
         elif kind == "deleted":
             if block_delete:
-                aside[line] = Aside.DELETED
+                exclusion[line] = Exclusion.DELETED
         elif kind == "switch":
             number = int(token["switch"])
             if number in (2, 30):
                 if not ended and depth == 0:
                     ended = True
-                    aside[line + 1 :] = Aside.FLOW
+                    exclusion[line + 1 :] = Exclusion.FLOW
             elif number < 90:
-                aside[line] = Aside.MODES
+                exclusion[line] = Exclusion.MODES
             else:
                 calls = True
-                aside[line] = Aside.FLOW
+                exclusion[line] = Exclusion.FLOW
         else:
             keyword = _KEYWORD.match(token["flow"])
             word = keyword["word"].upper() if keyword else b""
-            # The `while` that ends a `do` stands alone: it closes, where another one opens.
+            # The `while` that ends a `do` closes it; any other one opens a loop.
             closes_do = word == b"WHILE" and dos > 0
             if word in _CLOSES or closes_do:
                 depth, dos = max(depth - 1, 0), dos - int(closes_do)
                 if depth == 0:
-                    aside[opened : line + 1] = Aside.FLOW
+                    exclusion[opened : line + 1] = Exclusion.FLOW
             elif word in _OPENS:
                 opened = line if depth == 0 else opened
                 depth, dos = depth + 1, dos + int(word == b"DO")
                 subs |= word == b"SUB"
             elif word:
-                aside[line] = Aside.FLOW
+                exclusion[line] = Exclusion.FLOW
                 calls |= word == b"CALL"
             elif token["flow"].strip():
                 subs |= ended
     if depth:
-        aside[opened:] = Aside.FLOW
+        exclusion[opened:] = Exclusion.FLOW
     if jumps:
         # Fanuc's GOTO goes to any line.
-        aside[aside != Aside.DELETED] = Aside.FLOW
-    if (aside == Aside.THREAD).any():
-        _follow_threads(content, start, aside)
-    away = (aside == Aside.FLOW) | (aside == Aside.MODES)
+        exclusion[exclusion != Exclusion.DELETED] = Exclusion.FLOW
+    if (exclusion == Exclusion.THREAD).any():
+        _follow_threads(content, start, exclusion)
+    away = (exclusion == Exclusion.FLOW) | (exclusion == Exclusion.MODES)
     return Blocks(
         content=content,
         start=start,
-        aside=aside,
+        exclusion=exclusion,
         feed_at=feed_at,
         feed=feed,
         inverse=now.column("inverse", count, False),
@@ -261,22 +264,22 @@ def blocks_of(content: bytes, block_delete: bool = True) -> Blocks:
 
 
 def _tokens(content: bytes, start: NDArray[np.int64]) -> Iterator[tuple[re.Match[bytes], int]]:
-    """What is looked for in a text, with its line by index; some at a time, as a text may have millions."""
+    """The tokens of a text, each with its line by index; a part at a time, as a text may have millions."""
     found = _TOKEN.finditer(content)
     while tokens := list(islice(found, _AT_ONCE)):
         at = np.searchsorted(start, [token.start() for token in tokens], side="right") - 1
         yield from zip(tokens, at.tolist(), strict=True)
 
 
-def _follow_threads(content: bytes, start: NDArray[np.int64], aside: NDArray[np.uint8]) -> None:
-    """Lines after a thread's are threads too, until another motion code."""
+def _follow_threads(content: bytes, start: NDArray[np.int64], exclusion: NDArray[np.uint8]) -> None:
+    """Marks lines after a thread as threads too, until another motion code."""
     threading = False
-    for line in range(len(aside)):
-        if aside[line] == Aside.THREAD:
+    for line in range(len(exclusion)):
+        if exclusion[line] == Exclusion.THREAD:
             threading = True
         elif threading:
             text = re.sub(_NO_WORDS, b"", content[start[line] : start[line + 1]])
             if _MOTION.search(text):
                 threading = False
-            elif aside[line] == Aside.NO:
-                aside[line] = Aside.THREAD
+            elif exclusion[line] == Exclusion.NO:
+                exclusion[line] = Exclusion.THREAD

@@ -1,4 +1,4 @@
-"""Controls that a program may be for, and which of its words each of them lacks."""
+"""The dialects of controls, and the words of a program that each of them lacks."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def _m(codes: str) -> bytes:
     return rb"[Mm][ \t]*0*(?:" + codes.encode() + rb")(?![\d.])"
 
 
-# What is looked for in the words of a line, without comments, and what is said of it.
+# Patterns of words, without comments, and their names in messages.
 _SPLINES = (_g(r"5|5\.1|5\.2|5\.3"), "splines by G5, G5.1 and G5.2")
 _NURBS = (_g(r"6\.2"), "NURBS by G6.2")
 _FLOW = (rb"[Oo][ \t]*(?:<|\[|\d+[ \t]*[A-Za-z])", "O words of subroutines, loops and branches")
@@ -75,7 +75,7 @@ def writes_points(dialect: DialectName) -> bool:
 
 
 def lacks(dialect: DialectName, content: bytes) -> tuple[str, ...]:
-    """Sentences on what a program has that the control lacks, each with its first line."""
+    """Sentences on the words of a program that the control lacks, each with its first line."""
     # Comments become blanks, so that places stay.
     code = _COMMENT.sub(lambda found: b" " * len(found[0]), content)
     sentences = []

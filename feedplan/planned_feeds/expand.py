@@ -1,10 +1,10 @@
-"""A program written anew: its moves in the order in which they run, one plain block each.
+"""Writes a program as plain blocks: its moves in the order in which they run, one block each.
 
-Loops, calls, cycles and compensation become the lines and arcs that they make, and drawings and path files
-G-code. Places are those of the machine in millimetres, less the work offset G54 of the machine file. Splines
-become one a polynomial or rational piece: G1 of a line, else G5.2 in X and Y, which LinuxCNC reads, or G6.2,
-which Fanuc's controls read. Spindle, coolant, tools, outputs, dwells, stops and messages stand where they
-were; other comments are lost.
+Loops, calls, cycles and compensation become the lines and arcs that they make; drawings and path files become
+G-code. Coordinates are those of the machine in millimetres, less the work offset G54 of the machine file.
+Each polynomial or rational piece of a spline becomes a block: G1 for a line, else G5.2 in X and Y for
+LinuxCNC, or G6.2 for Fanuc. Spindle, coolant, tools, outputs, dwells, stops and messages keep their places;
+other comments are lost.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _CONTROL = {PathControl.EXACT_STOP: b"G61.1", PathControl.EXACT_PATH: b"G61"}
 
 
 class _Blocks:
-    """Blocks with what is in force, so that codes stand where they change."""
+    """Blocks, and the codes in force: a code is written only where it changes."""
 
     def __init__(self) -> None:
         self.lines: list[bytes] = []
@@ -41,7 +41,7 @@ class _Blocks:
             self.lines.append(text)
 
     def changed(self, group: str, word: bytes) -> bytes:
-        """The word where it is not in force."""
+        """The word, empty if it is in force already."""
         if self._force.get(group) == word:
             return b""
         self._force[group] = word
@@ -51,10 +51,9 @@ class _Blocks:
 def expanded(
     program: Program, machine: Machine | None, dialect: DialectName
 ) -> tuple[bytes, NDArray[np.int64]]:
-    """The program as plain blocks, and which of its moves each block with a move is (k,).
+    """The program as plain blocks, and the move of each block that moves (k,).
 
-    Raises InputError for what plain blocks cannot say: the tool's tip (G43.4, G43.5), splines that the
-    dialect lacks.
+    Raises InputError for the tool's tip (G43.4, G43.5), and for splines that the dialect lacks.
     """
     if len(program.change_move) and program.coordinate_mode is not None and program.coordinate_mode.any():
         raise InputError(
@@ -68,15 +67,15 @@ def expanded(
     ends = program.target - zero
     arcs = {int(m): row for row, m in enumerate(program.arc_move)}
     splines = {int(m): row for row, m in enumerate(program.spline_move)}
-    told = _events(program.events)
+    events = _events(program.events)
     of: list[int] = []
-    if program.start_dwell and 0 not in told:
+    if program.start_dwell and 0 not in events:
         out.add(b"G4 P" + place_text(program.start_dwell))
     for m in range(len(program)):
-        out.lines += told.pop(m, [])
+        out.lines += events.pop(m, [])
         out.add(out.changed("control", _control(program, m)))
         rapid = not np.isfinite(program.feed[m])
-        # A feed is read as the number that it was.
+        # The feed is read back as the same number.
         feed = b"" if rapid else out.changed("F", b"F" + place_text(60.0 * float(program.feed[m])))
         if m in splines:
             of += [m] * _spline(out, program, splines[m], zero, dialect, feed)
@@ -92,10 +91,10 @@ def expanded(
                 code = [out.changed("motion", b"G0" if rapid else b"G1")]
             out.add(*code[:2], *moved, *code[2:], feed)
             of.append(m)
-        if program.stop[m] and m + 1 < len(program) and m + 1 not in told:
-            # Stops without a word of their own, as changes of the tool length have.
+        if program.stop[m] and m + 1 < len(program) and m + 1 not in events:
+            # A stop without a word of its own, for example at a change of the tool length.
             out.add(b"G4 P" + place_text(float(program.dwell[m])))
-    for lines in told.values():
+    for lines in events.values():
         out.lines += lines
     if not out.lines[-1].startswith((b"M2", b"M30")):
         out.add(b"M2")
@@ -197,7 +196,7 @@ def _g62(
 
 def _events(events: Events) -> dict[int, list[bytes]]:
     """The blocks before each move, by its number."""
-    told: dict[int, list[bytes]] = {}
+    before: dict[int, list[bytes]] = {}
     words = events.words()
     for row in range(len(events)):
         letter, number = chr(events.letter[row]), float(events.number[row])
@@ -209,10 +208,10 @@ def _events(events: Events) -> dict[int, list[bytes]]:
             text = b"M%d E%d Q" % (number, events.p[row]) + place_text(float(events.q[row]))
         else:
             text = words[row].encode()
-        told.setdefault(int(events.move[row]), []).append(text)
-    return told
+        before.setdefault(int(events.move[row]), []).append(text)
+    return before
 
 
 def _plain(text: str) -> bytes:
-    """Text for a comment."""
+    """The text without characters that a comment cannot have."""
     return text.replace("(", "[").replace(")", "]").encode("ascii", "replace")

@@ -1,9 +1,9 @@
-"""Which F each line gets: the greatest planned speed in it, where that is below what the program asks for.
+"""The F of each line: the greatest planned speed in it, where that is below the programmed feed.
 
-F is an upper bound for a control, which speeds up and brakes at the ends of a block by itself. So the F of a
-block is the greatest planned speed in it, rounded down, and the program's own where the plan reaches that. It
-is in the program's units and feed mode: the F in force there times planned over programmed feed. An F is
-modal: it is written where it changes, and the program's own one comes back before a line that relies on it.
+F is an upper limit for a control, which speeds up and brakes at the ends of a block by itself. So the F of a
+block is the greatest planned speed in it, rounded down, or the program's own F where the plan reaches that.
+It is in the program's units and feed mode: the F in force there times planned over programmed feed. An F is
+modal: it is written where it changes, and the program's own F is restored before a line that relies on it.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.geometry.feed_groups import GROUPS
-from feedplan.planned_feeds.blocks import REASONS, Aside, Blocks
+from feedplan.planned_feeds.blocks import REASONS, Blocks, Exclusion
 from feedplan.planned_feeds.number import FEED_ROUNDING, exact_text, feed_texts, rounded_down
 from feedplan.program.program import Program
 from feedplan.units import MM_PER_INCH, SECONDS_PER_MINUTE
@@ -29,9 +29,11 @@ UNKNOWN_FEED = "the F in force, by G93 or G95, is computed, or set where lines r
 
 @dataclass(frozen=True, eq=False)
 class Changes:
-    """Feeds that are others than the program's, one row a block in order: `line` (k,) of the program,
-    1-based, several times where it is split, `before` (k,) the F in force in the program and `after` (k,) the
-    new one, in the program's units."""
+    """Feeds that differ from the program's, one row a block in order.
+
+    `line` (k,) of the program, 1-based, several times where it is split; `before` (k,) the F in force in the
+    program and `after` (k,) the new F, in the program's units.
+    """
 
     line: Indices
     before: Array
@@ -40,9 +42,11 @@ class Changes:
 
 @dataclass(frozen=True, eq=False)
 class Feeds:
-    """What becomes of lines, by index from 0: `texts` the F that each gets; `parts` those of its parts, None
-    where one is in force; `restore` the F that is to stand in a line before it; `modes` the lines that are to
-    have G93; `left` why others keep theirs."""
+    """Edits of lines, by their index from 0.
+
+    `texts`: the new F of a line; `parts`: those of its parts, None where the F in force holds; `restore`: the
+    F in a new line before it; `modes`: lines that get G93; `left`: the reason why a line keeps its F.
+    """
 
     texts: dict[int, bytes]
     parts: dict[int, list[bytes | None]]
@@ -85,31 +89,31 @@ def line_speeds(program: Program, greatest: Array, group: Indices) -> LineSpeeds
 def planned_feeds(
     blocks: Blocks,
     speeds: LineSpeeds,
-    aside_of: NDArray[np.uint8],
+    exclusion_of: NDArray[np.uint8],
     parts: Mapping[int, Sequence[float]],
     point: bool = False,
 ) -> Feeds:
-    """What becomes of the F of each line.
+    """The edits of the F of each line.
 
-    `aside_of` (n,) is the Aside of each line; `parts` are ratios as those of `speeds`, of the parts of lines
-    that are split, by index from 0; `point`: new ones have a decimal point.
+    `exclusion_of` (n,) is the Exclusion of each line; `parts` are the ratios, as in `speeds`, of the parts of
+    lines that are split, by index from 0; `point`: a new F has a decimal point.
     """
     own_of = blocks.feed_at[:, 0] >= 0
     row_of = np.full(len(blocks), -1, dtype=np.int64)
     row_of[speeds.line] = np.arange(len(speeds.line))
-    lines = np.flatnonzero((aside_of != Aside.NO) | own_of | blocks.voids | (row_of >= 0))
-    aside, row = aside_of[lines], row_of[lines]
+    lines = np.flatnonzero((exclusion_of != Exclusion.NO) | own_of | blocks.voids | (row_of >= 0))
+    exclusion, row = exclusion_of[lines], row_of[lines]
 
-    theirs, source = _theirs(blocks, lines, aside, own_of[lines])
-    # What is not known is that of the feed, where F is in units a minute.
-    feeds = (row >= 0) & (aside == Aside.NO)
+    programmed, source = _programmed_feeds(blocks, lines, exclusion, own_of[lines])
+    # An unknown F follows from the feed if F is in units a minute.
+    feeds = (row >= 0) & (exclusion == Exclusion.NO)
     fed = np.flatnonzero(feeds)
     units = np.where(blocks.inches[lines[fed]] & ~speeds.turns[row[fed]], MM_PER_INCH, 1.0)
     from_feed = np.where(
         blocks.per_minute[lines[fed]], speeds.feed[row[fed]] * SECONDS_PER_MINUTE / units, np.nan
     )
-    theirs[fed] = np.where(np.isnan(theirs[fed]), from_feed, theirs[fed])
-    unknown = feeds & np.isnan(theirs)
+    programmed[fed] = np.where(np.isnan(programmed[fed]), from_feed, programmed[fed])
+    unknown = feeds & np.isnan(programmed)
     ratio = np.ones(len(lines))
     ratio[fed] = speeds.ratio[row[fed]]
     ratio[np.isnan(ratio) | unknown] = 1.0
@@ -126,10 +130,10 @@ def planned_feeds(
     for line, place in places.items():
         if counts[place] > 1:
             ratio[starts[place] : starts[place] + counts[place]] = parts[line]
-    # The F that is wanted, 0 for the program's own one, and what is in force before: 0 likewise.
+    # The wanted F, and the F in force before the line; 0 means the program's own F.
     other = feeds[of] & (np.abs(ratio - 1.0) > FEED_ROUNDING)
-    wanted = np.where(other, rounded_down(np.where(other, theirs[of] * ratio, 1.0)), 0.0)
-    # Behind a block of G93 and before a change of what F means nothing is in force.
+    wanted = np.where(other, rounded_down(np.where(other, programmed[of] * ratio, 1.0)), 0.0)
+    # No new F is in force after a block of G93, and after a change of the meaning of F.
     before = np.append(0.0, np.where(blocks.inverse[lines[of]], 0.0, wanted)[:-1])
     before[first & blocks.voids[lines[of]]] = 0.0
     own = own_of[lines[of]] & first
@@ -140,31 +144,33 @@ def planned_feeds(
     rows = np.flatnonzero(write)
     for k, text in zip(rows.tolist(), feed_texts(wanted[rows], point), strict=True):
         place = int(of[k])
-        new = text if wanted[k] else _text(blocks, source[place], theirs[place])
+        new = text if wanted[k] else _text(blocks, source[place], programmed[place])
         if counts[place] == 1:
             texts[int(lines[place])] = new
         else:
             several.setdefault(int(lines[place]), [None] * int(counts[place]))[k - int(starts[place])] = new
     restore: dict[int, bytes] = {}
-    for k in np.flatnonzero((aside[of] != Aside.NO) & (before != 0.0)).tolist():
-        # The last block has what is to come back.
+    for k in np.flatnonzero((exclusion[of] != Exclusion.NO) & (before != 0.0)).tolist():
+        # The line before has the F that is restored.
         last = int(of[k - 1])
-        restore[int(lines[of[k]])] = _text(blocks, source[last], theirs[last])
+        restore[int(lines[of[k]])] = _text(blocks, source[last], programmed[last])
     left = {int(lines[place]): UNKNOWN_FEED for place in np.flatnonzero(unknown)}
-    for place in np.flatnonzero((row >= 0) & (aside != Aside.NO)).tolist():
-        left[int(lines[place])] = REASONS[Aside(aside[place])]
+    for place in np.flatnonzero((row >= 0) & (exclusion != Exclusion.NO)).tolist():
+        left[int(lines[place])] = REASONS[Exclusion(exclusion[place])]
     changed = np.flatnonzero(other)
-    changes = Changes(lines[of[changed]] + 1, theirs[of[changed]], wanted[changed])
+    changes = Changes(lines[of[changed]] + 1, programmed[of[changed]], wanted[changed])
     return Feeds(texts, several, restore, changes, left)
 
 
-def _theirs(blocks: Blocks, lines: Indices, aside: NDArray[np.uint8], own: Flags) -> tuple[Array, Indices]:
-    """The program's F in force on lines (k,), NaN where it is not known, and where it stands (k,)."""
+def _programmed_feeds(
+    blocks: Blocks, lines: Indices, exclusion: NDArray[np.uint8], own: Flags
+) -> tuple[Array, Indices]:
+    """The program's F in force on lines (k,), NaN where it is not known, and the line that has it (k,)."""
     number = blocks.feed[lines]
-    own = own & (aside != Aside.DELETED)
+    own = own & (exclusion != Exclusion.DELETED)
     lost = blocks.voids[lines] & ~own
     if blocks.calls_set_feed:
-        lost |= (aside == Aside.FLOW) | (aside == Aside.MODES)
+        lost |= (exclusion == Exclusion.FLOW) | (exclusion == Exclusion.MODES)
     event = np.where(own | lost, np.arange(len(lines)), -1)
     event = np.maximum.accumulate(event) if len(event) else event
     known = (event >= 0) & ~lost[event] & (number[event] > 0.0)
@@ -172,19 +178,19 @@ def _theirs(blocks: Blocks, lines: Indices, aside: NDArray[np.uint8], own: Flags
 
 
 def _text(blocks: Blocks, source: int, value: float) -> bytes:
-    """The program's F in force: as it stands in the line `source`, else its number."""
+    """The program's F in force as text: that of the line `source`, if there is one, else of its number."""
     if source < 0:
         return exact_text(value)
     return blocks.content[slice(*blocks.feed_at[source])]
 
 
-def asides_of(blocks: Blocks, program: Program) -> NDArray[np.uint8]:
-    """The Aside of each line (n,), with what the order of the moves tells."""
-    aside, line = blocks.aside.copy(), program.line.astype(np.int64) - 1
+def exclusions_of(blocks: Blocks, program: Program) -> NDArray[np.uint8]:
+    """The Exclusion of each line (n,): that of its text, or REPEATED by the order of the moves."""
+    exclusion, line = blocks.exclusion.copy(), program.line.astype(np.int64) - 1
     starts = np.append(True, line[1:] != line[:-1])
     again = np.bincount(line[starts], minlength=len(blocks)) > 1
-    # Calls go elsewhere and come back.
-    straight = line[aside[line] == Aside.NO]
+    # A line after which earlier lines run was called.
+    straight = line[exclusion[line] == Exclusion.NO]
     again[straight[straight < np.maximum.accumulate(straight)]] = True
-    aside[again & (aside == Aside.NO)] = Aside.REPEATED
-    return aside
+    exclusion[again & (exclusion == Exclusion.NO)] = Exclusion.REPEATED
+    return exclusion

@@ -1,7 +1,7 @@
 """F as inverse time (G93): moves a minute, so that each block has an F of its own.
 
-A control makes the feed from it by the length of the block, so F is the greatest planned speed in the block
-over that length, not one over the block's planned time: that would bound the speed by its mean.
+A control multiplies it by the length of the block to get the feed. So F is the greatest planned speed in the
+block over that length; one over the block's planned time would limit the speed to its mean.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feedplan.errors import InputError
-from feedplan.planned_feeds.blocks import REASONS, Aside, Blocks
+from feedplan.planned_feeds.blocks import REASONS, Blocks, Exclusion
 from feedplan.planned_feeds.feeds import Changes, Feeds
 from feedplan.planned_feeds.number import feed_texts, rounded_down
 from feedplan.planned_feeds.parts import Motion, Parts
@@ -24,7 +24,7 @@ from feedplan.units import mm_per_min
 Array = NDArray[np.float64]
 
 _REMEDY = "leave out --inverse-time, or give --expand"
-# A line that moves nothing and yet needs an F: words of axes, beside codes of motion alone.
+# Lines that move nothing also need an F if they have words of axes beside codes of motion only.
 _AXIS = re.compile(rb"[XYZABCUVWxyzabcuvw][ \t]*[-+.\d\[#]")
 _CODE = re.compile(rb"[Gg][ \t]*0*(\d*(?:\.\d+)?)")
 _MOVING = {b"1", b"2", b"3", b"17", b"18", b"19", b"20", b"21", b"90", b"91", b"90.1", b"91.1", b"93", b"94"}
@@ -33,12 +33,12 @@ _MOVING = {b"1", b"2", b"3", b"17", b"18", b"19", b"20", b"21", b"90", b"91", b"
 def inverse_feeds(
     blocks: Blocks,
     program: Program,
-    aside: NDArray[np.uint8],
+    exclusion: NDArray[np.uint8],
     greatest: Array,
     parts: Mapping[int, Parts],
     point: bool = False,
 ) -> Feeds:
-    """An F for each line with a feed move, by the greatest planned speed in it; `aside` (n,) is that of
+    """An F for each line with a feed move, by the greatest planned speed in it; `exclusion` (n,) is that of
     each line, `parts` are those of moves that are split.
 
     Raises InputError where a line has no one length: in loops and cycles, on splines and on turns of a tool.
@@ -47,15 +47,15 @@ def inverse_feeds(
         raise InputError(f"{program.name} has no feed moves: inverse time (G93) is for them: {_REMEDY}")
     counts = np.bincount(program.line.astype(np.int64) - 1, minlength=len(blocks))
     idle = _idle(blocks, counts)
-    away = idle[(aside[idle] != Aside.NO) & (aside[idle] != Aside.DELETED)]
+    away = idle[(exclusion[idle] != Exclusion.NO) & (exclusion[idle] != Exclusion.DELETED)]
     if len(away):
-        raise _refused(program, int(away[0]), REASONS[Aside(aside[away[0]])])
+        raise _refused(program, int(away[0]), REASONS[Exclusion(exclusion[away[0]])])
     first: dict[int, int] = {}
     for m in np.flatnonzero(np.isfinite(program.feed)).tolist():
         line = int(program.line[m]) - 1
         why = None
-        if aside[line]:
-            why = REASONS[Aside(aside[line])]
+        if exclusion[line]:
+            why = REASONS[Exclusion(exclusion[line])]
         elif counts[line] > 1:
             why = "several moves, as of a cycle"
         elif program.kind[m] == MoveKind.SPLINE:
@@ -68,17 +68,17 @@ def inverse_feeds(
     starts, arcs = program.starts(), {int(m): row for row, m in enumerate(program.arc_move)}
     rows: list[tuple[int, float, float]] = []
     sizes: dict[int, int] = {}
-    theirs = np.nan
+    programmed = np.nan
     for line, m in sorted(first.items()):
         motion = Motion(program, m, starts[m], arcs.get(m))
         cut = parts.get(m)
         shares = [0.0, 1.0] if cut is None else [0.0, *cut.shares]
         tops = [greatest[m]] if cut is None else cut.speed
         sizes[line] = len(shares) - 1
-        theirs = blocks.feed[line] if blocks.feed_at[line, 0] >= 0 else theirs
+        programmed = blocks.feed[line] if blocks.feed_at[line, 0] >= 0 else programmed
         for begin, end, top in zip(shares[:-1], shares[1:], tops, strict=True):
             speed = float(top if top > 0.0 else program.feed[m])
-            rows.append((line + 1, theirs, mm_per_min(speed) / feed_length(program, motion, begin, end)))
+            rows.append((line + 1, programmed, mm_per_min(speed) / feed_length(program, motion, begin, end)))
     lines, before, wanted = (np.array(column) for column in zip(*rows, strict=True))
     after = rounded_down(wanted)
     written = iter(feed_texts(after, point))
@@ -89,7 +89,7 @@ def inverse_feeds(
             texts[line] = next(written)
         else:
             several[line] = [next(written) for _ in range(size)]
-    # Where the tool stays the number does not matter.
+    # Where the tool does not move any number will do.
     texts |= dict.fromkeys(_idle(blocks, counts).tolist(), b"1")
     modes = set(np.flatnonzero(blocks.modes[:, 0] >= 0).tolist())
     if min(modes, default=len(blocks)) > min(first):
@@ -103,7 +103,7 @@ def _refused(program: Program, line: int, why: str) -> InputError:
 
 
 def _idle(blocks: Blocks, counts: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Lines that go to where the tool is, or do not run: they need an F as well."""
+    """Lines whose moves have no length, or that do not run: they need an F as well."""
     found = []
     for line in np.flatnonzero((counts == 0) & (blocks.feed_at[:, 0] < 0)).tolist():
         text = re.sub(rb"\([^()\r\n]*\)?|;.*", b"", blocks.line(line))
@@ -113,7 +113,7 @@ def _idle(blocks: Blocks, counts: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def feed_length(program: Program, motion: Motion, begin: float, end: float) -> float:
-    """The length [mm, deg] that a feed counts on a part of a motion, between two shares of it."""
+    """The length [mm, deg] that a feed counts along on a part of a motion, between two shares of it."""
     first, last = motion.at(begin), motion.at(end)
     if motion.turn:
         radii = [math.hypot(*(place[motion.plane] - motion.centre)) for place in (first, last)]

@@ -1,4 +1,4 @@
-"""Numbers as a program writes them: no exponents, rounded so that a feed is never above what is meant."""
+"""Numbers as text of a program: without exponents, feeds rounded down."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# An F word keeps so many significant digits: it is below the speed that is meant by less than 1e-4 of it.
+# Significant digits of an F word: it is below the planned speed by less than 1e-4 of it.
 FEED_DIGITS = 5
-# What rounding a feed down takes off at most; an F that is above the plan by no more stays.
+# The greatest share by which a feed is rounded down; an F above the plan by less stays.
 FEED_ROUNDING = 10.0 ** (1 - FEED_DIGITS)
-# Decimals of a place inside a block [mm, inch, deg]: a thousandth of what reading back may differ by.
+# Decimals of a coordinate [mm, inch, deg]: a thousandth of the difference that reading back allows.
 PLACE_DECIMALS = 12
 
 
 def rounded_down(feeds: Array) -> Array:
-    """Feeds (k,), all positive, with so many digits."""
+    """Feeds (k,), all positive, rounded down to FEED_DIGITS digits."""
     scale = 10.0 ** (FEED_DIGITS - 1 - np.floor(np.log10(feeds)))
     return np.floor(feeds * scale) / scale
 
 
 def feed_texts(feeds: Array, point: bool = False) -> list[bytes]:
-    """Rounded feeds (k,) as they are written; `point`: with a decimal point in any case."""
+    """Rounded feeds (k,) as text; `point`: always with a decimal point."""
     return [_feed_text(feed, point) for feed in feeds.tolist()]
 
 

@@ -1,4 +1,4 @@
-"""Writes the parts of a split line: its own words where they hold for a part, new ends and centres."""
+"""Writes the parts of a split line, with new ends and centres and the line's other words."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 _WORD = re.compile(rb"([A-Za-z])([ \t]*)([-+]?[ \t]*(?:\d+\.?\d*|\.\d+))")
 _REST = re.compile(rb"[ \t]*(?:\([^()\r\n]*\))?")
-# Codes that may stand in a line that is split: they say nothing that would have to be said once at its end.
+# Codes that a split line may have: they may be repeated in every part, or given in the first part only.
 _CODES = {1.0, 2.0, 3.0, 17.0, 18.0, 19.0, 20.0, 21.0, 40.0, 61.0, 90.0, 91.0, 90.1, 91.1, 94.0}
 _ROTARY = b"ABC"
 _CENTRE = b"IJK"
@@ -42,19 +42,19 @@ class Word:
 
 @dataclass(frozen=True)
 class Sense:
-    """What the words of a line mean: whether places and centres are absolute, and how many mm a unit is."""
+    """The modes of a line: whether ends and centres are absolute, and the unit of lengths."""
 
     absolute: bool
     absolute_centres: bool
     inches: bool
 
     def unit(self, letter: bytes) -> float:
-        """What a word of that letter counts in [mm, deg]."""
+        """The unit of a word of that letter [mm, deg]."""
         return MM_PER_INCH if self.inches and letter not in _ROTARY else 1.0
 
 
 def words_of(line: bytes) -> list[Word] | None:
-    """The words of a line that is a plain line or arc and may be split; None of any other one."""
+    """The words of a plain line or arc, which may be split; None for any other line."""
     end, at, words = code_end(line), 0, []
     while at < end:
         rest = _REST.match(line, at)
@@ -92,7 +92,7 @@ def part_lines(
     """The lines of the parts, each with its F where `texts` has one.
 
     `start` (axes,) is where the move begins; `centre` are the coordinates of an arc's, in its plane; `usual`
-    is what is between words of the program. The first part has the line's other words and comments.
+    is the blank between words of the program. The first part has the line's other words and comments.
     """
     ends = np.concatenate([start[None, :], parts.ends])
     rows: list[dict[bytes, bytes]] = []
@@ -133,7 +133,7 @@ def _end(
             return word.text
         return place_text(float(word.number) + (ends[k + 1, column] - ends[last, column]) / unit)
     before = summed.get(word.letter, Decimal(0))
-    # Places are rounded, not steps: errors do not add up.
+    # Positions are rounded, not increments, so that errors do not add up.
     if k + 1 == last:
         return place_text(word.number - before)
     done = place_text((ends[k + 1, column] - ends[0, column]) / unit)

@@ -1,8 +1,8 @@
-"""Splits lines and arcs where the planned speed varies by more than a step: each part has an F near it.
+"""Splits lines and arcs where the planned speed varies by more than a step: each part has an F near the plan.
 
-A cut lies on the path where this follows one move alone, and as far again from the ends of the move as the
-blends of its corners reach: they keep their room. The parts are lines, or arcs about the same centre, whose
-ends are on the move, so that the geometry is the same.
+A cut is at a place where the path follows one move alone, at least twice as far from the ends of the move as
+the blends of its corners reach: so the blends stay the same. The parts are lines, or arcs about the same
+centre, with ends on the move: the geometry is the same.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from feedplan.program.program import Program
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-# A control takes its time for each block: no part takes less than so many servo periods.
+# The least time of a part in servo periods: a control needs time for each block.
 _LEAST_PERIODS = 10
-# The speed is looked at so many times in a step.
+# Samples of the speed in a step.
 _WITHIN_STEP = 4
-# Arcs that turn by less [rad] could be read as full turns, and no part of one turns by more.
+# The least turn of a part of an arc [rad], which could be read as a full turn, and the greatest.
 _LEAST_TURN, _GREATEST_TURN = 1e-4, math.pi
 
 
@@ -92,7 +92,7 @@ def parts_of(
 
 
 def _cuts(speed: Array, time: Array, free: NDArray[np.bool_], step: float, least: float) -> list[int]:
-    """Samples between which the speed varies by a step at most, where parts may end and take `least` [s]."""
+    """Indices of samples at which to cut: the speed varies by at most a step, and parts take `least` [s]."""
     cuts: list[int] = []
     values, clock, may = speed.tolist(), time.tolist(), free.tolist()
     low = high = values[0]
@@ -110,12 +110,12 @@ def _cuts(speed: Array, time: Array, free: NDArray[np.bool_], step: float, least
 def _samples(
     problem: Problem, profile: SpeedProfile, along: SpeedsAlong, moves: list[int], step: float
 ) -> list[tuple[Array, Array, Array, NDArray[np.bool_]]]:
-    """Of each move places in order: points, speeds, times, and whether the path follows it alone there."""
+    """Samples of each move in order: points, speeds, times, and whether the path follows it alone there."""
     pieces, parameters, sizes = [], [], []
     for m in moves:
         places = slice(int(along.first[m]), int(along.last[m]) + 1)
         piece, u, speed = along.piece[places], along.u[places], along.of(m)
-        # So many between two samples that the speed steps by less; its square goes about with the place.
+        # Between two samples the speed changes by less than a step; its square is about linear in u.
         counts = np.where(piece[1:] == piece[:-1], np.ceil(_WITHIN_STEP * np.abs(np.diff(speed)) / step), 1)
         counts = np.maximum(counts, 1).astype(np.int64)
         owner = np.repeat(np.arange(len(counts)), counts)
@@ -139,7 +139,7 @@ def _samples(
 
 
 class Motion:
-    """A line or an arc of a program: its places by the share of it that is done."""
+    """A line or an arc of a program: positions as a function of the share of it that is done."""
 
     def __init__(self, program: Program, move: int, start: Array, arc: int | None) -> None:
         self._start, self._way = start, program.target[move] - start

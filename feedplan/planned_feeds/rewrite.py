@@ -1,4 +1,4 @@
-"""From a plan to its program with planned feeds, and to the file of it."""
+"""The program of a plan with planned feeds, as an object and as a file."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from feedplan.arguments import file_path, flag, number, one_of, positive, refuse
 from feedplan.errors import InputError
-from feedplan.planned_feeds.again import SAME, require_same
-from feedplan.planned_feeds.blocks import Aside, Blocks, blocks_of
+from feedplan.planned_feeds.blocks import Blocks, Exclusion, blocks_of
 from feedplan.planned_feeds.dialects import DIALECTS, DialectName, lacks, writes_points
 from feedplan.planned_feeds.expand import expanded
-from feedplan.planned_feeds.feeds import Changes, Feeds, LineSpeeds, asides_of, line_speeds, planned_feeds
+from feedplan.planned_feeds.feeds import Changes, Feeds, LineSpeeds, exclusions_of, line_speeds, planned_feeds
 from feedplan.planned_feeds.inverse_time import inverse_feeds
 from feedplan.planned_feeds.part_lines import Sense, Word, moved_axes_are_named, part_lines, words_of
 from feedplan.planned_feeds.parts import Parts, parts_of
+from feedplan.planned_feeds.read_back import SAME, require_same
 from feedplan.planned_feeds.speeds import SpeedsAlong, speeds_along
 from feedplan.planned_feeds.text import rewritten, usual_blank
 from feedplan.planning import Plan
@@ -83,7 +83,7 @@ class PlannedProgram:
             raise InputError(f"{place} cannot be written ({reason}): choose another file") from error
 
     def to_json(self) -> dict[str, Any]:
-        """What plan.json tells of it."""
+        """Its entry in plan.json."""
         return {
             "sha256": self.sha256,
             "dialect": self.dialect,
@@ -95,7 +95,7 @@ class PlannedProgram:
         }
 
     def summary(self, shown: int = _SHOWN) -> str:
-        """What was changed, in words: at most `shown` lines of each kind one by one."""
+        """The changes in words: at most `shown` lines of each kind one by one."""
         rows = [
             f"{self.name}: {counted(self.changed, 'line')} of {self.lines} with another F, "
             f"{self.split} split, {len(self.left)} left as they were; "
@@ -129,11 +129,12 @@ def planned_program(
     """The program of a plan, in which no block asks for more than the plan's greatest speed in it.
 
     `feed_step` [mm/s, deg/s]: lines and arcs are split where the planned speed varies by more. `inverse_time`
-    gives every block an F in 1/min (G93). `dialect` is the control it is for: `linuxcnc`, `grbl` or `fanuc`;
-    what that lacks is in `notes`. `expand` writes the moves as plain blocks in the order in which they run.
-    What was written is read back: the moves are the same bit for bit, or within 1e-9 mm where lines are
-    split. Raises InputError for a plan without a program, a program that was changed since, and what cannot
-    be done.
+    gives every block an F in 1/min (G93). `dialect` is that of its control: `linuxcnc`, `grbl` or `fanuc`;
+    `notes` name the words that the control lacks. `expand` writes the moves as plain blocks in the order in
+    which they run. The text is read back: its moves are the same bit for bit, or within 1e-9 mm where lines
+    are split.
+    Raises InputError for a plan without a program, for a program that was changed since, and for moves that
+    cannot be written.
     """
     program = plan.program if isinstance(plan, Plan) else None
     if feed_step is not None:
@@ -148,23 +149,23 @@ def planned_program(
     else:
         content = _text_of(program)
     blocks = blocks_of(content, bool((program.reading or {}).get("block_delete", True)))
-    # By rounding alone a plan is faster than it was asked to be.
+    # A plan exceeds the requested feed only by rounding.
     greatest = np.fmin(along.greatest(), plan.problem.request.of(program.feed))
-    speeds, aside = line_speeds(program, greatest, along.group), asides_of(blocks, program)
+    speeds, exclusion = line_speeds(program, greatest, along.group), exclusions_of(blocks, program)
     words: dict[int, list[Word]] = {}
     parts: dict[int, Parts] = {}
     if feed_step is not None:
-        candidates = _candidates(blocks, program, aside)
+        candidates = _candidates(blocks, program, exclusion)
         parts = parts_of(plan.problem, plan.profile, program, along, candidates, feed_step)
         parts, words = _writable(blocks, program, parts)
     point = writes_points(dialect)
     if inverse_time:
-        feeds = inverse_feeds(blocks, program, aside, greatest, parts, point)
+        feeds = inverse_feeds(blocks, program, exclusion, greatest, parts, point)
     else:
         by_line = {
             int(program.line[m]) - 1: (own.speed / program.feed[m]).tolist() for m, own in parts.items()
         }
-        feeds = planned_feeds(blocks, speeds, aside, by_line, point)
+        feeds = planned_feeds(blocks, speeds, exclusion, by_line, point)
         # A line whose F could not be changed is not split.
         parts = {m: own for m, own in parts.items() if int(program.line[m]) - 1 not in feeds.left}
     result = rewritten(blocks, feeds, _split(blocks, program, parts, words, feeds))
@@ -205,7 +206,7 @@ def write_program(
 
 
 def _text_of(program: Program) -> bytes:
-    """The text that a program was read from. Raises InputError where there is none, or another by now."""
+    """The text of a program; raises InputError if it was not read from a text, or the text has changed."""
     if program.reading is None or program.text is None:
         raise InputError(
             f"{program.name} is no G-code that was read from a text: "
@@ -224,7 +225,7 @@ def _expanded(
     machine = (program.reading or {}).get("machine")
     content, of = expanded(program, machine, dialect)
     again = read_program(content, machine, name=program.name)
-    again = replace(again, reading={"machine": machine})
+    again = again.with_others(reading={"machine": machine})
     if len(again) != len(of):
         raise InputError(
             f"{program.name} is not the same when its moves are written anew ({len(again)} moves, "
@@ -261,11 +262,11 @@ def _curved(program: Program) -> Array:
     return program.splines.control_points[np.repeat(counts > 2, counts)]
 
 
-def _candidates(blocks: Blocks, program: Program, aside: NDArray[np.uint8]) -> NDArray[np.int64]:
+def _candidates(blocks: Blocks, program: Program, exclusion: NDArray[np.uint8]) -> NDArray[np.int64]:
     """Moves that may be split: lines and arcs at a feed, each alone in a line that runs once."""
     line = program.line.astype(np.int64) - 1
     alone = np.bincount(line, minlength=len(blocks))[line] == 1
-    plain = (aside == Aside.NO) & blocks.plain & ~blocks.inverse
+    plain = (exclusion == Exclusion.NO) & blocks.plain & ~blocks.inverse
     kinds = (program.kind == MoveKind.LINE) | (program.kind == MoveKind.ARC)
     return np.flatnonzero(alone & plain[line] & kinds & (program.control != PathControl.EXACT_STOP))
 

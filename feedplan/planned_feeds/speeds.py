@@ -1,10 +1,10 @@
 """The greatest planned speed in each move of a program, along the axes that its feed counts along.
 
-A move has the part of the path that is nearest to it. Where a piece follows two moves, as the blend of a
-corner does, all of it belongs to both, since the feeds of both hold on all of it; where it follows more, as a
-fitted piece does, it is cut at the places nearest to the ends of the moves, where a change of feed would cut
-it too. Where a move is shorter than the tolerance leaves room, both its ends may be nearest to one place: the
-feed of such a move is cut off nowhere, and all pieces that follow it belong to it.
+Each move owns the part of the path that is nearest to it. A piece that follows two moves, such as the blend
+of a corner, belongs to both, since both feeds hold on all of it. A piece that follows more moves, such as a
+fitted one, is cut at the places nearest to the ends of the moves, where a change of feed would cut it too. A
+move that is shorter than twice the tolerance may have both ends nearest to one place: all pieces that follow
+it belong to it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from feedplan.setpoints import sampler
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-# Columns of a program that point the tool.
+# Columns of a program that are the direction of the tool.
 DIRECTION = ("I", "J", "K")
 # Places within each phase of the profile at which the speed is taken, beside both ends.
 _WITHIN = (0.25, 0.5, 0.75)
@@ -74,7 +74,7 @@ def speeds_along(problem: Problem, profile: SpeedProfile, program: Program) -> S
     rank = np.empty(len(order), dtype=np.int64)
     rank[order] = np.arange(len(order))
     count = len(program)
-    # What has the same place as an end of a move is in the move.
+    # Places equal to an end of a move belong to the move.
     first, last = rank[len(piece) - 2 * count : len(piece) - count], rank[len(piece) - count :]
     piece, u = piece[order], u[order]
     return SpeedsAlong(
@@ -99,7 +99,7 @@ def _ends_of_moves(problem: Problem, program: Program) -> tuple[tuple[Indices, A
     ends = shared[end] & (last[end] > moves)
     u_end[ends] = _nearest(problem, end[ends], program.target[ends])
     begins = shared[begin] & (first[begin] < moves)
-    # Mostly the move before ends there, on the same piece.
+    # Usually the move before ends at the same place.
     same = begins & np.append(False, ends[:-1] & (end[:-1] == begin[1:]))
     u_begin[same] = u_end[:-1][same[1:]]
     begins &= ~same
@@ -148,7 +148,7 @@ def speeds_at(problem: Problem, profile: SpeedProfile, piece: Indices, u: Array)
         columns = [path.axes.index(name) for name in DIRECTION]
         vector, change = place[:, columns], words[:, columns]
         length = np.linalg.norm(vector, axis=1)
-        # A direction turns by its change across it, whatever its length.
+        # The turn of a direction is its change across it over its length.
         across = np.linalg.norm(np.cross(vector, change), axis=1) / np.where(length > 0.0, length, 1.0) ** 2
         squares[:, GROUPS - 1] += np.degrees(across) ** 2
     return np.sqrt(squares) * rate[:, None], time

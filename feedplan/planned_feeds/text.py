@@ -1,4 +1,4 @@
-"""Puts F words into the text of a program: every byte that needs no change stays."""
+"""Puts F words into the text of a program; every other byte stays."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ _BLANKS = b" \t\r\n\x1a"
 
 
 def code_end(line: bytes) -> int:
-    """Where the words of a line end: behind them are blanks and comments alone."""
+    """The end of the words of a line: after it are only blanks and comments."""
     if b"(" not in line and b";" not in line and b"11" not in line:
         return len(line.rstrip(_BLANKS))
     return len(_COMMENT.sub(lambda found: b" " * len(found[0]), line).rstrip(_BLANKS))
 
 
 def line_end(line: bytes) -> bytes:
-    """How a line ends: LF, CR LF, CR, or not at all."""
+    """The end of a line: LF, CR LF, CR or nothing."""
     return line[len(line.rstrip(b"\r\n")) :]
 
 
 def blank_of(code: bytes, usual: bytes) -> bytes:
-    """What is between the words of a line; `usual` where it has one word alone."""
+    """The blank between the words of a line; `usual` if it has only one word."""
     words = code.strip(_BLANKS)
     if b" " in words:
         return b" "
@@ -40,13 +40,13 @@ def blank_of(code: bytes, usual: bytes) -> bytes:
 
 
 def usual_blank(content: bytes) -> bytes:
-    """What is between the words of a program, by the first line that tells."""
+    """The blank between the words of a program, from its first line of several words."""
     found = _TWO_WORDS.search(content)
     return b"" if found is None or not found[1] else b" "
 
 
 def with_word(line: bytes, letter: bytes, number: bytes, usual: bytes) -> bytes:
-    """A line with one word more, in its own style: behind its words, with blanks between them or without."""
+    """A line with one more word after its words, in the line's own style of blanks and letters."""
     end = code_end(line)
     code = line[:end]
     word = (letter.lower() if code.islower() else letter) + number
@@ -54,7 +54,7 @@ def with_word(line: bytes, letter: bytes, number: bytes, usual: bytes) -> bytes:
 
 
 def rewritten(blocks: Blocks, feeds: Feeds, replaced: Mapping[int, bytes]) -> bytes:
-    """The text with these F words; `replaced` are lines that are split, by index, in place of theirs."""
+    """The text with these F words; `replaced` are the new lines of split ones, by index."""
     content = blocks.content
     usual = usual_blank(content)
     touched = sorted(feeds.texts.keys() | feeds.restore.keys() | feeds.modes | replaced.keys())
@@ -85,7 +85,7 @@ def rewritten(blocks: Blocks, feeds: Feeds, replaced: Mapping[int, bytes]) -> by
 
 
 def _with_mode(blocks: Blocks, line: int, feed: bytes | None, replaced: bytes | None, usual: bytes) -> bytes:
-    """A line with G93, in place of its own code of a feed mode if it has one, and its F."""
+    """A line with its F and with G93, which replaces its own code of a feed mode."""
     text, begin = blocks.line(line), int(blocks.start[line])
     if replaced is not None:
         first, stop, rest = replaced.partition(line_end(text) or b"\n")

@@ -7,7 +7,7 @@ import pytest
 
 import feedplan
 from feedplan.errors import InputError
-from feedplan.planned_feeds.blocks import Aside, blocks_of
+from feedplan.planned_feeds.blocks import Exclusion, blocks_of
 from feedplan.planned_feeds.number import feed_texts, rounded_down
 from feedplan.program.program import MoveKind
 from tests.planned_feeds.programs import SQUARE, again, planned
@@ -183,12 +183,12 @@ def test_line_ends_stay(end: str) -> None:
 
 def test_lines_are_asides_in_flow_alone() -> None:
     text = b"O1000 (name)\no1 if [1]\no2 do\nX1\no2 while [0]\no1 endif\nX2\nM30\nX3\n"
-    assert blocks_of(text).aside.tolist() == [
-        Aside.NO,
-        *[Aside.FLOW] * 5,
-        Aside.NO,
-        Aside.NO,
-        Aside.FLOW,
+    assert blocks_of(text).exclusion.tolist() == [
+        Exclusion.NO,
+        *[Exclusion.FLOW] * 5,
+        Exclusion.NO,
+        Exclusion.NO,
+        Exclusion.FLOW,
     ]
 
 

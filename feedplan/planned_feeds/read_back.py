@@ -1,4 +1,4 @@
-"""Reads a program back that was rewritten, and compares: the same moves, no block faster than it may be."""
+"""Reads a rewritten program back and compares it: the same moves, and no block above its allowed feed."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from feedplan.program.read import read_program
 
 Array = NDArray[np.float64]
 
-# Ends of parts and what follows them are the same within this [mm, deg].
+# The greatest difference of coordinates where lines are split [mm, deg].
 SAME = 1e-9
 
 
@@ -48,12 +48,12 @@ def require_same(content: bytes, program: Program, parts: Mapping[int, Parts], f
         kept = np.abs(own.speed / program.feed[move] - 1.0) <= FEED_ROUNDING
         wanted[rows] = np.where(kept, program.feed[move], own.speed)
     arc = np.searchsorted(program.arc_move, of[arc_of])
-    # Along its axis the centre of an arc is where the arc begins.
+    # The coordinate of a centre along the arc's axis is that of the start of the arc.
     centre, normal = program.arc_centre[arc], program.arc_normal[arc].astype(np.int64)
     split = share[arc_of] < 1.0
     if again.arc_centre.shape == centre.shape:
         centre[split, normal[split]] = again.arc_centre[split, normal[split]]
-    # Where nothing is split all numbers are the same; else the first parts round.
+    # Without split lines all numbers are equal; the ends of parts are rounded.
     within = SAME if parts else 0.0
     _compare(program, "kinds of moves", again.kind, program.kind[of])
     _compare(program, "places", again.target, target, within)
@@ -87,7 +87,7 @@ def require_same(content: bytes, program: Program, parts: Mapping[int, Parts], f
 def _compare(
     program: Program, what: str, found: NDArray[Any], wanted: NDArray[Any], within: float = 0.0
 ) -> None:
-    """Raises ProgramError where numbers are farther apart; what is no number is so in both."""
+    """Raises ProgramError where numbers differ by more than `within`; NaN equals NaN."""
     if found.shape != wanted.shape:
         raise _differs(program, f"it has other {what}")
     apart = np.abs(found.astype(np.float64) - wanted.astype(np.float64))
