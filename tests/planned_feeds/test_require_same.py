@@ -9,7 +9,7 @@ import pytest
 
 import feedplan
 from feedplan.errors import ProgramError
-from feedplan.planned_feeds.again import require_same
+from feedplan.planned_feeds.read_back import require_same
 
 PROGRAM = """G21 G64 P0.01
 M3 S1000
