@@ -257,11 +257,6 @@ class CompositeCurve(OfNative[Curve]):
         return None if self.weights is None else self.weights.reshape(self.by_piece.shape[:2])
 
     @property
-    def is_quadratic(self) -> bool:
-        """Whether all pieces are polynomials of degree 2."""
-        return self.weights is None and bool((self.degree == 2).all())
-
-    @property
     def breakpoints(self) -> NDArray[np.float64]:
         """The parameter from the start of the curve to each joint (n + 1,)."""
         return np.concatenate([[0.0], np.cumsum(self.width)])

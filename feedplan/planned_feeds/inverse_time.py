@@ -17,7 +17,7 @@ from feedplan.errors import InputError
 from feedplan.planned_feeds.blocks import REASONS, Blocks, Exclusion
 from feedplan.planned_feeds.feeds import Changes, Feeds
 from feedplan.planned_feeds.number import feed_texts, rounded_down
-from feedplan.planned_feeds.parts import Motion, Parts
+from feedplan.planned_feeds.parts import Motion, Parts, motions
 from feedplan.program.program import MoveKind, Program
 from feedplan.units import mm_per_min
 
@@ -65,12 +65,12 @@ def inverse_feeds(
         if why is not None:
             raise _refused(program, line, why)
         first[line] = m
-    starts, arcs = program.starts(), {int(m): row for row, m in enumerate(program.arc_move)}
+    motion_of = motions(program)
     rows: list[tuple[int, float, float]] = []
     sizes: dict[int, int] = {}
     programmed = np.nan
     for line, m in sorted(first.items()):
-        motion = Motion(program, m, starts[m], arcs.get(m))
+        motion = motion_of(m)
         cut = parts.get(m)
         shares = [0.0, 1.0] if cut is None else [0.0, *cut.shares]
         tops = [greatest[m]] if cut is None else cut.speed

@@ -23,7 +23,6 @@ _REST = re.compile(rb"[ \t]*(?:\([^()\r\n]*\))?")
 # Codes that a split line may have: they may be repeated in every part, or given in the first part only.
 _CODES = {1.0, 2.0, 3.0, 17.0, 18.0, 19.0, 20.0, 21.0, 40.0, 61.0, 90.0, 91.0, 90.1, 91.1, 94.0}
 _ROTARY = b"ABC"
-_CENTRE = b"IJK"
 
 
 @dataclass(frozen=True)

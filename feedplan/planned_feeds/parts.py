@@ -8,6 +8,7 @@ centre, with ends on the move: the geometry is the same.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -60,13 +61,12 @@ def parts_of(
     if not moves:
         return {}
     samples = _samples(problem, profile, along, moves, step)
-    arcs = {int(m): row for row, m in enumerate(program.arc_move)}
-    starts = program.starts()
+    motion_of = motions(program)
     columns = [program.axes.index(name) for name in problem.path.axes]
     found: dict[int, Parts] = {}
     for m, (point, speed, time, free) in zip(moves, samples, strict=True):
-        motion = Motion(program, m, starts[m], arcs.get(m))
-        there = np.tile(starts[m], (len(point), 1))
+        motion = motion_of(m)
+        there = np.tile(motion.start, (len(point), 1))
         there[:, columns] = point
         share = motion.shares(there)
         if not free.any():
@@ -138,12 +138,18 @@ def _samples(
     return list(zip(*(np.split(column, ends) for column in (point, own, time, alone)), strict=True))
 
 
+def motions(program: Program) -> Callable[[int], Motion]:
+    """A function from the index of a line or an arc to its motion."""
+    starts, arcs = program.starts(), {int(m): row for row, m in enumerate(program.arc_move)}
+    return lambda m: Motion(program, m, starts[m], arcs.get(m))
+
+
 class Motion:
     """A line or an arc of a program: positions as a function of the share of it that is done."""
 
     def __init__(self, program: Program, move: int, start: Array, arc: int | None) -> None:
-        self._start, self._way = start, program.target[move] - start
-        self.turn = 0.0
+        self.start, self._way = start, program.target[move] - start
+        self.turn, self.plane, self.centre = 0.0, [], np.empty(0)
         if arc is None:
             return
         self.turn = float(program.arc_angle[arc])
@@ -158,7 +164,7 @@ class Motion:
 
     def at(self, share: float) -> Array:
         """The place (axes,) where that share is done."""
-        place = self._start + share * self._way
+        place = self.start + share * self._way
         if self.turn:
             angle, (first, last) = self._angle + share * self.turn, self._radii
             radius = first + share * (last - first)
@@ -168,7 +174,7 @@ class Motion:
     def shares(self, points: Array) -> Array:
         """The shares (n,) that are nearest to places (n, axes) in the order of the motion."""
         if not self.turn:
-            return np.asarray((points - self._start) @ self._way / (self._way @ self._way))
+            return np.asarray((points - self.start) @ self._way / (self._way @ self._way))
         spokes = points[:, self.plane] - self.centre
         angles = np.unwrap(np.arctan2(spokes[:, 1], spokes[:, 0]))
         begin = self._angle + math.tau * round((angles[0] - self._angle) / math.tau)

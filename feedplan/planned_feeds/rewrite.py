@@ -20,7 +20,7 @@ from feedplan.planned_feeds.expand import expanded
 from feedplan.planned_feeds.feeds import Changes, Feeds, LineSpeeds, exclusions_of, line_speeds, planned_feeds
 from feedplan.planned_feeds.inverse_time import inverse_feeds
 from feedplan.planned_feeds.part_lines import Sense, Word, moved_axes_are_named, part_lines, words_of
-from feedplan.planned_feeds.parts import Parts, parts_of
+from feedplan.planned_feeds.parts import Parts, motions, parts_of
 from feedplan.planned_feeds.read_back import SAME, require_same
 from feedplan.planned_feeds.speeds import SpeedsAlong, speeds_along
 from feedplan.planned_feeds.text import rewritten, usual_blank
@@ -293,24 +293,20 @@ def _split(
     feeds: Feeds,
 ) -> dict[int, bytes]:
     """The lines that are split, by index, written anew."""
-    starts, arcs = program.starts(), {int(m): row for row, m in enumerate(program.arc_move)}
+    motion_of = motions(program)
     replaced: dict[int, bytes] = {}
     usual = usual_blank(blocks.content)
     for m, own in parts.items():
         line = int(program.line[m]) - 1
-        centre = None
-        if m in arcs:
-            row = arcs[m]
-            normal = int(program.arc_normal[row])
-            centre = {
-                "XYZ"[axis]: float(program.arc_centre[row, axis]) for axis in range(3) if axis != normal
-            }
+        motion = motion_of(m)
+        plane = sorted(zip(motion.plane, motion.centre.tolist(), strict=True))
+        centre = {program.axes[column]: value for column, value in plane} if motion.turn else None
         sense = Sense(
             bool(blocks.absolute[line]), bool(blocks.absolute_centres[line]), bool(blocks.inches[line])
         )
         texts = feeds.parts.get(line, [None] * len(own))
         replaced[line] = part_lines(
-            blocks.line(line), words[m], sense, program.axes, starts[m], own, centre, texts, usual
+            blocks.line(line), words[m], sense, program.axes, motion.start, own, centre, texts, usual
         )
     return replaced
 
