@@ -1,4 +1,4 @@
-//! numpy arrays to and from the types of the kernels, each length checked once here.
+//! Conversion of NumPy arrays to and from the types of kernels; lengths are checked here.
 
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
@@ -8,12 +8,12 @@ use pyo3::prelude::*;
 
 use feedplan_geometry::quadratic::Quadratic;
 
-/// Offsets; a negative one becomes one that fits nowhere.
+/// Offsets; a negative one becomes the greatest number, which no kernel accepts.
 pub fn indices(array: &PyReadonlyArray1<i64>) -> Vec<usize> {
     array.as_array().iter().map(|&value| usize::try_from(value).unwrap_or(usize::MAX)).collect()
 }
 
-/// (n, m) array to rows of M ≥ m axes; the axes beyond m rest at 0.
+/// Rows of an (n, m) array as rows of M ≥ m axes, those beyond m at 0.
 pub fn rows<const M: usize>(array: &PyReadonlyArray2<f64>) -> PyResult<Vec<[f64; M]>> {
     rows_with(array, 0.0)
 }
@@ -25,12 +25,12 @@ pub fn rows_with<const M: usize>(array: &PyReadonlyArray2<f64>, rest: f64) -> Py
     Ok(flat.chunks_exact(axes).map(|row| padded(row, rest)).collect())
 }
 
-/// Rows of `axes` numbers to rows of M, those beyond at 0.
+/// Rows of `axes` numbers as rows of M axes, those beyond at 0.
 pub fn padded_rows<const M: usize>(flat: &[f64], axes: usize) -> Vec<[f64; M]> {
     flat.chunks_exact(axes).map(|row| padded(row, 0.0)).collect()
 }
 
-/// (m,) array to one row of M ≥ m axes; the axes beyond m get `rest`.
+/// An (m,) array as one row of M ≥ m axes, those beyond m at `rest`.
 pub fn row<const M: usize>(array: &PyReadonlyArray1<f64>, rest: f64) -> PyResult<[f64; M]> {
     let flat = array.as_slice().map_err(|_| contiguous())?;
     if flat.len() > M {
@@ -43,7 +43,7 @@ pub fn padded<const M: usize>(values: &[f64], rest: f64) -> [f64; M] {
     std::array::from_fn(|k| values.get(k).copied().unwrap_or(rest))
 }
 
-/// The first `axes` columns of rows to an (n, axes) array.
+/// The first `axes` columns of rows as an (n, axes) array.
 pub fn to_array2<'py, T: numpy::Element + Copy, const M: usize>(
     py: Python<'py>,
     rows: Vec<[T; M]>,
@@ -58,7 +58,7 @@ pub fn to_array2<'py, T: numpy::Element + Copy, const M: usize>(
     PyArray1::from_vec(py, flat).reshape([count, axes]).expect("n × axes values")
 }
 
-/// Control points of pieces, the first `axes` columns of them, to an (n, 3, axes) array.
+/// The first `axes` coordinates of the control points of pieces as an (n, 3, axes) array.
 pub fn to_array3<'py, const M: usize>(
     py: Python<'py>,
     pieces: &[Quadratic<M>],

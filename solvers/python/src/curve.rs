@@ -35,12 +35,12 @@ pub fn register(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(insert_knot, module)?)
 }
 
-/// Places that one thread evaluates at a time.
+/// Number of places that one thread evaluates at a time.
 const BLOCK: usize = 4096;
-/// Widths of pieces lie between this and one over it.
+/// Least width of a piece; the greatest one is one over it.
 const LEAST_WIDTH: f64 = 1e-60;
 
-/// Where the values and the derivatives of some places go; their pieces and parameters.
+/// Where the values and derivatives of some places are written, then their pieces and parameters.
 type Block<'a> = (Vec<&'a mut [f64]>, &'a [u32], &'a [f64]);
 type Array1<'py> = PyReadonlyArray1<'py, f64>;
 type Array2<'py> = PyReadonlyArray2<'py, f64>;
@@ -137,7 +137,7 @@ fn checked_offsets(given: &[i64], widths: usize, points: usize) -> PyResult<Vec<
 }
 
 impl Curve {
-    /// Raises InputError for coordinates, weights and widths that cannot be used.
+    /// The curve of these pieces. Raises InputError for coordinates, weights or widths out of range.
     pub fn checked<const M: usize>(pieces: CompositeCurve<M>, axes: usize) -> PyResult<Self>
     where
         Padded: From<CompositeCurve<M>>,
@@ -180,7 +180,7 @@ impl Curve {
         with_pieces!(self, M, pieces, &pieces.width)
     }
 
-    /// The coordinates of the control points one after the other, and how many each has.
+    /// The coordinates of all control points, and the number of coordinates of each.
     pub fn coordinates(&self) -> (&[f64], usize) {
         with_pieces!(self, M, pieces, (pieces.control.as_flattened(), M))
     }
@@ -314,7 +314,7 @@ impl Curve {
                 }
             });
         };
-        // Few places take less time than to wake other threads.
+        // Waking other threads takes longer than a few places.
         if blocks.len() == 1 {
             py.detach(|| blocks.into_iter().for_each(fill));
         } else {
@@ -328,7 +328,7 @@ impl Curve {
         PyArray1::from_vec(py, values).reshape([order + 1, u.len(), axes])
     }
 
-    /// The curve with every piece of a degree below `degree` raised to it.
+    /// The curve with every piece of a lower degree raised to `degree`.
     fn elevated(&self, degree: usize) -> PyResult<Self> {
         with_pieces!(self, M, pieces, {
             let mut raised = CompositeCurve::<M>::default();
@@ -339,7 +339,7 @@ impl Curve {
         })
     }
 
-    /// The curve with pieces cut at places in order: piece numbers grow, and u within a piece.
+    /// The curve with pieces cut at places, which are in the order of the curve.
     fn split(&self, piece: PyReadonlyArray1<'_, u32>, u: Array1<'_>) -> PyResult<Self> {
         let (piece, u) = (piece.as_slice()?, u.as_slice()?);
         check_places(self.widths(), piece, u)?;
@@ -368,7 +368,7 @@ impl Curve {
         })
     }
 
-    /// How neighbouring pieces meet.
+    /// The joints of neighbouring pieces.
     fn joints<'py>(
         &self,
         py: Python<'py>,
@@ -390,8 +390,8 @@ impl Curve {
         ))
     }
 
-    /// The curve as lines and as curves without a cusp inside; of each piece the first and the last one that it goes
-    /// along (n, 2), and whether it rests at its start and at its end (n, 2).
+    /// The curve as lines and as curved pieces without a cusp inside; the first and the last piece of the old curve
+    /// that each one follows (n, 2), and whether it rests at its start and at its end (n, 2).
     #[allow(clippy::type_complexity)]
     fn regular<'py>(
         &self,

@@ -42,7 +42,7 @@ impl CurveLength {
         with_padded_axes!(self.axes, M, Ok(self.lengths.get::<Kernel<M>>()?.total()))
     }
 
-    /// Bound of the error of every length on the curve in mm.
+    /// Upper bound of the error of a length on the curve in mm.
     #[getter]
     fn error(&self) -> PyResult<f64> {
         with_padded_axes!(self.axes, M, Ok(self.lengths.get::<Kernel<M>>()?.error()))

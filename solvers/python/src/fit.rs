@@ -1,4 +1,4 @@
-//! Python binding of the spline fit.
+//! `fit_points`: a chain of points to the quadratic pieces that fit it.
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;

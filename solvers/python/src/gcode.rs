@@ -19,7 +19,7 @@ pyo3::import_exception!(feedplan.errors, ProgramError);
 struct PyTipControl(Py<PyAny>);
 
 impl PyTipControl {
-    /// Calls a method; what it raises is a sentence.
+    /// Calls a method of the Python object; the message of what it raises is the error.
     fn call<T, A>(&self, method: &str, arguments: A) -> Result<T, String>
     where
         T: for<'a, 'py> FromPyObject<'a, 'py>,
@@ -67,7 +67,7 @@ impl TipControl for PyTipControl {
 /// A row of the tool table: number, pocket, offset X to W, diameter, orientation.
 type ToolRow = (u32, u32, [f64; 9], f64, u32);
 
-/// What the function of Python finds for the name of a subprogram: the file's name and its bytes, or None.
+/// The file name and the bytes that the Python function finds for the name of a subprogram.
 fn find(finder: &Py<PyAny>, name: &str) -> Result<Option<(String, Vec<u8>)>, String> {
     Python::attach(|py| {
         let found = finder.bind(py).call1((name,)).map_err(|error| error.value(py).to_string())?;
@@ -75,7 +75,7 @@ fn find(finder: &Py<PyAny>, name: &str) -> Result<Option<(String, Vec<u8>)>, Str
     })
 }
 
-/// What the function of Python says of the machines that have an axis; nothing where it fails.
+/// The names of machines with an axis, by the Python function; empty where it fails.
 fn names_of(names: &Py<PyAny>, letter: char) -> String {
     Python::attach(|py| names.bind(py).call1((letter,)).and_then(|text| text.extract()).unwrap_or_default())
 }

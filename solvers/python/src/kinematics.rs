@@ -1,4 +1,4 @@
-//! Kinematics for Python: a recorded expression and pieces of a tip path in, joint motion out.
+//! Joint motion from a recorded expression and pieces of a tip path.
 
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
@@ -89,7 +89,7 @@ fn machine<'a>(
 
 fn require_order(order: usize) -> PyResult<()> {
     if order > MOST_ORDER {
-        return Err(PyValueError::new_err(format!("order {order}: at most {MOST_ORDER} can be had")));
+        return Err(PyValueError::new_err(format!("order {order}: at most {MOST_ORDER} is supported")));
     }
     Ok(())
 }
@@ -299,7 +299,7 @@ impl AccuracyArrays<'_> {
     }
 }
 
-/// By so much for each joint, or as limits of the machine allow.
+/// The allowed error of each joint, or the accuracy that the limits of the machine require.
 #[derive(FromPyObject)]
 enum ToleranceArrays<'py> {
     Given(PyReadonlyArray1<'py, f64>),
@@ -314,7 +314,7 @@ type InterpolantArrays<'py> = (
     Bound<'py, PyArray2<f64>>,
 );
 
-/// Polynomials that stand in for q' on parts of pieces.
+/// Polynomials that interpolate q' on parts of pieces.
 #[pyfunction]
 fn joint_interpolants<'py>(
     py: Python<'py>,

@@ -1,4 +1,4 @@
-//! The Python module `feedplan._solvers`: arrays in, arrays out, one submodule file per kernel.
+//! The Python module `feedplan._solvers`, one file per kernel: it passes arrays and native objects to kernels.
 
 mod arrays;
 mod audit;
@@ -23,8 +23,8 @@ mod work;
 
 use pyo3::prelude::*;
 
-/// Calls a generic kernel for at most 3, 6 or 9 axes, those beyond `count` at rest: an axis that rests changes no
-/// result, and three instances of a kernel are built where nine would be.
+/// Calls a generic kernel for 3, 6 or 9 axes, those beyond `count` at rest. An axis at rest does not change results, and
+/// three instances of a kernel suffice in place of nine.
 macro_rules! with_padded_axes {
     ($count:expr, $m:ident, $call:expr) => {
         match $count {

@@ -1,4 +1,4 @@
-//! What records of Python hold as `native`, and what native objects hold in as many axes as kernels are made for.
+//! Access to the native objects of Python's records, and their contents in 3, 6 or 9 axes.
 
 use std::any::Any;
 use std::ops::Deref;
@@ -37,7 +37,7 @@ impl<T: PyClass<Frozen = True> + Sync> Deref for Of<T> {
     }
 }
 
-/// Something in M axes, one of those that `with_padded_axes` counts.
+/// An object in M axes, M being a number of `with_padded_axes`.
 pub struct InAxes(Box<dyn Any + Send + Sync>);
 
 impl InAxes {

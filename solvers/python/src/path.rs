@@ -26,7 +26,7 @@ pub fn register(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(build_path, module)?)
 }
 
-/// The travel of an axis that is not there.
+/// The travel of an axis that the path does not have.
 const ANYWHERE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
 type Floats<'py> = PyReadonlyArray1<'py, f64>;

@@ -1,4 +1,4 @@
-//! The exact planner: the package's own problem in, a profile out.
+//! The exact planner, from a problem to a profile, and look-ahead over segments.
 
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
@@ -50,7 +50,7 @@ pub fn to_exception(fault: &Fault) -> PyErr {
     PlanError::new_err((kind, piece, reachable, text))
 }
 
-/// The greatest speed along each of these parts of pieces that keeps the feed everywhere on it (n,).
+/// The greatest speed on each part of a piece at which the feed holds everywhere on the part (n,).
 #[pyfunction]
 fn feed_between<'py>(
     py: Python<'py>,
@@ -76,8 +76,8 @@ fn feed_between<'py>(
     })
 }
 
-/// The greatest speeds at the ends of segments, lowered to those that the segments between lead to; `up` and `down`
-/// (n, 3) are gain and holds of speeding up and of slowing down.
+/// The greatest speeds at the ends of segments that the segments can reach; `up` and `down` (n, 3) are the gain and the
+/// two holds of speeding up and of slowing down.
 #[pyfunction]
 fn look_ahead<'py>(
     py: Python<'py>,

@@ -1,4 +1,4 @@
-//! `Problem`: a path with its limits, as the kernels take it.
+//! `Problem`: a path with its limits, made once for all kernels.
 
 use std::sync::Arc;
 
@@ -59,7 +59,7 @@ pub struct Problem {
     rows: InAxes,
 }
 
-/// The same in M axes, those beyond its own at rest.
+/// The path and its limits in M axes, those beyond its own at rest.
 pub struct Rows<const M: usize> {
     pub path: Arc<PathData<M>>,
     tip: Option<Arc<CompositeCurve<TIP_AXES>>>,
@@ -73,7 +73,7 @@ pub struct Rows<const M: usize> {
     end_speed: f64,
 }
 
-/// Limits of the axes as sizes, those at rest 1.
+/// Limits of the axes as sizes; 1 for axes at rest.
 fn both<const M: usize>(most: &PyReadonlyArray1<f64>, least: &PyReadonlyArray1<f64>) -> PyResult<Both<M>> {
     Ok([row(most, 1.0)?, row::<M>(least, -1.0)?.map(|value| -value)])
 }
@@ -116,7 +116,7 @@ impl<const M: usize> Rows<M> {
         })
     }
 
-    /// As the planners take it.
+    /// The problem for planners.
     pub fn problem(&self) -> problem::Problem<'_, M> {
         let (path, curve) = (&*self.path, &*self.path.curve);
         problem::Problem {
@@ -151,7 +151,7 @@ impl Problem {
         self.axes
     }
 
-    /// Its rows in M axes, as `with_padded_axes` counts them.
+    /// Its rows in M axes, M being the number of `with_padded_axes`.
     pub fn rows<const M: usize>(&self) -> PyResult<&Rows<M>> {
         self.rows.get()
     }

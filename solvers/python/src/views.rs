@@ -1,4 +1,4 @@
-//! NumPy views of what native objects hold: read-only, and no copies.
+//! Read-only NumPy views of the memory of native objects.
 
 use numpy::ndarray::{ArrayView, Dimension};
 use numpy::{Element, PyArray};
@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3::pyclass::boolean_struct::True;
 use pyo3::PyClass;
 
-/// A view of an array that `owner` holds.
+/// A view of an array of `owner`.
 #[allow(unsafe_code)]
 pub fn view<'py, O: PyClass<Frozen = True> + Sync, T: Element, D: Dimension>(
     owner: &Bound<'py, O>,

@@ -1,7 +1,7 @@
-//! Native work for Python: on threads of this process, while the thread that asked for it serves signals and progress.
+//! Native work for Python: it runs on threads of its own, while the calling thread serves signals and progress.
 //!
-//! Threads do not outlive a fork: pools are those of one process, and a child makes its own. Each call has a pool to
-//! itself while it works, so that none waits for another's work; a pool that rests is taken again by the next call.
+//! Threads do not survive a fork, so a child process makes its own pools. Each call has a pool of its own, so that no call
+//! waits for another one; later calls use the pool again.
 
 use std::panic::{catch_unwind, resume_unwind, AssertUnwindSafe};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -13,13 +13,13 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use feedplan_geometry::watch::{Watch, Work};
 
-/// How often signals are looked for and progress is told.
+/// Period of the checks for signals and of the reports of progress.
 const PERIOD: Duration = Duration::from_millis(50);
-/// Pools kept for the next calls.
+/// The greatest number of idle pools that are kept.
 const MOST_IDLE: usize = 4;
 
-/// The pools that rest. It is locked only by who holds Python's lock, and a process is forked by who holds that: a child
-/// never finds it locked.
+/// The idle pools. Only a thread with Python's lock locks it, and only such a thread forks the process: a child never
+/// finds it locked.
 static POOLS: Mutex<Pools> = Mutex::new(Pools { process: 0, idle: vec![] });
 
 struct Pools {
@@ -31,12 +31,12 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A pool of this process that nobody else uses.
+/// A pool of this process that no other call uses.
 fn take(_: Python<'_>) -> PyResult<ThreadPool> {
     let mut pools = lock(&POOLS);
     let process = std::process::id();
     if pools.process != process {
-        // The parent's: their threads are not here, and to end them would be to wait for them.
+        // Pools of the parent have no threads here. To drop them would be to wait for these threads.
         std::mem::forget(std::mem::take(&mut pools.idle));
         pools.process = process;
     }
@@ -53,8 +53,8 @@ fn give_back(_: Python<'_>, pool: ThreadPool) {
     }
 }
 
-/// Does `work` without Python's lock. Meanwhile signals are handled, and `progress` is called with the part that is done;
-/// what a handler or `progress` raises ends the work and is raised here.
+/// Does `work` without Python's lock. Meanwhile signals are handled, and `progress` is called with the part done. An error
+/// of a handler or of `progress` ends the work and is raised.
 pub fn run<T: Send>(
     py: Python<'_>,
     progress: Option<&Bound<'_, PyAny>>,
@@ -66,7 +66,7 @@ pub fn run<T: Send>(
     Ok(value.expect("the work is done"))
 }
 
-/// The same for work of one type: it is compiled once.
+/// `run` for work without a type, compiled once.
 fn run_once(
     py: Python<'_>,
     progress: Option<&Bound<'_, PyAny>>,
@@ -96,7 +96,7 @@ fn run_once(
     }
 }
 
-/// Waits for the end of the work, which is told as well; what was raised meanwhile, which cancels it.
+/// Reports progress until the end of the work; returns an error that was raised meanwhile and cancelled it.
 fn serve(
     work: &Work,
     progress: Option<&Py<PyAny>>,
@@ -123,7 +123,7 @@ fn serve(
     }
 }
 
-/// Handles signals and tells the progress.
+/// Handles signals and reports the progress.
 fn tell(py: Python<'_>, work: &Work, progress: Option<&Py<PyAny>>) -> PyResult<()> {
     py.check_signals()?;
     if let Some(progress) = progress {
