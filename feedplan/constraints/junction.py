@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from feedplan.geometry.corners import Corners
 from feedplan.geometry.joints import tangent_jumps
 from feedplan.geometry.path import Path
 
@@ -14,9 +15,11 @@ def junction_limit(path: Path, max_velocity_jump: NDArray[np.float64]) -> NDArra
 
     0 at the ends of runs. Within a run, where the unit tangent jumps by ΔT, min over the axes of
     `max_velocity_jump` [mm/s] / |ΔT|, and infinite where it does not jump. A cusp in which the direction of
-    motion agrees is left to the planner.
+    motion agrees is left to the planner. A smooth path rests where it turns back.
     """
     jump = tangent_jumps(path.curve)
+    if path.corners in (Corners.SMOOTH, Corners.FASTEST):
+        max_velocity_jump = np.zeros_like(max_velocity_jump)
     with np.errstate(divide="ignore", invalid="ignore"):
         allowed = np.where(jump > 0, max_velocity_jump / jump, np.inf).min(axis=1)
     limit = np.full(len(path) + 1, np.inf)

@@ -61,8 +61,9 @@ def build_path(
       within the tolerance; Q does not count. Exact moves are followed within `exact_tolerance`, with the
       lines that they touch. Lines longer than `max_chord` are straight in the middle. Arcs, splines and bends
       of points keep their size, except with FASTEST. The path stops where G0 meets other moves, where an
-      exact path meets another one, and where it turns back by more than 135°. Where no curve is found,
-      corners are rounded one by one between stops, and `Path.warnings` says so.
+      exact path meets another one, and where it turns back by more than 135°. Where it goes back along its
+      own line, and nothing else asks for a stop, it rests within a run. Where no curve is found, corners are
+      rounded one by one between stops, and `Path.warnings` says so.
 
     Corners that cannot be rounded are stops, unless every axis that moves has a `max_velocity_jump`. The tool
     also stops where the coordinate mode or the tool length changes.

@@ -45,14 +45,19 @@ class Stops:
 
 
 def stops_by_cause(problem: Problem, program: Program | None, activity: Activity) -> list[Stops]:
-    """The stops of a path by cause, the greatest loss first; start and end of the path are two stops."""
+    """The stops of a path by cause, the greatest loss first; start and end of the path are two stops.
+
+    The tool stops between runs, and for no time where pieces of a run meet at rest.
+    """
     path = problem.path
-    runs = len(path.runs) - 1
-    if runs < 1:
+    if len(path.runs) < 2:
         return []
-    causes = [ENDS, *_causes(problem, program), ENDS]
-    pauses = np.concatenate(([path.start_dwell], path.dwell))
-    before, after = _slow_parts(activity, runs)
+    # The first piece after each stop, and the number of pieces.
+    rests = np.union1d(path.runs, np.flatnonzero(problem.junction_speed == 0.0))
+    causes = [ENDS, *_causes(problem, program, rests[1:-1]), ENDS]
+    pauses = np.zeros(len(rests))
+    pauses[np.searchsorted(rests, path.runs)] = [path.start_dwell, *path.dwell]
+    before, after = _slow_parts(activity, rests)
     lost = np.concatenate(([0.0], before)) + np.concatenate((after, [0.0]))
     found = [
         Stops(
@@ -67,10 +72,9 @@ def stops_by_cause(problem: Problem, program: Program | None, activity: Activity
     return sorted(found, key=lambda stops: -(stops.pause + stops.lost))
 
 
-def _causes(problem: Problem, program: Program | None) -> list[str]:
-    """The cause of the stop after each run of the path but the last."""
-    path = problem.path
-    last, first = path.runs[1:-1] - 1, path.runs[1:-1]
+def _causes(problem: Problem, program: Program | None, first: NDArray[np.int64]) -> list[str]:
+    """The causes of the stops before these pieces of the path."""
+    path, last = problem.path, first - 1
     turn = _turns(problem, last, first)
     control = program.control if program is not None and len(program) else None
     result = []
@@ -114,15 +118,15 @@ def _turns(problem: Problem, last: NDArray[np.integer], first: NDArray[np.intege
     return np.asarray(np.degrees(2.0 * np.arcsin(np.clip(np.nan_to_num(half), 0.0, 1.0))))
 
 
-def _slow_parts(activity: Activity, runs: int) -> tuple[Floats, Floats]:
-    """Time lost before the end and after the start of each run [s].
+def _slow_parts(activity: Activity, rests: NDArray[np.int64]) -> tuple[Floats, Floats]:
+    """Time lost before the end and after the start of what lies between two stops [s].
 
     The part after a start ends where the tool reaches a feed or an axis velocity, or first slows down; the
     part before a stop is its mirror image.
     """
-    lost, pace, run = activity.lost, activity.pace, activity.run
+    lost, pace = activity.lost, activity.pace
     total = np.concatenate(([0.0], np.cumsum(lost)))
-    start, end = np.searchsorted(run, np.arange(runs), "left"), np.searchsorted(run, np.arange(runs), "right")
+    start, end = (np.searchsorted(activity.piece, places, "left") for places in (rests[:-1], rests[1:]))
     slower = np.append(pace[1:] < pace[:-1], True)
     faster = np.insert(pace[1:] > pace[:-1], 0, True) if len(pace) else np.empty(0, bool)
     risen = np.append(np.flatnonzero((pace >= ACTIVE) | slower), len(pace))

@@ -87,6 +87,10 @@ impl<const M: usize> Jerks<'_, M> {
         else {
             return; // said of the arc itself
         };
+        if arcs.p1[i] == 0.0 && arcs.p0[j] == 0.0 {
+            self.at_rest([i, j], [before, after], line, tally);
+            return;
+        }
         let change = (after - before).abs() - ROUNDINGS * EPS * (after.abs() + before.abs());
         tally.offer(Check::AccelerationContinuity, 0, change, self.negligible(0.0), time, line);
         if let Some(step) = self.step(i, j) {
@@ -94,6 +98,26 @@ impl<const M: usize> Jerks<'_, M> {
                 let limit = self.limits.jerk[k] * self.limits.period / MOST_SHOWN;
                 tally.offer(Check::AccelerationJump, k, step[k], limit, time, line);
             }
+        }
+    }
+
+    /// The step of the acceleration where the tool rests between two arcs. It goes on only where the path turns back along
+    /// the line that it came on.
+    fn at_rest(&self, [i, j]: [usize; 2], along: [f64; 2], line: i32, tally: &mut Tally<M>) {
+        let (arcs, time) = (self.arcs, self.starts[j]);
+        let ends = [(i, arcs.u1[i]), (j, arcs.u0[j])];
+        let axes = [0, 1].map(|side| {
+            let (arc, u) = ends[side];
+            let (tangent, a) = (self.path.curve::<M>(arcs.piece[arc] as usize).derivative(u), along[side]);
+            let size = length(&tangent);
+            tangent.map(|x| if a == 0.0 { 0.0 } else { x / size * a })
+        });
+        for k in 0..self.limits.axes {
+            let step = (axes[1][k] - axes[0][k]).abs();
+            let rounding = ROUNDINGS * EPS * (axes[1][k].abs() + axes[0][k].abs());
+            let step = if step.is_nan() { f64::INFINITY } else { step - rounding };
+            let negligible = PASS_EXCESS * self.limits.jerk[k] * self.limits.period;
+            tally.offer(Check::AccelerationContinuity, k, step, negligible, time, line);
         }
     }
 

@@ -11,7 +11,7 @@
 //! | module | what it computes |
 //! |---|---|
 //! | `speed_envelope`, `grid` | the stations of the spline, about equal in travel time |
-//! | `rest_ramp` | the start from rest and the stop: constant jerk, w ∝ s^(4/3) |
+//! | `rest_ramp` | the start from rest and the stop: constant jerk, w ∝ s^(4/3), or constant acceleration, w ∝ s |
 //! | `initial_plan`, `prepare` | a first plan within all limits |
 //! | `constraints`, `exact`, `relaxed` | the limits as slacks; the true problem and its convex relaxation |
 //! | `interior_point`, `newton`, `band` | the primal-dual interior-point method on one window |
@@ -19,6 +19,7 @@
 //! | `windows` | paths of any length |
 //! | `lower_bound` | a lower bound on the time on the same grid |
 //! | `on_path` | the planner on the package's own paths |
+//! | `turns` | the accelerations with which lines turn back |
 //!
 //! The limits hold to 5e-7 of themselves, as checked at 12 samples of each interval with the path's true derivatives.
 //! Every iterate is a valid plan, so that a planner that is stopped returns the best plan so far. The method is our
@@ -44,6 +45,7 @@ mod relaxed;
 mod rest_ramp;
 mod sides;
 mod speed_envelope;
+mod turns;
 mod window;
 mod windows;
 
@@ -54,6 +56,7 @@ use feedplan_planner::problem::Both;
 
 pub use lower_bound::{certify, Certificate};
 pub use profile::Profile;
+pub use rest_ramp::Ramp;
 
 /// Derivatives of the axes by the arc length at a point of the path, and the speed cap there.
 #[derive(Clone, Copy, Debug)]
@@ -109,6 +112,11 @@ impl SpeedCap {
 #[derive(Clone, Copy, Debug)]
 pub enum End {
     Rest,
+    /// At rest for no time where the path turns back, with an acceleration away from the end of at most this in mm/s²,
+    /// above 0.
+    Turn {
+        acceleration: f64,
+    },
     /// A speed above 0 in mm/s and an acceleration along the path in mm/s². Only some iterations lead to a plan.
     Moving {
         speed: f64,

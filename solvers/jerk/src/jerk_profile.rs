@@ -7,8 +7,8 @@
 use std::ops::Range;
 
 use crate::arc_length_path::{speed_sq, ArcLengthPath};
-use crate::jerk_limited::{Geometry, Profile};
-use crate::s_curve::Section;
+use crate::jerk_limited::{Geometry, Profile, Ramp};
+use crate::s_curve::{Section, SegmentEnd};
 use feedplan_geometry::arc_length::{W, X};
 use feedplan_planner::phase_law::PhaseLaw;
 use feedplan_planner::problem::{greater, lesser, Problem};
@@ -26,6 +26,8 @@ const DEPTH: u32 = 12;
 /// the limit, and its jerk changes by no more than this many roundings.
 const SHOWN: f64 = 1e-7;
 const NOISE: f64 = 8.0;
+/// The ramps of two profiles take up accelerations that differ by this part: some 90 times as much of the jerk.
+const TAKEN_UP: f64 = 2e-3;
 /// Bisection steps for the time at which a section of constant jerk passes a knot.
 const HALVINGS: usize = 200;
 
@@ -65,6 +67,11 @@ pub struct State {
 }
 
 impl State {
+    /// At rest with an acceleration, where the path turns back.
+    fn turns(&self) -> bool {
+        self.v == 0.0 && self.a != 0.0
+    }
+
     /// The state after a time t with a constant jerk.
     pub fn after(&self, t: f64, jerk: f64) -> Self {
         let Self { s, v, a } = *self;
@@ -164,6 +171,77 @@ impl JerkProfile {
         self.stopped |= other.stopped;
     }
 
+    /// The size of the acceleration at the start or at the end, in mm/s².
+    pub fn end_acceleration(&self, end: usize) -> f64 {
+        let a = if end == 0 { self.a0.first() } else { self.a1.last() };
+        a.map_or(0.0, |a| a.abs())
+    }
+
+    /// Lowers the acceleration at a rest where the path turns back from that of the ramp there.
+    ///
+    /// Over thirds of the ramp's time the acceleration is, from the rest on and in parts of the change d, d less, 5/6 d
+    /// more, 1/3 d less, and that of the ramp: time, length and speed stay. The jerk is at most 5.5 d over the time.
+    pub fn turn_with<const M: usize>(
+        &mut self,
+        problem: &Problem<M>,
+        path: &ArcLengthPath<M>,
+        end: usize,
+        acceleration: f64,
+    ) {
+        let at = if end == 0 { 0 } else { self.len() - 1 };
+        let (change, time) = (self.end_acceleration(end) - acceleration, self.duration[at]);
+        let mut from = State { s: 0.0, v: 0.0, a: acceleration };
+        let mut spans = vec![];
+        for jerk in [5.5, -3.5, 1.0].map(|part| part * change / time) {
+            let duration = time / 3.0;
+            let to = from.after(duration, jerk);
+            let part = if end == 0 { 0 } else { path.parts.len() - 1 };
+            let back = |state: State| State { s: path.total() - state.s, v: state.v, a: -state.a };
+            let ends = if end == 0 { [from, to] } else { [back(to), back(from)] };
+            spans.push(Span { part, ends, jerk, duration });
+            from = to;
+        }
+        if end == 1 {
+            spans.reverse();
+        }
+        let mut ramp = Self::default();
+        ramp.push_spans(problem, path, &spans);
+        let last = ramp.len() - 1;
+        (ramp.u0[0], ramp.p0[0], ramp.u1[last], ramp.p1[last]) =
+            (self.u0[at], self.p0[at], self.u1[at], self.p1[at]);
+        for column in [&mut self.value, &mut self.u0, &mut self.u1, &mut self.p0, &mut self.p1] {
+            column.remove(at);
+        }
+        for column in [&mut self.duration, &mut self.a0, &mut self.a1] {
+            column.remove(at);
+        }
+        self.piece.remove(at);
+        self.kind.remove(at);
+        if end == 0 {
+            std::mem::swap(self, &mut ramp);
+        }
+        self.append(ramp);
+    }
+
+    /// Whether another profile can go on from a turn after this one, where the acceleration may be at most `most`: the
+    /// ramps take up what their accelerations differ by.
+    pub fn meets(&self, next: &Self, most: f64) -> bool {
+        let [own, other] = [self.end_acceleration(1), next.end_acceleration(0)];
+        let (change, greater) = ((own - other).abs(), own.max(other));
+        let ramp = if own > other { self.has_ramp(1) } else { next.has_ramp(0) };
+        self.is_unplanned()
+            || next.is_unplanned()
+            || change == 0.0
+            || ramp && change <= TAKEN_UP * greater && greater + change <= most
+    }
+
+    /// Whether one phase is the ramp of constant acceleration from or to rest.
+    fn has_ramp(&self, end: usize) -> bool {
+        let is_steady = |at: usize| self.kind[at] == PATH_JERK && self.value[at] == 0.0;
+        let (at, next) = if end == 0 { (0, 1) } else { (self.len() - 1, self.len().wrapping_sub(2)) };
+        next < self.len() && is_steady(at) && !is_steady(next)
+    }
+
     /// Appends a phase between two parameters of a piece. A phase too short to show in u is merged into its neighbour.
     fn push<const M: usize>(
         &mut self,
@@ -176,7 +254,8 @@ impl JerkProfile {
         let last = self.len().wrapping_sub(1);
         let goes_on = last < self.len() && self.piece[last] as usize == piece && self.u1[last] == u0;
         let speed = |u: f64, v: f64| if v == 0.0 { 0.0 } else { v * v / speed_sq(problem, piece, u) };
-        if u1 <= u0 || phase.duration <= SHORTEST * rise_time(problem) {
+        let turns = phase.ends.iter().any(State::turns);
+        if u1 <= u0 || !turns && phase.duration <= SHORTEST * rise_time(problem) {
             let u1 = u1.max(u0);
             if goes_on {
                 self.duration[last] += phase.duration;
@@ -215,13 +294,13 @@ impl JerkProfile {
         self.push_spans(problem, path, &spans);
     }
 
-    /// Appends sections of constant jerk along a whole subrun, to a speed in mm/s without acceleration.
+    /// Appends sections of constant jerk along a whole subrun, to an end.
     pub fn push_sections<const M: usize>(
         &mut self,
         problem: &Problem<M>,
         path: &ArcLengthPath<M>,
         sections: &[Section],
-        end: f64,
+        end: SegmentEnd,
     ) {
         let mut spans = vec![];
         for (i, section) in sections.iter().enumerate() {
@@ -229,7 +308,7 @@ impl JerkProfile {
             let from = State { s: section.position, v: section.speed, a: section.acceleration };
             let to = match sections.get(i + 1) {
                 Some(next) => State { s: next.position, v: next.speed, a: next.acceleration },
-                None => State { s: path.total(), v: end, a: 0.0 },
+                None => State { s: path.total(), v: end.speed, a: -end.acceleration },
             };
             let Section { jerk, duration, .. } = *section;
             Span { part: 0, ends: [from, to], jerk, duration }.cut(path, &mut spans);
@@ -257,9 +336,11 @@ impl JerkProfile {
             for (i, span) in spans.iter().enumerate() {
                 let (u, length) = ([u[i], u[i + 1]], span.length());
                 let moved = path.length_between(part, u[0], u[1]) - length;
-                // The faster end moves: next to rest a small part of the length takes much of the time.
+                // The faster end moves: next to rest a small part of the length takes much of the time. Where the path turns
+                // back, the speed follows from the acceleration and the time.
                 let fastest = span.ends[0].v.max(span.ends[1].v);
-                let duration = span.duration + if fastest > 0.0 { moved / fastest } else { 0.0 };
+                let keeps = fastest == 0.0 || span.ends.iter().any(State::turns);
+                let duration = span.duration + if keeps { 0.0 } else { moved / fastest };
                 let phase = Phase { kind: PATH_JERK, value: span.jerk, ends: span.ends, duration };
                 self.push(problem, path.parts[part].piece, u, &phase);
             }
@@ -297,11 +378,12 @@ impl JerkProfile {
             let mut states = moved_states(profile, first..end + 1, ends_of_part, meeting, &lengths);
             let count = states.len();
             if first == 0 && s[0] > ends[0] {
-                let rest = State { s: ends[0], v: 0.0, a: 0.0 };
                 let within = part == 0;
                 let length = if within { lengths[0] } else { s[0] - ends[0] };
-                let (jerk, duration) = ramp(length, states[0].v);
-                states[0].a = jerk * duration;
+                let OnRamp { jerk, duration, ends: [from, to] } =
+                    OnRamp::new(Ramp { length, ..profile.ramp(0) }, states[0].v);
+                let rest = State { s: ends[0], v: 0.0, a: from };
+                states[0].a = to;
                 if within {
                     let phase = Phase { kind: PATH_JERK, value: jerk, ends: [rest, states[0]], duration };
                     self.push(problem, at.piece, [u[0], u[1]], &phase);
@@ -312,9 +394,10 @@ impl JerkProfile {
             let stops = end == last && s[last] < ends[1];
             let within = part + 1 == path.parts.len();
             let length = if within { lengths[count] } else { ends[1] - s[last] };
-            let (jerk, duration) = ramp(length, states[count - 1].v);
+            let OnRamp { jerk, duration, ends: [from, to] } =
+                OnRamp::new(Ramp { length, ..profile.ramp(1) }, states[count - 1].v);
             if stops {
-                states[count - 1].a = -jerk * duration;
+                states[count - 1].a = -to;
             }
             for n in 1..count {
                 // Where the moves from both knots meet, the phase has the rounding of s.
@@ -324,7 +407,7 @@ impl JerkProfile {
                 self.push(problem, at.piece, [u[n], u[n + 1]], &phase);
             }
             if stops {
-                let rest = State { s: ends[1], v: 0.0, a: 0.0 };
+                let rest = State { s: ends[1], v: 0.0, a: -from };
                 let from = states[count - 1];
                 if within {
                     let phase = Phase { kind: PATH_JERK, value: jerk, ends: [from, rest], duration };
@@ -345,11 +428,25 @@ fn rise_time<const M: usize>(problem: &Problem<M>) -> f64 {
     (0..M).map(of_axis).fold(f64::INFINITY, f64::min)
 }
 
-/// Jerk and duration of a ramp from rest to a speed: s = J t³/6 and v = J t²/2, so that t = 3 s/v. The acceleration at
-/// its end is J t up to rounding; that of the profile belongs to the length before rounding.
-fn ramp(length: f64, v: f64) -> (f64, f64) {
-    let t = 3.0 * length / v;
-    (2.0 * v / (t * t), t)
+/// The motion on a ramp from rest to a speed.
+struct OnRamp {
+    jerk: f64,
+    duration: f64,
+    /// The accelerations at both ends, up to rounding; those of the profile belong to the length before rounding.
+    ends: [f64; 2],
+}
+
+impl OnRamp {
+    /// At constant jerk, s = J t³/6 and v = J t²/2, so that t = 3 s/v; at constant acceleration t = 2 s/v.
+    fn new(ramp: Ramp, v: f64) -> Self {
+        let t = ramp.way() / v;
+        if ramp.power == Ramp::ACCELERATION {
+            Self { jerk: 0.0, duration: t, ends: [v / t; 2] }
+        } else {
+            let jerk = 2.0 * v / (t * t);
+            Self { jerk, duration: t, ends: [0.0, jerk * t] }
+        }
+    }
 }
 
 /// The number of these stations between two knots that are nearer to the first knot.

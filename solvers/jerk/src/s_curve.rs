@@ -45,7 +45,7 @@ use buffer::Buffer;
 use feedplan_geometry::watch::Watch;
 use feedplan_planner::problem::Fault;
 pub use section::{Section, SectionKind};
-pub use segment::Segment;
+pub use segment::{Segment, SegmentEnd};
 pub use transition::Limits;
 
 /// The streaming profiler: segments in, sections out.
@@ -102,7 +102,8 @@ impl Profiler {
         self.plan();
         let start = self.speeds.pop_front().unwrap_or(0.0);
         if let Some(segment) = self.buffer.pop() {
-            self.start = section::cross(&segment, start, self.speeds[0], self.start, out);
+            self.start =
+                section::cross(&segment, [start, self.speeds[0]].map(SegmentEnd::moving), self.start, out);
             self.entered += 1;
             self.moving = self.moving.saturating_sub(1);
         }
@@ -138,15 +139,11 @@ pub fn plan(segments: &[Segment], look_ahead: usize, watch: Watch) -> Result<Vec
     Ok(sections)
 }
 
-/// The quickest sections of a segment between speeds without acceleration; None where the segment does not join them.
-pub fn cross(segment: &Segment, [from, to]: [f64; 2]) -> Result<Option<Vec<Section>>, Fault> {
-    segment.check(0)?;
-    let joins = from.max(to) <= segment.speed() && segment.joins(from, to);
-    Ok(joins.then(|| {
-        let mut sections = vec![];
-        section::cross(segment, from, to, section::SegmentStart::default(), &mut sections);
-        sections
-    }))
+/// The quickest sections of a segment between two ends that it joins.
+pub fn cross(segment: &Segment, ends: [SegmentEnd; 2]) -> Vec<Section> {
+    let mut sections = vec![];
+    section::cross(segment, ends, section::SegmentStart::default(), &mut sections);
+    sections
 }
 
 #[cfg(test)]

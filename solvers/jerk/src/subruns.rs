@@ -1,5 +1,6 @@
 //! Subruns of a path: runs cut where the tool must rest (stops, and cusps, whose curvature has no bound), and each
-//! subrun cut into parts without such a place and without a kink of the speed cap.
+//! subrun cut into parts without such a place and without a kink of the speed cap. Where the path turns back, the tool
+//! rests for no time, and its acceleration need not vanish: such subruns follow each other in a chain.
 //!
 //! Input: the pieces and limits of a problem. Lengths in mm, speeds in mm/s, parameters u in [0, width] of a piece.
 
@@ -17,7 +18,7 @@ use feedplan_geometry::spline::cusps::piece_cusps;
 use feedplan_geometry::spline::rational::Hodograph;
 use feedplan_geometry::tolerance::CUSP;
 use feedplan_geometry::watch::Watch;
-use feedplan_planner::problem::{lesser, Fault, Problem};
+use feedplan_planner::problem::{along, lesser, Fault, Problem};
 
 /// Cusps closer to the end of a piece than this part of it count as its end.
 const AT_END: f64 = 1e-9;
@@ -43,6 +44,9 @@ const SAMPLES: [usize; 2] = [4, 64];
 const TIGHT: f64 = 10.0;
 /// Distance from a point of a line at which its direction is compared, as a part of the piece.
 const BESIDE: f64 = 1e-4;
+/// A jump of the acceleration that third differences of setpoints show as less than this part of the limit of jerk is
+/// rounding: half of what an audit can tell.
+const UNSEEN: f64 = 5e-7;
 /// The share of this cutting in the work of a plan.
 const CUTTING: f64 = 0.1;
 
@@ -56,6 +60,14 @@ pub struct Subrun {
     pub ends: [f64; 2],
 }
 
+/// Subruns between whose ends the path turns back.
+pub struct Chain<'a> {
+    pub subruns: &'a [Subrun],
+    /// The greatest acceleration along the path, in mm/s², with which the tool can turn back after each of them but the
+    /// last.
+    pub turns: &'a [f64],
+}
+
 /// The profile of a path within these jerk limits in mm/s³; `plan` plans each subrun alone and counts its work. A run
 /// with an unplanned subrun has no phases.
 pub fn over_subruns<const M: usize>(
@@ -63,14 +75,28 @@ pub fn over_subruns<const M: usize>(
     jerk: &[f64; M],
     plan: impl Fn(&Subrun, &Limits<M>, Watch) -> Result<JerkProfile, Fault> + Sync,
 ) -> Result<JerkProfile, Fault> {
+    over_chains(problem, jerk, |chain, limits, watch| {
+        chain
+            .subruns
+            .par_iter()
+            .map(|subrun| plan(subrun, limits, watch.part(subrun.parts.len() as f64)))
+            .collect()
+    })
+}
+
+/// The same with a `plan` of the subruns of a chain. Its watch counts a part of a piece.
+pub fn over_chains<const M: usize>(
+    problem: &Problem<M>,
+    jerk: &[f64; M],
+    plan: impl Fn(Chain, &Limits<M>, Watch) -> Result<Vec<JerkProfile>, Fault> + Sync,
+) -> Result<JerkProfile, Fault> {
     let limits = checked(problem, jerk)?;
     let subruns = subruns(problem);
+    let turns = turns(problem, &limits, &subruns);
     let watch = problem.watch.part(1.0 - CUTTING).each(problem.width.len());
-    let planned: Result<Vec<JerkProfile>, Fault> = subruns
-        .par_iter()
-        .map(|subrun| plan(subrun, &limits, watch.part(subrun.parts.len() as f64)))
-        .collect();
-    let mut planned = planned?.into_iter();
+    let planned: Result<Vec<Vec<JerkProfile>>, Fault> =
+        chains(&subruns, &turns).into_par_iter().map(|chain| plan(chain, &limits, watch)).collect();
+    let mut planned = planned?.into_iter().flatten();
     let mut all = JerkProfile::default();
     all.runs.push(0);
     for run in subruns.chunk_by(|a, b| a.run == b.run) {
@@ -95,6 +121,45 @@ pub fn checked<const M: usize>(problem: &Problem<M>, jerk: &[f64; M]) -> Result<
         }
     }
     Ok(Limits { velocity: problem.max_velocity, acceleration: problem.max_acceleration, jerk: *jerk })
+}
+
+/// The greatest accelerations along the path, in mm/s², with which the tool can turn back between subruns.
+pub fn turns<const M: usize>(problem: &Problem<M>, limits: &Limits<M>, subruns: &[Subrun]) -> Vec<f64> {
+    subruns.windows(2).map(|pair| turn(problem, limits, &pair[0], &pair[1])).collect()
+}
+
+/// The subruns between turns of which none is 0.
+pub fn chains<'a>(subruns: &'a [Subrun], turns: &'a [f64]) -> Vec<Chain<'a>> {
+    let mut out = vec![];
+    let mut first = 0;
+    for end in 1..=subruns.len() {
+        if end == subruns.len() || turns[end - 1] == 0.0 {
+            out.push(Chain { subruns: &subruns[first..end], turns: &turns[first..end - 1] });
+            first = end;
+        }
+    }
+    out
+}
+
+/// The greatest acceleration along the path, in mm/s², with which the tool can turn back from the end of a subrun to the
+/// next one; 0 where the path does not turn back, or a run ends.
+///
+/// Both directions are opposite up to what setpoints show of the jump between both accelerations.
+fn turn<const M: usize>(problem: &Problem<M>, limits: &Limits<M>, before: &Subrun, after: &Subrun) -> f64 {
+    let (end, start) = (before.parts[before.parts.len() - 1], after.parts[0]);
+    if before.run != after.run {
+        return 0.0;
+    }
+    let back = path_point(problem, end.piece, end.u[1]).first;
+    let first = path_point(problem, start.piece, start.u[0]).first;
+    let acceleration = along(&limits.acceleration, &first);
+    let unseen =
+        |k: usize| acceleration * (first[k] + back[k]).abs() <= UNSEEN * limits.jerk[k] * problem.period;
+    if (0..M).all(unseen) {
+        acceleration
+    } else {
+        0.0
+    }
 }
 
 pub fn subruns<const M: usize>(problem: &Problem<M>) -> Vec<Subrun> {
@@ -134,7 +199,7 @@ pub fn subruns<const M: usize>(problem: &Problem<M>) -> Vec<Subrun> {
         }
     }
     // Given end speeds are the tool's; convert them to the axes' path.
-    let along = |speed: f64, i: usize, u: f64| {
+    let on_path = |speed: f64, i: usize, u: f64| {
         if speed > 0.0 {
             speed * per_feed(problem, i, u, speed_sq(problem, i, u))
         } else {
@@ -142,8 +207,8 @@ pub fn subruns<const M: usize>(problem: &Problem<M>) -> Vec<Subrun> {
         }
     };
     let (last, end) = (out.len() - 1, problem.width.len() - 1);
-    out[0].ends[0] = along(problem.start_speed, 0, 0.0);
-    out[last].ends[1] = along(problem.end_speed, end, problem.width[end]);
+    out[0].ends[0] = on_path(problem.start_speed, 0, 0.0);
+    out[last].ends[1] = on_path(problem.end_speed, end, problem.width[end]);
     out
 }
 

@@ -19,6 +19,8 @@ pub const SAME_DIRECTION: f64 = 1e-9;
 pub const ROUNDED_TANGENT: f64 = 0.0175;
 /// A smooth path stops where the program turns by more: no curve passes both sides of the corner at any speed. [135°]
 pub const REVERSAL: f64 = 2.356;
+/// Two edges are opposite that turn by half a circle but for less. [program: a planner that goes on there checks it itself]
+pub const OPPOSITE: f64 = 1e-6;
 /// Corners that turn back are not rounded where cos(turn/2) is below this, for they are passed near rest anyway. [177.7°]
 pub const REVERSAL_COSINE: f64 = 0.02;
 /// The sweep of an arc is corrected by up to this to the end point that the program gives. [program, on a small radius]

@@ -133,7 +133,8 @@ impl<const M: usize> JointAudit<'_, M> {
         }
     }
 
-    /// From the arc before: no jump along the path, and of a joint only where the curvature jumps.
+    /// From the arc before: no jump along the path, and of a joint only where the curvature jumps. At rest between two
+    /// pieces no joint's acceleration jumps: it goes on where the path turns back along the line that it came on.
     fn jumps(&self, arc: usize, piece: &Piece<M>, work: &mut Work, tally: &mut Tally<M>) {
         let arcs = &self.arcs;
         if !is_by_way(arcs.kind[arc]) || !is_by_way(arcs.kind[arc - 1]) {
@@ -141,10 +142,13 @@ impl<const M: usize> JointAudit<'_, M> {
         }
         let (time, line) = (self.starts[arc], piece.line);
         let (from, to) = (arcs.a1[arc - 1], arcs.a0[arc]);
-        let off = (to - from).abs() - ROUNDING * (to.abs() + from.abs());
-        tally.offer(Check::AccelerationContinuity, 0, off, self.negligible_pull(0.0), time, line);
         let number = arcs.piece[arc - 1] as usize;
-        if number == piece.number {
+        let rests = number != piece.number && arcs.p1[arc - 1] == 0.0 && arcs.p0[arc] == 0.0;
+        if !rests {
+            let off = (to - from).abs() - ROUNDING * (to.abs() + from.abs());
+            tally.offer(Check::AccelerationContinuity, 0, off, self.negligible_pull(0.0), time, line);
+        }
+        if number == piece.number || rests && from == 0.0 && to == 0.0 {
             return;
         }
         let before: Piece<M> = self.path.piece(number);
@@ -155,6 +159,11 @@ impl<const M: usize> JointAudit<'_, M> {
         for k in 0..self.path.joints {
             let doubt = into.acceleration.1[k] + out.acceleration.1[k];
             let step = (out.acceleration.0[k] - into.acceleration.0[k]).abs() - doubt;
+            if rests {
+                let negligible = PASS_EXCESS * self.limits.jerk[k] * self.limits.period;
+                tally.offer(Check::AccelerationContinuity, k, step, negligible, time, line);
+                continue;
+            }
             let step = if turn <= SMOOTH { step } else { 0.0 };
             // Of a step over the period a third difference of setpoints shows at most three quarters as a jerk.
             let limit = self.limits.jerk[k] * self.limits.period / 0.75;

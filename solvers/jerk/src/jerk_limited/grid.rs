@@ -165,7 +165,7 @@ fn density(samples: &[EnvelopeSample], slopes: Slopes, ends: &[WindowEnd; 2], re
     // The first interval is at most as long as the ramp before it, and the last one as the ramp after it.
     for (kind, i) in ends.iter().zip([0, last]) {
         if let WindowEnd::Rest { ramp, .. } = *kind {
-            length[i] = length[i].min(1.0 / (1.0 / ramp + samples[i].turning));
+            length[i] = length[i].min(1.0 / (1.0 / ramp.length + samples[i].turning));
         }
     }
     for i in 1..=last {
@@ -184,6 +184,7 @@ fn density(samples: &[EnvelopeSample], slopes: Slopes, ends: &[WindowEnd; 2], re
 
 #[cfg(test)]
 mod tests {
+    use super::super::rest_ramp::Ramp;
     use super::super::speed_envelope::sample_envelope;
     use super::super::{Limits, PathPoint};
     use super::*;
@@ -204,7 +205,8 @@ mod tests {
     fn knots_and_capped_places_are_stations() {
         let limits = Limits { velocity: [[250.0]; 2], acceleration: [[3000.0]; 2], jerk: [50_000.0] };
         let caps = [SpeedCap::new(3.0, 20.0), SpeedCap::new(30.0, 5.0)];
-        let ends = [WindowEnd::Rest { ramp: 0.01, greatest: 1.0 }; 2];
+        let ramp = Ramp { length: 0.01, power: Ramp::JERK };
+        let ends = [WindowEnd::Rest { ramp, greatest: 1.0 }; 2];
         let (samples, slopes) =
             sample_envelope(&Line, &limits, &caps, [0.01, 49.99], &ends, Watch::default()).expect("speeds");
         let grid = Grid::new(&samples, slopes, &caps, &ends, 16.0);

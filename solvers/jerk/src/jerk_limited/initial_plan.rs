@@ -43,7 +43,7 @@ pub fn smooth(stations: &[f64], caps: &[f64], slopes: Slopes, ends: &[WindowEnd;
         if let WindowEnd::Rest { ramp, greatest } = *kind {
             let (at, sign) = if end == 0 { (0, 1.0) } else { (2 * last, -1.0) };
             x[at] = x[at].min(END * greatest);
-            x[at + 1] = sign * 4.0 / 3.0 * x[at] / ramp;
+            x[at + 1] = sign * ramp.slope() * x[at];
         }
     }
     x

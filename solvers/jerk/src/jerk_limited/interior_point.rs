@@ -16,19 +16,28 @@ use super::constraints::{Constraints, RowLayout};
 use super::hermite::local;
 use super::model::Model;
 use super::newton::State;
+use super::rest_ramp::Ramp;
 use crate::lanes::{Lanes, LogProduct};
 use feedplan_geometry::watch::Watch;
 
 /// The known values at an end of a window.
 #[derive(Clone, Copy, Debug)]
 pub enum WindowEnd {
-    /// The path begins or ends at rest: a ramp w ∝ s^(4/3) of this length in mm, with w at most `greatest` at its end.
-    Rest { ramp: f64, greatest: f64 },
+    /// The path begins or ends at rest, with a ramp, and w at most `greatest` at its end.
+    Rest { ramp: Ramp, greatest: f64 },
     /// w and w' are given.
     Fixed { w: f64, slope: f64 },
 }
 
 impl WindowEnd {
+    /// The ramp at this end.
+    pub fn ramp(&self) -> Ramp {
+        match *self {
+            Self::Rest { ramp, .. } => ramp,
+            Self::Fixed { .. } => Ramp { length: 0.0, power: Ramp::JERK },
+        }
+    }
+
     /// Whether a spline that ends with these values meets this end.
     pub fn is_met(&self, end_w: f64, end_slope: f64) -> bool {
         match *self {
@@ -106,7 +115,7 @@ pub struct InteriorPoint<X, const M: usize> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct EndRow {
     pub station: usize,
-    pub ramp: f64,
+    pub ramp: Ramp,
     pub greatest: f64,
     pub slack: f64,
     pub dual: f64,
@@ -338,7 +347,7 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
         let mut time = self.model.time(simd, rows, x, trial);
         for (kind, w) in ends.iter().zip([x[0], x[x.len() - 2]]) {
             if let WindowEnd::Rest { ramp, .. } = kind {
-                time += if w > 0.0 { 3.0 * ramp / w.sqrt() } else { f64::INFINITY };
+                time += if w > 0.0 { ramp.way() / w.sqrt() } else { f64::INFINITY };
             }
         }
         time
@@ -348,7 +357,7 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
 /// The condition on the unknowns of an end; `sign` is −1 at the end of the path.
 fn end_condition(kind: &WindowEnd, sign: f64) -> EndCondition {
     match kind {
-        WindowEnd::Rest { ramp, .. } => EndCondition::Slope(sign * 4.0 / (3.0 * ramp)),
+        WindowEnd::Rest { ramp, .. } => EndCondition::Slope(sign * ramp.slope()),
         WindowEnd::Fixed { .. } => EndCondition::Given,
     }
 }

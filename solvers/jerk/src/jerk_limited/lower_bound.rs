@@ -241,9 +241,9 @@ fn join(parts: &[Part], cores: &[Range<usize>], ends: &[WindowEnd; 2], unknowns:
             WindowEnd::Rest { ramp, greatest } => {
                 let dual = parts[end * (parts.len() - 1)].ends[end];
                 let w = x[at];
-                value += 3.0 * ramp / w.sqrt() - dual * (1.0 - w / greatest);
-                slope[at] += dual / greatest - 1.5 * ramp / (w * w.sqrt());
-                slope[at] += sign * 4.0 / (3.0 * ramp) * slope[at + 1];
+                value += ramp.way() / w.sqrt() - dual * (1.0 - w / greatest);
+                slope[at] += dual / greatest - 0.5 * ramp.way() / (w * w.sqrt());
+                slope[at] += sign * ramp.slope() * slope[at + 1];
                 slope[at + 1] = 0.0;
                 boxes[at][1] = boxes[at][1].min(greatest);
             }

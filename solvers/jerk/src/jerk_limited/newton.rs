@@ -58,10 +58,10 @@ impl<X: Model<M>, const M: usize> InteriorPoint<X, M> {
             row.dual = (row.dual + part * row.step).max(least_dual / row.slack);
             work += row.dual * row.slack;
             let w = x[2 * row.station];
-            let fall = row.ramp / (w * w.sqrt());
-            self.gradient[2 * row.station] -= 1.5 * fall;
+            let fall = row.ramp.way() / (w * w.sqrt());
+            self.gradient[2 * row.station] -= 0.5 * fall;
             self.band.diagonal[row.station][0] +=
-                2.25 * fall / w + row.dual / row.slack / (row.greatest * row.greatest);
+                0.75 * fall / w + row.dual / row.slack / (row.greatest * row.greatest);
         }
         work
     }

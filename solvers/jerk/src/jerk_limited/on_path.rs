@@ -3,23 +3,29 @@
 //!
 //! Each subrun is planned along its arc length. Two more speed caps hold inside it: a corner is passed at its speed,
 //! and a junction where q'' jumps at the speed at which third differences of setpoints keep the limits of jerk
-//! (`curvature_jumps`). Lines from rest to rest take sections of constant jerk.
+//! (`curvature_jumps`). Lines take sections of constant jerk. Where the path turns back, the tool rests for no time, and
+//! the acceleration goes on (`turns`).
 
 use std::ops::Range;
 
 use rayon::prelude::*;
 
 use crate::arc_length_path::{speed_sq, ArcLengthPath, Junction, Part};
-use crate::jerk_limited::{self, Effort, End, Geometry, Limits, Profile};
+use crate::jerk_limited::turns::{lower, Line};
+use crate::jerk_limited::{self, Effort, End, Geometry, Limits, Profile, Ramp};
 use crate::jerk_profile::{JerkProfile, SPEED_CUBIC};
-use crate::s_curve;
-use crate::subruns::{checked, over_subruns, subruns, Subrun};
+use crate::s_curve::{self, Segment};
+use crate::subruns::{chains, checked, over_chains, subruns, turns, Chain, Subrun};
 use feedplan_planner::problem::{along, Fault, Problem};
 
 /// A junction holds the speed where the plan is within this part of its cap.
 const HELD: f64 = 0.998;
 /// A subrun without a plan is cut at most this often where the planner finds no speed.
 const CUTS: u32 = 12;
+/// Other subruns turn back with at most this part of what lines can: a line must reach the rest.
+const BELOW: f64 = 0.9999;
+/// How often subruns are planned that do not meet, and meet without acceleration at last.
+const ROUNDS: usize = 4;
 /// Bisection steps for the greatest speed that an end can have.
 const TRIALS: u32 = 12;
 
@@ -32,8 +38,8 @@ pub fn plan<const M: usize>(
     jerk: &[f64; M],
     effort: &Effort,
 ) -> Result<JerkProfile, Fault> {
-    over_subruns(problem, jerk, |subrun, limits, watch| {
-        Task { problem, limits: *limits, effort: &Effort { watch, ..*effort } }.subrun(subrun)
+    over_chains(problem, jerk, |chain, limits, watch| {
+        Task { problem, limits: *limits, effort: &Effort { watch, ..*effort } }.chain(&chain)
     })
 }
 
@@ -74,15 +80,38 @@ pub fn certified<const M: usize>(
     }
     offsets.push(count);
     let watch = problem.watch.each(problem.width.len());
-    let lower_bound = |(i, subrun): (usize, &Subrun)| {
-        if effort.expired() {
-            return 0.0;
-        }
-        let effort = Effort { watch: watch.part(subrun.parts.len() as f64), ..*effort };
-        let task = Task { problem, limits, effort: &effort };
-        task.certified(subrun, columns, offsets[i]..offsets[i + 1]).unwrap_or(0.0)
+    let of_chain = |chain: Chain| -> Result<Vec<f64>, Fault> {
+        let Strokes { paths, lines, accelerations } = Task { problem, limits, effort }.strokes(&chain)?;
+        let lower_bound = |i: usize| {
+            let subrun = &chain.subruns[i];
+            let watch = watch.part(subrun.parts.len() as f64);
+            if let Some(line) = lines[i] {
+                let ends = line.ends([accelerations[i], accelerations[i + 1]]);
+                return s_curve::cross(&line.segment, ends).iter().map(|section| section.duration).sum();
+            }
+            if effort.expired() {
+                return 0.0;
+            }
+            let phases = offsets[subrun.number]..offsets[subrun.number + 1];
+            let ends = [0, 1].map(|end| end_of(subrun.ends[end], accelerations[i + end]));
+            let task = Task { problem, limits, effort: &Effort { watch, ..*effort } };
+            task.certified(&paths[i], ends, columns, phases).unwrap_or(0.0)
+        };
+        Ok((0..lines.len()).into_par_iter().map(lower_bound).collect())
     };
-    Ok(subruns.par_iter().enumerate().map(lower_bound).collect())
+    let turns = turns(problem, &limits, &subruns);
+    let bounds: Result<Vec<Vec<f64>>, Fault> =
+        chains(&subruns, &turns).into_par_iter().map(of_chain).collect();
+    Ok(bounds?.concat())
+}
+
+/// The subruns of a chain.
+struct Strokes<'a, const M: usize> {
+    paths: Vec<ArcLengthPath<'a, M>>,
+    /// Those that are lines.
+    lines: Vec<Option<Line>>,
+    /// The greatest accelerations at their ends that the lines allow, in mm/s².
+    accelerations: Vec<f64>,
 }
 
 pub struct Task<'a, const M: usize> {
@@ -92,43 +121,121 @@ pub struct Task<'a, const M: usize> {
 }
 
 impl<const M: usize> Task<'_, M> {
-    /// The profile of a subrun; unplanned if the deadline has passed.
-    pub fn subrun(&self, subrun: &Subrun) -> Result<JerkProfile, Fault> {
+    /// The profiles of a chain of subruns; unplanned if the deadline has passed. Between them the tool turns back with
+    /// the greatest accelerations that all lines allow. Other subruns are planned first, with what accelerations are
+    /// the best for them; the lines beside them take the same. Two of those in a row are planned again, with at most the
+    /// lesser of both, until they meet.
+    fn chain(&self, chain: &Chain) -> Result<Vec<JerkProfile>, Fault> {
+        let count = chain.subruns.len();
         if self.effort.expired() {
-            return Ok(JerkProfile::unplanned());
+            return Ok(vec![JerkProfile::unplanned(); count]);
         }
-        self.plan(&subrun.parts, subrun.ends, 0)
-    }
-
-    /// The profile of parts between speeds at their ends in mm/s, after this number of cuts.
-    fn plan(&self, parts: &[Part], speeds: [f64; 2], cuts: u32) -> Result<JerkProfile, Fault> {
-        let path = ArcLengthPath::new(self.problem, parts);
-        let mut phases = JerkProfile::default();
-        if let Some((direction, feed)) = path.line() {
-            if let Some(sections) = self.cross(path.total(), &direction, feed, speeds)? {
-                phases.push_sections(self.problem, &path, &sections, speeds[1]);
-                return Ok(phases);
+        let Strokes { paths, lines, mut accelerations } = self.strokes(chain)?;
+        for i in 1..count {
+            let most = BELOW * accelerations[i];
+            accelerations[i] = match [lines[i - 1], lines[i]] {
+                [None, None] => most,
+                [Some(line), None] => line.alone(1, most),
+                [None, Some(line)] => line.alone(0, most),
+                _ => accelerations[i],
+            };
+        }
+        let plan = |i: usize, accelerations: &[f64]| {
+            let subrun = &chain.subruns[i];
+            let watch = self.effort.watch.part(subrun.parts.len() as f64);
+            let effort = Effort { watch, ..*self.effort };
+            let ends = [0, 1].map(|end| end_of(subrun.ends[end], accelerations[i + end]));
+            Task { effort: &effort, problem: self.problem, limits: self.limits }.plan(&paths[i], ends, 0)
+        };
+        let mut planned = vec![JerkProfile::default(); count];
+        let mut open: Vec<usize> = (0..count).filter(|&i| lines[i].is_none()).collect();
+        for round in 0.. {
+            if open.is_empty() {
+                break;
+            }
+            let again: Vec<JerkProfile> =
+                open.par_iter().map(|&i| plan(i, &accelerations)).collect::<Result<_, _>>()?;
+            for (&i, phases) in open.iter().zip(again) {
+                planned[i] = phases;
+            }
+            open.clear();
+            for i in 1..count {
+                if lines[i - 1].is_some()
+                    || lines[i].is_some()
+                    || planned[i - 1].meets(&planned[i], chain.turns[i - 1])
+                {
+                    continue;
+                }
+                let both = [planned[i - 1].end_acceleration(1), planned[i].end_acceleration(0)];
+                accelerations[i] = if round < ROUNDS { both[0].min(both[1]) } else { 0.0 };
+                open.extend(
+                    [0, 1].into_iter().filter(|&side| both[side] > accelerations[i]).map(|side| i - 1 + side),
+                );
+            }
+            open.dedup();
+        }
+        for i in 0..count {
+            if lines[i].is_none() && !planned[i].is_empty() {
+                let own = [0, 1].map(|end| planned[i].end_acceleration(end));
+                accelerations[i] =
+                    if i > 0 && lines[i - 1].is_none() { accelerations[i].min(own[0]) } else { own[0] };
+                accelerations[i + 1] = own[1];
             }
         }
+        for i in 0..count {
+            for end in [0, 1] {
+                let own = accelerations[i + end];
+                if lines[i].is_none() && planned[i].end_acceleration(end) > own {
+                    planned[i].turn_with(self.problem, &paths[i], end, own);
+                }
+            }
+        }
+        lower(&lines, &mut accelerations);
+        for i in 0..count {
+            if let Some(line) = &lines[i] {
+                planned[i] = self.along_line(&paths[i], line, [accelerations[i], accelerations[i + 1]]);
+            }
+        }
+        Ok(planned)
+    }
+
+    /// The paths and lines of a chain, with the greatest accelerations between them.
+    fn strokes<'b>(&self, chain: &Chain<'b>) -> Result<Strokes<'b, M>, Fault>
+    where
+        Self: 'b,
+    {
+        let paths: Vec<ArcLengthPath<M>> =
+            chain.subruns.par_iter().map(|subrun| ArcLengthPath::new(self.problem, &subrun.parts)).collect();
+        let line = |(path, subrun): (&ArcLengthPath<M>, &Subrun)| self.line(path, subrun.ends);
+        let lines = paths.iter().zip(chain.subruns).map(line).collect::<Result<Vec<_>, _>>()?;
+        let mut accelerations = [&[0.0], chain.turns, &[0.0]].concat();
+        lower(&lines, &mut accelerations);
+        Ok(Strokes { paths, lines, accelerations })
+    }
+
+    /// The profile of a subrun that rests at its ends, or moves as it says; unplanned if the deadline has passed.
+    pub fn subrun(&self, subrun: &Subrun) -> Result<JerkProfile, Fault> {
+        let own = Chain { subruns: std::slice::from_ref(subrun), turns: &[] };
+        Ok(self.chain(&own)?.remove(0))
+    }
+
+    /// The profile of a path between two ends, after this number of cuts.
+    fn plan(&self, path: &ArcLengthPath<M>, ends: [End; 2], cuts: u32) -> Result<JerkProfile, Fault> {
+        let mut phases = JerkProfile::default();
         let junctions = path.junctions(&self.limits.jerk);
         let caps = path.caps(&junctions);
-        let problem = jerk_limited::Problem {
-            geometry: &path,
-            limits: self.limits,
-            caps: &caps,
-            ends: speeds.map(end),
-        };
-        let moving = speeds != [0.0; 2];
+        let problem = jerk_limited::Problem { geometry: path, limits: self.limits, caps: &caps, ends };
+        let moving = ends.iter().any(|end| matches!(end, End::Moving { .. }));
         match jerk_limited::plan(&problem, self.effort) {
             // The deadline came before the first iteration of all windows.
             Ok(plan) if plan.iterations == 0.0 && self.effort.expired() => Ok(JerkProfile::unplanned()),
             Ok(plan) => {
-                phases.push_profile(self.problem, &path, &self.limits.jerk, &plan.profile);
+                phases.push_profile(self.problem, path, &self.limits.jerk, &plan.profile);
                 phases.excess.push(plan.excess);
                 phases.stopped = !plan.converged && self.effort.expired();
                 for Junction { cap, jumps } in junctions {
                     if jumps && plan.profile.at(cap.s)[0] >= HELD * cap.speed * cap.speed {
-                        phases.kinks.push(parts[path.part(cap.s)].piece as u32);
+                        phases.kinks.push(path.parts[path.part(cap.s)].piece as u32);
                     }
                 }
                 Ok(phases)
@@ -137,32 +244,38 @@ impl<const M: usize> Task<'_, M> {
             Err(jerk_limited::Fault::NoPlan { .. }) if moving && self.effort.expired() => {
                 Ok(JerkProfile::unplanned())
             }
-            Err(jerk_limited::Fault::Input(what)) => Err(Fault::Input { piece: Some(parts[0].piece), what }),
-            Err(jerk_limited::Fault::NoPlan { .. }) if moving => {
-                self.out_of_reach(&path, parts, speeds, &caps)
+            Err(jerk_limited::Fault::Input(what)) => {
+                Err(Fault::Input { piece: Some(path.parts[0].piece), what })
             }
-            Err(jerk_limited::Fault::NoPlan { s }) if cuts < CUTS => self.cut(&path, s, cuts),
+            Err(jerk_limited::Fault::NoPlan { .. }) if moving => self.out_of_reach(path, ends, &caps),
+            Err(jerk_limited::Fault::NoPlan { s }) if cuts < CUTS => self.cut(path, s, cuts),
             Err(jerk_limited::Fault::NoPlan { s }) => {
                 let part = path.part(s);
-                Err(Fault::Stuck { piece: parts[part].piece, u: path.locate(part, s) })
+                Err(Fault::Stuck { piece: path.parts[part].piece, u: path.locate(part, s) })
             }
         }
     }
 
     /// The lower bound of a subrun; None where its phases are no profile of this planner.
-    fn certified(&self, subrun: &Subrun, columns: &Columns, phases: Range<usize>) -> Option<f64> {
-        let path = ArcLengthPath::new(self.problem, &subrun.parts);
+    fn certified(
+        &self,
+        path: &ArcLengthPath<M>,
+        ends: [End; 2],
+        columns: &Columns,
+        phases: Range<usize>,
+    ) -> Option<f64> {
         let is_cubic = |phase: &usize| columns.kind[*phase] == SPEED_CUBIC;
-        let Some(first) = phases.clone().find(is_cubic) else {
-            let time = columns.duration[phases].iter().sum();
-            return path.line().map(|_| time);
-        };
+        let first = phases.clone().find(is_cubic)?;
         let last = phases.clone().rev().find(is_cubic)?;
         if (first..last).any(|phase| columns.p1[phase] == 0.0) {
             return None;
         }
         let knots = path.knots();
-        let mut profile = Profile { ends: [0.0, path.total()], ..Profile::default() };
+        let powers = ends.map(|end| match end {
+            End::Turn { .. } => Ramp::ACCELERATION,
+            _ => Ramp::JERK,
+        });
+        let mut profile = Profile { ends: [0.0, path.total()], powers, ..Profile::default() };
         let mut part = 0;
         for phase in first..=last {
             self.problem.watch.check_at(phase);
@@ -191,38 +304,42 @@ impl<const M: usize> Task<'_, M> {
             profile.speed_sq.push(speed_sq(u[1], columns.p1[phase]));
             profile.slope.push(2.0 * columns.a1[phase]);
         }
+        let turns = [columns.a0[phases.start], columns.a1[phases.end - 1]];
+        if ends.iter().zip(turns).any(|(end, a)| matches!(end, End::Turn { .. }) != (a != 0.0)) {
+            return None;
+        }
         let caps = path.caps(&path.junctions(&self.limits.jerk));
-        let problem = jerk_limited::Problem {
-            geometry: &path,
-            limits: self.limits,
-            caps: &caps,
-            ends: subrun.ends.map(end),
-        };
+        let problem = jerk_limited::Problem { geometry: path, limits: self.limits, caps: &caps, ends };
         Some(jerk_limited::certify(&problem, &profile, self.effort).least_time)
     }
 
-    /// The quickest sections of a line with one feed; None where it is too short, or its limits differ for speeding up
+    /// The quickest profile of a line with these accelerations at its ends.
+    fn along_line(&self, path: &ArcLengthPath<M>, line: &Line, accelerations: [f64; 2]) -> JerkProfile {
+        let ends = line.ends(accelerations);
+        let mut phases = JerkProfile::default();
+        phases.push_sections(self.problem, path, &s_curve::cross(&line.segment, ends), ends[1]);
+        phases
+    }
+
+    /// A line with one feed; None where it is too short for the speeds at its ends, or its limits differ for speeding up
     /// and down.
-    fn cross(
-        &self,
-        length: f64,
-        direction: &[f64; M],
-        feed: f64,
-        speeds: [f64; 2],
-    ) -> Result<Option<Vec<s_curve::Section>>, Fault> {
+    fn line(&self, path: &ArcLengthPath<M>, speeds: [f64; 2]) -> Result<Option<Line>, Fault> {
+        let Some((direction, feed)) = path.line() else { return Ok(None) };
         let Limits { velocity, acceleration, jerk } = &self.limits;
-        let up = along(acceleration, direction);
+        let up = along(acceleration, &direction);
         if up != along(acceleration, &direction.map(|direction| -direction)) {
             return Ok(None);
         }
-        let segment = s_curve::Segment {
-            length,
-            allowable: along(velocity, direction),
+        let segment = Segment {
+            length: path.total(),
+            allowable: along(velocity, &direction),
             desired: feed,
-            limits: s_curve::Limits { acceleration: up, jerk: along(&[*jerk; 2], direction) },
+            limits: s_curve::Limits { acceleration: up, jerk: along(&[*jerk; 2], &direction) },
             junction: 0.0,
         };
-        s_curve::cross(&segment, speeds)
+        segment.check(0)?;
+        let line = Line { segment, speeds };
+        Ok(segment.can_cross(line.ends([0.0; 2])).then_some(line))
     }
 
     /// The profile with a stop at s, where the planner finds no speed, or half-way.
@@ -242,8 +359,8 @@ impl<const M: usize> Task<'_, M> {
         if left.is_empty() {
             return Err(Fault::Stuck { piece: at.piece, u });
         }
-        let mut phases = self.plan(&left, [0.0; 2], cuts + 1)?;
-        let rest = self.plan(&right, [0.0; 2], cuts + 1)?;
+        let mut phases = self.between_stops(&left, cuts + 1)?;
+        let rest = self.between_stops(&right, cuts + 1)?;
         if phases.is_unplanned() || rest.is_unplanned() {
             return Ok(JerkProfile::unplanned());
         }
@@ -251,18 +368,30 @@ impl<const M: usize> Task<'_, M> {
         Ok(phases)
     }
 
-    /// The fault of a subrun that cannot meet both ends, with the greatest speed that can be met.
+    /// The profile of parts between stops.
+    fn between_stops(&self, parts: &[Part], cuts: u32) -> Result<JerkProfile, Fault> {
+        let path = ArcLengthPath::new(self.problem, parts);
+        match self.line(&path, [0.0; 2])? {
+            Some(line) => Ok(self.along_line(&path, &line, [0.0; 2])),
+            None => self.plan(&path, [End::Rest; 2], cuts),
+        }
+    }
+
+    /// The fault of a path that cannot meet both ends, with the greatest speed that can be met.
     fn out_of_reach(
         &self,
         path: &ArcLengthPath<M>,
-        parts: &[Part],
-        speeds: [f64; 2],
+        ends: [End; 2],
         caps: &[jerk_limited::SpeedCap],
     ) -> Result<JerkProfile, Fault> {
         let effort = Effort { deadline: None, tolerance: 1e-4, ..*self.effort };
+        let speeds = ends.map(|end| match end {
+            End::Moving { speed, .. } => speed,
+            End::Rest | End::Turn { .. } => 0.0,
+        });
         let possible = |speeds: [f64; 2]| {
-            let problem =
-                jerk_limited::Problem { geometry: path, limits: self.limits, caps, ends: speeds.map(end) };
+            let ends = speeds.map(|speed| end_of(speed, 0.0));
+            let problem = jerk_limited::Problem { geometry: path, limits: self.limits, caps, ends };
             jerk_limited::plan(&problem, &effort).is_ok()
         };
         // The end is at fault where the start alone can be met.
@@ -277,6 +406,7 @@ impl<const M: usize> Task<'_, M> {
                 high = middle;
             }
         }
+        let parts = path.parts;
         Err(if at == 0 {
             Fault::Start { piece: parts[0].piece, reachable: low }
         } else {
@@ -285,10 +415,13 @@ impl<const M: usize> Task<'_, M> {
     }
 }
 
-fn end(speed: f64) -> End {
-    if speed == 0.0 {
-        End::Rest
-    } else {
+/// The end of a path at a speed in mm/s; at rest with an acceleration of at most this, in mm/s².
+fn end_of(speed: f64, acceleration: f64) -> End {
+    if speed > 0.0 {
         End::Moving { speed, acceleration: 0.0 }
+    } else if acceleration > 0.0 {
+        End::Turn { acceleration }
+    } else {
+        End::Rest
     }
 }

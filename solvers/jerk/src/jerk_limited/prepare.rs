@@ -7,7 +7,7 @@ use super::grid::Grid;
 use super::initial_plan;
 use super::interior_point::WindowEnd;
 use super::intersample_check::IntersampleCheck;
-use super::rest_ramp;
+use super::rest_ramp::{self, Ramp};
 use super::speed_envelope::{sample_envelope, Slopes};
 use super::window::Window;
 use super::{Effort, End, Fault, Geometry, Limits, Problem};
@@ -40,15 +40,11 @@ impl<'a, G: Geometry<M>, const M: usize> Prepared<'a, G, M> {
         let limits = &problem.limits;
         let ends = window_ends(problem);
         let watch = effort.watch.part(PREPARING);
-        let span = |end: usize| match ends[end] {
-            WindowEnd::Rest { ramp, .. } => ramp,
-            WindowEnd::Fixed { .. } => 0.0,
-        };
         let (samples, slopes) = sample_envelope(
             problem.geometry,
             limits,
             problem.caps,
-            [span(0), total - span(1)],
+            [ends[0].ramp().length, total - ends[1].ramp().length],
             &ends,
             watch,
         )?;
@@ -125,11 +121,16 @@ pub fn window_ends<G: Geometry<M>, const M: usize>(problem: &Problem<G, M>) -> [
         End::Moving { speed, acceleration } => {
             WindowEnd::Fixed { w: speed * speed, slope: 2.0 * acceleration }
         }
-        End::Rest => {
+        End::Rest | End::Turn { .. } => {
             let (piece, s) = if end == 0 { (0, 0.0) } else { (pieces - 1, total) };
-            let ramp = rest_ramp::length(limits, &problem.geometry.at(piece, s), total);
+            let length = rest_ramp::length(limits, &problem.geometry.at(piece, s), total);
+            let (power, most) = match problem.ends[end] {
+                End::Turn { acceleration } => (Ramp::ACCELERATION, 2.0 * acceleration * length),
+                _ => (Ramp::JERK, f64::INFINITY),
+            };
+            let ramp = Ramp { length, power };
             let greatest = rest_ramp::greatest(problem.geometry, limits, problem.caps, ramp, end);
-            WindowEnd::Rest { ramp, greatest }
+            WindowEnd::Rest { ramp, greatest: greatest.min(most) }
         }
     })
 }

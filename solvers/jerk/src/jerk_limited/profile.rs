@@ -2,8 +2,9 @@
 //! jerk.
 
 use super::hermite;
+use super::rest_ramp::Ramp;
 
-/// w at the stations. At rest, a ramp w ∝ s^(4/3) joins the end of the path and the nearest station.
+/// w at the stations. At rest, a ramp joins the end of the path and the nearest station.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Profile {
     /// Arc lengths of the stations, in mm.
@@ -14,6 +15,8 @@ pub struct Profile {
     pub slope: Vec<f64>,
     /// Arc lengths of the ends of the path; without a ramp they are the first and the last station.
     pub ends: [f64; 2],
+    /// The powers of the distance from rest to which w is proportional on the ramps.
+    pub powers: [f64; 2],
 }
 
 impl Profile {
@@ -22,10 +25,10 @@ impl Profile {
     pub fn at(&self, s: f64) -> [f64; 3] {
         let last = self.s.len() - 1;
         if s < self.s[0] {
-            return ramp(s - self.ends[0], self.s[0] - self.ends[0], self.speed_sq[0], 1.0);
+            return on_ramp(s - self.ends[0], self.ramp(0), self.speed_sq[0], 1.0);
         }
         if s > self.s[last] {
-            return ramp(self.ends[1] - s, self.ends[1] - self.s[last], self.speed_sq[last], -1.0);
+            return on_ramp(self.ends[1] - s, self.ramp(1), self.speed_sq[last], -1.0);
         }
         let n = self.s.partition_point(|&station| station <= s).clamp(1, last) - 1;
         let h = self.s[n + 1] - self.s[n];
@@ -40,22 +43,30 @@ impl Profile {
         let last = self.s.len() - 1;
         let x: Vec<f64> = self.speed_sq.iter().zip(&self.slope).flat_map(|(w, slope)| [*w, *slope]).collect();
         let inside: f64 = (0..last).map(|n| hermite::duration(&x, n, self.s[n + 1] - self.s[n])).sum();
-        let ramp = |length: f64, w: f64| if length > 0.0 { 3.0 * length / w.sqrt() } else { 0.0 };
-        inside
-            + ramp(self.s[0] - self.ends[0], self.speed_sq[0])
-            + ramp(self.ends[1] - self.s[last], self.speed_sq[last])
+        let ramp = |end: usize, w: f64| {
+            if self.ramp(end).length > 0.0 {
+                self.ramp(end).way() / w.sqrt()
+            } else {
+                0.0
+            }
+        };
+        inside + ramp(0, self.speed_sq[0]) + ramp(1, self.speed_sq[last])
+    }
+
+    /// The ramp at the start or at the end.
+    pub fn ramp(&self, end: usize) -> Ramp {
+        let lengths = [self.s[0] - self.ends[0], self.ends[1] - self.s[self.s.len() - 1]];
+        Ramp { length: lengths[end], power: self.powers[end] }
     }
 }
 
-/// w, w', w'' at a distance from rest on a ramp of a length with w = `greatest` at its end.
-fn ramp(distance: f64, length: f64, greatest: f64, sign: f64) -> [f64; 3] {
-    let part = distance / length;
-    let root = part.cbrt();
-    [
-        greatest * part * root,
-        sign * 4.0 / 3.0 * greatest / length * root,
-        4.0 / 9.0 * greatest / (length * length) / (root * root),
-    ]
+/// w, w', w'' at a distance from rest on a ramp with w = `greatest` at its end.
+fn on_ramp(distance: f64, ramp: Ramp, greatest: f64, sign: f64) -> [f64; 3] {
+    let part = distance / ramp.length;
+    let w = greatest * part.powf(ramp.power);
+    let slope = ramp.power * greatest / ramp.length * part.powf(ramp.power - 1.0);
+    let bend = (ramp.power - 1.0) * ramp.slope() / ramp.length * greatest * part.powf(ramp.power - 2.0);
+    [w, sign * slope, bend]
 }
 
 #[cfg(test)]
@@ -70,6 +81,7 @@ mod tests {
             speed_sq: vec![9.0, 9.0],
             slope: vec![12.0, -12.0],
             ends: [0.0, 3.0],
+            powers: [Ramp::JERK; 2],
         };
         let [w, w1, w2] = profile.at(0.125);
         assert!((w - 9.0 / 16.0).abs() < 1e-14 && (w1 - 6.0).abs() < 1e-14);
@@ -79,5 +91,20 @@ mod tests {
         // 1 s on each ramp.
         let inside = hermite::duration(&[9.0, 12.0, 9.0, -12.0], 0, 1.0);
         assert!((profile.time() - 2.0 - inside).abs() < 1e-14);
+    }
+
+    #[test]
+    fn ramps_where_the_path_turns_back_are_of_constant_acceleration() {
+        // From rest at 4 mm/s²: s = 2 t², w = 8 s.
+        let profile = Profile {
+            s: vec![0.5, 1.0],
+            speed_sq: vec![4.0, 4.0],
+            slope: vec![8.0, -8.0],
+            ends: [0.0, 1.5],
+            powers: [Ramp::ACCELERATION; 2],
+        };
+        assert_eq!((profile.at(0.125), profile.at(1.375)), ([1.0, 8.0, 0.0], [1.0, -8.0, 0.0]));
+        let inside = hermite::duration(&[4.0, 8.0, 4.0, -8.0], 0, 0.5);
+        assert!((profile.time() - 1.0 - inside).abs() < 1e-14);
     }
 }

@@ -1,5 +1,6 @@
-//! The ramp from rest, or to rest: constant jerk along the path, w = c s^(4/3) with the distance s [mm] from rest. Its
-//! length follows from the derivatives and limits at the end of the path, the greatest c from all points of the ramp.
+//! The ramp from rest, or to rest, with the distance s [mm] from rest: constant jerk along the path, w = c s^(4/3), or,
+//! where the path turns back, constant acceleration c/2, w = c s. Its length follows from the derivatives and limits at
+//! the end of the path, the greatest c from all points of the ramp.
 
 use std::ops::Range;
 
@@ -16,16 +17,43 @@ const DEPTH: Range<u32> = 4..40;
 /// … where ln c changes by more than `CHANGE` between them, and they are further apart than `APART` of their time.
 const CHANGE: f64 = 0.05;
 const APART: f64 = 1e-5;
+/// The part of the limit of jerk that a ramp of constant acceleration uses: the rest is for changes of it.
+const USED: f64 = 0.75;
 /// Number of octaves of time in which points begin near rest: the path may turn within any length there.
 const OCTAVES: i32 = 12;
 /// Points between the neighbours of the worst point, and rounds of this refinement.
 const SAMPLES: usize = 16;
 const ROUNDS: usize = 2;
 
+/// The length of a ramp, and the power of s to which w is proportional on it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ramp {
+    /// In mm; 0 for no ramp.
+    pub length: f64,
+    pub power: f64,
+}
+
+impl Ramp {
+    /// The power at constant jerk.
+    pub const JERK: f64 = 4.0 / 3.0;
+    /// The power at constant acceleration.
+    pub const ACCELERATION: f64 = 1.0;
+
+    /// The slope w' at its end, over w there, in 1/mm.
+    pub fn slope(&self) -> f64 {
+        self.power / self.length
+    }
+
+    /// Its time, times the speed at its end, in mm.
+    pub fn way(&self) -> f64 {
+        self.length / (1.0 - 0.5 * self.power)
+    }
+}
+
 /// The length of a ramp, in mm, from the derivatives and the speed cap at the end of the path and the path's length.
 ///
-/// It is rounded to a distance that the arc length can express: the slope at the ramp's station is 4/3 w over the
-/// ramp's length, which a rounded station would change.
+/// It is rounded to a distance that the arc length can express: the slope at the ramp's station is w over the ramp's
+/// length, times its power, which a rounded station would change.
 pub fn length<const M: usize>(limits: &Limits<M>, point: &PathPoint<M>, path: f64) -> f64 {
     let [least, most] = PARTS.map(|part| part * path);
     let along = |limit: &[f64; M]| {
@@ -44,7 +72,7 @@ pub fn greatest<const M: usize>(
     geometry: &impl Geometry<M>,
     limits: &Limits<M>,
     caps: &[SpeedCap],
-    ramp: f64,
+    Ramp { length: ramp, power }: Ramp,
     end: usize,
 ) -> f64 {
     let knots = geometry.knots();
@@ -52,7 +80,10 @@ pub fn greatest<const M: usize>(
     let sign = if end == 0 { 1.0 } else { -1.0 };
     let from_rest = |cap: &SpeedCap| if end == 0 { cap.s } else { total - cap.s };
     let share = |cap: &SpeedCap| if from_rest(cap) - cap.reach < ramp { cap.share } else { 0.0 };
-    let jerk_part = 1.0 - caps.iter().map(share).fold(0.0, f64::max);
+    let mut jerk_part = 1.0 - caps.iter().map(share).fold(0.0, f64::max);
+    if power == Ramp::ACCELERATION {
+        jerk_part *= USED;
+    }
     let mut c = f64::INFINITY;
     for piece in 0..knots.len() - 1 {
         let (start, stop) = if end == 0 {
@@ -65,11 +96,12 @@ pub fn greatest<const M: usize>(
         }
         // The greatest c at a time t, in units where the distance from rest is t³.
         let at = |t: f64| {
-            let x = t * t * t;
+            let x = (t * t * t).max(f64::MIN_POSITIVE);
             let point = geometry.at(piece, if end == 0 { x } else { total - x });
             // w/c, w'/c; then w^(3/2), √w w' and √w w'', all over c^(3/2).
-            let (w, w1) = (x * t, sign * 4.0 / 3.0 * t);
-            let (cubed, crossed, bend) = (x * x, sign * 4.0 / 3.0 * x, 4.0 / 9.0);
+            let (w, w1) = (x.powf(power), sign * power * x.powf(power - 1.0));
+            let (cubed, crossed) = (x.powf(1.5 * power), sign * power * x.powf(1.5 * power - 1.0));
+            let bend = power * (power - 1.0) * x.powf(1.5 * power - 2.0);
             let mut c = 1.0 / (limits.per_speed_sq(&point) * w);
             for k in 0..M {
                 let (q1, q2, q3) = (point.first[k], point.second[k], point.third[k]);
@@ -100,10 +132,10 @@ pub fn greatest<const M: usize>(
     for cap in caps {
         let x = from_rest(cap);
         if x <= ramp {
-            c = c.min(cap.speed * cap.speed / (x * x.cbrt()));
+            c = c.min(cap.speed * cap.speed / x.powf(power));
         }
     }
-    c * ramp * ramp.cbrt() * (1.0 - 1e-9)
+    c * ramp.powf(power) * (1.0 - 1e-9)
 }
 
 /// Appends points (t, greatest c) from the first to the second of a pair.
@@ -142,13 +174,27 @@ mod tests {
     const LIMITS: Limits<2> =
         Limits { velocity: [[100.0; 2]; 2], acceleration: [[1000.0; 2]; 2], jerk: [50_000.0; 2] };
 
+    const RAMP_OF_JERK: Ramp = Ramp { length: 0.01, power: Ramp::JERK };
+
+    #[test]
+    fn on_a_line_of_constant_acceleration_that_is_used_fully() {
+        let ramp = Ramp { power: Ramp::ACCELERATION, ..RAMP_OF_JERK };
+        let w = greatest(&Circle { curvature: 0.0 }, &LIMITS, &[], ramp, 0);
+        assert!((w / (2.0 * 1000.0 * 0.01) - 1.0).abs() < 1e-8, "{w}");
+        // 2 s/v.
+        assert_eq!((ramp.way(), ramp.slope()), (0.02, 100.0));
+        // The direction of a circle turns at v a/radius: jerk across the path is 3/2 q'' √w w'.
+        let circle = greatest(&Circle { curvature: 10.0 }, &LIMITS, &[], ramp, 1);
+        assert!(circle < w, "{circle} and {w}");
+    }
+
     #[test]
     fn on_a_line_jerk_is_used_fully() {
         // s = J t³/6 and v = J t²/2: v = (9 J s²/2)^(1/3).
-        let w = greatest(&Circle { curvature: 0.0 }, &LIMITS, &[], 0.01, 0);
+        let w = greatest(&Circle { curvature: 0.0 }, &LIMITS, &[], RAMP_OF_JERK, 0);
         let expected = (4.5 * 50_000.0 * 1e-4f64).powf(2.0 / 3.0);
         assert!((w / expected - 1.0).abs() < 1e-6, "{w} and {expected}");
-        assert_eq!(w, greatest(&Circle { curvature: 0.0 }, &LIMITS, &[], 0.01, 1));
+        assert_eq!(w, greatest(&Circle { curvature: 0.0 }, &LIMITS, &[], RAMP_OF_JERK, 1));
     }
 
     /// A line that turns at its start within this length, by the angle arctan(s/length).
@@ -172,21 +218,21 @@ mod tests {
     #[test]
     fn a_turn_of_any_length_lowers_the_ramp_alike() {
         // The jerk of a ramp depends only on the ratio of the lengths of turn and ramp.
-        let line = greatest(&Circle { curvature: 0.0 }, &LIMITS, &[], 0.01, 0);
+        let line = greatest(&Circle { curvature: 0.0 }, &LIMITS, &[], RAMP_OF_JERK, 0);
         for i in 0..80 {
             let length = 1e-3 * 10f64.powf(-0.1 * i as f64);
-            let ramp = greatest(&Turn(length), &LIMITS, &[], 0.01, 0) / line;
+            let ramp = greatest(&Turn(length), &LIMITS, &[], RAMP_OF_JERK, 0) / line;
             assert!((ramp - 0.5).abs() < 0.02, "{ramp} beside a turn of {length} mm");
         }
     }
 
     #[test]
     fn curvature_and_caps_lower_the_ramp() {
-        let line = greatest(&Circle { curvature: 0.0 }, &LIMITS, &[], 0.01, 0);
-        let circle = greatest(&Circle { curvature: 100.0 }, &LIMITS, &[], 0.01, 0);
+        let line = greatest(&Circle { curvature: 0.0 }, &LIMITS, &[], RAMP_OF_JERK, 0);
+        let circle = greatest(&Circle { curvature: 100.0 }, &LIMITS, &[], RAMP_OF_JERK, 0);
         assert!(circle < line, "{circle} and {line}");
         let cap = [SpeedCap::new(0.01, 0.5)];
-        let capped = greatest(&Circle { curvature: 0.0 }, &LIMITS, &cap, 0.01, 0);
+        let capped = greatest(&Circle { curvature: 0.0 }, &LIMITS, &cap, RAMP_OF_JERK, 0);
         assert!((capped - 0.25).abs() < 1e-6, "{capped}");
     }
 

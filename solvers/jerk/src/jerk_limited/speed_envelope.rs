@@ -132,7 +132,7 @@ impl Slopes {
     pub fn end(&self, r: &mut [f64], ends: &[WindowEnd; 2]) {
         for (kind, station) in ends.iter().zip([0, r.len() - 1]) {
             r[station] = r[station].min(match *kind {
-                WindowEnd::Rest { ramp, .. } => self.k * ramp,
+                WindowEnd::Rest { ramp, .. } => self.k * ramp.length,
                 WindowEnd::Fixed { w, .. } => w.powf(0.75),
             });
         }

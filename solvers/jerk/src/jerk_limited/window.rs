@@ -198,7 +198,7 @@ impl<const M: usize> Window<M> {
 /// Time on the ramps at ends at rest, in s.
 pub fn ramps(ends: &[WindowEnd; 2], x: &[f64]) -> f64 {
     let time = |end: usize, w: f64| match ends[end] {
-        WindowEnd::Rest { ramp, .. } => 3.0 * ramp / w.sqrt(),
+        WindowEnd::Rest { ramp, .. } => ramp.way() / w.sqrt(),
         WindowEnd::Fixed { .. } => 0.0,
     };
     time(0, x[0]) + time(1, x[x.len() - 2])

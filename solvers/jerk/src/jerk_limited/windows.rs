@@ -244,6 +244,7 @@ impl<G: Geometry<M>, const M: usize> Run<'_, G, M> {
             speed_sq: x.iter().step_by(2).copied().collect(),
             slope: x.iter().skip(1).step_by(2).copied().collect(),
             ends: [start, end],
+            powers: self.prepared.ends.map(|end| end.ramp().power),
         }
     }
 }

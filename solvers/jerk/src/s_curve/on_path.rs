@@ -13,7 +13,7 @@ use crate::jerk_limited::on_path::Task;
 use crate::jerk_limited::{Effort, Geometry, Limits, PathPoint, SpeedCap};
 use crate::jerk_profile::JerkProfile;
 use crate::path_limits::{allowable, bounded, greatest, Allowable, AxisLimits, Curve, Shape};
-use crate::s_curve::{self, Section, Segment};
+use crate::s_curve::{self, Section, Segment, SegmentEnd};
 use crate::subruns::{checked, over_subruns, subruns, Subrun, CREEP, MOMENT};
 use feedplan_geometry::spline::bezier::split;
 use feedplan_geometry::spline::CompositeCurve;
@@ -137,7 +137,7 @@ fn along<const M: usize>(
     sections: &[Section],
 ) -> JerkProfile {
     let mut phases = JerkProfile::default();
-    phases.push_sections(problem, path, sections, 0.0);
+    phases.push_sections(problem, path, sections, SegmentEnd::moving(0.0));
     let mut next = 0;
     for Junction { cap, jumps } in path.junctions(&limits.jerk) {
         while next + 1 < sections.len() && sections[next + 1].position <= cap.s {

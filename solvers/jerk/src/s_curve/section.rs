@@ -1,10 +1,14 @@
 //! Sections of constant jerk (the seven types of Cheatham 2007, figure 4.1), and how they fill a segment between two
-//! speeds.
+//! ends.
 //!
 //! A segment is crossed by a rise, a constant speed and a fall, each where needed, at the highest speed inside it that
 //! leaves room for both changes. The thesis's one S-curve per segment is the case without a peak.
+//!
+//! A rise that begins with an acceleration a is one without, cut short: it would have begun a/J earlier, at a speed
+//! lower by a²/(2 J). From rest, that speed is below 0, and the part before the cut goes −a³/(3 J²). A fall is the same
+//! backwards in time.
 
-use super::segment::Segment;
+use super::segment::{Segment, SegmentEnd};
 use super::transition::{retreat, Limits};
 
 /// Most steps of Newton's method on a convex function from above; far fewer are used.
@@ -66,11 +70,10 @@ pub struct SegmentStart {
     pub position: f64,
 }
 
-/// Appends the sections of a segment between two speeds that it joins; returns where and when it ends.
+/// Appends the sections of a segment between two ends that it joins; returns where and when it ends.
 pub fn cross(
     segment: &Segment,
-    from: f64,
-    to: f64,
+    ends: [SegmentEnd; 2],
     start: SegmentStart,
     out: &mut Vec<Section>,
 ) -> SegmentStart {
@@ -79,15 +82,17 @@ pub fn cross(
         return SegmentStart { position: end_position, ..start };
     }
     let Limits { acceleration, jerk } = segment.limits;
-    let peak = peak(segment, from, to);
-    let mut at = Cursor { start, speed: from, acceleration: 0.0, out };
+    let peak = peak(segment, ends);
+    let [from, to] = ends.map(|end| end.before_cut(jerk));
+    let mut at = Cursor { start, speed: ends[0].speed, acceleration: ends[0].acceleration, out };
 
     let rise = ramp(peak - from, acceleration, jerk);
-    at.section(SectionKind::ConcaveRise, rise.bend, jerk);
+    at.section(SectionKind::ConcaveRise, segment.bend_left(ends[0], rise.bend), jerk);
     at.section(SectionKind::LinearRise, rise.hold, 0.0);
     at.section(SectionKind::ConvexRise, rise.bend, -jerk);
 
-    let rest = segment.length - segment.limits.distance(from, peak) - segment.limits.distance(peak, to);
+    let rest =
+        segment.uncut_length(ends) - segment.limits.distance(from, peak) - segment.limits.distance(peak, to);
     at.set_speed(peak);
     if rest > ROUNDING * segment.length {
         at.section(SectionKind::ConstantSpeed, rest / peak, 0.0);
@@ -96,17 +101,25 @@ pub fn cross(
     let fall = ramp(peak - to, acceleration, jerk);
     at.section(SectionKind::ConvexFall, fall.bend, -jerk);
     at.section(SectionKind::LinearFall, fall.hold, 0.0);
-    at.section(SectionKind::ConcaveFall, fall.bend, jerk);
+    at.section(SectionKind::ConcaveFall, segment.bend_left(ends[1], fall.bend), jerk);
     SegmentStart { time: at.start.time, position: end_position }
 }
 
 /// The highest speed inside a segment, in mm/s.
-fn peak(segment: &Segment, from: f64, to: f64) -> f64 {
-    let Segment { limits, length, .. } = *segment;
+fn peak(segment: &Segment, ends: [SegmentEnd; 2]) -> f64 {
+    let Segment { limits, .. } = *segment;
+    let ([from, to], length) = (ends.map(|end| end.before_cut(limits.jerk)), segment.uncut_length(ends));
     let (low, high) = (from.min(to), from.max(to));
     let needed = |peak: f64| limits.distance(from, peak) + limits.distance(peak, to);
-    // The peak is at most what each change alone can reach within the length.
-    let most = segment.speed().min(limits.highest(low, length)).min(limits.highest(high, length)).max(high);
+    // The peak is at most what each change alone can reach within the length; with an acceleration at an end, at most
+    // what the greatest acceleration can.
+    let reached = if low < 0.0 {
+        (high.max(0.0).powi(2) + 2.0 * limits.acceleration * segment.length).sqrt()
+    } else {
+        limits.highest(low, length).min(limits.highest(high, length))
+    };
+    let least = segment.least_peak(ends);
+    let most = segment.speed().min(reached).max(least);
     if needed(most) <= length {
         return most;
     }
@@ -131,7 +144,7 @@ fn peak(segment: &Segment, from: f64, to: f64) -> f64 {
             break;
         }
     }
-    retreat((high + q * q).min(most), high, most, |peak| needed(peak) <= length)
+    retreat((high + q * q).clamp(least, most), least, most, |peak| needed(peak) <= length)
 }
 
 /// The durations of a change of speed: of each section with jerk, and of the constant acceleration between them.
@@ -197,7 +210,8 @@ mod tests {
 
     fn sections(length: f64, from: f64, to: f64) -> Vec<Section> {
         let mut out = vec![];
-        let end = cross(&segment(length), from, to, SegmentStart::default(), &mut out);
+        let ends = [from, to].map(SegmentEnd::moving);
+        let end = cross(&segment(length), ends, SegmentStart::default(), &mut out);
         assert_eq!(end.position, length);
         let time: f64 = out.iter().map(|section| section.duration).sum();
         assert!((time - end.time).abs() < 1e-12);
@@ -259,7 +273,7 @@ mod tests {
     fn a_segment_without_length_has_no_sections() {
         let mut out = vec![];
         let start = SegmentStart { time: 2.0, position: 3.0 };
-        assert_eq!(cross(&segment(0.0), 50.0, 50.0, start, &mut out), start);
+        assert_eq!(cross(&segment(0.0), [SegmentEnd::moving(50.0); 2], start, &mut out), start);
         assert!(out.is_empty());
     }
 }

@@ -6,6 +6,12 @@ use feedplan_planner::problem::Fault;
 /// Range of lengths and limits, in which no product of three of them over- or underflows.
 const LEAST: f64 = 1e-12;
 const GREATEST: f64 = 1e15;
+/// At an end with an acceleration below the limit, what is left of the bend takes at least this part of the time of what
+/// is cut off, and at least this part of the length: shorter sections are rounding.
+const LEFT: f64 = 1e-5;
+const DIGITS: f64 = 1e3 * f64::EPSILON;
+/// An acceleration below the limit by no more than this part is the limit.
+const AT_LIMIT: f64 = 1e-9;
 
 /// A segment of path. Both speeds are limits: `allowable` by the machine (`path_limits`), `desired` by the program.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,7 +27,79 @@ pub struct Segment {
     pub junction: f64,
 }
 
+/// How a segment begins or ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SegmentEnd {
+    /// In mm/s.
+    pub speed: f64,
+    /// The size of the acceleration, in mm/s²: a segment begins speeding up and ends slowing down.
+    pub acceleration: f64,
+}
+
+impl SegmentEnd {
+    pub fn moving(speed: f64) -> Self {
+        Self { speed, acceleration: 0.0 }
+    }
+
+    /// What the acceleration has changed the speed by since it was 0, in mm/s.
+    fn gained(&self, jerk: f64) -> f64 {
+        0.5 * self.acceleration * self.acceleration / jerk
+    }
+
+    /// The speed when the acceleration was 0, in mm/s: below 0 before a rest.
+    pub fn before_cut(&self, jerk: f64) -> f64 {
+        self.speed - self.gained(jerk)
+    }
+
+    /// How far the motion has gone since then, in mm.
+    fn cut_length(&self, jerk: f64) -> f64 {
+        let time = self.acceleration / jerk;
+        time * (self.speed - 2.0 / 3.0 * self.gained(jerk))
+    }
+}
+
 impl Segment {
+    /// The length with what ends with an acceleration cut off, in mm.
+    pub fn uncut_length(&self, ends: [SegmentEnd; 2]) -> f64 {
+        let [from, to] = ends.map(|end| end.cut_length(self.limits.jerk));
+        self.length + from + to
+    }
+
+    /// The time at an end that is left of the bend to or from its acceleration, in s, from the time of the whole bend; 0
+    /// where the acceleration is the limit.
+    pub fn bend_left(&self, end: SegmentEnd, bend: f64) -> f64 {
+        let cut = end.acceleration / self.limits.jerk;
+        if bend - cut > AT_LIMIT * cut {
+            bend - cut
+        } else {
+            0.0
+        }
+    }
+
+    /// The least peak of the speed between two ends, in mm/s.
+    pub fn least_peak(&self, ends: [SegmentEnd; 2]) -> f64 {
+        let Limits { acceleration, jerk } = self.limits;
+        let [from, to] = ends.map(|end| {
+            let (a, length) = (end.acceleration, DIGITS * self.length);
+            let digits = (2.0 * length / a).sqrt().min((6.0 * length / jerk).cbrt());
+            let at_limit = a == 0.0 || a >= (1.0 - AT_LIMIT) * acceleration;
+            let left = if at_limit { 0.0 } else { digits.max(LEFT * a / jerk) };
+            if a / jerk + left > (1.0 + AT_LIMIT) * acceleration / jerk {
+                return f64::INFINITY;
+            }
+            end.before_cut(jerk) + jerk * (a / jerk + left).powi(2)
+        });
+        from.max(to)
+    }
+
+    /// Whether it can be crossed between two ends.
+    pub fn can_cross(&self, ends: [SegmentEnd; 2]) -> bool {
+        let peak = self.least_peak(ends);
+        let [from, to] = ends.map(|end| end.before_cut(self.limits.jerk));
+        let needed = || self.limits.distance(from, peak) + self.limits.distance(peak, to);
+        peak <= self.speed() && needed() <= self.uncut_length(ends)
+    }
+
     /// The speed limit inside the segment, in mm/s.
     #[inline]
     pub fn speed(&self) -> f64 {

@@ -5,11 +5,12 @@
 //! * the program halts,
 //! * rapids begin or end,
 //! * moves that ask for the exact path meet others, and
-//! * the path turns back.
+//! * the path turns back; along the line that it came on it rests within a run, if nothing else asks for a stop.
 //!
 //! Lines that ask for the exact path stay lines, and stop at their corners. Arcs and splines that ask for it, with the
 //! lines that touch them, are followed within the exact tolerance.
 
+use std::f64::consts::PI;
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -73,6 +74,8 @@ pub fn build_smooth_path<const M: usize>(
         path.not_smooth.reversals.extend(section.not_smooth.reversals);
         path.not_smooth.corners.extend(section.not_smooth.corners);
     }
+    let pieces: Vec<&PathPiece<M>> = path.chunks.iter().flat_map(|chunk| &chunk.pieces).collect();
+    path.runs.retain(|&first| first == 0 || !goes_back(moves, pieces[first - 1], pieces[first]));
     path.runs.push(total);
     path.deviation = deviation(&path.chunks);
     path.offsets = Some(offsets);
@@ -98,6 +101,16 @@ fn sections<const M: usize>(moves: &Moves<M>) -> Vec<Range<usize>> {
         }
     }
     sections
+}
+
+/// Whether the path goes back along its own line from one piece to the next, and nothing else asks for a stop.
+fn goes_back<const M: usize>(moves: &Moves<M>, before: &PathPiece<M>, after: &PathPiece<M>) -> bool {
+    let (last, first) = (before.last as usize, after.first as usize);
+    let halts = (last..first).any(|i| moves.halt[i]);
+    let next = moves.changes.partition_point(|change| change.0 <= last);
+    let changes = moves.changes.get(next).is_some_and(|change| change.0 <= first);
+    let turn = angle(&before.shape.end_edge(), &after.shape.start_edge());
+    turn > PI - tolerance::OPPOSITE && !halts && !changes
 }
 
 /// How the runs of a section are fitted.

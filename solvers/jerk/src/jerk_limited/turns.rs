@@ -1,0 +1,154 @@
+//! The accelerations with which lines turn back, at rest for no time: the greatest that all lines of a chain can be
+//! crossed with.
+//!
+//! A line is crossed the quicker the more it speeds up at its start and slows down at its end: at every place it is as
+//! fast as with less, or faster. But from the acceleration a it must get to 0, and this takes a length of its own. So
+//! the acceleration at one end of a line is at most a number that rises with the acceleration at the other. The
+//! greatest accelerations within all these bounds exist, and each line takes its least time with them. They come from
+//! the greatest accelerations of the axes by lowering both ends of each line that is too short, until none is.
+
+use crate::s_curve::{Segment, SegmentEnd};
+
+/// A line of a chain, and the speeds at its ends in mm/s, which are 0 where it turns back.
+#[derive(Clone, Copy, Debug)]
+pub struct Line {
+    pub segment: Segment,
+    pub speeds: [f64; 2],
+}
+
+impl Line {
+    /// Its ends with these accelerations, in mm/s².
+    pub fn ends(&self, accelerations: [f64; 2]) -> [SegmentEnd; 2] {
+        [0, 1].map(|end| SegmentEnd { speed: self.speeds[end], acceleration: accelerations[end] })
+    }
+
+    fn can_cross(&self, accelerations: [f64; 2]) -> bool {
+        self.segment.can_cross(self.ends(accelerations))
+    }
+
+    /// The accelerations, at most these, of which the greater one is as great as can be.
+    fn lowered(&self, [from, to]: [f64; 2]) -> [f64; 2] {
+        let at_most = |most: f64| [from.min(most), to.min(most)];
+        let (mut low, mut high) = (0.0, from.max(to));
+        loop {
+            let middle = 0.5 * (low + high);
+            if middle <= low || middle >= high {
+                return at_most(low);
+            }
+            if self.can_cross(at_most(middle)) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+    }
+
+    /// The greatest acceleration, at most this, at an end, whatever that at the other end.
+    pub fn alone(&self, end: usize, most: f64) -> f64 {
+        let mut accelerations = [0.0; 2];
+        accelerations[end] = most;
+        if self.can_cross(accelerations) {
+            most
+        } else {
+            self.lowered(accelerations)[end]
+        }
+    }
+}
+
+/// Lowers the accelerations between subruns in mm/s², with those at both ends of the chain, until each line can be
+/// crossed.
+pub fn lower(lines: &[Option<Line>], accelerations: &mut [f64]) {
+    let mut settled = false;
+    while !settled {
+        settled = true;
+        for i in (0..lines.len()).chain((0..lines.len()).rev()) {
+            let own = [accelerations[i], accelerations[i + 1]];
+            if let Some(line) = lines[i].filter(|line| !line.can_cross(own)) {
+                accelerations[i..i + 2].copy_from_slice(&line.lowered(own));
+                settled = false;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::s_curve::{self, Limits};
+    use proptest::prelude::*;
+
+    const LIMITS: Limits = Limits { acceleration: 3000.0, jerk: 5e4 };
+
+    fn line(length: f64, speed: f64) -> Option<Line> {
+        let segment =
+            Segment { length, allowable: speed, desired: f64::INFINITY, limits: LIMITS, junction: 0.0 };
+        Some(Line { segment, speeds: [0.0; 2] })
+    }
+
+    fn time(line: &Option<Line>, accelerations: [f64; 2]) -> f64 {
+        let line = line.expect("a line");
+        s_curve::cross(&line.segment, line.ends(accelerations)).iter().map(|section| section.duration).sum()
+    }
+
+    #[test]
+    fn short_strokes_alike_swing_with_jerk_of_one_sign_each() {
+        // From a to −a at −J: L = 2/3 a³/J² in the time 2 a/J; a little less where the next one has less.
+        let mut a = vec![0.0, 3000.0, 3000.0, 3000.0, 3000.0, 0.0];
+        let lines = [line(2.0, 250.0); 5];
+        lower(&lines, &mut a);
+        let expected = (1.5 * 2.0 * 5e4f64.powi(2)).cbrt();
+        assert!(a[2] == a[3] && (1.0 - a[2] / expected).abs() < 3e-5, "{a:?}");
+        assert!((time(&lines[2], [a[2], a[3]]) / (2.0 * expected / 5e4) - 1.0).abs() < 1e-8);
+        // The first stroke starts without acceleration: a³/3 + (a²/2)^1.5 = L J².
+        let first = (2.0 * 5e4f64.powi(2) / (1.0 / 3.0 + 0.125f64.sqrt())).cbrt();
+        assert!((a[1] / first - 1.0).abs() < 3e-5, "{} for {first}", a[1]);
+    }
+
+    #[test]
+    fn long_strokes_turn_back_with_the_greatest_acceleration() {
+        let mut a = vec![0.0, 3000.0, 3000.0, 0.0];
+        let lines = [line(100.0, 250.0); 3];
+        lower(&lines, &mut a);
+        assert_eq!(a, [0.0, 3000.0, 3000.0, 0.0]);
+        // At 3000 mm/s² to where the speed is 36 ms · 3000/2 below 250 mm/s …: without acceleration at its ends a rise
+        // takes V/A + A/J and goes half of V that long; what is cut off took A/J and went −A³/(3 J²).
+        let (v, a, j) = (250.0, 3000.0, 5e4);
+        let rise = v / a + 0.5 * a / j;
+        let way = 0.5 * v * (v / a + a / j) - (a * a / j) * (a / j) / 24.0;
+        let expected = 2.0 * rise + (100.0 - 2.0 * way) / v;
+        assert!(
+            (time(&lines[1], [a, a]) - expected).abs() < 1e-12,
+            "{} for {expected}",
+            time(&lines[1], [a, a])
+        );
+    }
+
+    fn lengths() -> impl Strategy<Value = (f64, f64)> {
+        (-2.0..2.0f64, 0.0..2.7f64).prop_map(|(length, speed)| (10f64.powf(length), 10f64.powf(speed)))
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(500))]
+        #[test]
+        fn no_lower_acceleration_is_quicker_and_no_greater_one_possible(
+            lengths in prop::collection::vec(lengths(), 2..8),
+            which in 0..7usize,
+            part in 0.0..1.0f64,
+        ) {
+            let lines: Vec<Option<Line>> = lengths.iter().map(|&(length, speed)| line(length, speed)).collect();
+            let mut a = vec![3000.0; lines.len() + 1];
+            (a[0], a[lines.len()]) = (0.0, 0.0);
+            lower(&lines, &mut a);
+            let total = |a: &[f64]| -> f64 { (0..lines.len()).map(|i| time(&lines[i], [a[i], a[i + 1]])).sum() };
+            let at = 1 + which % (lines.len() - 1);
+            let mut less = a.clone();
+            less[at] *= part;
+            lower(&lines, &mut less);
+            prop_assert!(total(&a) <= total(&less) * (1.0 + 1e-12), "{a:?}: {} {less:?}: {}", total(&a), total(&less));
+            let mut more = a.clone();
+            more[at] = (1.0 + 4e-5) * a[at];
+            let can = |i: usize| lines[i].expect("a line").can_cross([more[i], more[i + 1]]);
+            prop_assert!(!(0..lines.len()).all(can), "{a:?}");
+        }
+    }
+}
