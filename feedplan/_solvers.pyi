@@ -35,23 +35,23 @@ __version__: str
 class PlanError(Exception): ...
 
 # Who is told how far the work is, 0 to 1; what it raises ends the work and is raised.
-_Progress = Callable[[float], None]
+_Progress = Callable[[float], None] | None
 
-def plan_bang_bang(problem: _Problem, progress: _Progress | None = None) -> Profile: ...
+def plan_bang_bang(problem: _Problem, progress: _Progress = None) -> Profile: ...
 def plan_jerk_limited(
     problem: _Problem | Part,
     jerk: _Floats,
     resolution: float,
     tolerance: float,
     time_limit: float | None = None,
-    progress: _Progress | None = None,
+    progress: _Progress = None,
 ) -> tuple[Profile, bool, _Floats]: ...
 def bound_jerk_limited(
     problem: _Problem | Part,
     jerk: _Floats,
     profile: SpeedProfile,
     time_limit: float | None = None,
-    progress: _Progress | None = None,
+    progress: _Progress = None,
 ) -> _Floats: ...
 def plan_s_curve(
     problem: _Problem,
@@ -59,7 +59,7 @@ def plan_s_curve(
     cuttings: Sequence[tuple[float, float]],
     look_ahead: int,
     time_limit: float | None = None,
-    progress: _Progress | None = None,
+    progress: _Progress = None,
 ) -> Profile: ...
 def path_segments(
     problem: _Problem, jerk: _Floats, cuttings: Sequence[tuple[float, float]], look_ahead: int
@@ -67,7 +67,7 @@ def path_segments(
 def profile_of_sections(
     problem: _Problem, jerk: _Floats, offsets: _Integers, sections: _Floats
 ) -> Profile: ...
-def lower_bound(problem: _Problem, profile: SpeedProfile, progress: _Progress | None = None) -> float: ...
+def lower_bound(problem: _Problem, profile: SpeedProfile, progress: _Progress = None) -> float: ...
 def feed_between(problem: _Problem, piece: _Integers, u0: _Floats, u1: _Floats) -> _Floats: ...
 def look_ahead(speed: _Floats, up: _Floats, down: _Floats) -> _Floats: ...
 
@@ -86,7 +86,7 @@ class Profile:
 @final
 class Sampler:
     def __new__(
-        cls, problem: _Problem, profile: SpeedProfile, period: float, progress: _Progress | None = None
+        cls, problem: _Problem, profile: SpeedProfile, period: float, progress: _Progress = None
     ) -> Sampler: ...
     count: Final[int]
     duration: Final[float]
@@ -103,13 +103,13 @@ class Moves:
     def fields(self) -> dict[str, Any]: ...
 
 def read_gcode(
-    source: bytes, name: str, options: Options, progress: _Progress | None = None
+    source: bytes, name: str, options: Options, progress: _Progress = None
 ) -> tuple[Moves, dict[str, Any]]: ...
 def fit_points(
     points: _Floats, tolerance: float, max_chord: float, max_curvature: float, corner_angle: float
 ) -> tuple[_Floats, _Floats, _Integers, _Floats, _Naturals]: ...
 def build_path(
-    program: Program, rules: Rules, progress: _Progress | None = None
+    program: Program, rules: Rules, progress: _Progress = None
 ) -> tuple[
     tuple[Curve, _Floats, _Integers, _Floats, _Integers],
     tuple[int, int, int, float, list[float] | None],
@@ -126,21 +126,17 @@ def audit_plan(
     feed: _Floats,
     profile: SpeedProfile | None = None,
     program: Program | None = None,
-    progress: _Progress | None = None,
+    progress: _Progress = None,
 ) -> _Findings: ...
 def audit_joints(
-    problem: _Problem, limits: _Limits, profile: SpeedProfile, progress: _Progress | None = None
+    problem: _Problem, limits: _Limits, profile: SpeedProfile, progress: _Progress = None
 ) -> _Findings: ...
 
 @final
 class JointSetpointAudit:
     def __new__(cls, problem: _Problem, limits: _Limits, profile: SpeedProfile) -> JointSetpointAudit: ...
     def push(
-        self,
-        t: _Floats,
-        position: _Floats,
-        velocity: _Floats | None = None,
-        progress: _Progress | None = None,
+        self, t: _Floats, position: _Floats, velocity: _Floats | None = None, progress: _Progress = None
     ) -> None: ...
     def finish(self) -> _Findings: ...
 
@@ -162,7 +158,7 @@ class SetpointAudit:
         velocity: _Floats | None = None,
         acceleration: _Floats | None = None,
         line: NDArray[np.int32] | None = None,
-        progress: _Progress | None = None,
+        progress: _Progress = None,
     ) -> None: ...
     def finish(self) -> _Findings: ...
 
@@ -219,7 +215,7 @@ class Curve:
     ) -> tuple[_Naturals, NDArray[np.uint8], _Floats, _Floats, _Floats]: ...
     def regular(self) -> tuple[Curve, _Integers, NDArray[np.bool_]]: ...
     def cusps(self, tolerance: float) -> tuple[_Naturals, _Floats]: ...
-    def lengths(self, accuracy: float, progress: _Progress | None = None) -> CurveLength: ...
+    def lengths(self, accuracy: float, progress: _Progress = None) -> CurveLength: ...
 
 @final
 class CurveLength:
