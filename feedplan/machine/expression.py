@@ -39,6 +39,9 @@ class Op(IntEnum):
     DEGREES = 14
 
 
+_AFFINE = [Op.CONSTANT, Op.NEGATIVE, Op.SUM, Op.DIFFERENCE, Op.SHIFT, Op.SCALE, Op.RADIANS, Op.DEGREES]
+
+
 @dataclass(frozen=True, eq=False)
 class Expression:
     """Joints as operations on tip coordinates.
@@ -53,6 +56,11 @@ class Expression:
     constants: NDArray[np.float64]
     outputs: NDArray[np.int32]
     turning: tuple[bool, ...]
+
+    @property
+    def affine(self) -> bool:
+        """Whether every joint is a weighted sum of tip coordinates and a constant."""
+        return bool(np.isin(self.operations[:, 0], _AFFINE).all())
 
 
 def record(

@@ -83,6 +83,14 @@ def test_the_list_names_every_result_once() -> None:
     assert recorded.outputs.tolist() == [5, 6, 7]
 
 
+def test_weighted_sums_are_affine_and_other_formulas_are_not() -> None:
+    assert Formulas(
+        lambda x, y: 0.5 * (x + y), lambda x, y: 1.0 - x, lambda x, y: 3.0, lambda x, y: degrees(y)
+    ).affine
+    for formula in (lambda x, y: x * y, lambda x, y: x**2, lambda x, y: x / y, lambda x, y: sqrt(x)):
+        assert not Formulas(lambda x, y: x + y, formula).affine
+
+
 def test_a_formula_is_called_once() -> None:
     calls = []
 

@@ -46,8 +46,8 @@ class Kinematics(ABC):
 
     @property
     def affine(self) -> bool:
-        """Whether every joint is a weighted sum of tip coordinates and a constant."""
-        return False
+        """Whether the formula of every joint is a weighted sum of tip coordinates and a constant."""
+        return self.recorded.affine
 
     @property
     def turning(self) -> tuple[bool, ...]:

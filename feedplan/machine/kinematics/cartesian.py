@@ -34,11 +34,6 @@ class Cartesian(Kinematics):
         """As the machine's axes are."""
         return self.rotary_joints
 
-    @property
-    def affine(self) -> bool:
-        """It is."""
-        return True
-
     def joints(self, tip: Sequence[Number]) -> tuple[Number, ...]:
         """Scaled program axes."""
         return tuple(tip[i] * scale for i, scale in zip(self.source, self.scale, strict=True))

@@ -31,11 +31,6 @@ class CoreXY(Kinematics):
         """The motors are counted in mm of belt; the others are as in the machine file."""
         return self.rotary_joints
 
-    @property
-    def affine(self) -> bool:
-        """It is."""
-        return True
-
     def joints(self, tip: Sequence[Number]) -> tuple[Number, ...]:
         """Sum and difference of X and Y."""
         x, y, *others = tip
