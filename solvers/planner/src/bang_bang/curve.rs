@@ -162,7 +162,7 @@ fn backward_over<const M: usize, const C: usize>(
         let phases = space.controllable.len();
         space.offsets.push(phases);
         let state = State { speed_sq: at.speed_sq };
-        at.speed_sq = match pass::travel::<M, C, true>(&sub.reversed(), state, &[], &mut space.controllable) {
+        at.speed_sq = match pass::travel(&sub.reversed(), state, None, &mut space.controllable) {
             Ok(next) if !part.starts_at_rest() => next.speed_sq,
             Ok(_) => 0.0,
             Err(Stuck(x)) => {
@@ -209,7 +209,7 @@ fn forward_over<const M: usize, const C: usize>(
         }
         space.phases.clear();
         let state = State { speed_sq: at.speed_sq };
-        let kept = pass::travel::<M, C, false>(&sub, state, &space.controllable[offset..], &mut space.phases)
+        let kept = pass::travel(&sub, state, Some(&space.controllable[offset..]), &mut space.phases)
             .and_then(|next| keeps_limits(&sub, &space.phases).map(|()| next.speed_sq));
         space.controllable.truncate(offset);
         at.speed_sq = kept.unwrap_or_else(|Stuck(x)| {

@@ -69,18 +69,19 @@ pub struct State {
 
 /// A pass over the sub-piece from a state: backward under its cap, forward under the phases of K, from the last to
 /// the first. Appends the phases and returns the state at the end.
-pub fn travel<const M: usize, const C: usize, const BACK: bool>(
+pub fn travel<const M: usize, const C: usize>(
     sub: &SubPiece<M, C>,
     state: State,
-    controllable: &[Phase],
+    controllable: Option<&[Phase]>,
     out: &mut Vec<Phase>,
 ) -> Result<State, Stuck> {
     // A curve is at rest in its cusps.
     let order = sub.cusp_order(false);
     let pi = if order == 0 { state.speed_sq / sub.rate_sq(false) } else { f64::INFINITY };
     let first = out.len();
-    let mut pass = Pass::<M, C, BACK> {
+    let mut pass = Pass {
         sub,
+        back: controllable.is_none(),
         window: Window::new(sub),
         pi,
         order,
@@ -95,10 +96,9 @@ pub fn travel<const M: usize, const C: usize, const BACK: bool>(
         limit_curve: None,
         entering: true,
     };
-    if BACK {
-        pass.over_window()?;
-    } else {
-        pass.under_controllable(controllable)?;
+    match controllable {
+        None => pass.over_window()?,
+        Some(controllable) => pass.under_controllable(controllable)?,
     }
     let pi = pass.pi;
     let sound = |phase: &Phase| {
@@ -136,8 +136,10 @@ struct Start<const M: usize> {
     low_limit: [f64; M],
 }
 
-struct Pass<'a, const M: usize, const C: usize, const BACK: bool> {
+struct Pass<'a, const M: usize, const C: usize> {
     sub: &'a SubPiece<M, C>,
+    /// The pass goes backward.
+    back: bool,
     window: Window<M, C>,
     /// π over x of the window.
     pi: f64,
@@ -159,7 +161,7 @@ struct Pass<'a, const M: usize, const C: usize, const BACK: bool> {
     entering: bool,
 }
 
-impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
+impl<const M: usize, const C: usize> Pass<'_, M, C> {
     /// Whether the interval from the start of the window to t is long enough for a step.
     fn is_step(&self, t: f64) -> bool {
         t * self.window.length() >= NO_STEP * self.window.x0.max(START)
@@ -237,14 +239,12 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
             if std::mem::take(&mut self.entering) {
                 self.enter(&start);
             }
-            // The constant comes first, so that the forward pass is compiled without the limit curve.
-            if BACK {
-                if let Some(pair) = self.limit_curve.take() {
-                    if !self.follow_limit_curve(pair) && self.hops > MAX_HOPS {
-                        return Err(self.stuck());
-                    }
-                    continue;
+            // The forward pass needs no test against the limit curve.
+            if let Some(pair) = self.limit_curve.take().filter(|_| self.back) {
+                if !self.follow_limit_curve(pair) && self.hops > MAX_HOPS {
+                    return Err(self.stuck());
                 }
+                continue;
             }
             let on_ceiling = self.is_on_ceiling();
             if on_ceiling {
@@ -287,7 +287,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                 self.pi = self.pi.min(limit / start.c[k].abs());
             }
         }
-        if !BACK || self.straight {
+        if !self.back || self.straight {
             return;
         }
         let mut lowest = f64::INFINITY;

@@ -14,7 +14,7 @@ enum Switch {
     Ceiling,
 }
 
-impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
+impl<const M: usize, const C: usize> Pass<'_, M, C> {
     /// The control axis, s = π'/2, bits of the axes tied with it, and whether it turns here.
     pub(super) fn control_axis(&self, start: &Start<M>) -> Option<(usize, f64, AxisBits, bool)> {
         let (mut s, mut rests) = ([f64::INFINITY; M], [0.0; M]);
@@ -191,14 +191,14 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         let (a, low, window) = (&self.sub.limits.up, &self.sub.limits.down, &self.window);
         let (g, other) = (&window.g[j], &window.g[l]);
         if window.weight.degree() > 0 {
-            return [false, !BACK];
+            return [false, !self.back];
         }
         if g.degree() == 1 {
             let wronskian = other.last() * g.first() - other.first() * g.last();
             let keeps = |g: f64, other: f64, w: f64| {
                 let (cube, turn) = (g * g * g, w * wronskian);
                 let need = a[j] * other * g * g + turn;
-                [a[l] * cube >= need, !BACK || low[l] * cube >= -need]
+                [a[l] * cube >= need, !self.back || low[l] * cube >= -need]
             };
             let start = keeps(g.first(), other.first(), w.first());
             let end = keeps(g.last(), other.last(), w.last());
@@ -206,11 +206,14 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
         }
         let highest = w.last() / g.range().0.powi(2);
         if self.order > 0 || !highest.is_finite() {
-            return [false, !BACK];
+            return [false, !self.back];
         }
         let (least, greatest) = other.wronskian(g).range();
         let (up, down) = (highest * greatest.max(0.0), -highest * least.min(0.0));
-        [g.combine(a[l], other, -a[j]).is_above(up), !BACK || g.combine(low[l], other, a[j]).is_above(down)]
+        [
+            g.combine(a[l], other, -a[j]).is_above(up),
+            !self.back || g.combine(low[l], other, a[j]).is_above(down),
+        ]
     }
 
     /// Whether no motion within the limits can reach the cap: 2 A_k times its distance limits the growth of v_k².

@@ -12,7 +12,7 @@ enum Leave {
     Ceiling,
 }
 
-impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
+impl<const M: usize, const C: usize> Pass<'_, M, C> {
     /// N and W of the limit curve π = N/(ω² W) with axis j at +A and axis l at −A⁻.
     pub(super) fn limit_quotient(&self, j: usize, l: usize) -> (Polynomial<C>, Polynomial<C>) {
         let (g, limits) = (&self.window.g, &self.sub.limits);

@@ -7,7 +7,7 @@ use crate::bang_bang::curve::window::Ceiling;
 use crate::bang_bang::tolerance::TEST;
 use feedplan_geometry::polynomial::Polynomial;
 
-impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
+impl<const M: usize, const C: usize> Pass<'_, M, C> {
     /// Follows the ceiling as far as possible; returns whether that was a step or led to the limit curve.
     pub(super) fn follow_ceiling(&mut self) -> bool {
         let (end, saturated, pair) = match &self.window.ceiling {
@@ -133,7 +133,7 @@ impl<const M: usize, const C: usize, const BACK: bool> Pass<'_, M, C, BACK> {
                     (end, saturated) = (t, Some(l));
                 }
             }
-            low |= BACK && !x.combine(low_limit, &y, 1.0).is_positive();
+            low |= self.back && !x.combine(low_limit, &y, 1.0).is_positive();
         }
         let mut pair = None;
         if low && !self.straight {
