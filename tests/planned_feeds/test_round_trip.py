@@ -33,7 +33,7 @@ def same_time(plan: feedplan.Plan, program: feedplan.Program) -> None:
 
 
 @given(st.randoms(use_true_random=False))
-@settings(max_examples=examples(150))
+@settings(max_examples=examples(60))
 def test_moves_are_the_same_and_no_block_is_faster_than_planned(rng: random.Random) -> None:
     _, plan = plan_of(rng)
     result = feedplan.planned_program(plan)
@@ -53,7 +53,7 @@ def test_moves_are_the_same_and_no_block_is_faster_than_planned(rng: random.Rand
 
 
 @given(st.randoms(use_true_random=False))
-@settings(max_examples=examples(100))
+@settings(max_examples=examples(60))
 def test_lines_keep_every_byte_but_those_of_feeds(rng: random.Random) -> None:
     text, plan = plan_of(rng)
     result = feedplan.planned_program(plan)
@@ -84,7 +84,7 @@ def restores(new: bytes, line: bytes) -> bool:
 
 
 @given(st.randoms(use_true_random=False), st.sampled_from([5.0, 40.0]))
-@settings(max_examples=examples(60))
+@settings(max_examples=examples(40))
 def test_split_lines_and_arcs_are_the_same_geometry(rng: random.Random, step: float) -> None:
     _, plan = plan_of(rng)
     result = feedplan.planned_program(plan, feed_step=step)

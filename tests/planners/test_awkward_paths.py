@@ -16,7 +16,7 @@ from tests.planners.random_paths import awkward_case
 METHODS = ("bang-bang", "jerk-limited", "s-curve")
 # They keep accelerations on lines; on curves they look at places, and the audit tells what they miss.
 CONTROLLERS = ("arc-transition", "constant-velocity-transition", "junction-deviation", "tangential")
-COUNT = seeds(12)
+COUNT = seeds(6)
 # They are run in so many parts, beside each other.
 PARTS = 3
 

@@ -13,7 +13,7 @@ from tests.campaign import seeds
 Array = NDArray[np.float64]
 METHODS = ("jerk-limited", "s-curve", "ruckig")
 PERIODS = (1e-3, 2e-3, 2.5e-4, 4e-3)
-COUNT = seeds(12)
+COUNT = seeds(6)
 
 
 def arcs_and_lines(rng: np.random.Generator) -> CompositeCurve:

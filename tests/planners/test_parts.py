@@ -21,7 +21,7 @@ ROWS = "\n".join(f"X{k * 7 % 31}.{k % 10} Y{k * 5 % 23} Z{5 + 0.1 * (k % 4):.1f}
 CORNERS = f"G21 G90 G64 P0.01\nF3000\nG1 {ROWS}\nG2 X40 Y10 R30\nG61.1 G1 X50\nY20\nG64 X0 Y0\nM2\n"
 TIP = (
     "G21 G90 G94 G64 P0.01 F2000\nT1 M6 G43.4 H1\nG0 X0 Y0 Z20 A0 C0\n"
-    + "\n".join(f"G1 X{2 * k} Y{k % 5} A{3 * (k % 7)} C{5 * k}" for k in range(1, 12))
+    + "\n".join(f"G1 X{2 * k} Y{k % 5} A{3 * (k % 7)} C{5 * k}" for k in range(1, 8))
     + "\nG0 Z40\nG1 X0 Y0 Z20 A0 C0\nG49\nM2\n"
 )
 
@@ -48,21 +48,23 @@ class Others:
     [(CORNERS, "mill"), (TIP, "trunnion-ac")],
     ids=["mill", "tip"],
 )
-@pytest.mark.parametrize("count", [2, 1000])
-def test_parts_make_the_whole_bit_for_bit(program: str, machine: str, count: int) -> None:
+def test_parts_make_the_whole_bit_for_bit(program: str, machine: str) -> None:
     def made(**more: Any) -> feedplan.Plan:
         return feedplan.plan(program, machine, "jerk-limited", accuracy=0.1, start_speed=1.0, **more)
 
-    others = Others(count)
-    here, there = made(), made(elsewhere=others)
-    assert 1 < others.given <= min(count, len(here.path.runs) - 1)
-    for name in here.profile.__dataclass_fields__:
-        assert np.array_equal(getattr(here.profile, name), getattr(there.profile, name)), name
-        assert np.asarray(getattr(here.profile, name)).dtype == np.asarray(getattr(there.profile, name)).dtype
-    summaries = [json.loads(json.dumps(each.summary())) for each in (here, there)]
-    for summary in summaries:
-        del summary["compute"]
-    assert summaries[0] == summaries[1]
+    here = made()
+    for count in (2, 1000):
+        others = Others(count)
+        there = made(elsewhere=others)
+        assert 1 < others.given <= min(count, len(here.path.runs) - 1)
+        for name in here.profile.__dataclass_fields__:
+            own, other = getattr(here.profile, name), getattr(there.profile, name)
+            assert np.array_equal(own, other), name
+            assert np.asarray(own).dtype == np.asarray(other).dtype, name
+        summaries = [json.loads(json.dumps(each.summary())) for each in (here, there)]
+        for summary in summaries:
+            del summary["compute"]
+        assert summaries[0] == summaries[1]
 
 
 def test_a_path_of_one_run_stays_here() -> None:
@@ -92,7 +94,7 @@ def test_a_plan_is_the_same_on_any_number_of_threads() -> None:
     code = """
 import feedplan
 from tests.service.servers import long_part
-program = b"\\n".join(long_part().splitlines()[:250]) + b"\\nM2\\n"
+program = b"\\n".join(long_part().splitlines()[:120]) + b"\\nM2\\n"
 plan = feedplan.plan(program, "mill", "jerk-limited", accuracy=0.1)
 print(plan.time, plan.lower_bound, plan.profile.excess)
 """

@@ -15,7 +15,7 @@ from tests.campaign import seeds
 from tests.planners.differences import beside_the_path, exceeded, too_fast
 from tests.planners.posted_programs import posted_program
 
-SEEDS = seeds(6)
+SEEDS = seeds(4)
 # They are run in so many parts, beside each other.
 PARTS = 2
 # What states between segments may be improved for: their first ones are a plan [s].

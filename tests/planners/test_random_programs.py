@@ -12,7 +12,7 @@ from tests.campaign import seeds
 from tests.planners.audited import audited
 from tests.planners.random_programs import random_machine, random_program
 
-SEEDS = seeds(8)
+SEEDS = seeds(4)
 # They are run in so many parts, beside each other.
 PARTS = 4
 
