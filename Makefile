@@ -3,6 +3,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 NATIVE := $(wildcard $(foreach below,src src/* src/*/*,solvers/*/$(below)/*.rs) solvers/*/Cargo.toml) solvers/Cargo.toml pyproject.toml
 PAGE := feedplan/report/bundle/page.js
+# Modules are compiled when they are imported first: most files of the packages never are.
+INSTALL := $(BIN)/pip install --quiet --no-compile --constraint constraints.txt
+CARGO := MAKEFLAGS= CARGO_TARGET_DIR=$(CURDIR)/solvers/target
 MANYLINUX := $(if $(filter Linux,$(shell uname -s)),--zig --compatibility manylinux_2_28)
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
@@ -19,9 +22,9 @@ test: native lint $(PAGE)
 
 # They need no Python. They come first: the module links what has been compiled for them.
 native: cargo
-	MAKEFLAGS= CARGO_TARGET_DIR=$(CURDIR)/solvers/target cargo test --release --quiet --manifest-path solvers/Cargo.toml
+	$(CARGO) cargo test --release --quiet --lib --tests --manifest-path solvers/Cargo.toml
 
-lint: clippy $(VENV)/built
+lint: clippy $(VENV)/dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
@@ -30,18 +33,20 @@ lint: clippy $(VENV)/built
 
 # It generates no code and waits for none: it runs beside the builds, in a folder of its own, at a lower priority.
 clippy: cargo
-	MAKEFLAGS= CARGO_TARGET_DIR=$(CURDIR)/solvers/target/lint nice cargo clippy --release --quiet --workspace --all-targets --manifest-path solvers/Cargo.toml -- -D warnings
+	$(CARGO)/lint nice cargo clippy --release --quiet --workspace --all-targets --manifest-path solvers/Cargo.toml -- -D warnings
 
 page: $(PAGE)
 
-# For those who have neither cargo nor Node.js. On Linux zig links it for glibc 2.28 and newer.
-wheel: $(VENV)/built $(VENV)/zig $(PAGE)
+# For those who have neither cargo nor Node.js. On Linux zig links it for glibc 2.28 and newer. TARGET is another kind of
+# processor that cargo can compile for: `rustup target add $(ARM)`, then `make wheel TARGET=$(ARM)`.
+ARM := aarch64-unknown-linux-gnu
+wheel: $(VENV)/dev $(VENV)/zig $(PAGE)
 	rm -rf dist
-	MAKEFLAGS= CARGO_TARGET_DIR=$(CURDIR)/solvers/target $(BIN)/maturin build --release $(MANYLINUX) --out dist
+	$(CARGO) $(BIN)/maturin build --release $(MANYLINUX) $(addprefix --target ,$(TARGET)) --out dist
 	FEEDPLAN_WHEELS=dist $(BIN)/pytest -rs tests/test_portable.py
 
 # Warnings are errors. Pages show what the numbered examples print, and load nothing from the network.
-docs: $(VENV)/docs $(PAGE)
+docs: $(VENV)/docs $(VENV)/dev $(PAGE)
 	@mkdir -p out/examples
 	for script in examples/[0-9]_*.py; do \
 		$(BIN)/python $$script >out/examples/$$(basename $$script .py).txt || exit 1; \
@@ -50,13 +55,13 @@ docs: $(VENV)/docs $(PAGE)
 	FEEDPLAN_DOCS=out/docs $(BIN)/pytest tests/test_docs.py
 	@echo "The documentation is out/docs/index.html"
 
-bench: $(VENV)/built $(PAGE)
+bench: $(VENV)/dev $(PAGE)
 	cargo run --release --package feedplan-benches --manifest-path solvers/Cargo.toml -- --bench
 	$(BIN)/python -m benchmarks
 
 # Random paths by the million, on every machine by the thousand, and property tests on cases never drawn before. What is
 # found becomes a case of the test that found it; the figures stand in benchmarks/README.md.
-campaign: $(VENV)/built $(PAGE) docs wheel
+campaign: $(VENV)/dev $(PAGE) docs wheel
 	FEEDPLAN_SEEDS=1000000 cargo test --release --manifest-path solvers/Cargo.toml --test kernels planning::random:: -- --nocapture
 	FEEDPLAN_SEEDS=1000000 cargo test --release --manifest-path solvers/Cargo.toml --test kernels planning::bound:: -- --nocapture
 	FEEDPLAN_SEEDS=1250 $(BIN)/pytest --numprocesses auto tests/constraints/test_joints.py -k random
@@ -93,15 +98,16 @@ clean:
 
 # The native module is built once, and again only when its sources change; the tests of native code link the same crates.
 $(VENV)/built: $(VENV)/maturin $(NATIVE) | cargo
-	MAKEFLAGS= CARGO_TARGET_DIR=$(CURDIR)/solvers/target $(BIN)/pip install --quiet --constraint constraints.txt --no-build-isolation --editable ".[dev]"
+	$(CARGO) $(INSTALL) --no-build-isolation --editable .
 	@touch $@
 
-$(VENV)/docs: pyproject.toml constraints.txt | $(VENV)/built
-	MAKEFLAGS= CARGO_TARGET_DIR=$(CURDIR)/solvers/target $(BIN)/pip install --quiet --constraint constraints.txt --no-build-isolation --editable ".[docs]"
+# The packages that tests and lint need besides, and those of the documentation.
+$(VENV)/dev $(VENV)/docs: pyproject.toml constraints.txt | $(VENV)/built
+	$(INSTALL) "feedplan[$(@F)]"
 	@touch $@
 
 $(VENV)/zig: constraints.txt | $(VENV)/maturin
-	$(BIN)/pip install --quiet --constraint constraints.txt ziglang
+	$(INSTALL) ziglang
 	@touch $@
 
 cargo:
@@ -118,5 +124,5 @@ page/node_modules/installed: page/package.json page/package-lock.json
 
 $(VENV)/maturin: constraints.txt
 	@python3 -m venv $(VENV) || { echo "python3 lacks venv: install the package python3-venv"; exit 1; }
-	$(BIN)/pip install --quiet --constraint constraints.txt maturin
+	$(INSTALL) maturin
 	@touch $@

@@ -1,4 +1,4 @@
-"""The native module runs on older processors and systems than those that built it, and gives equal plans.
+"""The native module runs on other processors and older systems than its own builder, and gives equal plans.
 
 `make wheel` runs these tests on its wheel too.
 """
@@ -24,9 +24,12 @@ wheels = pytest.mark.skipif(WHEELS is None, reason="make wheel builds wheels and
 linux = pytest.mark.skipif(sys.platform != "linux", reason="of ELF files")
 x86 = pytest.mark.skipif(platform.machine() != "x86_64", reason="of processors of another kind")
 # With the instructions of x86-64-v2 and no wider vectors.
-NEHALEM = ("qemu-x86_64", "-cpu", "Nehalem")
+# The linear algebra of numpy takes the processor for that of the host, unless it is told.
+NEHALEM = ("qemu-x86_64", "-cpu", "Nehalem", "-E", "OPENBLAS_CORETYPE=Nehalem")
 emulator = pytest.mark.skipif(shutil.which(NEHALEM[0]) is None, reason="needs Debian's package qemu-user")
 PYTHONS = [f"python3.{minor}" for minor in range(10, 15)]
+MACHINES = ["x86_64", "aarch64"]
+CONSTRAINTS = Path(__file__).parents[1] / "constraints.txt"
 PROGRAM = "G21 G90 G64 P0.05\nG1 F1000\nX10 Y0 Z0\nY10\nG2 X20 Y0 R10\nG1 X30 Y5\nM2\n"
 # Prints a time and the bits of all setpoints by each method; the methods name other planners and paths.
 PLANS = """
@@ -78,16 +81,20 @@ def test_a_processor_without_wide_vectors_plans_the_same(tmp_path: Path) -> None
     assert own_plans(tmp_path, NEHALEM) == own_plans(tmp_path)
 
 
-def wheel() -> Path:
-    (found,) = Path(str(WHEELS)).glob("*.whl")
-    return found.resolve()
+def wheel(machine: str = platform.machine()) -> Path:
+    """The wheel for a kind of processor."""
+    found = list(Path(str(WHEELS)).glob(f"*{machine}.whl"))
+    if not found:
+        pytest.skip(f"no wheel for {machine}")
+    return found[0].resolve()
 
 
 @wheels
 @linux
-def test_the_wheel_asks_for_no_newer_system_than_it_says(tmp_path: Path) -> None:
-    assert wheel().name.endswith(f"-cp310-abi3-manylinux_2_28_{platform.machine()}.whl")
-    shutil.unpack_archive(wheel(), tmp_path, "zip")
+@pytest.mark.parametrize("machine", MACHINES)
+def test_the_wheel_asks_for_no_newer_system_than_it_says(machine: str, tmp_path: Path) -> None:
+    assert wheel(machine).name.endswith(f"-cp310-abi3-manylinux_2_28_{machine}.whl")
+    shutil.unpack_archive(wheel(machine), tmp_path, "zip")
     done = subprocess.run(
         ["objdump", "-T", tmp_path / "feedplan" / "_solvers.abi3.so"],
         capture_output=True,
@@ -112,3 +119,37 @@ def test_the_wheel_installs_and_plans_the_same_in_a_bare_environment(name: str, 
     assert plans([python], tmp_path) == expected
     if shutil.which(NEHALEM[0]) and platform.machine() == "x86_64":
         assert plans([*NEHALEM, python], tmp_path) == expected
+
+
+def arm_python(folder: Path) -> list[str]:
+    """Debian's Python for ARM64, unpacked into a folder and run by an emulator."""
+    status = folder / "status"
+    status.touch()
+    directories = {"State": folder, "State::status": status, "Cache": folder}
+    apt = ["apt-get", "--quiet=2", "-oAPT::Architecture=arm64", "-oAPT::Architectures=arm64"]
+    apt += [f"-oDir::{name}={place}" for name, place in directories.items()]
+    subprocess.run([*apt, "update"], check=True)
+    subprocess.run(
+        [*apt, "install", "--yes", "--download-only", "--no-install-recommends", "python3"], check=True
+    )
+    root = folder / "root"
+    for package in folder.glob("archives/*.deb"):
+        subprocess.run(["dpkg", "--extract", package, root], check=True)
+    return ["qemu-aarch64", "-L", str(root), str((root / "usr" / "bin" / "python3").resolve())]
+
+
+@wheels
+@linux
+@pytest.mark.skipif(shutil.which("qemu-aarch64") is None, reason="needs Debian's package qemu-user")
+@pytest.mark.skipif(shutil.which("apt-get") is None, reason="takes Python for ARM64 from Debian")
+def test_the_wheel_plans_the_same_on_arm(tmp_path: Path) -> None:
+    built = wheel("aarch64")
+    python = arm_python(tmp_path)
+    version = re.findall(r"python(3\.\d+)$", python[-1])[0]
+    site = tmp_path / "site"
+    install = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target", site]
+    foreign = ["--platform=manylinux_2_28_aarch64", "--platform=manylinux_2_27_aarch64"]
+    foreign += ["--only-binary=:all:", f"--python-version={version}", f"--constraint={CONSTRAINTS}"]
+    subprocess.run([*install, *foreign, "numpy", built], check=True)
+    found = plans(python, tmp_path, PYTHONPATH=str(site))
+    assert found == own_plans(tmp_path)
